@@ -1,0 +1,1 @@
+"""Data sets: file layout, generation, import, splits."""

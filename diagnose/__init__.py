@@ -1,0 +1,1 @@
+"""Wear estimate: grades, training, novelty, evaluation, report, command line."""

@@ -1,0 +1,1 @@
+"""Features: pure functions of arrays, from amplitude statistics to the crank-angle map."""

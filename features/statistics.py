@@ -1,0 +1,365 @@
+"""Amplitude statistics of a signal about its mean: size, peakedness, asymmetry."""
+
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Real = NDArray[np.floating[Any]]
+
+
+def centred(x: ArrayLike) -> Real:
+    """Signal minus its mean; exactly zero for a constant signal.
+
+    Parameters
+    ----------
+    x : array_like, shape (..., n_samples)
+        Signal [any unit]. float32 stays float32; integers become float64.
+
+    Returns
+    -------
+    ndarray, shape (..., n_samples)
+        Zero-mean signal [unit of x].
+
+    Raises
+    ------
+    ValueError
+        If there is no sample.
+
+    Examples
+    --------
+    >>> centred([0.1, 0.1, 0.1]).tolist()
+    [0.0, 0.0, 0.0]
+    """
+    signal = np.asarray(x)
+    if not np.issubdtype(signal.dtype, np.floating):
+        signal = signal.astype(np.float64)
+    if signal.ndim == 0 or signal.shape[-1] == 0:
+        raise ValueError(f"n_samples = 0 (shape {signal.shape}) must be >= 1; give a signal")
+    # Subtracting one sample first leaves exact zeros of a constant, where the mean would round.
+    shifted: Real = signal - signal[..., :1]
+    shifted -= shifted.mean(axis=-1, keepdims=True)
+    return shifted
+
+
+class Amplitude:
+    """The amplitude statistics of one array, each computed at most once.
+
+    Parameters
+    ----------
+    x : array_like, shape (..., n_samples)
+        Signal [any unit].
+
+    Raises
+    ------
+    ValueError
+        If there is no sample.
+
+    Notes
+    -----
+    Powers are taken of the signal divided by its peak, so float32 neither overflows nor
+    underflows. Every ratio of a constant signal (0/0) is 0 by convention. Results have shape
+    (...) and the dtype of `x`. Samples are assumed finite: NaN gives NaN.
+
+    Examples
+    --------
+    >>> shape = Amplitude([1.0, -1.0, 1.0, -1.0])
+    >>> float(shape.rms), float(shape.kurtosis)
+    (1.0, 1.0)
+    """
+
+    def __init__(self, x: ArrayLike) -> None:
+        self.centred = centred(x)
+
+    @cached_property
+    def peak(self) -> Real:
+        """Largest departure from the mean [unit of x]."""
+        return np.asarray(np.maximum(self._highest, -self._lowest))
+
+    @cached_property
+    def peak_to_peak(self) -> Real:
+        """Highest minus lowest sample [unit of x]."""
+        return np.asarray(self._highest - self._lowest)
+
+    @cached_property
+    def rms(self) -> Real:
+        """Root mean square about the mean [unit of x]."""
+        return np.asarray(self.peak * self._relative_rms)
+
+    @cached_property
+    def crest_factor(self) -> Real:
+        """Peak over rms [-]."""
+        return _ratio(np.ones_like(self.peak), self._relative_rms)
+
+    @cached_property
+    def shape_factor(self) -> Real:
+        """Rms over mean absolute value [-]."""
+        return _ratio(self._relative_rms, self._relative_mean)
+
+    @cached_property
+    def impulse_factor(self) -> Real:
+        """Peak over mean absolute value [-]."""
+        return _ratio(np.ones_like(self.peak), self._relative_mean)
+
+    @cached_property
+    def skewness(self) -> Real:
+        """Third standardised moment [-]."""
+        third = np.vecdot(self._square, self._relative) / self._relative.shape[-1]
+        return _ratio(third, self._relative_rms**3)
+
+    @cached_property
+    def kurtosis(self) -> Real:
+        """Fourth standardised moment, 3 for a Gaussian [-]."""
+        fourth = np.vecdot(self._square, self._square) / self._relative.shape[-1]
+        return _ratio(fourth, self._relative_rms**4)
+
+    @cached_property
+    def _highest(self) -> Real:
+        return np.asarray(self.centred.max(axis=-1))
+
+    @cached_property
+    def _lowest(self) -> Real:
+        return np.asarray(self.centred.min(axis=-1))
+
+    @cached_property
+    def _relative(self) -> Real:
+        scale = np.where(self.peak > 0, self.peak, np.ones_like(self.peak))
+        return np.asarray(self.centred / scale[..., np.newaxis])
+
+    @cached_property
+    def _square(self) -> Real:
+        return np.asarray(np.square(self._relative))
+
+    @cached_property
+    def _relative_rms(self) -> Real:
+        return np.asarray(np.sqrt(self._square.mean(axis=-1)))
+
+    @cached_property
+    def _relative_mean(self) -> Real:
+        return np.asarray(np.abs(self._relative).mean(axis=-1))
+
+
+def _ratio(above: Real, below: Real) -> Real:
+    """Quotient that is 0 where the denominator is 0: the value of a constant signal."""
+    out: Real = np.zeros_like(np.asarray(below))
+    return np.asarray(np.divide(above, below, out=out, where=np.asarray(below) > 0))
+
+
+def rms(x: ArrayLike) -> Real:
+    """Root mean square about the mean.
+
+    Parameters
+    ----------
+    x : array_like, shape (..., n_samples)
+        Signal [any unit].
+
+    Returns
+    -------
+    ndarray, shape (...)
+        ``sqrt(mean((x - mean(x))**2))`` [unit of x]; 0 for a constant signal.
+
+    Raises
+    ------
+    ValueError
+        If there is no sample.
+
+    Examples
+    --------
+    >>> float(rms([3.0, 1.0, 3.0, 1.0]))
+    1.0
+    """
+    return Amplitude(x).rms
+
+
+def peak(x: ArrayLike) -> Real:
+    """Largest departure from the mean.
+
+    Parameters
+    ----------
+    x : array_like, shape (..., n_samples)
+        Signal [any unit].
+
+    Returns
+    -------
+    ndarray, shape (...)
+        ``max |x - mean(x)|`` [unit of x]; 0 for a constant signal. It grows with the length of
+        a random record: compare records of equal length.
+
+    Raises
+    ------
+    ValueError
+        If there is no sample.
+
+    Examples
+    --------
+    >>> float(peak([0.0, 0.0, 0.0, 4.0]))
+    3.0
+    """
+    return Amplitude(x).peak
+
+
+def peak_to_peak(x: ArrayLike) -> Real:
+    """Distance between the highest and the lowest sample.
+
+    Parameters
+    ----------
+    x : array_like, shape (..., n_samples)
+        Signal [any unit].
+
+    Returns
+    -------
+    ndarray, shape (...)
+        ``max(x) - min(x)`` [unit of x]; 0 for a constant signal.
+
+    Raises
+    ------
+    ValueError
+        If there is no sample.
+
+    Examples
+    --------
+    >>> float(peak_to_peak([0.0, 0.0, 0.0, 4.0]))
+    4.0
+    """
+    return Amplitude(x).peak_to_peak
+
+
+def crest_factor(x: ArrayLike) -> Real:
+    """Peak over rms: how far the largest event stands out.
+
+    Parameters
+    ----------
+    x : array_like, shape (..., n_samples)
+        Signal [any unit].
+
+    Returns
+    -------
+    ndarray, shape (...)
+        ``peak(x) / rms(x)`` [-], 1.414 for a sine; 0 for a constant signal, by convention.
+
+    Raises
+    ------
+    ValueError
+        If there is no sample.
+
+    Examples
+    --------
+    >>> float(crest_factor([1.0, -1.0, 1.0, -1.0]))
+    1.0
+    """
+    return Amplitude(x).crest_factor
+
+
+def shape_factor(x: ArrayLike) -> Real:
+    """Rms over mean absolute value.
+
+    Parameters
+    ----------
+    x : array_like, shape (..., n_samples)
+        Signal [any unit].
+
+    Returns
+    -------
+    ndarray, shape (...)
+        ``rms(x) / mean |x - mean(x)|`` [-], pi / (2 sqrt 2) = 1.111 for a sine; 0 for a
+        constant signal, by convention.
+
+    Raises
+    ------
+    ValueError
+        If there is no sample.
+
+    Examples
+    --------
+    >>> float(shape_factor([1.0, -1.0, 1.0, -1.0]))
+    1.0
+    """
+    return Amplitude(x).shape_factor
+
+
+def impulse_factor(x: ArrayLike) -> Real:
+    """Peak over mean absolute value.
+
+    Parameters
+    ----------
+    x : array_like, shape (..., n_samples)
+        Signal [any unit].
+
+    Returns
+    -------
+    ndarray, shape (...)
+        ``peak(x) / mean |x - mean(x)|`` [-], pi / 2 for a sine; 0 for a constant signal, by
+        convention.
+
+    Raises
+    ------
+    ValueError
+        If there is no sample.
+
+    Examples
+    --------
+    >>> float(impulse_factor([1.0, -1.0, 1.0, -1.0]))
+    1.0
+    """
+    return Amplitude(x).impulse_factor
+
+
+def skewness(x: ArrayLike) -> Real:
+    """Third standardised moment: the asymmetry of the amplitude distribution.
+
+    Parameters
+    ----------
+    x : array_like, shape (..., n_samples)
+        Signal [any unit].
+
+    Returns
+    -------
+    ndarray, shape (...)
+        ``mean(z**3)`` with ``z = (x - mean(x)) / rms(x)`` [-], biased (divided by n_samples);
+        0 for a symmetric signal, and for a constant one by convention.
+
+    Raises
+    ------
+    ValueError
+        If there is no sample.
+
+    Examples
+    --------
+    >>> round(float(skewness([0.0, 0.0, 0.0, 4.0])), 6)
+    1.154701
+    """
+    return Amplitude(x).skewness
+
+
+def kurtosis(x: ArrayLike) -> Real:
+    """Fourth standardised moment in Pearson's sense: a Gaussian has 3.
+
+    Parameters
+    ----------
+    x : array_like, shape (..., n_samples)
+        Signal [any unit].
+
+    Returns
+    -------
+    ndarray, shape (...)
+        ``mean(z**4)`` with ``z = (x - mean(x)) / rms(x)`` [-], biased (divided by n_samples);
+        1.5 for a sine, 1 for a square wave; 0 for a constant signal, by convention (no
+        varying signal goes below 1).
+
+    Raises
+    ------
+    ValueError
+        If there is no sample.
+
+    References
+    ----------
+    D. Dyer, R. M. Stewart, "Detection of rolling element bearing damage by statistical vibration
+    analysis", J. Mech. Design 100 (1978) 229-235, doi:10.1115/1.3453905.
+
+    Examples
+    --------
+    >>> float(kurtosis([1.0, -1.0, 1.0, -1.0]))
+    1.0
+    """
+    return Amplitude(x).kurtosis

@@ -1,0 +1,1 @@
+"""The physics: a scene goes in, a time history comes out."""

@@ -1,0 +1,259 @@
+"""From a scene to a recording: only the physics that the scene needs."""
+
+import math
+from collections.abc import Callable
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .casing import decimate, edge_samples, housing_acceleration
+from .integrate import SimulationError, Solution, Status
+from .ladder import Rung, crankpin_rung
+from .scene import FORCE_PLACES, PumpScene, Scene, SceneError
+from .sensor import Channel, digitise, tacho_pulses
+from .slider_crank import (
+    LARGEST_STEP_PER_CONTACT_TIME,
+    STATE,
+    STEP_PER_CONTACT_TIME,
+    CrankRun,
+    contact_frequency,
+)
+
+_CASING_SIGN = np.array([-1.0, -1.0, -1.0, 1.0])
+"""Reactions on the casing from the forces on rod and piston: bearing x, y, guide; the pressure on
+the piston is its own counterpart on the cylinder head."""
+
+
+def channels_of(scene: Scene) -> tuple[Channel, ...]:
+    """Channels of a recording of this scene, accelerometers first, then the tacho.
+
+    Examples
+    --------
+    >>> from wearstate.sim.scene import load_scene
+    >>> [channel.name for channel in channels_of(load_scene("bilge-pump"))]
+    ['acc_x', 'acc_y', 'tacho']
+    """
+    sensors = tuple(
+        Channel(
+            name=sensor.name,
+            unit="m/s^2",
+            quantity="acceleration",
+            place=sensor.place,
+            direction=sensor.direction,
+        )
+        for sensor in scene.sensors
+    )
+    if scene.tacho is None:
+        return sensors
+    return (*sensors, Channel(name=scene.tacho.name, unit="V", quantity="tacho"))
+
+
+def simulate(
+    scene: Scene, *, seed: int, truth: bool = False, raise_on_failure: bool = True
+) -> Solution:
+    """Simulate one recording of a scene.
+
+    Parameters
+    ----------
+    scene : Scene
+        A validated scene, see :func:`wearstate.sim.scene.load_scene`.
+    seed : int
+        Seed of the sensor noise; the mechanics are deterministic.
+    truth : bool
+        Also return forces and orbit at the sample instants.
+    raise_on_failure : bool
+        False: a failed run comes back with its status and a signal of zeros.
+
+    Returns
+    -------
+    Solution
+        Signal, channels, status, numerics, and truth where asked for.
+
+    Raises
+    ------
+    SceneError
+        A rung is not valid for the scene, the step is too long for the contact, the recording is
+        shorter than a revolution, or pulses or modes cannot be sampled.
+    SimulationError
+        The run failed and `raise_on_failure` is true.
+
+    Examples
+    --------
+    >>> from wearstate.sim.scene import load_scene
+    >>> scene = load_scene("bilge-pump", {"duration": "0.2 s"})
+    >>> simulate(scene, seed=1).signal.shape
+    (3, 5120)
+    """
+    return _SIMULATORS[scene.machine](scene, seed, truth, raise_on_failure)
+
+
+def _simulate_pump(scene: Scene, seed: int, truth: bool, raise_on_failure: bool) -> Solution:
+    pump = cast(PumpScene, scene)
+    factor = steps_per_sample(pump)
+    rung = crankpin_rung(pump.joint.crankpin.rung)
+    step = 1 / (pump.sample_rate * factor)
+    plan = _Plan(pump, factor)
+    run = rung.run(pump, step, plan.n_steps, plan.first_angle)
+    numerics = _numerics(pump, rung, run)
+    if not run.status.ok:
+        if raise_on_failure:
+            raise SimulationError(run.status, pump.name)
+        silence = np.zeros((len(channels_of(pump)), plan.n_samples), dtype=np.float32)
+        return _solution(pump, silence, run.status, numerics, {})
+    on_rod = decimate(run.forces, factor)
+    acceleration = housing_acceleration(
+        on_rod * _CASING_SIGN, pump.sample_rate, **_modes(pump)
+    )[:, plan.kept]
+    signal, clipped = _measured(pump, acceleration, plan, seed)
+    numerics["clipped_samples"] = clipped
+    hidden = _truth(run, on_rod, plan) if truth else {}
+    return _solution(pump, signal, run.status, numerics, hidden)
+
+
+class _Plan:
+    """Which steps are run, and which samples are kept."""
+
+    def __init__(self, scene: PumpScene, factor: int) -> None:
+        rate, speed = scene.sample_rate, scene.drive.speed
+        edge = edge_samples(factor)
+        settling = math.ceil(scene.settling_revolutions / speed * rate) + edge
+        self.factor = factor
+        self.n_samples = round(scene.duration * rate)
+        self.n_steps = (settling + self.n_samples + edge) * factor
+        self.kept = slice(settling, settling + self.n_samples)
+        # a sample stands for the middle of its first step, see decimate
+        before = (settling * factor + 0.5) / (rate * factor)
+        self.first_angle = scene.drive.start_angle - 2 * math.pi * speed * before
+        self.angle = scene.drive.start_angle + 2 * math.pi * speed * (
+            np.arange(self.n_samples) / rate
+        )
+
+
+def steps_per_sample(scene: PumpScene) -> int:
+    """Integration steps per sample: what the contact needs, or what the scene asks for.
+
+    Raises
+    ------
+    SceneError
+        All of: an invalid rung, a step too long for the contact, a recording shorter than a
+        revolution, a pulse shorter than two samples.
+    """
+    frequency = contact_frequency(scene)
+    compliant = scene.joint.crankpin.rung != "ideal"
+    faults = [fault for fault in (_rung_fault(scene), *_sampling_faults(scene)) if fault]
+    needed = STEP_PER_CONTACT_TIME / frequency if compliant else 0.5 / scene.sample_rate
+    step = scene.numerics.step or needed
+    if compliant and step * frequency > LARGEST_STEP_PER_CONTACT_TIME:
+        faults.append(
+            f"numerics.step = {step:g} s must be <= "
+            f"{LARGEST_STEP_PER_CONTACT_TIME / frequency:.3g} s for the contact's angular frequency "
+            f"{frequency:.4g} rad/s; shorten it or lower joint.crankpin.stiffness"
+        )
+    if faults:
+        raise SceneError(scene.name, faults)
+    return max(1, math.ceil(1 / (scene.sample_rate * step) - 1e-9))
+
+
+def _rung_fault(scene: PumpScene) -> str | None:
+    return crankpin_rung(scene.joint.crankpin.rung).fault(scene)
+
+
+def _sampling_faults(scene: PumpScene) -> list[str]:
+    revolution = 1 / scene.drive.speed
+    faults = []
+    if scene.duration < revolution:
+        faults.append(
+            f"duration = {scene.duration:g} s must be >= one revolution = {revolution:g} s; "
+            "record longer"
+        )
+    if scene.tacho and scene.tacho.pulse_width / (2 * math.pi) * revolution < 2 / scene.sample_rate:
+        faults.append(
+            f"tacho.pulse_width = {scene.tacho.pulse_width:g} rad must last >= 2 samples; "
+            "widen the pulse or raise sample_rate"
+        )
+    return faults
+
+
+def _modes(scene: PumpScene) -> dict[str, NDArray[np.float64]]:
+    modes = scene.casing.modes
+    return {
+        "frequency": np.array([mode.frequency for mode in modes]),
+        "damping_ratio": np.array([mode.damping_ratio for mode in modes]),
+        "inputs": np.array([[mode.shape.get(p, 0.0) for p in FORCE_PLACES] for mode in modes]),
+        "outputs": np.array([[mode.shape[s.name] for s in scene.sensors] for mode in modes]),
+    }
+
+
+def _measured(
+    scene: PumpScene, acceleration: NDArray[np.float64], plan: _Plan, seed: int
+) -> tuple[NDArray[np.float32], int]:
+    """Signal of every channel, and how many samples were clipped."""
+    rng = np.random.default_rng(seed)
+    rows, clipped = [], 0
+    for sensor, row in zip(scene.sensors, acceleration, strict=True):
+        channel, lost = digitise(
+            row,
+            gain=sensor.gain,
+            noise=sensor.noise,
+            full_scale=sensor.range,
+            bits=sensor.bits,
+            rng=rng,
+        )
+        rows.append(channel)
+        clipped += lost
+    if scene.tacho:
+        turn = 2 * math.pi
+        width = scene.tacho.pulse_width / turn
+        rows.append(
+            tacho_pulses(plan.angle / turn, pulse_width=width, level=scene.tacho.level)
+        )
+    return np.stack(rows), clipped
+
+
+def _numerics(scene: PumpScene, rung: Rung, run: CrankRun) -> dict[str, float | int | str]:
+    return {
+        "rung_joint": rung.name,
+        "rung_pressure": scene.pressure.rung,
+        "step_s": run.step,
+        "steps": len(run.forces),
+        "step_per_contact_time": run.step * contact_frequency(scene),
+        "contact_changes": run.contact_changes,
+        "cuts_refused": run.cuts_refused,
+        "peak_normal_force_n": run.peak_normal_force,
+    }
+
+
+def _truth(run: CrankRun, on_rod: NDArray[np.float64], plan: _Plan) -> dict[str, Any]:
+    """Forces (low-passed as the casing felt them) and state at the sample instants."""
+    states = (0.5 * (run.states[:-1] + run.states[1:]))[:: plan.factor][plan.kept]
+    force = on_rod[plan.kept]
+    return {
+        "pin_force_n": force[:, :2],
+        "guide_force_n": force[:, 2],
+        "piston_pressure_force_n": force[:, 3],
+        **{f"state_{name}": states[:, column] for column, name in enumerate(STATE)},
+    }
+
+
+def _solution(
+    scene: PumpScene,
+    signal: NDArray[np.float32],
+    status: Status,
+    numerics: dict[str, float | int | str],
+    truth: dict[str, NDArray[np.float64]],
+) -> Solution:
+    return Solution(
+        signal=signal,
+        sample_rate=scene.sample_rate,
+        channels=channels_of(scene),
+        truth=truth,
+        status=status,
+        numerics=numerics,
+    )
+
+
+_SIMULATORS: dict[str, Callable[[Scene, int, bool, bool], Solution]] = {
+    "reciprocating-pump": _simulate_pump,
+}
+"""A new machine is one row."""

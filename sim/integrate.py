@@ -1,0 +1,77 @@
+"""What a solver returns: a frozen solution with a status. Knows no physics."""
+
+from dataclasses import dataclass, field
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .sensor import Channel
+
+
+class Status(IntEnum):
+    """How a run ended. Everything but OK carries a cure."""
+
+    OK = 0
+    DIVERGED = 1
+    OVERLAP = 2
+    LOCKED = 3
+
+    @property
+    def ok(self) -> bool:
+        """True where the run can be used."""
+        return self is Status.OK
+
+    @property
+    def text(self) -> str:
+        """One sentence with the cure."""
+        return _STATUS_TEXT[self]
+
+
+_STATUS_TEXT = {
+    Status.OK: "done",
+    Status.DIVERGED: "the state is no longer finite; shorten numerics.step",
+    Status.OVERLAP: (
+        "a joint's penetration exceeds a tenth of its pin radius, beyond the contact law; "
+        "raise joint.crankpin.stiffness or lower the speed"
+    ),
+    Status.LOCKED: (
+        "the rod stands across the stroke; lengthen rod.length or lower the clearance"
+    ),
+}
+
+
+class SimulationError(RuntimeError):
+    """A run ended in a status other than OK and the caller asked to be told so."""
+
+    def __init__(self, status: Status, where: str) -> None:
+        self.status = status
+        super().__init__(f"{where}: {status.name.lower()}: {status.text}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Solution:
+    """A simulated recording.
+
+    Attributes
+    ----------
+    signal : numpy.ndarray [shape=(n_channels, n_samples)]
+        float32, in the unit of each channel.
+    sample_rate : float
+        [Hz]
+    channels : tuple of Channel
+        Name, unit and place of each row of `signal`.
+    truth : dict of str to numpy.ndarray
+        Hidden quantities, first dimension time; empty unless asked for.
+    status : Status
+        How the run ended.
+    numerics : dict
+        Rungs, step, step count and guards of the run; no wall time.
+    """
+
+    signal: NDArray[np.float32]
+    sample_rate: float
+    channels: tuple[Channel, ...]
+    status: Status
+    truth: dict[str, NDArray[np.float64]] = field(default_factory=dict)
+    numerics: dict[str, float | int | str] = field(default_factory=dict)

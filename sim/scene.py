@@ -1,0 +1,643 @@
+"""What the machine is: frozen, validated, without physics.
+
+A scene is a TOML file. Numbers are SI; a string carries its unit (``"0.25 mm"``, ``"300 rpm"``).
+Validation happens here once, reports every error at once as a dotted path with value, bound and
+cure, and names the nearest match of an unknown key. Kernels trust what passes.
+"""
+
+import difflib
+import math
+import re
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    ValidationError,
+    model_validator,
+)
+
+SCENE_FOLDER = Path(__file__).parent / "scenes"
+
+_INCH = 0.0254  # m, exact by definition
+_POUND_FORCE = 4.4482216152605  # N, exact by definition
+STANDARD_GRAVITY = 9.80665  # m/s^2, ISO 80000-3
+
+UNITS: dict[str, dict[str, float]] = {
+    "length": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "in": _INCH},
+    "mass": {"kg": 1.0, "g": 1e-3},
+    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "h": 3600.0},
+    "rotation speed": {"rev/s": 1.0, "Hz": 1.0, "rpm": 1.0 / 60.0},
+    "frequency": {"Hz": 1.0, "kHz": 1e3, "MHz": 1e6},
+    "angle": {"rad": 1.0, "deg": math.pi / 180.0},
+    "pressure": {
+        "Pa": 1.0,
+        "kPa": 1e3,
+        "MPa": 1e6,
+        "bar": 1e5,
+        "psi": _POUND_FORCE / _INCH**2,
+    },
+    "acceleration": {"m/s^2": 1.0, "g": STANDARD_GRAVITY},
+    "velocity": {"m/s": 1.0, "mm/s": 1e-3},
+    "inertia": {"kg m^2": 1.0, "kg mm^2": 1e-6},
+    "stiffness": {"N/m": 1.0, "kN/m": 1e3, "MN/m": 1e6, "N/um": 1e6, "N/µm": 1e6},
+    "damping": {"N s/m": 1.0, "kN s/m": 1e3},
+    "voltage": {"V": 1.0, "mV": 1e-3},
+    "ratio": {"": 1.0, "%": 1e-2},
+    "mode shape": {"kg^-0.5": 1.0},
+}
+"""Factor to SI of every unit string, by dimension. The first unit of a row is the SI one."""
+
+_QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*")
+
+
+class SceneError(ValueError):
+    """Every fault of one scene, one line each, as dotted path, value, bound and cure."""
+
+    def __init__(self, name: str, faults: list[str]) -> None:
+        self.faults = faults
+        super().__init__("\n".join([f"{name}: {len(faults)} fault(s)", *faults]))
+
+
+def to_si(value: Any, dimension: str) -> float:
+    """Convert a number or a string with a unit to SI.
+
+    Parameters
+    ----------
+    value : float or str
+        A bare number is SI; a string is a number and a unit of `dimension`.
+    dimension : str
+        A key of :data:`UNITS`.
+
+    Returns
+    -------
+    float
+        The value in the SI unit of `dimension` (rotation speed: revolutions per second).
+
+    Raises
+    ------
+    ValueError
+        The string has no number, no unit, or a unit of another dimension.
+
+    Examples
+    --------
+    >>> to_si("0.25 mm", "length")
+    0.00025
+    >>> to_si("300 rpm", "rotation speed")
+    5.0
+    """
+    units = UNITS[dimension]
+    if isinstance(value, bool) or not isinstance(value, (int, float, str)):
+        raise ValueError(f"is not a number or a string with a unit ({_unit_list(dimension)})")
+    if not isinstance(value, str):
+        return float(value)
+    match = _QUANTITY.fullmatch(value)
+    if match is None:
+        raise ValueError(f"has no leading number; write it like '1.5 {next(iter(units))}'")
+    number, unit = match.groups()
+    if unit not in units:
+        missing = "has no unit" if unit == "" else f"has unit '{unit}', not one of {dimension}"
+        raise ValueError(f"{missing}; use one of {_unit_list(dimension)}")
+    # a division keeps 0.25 mm at exactly 0.00025 where a product would not
+    factor = units[unit]
+    return float(number) * factor if factor >= 1.0 else float(number) / (1.0 / factor)
+
+
+def _unit_list(dimension: str) -> str:
+    return ", ".join(unit or "(none)" for unit in UNITS[dimension])
+
+
+def _unit_symbol(dimension: str) -> str:
+    return next(iter(UNITS[dimension]))
+
+
+class _Dimension:
+    """Marks a field with its dimension, for unit strings and for error texts."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+
+
+def _parser(dimension: str) -> BeforeValidator:
+    return BeforeValidator(lambda value: to_si(value, dimension))
+
+
+Length = Annotated[float, _parser("length"), _Dimension("length")]
+Mass = Annotated[float, _parser("mass"), _Dimension("mass")]
+Time = Annotated[float, _parser("time"), _Dimension("time")]
+RotationSpeed = Annotated[float, _parser("rotation speed"), _Dimension("rotation speed")]
+Frequency = Annotated[float, _parser("frequency"), _Dimension("frequency")]
+Angle = Annotated[float, _parser("angle"), _Dimension("angle")]
+Pressure = Annotated[float, _parser("pressure"), _Dimension("pressure")]
+Acceleration = Annotated[float, _parser("acceleration"), _Dimension("acceleration")]
+Velocity = Annotated[float, _parser("velocity"), _Dimension("velocity")]
+Inertia = Annotated[float, _parser("inertia"), _Dimension("inertia")]
+Stiffness = Annotated[float, _parser("stiffness"), _Dimension("stiffness")]
+Damping = Annotated[float, _parser("damping"), _Dimension("damping")]
+Voltage = Annotated[float, _parser("voltage"), _Dimension("voltage")]
+Ratio = Annotated[float, _parser("ratio"), _Dimension("ratio")]
+ModeShape = Annotated[float, _parser("mode shape"), _Dimension("mode shape")]
+
+
+class Part(BaseModel):
+    """Base of every table of a scene: frozen, no unknown keys, finite numbers."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+class Drive(Part):
+    """How the crank is turned."""
+
+    speed: RotationSpeed = Field(gt=0, description="crank speed in rev/s, constant")
+    start_angle: Angle = Field(default=0.0, description="crank angle at the first sample")
+
+
+class Crank(Part):
+    """The crank throw, balanced about its axis."""
+
+    radius: Length = Field(gt=0, description="half the stroke")
+
+
+class Rod(Part):
+    """The connecting rod."""
+
+    length: Length = Field(gt=0, description="between the centres of wrist pin and crank-pin eye")
+    mass: Mass = Field(gt=0)
+    centre_of_mass: Length = Field(ge=0, description="distance from the wrist pin")
+    inertia: Inertia = Field(gt=0, description="about the centre of mass")
+
+    @model_validator(mode="after")
+    def _centre_between_pins(self) -> Self:
+        if self.centre_of_mass > self.length:
+            raise ValueError(
+                f"centre_of_mass = {self.centre_of_mass:g} m must be <= length = {self.length:g} m;"
+                " measure it from the wrist pin"
+            )
+        return self
+
+
+class Piston(Part):
+    """Piston with crosshead and wrist pin: everything that only slides."""
+
+    mass: Mass = Field(gt=0)
+    diameter: Length = Field(ge=0, description="bore that the cylinder pressure acts on")
+
+
+class CylinderPressure(Part):
+    """Gauge pressure on the piston face."""
+
+    rung: Literal["none", "two-level"] = "two-level"
+    suction: Pressure = Field(default=0.0, ge=-101325.0, description="gauge; below -1 atm no liquid")
+    discharge: Pressure = Field(default=0.0, description="gauge")
+    rise_angle: Angle = Field(
+        default=math.radians(3.0),
+        ge=math.radians(0.5),
+        le=math.radians(90.0),
+        description="crank angle after a dead centre over which the pressure changes level",
+    )
+
+    @model_validator(mode="after")
+    def _levels_ordered(self) -> Self:
+        if self.discharge < self.suction:
+            raise ValueError(
+                f"discharge = {self.discharge:g} Pa must be >= suction = {self.suction:g} Pa; "
+                "swap them"
+            )
+        return self
+
+
+class RevoluteJoint(Part):
+    """A pin in an eye with clearance. Give exactly one of the two clearances."""
+
+    rung: Literal["ideal", "compliant"] = "compliant"
+    pin_diameter: Length = Field(gt=0)
+    diametral_clearance: Length | None = Field(
+        default=None, ge=0, description="eye diameter minus pin diameter"
+    )
+    radial_clearance: Length | None = Field(
+        default=None, ge=0, description="eye radius minus pin radius"
+    )
+    stiffness: Stiffness = Field(gt=0, description="contact force per penetration")
+    damping: Damping = Field(default=0.0, ge=0, description="normal contact damping C_n")
+    friction: Ratio = Field(default=0.0, ge=0, le=1, description="Coulomb coefficient")
+    friction_speed: Velocity = Field(
+        default=0.01, gt=0, description="sliding speed that regularises the Coulomb sign"
+    )
+    tangential_damping: Damping = Field(default=0.0, ge=0, description="C_t of the source paper")
+
+    @model_validator(mode="after")
+    def _one_clearance_that_fits(self) -> Self:
+        given = [
+            name
+            for name in ("diametral_clearance", "radial_clearance")
+            if getattr(self, name) is not None
+        ]
+        if len(given) != 1:
+            raise ValueError(
+                f"{' and '.join(given) if given else 'no clearance'} given, must be exactly one of "
+                "diametral_clearance and radial_clearance; keep the one you measured"
+            )
+        if self.clearance_radial >= self.pin_diameter / 2:
+            raise ValueError(
+                f"{given[0]} = {getattr(self, given[0]):g} m must be smaller than the pin "
+                f"(pin_diameter = {self.pin_diameter:g} m); check the unit"
+            )
+        return self
+
+    @property
+    def clearance_radial(self) -> float:
+        """Radial clearance [m], whichever way it was given."""
+        if self.radial_clearance is not None:
+            return self.radial_clearance
+        assert self.diametral_clearance is not None  # the validator saw to it
+        return self.diametral_clearance / 2
+
+    @property
+    def clearance_diametral(self) -> float:
+        """Diametral clearance [m], whichever way it was given."""
+        return 2 * self.clearance_radial
+
+
+class PumpJoints(Part):
+    """The joints of the crank mechanism that may have clearance."""
+
+    crankpin: RevoluteJoint
+
+
+class Wear(Part):
+    """Limits of the crank-pin clearance, all diametral, with their source."""
+
+    as_new_diametral: Length = Field(gt=0, description="smallest clearance of a new joint")
+    condemning_diametral: Length = Field(gt=0, description="the joint must be renewed above it")
+    grade_edges_diametral: tuple[Length, Length, Length] = Field(
+        description="clearance at which grades 1, 2 and 3 begin"
+    )
+    source: str = Field(min_length=1)
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        values = (self.as_new_diametral, *self.grade_edges_diametral)
+        if any(low >= high for low, high in zip(values, values[1:], strict=False)):
+            raise ValueError(
+                "as_new_diametral and grade_edges_diametral = "
+                f"{', '.join(f'{v:g} m' for v in values)} must rise strictly; reorder them"
+            )
+        if self.grade_edges_diametral[-1] != self.condemning_diametral:
+            raise ValueError(
+                f"grade_edges_diametral[2] = {self.grade_edges_diametral[-1]:g} m must equal "
+                f"condemning_diametral = {self.condemning_diametral:g} m; grade 3 is condemned"
+            )
+        return self
+
+
+class CasingMode(Part):
+    """One mode of the casing: mass-normalised shape at every force and sensor place."""
+
+    frequency: Frequency = Field(gt=0)
+    damping_ratio: Ratio = Field(gt=0, lt=1)
+    shape: dict[str, ModeShape] = Field(min_length=1)
+
+
+class Casing(Part):
+    """The pump casing on its mounts, as modes."""
+
+    modes: tuple[CasingMode, ...] = Field(min_length=1)
+
+
+class Accelerometer(Part):
+    """An accelerometer with its converter."""
+
+    name: str = Field(min_length=1)
+    place: str = Field(default="", description="where it sits, for the report")
+    direction: str = Field(default="", description="which way it points, for the report")
+    gain: Ratio = Field(default=1.0, gt=0, description="true sensitivity over nominal")
+    noise: Acceleration = Field(default=0.0, ge=0, description="rms of white noise")
+    range: Acceleration = Field(gt=0, description="full scale, plus and minus")
+    bits: int = Field(default=24, ge=8, le=32)
+
+
+class Tacho(Part):
+    """A rectangular pulse per revolution, rising at crank angle zero."""
+
+    name: str = "tacho"
+    pulse_width: Angle = Field(default=math.radians(10.0), gt=0, le=math.pi)
+    level: Voltage = Field(default=5.0, gt=0)
+
+
+class Numerics(Part):
+    """What the solver may be told; every field has a default that the scene decides."""
+
+    step: Time | None = Field(default=None, gt=0, description="largest integration step")
+
+
+class Scene(Part):
+    """What every machine's scene holds."""
+
+    name: str = Field(min_length=1)
+    machine: str
+    description: str = ""
+    duration: Time = Field(gt=0, description="length of the recording, after settling")
+    sample_rate: Frequency = Field(gt=0)
+    settling_revolutions: int = Field(default=3, ge=1, description="run before the recording")
+    accuracy: Ratio = Field(default=0.02, gt=0, lt=1, description="error the features may carry")
+    sensors: tuple[Accelerometer, ...] = Field(min_length=1)
+    tacho: Tacho | None = Tacho()
+    numerics: Numerics = Numerics()
+
+
+FORCE_PLACES = ("bearing_x", "bearing_y", "guide_y", "cylinder_x")
+"""Where the crank mechanism pushes on the casing: x along the stroke, y across it."""
+
+
+class PumpScene(Scene):
+    """A single-throw reciprocating pump with a worn crank pin."""
+
+    machine: Literal["reciprocating-pump"]
+    gravity: Acceleration = Field(default=STANDARD_GRAVITY, ge=0)
+    stroke_inclination: Angle = Field(default=0.0, description="0 horizontal, 90 deg piston up")
+    drive: Drive
+    crank: Crank
+    rod: Rod
+    piston: Piston
+    pressure: CylinderPressure = CylinderPressure(rung="none")
+    joint: PumpJoints
+    wear: Wear | None = None
+    casing: Casing
+
+    @model_validator(mode="after")
+    def _cross_checks(self) -> Self:
+        faults = [*self._geometry_faults(), *self._shape_faults()]
+        if faults:
+            raise ValueError("\n".join(faults))
+        return self
+
+    def _geometry_faults(self) -> list[str]:
+        faults = []
+        reach = self.crank.radius + self.joint.crankpin.clearance_radial
+        if self.rod.length <= reach:
+            faults.append(
+                f"rod.length = {self.rod.length:g} m must be > crank radius + radial clearance = "
+                f"{reach:g} m; a shorter rod locks the crank"
+            )
+        names = [sensor.name for sensor in self.sensors]
+        names += [self.tacho.name] if self.tacho else []
+        faults += [
+            f"sensors: name '{name}' is given {names.count(name)} times, must be unique; rename one"
+            for name in sorted(set(names))
+            if names.count(name) > 1
+        ]
+        return faults
+
+    def _shape_faults(self) -> list[str]:
+        places = (*FORCE_PLACES, *(sensor.name for sensor in self.sensors))
+        faults = []
+        for index, mode in enumerate(self.casing.modes):
+            path = f"casing.modes.{index}.shape"
+            faults += [
+                f"{path}.{key} is no place of this scene{_nearest(key, places)}"
+                for key in mode.shape
+                if key not in places
+            ]
+            faults += [
+                f"{path}.{sensor.name} is missing; give the shape at every sensor (0 at a node)"
+                for sensor in self.sensors
+                if sensor.name not in mode.shape
+            ]
+        return faults
+
+
+MACHINES: dict[str, type[Scene]] = {"reciprocating-pump": PumpScene}
+"""The scene type of every machine. A new machine is one row."""
+
+
+def scene_names() -> list[str]:
+    """Names of the built-in scenes, sorted.
+
+    Examples
+    --------
+    >>> "bilge-pump" in scene_names()
+    True
+    """
+    return sorted(path.stem for path in SCENE_FOLDER.glob("*.toml"))
+
+
+def scene_text(name_or_path: str | Path) -> str:
+    """TOML text of a built-in scene or of a file.
+
+    Raises
+    ------
+    SceneError
+        There is neither a built-in scene nor a file of that name; the nearest is named.
+    """
+    built_in = SCENE_FOLDER / f"{name_or_path}.toml"
+    path = built_in if built_in.is_file() else Path(name_or_path)
+    try:
+        return path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        hint = _nearest(str(name_or_path), scene_names())
+        reason = "is no UTF-8 text" if isinstance(error, UnicodeDecodeError) else "is no scene"
+        raise SceneError(str(name_or_path), [f"{name_or_path} {reason}{hint}"]) from None
+
+
+def scene_table(text: str, name: str = "scene") -> dict[str, Any]:
+    """Parse TOML text into a plain table.
+
+    Raises
+    ------
+    SceneError
+        The text is no TOML; the message gives line and column.
+    """
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise SceneError(name, [f"not TOML: {error}; mend the line it names"]) from None
+
+
+def scene_from_table(table: Mapping[str, Any]) -> Scene:
+    """Validate a plain table (numbers SI, or strings with units) into a scene.
+
+    Parameters
+    ----------
+    table : mapping
+        Nested tables, as TOML gives them.
+
+    Returns
+    -------
+    Scene
+        Frozen scene of the type that ``machine`` names.
+
+    Raises
+    ------
+    SceneError
+        Every fault at once, each as dotted path, value, bound and cure.
+    """
+    name = str(table.get("name", "scene"))
+    machine = table.get("machine")
+    if not isinstance(machine, str) or machine not in MACHINES:
+        hint = _nearest(str(machine), MACHINES)
+        raise SceneError(name, [f"machine = {machine!r} is no machine of this program{hint}"])
+    model = MACHINES[machine]
+    try:
+        return model.model_validate(dict(table))
+    except ValidationError as error:
+        faults = [line for entry in error.errors() for line in _fault_lines(model, entry)]
+        raise SceneError(name, faults) from None
+
+
+def load_scene(name_or_path: str | Path, overrides: Mapping[str, Any] | None = None) -> Scene:
+    """Load a built-in scene or a TOML file, with values replaced by dotted path.
+
+    Parameters
+    ----------
+    name_or_path : str or Path
+        A name of :func:`scene_names`, or a file.
+    overrides : mapping, optional
+        Dotted path -> number or string with unit, e.g. ``{"drive.speed": "250 rpm"}``. Setting
+        one of the two clearances of a joint removes the other.
+
+    Returns
+    -------
+    Scene
+        The validated scene.
+
+    Raises
+    ------
+    SceneError
+        Every fault at once.
+
+    Examples
+    --------
+    >>> load_scene("bilge-pump", {"drive.speed": "240 rpm"}).drive.speed
+    4.0
+    """
+    table = scene_table(scene_text(name_or_path), str(name_or_path))
+    return scene_from_table(override(table, overrides or {}))
+
+
+_CLEARANCE_TWINS = {
+    "diametral_clearance": "radial_clearance",
+    "radial_clearance": "diametral_clearance",
+}
+
+
+def override(table: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
+    """Copy of a table with values replaced by dotted path (list entries by index).
+
+    Raises
+    ------
+    SceneError
+        A path leads through something that is no table, or past the end of a list.
+
+    Examples
+    --------
+    >>> override({"rod": {"mass": 1.0}}, {"rod.mass": 2.0})
+    {'rod': {'mass': 2.0}}
+    """
+    result = _copy(table)
+    faults = []
+    for path, value in values.items():
+        try:
+            _replace(result, path.split("."), value)
+        except (KeyError, IndexError, TypeError, ValueError):
+            faults.append(f"{path} does not lead to a value; see the scene's own tables")
+    if faults:
+        raise SceneError(str(table.get("name", "scene")), faults)
+    return result
+
+
+def _copy(node: Any) -> Any:
+    if isinstance(node, Mapping):
+        return {key: _copy(value) for key, value in node.items()}
+    return [_copy(value) for value in node] if isinstance(node, (list, tuple)) else node
+
+
+def _replace(node: Any, keys: list[str], value: Any) -> None:
+    for key in keys[:-1]:
+        node = node[int(key)] if isinstance(node, list) else node.setdefault(key, {})
+    if isinstance(node, list):
+        node[int(keys[-1])] = value
+        return
+    if not isinstance(node, dict):
+        raise TypeError(keys)
+    node.pop(_CLEARANCE_TWINS.get(keys[-1], ""), None)
+    node[keys[-1]] = value
+
+
+def _nearest(word: str, choices: Any) -> str:
+    matches = difflib.get_close_matches(word, list(choices), n=1, cutoff=0.5)
+    if matches:
+        return f"; did you mean '{matches[0]}'?"
+    return f"; choose one of {', '.join(choices)}"
+
+
+def _fault_lines(model: type[BaseModel], entry: Any) -> list[str]:
+    """Turn one pydantic error into lines with path, value, bound and cure."""
+    path = ".".join(str(part) for part in entry["loc"])
+    kind, context = entry["type"], entry.get("ctx", {})
+    owner, field = _find_field(model, entry["loc"])
+    if kind == "extra_forbidden":
+        known = owner.model_fields if owner else ()
+        return [f"{path} is an unknown key{_nearest(str(entry['loc'][-1]), known)}"]
+    about = f" ({field.description})" if field is not None and field.description else ""
+    if kind == "missing":
+        return [f"{path} is missing{about}; add it"]
+    if kind == "value_error":
+        text = str(context["error"])
+        if text.startswith(("has ", "is not ")):  # from to_si, about this one value
+            return [f"{path} = {entry['input']!r} {text}"]
+        return [f"{path}: {line}" if path else line for line in text.splitlines()]
+    return [f"{path} = {_shown(entry['input'], field)} {_bound(entry)}{about}"]
+
+
+def _bound(entry: Any) -> str:
+    context = entry.get("ctx", {})
+    for key, sign in (("gt", ">"), ("ge", ">="), ("lt", "<"), ("le", "<=")):
+        if key in context:
+            return f"must be {sign} {context[key]:g}"
+    if entry["type"] == "literal_error":
+        return f"must be {context['expected']}"
+    return f"must be otherwise: {entry['msg'].lower()}"
+
+
+def _shown(value: Any, field: Any) -> str:
+    dimension = next((m.name for m in _metadata(field) if isinstance(m, _Dimension)), None)
+    if dimension is None:
+        return repr(value)
+    try:
+        return f"{to_si(value, dimension):g} {_unit_symbol(dimension)}".rstrip()
+    except ValueError:
+        return repr(value)
+
+
+def _metadata(field: Any) -> list[Any]:
+    """Metadata of a field, also of ``Annotated[...] | None``."""
+    if field is None:
+        return []
+    arguments = getattr(field.annotation, "__args__", ())
+    inner = [m for argument in arguments for m in getattr(argument, "__metadata__", ())]
+    return [*field.metadata, *inner]
+
+
+def _find_field(model: type[BaseModel], location: tuple[Any, ...]) -> tuple[Any, Any]:
+    """Model class that owns the last name of a location, and the field where there is one."""
+    owner: Any = model
+    field = None
+    for part in location:
+        if isinstance(part, int) or owner is None:
+            continue
+        field = owner.model_fields.get(part)
+        if part != location[-1]:
+            owner = _model_inside(field.annotation) if field is not None else None
+    return owner, field
+
+
+def _model_inside(annotation: Any) -> type[BaseModel] | None:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    found = (_model_inside(inner) for inner in getattr(annotation, "__args__", ()))
+    return next((model for model in found if model is not None), None)
