@@ -31,7 +31,7 @@ DEAD_CENTRE_HALF_WIDTH_DEG = 20.0
 IMPACT_THRESHOLD = 4.0
 """Short-time energy that counts as an impact, in medians of it [-]."""
 
-_CHUNK_FRAMES = 512
+_CHUNK_FRAMES = 256
 _CHUNK_SAMPLES = 8192
 
 
@@ -258,7 +258,8 @@ def order_amplitudes(x: ArrayLike, phase: ArrayLike, orders: ArrayLike) -> NDArr
     -------
     ndarray, shape (..., n_orders)
         ``A = (2 / R) integral x exp(-2j pi order phase) d phase`` over the R whole revolutions of
-        the record, minus the mean [unit of x]: ``x = A cos(2 pi order phase + angle)`` gives
+        the record, the mean over time removed [unit of x]:
+        ``x = A cos(2 pi order phase + angle)`` gives
         ``A exp(1j angle)``. complex64 for float32, else complex128.
 
     Raises
@@ -311,19 +312,12 @@ def _project(signal: Real, phase: Float, weights: Float, orders: Float) -> NDArr
     """Weighted sum of the signal against every order, a cache-sized piece at a time."""
     rows = signal.reshape(-1, signal.shape[-1])
     total = np.zeros((rows.shape[0], orders.size), dtype=np.complex128)
-    mean = np.zeros(rows.shape[0])
-    carrier = np.zeros(orders.size, dtype=np.complex128)
     for start in range(0, phase.size, _CHUNK_SAMPLES):
         part = slice(start, start + _CHUNK_SAMPLES)
         waves = _waves(phase[part], orders, signal.dtype)
         weight = weights[part].astype(signal.dtype)
         total += (rows[:, part] * weight) @ waves.T
-        mean += rows[:, part] @ weight
-        carrier += waves @ weight
-    revolutions = weights.sum()
-    # The mean over phase differs from the mean over time when the speed changes.
-    total -= np.outer(mean / revolutions, carrier)
-    result = (2 / revolutions) * total
+    result = (2 / weights.sum()) * total
     kept = np.complex64 if signal.dtype == np.float32 else np.complex128
     return np.asarray(result.astype(kept).reshape(*signal.shape[:-1], orders.size))
 
