@@ -96,9 +96,7 @@ def ideal_crank(
     beta = np.arcsin(crank_radius / rod_length * sin_a)
     sin_b, cos_b = np.sin(beta), np.cos(beta)
     beta_rate = crank_radius * cos_a * speed / (rod_length * cos_b)
-    beta_acc = (
-        -crank_radius * sin_a * speed**2 / rod_length + sin_b * beta_rate**2
-    ) / cos_b
+    beta_acc = (-crank_radius * sin_a * speed**2 / rod_length + sin_b * beta_rate**2) / cos_b
     piston = crank_radius * cos_a + rod_length * cos_b
     piston_velocity = -crank_radius * sin_a * speed - rod_length * sin_b * beta_rate
     piston_acc = -crank_radius * cos_a * speed**2 - rod_length * (
@@ -110,9 +108,8 @@ def ideal_crank(
         + static_moment * (sin_b * beta_acc + cos_b * beta_rate**2)
         + piston_force
     )
-    about_wrist = (
-        (rod_inertia + static_moment * rod_centre) * beta_acc
-        + static_moment * (sin_b * (piston_acc + gravity_x) + cos_b * gravity_y)
+    about_wrist = (rod_inertia + static_moment * rod_centre) * beta_acc + static_moment * (
+        sin_b * (piston_acc + gravity_x) + cos_b * gravity_y
     )
     pin_y = (about_wrist - rod_length * pin_x * sin_b) / (rod_length * cos_b)
     wrist_x = piston_mass * (piston_acc + gravity_x) + piston_force

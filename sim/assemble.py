@@ -18,6 +18,7 @@ from .slider_crank import (
     STEP_PER_CONTACT_TIME,
     CrankRun,
     contact_frequency,
+    pin_offset,
 )
 
 _CASING_SIGN = np.array([-1.0, -1.0, -1.0, 1.0])
@@ -88,6 +89,26 @@ def simulate(
     return _SIMULATORS[scene.machine](scene, seed, truth, raise_on_failure)
 
 
+def check(scene: Scene) -> None:
+    """Check what only the physics can tell: rungs, step, sampling.
+
+    Raises
+    ------
+    SceneError
+        Every fault at once.
+
+    Examples
+    --------
+    >>> from wearstate.sim.scene import load_scene
+    >>> check(load_scene("bilge-pump"))
+    """
+    _CHECKS[scene.machine](scene)
+
+
+def _check_pump(scene: Scene) -> None:
+    steps_per_sample(cast(PumpScene, scene))
+
+
 def _simulate_pump(scene: Scene, seed: int, truth: bool, raise_on_failure: bool) -> Solution:
     pump = cast(PumpScene, scene)
     factor = steps_per_sample(pump)
@@ -102,9 +123,9 @@ def _simulate_pump(scene: Scene, seed: int, truth: bool, raise_on_failure: bool)
         silence = np.zeros((len(channels_of(pump)), plan.n_samples), dtype=np.float32)
         return _solution(pump, silence, run.status, numerics, {})
     on_rod = decimate(run.forces, factor)
-    acceleration = housing_acceleration(
-        on_rod * _CASING_SIGN, pump.sample_rate, **_modes(pump)
-    )[:, plan.kept]
+    acceleration = housing_acceleration(on_rod * _CASING_SIGN, pump.sample_rate, **_modes(pump))[
+        :, plan.kept
+    ]
     signal, clipped = _measured(pump, acceleration, plan, seed)
     numerics["clipped_samples"] = clipped
     hidden = _truth(run, on_rod, plan) if truth else {}
@@ -118,6 +139,7 @@ class _Plan:
         rate, speed = scene.sample_rate, scene.drive.speed
         edge = edge_samples(factor)
         settling = math.ceil(scene.settling_revolutions / speed * rate) + edge
+        self.scene = scene
         self.factor = factor
         self.n_samples = round(scene.duration * rate)
         self.n_steps = (settling + self.n_samples + edge) * factor
@@ -147,8 +169,8 @@ def steps_per_sample(scene: PumpScene) -> int:
     if compliant and step * frequency > LARGEST_STEP_PER_CONTACT_TIME:
         faults.append(
             f"numerics.step = {step:g} s must be <= "
-            f"{LARGEST_STEP_PER_CONTACT_TIME / frequency:.3g} s for the contact's angular frequency "
-            f"{frequency:.4g} rad/s; shorten it or lower joint.crankpin.stiffness"
+            f"{LARGEST_STEP_PER_CONTACT_TIME / frequency:.3g} s, the contact's angular frequency "
+            f"being {frequency:.4g} rad/s; shorten it or lower joint.crankpin.stiffness"
         )
     if faults:
         raise SceneError(scene.name, faults)
@@ -205,9 +227,7 @@ def _measured(
     if scene.tacho:
         turn = 2 * math.pi
         width = scene.tacho.pulse_width / turn
-        rows.append(
-            tacho_pulses(plan.angle / turn, pulse_width=width, level=scene.tacho.level)
-        )
+        rows.append(tacho_pulses(plan.angle / turn, pulse_width=width, level=scene.tacho.level))
     return np.stack(rows), clipped
 
 
@@ -228,10 +248,12 @@ def _truth(run: CrankRun, on_rod: NDArray[np.float64], plan: _Plan) -> dict[str,
     """Forces (low-passed as the casing felt them) and state at the sample instants."""
     states = (0.5 * (run.states[:-1] + run.states[1:]))[:: plan.factor][plan.kept]
     force = on_rod[plan.kept]
+    offset = pin_offset(plan.scene, states)
     return {
         "pin_force_n": force[:, :2],
         "guide_force_n": force[:, 2],
         "piston_pressure_force_n": force[:, 3],
+        "pin_offset_m": offset,
         **{f"state_{name}": states[:, column] for column, name in enumerate(STATE)},
     }
 
@@ -257,3 +279,5 @@ _SIMULATORS: dict[str, Callable[[Scene, int, bool, bool], Solution]] = {
     "reciprocating-pump": _simulate_pump,
 }
 """A new machine is one row."""
+
+_CHECKS: dict[str, Callable[[Scene], None]] = {"reciprocating-pump": _check_pump}

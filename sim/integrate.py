@@ -35,9 +35,7 @@ _STATUS_TEXT = {
         "a joint's penetration exceeds a tenth of its pin radius, beyond the contact law; "
         "raise joint.crankpin.stiffness or lower the speed"
     ),
-    Status.LOCKED: (
-        "the rod stands across the stroke; lengthen rod.length or lower the clearance"
-    ),
+    Status.LOCKED: ("the rod stands across the stroke; lengthen rod.length or lower the clearance"),
 }
 
 

@@ -69,12 +69,13 @@ def kernel(function: Function) -> Function:
     folder = cache_folder()
     if folder is None:
         return numba.njit(**_OPTIONS)(function)  # type: ignore[no-any-return]
-    before = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = str(folder)  # read by numba while it decorates, restored at once
+    settings: Any = numba.config
+    before = settings.CACHE_DIR
+    settings.CACHE_DIR = str(folder)  # read by numba while it decorates, restored at once
     try:
         return numba.njit(cache=True, **_OPTIONS)(function)  # type: ignore[no-any-return]
     finally:
-        numba.config.CACHE_DIR = before
+        settings.CACHE_DIR = before
 
 
 @kernel

@@ -10,8 +10,10 @@ import math
 import re
 import tomllib
 from collections.abc import Mapping
+from decimal import Decimal
+from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, Self, TypeVar
 
 from pydantic import (
     BaseModel,
@@ -52,6 +54,8 @@ UNITS: dict[str, dict[str, float]] = {
     "mode shape": {"kg^-0.5": 1.0},
 }
 """Factor to SI of every unit string, by dimension. The first unit of a row is the SI one."""
+
+Table = TypeVar("Table", bound=BaseModel)
 
 _QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*")
 
@@ -103,9 +107,10 @@ def to_si(value: Any, dimension: str) -> float:
     if unit not in units:
         missing = "has no unit" if unit == "" else f"has unit '{unit}', not one of {dimension}"
         raise ValueError(f"{missing}; use one of {_unit_list(dimension)}")
-    # a division keeps 0.25 mm at exactly 0.00025 where a product would not
-    factor = units[unit]
-    return float(number) * factor if factor >= 1.0 else float(number) / (1.0 / factor)
+    try:  # a product of decimals keeps 0.13 mm at exactly 0.00013, that of two floats would not
+        return float(Decimal(number) * Decimal(repr(units[unit])))
+    except ArithmeticError:  # an exponent beyond decimals; the caller refuses what is not finite
+        return float(number) * units[unit]
 
 
 def _unit_list(dimension: str) -> str:
@@ -192,7 +197,7 @@ class CylinderPressure(Part):
     """Gauge pressure on the piston face."""
 
     rung: Literal["none", "two-level"] = "two-level"
-    suction: Pressure = Field(default=0.0, ge=-101325.0, description="gauge; below -1 atm no liquid")
+    suction: Pressure = Field(default=0.0, ge=-101325.0, description="gauge, above vacuum")
     discharge: Pressure = Field(default=0.0, description="gauge")
     rise_angle: Angle = Field(
         default=math.radians(3.0),
@@ -282,7 +287,7 @@ class Wear(Part):
     @model_validator(mode="after")
     def _ordered(self) -> Self:
         values = (self.as_new_diametral, *self.grade_edges_diametral)
-        if any(low >= high for low, high in zip(values, values[1:], strict=False)):
+        if any(low >= high for low, high in pairwise(values)):
             raise ValueError(
                 "as_new_diametral and grade_edges_diametral = "
                 f"{', '.join(f'{v:g} m' for v in values)} must rise strictly; reorder them"
@@ -481,11 +486,35 @@ def scene_from_table(table: Mapping[str, Any]) -> Scene:
     if not isinstance(machine, str) or machine not in MACHINES:
         hint = _nearest(str(machine), MACHINES)
         raise SceneError(name, [f"machine = {machine!r} is no machine of this program{hint}"])
-    model = MACHINES[machine]
+    return validate_table(MACHINES[machine], table, name)
+
+
+def validate_table(model: type[Table], table: Mapping[str, Any], name: str) -> Table:
+    """Validate a plain table into any model, with every fault in the words of this program.
+
+    Raises
+    ------
+    SceneError
+        Every fault at once, each as dotted path, value, bound and cure.
+
+    Examples
+    --------
+    >>> validate_table(Crank, {"radius": "50 mm"}, "crank").radius
+    0.05
+    """
     try:
         return model.model_validate(dict(table))
     except ValidationError as error:
-        faults = [line for entry in error.errors() for line in _fault_lines(model, entry)]
+        entries = error.errors()
+        places = [entry["loc"] for entry in entries]
+        faults = [
+            line
+            for entry in entries
+            # a list all of whose entries are at fault is called too short as well
+            if not any(place[:-1][: len(entry["loc"])] == entry["loc"] for place in places)
+            or entry["type"] != "too_short"
+            for line in _fault_lines(model, entry)
+        ]
         raise SceneError(name, faults) from None
 
 
@@ -538,7 +567,7 @@ def override(table: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, A
     >>> override({"rod": {"mass": 1.0}}, {"rod.mass": 2.0})
     {'rod': {'mass': 2.0}}
     """
-    result = _copy(table)
+    result: dict[str, Any] = _copy(table)
     faults = []
     for path, value in values.items():
         try:

@@ -136,10 +136,19 @@ def _gap(state: Any, p: Any) -> Any:
 
 
 @kernel
-def _piston_force(alpha: float, p: Any) -> float:
+def _piston_force(alpha: float, p: CrankParameters) -> float:
     if p.pressure_rung == PRESSURE_NONE:
         return 0.0
-    return two_level_pressure(alpha, p.suction_force, p.discharge_force, p.rise_angle)
+    force: float = two_level_pressure(alpha, p.suction_force, p.discharge_force, p.rise_angle)
+    return force
+
+
+@kernel
+def _piston_forces(angle: NDArray[np.float64], p: Any) -> NDArray[np.float64]:
+    force = np.empty(angle.size)
+    for i in range(angle.size):
+        force[i] = _piston_force(angle[i], p)
+    return force
 
 
 @kernel
@@ -207,7 +216,7 @@ def _runge_kutta(state: Any, first: Any, h: float, contact: bool, p: Any) -> Any
     k1, x1, y1, p1, n1, _, _ = first
     k2, x2, y2, p2, n2, _, _ = _derivative(_moved(state, k1, 0.5 * h), contact, p)
     k3, x3, y3, p3, n3, _, _ = _derivative(_moved(state, k2, 0.5 * h), contact, p)
-    k4, x4, y4, p4, n4, _, _ = _derivative(_moved(state, k3, h), contact, p)
+    k4, x4, y4, p4, _, _, _ = _derivative(_moved(state, k3, h), contact, p)
     after = _moved(state, _mean_rate(k1, k2, k3, k4), h)
     sixth = h / 6.0
     return (
@@ -221,7 +230,7 @@ def _runge_kutta(state: Any, first: Any, h: float, contact: bool, p: Any) -> Any
 
 
 @kernel
-def _margin(sigma: float, law_force: float, contact: bool, p: Any) -> float:
+def _margin(sigma: float, law_force: float, contact: bool, p: CrankParameters) -> float:
     """Positive while the contact stays as it is, negative once it should change [N]."""
     if p.release == RELEASE_AT_ZERO_PENETRATION:
         return p.stiffness * sigma if contact else -p.stiffness * sigma
@@ -229,12 +238,12 @@ def _margin(sigma: float, law_force: float, contact: bool, p: Any) -> float:
 
 
 @kernel
-def _hermite(before: float, rate_before: float, after: float, rate_after: float, h: float,
-             s: float) -> float:
+def _hermite(
+    before: float, rate_before: float, after: float, rate_after: float, h: float, s: float
+) -> float:
     r = 1.0 - s
-    return (
-        r * r * ((1.0 + 2.0 * s) * before + s * h * rate_before)
-        + s * s * ((1.0 + 2.0 * r) * after - r * h * rate_after)
+    return r * r * ((1.0 + 2.0 * s) * before + s * h * rate_before) + s * s * (
+        (1.0 + 2.0 * r) * after - r * h * rate_after
     )
 
 
@@ -320,7 +329,7 @@ def _fault(state: Any, sigma: float, p: Any) -> int:
 def _integrate(
     start: Any, h: float, p: Any, states: NDArray[np.float64], forces: NDArray[np.float64]
 ) -> Any:
-    """March through ``len(forces)`` steps; returns code, steps done, peak force, changes, refused."""
+    """March; returns status code, steps done, peak force, contact changes, refused cuts."""
     state = start
     first = _derivative(state, False, p)
     contact = _margin(first[5], first[6], False, p) < 0.0
@@ -406,7 +415,7 @@ def _mobility(beta: float, p: CrankParameters) -> float:
 def ideal_motion(scene: PumpScene, angle: NDArray[np.float64]) -> IdealCrank:
     """The rung *ideal*: inverse dynamics without clearance at the crank angles given [rad]."""
     p = parameters(scene)
-    force = np.array([_piston_force(a, p) for a in np.atleast_1d(angle)]).reshape(np.shape(angle))
+    force = _piston_forces(np.ravel(angle).astype(float), p).reshape(np.shape(angle))
     return ideal_crank(
         angle,
         speed=2 * math.pi * scene.drive.speed,
@@ -431,7 +440,8 @@ def start_state(scene: PumpScene, angle: float) -> tuple[float, ...]:
     direction = force / size if size > 0 else np.array([1.0, 0.0])
     offset = (p.clearance + size / p.stiffness) * direction
     sin_b = (p.crank_radius * math.sin(angle) - offset[1]) / p.rod_length
-    beta = math.asin(sin_b)
+    # out of reach only where the contact is far too soft: the run then says so by its status
+    beta = math.asin(min(1.0, max(-1.0, sin_b)))
     piston = p.crank_radius * math.cos(angle) + p.rod_length * math.cos(beta) - offset[0]
     return (
         angle,
@@ -441,6 +451,27 @@ def start_state(scene: PumpScene, angle: float) -> tuple[float, ...]:
         beta,
         float(ideal.beta_rate[0]),
     )
+
+
+def pin_offset(scene: PumpScene, states: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Position of the pin's centre from the eye's [m].
+
+    Parameters
+    ----------
+    scene : PumpScene
+    states : numpy.ndarray [shape=(n, 6)]
+        Columns as :data:`STATE`.
+
+    Returns
+    -------
+    numpy.ndarray [shape=(n, 2)]
+        x along the stroke, y across it. Its length exceeds the radial clearance by the
+        penetration where there is contact.
+    """
+    alpha, piston, beta = states[:, 0], states[:, 2], states[:, 4]
+    radius, length = scene.crank.radius, scene.rod.length
+    along = radius * np.cos(alpha) + length * np.cos(beta) - piston
+    return np.column_stack([along, radius * np.sin(alpha) - length * np.sin(beta)])
 
 
 def run_compliant(
@@ -481,15 +512,15 @@ def run_compliant(
 def run_ideal(scene: PumpScene, *, step: float, n_steps: int, start_angle: float) -> CrankRun:
     """The rung *ideal* in the form of a run: forces at the middle of each step."""
     speed = 2 * math.pi * scene.drive.speed
-    ends = ideal_motion(scene, start_angle + speed * step * np.arange(n_steps + 1))
-    angle = start_angle + speed * step * (np.arange(n_steps) + 0.5)
-    middle = ideal_motion(scene, angle)
+    angle = start_angle + speed * step * np.arange(n_steps + 1.0)
+    ends = ideal_motion(scene, angle)
+    middle = ideal_motion(scene, 0.5 * (angle[:-1] + angle[1:]))
     force = middle.wrist_force_x - scene.piston.mass * (
         middle.piston_acceleration + parameters(scene).gravity_x
     )
     states = np.column_stack(
         [
-            start_angle + speed * step * np.arange(n_steps + 1),
+            angle,
             np.full(n_steps + 1, speed),
             ends.piston,
             ends.piston_velocity,

@@ -1,0 +1,31 @@
+# Every target makes .venv by itself and reuses it. PYTHON picks the interpreter (>= 3.11).
+PYTHON ?= python3
+BIN := .venv/bin
+STAMP := .venv/.ready
+
+.PHONY: demo test lint types benchmark clean
+
+demo: $(STAMP)
+	$(BIN)/wearstate demo
+
+test: $(STAMP)
+	bash tests/run.sh $(BIN)
+
+benchmark: $(STAMP)
+	$(BIN)/pytest tests/benchmarks --benchmark-enable --benchmark-only -s
+
+lint: $(STAMP)
+	$(BIN)/ruff check . && $(BIN)/ruff format --check .
+
+types: $(STAMP)
+	bash tests/types.sh $(BIN)
+
+$(STAMP): pyproject.toml
+	@$(PYTHON) -c 'import sys; v = sys.version_info; \
+	  sys.exit(None if v >= (3, 11) else f"Python {v[0]}.{v[1]} must be >= 3.11; call make PYTHON=python3.11")'
+	test -x $(BIN)/python || $(PYTHON) -m venv .venv
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[test]'
+	@touch $(STAMP)
+
+clean:
+	rm -rf .venv build dist *.egg-info .mypy_cache .ruff_cache

@@ -1,0 +1,347 @@
+"""A recipe goes in, a labelled data set file comes out.
+
+Workers simulate, this process alone writes. A killed run is resumed by the same call.
+"""
+
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..sim.assemble import channels_of, simulate
+from ..sim.integrate import Solution
+from ..sim.scene import PumpScene, Scene, SceneError
+from ..sim.wear import grade
+from .recipe import Recipe, RecipeError, Sample, load_recipe, overrides_text, sample_records
+from .record import Attributes, DataError, DataSetWriter
+from .workers import in_order
+
+NUMERICS = {
+    "rung_joint": "S16",
+    "rung_pressure": "S16",
+    "step_s": "<f8",
+    "steps": "<i8",
+    "step_per_contact_time": "<f8",
+    "contact_changes": "<i8",
+    "cuts_refused": "<i8",
+    "peak_normal_force_n": "<f8",
+    "residual": "<f8",
+    "estimated_error": "<f8",
+    "clipped_samples": "<i8",
+}
+"""Manifest columns taken from a solution; -1, NaN or empty where it does not give them."""
+
+REFUSED = "refused"
+"""Status of a record whose drawn scene the simulation does not accept."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Summary:
+    """What a run of `generate` made.
+
+    Attributes
+    ----------
+    path : Path
+        The file.
+    n_records, n_groups : int
+        Records and machines in it.
+    n_resumed : int
+        Records that an earlier, interrupted run had written.
+    grades : dict of int to int
+        Records of each grade; -1 unknown.
+    failures : dict of str to int
+        Records of each status other than ``ok``; their signal is zero.
+    first_failures : tuple of str
+        Text of the first few failures of this run.
+    n_clipped : int
+        Records with saturated samples.
+    """
+
+    path: Path
+    n_records: int
+    n_groups: int
+    n_resumed: int
+    grades: dict[int, int]
+    failures: dict[str, int]
+    first_failures: tuple[str, ...]
+    n_clipped: int
+
+
+@dataclass(frozen=True)
+class _Outcome:
+    """What a worker sends back: arrays and plain values only."""
+
+    index: int
+    signal: NDArray[np.float32]
+    row: dict[str, Any]
+    truth: dict[str, NDArray[np.float32]]
+    fault: str
+
+
+def generate(
+    recipe: str | Path | Recipe,
+    n: int | None,
+    path: str | Path,
+    *,
+    seed: int = 0,
+    jobs: int = 1,
+    force: bool = False,
+    truth: bool = False,
+    progress: Callable[[int, int], None] | None = None,
+) -> Summary:
+    """Simulate a labelled data set into a file.
+
+    Parameters
+    ----------
+    recipe : str, Path or Recipe
+        Built-in name, file, or a loaded recipe.
+    n : int or None
+        Records; None for the recipe's own number.
+    path : str or Path
+        File to write; ``<path>.part`` until finished. An unfinished file of the same call is
+        gone on with.
+    seed : int
+        Of the data set, >= 0. Record `i` depends on recipe, seed and `i` alone.
+    jobs : int
+        Processes that simulate, >= 1. Signal and manifest are the same for any number.
+    force : bool
+        Replace an existing file and start an unfinished one anew.
+    truth : bool
+        Store the hidden quantities of each record.
+    progress : callable, optional
+        Called with (records done, records in all) after each.
+
+    Returns
+    -------
+    Summary
+        Counts of records, grades and failures.
+
+    Raises
+    ------
+    RecipeError
+        The recipe is at fault; nothing is written.
+    DataError
+        The file exists, an unfinished one is of another run, `jobs` is below one, there is no
+        room, or every record failed (the file stays, to be looked at).
+    KeyboardInterrupt
+        As it came; the unfinished file is closed and can be gone on with.
+
+    Notes
+    -----
+    A record whose simulation fails keeps its row, with its status and a signal of zeros.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> recipe = load_recipe("bilge-pump-small", {"duration": "0.25 s"})
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     generate(recipe, 2, Path(folder) / "data.h5").n_groups
+    1
+    """
+    plan = recipe if isinstance(recipe, Recipe) else load_recipe(recipe)
+    count = plan.table.records if n is None else n
+    if jobs < 1:
+        raise DataError(f"jobs = {jobs} must be >= 1; give the number of cores")
+    _refuse_bounds(plan, count, seed)
+    tally = _Tally(count)
+    with _writer(plan, count, path, seed=seed, force=force, truth=truth) as writer:
+        tally.n_resumed = int(np.count_nonzero(writer.done))
+        samples = sample_records(plan, count, seed=seed, skip=writer.done.copy())
+        for outcome in in_order(partial(_simulated, truth=truth), samples, jobs=jobs):
+            writer.write(outcome.index, outcome.signal, outcome.row, outcome.truth)
+            tally.note(outcome)
+            if progress is not None:
+                progress(int(np.count_nonzero(writer.done)), count)
+        rows = writer.manifest()
+        writer.finish()
+    return tally.summary(writer.path, rows)
+
+
+def _refuse_bounds(plan: Recipe, count: int, seed: int) -> None:
+    if count < 1 or seed < 0:
+        raise RecipeError(plan.name, [f"n = {count} must be >= 1 and seed = {seed} must be >= 0"])
+
+
+def _writer(
+    plan: Recipe, count: int, path: str | Path, *, seed: int, force: bool, truth: bool
+) -> DataSetWriter:
+    columns = {
+        plan.severity_column: "<f8",
+        **dict.fromkeys(plan.conditions, "<f8"),
+        **NUMERICS,
+    }
+    return DataSetWriter(
+        path,
+        _attributes(plan, seed, truth),
+        n_records=count,
+        n_samples=round(plan.scene.duration * plan.scene.sample_rate),
+        columns=columns,
+        force=force,
+    )
+
+
+def _attributes(plan: Recipe, seed: int, truth: bool) -> Attributes:
+    scene = plan.scene
+    return Attributes(
+        sample_rate=scene.sample_rate,
+        channels=channels_of(scene),
+        origin="simulated",
+        tacho=scene.tacho.name if scene.tacho else None,
+        severities=(plan.severity_column,),
+        recipe=plan.text,
+        scene=plan.scene_text,
+        overrides=overrides_text(plan),
+        seed=seed,
+        truth=truth,
+        **_limits(scene),
+    )
+
+
+def _limits(scene: Scene) -> dict[str, Any]:
+    wear = getattr(scene, "wear", None)
+    if wear is None:
+        return {}
+    return {
+        "grade_edges": wear.grade_edges_diametral,
+        "condemning_limit": wear.condemning_diametral,
+        "limit_source": wear.source,
+    }
+
+
+def _simulated(sample: Sample, *, truth: bool) -> _Outcome:
+    """Simulate one record; runs in a worker."""
+    try:
+        solution = simulate(sample.scene, seed=sample.seed, truth=truth, raise_on_failure=False)
+    except SceneError as error:
+        return _refused(sample, str(error))
+    status = solution.status
+    return _Outcome(
+        index=sample.index,
+        signal=solution.signal,
+        row={**sample.row, "status": status.name.lower(), **_numerics(solution)},
+        truth={name: array.astype(np.float32) for name, array in solution.truth.items()},
+        fault="" if status.ok else status.text,
+    )
+
+
+def _refused(sample: Sample, text: str) -> _Outcome:
+    return _Outcome(
+        index=sample.index,
+        signal=_silence(sample.scene),
+        row={**sample.row, "status": REFUSED},
+        truth={},
+        fault=text,
+    )
+
+
+def _silence(scene: Scene) -> NDArray[np.float32]:
+    n_samples = round(scene.duration * scene.sample_rate)
+    return np.zeros((len(channels_of(scene)), n_samples), dtype=np.float32)
+
+
+def _numerics(solution: Solution) -> dict[str, Any]:
+    return {name: value for name, value in solution.numerics.items() if name in NUMERICS}
+
+
+class _Tally:
+    """Counts of a run."""
+
+    def __init__(self, count: int) -> None:
+        self.count = count
+        self.n_resumed = 0
+        self.faults: list[str] = []
+
+    def note(self, outcome: _Outcome) -> None:
+        if outcome.fault and len(self.faults) < 3:
+            self.faults.append(f"record {outcome.index}: {outcome.fault}")
+
+    def summary(self, path: Path, rows: NDArray[np.void]) -> Summary:
+        status = Counter(name.decode() for name in rows["status"].tolist())
+        del status["ok"]
+        if status.total() == self.count:
+            raise DataError(
+                f"{path}: 0 of {self.count} records are simulated, must be >= 1; "
+                f"{self.faults[0] if self.faults else 'see the status column'}"
+            )
+        return Summary(
+            path=path,
+            n_records=self.count,
+            n_groups=len(np.unique(rows["group"])),
+            n_resumed=self.n_resumed,
+            grades=dict(sorted(Counter(rows["grade"].tolist()).items())),
+            failures=dict(status),
+            first_failures=tuple(self.faults),
+            n_clipped=int(np.count_nonzero(rows["clipped_samples"] > 0)),
+        )
+
+
+def save_solution(
+    scene: Scene,
+    solution: Solution,
+    path: str | Path,
+    *,
+    seed: int,
+    force: bool = False,
+    truth: bool = False,
+) -> None:
+    """Write one simulated recording as a data set of one record.
+
+    Parameters
+    ----------
+    scene : Scene
+        What was simulated.
+    solution : Solution
+        Its result.
+    path : str or Path
+        File to write.
+    seed : int
+        Of the simulation, for the record.
+    force : bool
+        Replace an existing file.
+    truth : bool
+        Also store the hidden quantities that the solution holds.
+
+    Raises
+    ------
+    DataError
+        The file exists, or cannot be written.
+    """
+    joint = getattr(getattr(scene, "joint", None), "crankpin", None)
+    severity = {} if joint is None else {_PUMP_SEVERITY: joint.clearance_diametral}
+    limits = _limits(scene)
+    row = {
+        "record_id": "0",
+        "seed": seed,
+        "status": solution.status.name.lower(),
+        "speed_hz": scene.drive.speed if isinstance(scene, PumpScene) else float("nan"),
+        **severity,
+        **_numerics(solution),
+    }
+    if severity and limits:
+        row["grade"] = grade(severity[_PUMP_SEVERITY], limits["grade_edges"])
+    head = Attributes(
+        sample_rate=solution.sample_rate,
+        channels=solution.channels,
+        origin="simulated",
+        tacho=scene.tacho.name if scene.tacho else None,
+        severities=tuple(severity),
+        scene=scene.model_dump_json(),
+        seed=seed,
+        truth=truth,
+        **limits,
+    )
+    columns = {**dict.fromkeys((*severity, "speed_hz"), "<f8"), **NUMERICS}
+    n_samples = solution.signal.shape[1]
+    with DataSetWriter(
+        path, head, n_records=1, n_samples=n_samples, columns=columns, force=force
+    ) as writer:
+        writer.write(0, solution.signal, row, solution.truth if truth else None)
+        writer.finish()
+
+
+_PUMP_SEVERITY = "diametral_clearance_crankpin_m"

@@ -1,0 +1,498 @@
+"""The command line. Commands call library functions and hold no physics.
+
+Results go to stdout, progress and talk to stderr. Exit codes: 0 done, 1 failed, 2 bad input; with
+``report --fail-on``: 3 warning, 4 alarm, 5 unfamiliar. Heavy imports stay inside the commands, so
+that ``--help`` answers at once.
+"""
+
+import json
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import click
+
+from .. import __version__
+
+EXIT_FAILED, EXIT_BAD_INPUT, EXIT_WARNING, EXIT_ALARM, EXIT_UNFAMILIAR = 1, 2, 3, 4, 5
+
+_FAIL_ON_HELP = "Exit 3 at a warning, 4 at an alarm, 5 when unfamiliar; alarm: only 4 and 5."
+
+
+class _Group(click.Group):
+    """Turns the library's own errors into one message and an exit code."""
+
+    def invoke(self, context: click.Context) -> Any:
+        try:
+            return super().invoke(context)
+        except (ValueError, RuntimeError) as error:
+            if not type(error).__module__.startswith(__name__.split(".")[0]):
+                raise  # not ours: a defect, with its traceback
+            click.echo(f"Error: {error}", err=True)
+            bad_input = isinstance(error, ValueError)
+            raise click.exceptions.Exit(EXIT_BAD_INPUT if bad_input else EXIT_FAILED) from None
+        except OSError as error:
+            click.echo(f"Error: {error}; check path, rights and space", err=True)
+            raise click.exceptions.Exit(EXIT_BAD_INPUT) from None
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the command line; ends the process with its exit code."""
+    cli.main(args=None if arguments is None else list(arguments), prog_name="wearstate")
+
+
+@click.group(cls=_Group, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(__version__, prog_name="wearstate")
+def cli() -> None:
+    """Condition monitoring built around physics.
+
+    Simulate a machine that wears, make labelled data sets, train a wear estimate, and report on
+    a recording.
+    """
+
+
+_json_option = click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout.")
+_force_option = click.option("--force", is_flag=True, help="Replace an existing output.")
+_jobs_option = click.option(
+    "-j",
+    "--jobs",
+    type=click.IntRange(1),
+    default=None,
+    help="Worker processes; all cores by default. The result does not depend on it.",
+)
+_seed_option = click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
+
+
+def _emit(value: dict[str, Any], as_json: bool, text: str) -> None:
+    """Print a result, as JSON or as text."""
+    if as_json:
+        click.echo(json.dumps({"schema_version": 1, **value}, allow_nan=True, default=str))
+    else:
+        click.echo(text)
+
+
+def _workers(jobs: int | None) -> int:
+    import os
+
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    return jobs or cores or 1
+
+
+@contextmanager
+def _progress(what: str) -> Iterator[Callable[[int, int], None] | None]:
+    """Progress bar on stderr where a person watches; nothing elsewhere."""
+    if not sys.stderr.isatty():
+        yield None
+        return
+    from rich.console import Console
+    from rich.progress import MofNCompleteColumn, Progress, TimeRemainingColumn
+
+    columns = (*Progress.get_default_columns()[:2], MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task(what, total=None)
+        yield lambda done, total: bar.update(task, completed=done, total=total)
+
+
+def _overrides(pairs: Sequence[str]) -> dict[str, Any]:
+    """``path=value`` pairs; a value that reads as a number is one."""
+    values: dict[str, Any] = {}
+    for pair in pairs:
+        path, sign, text = pair.partition("=")
+        if not sign or not path:
+            raise click.BadParameter(f"'{pair}' must read PATH=VALUE", param_hint="--set")
+        values[path.strip()] = _number_or_text(text.strip())
+    return values
+
+
+def _number_or_text(text: str) -> Any:
+    for kind in (int, float):
+        try:
+            return kind(text)
+        except ValueError:
+            continue
+    return text
+
+
+# --- scenes -------------------------------------------------------------------------------------
+
+
+@cli.group()
+def scene() -> None:
+    """The machines: list, show, check."""
+
+
+@scene.command("list")
+@_json_option
+def scene_list(as_json: bool) -> None:
+    """Names and descriptions of the built-in scenes."""
+    from ..sim.scene import load_scene, scene_names
+
+    scenes = {name: load_scene(name).description for name in scene_names()}
+    _emit({"scenes": scenes}, as_json, "\n".join(f"{n:24} {d}" for n, d in scenes.items()))
+
+
+@scene.command("show")
+@click.argument("name")
+def scene_show(name: str) -> None:
+    """TOML text of a scene: copy it, change it, check it."""
+    from ..sim.scene import scene_text
+
+    click.echo(scene_text(name), nl=False)
+
+
+@scene.command("check")
+@click.argument("file")
+@_json_option
+def scene_check(file: str, as_json: bool) -> None:
+    """Check a scene file; every fault at once."""
+    from ..sim.assemble import check
+    from ..sim.scene import load_scene
+
+    checked = load_scene(file)
+    check(checked)
+    _emit({"scene": checked.name, "faults": []}, as_json, f"{checked.name}: no fault")
+
+
+# --- simulation and data sets -------------------------------------------------------------------
+
+
+@cli.command()
+@click.argument("scene_name", metavar="SCENE")
+@click.option("--set", "pairs", multiple=True, metavar="PATH=VALUE", help="Replace a scene value.")
+@click.option("-o", "--output", type=click.Path(path_type=Path), help="Recording to write (.h5).")
+@click.option("--plot", type=click.Path(path_type=Path), help="Picture to write (.png or .svg).")
+@click.option("--truth", is_flag=True, help="Also store forces and orbit.")
+@_seed_option
+@_force_option
+@_json_option
+def simulate(
+    scene_name: str,
+    pairs: Sequence[str],
+    output: Path | None,
+    plot: Path | None,
+    truth: bool,
+    seed: int,
+    force: bool,
+    as_json: bool,
+) -> None:
+    """Simulate one recording of SCENE (a built-in name or a TOML file)."""
+    from ..datasets.generate import save_solution
+    from ..sim.assemble import simulate as run
+    from ..sim.scene import load_scene
+
+    machine = load_scene(scene_name, _overrides(pairs))
+    _refuse_existing(plot, force)
+    solution = run(machine, seed=seed, truth=truth or plot is not None)
+    if output is not None:
+        save_solution(machine, solution, output, seed=seed, force=force, truth=truth)
+    if plot is not None:
+        from .plots import plot_simulation
+
+        plot_simulation(machine, solution, plot)
+    rms = {c.name: float(r.std()) for c, r in zip(solution.channels, solution.signal, strict=True)}
+    shown = ", ".join(f"{c.name} {rms[c.name]:.3g} {c.unit} rms" for c in solution.channels)
+    files = [str(path) for path in (output, plot) if path]
+    _emit(
+        {"scene": machine.name, "rms": rms, "numerics": solution.numerics, "files": files},
+        as_json,
+        "\n".join([f"{machine.name} (simulated): {shown}", *files]),
+    )
+
+
+def _refuse_existing(path: Path | None, force: bool) -> None:
+    from ..datasets.record import DataError
+
+    if path is None:
+        return
+    if path.exists() and not force:
+        raise DataError(f"{path} exists; choose another name or use --force to replace it")
+    if not path.parent.is_dir():
+        raise DataError(f"{path.parent} is no folder; create it")
+
+
+@cli.command()
+@click.argument("recipe")
+@click.option("-n", "--records", type=int, default=None, help="Records; the recipe's by default.")
+@click.option("-o", "--output", type=click.Path(path_type=Path), required=True)
+@click.option("--truth", is_flag=True, help="Also store forces and orbit.")
+@_seed_option
+@_jobs_option
+@_force_option
+@_json_option
+def generate(
+    recipe: str,
+    records: int | None,
+    output: Path,
+    truth: bool,
+    seed: int,
+    jobs: int | None,
+    force: bool,
+    as_json: bool,
+) -> None:
+    """Simulate a labelled data set from RECIPE (a built-in name or a TOML file).
+
+    An interrupted run goes on where it stopped when the same command is repeated.
+    """
+    from ..datasets.generate import generate as run
+
+    with _progress("simulating") as progress:
+        summary = run(
+            recipe,
+            records,
+            output,
+            seed=seed,
+            jobs=_workers(jobs),
+            force=force,
+            truth=truth,
+            progress=progress,
+        )
+    _emit(_plain(summary), as_json, _generated_text(summary))
+
+
+def _plain(summary: Any) -> dict[str, Any]:
+    from dataclasses import asdict
+
+    return {**asdict(summary), "path": str(summary.path)}
+
+
+def _generated_text(summary: Any) -> str:
+    grades = ", ".join(f"{count} of grade {grade}" for grade, count in summary.grades.items())
+    lines = [
+        f"{summary.path}: {summary.n_records} simulated records of {summary.n_groups} machine "
+        f"draws ({grades})"
+    ]
+    if summary.n_resumed:
+        lines.append(f"  {summary.n_resumed} of them from an earlier, interrupted run")
+    lines += [f"  {count} failed: {status}" for status, count in summary.failures.items()]
+    lines += [f"    {text}" for text in summary.first_failures]
+    if summary.n_clipped:
+        lines.append(f"  {summary.n_clipped} hold saturated samples, as a real sensor would")
+    return "\n".join(lines)
+
+
+@cli.command()
+@click.argument("file", type=click.Path(path_type=Path))
+@_json_option
+def info(file: Path, as_json: bool) -> None:
+    """What a data set, recording or model is, checked."""
+    from .info import describe
+
+    described = describe(file)
+    width = max(len(key) for key in described)
+    _emit(described, as_json, "\n".join(f"{k:{width}}  {v}" for k, v in described.items()))
+
+
+@cli.command()
+@click.argument("data", type=click.Path(path_type=Path))
+@click.option("-o", "--output", type=click.Path(path_type=Path), required=True)
+@_jobs_option
+@_force_option
+@_json_option
+def features(data: Path, output: Path, jobs: int | None, force: bool, as_json: bool) -> None:
+    """Feature table of a data set (.parquet, .csv or .h5), manifest beside it."""
+    from .tabulate import feature_table, save_table
+
+    _refuse_existing(output, force)
+    with _progress("features") as progress:
+        table = feature_table(data, jobs=_workers(jobs), progress=progress)
+    save_table(table, output)
+    size = {"path": str(output), "records": len(table.values), "features": len(table.names)}
+    _emit(size, as_json, f"{output}: {size['records']} records, {size['features']} features")
+
+
+# --- models -------------------------------------------------------------------------------------
+
+
+@cli.command()
+@click.argument("data", type=click.Path(path_type=Path))
+@click.option("-o", "--output", type=click.Path(path_type=Path), required=True)
+@click.option(
+    "--held-out",
+    type=click.FloatRange(0, 0.9),
+    default=0.25,
+    show_default=True,
+    help="Share of the machine draws kept out of training, to judge the model.",
+)
+@_seed_option
+@_jobs_option
+@_force_option
+@_json_option
+def train(
+    data: Path,
+    output: Path,
+    held_out: float,
+    seed: int,
+    jobs: int | None,
+    force: bool,
+    as_json: bool,
+) -> None:
+    """Train a wear model on a labelled data set and judge it on held-out machine draws."""
+    from .estimate import save_model
+    from .evaluate import score
+    from .train import train_model
+
+    _refuse_existing(output, force)
+    with _progress("features") as progress:
+        model, table, test = train_model(
+            data, held_out=held_out, seed=seed, jobs=_workers(jobs), progress=progress
+        )
+    save_model(model, output, force=force)
+    result = score(model, table, test) if len(test) else {}
+    trained = model.card["trained_on"]
+    head = f"{output}: trained on {trained['records']} records of {trained['draws']} machine draws"
+    lines = [head, *_score_lines(result, model.card)]
+    if model.card["notice"]:
+        lines.append(f"Notice: {model.card['notice']}.")
+    value = {"path": str(output), "trained_on": trained, "held_out": result}
+    _emit(value, as_json, "\n".join(lines))
+
+
+@cli.command()
+@click.argument("model_file", metavar="MODEL", type=click.Path(path_type=Path))
+@click.argument("data", type=click.Path(path_type=Path))
+@_jobs_option
+@_json_option
+def evaluate(model_file: Path, data: Path, jobs: int | None, as_json: bool) -> None:
+    """Judge MODEL on the machine draws of DATA that it has not seen."""
+    from .estimate import load_model
+    from .evaluate import evaluate_model
+
+    model = load_model(model_file)
+    with _progress("features") as progress:
+        result = evaluate_model(model, data, jobs=_workers(jobs), progress=progress)
+    _emit(result, as_json, "\n".join(_score_lines(result, model.card)))
+
+
+def _score_lines(result: dict[str, Any], card: dict[str, Any]) -> list[str]:
+    if not result:
+        return ["not judged: no machine draw was held out"]
+    base = ", ".join(f"{k.replace('_', ' ')} {v:.3f}" for k, v in result["baselines"].items())
+    return [
+        f"Judged on {result['records']} records of {result['draws']} unseen machine draws "
+        f"({100 * result['unfamiliar']:.1f} % called unfamiliar)",
+        f"  clearance error   {1e6 * result['mae_m']:.1f} um mean, "
+        f"{100 * result['mae_share_of_limit']:.1f} % of the condemning limit "
+        f"{1e3 * card['condemning_limit_m']:.3g} mm",
+        f"  interval coverage {result['coverage']:.3f} (nominal {result['nominal_coverage']:.2f}), "
+        f"{result['mean_set_size']:.2f} grades touched on average",
+        f"  grade accuracy    {result['accuracy']:.3f}; an error of that size allows "
+        f"{result['accuracy_bound']:.3f}",
+        f"  within one grade  {result['within_one_grade']:.4f}",
+        f"  baselines         {base}",
+    ]
+
+
+@cli.command()
+@click.argument("recording_file", metavar="RECORDING", type=click.Path(path_type=Path))
+@click.option("--model", "model_file", type=click.Path(path_type=Path), required=True)
+@click.option("-o", "--output", type=click.Path(path_type=Path), help="HTML page to write.")
+@click.option("--record", type=int, default=0, help="Record of a data set file.")
+@click.option("--fs", type=float, default=None, help="Sample rate [Hz], where the file has none.")
+@click.option("--unit", default=None, help="Unit of the signal, where the file declares none.")
+@click.option("--variable", default=None, help="Array of a MATLAB file of unknown layout.")
+@click.option("--fail-on", type=click.Choice(["warning", "alarm"]), help=_FAIL_ON_HELP)
+@_force_option
+@_json_option
+def report(
+    recording_file: Path,
+    model_file: Path,
+    output: Path | None,
+    record: int,
+    fs: float | None,
+    unit: str | None,
+    variable: str | None,
+    fail_on: str | None,
+    force: bool,
+    as_json: bool,
+) -> None:
+    """The verdict on RECORDING: wear grade and clearance with interval, or unfamiliar."""
+    from ..datasets.importers import read_recording
+    from .estimate import load_model
+    from .report import report_html, report_table, report_text
+
+    _refuse_existing(output, force)
+    model = load_model(model_file)
+    recording = read_recording(recording_file, record=record, fs=fs, unit=unit, variable=variable)
+    estimate = model.estimate(recording)
+    table = report_table(recording, model, estimate)
+    if output is not None:
+        _write_text(output, report_html(table, recording))
+        table["html"] = str(output)
+    if as_json:
+        click.echo(json.dumps(table))
+    else:
+        click.echo(report_text(table) + (f"\nPage        {output}" if output else ""))
+    raise click.exceptions.Exit(_report_exit(estimate.verdict, estimate.grade, fail_on))
+
+
+def _write_text(path: Path, text: str) -> None:
+    """Write a whole file or none."""
+    part = path.with_name(path.name + ".part")
+    try:
+        part.write_text(text, encoding="utf-8")
+        part.replace(path)
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def _report_exit(verdict: str, grade: int | None, fail_on: str | None) -> int:
+    from .grades import ALARM_GRADE, WARNING_GRADE
+
+    if fail_on is None:
+        return 0
+    if verdict == "unfamiliar" or grade is None:
+        return EXIT_UNFAMILIAR
+    if grade >= ALARM_GRADE:
+        return EXIT_ALARM
+    return EXIT_WARNING if fail_on == "warning" and grade >= WARNING_GRADE else 0
+
+
+@cli.command()
+@_json_option
+def verify(as_json: bool) -> None:
+    """Every literature check: expected, obtained, tolerance, source. Exit 1 if one fails."""
+    from dataclasses import asdict
+
+    from .verify import run_checks
+
+    results = run_checks()
+    failed = sum(not result.passed for result in results)
+    lines = [f"{'check':44} {'expected':>14} {'obtained':>14} {'tolerance':>10}  source"]
+    lines += [
+        f"{r.name:44} {r.expected:14.8g} {r.obtained:14.8g} {r.tolerance:10.2g}  "
+        f"{'' if r.passed else 'FAILED '}[{r.trust}] {r.source}"
+        for r in results
+    ]
+    lines.append(f"{len(results) - failed} passed, {failed} failed")
+    checks = [{**asdict(r), "passed": r.passed} for r in results]
+    _emit({"checks": checks, "failed": failed}, as_json, "\n".join(lines))
+    raise click.exceptions.Exit(EXIT_FAILED if failed else 0)
+
+
+@cli.command()
+@click.option(
+    "--folder",
+    type=click.Path(path_type=Path, file_okay=False),
+    default=Path("demo"),
+    show_default=True,
+    help="Where its files go; files of an earlier demo are replaced.",
+)
+@_seed_option
+@_jobs_option
+@_json_option
+def demo(folder: Path, seed: int, jobs: int | None, as_json: bool) -> None:
+    """The whole job, small: simulate, features, train, evaluate, report."""
+    from .demo import run_demo
+
+    with _progress("simulating and learning") as progress:
+        result = run_demo(
+            folder,
+            seed=seed,
+            jobs=_workers(jobs),
+            progress=progress,
+            say=lambda text: click.echo(text, err=True),
+        )
+    text = "\n".join([*_score_lines(result["held_out"], result["card"]), "", result["text"]])
+    _emit({key: result[key] for key in ("files", "held_out", "report", "seconds")}, as_json, text)

@@ -1,0 +1,485 @@
+"""The wear model: what it says of a recording, and its file."""
+
+import hashlib
+import io
+import json
+import math
+import os
+import zipfile
+import zlib
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..datasets.record import DataError, Recording
+from .grades import GRADE_NAMES, grades_of
+from .novelty import Familiarity, novelty_p_value
+from .tabulate import recording_features
+
+Float = NDArray[np.float64]
+
+MODEL_SCHEMA = 1
+
+COVERAGE = 0.9
+"""Nominal coverage of the interval."""
+
+UNFAMILIAR_BELOW = 0.01
+"""A recording with a smaller p-value is called unfamiliar: at most 1 % of familiar ones are."""
+
+_FEWEST_NEIGHBOURS = 40  # out-of-fold errors that decide an interval: its level moves by 2.5 %
+_RATE_TOLERANCE = 1e-3  # of the sample rate; band edges move as much
+_LARGEST_MEMBER = 2**28  # byte, of a model file's parts once unpacked
+
+
+class ModelError(ValueError):
+    """A model file cannot be used; names what is wrong and what helps."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Calibration:
+    """Out-of-fold behaviour of a model on machine draws it had not seen.
+
+    Attributes
+    ----------
+    log_estimate, log_error : numpy.ndarray [shape=(n,)]
+        Estimates of log severity, and truth minus estimate.
+    distance : numpy.ndarray [shape=(n,)]
+        Novelty distances.
+    """
+
+    log_estimate: Float
+    log_error: Float
+    distance: Float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Estimate:
+    """What a model says of one recording.
+
+    Attributes
+    ----------
+    verdict : {"graded", "unfamiliar"}
+        Unfamiliar: no grade is given.
+    reasons : tuple of str
+        Why it is unfamiliar; empty where graded.
+    cautions : tuple of str
+        Conditions outside the trained range.
+    p_value : float or None
+        Of the hypothesis that the recording is of the trained kind; None where it could not even
+        be turned into the model's features.
+    grade : int or None
+        0 to 3.
+    grade_name : str
+        In words; empty where unfamiliar.
+    possible_grades : tuple of int
+        Grades that the interval touches.
+    severity, low, high : float or None
+        Estimate and interval [m].
+    coverage : float
+        Nominal coverage of the interval.
+    evidence : tuple of (str, float, float, float)
+        Feature, its value, mean of as-new machines, distance in their standard deviations; the
+        features that moved the most.
+    """
+
+    verdict: Literal["graded", "unfamiliar"]
+    reasons: tuple[str, ...] = ()
+    cautions: tuple[str, ...] = ()
+    p_value: float | None = None
+    grade: int | None = None
+    grade_name: str = ""
+    possible_grades: tuple[int, ...] = ()
+    severity: float | None = None
+    low: float | None = None
+    high: float | None = None
+    coverage: float = COVERAGE
+    evidence: tuple[tuple[str, float, float, float], ...] = field(default=())
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        return asdict(self)
+
+
+@dataclass(frozen=True, kw_only=True)
+class WearModel:
+    """A trained wear model.
+
+    Attributes
+    ----------
+    regressor : sklearn estimator
+        Features to log severity.
+    calibration : Calibration
+        Out-of-fold errors and distances.
+    familiarity : Familiarity
+        The cloud of the training features.
+    card : dict
+        What it was trained on, its inputs, limits and ranges.
+    """
+
+    regressor: Any
+    calibration: Calibration
+    familiarity: Familiarity
+    card: dict[str, Any]
+
+    def estimate(self, recording: Recording) -> Estimate:
+        """Estimate the wear of the machine in a recording.
+
+        Parameters
+        ----------
+        recording : Recording
+            Any; one that lacks the model's inputs is unfamiliar, with the reasons.
+
+        Returns
+        -------
+        Estimate
+            Grade and severity with interval, or unfamiliar.
+
+        Raises
+        ------
+        DataError
+            The signal itself is unusable: not finite, or shorter than a revolution.
+        """
+        names, values = recording_features(recording)
+        missing = input_faults(recording, self.card)
+        if missing:
+            return Estimate(verdict="unfamiliar", reasons=tuple(missing))
+        if list(names) != self.card["features"]:
+            raise ModelError(
+                f"the model's {len(self.card['features'])} features are not the program's "
+                f"{len(names)}; retrain it: wearstate train DATA -o MODEL"
+            )
+        return self.judge(values)
+
+    def judge(self, values: Float) -> Estimate:
+        """Estimate from a feature row in the order of ``card["features"]``."""
+        row = values[None, :]
+        distance = float(self.familiarity.distance(row)[0])
+        p_value = novelty_p_value(distance, self.calibration.distance)
+        if p_value < UNFAMILIAR_BELOW:
+            reason = (
+                f"its features lie {distance:.3g} from the centre of the training recordings, "
+                f"farther than {100 * (1 - p_value):.2g} % of them (largest: "
+                f"{self.calibration.distance.max():.3g})"
+            )
+            return Estimate(verdict="unfamiliar", reasons=(reason,), p_value=p_value)
+        log_severity = float(self.regressor.predict(row)[0])
+        low, high = (
+            math.exp(log_severity + q) for q in interval_offsets(log_severity, self.calibration)
+        )
+        edges = self.card["grade_edges_m"]
+        severity = math.exp(log_severity)
+        grade = int(grades_of(severity, edges))
+        span = range(int(grades_of(low, edges)), int(grades_of(high, edges)) + 1)
+        return Estimate(
+            verdict="graded",
+            cautions=tuple(self._cautions(values)),
+            p_value=p_value,
+            grade=grade,
+            grade_name=GRADE_NAMES[grade],
+            possible_grades=tuple(span),
+            severity=severity,
+            low=low,
+            high=high,
+            evidence=self._evidence(values),
+        )
+
+    def _cautions(self, values: Float) -> list[str]:
+        columns = {name: i for i, name in enumerate(self.card["features"])}
+        return [
+            f"{name} = {values[columns[name]]:.3g} is outside the trained range "
+            f"{low:.3g} to {high:.3g}: extrapolating"
+            for name, (low, high) in self.card["condition_ranges"].items()
+            if not low <= values[columns[name]] <= high
+        ]
+
+    def _evidence(
+        self, values: Float, most: int = 12
+    ) -> tuple[tuple[str, float, float, float], ...]:
+        """Features farthest from those of as-new machines."""
+        healthy = self.card["healthy_features"]
+        mean, spread = np.array(healthy["mean"]), np.array(healthy["spread"])
+        moved = np.where(spread > 0, (values - mean) / np.where(spread > 0, spread, 1), 0.0)
+        order = np.argsort(-np.abs(moved))[:most]
+        names = self.card["features"]
+        return tuple((names[i], float(values[i]), float(mean[i]), float(moved[i])) for i in order)
+
+
+def interval_offsets(log_estimate: float, calibration: Calibration) -> tuple[float, float]:
+    """Offsets of log severity that bracket the truth with the nominal coverage.
+
+    Parameters
+    ----------
+    log_estimate : float
+        Estimate in question.
+    calibration : Calibration
+        Out-of-fold estimates and errors.
+
+    Returns
+    -------
+    low, high : float
+        From the conformal quantiles of the errors of the nearest estimates, one tail each.
+
+    Notes
+    -----
+    Errors of unseen draws near the same estimate are exchangeable with the new one up to the
+    change of the neighbourhood, so the coverage is nominal up to about one over their number.
+    The fits behind them lack a fifth of the draws, which makes the interval slightly wide.
+    """
+    gap = np.abs(calibration.log_estimate - log_estimate)
+    n = min(len(gap), max(_FEWEST_NEIGHBOURS, len(gap) // 4))
+    errors = np.sort(calibration.log_error[np.argsort(gap, kind="stable")[:n]])
+    rank = math.ceil((1 + COVERAGE) / 2 * (n + 1))
+    return float(errors[max(n - rank, 0)]), float(errors[min(rank, n) - 1])
+
+
+def input_faults(recording: Recording, card: Mapping[str, Any]) -> list[str]:
+    """What a recording lacks of a model's inputs, as sentences; empty where it fits."""
+    wanted = [c for c in card["channels"] if c["name"] != card["tacho"]]
+    units = [c["unit"] for c in wanted]
+    found = recording.vibration_channels
+    faults = []
+    if len(found) != len(wanted):
+        faults.append(
+            f"it has {len(found)} vibration channel(s), the model needs {len(wanted)}: "
+            f"{', '.join(c['name'] for c in wanted)}"
+        )
+    elif [c.name for c in found] != [c["name"] for c in wanted]:
+        faults.append(
+            f"its channels are {', '.join(c.name for c in found)}, the model needs "
+            f"{', '.join(c['name'] for c in wanted)}, in this order"
+        )
+    faults += [
+        f"channel {c.name} is in {c.unit or 'an unknown unit'}, the model needs {units[0]}"
+        for c in found
+        if c.unit not in units
+    ]
+    if (recording.tacho is None) != (card["tacho"] is None):
+        faults.append("it has no tacho, the model needs one" if card["tacho"] else "it has a tacho")
+    elif recording.pulses_per_revolution != card["pulses_per_revolution"]:
+        faults.append(
+            f"its tacho gives {recording.pulses_per_revolution} pulses per revolution, the model "
+            f"needs {card['pulses_per_revolution']}"
+        )
+    rate = card["sample_rate_hz"]
+    if abs(recording.sample_rate / rate - 1) > _RATE_TOLERANCE:
+        faults.append(
+            f"it is sampled at {recording.sample_rate:g} Hz, the model needs {rate:g} Hz: resample"
+        )
+    return faults
+
+
+def save_model(model: WearModel, path: str | Path, *, force: bool = False) -> None:
+    """Write a model file: card, estimator and arrays in a zip, each with its SHA-256.
+
+    Parameters
+    ----------
+    model : WearModel
+    path : str or Path
+        Usually ``*.wsm``.
+    force : bool
+        Replace an existing file.
+
+    Raises
+    ------
+    DataError
+        The file exists, or its folder does not.
+    """
+    import skops.io
+    from sklearn import __version__ as sklearn_version
+
+    target = Path(path)
+    if target.exists() and not force:
+        raise DataError(f"{target} exists; choose another name or use force to replace it")
+    if not target.parent.is_dir():
+        raise DataError(f"{target.parent} is no folder; create it")
+    arrays = io.BytesIO()
+    np.savez(arrays, **asdict(model.calibration), **asdict(model.familiarity))
+    members = {
+        "card.json": json.dumps(model.card, indent=1, sort_keys=True).encode(),
+        "regressor.skops": skops.io.dumps(model.regressor),
+        "arrays.npz": arrays.getvalue(),
+    }
+    seal = {
+        "schema_version": MODEL_SCHEMA,
+        "sklearn": sklearn_version,
+        "sha256": {name: hashlib.sha256(data).hexdigest() for name, data in members.items()},
+    }
+    part = target.with_name(target.name + ".part")
+    try:
+        with zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED) as bundle:
+            for name, data in {"seal.json": json.dumps(seal).encode(), **members}.items():
+                # a fixed date, so that the same model is the same file
+                bundle.writestr(zipfile.ZipInfo(name, (1980, 1, 1, 0, 0, 0)), data)
+        os.replace(part, target)
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def load_model(path: str | Path) -> WearModel:
+    """Read a model file; nothing in it is executed.
+
+    Parameters
+    ----------
+    path : str or Path
+        File of :func:`save_model`.
+
+    Returns
+    -------
+    WearModel
+
+    Raises
+    ------
+    ModelError
+        No such file, not a model, damaged, changed, or of another version of this program's
+        model format or of scikit-learn; the text says what helps.
+    """
+    members = _members(Path(path))
+    seal = _parsed(members, "seal.json", path)
+    _check_seal(seal, members, path)
+    card = _parsed(members, "card.json", path)
+    try:
+        with np.load(io.BytesIO(members["arrays.npz"]), allow_pickle=False) as stored:
+            arrays = {name: np.asarray(stored[name], dtype=float) for name in stored.files}
+        calibration = Calibration(
+            **{name: arrays.pop(name) for name in Calibration.__dataclass_fields__}
+        )
+        arrays["residual"] = float(arrays["residual"])  # type: ignore[assignment]
+        familiarity = Familiarity(**arrays)  # type: ignore[arg-type]
+    except (KeyError, TypeError, ValueError, OSError, zipfile.BadZipFile) as error:
+        raise ModelError(f"{path}: arrays.npz cannot be read ({error}); retrain it") from error
+    model = WearModel(
+        regressor=_regressor(members["regressor.skops"], path),
+        calibration=calibration,
+        familiarity=familiarity,
+        card=card,
+    )
+    _check_structure(model, path)
+    return model
+
+
+def _members(path: Path) -> dict[str, bytes]:
+    if not path.is_file():
+        raise ModelError(f"{path} is no file; make one: wearstate train DATA -o {path.name}")
+    try:
+        with zipfile.ZipFile(path) as bundle:
+            too_large = [i.filename for i in bundle.infolist() if i.file_size > _LARGEST_MEMBER]
+            if too_large:
+                raise ModelError(f"{path}: {too_large[0]} is over 256 MiB; this is no model file")
+            return {name: bundle.read(name) for name in bundle.namelist()}
+    except ModelError:
+        raise
+    except _ZIP_FAULTS as error:
+        raise ModelError(f"{path} is no intact model ({error}); take an intact copy") from error
+
+
+def _parsed(members: dict[str, bytes], name: str, path: str | Path) -> dict[str, Any]:
+    try:
+        parsed = json.loads(members[name])
+    except (KeyError, ValueError) as error:
+        raise ModelError(f"{path}: {name} cannot be read; this is no intact model file") from error
+    if not isinstance(parsed, dict):
+        raise ModelError(f"{path}: {name} is no table; this is no intact model file")
+    return parsed
+
+
+def _check_seal(seal: Mapping[str, Any], members: dict[str, bytes], path: str | Path) -> None:
+    from sklearn import __version__ as sklearn_version
+
+    if seal.get("schema_version") != MODEL_SCHEMA:
+        raise ModelError(
+            f"{path}: schema_version = {seal.get('schema_version')} must be {MODEL_SCHEMA}; "
+            "retrain it: wearstate train DATA -o MODEL"
+        )
+    sums = seal.get("sha256")
+    wanted = sums if isinstance(sums, dict) else {}
+    found = {n: hashlib.sha256(d).hexdigest() for n, d in members.items() if n != "seal.json"}
+    if found != wanted:
+        changed = sorted(n for n in {*found, *wanted} if found.get(n) != wanted.get(n))
+        raise ModelError(
+            f"{path}: checksum of {', '.join(changed)} does not fit; the file was changed or "
+            "damaged: take an intact copy or retrain"
+        )
+    here, there = sklearn_version.split(".")[:2], str(seal.get("sklearn")).split(".")[:2]
+    if here != there:
+        raise ModelError(
+            f"{path}: made with scikit-learn {seal.get('sklearn')}, this is {sklearn_version}; "
+            f"retrain it (wearstate train DATA -o MODEL) or install scikit-learn=={seal['sklearn']}"
+        )
+
+
+def _regressor(data: bytes, path: str | Path) -> Any:
+    import skops.io
+
+    try:
+        unknown = skops.io.get_untrusted_types(data=data)
+        if unknown:
+            raise ModelError(
+                f"{path}: holds types that are not allowed ({', '.join(unknown)}); do not use it"
+            )
+        return skops.io.loads(data, trusted=[])
+    except ModelError:
+        raise
+    except Exception as error:  # skops raises whatever its reader met
+        raise ModelError(f"{path}: regressor cannot be read ({error}); retrain it") from error
+
+
+def _check_structure(model: WearModel, path: str | Path) -> None:
+    """Shapes that fit each other, so that a forged file fails here and not in a prediction."""
+    n = len(model.card.get("features", []))
+    f, c = model.familiarity, model.calibration
+    shapes = {
+        "familiarity": f.centre.shape == f.spread.shape == (n,)
+        and f.directions.shape == (len(f.variance), n)
+        and bool((f.spread > 0).all() and (f.variance > 0).all() and f.residual > 0),
+        "calibration": c.log_error.shape == c.log_estimate.shape == c.distance.shape
+        and c.log_error.ndim == 1
+        and c.log_error.size > 0,
+        "finite": all(np.isfinite(a).all() for a in (*asdict(c).values(), f.centre, f.directions)),
+        "card": set(model.card) >= _CARD_KEYS,
+    }
+    steps = dict(getattr(model.regressor, "steps", []))
+    scaler, ridge = steps.get("standardscaler"), steps.get("ridge")
+    shapes["regressor"] = [type(step).__name__ for step in steps.values()] == [
+        "StandardScaler",
+        "Ridge",
+    ] and _shape(scaler, "mean_") == _shape(scaler, "scale_") == _shape(ridge, "coef_") == (n,)
+    bad = [name for name, fits in shapes.items() if not fits]
+    if bad:
+        raise ModelError(f"{path}: {', '.join(bad)} do not fit {n} features; retrain it")
+
+
+def _shape(step: Any, attribute: str) -> tuple[int, ...]:
+    return tuple(np.shape(getattr(step, attribute, ())))
+
+
+_ZIP_FAULTS = (
+    zipfile.BadZipFile,
+    zlib.error,
+    OSError,
+    EOFError,
+    NotImplementedError,
+    RuntimeError,
+    ValueError,
+)
+"""What zipfile raises on damaged bytes."""
+
+_CARD_KEYS = {
+    "features",
+    "channels",
+    "tacho",
+    "pulses_per_revolution",
+    "sample_rate_hz",
+    "severity",
+    "grade_edges_m",
+    "condemning_limit_m",
+    "limit_source",
+    "condition_ranges",
+    "healthy_features",
+    "notice",
+    "origin",
+    "trained_on",
+}

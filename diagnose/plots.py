@@ -1,0 +1,94 @@
+"""Pictures of a simulated recording. Always says that it is simulated."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..datasets.record import DataError
+from ..features.spectrum import decibel, power_lines
+from ..sim.integrate import Solution
+from ..sim.scene import PumpScene, Scene
+
+_FORMATS = (".png", ".svg", ".pdf")
+_COLOURS = ("#1f5a94", "#b3541e", "#4f7d3a")
+_REVOLUTIONS = 2
+
+
+def plot_simulation(scene: Scene, solution: Solution, path: Path) -> None:
+    """Draw acceleration, spectrum, joint force and pin orbit of a simulated recording.
+
+    Parameters
+    ----------
+    scene : Scene
+    solution : Solution
+        With truth.
+    path : Path
+        ``.png``, ``.svg`` or ``.pdf``.
+
+    Raises
+    ------
+    DataError
+        Another suffix.
+    """
+    from matplotlib.figure import Figure
+
+    if path.suffix not in _FORMATS:
+        raise DataError(f"{path}: suffix must be one of {', '.join(_FORMATS)}; rename it")
+    figure = Figure(figsize=(11, 7), layout="constrained")
+    figure.suptitle(f"{scene.name} (simulated)")
+    _DRAWERS[scene.machine](figure, scene, solution)
+    figure.savefig(path, dpi=110)
+
+
+def _draw_pump(figure: Any, scene: Scene, solution: Solution) -> None:
+    pump = cast(PumpScene, scene)
+    rate = solution.sample_rate
+    n = min(solution.signal.shape[1], round(_REVOLUTIONS / pump.drive.speed * rate))
+    turns = np.arange(n) / rate * pump.drive.speed + pump.drive.start_angle / (2 * np.pi)
+    panels = figure.subplot_mosaic([["wave", "wave", "orbit"], ["force", "force", "spectrum"]])
+    accelerations = [
+        (channel.name, row)
+        for channel, row in zip(solution.channels, solution.signal, strict=True)
+        if channel.quantity == "acceleration"
+    ]
+    for (name, row), colour in zip(accelerations, _COLOURS, strict=False):
+        panels["wave"].plot(turns, row[:n], lw=0.5, color=colour, label=name)
+        frequency, level = _density(row, rate)
+        panels["spectrum"].plot(frequency / 1e3, level, lw=0.6, color=colour, label=name)
+    _label(panels["wave"], "crank revolutions", "acceleration [m/s²]", "Casing acceleration")
+    _label(panels["spectrum"], "frequency [kHz]", "PSD [dB re 1 (m/s²)²/Hz]", "Spectrum")
+    panels["spectrum"].set_xscale("log")
+    for column, name in enumerate("xy"):
+        force = solution.truth["pin_force_n"][:n, column] / 1e3
+        panels["force"].plot(turns, force, lw=0.6, color=_COLOURS[column], label=name)
+    _label(panels["force"], "crank revolutions", "pin on rod [kN]", "Crank-pin force")
+    _orbit(panels["orbit"], pump, solution.truth["pin_offset_m"][:n])
+
+
+def _label(axes: Any, x: str, y: str, title: str) -> None:
+    axes.set(xlabel=x, ylabel=y, title=title)
+    axes.grid(alpha=0.3)
+    axes.margins(x=0)
+    axes.legend(fontsize=8, loc="upper right")
+
+
+def _density(row: NDArray[np.float32], rate: float) -> tuple[NDArray[Any], NDArray[Any]]:
+    lines = power_lines(row, rate)
+    frequency = np.linspace(0, rate / 2, lines.shape[-1])
+    return frequency[1:], decibel(lines[1:] / frequency[1])
+
+
+def _orbit(axes: Any, scene: PumpScene, offset: NDArray[np.float64]) -> None:
+    """Path of the pin's centre in its clearance circle."""
+    circle = np.exp(2j * np.pi * np.linspace(0, 1, 181)) * scene.joint.crankpin.clearance_radial
+    axes.plot(1e3 * circle.real, 1e3 * circle.imag, color="black", lw=1)
+    axes.plot(1e3 * offset[:, 0], 1e3 * offset[:, 1], lw=0.5, color=_COLOURS[0])
+    axes.set(xlabel="x, along the stroke [mm]", ylabel="y [mm]", title="Pin in its clearance")
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.grid(alpha=0.3)
+
+
+_DRAWERS: dict[str, Callable[[Any, Scene, Solution], None]] = {"reciprocating-pump": _draw_pump}

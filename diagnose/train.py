@@ -1,0 +1,245 @@
+"""Fit a wear model to a labelled data set, with its uncertainty and its sense of the familiar."""
+
+import hashlib
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import __version__
+from ..datasets.record import Attributes, DataError, DataSet
+from ..datasets.splits import group_folds, group_split
+from .estimate import Calibration, WearModel
+from .novelty import fit_familiarity
+from .tabulate import FeatureTable, Progress, feature_table
+
+Float = NDArray[np.float64]
+
+SIMULATION_NOTICE = "trained on simulation; no measured joint of known clearance has confirmed it"
+
+_PENALTIES = (10.0, 30.0, 100.0, 300.0, 1000.0)  # ridge, for standardised features
+_FOLDS = 5
+_FEWEST_GROUPS = 10  # two a fold, so that a fold's error is no accident
+_CONDITIONS = {"shaft.speed_hz": "speed [rev/s]"}
+
+
+def train_model(
+    path: str | Path,
+    *,
+    held_out: float = 0.25,
+    seed: int = 0,
+    jobs: int = 1,
+    progress: Progress | None = None,
+) -> tuple[WearModel, FeatureTable, NDArray[np.intp]]:
+    """Fit a wear model on a data set's training groups.
+
+    Parameters
+    ----------
+    path : str or Path
+        Labelled data set.
+    held_out : float
+        Share of the groups (machine draws) kept out of every fit, 0 <= share < 1.
+    seed : int
+        Of the split and the folds.
+    jobs : int
+        Worker processes for the features.
+    progress : callable, optional
+        Called with (records done, records).
+
+    Returns
+    -------
+    model : WearModel
+        Regression of log severity, out-of-fold errors, familiarity, card.
+    table : FeatureTable
+        All usable records.
+    test : numpy.ndarray
+        Rows of `table` that were held out.
+
+    Raises
+    ------
+    DataError
+        No severity column, no limits, or too few machine draws.
+    """
+    with DataSet(path) as data:
+        head = data.attributes
+    _check_labelled(head, path)
+    table = feature_table(path, jobs=jobs, progress=progress)
+    groups = table.manifest["group"].to_numpy()
+    train, test = _split(groups, held_out, seed, path)
+    severity = table.manifest[head.severities[0]].to_numpy(dtype=float)
+    regressor, errors = fit_severity(table.values[train], severity[train], groups[train], seed)
+    distances = _out_of_fold_distances(table.values[train], groups[train], seed)
+    model = WearModel(
+        regressor=regressor,
+        calibration=Calibration(log_estimate=errors[0], log_error=errors[1], distance=distances),
+        familiarity=fit_familiarity(table.values[train]),
+        card=_card(head, table, train, held_out, seed),
+    )
+    return model, table, test
+
+
+def _check_labelled(head: Attributes, path: str | Path) -> None:
+    if not head.severities or len(head.grade_edges) == 0:
+        raise DataError(
+            f"{path}: severities = {list(head.severities)}, grade_edges = {list(head.grade_edges)} "
+            "must both be given; label the data set, or generate it from a recipe"
+        )
+
+
+def _split(
+    groups: NDArray[Any], held_out: float, seed: int, path: str | Path
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    n_groups = len(np.unique(groups))
+    if n_groups < _FEWEST_GROUPS:
+        raise DataError(
+            f"{path}: {n_groups} machine draws, must be >= {_FEWEST_GROUPS}; generate more records"
+        )
+    if held_out == 0:
+        return np.arange(len(groups)), np.arange(0)
+    return group_split(groups, test_fraction=held_out, seed=seed)
+
+
+def fit_severity(
+    features: Float, severity: Float, groups: NDArray[Any], seed: int
+) -> tuple[Any, tuple[Float, Float]]:
+    """Ridge regression of log severity, its penalty chosen by folds of whole groups.
+
+    Parameters
+    ----------
+    features : numpy.ndarray [shape=(n, n_features)]
+    severity : numpy.ndarray [shape=(n,)]
+        [m], > 0.
+    groups : numpy.ndarray [shape=(n,)]
+        Machine draw of each record; a draw is never in two folds.
+    seed : int
+        Of the folds.
+
+    Returns
+    -------
+    regressor : sklearn.pipeline.Pipeline
+        Scaler and ridge, fitted on all records.
+    errors : tuple of numpy.ndarray
+        Out-of-fold estimates of log severity, and their errors (truth minus estimate).
+
+    Raises
+    ------
+    DataError
+        A severity is not positive.
+    """
+    if not (severity > 0).all():
+        raise DataError(
+            f"severity = {severity.min():g} m must be > 0 in every record; label them all"
+        )
+    target = np.log(severity)
+    folds = _folds(groups, seed)
+    trials = [_out_of_fold(penalty, features, target, folds) for penalty in _PENALTIES]
+    errors = [float(np.abs(np.exp(trial) - severity).mean()) for trial in trials]
+    best = int(np.argmin(errors))
+    regressor = _regressor(_PENALTIES[best]).fit(features, target)
+    return regressor, (trials[best], target - trials[best])
+
+
+def _regressor(penalty: float) -> Any:
+    from sklearn.linear_model import Ridge
+    from sklearn.pipeline import make_pipeline
+    from sklearn.preprocessing import StandardScaler
+
+    return make_pipeline(StandardScaler(), Ridge(penalty))
+
+
+def _folds(groups: NDArray[Any], seed: int) -> list[tuple[NDArray[np.intp], NDArray[np.intp]]]:
+    return list(group_folds(groups, n=_FOLDS, seed=seed))
+
+
+def _out_of_fold(
+    penalty: float,
+    features: Float,
+    target: Float,
+    folds: list[tuple[NDArray[np.intp], NDArray[np.intp]]],
+) -> Float:
+    estimate = np.empty_like(target)
+    for train, test in folds:
+        estimate[test] = (
+            _regressor(penalty).fit(features[train], target[train]).predict(features[test])
+        )
+    return estimate
+
+
+def _out_of_fold_distances(features: Float, groups: NDArray[Any], seed: int) -> Float:
+    """Novelty distances of records from clouds that their machine draw had no part in."""
+    distance = np.empty(len(features))
+    for train, test in _folds(groups, seed):
+        distance[test] = fit_familiarity(features[train]).distance(features[test])
+    return distance
+
+
+def draw_identity(head: Attributes) -> str:
+    """Hash of what decides the machine draws: equal groups of equal identity are one machine."""
+    text = json.dumps([head.recipe, head.scene, head.overrides, head.seed])
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _card(
+    head: Attributes,
+    table: FeatureTable,
+    train: NDArray[np.intp],
+    held_out: float,
+    seed: int,
+) -> dict[str, Any]:
+    """Everything a reader of the model must know, as JSON."""
+    manifest = table.manifest.iloc[train]
+    severity = manifest[head.severities[0]].to_numpy(dtype=float)
+    columns = {name: i for i, name in enumerate(table.names)}
+    ranges = {
+        name: [
+            float(table.values[train, columns[name]].min()),
+            float(table.values[train, columns[name]].max()),
+        ]
+        for name in _CONDITIONS
+        if name in columns
+    }
+    return {
+        "created_by": f"wearstate {__version__}",
+        "origin": head.origin,
+        "notice": SIMULATION_NOTICE if head.origin == "simulated" else "",
+        "trained_on": {
+            "records": len(train),
+            "draws": int(manifest["group"].nunique()),
+            "draw_identity": draw_identity(head),
+            "held_out_share": held_out,
+            "split_seed": seed,
+            "training_groups": sorted({int(g) for g in manifest["group"]}),
+            "scene": _name_in(head.scene),
+            "recipe": _name_in(head.recipe),
+        },
+        "severity": head.severities[0],
+        "severity_range_m": [float(severity.min()), float(severity.max())],
+        "grade_edges_m": list(head.grade_edges),
+        "condemning_limit_m": head.condemning_limit,
+        "limit_source": head.limit_source,
+        "sample_rate_hz": head.sample_rate,
+        "channels": [asdict(channel) for channel in head.channels],
+        "tacho": head.tacho,
+        "pulses_per_revolution": head.pulses_per_revolution,
+        "features": list(table.names),
+        "condition_ranges": ranges,
+        "healthy_features": _healthy(table.values[train], manifest["grade"].to_numpy()),
+    }
+
+
+def _healthy(values: Float, grade: NDArray[Any]) -> dict[str, list[float]]:
+    """Mean and spread of the features of as-new machines, the reference of the evidence."""
+    rows = values[grade == 0] if (grade == 0).any() else values
+    return {"mean": rows.mean(axis=0).tolist(), "spread": rows.std(axis=0).tolist()}
+
+
+def _name_in(toml_text: str) -> str:
+    import tomllib
+
+    try:
+        return str(tomllib.loads(toml_text).get("name", ""))
+    except tomllib.TOMLDecodeError:
+        return ""

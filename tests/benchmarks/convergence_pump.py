@@ -1,0 +1,94 @@
+"""Is the default step of the crank with clearance fine enough for the features?
+
+Band levels and peak pin force at the default step against a quarter of it, and the quarter
+against an eighth. Contact with clearance is chaotic, so means over start angles are compared, and
+the number of starts is doubled until their standard error is a third of what is asked. Run as
+``python tests/benchmarks/convergence_pump.py`` (about ten minutes on two cores).
+"""
+
+from functools import cache
+
+import numpy as np
+from wearstate.features.spectrum import band_edges, band_levels
+from wearstate.sim.assemble import simulate
+from wearstate.sim.scene import load_scene
+
+LEVEL_TOLERANCE = 0.2  # dB, a change of 2.3 %
+PEAK_TOLERANCE = 0.02
+CLEARANCES = ("0.08 mm", "0.31 mm")  # diametral: as new, and at the renewal limit
+MOST_STARTS = 256
+
+
+@cache  # the starts of a smaller sample are those of the larger
+def features(clearance, start, part, duration="4.8 s"):
+    """Band levels [dB], both channels in a row, and the peak contact force [N] of one run.
+
+    `part` divides the default step; the default is the step that `simulate` itself chooses.
+    """
+    overrides = {
+        "joint.crankpin.diametral_clearance": clearance,
+        "drive.start_angle": start,
+        "duration": duration,
+        "sensors.0.noise": 0,
+        "sensors.1.noise": 0,
+    }
+    if part > 1:
+        default = load_scene("bilge-pump", {**overrides, "duration": "0.2 s"})
+        step = simulate(default, seed=0).numerics["step_s"]
+        overrides["numerics.step"] = step / part
+    result = simulate(load_scene("bilge-pump", overrides), seed=0)
+    levels = band_levels(result.signal[:2], 25_600.0, band_edges(25_600.0))
+    return levels.ravel(), result.numerics["peak_normal_force_n"]
+
+
+def sample(clearance, part, n_starts):
+    """Features of `n_starts` runs; the starts are the same for every part of the step."""
+    angles = 2 * np.pi * (np.arange(n_starts) * 0.6180339887498949 % 1)  # nested, evenly spread
+    runs = [features(clearance, angle, part) for angle in angles]
+    return np.array([levels for levels, _ in runs]), np.array([peak for _, peak in runs])
+
+
+def standard_error(values):
+    return values.std(axis=0, ddof=1) / np.sqrt(len(values))
+
+
+def starts_needed(clearance, parts=(1, 4), first=8):
+    """Number of starts, doubled until every band's standard error is below a third of 0.2 dB."""
+    n_starts = first
+    while n_starts <= MOST_STARTS:
+        errors = (standard_error(sample(clearance, part, n_starts)[0]).max() for part in parts)
+        if all(error < LEVEL_TOLERANCE / 3 for error in errors):
+            return n_starts
+        n_starts *= 2
+    raise RuntimeError(f"{clearance}: unresolvable with {MOST_STARTS} starts; record longer")
+
+
+def compare(clearance, coarse, fine, n_starts):
+    """Worst difference of mean band levels [dB], and of mean peak force [-]."""
+    (level_c, peak_c), (level_f, peak_f) = (sample(clearance, p, n_starts) for p in (coarse, fine))
+    return {
+        "bands": float(abs(level_c.mean(axis=0) - level_f.mean(axis=0)).max()),
+        "peak": float(peak_c.mean() / peak_f.mean() - 1),
+        "scatter": float(max(standard_error(level_c).max(), standard_error(level_f).max())),
+        "peak_scatter": float(standard_error(peak_f) / peak_f.mean()),
+    }
+
+
+def main():
+    for clearance in CLEARANCES:
+        n_starts = starts_needed(clearance, parts=(1, 4, 8))
+        for coarse, fine in ((1, 4), (4, 8)):
+            found = compare(clearance, coarse, fine, n_starts)
+            print(
+                f"{clearance}, {n_starts} starts, step 1/{coarse} against 1/{fine}: "
+                f"bands {found['bands']:.3f} dB (standard error {found['scatter']:.3f}), "
+                f"peak {found['peak']:+.2%} ({found['peak_scatter']:.2%})",
+                flush=True,
+            )
+            good = found["bands"] < LEVEL_TOLERANCE and abs(found["peak"]) < PEAK_TOLERANCE
+            if not good:
+                raise SystemExit("the default step is too long")
+
+
+if __name__ == "__main__":
+    main()

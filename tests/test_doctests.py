@@ -1,0 +1,28 @@
+"""Every example in a docstring runs and gives what it says."""
+
+import doctest
+import importlib
+import pkgutil
+
+import pytest
+import wearstate
+
+MODULES = ["wearstate"] + [
+    info.name
+    for info in pkgutil.walk_packages(wearstate.__path__, "wearstate.")
+    if not info.name.endswith("__main__")  # importing it runs the command line
+    and info.name.split(".")[1] in {"sim", "features", "datasets", "diagnose"}
+]
+
+
+def test_the_walk_finds_the_library():
+    assert {"wearstate.sim.scene", "wearstate.diagnose.verify"} <= set(MODULES)
+    assert len(MODULES) > 20
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_docstrings(name, tmp_path, monkeypatch):
+    module = importlib.import_module(name)
+    monkeypatch.chdir(tmp_path)  # an example that writes a file leaves none behind
+    failed, _ = doctest.testmod(module, optionflags=doctest.NORMALIZE_WHITESPACE)
+    assert failed == 0

@@ -1,0 +1,256 @@
+"""The layers: arrows point down only, and importing the command line costs next to nothing."""
+
+import ast
+import importlib
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+import wearstate
+
+ROOT = Path(wearstate.__file__).parent
+PACKAGES = ("sim", "features", "datasets", "diagnose")
+
+MAY_IMPORT = {
+    "sim": set(),
+    "features": set(),
+    "datasets": {"sim", "features"},
+    "diagnose": {"sim", "features", "datasets"},
+}
+"""Package -> packages below it. sim and features know nothing of each other."""
+
+SIM_FLOORS = [
+    {"assemble"},
+    {"ladder"},
+    {"slider_crank", "orbit", "shaft_line", "casing"},
+    {"film", "impedance", "bearing", "contact", "hydraulics"},
+    {"integrate", "analytic", "scene"},
+    {"sensor", "jit", "wear"},
+]
+"""Inside sim, from the roof to the ground; a file imports from lower floors or its own."""
+
+HEAVY = {
+    "matplotlib": set(),  # inside functions only
+    "click": {"diagnose.cli"},
+    "rich": set(),
+    "sklearn": {"diagnose"},
+    "skops": {"diagnose"},
+    "joblib": {"diagnose", "datasets"},
+    "pandas": {"features.table", "datasets.record", "diagnose"},
+    "h5py": {"datasets"},
+    "pyarrow": set(),
+}
+"""Library -> modules or packages that may import it at module level."""
+
+
+def sources():
+    for package in PACKAGES:
+        for path in sorted((ROOT / package).glob("*.py")):
+            yield f"{package}.{path.stem}", ast.parse(path.read_text(encoding="utf-8"))
+
+
+SOURCES = dict(sources())
+
+
+def targets(name, node):
+    """Modules that an import statement names, ours as 'package.module', others as they are."""
+    if isinstance(node, ast.Import):
+        return [alias.name.removeprefix("wearstate.") for alias in node.names]
+    if not isinstance(node, ast.ImportFrom):
+        return []
+    if node.level == 0:
+        return [(node.module or "").removeprefix("wearstate.")]
+    here = ("wearstate." + name).split(".")[: -node.level]
+    base = ".".join([*here, *([node.module] if node.module else [])])
+    found = base.removeprefix("wearstate").removeprefix(".")
+    # `from . import x` and `from ..sim import scene` name modules, not their contents
+    if found.count(".") == 0:
+        return [f"{found}.{alias.name}".removeprefix(".") for alias in node.names]
+    return [found]
+
+
+def imports_of(name, tree):
+    return [target for node in ast.walk(tree) for target in targets(name, node)]
+
+
+def module_level(tree):
+    """Nodes that run at import: all but function bodies and blocks for the type checker."""
+    queue = list(tree.body)
+    while queue:
+        node = queue.pop()
+        if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda)):
+            continue
+        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test):
+            queue.extend(node.orelse)
+            continue
+        yield node
+        queue.extend(ast.iter_child_nodes(node))
+
+
+def ours(target):
+    return target.split(".")[0] in PACKAGES
+
+
+def violations(name, tree):
+    package = name.split(".")[0]
+    found = []
+    for target in filter(ours, imports_of(name, tree)):
+        other = target.split(".")[0]
+        if other != package and other not in MAY_IMPORT[package]:
+            found.append(f"{name} -> {target}")
+        if package == other == "sim" and floor(target) < floor(name):
+            found.append(f"{name} -> {target} (upwards inside sim)")
+    return found
+
+
+def floor(name):
+    stem = name.split(".")[1]
+    return next(i for i, names in enumerate(SIM_FLOORS) if stem in names)
+
+
+def test_the_reader_sees_a_forbidden_import():
+    upward = ast.parse("from ..diagnose.cli import main\nimport wearstate.features.fft\n")
+    assert violations("sim.scene", upward) == [
+        "sim.scene -> diagnose.cli",
+        "sim.scene -> features.fft",
+    ]
+    assert violations("features.fft", ast.parse("from ..sim import scene")) == [
+        "features.fft -> sim.scene"
+    ]
+    inside = ast.parse("def f():\n    from .assemble import simulate\n")
+    assert violations("sim.ladder", inside) == ["sim.ladder -> sim.assemble (upwards inside sim)"]
+    assert violations("sim.ladder", ast.parse("from . import assemble")) != []
+    assert violations("datasets.generate", ast.parse("from ..sim.scene import load_scene")) == []
+
+
+@pytest.mark.parametrize("name", SOURCES)
+def test_arrows_point_down(name):
+    assert violations(name, SOURCES[name]) == []
+
+
+def test_every_file_of_sim_has_a_floor():
+    stems = {name.split(".")[1] for name in SOURCES if name.startswith("sim.")} - {"__init__"}
+    assert stems <= set().union(*SIM_FLOORS)
+
+
+def reaches_itself(name, graph):
+    seen, queue = set(), list(graph[name])
+    while queue:
+        other = queue.pop()
+        if other == name:
+            return True
+        if other in graph and other not in seen:
+            seen.add(other)
+            queue.extend(graph[other])
+    return False
+
+
+def test_no_import_circles():
+    assert reaches_itself("a", {"a": {"b"}, "b": {"c"}, "c": {"a"}})
+    graph = {name: set(filter(ours, imports_of(name, tree))) for name, tree in SOURCES.items()}
+    assert [name for name in graph if reaches_itself(name, graph)] == []
+
+
+@pytest.mark.parametrize("name", SOURCES)
+def test_imports_inside_the_library_are_relative(name):
+    absolute = [
+        ast.unparse(node)
+        for node in ast.walk(SOURCES[name])
+        if (isinstance(node, ast.ImportFrom) and (node.module or "").startswith("wearstate"))
+        or (isinstance(node, ast.Import) and any("wearstate" in a.name for a in node.names))
+    ]
+    assert absolute == []
+
+
+def heavy_imports(name, tree):
+    found = []
+    for node in module_level(tree):
+        for target in targets(name, node):
+            library = target.split(".")[0]
+            allowed = HEAVY.get(library)
+            if allowed is not None and not {name, name.split(".")[0]} & allowed:
+                found.append(target)
+    return found
+
+
+def test_the_reader_sees_a_heavy_import():
+    assert heavy_imports("sim.scene", ast.parse("import pandas as pd")) == ["pandas"]
+    guarded = ast.parse("try:\n    import h5py\nfinally:\n    1")
+    assert heavy_imports("sim.scene", guarded) == ["h5py"]
+    assert heavy_imports("sim.scene", ast.parse("def f():\n    import pandas")) == []
+
+
+@pytest.mark.parametrize("name", SOURCES)
+def test_heavy_libraries_stay_where_they_belong(name):
+    assert heavy_imports(name, SOURCES[name]) == []
+
+
+@pytest.mark.parametrize("name", [name for name in SOURCES if name.endswith("__init__")])
+def test_packages_hold_no_code(name):
+    [docstring] = SOURCES[name].body
+    assert isinstance(docstring, ast.Expr)
+    assert isinstance(docstring.value, ast.Constant)
+
+
+def imported_by(statement):
+    """Top-level names in sys.modules of a fresh interpreter after a statement."""
+    code = f"{statement}\nimport sys\nprint(*{{name.split('.')[0] for name in sys.modules}})"
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60
+    )
+    return set(done.stdout.split())
+
+
+SLOW_TO_IMPORT = {"numba", "scipy", "sklearn", "matplotlib", "pandas", "h5py", "pyfftw"}
+
+
+def test_the_probe_sees_an_import():
+    assert "scipy" in imported_by("import scipy.signal")
+
+
+@pytest.mark.parametrize("module", ["wearstate", "wearstate.diagnose.cli"])
+def test_the_command_line_imports_nothing_slow(module):
+    assert imported_by(f"import {module}") & SLOW_TO_IMPORT == set()
+
+
+def test_scenes_are_validated_without_the_kernels():
+    assert imported_by("import wearstate.sim.scene") & SLOW_TO_IMPORT == set()
+
+
+def test_pyproject_lists_every_package():
+    table = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    listed = table["tool"]["setuptools"]["packages"]
+    built = {path.parent.name for path in ROOT.glob("*/__init__.py")} - {"tests", "docs", "build"}
+    assert set(listed) == {"wearstate", *(f"wearstate.{name}" for name in built)}
+    assert len(listed) == len(set(listed))
+    assert not list(ROOT.glob("sim/*/__init__.py")), "a nested package must be listed too"
+
+
+def test_pyproject_ships_every_data_file():
+    table = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    shipped = {
+        path
+        for package, patterns in table["tool"]["setuptools"]["package-data"].items()
+        for pattern in patterns
+        for path in (ROOT / Path(*package.split(".")[1:])).glob(pattern)
+    }
+    here = {
+        path
+        for package in PACKAGES
+        for path in (ROOT / package).rglob("*")
+        if path.suffix in {".toml", ".csv", ".j2"}
+    }
+    assert here <= shipped
+
+
+@pytest.mark.parametrize("name", wearstate.__all__)
+def test_public_names_resolve(name):
+    assert getattr(wearstate, name) is not None
+    assert name in dir(wearstate)
+
+
+def test_unknown_public_name():
+    with pytest.raises(AttributeError, match="no attribute 'simulat'"):
+        importlib.import_module("wearstate").simulat  # noqa: B018 - the access is the test

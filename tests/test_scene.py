@@ -1,0 +1,354 @@
+"""Scenes: units, refusals, and the built-in machines."""
+
+import copy
+import math
+import re
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+from pydantic import ValidationError
+from wearstate.sim.assemble import simulate
+from wearstate.sim.scene import (
+    SCENE_FOLDER,
+    UNITS,
+    SceneError,
+    load_scene,
+    scene_from_table,
+    scene_names,
+    scene_table,
+    scene_text,
+    to_si,
+)
+from wearstate.sim.slider_crank import contact_frequency
+
+EVERY_UNIT = [(dimension, unit) for dimension, units in UNITS.items() for unit in units]
+CRANKPIN = "joint.crankpin"
+
+
+def pump_table():
+    return scene_table(scene_text("bilge-pump"))
+
+
+def faults_of(overrides):
+    with pytest.raises(SceneError) as caught:
+        load_scene("bilge-pump", overrides)
+    return caught.value.faults
+
+
+# --- units
+
+
+@pytest.mark.parametrize(("dimension", "unit"), EVERY_UNIT)
+@given(
+    number=st.floats(-1e12, 1e12).filter(lambda x: x == 0 or abs(x) > 1e-250),
+    space=st.sampled_from(["", " ", "  "]),
+)
+def test_every_unit_round_trips(dimension, unit, number, space):
+    value = to_si(f"{number!r}{space}{unit}", dimension)
+    # the factor's decimals, the product and the way back: three roundings of 1.1e-16
+    assert_allclose(value / UNITS[dimension][unit], number, rtol=4e-16, atol=0)
+
+
+@pytest.mark.parametrize(("dimension", "unit"), EVERY_UNIT)
+def test_one_unit_is_its_factor(dimension, unit):
+    assert to_si(f"1 {unit}", dimension) == UNITS[dimension][unit]
+
+
+def test_factors_against_their_definitions():
+    # Not from the table: what each unit means. Exact but for one rounding.
+    known = [
+        ("1 in", "length", 25.4e-3),
+        ("60 rpm", "rotation speed", 1.0),
+        ("25 Hz", "rotation speed", 25.0),
+        ("25 Hz", "frequency", 25.0),
+        ("180 deg", "angle", math.pi),
+        ("1 bar", "pressure", 1e5),
+        ("14.503773773020923 psi", "pressure", 1e5),
+        ("1 g", "acceleration", 9.80665),
+        ("1 g", "mass", 1e-3),
+        ("2 h", "time", 7200.0),
+        ("1 N/um", "stiffness", 1e6),
+        ("1 kg mm^2", "inertia", 1e-6),
+        ("2.5 %", "ratio", 0.025),
+    ]
+    for text, dimension, expected in known:
+        assert_allclose(to_si(text, dimension), expected, rtol=3e-16, err_msg=text)
+
+
+@pytest.mark.parametrize("first", UNITS)
+def test_the_first_unit_of_a_dimension_is_si(first):
+    assert next(iter(UNITS[first].values())) == 1.0
+
+
+def test_decimal_prefixes_are_exact():
+    assert to_si("0.25 mm", "length") == 0.00025
+    assert to_si("0.08 mm", "length") == 0.00008
+    assert to_si("0.13 mm", "length") == 0.00013
+    assert to_si("0.31 mm", "length") == 0.00031
+    assert to_si("-3e-2 MPa", "pressure") == -30000.0
+    assert to_si("7 us", "time") == 7e-6
+
+
+@given(st.one_of(st.floats(allow_nan=False), st.integers(-(10**15), 10**15)))
+def test_bare_numbers_are_si(number):
+    assert to_si(number, "length") == number
+
+
+@pytest.mark.parametrize(
+    ("value", "says"),
+    [
+        ("0.25", "has no unit; use one of m, cm, mm"),
+        ("0.25 kg", "has unit 'kg', not one of length"),
+        ("0.25 MM", "has unit 'MM'"),
+        ("mm", "has no leading number"),
+        ("", "has no leading number"),
+        ("nan mm", "has no leading number"),
+        ("1,5 mm", "has unit ',5 mm'"),
+        (True, "is not a number or a string with a unit"),
+        (None, "is not a number"),
+        ([1.0], "is not a number"),
+    ],
+)
+def test_unusable_quantities(value, says):
+    with pytest.raises(ValueError, match=re.escape(says)):
+        to_si(value, "length")
+
+
+@given(st.text(max_size=12))
+def test_any_text_is_a_finite_length_or_a_value_error(text):
+    try:
+        value = to_si(text, "length")
+    except ValueError:
+        return
+    assert not math.isnan(value)
+
+
+# --- refusals
+
+
+def test_all_errors_at_once():
+    faults = faults_of(
+        {
+            "drive.speed": "0 rpm",
+            f"{CRANKPIN}.diametral_clearance": "-0.02 mm",
+            "rod.mass": "3 m",
+            "piston.diamter": "0.1 m",
+            "pressure.rung": "magic",
+            "sensors.1.range": 0,
+        }
+    )
+    assert sorted(fault.split(" ")[0] for fault in faults) == [
+        "drive.speed",
+        "joint.crankpin.diametral_clearance",
+        "piston.diamter",
+        "pressure.rung",
+        "rod.mass",
+        "sensors.1.range",
+    ]
+
+
+def test_error_names_quantity_value_bound_and_cure():
+    [speed] = faults_of({"drive.speed": "0 rpm"})
+    assert speed.startswith("drive.speed = 0 rev/s must be > 0")
+    [clearance] = faults_of({f"{CRANKPIN}.diametral_clearance": "-0.02 mm"})
+    assert clearance.startswith("joint.crankpin.diametral_clearance = -2e-05 m must be >= 0")
+    [unit] = faults_of({"rod.mass": "3 m"})
+    assert unit.startswith("rod.mass = '3 m' has unit 'm', not one of mass; use one of kg, g")
+
+
+@pytest.mark.parametrize(
+    ("path", "nearest"),
+    [
+        ("piston.diamter", "diameter"),
+        ("drive.sped", "speed"),
+        (f"{CRANKPIN}.diametric_clearance", "diametral_clearance"),
+        ("joint.crank_pin", "crankpin"),
+        ("durations", "duration"),
+    ],
+)
+def test_unknown_keys_are_refused_with_the_nearest(path, nearest):
+    faults = faults_of({path: "1 m"})
+    assert f"{path} is an unknown key; did you mean '{nearest}'?" in faults
+
+
+def test_unknown_scene_and_machine_name_the_nearest():
+    with pytest.raises(SceneError, match="did you mean 'bilge-pump'"):
+        load_scene("bilge-pmup")
+    with pytest.raises(SceneError, match="did you mean 'reciprocating-pump'"):
+        load_scene("bilge-pump", {"machine": "reciprocating-pmup"})
+
+
+@pytest.mark.parametrize(
+    ("changes", "says"),
+    [
+        ({f"{CRANKPIN}.radial_clearance": "40 mm"}, "must be smaller than the pin"),
+        ({f"{CRANKPIN}.diametral_clearance": "60 mm"}, "must be smaller than the pin"),
+        ({"rod.centre_of_mass": "0.3 m"}, "centre_of_mass = 0.3 m must be <= length = 0.25 m"),
+        ({"rod.length": "50 mm", "rod.centre_of_mass": 0.03}, "a shorter rod locks the crank"),
+        ({"pressure.discharge": "-0.05 MPa"}, "must be >= suction"),
+        ({"pressure.suction": "-2 bar"}, "must be >= -101325"),
+        ({"wear.condemning_diametral": "0.3 mm"}, "must equal condemning_diametral"),
+        ({"wear.as_new_diametral": "0.2 mm"}, "must rise strictly"),
+        ({"sensors.1.name": "acc_x"}, "'acc_x' is given 2 times"),
+        ({"casing.modes.2.shape.bearing_z": 0.1}, "casing.modes.2.shape.bearing_z is no place"),
+        ({"rod.mass": math.inf}, "rod.mass = inf kg"),
+        ({"rod.mass": "1e999 kg"}, "rod.mass = inf kg"),
+    ],
+)
+def test_impossible_machines(changes, says):
+    assert any(says in fault for fault in faults_of(changes))
+
+
+@pytest.mark.parametrize("given", [(), ("diametral_clearance", "radial_clearance")])
+def test_exactly_one_clearance(given):
+    table = pump_table()
+    joint = table["joint"]["crankpin"]
+    del joint["diametral_clearance"]
+    joint |= dict.fromkeys(given, "0.1 mm")
+    with pytest.raises(SceneError, match="must be exactly one of diametral_clearance and radial"):
+        scene_from_table(table)
+
+
+def test_missing_shape_at_a_sensor():
+    table = copy.deepcopy(pump_table())
+    del table["casing"]["modes"][0]["shape"]["acc_y"]
+    with pytest.raises(SceneError, match=r"casing.modes.0.shape.acc_y is missing; give the shape"):
+        scene_from_table(table)
+
+
+def test_override_that_leads_nowhere():
+    with pytest.raises(SceneError, match=r"sensors.7.noise does not lead to a value"):
+        load_scene("bilge-pump", {"sensors.7.noise": 0})
+    with pytest.raises(SceneError, match=r"name.first does not lead to a value"):
+        load_scene("bilge-pump", {"name.first": 0})
+
+
+def test_override_leaves_the_table_alone():
+    table = pump_table()
+    before = copy.deepcopy(table)
+    load_scene("bilge-pump", {"casing.modes.0.shape.acc_x": 0.5})
+    assert table == before
+    assert pump_table() == before
+
+
+def test_no_toml_and_no_text(tmp_path):
+    broken = tmp_path / "broken.toml"
+    broken.write_text("name = ", encoding="utf-8")
+    with pytest.raises(SceneError, match="not TOML"):
+        load_scene(broken)
+    broken.write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(SceneError, match="is no UTF-8 text"):
+        load_scene(broken)
+
+
+def test_too_long_a_step_names_value_and_bound():
+    scene = load_scene("bilge-pump", {"numerics.step": "1 ms"})
+    bound = f"{1 / contact_frequency(scene):.3g} s"
+    with pytest.raises(SceneError, match=r"numerics\.step = 0\.001 s must be <= ") as caught:
+        simulate(scene, seed=0)
+    assert bound in str(caught.value)
+    assert "shorten it" in str(caught.value)
+
+
+def test_a_recording_holds_a_revolution():
+    scene = load_scene("bilge-pump", {"duration": "0.19 s"})
+    with pytest.raises(SceneError, match=r"duration = 0\.19 s must be >= one revolution = 0\.2 s"):
+        simulate(scene, seed=0)
+
+
+def test_faults_of_the_plan_come_together():
+    changes = {"duration": "0.19 s", "numerics.step": "1 ms", "sample_rate": "60 Hz"}
+    with pytest.raises(SceneError) as caught:
+        simulate(load_scene("bilge-pump", changes), seed=0)
+    assert [fault.split(" ")[0] for fault in caught.value.faults] == [
+        "duration",
+        "tacho.pulse_width",
+        "numerics.step",
+    ]
+
+
+@pytest.mark.parametrize(
+    "part", [lambda s: s, lambda s: s.rod, lambda s: s.joint.crankpin, lambda s: s.sensors[0]]
+)
+def test_frozen(part):
+    target = part(load_scene("bilge-pump"))
+    field = next(iter(type(target).model_fields))
+    with pytest.raises(ValidationError, match="frozen"):
+        setattr(target, field, getattr(target, field))
+
+
+# --- radial and diametral
+
+
+def test_diametral_is_twice_radial():
+    # Jetstream 3600/4200: renew the rod bearing at 0.31 mm on the diameter
+    for name, value in (("diametral_clearance", "0.31 mm"), ("radial_clearance", "0.155 mm")):
+        joint = load_scene("bilge-pump", {f"{CRANKPIN}.{name}": value}).joint.crankpin
+        assert joint.clearance_radial == 0.155e-3
+        assert joint.clearance_diametral == 0.31e-3
+
+
+def test_setting_one_clearance_removes_the_other():
+    joint = load_scene("bilge-pump", {f"{CRANKPIN}.radial_clearance": "0.1 mm"}).joint.crankpin
+    assert joint.diametral_clearance is None
+    assert joint.clearance_diametral == 0.2e-3
+
+
+def test_limits_of_the_bilge_pump_are_those_of_its_source():
+    wear = load_scene("bilge-pump").wear
+    new_low, new_high, renew = 0.05e-3, 0.13e-3, 0.31e-3  # Jetstream 3600/4200, diametral
+    assert wear.as_new_diametral == new_low
+    assert wear.grade_edges_diametral[0] == new_high
+    assert wear.grade_edges_diametral[2] == wear.condemning_diametral == renew
+    # grade 2 begins in the middle of the wear allowance
+    assert_allclose(wear.grade_edges_diametral[1], (new_high + renew) / 2, rtol=1e-12)
+
+
+# --- the built-in scenes
+
+
+@pytest.mark.parametrize("name", scene_names())
+def test_built_in_scenes_load(name):
+    scene = load_scene(name)
+    assert scene.name == name
+    assert scene.description
+    assert scene == load_scene(SCENE_FOLDER / f"{name}.toml")
+
+
+def unexplained_numbers(text):
+    """Lines of TOML with a number that neither they, nor their block, nor an elder twin explain.
+
+    A block is explained by a comment above its header or under it; the second ``[[sensors]]``
+    shares the reasons of the first.
+    """
+    explained, bare, block, above = set(), [], "", ""
+    for number, line in enumerate(text.splitlines(), 1):
+        code, _, comment = line.partition("#")
+        key, _, value = code.partition("=")
+        if code.startswith("["):
+            block = code.strip()
+            explained |= {block} if above.startswith("#") else set()
+        elif comment and not code.strip():
+            explained |= {block} if block and above else set()
+        elif comment.strip():
+            explained.add((block, key))
+        elif any(c.isdigit() for c in value) and not {block, (block, key)} & explained:
+            bare.append(f"{number}: {line}")
+        above = line.strip()
+    return bare
+
+
+def test_the_reader_of_comments_sees_a_bare_number():
+    assert unexplained_numbers("a = 1\n") == ["1: a = 1"]
+    twins = "[[e]]\nf = 3  # why\n[[e]]\nf = 4\ng = 5\n"
+    assert unexplained_numbers(f"a = 1  # why\nb = 'x'\n\n# why\n[c]\nd = 2\n{twins}") == [
+        "11: g = 5"
+    ]
+    assert unexplained_numbers("[a]\n# why\nb = 1\n[c]\nd = 2\n") == ["5: d = 2"]
+
+
+@pytest.mark.parametrize("name", scene_names())
+def test_every_number_of_a_scene_has_a_reason(name):
+    assert unexplained_numbers(scene_text(name)) == []

@@ -1,0 +1,15 @@
+#!/usr/bin/env bash
+# mypy takes a package's name from its folder, so it checks a link that is named right.
+# Usage: tests/types.sh BIN
+set -euo pipefail
+cd "$(dirname "$0")/.."
+bin=$(cd "$1" && pwd)
+scratch=$(mktemp -d)
+trap 'rm -rf "$scratch"' EXIT
+mkdir "$scratch/wearstate"
+for part in __init__.py __main__.py py.typed sim features datasets diagnose; do
+  ln -s "$PWD/$part" "$scratch/wearstate/$part"
+done
+cp pyproject.toml "$scratch"
+cd "$scratch"
+"$bin/mypy" --config-file pyproject.toml --cache-dir "$scratch/cache" -p wearstate
