@@ -296,7 +296,9 @@ def _recording(
     factor = to_si(f"1 {unit}", "acceleration")
     with np.errstate(over="ignore"):  # becomes inf, which a recording refuses by name
         signal = (rows.astype(np.float64) * factor).astype(np.float32)
-    channels = tuple(Channel(name=n, unit="m/s^2", quantity="acceleration") for n in names)
+    channels = tuple(
+        Channel(name=n, unit="m/s^2", quantity="acceleration", unit_in_file=unit) for n in names
+    )
     return Recording(
         signal=signal,
         sample_rate=fs,

@@ -70,7 +70,7 @@ def _describe_data(path: Path) -> dict[str, Any]:
         "machine draws": int(manifest["group"].nunique()),
         "status": ", ".join(f"{n} {s}" for s, n in manifest["status"].value_counts().items()),
         "grades": ", ".join(f"{n} of {_grade(g)}" for g, n in grades.items()),
-        "channels": ", ".join(f"{c.name} [{c.unit}]" for c in head.channels),
+        "channels": ", ".join(channel.label for channel in head.channels),
         "tacho": head.tacho or "none",
         "sample rate": f"{head.sample_rate:g} Hz",
         "duration": f"{first.duration:g} s each",
@@ -93,7 +93,7 @@ def _describe_recording(path: Path) -> dict[str, Any]:
     return {
         "kind": "recording",
         "origin": recording.origin,
-        "channels": ", ".join(f"{c.name} [{c.unit}]" for c in recording.channels),
+        "channels": ", ".join(channel.label for channel in recording.channels),
         "tacho": recording.tacho or "none",
         "sample rate": f"{recording.sample_rate:g} Hz",
         "samples": recording.signal.shape[1],

@@ -43,6 +43,7 @@ def report_table(recording: Recording, model: WearModel, estimate: Estimate) -> 
             "source": recording.source,
             "origin": recording.origin,
             "channels": [asdict(channel) for channel in recording.channels],
+            "label": _recording_line(recording),
             "tacho": recording.tacho,
             "sample_rate_hz": recording.sample_rate,
             "duration_s": recording.duration,
@@ -96,7 +97,7 @@ def quantity_name(severity: str) -> str:
 def report_text(table: dict[str, Any]) -> str:
     """The report for a terminal: verdict first, a dozen lines."""
     estimate, limits = table["estimate"], table["limits"]
-    lines = [f"Recording   {_recording_line(table['recording'])}"]
+    lines = [f"Recording   {table['recording']['label']}"]
     if estimate["verdict"] == "unfamiliar":
         lines.append("Verdict     UNFAMILIAR: no grade is given")
         lines += [f"  because   {reason}" for reason in estimate["reasons"]]
@@ -114,11 +115,11 @@ def report_text(table: dict[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def _recording_line(recording: dict[str, Any]) -> str:
-    channels = ", ".join(f"{c['name']} [{c['unit']}]" for c in recording["channels"])
+def _recording_line(recording: Recording) -> str:
+    channels = ", ".join(channel.label for channel in recording.channels)
     return (
-        f"{recording['source']}: {recording['origin']}, {recording['duration_s']:.3g} s at "
-        f"{recording['sample_rate_hz']:g} Hz, {channels}"
+        f"{recording.source}: {recording.origin}, {recording.duration:.3g} s at "
+        f"{recording.sample_rate:g} Hz, {channels}"
     )
 
 
@@ -163,7 +164,6 @@ def report_html(table: dict[str, Any], recording: Recording) -> str:
         colour=_GRADE_COLOURS[estimate["grade"]] if graded else "#5b6470",
         clearance=_millimetres(estimate) if graded else "",
         quantity=quantity_name(table["limits"]["severity"]),
-        recording_line=_recording_line(table["recording"]),
         gauge=_gauge(table) if graded else "",
         figures=figures,
         trained=table["provenance"]["model"],

@@ -64,11 +64,11 @@ def train_model(
         No severity column, no limits, or too few machine draws.
     """
     with DataSet(path) as data:
-        head = data.attributes
-    _check_labelled(head, path)
+        head, draws = data.attributes, data.manifest["group"].nunique()
+    _check_labelled(head, draws, path)
     table = feature_table(path, jobs=jobs, progress=progress)
     groups = table.manifest["group"].to_numpy()
-    train, test = _split(groups, held_out, seed, path)
+    train, test = _split(groups, held_out, seed)
     severity = table.manifest[head.severities[0]].to_numpy(dtype=float)
     regressor, errors = fit_severity(table.values[train], severity[train], groups[train], seed)
     distances = _out_of_fold_distances(table.values[train], groups[train], seed)
@@ -81,22 +81,21 @@ def train_model(
     return model, table, test
 
 
-def _check_labelled(head: Attributes, path: str | Path) -> None:
+def _check_labelled(head: Attributes, draws: int, path: str | Path) -> None:
     if not head.severities or len(head.grade_edges) == 0:
         raise DataError(
             f"{path}: severities = {list(head.severities)}, grade_edges = {list(head.grade_edges)} "
             "must both be given; label the data set, or generate it from a recipe"
         )
+    if draws < _FEWEST_GROUPS:
+        raise DataError(
+            f"{path}: {draws} machine draws, must be >= {_FEWEST_GROUPS}; generate more records"
+        )
 
 
 def _split(
-    groups: NDArray[Any], held_out: float, seed: int, path: str | Path
+    groups: NDArray[Any], held_out: float, seed: int
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    n_groups = len(np.unique(groups))
-    if n_groups < _FEWEST_GROUPS:
-        raise DataError(
-            f"{path}: {n_groups} machine draws, must be >= {_FEWEST_GROUPS}; generate more records"
-        )
     if held_out == 0:
         return np.arange(len(groups)), np.arange(0)
     return group_split(groups, test_fraction=held_out, seed=seed)

@@ -46,8 +46,8 @@ class Check:
     kind : str
         ``"absolute"`` or ``"relative"``.
     trust : str
-        How far the expected value can be trusted: ``R`` read at the source, ``H`` recomputed by
-        hand, ``M`` recalled, ``V`` verified; combined with ``+``.
+        How far the expected value can be trusted: ``R`` read at the source, ``H`` computed by
+        an independent implementation, ``M`` recalled, ``V`` verified; combined with ``+``.
     source : str
         Where it is from.
     obtain : callable

@@ -8,13 +8,30 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True, kw_only=True)
 class Channel:
-    """One row of a signal: what it is, in which unit, from where."""
+    """One row of a signal: what it is, in which unit, from where.
+
+    Attributes
+    ----------
+    name, unit, quantity : str
+        The unit is that of the numbers; the quantity is ``acceleration``, ``tacho``, ….
+    place, direction : str
+        For the report.
+    unit_in_file : str
+        What a measured file declared before conversion; empty for a simulated channel.
+    """
 
     name: str
     unit: str
     quantity: str
     place: str = ""
     direction: str = ""
+    unit_in_file: str = ""
+
+    @property
+    def label(self) -> str:
+        """Name and unit, for people: ``acc [m/s^2]``, or ``gs [m/s^2, g in the file]``."""
+        converted = self.unit_in_file not in ("", self.unit)
+        return f"{self.name} [{self.unit}{f', {self.unit_in_file} in the file' * converted}]"
 
 
 def digitise(

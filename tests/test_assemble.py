@@ -160,9 +160,9 @@ def test_a_floating_casing_recoils(rung):
     rate = 2j * np.pi * order / 0.4
     expected = -(rate**2) * np.fft.rfft(mass_times_place, axis=1)[:, order] / 100.0
     found = np.fft.rfft(result.signal[:2].astype(float), axis=1)[:, order]
-    # Ideal: periodic, so rounding of float32 and 24 bits. Compliant: the two turns differ by
-    # their knocks.
-    tolerance = 1e-3 if rung == "ideal" else 3e-2
+    # The decimation's ripple, 0.002 dB at this factor; the two turns of the compliant joint differ
+    # by their knocks, which a spectrum of two turns does not mind below order 10.
+    tolerance = 2.5e-4
     for axis in range(2):
         miss = np.linalg.norm(found[axis] - expected[axis]) / np.linalg.norm(expected[axis])
         print(f"\n{rung}, axis {axis}: {miss:.1e}")

@@ -266,6 +266,14 @@ def test_draws_are_independent(standard):
     assert np.abs(correlation).max() < 5 / np.sqrt(999)
 
 
+def test_machine_and_record_of_one_number_are_independent(standard):
+    values, _ = standard
+    # machine k and record k, each by the first number of its stream; bound as above
+    machine = rankdata(values["casing.modes.0.frequency"][::2])
+    record = rankdata(values["drive.speed"][:1000])
+    assert abs(np.corrcoef(machine, record)[0, 1]) < 5 / np.sqrt(999)
+
+
 def test_severity_does_not_know_its_group(standard):
     values, _ = standard
     level = np.log(values[CRANKPIN] / 0.05e-3) / np.log(9.3)
@@ -302,6 +310,9 @@ def test_the_shifted_set_lies_outside_the_standard_one():
     assert np.all((np.abs(pressure - 1) >= 0.2) & (np.abs(pressure - 1) <= 0.4))
     # both bands equally wide: 200 of 400, 4 deviations = 40
     assert abs(np.count_nonzero(pressure > 1) - 200) < 40
+    # each band is filled: 200 draws leave 5 % of it free at an end with probability 4e-5
+    ends = [pressure[pressure < 1].max(), pressure[pressure > 1].min()]
+    assert_allclose(ends, [0.8, 1.2], atol=0.01)
     speed = np.array([row["speed_hz"] for row in rows])
     assert 3.5 <= speed.min() < 3.6
     assert 6.4 < speed.max() <= 6.5

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.io import loadmat, savemat
 from wearstate.datasets import importers
-from wearstate.datasets.importers import POUND_FORCE, read_recording
+from wearstate.datasets.importers import read_recording
 from wearstate.datasets.record import Attributes, DataError, DataSetWriter
 from wearstate.sim.scene import STANDARD_GRAVITY
 from wearstate.sim.sensor import Channel
@@ -37,7 +37,8 @@ def test_a_known_layout_declares_its_unit(mat):
     # float32: half an ulp
     assert_allclose(item.signal, [SIGNAL * STANDARD_GRAVITY], rtol=6e-8)
     assert (item.sample_rate, item.units, item.tacho) == (1000.0, {"gs": "m/s^2"}, None)
-    assert item.row == {"speed_hz": 25.0, "load_n": 100 * POUND_FORCE}
+    # pound-force: 0.45359237 kg at 9.80665 m/s^2
+    assert item.row == {"speed_hz": 25.0, "load_n": 444.82216152605}
     assert (item.origin, item.source) == ("measured", "bearing.mat")
 
 
@@ -210,7 +211,7 @@ def test_measured_bearings(realdata, name, fs, n_samples, load):
     item = read_recording(path)
     assert (item.sample_rate, item.signal.shape, item.tacho) == (fs, (1, n_samples), None)
     assert_allclose(item.row["speed_hz"], 25.0)
-    assert_allclose(item.row["load_n"], load * POUND_FORCE)
+    assert_allclose(item.row["load_n"], load * 4.4482216152605)
     in_g = loadmat(path)["bearing"]["gs"][0, 0][:, 0]
     # float32 of the product: half an ulp
     assert_allclose(item.signal[0], in_g * 9.80665, rtol=6e-8)

@@ -1,11 +1,12 @@
 """The data set file: what is written comes back, and nothing damaged passes as data."""
 
 import json
+import os
 import pickle
 import shutil
 from concurrent.futures import ProcessPoolExecutor
 from functools import partial
-from multiprocessing import get_context
+from multiprocessing import Pipe, get_context
 from operator import getitem
 from types import SimpleNamespace
 
@@ -133,6 +134,22 @@ def test_loader_processes_open_it_themselves(path, start):
         copy.close()
 
 
+def opened_by(data, pipe):
+    pipe.send((data[1].signal, data._pid == os.getpid()))
+
+
+def test_a_handle_does_not_cross_a_fork(path):
+    receiving, sending = Pipe(duplex=False)
+    with DataSet(write_all(path)) as data:
+        data[0]  # the parent's handle is open
+        child = get_context("fork").Process(target=opened_by, args=(data, sending))
+        child.start()
+        signal, own = receiving.recv()
+        child.join()
+    assert_array_equal(signal, signal_of(1))
+    assert own
+
+
 # -- refused -----------------------------------------------------------------------------------
 
 
@@ -202,13 +219,20 @@ def test_files_of_others_are_refused(tmp_path):
         DataSet(tmp_path / "absent.h5")
 
 
-def test_sizes_the_file_cannot_hold_are_refused(path):
+@pytest.mark.parametrize(
+    ("n_samples", "message"),
+    [
+        (2**40, "declares 8796093022208 byte per record"),  # reading one would ask for 8 TB
+        (1000, r"declares 8000 byte .* and holds 0 of 24000 byte"),  # would read as zeros
+    ],
+)
+def test_sizes_the_file_does_not_hold_are_refused(path, n_samples, message):
     write_all(path)
     with h5py.File(path, "r+") as file:
         del file["signal"]
-        # declared, never stored: reading one record would ask for 8 TB
-        file.create_dataset("signal", (N_RECORDS, 2, 2**40), np.float32, chunks=(1, 1, 2**20))
-    with pytest.raises(DataError, match=r"/signal declares 8796093022208 byte per record"):
+        chunks = (1, 1, min(n_samples, 2**20))
+        file.create_dataset("signal", (N_RECORDS, 2, n_samples), np.float32, chunks=chunks)
+    with pytest.raises(DataError, match=message):
         DataSet(path)
 
 

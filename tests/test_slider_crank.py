@@ -21,7 +21,7 @@ from wearstate.sim.scene import load_scene
 REVOLUTION = np.linspace(0.0, 2 * np.pi, 721)
 PUMP = load_scene("bilge-pump")
 BENCHMARK = load_scene("slider-crank-benchmark")
-TILTED = load_scene("bilge-pump", {"stroke_inclination": "35 deg"})
+TILTED = load_scene("bilge-pump", {"stroke_inclination": "35 deg"})  # gravity both ways
 
 
 def crank_by_newton_euler(scene, angle, piston_force):
@@ -145,6 +145,26 @@ def test_drive_does_the_work_of_the_pressure(rise):
     assert 0 < work < area * span * 2 * radius
 
 
+def test_ideal_run_records_the_ideal_forces_in_mid_step():
+    step, start = 1e-4, 0.4
+    run = sc.run_ideal(TILTED, step=step, n_steps=3000, start_angle=start)
+    omega, p = 2 * np.pi * TILTED.drive.speed, sc.parameters(TILTED)
+    middle = start + omega * step * (np.arange(3000) + 0.5)
+    push = np.array([sc._piston_force(a, p) for a in middle])
+    assert np.ptp(push) > 1000  # N: both levels are met
+    expected = crank_by_newton_euler(TILTED, middle, push)
+    columns = [expected["pin_force_x"], expected["pin_force_y"], expected["guide_force"], push]
+    # Rounding of angle and forces, on the scale of the pin force.
+    assert_allclose(run.forces, np.column_stack(columns), rtol=0, atol=1e-11 * 3000)
+    assert run.states.shape == (3001, 6)
+    ends = start + omega * step * np.arange(3001)
+    assert_allclose(run.states[:, 0], ends, rtol=1e-14)
+    at_ends = crank_by_newton_euler(TILTED, ends, 0.0)
+    assert_allclose(run.states[:, 2], at_ends["piston"], rtol=1e-13)
+    assert_allclose(run.states[:, 3], at_ends["piston_velocity"], rtol=0, atol=1e-12)
+    assert run.peak_normal_force == np.hypot(*run.forces[:, :2].T).max()
+
+
 def test_pressure_levels_and_ramps():
     down, up = 0.5 * math.pi, 1.5 * math.pi
     assert two_level_pressure(down, -2.0, 7.0, 0.1) == -2.0
@@ -181,7 +201,7 @@ def test_restitution_of_the_mechanism(ratio, release, expected):
 # --- energy of the free crank
 
 
-def free_crank(scene=PUMP, **changes):
+def free_crank(scene=TILTED, **changes):
     """Parameters without drive and losses: the crank has an inertia, nothing takes energy out."""
     free = {
         "pressure_rung": PRESSURE_NONE,
@@ -211,7 +231,7 @@ def mechanical_energy(state, p):
     return kinetic + height + np.where(sigma.real > 0, 0.5 * p.stiffness * sigma * sigma, 0.0)
 
 
-def thrown(angle, p, scene=PUMP):
+def thrown(angle, p, scene=TILTED):
     """A start in free flight: the pin is kicked off its side of the eye."""
     start = list(sc.start_state(scene, angle))
     start[2] += 0.5 * p.clearance
@@ -349,7 +369,8 @@ def test_energy_of_a_run_with_friction_only_falls():
 @pytest.fixture(scope="module")
 def fine_run():
     """Worn pump at a twentieth of the contact time, without friction, and its parameters."""
-    scene = load_scene("bilge-pump", {"joint.crankpin.diametral_clearance": "0.31 mm"})
+    worn = {"joint.crankpin.diametral_clearance": "0.31 mm", "stroke_inclination": "35 deg"}
+    scene = load_scene("bilge-pump", worn)
     p = sc.parameters(scene)._replace(friction=0.0, tangential_damping=0.0)
     step = 0.05 / sc.contact_frequency(scene)
     run = sc.run_compliant(p, sc.start_state(scene, 0.3), step=step, n_steps=math.ceil(0.5 / step))

@@ -3,7 +3,7 @@
 Band levels and peak pin force at the default step against a quarter of it, and the quarter
 against an eighth. Contact with clearance is chaotic, so means over start angles are compared, and
 the number of starts is doubled until their standard error is a third of what is asked. Run as
-``python tests/benchmarks/convergence_pump.py`` (about ten minutes on two cores).
+``python tests/benchmarks/convergence_pump.py`` (about five minutes on one core).
 """
 
 from functools import cache
