@@ -1,6 +1,9 @@
 """Worker processes: results in the order of the work, few in flight."""
 
 import gc
+import os
+import threading
+import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any, TypeVar
@@ -10,6 +13,9 @@ Result = TypeVar("Result")
 
 AHEAD_PER_JOB = 3
 """Items handed out and not yet taken back, per worker; bounds the memory of a run."""
+
+PARENT_CHECK = 1.0
+"""Time between two looks of a worker at whether its parent lives [s]."""
 
 _ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 
@@ -58,8 +64,14 @@ def in_order(
 
 
 def _settle() -> None:
-    """Start a worker: exempt what is imported from garbage collection.
-
-    Without it loky's collection, once a second over every module's objects, costs 8 % of a run.
-    """
+    """Start a worker."""
+    # loky collects garbage once a second; over every imported object that is 8 % of a run
     gc.freeze()
+    threading.Thread(target=_follow, args=(os.getppid(),), daemon=True).start()
+
+
+def _follow(parent: int) -> None:
+    """End this worker when the process that started it is gone: a killed one cannot say so."""
+    while os.getppid() == parent:
+        time.sleep(PARENT_CHECK)
+    os._exit(1)

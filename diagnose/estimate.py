@@ -27,8 +27,9 @@ MODEL_SCHEMA = 1
 COVERAGE = 0.9
 """Nominal coverage of the interval."""
 
-UNFAMILIAR_BELOW = 0.01
-"""A recording with a smaller p-value is called unfamiliar: at most 1 % of familiar ones are."""
+UNFAMILIAR_SHARE = 0.01
+"""Share of familiar recordings that may be called unfamiliar, where the calibration is large
+enough to tell so small a share; else one in its number."""
 
 _FEWEST_NEIGHBOURS = 40  # out-of-fold errors that decide an interval: its level moves by 2.5 %
 _RATE_TOLERANCE = 1e-3  # of the sample rate; band edges move as much
@@ -71,6 +72,8 @@ class Estimate:
     p_value : float or None
         Of the hypothesis that the recording is of the trained kind; None where it could not even
         be turned into the model's features.
+    p_limit : float or None
+        At or below it a recording is called unfamiliar.
     grade : int or None
         0 to 3.
     grade_name : str
@@ -90,6 +93,7 @@ class Estimate:
     reasons: tuple[str, ...] = ()
     cautions: tuple[str, ...] = ()
     p_value: float | None = None
+    p_limit: float | None = None
     grade: int | None = None
     grade_name: str = ""
     possible_grades: tuple[int, ...] = ()
@@ -125,6 +129,11 @@ class WearModel:
     familiarity: Familiarity
     card: dict[str, Any]
 
+    @property
+    def p_limit(self) -> float:
+        """A recording with this p-value or a smaller one is called unfamiliar."""
+        return max(UNFAMILIAR_SHARE, 1 / (len(self.calibration.distance) + 1))
+
     def estimate(self, recording: Recording) -> Estimate:
         """Estimate the wear of the machine in a recording.
 
@@ -159,13 +168,16 @@ class WearModel:
         row = values[None, :]
         distance = float(self.familiarity.distance(row)[0])
         p_value = novelty_p_value(distance, self.calibration.distance)
-        if p_value < UNFAMILIAR_BELOW:
+        if p_value <= self.p_limit:
             reason = (
                 f"its features lie {distance:.3g} from the centre of the training recordings, "
-                f"farther than {100 * (1 - p_value):.2g} % of them (largest: "
+                f"as far as at most {100 * p_value:.2g} % of them (median "
+                f"{np.median(self.calibration.distance):.3g}, largest "
                 f"{self.calibration.distance.max():.3g})"
             )
-            return Estimate(verdict="unfamiliar", reasons=(reason,), p_value=p_value)
+            return Estimate(
+                verdict="unfamiliar", reasons=(reason,), p_value=p_value, p_limit=self.p_limit
+            )
         log_severity = float(self.regressor.predict(row)[0])
         low, high = (
             math.exp(log_severity + q) for q in interval_offsets(log_severity, self.calibration)
@@ -178,6 +190,7 @@ class WearModel:
             verdict="graded",
             cautions=tuple(self._cautions(values)),
             p_value=p_value,
+            p_limit=self.p_limit,
             grade=grade,
             grade_name=GRADE_NAMES[grade],
             possible_grades=tuple(span),
@@ -312,8 +325,7 @@ def save_model(model: WearModel, path: str | Path, *, force: bool = False) -> No
     try:
         with zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED) as bundle:
             for name, data in {"seal.json": json.dumps(seal).encode(), **members}.items():
-                # a fixed date, so that the same model is the same file
-                bundle.writestr(zipfile.ZipInfo(name, (1980, 1, 1, 0, 0, 0)), data)
+                bundle.writestr(name, data)
         os.replace(part, target)
     finally:
         part.unlink(missing_ok=True)

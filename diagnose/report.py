@@ -106,7 +106,7 @@ def report_text(table: dict[str, Any]) -> str:
             f"Verdict     grade {estimate['grade']} ({estimate['grade_name']})",
             f"Clearance   {_millimetres(estimate)} mm, {quantity_name(limits['severity'])}",
             f"Limit       {1e3 * limits['condemning_limit_m']:.3g} mm ({limits['source']})",
-            f"Familiarity p = {estimate['p_value']:.2g} (unfamiliar below 0.01)",
+            f"Familiarity p = {estimate['p_value']:.2g} (unfamiliar at {estimate['p_limit']:.2g})",
         ]
     lines += [f"Caution     {caution}" for caution in estimate["cautions"]]
     lines.append(f"Advice      {table['advice']}")

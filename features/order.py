@@ -78,7 +78,7 @@ def pulse_times(tacho: ArrayLike, fs: float, *, level: float | None = None) -> F
     if not low < middle < high:
         raise ValueError(
             f"level = {middle:.6g} must lie between the extremes of the tacho, {low:.6g} and "
-            f"{high:.6g}; a tacho without swing is disconnected"
+            f"{high:.6g}; the tacho is disconnected, or the record shorter than a revolution"
         )
     before = _edge_samples(volts, middle, HYSTERESIS_SHARE * min(middle - low, high - middle))
     if before.size < 2:

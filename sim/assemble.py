@@ -7,7 +7,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from .casing import decimate, edge_samples, housing_acceleration
+from .casing import Modes, band_limited_acceleration, decimate, edge_samples
 from .integrate import SimulationError, Solution, Status
 from .ladder import Rung, crankpin_rung
 from .scene import FORCE_PLACES, PumpScene, Scene, SceneError
@@ -15,11 +15,15 @@ from .sensor import Channel, digitise, tacho_pulses
 from .slider_crank import (
     LARGEST_STEP_PER_CONTACT_TIME,
     STATE,
+    STEP_PER_CONTACT_DECAY,
     STEP_PER_CONTACT_TIME,
     CrankRun,
     contact_frequency,
+    contact_rate,
     pin_offset,
 )
+
+_FEWEST_STEPS = 2  # per sample: the casing runs once a step, and needs twice the sample rate
 
 _CASING_SIGN = np.array([-1.0, -1.0, -1.0, 1.0])
 """Reactions on the casing from the forces on rod and piston: bearing x, y, guide; the pressure on
@@ -122,13 +126,11 @@ def _simulate_pump(scene: Scene, seed: int, truth: bool, raise_on_failure: bool)
             raise SimulationError(run.status, pump.name)
         silence = np.zeros((len(channels_of(pump)), plan.n_samples), dtype=np.float32)
         return _solution(pump, silence, run.status, numerics, {})
-    on_rod = decimate(run.forces, factor)
-    acceleration = housing_acceleration(on_rod * _CASING_SIGN, pump.sample_rate, **_modes(pump))[
-        :, plan.kept
-    ]
-    signal, clipped = _measured(pump, acceleration, plan, seed)
+    on_casing = run.forces * _CASING_SIGN
+    acceleration = band_limited_acceleration(on_casing, 1 / step, factor, _modes(pump))
+    signal, clipped = _measured(pump, acceleration[:, plan.kept], plan, seed)
     numerics["clipped_samples"] = clipped
-    hidden = _truth(run, on_rod, plan) if truth else {}
+    hidden = _truth(run, plan) if truth else {}
     return _solution(pump, signal, run.status, numerics, hidden)
 
 
@@ -161,20 +163,25 @@ def steps_per_sample(scene: PumpScene) -> int:
         All of: an invalid rung, a step too long for the contact, a recording shorter than a
         revolution, a pulse shorter than two samples.
     """
-    frequency = contact_frequency(scene)
     compliant = scene.joint.crankpin.rung != "ideal"
     faults = [fault for fault in (_rung_fault(scene), *_sampling_faults(scene)) if fault]
-    needed = STEP_PER_CONTACT_TIME / frequency if compliant else 0.5 / scene.sample_rate
-    step = scene.numerics.step or needed
-    if compliant and step * frequency > LARGEST_STEP_PER_CONTACT_TIME:
-        faults.append(
-            f"numerics.step = {step:g} s must be <= "
-            f"{LARGEST_STEP_PER_CONTACT_TIME / frequency:.3g} s, the contact's angular frequency "
-            f"being {frequency:.4g} rad/s; shorten it or lower joint.crankpin.stiffness"
+    step = 0.5 / scene.sample_rate
+    if compliant:
+        longest = LARGEST_STEP_PER_CONTACT_TIME / contact_rate(scene)
+        needed = min(
+            STEP_PER_CONTACT_TIME / contact_frequency(scene),
+            STEP_PER_CONTACT_DECAY / contact_rate(scene),
         )
+        step = min(scene.numerics.step or needed, step)
+        if (scene.numerics.step or 0.0) > longest:
+            faults.append(
+                f"numerics.step = {scene.numerics.step:g} s must be <= {longest:.3g} s, the "
+                f"contact's rate being {1 / longest:.4g} 1/s; shorten it, or lower "
+                "joint.crankpin.stiffness and damping"
+            )
     if faults:
         raise SceneError(scene.name, faults)
-    return max(1, math.ceil(1 / (scene.sample_rate * step) - 1e-9))
+    return max(_FEWEST_STEPS, math.ceil(1 / (scene.sample_rate * step) - 1e-9))
 
 
 def _rung_fault(scene: PumpScene) -> str | None:
@@ -197,14 +204,14 @@ def _sampling_faults(scene: PumpScene) -> list[str]:
     return faults
 
 
-def _modes(scene: PumpScene) -> dict[str, NDArray[np.float64]]:
+def _modes(scene: PumpScene) -> Modes:
     modes = scene.casing.modes
-    return {
-        "frequency": np.array([mode.frequency for mode in modes]),
-        "damping_ratio": np.array([mode.damping_ratio for mode in modes]),
-        "inputs": np.array([[mode.shape.get(p, 0.0) for p in FORCE_PLACES] for mode in modes]),
-        "outputs": np.array([[mode.shape[s.name] for s in scene.sensors] for mode in modes]),
-    }
+    return Modes(
+        frequency=np.array([mode.frequency for mode in modes]),
+        damping_ratio=np.array([mode.damping_ratio for mode in modes]),
+        inputs=np.array([[mode.shape.get(p, 0.0) for p in FORCE_PLACES] for mode in modes]),
+        outputs=np.array([[mode.shape[s.name] for s in scene.sensors] for mode in modes]),
+    )
 
 
 def _measured(
@@ -237,17 +244,17 @@ def _numerics(scene: PumpScene, rung: Rung, run: CrankRun) -> dict[str, float | 
         "rung_pressure": scene.pressure.rung,
         "step_s": run.step,
         "steps": len(run.forces),
-        "step_per_contact_time": run.step * contact_frequency(scene),
+        "step_per_contact_time": run.step * contact_rate(scene),
         "contact_changes": run.contact_changes,
         "cuts_refused": run.cuts_refused,
         "peak_normal_force_n": run.peak_normal_force,
     }
 
 
-def _truth(run: CrankRun, on_rod: NDArray[np.float64], plan: _Plan) -> dict[str, Any]:
-    """Forces (low-passed as the casing felt them) and state at the sample instants."""
+def _truth(run: CrankRun, plan: _Plan) -> dict[str, Any]:
+    """Forces, low-passed as the signal is, and state at the sample instants."""
     states = (0.5 * (run.states[:-1] + run.states[1:]))[:: plan.factor][plan.kept]
-    force = on_rod[plan.kept]
+    force = decimate(run.forces, plan.factor)[plan.kept]
     offset = pin_offset(plan.scene, states)
     return {
         "pin_force_n": force[:, :2],

@@ -43,8 +43,12 @@ from .scene import PumpScene
 STEP_PER_CONTACT_TIME = 0.3
 """Default step times the contact's fastest angular frequency: 21 steps a contact period."""
 
+STEP_PER_CONTACT_DECAY = 0.7
+"""Default step times the contact's fastest decay, where damping is beyond critical."""
+
 LARGEST_STEP_PER_CONTACT_TIME = 1.0
-"""A longer step is refused: Runge-Kutta 4 stays stable to 2.8 but no longer accurate."""
+"""A step longer than this over the contact's rate is refused: Runge-Kutta 4 stays stable to 2.8
+but is no longer accurate."""
 
 _OVERLAP_LIMIT = 0.1  # of the pin radius: small-penetration contact laws end there
 _MOST_CUTS = 8  # contact changes within one step before the rest is taken as it is
@@ -392,15 +396,30 @@ def parameters(scene: PumpScene) -> CrankParameters:
 
 
 def contact_frequency(scene: PumpScene) -> float:
-    """Largest angular frequency of the mechanism on its contact spring [rad/s].
+    """Largest angular frequency of the mechanism on its undamped contact spring [rad/s].
 
     The mass felt at the eye depends on the direction; its least value over a revolution sets the
     fastest contact, and so the step.
     """
     p = parameters(scene)
+    return math.sqrt(p.stiffness * _largest_mobility(p))
+
+
+def contact_rate(scene: PumpScene) -> float:
+    """Fastest rate of the damped contact [1/s]: largest root of ``s^2 + C/m s + K/m``.
+
+    The contact's angular frequency while it oscillates; beyond critical damping the faster of
+    its two decays, which is what limits an explicit step.
+    """
+    p = parameters(scene)
+    half = p.damping * _largest_mobility(p) / 2
+    square = p.stiffness * _largest_mobility(p)
+    return half + math.sqrt(half**2 - square) if half**2 > square else math.sqrt(square)
+
+
+def _largest_mobility(p: CrankParameters) -> float:
     largest = math.asin(min(1.0, p.crank_radius / p.rod_length))
-    mobility = max(_mobility(beta, p) for beta in np.linspace(0.0, largest, 5))
-    return math.sqrt(p.stiffness * mobility)
+    return max(_mobility(beta, p) for beta in np.linspace(0.0, largest, 5))
 
 
 def _mobility(beta: float, p: CrankParameters) -> float:

@@ -186,8 +186,9 @@ def test_sensors_act_on_the_signal():
     bare = {"sensors.0.noise": 0, "sensors.1.noise": 0}
     plain = simulate(pump(**bare), seed=1)
     louder = simulate(pump(**bare, **{"sensors.0.gain": 1.05}), seed=1)
-    # 24 bits over 50 g: steps of 6e-5 m/s^2
-    assert_allclose(louder.signal[0], 1.05 * plain.signal[0], atol=1.5e-4)
+    step = 2 * pump().sensors[0].range / 2**24
+    # Half a step of either, one of them times 1.05, and float32.
+    assert_allclose(louder.signal[0], 1.05 * plain.signal[0], rtol=2e-7, atol=1.03 * step)
     assert_array_equal(louder.signal[1], plain.signal[1])
     narrow = simulate(pump(**bare, **{"sensors.0.range": "1 m/s^2"}), seed=1)
     assert abs(narrow.signal[0]).max() == 1.0

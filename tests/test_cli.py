@@ -9,7 +9,6 @@ import h5py
 import numpy as np
 import pytest
 from click.testing import CliRunner
-
 from wearstate.datasets.record import DataSet
 from wearstate.diagnose.cli import cli
 
@@ -141,8 +140,8 @@ def test_bad_scene_values(tmp_path, setting, says):
 
 def test_bad_scene_files(tmp_path):
     refused("simulate", "bilgepump", says=["did you mean 'bilge-pump'"])
-    (tmp_path / "bad.toml").write_text("name = ")
-    refused("scene", "check", tmp_path / "bad.toml", says=["not TOML", "line 1"])
+    (tmp_path / "bad.toml").write_text("machine = 'x'\nname = \n")
+    refused("scene", "check", tmp_path / "bad.toml", says=["not TOML", "line 2"])
     (tmp_path / "empty.toml").write_text("")
     refused("scene", "check", tmp_path / "empty.toml", says=["machine = None"])
     refused("simulate", "bilge-pump", "--set", "drive.speed", says=["must read PATH=VALUE"])

@@ -21,7 +21,7 @@ from wearstate.datasets.recipe import (
     sample_records,
 )
 from wearstate.datasets.record import DataError, DataSet
-from wearstate.sim.scene import load_scene
+from wearstate.sim.scene import SceneError, load_scene
 
 SHORT = {"duration": "0.25 s", "settling_revolutions": 1}
 """One revolution and a bit of the slowest machine: about 20 ms to simulate."""
@@ -90,15 +90,18 @@ from wearstate.datasets.generate import generate
 from wearstate.datasets.recipe import load_recipe
 recipe = load_recipe("bilge-pump-small", {overrides})
 kill = lambda done, total: os.kill(os.getpid(), signal.SIGKILL) if done == 4 else None
-generate(recipe, {n}, sys.argv[1], seed=5, progress=kill)
+generate(recipe, {n}, sys.argv[1], seed=5, progress=kill, jobs=int(sys.argv[2]))
 """
 
 
-def test_a_killed_process_goes_on(short, reference, tmp_path):
+@pytest.mark.parametrize("jobs", ["1", "2"])
+def test_a_killed_process_goes_on(short, reference, tmp_path, jobs):
     path = tmp_path / "data.h5"
     script = KILLED.format(overrides=SHORT, n=N)
-    # -P: the checkout holds packages named like other projects' top-level ones
-    run = subprocess.run([sys.executable, "-P", "-c", script, str(path)], cwd=tmp_path, check=False)
+    # -P: the checkout holds packages named like other projects' top-level ones. Workers share the
+    # captured stdout: the call returns when the last of them is gone, or fails at the timeout.
+    command = [sys.executable, "-P", "-c", script, str(path), jobs]
+    run = subprocess.run(command, cwd=tmp_path, check=False, stdout=subprocess.PIPE, timeout=60)
     assert run.returncode == -signal.SIGKILL
     assert os.listdir(tmp_path) == ["data.h5.part"]
     assert generate(short, N, path, seed=5).n_resumed == 4
@@ -151,15 +154,25 @@ def test_failures_keep_their_row(tmp_path):
         assert not data[0].signal.any()
 
 
-def test_scenes_the_simulation_refuses_keep_their_row(tmp_path):
-    # the contact of the softer half allows this step, that of the stiffer half does not
-    recipe = load_recipe("bilge-pump-small", {**SHORT, "numerics.step": "9.3e-5 s"})
-    summary = generate(recipe, 12, tmp_path / "data.h5", seed=1)
-    assert 0 < summary.failures["refused"] < 12
-    assert "numerics.step" in summary.first_failures[0]
+def test_scenes_the_simulation_refuses_keep_their_row(short, tmp_path, monkeypatch):
+    middle = load_scene("bilge-pump").joint.crankpin.friction
+    simulate = generation.simulate
+
+    def particular(scene, **options):
+        if scene.joint.crankpin.friction > middle:
+            raise SceneError(scene.name, ["joint.crankpin.friction is beyond the model"])
+        return simulate(scene, **options)
+
+    monkeypatch.setattr(generation, "simulate", particular)
+    samples = list(sample_records(short, 12, seed=1))
+    expected = [sample.scene.joint.crankpin.friction > middle for sample in samples]
+    summary = generate(short, 12, tmp_path / "data.h5", seed=1)
+    assert 0 < sum(expected) < 12
+    assert summary.failures == {"refused": sum(expected)}
+    assert "friction is beyond the model" in summary.first_failures[0]
     with DataSet(tmp_path / "data.h5") as data:
-        refused = (data.manifest["status"] == "refused").to_numpy()
-        assert_array_equal([not item.signal.any() for item in data], refused)
+        assert (data.manifest["status"] == "refused").tolist() == expected
+        assert [not item.signal.any() for item in data] == expected
 
 
 def test_existing_output_is_refused_before_any_work(short, tmp_path, monkeypatch):
