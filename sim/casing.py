@@ -209,7 +209,7 @@ def _raised(means: NDArray[np.float64]) -> NDArray[np.float64]:
     padded = np.concatenate(
         [np.repeat(means[:1], half, axis=0), means, np.repeat(means[-1:], half, axis=0)]
     )
-    raised = taps[half] * means
+    raised: NDArray[np.float64] = taps[half] * means
     for k in range(half):
         other = len(taps) - 1 - k
         raised += taps[k] * (padded[k : k + len(means)] + padded[other : other + len(means)])

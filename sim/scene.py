@@ -10,6 +10,7 @@ import math
 import re
 import tomllib
 from collections.abc import Mapping
+from contextlib import suppress
 from decimal import Decimal
 from itertools import pairwise
 from pathlib import Path
@@ -20,6 +21,7 @@ from pydantic import (
     BeforeValidator,
     ConfigDict,
     Field,
+    TypeAdapter,
     ValidationError,
     model_validator,
 )
@@ -158,7 +160,7 @@ class Part(BaseModel):
 class Drive(Part):
     """How the crank is turned."""
 
-    speed: RotationSpeed = Field(gt=0, description="crank speed in rev/s, constant")
+    speed: RotationSpeed = Field(gt=0, le=1000, description="crank speed in rev/s, constant")
     start_angle: Angle = Field(default=0.0, description="crank angle at the first sample")
 
 
@@ -354,6 +356,19 @@ class Scene(Part):
     tacho: Tacho | None = Tacho()
     numerics: Numerics = Numerics()
 
+    @model_validator(mode="after")
+    def _cross_checks(self) -> Self:
+        faults = self.cross_faults({name: getattr(self, name) for name in type(self).model_fields})
+        if faults:
+            raise ValueError("\n".join(faults))
+        return self
+
+    @classmethod
+    def cross_faults(cls, parts: Mapping[str, Any]) -> list[str]:
+        """Faults between parts, of those parts that are there; each machine has its own."""
+        del parts
+        return []
+
 
 FORCE_PLACES = ("bearing_x", "bearing_y", "guide_y", "cylinder_x")
 """Where the crank mechanism pushes on the casing: x along the stroke, y across it."""
@@ -374,46 +389,57 @@ class PumpScene(Scene):
     wear: Wear | None = None
     casing: Casing
 
-    @model_validator(mode="after")
-    def _cross_checks(self) -> Self:
-        faults = [*self._geometry_faults(), *self._shape_faults()]
-        if faults:
-            raise ValueError("\n".join(faults))
-        return self
-
-    def _geometry_faults(self) -> list[str]:
-        faults = []
-        reach = self.crank.radius + self.joint.crankpin.clearance_radial
-        if self.rod.length <= reach:
-            faults.append(
-                f"rod.length = {self.rod.length:g} m must be > crank radius + radial clearance = "
-                f"{reach:g} m; a shorter rod locks the crank"
-            )
-        names = [sensor.name for sensor in self.sensors]
-        names += [self.tacho.name] if self.tacho else []
-        faults += [
-            f"sensors: name '{name}' is given {names.count(name)} times, must be unique; rename one"
-            for name in sorted(set(names))
-            if names.count(name) > 1
+    @classmethod
+    def cross_faults(cls, parts: Mapping[str, Any]) -> list[str]:
+        """Faults between parts, of those parts that are there."""
+        checks = (
+            (_rod_faults, ("crank", "joint", "rod")),
+            (_name_faults, ("sensors", "tacho")),
+            (_shape_faults, ("casing", "sensors")),
+        )
+        return [
+            fault
+            for check, needs in checks
+            if all(need in parts for need in needs)
+            for fault in check(*(parts[need] for need in needs))
         ]
-        return faults
 
-    def _shape_faults(self) -> list[str]:
-        places = (*FORCE_PLACES, *(sensor.name for sensor in self.sensors))
-        faults = []
-        for index, mode in enumerate(self.casing.modes):
-            path = f"casing.modes.{index}.shape"
-            faults += [
-                f"{path}.{key} is no place of this scene{_nearest(key, places)}"
-                for key in mode.shape
-                if key not in places
-            ]
-            faults += [
-                f"{path}.{sensor.name} is missing; give the shape at every sensor (0 at a node)"
-                for sensor in self.sensors
-                if sensor.name not in mode.shape
-            ]
-        return faults
+
+def _rod_faults(crank: Crank, joint: PumpJoints, rod: Rod) -> list[str]:
+    reach = crank.radius + joint.crankpin.clearance_radial
+    if rod.length > reach:
+        return []
+    return [
+        f"rod.length = {rod.length:g} m must be > crank radius + radial clearance = {reach:g} m; "
+        "a shorter rod locks the crank"
+    ]
+
+
+def _name_faults(sensors: tuple[Accelerometer, ...], tacho: Tacho | None) -> list[str]:
+    names = [sensor.name for sensor in sensors] + ([tacho.name] if tacho else [])
+    return [
+        f"sensors: name '{name}' is given {names.count(name)} times, must be unique; rename one"
+        for name in sorted(set(names))
+        if names.count(name) > 1
+    ]
+
+
+def _shape_faults(casing: Casing, sensors: tuple[Accelerometer, ...]) -> list[str]:
+    places = (*FORCE_PLACES, *(sensor.name for sensor in sensors))
+    faults = []
+    for index, mode in enumerate(casing.modes):
+        path = f"casing.modes.{index}.shape"
+        faults += [
+            f"{path}.{key} is no place of this scene{_nearest(key, places)}"
+            for key in mode.shape
+            if key not in places
+        ]
+        faults += [
+            f"{path}.{sensor.name} is missing; give the shape at every sensor (0 at a node)"
+            for sensor in sensors
+            if sensor.name not in mode.shape
+        ]
+    return faults
 
 
 MACHINES: dict[str, type[Scene]] = {"reciprocating-pump": PumpScene}
@@ -515,7 +541,23 @@ def validate_table(model: type[Table], table: Mapping[str, Any], name: str) -> T
             or entry["type"] != "too_short"
             for line in _fault_lines(model, entry)
         ]
+        if issubclass(model, Scene) and () not in places:
+            faults += model.cross_faults(_valid_parts(model, table))
         raise SceneError(name, faults) from None
+
+
+def _valid_parts(model: type[BaseModel], table: Mapping[str, Any]) -> dict[str, Any]:
+    """Parts of a faulty table that are valid on their own, defaults included."""
+    parts = {}
+    for name, field in model.model_fields.items():
+        if name not in table:
+            if not field.is_required():
+                parts[name] = field.get_default(call_default_factory=True)
+            continue
+        with suppress(ValidationError):
+            kind: Any = Annotated[field.annotation, field]
+            parts[name] = TypeAdapter(kind).validate_python(table[name])
+    return parts
 
 
 def load_scene(name_or_path: str | Path, overrides: Mapping[str, Any] | None = None) -> Scene:

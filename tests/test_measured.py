@@ -99,5 +99,6 @@ def test_it_is_the_vibration_that_is_unfamiliar(mfpt, small_model, name, speed, 
         )
     estimate = model.estimate(matched)
     assert estimate.verdict == "unfamiliar"
-    assert estimate.p_value is not None and estimate.p_value <= model.p_limit <= 0.012
+    assert estimate.p_value is not None
+    assert estimate.p_value <= model.p_limit <= 0.012
     assert _report_exit(estimate.verdict, estimate.grade, "alarm") == 5

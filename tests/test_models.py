@@ -140,7 +140,7 @@ def test_one_rms_alone_does_not_solve_the_task(trained):
 
 
 def test_the_training_set_is_judged_on_its_held_out_draws_only(trained, small_set):
-    model, table, test = trained
+    model, _table, test = trained
     assert evaluate_model(model, small_set)["records"] == len(test)
     everything, *_ = train_model(small_set, held_out=0.0)
     with pytest.raises(DataError, match="has not seen"):
@@ -160,7 +160,7 @@ def test_too_few_machines_are_refused(tmp_path):
 
 
 def test_estimate_of_a_held_out_recording(trained, small_set):
-    model, table, test = trained
+    model, _table, test = trained
     with DataSet(small_set) as data:
         estimate = model.estimate(data[int(test[0])])
     assert estimate.verdict == "graded"

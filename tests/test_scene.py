@@ -352,3 +352,20 @@ def test_the_reader_of_comments_sees_a_bare_number():
 @pytest.mark.parametrize("name", scene_names())
 def test_every_number_of_a_scene_has_a_reason(name):
     assert unexplained_numbers(scene_text(name)) == []
+
+
+def test_faults_between_parts_are_told_beside_faults_of_a_value():
+    """The rod is too short and a mode's shape is misspelt, while the speed is no number."""
+    changes = {
+        "drive.speed": 0,
+        "rod.length": "50 mm",
+        "rod.centre_of_mass": "20 mm",
+        "casing.modes.0.shape.guid_y": 0.1,
+    }
+    with pytest.raises(SceneError) as refusal:
+        load_scene("bilge-pump", changes)
+    text = "\n".join(refusal.value.faults)
+    assert len(refusal.value.faults) == 3
+    assert "drive.speed = 0 rev/s must be > 0" in text
+    assert "rod.length = 0.05 m must be > crank radius" in text
+    assert "did you mean 'guide_y'" in text
