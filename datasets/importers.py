@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.io import loadmat
 
 from ..sim.scene import UNITS, to_si
 from ..sim.sensor import Channel
@@ -168,6 +167,8 @@ def _mat_content(file: Path) -> dict[str, Any]:
     DataError
         It cannot be read.
     """
+    from scipy.io import loadmat  # slow to import, and only for this format
+
     raw = file.read_bytes()
     if raw.startswith(_LEVEL_7_3):
         raise DataError(f"{file} is MATLAB 7.3, must be 5 to 7; save it again with '-v7'")

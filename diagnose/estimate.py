@@ -41,6 +41,29 @@ class ModelError(ValueError):
 
 
 @dataclass(frozen=True, kw_only=True)
+class LinearSeverity:
+    """Log severity as a linear function of the features.
+
+    Attributes
+    ----------
+    centre, spread, weight : numpy.ndarray [shape=(n_features,)]
+        ``log severity = offset + sum(weight * (feature - centre) / spread)``
+    offset : float
+        Log of the severity in metres at the centre.
+    """
+
+    centre: Float
+    spread: Float
+    weight: Float
+    offset: float
+
+    def predict(self, features: Float) -> Float:
+        """Log severity [shape=(n_recordings,)] of feature rows [shape=(n_recordings, n)]."""
+        standard = (features - self.centre) / self.spread
+        return np.asarray(standard @ self.weight + self.offset)
+
+
+@dataclass(frozen=True, kw_only=True)
 class Calibration:
     """Out-of-fold behaviour of a model on machine draws it had not seen.
 
@@ -114,7 +137,7 @@ class WearModel:
 
     Attributes
     ----------
-    regressor : sklearn estimator
+    regressor : LinearSeverity
         Features to log severity.
     calibration : Calibration
         Out-of-fold errors and distances.
@@ -124,7 +147,7 @@ class WearModel:
         What it was trained on, its inputs, limits and ranges.
     """
 
-    regressor: Any
+    regressor: LinearSeverity
     calibration: Calibration
     familiarity: Familiarity
     card: dict[str, Any]
@@ -286,7 +309,7 @@ def input_faults(recording: Recording, card: Mapping[str, Any]) -> list[str]:
 
 
 def save_model(model: WearModel, path: str | Path, *, force: bool = False) -> None:
-    """Write a model file: card, estimator and arrays in a zip, each with its SHA-256.
+    """Write a model file: card and arrays in a zip, each with its SHA-256. No code, no pickle.
 
     Parameters
     ----------
@@ -301,24 +324,26 @@ def save_model(model: WearModel, path: str | Path, *, force: bool = False) -> No
     DataError
         The file exists, or its folder does not.
     """
-    import skops.io
-    from sklearn import __version__ as sklearn_version
-
     target = Path(path)
     if target.exists() and not force:
         raise DataError(f"{target} exists; choose another name or use force to replace it")
     if not target.parent.is_dir():
         raise DataError(f"{target.parent} is no folder; create it")
     arrays = io.BytesIO()
-    np.savez(arrays, **asdict(model.calibration), **asdict(model.familiarity))
+    np.savez(
+        arrays,
+        **{
+            f"{part}.{name}": value
+            for part in _ARRAY_PARTS
+            for name, value in asdict(getattr(model, part)).items()
+        },
+    )
     members = {
         "card.json": json.dumps(model.card, indent=1, sort_keys=True).encode(),
-        "regressor.skops": skops.io.dumps(model.regressor),
         "arrays.npz": arrays.getvalue(),
     }
     seal = {
         "schema_version": MODEL_SCHEMA,
-        "sklearn": sklearn_version,
         "sha256": {name: hashlib.sha256(data).hexdigest() for name, data in members.items()},
     }
     part = target.with_name(target.name + ".part")
@@ -346,31 +371,34 @@ def load_model(path: str | Path) -> WearModel:
     Raises
     ------
     ModelError
-        No such file, not a model, damaged, changed, or of another version of this program's
-        model format or of scikit-learn; the text says what helps.
+        No such file, not a model, damaged, changed, of another version of the model format, or
+        forged so that its parts do not fit each other; the text says what helps.
     """
     members = _members(Path(path))
-    seal = _parsed(members, "seal.json", path)
-    _check_seal(seal, members, path)
+    _check_seal(_parsed(members, "seal.json", path), members, path)
     card = _parsed(members, "card.json", path)
     try:
         with np.load(io.BytesIO(members["arrays.npz"]), allow_pickle=False) as stored:
             arrays = {name: np.asarray(stored[name], dtype=float) for name in stored.files}
-        calibration = Calibration(
-            **{name: arrays.pop(name) for name in Calibration.__dataclass_fields__}
-        )
-        arrays["residual"] = float(arrays["residual"])  # type: ignore[assignment]
-        familiarity = Familiarity(**arrays)  # type: ignore[arg-type]
-    except (KeyError, TypeError, ValueError, OSError, zipfile.BadZipFile) as error:
+        parts = {part: kind(**_part(arrays, part)) for part, kind in _ARRAY_PARTS.items()}
+    except (KeyError, TypeError, ValueError, *_ZIP_FAULTS) as error:
         raise ModelError(f"{path}: arrays.npz cannot be read ({error}); retrain it") from error
-    model = WearModel(
-        regressor=_regressor(members["regressor.skops"], path),
-        calibration=calibration,
-        familiarity=familiarity,
-        card=card,
-    )
+    model = WearModel(**parts, card=card)
     _check_structure(model, path)
     return model
+
+
+_ARRAY_PARTS: dict[str, Any] = {
+    "regressor": LinearSeverity,
+    "calibration": Calibration,
+    "familiarity": Familiarity,
+}
+
+
+def _part(arrays: Mapping[str, Float], part: str) -> dict[str, Any]:
+    """Fields of one part; a single number comes back as a float."""
+    found = {n.removeprefix(f"{part}."): a for n, a in arrays.items() if n.startswith(f"{part}.")}
+    return {name: array if array.ndim else float(array) for name, array in found.items()}
 
 
 def _members(path: Path) -> dict[str, bytes]:
@@ -399,8 +427,6 @@ def _parsed(members: dict[str, bytes], name: str, path: str | Path) -> dict[str,
 
 
 def _check_seal(seal: Mapping[str, Any], members: dict[str, bytes], path: str | Path) -> None:
-    from sklearn import __version__ as sklearn_version
-
     if seal.get("schema_version") != MODEL_SCHEMA:
         raise ModelError(
             f"{path}: schema_version = {seal.get('schema_version')} must be {MODEL_SCHEMA}; "
@@ -415,57 +441,35 @@ def _check_seal(seal: Mapping[str, Any], members: dict[str, bytes], path: str | 
             f"{path}: checksum of {', '.join(changed)} does not fit; the file was changed or "
             "damaged: take an intact copy or retrain"
         )
-    here, there = sklearn_version.split(".")[:2], str(seal.get("sklearn")).split(".")[:2]
-    if here != there:
-        raise ModelError(
-            f"{path}: made with scikit-learn {seal.get('sklearn')}, this is {sklearn_version}; "
-            f"retrain it (wearstate train DATA -o MODEL) or install scikit-learn=={seal['sklearn']}"
-        )
-
-
-def _regressor(data: bytes, path: str | Path) -> Any:
-    import skops.io
-
-    try:
-        unknown = skops.io.get_untrusted_types(data=data)
-        if unknown:
-            raise ModelError(
-                f"{path}: holds types that are not allowed ({', '.join(unknown)}); do not use it"
-            )
-        return skops.io.loads(data, trusted=[])
-    except ModelError:
-        raise
-    except Exception as error:  # skops raises whatever its reader met
-        raise ModelError(f"{path}: regressor cannot be read ({error}); retrain it") from error
 
 
 def _check_structure(model: WearModel, path: str | Path) -> None:
     """Shapes that fit each other, so that a forged file fails here and not in a prediction."""
     n = len(model.card.get("features", []))
-    f, c = model.familiarity, model.calibration
-    shapes = {
-        "familiarity": f.centre.shape == f.spread.shape == (n,)
-        and f.directions.shape == (len(f.variance), n)
-        and bool((f.spread > 0).all() and (f.variance > 0).all() and f.residual > 0),
-        "calibration": c.log_error.shape == c.log_estimate.shape == c.distance.shape
-        and c.log_error.ndim == 1
-        and c.log_error.size > 0,
-        "finite": all(np.isfinite(a).all() for a in (*asdict(c).values(), f.centre, f.directions)),
+    r, f, c = model.regressor, model.familiarity, model.calibration
+    fits = {
         "card": set(model.card) >= _CARD_KEYS,
+        "regressor": _shapes(r.centre, r.spread, r.weight) == {(n,)}
+        and isinstance(r.offset, float)
+        and bool((r.spread > 0).all()),
+        "familiarity": _shapes(f.centre, f.spread) == {(n,)}
+        and f.directions.shape == (np.size(f.variance), n)
+        and isinstance(f.residual, float)
+        and bool((f.spread > 0).all() and np.all(f.variance > 0) and f.residual > 0),
+        "calibration": len(_shapes(c.log_error, c.log_estimate, c.distance)) == 1
+        and np.ndim(c.log_error) == 1
+        and np.size(c.log_error) > 0,
+        "numbers": all(
+            np.isfinite(value).all() for part in (r, f, c) for value in vars(part).values()
+        ),
     }
-    steps = dict(getattr(model.regressor, "steps", []))
-    scaler, ridge = steps.get("standardscaler"), steps.get("ridge")
-    shapes["regressor"] = [type(step).__name__ for step in steps.values()] == [
-        "StandardScaler",
-        "Ridge",
-    ] and _shape(scaler, "mean_") == _shape(scaler, "scale_") == _shape(ridge, "coef_") == (n,)
-    bad = [name for name, fits in shapes.items() if not fits]
+    bad = [name for name, good in fits.items() if not good]
     if bad:
         raise ModelError(f"{path}: {', '.join(bad)} do not fit {n} features; retrain it")
 
 
-def _shape(step: Any, attribute: str) -> tuple[int, ...]:
-    return tuple(np.shape(getattr(step, attribute, ())))
+def _shapes(*arrays: Any) -> set[tuple[int, ...]]:
+    return {np.shape(array) for array in arrays}
 
 
 _ZIP_FAULTS = (

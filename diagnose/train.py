@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from .. import __version__
 from ..datasets.record import Attributes, DataError, DataSet
 from ..datasets.splits import group_folds, group_split
-from .estimate import Calibration, WearModel
+from .estimate import Calibration, LinearSeverity, WearModel
 from .novelty import fit_familiarity
 from .tabulate import FeatureTable, Progress, feature_table
 
@@ -103,7 +103,7 @@ def _split(
 
 def fit_severity(
     features: Float, severity: Float, groups: NDArray[Any], seed: int
-) -> tuple[Any, tuple[Float, Float]]:
+) -> tuple[LinearSeverity, tuple[Float, Float]]:
     """Ridge regression of log severity, its penalty chosen by folds of whole groups.
 
     Parameters
@@ -118,8 +118,8 @@ def fit_severity(
 
     Returns
     -------
-    regressor : sklearn.pipeline.Pipeline
-        Scaler and ridge, fitted on all records.
+    regressor : LinearSeverity
+        Fitted on all records.
     errors : tuple of numpy.ndarray
         Out-of-fold estimates of log severity, and their errors (truth minus estimate).
 
@@ -137,16 +137,22 @@ def fit_severity(
     trials = [_out_of_fold(penalty, features, target, folds) for penalty in _PENALTIES]
     errors = [float(np.abs(np.exp(trial) - severity).mean()) for trial in trials]
     best = int(np.argmin(errors))
-    regressor = _regressor(_PENALTIES[best]).fit(features, target)
+    regressor = _fit_ridge(_PENALTIES[best], features, target)
     return regressor, (trials[best], target - trials[best])
 
 
-def _regressor(penalty: float) -> Any:
+def _fit_ridge(penalty: float, features: Float, target: Float) -> LinearSeverity:
     from sklearn.linear_model import Ridge
-    from sklearn.pipeline import make_pipeline
     from sklearn.preprocessing import StandardScaler
 
-    return make_pipeline(StandardScaler(), Ridge(penalty))
+    scaler = StandardScaler().fit(features)
+    ridge = Ridge(penalty).fit(scaler.transform(features), target)
+    return LinearSeverity(
+        centre=scaler.mean_,
+        spread=scaler.scale_,  # one where a feature is constant
+        weight=ridge.coef_,
+        offset=float(ridge.intercept_),
+    )
 
 
 def _folds(groups: NDArray[Any], seed: int) -> list[tuple[NDArray[np.intp], NDArray[np.intp]]]:
@@ -161,9 +167,8 @@ def _out_of_fold(
 ) -> Float:
     estimate = np.empty_like(target)
     for train, test in folds:
-        estimate[test] = (
-            _regressor(penalty).fit(features[train], target[train]).predict(features[test])
-        )
+        fitted = _fit_ridge(penalty, features[train], target[train])
+        estimate[test] = fitted.predict(features[test])
     return estimate
 
 

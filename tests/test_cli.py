@@ -44,7 +44,7 @@ def test_help_imports_nothing_heavy():
     code = (
         "import sys\nfrom wearstate.diagnose.cli import cli\n"
         "heavy = {'numpy', 'scipy', 'numba', 'pandas', 'sklearn', 'matplotlib', 'h5py'}\n"
-        "heavy |= {'pydantic', 'rich', 'joblib', 'skops'}\n"
+        "heavy |= {'pydantic', 'rich', 'joblib'}\n"
         "print(sorted(heavy & set(sys.modules)))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -36,7 +36,6 @@ HEAVY = {
     "click": {"diagnose.cli"},
     "rich": set(),
     "sklearn": {"diagnose"},
-    "skops": {"diagnose"},
     "joblib": {"diagnose", "datasets"},
     "pandas": {"features.table", "datasets.record", "diagnose"},
     "h5py": {"datasets"},
