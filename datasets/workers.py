@@ -8,6 +8,8 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any, TypeVar
 
+from threadpoolctl import threadpool_limits
+
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
@@ -45,7 +47,9 @@ def in_order(
     [1, 2, 3]
     """
     if jobs == 1:
-        yield from map(function, items)
+        # one thread for linear algebra, as in a worker: the same sums in the same order
+        with threadpool_limits(1):
+            yield from map(function, items)
         return
     from joblib.externals.loky import get_reusable_executor
 
