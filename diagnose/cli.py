@@ -343,8 +343,8 @@ def train(
     trained = model.card["trained_on"]
     head = f"{output}: trained on {trained['records']} records of {trained['draws']} machine draws"
     lines = [head, *_score_lines(result, model.card)]
-    if model.card["notice"]:
-        lines.append(f"Notice: {model.card['notice']}.")
+    if model.notice:
+        lines.append(f"Notice: {model.notice}.")
     value = {"path": str(output), "trained_on": trained, "held_out": result}
     _emit(value, as_json, "\n".join(lines))
 
@@ -369,19 +369,30 @@ def _score_lines(result: dict[str, Any], card: dict[str, Any]) -> list[str]:
     if not result:
         return ["not judged: no machine draw was held out"]
     base = ", ".join(f"{k.replace('_', ' ')} {v:.3f}" for k, v in result["baselines"].items())
-    return [
+    lines = [
         f"Judged on {result['records']} records of {result['draws']} unseen machine draws "
-        f"({100 * result['unfamiliar']:.1f} % called unfamiliar)",
+        f"({100 * result['unfamiliar']:.1f} % called unfamiliar)"
+    ]
+    if result["records"] < _FEW_RECORDS:
+        lines.append("  so few records tell little: every figure below may be far off")
+    if result["mae_m"] is None:
+        return [*lines, "  none is familiar: no figure can be given for this machine"]
+    return [
+        *lines,
         f"  clearance error   {1e6 * result['mae_m']:.1f} um mean, "
         f"{100 * result['mae_share_of_limit']:.1f} % of the condemning limit "
-        f"{1e3 * card['condemning_limit_m']:.3g} mm",
+        f"{1e3 * card['condemning_limit_m']:.3g} mm "
+        f"({1e6 * result['mae_all_m']:.1f} um with the unfamiliar)",
         f"  interval coverage {result['coverage']:.3f} (nominal {result['nominal_coverage']:.2f}), "
         f"{result['mean_set_size']:.2f} grades touched on average",
-        f"  grade accuracy    {result['accuracy']:.3f}; an error of that size allows "
+        f"  grade accuracy    {result['accuracy']:.3f}; an error of that size allows about "
         f"{result['accuracy_bound']:.3f}",
         f"  within one grade  {result['within_one_grade']:.4f}",
         f"  baselines         {base}",
     ]
+
+
+_FEW_RECORDS = 30
 
 
 @cli.command()

@@ -10,10 +10,11 @@ import zlib
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from ..datasets.record import DataError, Recording
 from .grades import GRADE_NAMES, grades_of
@@ -23,6 +24,8 @@ from .tabulate import recording_features
 Float = NDArray[np.float64]
 
 MODEL_SCHEMA = 1
+
+SIMULATION_NOTICE = "trained on simulation; no measured joint of known clearance has confirmed it"
 
 COVERAGE = 0.9
 """Nominal coverage of the interval."""
@@ -153,6 +156,11 @@ class WearModel:
     card: dict[str, Any]
 
     @property
+    def notice(self) -> str:
+        """What every report of this model must say; from its origin, not from a text in a file."""
+        return SIMULATION_NOTICE if self.card["origin"] == "simulated" else ""
+
+    @property
     def p_limit(self) -> float:
         """A recording with this p-value or a smaller one is called unfamiliar."""
         return max(UNFAMILIAR_SHARE, 1 / (len(self.calibration.distance) + 1))
@@ -175,10 +183,10 @@ class WearModel:
         DataError
             The signal itself is unusable: not finite, or shorter than a revolution.
         """
-        names, values = recording_features(recording)
         missing = input_faults(recording, self.card)
         if missing:
             return Estimate(verdict="unfamiliar", reasons=tuple(missing))
+        names, values = recording_features(recording)
         if list(names) != self.card["features"]:
             raise ModelError(
                 f"the model's {len(self.card['features'])} features are not the program's "
@@ -192,26 +200,20 @@ class WearModel:
         distance = float(self.familiarity.distance(row)[0])
         p_value = novelty_p_value(distance, self.calibration.distance)
         if p_value <= self.p_limit:
-            reason = (
-                f"its features lie {distance:.3g} from the centre of the training recordings, "
-                f"as far as at most {100 * p_value:.2g} % of them (median "
-                f"{np.median(self.calibration.distance):.3g}, largest "
-                f"{self.calibration.distance.max():.3g})"
-            )
+            reason = _strangeness(distance, self.calibration.distance)
             return Estimate(
                 verdict="unfamiliar", reasons=(reason,), p_value=p_value, p_limit=self.p_limit
             )
         log_severity = float(self.regressor.predict(row)[0])
-        low, high = (
-            math.exp(log_severity + q) for q in interval_offsets(log_severity, self.calibration)
-        )
+        below, above, coverage = interval_offsets(log_severity, self.calibration)
+        low, high = math.exp(log_severity + below), math.exp(log_severity + above)
         edges = self.card["grade_edges_m"]
         severity = math.exp(log_severity)
         grade = int(grades_of(severity, edges))
         span = range(int(grades_of(low, edges)), int(grades_of(high, edges)) + 1)
         return Estimate(
             verdict="graded",
-            cautions=tuple(self._cautions(values)),
+            cautions=(*self._range_cautions(severity), *self._condition_cautions(values)),
             p_value=p_value,
             p_limit=self.p_limit,
             grade=grade,
@@ -220,10 +222,22 @@ class WearModel:
             severity=severity,
             low=low,
             high=high,
+            coverage=coverage,
             evidence=self._evidence(values),
         )
 
-    def _cautions(self, values: Float) -> list[str]:
+    def _range_cautions(self, severity: float) -> list[str]:
+        """Beyond the trained severities an estimate is a bound, and a poor one."""
+        low, high = self.card["severity_range_m"]
+        if low <= severity <= high:
+            return []
+        side, edge = ("more", high) if severity > high else ("less", low)
+        return [
+            f"the estimate {1e3 * severity:.3g} mm is outside the trained range {1e3 * low:.3g} to "
+            f"{1e3 * high:.3g} mm: read it, and its interval, as '{side} than {1e3 * edge:.3g} mm'"
+        ]
+
+    def _condition_cautions(self, values: Float) -> list[str]:
         columns = {name: i for i, name in enumerate(self.card["features"])}
         return [
             f"{name} = {values[columns[name]]:.3g} is outside the trained range "
@@ -244,8 +258,19 @@ class WearModel:
         return tuple((names[i], float(values[i]), float(mean[i]), float(moved[i])) for i in order)
 
 
-def interval_offsets(log_estimate: float, calibration: Calibration) -> tuple[float, float]:
-    """Offsets of log severity that bracket the truth with the nominal coverage.
+def _strangeness(distance: float, calibration: Float) -> str:
+    """How far a recording lies from the training recordings, in words."""
+    n, farther = len(calibration), int(np.count_nonzero(calibration >= distance))
+    rank = f"{farther} of {n}" if farther else f"none of {n}"
+    return (
+        f"its features lie {distance:.3g} from the centre of the training recordings; {rank} "
+        f"calibration recordings lie as far (median {np.median(calibration):.3g}, largest "
+        f"{calibration.max():.3g})"
+    )
+
+
+def interval_offsets(log_estimate: float, calibration: Calibration) -> tuple[float, float, float]:
+    """Offsets of log severity that bracket the truth, and with which coverage.
 
     Parameters
     ----------
@@ -258,18 +283,21 @@ def interval_offsets(log_estimate: float, calibration: Calibration) -> tuple[flo
     -------
     low, high : float
         From the conformal quantiles of the errors of the nearest estimates, one tail each.
+    coverage : float
+        :data:`COVERAGE`, or the ``(n - 1) / (n + 1)`` that lies between the extremes of n errors
+        where n is too small for it.
 
     Notes
     -----
-    Errors of unseen draws near the same estimate are exchangeable with the new one up to the
-    change of the neighbourhood, so the coverage is nominal up to about one over their number.
-    The fits behind them lack a fifth of the draws, which makes the interval slightly wide.
+    Nominal as far as errors of unseen draws near the same estimate are exchangeable with the new
+    one. Two records share a machine, and the neighbourhood has a width, so it is approximate; the
+    fits behind the errors lack a fifth of the draws, which makes the interval slightly wide.
     """
     gap = np.abs(calibration.log_estimate - log_estimate)
     n = min(len(gap), max(_FEWEST_NEIGHBOURS, len(gap) // 4))
     errors = np.sort(calibration.log_error[np.argsort(gap, kind="stable")[:n]])
-    rank = math.ceil((1 + COVERAGE) / 2 * (n + 1))
-    return float(errors[max(n - rank, 0)]), float(errors[min(rank, n) - 1])
+    rank = min(math.ceil((1 + COVERAGE) / 2 * (n + 1)), n)
+    return float(errors[n - rank]), float(errors[rank - 1]), min(COVERAGE, (n - 1) / (n + 1))
 
 
 def input_faults(recording: Recording, card: Mapping[str, Any]) -> list[str]:
@@ -377,6 +405,7 @@ def load_model(path: str | Path) -> WearModel:
     members = _members(Path(path))
     _check_seal(_parsed(members, "seal.json", path), members, path)
     card = _parsed(members, "card.json", path)
+    _check_card(card, path)
     try:
         with np.load(io.BytesIO(members["arrays.npz"]), allow_pickle=False) as stored:
             arrays = {name: np.asarray(stored[name], dtype=float) for name in stored.files}
@@ -397,7 +426,11 @@ _ARRAY_PARTS: dict[str, Any] = {
 
 def _part(arrays: Mapping[str, Float], part: str) -> dict[str, Any]:
     """Fields of one part; a single number comes back as a float."""
-    found = {n.removeprefix(f"{part}."): a for n, a in arrays.items() if n.startswith(f"{part}.")}
+    names = [f"{part}.{name}" for name in _ARRAY_PARTS[part].__dataclass_fields__]
+    missing = [name for name in names if name not in arrays]
+    if missing:
+        raise ValueError(f"{', '.join(missing)} missing")
+    found = {name.removeprefix(f"{part}."): arrays[name] for name in names}
     return {name: array if array.ndim else float(array) for name, array in found.items()}
 
 
@@ -448,11 +481,10 @@ def _check_structure(model: WearModel, path: str | Path) -> None:
     n = len(model.card.get("features", []))
     r, f, c = model.regressor, model.familiarity, model.calibration
     fits = {
-        "card": set(model.card) >= _CARD_KEYS,
         "regressor": _shapes(r.centre, r.spread, r.weight) == {(n,)}
         and isinstance(r.offset, float)
         and bool((r.spread > 0).all()),
-        "familiarity": _shapes(f.centre, f.spread) == {(n,)}
+        "familiarity": _shapes(f.centre, f.spread, f.shift) == {(n,)}
         and f.directions.shape == (np.size(f.variance), n)
         and isinstance(f.residual, float)
         and bool((f.spread > 0).all() and np.all(f.variance > 0) and f.residual > 0),
@@ -483,19 +515,69 @@ _ZIP_FAULTS = (
 )
 """What zipfile raises on damaged bytes."""
 
-_CARD_KEYS = {
-    "features",
-    "channels",
-    "tacho",
-    "pulses_per_revolution",
-    "sample_rate_hz",
-    "severity",
-    "grade_edges_m",
-    "condemning_limit_m",
-    "limit_source",
-    "condition_ranges",
-    "healthy_features",
-    "notice",
-    "origin",
-    "trained_on",
-}
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False, strict=True)
+
+
+class _TrainedOn(_Strict):
+    records: int
+    draws: int
+    draw_identity: str
+    held_out_share: float
+    split_seed: int
+    training_groups: list[int]
+    training_signals: list[int]
+    scene: str
+    recipe: str
+
+
+class _Healthy(_Strict):
+    mean: list[float]
+    spread: list[float]
+
+
+class _Card(_Strict):
+    """What a card must hold, so that nothing that reads it can fail."""
+
+    created_by: str
+    origin: Literal["simulated", "measured"]
+    trained_on: _TrainedOn
+    severity: str = Field(pattern=r"^\w+_\w+_m$")
+    severity_range_m: list[float] = Field(min_length=2, max_length=2)
+    grade_edges_m: list[float] = Field(
+        min_length=len(GRADE_NAMES) - 1, max_length=len(GRADE_NAMES) - 1
+    )
+    condemning_limit_m: float = Field(gt=0)
+    limit_source: str
+    sample_rate_hz: float = Field(gt=0)
+    channels: list[dict[str, str]] = Field(min_length=1)
+    tacho: str | None
+    pulses_per_revolution: int = Field(ge=1)
+    features: list[str] = Field(min_length=1)
+    condition_ranges: dict[str, list[float]]
+    healthy_features: _Healthy
+
+    @model_validator(mode="after")
+    def _fits_itself(self) -> Self:
+        n = len(self.features)
+        if len(self.healthy_features.mean) != n or len(self.healthy_features.spread) != n:
+            raise ValueError("healthy_features must have one number per feature")
+        if sorted(self.grade_edges_m) != self.grade_edges_m:
+            raise ValueError("grade_edges_m must rise")
+        if not set(self.condition_ranges) <= set(self.features):
+            raise ValueError("condition_ranges must name features")
+        if any(len(bounds) != 2 for bounds in self.condition_ranges.values()):
+            raise ValueError("condition_ranges must be pairs")
+        if any(not {"name", "unit"} <= set(channel) for channel in self.channels):
+            raise ValueError("channels must have a name and a unit")
+        return self
+
+
+def _check_card(card: Mapping[str, Any], path: str | Path) -> None:
+    try:
+        _Card.model_validate(card)
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(str(part) for part in first["loc"]) or "card"
+        raise ModelError(f"{path}: card.json: {place}: {first['msg']}; retrain it") from error

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from ..datasets.record import DataError, DataSet
 from ..datasets.splits import group_folds
-from .estimate import WearModel
+from .estimate import Estimate, WearModel
 from .grades import accuracy_bound, grades_of
 from .tabulate import FeatureTable, Progress, feature_table
 from .train import draw_identity
@@ -67,6 +67,9 @@ def unseen_rows(
 ) -> NDArray[np.intp]:
     """Rows of machine draws that the model was not trained on.
 
+    A draw is seen where recipe name and seed are those of the training set and its number was in
+    training, or where any of its signals is, byte for byte, a training signal.
+
     Raises
     ------
     DataError
@@ -77,9 +80,12 @@ def unseen_rows(
             f"{path}: its {len(table.names)} features are not the model's "
             f"{len(model.card['features'])}; use recordings with the model's channels and rate"
         )
-    if identity != model.card["trained_on"]["draw_identity"]:
-        return np.arange(len(table.values))
-    seen = np.isin(table.manifest["group"], model.card["trained_on"]["training_groups"])
+    trained = model.card["trained_on"]
+    groups = table.manifest["group"]
+    known = table.manifest["signal_crc32"].isin(trained["training_signals"])
+    seen = groups.isin(groups[known])
+    if identity and identity == trained["draw_identity"]:
+        seen |= groups.isin(trained["training_groups"])
     rows = np.flatnonzero(~seen)
     if rows.size == 0:
         raise DataError(
@@ -92,41 +98,76 @@ def unseen_rows(
 def score(model: WearModel, table: FeatureTable, rows: NDArray[np.intp]) -> dict[str, Any]:
     """Errors, coverage and baselines on some rows of a table.
 
+    Parameters
+    ----------
+    model : WearModel
+    table : FeatureTable
+        With the model's features and its severity.
+    rows : numpy.ndarray
+        Rows to judge on; the others serve to fit the baselines.
+
     Returns
     -------
     dict
-        ``records``, ``draws``; over the records called familiar: ``mae_m``,
-        ``mae_share_of_limit``, ``accuracy`` with ``accuracy_bound`` (what the error in metres
-        allows), ``within_one_grade``, ``coverage`` with ``mean_set_size``; ``unfamiliar`` share;
-        ``confusion`` (true grade by row); ``baselines`` (accuracy of the majority grade and of
-        the best single rms, by folds of whole groups over the whole table).
+        ``records``, ``draws``, ``unfamiliar`` share; ``mae_all_m`` over all records, whatever
+        their familiarity; over the records called familiar, None where there is none: ``mae_m``,
+        ``mae_share_of_limit``, ``accuracy`` with ``accuracy_bound`` (about what the error in
+        metres allows), ``within_one_grade``, ``coverage`` with ``nominal_coverage`` and
+        ``mean_set_size``, ``confusion`` (true grade by row); ``baselines`` (accuracy of the
+        majority grade and of the best single rms).
     """
     truth = table.manifest[model.card["severity"]].to_numpy(dtype=float)
-    edges, limit = model.card["grade_edges_m"], model.card["condemning_limit_m"]
+    edges = model.card["grade_edges_m"]
     estimates = [model.judge(table.values[row]) for row in rows]
     graded = [(row, e) for row, e in zip(rows, estimates, strict=True) if e.verdict == "graded"]
+    # an unfamiliar row may be estimated at any length: e^50 m is absurd enough to average
+    raw = np.exp(np.clip(model.regressor.predict(table.values[rows]), -50, 50))
+    return {
+        "records": len(rows),
+        "draws": int(table.manifest["group"].iloc[rows].nunique()),
+        "unfamiliar": 1 - len(graded) / len(rows),
+        "mae_all_m": float(np.abs(raw - truth[rows]).mean()),
+        **_graded_scores(model, truth, graded),
+        "baselines": baselines(table, grades_of(truth, edges), rows),
+    }
+
+
+_GRADED_SCORES = (
+    "mae_m",
+    "mae_share_of_limit",
+    "accuracy",
+    "accuracy_bound",
+    "within_one_grade",
+    "coverage",
+    "nominal_coverage",
+    "mean_set_size",
+    "confusion",
+)
+
+
+def _graded_scores(
+    model: WearModel, truth: Float, graded: list[tuple[np.intp, Estimate]]
+) -> dict[str, Any]:
     if not graded:
-        raise DataError("every recording is unfamiliar to the model; train on this machine")
+        return dict.fromkeys(_GRADED_SCORES)
+    edges, limit = model.card["grade_edges_m"], model.card["condemning_limit_m"]
     true = truth[[row for row, _ in graded]]
     found = np.array([e.severity for _, e in graded], dtype=float)
     true_grade, grade = grades_of(true, edges), grades_of(found, edges)
     error = float(np.abs(found - true).mean())
     inside = [e.low <= t <= e.high for t, (_, e) in zip(true, graded, strict=True)]
-    return {
-        "records": len(rows),
-        "draws": int(table.manifest["group"].iloc[rows].nunique()),
-        "unfamiliar": 1 - len(graded) / len(rows),
-        "mae_m": error,
-        "mae_share_of_limit": error / limit,
-        "accuracy": float(np.mean(grade == true_grade)),
-        "accuracy_bound": accuracy_bound(true, edges, error),
-        "within_one_grade": float(np.mean(np.abs(grade - true_grade) <= 1)),
-        "coverage": float(np.mean(inside)),
-        "nominal_coverage": graded[0][1].coverage,
-        "mean_set_size": float(np.mean([len(e.possible_grades) for _, e in graded])),
-        "confusion": _confusion(true_grade, grade, len(edges) + 1),
-        "baselines": baselines(table, grades_of(truth, edges)),
-    }
+    values = (
+        error,
+        error / limit,
+        float(np.mean(grade == true_grade)),
+        accuracy_bound(true, edges, error),
+        float(np.mean(np.abs(grade - true_grade) <= 1)),
+        float(np.mean(inside)),
+        float(np.mean([e.coverage for _, e in graded])),
+        float(np.mean([len(e.possible_grades) for _, e in graded])),
+        _confusion(true_grade, grade, len(edges) + 1),
+    )
+    return dict(zip(_GRADED_SCORES, values, strict=True))
 
 
 def _confusion(true: NDArray[np.intp], found: NDArray[np.intp], n: int) -> list[list[int]]:
@@ -135,7 +176,9 @@ def _confusion(true: NDArray[np.intp], found: NDArray[np.intp], n: int) -> list[
     return counts.tolist()
 
 
-def baselines(table: FeatureTable, grade: NDArray[np.intp], *, seed: int = 0) -> dict[str, float]:
+def baselines(
+    table: FeatureTable, grade: NDArray[np.intp], rows: NDArray[np.intp], *, seed: int = 0
+) -> dict[str, float]:
     """Accuracy of what costs nothing: the majority grade, and thresholds on one channel's rms.
 
     Parameters
@@ -143,29 +186,49 @@ def baselines(table: FeatureTable, grade: NDArray[np.intp], *, seed: int = 0) ->
     table : FeatureTable
     grade : numpy.ndarray [shape=(n_records,)]
         True grades.
+    rows : numpy.ndarray
+        Rows judged. The thresholds are fitted on all other rows, or, where there are none, by
+        folds of whole machine draws.
     seed : int
         Of the folds.
 
     Returns
     -------
     dict
-        ``majority`` and ``single_rms`` (the best channel, flattering the baseline).
+        ``majority`` and ``single_rms`` (the best channel, which flatters the baseline).
     """
+    result = {"majority": float(np.bincount(grade[rows]).max() / len(rows))}
+    columns = [i for i, name in enumerate(table.names) if name.endswith(".rms")]
+    sides = _baseline_sides(table.manifest["group"].to_numpy(), rows, seed)
+    if sides and columns:
+        result["single_rms"] = max(
+            _tree_accuracy(table.values[:, [column]], grade, sides, seed) for column in columns
+        )
+    return result
+
+
+def _baseline_sides(
+    groups: NDArray[Any], rows: NDArray[np.intp], seed: int
+) -> list[tuple[NDArray[np.intp], NDArray[np.intp]]]:
+    others = np.setdiff1d(np.arange(len(groups)), rows)
+    if others.size:
+        return [(others, rows)]
+    folds = min(_FOLDS, len(np.unique(groups)))
+    return list(group_folds(groups, n=folds, seed=seed)) if folds > 1 else []
+
+
+def _tree_accuracy(
+    column: Float,
+    grade: NDArray[np.intp],
+    sides: list[tuple[NDArray[np.intp], NDArray[np.intp]]],
+    seed: int,
+) -> float:
     from sklearn.tree import DecisionTreeClassifier
 
-    groups = table.manifest["group"].to_numpy()
-    folds = min(_FOLDS, len(np.unique(groups)))
-    result = {"majority": float(np.bincount(grade).max() / len(grade))}
-    columns = [i for i, name in enumerate(table.names) if name.endswith(".rms")]
-    if folds < 2 or not columns:
-        return result
-    accuracies = []
-    for column in columns:
-        right = 0
-        for train, test in group_folds(groups, n=folds, seed=seed):
-            tree = DecisionTreeClassifier(
-                max_depth=_TREE_DEPTH, min_samples_leaf=5, random_state=seed
-            ).fit(table.values[train][:, [column]], grade[train])
-            right += int((tree.predict(table.values[test][:, [column]]) == grade[test]).sum())
-        accuracies.append(right / len(grade))
-    return {**result, "single_rms": max(accuracies)}
+    right = 0
+    for train, test in sides:
+        tree = DecisionTreeClassifier(
+            max_depth=_TREE_DEPTH, min_samples_leaf=5, random_state=seed
+        ).fit(column[train], grade[train])
+        right += int((tree.predict(column[test]) == grade[test]).sum())
+    return right / sum(len(test) for _, test in sides)

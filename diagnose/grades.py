@@ -45,13 +45,14 @@ def accuracy_bound(severity: ArrayLike, edges: Sequence[float], mean_error: floa
     """Grade accuracy to expect from an estimate with this mean absolute error.
 
     A machine near an edge is misgraded by any error, so accuracy has a ceiling that follows from
-    the error in metres and from how many machines stand near an edge. Errors are taken as
-    Laplace distributed and independent of the severity.
+    the error in metres and from how many machines stand near an edge. It is the expectation for
+    errors that are Laplace distributed and proportional to the severity, as those of a model of
+    log severity are; other errors of the same mean can do somewhat better or worse.
 
     Parameters
     ----------
     severity : array_like
-        True severities of the set judged [m].
+        True severities of the set judged [m], > 0.
     edges : sequence of float
         Grade edges [m].
     mean_error : float
@@ -74,8 +75,9 @@ def accuracy_bound(severity: ArrayLike, edges: Sequence[float], mean_error: floa
     if mean_error <= 0:
         return 1.0
     grade = grades_of(values, edges)
-    above = _laplace_tail((bounds[grade + 1] - values) / mean_error)
-    below = _laplace_tail((values - bounds[grade]) / mean_error)
+    scale = mean_error * values / values.mean()
+    above = _laplace_tail((bounds[grade + 1] - values) / scale)
+    below = _laplace_tail((values - bounds[grade]) / scale)
     return float(np.mean(1 - above - below))
 
 

@@ -36,7 +36,8 @@ def describe(path: Path) -> dict[str, Any]:
 
 
 def _describe_model(path: Path) -> dict[str, Any]:
-    card = load_model(path).card
+    model = load_model(path)
+    card = model.card
     trained = card["trained_on"]
     return {
         "kind": "wear model",
@@ -51,7 +52,7 @@ def _describe_model(path: Path) -> dict[str, Any]:
         "trained range": " to ".join(f"{1e3 * v:.3g} mm" for v in card["severity_range_m"]),
         "grades from": ", ".join(f"{1e3 * v:.3g} mm" for v in card["grade_edges_m"]),
         "limit source": card["limit_source"],
-        "notice": card["notice"],
+        "notice": model.notice,
     }
 
 

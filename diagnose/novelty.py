@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 Float = NDArray[np.float64]
 
 _SHARE = 0.95  # of the variance, kept as directions
-_MOST_DIRECTIONS = 30  # more cannot be estimated from a few hundred recordings
+_MOST_DIRECTIONS = 100
 _LEAST_SPREAD = 1e-6  # of the largest: a feature that never moved says nothing
+_CLIP = 5.0  # standard deviations: one wild feature must not stand for a strange recording
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -20,6 +21,8 @@ class Familiarity:
     ----------
     centre, spread : numpy.ndarray [shape=(n_features,)]
         Mean and standard deviation of each feature.
+    shift : numpy.ndarray [shape=(n_features,)]
+        Mean of the standardised features once they are clipped.
     directions : numpy.ndarray [shape=(n_directions, n_features)]
         Orthonormal main directions of the standardised features.
     variance : numpy.ndarray [shape=(n_directions,)]
@@ -30,12 +33,13 @@ class Familiarity:
 
     centre: Float
     spread: Float
+    shift: Float
     directions: Float
     variance: Float
     residual: float
 
     def distance(self, features: Float) -> Float:
-        """Distance of recordings from the cloud: about 2 for a training recording.
+        """Distance of recordings from the cloud: about 1 for a training recording.
 
         Parameters
         ----------
@@ -44,13 +48,17 @@ class Familiarity:
         Returns
         -------
         numpy.ndarray [shape=(n_recordings,)]
-            Mean squared distance along the directions, in variances, plus the squared distance
-            off them over its training mean.
+            The larger of two: the mean squared distance along the directions, in variances; the
+            squared distance off them over its training mean.
         """
-        standard = (features - self.centre) / self.spread
+        standard = _standardised(features, self.centre, self.spread) - self.shift
         along = standard @ self.directions.T
         off = np.maximum((standard**2).sum(axis=1) - (along**2).sum(axis=1), 0.0)
-        return np.asarray((along**2 / self.variance).mean(axis=1) + off / self.residual)
+        return np.asarray(np.maximum((along**2 / self.variance).mean(axis=1), off / self.residual))
+
+
+def _standardised(features: Float, centre: Float, spread: Float) -> Float:
+    return np.asarray(np.clip((features - centre) / spread, -_CLIP, _CLIP))
 
 
 def fit_familiarity(features: Float) -> Familiarity:
@@ -64,7 +72,7 @@ def fit_familiarity(features: Float) -> Familiarity:
     Returns
     -------
     Familiarity
-        Principal directions by singular values of the standardised features.
+        Principal directions by singular values of the standardised, clipped features.
 
     Examples
     --------
@@ -76,8 +84,9 @@ def fit_familiarity(features: Float) -> Familiarity:
     """
     centre, spread = features.mean(axis=0), features.std(axis=0)
     spread = np.maximum(spread, _LEAST_SPREAD * max(float(spread.max()), 1.0))
-    standard = (features - centre) / spread
-    _, singular, directions = np.linalg.svd(standard, full_matrices=False)
+    standard = _standardised(features, centre, spread)
+    shift = standard.mean(axis=0)
+    _, singular, directions = np.linalg.svd(standard - shift, full_matrices=False)
     variance = singular**2 / len(features)
     share = np.cumsum(variance) / variance.sum()
     kept = min(int(np.searchsorted(share, _SHARE)) + 1, _MOST_DIRECTIONS, len(features) // 3)
@@ -87,6 +96,7 @@ def fit_familiarity(features: Float) -> Familiarity:
     return Familiarity(
         centre=centre,
         spread=spread,
+        shift=shift,
         directions=directions[:kept],
         variance=variance[:kept],
         residual=residual,
@@ -106,8 +116,14 @@ def novelty_p_value(distance: float, calibration: Float) -> float:
     Returns
     -------
     float
-        ``(1 + #{calibration >= distance}) / (n + 1)``: for a familiar recording at most alpha
-        with probability alpha, whatever the distribution.
+        ``(1 + #{calibration >= distance}) / (n + 1)``. For a recording exchangeable with the
+        calibration it is at most alpha with probability alpha, whatever the distribution.
+
+    Notes
+    -----
+    Here the calibration is out of fold: its clouds were fitted on four fifths of the machine
+    draws, the recording's on all of them, which makes p slightly too large, so that a few less
+    familiar recordings are refused than alpha says.
 
     Examples
     --------

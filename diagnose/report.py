@@ -14,7 +14,7 @@ from ..datasets.record import Recording
 from ..features.order import crank_angle_map, pulse_times, shaft_phase
 from ..features.spectrum import decibel, line_band_edges, power_lines
 from .estimate import Estimate, WearModel, input_faults
-from .grades import ADVICE, ALARM_GRADE, GRADE_NAMES, WARNING_GRADE
+from .grades import ADVICE, GRADE_NAMES
 
 REPORT_SCHEMA = 1
 
@@ -23,9 +23,6 @@ _GRADE_COLOURS = ("#3a923a", "#c8b400", "#e07b00", "#c03a2b")
 _LINE_COLOURS = ("#1f5a94", "#b3541e", "#4f7d3a", "#7a4a8c")
 _LOWEST_SHOWN = 10.0  # Hz, of a spectrum
 _MOST_POINTS = 4000  # of a curve in a plot; more cannot be seen
-
-FAIL_LEVELS = {"warning": WARNING_GRADE, "alarm": ALARM_GRADE}
-"""Lowest grade that each ``--fail-on`` level reacts to."""
 
 
 def report_table(recording: Recording, model: WearModel, estimate: Estimate) -> dict[str, Any]:
@@ -65,7 +62,7 @@ def report_table(recording: Recording, model: WearModel, estimate: Estimate) -> 
             "condemning_limit_m": card["condemning_limit_m"],
             "source": card["limit_source"],
         },
-        "notice": card["notice"],
+        "notice": model.notice,
         "provenance": {
             "program": f"wearstate {__version__}",
             "model": {key: card[key] for key in ("created_by", "origin")}

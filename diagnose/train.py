@@ -1,7 +1,6 @@
 """Fit a wear model to a labelled data set, with its uncertainty and its sense of the familiar."""
 
 import hashlib
-import json
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -11,19 +10,16 @@ from numpy.typing import NDArray
 
 from .. import __version__
 from ..datasets.record import Attributes, DataError, DataSet
-from ..datasets.splits import group_folds, group_split
+from ..datasets.splits import check_no_leak, group_folds, group_split
 from .estimate import Calibration, LinearSeverity, WearModel
 from .novelty import fit_familiarity
 from .tabulate import FeatureTable, Progress, feature_table
 
 Float = NDArray[np.float64]
 
-SIMULATION_NOTICE = "trained on simulation; no measured joint of known clearance has confirmed it"
-
 _PENALTIES = (10.0, 30.0, 100.0, 300.0, 1000.0)  # ridge, for standardised features
 _FOLDS = 5
 _FEWEST_GROUPS = 10  # two a fold, so that a fold's error is no accident
-_CONDITIONS = {"shaft.speed_hz": "speed [rev/s]"}
 
 
 def train_model(
@@ -68,7 +64,8 @@ def train_model(
     _check_labelled(head, draws, path)
     table = feature_table(path, jobs=jobs, progress=progress)
     groups = table.manifest["group"].to_numpy()
-    train, test = _split(groups, held_out, seed)
+    train, test = _split(groups, held_out, seed, path)
+    check_no_leak(groups, train, test)
     severity = table.manifest[head.severities[0]].to_numpy(dtype=float)
     regressor, errors = fit_severity(table.values[train], severity[train], groups[train], seed)
     distances = _out_of_fold_distances(table.values[train], groups[train], seed)
@@ -94,8 +91,18 @@ def _check_labelled(head: Attributes, draws: int, path: str | Path) -> None:
 
 
 def _split(
-    groups: NDArray[Any], held_out: float, seed: int
+    groups: NDArray[Any], held_out: float, seed: int, path: str | Path
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Training and test rows; enough draws for the folds must be left to train on."""
+    draws = len(np.unique(groups))
+    if not 0 <= held_out < 1:
+        raise DataError(f"held_out = {held_out} must be >= 0 and < 1; try 0.25")
+    kept = draws - max(1, round(held_out * draws)) if held_out > 0 else draws
+    if kept < _FOLDS:
+        raise DataError(
+            f"{path}: held_out = {held_out} leaves {kept} of {draws} usable machine draws to train "
+            f"on, must be >= {_FOLDS}; hold out less or generate more records"
+        )
     if held_out == 0:
         return np.arange(len(groups)), np.arange(0)
     return group_split(groups, test_fraction=held_out, seed=seed)
@@ -181,9 +188,13 @@ def _out_of_fold_distances(features: Float, groups: NDArray[Any], seed: int) -> 
 
 
 def draw_identity(head: Attributes) -> str:
-    """Hash of what decides the machine draws: equal groups of equal identity are one machine."""
-    text = json.dumps([head.recipe, head.scene, head.overrides, head.seed])
-    return hashlib.sha256(text.encode()).hexdigest()
+    """Hash of what decides the machine draws: equal groups of equal identity are one machine.
+
+    Recipes draw from their name and the data set's seed alone, so their texts, record numbers
+    and comments do not make other machines. Empty for a set that no recipe made.
+    """
+    recipe = _name_in(head.recipe)
+    return hashlib.sha256(f"{recipe} {head.seed}".encode()).hexdigest() if recipe else ""
 
 
 def _card(
@@ -202,13 +213,12 @@ def _card(
             float(table.values[train, columns[name]].min()),
             float(table.values[train, columns[name]].max()),
         ]
-        for name in _CONDITIONS
-        if name in columns
+        for name in table.names
+        if name == "shaft.speed_hz" or name.endswith(".rms")
     }
     return {
         "created_by": f"wearstate {__version__}",
         "origin": head.origin,
-        "notice": SIMULATION_NOTICE if head.origin == "simulated" else "",
         "trained_on": {
             "records": len(train),
             "draws": int(manifest["group"].nunique()),
@@ -216,6 +226,7 @@ def _card(
             "held_out_share": held_out,
             "split_seed": seed,
             "training_groups": sorted({int(g) for g in manifest["group"]}),
+            "training_signals": sorted({int(crc) for crc in manifest["signal_crc32"]}),
             "scene": _name_in(head.scene),
             "recipe": _name_in(head.recipe),
         },
