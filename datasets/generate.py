@@ -17,7 +17,16 @@ from ..sim.assemble import channels_of, simulate
 from ..sim.integrate import Solution
 from ..sim.scene import PumpScene, Scene, SceneError
 from ..sim.wear import grade
-from .recipe import Recipe, RecipeError, Sample, load_recipe, overrides_text, sample_records
+from .recipe import (
+    LARGEST_SEED,
+    MOST_RECORDS,
+    Recipe,
+    RecipeError,
+    Sample,
+    load_recipe,
+    overrides_text,
+    sample_records,
+)
 from .record import Attributes, DataError, DataSetWriter
 from .workers import in_order
 
@@ -108,7 +117,8 @@ def generate(
     seed : int
         Of the data set, >= 0. Record `i` depends on recipe, seed and `i` alone.
     jobs : int
-        Processes that simulate, >= 1. Signal and manifest are the same for any number.
+        Processes that simulate, >= 1; no more are started than there are records. Signal and
+        manifest are the same for any number.
     force : bool
         Replace an existing file and start an unfinished one anew.
     truth : bool
@@ -148,6 +158,7 @@ def generate(
     if jobs < 1:
         raise DataError(f"jobs = {jobs} must be >= 1; give the number of cores")
     _refuse_bounds(plan, count, seed)
+    jobs = min(jobs, count)
     tally = _Tally(count)
     with _writer(plan, count, path, seed=seed, force=force, truth=truth) as writer:
         tally.n_resumed = int(np.count_nonzero(writer.done))
@@ -163,8 +174,13 @@ def generate(
 
 
 def _refuse_bounds(plan: Recipe, count: int, seed: int) -> None:
-    if count < 1 or seed < 0:
-        raise RecipeError(plan.name, [f"n = {count} must be >= 1 and seed = {seed} must be >= 0"])
+    faults = []
+    if not 1 <= count <= MOST_RECORDS:
+        faults.append(f"n = {count} must be >= 1 and <= {MOST_RECORDS}; choose a number between")
+    if not 0 <= seed <= LARGEST_SEED:
+        faults.append(f"seed = {seed} must be >= 0 and <= {LARGEST_SEED}; choose another")
+    if faults:
+        raise RecipeError(plan.name, faults)
 
 
 def _writer(
@@ -337,11 +353,16 @@ def save_solution(
     )
     columns = {**dict.fromkeys((*severity, "speed_hz"), "<f8"), **NUMERICS}
     n_samples = solution.signal.shape[1]
-    with DataSetWriter(
+    writer = DataSetWriter(
         path, head, n_records=1, n_samples=n_samples, columns=columns, force=force
-    ) as writer:
-        writer.write(0, solution.signal, row, solution.truth if truth else None)
-        writer.finish()
+    )
+    try:
+        with writer:
+            writer.write(0, solution.signal, row, solution.truth if truth else None)
+            writer.finish()
+    except BaseException:
+        writer.part.unlink(missing_ok=True)  # a single recording is made anew, not gone on with
+        raise
 
 
 _PUMP_SEVERITY = "diametral_clearance_crankpin_m"

@@ -47,6 +47,12 @@ CONDITIONS = {
 STRATA = 16
 """Severities of each run of this many records fall in as many equal parts of the range."""
 
+MOST_RECORDS = 10**8
+"""Records of one data set: a decade of recordings, one every three seconds."""
+
+LARGEST_SEED = 2**63 - 1
+"""Seed of a data set: fits a signed integer in every file format."""
+
 _MACHINE, _RECORD, _NOISE, _SEVERITY = range(4)  # independent random streams of one data set
 
 Bound = float | str
@@ -75,7 +81,10 @@ class Draw(Part):
         default=(), description="several ranges instead of low and high, likely as they are wide"
     )
     scale: Ratio | None = Field(
-        default=None, gt=0, description="relative-normal: norm of the change over the value's norm"
+        default=None,
+        gt=0,
+        le=10,
+        description="relative-normal: norm of the change over the value's norm",
     )
 
     @model_validator(mode="after")
@@ -104,8 +113,10 @@ class RecipeTable(Part):
     name: str = Field(min_length=1, max_length=64)
     description: str = ""
     scene: str = Field(min_length=1, description="a built-in scene or a file")
-    records: int = Field(ge=1, description="records made unless told otherwise")
-    records_per_group: int = Field(default=1, ge=1, description="records of each machine drawn")
+    records: int = Field(ge=1, le=MOST_RECORDS, description="records made unless told otherwise")
+    records_per_group: int = Field(
+        default=1, ge=1, le=MOST_RECORDS, description="records of each machine drawn"
+    )
     fixed: dict[str, Bound | bool] = Field(
         default={}, description="scene values replaced in every record, by dotted path in quotes"
     )
@@ -282,7 +293,7 @@ def recipe_text(name_or_path: str | Path) -> str:
     path = built_in if built_in.is_file() else Path(name_or_path)
     try:
         return path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError):
+    except (OSError, ValueError):  # ValueError: no UTF-8, or a NUL in the name
         near = difflib.get_close_matches(str(name_or_path), recipe_names(), n=1, cutoff=0.5)
         hint = f"did you mean '{near[0]}'?" if near else f"choose one of {recipe_names()}"
         fault = f"{name_or_path} is no recipe and no readable text file; {hint}"

@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import math
 import os
 import shutil
 import zlib
@@ -723,14 +724,16 @@ def _refuse_output(path: Path, force: bool) -> None:
         raise DataError(f"{path}: the name must not end in .part, kept for unfinished files")
     if not path.parent.is_dir():
         raise DataError(f"{path.parent} is no folder; create it")
-    if path.is_dir() or (path.exists() and not force):
+    if path.is_dir():
+        raise DataError(f"{path} is a folder; name a file in it")
+    if path.exists() and not force:
         raise DataError(f"{path} exists; choose another name or use force to replace it")
 
 
 def _refuse_size(shape: tuple[int, int, int], row: np.dtype[Any], folder: Path) -> None:
     if min(shape) < 1:
         raise DataError(f"signal of shape {shape} must have >= 1 record, channel and sample")
-    needed = 4 * int(np.prod(shape, dtype=np.int64)) + shape[0] * row.itemsize
+    needed = 4 * math.prod(shape) + shape[0] * row.itemsize
     free = shutil.disk_usage(folder).free
     if needed > free:
         raise DataError(

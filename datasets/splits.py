@@ -6,6 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .record import DataError
+
 Index = NDArray[np.intp]
 
 
@@ -30,7 +32,7 @@ def group_split(
 
     Raises
     ------
-    ValueError
+    DataError
         The fraction is out of bounds, or there is only one group.
 
     Examples
@@ -40,7 +42,7 @@ def group_split(
     (4, 2)
     """
     if not 0 < test_fraction < 1:
-        raise ValueError(f"test_fraction = {test_fraction} must be > 0 and < 1; try 0.25")
+        raise DataError(f"test_fraction = {test_fraction} must be > 0 and < 1; try 0.25")
     labels = _labels(groups)
     order = _shuffled_groups(labels, 2, seed)
     n_test = min(max(round(test_fraction * len(order)), 1), len(order) - 1)
@@ -67,7 +69,7 @@ def group_folds(groups: ArrayLike, *, n: int = 5, seed: int = 0) -> list[tuple[I
 
     Raises
     ------
-    ValueError
+    DataError
         There are fewer groups than folds, or `n` is below two.
 
     Examples
@@ -76,7 +78,7 @@ def group_folds(groups: ArrayLike, *, n: int = 5, seed: int = 0) -> list[tuple[I
     [[0, 1], [2, 3]]
     """
     if n < 2:
-        raise ValueError(f"n = {n} folds must be >= 2; try 5")
+        raise DataError(f"n = {n} folds must be >= 2; try 5")
     labels = _labels(groups)
     order = _shuffled_groups(labels, n, seed)
     return [_sides(labels, part) for part in np.array_split(order, n)]
@@ -103,7 +105,7 @@ def condition_split(
 
     Raises
     ------
-    ValueError
+    DataError
         A value is not finite, the range is reversed, or a side is empty.
 
     Examples
@@ -115,14 +117,14 @@ def condition_split(
     condition = np.asarray(values, dtype=float)
     if not np.isfinite(condition).all():
         bad = int(np.count_nonzero(~np.isfinite(condition)))
-        raise ValueError(f"{bad} condition value(s) are not finite, must be 0; leave them out")
+        raise DataError(f"{bad} condition value(s) are not finite, must be 0; leave them out")
     held = (condition >= low) & (condition <= high)
     kept = ~held
     if groups is not None:
         labels = np.asarray(groups)
         kept &= ~np.isin(labels, labels[held])
     if not (held.any() and kept.any()):
-        raise ValueError(
+        raise DataError(
             f"range {low:g} to {high:g} holds out {np.count_nonzero(held)} and keeps "
             f"{np.count_nonzero(kept)} of {condition.size} records, must be >= 1 each; values run "
             f"from {condition.min(initial=np.inf):g} to {condition.max(initial=-np.inf):g}"
@@ -142,7 +144,7 @@ def check_no_leak(groups: ArrayLike, train: Sequence[int] | Index, test: Any) ->
 
     Raises
     ------
-    ValueError
+    DataError
         A group is on both sides; the first few are named.
 
     Examples
@@ -152,7 +154,7 @@ def check_no_leak(groups: ArrayLike, train: Sequence[int] | Index, test: Any) ->
     labels = np.asarray(groups)
     shared = np.intersect1d(labels[np.asarray(train)], labels[np.asarray(test)])
     if shared.size:
-        raise ValueError(
+        raise DataError(
             f"{shared.size} group(s) are on both sides, must be 0: {shared[:5].tolist()}; split "
             "with group_split or group_folds"
         )
@@ -161,14 +163,14 @@ def check_no_leak(groups: ArrayLike, train: Sequence[int] | Index, test: Any) ->
 def _labels(groups: ArrayLike) -> NDArray[Any]:
     labels = np.asarray(groups)
     if labels.ndim != 1:
-        raise ValueError(f"groups has {labels.ndim} dimensions, must be 1; give one per record")
+        raise DataError(f"groups has {labels.ndim} dimensions, must be 1; give one per record")
     return labels
 
 
 def _shuffled_groups(labels: NDArray[Any], fewest: int, seed: int) -> NDArray[Any]:
     unique = np.unique(labels)
     if unique.size < fewest:
-        raise ValueError(
+        raise DataError(
             f"{unique.size} group(s), must be >= {fewest}; record or generate more machines"
         )
     return np.random.default_rng(seed).permutation(unique)

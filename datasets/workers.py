@@ -16,6 +16,9 @@ Result = TypeVar("Result")
 AHEAD_PER_JOB = 3
 """Items handed out and not yet taken back, per worker; bounds the memory of a run."""
 
+JOBS_PER_CORE = 4
+"""More processes than this for every core only wait for each other."""
+
 PARENT_CHECK = 1.0
 """Time between two looks of a worker at whether its parent lives [s]."""
 
@@ -34,7 +37,8 @@ def in_order(
     items : iterable
         Drawn from only as far as the workers need.
     jobs : int
-        Processes; 1 works in this one, without any other.
+        Processes; 1 works in this one, without any other. No more are started than
+        `JOBS_PER_CORE` for every core.
 
     Yields
     ------
@@ -46,6 +50,7 @@ def in_order(
     >>> list(in_order(abs, [-1, 2, -3], jobs=1))
     [1, 2, 3]
     """
+    jobs = min(jobs, JOBS_PER_CORE * cores())
     if jobs == 1:
         # one thread for linear algebra, as in a worker: the same sums in the same order
         with threadpool_limits(1):
@@ -65,6 +70,19 @@ def in_order(
     except BaseException:  # also Ctrl-C, and a caller that stops: leave no worker behind
         executor.shutdown(wait=True, kill_workers=True)
         raise
+
+
+def cores() -> int:
+    """Cores that this process may use.
+
+    Examples
+    --------
+    >>> cores() >= 1
+    True
+    """
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
 
 
 def _settle() -> None:

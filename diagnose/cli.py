@@ -6,8 +6,10 @@ that ``--help`` answers at once.
 """
 
 import json
+import math
+import re
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -30,12 +32,20 @@ class _Group(click.Group):
         except (ValueError, RuntimeError) as error:
             if not type(error).__module__.startswith(__name__.split(".")[0]):
                 raise  # not ours: a defect, with its traceback
-            click.echo(f"Error: {error}", err=True)
+            # the library's word is an argument, here it is an option
+            click.echo(f"Error: {error}".replace("use force", "use --force"), err=True)
             bad_input = isinstance(error, ValueError)
             raise click.exceptions.Exit(EXIT_BAD_INPUT if bad_input else EXIT_FAILED) from None
+        except BrokenPipeError:
+            raise  # the reader of stdout has gone: click ends quietly
         except OSError as error:
-            click.echo(f"Error: {error}; check path, rights and space", err=True)
+            # files are written under another name first, which says nothing to the caller
+            text = re.sub(r"\.part(\.new)?\b", "", str(error))
+            click.echo(f"Error: {text}; check path, rights and space", err=True)
             raise click.exceptions.Exit(EXIT_BAD_INPUT) from None
+        except MemoryError:
+            click.echo("Error: out of memory; use fewer jobs or shorter recordings", err=True)
+            raise click.exceptions.Exit(EXIT_FAILED) from None
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -53,6 +63,29 @@ def cli() -> None:
     """
 
 
+class _PathType(click.Path):
+    """A path that is not empty: an empty one is a shell variable gone wrong."""
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> Any:
+        if str(value).strip() == "":
+            self.fail("is empty, must be a path; name one", param, ctx)
+        return super().convert(value, param, ctx)
+
+
+class _Share(click.FloatRange):
+    """A number in a range; not-a-number is in none."""
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> Any:
+        number = super().convert(value, param, ctx)
+        if math.isnan(number):
+            self.fail(f"{value} must be >= {self.min:g} and <= {self.max:g}; try 0.25", param, ctx)
+        return number
+
+
+_PATH = _PathType(path_type=Path)
+_MOST_RECORDS = 10**8  # as wearstate.datasets.recipe, which is too heavy to import for --help
+_LARGEST_SEED = 2**63 - 1
+
 _json_option = click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout.")
 _force_option = click.option("--force", is_flag=True, help="Replace an existing output.")
 _jobs_option = click.option(
@@ -62,22 +95,93 @@ _jobs_option = click.option(
     default=None,
     help="Worker processes; all cores by default. The result does not depend on it.",
 )
-_seed_option = click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
+_seed_option = click.option(
+    "--seed", type=click.IntRange(0, _LARGEST_SEED), default=0, show_default=True
+)
 
 
 def _emit(value: dict[str, Any], as_json: bool, text: str) -> None:
     """Print a result, as JSON or as text."""
-    if as_json:
-        click.echo(json.dumps({"schema_version": 1, **value}, allow_nan=True, default=str))
-    else:
-        click.echo(text)
+    click.echo(_json_text({"schema_version": 1, **value}) if as_json else text)
+
+
+def _json_text(value: Mapping[str, Any]) -> str:
+    """Strict JSON: what is not finite is null, what has no JSON form is a defect."""
+    return json.dumps(_plain(value), allow_nan=False)
+
+
+def _plain(value: Any) -> Any:
+    """Python's own types, from numpy's and from tuples; null for a number that is not finite."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(inner) for key, inner in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(inner) for inner in value]
+    if hasattr(value, "tolist"):  # of numpy
+        return _plain(value.tolist())
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _workers(jobs: int | None) -> int:
-    import os
+    from ..datasets.workers import cores
 
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
-    return jobs or cores or 1
+    return jobs or cores()
+
+
+_DATA, _MODEL, _PAGE = (".h5", ".hdf5"), (".wsm",), (".html", ".htm")
+_PICTURE, _TABLE = (".png", ".svg", ".pdf"), (".parquet", ".csv", ".h5")
+
+_Output = tuple[Path | None, tuple[str, ...]]
+"""A file to write, None where it was not asked for, and the suffixes it may have."""
+
+
+def _check_outputs(inputs: Sequence[Path | str], outputs: Sequence[_Output], force: bool) -> None:
+    """Refuse outputs that cannot or must not be written, before any work.
+
+    Raises
+    ------
+    DataError
+        An output has the wrong suffix, is a folder or in none, exists and `force` is not given,
+        or is the same file as an input or another output: that one `force` does not override.
+    """
+    from ..datasets.record import DataError
+
+    wanted = [(path, suffixes) for path, suffixes in outputs if path is not None]
+    paths = [path for path, _ in wanted]
+    faults = [fault for path, suffixes in wanted for fault in _name_faults(path, suffixes)]
+    faults += [
+        f"{path} is also an input, must be another file; choose another name"
+        for path in paths
+        if any(_same_file(path, Path(source)) for source in inputs)
+    ]
+    faults += [
+        f"{path} is given for two outputs, must be one; choose another name"
+        for number, path in enumerate(paths)
+        if any(_same_file(path, other) for other in paths[:number])
+    ]
+    if not faults and not force:
+        faults = [
+            f"{path} exists; choose another name or use --force to replace it"
+            for path in paths
+            if path.exists()
+        ]
+    if faults:
+        raise DataError("\n".join(faults))
+
+
+def _name_faults(path: Path, suffixes: tuple[str, ...]) -> list[str]:
+    if path.is_dir():
+        return [f"{path} is a folder; name a file in it"]
+    if path.suffix not in suffixes:
+        return [f"{path}: suffix {path.suffix!r} must be one of {', '.join(suffixes)}; rename it"]
+    if not path.parent.is_dir():
+        return [f"{path.parent} is no folder; create it"]
+    return []
+
+
+def _same_file(one: Path, other: Path) -> bool:
+    if one.exists() and other.exists():
+        return one.samefile(other)  # also by another link
+    return one.resolve() == other.resolve()
 
 
 @contextmanager
@@ -106,13 +210,15 @@ def _overrides(pairs: Sequence[str]) -> dict[str, Any]:
     return values
 
 
+_NUMBER = re.compile(r"[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?")
+
+
 def _number_or_text(text: str) -> Any:
-    for kind in (int, float):
-        try:
-            return kind(text)
-        except ValueError:
-            continue
-    return text
+    """Python would also read ``1_0`` and ``nan`` as numbers; a person has mistyped them."""
+    if not _NUMBER.fullmatch(text):
+        return text
+    whole = re.fullmatch("[-+]?[0-9]{1,18}", text)
+    return int(text) if whole else float(text)
 
 
 # --- scenes -------------------------------------------------------------------------------------
@@ -137,9 +243,12 @@ def scene_list(as_json: bool) -> None:
 @click.argument("name")
 def scene_show(name: str) -> None:
     """TOML text of a scene: copy it, change it, check it."""
-    from ..sim.scene import scene_text
+    from ..sim.scene import SceneError, scene_table, scene_text
 
-    click.echo(scene_text(name), nl=False)
+    text = scene_text(name)
+    if not isinstance(scene_table(text, name).get("machine"), str):
+        raise SceneError(name, ["machine is missing, must be a text; this file is no scene"])
+    click.echo(text, nl=False)
 
 
 @scene.command("check")
@@ -161,8 +270,8 @@ def scene_check(file: str, as_json: bool) -> None:
 @cli.command()
 @click.argument("scene_name", metavar="SCENE")
 @click.option("--set", "pairs", multiple=True, metavar="PATH=VALUE", help="Replace a scene value.")
-@click.option("-o", "--output", type=click.Path(path_type=Path), help="Recording to write (.h5).")
-@click.option("--plot", type=click.Path(path_type=Path), help="Picture to write (.png or .svg).")
+@click.option("-o", "--output", type=_PATH, help="Recording to write (.h5).")
+@click.option("--plot", type=_PATH, help="Picture to write (.png, .svg or .pdf).")
 @click.option("--truth", is_flag=True, help="Also store forces and orbit.")
 @_seed_option
 @_force_option
@@ -182,8 +291,8 @@ def simulate(
     from ..sim.assemble import simulate as run
     from ..sim.scene import load_scene
 
+    _check_outputs([scene_name], [(output, _DATA), (plot, _PICTURE)], force)
     machine = load_scene(scene_name, _overrides(pairs))
-    _refuse_existing(plot, force)
     solution = run(machine, seed=seed, truth=truth or plot is not None)
     if output is not None:
         save_solution(machine, solution, output, seed=seed, force=force, truth=truth)
@@ -191,31 +300,31 @@ def simulate(
         from .plots import plot_simulation
 
         plot_simulation(machine, solution, plot)
-    rms = {c.name: float(r.std()) for c, r in zip(solution.channels, solution.signal, strict=True)}
-    shown = ", ".join(f"{c.name} {rms[c.name]:.3g} {c.unit} rms" for c in solution.channels)
+    vibration = [
+        (channel, float(row.std()))
+        for channel, row in zip(solution.channels, solution.signal, strict=True)
+        if channel.quantity != "tacho"
+    ]
+    rms = {channel.name: value for channel, value in vibration}
+    shown = ", ".join(f"{channel.name} {value:.3g} {channel.unit}" for channel, value in vibration)
     files = [str(path) for path in (output, plot) if path]
     _emit(
         {"scene": machine.name, "rms": rms, "numerics": solution.numerics, "files": files},
         as_json,
-        "\n".join([f"{machine.name} (simulated): {shown}", *files]),
+        "\n".join([f"{machine.name} (simulated): {shown} rms about the mean", *files]),
     )
-
-
-def _refuse_existing(path: Path | None, force: bool) -> None:
-    from ..datasets.record import DataError
-
-    if path is None:
-        return
-    if path.exists() and not force:
-        raise DataError(f"{path} exists; choose another name or use --force to replace it")
-    if not path.parent.is_dir():
-        raise DataError(f"{path.parent} is no folder; create it")
 
 
 @cli.command()
 @click.argument("recipe")
-@click.option("-n", "--records", type=int, default=None, help="Records; the recipe's by default.")
-@click.option("-o", "--output", type=click.Path(path_type=Path), required=True)
+@click.option(
+    "-n",
+    "--records",
+    type=click.IntRange(1, _MOST_RECORDS),
+    default=None,
+    help="Records; the recipe's by default.",
+)
+@click.option("-o", "--output", type=_PATH, required=True, help="Data set to write (.h5).")
 @click.option("--truth", is_flag=True, help="Also store forces and orbit.")
 @_seed_option
 @_jobs_option
@@ -235,8 +344,11 @@ def generate(
 
     An interrupted run goes on where it stopped when the same command is repeated.
     """
+    from dataclasses import asdict
+
     from ..datasets.generate import generate as run
 
+    _check_outputs([recipe], [(output, _DATA)], force)
     with _progress("simulating") as progress:
         summary = run(
             recipe,
@@ -248,13 +360,8 @@ def generate(
             truth=truth,
             progress=progress,
         )
-    _emit(_plain(summary), as_json, _generated_text(summary))
-
-
-def _plain(summary: Any) -> dict[str, Any]:
-    from dataclasses import asdict
-
-    return {**asdict(summary), "path": str(summary.path)}
+    value = {**asdict(summary), "path": str(summary.path)}
+    _emit(value, as_json, _generated_text(summary))
 
 
 def _generated_text(summary: Any) -> str:
@@ -273,20 +380,19 @@ def _generated_text(summary: Any) -> str:
 
 
 @cli.command()
-@click.argument("file", type=click.Path(path_type=Path))
+@click.argument("file", type=_PATH)
 @_json_option
 def info(file: Path, as_json: bool) -> None:
     """What a data set, recording or model is, checked."""
-    from .info import describe
+    from .info import describe, description_text
 
     described = describe(file)
-    width = max(len(key) for key in described)
-    _emit(described, as_json, "\n".join(f"{k:{width}}  {v}" for k, v in described.items()))
+    _emit(described, as_json, description_text(described))
 
 
 @cli.command()
-@click.argument("data", type=click.Path(path_type=Path))
-@click.option("-o", "--output", type=click.Path(path_type=Path), required=True)
+@click.argument("data", type=_PATH)
+@click.option("-o", "--output", type=_PATH, required=True, help="Table (.parquet, .csv, .h5).")
 @_jobs_option
 @_force_option
 @_json_option
@@ -294,7 +400,7 @@ def features(data: Path, output: Path, jobs: int | None, force: bool, as_json: b
     """Feature table of a data set (.parquet, .csv or .h5), manifest beside it."""
     from .tabulate import feature_table, save_table
 
-    _refuse_existing(output, force)
+    _check_outputs([data], [(output, _TABLE)], force)
     with _progress("features") as progress:
         table = feature_table(data, jobs=_workers(jobs), progress=progress)
     save_table(table, output)
@@ -306,11 +412,11 @@ def features(data: Path, output: Path, jobs: int | None, force: bool, as_json: b
 
 
 @cli.command()
-@click.argument("data", type=click.Path(path_type=Path))
-@click.option("-o", "--output", type=click.Path(path_type=Path), required=True)
+@click.argument("data", type=_PATH)
+@click.option("-o", "--output", type=_PATH, required=True, help="Model to write (.wsm).")
 @click.option(
     "--held-out",
-    type=click.FloatRange(0, 0.9),
+    type=_Share(0, 0.9),
     default=0.25,
     show_default=True,
     help="Share of the machine draws kept out of training, to judge the model.",
@@ -333,7 +439,7 @@ def train(
     from .evaluate import score
     from .train import train_model
 
-    _refuse_existing(output, force)
+    _check_outputs([data], [(output, _MODEL)], force)
     with _progress("features") as progress:
         model, table, test = train_model(
             data, held_out=held_out, seed=seed, jobs=_workers(jobs), progress=progress
@@ -350,8 +456,8 @@ def train(
 
 
 @cli.command()
-@click.argument("model_file", metavar="MODEL", type=click.Path(path_type=Path))
-@click.argument("data", type=click.Path(path_type=Path))
+@click.argument("model_file", metavar="MODEL", type=_PATH)
+@click.argument("data", type=_PATH)
 @_jobs_option
 @_json_option
 def evaluate(model_file: Path, data: Path, jobs: int | None, as_json: bool) -> None:
@@ -396,9 +502,9 @@ _FEW_RECORDS = 30
 
 
 @cli.command()
-@click.argument("recording_file", metavar="RECORDING", type=click.Path(path_type=Path))
-@click.option("--model", "model_file", type=click.Path(path_type=Path), required=True)
-@click.option("-o", "--output", type=click.Path(path_type=Path), help="HTML page to write.")
+@click.argument("recording_file", metavar="RECORDING", type=_PATH)
+@click.option("--model", "model_file", type=_PATH, required=True)
+@click.option("-o", "--output", type=_PATH, help="HTML page to write.")
 @click.option("--record", type=int, default=0, help="Record of a data set file.")
 @click.option("--fs", type=float, default=None, help="Sample rate [Hz], where the file has none.")
 @click.option("--unit", default=None, help="Unit of the signal, where the file declares none.")
@@ -423,7 +529,7 @@ def report(
     from .estimate import load_model
     from .report import report_html, report_table, report_text
 
-    _refuse_existing(output, force)
+    _check_outputs([recording_file, model_file], [(output, _PAGE)], force)
     model = load_model(model_file)
     recording = read_recording(recording_file, record=record, fs=fs, unit=unit, variable=variable)
     estimate = model.estimate(recording)
@@ -432,7 +538,7 @@ def report(
         _write_text(output, report_html(table, recording))
         table["html"] = str(output)
     if as_json:
-        click.echo(json.dumps(table))
+        click.echo(_json_text(table))
     else:
         click.echo(report_text(table) + (f"\nPage        {output}" if output else ""))
     raise click.exceptions.Exit(_report_exit(estimate.verdict, estimate.grade, fail_on))
@@ -485,10 +591,10 @@ def verify(as_json: bool) -> None:
 @cli.command()
 @click.option(
     "--folder",
-    type=click.Path(path_type=Path, file_okay=False),
+    type=_PathType(path_type=Path, file_okay=False),
     default=Path("demo"),
     show_default=True,
-    help="Where its files go; files of an earlier demo are replaced.",
+    help="Where its files go: new, empty, or an earlier demo's, whose files are replaced.",
 )
 @_seed_option
 @_jobs_option

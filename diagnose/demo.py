@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..datasets.generate import generate
 from ..datasets.record import DataError, DataSet
@@ -16,6 +17,9 @@ from .tabulate import Progress
 from .train import train_model
 
 RECIPE = "bilge-pump-small"
+MARKER = ".wearstate-demo"
+"""File that says that a folder is a demo's own, and its files may be replaced."""
+
 FILES = {"data": "data.h5", "model": "model.wsm", "report": "report.html"}
 
 
@@ -32,7 +36,7 @@ def run_demo(
     Parameters
     ----------
     folder : Path
-        Created if needed; the three files of an earlier demo are replaced.
+        Created if needed; must be empty or an earlier demo's, whose three files are replaced.
     seed : int
         Of the data set and of the split.
     jobs : int
@@ -51,12 +55,9 @@ def run_demo(
     Raises
     ------
     DataError
-        The folder cannot be made.
+        The folder cannot be made or written to, or holds files of someone else.
     """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise DataError(f"{folder} cannot be made a folder ({error}); choose another") from error
+    _claim(folder)
     files = {key: folder / name for key, name in FILES.items()}
     clock = _Clock()
     say(f"1/3 simulating recordings of recipe {RECIPE} …")
@@ -79,15 +80,29 @@ def run_demo(
     }
 
 
+def _claim(folder: Path) -> None:
+    """Make the folder a demo's own, unless it holds other files."""
+    marker = folder / MARKER
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        if not marker.is_file() and any(folder.iterdir()):
+            raise DataError(
+                f"{folder} holds files and is no earlier demo's, must be new or empty; choose "
+                "another folder"
+            )
+        marker.touch()
+    except OSError as error:
+        raise DataError(f"{folder} cannot be made a folder ({error}); choose another") from error
+
+
 def _report_on_unseen(files: dict[str, Path], unseen: list[str]) -> dict[str, Any]:
-    """Report on the most worn but not yet condemned of the unseen recordings."""
+    """Report on one of the unseen recordings."""
     model = load_model(files["model"])
     with DataSet(files["data"]) as data:
         manifest = data.manifest
         severity = manifest[model.card["severity"]].to_numpy()
-        unseen_row = manifest["record_id"].isin(unseen).to_numpy()
-        candidate = unseen_row & (severity < model.card["condemning_limit_m"])
-        number = int(np.argmax(np.where(candidate, severity, -1.0)))
+        rows = np.flatnonzero(manifest["record_id"].isin(unseen).to_numpy())
+        number = _most_worn(rows, severity, model.card["condemning_limit_m"])
         recording = data[number]
     table = report_table(recording, model, model.estimate(recording))
     files["report"].write_text(report_html(table, recording), encoding="utf-8")
@@ -97,6 +112,14 @@ def _report_on_unseen(files: dict[str, Path], unseen: list[str]) -> dict[str, An
         f"Page        {files['report']}"
     )
     return {"report": table, "text": text}
+
+
+def _most_worn(rows: NDArray[np.intp], severity: NDArray[np.float64], limit: float) -> int:
+    """The most worn of some records that is not yet condemned; where all are, the least worn."""
+    good = rows[severity[rows] < limit]
+    if good.size:
+        return int(good[np.argmax(severity[good])])
+    return int(rows[np.argmin(severity[rows])])
 
 
 class _Clock:

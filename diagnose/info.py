@@ -1,10 +1,13 @@
 """What a file is, checked while reading it."""
 
+from collections.abc import Mapping
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from ..datasets.importers import read_recording
 from ..datasets.record import DataError, DataSet
+from ..sim.sensor import Channel
 from .estimate import load_model
 
 
@@ -19,7 +22,8 @@ def describe(path: Path) -> dict[str, Any]:
     Returns
     -------
     dict
-        Plain values, ``kind`` first.
+        ``kind`` first; names in snake case, numbers SI with the unit in the name, None where
+        unknown.
 
     Raises
     ------
@@ -35,23 +39,81 @@ def describe(path: Path) -> dict[str, Any]:
     return _describe_recording(path)
 
 
+def description_text(described: Mapping[str, Any]) -> str:
+    """A description as lines of name and value, in the units people use.
+
+    Parameters
+    ----------
+    described : mapping
+        From :func:`describe`.
+
+    Examples
+    --------
+    >>> print(description_text({"kind": "recording", "sample_rate_hz": 25600.0}))
+    kind         recording
+    sample rate  25600 Hz
+    """
+    lines = dict(_line(key, value) for key, value in described.items())
+    width = max(len(name) for name in lines)
+    return "\n".join(f"{name:{width}}  {value}" for name, value in lines.items())
+
+
+def _line(key: str, value: Any) -> tuple[str, str]:
+    """Name and value of one entry, for people."""
+    if value is None or value == "":
+        return key.removesuffix("_m").replace("_", " "), "none"
+    if key == "channels":
+        return key, ", ".join(Channel(**channel).label for channel in value)
+    for ending, unit, scale in _UNITS:
+        if key.endswith(ending):
+            return key.removesuffix(ending).replace("_", " "), _quantity(value, unit, scale)
+    if key == "grades":
+        names = {grade: f"grade {grade}" if int(grade) >= 0 else "unknown grade" for grade in value}
+        return key, ", ".join(f"{count} of {names[grade]}" for grade, count in value.items())
+    return key.replace("_", " "), _value_text(value)
+
+
+_UNITS = (("_hz", "Hz", 1.0), ("_s", "s", 1.0), ("_m", "mm", 1e3))
+"""Ending of a name, unit for people, factor to it."""
+
+
+def _quantity(value: Any, unit: str, scale: float) -> str:
+    if isinstance(value, Mapping):
+        return ", ".join(
+            f"{name.removesuffix('_m')} {_quantity(v, unit, scale)}" for name, v in value.items()
+        )
+    if isinstance(value, (list, tuple)):
+        between = " to " if len(value) == 2 else ", "
+        return between.join(f"{scale * v:.4g}" for v in value) + f" {unit}"
+    return f"{scale * value:.6g} {unit}"
+
+
+def _value_text(value: Any) -> str:
+    if isinstance(value, Mapping):
+        return ", ".join(f"{name} {_value_text(inner)}" for name, inner in value.items())
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
 def _describe_model(path: Path) -> dict[str, Any]:
     model = load_model(path)
     card = model.card
     trained = card["trained_on"]
     return {
         "kind": "wear model",
-        "created by": card["created_by"],
-        "trained on": f"{trained['records']} {card['origin']} records, {trained['draws']} draws",
+        "created_by": card["created_by"],
+        "origin": card["origin"],
+        "trained_on": {"records": trained["records"], "draws": trained["draws"]},
         "scene": trained["scene"],
         "recipe": trained["recipe"],
-        "channels": ", ".join(f"{c['name']} [{c['unit']}]" for c in card["channels"]),
-        "tacho": card["tacho"] or "none",
-        "sample rate": f"{card['sample_rate_hz']:g} Hz",
+        "channels": card["channels"],
+        "tacho": card["tacho"],
+        "sample_rate_hz": card["sample_rate_hz"],
         "severity": card["severity"],
-        "trained range": " to ".join(f"{1e3 * v:.3g} mm" for v in card["severity_range_m"]),
-        "grades from": ", ".join(f"{1e3 * v:.3g} mm" for v in card["grade_edges_m"]),
-        "limit source": card["limit_source"],
+        "severity_range_m": list(card["severity_range_m"]),
+        "grade_edges_m": list(card["grade_edges_m"]),
+        "limit_source": card["limit_source"],
         "notice": model.notice,
     }
 
@@ -62,46 +124,43 @@ def _describe_data(path: Path) -> dict[str, Any]:
         for index in range(len(data)):  # every signal against its checksum
             data[index]
         first = data[0]
-    grades = manifest["grade"].value_counts().sort_index()
-    described = {
+    return {
         "kind": "data set" if len(manifest) > 1 else "recording",
         "origin": head.origin,
-        "created by": head.created_by,
+        "created_by": head.created_by,
         "records": len(manifest),
-        "machine draws": int(manifest["group"].nunique()),
-        "status": ", ".join(f"{n} {s}" for s, n in manifest["status"].value_counts().items()),
-        "grades": ", ".join(f"{n} of {_grade(g)}" for g, n in grades.items()),
-        "channels": ", ".join(channel.label for channel in head.channels),
-        "tacho": head.tacho or "none",
-        "sample rate": f"{head.sample_rate:g} Hz",
-        "duration": f"{first.duration:g} s each",
-        "checksums": "all signals intact",
+        "machine_draws": int(manifest["group"].nunique()),
+        "status": _counts(manifest["status"]),
+        "grades": _counts(manifest["grade"]),
+        "channels": [asdict(channel) for channel in head.channels],
+        "tacho": head.tacho,
+        "sample_rate_hz": head.sample_rate,
+        "duration_s": first.duration,
+        "checksums_intact": True,
+        "severity_ranges_m": {
+            column: [float(manifest[column].min()), float(manifest[column].max())]
+            for column in head.severities
+        },
+        "condemning_limit_m": head.condemning_limit if head.limit_source else None,
+        "limit_source": head.limit_source,
     }
-    for column in head.severities:
-        low, high = manifest[column].min(), manifest[column].max()
-        described[column] = f"{1e3 * low:.4g} to {1e3 * high:.4g} mm"
-    if head.limit_source:
-        described["limit"] = f"{1e3 * head.condemning_limit:.3g} mm ({head.limit_source})"
-    return described
 
 
-def _grade(grade: Any) -> str:
-    return "unknown grade" if grade < 0 else f"grade {grade}"
+def _counts(column: Any) -> dict[str, int]:
+    return {str(value): int(count) for value, count in column.value_counts().sort_index().items()}
 
 
 def _describe_recording(path: Path) -> dict[str, Any]:
     recording = read_recording(path)
+    rows = zip(recording.vibration_names, recording.vibration, strict=True)
     return {
         "kind": "recording",
         "origin": recording.origin,
-        "channels": ", ".join(channel.label for channel in recording.channels),
-        "tacho": recording.tacho or "none",
-        "sample rate": f"{recording.sample_rate:g} Hz",
+        "channels": [asdict(channel) for channel in recording.channels],
+        "tacho": recording.tacho,
+        "sample_rate_hz": recording.sample_rate,
         "samples": recording.signal.shape[1],
-        "duration": f"{recording.duration:g} s",
-        "rms": ", ".join(
-            f"{name} {row.std():.4g}"
-            for name, row in zip(recording.vibration_names, recording.vibration, strict=True)
-        ),
-        **{str(key): value for key, value in recording.row.items()},
+        "duration_s": recording.duration,
+        "rms_about_mean": {name: float(row.std()) for name, row in rows},
+        "manifest": {str(key): value for key, value in recording.row.items()},
     }

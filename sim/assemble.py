@@ -25,6 +25,12 @@ from .slider_crank import (
 
 _FEWEST_STEPS = 2  # per sample: the casing runs once a step, and needs twice the sample rate
 
+_MOST_STEPS = 1000
+"""Steps per sample: beyond it a step says more about a slip than about accuracy."""
+
+_MEMORY = 4e9  # byte, what one run may take: a data set runs one on every core
+_BYTES_PER_STEP = 3 * 10 * 8  # states and forces as doubles, and two passes over them
+
 _CASING_SIGN = np.array([-1.0, -1.0, -1.0, 1.0])
 """Reactions on the casing from the forces on rod and piston: bearing x, y, guide; the pressure on
 the piston is its own counterpart on the cylinder head."""
@@ -161,7 +167,8 @@ def steps_per_sample(scene: PumpScene) -> int:
     ------
     SceneError
         All of: an invalid rung, a step too long for the contact, a recording shorter than a
-        revolution, a pulse shorter than two samples.
+        revolution or two samples, a pulse shorter than two samples. Or: a step of less than a
+        thousandth of a sample, a run that needs more than 4 GB.
     """
     compliant = scene.joint.crankpin.rung != "ideal"
     faults = [fault for fault in (_rung_fault(scene), *_sampling_faults(scene)) if fault]
@@ -181,7 +188,41 @@ def steps_per_sample(scene: PumpScene) -> int:
             )
     if faults:
         raise SceneError(scene.name, faults)
-    return max(_FEWEST_STEPS, math.ceil(1 / (scene.sample_rate * step) - 1e-9))
+    wanted = 1 / (scene.sample_rate * step)
+    faults = [fault for fault in (_step_fault(scene, wanted), _size_fault(scene, wanted)) if fault]
+    if faults:
+        raise SceneError(scene.name, faults)
+    return max(_FEWEST_STEPS, math.ceil(wanted - 1e-9))
+
+
+def _step_fault(scene: PumpScene, steps: float) -> str | None:
+    if steps - 1e-9 <= _MOST_STEPS:  # the bound itself, whatever its rounding
+        return None
+    shortest = 1 / (scene.sample_rate * _MOST_STEPS)
+    if scene.numerics.step is not None:
+        return (
+            f"numerics.step = {scene.numerics.step:g} s must be >= {shortest:.3g} s, "
+            f"{_MOST_STEPS} steps a sample; lengthen it, or raise sample_rate"
+        )
+    return (
+        f"the contact needs steps of {shortest * _MOST_STEPS / steps:.3g} s, must be >= "
+        f"{shortest:.3g} s, {_MOST_STEPS} steps a sample; raise sample_rate, or lower "
+        "joint.crankpin.stiffness and damping"
+    )
+
+
+def _size_fault(scene: PumpScene, steps: float) -> str | None:
+    """Refuse what would not fit the memory, before any of it is taken."""
+    time = scene.duration + scene.settling_revolutions / scene.drive.speed
+    needed = time * scene.sample_rate * max(steps, _FEWEST_STEPS) * _BYTES_PER_STEP
+    if needed <= _MEMORY:
+        return None
+    return (
+        f"duration = {scene.duration:g} s at sample_rate = {scene.sample_rate:g} Hz with "
+        f"{max(steps, _FEWEST_STEPS):.0f} steps a sample needs {needed / 1e9:.3g} GB, must be <= "
+        f"{_MEMORY / 1e9:g} GB; shorten duration or settling_revolutions, lower sample_rate, or "
+        "lengthen numerics.step"
+    )
 
 
 def _rung_fault(scene: PumpScene) -> str | None:
@@ -195,6 +236,11 @@ def _sampling_faults(scene: PumpScene) -> list[str]:
         faults.append(
             f"duration = {scene.duration:g} s must be >= one revolution = {revolution:g} s; "
             "record longer"
+        )
+    if scene.duration * scene.sample_rate < 2:
+        faults.append(
+            f"duration = {scene.duration:g} s must be >= 2 samples = {2 / scene.sample_rate:g} s; "
+            "raise sample_rate or record longer"
         )
     if scene.tacho and scene.tacho.pulse_width / (2 * math.pi) * revolution < 2 / scene.sample_rate:
         faults.append(
@@ -252,7 +298,10 @@ def _numerics(scene: PumpScene, rung: Rung, run: CrankRun) -> dict[str, float | 
 
 
 def _truth(run: CrankRun, plan: _Plan) -> dict[str, Any]:
-    """Forces, low-passed as the signal is, and state at the sample instants."""
+    """Forces, low-passed as the signal is, and state at the sample instants.
+
+    A sample stands for the middle of a step: its state is the mean of the step's two ends.
+    """
     states = (0.5 * (run.states[:-1] + run.states[1:]))[:: plan.factor][plan.kept]
     force = decimate(run.forces, plan.factor)[plan.kept]
     offset = pin_offset(plan.scene, states)

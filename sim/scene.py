@@ -8,6 +8,7 @@ cure, and names the nearest match of an unknown key. Kernels trust what passes.
 import difflib
 import math
 import re
+import reprlib
 import tomllib
 from collections.abc import Mapping
 from contextlib import suppress
@@ -17,6 +18,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, Self, TypeVar
 
 from pydantic import (
+    AfterValidator,
     BaseModel,
     BeforeValidator,
     ConfigDict,
@@ -59,7 +61,30 @@ UNITS: dict[str, dict[str, float]] = {
 
 Table = TypeVar("Table", bound=BaseModel)
 
-_QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*")
+_QUANTITY = re.compile(r"\s*([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)\s*(.*?)\s*")
+
+# Bounds no machine comes near: they catch a wrong unit or a slipped exponent, and keep every
+# product and quotient of the kernels finite.
+_LONGEST = 100.0  # m
+_HEAVIEST, _LIGHTEST = 1e6, 1e-6  # kg
+_INERTIA_MOST, _INERTIA_LEAST = 1e9, 1e-12  # kg m^2
+_PRESSURE_MOST = 1e9  # Pa, a waterjet intensifier has 6e8
+_GRAVITY_MOST = 1000.0  # m/s^2, a hundred g
+_STIFFEST = 1e13  # N/m, a metre of steel has 1e11
+_DAMPING_MOST = 1e9  # N s/m
+_SLIDING_LEAST, _SLIDING_MOST = 1e-6, 1e3  # m/s
+_ANGLE_MOST = 1e4  # rad, beyond it a cosine has lost four digits
+_ACCELERATION_LEAST, _ACCELERATION_MOST = 1e-9, 1e7  # m/s^2, a shock sensor ends at 1e6
+_SHAPE_MOST = 1e3  # kg^-0.5, the mode of a milligram
+_LEVEL_LEAST, _LEVEL_MOST = 1e-3, 1e4  # V
+_GAIN_LEAST, _GAIN_MOST = 1e-3, 1e3
+_MODE_SLOWEST, _MODE_FASTEST = 1e-6, 1e6  # Hz, a floating casing has almost none
+_RATE_LEAST, _RATE_MOST = 1.0, 1e6  # Hz, of sampling
+_RECORDING_LONGEST = 3600.0  # s
+_STEP_LEAST = 1e-12  # s
+_SETTLING_MOST = 1000
+_MOST_SENSORS, _MOST_MODES = 64, 1000
+_NAME_LONGEST = 64
 
 
 class SceneError(ValueError):
@@ -101,10 +126,14 @@ def to_si(value: Any, dimension: str) -> float:
     if isinstance(value, bool) or not isinstance(value, (int, float, str)):
         raise ValueError(f"is not a number or a string with a unit ({_unit_list(dimension)})")
     if not isinstance(value, str):
-        return float(value)
+        try:
+            return float(value)
+        except OverflowError:  # a whole number of hundreds of digits
+            return math.inf if value > 0 else -math.inf
     match = _QUANTITY.fullmatch(value)
     if match is None:
-        raise ValueError(f"has no leading number; write it like '1.5 {next(iter(units))}'")
+        example = f"1.5 {_unit_symbol(dimension)}".rstrip()
+        raise ValueError(f"has no leading number; write it like '{example}'")
     number, unit = match.groups()
     if unit not in units:
         missing = "has no unit" if unit == "" else f"has unit '{unit}', not one of {dimension}"
@@ -148,7 +177,34 @@ Stiffness = Annotated[float, _parser("stiffness"), _Dimension("stiffness")]
 Damping = Annotated[float, _parser("damping"), _Dimension("damping")]
 Voltage = Annotated[float, _parser("voltage"), _Dimension("voltage")]
 Ratio = Annotated[float, _parser("ratio"), _Dimension("ratio")]
-ModeShape = Annotated[float, _parser("mode shape"), _Dimension("mode shape")]
+ModeShape = Annotated[
+    float,
+    _parser("mode shape"),
+    _Dimension("mode shape"),
+    Field(ge=-_SHAPE_MOST, le=_SHAPE_MOST),
+]
+
+
+class FixedTable(dict[str, float]):
+    """A table of numbers that refuses to change; hashable, picklable, and a dict to dump.
+
+    Examples
+    --------
+    >>> FixedTable({"acc_x": 0.1})["acc_x"]
+    0.1
+    """
+
+    def _refuse(self, *_: Any, **__: Any) -> Any:
+        raise TypeError("a scene is frozen; load it again with an override by dotted path")
+
+    __setitem__ = __delitem__ = __ior__ = _refuse
+    clear = pop = popitem = setdefault = update = _refuse
+
+    def __hash__(self) -> int:  # type: ignore[override]
+        return hash(frozenset(self.items()))
+
+    def __reduce__(self) -> tuple[type["FixedTable"], tuple[dict[str, float]]]:
+        return FixedTable, (dict(self),)
 
 
 class Part(BaseModel):
@@ -161,22 +217,31 @@ class Drive(Part):
     """How the crank is turned."""
 
     speed: RotationSpeed = Field(gt=0, le=1000, description="crank speed in rev/s, constant")
-    start_angle: Angle = Field(default=0.0, description="crank angle at the first sample")
+    start_angle: Angle = Field(
+        default=0.0,
+        ge=-_ANGLE_MOST,
+        le=_ANGLE_MOST,
+        description="crank angle at the first sample",
+    )
 
 
 class Crank(Part):
     """The crank throw, balanced about its axis."""
 
-    radius: Length = Field(gt=0, description="half the stroke")
+    radius: Length = Field(gt=0, le=_LONGEST, description="half the stroke")
 
 
 class Rod(Part):
     """The connecting rod."""
 
-    length: Length = Field(gt=0, description="between the centres of wrist pin and crank-pin eye")
-    mass: Mass = Field(gt=0)
+    length: Length = Field(
+        gt=0, le=_LONGEST, description="between the centres of wrist pin and crank-pin eye"
+    )
+    mass: Mass = Field(ge=_LIGHTEST, le=_HEAVIEST)
     centre_of_mass: Length = Field(ge=0, description="distance from the wrist pin")
-    inertia: Inertia = Field(gt=0, description="about the centre of mass")
+    inertia: Inertia = Field(
+        ge=_INERTIA_LEAST, le=_INERTIA_MOST, description="about the centre of mass"
+    )
 
     @model_validator(mode="after")
     def _centre_between_pins(self) -> Self:
@@ -191,8 +256,10 @@ class Rod(Part):
 class Piston(Part):
     """Piston with crosshead and wrist pin: everything that only slides."""
 
-    mass: Mass = Field(gt=0)
-    diameter: Length = Field(ge=0, description="bore that the cylinder pressure acts on")
+    mass: Mass = Field(ge=_LIGHTEST, le=_HEAVIEST)
+    diameter: Length = Field(
+        ge=0, le=_LONGEST, description="bore that the cylinder pressure acts on"
+    )
 
 
 class CylinderPressure(Part):
@@ -200,7 +267,7 @@ class CylinderPressure(Part):
 
     rung: Literal["none", "two-level"] = "two-level"
     suction: Pressure = Field(default=0.0, ge=-101325.0, description="gauge, above vacuum")
-    discharge: Pressure = Field(default=0.0, description="gauge")
+    discharge: Pressure = Field(default=0.0, le=_PRESSURE_MOST, description="gauge")
     rise_angle: Angle = Field(
         default=math.radians(3.0),
         ge=math.radians(0.5),
@@ -222,20 +289,27 @@ class RevoluteJoint(Part):
     """A pin in an eye with clearance. Give exactly one of the two clearances."""
 
     rung: Literal["ideal", "compliant"] = "compliant"
-    pin_diameter: Length = Field(gt=0)
+    pin_diameter: Length = Field(gt=0, le=_LONGEST)
     diametral_clearance: Length | None = Field(
         default=None, ge=0, description="eye diameter minus pin diameter"
     )
     radial_clearance: Length | None = Field(
         default=None, ge=0, description="eye radius minus pin radius"
     )
-    stiffness: Stiffness = Field(gt=0, description="contact force per penetration")
-    damping: Damping = Field(default=0.0, ge=0, description="normal contact damping C_n")
+    stiffness: Stiffness = Field(gt=0, le=_STIFFEST, description="contact force per penetration")
+    damping: Damping = Field(
+        default=0.0, ge=0, le=_DAMPING_MOST, description="normal contact damping C_n"
+    )
     friction: Ratio = Field(default=0.0, ge=0, le=1, description="Coulomb coefficient")
     friction_speed: Velocity = Field(
-        default=0.01, gt=0, description="sliding speed that regularises the Coulomb sign"
+        default=0.01,
+        ge=_SLIDING_LEAST,
+        le=_SLIDING_MOST,
+        description="sliding speed that regularises the Coulomb sign",
     )
-    tangential_damping: Damping = Field(default=0.0, ge=0, description="C_t of the source paper")
+    tangential_damping: Damping = Field(
+        default=0.0, ge=0, le=_DAMPING_MOST, description="C_t of the source paper"
+    )
 
     @model_validator(mode="after")
     def _one_clearance_that_fits(self) -> Self:
@@ -279,8 +353,12 @@ class PumpJoints(Part):
 class Wear(Part):
     """Limits of the crank-pin clearance, all diametral, with their source."""
 
-    as_new_diametral: Length = Field(gt=0, description="smallest clearance of a new joint")
-    condemning_diametral: Length = Field(gt=0, description="the joint must be renewed above it")
+    as_new_diametral: Length = Field(
+        gt=0, le=_LONGEST, description="smallest clearance of a new joint"
+    )
+    condemning_diametral: Length = Field(
+        gt=0, le=_LONGEST, description="the joint must be renewed above it"
+    )
     grade_edges_diametral: tuple[Length, Length, Length] = Field(
         description="clearance at which grades 1, 2 and 3 begin"
     )
@@ -305,54 +383,67 @@ class Wear(Part):
 class CasingMode(Part):
     """One mode of the casing: mass-normalised shape at every force and sensor place."""
 
-    frequency: Frequency = Field(gt=0)
+    frequency: Frequency = Field(ge=_MODE_SLOWEST, le=_MODE_FASTEST)
     damping_ratio: Ratio = Field(gt=0, lt=1)
-    shape: dict[str, ModeShape] = Field(min_length=1)
+    shape: Annotated[dict[str, ModeShape], AfterValidator(FixedTable)] = Field(min_length=1)
 
 
 class Casing(Part):
     """The pump casing on its mounts, as modes."""
 
-    modes: tuple[CasingMode, ...] = Field(min_length=1)
+    modes: tuple[CasingMode, ...] = Field(min_length=1, max_length=_MOST_MODES)
 
 
 class Accelerometer(Part):
     """An accelerometer with its converter."""
 
-    name: str = Field(min_length=1)
+    name: str = Field(min_length=1, max_length=_NAME_LONGEST)
     place: str = Field(default="", description="where it sits, for the report")
     direction: str = Field(default="", description="which way it points, for the report")
-    gain: Ratio = Field(default=1.0, gt=0, description="true sensitivity over nominal")
-    noise: Acceleration = Field(default=0.0, ge=0, description="rms of white noise")
-    range: Acceleration = Field(gt=0, description="full scale, plus and minus")
+    gain: Ratio = Field(
+        default=1.0, ge=_GAIN_LEAST, le=_GAIN_MOST, description="true sensitivity over nominal"
+    )
+    noise: Acceleration = Field(
+        default=0.0, ge=0, le=_ACCELERATION_MOST, description="rms of white noise"
+    )
+    range: Acceleration = Field(
+        ge=_ACCELERATION_LEAST, le=_ACCELERATION_MOST, description="full scale, plus and minus"
+    )
     bits: int = Field(default=24, ge=8, le=32)
 
 
 class Tacho(Part):
     """A rectangular pulse per revolution, rising at crank angle zero."""
 
-    name: str = "tacho"
+    name: str = Field(default="tacho", min_length=1, max_length=_NAME_LONGEST)
     pulse_width: Angle = Field(default=math.radians(10.0), gt=0, le=math.pi)
-    level: Voltage = Field(default=5.0, gt=0)
+    level: Voltage = Field(default=5.0, ge=_LEVEL_LEAST, le=_LEVEL_MOST)
 
 
 class Numerics(Part):
     """What the solver may be told; every field has a default that the scene decides."""
 
-    step: Time | None = Field(default=None, gt=0, description="largest integration step")
+    step: Time | None = Field(default=None, ge=_STEP_LEAST, description="largest integration step")
 
 
 class Scene(Part):
-    """What every machine's scene holds."""
+    """What every machine's scene holds.
+
+    ``accuracy`` is stored with the scene and not yet used to choose rungs or the step.
+    """
 
     name: str = Field(min_length=1)
     machine: str
     description: str = ""
-    duration: Time = Field(gt=0, description="length of the recording, after settling")
-    sample_rate: Frequency = Field(gt=0)
-    settling_revolutions: int = Field(default=3, ge=1, description="run before the recording")
+    duration: Time = Field(
+        gt=0, le=_RECORDING_LONGEST, description="length of the recording, after settling"
+    )
+    sample_rate: Frequency = Field(ge=_RATE_LEAST, le=_RATE_MOST)
+    settling_revolutions: int = Field(
+        default=3, ge=1, le=_SETTLING_MOST, description="run before the recording"
+    )
     accuracy: Ratio = Field(default=0.02, gt=0, lt=1, description="error the features may carry")
-    sensors: tuple[Accelerometer, ...] = Field(min_length=1)
+    sensors: tuple[Accelerometer, ...] = Field(min_length=1, max_length=_MOST_SENSORS)
     tacho: Tacho | None = Tacho()
     numerics: Numerics = Numerics()
 
@@ -378,8 +469,10 @@ class PumpScene(Scene):
     """A single-throw reciprocating pump with a worn crank pin."""
 
     machine: Literal["reciprocating-pump"]
-    gravity: Acceleration = Field(default=STANDARD_GRAVITY, ge=0)
-    stroke_inclination: Angle = Field(default=0.0, description="0 horizontal, 90 deg piston up")
+    gravity: Acceleration = Field(default=STANDARD_GRAVITY, ge=0, le=_GRAVITY_MOST)
+    stroke_inclination: Angle = Field(
+        default=0.0, ge=-math.tau, le=math.tau, description="0 horizontal, 90 deg piston up"
+    )
     drive: Drive
     crank: Crank
     rod: Rod
@@ -469,7 +562,7 @@ def scene_text(name_or_path: str | Path) -> str:
     path = built_in if built_in.is_file() else Path(name_or_path)
     try:
         return path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
+    except (OSError, ValueError) as error:  # ValueError: no UTF-8, or a NUL in the name
         hint = _nearest(str(name_or_path), scene_names())
         reason = "is no UTF-8 text" if isinstance(error, UnicodeDecodeError) else "is no scene"
         raise SceneError(str(name_or_path), [f"{name_or_path} {reason}{hint}"]) from None
@@ -485,6 +578,8 @@ def scene_table(text: str, name: str = "scene") -> dict[str, Any]:
     """
     try:
         return tomllib.loads(text)
+    except RecursionError:
+        raise SceneError(name, ["not TOML: lists or tables nested too deep; flatten it"]) from None
     except tomllib.TOMLDecodeError as error:
         raise SceneError(name, [f"not TOML: {error}; mend the line it names"]) from None
 
@@ -531,7 +626,7 @@ def validate_table(model: type[Table], table: Mapping[str, Any], name: str) -> T
     try:
         return model.model_validate(dict(table))
     except ValidationError as error:
-        entries = error.errors()
+        entries = [entry for entry in error.errors() if not _other_choice(entry)]
         places = [entry["loc"] for entry in entries]
         faults = [
             line
@@ -544,6 +639,13 @@ def validate_table(model: type[Table], table: Mapping[str, Any], name: str) -> T
         if issubclass(model, Scene) and () not in places:
             faults += model.cross_faults(_valid_parts(model, table))
         raise SceneError(name, faults) from None
+
+
+def _other_choice(entry: Any) -> bool:
+    """The text or boolean member of a union: its number has been reported already."""
+    return entry["loc"][-1:] in (("str",), ("bool",)) and entry["type"].startswith(
+        ("string_", "bool_")
+    )
 
 
 def _valid_parts(model: type[BaseModel], table: Mapping[str, Any]) -> dict[str, Any]:
@@ -629,9 +731,9 @@ def _copy(node: Any) -> Any:
 
 def _replace(node: Any, keys: list[str], value: Any) -> None:
     for key in keys[:-1]:
-        node = node[int(key)] if isinstance(node, list) else node.setdefault(key, {})
+        node = node[_index(key)] if isinstance(node, list) else node.setdefault(key, {})
     if isinstance(node, list):
-        node[int(keys[-1])] = value
+        node[_index(keys[-1])] = value
         return
     if not isinstance(node, dict):
         raise TypeError(keys)
@@ -639,7 +741,17 @@ def _replace(node: Any, keys: list[str], value: Any) -> None:
     node[keys[-1]] = value
 
 
+def _index(key: str) -> int:
+    """Place in a list; counted from the front, in plain digits."""
+    if not re.fullmatch("[0-9]{1,9}", key):
+        raise IndexError(key)
+    return int(key)
+
+
 def _nearest(word: str, choices: Any) -> str:
+    whole = [choice for choice in choices if word in choice.split("_")]
+    if len(whole) > 1:  # "clearance" is both of the two clearances
+        return f"; did you mean {' or '.join(map(repr, sorted(whole)))}?"
     matches = difflib.get_close_matches(word, list(choices), n=1, cutoff=0.5)
     if matches:
         return f"; did you mean '{matches[0]}'?"
@@ -648,21 +760,49 @@ def _nearest(word: str, choices: Any) -> str:
 
 def _fault_lines(model: type[BaseModel], entry: Any) -> list[str]:
     """Turn one pydantic error into lines with path, value, bound and cure."""
-    path = ".".join(str(part) for part in entry["loc"])
+    location = entry["loc"]
+    if location[-1:] == ("float",):  # the number of a union, not a part of the path
+        location = location[:-1]
+    path = ".".join(str(part) for part in location)
     kind, context = entry["type"], entry.get("ctx", {})
-    owner, field = _find_field(model, entry["loc"])
+    owner, field = _find_field(model, location)
     if kind == "extra_forbidden":
         known = owner.model_fields if owner else ()
-        return [f"{path} is an unknown key{_nearest(str(entry['loc'][-1]), known)}"]
+        return [f"{path} is an unknown key{_nearest(str(location[-1]), known)}"]
     about = f" ({field.description})" if field is not None and field.description else ""
     if kind == "missing":
         return [f"{path} is missing{about}; add it"]
     if kind == "value_error":
         text = str(context["error"])
         if text.startswith(("has ", "is not ")):  # from to_si, about this one value
-            return [f"{path} = {entry['input']!r} {text}"]
+            return [f"{path} = {_short(entry['input'])} {text}"]
         return [f"{path}: {line}" if path else line for line in text.splitlines()]
-    return [f"{path} = {_shown(entry['input'], field)} {_bound(entry)}{about}"]
+    return [f"{path} = {_shown(entry['input'], field)} {_bound(entry)}{about}{_cure(entry, field)}"]
+
+
+def _cure(entry: Any, field: Any) -> str:
+    """A number out of bounds has a slipped exponent or a wrong unit."""
+    out = entry["type"].startswith(("greater_", "less_"))
+    return "; check value and unit" if out and _dimension_of(field) not in (None, "ratio") else ""
+
+
+_KINDS = {
+    "finite_number": "must be finite",
+    "float_": "must be a number or a text with a unit",
+    "int_": "must be a whole number",
+    "string_too_short": "must have >= {min_length} character(s)",
+    "string_too_long": "must have <= {max_length} characters",
+    "string_": "must be a text",
+    "bool_": "must be true or false",
+    "too_short": "must have >= {min_length} entries",
+    "too_long": "must have <= {max_length} entries",
+    "tuple_": "must be a list",
+    "list_": "must be a list",
+    "model_": "must be a table",
+    "dict_": "must be a table",
+    "mapping_": "must be a table",
+}
+"""What a value must be, by the beginning of pydantic's name of the fault."""
 
 
 def _bound(entry: Any) -> str:
@@ -672,17 +812,38 @@ def _bound(entry: Any) -> str:
             return f"must be {sign} {context[key]:g}"
     if entry["type"] == "literal_error":
         return f"must be {context['expected']}"
-    return f"must be otherwise: {entry['msg'].lower()}"
+    for beginning, text in _KINDS.items():
+        if entry["type"].startswith(beginning):
+            return text.format_map(context)
+    return "must be of another kind; see a built-in one"  # no kind that a scene has today
 
 
 def _shown(value: Any, field: Any) -> str:
-    dimension = next((m.name for m in _metadata(field) if isinstance(m, _Dimension)), None)
-    if dimension is None:
-        return repr(value)
+    dimension = _dimension_of(field)
+    if dimension is None or _holds_many(field):
+        return _short(value)
     try:
         return f"{to_si(value, dimension):g} {_unit_symbol(dimension)}".rstrip()
     except ValueError:
-        return repr(value)
+        return _short(value)
+
+
+def _holds_many(field: Any) -> bool:
+    origin = getattr(field.annotation, "__origin__", None)
+    return origin in (dict, tuple)
+
+
+def _dimension_of(field: Any) -> str | None:
+    return next((m.name for m in _metadata(field) if isinstance(m, _Dimension)), None)
+
+
+def _short(value: Any) -> str:
+    """A value for a message, cut where it would bury the rest."""
+    text = reprlib.repr(value)
+    return text if len(text) <= _SHOWN else f"{text[:_SHOWN]}…"
+
+
+_SHOWN = 60  # characters
 
 
 def _metadata(field: Any) -> list[Any]:

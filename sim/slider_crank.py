@@ -97,7 +97,8 @@ class CrankRun:
     Attributes
     ----------
     states : numpy.ndarray [shape=(n_steps + 1, 6)]
-        Columns as :data:`STATE`, at the ends of the steps.
+        Columns as :data:`STATE`, at the ends of the steps; the state in the middle of a step, to
+        which its forces belong, is the mean of two rows.
     forces : numpy.ndarray [shape=(n_steps, 4)]
         Columns as :data:`FORCES`, mean over each step.
     step : float
@@ -505,7 +506,7 @@ def run_compliant(
     start : tuple of float
         Columns as :data:`STATE`.
     step : float
-        [s], at most ``LARGEST_STEP_PER_CONTACT_TIME`` over :func:`contact_frequency`.
+        [s], at most ``LARGEST_STEP_PER_CONTACT_TIME`` over :func:`contact_rate`.
     n_steps : int
         Steps to take.
 

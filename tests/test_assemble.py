@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from wearstate.sim.assemble import channels_of, simulate, steps_per_sample
+from wearstate.sim.assemble import channels_of, check, simulate, steps_per_sample
 from wearstate.sim.integrate import SimulationError, Status
 from wearstate.sim.scene import SceneError, load_scene
 from wearstate.sim.slider_crank import contact_frequency
@@ -15,7 +15,7 @@ SHORT = {"duration": "0.4 s"}  # two revolutions
 RATE = 25_600.0
 SOFT = {**SHORT, "joint.crankpin.stiffness": "0.1 N/um"}  # 25 mm under 2.5 kN, pin radius 30 mm
 # pushed to the end of what a double holds, the gap overflows
-OVERFLOWING = {**SHORT, "pressure.discharge": "1e300 Pa"}
+OVERFLOWING = {**SHORT, "pressure.discharge": 1e300}
 # asin(50 / 50.1) = 1.51 rad: within the geometry, but the rod stands across the stroke
 ACROSS = {
     "rod.length": "50.1 mm",
@@ -25,6 +25,7 @@ ACROSS = {
     "drive.speed": "20 rpm",
     "duration": "3.2 s",
 }
+UNCHECKED = {"pressure.discharge"}
 FAILURES = [(OVERFLOWING, Status.DIVERGED), (SOFT, Status.OVERLAP), (ACROSS, Status.LOCKED)]
 
 
@@ -218,9 +219,16 @@ def test_speed_and_rate_decide_the_length():
 # --- honest
 
 
+def unchecked(changes):
+    """A scene with values that validation refuses: what a solver must still survive."""
+    scene = load_scene("bilge-pump", {k: v for k, v in changes.items() if k not in UNCHECKED})
+    pressure = {k.split(".")[1]: v for k, v in changes.items() if k in UNCHECKED}
+    return scene.model_copy(update={"pressure": scene.pressure.model_copy(update=pressure)})
+
+
 @pytest.mark.parametrize(("changes", "status"), FAILURES)
 def test_failure_is_a_status(changes, status):
-    scene = load_scene("bilge-pump", changes)
+    scene = unchecked(changes)
     with pytest.raises(SimulationError, match=f"bilge-pump: {status.name.lower()}: ") as caught:
         simulate(scene, seed=1)
     assert caught.value.status is status
@@ -301,3 +309,48 @@ def test_default_step_is_fine_enough_for_the_features():
     assert found["scatter"] < 0.2 / 3
     assert found["bands"] < 0.2  # dB: what a chart of the features resolves
     assert abs(found["peak"]) < 0.02
+
+
+# --- bounds of a run
+
+
+def test_a_step_of_less_than_a_thousandth_of_a_sample_is_refused():
+    with pytest.raises(SceneError, match=r"numerics\.step = 1e-09 s must be >= 3\.91e-08 s, 1000"):
+        check(pump(**{"numerics.step": 1e-9}))
+    shortest = 1 / (1000 * RATE)
+    brief = {"settling_revolutions": 1, "numerics.step": shortest}
+    assert steps_per_sample(pump(**brief)) == 1000
+    stiff = {"joint.crankpin.stiffness": 1e13, "sample_rate": "500 Hz"}
+    with pytest.raises(SceneError, match=r"the contact needs steps of .* raise sample_rate"):
+        check(pump(**stiff))
+
+
+def test_a_run_that_does_not_fit_the_memory_is_refused():
+    # 3600.6 s * 25600 Hz * 2 steps * 240 byte = 44.2 GB
+    with pytest.raises(SceneError, match=r"duration = 3600 s .* needs 44\.2 GB, must be <= 4 GB"):
+        check(pump(duration="1 h", settling_revolutions=3))
+    with pytest.raises(SceneError, match=r"needs .* GB, must be <= 4 GB; shorten duration"):
+        check(pump(settling_revolutions=1000, **{"drive.speed": 0.01, "duration": 100}))
+    # the largest that fits: 4e9 / 240 byte are 16.7 million steps
+    check(pump(duration=16.6e6 / 2 / RATE - 1))
+
+
+def test_a_recording_holds_two_samples():
+    slow = {"sample_rate": 1, "duration": 1, "drive.speed": 100}
+    with pytest.raises(SceneError, match=r"duration = 1 s must be >= 2 samples = 2 s"):
+        check(pump(**slow))
+
+
+def test_the_convergence_campaign_fails_on_a_miss_or_on_scatter():
+    faults_of = runpy.run_path(str(CAMPAIGN))["faults_of"]
+    good = {"bands": 0.19, "peak": -0.019, "scatter": 0.06, "peak_scatter": 0.006}
+    assert faults_of(good) == []
+    for name, value in (
+        ("bands", 0.2),
+        ("peak", -0.02),
+        ("scatter", 0.07),
+        ("peak_scatter", 0.007),
+    ):
+        [fault] = faults_of({**good, name: value})
+        assert fault.startswith(f"{name} = ")
+    assert len(faults_of(dict.fromkeys(good, float("nan")))) == 4

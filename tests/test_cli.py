@@ -2,15 +2,19 @@
 
 import json
 import os
+import runpy
 import subprocess
 import sys
+from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from wearstate.datasets.recipe import recipe_text
 from wearstate.datasets.record import DataSet
-from wearstate.diagnose.cli import cli
+from wearstate.diagnose import demo
+from wearstate.diagnose.cli import _json_text, cli
 
 
 def run(*arguments, code=0):
@@ -19,6 +23,11 @@ def run(*arguments, code=0):
         raise result.exception
     assert result.exit_code == code, result.output
     return result
+
+
+def strict(text):
+    """Parse JSON; a NaN or an infinity is none."""
+    return json.loads(text, parse_constant=lambda word: pytest.fail(f"{word} is not JSON"))
 
 
 def refused(*arguments, says):
@@ -52,7 +61,7 @@ def test_help_imports_nothing_heavy():
 
 
 def test_scene_list_show_check(tmp_path):
-    scenes = json.loads(run("scene", "list", "--json").stdout)["scenes"]
+    scenes = strict(run("scene", "list", "--json").stdout)["scenes"]
     assert {"bilge-pump", "slider-crank-benchmark"} <= set(scenes)
     text = run("scene", "show", "bilge-pump").stdout
     (tmp_path / "mine.toml").write_text(text)
@@ -65,14 +74,14 @@ def test_simulate_writes_a_recording_that_info_and_report_read(tmp_path, small_m
         "simulate", "bilge-pump", "--set", "joint.crankpin.diametral_clearance=0.2mm",
         "--seed", 3, "-o", file, "--plot", picture, "--truth", "--json",
     )  # fmt: skip
-    assert json.loads(done.stdout)["numerics"]["rung_joint"] == "compliant"
+    assert strict(done.stdout)["numerics"]["rung_joint"] == "compliant"
     assert picture.read_bytes().startswith(b"\x89PNG")
     with DataSet(file) as data:
         assert data.manifest["diametral_clearance_crankpin_m"][0] == pytest.approx(0.2e-3)
         assert data.manifest["grade"][0] == 1
         assert data.truth(0)["pin_offset_m"].shape == (data[0].signal.shape[1], 2)
     assert "simulated" in run("info", file).stdout
-    table = json.loads(run("report", file, "--model", small_model, "--json").stdout)
+    table = strict(run("report", file, "--model", small_model, "--json").stdout)
     assert table["schema_version"] == 1
     assert table["estimate"]["verdict"] == "graded"
     assert "trained on simulation" in table["notice"]
@@ -84,10 +93,8 @@ def test_generate_features_train_evaluate_report(tmp_path, small_set):
     with h5py.File(tmp_path / "table.h5") as file:
         assert {len(column) for column in file.values()} == {120}
     model = tmp_path / "model.wsm"
-    held_out = json.loads(run("train", small_set, "-o", model, "-j", 1, "--json").stdout)[
-        "held_out"
-    ]
-    judged = json.loads(run("evaluate", model, small_set, "-j", 1, "--json").stdout)
+    held_out = strict(run("train", small_set, "-o", model, "-j", 1, "--json").stdout)["held_out"]
+    judged = strict(run("evaluate", model, small_set, "-j", 1, "--json").stdout)
     assert judged["mae_m"] == pytest.approx(held_out["mae_m"])
     page = tmp_path / "report.html"
     text = run("report", small_set, "--record", 5, "--model", model, "-o", page).stdout
@@ -116,7 +123,7 @@ def test_fail_on_tells_grade_and_level(small_set, small_model):
 
 
 def test_verify_passes():
-    result = json.loads(run("verify", "--json").stdout)
+    result = strict(run("verify", "--json").stdout)
     assert result["failed"] == 0
     assert len(result["checks"]) >= 14
 
@@ -152,20 +159,21 @@ def test_bad_scene_files(tmp_path):
 
 
 def test_outputs_are_not_overwritten_nor_half_written(tmp_path, small_set, small_model):
-    there = tmp_path / "there"
-    there.write_text("mine")
-    for command in (
-        ("generate", "bilge-pump-small", "-n", 1, "-o", there),
-        ("features", small_set, "-o", there),
-        ("train", small_set, "-o", there),
-        ("report", small_set, "--model", small_model, "-o", there),
-        ("simulate", "bilge-pump", "-o", there),
-        ("simulate", "bilge-pump", "--plot", there),
+    for suffix, command in (
+        ("h5", ("generate", "bilge-pump-small", "-n", 1, "-o")),
+        ("csv", ("features", small_set, "-o")),
+        ("wsm", ("train", small_set, "-o")),
+        ("html", ("report", small_set, "--model", small_model, "-o")),
+        ("hdf5", ("simulate", "bilge-pump", "-o")),
+        ("png", ("simulate", "bilge-pump", "--plot")),
     ):
-        refused(*command, says=["exists"])
+        there = tmp_path / f"there.{suffix}"
+        there.write_text("mine")
+        refused(*command, there, says=["exists; choose another name or use --force"])
         assert there.read_text() == "mine"
+        there.unlink()
     refused("simulate", "bilge-pump", "-o", tmp_path / "no" / "x.h5", says=["is no folder"])
-    assert [path.name for path in tmp_path.iterdir()] == ["there"]
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_truncated_and_foreign_files(tmp_path, small_set, small_model):
@@ -202,8 +210,223 @@ def test_record_number_out_of_range(small_set, small_model):
     refused("report", small_set, "--model", small_model, "--record", 500, says=["500", "120"])
 
 
-def test_a_read_only_folder_is_one_message(tmp_path, small_set):
-    if os.geteuid() == 0:
-        pytest.skip("root may write anywhere")
-    tmp_path.chmod(0o500)
-    refused("features", small_set, "-o", tmp_path / "t.csv", says=["t.csv"])
+def test_a_folder_that_is_a_file_is_one_message(tmp_path, small_set):
+    (tmp_path / "file").write_text("")
+    for output in ("file/t.csv", "file/deeper/t.csv"):
+        refused("features", small_set, "-o", tmp_path / output, says=["is no folder; create it"])
+    refused("demo", "--folder", tmp_path / "file" / "demo", says=["cannot be made a folder"])
+    refused("info", tmp_path / "file" / "x.h5", says=["is no file"])
+
+
+def test_an_output_is_never_an_input(tmp_path, small_set, small_model):
+    data, model = tmp_path / "data.h5", tmp_path / "model.wsm"
+    data.write_bytes(small_set.read_bytes())
+    model.write_bytes(small_model.read_bytes())
+    (tmp_path / "link.h5").symlink_to(data)
+    os.link(model, tmp_path / "twin.html")
+    recipe = tmp_path / "recipe.h5"
+    recipe.write_text("name = 'no matter'")
+    before = {path: path.read_bytes() for path in tmp_path.iterdir()}
+    for command in (
+        ("features", data, "-o", data),
+        ("features", data, "-o", tmp_path / "." / "link.h5"),
+        ("report", data, "--model", model, "-o", tmp_path / "twin.html"),
+        ("generate", recipe, "-o", recipe),
+        ("simulate", recipe, "-o", recipe),
+    ):
+        refused(*command, "--force", says=["is also an input"])
+        refused(*command, says=["is also an input"])
+    assert {path: path.read_bytes() for path in tmp_path.iterdir()} == before
+
+
+def test_two_outputs_are_two_files(tmp_path):
+    picture = tmp_path / "a.png"
+    for force in ((), ("--force",)):
+        refused(
+            "simulate", "bilge-pump", "-o", picture, "--plot", picture, *force,
+            says=["given for two outputs"],
+        )  # fmt: skip
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("command", "name", "says"),
+    [
+        (("simulate", "bilge-pump", "-o"), "x.png", ".h5, .hdf5"),
+        (("simulate", "bilge-pump", "--plot"), "x.h5", ".png, .svg, .pdf"),
+        (("generate", "bilge-pump-small", "-o"), "x", ".h5, .hdf5"),
+        (("features", "data.h5", "-o"), "x.txt", ".parquet, .csv, .h5"),
+        (("train", "data.h5", "-o"), "x.h5", "one of .wsm"),
+        (("report", "data.h5", "--model", "m.wsm", "-o"), "x.wsm", ".html, .htm"),
+    ],
+)
+def test_an_output_has_a_suffix_of_its_kind(tmp_path, command, name, says):
+    refused(*command, tmp_path / name, says=["suffix", says, "rename it"])
+    (tmp_path / "folder.h5").mkdir()
+    refused(*command, tmp_path / "folder.h5", says=["is a folder; name a file in it"])
+    refused(*command, "", says=["is empty"])
+
+
+@pytest.mark.parametrize(
+    ("command", "says"),
+    [
+        (("simulate", "bilge-pump", "--seed", 2**63), "range"),
+        (("generate", "bilge-pump-small", "-o", "x.h5", "-n", 10**8 + 1), "range"),
+        (("generate", "bilge-pump-small", "-o", "x.h5", "-n", 10**8), "GB; ask for fewer"),
+        (("generate", "bilge-pump-small", "-o", "x.h5", "-n", 0), "range"),
+        (("train", "x.h5", "-o", "x.wsm", "--held-out", "nan"), "nan must be >= 0 and <= 0.9"),
+        (("simulate", "bilge-pump", "--set", "duration=1e9"), "must be <= 3600"),
+        (("simulate", "bilge-pump", "--set", "duration=1h"), "must be <= 4 GB"),
+        (("simulate", "bilge-pump", "--set", "numerics.step=1e-9"), "must be >= 3.91e-08 s"),
+        (("simulate", "bilge-pump", "--set", "drive.speed=1_0"), "drive.speed = '1_0' has unit"),
+        (("simulate", "bilge-pump", "--set", "drive.speed=nan"), "has no leading number"),
+        (("simulate", "bilge-pump", "--set", f"rod.mass={'9' * 400}"), "inf kg must be finite"),
+        (("simulate", "bilge-pump", "--set", "sensors.-1.noise=0"), "does not lead to a value"),
+        (("simulate", "bilge-pump", "--set", "drive=1"), "drive = 1 must be a table"),
+    ],
+)
+def test_values_out_of_bounds(tmp_path, monkeypatch, command, says):
+    monkeypatch.chdir(tmp_path)
+    refused(*command, says=[says])
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_only_a_scene_is_shown(tmp_path):
+    (tmp_path / "secret").write_text("password: 1234")
+    assert "1234" not in refused("scene", "show", tmp_path / "secret", says=["not TOML"])
+    (tmp_path / "other.toml").write_text("name = 'no scene'")
+    refused("scene", "show", tmp_path / "other.toml", says=["machine is missing"])
+    refused("scene", "show", tmp_path, says=["is no scene"])
+
+
+def test_force_is_an_option_here_and_an_argument_in_the_library(tmp_path):
+    run("generate", "bilge-pump-small", "-n", 1, "-o", tmp_path / "a.h5", "-j", 1)
+    (tmp_path / "a.h5").rename(tmp_path / "a.h5.part")
+    command = ("generate", "bilge-pump-small", "-n", 2, "-o", tmp_path / "a.h5")
+    refused(*command, says=["use --force to start anew"])
+    (tmp_path / "b.h5").write_text("")
+    refused(*command[:-1], tmp_path / "b.h5", says=["use --force to replace it"])
+
+
+def test_a_failed_simulation_leaves_nothing(tmp_path, monkeypatch):
+    def fail(*_, **__):
+        raise OSError(28, "No space left on device", str(tmp_path / "x.h5.part"))
+
+    monkeypatch.setattr("wearstate.datasets.record.DataSetWriter.write", fail)
+    error = refused("simulate", "bilge-pump", "-o", tmp_path / "x.h5", says=["No space", "x.h5'"])
+    assert ".part" not in error
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_reader_that_stops_ends_the_program_quietly():
+    program = subprocess.Popen(
+        [sys.executable, "-m", "wearstate", "scene", "show", "bilge-pump"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    )
+    program.stdout.close()  # before anything is written
+    assert program.stderr.read() == b""
+    program.stderr.close()
+    assert program.wait(timeout=60) == 1
+
+
+def test_no_more_workers_than_four_a_core():
+    from wearstate.datasets import workers
+
+    assert workers.cores() >= 1
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(workers, "cores", lambda: 0.25)  # four times that is one: no process at all
+        patch.setattr("joblib.externals.loky.get_reusable_executor", None)
+        assert list(workers.in_order(abs, [-1, 2], jobs=10**9)) == [1, 2]
+
+
+# --- info and demo ------------------------------------------------------------------------------
+
+
+def test_info_is_si_in_json_and_units_in_text(tmp_path, small_set, small_model):
+    data = strict(run("info", small_set, "--json").stdout)
+    assert data["sample_rate_hz"] == 25600.0
+    assert data["duration_s"] == 4.8
+    assert (data["records"], data["machine_draws"]) == (120, 60)
+    assert sum(data["grades"].values()) == data["status"]["ok"] == 120
+    low, high = data["severity_ranges_m"]["diametral_clearance_crankpin_m"]
+    assert 0.05e-3 <= low < 0.06e-3 < 0.4e-3 < high <= 0.465e-3  # the recipe's bounds
+    assert data["condemning_limit_m"] == 0.31e-3
+    model = strict(run("info", small_model, "--json").stdout)
+    assert model["grade_edges_m"] == [0.13e-3, 0.22e-3, 0.31e-3]
+    assert all(key == key.lower() and " " not in key for key in [*data, *model])
+    assert "grade edges     0.13, 0.22, 0.31 mm" in run("info", small_model).stdout
+    assert "sample rate       25600 Hz" in run("info", small_set).stdout
+
+
+def test_rms_is_that_of_the_vibration_about_its_mean(tmp_path):
+    file = tmp_path / "a.h5"
+    shown = run("simulate", "bilge-pump", "--set", "duration=0.3 s", "-o", file, "--json").stdout
+    with DataSet(file) as data:
+        vibration = data[0].vibration
+    expected = np.sqrt(np.mean((vibration - vibration.mean(axis=1, keepdims=True)) ** 2, axis=1))
+    rms = strict(shown)["rms"]
+    assert list(rms) == ["acc_x", "acc_y"]
+    # sums of 7,680 floats of 24 bit, in two orders
+    assert list(rms.values()) == pytest.approx(expected.tolist(), rel=1e-4)
+
+
+def test_json_has_null_for_what_is_not_finite():
+    text = _json_text({"a": float("nan"), "b": [np.float32("inf"), np.int64(3)], "c": (1.5,)})
+    assert strict(text) == {"a": None, "b": [None, 3], "c": [1.5]}
+    with pytest.raises(TypeError, match="not JSON serializable"):
+        _json_text({"a": object()})
+
+
+@pytest.fixture
+def tiny_recipe(tmp_path, monkeypatch):
+    """24 records of 12 draws, 0.6 s each: as few as can be trained on."""
+    text = recipe_text("bilge-pump-small").replace("records = 120", "records = 24")
+    path = tmp_path / "tiny.toml"
+    path.write_text(text.replace("[fixed]", '[fixed]\nduration = "0.6 s"'))
+    monkeypatch.setattr(demo, "RECIPE", str(path))
+
+
+@pytest.mark.usefixtures("tiny_recipe")
+def test_demo_makes_its_files_and_replaces_only_them(tmp_path):
+    folder = tmp_path / "out"
+    result = strict(run("demo", "--folder", folder, "-j", 1, "--json").stdout)
+    assert set(result["seconds"]) == {"generate", "train", "report"}
+    assert all(seconds > 0 for seconds in result["seconds"].values())
+    names = {"data.h5", "model.wsm", "report.html", demo.MARKER}
+    assert {path.name for path in folder.iterdir()} == names
+    assert set(result["files"].values()) == {str(folder / n) for n in names - {demo.MARKER}}
+    assert result["held_out"]["records"] > 0
+    assert run("demo", "--folder", folder, "-j", 1).stdout.startswith("Judged on")
+
+
+def test_demo_leaves_the_files_of_others_alone(tmp_path):
+    (tmp_path / "data.h5").write_text("mine")
+    refused("demo", "--folder", tmp_path, says=["is no earlier demo's", "another folder"])
+    assert [path.name for path in tmp_path.iterdir()] == ["data.h5"]
+    assert (tmp_path / "data.h5").read_text() == "mine"
+    refused("demo", "--folder", "", says=["is empty"])
+
+
+def test_demo_reports_on_an_unseen_record_whatever_its_wear():
+    severity = np.array([0.1, 0.2, 0.9, 0.4, 0.5, 0.7])
+    assert demo._most_worn(np.array([0, 1, 4]), severity, 0.45) == 1
+    assert demo._most_worn(np.array([2, 5]), severity, 0.45) == 5
+
+
+def test_the_benchmark_fails_on_a_miss():
+    script = Path(__file__).parent / "benchmarks" / "standard_pump.py"
+    misses = runpy.run_path(str(script))["misses"]
+    good = {
+        "mae_share_of_limit": 0.06,
+        "within_one_grade": 0.99,
+        "baselines": {"single_rms": 0.6},
+    }
+    assert misses(good) == []
+    bad = {
+        "mae_share_of_limit": 0.061,
+        "within_one_grade": 0.989,
+        "baselines": {"single_rms": 0.61},
+    }
+    assert len(misses(bad)) == 3
+    assert len(misses({**good, "mae_share_of_limit": None})) == 1

@@ -12,15 +12,20 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.stats import rankdata
 from wearstate.datasets import generate as generation
-from wearstate.datasets.generate import generate
+from wearstate.datasets.generate import generate, save_solution
 from wearstate.datasets.recipe import (
+    LARGEST_SEED,
+    MOST_RECORDS,
     STRATA,
     RecipeError,
     load_recipe,
     recipe_names,
     sample_records,
 )
-from wearstate.datasets.record import DataError, DataSet
+from wearstate.datasets.record import DataError, DataSet, DataSetWriter
+from wearstate.datasets.splits import group_split
+from wearstate.datasets.workers import in_order
+from wearstate.sim.assemble import simulate
 from wearstate.sim.scene import SceneError, load_scene
 
 SHORT = {"duration": "0.25 s", "settling_revolutions": 1}
@@ -442,3 +447,74 @@ def test_unknown_recipes_and_scenes_are_named(tmp_path):
         load_recipe("bilge-pump-smal")
     faults = faults_of(GOOD.replace('"bilge-pump"', '"bilge-pum"'), tmp_path)
     assert "did you mean 'bilge-pump'?" in faults[0]
+
+
+# -- bounds ------------------------------------------------------------------------------------
+
+
+def test_records_and_seed_have_upper_bounds(short, tmp_path):
+    with pytest.raises(RecipeError, match=r"n = 100000001 must be >= 1 and <= 100000000"):
+        generate(short, MOST_RECORDS + 1, tmp_path / "data.h5")
+    with pytest.raises(RecipeError, match=r"seed = 9223372036854775808 must be .* choose another"):
+        generate(short, 1, tmp_path / "data.h5", seed=LARGEST_SEED + 1)
+    with pytest.raises(DataError, match=r"must be >= .* GB; ask for fewer"):
+        generate(short, MOST_RECORDS, tmp_path / "data.h5")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_no_more_workers_than_records(short, tmp_path, monkeypatch):
+    asked = []
+
+    def noted(function, items, *, jobs):
+        asked.append(jobs)
+        return in_order(function, items, jobs=1)
+
+    monkeypatch.setattr(generation, "in_order", noted)
+    generate(short, 1, tmp_path / "data.h5", jobs=10**6)
+    assert asked == [1]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ("records = 4", "records = 1_000_000_001", "records = 1000000001 must be <= 1e+08"),
+        ("records = 4", "records = 'x'", "records = 'x' must be a whole number"),
+        ("records = 4", "records = 4\nfixed = 3", "fixed = 3 must be a table"),
+        ("records = 4", "records = 4\nmachine = 3", "machine = 3 must be a list"),
+        (
+            "records = 4",
+            "records = 4\nfixed = { duration = [1] }",
+            "fixed.duration = [1] must be a number or a text with a unit",
+        ),
+    ],
+)
+def test_tables_of_the_wrong_kind(tmp_path, old, new, says):
+    assert old in GOOD
+    [fault] = faults_of(GOOD.replace(old, new), tmp_path)
+    assert says in fault
+
+
+def test_a_failed_recording_leaves_no_unfinished_file_but_that_of_others(tmp_path, monkeypatch):
+    scene = load_scene("bilge-pump", SHORT)
+    solution = simulate(scene, seed=0)
+    other = tmp_path / "other.h5.part"
+    other.write_bytes(b"of an interrupted run")
+    with pytest.raises(DataError, match="unfinished file"):
+        save_solution(scene, solution, tmp_path / "other.h5", seed=0)
+    assert other.read_bytes() == b"of an interrupted run"
+
+    def full(*_, **__):
+        raise OSError("no space")
+
+    monkeypatch.setattr(DataSetWriter, "write", full)
+    with pytest.raises(OSError, match="no space"):
+        save_solution(scene, solution, tmp_path / "mine.h5", seed=0)
+    assert list(tmp_path.iterdir()) == [other]
+
+
+def test_a_split_that_cannot_be_made_is_bad_data():
+    """So that the command line answers with one message and not with a traceback."""
+    with pytest.raises(DataError, match=r"1 group\(s\), must be >= 2"):
+        group_split([1, 1])
+    with pytest.raises(DataError, match="test_fraction = nan must be > 0 and < 1"):
+        group_split([1, 2], test_fraction=float("nan"))

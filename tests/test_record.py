@@ -264,6 +264,12 @@ def test_existing_output_is_kept_unless_forced(path):
     assert list(path.parent.iterdir()) == [path]
 
 
+def test_a_folder_is_no_output(path):
+    path.mkdir()
+    with pytest.raises(DataError, match="is a folder; name a file in it"):
+        begin(path, force=True)
+
+
 def test_nothing_is_left_when_set_up_fails(path, monkeypatch):
     def fail(*_, **__):
         raise OSError("no space")

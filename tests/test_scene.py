@@ -1,18 +1,23 @@
 """Scenes: units, refusals, and the built-in machines."""
 
 import copy
+import json
 import math
+import pickle
 import re
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from pydantic import ValidationError
+from wearstate.sim.analytic import kelvin_voigt_restitution
 from wearstate.sim.assemble import simulate
 from wearstate.sim.scene import (
     SCENE_FOLDER,
     UNITS,
+    FixedTable,
     SceneError,
     load_scene,
     scene_from_table,
@@ -21,7 +26,7 @@ from wearstate.sim.scene import (
     scene_text,
     to_si,
 )
-from wearstate.sim.slider_crank import contact_frequency
+from wearstate.sim.slider_crank import contact_frequency, ideal_motion
 
 EVERY_UNIT = [(dimension, unit) for dimension, units in UNITS.items() for unit in units]
 CRANKPIN = "joint.crankpin"
@@ -233,6 +238,137 @@ def test_override_leaves_the_table_alone():
     assert pump_table() == before
 
 
+@pytest.mark.parametrize(
+    ("changes", "says"),
+    [
+        ({"drive": 1}, "drive = 1 must be a table"),
+        ({"tacho": "none"}, "tacho = 'none' must be a table"),
+        ({"sensors.0": 3}, "sensors.0 = 3 must be a table"),
+        ({"casing.modes.0.shape": 3}, "casing.modes.0.shape = 3 must be a table"),
+        ({"sensors": 3}, "sensors = 3 must be a list"),
+        ({"sensors": []}, "sensors = [] must have >= 1 entries"),
+        ({"wear.grade_edges_diametral": [1, 2, 3, 4]}, "must have <= 3 entries"),
+        ({"settling_revolutions": 1.5}, "settling_revolutions = 1.5 must be a whole number"),
+        ({"settling_revolutions": "x"}, "settling_revolutions = 'x' must be a whole number"),
+        ({"name": 5}, "name = 5 must be a text"),
+        ({"name": ""}, "name = '' must have >= 1 character(s)"),
+        ({"tacho.name": "t" * 65}, "must have <= 64 characters"),
+        ({"rod.mass": math.nan}, "rod.mass = nan kg must be finite"),
+        ({"rod.mass": 10**400}, "rod.mass = inf kg must be finite"),
+        ({"pressure.rung": 3}, "pressure.rung = 3 must be 'none' or 'two-level'"),
+    ],
+)
+def test_every_kind_of_fault_has_its_own_words(changes, says):
+    faults = faults_of(changes)
+    assert any(says in fault for fault in faults), faults
+    assert not any(word in fault for fault in faults for word in ("input", "instance", "valid "))
+
+
+@pytest.mark.parametrize(
+    ("path", "bound"),
+    [
+        ("duration", "<= 3600"),
+        ("sample_rate", "<= 1e+06"),
+        ("settling_revolutions", "<= 1000"),
+        ("gravity", "<= 1000"),
+        ("stroke_inclination", "<= 6.28319"),
+        ("drive.speed", "<= 1000"),
+        ("drive.start_angle", "<= 10000"),
+        ("crank.radius", "<= 100"),
+        ("rod.length", "<= 100"),
+        ("rod.mass", "<= 1e+06"),
+        ("rod.inertia", "<= 1e+09"),
+        ("piston.mass", "<= 1e+06"),
+        ("piston.diameter", "<= 100"),
+        ("pressure.discharge", "<= 1e+09"),
+        ("joint.crankpin.pin_diameter", "<= 100"),
+        ("joint.crankpin.stiffness", "<= 1e+13"),
+        ("joint.crankpin.damping", "<= 1e+09"),
+        ("joint.crankpin.tangential_damping", "<= 1e+09"),
+        ("joint.crankpin.friction_speed", "<= 1000"),
+        ("wear.as_new_diametral", "<= 100"),
+        ("casing.modes.0.frequency", "<= 1e+06"),
+        ("casing.modes.0.shape.acc_x", "<= 1000"),
+        ("sensors.0.gain", "<= 1000"),
+        ("sensors.0.noise", "<= 1e+07"),
+        ("sensors.0.range", "<= 1e+07"),
+        ("tacho.level", "<= 10000"),
+    ],
+)
+def test_absurd_values_meet_a_bound(path, bound):
+    value = 10**12 if path == "settling_revolutions" else 1e200
+    faults = [fault for fault in faults_of({path: value}) if fault.startswith(f"{path} = ")]
+    assert len(faults) == 1
+    assert f"must be {bound}" in faults[0]
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        *("rod.mass", "rod.inertia", "piston.mass", "sample_rate", "numerics.step"),
+        *("sensors.0.range", "sensors.0.gain", "casing.modes.0.frequency", "tacho.level"),
+        "joint.crankpin.friction_speed",
+    ],
+)
+def test_what_divides_has_a_least_value(path):
+    [fault] = faults_of({path: 1e-300})
+    assert fault.startswith(f"{path} = 1e-300")
+    assert "must be >= " in fault
+
+
+def test_a_number_out_of_bounds_comes_with_a_cure():
+    [fault] = faults_of({"rod.mass": "3e9 kg"})
+    assert fault == "rod.mass = 3e+09 kg must be <= 1e+06; check value and unit"
+
+
+def test_half_a_name_is_answered_with_every_whole_one():
+    assert faults_of({f"{CRANKPIN}.clearance": "0.1 mm"}) == [
+        f"{CRANKPIN}.clearance is an unknown key; "
+        "did you mean 'diametral_clearance' or 'radial_clearance'?"
+    ]
+
+
+@pytest.mark.parametrize("index", ["-1", "1_0", "+0", "٠", "7", "x"])
+def test_a_list_is_counted_from_the_front_in_plain_digits(index):
+    [fault] = faults_of({f"sensors.{index}.noise": 0})
+    assert fault.startswith(f"sensors.{index}.noise does not lead to a value")
+
+
+def test_a_mode_shape_is_frozen_hashable_and_picklable():
+    scene = load_scene("bilge-pump")
+    shape = scene.casing.modes[0].shape
+    for change in (
+        lambda: shape.update(acc_x=1.0),
+        lambda: shape.__setitem__("acc_x", 1.0),
+        lambda: shape.pop("acc_x"),
+        lambda: shape.clear(),
+        lambda: shape.setdefault("new", 1.0),
+        lambda: shape.__ior__({"acc_x": 1.0}),
+        lambda: shape.__delitem__("acc_x"),
+    ):
+        with pytest.raises(TypeError, match="a scene is frozen"):
+            change()
+    assert shape["acc_x"] == 0.06
+    twin = pickle.loads(pickle.dumps(scene))
+    assert twin == copy.deepcopy(scene) == scene
+    assert hash(twin) == hash(scene)
+    assert type(twin.casing.modes[0].shape) is FixedTable
+    assert scene_from_table(json.loads(scene.model_dump_json())) == scene
+
+
+def test_the_benchmark_contact_is_the_secant_of_its_hertz_law():
+    # F = K d^1.5 has the secant F/d = K^(2/3) F^(1/3); F is the ideal joint's largest force
+    scene = load_scene("slider-crank-benchmark")
+    ideal = ideal_motion(scene, np.linspace(0, 2 * np.pi, 721))
+    force = np.hypot(ideal.pin_force_x, ideal.pin_force_y).max()
+    secant = 6.61e10 ** (2 / 3) * force ** (1 / 3)
+    assert_allclose(force, 6.2e3, rtol=5e-3)  # as the scene's comment rounds it
+    assert_allclose(scene.joint.crankpin.stiffness, secant, rtol=5e-3)  # two digits
+    mass = scene.rod.mass + scene.piston.mass
+    ratio = scene.joint.crankpin.damping / 2 / math.sqrt(scene.joint.crankpin.stiffness * mass)
+    assert_allclose(kelvin_voigt_restitution(ratio), 0.94, atol=5e-3)  # two digits
+
+
 def test_no_toml_and_no_text(tmp_path):
     broken = tmp_path / "broken.toml"
     broken.write_text("name = ", encoding="utf-8")
@@ -241,6 +377,11 @@ def test_no_toml_and_no_text(tmp_path):
     broken.write_bytes(b"\xff\xfe\x00")
     with pytest.raises(SceneError, match="is no UTF-8 text"):
         load_scene(broken)
+    broken.write_text(f"a = {'[' * 5000}", encoding="utf-8")
+    with pytest.raises(SceneError, match="nested too deep"):
+        load_scene(broken)
+    with pytest.raises(SceneError, match="did you mean"):
+        load_scene("bilge-pump\0")
 
 
 def test_too_long_a_step_names_value_and_bound():

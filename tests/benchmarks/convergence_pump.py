@@ -53,14 +53,20 @@ def standard_error(values):
 
 
 def starts_needed(clearance, parts=(1, 4), first=8):
-    """Number of starts, doubled until every band's standard error is below a third of 0.2 dB."""
+    """Number of starts, doubled until the standard errors are a third of the tolerances."""
     n_starts = first
     while n_starts <= MOST_STARTS:
-        errors = (standard_error(sample(clearance, part, n_starts)[0]).max() for part in parts)
-        if all(error < LEVEL_TOLERANCE / 3 for error in errors):
+        if all(_resolved(*sample(clearance, part, n_starts)) for part in parts):
             return n_starts
         n_starts *= 2
     raise RuntimeError(f"{clearance}: unresolvable with {MOST_STARTS} starts; record longer")
+
+
+def _resolved(levels, peaks):
+    return (
+        standard_error(levels).max() < LEVEL_TOLERANCE / 3
+        and standard_error(peaks) / peaks.mean() < PEAK_TOLERANCE / 3
+    )
 
 
 def compare(clearance, coarse, fine, n_starts):
@@ -70,11 +76,29 @@ def compare(clearance, coarse, fine, n_starts):
         "bands": float(abs(level_c.mean(axis=0) - level_f.mean(axis=0)).max()),
         "peak": float(peak_c.mean() / peak_f.mean() - 1),
         "scatter": float(max(standard_error(level_c).max(), standard_error(level_f).max())),
-        "peak_scatter": float(standard_error(peak_f) / peak_f.mean()),
+        "peak_scatter": float(max(standard_error(p) / p.mean() for p in (peak_c, peak_f))),
     }
 
 
+def faults_of(found):
+    """What of a comparison misses its tolerance, or is too scattered to be told."""
+    limits = {
+        "bands": LEVEL_TOLERANCE,
+        "peak": PEAK_TOLERANCE,
+        "scatter": LEVEL_TOLERANCE / 3,
+        "peak_scatter": PEAK_TOLERANCE / 3,
+    }
+    return [
+        f"{name} = {found[name]:.3g} must be < {limit:.3g}; shorten the default step"
+        if name in ("bands", "peak")
+        else f"{name} = {found[name]:.3g} must be < {limit:.3g}; take more starts"
+        for name, limit in limits.items()
+        if not abs(found[name]) < limit
+    ]
+
+
 def main():
+    faults = []
     for clearance in CLEARANCES:
         n_starts = starts_needed(clearance, parts=(1, 4, 8))
         for coarse, fine in ((1, 4), (4, 8)):
@@ -85,9 +109,9 @@ def main():
                 f"peak {found['peak']:+.2%} ({found['peak_scatter']:.2%})",
                 flush=True,
             )
-            good = found["bands"] < LEVEL_TOLERANCE and abs(found["peak"]) < PEAK_TOLERANCE
-            if not good:
-                raise SystemExit("the default step is too long")
+            faults += [f"{clearance}, 1/{coarse} against 1/{fine}: {f}" for f in faults_of(found)]
+    if faults:  # exit code 1, with every miss on stderr
+        raise SystemExit("\n".join(faults))
 
 
 if __name__ == "__main__":
