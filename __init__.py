@@ -22,7 +22,7 @@ _PUBLIC = {
     "DataSet": ".datasets.record",
     "generate": ".datasets.generate",
     "read_recording": ".datasets.importers",
-    "load_model": ".diagnose.estimate",
+    "load_model": ".diagnose.modelfile",
 }
 
 __all__ = ["__version__", *_PUBLIC]

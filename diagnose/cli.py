@@ -435,8 +435,8 @@ def train(
     as_json: bool,
 ) -> None:
     """Train a wear model on a labelled data set and judge it on held-out machine draws."""
-    from .estimate import save_model
     from .evaluate import score
+    from .modelfile import save_model
     from .train import train_model
 
     _check_outputs([data], [(output, _MODEL)], force)
@@ -462,8 +462,8 @@ def train(
 @_json_option
 def evaluate(model_file: Path, data: Path, jobs: int | None, as_json: bool) -> None:
     """Judge MODEL on the machine draws of DATA that it has not seen."""
-    from .estimate import load_model
     from .evaluate import evaluate_model
+    from .modelfile import load_model
 
     model = load_model(model_file)
     with _progress("features") as progress:
@@ -526,7 +526,7 @@ def report(
 ) -> None:
     """The verdict on RECORDING: wear grade and clearance with interval, or unfamiliar."""
     from ..datasets.importers import read_recording
-    from .estimate import load_model
+    from .modelfile import load_model
     from .report import report_html, report_table, report_text
 
     _check_outputs([recording_file, model_file], [(output, _PAGE)], force)

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from ..datasets.generate import generate
 from ..datasets.record import DataError, DataSet
-from .estimate import load_model, save_model
 from .evaluate import score
+from .modelfile import load_model, save_model
 from .report import report_html, report_table, report_text
 from .tabulate import Progress
 from .train import train_model

@@ -8,7 +8,7 @@ from typing import Any
 from ..datasets.importers import read_recording
 from ..datasets.record import DataError, DataSet
 from ..sim.sensor import Channel
-from .estimate import load_model
+from .modelfile import load_model
 
 
 def describe(path: Path) -> dict[str, Any]:

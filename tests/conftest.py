@@ -27,7 +27,7 @@ def small_set(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="session")
 def small_model(small_set: Path) -> Path:
     """Model file trained on `small_set`."""
-    from wearstate.diagnose.estimate import save_model
+    from wearstate.diagnose.modelfile import save_model
     from wearstate.diagnose.train import train_model
 
     path = small_set.with_name("model.wsm")

@@ -14,11 +14,10 @@ from wearstate.diagnose.estimate import (
     Calibration,
     ModelError,
     interval_offsets,
-    load_model,
-    save_model,
 )
 from wearstate.diagnose.evaluate import evaluate_model, score
 from wearstate.diagnose.grades import accuracy_bound, grades_of
+from wearstate.diagnose.modelfile import load_model, save_model
 from wearstate.diagnose.novelty import fit_familiarity, novelty_p_value
 from wearstate.diagnose.train import fit_severity, train_model
 from wearstate.sim.wear import grade
