@@ -503,3 +503,40 @@ def test_holding_out_too_much_is_refused(small_set):
     for share in (0.95, float("nan"), -0.1):
         with pytest.raises(DataError, match="held_out"):
             train_model(small_set, held_out=share)
+
+
+def test_the_penalty_is_the_one_with_the_least_error_out_of_fold(monkeypatch):
+    from wearstate.diagnose import train
+
+    rng = np.random.default_rng(10)
+    features = rng.standard_normal((60, 20))
+    severity = np.exp(0.3 * features.sum(axis=1) / 3 + 0.05 * rng.standard_normal(60))
+    groups = np.arange(60)
+
+    def error(estimate):
+        return np.abs(np.exp(estimate) - severity).mean()
+
+    alone = []
+    for penalty in train._PENALTIES:
+        with monkeypatch.context() as patch:
+            patch.setattr(train, "_PENALTIES", (penalty,))
+            alone.append(error(fit_severity(features, severity, groups, seed=0)[1][0]))
+    assert max(alone) > 1.05 * min(alone)  # the choice matters here
+    assert error(fit_severity(features, severity, groups, seed=0)[1][0]) == min(alone)
+
+
+def test_within_one_grade_and_accuracy_are_those_of_the_confusion(trained):
+    """Estimates four times too large: many grades are off by two."""
+    model, table, test = trained
+    wrong = dataclasses.replace(
+        model,
+        regressor=dataclasses.replace(
+            model.regressor, offset=model.regressor.offset + float(np.log(4))
+        ),
+    )
+    result = score(wrong, table, test)
+    counts = np.array(result["confusion"])
+    near = sum(counts[i, j] for i in range(4) for j in range(4) if abs(i - j) <= 1)
+    assert result["within_one_grade"] == pytest.approx(near / counts.sum())
+    assert result["within_one_grade"] < 0.9
+    assert result["accuracy"] == pytest.approx(np.trace(counts) / counts.sum())
