@@ -99,6 +99,15 @@ def test_familiarity_sees_what_leaves_the_cloud_in_a_direction_it_never_took():
     assert outside > 10 * inside
 
 
+def test_one_wild_feature_counts_as_five_standard_deviations_and_no_more():
+    rng = np.random.default_rng(11)
+    cloud = fit_familiarity(rng.standard_normal((300, 40)))
+    point = np.zeros((3, 40))
+    point[:, 0] = [6.0, 1e3, 1e9]
+    distance = cloud.distance(point)
+    assert distance[0] == distance[1] == distance[2]
+
+
 def test_familiarity_survives_constant_features():
     rng = np.random.default_rng(5)
     cloud = fit_familiarity(np.column_stack([rng.standard_normal(50), np.full(50, 7.0)]))
