@@ -99,6 +99,19 @@ def test_familiarity_sees_what_leaves_the_cloud_in_a_direction_it_never_took():
     assert outside > 10 * inside
 
 
+def test_familiarity_sees_usual_values_in_an_unusual_combination():
+    """Forty features driven by five causes: a recording that no causes can make."""
+    rng = np.random.default_rng(12)
+    mixing = rng.standard_normal((5, 40))
+    seen = rng.standard_normal((300, 5)) @ mixing + 0.01 * rng.standard_normal((300, 40))
+    cloud = fit_familiarity(seen)
+    usual = rng.standard_normal((1, 5)) @ mixing
+    shuffled = rng.permutation(usual[0])[None, :]  # the same values, at other features
+    assert np.abs((shuffled - cloud.centre) / cloud.spread).max() < 5
+    # Along the five directions it may lie anywhere near; off them by the noise's 0.01 it should.
+    assert cloud.distance(shuffled)[0] > 100 * cloud.distance(usual)[0]
+
+
 def test_one_wild_feature_counts_as_five_standard_deviations_and_no_more():
     rng = np.random.default_rng(11)
     cloud = fit_familiarity(rng.standard_normal((300, 40)))
