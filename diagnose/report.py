@@ -2,6 +2,7 @@
 
 import base64
 import io
+import re
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -92,6 +93,28 @@ def quantity_name(severity: str) -> str:
     return f"{kind.replace('_', ' ')}, {place}"
 
 
+def feature_words(name: str) -> str:
+    """Feature name for people.
+
+    Examples
+    --------
+    >>> feature_words("acc_x.angle_040_050.band_4350_5250.level_db")
+    'acc_x, 40 to 50°, 4350 to 5250 Hz, level [dB]'
+    >>> feature_words("acc_y.kurtosis")
+    'acc_y, kurtosis'
+    """
+    owner, *parts = name.split(".")
+    words = [owner]
+    for part in parts:
+        span = re.fullmatch(r"(angle|band)_(\d+)_(\d+)", part)
+        if span:
+            unit = "°" if span[1] == "angle" else " Hz"
+            words.append(f"{int(span[2])} to {int(span[3])}{unit}")
+        else:
+            words.append(re.sub(r"_db$", " [dB]", part).replace("_", " "))
+    return ", ".join(words)
+
+
 def report_text(table: dict[str, Any]) -> str:
     """The report for a terminal: verdict first, a dozen lines."""
     estimate, limits = table["estimate"], table["limits"]
@@ -161,6 +184,7 @@ def report_html(table: dict[str, Any], recording: Recording) -> str:
         graded=graded,
         colour=_GRADE_COLOURS[estimate["grade"]] if graded else "#5b6470",
         clearance=_millimetres(estimate) if graded else "",
+        words=feature_words,
         quantity=quantity_name(table["limits"]["severity"]),
         gauge=_gauge(table) if graded else "",
         figures=figures,

@@ -430,3 +430,15 @@ def test_the_benchmark_fails_on_a_miss():
     }
     assert len(misses(bad)) == 3
     assert len(misses({**good, "mae_share_of_limit": None})) == 1
+
+
+def test_a_caution_stands_beside_the_verdict_of_the_page(tmp_path, small_model):
+    """A speed that the model was not trained on: graded or not, the page must not hide it."""
+    file, page = tmp_path / "fast.h5", tmp_path / "fast.html"
+    run("simulate", "bilge-pump", "--set", "drive.speed=360 rpm", "-o", file)
+    table = json.loads(run("report", file, "--model", small_model, "-o", page, "--json").stdout)
+    verdict = page.read_text().split('<div class="verdict">')[1].split("</div>")[0]
+    if table["estimate"]["verdict"] == "graded":
+        assert "shaft.speed_hz = 6 is outside the trained range" in verdict
+    else:
+        assert "Unfamiliar" in verdict
