@@ -1,6 +1,6 @@
 """The wear estimate at full size: generate, train, judge on held-out machine draws.
 
-    python tests/benchmarks/standard_pump.py [--records 2000] [--folder /tmp/standard]
+    python tests/benchmarks/standard_pump.py [--records 2000] [--folder benchmark-data]
 
 Exits 1 where a figure misses its goal. Needs 3 GB of disk for 2,000 records and takes about three
 minutes on two cores. An unfinished data set in the folder is gone on with, a finished one is used
