@@ -527,7 +527,7 @@ def report(
     """The verdict on RECORDING: wear grade and clearance with interval, or unfamiliar."""
     from ..datasets.importers import read_recording
     from .modelfile import load_model
-    from .report import report_html, report_table, report_text
+    from .report import report_html, report_table, report_text, save_page
 
     _check_outputs([recording_file, model_file], [(output, _PAGE)], force)
     model = load_model(model_file)
@@ -535,23 +535,13 @@ def report(
     estimate = model.estimate(recording)
     table = report_table(recording, model, estimate)
     if output is not None:
-        _write_text(output, report_html(table, recording))
+        save_page(report_html(table, recording), output)
         table["html"] = str(output)
     if as_json:
         click.echo(_json_text(table))
     else:
         click.echo(report_text(table) + (f"\nPage        {output}" if output else ""))
     raise click.exceptions.Exit(_report_exit(estimate.verdict, estimate.grade, fail_on))
-
-
-def _write_text(path: Path, text: str) -> None:
-    """Write a whole file or none."""
-    part = path.with_name(path.name + ".part")
-    try:
-        part.write_text(text, encoding="utf-8")
-        part.replace(path)
-    finally:
-        part.unlink(missing_ok=True)
 
 
 def _report_exit(verdict: str, grade: int | None, fail_on: str | None) -> int:

@@ -12,7 +12,7 @@ from ..datasets.generate import generate
 from ..datasets.record import DataError, DataSet
 from .evaluate import score
 from .modelfile import load_model, save_model
-from .report import report_html, report_table, report_text
+from .report import report_html, report_table, report_text, save_page
 from .tabulate import Progress
 from .train import train_model
 
@@ -105,7 +105,7 @@ def _report_on_unseen(files: dict[str, Path], unseen: list[str]) -> dict[str, An
         number = _most_worn(rows, severity, model.card["condemning_limit_m"])
         recording = data[number]
     table = report_table(recording, model, model.estimate(recording))
-    files["report"].write_text(report_html(table, recording), encoding="utf-8")
+    save_page(report_html(table, recording), files["report"])
     text = (
         f"{report_text(table)}\n"
         f"Truth       {1e3 * severity[number]:.3f} mm (known, because it is simulated)\n"

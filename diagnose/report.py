@@ -192,6 +192,16 @@ def report_html(table: dict[str, Any], recording: Recording) -> str:
     )
 
 
+def save_page(html: str, path: Path) -> None:
+    """Write a page whole, or not at all."""
+    part = path.with_name(path.name + ".part")
+    try:
+        part.write_text(html, encoding="utf-8")
+        part.replace(path)
+    finally:
+        part.unlink(missing_ok=True)
+
+
 def _encoded(figure: Any) -> str:
     """PNG of a figure as a data address."""
     buffer = io.BytesIO()

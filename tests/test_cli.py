@@ -442,3 +442,12 @@ def test_a_caution_stands_beside_the_verdict_of_the_page(tmp_path, small_model):
         assert "shaft.speed_hz = 6 is outside the trained range" in verdict
     else:
         assert "Unfamiliar" in verdict
+
+
+def test_the_bounds_of_the_options_are_those_of_the_library():
+    """The command line repeats two numbers, because importing them would slow its help."""
+    from wearstate.datasets import recipe
+    from wearstate.diagnose import cli as module
+
+    assert module._MOST_RECORDS == recipe.MOST_RECORDS
+    assert module._LARGEST_SEED == recipe.LARGEST_SEED
