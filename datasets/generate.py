@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from ..sim.assemble import channels_of, simulate
 from ..sim.integrate import Solution
-from ..sim.scene import PumpScene, Scene, SceneError
+from ..sim.parts import Scene, SceneError
+from ..sim.pump_parts import PumpScene
 from ..sim.wear import grade
 from .recipe import (
     LARGEST_SEED,

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..sim.scene import UNITS, to_si
+from ..sim.parts import UNITS, to_si
 from ..sim.sensor import Channel
 from .record import DataError, DataSet, Recording
 

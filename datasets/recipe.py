@@ -18,17 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from ..sim.scene import (
-    Part,
-    Ratio,
-    Scene,
-    SceneError,
-    override,
-    scene_from_table,
-    scene_table,
-    scene_text,
-    validate_table,
-)
+from ..sim.parts import Part, Ratio, Scene, SceneError, validate_table
+from ..sim.scene import override, scene_from_table, scene_table, scene_text
 from ..sim.wear import grade
 
 RECIPE_FOLDER = Path(__file__).parent / "recipes"

@@ -243,7 +243,8 @@ def scene_list(as_json: bool) -> None:
 @click.argument("name")
 def scene_show(name: str) -> None:
     """TOML text of a scene: copy it, change it, check it."""
-    from ..sim.scene import SceneError, scene_table, scene_text
+    from ..sim.parts import SceneError
+    from ..sim.scene import scene_table, scene_text
 
     text = scene_text(name)
     if not isinstance(scene_table(text, name).get("machine"), str):

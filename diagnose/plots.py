@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from ..datasets.record import DataError
 from ..features.spectrum import decibel, power_lines
 from ..sim.integrate import Solution
-from ..sim.scene import PumpScene, Scene
+from ..sim.parts import Scene
+from ..sim.pump_parts import PumpScene
 
 _FORMATS = (".png", ".svg", ".pdf")
 _COLOURS = ("#1f5a94", "#b3541e", "#4f7d3a")

@@ -16,7 +16,8 @@ import numpy as np
 from ..sim.analytic import IdealCrank
 from ..sim.contact import RELEASE_AT_ZERO_FORCE, RELEASE_AT_ZERO_PENETRATION
 from ..sim.hydraulics import PRESSURE_NONE
-from ..sim.scene import PumpScene, load_scene
+from ..sim.pump_parts import PumpScene
+from ..sim.scene import load_scene
 from ..sim.slider_crank import (
     CrankParameters,
     CrankRun,

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from .casing import Modes, band_limited_acceleration, decimate, edge_samples
 from .integrate import SimulationError, Solution, Status
 from .ladder import Rung, crankpin_rung
-from .scene import FORCE_PLACES, PumpScene, Scene, SceneError
+from .parts import Scene, SceneError
+from .pump_parts import FORCE_PLACES, PumpScene
 from .sensor import Channel, digitise, tacho_pulses
 from .slider_crank import (
     LARGEST_STEP_PER_CONTACT_TIME,

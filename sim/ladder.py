@@ -7,7 +7,7 @@ that runs it. Dispatch goes by these tables, never by a chain of conditions.
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from .scene import PumpScene
+from .pump_parts import PumpScene
 from .slider_crank import CrankRun, parameters, run_compliant, run_ideal, start_state
 
 

@@ -38,7 +38,7 @@ from .contact import (
 from .hydraulics import PRESSURE_NONE, PRESSURE_TWO_LEVEL, two_level_pressure
 from .integrate import Status
 from .jit import kernel, sine_cosine
-from .scene import PumpScene
+from .pump_parts import PumpScene
 
 STEP_PER_CONTACT_TIME = 0.3
 """Default step times the contact's fastest angular frequency: 21 steps a contact period."""

@@ -8,7 +8,8 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from wearstate.sim.assemble import channels_of, check, simulate, steps_per_sample
 from wearstate.sim.integrate import SimulationError, Status
-from wearstate.sim.scene import SceneError, load_scene
+from wearstate.sim.parts import SceneError
+from wearstate.sim.scene import load_scene
 from wearstate.sim.slider_crank import contact_frequency
 
 SHORT = {"duration": "0.4 s"}  # two revolutions

@@ -26,7 +26,8 @@ from wearstate.datasets.record import DataError, DataSet, DataSetWriter
 from wearstate.datasets.splits import group_split
 from wearstate.datasets.workers import in_order
 from wearstate.sim.assemble import simulate
-from wearstate.sim.scene import SceneError, load_scene
+from wearstate.sim.parts import SceneError
+from wearstate.sim.scene import load_scene
 
 SHORT = {"duration": "0.25 s", "settling_revolutions": 1}
 """One revolution and a bit of the slowest machine: about 20 ms to simulate."""

@@ -11,7 +11,7 @@ from scipy.io import loadmat, savemat
 from wearstate.datasets import importers
 from wearstate.datasets.importers import read_recording
 from wearstate.datasets.record import Attributes, DataError, DataSetWriter
-from wearstate.sim.scene import STANDARD_GRAVITY
+from wearstate.sim.parts import STANDARD_GRAVITY
 from wearstate.sim.sensor import Channel
 
 SIGNAL = np.random.default_rng(0).standard_normal(50)

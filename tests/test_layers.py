@@ -27,6 +27,9 @@ SIM_FLOORS = [
     {"slider_crank", "orbit", "shaft_line", "casing"},
     {"film", "impedance", "bearing", "contact", "hydraulics"},
     {"integrate", "analytic", "scene"},
+    {"pump_parts"},
+    {"hydraulic_parts"},
+    {"parts"},
     {"sensor", "jit", "wear"},
 ]
 """Inside sim, from the roof to the ground; a file imports from lower floors or its own."""

@@ -9,7 +9,7 @@ from wearstate.datasets.importers import read_recording
 from wearstate.datasets.record import Channel, Recording
 from wearstate.diagnose.cli import _report_exit
 from wearstate.diagnose.modelfile import load_model
-from wearstate.sim.scene import STANDARD_GRAVITY
+from wearstate.sim.parts import STANDARD_GRAVITY
 from wearstate.sim.sensor import tacho_pulses
 
 FILES = [

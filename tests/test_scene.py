@@ -14,17 +14,14 @@ from numpy.testing import assert_allclose
 from pydantic import ValidationError
 from wearstate.sim.analytic import kelvin_voigt_restitution
 from wearstate.sim.assemble import simulate
+from wearstate.sim.parts import UNITS, FixedTable, SceneError, to_si
 from wearstate.sim.scene import (
     SCENE_FOLDER,
-    UNITS,
-    FixedTable,
-    SceneError,
     load_scene,
     scene_from_table,
     scene_names,
     scene_table,
     scene_text,
-    to_si,
 )
 from wearstate.sim.slider_crank import contact_frequency, ideal_motion
 

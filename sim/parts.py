@@ -1,0 +1,468 @@
+"""What every scene is made of: quantities with units, frozen parts, and errors in words.
+
+Validation reports every fault at once as a dotted path with value, bound and cure, and names the
+nearest match of an unknown key. Kernels trust what passes.
+"""
+
+import difflib
+import math
+import re
+import reprlib
+from collections.abc import Mapping
+from contextlib import suppress
+from decimal import Decimal
+from typing import Annotated, Any, Self, TypeVar
+
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    TypeAdapter,
+    ValidationError,
+    model_validator,
+)
+
+_INCH = 0.0254  # m, exact by definition
+_POUND_FORCE = 4.4482216152605  # N, exact by definition
+STANDARD_GRAVITY = 9.80665  # m/s^2, ISO 80000-3
+
+UNITS: dict[str, dict[str, float]] = {
+    "length": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "in": _INCH},
+    "mass": {"kg": 1.0, "g": 1e-3},
+    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "h": 3600.0},
+    "rotation speed": {"rev/s": 1.0, "Hz": 1.0, "rpm": 1.0 / 60.0},
+    "frequency": {"Hz": 1.0, "kHz": 1e3, "MHz": 1e6},
+    "angle": {"rad": 1.0, "deg": math.pi / 180.0},
+    "pressure": {
+        "Pa": 1.0,
+        "kPa": 1e3,
+        "MPa": 1e6,
+        "bar": 1e5,
+        "psi": _POUND_FORCE / _INCH**2,
+    },
+    "acceleration": {"m/s^2": 1.0, "g": STANDARD_GRAVITY},
+    "velocity": {"m/s": 1.0, "mm/s": 1e-3},
+    "inertia": {"kg m^2": 1.0, "kg mm^2": 1e-6},
+    "stiffness": {"N/m": 1.0, "kN/m": 1e3, "MN/m": 1e6, "N/um": 1e6, "N/µm": 1e6},
+    "damping": {"N s/m": 1.0, "kN s/m": 1e3},
+    "voltage": {"V": 1.0, "mV": 1e-3},
+    "ratio": {"": 1.0, "%": 1e-2},
+    "mode shape": {"kg^-0.5": 1.0},
+}
+"""Factor to SI of every unit string, by dimension. The first unit of a row is the SI one."""
+
+Table = TypeVar("Table", bound=BaseModel)
+
+_QUANTITY = re.compile(r"\s*([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)\s*(.*?)\s*")
+
+# Bounds no machine comes near: they catch a wrong unit or a slipped exponent, and keep every
+# product and quotient of the kernels finite.
+LONGEST = 100.0  # m
+HEAVIEST, LIGHTEST = 1e6, 1e-6  # kg
+INERTIA_MOST, INERTIA_LEAST = 1e9, 1e-12  # kg m^2
+PRESSURE_MOST = 1e9  # Pa, a waterjet intensifier has 6e8
+GRAVITY_MOST = 1000.0  # m/s^2, a hundred g
+STIFFEST = 1e13  # N/m, a metre of steel has 1e11
+DAMPING_MOST = 1e9  # N s/m
+SLIDING_LEAST, SLIDING_MOST = 1e-6, 1e3  # m/s
+ANGLE_MOST = 1e4  # rad, beyond it a cosine has lost four digits
+_ACCELERATION_LEAST, _ACCELERATION_MOST = 1e-9, 1e7  # m/s^2, a shock sensor ends at 1e6
+_SHAPE_MOST = 1e3  # kg^-0.5, the mode of a milligram
+_LEVEL_LEAST, _LEVEL_MOST = 1e-3, 1e4  # V
+_GAIN_LEAST, _GAIN_MOST = 1e-3, 1e3
+_MODE_SLOWEST, _MODE_FASTEST = 1e-6, 1e6  # Hz, a floating casing has almost none
+_RATE_LEAST, _RATE_MOST = 1.0, 1e6  # Hz, of sampling
+_RECORDING_LONGEST = 3600.0  # s
+_STEP_LEAST = 1e-12  # s
+_SETTLING_MOST = 1000
+_MOST_SENSORS, _MOST_MODES = 64, 1000
+_NAME_LONGEST = 64
+
+
+class SceneError(ValueError):
+    """Every fault of one scene, one line each, as dotted path, value, bound and cure."""
+
+    def __init__(self, name: str, faults: list[str]) -> None:
+        self.faults = faults
+        super().__init__("\n".join([f"{name}: {len(faults)} fault(s)", *faults]))
+
+
+def to_si(value: Any, dimension: str) -> float:
+    """Convert a number or a string with a unit to SI.
+
+    Parameters
+    ----------
+    value : float or str
+        A bare number is SI; a string is a number and a unit of `dimension`.
+    dimension : str
+        A key of :data:`UNITS`.
+
+    Returns
+    -------
+    float
+        The value in the SI unit of `dimension` (rotation speed: revolutions per second).
+
+    Raises
+    ------
+    ValueError
+        The string has no number, no unit, or a unit of another dimension.
+
+    Examples
+    --------
+    >>> to_si("0.25 mm", "length")
+    0.00025
+    >>> to_si("300 rpm", "rotation speed")
+    5.0
+    """
+    units = UNITS[dimension]
+    if isinstance(value, bool) or not isinstance(value, (int, float, str)):
+        raise ValueError(f"is not a number or a string with a unit ({_unit_list(dimension)})")
+    if not isinstance(value, str):
+        try:
+            return float(value)
+        except OverflowError:  # a whole number of hundreds of digits
+            return math.inf if value > 0 else -math.inf
+    match = _QUANTITY.fullmatch(value)
+    if match is None:
+        example = f"1.5 {_unit_symbol(dimension)}".rstrip()
+        raise ValueError(f"has no leading number; write it like '{example}'")
+    number, unit = match.groups()
+    if unit not in units:
+        missing = "has no unit" if unit == "" else f"has unit '{unit}', not one of {dimension}"
+        raise ValueError(f"{missing}; use one of {_unit_list(dimension)}")
+    try:  # a product of decimals keeps 0.13 mm at exactly 0.00013, that of two floats would not
+        return float(Decimal(number) * Decimal(repr(units[unit])))
+    except ArithmeticError:  # an exponent beyond decimals; the caller refuses what is not finite
+        return float(number) * units[unit]
+
+
+def _unit_list(dimension: str) -> str:
+    return ", ".join(unit or "(none)" for unit in UNITS[dimension])
+
+
+def _unit_symbol(dimension: str) -> str:
+    return next(iter(UNITS[dimension]))
+
+
+class _Dimension:
+    """Marks a field with its dimension, for unit strings and for error texts."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+
+
+def _parser(dimension: str) -> BeforeValidator:
+    return BeforeValidator(lambda value: to_si(value, dimension))
+
+
+Length = Annotated[float, _parser("length"), _Dimension("length")]
+Mass = Annotated[float, _parser("mass"), _Dimension("mass")]
+Time = Annotated[float, _parser("time"), _Dimension("time")]
+RotationSpeed = Annotated[float, _parser("rotation speed"), _Dimension("rotation speed")]
+Frequency = Annotated[float, _parser("frequency"), _Dimension("frequency")]
+Angle = Annotated[float, _parser("angle"), _Dimension("angle")]
+Pressure = Annotated[float, _parser("pressure"), _Dimension("pressure")]
+Acceleration = Annotated[float, _parser("acceleration"), _Dimension("acceleration")]
+Velocity = Annotated[float, _parser("velocity"), _Dimension("velocity")]
+Inertia = Annotated[float, _parser("inertia"), _Dimension("inertia")]
+Stiffness = Annotated[float, _parser("stiffness"), _Dimension("stiffness")]
+Damping = Annotated[float, _parser("damping"), _Dimension("damping")]
+Voltage = Annotated[float, _parser("voltage"), _Dimension("voltage")]
+Ratio = Annotated[float, _parser("ratio"), _Dimension("ratio")]
+ModeShape = Annotated[
+    float,
+    _parser("mode shape"),
+    _Dimension("mode shape"),
+    Field(ge=-_SHAPE_MOST, le=_SHAPE_MOST),
+]
+
+
+class FixedTable(dict[str, float]):
+    """A table of numbers that refuses to change; hashable, picklable, and a dict to dump.
+
+    Examples
+    --------
+    >>> FixedTable({"acc_x": 0.1})["acc_x"]
+    0.1
+    """
+
+    def _refuse(self, *_: Any, **__: Any) -> Any:
+        raise TypeError("a scene is frozen; load it again with an override by dotted path")
+
+    __setitem__ = __delitem__ = __ior__ = _refuse
+    clear = pop = popitem = setdefault = update = _refuse
+
+    def __hash__(self) -> int:  # type: ignore[override]
+        return hash(frozenset(self.items()))
+
+    def __reduce__(self) -> tuple[type["FixedTable"], tuple[dict[str, float]]]:
+        return FixedTable, (dict(self),)
+
+
+class Part(BaseModel):
+    """Base of every table of a scene: frozen, no unknown keys, finite numbers."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+class CasingMode(Part):
+    """One mode of the casing: mass-normalised shape at every force and sensor place."""
+
+    frequency: Frequency = Field(ge=_MODE_SLOWEST, le=_MODE_FASTEST)
+    damping_ratio: Ratio = Field(gt=0, lt=1)
+    shape: Annotated[dict[str, ModeShape], AfterValidator(FixedTable)] = Field(min_length=1)
+
+
+class Casing(Part):
+    """The pump casing on its mounts, as modes."""
+
+    modes: tuple[CasingMode, ...] = Field(min_length=1, max_length=_MOST_MODES)
+
+
+class Accelerometer(Part):
+    """An accelerometer with its converter."""
+
+    name: str = Field(min_length=1, max_length=_NAME_LONGEST)
+    place: str = Field(default="", description="where it sits, for the report")
+    direction: str = Field(default="", description="which way it points, for the report")
+    gain: Ratio = Field(
+        default=1.0, ge=_GAIN_LEAST, le=_GAIN_MOST, description="true sensitivity over nominal"
+    )
+    noise: Acceleration = Field(
+        default=0.0, ge=0, le=_ACCELERATION_MOST, description="rms of white noise"
+    )
+    range: Acceleration = Field(
+        ge=_ACCELERATION_LEAST, le=_ACCELERATION_MOST, description="full scale, plus and minus"
+    )
+    bits: int = Field(default=24, ge=8, le=32)
+
+
+class Tacho(Part):
+    """A rectangular pulse per revolution, rising at crank angle zero."""
+
+    name: str = Field(default="tacho", min_length=1, max_length=_NAME_LONGEST)
+    pulse_width: Angle = Field(default=math.radians(10.0), gt=0, le=math.pi)
+    level: Voltage = Field(default=5.0, ge=_LEVEL_LEAST, le=_LEVEL_MOST)
+
+
+class Numerics(Part):
+    """What the solver may be told; every field has a default that the scene decides."""
+
+    step: Time | None = Field(default=None, ge=_STEP_LEAST, description="largest integration step")
+
+
+class Scene(Part):
+    """What every machine's scene holds.
+
+    ``accuracy`` is stored with the scene and not yet used to choose rungs or the step.
+    """
+
+    name: str = Field(min_length=1)
+    machine: str
+    description: str = ""
+    duration: Time = Field(
+        gt=0, le=_RECORDING_LONGEST, description="length of the recording, after settling"
+    )
+    sample_rate: Frequency = Field(ge=_RATE_LEAST, le=_RATE_MOST)
+    settling_revolutions: int = Field(
+        default=3, ge=1, le=_SETTLING_MOST, description="run before the recording"
+    )
+    accuracy: Ratio = Field(default=0.02, gt=0, lt=1, description="error the features may carry")
+    sensors: tuple[Accelerometer, ...] = Field(min_length=1, max_length=_MOST_SENSORS)
+    tacho: Tacho | None = Tacho()
+    numerics: Numerics = Numerics()
+
+    @model_validator(mode="after")
+    def _cross_checks(self) -> Self:
+        faults = self.cross_faults({name: getattr(self, name) for name in type(self).model_fields})
+        if faults:
+            raise ValueError("\n".join(faults))
+        return self
+
+    @classmethod
+    def cross_faults(cls, parts: Mapping[str, Any]) -> list[str]:
+        """Faults between parts, of those parts that are there; each machine has its own."""
+        del parts
+        return []
+
+
+def validate_table(model: type[Table], table: Mapping[str, Any], name: str) -> Table:
+    """Validate a plain table into any model, with every fault in the words of this program.
+
+    Raises
+    ------
+    SceneError
+        Every fault at once, each as dotted path, value, bound and cure.
+
+    Examples
+    --------
+    >>> validate_table(Crank, {"radius": "50 mm"}, "crank").radius
+    0.05
+    """
+    try:
+        return model.model_validate(dict(table))
+    except ValidationError as error:
+        entries = [entry for entry in error.errors() if not _other_choice(entry)]
+        places = [entry["loc"] for entry in entries]
+        faults = [
+            line
+            for entry in entries
+            # a list all of whose entries are at fault is called too short as well
+            if not any(place[:-1][: len(entry["loc"])] == entry["loc"] for place in places)
+            or entry["type"] != "too_short"
+            for line in _fault_lines(model, entry)
+        ]
+        if issubclass(model, Scene) and () not in places:
+            faults += model.cross_faults(_valid_parts(model, table))
+        raise SceneError(name, faults) from None
+
+
+def _other_choice(entry: Any) -> bool:
+    """The text or boolean member of a union: its number has been reported already."""
+    return entry["loc"][-1:] in (("str",), ("bool",)) and entry["type"].startswith(
+        ("string_", "bool_")
+    )
+
+
+def _valid_parts(model: type[BaseModel], table: Mapping[str, Any]) -> dict[str, Any]:
+    """Parts of a faulty table that are valid on their own, defaults included."""
+    parts = {}
+    for name, field in model.model_fields.items():
+        if name not in table:
+            if not field.is_required():
+                parts[name] = field.get_default(call_default_factory=True)
+            continue
+        with suppress(ValidationError):
+            kind: Any = Annotated[field.annotation, field]
+            parts[name] = TypeAdapter(kind).validate_python(table[name])
+    return parts
+
+
+def nearest(word: str, choices: Any) -> str:
+    """End of an error message: the choice that was probably meant, or all of them."""
+    whole = [choice for choice in choices if word in choice.split("_")]
+    if len(whole) > 1:  # "clearance" is both of the two clearances
+        return f"; did you mean {' or '.join(map(repr, sorted(whole)))}?"
+    matches = difflib.get_close_matches(word, list(choices), n=1, cutoff=0.5)
+    if matches:
+        return f"; did you mean '{matches[0]}'?"
+    return f"; choose one of {', '.join(choices)}"
+
+
+def _fault_lines(model: type[BaseModel], entry: Any) -> list[str]:
+    """Turn one pydantic error into lines with path, value, bound and cure."""
+    location = entry["loc"]
+    if location[-1:] == ("float",):  # the number of a union, not a part of the path
+        location = location[:-1]
+    path = ".".join(str(part) for part in location)
+    kind, context = entry["type"], entry.get("ctx", {})
+    owner, field = _find_field(model, location)
+    if kind == "extra_forbidden":
+        known = owner.model_fields if owner else ()
+        return [f"{path} is an unknown key{nearest(str(location[-1]), known)}"]
+    about = f" ({field.description})" if field is not None and field.description else ""
+    if kind == "missing":
+        return [f"{path} is missing{about}; add it"]
+    if kind == "value_error":
+        text = str(context["error"])
+        if text.startswith(("has ", "is not ")):  # from to_si, about this one value
+            return [f"{path} = {_short(entry['input'])} {text}"]
+        return [f"{path}: {line}" if path else line for line in text.splitlines()]
+    return [f"{path} = {_shown(entry['input'], field)} {_bound(entry)}{about}{_cure(entry, field)}"]
+
+
+def _cure(entry: Any, field: Any) -> str:
+    """A number out of bounds has a slipped exponent or a wrong unit."""
+    out = entry["type"].startswith(("greater_", "less_"))
+    return "; check value and unit" if out and _dimension_of(field) not in (None, "ratio") else ""
+
+
+_KINDS = {
+    "finite_number": "must be finite",
+    "float_": "must be a number or a text with a unit",
+    "int_": "must be a whole number",
+    "string_too_short": "must have >= {min_length} character(s)",
+    "string_too_long": "must have <= {max_length} characters",
+    "string_": "must be a text",
+    "bool_": "must be true or false",
+    "too_short": "must have >= {min_length} entries",
+    "too_long": "must have <= {max_length} entries",
+    "tuple_": "must be a list",
+    "list_": "must be a list",
+    "model_": "must be a table",
+    "dict_": "must be a table",
+    "mapping_": "must be a table",
+}
+"""What a value must be, by the beginning of pydantic's name of the fault."""
+
+
+def _bound(entry: Any) -> str:
+    context = entry.get("ctx", {})
+    for key, sign in (("gt", ">"), ("ge", ">="), ("lt", "<"), ("le", "<=")):
+        if key in context:
+            return f"must be {sign} {context[key]:g}"
+    if entry["type"] == "literal_error":
+        return f"must be {context['expected']}"
+    for beginning, text in _KINDS.items():
+        if entry["type"].startswith(beginning):
+            return text.format_map(context)
+    return "must be of another kind; see a built-in one"  # no kind that a scene has today
+
+
+def _shown(value: Any, field: Any) -> str:
+    dimension = _dimension_of(field)
+    if dimension is None or _holds_many(field):
+        return _short(value)
+    try:
+        return f"{to_si(value, dimension):g} {_unit_symbol(dimension)}".rstrip()
+    except ValueError:
+        return _short(value)
+
+
+def _holds_many(field: Any) -> bool:
+    origin = getattr(field.annotation, "__origin__", None)
+    return origin in (dict, tuple)
+
+
+def _dimension_of(field: Any) -> str | None:
+    return next((m.name for m in _metadata(field) if isinstance(m, _Dimension)), None)
+
+
+def _short(value: Any) -> str:
+    """A value for a message, cut where it would bury the rest."""
+    text = reprlib.repr(value)
+    return text if len(text) <= _SHOWN else f"{text[:_SHOWN]}…"
+
+
+_SHOWN = 60  # characters
+
+
+def _metadata(field: Any) -> list[Any]:
+    """Metadata of a field, also of ``Annotated[...] | None``."""
+    if field is None:
+        return []
+    arguments = getattr(field.annotation, "__args__", ())
+    inner = [m for argument in arguments for m in getattr(argument, "__metadata__", ())]
+    return [*field.metadata, *inner]
+
+
+def _find_field(model: type[BaseModel], location: tuple[Any, ...]) -> tuple[Any, Any]:
+    """Model class that owns the last name of a location, and the field where there is one."""
+    owner: Any = model
+    field = None
+    for part in location:
+        if isinstance(part, int) or owner is None:
+            continue
+        field = owner.model_fields.get(part)
+        if part != location[-1]:
+            owner = _model_inside(field.annotation) if field is not None else None
+    return owner, field
+
+
+def _model_inside(annotation: Any) -> type[BaseModel] | None:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    found = (_model_inside(inner) for inner in getattr(annotation, "__args__", ()))
+    return next((model for model in found if model is not None), None)
