@@ -13,33 +13,45 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..sim.assemble import channels_of, simulate
+from ..sim.assemble import simulate
 from ..sim.integrate import Solution
-from ..sim.parts import Scene, SceneError
+from ..sim.parts import Scene, SceneError, channels_of
 from ..sim.pump_parts import PumpScene
 from ..sim.wear import grade
 from .recipe import (
     LARGEST_SEED,
     MOST_RECORDS,
     Recipe,
-    RecipeError,
     Sample,
+    clearances,
     load_recipe,
     overrides_text,
     sample_records,
+    wear_limits,
 )
+from .recipe_file import RecipeError
 from .record import Attributes, DataError, DataSetWriter
 from .workers import in_order
 
 NUMERICS = {
     "rung_joint": "S16",
+    "rung_wristpin": "S16",
+    "rung_guide": "S16",
     "rung_pressure": "S16",
+    "rung_drive": "S16",
+    "contact_law": "S24",
+    "frf_sha256": "S64",
+    "mean_speed_hz": "<f8",
     "step_s": "<f8",
     "steps": "<i8",
     "step_per_contact_time": "<f8",
     "contact_changes": "<i8",
     "cuts_refused": "<i8",
     "peak_normal_force_n": "<f8",
+    "cavitating_share": "<f8",
+    "lift_left": "<f8",
+    "tension_share": "<f8",
+    "floored_share": "<f8",
     "residual": "<f8",
     "estimated_error": "<f8",
     "clipped_samples": "<i8",
@@ -187,17 +199,12 @@ def _refuse_bounds(plan: Recipe, count: int, seed: int) -> None:
 def _writer(
     plan: Recipe, count: int, path: str | Path, *, seed: int, force: bool, truth: bool
 ) -> DataSetWriter:
-    columns = {
-        plan.severity_column: "<f8",
-        **dict.fromkeys(plan.conditions, "<f8"),
-        **NUMERICS,
-    }
     return DataSetWriter(
         path,
         _attributes(plan, seed, truth),
         n_records=count,
         n_samples=round(plan.scene.duration * plan.scene.sample_rate),
-        columns=columns,
+        columns={**plan.columns, **NUMERICS},
         force=force,
     )
 
@@ -209,18 +216,18 @@ def _attributes(plan: Recipe, seed: int, truth: bool) -> Attributes:
         channels=channels_of(scene),
         origin="simulated",
         tacho=scene.tacho.name if scene.tacho else None,
-        severities=(plan.severity_column,),
+        severities=plan.severity_columns,
         recipe=plan.text,
         scene=plan.scene_text,
         overrides=overrides_text(plan),
         seed=seed,
         truth=truth,
-        **_limits(scene),
+        **_limits(scene, plan.severity_columns[0]),
     )
 
 
-def _limits(scene: Scene) -> dict[str, Any]:
-    wear = getattr(scene, "wear", None)
+def _limits(scene: Scene, severity: str) -> dict[str, Any]:
+    wear = wear_limits(scene, severity)
     if wear is None:
         return {}
     return {
@@ -328,9 +335,8 @@ def save_solution(
     DataError
         The file exists, or cannot be written.
     """
-    joint = getattr(getattr(scene, "joint", None), "crankpin", None)
-    severity = {} if joint is None else {_PUMP_SEVERITY: joint.clearance_diametral}
-    limits = _limits(scene)
+    severity = clearances(scene)
+    limits = _limits(scene, _PUMP_SEVERITY)
     row = {
         "record_id": "0",
         "seed": seed,
@@ -339,7 +345,7 @@ def save_solution(
         **severity,
         **_numerics(solution),
     }
-    if severity and limits:
+    if _PUMP_SEVERITY in severity and limits:
         row["grade"] = grade(severity[_PUMP_SEVERITY], limits["grade_edges"])
     head = Attributes(
         sample_rate=solution.sample_rate,

@@ -1,14 +1,16 @@
 """What a data set is drawn from: the recipe, validated, and its records, lazily.
 
 Record `i` depends on the recipe's name, the seed and `i` alone: not on how many records there
-are, in which order or where they are made.
+are, in which order or where they are made. Nor does a draw depend on which severities and
+confounders stand beside it: each has a random stream of its own.
 """
 
-import difflib
 import hashlib
 import json
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -19,13 +21,34 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from ..sim.parts import Part, Ratio, Scene, SceneError, validate_table
-from ..sim.scene import override, scene_from_table, scene_table, scene_text
+from ..sim.parts import beside as files_beside
+from ..sim.pump_parts import Wear
+from ..sim.scene import override, scene_folder, scene_from_table, scene_table, scene_text
 from ..sim.wear import grade
+from .draws import Axis, Bound, Draw, Range, axes_of, has_value, matches, value_at
+from .recipe_file import RecipeError, beside, read_recipe
 
-RECIPE_FOLDER = Path(__file__).parent / "recipes"
+SEVERITIES = {
+    "joint.crankpin.diametral_clearance": "diametral_clearance_crankpin_m",
+    "joint.wristpin.diametral_clearance": "diametral_clearance_wristpin_m",
+    "joint.guide.diametral_clearance": "diametral_clearance_guide_m",
+    "throws.*.joint.crankpin.diametral_clearance": "diametral_clearance_crankpin_{}_m",
+    "throws.*.joint.wristpin.diametral_clearance": "diametral_clearance_wristpin_{}_m",
+    "throws.*.joint.guide.diametral_clearance": "diametral_clearance_guide_{}_m",
+}
+"""Manifest column of every scene value that says how worn a machine is. A new one is one row.
 
-SEVERITIES = {"joint.crankpin.diametral_clearance": "diametral_clearance_crankpin_m"}
-"""Manifest column of every scene value that says how worn a machine is. A new one is one row."""
+In a path, ``*`` stands for the number of a list entry, counted from 0; in its column, ``{}`` for
+the same number counted from 1, as people count throws.
+"""
+
+LIMITS = {
+    "joint.crankpin.diametral_clearance": "wear",
+    "joint.wristpin.diametral_clearance": "wear_wristpin",
+    "throws.*.joint.crankpin.diametral_clearance": "wear",
+    "throws.*.joint.wristpin.diametral_clearance": "wear_wristpin",
+}
+"""Scene table with the wear limits of a severity. One without a row has no grade."""
 
 CONDITIONS = {
     "speed_hz": "drive.speed",
@@ -44,13 +67,12 @@ MOST_RECORDS = 10**8
 LARGEST_SEED = 2**63 - 1
 """Seed of a data set: fits a signed integer in every file format."""
 
-_MACHINE, _RECORD, _NOISE, _SEVERITY = range(4)  # independent random streams of one data set
+RESERVED = ("none", "combined")
+"""Names that no confounder may have: tables use them for records without any and with several."""
 
-Bound = float | str
-
-
-class RecipeError(SceneError):
-    """Every fault of one recipe, one line each."""
+# independent random streams of one data set; the first four are older than the others, and their
+# numbers decide the records of every recipe
+_MACHINE, _RECORD, _NOISE, _SEVERITY, _FURTHER_SEVERITY, _PRESENCE, _CONFOUNDER = range(7)
 
 
 class Severity(Part):
@@ -61,41 +83,27 @@ class Severity(Part):
     high: Bound = Field(description="1.5 times the condemning limit is the custom")
 
 
-class Draw(Part):
-    """One scene value, or every value that ``*`` matches, drawn independently."""
+class Confounder(Draw):
+    """A fault that is not the wear to be estimated, present in a share of machines or records."""
 
-    path: str = Field(description="dotted path of the scene; * stands for every list entry")
-    distribution: Literal["uniform", "log-uniform", "factor", "log-factor", "relative-normal"]
-    low: Bound | None = None
-    high: Bound | None = None
-    bands: tuple[tuple[Bound, Bound], ...] = Field(
-        default=(), description="several ranges instead of low and high, likely as they are wide"
+    name: str = Field(
+        pattern="^[a-z][a-z0-9_]*$", max_length=48, description="of its manifest columns"
     )
-    scale: Ratio | None = Field(
-        default=None,
-        gt=0,
-        le=10,
-        description="relative-normal: norm of the change over the value's norm",
+    probability: Ratio = Field(ge=0, le=1, description="share of the machines or records")
+    per: Literal["machine", "record"] = "machine"
+    exclusive: str = Field(
+        default="", description="of all confounders with this word, one at a time at most"
     )
 
     @model_validator(mode="after")
-    def _one_way_to_say_it(self) -> Self:
-        vector = self.distribution == "relative-normal"
-        ends = [self.low is not None, self.high is not None]
-        if vector and (self.scale is None or any(ends) or self.bands):
-            raise ValueError(f"{self.path}: relative-normal takes scale and nothing else")
-        if not vector and self.scale is not None:
-            raise ValueError(f"{self.path}: scale is for relative-normal; give low and high")
-        if not vector and (any(ends) == bool(self.bands) or any(ends) != all(ends)):
-            raise ValueError(f"{self.path}: give low and high, or bands, and not both")
+    def _a_number(self) -> Self:
+        if self.name in RESERVED:
+            raise ValueError(f"name = '{self.name}' must be none of {RESERVED}; rename it")
+        if self.distribution == "relative-normal":
+            raise ValueError(
+                f"{self.name}: distribution = 'relative-normal' draws no single number; use uniform"
+            )
         return self
-
-    @property
-    def ranges(self) -> tuple[tuple[Bound, Bound], ...]:
-        """Bands as written."""
-        if self.low is not None and self.high is not None:
-            return ((self.low, self.high),)
-        return self.bands
 
 
 class RecipeTable(Part):
@@ -111,9 +119,12 @@ class RecipeTable(Part):
     fixed: dict[str, Bound | bool] = Field(
         default={}, description="scene values replaced in every record, by dotted path in quotes"
     )
-    severity: Severity
+    severity: tuple[Severity, ...] = Field(
+        min_length=1, description="what wears; the first is graded and trained for"
+    )
     machine: tuple[Draw, ...] = Field(default=(), description="drawn once per group")
     record: tuple[Draw, ...] = Field(default=(), description="drawn for every record")
+    confounder: tuple[Confounder, ...] = Field(default=(), description="faults beside the wear")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -129,7 +140,7 @@ class Sample:
     row : dict
         Manifest values known before the simulation.
     drawn : dict
-        Dotted path of the scene -> value drawn [SI].
+        Dotted path of the scene -> value drawn [SI]; of confounders, those present.
     scene : Scene
         Validated.
     """
@@ -142,63 +153,48 @@ class Sample:
     scene: Scene
 
 
-@dataclass(frozen=True)
-class _Kind:
-    """How a distribution reads its bounds."""
+@dataclass(frozen=True, kw_only=True)
+class Wearing:
+    """A severity with its manifest columns.
 
-    relative: bool  # bounds multiply the scene's own value
-    scale: Callable[[float], float]
-    back: Callable[[float], float]
+    Attributes
+    ----------
+    axis : Range
+        One band, log-uniform [m].
+    column : str
+        Manifest column of the value.
+    grade_column : str
+        Manifest column of its grade: ``grade`` for the first severity; empty for a further one
+        that the scene has no wear limits for.
+    edges : tuple of float
+        Where grades 1, 2 and 3 begin [m]; empty without wear limits.
+    """
 
-
-_KINDS = {
-    "uniform": _Kind(False, float, float),
-    "log-uniform": _Kind(False, math.log, math.exp),
-    "factor": _Kind(True, float, float),
-    "log-factor": _Kind(True, math.log, math.exp),
-}
-
-
-@dataclass(frozen=True)
-class _Range:
-    """A value drawn from bands, uniform in the scale of its kind."""
-
-    path: str
-    kind: _Kind
-    bands: tuple[tuple[float, float], ...]  # [SI]
-
-    def value(self, rng: np.random.Generator) -> float:
-        scaled = [(self.kind.scale(low), self.kind.scale(high)) for low, high in self.bands]
-        left = rng.random() * sum(high - low for low, high in scaled)
-        for low, high in scaled:
-            if left <= high - low:
-                return self.kind.back(low + left)
-            left -= high - low
-        return self.bands[-1][1]
-
-    def extremes(self) -> tuple[float, float]:
-        return self.bands[0][0], self.bands[-1][1]
+    axis: Range
+    column: str
+    grade_column: str
+    edges: tuple[float, ...]
 
 
-@dataclass(frozen=True)
-class _Vector:
-    """A table of numbers plus a random vector of given norm."""
+@dataclass(frozen=True, kw_only=True)
+class Fault:
+    """A confounder with its place in the scene.
 
-    path: str
-    base: Mapping[str, float]
-    scale: float
+    Attributes
+    ----------
+    table : Confounder
+        What the recipe says.
+    axes : tuple of Range
+        One for every value that its path stands for; all take the same random number.
+    """
 
-    def value(self, rng: np.random.Generator) -> dict[str, float]:
-        centre = np.array(list(self.base.values()))
-        change = rng.standard_normal(centre.size)
-        change *= self.scale * np.linalg.norm(centre) / np.linalg.norm(change)
-        return dict(zip(self.base, (centre + change).tolist(), strict=True))
+    table: Confounder
+    axes: tuple[Range, ...]
 
-    def extremes(self) -> tuple[Mapping[str, float], Mapping[str, float]]:
-        return self.base, self.base
-
-
-_Axis = _Range | _Vector
+    @property
+    def columns(self) -> tuple[str, str]:
+        """Manifest columns of presence and value."""
+        return f"confounder_{self.table.name}", f"{self.table.name}_value"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -208,13 +204,19 @@ class Recipe:
     Attributes
     ----------
     table : RecipeTable
-        What the file says.
+        What the file says, with what it extends.
     text, scene_text : str
-        TOML of recipe and scene.
+        TOML of recipe and scene; that of a recipe which extends another holds both.
     overrides : mapping
         What replaced values of the recipe file, by dotted path.
     base : dict
         Scene table with the fixed values in place.
+    severities : tuple of Wearing
+        The first is graded and trained for.
+    machine, record : tuple of Range or Vector
+        Nuisance and conditions, in the order in which they are drawn.
+    confounders : mapping
+        Name of a random stream -> confounders that share it because they exclude each other.
     """
 
     table: RecipeTable
@@ -222,9 +224,10 @@ class Recipe:
     scene_text: str
     overrides: Mapping[str, Any]
     base: dict[str, Any]
-    severity: _Range
-    machine: tuple[_Axis, ...]
-    record: tuple[_Axis, ...]
+    severities: tuple[Wearing, ...]
+    machine: tuple[Axis, ...]
+    record: tuple[Axis, ...]
+    confounders: Mapping[str, tuple[Fault, ...]]
 
     @property
     def name(self) -> str:
@@ -232,9 +235,14 @@ class Recipe:
         return self.table.name
 
     @property
-    def severity_column(self) -> str:
-        """Manifest column of the severity."""
-        return SEVERITIES[self.table.severity.path]
+    def severity(self) -> Range:
+        """What is graded and trained for."""
+        return self.severities[0].axis
+
+    @property
+    def severity_columns(self) -> tuple[str, ...]:
+        """Manifest columns of the severities, the primary one first."""
+        return tuple(wearing.column for wearing in self.severities)
 
     @cached_property
     def scene(self) -> Scene:
@@ -244,16 +252,34 @@ class Recipe:
     @cached_property
     def conditions(self) -> dict[str, str]:
         """Rows of `CONDITIONS` that this scene has."""
-        return {name: path for name, path in CONDITIONS.items() if _has(self.scene, path)}
+        return {name: path for name, path in CONDITIONS.items() if has_value(self.scene, path)}
 
-    def rng(self, seed: int, stream: int, index: int) -> np.random.Generator:
+    @cached_property
+    def columns(self) -> dict[str, str]:
+        """Manifest columns of labels and conditions -> numpy type, in order."""
+        further = [wearing.grade_column for wearing in self.severities[1:] if wearing.grade_column]
+        presence = [fault.columns[0] for fault in self.faults]
+        values = [fault.columns[1] for fault in self.faults]
+        return {
+            **dict.fromkeys(self.severity_columns, "<f8"),
+            **dict.fromkeys(further, "i1"),
+            **dict.fromkeys(presence, "?"),
+            **dict.fromkeys(values, "<f8"),
+            **dict.fromkeys(self.conditions, "<f8"),
+        }
+
+    @property
+    def faults(self) -> tuple[Fault, ...]:
+        """All confounders."""
+        return tuple(fault for members in self.confounders.values() for fault in members)
+
+    def rng(self, seed: int, stream: int, *key: int) -> np.random.Generator:
         """Random stream of one group or record, its own whatever else is drawn."""
-        return np.random.default_rng(self._sequence(seed, stream, index))
+        return np.random.default_rng(self._sequence(seed, stream, *key))
 
-    def _sequence(self, seed: int, stream: int, index: int) -> np.random.SeedSequence:
+    def _sequence(self, seed: int, stream: int, *key: int) -> np.random.SeedSequence:
         # the name keeps two recipes with one seed from drawing the same machines
-        name = int.from_bytes(hashlib.sha256(self.name.encode()).digest()[:8], "big")
-        return np.random.SeedSequence([seed, name], spawn_key=(stream, index))
+        return np.random.SeedSequence([seed, _number(self.name)], spawn_key=(stream, *key))
 
     def noise_seed(self, seed: int, index: int) -> int:
         """Seed of the sensor noise of one record."""
@@ -261,34 +287,9 @@ class Recipe:
         return int(state[0])
 
 
-def recipe_names() -> list[str]:
-    """Names of the built-in recipes, sorted.
-
-    Examples
-    --------
-    >>> "bilge-pump-standard" in recipe_names()
-    True
-    """
-    return sorted(path.stem for path in RECIPE_FOLDER.glob("*.toml"))
-
-
-def recipe_text(name_or_path: str | Path) -> str:
-    """TOML text of a built-in recipe or of a file.
-
-    Raises
-    ------
-    RecipeError
-        There is neither; the nearest built-in one is named.
-    """
-    built_in = RECIPE_FOLDER / f"{name_or_path}.toml"
-    path = built_in if built_in.is_file() else Path(name_or_path)
-    try:
-        return path.read_text(encoding="utf-8")
-    except (OSError, ValueError):  # ValueError: no UTF-8, or a NUL in the name
-        near = difflib.get_close_matches(str(name_or_path), recipe_names(), n=1, cutoff=0.5)
-        hint = f"did you mean '{near[0]}'?" if near else f"choose one of {recipe_names()}"
-        fault = f"{name_or_path} is no recipe and no readable text file; {hint}"
-        raise RecipeError(str(name_or_path), [fault]) from None
+def _number(word: str) -> int:
+    """64 bits of a word, the same on every machine."""
+    return int.from_bytes(hashlib.sha256(word.encode()).digest()[:8], "big")
 
 
 def load_recipe(name_or_path: str | Path, overrides: Mapping[str, Any] | None = None) -> Recipe:
@@ -318,197 +319,237 @@ def load_recipe(name_or_path: str | Path, overrides: Mapping[str, Any] | None = 
     >>> recipe.table.records, recipe.scene.duration
     (120, 1.0)
     """
-    text = recipe_text(name_or_path)
+    source = read_recipe(name_or_path)
     try:
-        table = validate_table(RecipeTable, scene_table(text), str(name_or_path))
-        scene = scene_text(_beside(name_or_path, table.scene))
-        base = scene_table(scene, table.scene)
+        table = validate_table(RecipeTable, source.table, str(name_or_path))
+        place = beside(source.folder, table.scene)
+        scene = scene_text(place)
+        base = dict(files_beside(scene_table(scene, table.scene), scene_folder(place)))
     except SceneError as error:
         raise RecipeError(str(name_or_path), error.faults) from None
     faults: list[str] = []
     base = _with_fixed(base, {**table.fixed, **(overrides or {})}, faults)
     if faults:
         raise RecipeError(table.name, faults)
-    severity = _severity(table.severity, base, faults)
-    machine = _axes("machine", table.machine, base, faults)
-    record = _axes("record", table.record, base, faults)
-    faults += _path_clashes([severity, *machine, *record])
+    axes = axes_of(_places(table), base, faults)
+    faults += _severity_faults(table.severity)
+    faults += _path_clashes([axis.path for found in axes.values() for axis in found])
+    faults += _confounder_faults(table.confounder)
     if faults:
         raise RecipeError(table.name, faults)
     return Recipe(
         table=table,
-        text=text,
+        text=source.text,
         scene_text=scene,
         overrides=dict(overrides or {}),
         base=base,
-        severity=severity,
-        machine=tuple(machine),
-        record=tuple(record),
+        severities=_wearing(table.severity, _of(axes, "severity"), scene_from_table(base)),
+        machine=tuple(_of(axes, "machine")),
+        record=tuple(_of(axes, "record")),
+        confounders=_fault_sets(table.confounder, axes),
     )
-
-
-def _beside(recipe: str | Path, scene: str) -> str | Path:
-    """A scene file is looked for beside the recipe file first."""
-    path = Path(recipe).parent / scene
-    return path if path.is_file() else scene
 
 
 def _with_fixed(
     base: dict[str, Any], fixed: Mapping[str, Any], faults: list[str]
 ) -> dict[str, Any]:
+    together = base
+    with suppress(SceneError):  # values may need each other: a rung and what it asks for
+        for pattern, value in fixed.items():
+            together = override(together, dict.fromkeys(matches(together, pattern), value))
+        scene_from_table(together)
+        return together
     for pattern, value in fixed.items():
         try:
-            base = override(base, dict.fromkeys(_matches(base, pattern), value))
+            base = override(base, dict.fromkeys(matches(base, pattern), value))
             scene_from_table(base)
         except SceneError as error:
             faults += [f"fixed.{pattern}: {fault}" for fault in error.faults]
     return base
 
 
-def _matches(base: Mapping[str, Any], pattern: str) -> list[str]:
-    """Every path of the scene that a pattern with ``*`` stands for.
+def _places(table: RecipeTable) -> dict[str, Draw]:
+    """Every draw of a recipe by its place in the file, for messages."""
+    worn = [
+        Draw(path=severity.path, distribution="log-uniform", low=severity.low, high=severity.high)
+        for severity in table.severity
+    ]
+    lists: dict[str, Sequence[Draw]] = {
+        "severity": worn,
+        "machine": table.machine,
+        "record": table.record,
+        "confounder": table.confounder,
+    }
+    return {f"{name}.{i}": draw for name, draws in lists.items() for i, draw in enumerate(draws)}
 
-    Raises
-    ------
-    SceneError
-        A ``*`` stands where the scene has no list.
+
+def _of(axes: Mapping[str, list[Axis]], name: str) -> list[Axis]:
+    """Axes of one list of the recipe, in order."""
+    return [axis for place, found in axes.items() if place.split(".")[0] == name for axis in found]
+
+
+def _severity_faults(severities: Sequence[Severity]) -> list[str]:
+    known = ", ".join(SEVERITIES)
+    return [
+        f"severity.{i}.path = {severity.path!r} is no known severity; choose one of {known}"
+        for i, severity in enumerate(severities)
+        if severity_column(severity.path) is None
+    ]
+
+
+def severity_column(path: str) -> str | None:
+    """Manifest column of a scene value that wears; None for any other.
+
+    Examples
+    --------
+    >>> severity_column("throws.0.joint.crankpin.diametral_clearance")
+    'diametral_clearance_crankpin_1_m'
     """
-    found = [""]
-    for key in pattern.split("."):
-        if key != "*":
-            found = [f"{path}.{key}".lstrip(".") for path in found]
-            continue
-        lists = {path: _node(base, path) for path in found}
-        if not all(isinstance(node, list) for node in lists.values()):
-            raise SceneError("path", [f"{pattern}: '*' stands where the scene has no list"])
-        found = [f"{path}.{i}" for path, node in lists.items() for i in range(len(node))]
-    return found
+    column = SEVERITIES.get(_pattern(path))
+    numbers = [int(number) + 1 for number in re.findall(_ENTRY, path)]
+    return None if column is None or "*" in path else column.format(*numbers)
 
 
-def _node(base: Any, path: str) -> Any:
-    for key in path.split("."):
-        inside = isinstance(base, list) and key.isdigit() and int(key) < len(base)
-        base = base[int(key)] if inside else base.get(key) if isinstance(base, dict) else None
-    return base
+_ENTRY = r"(?<=\.)[0-9]+(?=\.)"
+"""Number of a list entry inside a dotted path."""
 
 
-def _severity(table: Severity, base: dict[str, Any], faults: list[str]) -> _Range:
-    draw = Draw(path=table.path, distribution="log-uniform", low=table.low, high=table.high)
-    axes = _axes("severity", [draw], base, faults)
-    if table.path not in SEVERITIES:
-        known = ", ".join(SEVERITIES)
-        faults.append(f"severity.path = {table.path!r} is no known severity; choose one of {known}")
-    # a placeholder where the path itself is at fault, which is then reported
-    return next((axis for axis in axes if isinstance(axis, _Range)), _NO_RANGE)
+def _pattern(path: str) -> str:
+    return re.sub(_ENTRY, "*", path)
 
 
-_NO_RANGE = _Range("", _KINDS["uniform"], ((0.0, 1.0),))
-
-
-def _axes(
-    where: str, draws: Sequence[Draw], base: dict[str, Any], faults: list[str]
-) -> list[_Axis]:
-    """Resolve draws against the scene; a fault of one does not hide those of the next."""
-    axes: list[_Axis] = []
-    for number, draw in enumerate(draws):
-        place = where if where == "severity" else f"{where}.{number}"
-        try:
-            found = [_axis(draw, path, base) for path in _matches(base, draw.path)]
-            _try_extremes(found, base)
-            axes += found
-        except SceneError as error:
-            faults += [f"{place} ({draw.path}): {fault}" for fault in error.faults]
-    return axes
-
-
-def _axis(draw: Draw, path: str, base: dict[str, Any]) -> _Axis:
-    if draw.distribution == "relative-normal":
-        vector = _scene_value(base, path)
-        if not isinstance(vector, Mapping) or not any(vector.values()):
-            raise SceneError(path, [f"{path} is no table of numbers, as relative-normal needs"])
-        return _Vector(path, vector, draw.scale or 0.0)
-    kind = _KINDS[draw.distribution]
-    if kind.relative:
-        bands = _relative_bands(draw, path, base)
-    else:
-        bands = tuple((_in_si(base, path, a), _in_si(base, path, b)) for a, b in draw.ranges)
-    _refuse_bands(path, bands, positive=kind.scale is math.log)
-    return _Range(path, kind, bands)
-
-
-def _relative_bands(draw: Draw, path: str, base: dict[str, Any]) -> tuple[tuple[float, float], ...]:
-    value = _scene_value(base, path)
-    if not isinstance(value, float) or value == 0:
-        raise SceneError(path, [f"{path} = {value!r} must not be 0 to be multiplied; use uniform"])
-    if any(isinstance(factor, str) for band in draw.ranges for factor in band):
-        raise SceneError(path, [f"{path}: a factor takes plain numbers, like low = 0.9"])
-    factors = tuple((float(low), float(high)) for low, high in draw.ranges)
-    _refuse_bands(path, factors, positive=False)
-    if value > 0:
-        return tuple((value * low, value * high) for low, high in factors)
-    return tuple((value * high, value * low) for low, high in reversed(factors))
-
-
-def _refuse_bands(path: str, bands: tuple[tuple[float, float], ...], *, positive: bool) -> None:
-    flat = [end for band in bands for end in band]
-    rising = all(low < high for low, high in bands) and flat == sorted(flat)
-    if not rising:
-        shown = ", ".join(f"{low:g} to {high:g}" for low, high in bands)
-        raise SceneError(path, [f"{path}: {shown} must rise and not overlap; reorder the bounds"])
-    if positive and flat[0] <= 0:
-        raise SceneError(path, [f"{path}: low = {flat[0]:g} must be > 0 for a logarithm; raise it"])
-
-
-def _in_si(base: dict[str, Any], path: str, value: Bound) -> float:
-    """Bound in SI, by letting the scene itself read it."""
-    number = _scene_value(override(base, {path: value}), path)
-    if isinstance(number, bool) or not isinstance(number, (int, float)):
-        raise SceneError(path, [f"{path} = {number!r} is no number; draw one that is"])
-    return float(number)
-
-
-def _scene_value(base: dict[str, Any], path: str) -> Any:
-    """Validated value at a dotted path; a path the scene lacks is refused in the scene's words."""
-    scene = scene_from_table(base)
-    if not _has(scene, path):
-        scene_from_table(override(base, {path: 0.0}))  # names the nearest key
-        raise SceneError(path, [f"{path} does not lead to a value; see the scene's own tables"])
-    return _walk(scene, path)
-
-
-def _walk(node: Any, path: str) -> Any:
-    for key in path.split("."):
-        if isinstance(node, Mapping):
-            node = node[key]
-        elif isinstance(node, tuple):
-            node = node[int(key)]
-        else:
-            node = getattr(node, key)
-    return node
-
-
-def _has(scene: Scene, path: str) -> bool:
-    try:
-        _walk(scene, path)
-    except (AttributeError, KeyError, IndexError, ValueError):
-        return False
-    return True
-
-
-def _try_extremes(axes: Sequence[_Axis], base: dict[str, Any]) -> None:
-    """Let the scene refuse bounds now rather than in the middle of a run."""
-    for end in (0, 1):
-        scene_from_table(override(base, {axis.path: axis.extremes()[end] for axis in axes}))
-
-
-def _path_clashes(axes: Sequence[_Axis]) -> list[str]:
-    paths = [axis.path for axis in axes]
+def _path_clashes(paths: Sequence[str]) -> list[str]:
     held = [path for path in paths if path in ("duration", "sample_rate")]
     return [f"{path} is drawn, must be one for all records; put it in [fixed]" for path in held] + [
         f"{path} is drawn {paths.count(path)} times, must be once; remove the others"
         for path in sorted(set(paths))
         if paths.count(path) > 1
     ]
+
+
+def _confounder_faults(confounders: Sequence[Confounder]) -> list[str]:
+    names = [confounder.name for confounder in confounders]
+    faults = [
+        f"confounder name '{name}' is given {names.count(name)} times, must be unique; rename one"
+        for name in sorted(set(names))
+        if names.count(name) > 1
+    ]
+    for word, members in _exclusive_sets(confounders).items():
+        total = sum(member.probability for member in members)
+        if total > 1 + _ROUNDING:
+            faults.append(
+                f"probabilities of the confounders with {word} add up to {total:g}, must be <= 1; "
+                "lower them"
+            )
+        if len({member.per for member in members}) > 1:
+            faults.append(
+                f"confounders with {word} are drawn per machine and per record, must be one of "
+                "them; change per"
+            )
+    return faults
+
+
+_ROUNDING = 1e-12  # thirds and tenths add up to a little more than one
+
+
+def _exclusive_sets(confounders: Sequence[Confounder]) -> dict[str, list[Confounder]]:
+    """Confounders that exclude each other, by their word; a free one is alone under its name."""
+    sets: dict[str, list[Confounder]] = {}
+    for confounder in confounders:
+        word = f"exclusive = '{confounder.exclusive}'" if confounder.exclusive else confounder.name
+        sets.setdefault(word, []).append(confounder)
+    return sets
+
+
+def _fault_sets(
+    confounders: Sequence[Confounder], axes: Mapping[str, list[Axis]]
+) -> dict[str, tuple[Fault, ...]]:
+    """Confounders with their axes, those that exclude each other together."""
+    faults = {
+        confounder.name: Fault(
+            table=confounder,
+            axes=tuple(axis for axis in axes[f"confounder.{i}"] if isinstance(axis, Range)),
+        )
+        for i, confounder in enumerate(confounders)
+    }
+    return {
+        word: tuple(faults[member.name] for member in members)
+        for word, members in _exclusive_sets(confounders).items()
+    }
+
+
+def _wearing(
+    severities: Sequence[Severity], axes: Sequence[Axis], scene: Scene
+) -> tuple[Wearing, ...]:
+    result: list[Wearing] = []
+    for severity, axis in zip(severities, axes, strict=True):
+        column = severity_column(severity.path)
+        assert column is not None  # checked before
+        assert isinstance(axis, Range)
+        limits = wear_limits(scene, column)
+        place = column.removeprefix("diametral_clearance_").removesuffix("_m")
+        further = f"grade_{place}" if limits is not None else ""
+        result.append(
+            Wearing(
+                axis=axis,
+                column=column,
+                grade_column=further if result else "grade",
+                edges=() if limits is None else limits.grade_edges_diametral,
+            )
+        )
+    return tuple(result)
+
+
+def clearances(scene: Scene) -> dict[str, float]:
+    """Every clearance of a scene that acts, by its manifest column [m].
+
+    None of an ideal joint; those of one throw only where they are not those of all.
+
+    Parameters
+    ----------
+    scene : Scene
+        Of any machine.
+
+    Examples
+    --------
+    >>> from wearstate.sim.scene import load_scene
+    >>> clearances(load_scene("bilge-pump"))["diametral_clearance_crankpin_m"]
+    8e-05
+    """
+    found: dict[str, float] = {}
+    for pattern in SEVERITIES:
+        before, star, _ = pattern.partition("*")
+        entries = getattr(scene, before.rstrip("."), ()) if star else ("",)
+        for number in range(len(entries)):
+            path = pattern.replace("*", str(number))
+            joint = path.removesuffix(".diametral_clearance")
+            if not has_value(scene, path) or value_at(scene, joint).rung == "ideal":
+                continue
+            value = getattr(value_at(scene, joint), "clearance_diametral", value_at(scene, path))
+            if not star or value != found.get(SEVERITIES[pattern.partition("*.")[2]]):
+                found[str(severity_column(path))] = float(value)
+    return found
+
+
+def wear_limits(scene: Scene, column: str) -> Wear | None:
+    """Wear limits that a scene has for a severity, None where it has none.
+
+    Parameters
+    ----------
+    scene : Scene
+        Of any machine.
+    column : str
+        Manifest column of the severity, as in `SEVERITIES`.
+
+    Examples
+    --------
+    >>> from wearstate.sim.scene import load_scene
+    >>> wear_limits(load_scene("bilge-pump"), "diametral_clearance_crankpin_m").condemning_diametral
+    0.00031
+    """
+    kind = re.sub(r"_[0-9]+_m$", "_{}_m", column)
+    tables = [LIMITS[path] for path, name in SEVERITIES.items() if name == kind and path in LIMITS]
+    return next((getattr(scene, table, None) for table in tables), None)
 
 
 def sample_records(
@@ -541,10 +582,20 @@ def sample_records(
 
     Notes
     -----
-    Severity is log-uniform. Every block of `STRATA` records holds one severity of each of that
-    many equal parts of the (logarithmic) range, in random order and at a random place within its
-    part, so that small sets are balanced. A golden-ratio sequence would be as even, but fixes
-    the step between the records of one machine; here it is as good as random.
+    Severities are log-uniform. Every block of `STRATA` records holds one value of each severity in
+    each of that many equal parts of its (logarithmic) range, in an order of its own and at a random
+    place within its part (a Latin hypercube), so that small sets are balanced. A golden-ratio
+    sequence would be as even, but fixes the step between the records of one machine; here it is as
+    good as random.
+
+    Confounders come and go with their probabilities, independently of each other but for those
+    that exclude each other. Where one is absent, the scene's own value stays.
+
+    References
+    ----------
+    McKay, Beckman and Conover, "A comparison of three methods for selecting values of input
+    variables in the analysis of output from a computer code", Technometrics 21 (1979) 239-245,
+    doi:10.2307/1268522.
 
     Examples
     --------
@@ -565,33 +616,104 @@ def _sample(recipe: Recipe, index: int, seed: int) -> Sample:
     machine, record = recipe.rng(seed, _MACHINE, group), recipe.rng(seed, _RECORD, index)
     drawn: dict[str, Any] = {axis.path: axis.value(machine) for axis in recipe.machine}
     drawn |= {axis.path: axis.value(record) for axis in recipe.record}
-    drawn[recipe.severity.path] = _severity_value(recipe, index, seed)
+    drawn |= _worn(recipe, index, seed)
+    faults = _confounded(recipe, group, index, seed)
+    drawn |= {path: value for values in faults.values() for path, value in values.items()}
     scene = scene_from_table(override(recipe.base, drawn))
     noise_seed = recipe.noise_seed(seed, index)
     row = {
         "record_id": f"{index:08d}",
         "group": group,
         "seed": noise_seed,
-        "grade": _grade(scene, drawn[recipe.severity.path]),
-        recipe.severity_column: drawn[recipe.severity.path],
-        **{name: _walk(scene, path) for name, path in recipe.conditions.items()},
+        **_severity_labels(recipe, drawn),
+        **_confounder_labels(recipe, faults),
+        **{name: value_at(scene, path) for name, path in recipe.conditions.items()},
     }
     return Sample(index=index, group=group, seed=noise_seed, row=row, drawn=drawn, scene=scene)
 
 
-def _severity_value(recipe: Recipe, index: int, seed: int) -> float:
+def _worn(recipe: Recipe, index: int, seed: int) -> dict[str, float]:
+    """Severities of one record by path: one of each stratum in every block."""
     block, place = divmod(index, STRATA)
-    rng = recipe.rng(seed, _SEVERITY, block)
-    fraction = (rng.permutation(STRATA)[place] + rng.random(STRATA)[place]) / STRATA
-    low, high = recipe.severity.bands[0]
-    return math.exp(math.log(low) + fraction * math.log(high / low))
+    values = {}
+    for number, wearing in enumerate(recipe.severities):
+        # by its name, so that it does not depend on the others
+        key = (_FURTHER_SEVERITY, _number(wearing.column)) if number else (_SEVERITY,)
+        rng = recipe.rng(seed, *key, block)
+        fraction = (rng.permutation(STRATA)[place] + rng.random(STRATA)[place]) / STRATA
+        low, high = wearing.axis.bands[0]
+        values[wearing.axis.path] = math.exp(math.log(low) + fraction * math.log(high / low))
+    return values
 
 
-def _grade(scene: Scene, severity: float) -> int:
-    wear = getattr(scene, "wear", None)
-    return -1 if wear is None else grade(severity, wear.grade_edges_diametral)
+def _confounded(recipe: Recipe, group: int, index: int, seed: int) -> dict[str, dict[str, float]]:
+    """Values of the confounders that are present, by name and path."""
+    found = {}
+    for word, members in recipe.confounders.items():
+        which = group if members[0].table.per == "machine" else index
+        left = recipe.rng(seed, _PRESENCE, _number(word), which).random()
+        for member in members:
+            if 0 <= left < member.table.probability:
+                key = (_CONFOUNDER, _number(member.table.name), which)
+                # from the same number at every place that the path stands for
+                found[member.table.name] = {
+                    axis.path: axis.value(recipe.rng(seed, *key)) for axis in member.axes
+                }
+            left -= member.table.probability
+    return found
+
+
+def _severity_labels(recipe: Recipe, drawn: Mapping[str, Any]) -> dict[str, float | int]:
+    labels: dict[str, float | int] = {}
+    for wearing in recipe.severities:
+        labels[wearing.column] = value = drawn[wearing.axis.path]
+        if wearing.grade_column:
+            labels[wearing.grade_column] = grade(value, wearing.edges) if wearing.edges else -1
+    return labels
+
+
+def _confounder_labels(
+    recipe: Recipe, present: Mapping[str, Mapping[str, float]]
+) -> dict[str, bool | float]:
+    labels: dict[str, bool | float] = {}
+    for fault in recipe.faults:
+        values = present.get(fault.table.name, {})
+        presence, value = fault.columns
+        labels |= {presence: bool(values), value: next(iter(values.values()), 0.0)}
+    return labels
 
 
 def overrides_text(recipe: Recipe) -> str:
     """Overrides as JSON, for the file."""
     return json.dumps(dict(recipe.overrides), sort_keys=True)
+
+
+def recorded_scene(scene: str, recipe: str, overrides: str) -> Scene:
+    """Scene of a data set before anything was drawn, from the texts in its file.
+
+    Parameters
+    ----------
+    scene, recipe, overrides : str
+        As `Attributes` has them; recipe and overrides may be empty.
+
+    Returns
+    -------
+    Scene
+
+    Raises
+    ------
+    SceneError
+        The texts are no scene, as those of a measured data set.
+
+    Examples
+    --------
+    >>> recipe = load_recipe("bilge-pump-small")
+    >>> recorded_scene(recipe.scene_text, recipe.text, overrides_text(recipe)) == recipe.scene
+    True
+    """
+    faults: list[str] = []
+    fixed = scene_table(recipe, "recipe").get("fixed", {})
+    table = _with_fixed(scene_table(scene), {**fixed, **json.loads(overrides)}, faults)
+    if faults:
+        raise SceneError("scene", faults)
+    return scene_from_table(table)

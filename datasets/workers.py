@@ -22,6 +22,10 @@ JOBS_PER_CORE = 4
 PARENT_CHECK = 1.0
 """Time between two looks of a worker at whether its parent lives [s]."""
 
+IDLE = 600.0
+"""Time after which an idle worker ends [s]: long, since loky has hung where workers were ending of
+idleness (after 10 s, its default) just as new work came."""
+
 _ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 
 
@@ -58,7 +62,9 @@ def in_order(
         return
     from joblib.externals.loky import get_reusable_executor
 
-    executor = get_reusable_executor(max_workers=jobs, env=_ONE_THREAD, initializer=_settle)
+    executor = get_reusable_executor(
+        max_workers=jobs, timeout=IDLE, env=_ONE_THREAD, initializer=_settle
+    )
     waiting: deque[Any] = deque()
     try:
         for item in items:

@@ -309,8 +309,16 @@ def simulate(
     rms = {channel.name: value for channel, value in vibration}
     shown = ", ".join(f"{channel.name} {value:.3g} {channel.unit}" for channel, value in vibration)
     files = [str(path) for path in (output, plot) if path]
+    for warning in solution.warnings:
+        click.echo(f"warning: {warning}", err=True)
     _emit(
-        {"scene": machine.name, "rms": rms, "numerics": solution.numerics, "files": files},
+        {
+            "scene": machine.name,
+            "rms": rms,
+            "numerics": solution.numerics,
+            "warnings": list(solution.warnings),
+            "files": files,
+        },
         as_json,
         "\n".join([f"{machine.name} (simulated): {shown} rms about the mean", *files]),
     )
@@ -416,6 +424,12 @@ def features(data: Path, output: Path, jobs: int | None, force: bool, as_json: b
 @click.argument("data", type=_PATH)
 @click.option("-o", "--output", type=_PATH, required=True, help="Model to write (.wsm).")
 @click.option(
+    "--target",
+    metavar="COLUMN",
+    default=None,
+    help="Severity to train for; the first of DATA by default.",
+)
+@click.option(
     "--held-out",
     type=_Share(0, 0.9),
     default=0.25,
@@ -429,6 +443,7 @@ def features(data: Path, output: Path, jobs: int | None, force: bool, as_json: b
 def train(
     data: Path,
     output: Path,
+    target: str | None,
     held_out: float,
     seed: int,
     jobs: int | None,
@@ -443,7 +458,12 @@ def train(
     _check_outputs([data], [(output, _MODEL)], force)
     with _progress("features") as progress:
         model, table, test = train_model(
-            data, held_out=held_out, seed=seed, jobs=_workers(jobs), progress=progress
+            data,
+            target=target,
+            held_out=held_out,
+            seed=seed,
+            jobs=_workers(jobs),
+            progress=progress,
         )
     save_model(model, output, force=force)
     result = score(model, table, test) if len(test) else {}
@@ -473,6 +493,8 @@ def evaluate(model_file: Path, data: Path, jobs: int | None, as_json: bool) -> N
 
 
 def _score_lines(result: dict[str, Any], card: dict[str, Any]) -> list[str]:
+    from .evaluate import confounder_lines
+
     if not result:
         return ["not judged: no machine draw was held out"]
     base = ", ".join(f"{k.replace('_', ' ')} {v:.3f}" for k, v in result["baselines"].items())
@@ -496,6 +518,7 @@ def _score_lines(result: dict[str, Any], card: dict[str, Any]) -> list[str]:
         f"{result['accuracy_bound']:.3f}",
         f"  within one grade  {result['within_one_grade']:.4f}",
         f"  baselines         {base}",
+        *confounder_lines(result["by_confounder"]),
     ]
 
 

@@ -1,16 +1,18 @@
 """How good is a wear model on machines it has not seen, and against what."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from ..datasets.record import DataError, DataSet
 from ..datasets.splits import group_folds
 from .estimate import Estimate, WearModel
 from .grades import accuracy_bound, grades_of
-from .tabulate import FeatureTable, Progress, feature_table
+from .tabulate import FeatureTable, Progress, confounders_in, feature_table
 from .train import draw_identity
 
 Float = NDArray[np.float64]
@@ -114,7 +116,7 @@ def score(model: WearModel, table: FeatureTable, rows: NDArray[np.intp]) -> dict
         ``mae_share_of_limit``, ``accuracy`` with ``accuracy_bound`` (about what the error in
         metres allows), ``within_one_grade``, ``coverage`` with ``nominal_coverage`` and
         ``mean_set_size``, ``confusion`` (true grade by row); ``baselines`` (accuracy of the
-        majority grade and of the best single rms).
+        majority grade and of the best single rms); ``by_confounder`` as :func:`by_confounder`.
     """
     truth = table.manifest[model.card["severity"]].to_numpy(dtype=float)
     edges = model.card["grade_edges_m"]
@@ -129,7 +131,109 @@ def score(model: WearModel, table: FeatureTable, rows: NDArray[np.intp]) -> dict
         "mae_all_m": float(np.abs(raw - truth[rows]).mean()),
         **_graded_scores(model, truth, graded),
         "baselines": baselines(table, grades_of(truth, edges), rows),
+        "by_confounder": by_confounder(
+            table.manifest.iloc[rows],
+            error=np.abs(raw - truth[rows]),
+            familiar=np.array([e.verdict == "graded" for e in estimates]),
+            covered=np.array([_covers(e, t) for e, t in zip(estimates, truth[rows], strict=True)]),
+        ),
     }
+
+
+def _covers(estimate: Estimate, truth: float) -> bool:
+    if estimate.low is None or estimate.high is None:
+        return False
+    return estimate.low <= truth <= estimate.high
+
+
+def by_confounder(
+    manifest: pd.DataFrame,
+    *,
+    error: Float,
+    familiar: NDArray[np.bool_],
+    covered: NDArray[np.bool_],
+) -> dict[str, dict[str, Any]]:
+    """Errors apart for records with and without faults that are not the wear.
+
+    Parameters
+    ----------
+    manifest : pandas.DataFrame
+        Of the records judged.
+    error : numpy.ndarray [shape=(n_records,)]
+        Of the severity [m], >= 0.
+    familiar, covered : numpy.ndarray [shape=(n_records,)]
+        Whether the record was graded, and whether its interval holds the truth.
+
+    Returns
+    -------
+    dict
+        ``none``, each confounder that is alone, and ``combined`` (two or more), as far as there
+        are such records: ``records``, ``unfamiliar`` share, ``mae_all_m``, and over the familiar
+        ones (None without any) ``mae_m`` and ``coverage``. Empty where the data set has no
+        confounder.
+
+    Examples
+    --------
+    >>> manifest = pd.DataFrame({"confounder_leak": [False, True]})
+    >>> yes = np.array([True, True])
+    >>> rows = by_confounder(manifest, error=np.array([1e-5, 3e-5]), familiar=yes, covered=yes)
+    >>> {name: row["mae_m"] for name, row in rows.items()}
+    {'none': 1e-05, 'leak': 3e-05}
+    """
+    present = confounders_in(manifest)
+    count = np.sum(list(present.values()), axis=0)
+    if not present:
+        return {}
+    parts = {name: here & (count == 1) for name, here in present.items()}
+    parts = {"none": count == 0, **parts, "combined": count > 1}
+    return {
+        name: _part_scores(error[part], familiar[part], covered[part])
+        for name, part in parts.items()
+        if part.any()
+    }
+
+
+def _part_scores(
+    error: Float, familiar: NDArray[np.bool_], covered: NDArray[np.bool_]
+) -> dict[str, Any]:
+    graded = bool(familiar.any())
+    return {
+        "records": len(error),
+        "unfamiliar": float(1 - familiar.mean()),
+        "mae_all_m": float(error.mean()),
+        "mae_m": float(error[familiar].mean()) if graded else None,
+        "coverage": float(covered[familiar].mean()) if graded else None,
+    }
+
+
+def confounder_lines(rows: Mapping[str, Mapping[str, Any]]) -> list[str]:
+    """Errors by confounder as lines for a terminal; none where there are no confounders.
+
+    Parameters
+    ----------
+    rows : mapping
+        From :func:`by_confounder`.
+
+    Examples
+    --------
+    >>> row = {"records": 8, "unfamiliar": 0.25, "mae_m": 2e-5, "coverage": 1.0}
+    >>> print(*confounder_lines({"none": row}), sep=chr(10))
+      confounder  records  unfamiliar  mean error  coverage
+      none              8      25.0 %     20.0 um     1.000
+    """
+    if not rows:
+        return []
+    width = max(len(name) for name in (*rows, "confounder"))
+    head = f"  {'confounder':{width}}  records  unfamiliar  mean error  coverage"
+    return [head, *(_part_line(name, row, width) for name, row in rows.items())]
+
+
+def _part_line(name: str, row: Mapping[str, Any], width: int) -> str:
+    share = 100 * row["unfamiliar"]
+    line = f"  {name.replace('_', ' '):{width}}  {row['records']:7}  {share:8.1f} %"
+    if row["mae_m"] is None:
+        return f"{line}  none is familiar"
+    return f"{line}  {1e6 * row['mae_m']:7.1f} um  {row['coverage']:8.3f}"
 
 
 _GRADED_SCORES = (

@@ -9,6 +9,7 @@ from ..datasets.importers import read_recording
 from ..datasets.record import DataError, DataSet
 from ..sim.sensor import Channel
 from .modelfile import load_model
+from .tabulate import confounders_in
 
 
 def describe(path: Path) -> dict[str, Any]:
@@ -60,13 +61,17 @@ def description_text(described: Mapping[str, Any]) -> str:
 
 def _line(key: str, value: Any) -> tuple[str, str]:
     """Name and value of one entry, for people."""
-    if value is None or value == "":
+    if value is None or value == "" or value == {}:
         return key.removesuffix("_m").replace("_", " "), "none"
     if key == "channels":
         return key, ", ".join(Channel(**channel).label for channel in value)
     for ending, unit, scale in _UNITS:
         if key.endswith(ending):
             return key.removesuffix(ending).replace("_", " "), _quantity(value, unit, scale)
+    if key == "confounders":
+        return key, ", ".join(
+            f"{name.replace('_', ' ')} in {count}" for name, count in value.items()
+        )
     if key == "grades":
         names = {grade: f"grade {grade}" if int(grade) >= 0 else "unknown grade" for grade in value}
         return key, ", ".join(f"{count} of {names[grade]}" for grade, count in value.items())
@@ -140,6 +145,9 @@ def _describe_data(path: Path) -> dict[str, Any]:
         "severity_ranges_m": {
             column: [float(manifest[column].min()), float(manifest[column].max())]
             for column in head.severities
+        },
+        "confounders": {
+            name: int(present.sum()) for name, present in confounders_in(manifest).items()
         },
         "condemning_limit_m": head.condemning_limit if head.limit_source else None,
         "limit_source": head.limit_source,

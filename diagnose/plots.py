@@ -49,7 +49,7 @@ def _draw_pump(figure: Any, scene: Scene, solution: Solution) -> None:
     rate = solution.sample_rate
     n = min(solution.signal.shape[1], round(_REVOLUTIONS / pump.drive.speed * rate))
     turns = np.arange(n) / rate * pump.drive.speed + pump.drive.start_angle / (2 * np.pi)
-    panels = figure.subplot_mosaic([["wave", "wave", "orbit"], ["force", "force", "spectrum"]])
+    panels = figure.subplot_mosaic([["wave", "wave", "orbit"], ["force", "pressure", "spectrum"]])
     accelerations = [
         (channel.name, row)
         for channel, row in zip(solution.channels, solution.signal, strict=True)
@@ -66,14 +66,28 @@ def _draw_pump(figure: Any, scene: Scene, solution: Solution) -> None:
         force = solution.truth["pin_force_n"][:n, column] / 1e3
         panels["force"].plot(turns, force, lw=0.6, color=_COLOURS[column], label=name)
     _label(panels["force"], "crank revolutions", "pin on rod [kN]", "Crank-pin force")
+    _pressures(panels["pressure"], pump, solution, turns)
     _orbit(panels["orbit"], pump, solution.truth["pin_offset_m"][:n])
+
+
+def _pressures(axes: Any, scene: PumpScene, solution: Solution, turns: NDArray[np.float64]) -> None:
+    """Cylinder pressure of every throw."""
+    area = np.pi / 4 * scene.piston.diameter**2
+    for throw in range(len(scene.throws)):
+        suffix = f"_{throw + 1}" if throw else ""
+        force = solution.truth[f"piston_pressure_force_n{suffix}"][: turns.size]
+        colour = _COLOURS[throw % len(_COLOURS)]
+        if area > 0:
+            axes.plot(turns, force / area / 1e6, lw=0.8, color=colour, label=f"{throw + 1}")
+    _label(axes, "crank revolutions", "gauge pressure [MPa]", "Cylinder pressure")
 
 
 def _label(axes: Any, x: str, y: str, title: str) -> None:
     axes.set(xlabel=x, ylabel=y, title=title)
     axes.grid(alpha=0.3)
     axes.margins(x=0)
-    axes.legend(fontsize=8, loc="upper right")
+    if axes.lines:
+        axes.legend(fontsize=8, loc="upper right")
 
 
 def _density(row: NDArray[np.float32], rate: float) -> tuple[NDArray[Any], NDArray[Any]]:

@@ -88,9 +88,13 @@ def quantity_name(severity: str) -> str:
     --------
     >>> quantity_name("diametral_clearance_crankpin_m")
     'diametral clearance, crankpin'
+    >>> quantity_name("diametral_clearance_crankpin_2_m")
+    'diametral clearance, crankpin 2'
     """
-    kind, _, place = severity.removesuffix("_m").rpartition("_")
-    return f"{kind.replace('_', ' ')}, {place}"
+    number = re.search(r"_([0-9]+)_m$", severity)
+    stem = severity.removesuffix(number[0] if number else "_m")
+    kind, _, place = stem.rpartition("_")
+    return f"{kind.replace('_', ' ')}, {place}{f' {number[1]}' if number else ''}"
 
 
 def feature_words(name: str) -> str:

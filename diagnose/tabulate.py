@@ -43,6 +43,34 @@ class FeatureTable:
         return pd.concat([self.manifest, features], axis=1)
 
 
+def confounders_in(manifest: pd.DataFrame) -> dict[str, NDArray[np.bool_]]:
+    """Faults beside the wear that a manifest labels.
+
+    Parameters
+    ----------
+    manifest : pandas.DataFrame
+        Of a data set; its columns ``confounder_<name>`` are read.
+
+    Returns
+    -------
+    dict
+        Name -> whether it is present [shape=(n_records,)]; empty where nothing is labelled.
+
+    Examples
+    --------
+    >>> confounders_in(pd.DataFrame({"grade": [0], "confounder_leak": [1]}))
+    {'leak': array([ True])}
+    """
+    return {
+        str(column).removeprefix(_CONFOUNDER): manifest[column].to_numpy(dtype=bool)
+        for column in manifest.columns
+        if str(column).startswith(_CONFOUNDER)
+    }
+
+
+_CONFOUNDER = "confounder_"
+
+
 def recording_features(recording: Recording) -> tuple[tuple[str, ...], NDArray[np.float64]]:
     """Feature row of one recording.
 

@@ -1,7 +1,7 @@
 """Fit a wear model to a labelled data set, with its uncertainty and its sense of the familiar."""
 
 import hashlib
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -9,9 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import __version__
+from ..datasets.recipe import recorded_scene, wear_limits
 from ..datasets.record import Attributes, DataError, DataSet
 from ..datasets.splits import check_no_leak, group_folds, group_split
 from .estimate import Calibration, LinearSeverity, WearModel
+from .grades import grades_of
 from .novelty import fit_familiarity
 from .tabulate import FeatureTable, Progress, feature_table
 
@@ -25,6 +27,7 @@ _FEWEST_GROUPS = 10  # two a fold, so that a fold's error is no accident
 def train_model(
     path: str | Path,
     *,
+    target: str | None = None,
     held_out: float = 0.25,
     seed: int = 0,
     jobs: int = 1,
@@ -35,7 +38,10 @@ def train_model(
     Parameters
     ----------
     path : str or Path
-        Labelled data set.
+        Labelled data set. Of its manifest, only the target and the groups decide the fit: neither
+        conditions nor confounders are inputs.
+    target : str, optional
+        Severity column to train for; the first one of the data set unless given.
     held_out : float
         Share of the groups (machine draws) kept out of every fit, 0 <= share < 1.
     seed : int
@@ -57,33 +63,77 @@ def train_model(
     Raises
     ------
     DataError
-        No severity column, no limits, or too few machine draws.
+        No such severity column, no limits, or too few machine draws.
     """
     with DataSet(path) as data:
         head, draws = data.attributes, data.manifest["group"].nunique()
-    _check_labelled(head, draws, path)
+    aim = _aim(head, target, path)
+    _check_draws(draws, path)
     table = feature_table(path, jobs=jobs, progress=progress)
     groups = table.manifest["group"].to_numpy()
     train, test = _split(groups, held_out, seed, path)
     check_no_leak(groups, train, test)
-    severity = table.manifest[head.severities[0]].to_numpy(dtype=float)
+    severity = table.manifest[aim.column].to_numpy(dtype=float)
     regressor, errors = fit_severity(table.values[train], severity[train], groups[train], seed)
     distances = _out_of_fold_distances(table.values[train], groups[train], seed)
     model = WearModel(
         regressor=regressor,
         calibration=Calibration(log_estimate=errors[0], log_error=errors[1], distance=distances),
         familiarity=fit_familiarity(table.values[train]),
-        card=_card(head, table, train, held_out, seed),
+        card=_card(head, aim, table, train, held_out, seed),
     )
     return model, table, test
 
 
-def _check_labelled(head: Attributes, draws: int, path: str | Path) -> None:
+@dataclass(frozen=True, kw_only=True)
+class _Aim:
+    """The severity to train for, with its wear limits [m]."""
+
+    column: str
+    edges: tuple[float, ...]
+    condemning: float
+    source: str
+
+
+def _aim(head: Attributes, target: str | None, path: str | Path) -> _Aim:
+    if target is not None and target not in head.severities:
+        raise DataError(
+            f"{path}: target = {target!r} must be one of its severities "
+            f"{', '.join(head.severities) or '(it has none)'}; choose another"
+        )
     if not head.severities or len(head.grade_edges) == 0:
         raise DataError(
             f"{path}: severities = {list(head.severities)}, grade_edges = {list(head.grade_edges)} "
             "must both be given; label the data set, or generate it from a recipe"
         )
+    if target in (None, head.severities[0]):
+        return _Aim(
+            column=head.severities[0],
+            edges=head.grade_edges,
+            condemning=head.condemning_limit,
+            source=head.limit_source,
+        )
+    return _further_aim(head, str(target), path)
+
+
+def _further_aim(head: Attributes, target: str, path: str | Path) -> _Aim:
+    """A file holds the limits of its first severity only; those of others are the scene's."""
+    scene = recorded_scene(head.scene, head.recipe, head.overrides) if head.scene else None
+    limits = None if scene is None else wear_limits(scene, target)
+    if limits is None:
+        raise DataError(
+            f"{path}: {target} has 0 grade edges, must have 3 to be graded; give the scene its "
+            f"wear limits, or train for {head.severities[0]}"
+        )
+    return _Aim(
+        column=target,
+        edges=limits.grade_edges_diametral,
+        condemning=limits.condemning_diametral,
+        source=limits.source,
+    )
+
+
+def _check_draws(draws: int, path: str | Path) -> None:
     if draws < _FEWEST_GROUPS:
         raise DataError(
             f"{path}: {draws} machine draws, must be >= {_FEWEST_GROUPS}; generate more records"
@@ -199,6 +249,7 @@ def draw_identity(head: Attributes) -> str:
 
 def _card(
     head: Attributes,
+    aim: _Aim,
     table: FeatureTable,
     train: NDArray[np.intp],
     held_out: float,
@@ -206,7 +257,7 @@ def _card(
 ) -> dict[str, Any]:
     """Everything a reader of the model must know, as JSON."""
     manifest = table.manifest.iloc[train]
-    severity = manifest[head.severities[0]].to_numpy(dtype=float)
+    severity = manifest[aim.column].to_numpy(dtype=float)
     columns = {name: i for i, name in enumerate(table.names)}
     ranges = {
         name: [
@@ -230,18 +281,18 @@ def _card(
             "scene": _name_in(head.scene),
             "recipe": _name_in(head.recipe),
         },
-        "severity": head.severities[0],
+        "severity": aim.column,
         "severity_range_m": [float(severity.min()), float(severity.max())],
-        "grade_edges_m": list(head.grade_edges),
-        "condemning_limit_m": head.condemning_limit,
-        "limit_source": head.limit_source,
+        "grade_edges_m": list(aim.edges),
+        "condemning_limit_m": aim.condemning,
+        "limit_source": aim.source,
         "sample_rate_hz": head.sample_rate,
         "channels": [asdict(channel) for channel in head.channels],
         "tacho": head.tacho,
         "pulses_per_revolution": head.pulses_per_revolution,
         "features": list(table.names),
         "condition_ranges": ranges,
-        "healthy_features": _healthy(table.values[train], manifest["grade"].to_numpy()),
+        "healthy_features": _healthy(table.values[train], grades_of(severity, aim.edges)),
     }
 
 

@@ -10,26 +10,51 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from ..sim.analytic import IdealCrank
-from ..sim.contact import RELEASE_AT_ZERO_FORCE, RELEASE_AT_ZERO_PENETRATION
-from ..sim.hydraulics import PRESSURE_NONE
+from ..sim.analytic import IdealCrank, effective_modulus, hertz_sphere_stiffness
+from ..sim.contact import (
+    CONTACT,
+    ELASTIC_HERTZ,
+    HYSTERESIS,
+    LAW_HYSTERESIS,
+    RELEASE_AT_ZERO_FORCE,
+    RELEASE_AT_ZERO_PENETRATION,
+    hysteresis,
+    normal_force,
+)
+from ..sim.crank_setup import ideal_motion
+from ..sim.hydraulic_parts import CylinderPressure, Liquid, Valve
+from ..sim.hydraulics import (
+    HYDRAULIC,
+    acceleration_constant,
+    even_phases,
+    flow_ripple,
+    hydraulic_parameters,
+    run_chamber,
+)
+from ..sim.jit import kernel
 from ..sim.pump_parts import PumpScene
 from ..sim.scene import load_scene
 from ..sim.slider_crank import (
-    CrankParameters,
+    BODY,
+    CRANKPIN,
+    GUIDE,
+    JOINT_COMPLIANT,
+    THROW,
     CrankRun,
-    ideal_motion,
-    parameters,
-    run_compliant,
+    Machine,
+    Tables,
+    run_mechanism,
 )
 
 LITERATURE_FOLDER = Path(__file__).parent / "literature"
 
 _ANGLES = 36_001  # steps of 0.01 degree: a maximum is missed by less than 1e-7 of itself
 _APPROACH_SPEED = 0.3  # m/s, an impact speed of a worn pump; the law is linear, any would do
+_LONGEST_DROP = 1000.0  # contact times; the slowest rebound of the table is over after thirty
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -198,11 +223,80 @@ def _largest_crank_moment() -> float:
     return float(np.abs(_benchmark_crank().crank_moment).max())
 
 
-def rebound(damping_ratio: float, release: int, *, step_per_contact_time: float = 0.03) -> float:
+def _one_throw(numbers: dict[str, float], contacts: dict[int, np.void], **machine: float) -> Tables:
+    """Tables of one throw without pressure; what is not given is zero."""
+    throws, table = np.zeros(1, THROW), np.zeros((1, 3), CONTACT)
+    table["friction_speed"] = table["speed_floor"] = 1.0  # an unused record divides by neither
+    for name, value in numbers.items():
+        throws[name] = value
+    for joint, contact in contacts.items():
+        table[0, joint] = contact
+    shared = Machine(**{**dict.fromkeys(Machine._fields, 0.0), **machine})
+    return Tables(throws=throws, contacts=table, liquid=np.zeros(1, HYDRAULIC), machine=shared)
+
+
+def impact(
+    contact: np.void, *, speed: float = _APPROACH_SPEED, step: float, duration: float
+) -> float:
     """Coefficient of restitution that the mechanism itself gives for one straight impact.
 
     The rod lies along the stroke with the crank at rest, without gravity, pressure or friction,
-    so that rod and piston are one mass which runs against the pin.
+    so that rod and piston are one mass of 9 kg which runs against the pin.
+
+    Parameters
+    ----------
+    contact : record of sim.contact.CONTACT
+        Of the crank pin, with a clearance above zero [m].
+    speed : float
+        Of approach [m/s], > 0.
+    step : float
+        Integration step [s].
+    duration : float
+        From a hundredth of the clearance before first touch [s].
+
+    Returns
+    -------
+    float
+        Speed of separation over speed of approach, at the first rebound; NaN where it does not
+        come within the duration.
+
+    Examples
+    --------
+    >>> contact = np.zeros(1, CONTACT)[0]
+    >>> contact["law"], contact["stiffness"], contact["hysteresis"] = LAW_HYSTERESIS, 2e8, 0.75
+    >>> contact["clearance"], contact["friction_speed"] = 4e-5, 1.0
+    >>> round(impact(contact, step=1e-6, duration=2e-3), 5)
+    0.66296
+    """
+    clearance = float(contact["clearance"])
+    t = _one_throw(_STRAIGHT, {CRANKPIN: contact})
+    reach = _STRAIGHT["crank_radius"] + _STRAIGHT["rod_centre"] + _STRAIGHT["rod_arm"]
+    bodies = np.zeros((1, 2 * len(BODY)))
+    bodies[0, 3] = reach - 0.99 * clearance
+    bodies[0, 0] = bodies[0, 3] - _STRAIGHT["rod_centre"]
+    bodies[0, 6] = bodies[0, 9] = -speed
+    n_steps = math.ceil(duration / step)
+    run = run_mechanism(t, angle=0.0, speed=0.0, bodies=bodies, step=step, n_steps=n_steps)
+    return _first_free_speed(run, reach - clearance) / speed
+
+
+_STRAIGHT = {
+    "crank_radius": 0.05,
+    "rod_centre": 0.165,
+    "rod_arm": 0.085,
+    "rod_mass": 3.0,
+    "inverse_rod_mass": 1 / 3.0,
+    "inverse_rod_inertia": 1 / 0.025,
+    "piston_mass": 6.0,
+    "crankpin_rung": JOINT_COMPLIANT,
+    "crankpin_radius": 0.03,
+    "guide_half_height": 1.0,
+}
+"""A pump of 300 rpm in size; a law's restitution does not depend on it."""
+
+
+def rebound(damping_ratio: float, release: int, *, step_per_contact_time: float = 0.03) -> float:
+    """Coefficient of restitution of a spring and dashpot, by :func:`impact`.
 
     Parameters
     ----------
@@ -230,36 +324,233 @@ def rebound(damping_ratio: float, release: int, *, step_per_contact_time: float 
     """
     if not 0 <= damping_ratio < 1:
         raise ValueError(f"damping_ratio = {damping_ratio} must be in [0, 1); lower the damping")
-    p = _straight_impact(damping_ratio, release)
-    step = step_per_contact_time / math.sqrt(p.stiffness / p.moving_mass)
-    reach = p.crank_radius + p.rod_length
-    start = (0.0, 0.0, reach - 0.99 * p.clearance, -_APPROACH_SPEED, 0.0, 0.0)
+    stiffness, mass = 2e8, _STRAIGHT["rod_mass"] + _STRAIGHT["piston_mass"]
+    contact = np.zeros(1, CONTACT)[0]
+    contact["stiffness"], contact["release"] = stiffness, release
+    contact["damping"] = 2 * damping_ratio * math.sqrt(stiffness * mass)
+    contact["clearance"], contact["friction_speed"] = 4e-5, 1.0
+    step = step_per_contact_time / math.sqrt(stiffness / mass)
     # approach over a hundredth of the clearance, then at most half a contact period
-    duration = 0.01 * p.clearance / _APPROACH_SPEED + 2 * math.pi * step / step_per_contact_time
-    run = run_compliant(p, start, step=step, n_steps=math.ceil(duration / step))
-    return _first_free_speed(run, reach - p.clearance) / _APPROACH_SPEED
-
-
-def _straight_impact(damping_ratio: float, release: int) -> CrankParameters:
-    scene = load_scene("bilge-pump")
-    assert isinstance(scene, PumpScene)  # a built-in scene of that machine
-    p = parameters(scene)
-    return p._replace(
-        gravity_x=0.0,
-        gravity_y=0.0,
-        pressure_rung=PRESSURE_NONE,
-        friction=0.0,
-        tangential_damping=0.0,
-        release=release,
-        damping=2 * damping_ratio * math.sqrt(p.stiffness * p.moving_mass),
-    )
+    duration = 0.01 * 4e-5 / _APPROACH_SPEED + 2 * math.pi * step / step_per_contact_time
+    return impact(contact, step=step, duration=duration)
 
 
 def _first_free_speed(run: CrankRun, touch: float) -> float:
     """Piston velocity once it moves away and has cleared the side it ran against [m/s]."""
-    piston, velocity = run.states[:, 2], run.states[:, 3]
+    assert run.bodies is not None  # kept by default
+    piston, velocity = run.bodies[:, 0, 3], run.bodies[:, 0, 9]
     free = np.flatnonzero((velocity > 0) & (piston > touch))
     return float(velocity[free[0]]) if free.size else math.nan
+
+
+@cache
+def _loose_slider() -> CrankRun:
+    """Slider-crank whose slider has clearance in its guide, for the 2 ms before it touches."""
+    half_rod = 0.153
+    numbers = {
+        "crank_radius": 0.153,
+        "rod_centre": half_rod,
+        "rod_arm": half_rod,
+        "rod_mass": 0.038,
+        "inverse_rod_mass": 1 / 0.038,
+        "inverse_rod_inertia": 1 / 5.9e-4,
+        "piston_mass": 0.076,
+        "inverse_piston_across": 1 / 0.076,
+        "inverse_piston_tilt": 1 / 2.7e-6,
+        "guide_rung": JOINT_COMPLIANT,
+        "guide_half_length": 0.05,
+        "guide_half_height": 0.025,
+    }
+    guide = np.zeros(1, CONTACT)[0]
+    guide["stiffness"], guide["clearance"], guide["friction_speed"] = 1e6, 1e-3, 1.0
+    crank_mass, crank_centre, step = 0.038, 0.0765, 1e-5
+    t = _one_throw(
+        numbers,
+        {GUIDE: guide},
+        gravity_y=9.81,
+        inverse_inertia=1 / (7.4e-5 + crank_mass * crank_centre**2),
+        static_moment=crank_mass * crank_centre,
+        baumgarte=1000.0,  # 1/s, of drift: slow to the steps, fast to the run
+    )
+    crank_speed, rod_rate = 150.0, 75.0  # the published rod angle is minus ours
+    bodies = np.zeros((1, 2 * len(BODY)))
+    bodies[0, 0], bodies[0, 3] = 0.153 + half_rod, 0.153 + 2 * half_rod
+    bodies[0, 7], bodies[0, 8] = 0.153 * crank_speed - half_rod * rod_rate, rod_rate
+    return run_mechanism(t, angle=0.0, speed=crank_speed, bodies=bodies, step=step, n_steps=200)
+
+
+def _loose_slider_value(step: int, quantity: str) -> float:
+    run = _loose_slider()
+    assert run.bodies is not None  # kept by default
+    values = {
+        "revolutions": run.turns[step, 0] / (2 * math.pi),
+        "rod angle": -run.bodies[step, 0, 2],
+        "crank speed": run.turns[step, 1],
+        "rod rate": -run.bodies[step, 0, 8],
+    }
+    return float(values[quantity])
+
+
+@kernel
+def _slowing(penetration: float, velocity: float, speed: float, contact: Any) -> float:
+    return -normal_force(penetration, velocity, speed, contact)
+
+
+@kernel
+def _drop(speed: float, h: float, n_steps: int, contact: Any) -> float:
+    """Velocity at which a unit mass leaves, by Runge-Kutta 4; NaN where it does not.
+
+    Order 4 with a linear elasticity, 2.5 with those that start as d^(3/2).
+    """
+    d, v = 0.0, speed
+    for _ in range(n_steps):
+        k1 = _slowing(d, v, speed, contact)
+        v2 = v + 0.5 * h * k1
+        k2 = _slowing(d + 0.5 * h * v, v2, speed, contact)
+        v3 = v + 0.5 * h * k2
+        k3 = _slowing(d + 0.5 * h * v2, v3, speed, contact)
+        v4 = v + h * k3
+        k4 = _slowing(d + h * v3, v4, speed, contact)
+        after = d + h / 6.0 * (v + 2.0 * (v2 + v3) + v4)
+        if after <= 0.0:
+            return v - 0.5 * d * k1 / v  # the force falls to zero over the rest
+        d = after
+        v += h / 6.0 * (k1 + 2.0 * (k2 + k3) + k4)
+    return math.nan
+
+
+def drop(contact: np.void, *, speed: float = 1.0, step: float = 1e-3) -> float:
+    """Coefficient of restitution of a mass of 1 kg thrown on a hysteresis contact, integrated.
+
+    Parameters
+    ----------
+    contact : record of sim.contact.CONTACT
+        With a hysteresis law.
+    speed : float
+        Of approach [m/s], > 0.
+    step : float
+        Integration step [s]. With a stiffness and a speed of one the contact lasts from two to
+        thirty seconds and the default is within 1e-8, whatever the elasticity.
+
+    Returns
+    -------
+    float
+        Speed of separation over speed of approach; NaN where the mass does not come back.
+
+    Examples
+    --------
+    >>> contact = np.zeros(1, CONTACT)[0]
+    >>> contact["law"], contact["stiffness"], contact["hysteresis"] = LAW_HYSTERESIS, 1.0, 0.75
+    >>> round(drop(contact), 5)
+    0.66296
+    """
+    leaving: float = _drop(speed, step, math.ceil(_LONGEST_DROP / step), contact)
+    return -leaving / speed
+
+
+def _hertz_drop(law: str, restitution: float) -> float:
+    contact = np.zeros(1, CONTACT)[0]
+    contact["law"], contact["elasticity"], contact["stiffness"] = LAW_HYSTERESIS, ELASTIC_HERTZ, 1.0
+    contact["hysteresis"] = hysteresis(law, restitution)
+    return drop(contact)
+
+
+def _benchmark_hertz(clearance: float) -> float:
+    steel = effective_modulus(207e9, 0.3, 207e9, 0.3)
+    return hertz_sphere_stiffness(steel, 10e-3 - clearance, 10e-3)
+
+
+def _ripple(crank_to_rod: float, pump: str, quantity: str) -> float:
+    phases, double_acting = _PUMPS[pump]
+    ripple = flow_ripple(crank_to_rod, phases, double_acting=double_acting)
+    return float(getattr(ripple, quantity))
+
+
+def _acceleration(pump: str) -> float:
+    phases, double_acting = _PUMPS[pump]
+    return acceleration_constant(0.2, phases, double_acting=double_acting)
+
+
+_PUMPS = {
+    "simplex": (even_phases(1), False),
+    "duplex": (even_phases(2), False),
+    "triplex": (even_phases(3), False),
+    "quadruplex": (even_phases(4), False),
+    "quintuplex": (even_phases(5), False),
+    "sextuplex": (even_phases(6), False),
+    "septuplex": (even_phases(7), False),
+    "nonuplex": (even_phases(9), False),
+    "simplex double-acting": (even_phases(1), True),
+    "duplex double-acting": (even_phases(2, math.pi), True),
+}
+"""Name -> crank offsets [rad], and whether both sides of the pistons deliver."""
+
+_RIPPLES = (
+    *(("1/6", 1 / 6, pump) for pump in _PUMPS if pump not in ("quintuplex", "septuplex")),
+    *(("1/5", 1 / 5, pump) for pump in ("triplex", "quintuplex")),
+    ("0", 0.0, "triplex"),
+)
+
+_ACCELERATED = (
+    "simplex",
+    "simplex double-acting",
+    "duplex",
+    "duplex double-acting",
+    "triplex",
+    "quintuplex",
+    "septuplex",
+    "nonuplex",
+)
+
+
+@cache
+def _westphal() -> dict[str, float]:
+    """Lift of a discharge valve under a force that does not change, by the compiled chamber.
+
+    A valve without mass on a long soft spring keeps the pressure drop, and with it the velocity
+    in the gap, constant: then the lift follows Westphal's closed form, a sine behind the piston's.
+    """
+    opening, diameter, turn, steps = 15e3, 0.045, 2 * math.pi, 20_000
+    force = opening * math.pi / 4 * diameter**2
+    valve = Valve(
+        diameter=diameter,
+        mass=1e-6,
+        stiffness=0.3,
+        preload_lift=force / 0.3,
+        damping=0.0,
+        seat_stiffness=9e5,
+        seat_damping=0.0,
+    )
+    pressure = CylinderPressure(
+        rung="chamber",
+        discharge=3e5,
+        suction_valve=valve,
+        discharge_valve=valve,
+        dead_volume=5e-4,
+        liquid=Liquid(density=1000.0, bulk_modulus=1e12, air_fraction=0.0),
+    )
+    radius, speed = 0.05, 5 * turn
+    h = hydraulic_parameters(
+        pressure, area=math.pi / 4 * 0.01, crank_radius=radius, rod_length=0.25, speed=speed
+    )[0]
+    angle = 0.5 + turn * np.arange(6 * steps // 5) / steps
+    piston, velocity = 0.25 + radius * np.cos(angle), -radius * speed * np.sin(angle)
+    run = run_chamber(h, piston, velocity, step=turn / speed / steps)
+    lift = run.states[:, 4]
+    middle = (angle > 4.6) & (angle < 6.1)  # the start has died out, the dead centre is ahead
+    waves = np.column_stack([-np.sin(angle), np.cos(angle)])[middle]
+    in_phase, behind = np.linalg.lstsq(waves, lift[middle], rcond=None)[0]
+    late = (angle > turn) & (lift <= 0.0)
+    return {
+        "amplitude": math.hypot(in_phase, behind),
+        "phase": math.atan2(behind, in_phase),
+        "left": float(np.interp(turn, angle, lift)),
+        "delay": float(angle[late][0] - turn),
+    }
+
+
+def _westphal_value(name: str) -> float:
+    return _westphal()[name]
 
 
 _TABLES: dict[str, dict[str, Callable[[], float]]] = {
@@ -272,6 +563,18 @@ _TABLES: dict[str, dict[str, Callable[[], float]]] = {
         "ideal crank: largest wrist-pin force [N]": _largest_wrist_pin_force,
         "ideal crank: largest guide force [N]": _largest_guide_force,
         "ideal crank: largest crank moment [N m]": _largest_crank_moment,
+        **{
+            f"loose slider: {quantity} after {after} ms [{unit}]": partial(
+                _loose_slider_value, 100 * after, quantity
+            )
+            for after in (1, 2)
+            for quantity, unit in (
+                ("revolutions", "-"),
+                ("rod angle", "rad"),
+                ("crank speed", "rad/s"),
+                ("rod rate", "rad/s"),
+            )
+        },
     },
     "restitution.csv": {
         f"restitution: damping ratio {ratio:g}, release at zero {name}": partial(
@@ -282,6 +585,37 @@ _TABLES: dict[str, dict[str, Callable[[], float]]] = {
             ("force", RELEASE_AT_ZERO_FORCE),
             ("penetration", RELEASE_AT_ZERO_PENETRATION),
         )
+    },
+    "contact.csv": {
+        **{
+            f"impact by {law}, asked for {restitution:g}": partial(_hertz_drop, law, restitution)
+            for law in HYSTERESIS
+            for restitution in (0.1, 0.3, 0.5, 0.7, 0.8, 0.9, 0.95)
+            if law != "carvalho-martins" or restitution >= 1 / 3  # its validity
+        },
+        **{
+            f"Hertz contact: stiffness at {clearance * 1e3:g} mm clearance [N/m^1.5]": partial(
+                _benchmark_hertz, clearance
+            )
+            for clearance in (0.5e-3, 0.25e-3, 0.1e-3)
+        },
+    },
+    "pump.csv": {
+        **{
+            f"flow ripple {quantity}: {pump}, crank to rod {text}": partial(
+                _ripple, ratio, pump, quantity
+            )
+            for text, ratio, pump in _RIPPLES
+            for quantity in ("above", "below", "total")
+        },
+        **{
+            f"acceleration head constant: {pump}": partial(_acceleration, pump)
+            for pump in _ACCELERATED
+        },
+        "valve after Westphal: lift amplitude [m]": partial(_westphal_value, "amplitude"),
+        "valve after Westphal: phase [rad]": partial(_westphal_value, "phase"),
+        "valve after Westphal: lift at dead centre [m]": partial(_westphal_value, "left"),
+        "valve after Westphal: closing delay [rad]": partial(_westphal_value, "delay"),
     },
 }
 """File of the literature -> name of each of its checks -> what obtains it."""

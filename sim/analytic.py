@@ -169,3 +169,119 @@ def kelvin_voigt_restitution(damping_ratio: float, *, release_at_zero_force: boo
     w = math.sqrt(1 - z * z)
     end = math.pi - (math.atan2(2 * z * w, w * w - z * z) if release_at_zero_force else 0.0)
     return math.exp(-z * end / w)
+
+
+def effective_modulus(young_1: float, poisson_1: float, young_2: float, poisson_2: float) -> float:
+    """Contact modulus of two elastic bodies, ``1 / E* = sum of (1 - nu^2) / E``.
+
+    Parameters
+    ----------
+    young_1, young_2 : float
+        Young's moduli [Pa], > 0.
+    poisson_1, poisson_2 : float
+        Poisson's ratios, from -1 to 0.5.
+
+    Returns
+    -------
+    float
+        E* [Pa].
+
+    Raises
+    ------
+    ValueError
+        A modulus or a ratio is outside its range.
+
+    Examples
+    --------
+    >>> round(effective_modulus(207e9, 0.3, 207e9, 0.3) / 1e9, 3)  # steel on steel [GPa]
+    113.736
+    """
+    for name, young in (("young_1", young_1), ("young_2", young_2)):
+        if not young > 0:
+            raise ValueError(f"{name} = {young} Pa must be > 0; steel has about 2.1e11")
+    for name, poisson in (("poisson_1", poisson_1), ("poisson_2", poisson_2)):
+        if not -1 < poisson <= 0.5:
+            raise ValueError(f"{name} = {poisson} must be in (-1, 0.5]; metals have about 0.3")
+    return 1 / ((1 - poisson_1**2) / young_1 + (1 - poisson_2**2) / young_2)
+
+
+def hertz_sphere_stiffness(modulus: float, radius: float, seat_radius: float) -> float:
+    """Stiffness of a ball in a spherical seat, ``F = K d^(3/2)``.
+
+    Parameters
+    ----------
+    modulus : float
+        E* of the pair, see :func:`effective_modulus` [Pa], > 0.
+    radius, seat_radius : float
+        Of the ball, and of the hollow around it, larger [m].
+
+    Returns
+    -------
+    float
+        K [N/m^1.5].
+
+    Raises
+    ------
+    ValueError
+        The modulus or the radius is not above zero, or the seat not larger than the ball.
+
+    Notes
+    -----
+    ``K = 4/3 E* sqrt(R_1 R_2 / (R_2 - R_1))`` (Hertz 1882; Johnson, Contact Mechanics, 1985,
+    sec. 4.2). It holds while the contact is small beside the radii. The literature of clearance
+    joints takes it for a pin in an eye too (Ravn 1998), where it is a convention: their contact
+    is a line, and the nearer the radii the worse. :func:`conformal_stiffness` is for these.
+
+    Examples
+    --------
+    >>> steel = effective_modulus(207e9, 0.3, 207e9, 0.3)
+    >>> f"{hertz_sphere_stiffness(steel, 9.5e-3, 10e-3):.4e}"
+    '6.6102e+10'
+    """
+    if not modulus > 0:
+        raise ValueError(f"modulus = {modulus} Pa must be > 0; steel on steel has about 1.1e11")
+    if not 0 < radius < seat_radius:
+        raise ValueError(
+            f"radius = {radius} m must be > 0 and < seat_radius = {seat_radius} m; "
+            "check which is the hollow one"
+        )
+    return 4 / 3 * modulus * math.sqrt(radius * seat_radius / (seat_radius - radius))
+
+
+def conformal_stiffness(modulus: float, length: float) -> float:
+    """Stiffness of a pin in an eye of nearly its radius, ``F = K d sqrt(d / (2 (c + d)))``.
+
+    Parameters
+    ----------
+    modulus : float
+        E* of the pair, see :func:`effective_modulus` [Pa], > 0.
+    length : float
+        Of the contact along the pin's axis [m], > 0.
+
+    Returns
+    -------
+    float
+        K [N/m]; c is the radial clearance.
+
+    Raises
+    ------
+    ValueError
+        The modulus or the length is not above zero.
+
+    Notes
+    -----
+    ``K = pi/2 E* L``: a foundation whose pressure falls off over the arc of contact (Liu, Zhang,
+    Yang 2007, Mechanism and Machine Theory 42(2), 183-197). Plane strain, no friction. For d well
+    above c the force becomes linear, ``K d / sqrt(2)``.
+
+    Examples
+    --------
+    >>> steel = effective_modulus(207e9, 0.3, 207e9, 0.3)
+    >>> f"{conformal_stiffness(steel, 20e-3):.4e}"
+    '3.5731e+09'
+    """
+    if not modulus > 0:
+        raise ValueError(f"modulus = {modulus} Pa must be > 0; steel on steel has about 1.1e11")
+    if not length > 0:
+        raise ValueError(f"length = {length} m must be > 0; it is measured along the pin")
+    return math.pi / 2 * modulus * length

@@ -1,14 +1,19 @@
-"""Force to housing acceleration: the casing as a set of modes."""
+"""Force to housing acceleration: the casing as a set of modes, or as it was measured."""
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import signal
+from scipy import fft, signal
 
+from .frf_table import Accelerance
 from .jit import kernel
+from .parts import specific_key
+from .sensor import padded_spectrum
 
 PASS_BAND = 0.45
 """Upper edge of the flat band over the sample rate; 11.5 kHz at 25.6 kHz."""
@@ -64,22 +69,46 @@ def exact_oscillator(
 
 
 @kernel
-def _restoring(
-    modal_force: NDArray[np.float64],
-    outputs: NDArray[np.float64],
-    stiffness: NDArray[np.float64],
-    damping: NDArray[np.float64],
-    transition: NDArray[np.float64],
-    gain: NDArray[np.float64],
-    acceleration: NDArray[np.float64],
+def _respond(
+    forces: Any,
+    taps: Any,
+    inputs: Any,
+    outputs: Any,
+    stiffness: Any,
+    damping: Any,
+    transition: Any,
+    gain: Any,
+    scratch: Any,
+    acceleration: Any,
 ) -> None:
-    """Add what springs and dashpots of every mode do; starts in static balance with the force."""
-    n_modes, n_samples = modal_force.shape
-    for m in range(n_modes):
-        force = modal_force[m, 0]
-        q, v = force / stiffness[m], 0.0
-        for i in range(n_samples):
-            following = modal_force[m, i]
+    """Bare modal masses under `forces`, and what springs and dashpots of every mode take back.
+
+    These feel straight lines between the forces filtered by the symmetric `taps`; they start in
+    balance with the first of them. `scratch` [shape=(5, n)] holds forces as they are and filtered,
+    and of every mode its force, coordinate and rate.
+    """
+    n, n_inputs = forces.shape
+    n_modes, n_outputs = outputs.shape
+    half = taps.size // 2
+    for i in range(n):
+        for j in range(n_inputs):
+            raised = 0.0
+            for k in range(-half, half + 1):
+                raised += taps[half + k] * forces[min(max(i + k, 0), n - 1), j]
+            scratch[0, j] = forces[i, j]
+            scratch[1, j] = raised
+        for k in range(n_outputs):
+            acceleration[i, k] = 0.0
+        for m in range(n_modes):
+            bare, following = 0.0, 0.0
+            for j in range(n_inputs):
+                bare += inputs[m, j] * scratch[0, j]
+                following += inputs[m, j] * scratch[1, j]
+            if i == 0:
+                scratch[2, m] = following
+                scratch[3, m] = following / stiffness[m]
+                scratch[4, m] = 0.0
+            force, q, v = scratch[2, m], scratch[3, m], scratch[4, m]
             q, v = (
                 transition[m, 0, 0] * q
                 + transition[m, 0, 1] * v
@@ -90,10 +119,10 @@ def _restoring(
                 + gain[m, 1, 0] * force
                 + gain[m, 1, 1] * following,
             )
-            force = following
-            back = -damping[m] * v - stiffness[m] * q
-            for k in range(outputs.shape[1]):
-                acceleration[i, k] += outputs[m, k] * back
+            scratch[2, m], scratch[3, m], scratch[4, m] = following, q, v
+            felt = bare - damping[m] * v - stiffness[m] * q
+            for k in range(n_outputs):
+                acceleration[i, k] += outputs[m, k] * felt
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -115,28 +144,26 @@ class Modes:
 
 
 def _acceleration(
-    forces: NDArray[np.float64],
-    on_springs: NDArray[np.float64],
-    sample_rate: float,
-    modes: Modes,
+    forces: NDArray[np.float64], taps: NDArray[np.float64], sample_rate: float, modes: Modes
 ) -> NDArray[np.float64]:
-    """Bare modal masses under `forces`, and what springs take back under lines of `on_springs`.
-
-    All [shape=(n_samples, n_inputs or n_outputs)].
-    """
+    """Acceleration [shape=(n_samples, n_outputs)] where springs feel the forces through `taps`."""
     pairs = [
         exact_oscillator(f, z, 1 / sample_rate)
         for f, z in zip(modes.frequency, modes.damping_ratio, strict=True)
     ]
     omega = 2 * np.pi * modes.frequency
-    acceleration = forces @ (modes.inputs.T @ modes.outputs)
-    _restoring(
-        np.ascontiguousarray(modes.inputs @ on_springs.T),
+    n_modes, n_inputs = modes.inputs.shape
+    acceleration = np.empty((len(forces), modes.outputs.shape[1]))
+    _respond(
+        forces,
+        taps,
+        np.ascontiguousarray(modes.inputs),
         np.ascontiguousarray(modes.outputs),
         omega**2,
         2 * modes.damping_ratio * omega,
         np.array([pair[0] for pair in pairs]),
         np.array([pair[1] for pair in pairs]),
+        np.empty((5, max(n_modes, n_inputs))),
         acceleration,
     )
     return acceleration
@@ -168,7 +195,7 @@ def housing_acceleration(
     ``sinc^2(f / sample_rate)``, the share of the samples' spectrum that straight lines keep;
     :func:`band_limited_acceleration` has no such loss.
     """
-    return _acceleration(forces, forces, sample_rate, modes).T
+    return _acceleration(np.ascontiguousarray(forces), np.ones(1), sample_rate, modes).T
 
 
 def band_limited_acceleration(
@@ -199,21 +226,107 @@ def band_limited_acceleration(
     that loss made up for, so that they and the bare masses, which feel the means as they are,
     cancel each other below the modes as they should.
     """
-    return decimate(_acceleration(means, _raised(means), step_rate, modes), factor).T
+    means = np.ascontiguousarray(means)
+    return decimate(_acceleration(means, line_inverse(), step_rate, modes), factor).T
 
 
-def _raised(means: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Means filtered by the inverse of what straight lines between them lose."""
-    taps = line_inverse()
-    half = len(taps) // 2
-    padded = np.concatenate(
-        [np.repeat(means[:1], half, axis=0), means, np.repeat(means[-1:], half, axis=0)]
+def casing_inputs(shape: Mapping[str, float], place: str, throw: int) -> float:
+    """Mode shape where a force acts: that of the throw, else that of the place, else none.
+
+    Parameters
+    ----------
+    shape : mapping of str to float
+        Mass-normalised shape [kg^-0.5] by place; ``bearing_x`` is good for all throws,
+        ``bearing_x_2`` for the second alone, and wins there.
+    place : str
+        Where the force acts.
+    throw : int
+        Of which throw it is, counted from 1.
+
+    Returns
+    -------
+    float
+        [kg^-0.5]; 0 where the shape names neither.
+
+    Examples
+    --------
+    >>> casing_inputs({"bearing_x": 0.1, "bearing_x_2": 0.2}, "bearing_x", 2)
+    0.2
+    >>> casing_inputs({"bearing_x": 0.1, "bearing_x_2": 0.2}, "bearing_x", 3)
+    0.1
+    """
+    key = specific_key(shape, place, throw)
+    return 0.0 if key is None else shape[key]
+
+
+@dataclass(frozen=True, kw_only=True)
+class TableRun:
+    """Acceleration from measured frequency response functions, and what they left out.
+
+    Attributes
+    ----------
+    acceleration : numpy.ndarray [shape=(n_outputs, n_samples)]
+        [m/s^2]
+    force_share_above : float
+        Share of the forces' energy, their means apart, above the table's last line.
+    """
+
+    acceleration: NDArray[np.float64]
+    force_share_above: float
+
+
+def table_acceleration(
+    means: NDArray[np.float64], step_rate: float, factor: int, accelerance: Accelerance
+) -> TableRun:
+    """Acceleration of the housing at the sample rate, through measured responses.
+
+    Parameters
+    ----------
+    means : numpy.ndarray [shape=(n_steps, n_inputs)]
+        Means of the forces on the casing over each step [N].
+    step_rate : float
+        Steps per second, `factor` times the sample rate.
+    factor : int
+        Steps per sample, >= 1.
+    accelerance : Accelerance
+        From every force to every sensor.
+
+    Returns
+    -------
+    TableRun
+        Acceleration with the times and the spoilt edges of :func:`band_limited_acceleration`.
+
+    Notes
+    -----
+    The forces are decimated, their spectrum is multiplied by the accelerance between the lines,
+    :meth:`~wearstate.sim.frf_table.Accelerance.at`, and brought back. The record is padded by the
+    length of the response, one over the line spacing, so that its end does not wrap round to its
+    beginning. The casing starts in balance with the first forces, as the modes do: they have
+    stood there for ever and meet the accelerance at zero frequency.
+    """
+    rate = step_rate / factor
+    held = means[0]
+    forces = decimate(means - held, factor).T
+    pad = math.ceil(rate / accelerance.spacing)
+    edge = edge_samples(factor)
+    # the last rows run into zeros: they are led there more gently
+    inside = forces[:, : max(1, forces.shape[1] - edge)]
+    spectrum, length = padded_spectrum(inside, pad + edge)
+    frequency = fft.rfftfreq(length, 1 / rate)
+    rows = []
+    for values in accelerance.values:  # one sensor at a time: all at once may not fit the memory
+        response = replace(accelerance, values=values[None]).at(frequency)[0]
+        rows.append(
+            fft.irfft(np.sum(response * spectrum, axis=0), length)[: forces.shape[1]]
+            + response[:, 0].real @ held
+        )
+    energy = np.sum((inside - inside.mean(axis=1, keepdims=True)) ** 2)
+    beyond = spectrum[:, frequency > accelerance.frequency[-1]]
+    above = 2 * np.sum(np.abs(beyond) ** 2) / length  # Parseval; one side of two
+    return TableRun(
+        acceleration=np.stack(rows),
+        force_share_above=float(min(above / energy, 1.0)) if energy > 0 else 0.0,
     )
-    raised: NDArray[np.float64] = taps[half] * means
-    for k in range(half):
-        other = len(taps) - 1 - k
-        raised += taps[k] * (padded[k : k + len(means)] + padded[other : other + len(means)])
-    return raised
 
 
 @lru_cache(maxsize=1)

@@ -16,6 +16,11 @@ class Status(IntEnum):
     DIVERGED = 1
     OVERLAP = 2
     LOCKED = 3
+    CHAMBER = 4
+    STEP = 5
+    UNRESOLVED = 6
+    VAPOUR = 7
+    VALVE_OPEN = 8
 
     @property
     def ok(self) -> bool:
@@ -35,7 +40,27 @@ _STATUS_TEXT = {
         "a joint's penetration exceeds a tenth of its pin radius, beyond the contact law; "
         "raise joint.crankpin.stiffness or lower the speed"
     ),
-    Status.LOCKED: ("the rod stands across the stroke; lengthen rod.length or lower the clearance"),
+    Status.LOCKED: "the rod stands across the stroke; lengthen rod.length or lower the clearance",
+    Status.CHAMBER: (
+        "the cylinder pressure left all bounds, or the piston took up the whole chamber; "
+        "raise pressure.dead_volume or shorten numerics.step"
+    ),
+    Status.STEP: (
+        "the step is too long for the contact; shorten numerics.step, or lower "
+        "stiffness and damping of the joint"
+    ),
+    Status.UNRESOLVED: (
+        "a joint's clearance is smaller than its stiffness resolves; raise the stiffness, "
+        "or set the joint's rung to 'ideal'"
+    ),
+    Status.VAPOUR: (
+        "the pressure falls below that of the vapour, which the rung 'heads' does not know; "
+        "set pressure.rung = 'chamber', shorten the suction line, or lower the speed"
+    ),
+    Status.VALVE_OPEN: (
+        "a valve does not close in its idle stroke; raise the valve's stiffness or preload_lift, "
+        "or lower the speed"
+    ),
 }
 
 
@@ -63,6 +88,8 @@ class Solution:
         Hidden quantities, first dimension time; empty unless asked for.
     status : Status
         How the run ended.
+    warnings : tuple of str
+        What a user must know of a run that did not fail.
     numerics : dict
         Rungs, step, step count and guards of the run; no wall time.
     """
@@ -71,5 +98,6 @@ class Solution:
     sample_rate: float
     channels: tuple[Channel, ...]
     status: Status
+    warnings: tuple[str, ...] = ()
     truth: dict[str, NDArray[np.float64]] = field(default_factory=dict)
     numerics: dict[str, float | int | str] = field(default_factory=dict)

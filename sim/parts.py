@@ -8,10 +8,11 @@ import difflib
 import math
 import re
 import reprlib
-from collections.abc import Mapping
+from collections.abc import Container, Mapping, Sequence
 from contextlib import suppress
 from decimal import Decimal
-from typing import Annotated, Any, Self, TypeVar
+from pathlib import Path
+from typing import Annotated, Any, Generic, Literal, Self, TypeVar
 
 from pydantic import (
     AfterValidator,
@@ -23,6 +24,8 @@ from pydantic import (
     ValidationError,
     model_validator,
 )
+
+from .sensor import Channel
 
 _INCH = 0.0254  # m, exact by definition
 _POUND_FORCE = 4.4482216152605  # N, exact by definition
@@ -39,6 +42,7 @@ UNITS: dict[str, dict[str, float]] = {
         "Pa": 1.0,
         "kPa": 1e3,
         "MPa": 1e6,
+        "GPa": 1e9,
         "bar": 1e5,
         "psi": _POUND_FORCE / _INCH**2,
     },
@@ -50,10 +54,17 @@ UNITS: dict[str, dict[str, float]] = {
     "voltage": {"V": 1.0, "mV": 1e-3},
     "ratio": {"": 1.0, "%": 1e-2},
     "mode shape": {"kg^-0.5": 1.0},
+    "density": {"kg/m^3": 1.0, "g/cm^3": 1e3},
+    "volume": {"m^3": 1.0, "L": 1e-3, "cm^3": 1e-6, "mm^3": 1e-9},
+    "area": {"m^2": 1.0, "cm^2": 1e-4, "mm^2": 1e-6},
+    "moment": {"N m": 1.0, "kN m": 1e3},
+    "unbalance": {"kg m": 1.0, "kg mm": 1e-3, "g mm": 1e-6},
+    "Hertz stiffness": {"N/m^1.5": 1.0},
 }
 """Factor to SI of every unit string, by dimension. The first unit of a row is the SI one."""
 
 Table = TypeVar("Table", bound=BaseModel)
+Value = TypeVar("Value")
 
 _QUANTITY = re.compile(r"\s*([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)\s*(.*?)\s*")
 
@@ -79,6 +90,9 @@ _STEP_LEAST = 1e-12  # s
 _SETTLING_MOST = 1000
 _MOST_SENSORS, _MOST_MODES = 64, 1000
 _NAME_LONGEST = 64
+_FILTER_SLOWEST = 1.0  # Hz, of mounting and anti-alias filter: below it no signal is left
+_FILTER_STEEPEST = 10  # order; eight is usual
+_DAMPING_LEAST = 1e-3  # glued steel has some 0.01
 
 
 class SceneError(ValueError):
@@ -171,6 +185,12 @@ Stiffness = Annotated[float, _parser("stiffness"), _Dimension("stiffness")]
 Damping = Annotated[float, _parser("damping"), _Dimension("damping")]
 Voltage = Annotated[float, _parser("voltage"), _Dimension("voltage")]
 Ratio = Annotated[float, _parser("ratio"), _Dimension("ratio")]
+Density = Annotated[float, _parser("density"), _Dimension("density")]
+Volume = Annotated[float, _parser("volume"), _Dimension("volume")]
+Area = Annotated[float, _parser("area"), _Dimension("area")]
+Moment = Annotated[float, _parser("moment"), _Dimension("moment")]
+Unbalance = Annotated[float, _parser("unbalance"), _Dimension("unbalance")]
+HertzStiffness = Annotated[float, _parser("Hertz stiffness"), _Dimension("Hertz stiffness")]
 ModeShape = Annotated[
     float,
     _parser("mode shape"),
@@ -179,8 +199,8 @@ ModeShape = Annotated[
 ]
 
 
-class FixedTable(dict[str, float]):
-    """A table of numbers that refuses to change; hashable, picklable, and a dict to dump.
+class FixedTable(dict[str, Value], Generic[Value]):
+    """A table of plain values that refuses to change; hashable, picklable, and a dict to dump.
 
     Examples
     --------
@@ -197,7 +217,7 @@ class FixedTable(dict[str, float]):
     def __hash__(self) -> int:  # type: ignore[override]
         return hash(frozenset(self.items()))
 
-    def __reduce__(self) -> tuple[type["FixedTable"], tuple[dict[str, float]]]:
+    def __reduce__(self) -> tuple[type["FixedTable[Value]"], tuple[dict[str, Value]]]:
         return FixedTable, (dict(self),)
 
 
@@ -215,16 +235,92 @@ class CasingMode(Part):
     shape: Annotated[dict[str, ModeShape], AfterValidator(FixedTable)] = Field(min_length=1)
 
 
-class Casing(Part):
-    """The pump casing on its mounts, as modes."""
+class FrfFile(Part):
+    """Measured accelerance of the casing, in a file; see :mod:`wearstate.sim.frf_table`.
 
-    modes: tuple[CasingMode, ...] = Field(min_length=1, max_length=_MOST_MODES)
+    ``folder`` is where a relative file is looked for first; :func:`beside` sets it to that of the
+    scene file. It is no part of the scene's dump, which must not name a machine's folders.
+    """
+
+    file: str = Field(min_length=1, description="CSV or UFF58, accelerance in m/s^2/N")
+    pairs: Annotated[dict[str, Annotated[str, Field(min_length=1)]], AfterValidator(FixedTable)] = (
+        Field(default=FixedTable({}), description="sensor/place -> the name of it in the file")
+    )
+    without: tuple[str, ...] = Field(
+        default=(), description="places the file does not have, whose forces stay silent"
+    )
+    folder: str = Field(default="", exclude=True, description="where the file is looked for first")
+
+
+class Casing(Part):
+    """The pump casing on its mounts: as modes, or as measured frequency response functions."""
+
+    modes: tuple[CasingMode, ...] = Field(default=(), max_length=_MOST_MODES)
+    frf: FrfFile | None = None
+
+    @model_validator(mode="after")
+    def _one_description(self) -> Self:
+        given = [f"casing.{name}" for name in ("modes", "frf") if getattr(self, name)]
+        if len(given) != 1:
+            raise ValueError(
+                f"{' and '.join(given) if given else 'neither'} given, must be exactly one of "
+                f"casing.modes and casing.frf; {'remove one' if given else 'add one'}"
+            )
+        return self
+
+
+def beside(table: Mapping[str, Any], folder: Path) -> Mapping[str, Any]:
+    """Scene table whose files are looked for in this folder first, that of the scene file.
+
+    Examples
+    --------
+    >>> beside({"casing": {"frf": {"file": "pump.csv"}}}, Path("scenes"))["casing"]["frf"]
+    {'folder': 'scenes', 'file': 'pump.csv'}
+    """
+    casing = table.get("casing")
+    if not isinstance(casing, Mapping) or not isinstance(casing.get("frf"), Mapping):
+        return table
+    frf = {"folder": str(folder), **casing["frf"]}
+    return {**table, "casing": {**casing, "frf": frf}}
+
+
+def specific_key(keys: Container[str], place: str, throw: int) -> str | None:
+    """Key for a force: ``place_throw`` where there is one, else ``place``, else None.
+
+    Parameters
+    ----------
+    keys : container of str
+        Keys of a mode shape, or places of a frequency response table.
+    place : str
+        Where the force acts.
+    throw : int
+        Of which throw it is, counted from 1.
+
+    Examples
+    --------
+    >>> specific_key({"bearing_x", "bearing_x_2"}, "bearing_x", 2)
+    'bearing_x_2'
+    >>> specific_key({"bearing_x", "bearing_x_2"}, "bearing_x", 1)
+    'bearing_x'
+    """
+    return next((key for key in (f"{place}_{throw}", place) if key in keys), None)
+
+
+AXES = {"x": "along the stroke", "y": "across the stroke", "z": "along the shaft"}
+"""Axes of a triaxial accelerometer, in the frame of the machine."""
 
 
 class Accelerometer(Part):
-    """An accelerometer with its converter."""
+    """An accelerometer with its mounting, its filter and its converter.
+
+    With ``axes`` it is a triaxial one: channels ``name_x``, ``name_y``, …, see
+    :func:`single_axis`.
+    """
 
     name: str = Field(min_length=1, max_length=_NAME_LONGEST)
+    axes: tuple[Literal["x", "y", "z"], ...] = Field(
+        default=(), max_length=3, description="one channel for each; none: a single axis"
+    )
     place: str = Field(default="", description="where it sits, for the report")
     direction: str = Field(default="", description="which way it points, for the report")
     gain: Ratio = Field(
@@ -237,6 +333,87 @@ class Accelerometer(Part):
         ge=_ACCELERATION_LEAST, le=_ACCELERATION_MOST, description="full scale, plus and minus"
     )
     bits: int = Field(default=24, ge=8, le=32)
+    mounting_resonance: Frequency | None = Field(
+        default=None, ge=_FILTER_SLOWEST, le=_MODE_FASTEST, description="of sensor on its mount"
+    )
+    mounting_damping: Ratio | None = Field(
+        default=None, ge=_DAMPING_LEAST, lt=1, description="ratio to the critical one"
+    )
+    anti_alias: Literal["none", "butterworth", "bessel"] = Field(
+        default="none", description="none: what decimation does, flat to 0.45 of the rate"
+    )
+    anti_alias_cutoff: Frequency | None = Field(
+        default=None, ge=_FILTER_SLOWEST, le=_MODE_FASTEST, description="where 3 dB are lost"
+    )
+    anti_alias_order: int | None = Field(default=None, ge=1, le=_FILTER_STEEPEST)
+
+    @model_validator(mode="after")
+    def _whole_and_once(self) -> Self:
+        faults = [*self._axis_faults(), *self._mounting_faults(), *self._filter_faults()]
+        if faults:
+            raise ValueError("\n".join(faults))
+        return self
+
+    def _axis_faults(self) -> list[str]:
+        faults = []
+        if len(set(self.axes)) < len(self.axes):
+            faults.append(f"axes = {list(self.axes)} must be different; remove one")
+        if self.axes and self.direction:
+            faults.append(
+                f"direction = {self.direction!r} must be empty beside axes, which have their own; "
+                "remove it"
+            )
+        if self.axes and len(self.name) > _NAME_LONGEST - 2:
+            faults.append(
+                f"name has {len(self.name)} characters, must have <= {_NAME_LONGEST - 2} for the "
+                "axis to follow; shorten it"
+            )
+        return faults
+
+    def _mounting_faults(self) -> list[str]:
+        given = (self.mounting_resonance is not None, self.mounting_damping is not None)
+        if given[0] == given[1]:
+            return []
+        lone, other = ("resonance", "damping") if given[0] else ("damping", "resonance")
+        value = getattr(self, f"mounting_{lone}")
+        return [
+            f"mounting_{lone} = {value:g} needs mounting_{other} beside it; add it or remove both"
+        ]
+
+    def _filter_faults(self) -> list[str]:
+        fields = ("anti_alias_cutoff", "anti_alias_order")
+        if self.anti_alias == "none":
+            return [
+                f"{name} = {getattr(self, name):g} needs anti_alias = 'butterworth' or 'bessel'; "
+                "add it or remove this"
+                for name in fields
+                if getattr(self, name) is not None
+            ]
+        return [
+            f"anti_alias = {self.anti_alias!r} needs {name} beside it; add it"
+            for name in fields
+            if getattr(self, name) is None
+        ]
+
+
+def single_axis(sensors: Sequence[Accelerometer]) -> tuple[Accelerometer, ...]:
+    """Accelerometers with one axis each: a triaxial one becomes three, named ``name_axis``.
+
+    Examples
+    --------
+    >>> head = Accelerometer(name="head", axes=("x", "z"), range=100.0)
+    >>> [(one.name, one.direction) for one in single_axis([head])]
+    [('head_x', 'along the stroke'), ('head_z', 'along the shaft')]
+    """
+    return tuple(
+        sensor.model_copy(
+            update={"name": f"{sensor.name}_{axis}", "direction": AXES[axis], "axes": ()}
+        )
+        if axis
+        else sensor
+        for sensor in sensors
+        for axis in (sensor.axes or ("",))
+    )
 
 
 class Tacho(Part):
@@ -281,11 +458,40 @@ class Scene(Part):
             raise ValueError("\n".join(faults))
         return self
 
+    @property
+    def accelerometers(self) -> tuple[Accelerometer, ...]:
+        """One accelerometer for every channel: triaxial ones taken apart, see `single_axis`."""
+        return single_axis(self.sensors)
+
     @classmethod
     def cross_faults(cls, parts: Mapping[str, Any]) -> list[str]:
         """Faults between parts, of those parts that are there; each machine has its own."""
         del parts
         return []
+
+
+def channels_of(scene: Scene) -> tuple[Channel, ...]:
+    """Channels of a recording of this scene, accelerometers first, then the tacho.
+
+    Examples
+    --------
+    >>> from wearstate.sim.scene import load_scene
+    >>> [channel.name for channel in channels_of(load_scene("bilge-pump"))]
+    ['acc_x', 'acc_y', 'tacho']
+    """
+    sensors = tuple(
+        Channel(
+            name=sensor.name,
+            unit="m/s^2",
+            quantity="acceleration",
+            place=sensor.place,
+            direction=sensor.direction,
+        )
+        for sensor in scene.accelerometers
+    )
+    if scene.tacho is None:
+        return sensors
+    return (*sensors, Channel(name=scene.tacho.name, unit="V", quantity="tacho"))
 
 
 def validate_table(model: type[Table], table: Mapping[str, Any], name: str) -> Table:
@@ -298,8 +504,8 @@ def validate_table(model: type[Table], table: Mapping[str, Any], name: str) -> T
 
     Examples
     --------
-    >>> validate_table(Crank, {"radius": "50 mm"}, "crank").radius
-    0.05
+    >>> validate_table(Tacho, {"level": "5000 mV"}, "tacho").level
+    5.0
     """
     try:
         return model.model_validate(dict(table))
@@ -338,6 +544,34 @@ def _valid_parts(model: type[BaseModel], table: Mapping[str, Any]) -> dict[str, 
             kind: Any = Annotated[field.annotation, field]
             parts[name] = TypeAdapter(kind).validate_python(table[name])
     return parts
+
+
+_CLEARANCE_TWINS = {
+    "diametral_clearance": "radial_clearance",
+    "radial_clearance": "diametral_clearance",
+}
+
+
+def without_twin(table: dict[str, Any], key: str) -> None:
+    """Remove the other clearance of a joint that is about to be given one."""
+    table.pop(_CLEARANCE_TWINS.get(key, ""), None)
+
+
+def merged(base: Any, over: Any) -> Any:
+    """Table `over` upon table `base`, at any depth.
+
+    Examples
+    --------
+    >>> merged({"pin": {"mass": 1.0, "size": 2.0}}, {"pin": {"size": 3.0}})
+    {'pin': {'mass': 1.0, 'size': 3.0}}
+    """
+    if not isinstance(base, Mapping) or not isinstance(over, Mapping):
+        return over
+    result = dict(base)
+    for key, value in over.items():
+        without_twin(result, key)
+        result[key] = merged(base[key], value) if key in base else value
+    return result
 
 
 def nearest(word: str, choices: Any) -> str:

@@ -7,6 +7,7 @@ from typing import Any, Literal, Self
 
 from pydantic import Field, model_validator
 
+from .hydraulic_parts import CylinderPressure
 from .parts import (
     ANGLE_MOST,
     DAMPING_MOST,
@@ -16,7 +17,6 @@ from .parts import (
     INERTIA_MOST,
     LIGHTEST,
     LONGEST,
-    PRESSURE_MOST,
     SLIDING_LEAST,
     SLIDING_MOST,
     STANDARD_GRAVITY,
@@ -26,9 +26,12 @@ from .parts import (
     Angle,
     Casing,
     Damping,
+    FrfFile,
+    HertzStiffness,
     Inertia,
     Length,
     Mass,
+    Moment,
     Part,
     Pressure,
     Ratio,
@@ -36,27 +39,69 @@ from .parts import (
     Scene,
     Stiffness,
     Tacho,
+    Unbalance,
     Velocity,
+    merged,
     nearest,
+    single_axis,
 )
+
+_MOMENT_MOST = 1e9  # N m
+_UNBALANCE_MOST = 1e6  # kg m
+_HERTZ_MOST = 1e18  # N/m^1.5, a metre of steel has 1e11
+_MOST_THROWS = 32
+
+
+class Motor(Part):
+    """An asynchronous motor with everything that turns with it, all referred to the crank.
+
+    Moment ``2 M_b / (s / s_b + s_b / s)`` at the slip s, after Kloss.
+    """
+
+    synchronous_speed: RotationSpeed = Field(gt=0, le=1000, description="of the crank, no load")
+    breakdown_moment: Moment = Field(gt=0, le=_MOMENT_MOST, description="largest, at the crank")
+    breakdown_slip: Ratio = Field(
+        default=0.2, ge=1e-3, le=10, description="slip at which the moment is largest"
+    )
+    inertia: Inertia = Field(
+        ge=INERTIA_LEAST,
+        le=INERTIA_MOST,
+        description="of crank, flywheel, gear and rotor, at the crank",
+    )
 
 
 class Drive(Part):
-    """How the crank is turned."""
+    """How the crank is turned: at constant speed, or by a motor whose speed gives way."""
 
-    speed: RotationSpeed = Field(gt=0, le=1000, description="crank speed in rev/s, constant")
+    rung: Literal["constant-speed", "motor"] = "constant-speed"
+    speed: RotationSpeed = Field(
+        gt=0, le=1000, description="crank speed in rev/s, constant, or that at the start"
+    )
     start_angle: Angle = Field(
         default=0.0,
         ge=-ANGLE_MOST,
         le=ANGLE_MOST,
-        description="crank angle at the first sample",
+        description="crank angle at the first sample (of a motor: expected there)",
     )
+    motor: Motor | None = None
+
+    @model_validator(mode="after")
+    def _motor_given(self) -> Self:
+        if self.rung == "motor" and self.motor is None:
+            raise ValueError("motor is missing; the rung 'motor' needs it")
+        return self
 
 
 class Crank(Part):
-    """The crank throw, balanced about its axis."""
+    """The crank throws."""
 
     radius: Length = Field(gt=0, le=LONGEST, description="half the stroke")
+    unbalance: Unbalance = Field(
+        default=0.0,
+        ge=0,
+        le=_UNBALANCE_MOST,
+        description="mass times eccentricity of the whole crank, along the first throw",
+    )
 
 
 class Rod(Part):
@@ -88,55 +133,125 @@ class Piston(Part):
     diameter: Length = Field(
         ge=0, le=LONGEST, description="bore that the cylinder pressure acts on"
     )
+    inertia: Inertia | None = Field(
+        default=None,
+        ge=INERTIA_LEAST,
+        le=INERTIA_MOST,
+        description="about the wrist pin, for a guide with clearance",
+    )
 
 
-class CylinderPressure(Part):
-    """Gauge pressure on the piston face."""
+_ELASTICITY = {
+    "linear": ("stiffness",),
+    "hertz": ("hertz_stiffness",),
+    "conformal": ("effective_modulus", "contact_length"),
+}
+"""Elasticity of a contact -> what describes it."""
 
-    rung: Literal["none", "two-level"] = "two-level"
-    suction: Pressure = Field(default=0.0, ge=-101325.0, description="gauge, above vacuum")
-    discharge: Pressure = Field(default=0.0, le=PRESSURE_MOST, description="gauge")
-    rise_angle: Angle = Field(
-        default=math.radians(3.0),
-        ge=math.radians(0.5),
-        le=math.radians(90.0),
-        description="crank angle after a dead centre over which the pressure changes level",
+
+class Contact(Part):
+    """How two surfaces of a joint push and rub; alternatives, which no order ranks."""
+
+    law: Literal[
+        "kelvin-voigt",
+        "hunt-crossley",
+        "lankarani-nikravesh",
+        "flores",
+        "hu-guo",
+        "carvalho-martins",
+        "exact",
+    ] = "kelvin-voigt"
+    elasticity: Literal["linear", "hertz", "conformal"] = "linear"
+    stiffness: Stiffness | None = Field(
+        default=None, gt=0, le=STIFFEST, description="contact force per penetration"
+    )
+    hertz_stiffness: HertzStiffness | None = Field(
+        default=None, gt=0, le=_HERTZ_MOST, description="force per penetration to the power 1.5"
+    )
+    effective_modulus: Pressure | None = Field(
+        default=None, gt=0, le=1e13, description="E* of the conformal pair"
+    )
+    contact_length: Length | None = Field(
+        default=None, gt=0, le=LONGEST, description="along the pin, of the conformal pair"
+    )
+    damping: Damping = Field(
+        default=0.0, ge=0, le=DAMPING_MOST, description="C_n of the law kelvin-voigt"
+    )
+    restitution: Ratio | None = Field(
+        default=None, gt=0, le=1, description="of the hysteresis laws"
+    )
+    speed_floor: Velocity | None = Field(
+        default=None,
+        ge=SLIDING_LEAST,
+        le=SLIDING_MOST,
+        description="least impact speed a hysteresis law is given; none: damping at most critical",
+    )
+    friction_law: Literal["smooth", "ramp"] = "smooth"
+    friction: Ratio = Field(default=0.0, ge=0, le=1, description="Coulomb coefficient")
+    friction_speed: Velocity = Field(
+        default=0.01,
+        ge=SLIDING_LEAST,
+        le=SLIDING_MOST,
+        description="sliding speed that regularises the Coulomb sign; full friction of the ramp",
+    )
+    friction_dead_speed: Velocity = Field(
+        default=0.0, ge=0, le=SLIDING_MOST, description="the ramp has no friction below it"
+    )
+    tangential_damping: Damping = Field(
+        default=0.0, ge=0, le=DAMPING_MOST, description="C_t of the source paper"
     )
 
     @model_validator(mode="after")
-    def _levels_ordered(self) -> Self:
-        if self.discharge < self.suction:
-            raise ValueError(
-                f"discharge = {self.discharge:g} Pa must be >= suction = {self.suction:g} Pa; "
-                "swap them"
+    def _law_complete(self) -> Self:
+        faults = []
+        if self.law == "kelvin-voigt" and self.restitution is not None:
+            faults.append(
+                f"restitution = {self.restitution:g} is for the hysteresis laws; remove it and "
+                "set damping, or choose another law"
             )
+        if self.law != "kelvin-voigt" and self.restitution is None:
+            faults.append(f"restitution is missing; the law '{self.law}' needs it")
+        if self.law != "kelvin-voigt" and self.damping > 0:
+            faults.append(
+                f"damping = {self.damping:g} N s/m is for the law kelvin-voigt; remove it, the law "
+                f"'{self.law}' takes its loss from restitution"
+            )
+        if self.law == "carvalho-martins" and (self.restitution or 1) < 1 / 3:
+            faults.append(
+                f"restitution = {self.restitution:g} must be >= 1/3 for the law carvalho-martins; "
+                "choose the law 'exact'"
+            )
+        if self.friction_dead_speed >= self.friction_speed:
+            faults.append(
+                f"friction_dead_speed = {self.friction_dead_speed:g} m/s must be < friction_speed "
+                f"= {self.friction_speed:g} m/s; the ramp lies between them"
+            )
+        if faults:
+            raise ValueError("\n".join(faults))
         return self
 
+    def elastic_faults(self) -> list[str]:
+        """What the elasticity lacks; asked by the rungs that need one."""
+        return [
+            f"{name} is missing; the elasticity '{self.elasticity}' needs it"
+            for name in _ELASTICITY[self.elasticity]
+            if getattr(self, name) is None
+        ]
 
-class RevoluteJoint(Part):
-    """A pin in an eye with clearance. Give exactly one of the two clearances."""
 
-    rung: Literal["ideal", "compliant"] = "compliant"
+class RevoluteJoint(Contact):
+    """A pin in an eye with clearance. Give exactly one of the two clearances.
+
+    The rungs *ideal* (no clearance), *link* (always in contact) and *compliant*.
+    """
+
+    rung: Literal["ideal", "link", "compliant"] = "compliant"
     pin_diameter: Length = Field(gt=0, le=LONGEST)
     diametral_clearance: Length | None = Field(
         default=None, ge=0, description="eye diameter minus pin diameter"
     )
     radial_clearance: Length | None = Field(
         default=None, ge=0, description="eye radius minus pin radius"
-    )
-    stiffness: Stiffness = Field(gt=0, le=STIFFEST, description="contact force per penetration")
-    damping: Damping = Field(
-        default=0.0, ge=0, le=DAMPING_MOST, description="normal contact damping C_n"
-    )
-    friction: Ratio = Field(default=0.0, ge=0, le=1, description="Coulomb coefficient")
-    friction_speed: Velocity = Field(
-        default=0.01,
-        ge=SLIDING_LEAST,
-        le=SLIDING_MOST,
-        description="sliding speed that regularises the Coulomb sign",
-    )
-    tangential_damping: Damping = Field(
-        default=0.0, ge=0, le=DAMPING_MOST, description="C_t of the source paper"
     )
 
     @model_validator(mode="after")
@@ -146,36 +261,77 @@ class RevoluteJoint(Part):
             for name in ("diametral_clearance", "radial_clearance")
             if getattr(self, name) is not None
         ]
-        if len(given) != 1:
-            raise ValueError(
+        faults = self.elastic_faults() if self.rung == "compliant" else []
+        if len(given) > 1 or (not given and self.rung != "ideal"):
+            faults.append(
                 f"{' and '.join(given) if given else 'no clearance'} given, must be exactly one of "
                 "diametral_clearance and radial_clearance; keep the one you measured"
             )
-        if self.clearance_radial >= self.pin_diameter / 2:
-            raise ValueError(
+        elif self.clearance_radial >= self.pin_diameter / 2:
+            faults.append(
                 f"{given[0]} = {getattr(self, given[0]):g} m must be smaller than the pin "
                 f"(pin_diameter = {self.pin_diameter:g} m); check the unit"
             )
+        if faults:
+            raise ValueError("\n".join(faults))
         return self
 
     @property
     def clearance_radial(self) -> float:
-        """Radial clearance [m], whichever way it was given."""
+        """Radial clearance [m], whichever way it was given; 0 where none was."""
         if self.radial_clearance is not None:
             return self.radial_clearance
-        assert self.diametral_clearance is not None  # the validator saw to it
-        return self.diametral_clearance / 2
+        return (self.diametral_clearance or 0.0) / 2
 
     @property
     def clearance_diametral(self) -> float:
-        """Diametral clearance [m], whichever way it was given."""
+        """Diametral clearance [m], whichever way it was given; 0 where none was."""
         return 2 * self.clearance_radial
 
 
+class Guide(Contact):
+    """The guide of piston or crosshead, across the stroke in the plane of the crank."""
+
+    rung: Literal["ideal", "compliant"] = "compliant"
+    length: Length = Field(gt=0, le=LONGEST, description="of the guided part")
+    height: Length = Field(gt=0, le=LONGEST, description="of the guided part, across the stroke")
+    diametral_clearance: Length = Field(
+        ge=0, le=LONGEST, description="height of the guide minus that of the guided part"
+    )
+
+    @property
+    def clearance_radial(self) -> float:
+        """Clearance on either side of the centred part [m]."""
+        return self.diametral_clearance / 2
+
+    @model_validator(mode="after")
+    def _surfaces(self) -> Self:
+        faults = self.elastic_faults() if self.rung == "compliant" else []
+        if faults:
+            raise ValueError("\n".join(faults))
+        return self
+
+
 class PumpJoints(Part):
-    """The joints of the crank mechanism that may have clearance."""
+    """The joints of the crank mechanism that may have clearance; an absent one is ideal."""
 
     crankpin: RevoluteJoint
+    wristpin: RevoluteJoint | None = None
+    guide: Guide | None = None
+
+
+class Throw(Part):
+    """One throw of the crank: its place, and where it differs from what the scene says of all.
+
+    ``joint`` and ``pressure`` are merged over the scene's own tables, so that one worn joint or
+    one leaking valve takes one line.
+    """
+
+    phase: Angle = Field(
+        default=0.0, ge=-ANGLE_MOST, le=ANGLE_MOST, description="crank angle over the first"
+    )
+    joint: PumpJoints | None = None
+    pressure: CylinderPressure | None = None
 
 
 class Wear(Part):
@@ -208,12 +364,21 @@ class Wear(Part):
         return self
 
 
-FORCE_PLACES = ("bearing_x", "bearing_y", "guide_y", "cylinder_x")
+CRANK_PLACES = ("bearing_x", "bearing_y", "guide_y", "cylinder_x")
 """Where the crank mechanism pushes on the casing: x along the stroke, y across it."""
+
+GUIDE_PLACES = ("guide_x",)
+"""Where a piston in a guide with clearance rubs, along the stroke."""
+
+VALVE_PLACES = ("suction_valve", "discharge_valve")
+"""Where the valves strike their seats, along the stroke."""
+
+FORCE_PLACES = (*CRANK_PLACES, *GUIDE_PLACES, *VALVE_PLACES)
+"""All places of forces on the casing; with a suffix ``_1``, ``_2``, … those of one throw."""
 
 
 class PumpScene(Scene):
-    """A single-throw reciprocating pump with a worn crank pin."""
+    """A reciprocating pump of one to many equal throws with clearance in its joints."""
 
     machine: Literal["reciprocating-pump"]
     gravity: Acceleration = Field(default=STANDARD_GRAVITY, ge=0, le=GRAVITY_MOST)
@@ -226,16 +391,35 @@ class PumpScene(Scene):
     piston: Piston
     pressure: CylinderPressure = CylinderPressure(rung="none")
     joint: PumpJoints
+    throws: tuple[Throw, ...] = Field(default=(Throw(),), min_length=1, max_length=_MOST_THROWS)
     wear: Wear | None = None
+    wear_wristpin: Wear | None = None
     casing: Casing
+
+    @model_validator(mode="before")
+    @classmethod
+    def _merge_throws(cls, table: Any) -> Any:
+        """Complete the tables of every throw with those of the scene."""
+        if not isinstance(table, Mapping) or not isinstance(table.get("throws"), (list, tuple)):
+            return table
+        return {**table, "throws": [_merged_throw(table, throw) for throw in table["throws"]]}
+
+    def joints(self, throw: int) -> PumpJoints:
+        """Joints of one throw, counted from 0."""
+        return self.throws[throw].joint or self.joint
+
+    def pressures(self, throw: int) -> CylinderPressure:
+        """Pressure on the piston of one throw, counted from 0."""
+        return self.throws[throw].pressure or self.pressure
 
     @classmethod
     def cross_faults(cls, parts: Mapping[str, Any]) -> list[str]:
         """Faults between parts, of those parts that are there."""
         checks = (
             (_rod_faults, ("crank", "joint", "rod")),
+            (_guide_faults, ("joint", "piston")),
             (_name_faults, ("sensors", "tacho")),
-            (_shape_faults, ("casing", "sensors")),
+            (_shape_faults, ("casing", "sensors", "throws")),
         )
         return [
             fault
@@ -245,8 +429,28 @@ class PumpScene(Scene):
         ]
 
 
+def _merged_throw(scene: Mapping[str, Any], throw: Any) -> Any:
+    if not isinstance(throw, Mapping):
+        return throw
+    return {
+        **throw,
+        **{
+            name: merged(scene.get(name, {}), throw[name])
+            for name in ("joint", "pressure")
+            if isinstance(throw.get(name), Mapping)
+        },
+    }
+
+
+def _guide_faults(joint: PumpJoints, piston: Piston) -> list[str]:
+    if joint.guide is None or joint.guide.rung == "ideal" or piston.inertia is not None:
+        return []
+    return ["piston.inertia is missing; a piston in a guide with clearance tilts"]
+
+
 def _rod_faults(crank: Crank, joint: PumpJoints, rod: Rod) -> list[str]:
-    reach = crank.radius + joint.crankpin.clearance_radial
+    play = joint.wristpin.clearance_radial if joint.wristpin else 0.0
+    reach = crank.radius + joint.crankpin.clearance_radial + play
     if rod.length > reach:
         return []
     return [
@@ -256,7 +460,7 @@ def _rod_faults(crank: Crank, joint: PumpJoints, rod: Rod) -> list[str]:
 
 
 def _name_faults(sensors: tuple[Accelerometer, ...], tacho: Tacho | None) -> list[str]:
-    names = [sensor.name for sensor in sensors] + ([tacho.name] if tacho else [])
+    names = [sensor.name for sensor in single_axis(sensors)] + ([tacho.name] if tacho else [])
     return [
         f"sensors: name '{name}' is given {names.count(name)} times, must be unique; rename one"
         for name in sorted(set(names))
@@ -264,19 +468,42 @@ def _name_faults(sensors: tuple[Accelerometer, ...], tacho: Tacho | None) -> lis
     ]
 
 
-def _shape_faults(casing: Casing, sensors: tuple[Accelerometer, ...]) -> list[str]:
-    places = (*FORCE_PLACES, *(sensor.name for sensor in sensors))
+def _shape_faults(
+    casing: Casing, sensors: tuple[Accelerometer, ...], throws: tuple[Throw, ...]
+) -> list[str]:
+    names = [sensor.name for sensor in single_axis(sensors)]
+    forces = [
+        f"{place}{suffix}"
+        for place in FORCE_PLACES
+        for suffix in ("", *(f"_{throw}" for throw in range(1, len(throws) + 1)))
+    ]
+    if casing.frf is not None:
+        return _frf_faults(casing.frf, names, forces)
     faults = []
     for index, mode in enumerate(casing.modes):
         path = f"casing.modes.{index}.shape"
         faults += [
-            f"{path}.{key} is no place of this scene{nearest(key, places)}"
+            f"{path}.{key} is no place of this scene{nearest(key, (*FORCE_PLACES, *names))}"
             for key in mode.shape
-            if key not in places
+            if key not in forces and key not in names
         ]
         faults += [
-            f"{path}.{sensor.name} is missing; give the shape at every sensor (0 at a node)"
-            for sensor in sensors
-            if sensor.name not in mode.shape
+            f"{path}.{name} is missing; give the shape at every sensor (0 at a node)"
+            for name in names
+            if name not in mode.shape
         ]
     return faults
+
+
+def _frf_faults(frf: FrfFile, sensors: list[str], forces: list[str]) -> list[str]:
+    """Names of the scene's own table of pairs; those of the file are seen when it is read."""
+    pairs = [f"{sensor}/{force}" for sensor in sensors for force in forces]
+    return [
+        f"casing.frf.pairs.{pair} is no sensor/place of this scene{nearest(pair, pairs)}"
+        for pair in frf.pairs
+        if pair not in pairs
+    ] + [
+        f"casing.frf.without: '{place}' is no place of this scene{nearest(place, forces)}"
+        for place in frf.without
+        if place not in forces
+    ]

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from .parts import Scene, SceneError, nearest, validate_table
+from .parts import Scene, SceneError, beside, nearest, validate_table, without_twin
 from .pump_parts import PumpScene
 
 SCENE_FOLDER = Path(__file__).parent / "scenes"
@@ -48,6 +48,18 @@ def scene_text(name_or_path: str | Path) -> str:
         hint = nearest(str(name_or_path), scene_names())
         reason = "is no UTF-8 text" if isinstance(error, UnicodeDecodeError) else "is no scene"
         raise SceneError(str(name_or_path), [f"{name_or_path} {reason}{hint}"]) from None
+
+
+def scene_folder(name_or_path: str | Path) -> Path:
+    """Folder in which the files that a scene names are looked for first.
+
+    Examples
+    --------
+    >>> scene_folder("bilge-pump").name
+    'scenes'
+    """
+    built_in = (SCENE_FOLDER / f"{name_or_path}.toml").is_file()
+    return SCENE_FOLDER if built_in else Path(name_or_path).parent
 
 
 def scene_table(text: str, name: str = "scene") -> dict[str, Any]:
@@ -119,13 +131,7 @@ def load_scene(name_or_path: str | Path, overrides: Mapping[str, Any] | None = N
     4.0
     """
     table = scene_table(scene_text(name_or_path), str(name_or_path))
-    return scene_from_table(override(table, overrides or {}))
-
-
-_CLEARANCE_TWINS = {
-    "diametral_clearance": "radial_clearance",
-    "radial_clearance": "diametral_clearance",
-}
+    return scene_from_table(beside(override(table, overrides or {}), scene_folder(name_or_path)))
 
 
 def override(table: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
@@ -163,12 +169,12 @@ def _replace(node: Any, keys: list[str], value: Any) -> None:
     for key in keys[:-1]:
         node = node[_index(key)] if isinstance(node, list) else node.setdefault(key, {})
     if isinstance(node, list):
-        node[_index(keys[-1])] = value
+        node[_index(keys[-1])] = _copy(value)
         return
     if not isinstance(node, dict):
         raise TypeError(keys)
-    node.pop(_CLEARANCE_TWINS.get(keys[-1], ""), None)
-    node[keys[-1]] = value
+    without_twin(node, keys[-1])
+    node[keys[-1]] = _copy(value)
 
 
 def _index(key: str) -> int:

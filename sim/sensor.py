@@ -1,9 +1,14 @@
 """What an accelerometer, a tacho and a converter do to a signal."""
 
+import math
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+
+_FORGOTTEN = math.log(1e8)
+"""Time constants after which a transient has sunk to 1e-8, below a 24-bit converter's step."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,6 +37,181 @@ class Channel:
         """Name and unit, for people: ``acc [m/s^2]``, or ``gs [m/s^2, g in the file]``."""
         converted = self.unit_in_file not in ("", self.unit)
         return f"{self.name} [{self.unit}{f', {self.unit_in_file} in the file' * converted}]"
+
+
+def mounting_poles(resonance: float, damping_ratio: float) -> NDArray[np.complex128]:
+    """Poles of an accelerometer on its mount, an oscillator driven at its foot.
+
+    Parameters
+    ----------
+    resonance : float
+        Undamped natural frequency of the mounted sensor [Hz].
+    damping_ratio : float
+        0 < zeta < 1.
+
+    Returns
+    -------
+    numpy.ndarray [shape=(2,)]
+        [rad/s]
+
+    Notes
+    -----
+    What the sensor shows over what the housing does is ``1 / (1 - r^2 + 2 j zeta r)`` with r the
+    frequency over the resonance: one below it, ``1 / (2 zeta)`` at it [1]_.
+
+    References
+    ----------
+    .. [1] ISO 5348:2021, Mechanical mounting of accelerometers.
+
+    Examples
+    --------
+    >>> poles = mounting_poles(25e3, 0.05)
+    >>> round(float(abs(low_pass_response(np.array([25e3]), poles))[0]), 9)
+    10.0
+    """
+    omega = 2 * math.pi * resonance
+    pole = omega * complex(-damping_ratio, math.sqrt(1 - damping_ratio**2))
+    return np.array([pole, pole.conjugate()])
+
+
+def anti_alias_poles(
+    kind: Literal["butterworth", "bessel"], cutoff: float, order: int
+) -> NDArray[np.complex128]:
+    """Poles of the analogue low-pass before the converter.
+
+    Parameters
+    ----------
+    kind : str
+        ``butterworth`` (flattest level) or ``bessel`` (flattest delay).
+    cutoff : float
+        Where the level has fallen by 3 dB, ``1 / sqrt(2)`` [Hz].
+    order : int
+        1 to 10; the level falls by ``6 order`` dB an octave far above the cut-off.
+
+    Returns
+    -------
+    numpy.ndarray [shape=(order,)]
+        [rad/s]
+
+    Examples
+    --------
+    >>> level = abs(low_pass_response(np.array([0.0, 1e3]), anti_alias_poles("bessel", 1e3, 4)))
+    >>> np.round(level, 6).tolist()
+    [1.0, 0.707107]
+    """
+    from scipy import signal  # this file is imported wherever a channel is named
+
+    omega = 2 * math.pi * cutoff
+    if kind == "bessel":
+        _, poles, _ = signal.bessel(order, omega, analog=True, output="zpk", norm="mag")
+    else:
+        _, poles, _ = signal.butter(order, omega, analog=True, output="zpk")
+    return np.asarray(poles, dtype=np.complex128)
+
+
+def low_pass_response(
+    frequency: NDArray[np.float64], poles: NDArray[np.complex128]
+) -> NDArray[np.complex128]:
+    """Frequency response of poles without zeros, one at zero frequency.
+
+    Parameters
+    ----------
+    frequency : numpy.ndarray
+        [Hz]
+    poles : numpy.ndarray [shape=(n_poles,)]
+        [rad/s], real parts negative, closed under conjugation.
+
+    Returns
+    -------
+    numpy.ndarray [shape=frequency.shape]
+        Complex, ``exp(+j w t)``: a delay has a falling phase.
+
+    Examples
+    --------
+    >>> complex(low_pass_response(np.array([1.0]), np.array([-2 * np.pi + 0j]))[0])
+    (0.5-0.5j)
+    """
+    result = np.ones(frequency.shape, dtype=np.complex128)
+    for pole in poles:
+        result /= 1 - 2j * math.pi * frequency / pole
+    return result
+
+
+def low_pass(
+    x: NDArray[np.float64], fs: float, poles: NDArray[np.complex128]
+) -> NDArray[np.float64]:
+    """Pass a band-limited signal through analogue poles, by their exact frequency response.
+
+    Parameters
+    ----------
+    x : numpy.ndarray [shape=(..., n_samples)]
+        Band-limited below ``fs / 2``; taken to have stood at its first value before it began.
+    fs : float
+        Sample rate [Hz].
+    poles : numpy.ndarray [shape=(n_poles,)]
+        [rad/s], see :func:`mounting_poles` and :func:`anti_alias_poles`; they may lie above
+        ``fs / 2``.
+
+    Returns
+    -------
+    numpy.ndarray [shape=(..., n_samples)]
+        Same times. The end does not wrap round to the beginning: the transform is longer by what
+        the slowest pole needs to sink to 1e-8.
+
+    Notes
+    -----
+    No bilinear transform warps the response near ``fs / 2``; the phase is that of the analogue
+    chain. Within some ten samples of either end the band edge shows.
+
+    Examples
+    --------
+    >>> poles = anti_alias_poles("butterworth", 10e3, 4)
+    >>> bool(np.allclose(low_pass(np.full(100, 3.0), 25.6e3, poles), 3.0))
+    True
+    """
+    from scipy import fft
+
+    slowest = -float(np.max(poles.real))
+    pad = math.ceil(_FORGOTTEN / slowest * fs)
+    first = x[..., :1]
+    spectrum, length = padded_spectrum(x - first, pad)
+    spectrum *= low_pass_response(fft.rfftfreq(length, 1 / fs), poles)
+    back = fft.irfft(spectrum, length, axis=-1)[..., : x.shape[-1]]
+    return np.asarray(first + back)
+
+
+def padded_spectrum(x: NDArray[np.float64], pad: int) -> tuple[NDArray[np.complex128], int]:
+    """Spectrum of a record that begins at zero, with room for the tail of a response.
+
+    Parameters
+    ----------
+    x : numpy.ndarray [shape=(..., n_samples)]
+        First value zero.
+    pad : int
+        Samples of the longest response that is to be applied.
+
+    Returns
+    -------
+    spectrum : numpy.ndarray [shape=(..., length // 2 + 1)]
+        One-sided.
+    length : int
+        Samples of the transform, >= ``n_samples + 2 pad``. The last value is led to zero by half
+        a cosine over the first `pad` of them, so that no step excites the response.
+
+    Examples
+    --------
+    >>> padded_spectrum(np.zeros(100), 10)[1] >= 120
+    True
+    """
+    from scipy import fft
+
+    n = x.shape[-1]
+    length = fft.next_fast_len(n + 2 * pad, real=True)
+    whole = np.zeros((*x.shape[:-1], length))
+    whole[..., :n] = x
+    fall = 0.5 * (1 + np.cos(np.pi * np.arange(1, pad + 1) / (pad + 1)))
+    whole[..., n : n + pad] = x[..., -1:] * fall
+    return fft.rfft(whole, axis=-1), length
 
 
 def digitise(

@@ -1,24 +1,31 @@
-"""The crank mechanism with a clearance joint at the crank pin, compiled.
+"""The crank mechanism of one to N throws with clearance in its joints, compiled.
 
-Two degrees of freedom (piston position and rod angle) and the crank, which runs at constant
-speed where its inverse inertia is zero. Lagrange's equations, with the joint as a contact force:
+Bodies: the crank (one angle ``a``), and per throw a rod (centre of mass ``x_r, y_r`` and angle
+``b``) and a piston (``x, y`` and tilt ``t``). Axes: x along the stroke from the crank centre to
+the cylinder, y across it. The rod points from the wrist pin to the crank pin along
+``e = (-cos b, sin b)``; ``g = de/db = (sin b, cos b)``.
 
-    (m2 + m3) x'' + m2 Lc (sin b b'' + cos b b'^2) = F_x - A p - (m2 + m3) g_x
-    m2 Lc sin b x'' + (J + m2 Lc^2) b''
-        = L2 (F_x sin b + F_y cos b) - r_eye F_t - m2 Lc (g_x sin b + g_y cos b)
-    a'' / (1 / J1) = T + L1 (F_x sin a - F_y cos a) - r_pin F_t
+A joint is one of three things. *Ideal*: two constraint forces. *Link*: one constraint force along
+a massless link as long as the radial clearance, with friction at its ends; the pin never leaves
+its eye, and a link in tension says that it would. *Compliant*: the contact force of a law where
+the pin overlaps its eye, nothing in free flight. An ideal guide holds ``y = t = 0``; a compliant
+one has a clearance on either side and touches the piston at its four corners.
 
-with a the crank angle, b the rod angle, x the piston position from the crank centre. The pin
-stands at ``d = (L1 cos a + L2 cos b - x, L1 sin a - L2 sin b)`` from the eye's centre; contact is
-where ``|d|`` exceeds the radial clearance. F is the force of the pin on the rod; its tangential
-part follows the sliding velocity ``v_t = d' . t + r_pin a' + r_eye b'``, so that friction takes
-energy out (the printed signs of the source paper put it in).
+For a pin at ``d`` from the centre of its eye, with direction ``n`` and ``t`` a quarter turn
+further, the force on the rod is ``F_n n + F_t t``, where ``F_t`` follows the sliding velocity
+``v_t = d' . t + r_pin w_pin + r_eye b'`` (the rod turns at ``-b'``), so that friction takes energy
+out: the printed signs of the source paper put it in. Newton's and Euler's equations of each body
+are explicit but for the constraint forces, which solve a linear system of up to four unknowns per
+throw; drift is held by Baumgarte's terms. With a motor the crank's acceleration enters every
+throw's constraints linearly, so that it too comes out in closed form.
 
-Classical Runge-Kutta with a fixed step; a step in which the contact closes or opens is cut there,
-so the order is kept across contact. Forces are recorded as means over the step, that is as exact
-impulses, whatever the contact did in between.
+Classical Runge-Kutta with a fixed step; a step in which a contact closes or opens is cut there, so
+the order is kept across contact. Forces are recorded as means over the step, that is as exact
+impulses, whatever the contacts did in between. A chamber with valves is stepped after the
+mechanism, which feels its pressure extrapolated from the two steps before (second order).
 
-Source: Xia, Zhang, Yu, Zhu (2017), Ship Science and Technology 39(1), 51-55.
+Sources: Xia, Zhang, Yu, Zhu (2017), Ship Science and Technology 39(1), 51-55; Baumgarte (1972),
+doi:10.1016/0045-7825(72)90018-7.
 """
 
 import math
@@ -28,66 +35,992 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .analytic import IdealCrank, ideal_crank
 from .contact import (
+    LAW_KELVIN_VOIGT,
     RELEASE_AT_ZERO_FORCE,
-    RELEASE_AT_ZERO_PENETRATION,
-    kelvin_voigt,
-    tangential_force,
+    friction_force,
+    normal_force,
 )
-from .hydraulics import PRESSURE_NONE, PRESSURE_TWO_LEVEL, two_level_pressure
+from .hydraulics import PRESSURE_CHAMBER, chamber_step, line_pressure
 from .integrate import Status
 from .jit import kernel, sine_cosine
-from .pump_parts import PumpScene
 
-STEP_PER_CONTACT_TIME = 0.3
-"""Default step times the contact's fastest angular frequency: 21 steps a contact period."""
+JOINT_IDEAL, JOINT_LINK, JOINT_COMPLIANT = 0, 1, 2
 
-STEP_PER_CONTACT_DECAY = 0.7
-"""Default step times the contact's fastest decay, where damping is beyond critical."""
+THROW = np.dtype(
+    [
+        ("phase", "f8"),  # crank angle of this throw over that of the crank [rad]
+        ("crank_radius", "f8"),
+        ("rod_centre", "f8"),  # wrist pin to centre of mass [m]
+        ("rod_arm", "f8"),  # centre of mass to crank-pin eye [m]
+        ("rod_mass", "f8"),
+        ("inverse_rod_mass", "f8"),
+        ("inverse_rod_inertia", "f8"),  # about its centre of mass [1/(kg m^2)]
+        ("piston_mass", "f8"),
+        ("inverse_piston_across", "f8"),  # 0 in an ideal guide [1/kg]
+        ("inverse_piston_tilt", "f8"),  # about the wrist pin; 0 in an ideal guide [1/(kg m^2)]
+        ("piston_area", "f8"),
+        ("crankpin_rung", "i8"),
+        ("wristpin_rung", "i8"),
+        ("guide_rung", "i8"),
+        ("crankpin_radius", "f8"),
+        ("wristpin_radius", "f8"),
+        ("guide_half_length", "f8"),
+        ("guide_half_height", "f8"),
+        ("pressure_rung", "i8"),
+        ("substeps", "i8"),  # of the chamber
+    ]
+)
+"""One throw, in SI."""
 
-LARGEST_STEP_PER_CONTACT_TIME = 1.0
-"""A step longer than this over the contact's rate is refused: Runge-Kutta 4 stays stable to 2.8
-but is no longer accurate."""
+CRANKPIN, WRISTPIN, GUIDE = 0, 1, 2
+"""Columns of the contact table, one row per throw."""
 
-_OVERLAP_LIMIT = 0.1  # of the pin radius: small-penetration contact laws end there
-_MOST_CUTS = 8  # contact changes within one step before the rest is taken as it is
+CONTACTS = 6
+"""Places of contact per throw: crank pin, wrist pin, and the guide's corners, rear and front,
+upper then lower."""
 
 
-class CrankParameters(NamedTuple):
-    """Everything the kernel needs, in SI."""
+class Machine(NamedTuple):
+    """What the throws share, in SI."""
 
-    crank_radius: float
-    rod_length: float
-    rod_centre: float
-    moving_mass: float
-    static_moment: float
-    rod_inertia: float
-    inverse_crank_inertia: float
-    drive_moment: float
     gravity_x: float
     gravity_y: float
-    clearance: float
-    pin_radius: float
-    eye_radius: float
-    stiffness: float
-    damping: float
-    friction: float
-    friction_speed: float
-    tangential_damping: float
-    release: int
-    pressure_rung: int
-    suction_force: float
-    discharge_force: float
-    rise_angle: float
+    inverse_inertia: float  # of everything that turns; 0 is constant speed
+    static_moment: float  # unbalance of the crank along the first throw [kg m]
+    drive_moment: float  # constant part [N m]
+    synchronous_speed: float  # of the motor, at the crank [rad/s]
+    breakdown_moment: float  # largest moment of the motor [N m]; 0 is none
+    breakdown_slip: float
+    baumgarte: float  # decay rate of constraint drift [1/s]
 
 
-STATE = ("alpha", "alpha_rate", "piston", "piston_velocity", "beta", "beta_rate")
-"""Names of the state's columns: [rad], [rad/s], [m], [m/s], [rad], [rad/s]."""
+BODY = ("rod_x", "rod_y", "beta", "piston_x", "piston_y", "tilt")
+"""Coordinates of a throw [m, rad]; the state holds these, then their rates."""
 
-FORCES = ("pin_x", "pin_y", "guide_y", "piston_x")
-"""Names of the recorded mean forces [N]: pin on rod (x, y), guide on piston, pressure on piston
-(positive towards the crank)."""
+PER_THROW = 2 * len(BODY)
+
+FORCES = (
+    "pin_x",
+    "pin_y",
+    "wrist_x",
+    "wrist_y",
+    "guide_x",
+    "guide_y",
+    "piston_x",
+    "suction_valve",
+    "discharge_valve",
+)
+"""Mean forces of a throw over a step [N]: crank pin on rod, wrist pin on rod, guide on piston
+(friction along x, push along y), liquid on piston, each valve on the casing along the stroke.
+Before them stands the drive moment [N m]."""
+
+_PIN, _WRIST, _GUIDE, _FACE, _VALVES = 0, 2, 4, 6, 7  # first columns of FORCES
+
+OVERLAP_LIMIT = 0.1  # of the pin radius: small-penetration contact laws end there
+_MOST_CUTS = 8  # contact changes within one step and throw before the rest is taken as it is
+_NO_CHANGE = 1.0  # margin of a contact that cannot change [N]
+
+
+class Tables(NamedTuple):
+    """Everything that the kernel is told."""
+
+    throws: NDArray[Any]  # (n_throws,) of THROW
+    contacts: NDArray[Any]  # (n_throws, 3) of CONTACT
+    liquid: NDArray[Any]  # (n_throws,) of HYDRAULIC
+    machine: Machine
+
+
+STAGE = np.dtype(
+    [
+        ("y", "f8", PER_THROW),
+        ("rate", "f8", PER_THROW),
+        ("force", "f8", len(FORCES)),
+        ("margin", "f8", CONTACTS),
+        ("approach", "f8", CONTACTS),
+        ("normal", "f8"),  # largest normal force
+        ("overlap", "f8"),  # largest overlap over the pin radius
+        ("link", "f8"),  # least force in a link: negative is tension
+        ("rate_per_turn", "f8", PER_THROW),  # per crank acceleration
+        ("force_per_turn", "f8", len(FORCES)),
+    ]
+)
+"""One throw at one stage of a step."""
+
+HELD = np.dtype(
+    [
+        ("touching", "i8", CONTACTS),  # 0 or 1
+        ("impact", "f8", CONTACTS),  # speed at which each contact closed
+        ("pressure", "f8", 2),  # of the chamber, at both ends of the step
+        ("flow", "f8", 4),  # of the chamber's valves, see chamber_step
+    ]
+)
+"""What one throw remembers from step to step."""
+
+ANGLE, SPEED, ANGLE_RATE, SPEED_RATE, MOMENT = range(5)
+"""Columns of the crank's stages."""
+
+
+class _Work(NamedTuple):
+    """Scratch of the march; nothing is allocated in its loop.
+
+    Rows 0 and 1 are the ends of the step in turn, rows 2 to 4 the stages between them.
+    """
+
+    crank: NDArray[np.float64]  # (5, 5)
+    stage: NDArray[Any]  # (5, n_throws) of STAGE
+    held: NDArray[Any]  # (n_throws,) of HELD
+    moment: NDArray[np.float64]  # (2,): on the crank, and per crank acceleration
+    matrix: NDArray[np.float64]  # (4, 6): constraint equations with two right sides
+    place: NDArray[np.float64]  # (4, 6): joint, direction, tangential share, normal
+
+
+@kernel
+def _crank_offset(
+    b: Any, omega: float, q: Any, sin_a: float, cos_a: float, sin_b: float, cos_b: float
+) -> Any:
+    """Pin from its eye's centre, and how fast."""
+    turn = omega * q.crank_radius
+    swing = b.y[8] * q.rod_arm
+    return (
+        q.crank_radius * cos_a - b.y[0] + q.rod_arm * cos_b,
+        q.crank_radius * sin_a - b.y[1] - q.rod_arm * sin_b,
+        -turn * sin_a - b.y[6] - swing * sin_b,
+        turn * cos_a - b.y[7] - swing * cos_b,
+    )
+
+
+@kernel
+def _wrist_offset(b: Any, q: Any, sin_b: float, cos_b: float) -> Any:
+    """Pin from its eye's centre, and how fast."""
+    swing = b.y[8] * q.rod_centre
+    return (
+        b.y[3] - b.y[0] - q.rod_centre * cos_b,
+        b.y[4] - b.y[1] + q.rod_centre * sin_b,
+        b.y[9] - b.y[6] + swing * sin_b,
+        b.y[10] - b.y[7] + swing * cos_b,
+    )
+
+
+@kernel
+def _polar(d_x: float, d_y: float, v_x: float, v_y: float) -> Any:
+    """Length, its rate, and direction; a centred pin has the stroke's, never NaN."""
+    distance = math.sqrt(d_x * d_x + d_y * d_y)
+    if distance > 0.0:
+        n_x, n_y = d_x / distance, d_y / distance
+    else:
+        n_x, n_y = 1.0, 0.0
+    return distance, v_x * n_x + v_y * n_y, n_x, n_y
+
+
+@kernel
+def _corner(b: Any, q: Any, corner: int, clearance: float) -> Any:
+    """Overlap of a corner with its guide, its rate, and the corner from the wrist pin."""
+    along = q.guide_half_length if corner & 1 else -q.guide_half_length
+    side = 1.0 if corner < 2 else -1.0
+    across = side * q.guide_half_height
+    sin_t, cos_t = sine_cosine(b.y[5])
+    r_x = along * cos_t - across * sin_t
+    r_y = along * sin_t + across * cos_t
+    overlap = side * (b.y[4] + r_y) - q.guide_half_height - clearance
+    return overlap, side * (b.y[10] + b.y[11] * r_x), r_x, r_y, side
+
+
+@kernel
+def _margin(overlap: float, force: float, touching: bool, c: Any) -> Any:
+    """Positive while the contact stays as it is, negative once it should change [N]."""
+    elastic = c.stiffness * overlap
+    if c.law == LAW_KELVIN_VOIGT and c.release == RELEASE_AT_ZERO_FORCE:
+        return force if touching else -min(elastic, force)
+    return elastic if touching else -elastic
+
+
+@kernel
+def _contact_margin(k: int, j: int, w: Any, row: int, t: Any) -> Any:
+    """Margin of one contact alone, for the search of its change."""
+    q, b, omega = t.throws[k], w.stage[row, k], w.crank[row, SPEED]
+    touching, impact = w.held[k].touching[j] != 0, w.held[k].impact[j]
+    if j > WRISTPIN:
+        c = t.contacts[k, GUIDE]
+        overlap, speed, _, _, _ = _corner(b, q, j - GUIDE, c.clearance)
+        return _margin(overlap, normal_force(overlap, speed, impact, c), touching, c)
+    sin_b, cos_b = sine_cosine(b.y[2])
+    c = t.contacts[k, j]
+    if j == CRANKPIN:
+        sin_a, cos_a = sine_cosine(w.crank[row, ANGLE] + q.phase)
+        d_x, d_y, v_x, v_y = _crank_offset(b, omega, q, sin_a, cos_a, sin_b, cos_b)
+    else:
+        d_x, d_y, v_x, v_y = _wrist_offset(b, q, sin_b, cos_b)
+    distance, speed, _, _ = _polar(d_x, d_y, v_x, v_y)
+    overlap = distance - c.clearance
+    return _margin(overlap, normal_force(overlap, speed, impact, c), touching, c)
+
+
+@kernel
+def _pin_contact(
+    d_x: float,
+    d_y: float,
+    v_x: float,
+    v_y: float,
+    spin: float,
+    touching: bool,
+    impact: float,
+    c: Any,
+) -> Any:
+    """Force on the rod (x, y), its tangential part, normal part; margin, approach, overlap."""
+    distance, speed, n_x, n_y = _polar(d_x, d_y, v_x, v_y)
+    overlap = distance - c.clearance
+    law = normal_force(overlap, speed, impact, c)
+    margin = _margin(overlap, law, touching, c)
+    if not touching:
+        return 0.0, 0.0, 0.0, 0.0, margin, speed, overlap
+    tangential = friction_force(v_y * n_x - v_x * n_y + spin, law, c)
+    return (
+        law * n_x - tangential * n_y,
+        law * n_y + tangential * n_x,
+        tangential,
+        law,
+        margin,
+        speed,
+        overlap,
+    )
+
+
+@kernel
+def _link_drag(d_x: float, d_y: float, v_x: float, v_y: float, spin: float, c: Any) -> Any:
+    """Viscous force on the rod along a link's end (x, y), and its share between the surfaces.
+
+    The contact's damping resists the swing of the link, `tangential_damping` the sliding.
+    """
+    _, _, n_x, n_y = _polar(d_x, d_y, v_x, v_y)
+    swing = v_y * n_x - v_x * n_y
+    sliding = c.tangential_damping * (swing + spin)
+    drag = c.damping * swing + sliding
+    return -drag * n_y, drag * n_x, sliding
+
+
+@kernel
+def _throw(k: int, w: Any, row: int, share: float, t: Any) -> None:
+    """Rates and forces of one throw at constant crank speed, and per crank acceleration."""
+    q, m, b, held = t.throws[k], t.machine, w.stage[row, k], w.held[k]
+    sin_a, cos_a = sine_cosine(w.crank[row, ANGLE] + q.phase)
+    sin_b, cos_b = sine_cosine(b.y[2])
+    omega, b_rate = w.crank[row, SPEED], b.y[8]
+    if q.pressure_rung == PRESSURE_CHAMBER:
+        added = 0.0
+        before, after = held.pressure[0], held.pressure[1]
+        pressure = before + share * (after - before)
+    else:
+        pressure, added = line_pressure(w.crank[row, ANGLE] + q.phase, omega, b.y[9], t.liquid[k])
+    # applied forces on rod (x, y, turning with b), piston (x, y, turning with t), and crank
+    rod_x, rod_y, rod_b = -m.gravity_x * q.rod_mass, -m.gravity_y * q.rod_mass, 0.0
+    on_face = -q.piston_area * pressure
+    piston_x, piston_y = on_face - m.gravity_x * q.piston_mass, -m.gravity_y * q.piston_mass
+    piston_t, guide_x, guide_y, crank_moment = 0.0, 0.0, 0.0, 0.0
+    pin_x, pin_y, wrist_x, wrist_y = 0.0, 0.0, 0.0, 0.0
+    peak, overlap_ratio = 0.0, 0.0
+    c_x, c_y, cv_x, cv_y = _crank_offset(b, omega, q, sin_a, cos_a, sin_b, cos_b)
+    if q.crankpin_rung == JOINT_COMPLIANT:
+        c = t.contacts[k, CRANKPIN]
+        eye = q.crankpin_radius + c.clearance
+        pin_x, pin_y, tangential, normal, b.margin[CRANKPIN], b.approach[CRANKPIN], overlap = (
+            _pin_contact(
+                c_x,
+                c_y,
+                cv_x,
+                cv_y,
+                omega * q.crankpin_radius + b_rate * eye,
+                held.touching[CRANKPIN] != 0,
+                held.impact[CRANKPIN],
+                c,
+            )
+        )
+        rod_x += pin_x
+        rod_y += pin_y
+        rod_b += q.rod_arm * (pin_x * sin_b + pin_y * cos_b) - eye * tangential
+        crank_moment -= q.crankpin_radius * tangential
+        peak, overlap_ratio = normal, overlap / q.crankpin_radius
+    elif q.crankpin_rung == JOINT_LINK:
+        c = t.contacts[k, CRANKPIN]
+        eye = q.crankpin_radius + c.clearance
+        spin = omega * q.crankpin_radius + b_rate * eye
+        pin_x, pin_y, tangential = _link_drag(c_x, c_y, cv_x, cv_y, spin, c)
+        rod_x += pin_x
+        rod_y += pin_y
+        rod_b += q.rod_arm * (pin_x * sin_b + pin_y * cos_b) - eye * tangential
+        crank_moment -= q.crankpin_radius * tangential
+    if q.wristpin_rung == JOINT_LINK:
+        w_x, w_y, wv_x, wv_y = _wrist_offset(b, q, sin_b, cos_b)
+        c = t.contacts[k, WRISTPIN]
+        eye = q.wristpin_radius + c.clearance
+        spin = b.y[11] * q.wristpin_radius + b_rate * eye
+        wrist_x, wrist_y, tangential = _link_drag(w_x, w_y, wv_x, wv_y, spin, c)
+        rod_x += wrist_x
+        rod_y += wrist_y
+        rod_b -= q.rod_centre * (wrist_x * sin_b + wrist_y * cos_b) + eye * tangential
+        piston_x -= wrist_x
+        piston_y -= wrist_y
+        piston_t -= q.wristpin_radius * tangential
+    elif q.wristpin_rung == JOINT_COMPLIANT:
+        w_x, w_y, wv_x, wv_y = _wrist_offset(b, q, sin_b, cos_b)
+        c = t.contacts[k, WRISTPIN]
+        eye = q.wristpin_radius + c.clearance
+        (
+            wrist_x,
+            wrist_y,
+            tangential,
+            normal,
+            b.margin[WRISTPIN],
+            b.approach[WRISTPIN],
+            overlap,
+        ) = _pin_contact(
+            w_x,
+            w_y,
+            wv_x,
+            wv_y,
+            b.y[11] * q.wristpin_radius + b_rate * eye,
+            held.touching[WRISTPIN] != 0,
+            held.impact[WRISTPIN],
+            c,
+        )
+        rod_x += wrist_x
+        rod_y += wrist_y
+        rod_b -= q.rod_centre * (wrist_x * sin_b + wrist_y * cos_b) + eye * tangential
+        piston_x -= wrist_x
+        piston_y -= wrist_y
+        piston_t -= q.wristpin_radius * tangential
+        peak = max(peak, normal)
+        overlap_ratio = max(overlap_ratio, overlap / q.wristpin_radius)
+    if q.guide_rung == JOINT_COMPLIANT:
+        c = t.contacts[k, GUIDE]
+        for corner in range(4):
+            j = GUIDE + corner
+            overlap, speed, r_x, r_y, side = _corner(b, q, corner, c.clearance)
+            law = normal_force(overlap, speed, held.impact[j], c)
+            b.margin[j] = _margin(overlap, law, held.touching[j] != 0, c)
+            b.approach[j] = speed
+            overlap_ratio = max(overlap_ratio, overlap / q.guide_half_height)
+            if held.touching[j] != 0:
+                push = -side * law
+                drag = -friction_force(b.y[9] - b.y[11] * r_y, law, c)
+                piston_x += drag
+                piston_y += push
+                piston_t += r_x * push - r_y * drag
+                guide_x += drag
+                guide_y += push
+                peak = max(peak, law)
+    inv_m, inv_j = q.inverse_rod_mass, q.inverse_rod_inertia
+    inv_px = 1.0 / (q.piston_mass + added)
+    inv_py, inv_pt = q.inverse_piston_across, q.inverse_piston_tilt
+    acc_x, acc_y, acc_b = rod_x * inv_m, rod_y * inv_m, rod_b * inv_j
+    pis_x, pis_y, pis_t = piston_x * inv_px, piston_y * inv_py, piston_t * inv_pt
+    rigid = q.crankpin_rung != JOINT_COMPLIANT
+    link = 0.0
+    if q.crankpin_rung == JOINT_COMPLIANT and q.wristpin_rung == JOINT_IDEAL:
+        # two constraints of the wrist pin in closed form: the way a worn crank pin takes
+        w_x, w_y, wv_x, wv_y = _wrist_offset(b, q, sin_b, cos_b)
+        decay = m.baumgarte
+        swing = q.rod_centre * b_rate * b_rate
+        lag = q.rod_centre * acc_b
+        need_x = pis_x - acc_x + lag * sin_b + swing * cos_b + decay * (2.0 * wv_x + decay * w_x)
+        need_y = pis_y - acc_y + lag * cos_b - swing * sin_b + decay * (2.0 * wv_y + decay * w_y)
+        turning = q.rod_centre * q.rod_centre * inv_j
+        a_xx = inv_m + inv_px + turning * sin_b * sin_b
+        a_yy = inv_m + inv_py + turning * cos_b * cos_b
+        a_xy = turning * sin_b * cos_b
+        inverse = 1.0 / (a_xx * a_yy - a_xy * a_xy)
+        wrist_x = (a_yy * need_x - a_xy * need_y) * inverse
+        wrist_y = (a_xx * need_y - a_xy * need_x) * inverse
+        acc_x += wrist_x * inv_m
+        acc_y += wrist_y * inv_m
+        acc_b -= q.rod_centre * (wrist_x * sin_b + wrist_y * cos_b) * inv_j
+        pis_x -= wrist_x * inv_px
+        pis_y -= wrist_y * inv_py
+    elif rigid or q.wristpin_rung != JOINT_COMPLIANT:
+        (
+            acc_x,
+            acc_y,
+            acc_b,
+            pis_x,
+            pis_y,
+            pis_t,
+            pin_x,
+            pin_y,
+            wrist_x,
+            wrist_y,
+            crank_moment,
+            link,
+        ) = _constrained(
+            k,
+            w,
+            row,
+            t,
+            sin_a,
+            cos_a,
+            sin_b,
+            cos_b,
+            inv_px,
+            inv_py,
+            inv_pt,
+            acc_x,
+            acc_y,
+            acc_b,
+            pis_x,
+            pis_y,
+            pis_t,
+            pin_x,
+            pin_y,
+            wrist_x,
+            wrist_y,
+            crank_moment,
+        )
+    crank_moment += q.crank_radius * (pin_x * sin_a - pin_y * cos_a)
+    if q.guide_rung != JOINT_COMPLIANT:
+        guide_y = wrist_y + m.gravity_y * q.piston_mass
+    for i in range(6):
+        b.rate[i] = b.y[6 + i]
+    b.rate[6], b.rate[7], b.rate[8] = acc_x, acc_y, acc_b
+    b.rate[9], b.rate[10], b.rate[11] = pis_x, pis_y, pis_t
+    b.force[_PIN], b.force[_PIN + 1] = pin_x, pin_y
+    b.force[_WRIST], b.force[_WRIST + 1] = wrist_x, wrist_y
+    b.force[_GUIDE], b.force[_GUIDE + 1] = guide_x, guide_y
+    b.force[_FACE] = on_face - added * pis_x
+    w.moment[0] += crank_moment
+    b.normal, b.overlap, b.link = peak, overlap_ratio, link
+    if rigid and m.inverse_inertia > 0.0:
+        b.force_per_turn[_FACE] = -added * b.rate_per_turn[9]
+        if q.guide_rung != JOINT_COMPLIANT:
+            b.force_per_turn[_GUIDE + 1] = b.force_per_turn[_WRIST + 1]
+
+
+@kernel
+def _constrained(
+    k: int,
+    w: Any,
+    row: int,
+    t: Any,
+    sin_a: float,
+    cos_a: float,
+    sin_b: float,
+    cos_b: float,
+    inv_px: float,
+    inv_py: float,
+    inv_pt: float,
+    acc_x: float,
+    acc_y: float,
+    acc_b: float,
+    pis_x: float,
+    pis_y: float,
+    pis_t: float,
+    pin_x: float,
+    pin_y: float,
+    wrist_x: float,
+    wrist_y: float,
+    crank_moment: float,
+) -> Any:
+    """Add the constraint forces of ideal joints and links to the accelerations.
+
+    Unknowns are forces along given directions at either end of the rod; the equations ask the
+    relative acceleration of pin and eye to be what keeps them together.
+    """
+    q, m, b = t.throws[k], t.machine, w.stage[row, k]
+    inv_m, inv_j = q.inverse_rod_mass, q.inverse_rod_inertia
+    omega, b_rate, decay = w.crank[row, SPEED], b.y[8], m.baumgarte
+    square = b_rate * b_rate
+    least, at_pin, at_wrist = 0.0, 1.0, 1.0  # +1: link in compression, -1: in tension
+    for _ in range(4):
+        n = 0
+        for joint in range(2):
+            rung = q.crankpin_rung if joint == CRANKPIN else q.wristpin_rung
+            if rung == JOINT_COMPLIANT:
+                continue
+            c = t.contacts[k, joint]
+            if joint == CRANKPIN:
+                d_x, d_y, v_x, v_y = _crank_offset(b, omega, q, sin_a, cos_a, sin_b, cos_b)
+                arm, radius, spin = q.rod_arm, q.crankpin_radius, omega
+                pull = q.crank_radius * omega * omega
+                of_pin_x, of_pin_y = -pull * cos_a, -pull * sin_a
+                turn_x, turn_y = -q.crank_radius * sin_a, q.crank_radius * cos_a
+            else:
+                d_x, d_y, v_x, v_y = _wrist_offset(b, q, sin_b, cos_b)
+                arm, radius, spin = -q.rod_centre, q.wristpin_radius, b.y[11]
+                of_pin_x, of_pin_y = pis_x, pis_y
+                turn_x, turn_y = 0.0, 0.0
+            apart_x = of_pin_x - acc_x - arm * (acc_b * sin_b + square * cos_b)
+            apart_y = of_pin_y - acc_y - arm * (acc_b * cos_b - square * sin_b)
+            if rung == JOINT_IDEAL:
+                for axis in range(2):
+                    w.place[n, 0] = joint
+                    w.place[n, 1], w.place[n, 2] = 1.0 - axis, float(axis)
+                    w.place[n, 3], w.place[n, 4], w.place[n, 5] = 0.0, 1.0 - axis, float(axis)
+                    w.matrix[n, 4] = (
+                        apart_x + decay * (2.0 * v_x + decay * d_x)
+                        if axis == 0
+                        else apart_y + decay * (2.0 * v_y + decay * d_y)
+                    )
+                    w.matrix[n, 5] = turn_x if axis == 0 else turn_y
+                    n += 1
+                continue
+            distance, speed, n_x, n_y = _polar(d_x, d_y, v_x, v_y)
+            eye = radius + c.clearance
+            slide = v_y * n_x - v_x * n_y
+            share = friction_force(slide + radius * spin + eye * b_rate, 1.0, c)
+            share -= c.tangential_damping * (slide + radius * spin + eye * b_rate)
+            share *= at_pin if joint == CRANKPIN else at_wrist
+            w.place[n, 0] = joint
+            w.place[n, 1], w.place[n, 2] = n_x - share * n_y, n_y + share * n_x
+            w.place[n, 3], w.place[n, 4], w.place[n, 5] = share, n_x, n_y
+            w.matrix[n, 4] = (
+                apart_x * n_x
+                + apart_y * n_y
+                + slide * slide / distance
+                + decay * (2.0 * speed + decay * (distance - c.clearance))
+            )
+            w.matrix[n, 5] = turn_x * n_x + turn_y * n_y
+            n += 1
+        for j in range(n):
+            at_crank = w.place[j, 0] == CRANKPIN
+            arm = q.rod_arm if at_crank else -q.rod_centre
+            radius = q.crankpin_radius if at_crank else q.wristpin_radius
+            eye = radius + t.contacts[k, CRANKPIN if at_crank else WRISTPIN].clearance
+            u_x, u_y = w.place[j, 1], w.place[j, 2]
+            swing = (arm * (u_x * sin_b + u_y * cos_b) - eye * w.place[j, 3]) * inv_j
+            for i in range(n):
+                reach = q.rod_arm if w.place[i, 0] == CRANKPIN else -q.rod_centre
+                e_x = u_x * inv_m + reach * swing * sin_b
+                e_y = u_y * inv_m + reach * swing * cos_b
+                if not at_crank and w.place[i, 0] == WRISTPIN:
+                    e_x += u_x * inv_px
+                    e_y += u_y * inv_py
+                w.matrix[i, j] = e_x * w.place[i, 4] + e_y * w.place[i, 5]
+        _eliminate(w, n)
+        least, consistent = 1.0, True
+        for j in range(n):
+            at_crank = w.place[j, 0] == CRANKPIN
+            if (q.crankpin_rung if at_crank else q.wristpin_rung) != JOINT_LINK:
+                continue
+            size = w.matrix[j, 4]
+            side = -1.0 if size < 0.0 else 1.0
+            least = min(least, size)
+            consistent &= side == (at_pin if at_crank else at_wrist)
+            if at_crank:  # friction acts on the other side of the eye
+                at_pin = side
+            else:
+                at_wrist = side
+        if consistent:
+            break
+    per_turn = m.inverse_inertia > 0.0 and q.crankpin_rung != JOINT_COMPLIANT
+    if per_turn:
+        for i in range(6):
+            b.rate_per_turn[6 + i] = 0.0
+        for i in range(_VALVES):
+            b.force_per_turn[i] = 0.0
+    moment_per_turn = 0.0
+    for j in range(n):
+        at_crank = w.place[j, 0] == CRANKPIN
+        arm = q.rod_arm if at_crank else -q.rod_centre
+        radius = q.crankpin_radius if at_crank else q.wristpin_radius
+        eye = radius + t.contacts[k, CRANKPIN if at_crank else WRISTPIN].clearance
+        u_x, u_y, share = w.place[j, 1], w.place[j, 2], w.place[j, 3]
+        swing = (arm * (u_x * sin_b + u_y * cos_b) - eye * share) * inv_j
+        size = w.matrix[j, 4]
+        acc_x += size * u_x * inv_m
+        acc_y += size * u_y * inv_m
+        acc_b += size * swing
+        if at_crank:
+            pin_x += size * u_x
+            pin_y += size * u_y
+            crank_moment -= size * radius * share
+        else:
+            wrist_x += size * u_x
+            wrist_y += size * u_y
+            pis_x -= size * u_x * inv_px
+            pis_y -= size * u_y * inv_py
+            pis_t -= size * radius * share * inv_pt
+        if per_turn:
+            more = w.matrix[j, 5]
+            b.rate_per_turn[6] += more * u_x * inv_m
+            b.rate_per_turn[7] += more * u_y * inv_m
+            b.rate_per_turn[8] += more * swing
+            if at_crank:
+                b.force_per_turn[_PIN] += more * u_x
+                b.force_per_turn[_PIN + 1] += more * u_y
+                moment_per_turn += more * (
+                    q.crank_radius * (u_x * sin_a - u_y * cos_a) - radius * share
+                )
+            else:
+                b.force_per_turn[_WRIST] += more * u_x
+                b.force_per_turn[_WRIST + 1] += more * u_y
+                b.rate_per_turn[9] -= more * u_x * inv_px
+                b.rate_per_turn[10] -= more * u_y * inv_py
+                b.rate_per_turn[11] -= more * radius * share * inv_pt
+    w.moment[1] += moment_per_turn
+    return (
+        acc_x,
+        acc_y,
+        acc_b,
+        pis_x,
+        pis_y,
+        pis_t,
+        pin_x,
+        pin_y,
+        wrist_x,
+        wrist_y,
+        crank_moment,
+        min(least, 0.0),
+    )
+
+
+@kernel
+def _eliminate(w: Any, n: int) -> None:
+    """Gauss elimination in place; the solutions replace columns 4 and 5."""
+    for i in range(n):
+        inverse = 1.0 / w.matrix[i, i]
+        for r in range(i + 1, n):
+            factor = w.matrix[r, i] * inverse
+            for column in range(i + 1, n):
+                w.matrix[r, column] -= factor * w.matrix[i, column]
+            w.matrix[r, 4] -= factor * w.matrix[i, 4]
+            w.matrix[r, 5] -= factor * w.matrix[i, 5]
+    for i in range(n - 1, -1, -1):
+        for column in range(i + 1, n):
+            w.matrix[i, 4] -= w.matrix[i, column] * w.matrix[column, 4]
+            w.matrix[i, 5] -= w.matrix[i, column] * w.matrix[column, 5]
+        w.matrix[i, 4] /= w.matrix[i, i]
+        w.matrix[i, 5] /= w.matrix[i, i]
+
+
+@kernel
+def motor_moment(speed: float, m: Any) -> Any:
+    """Moment of the drive at a crank speed [N m]: constant part plus Kloss's curve.
+
+    ``2 M_b / (s / s_b + s_b / s)`` with the slip s of an asynchronous motor, breakdown moment M_b
+    at the slip s_b. Source: Kloss (1929); Boldea and Nasar, The Induction Machine Handbook.
+    """
+    if m.breakdown_moment == 0.0:
+        return m.drive_moment
+    slip = 1.0 - speed / m.synchronous_speed
+    both = slip * slip + m.breakdown_slip * m.breakdown_slip
+    return m.drive_moment + 2.0 * m.breakdown_moment * slip * m.breakdown_slip / both
+
+
+@kernel
+def _derivative(w: Any, row: int, share: float, t: Any) -> None:
+    """Rates, forces and margins at the state of a row; `share` of the step has passed."""
+    m = t.machine
+    w.moment[0] = w.moment[1] = 0.0
+    for k in range(t.throws.shape[0]):
+        _throw(k, w, row, share, t)
+    w.crank[row, ANGLE_RATE], w.crank[row, SPEED_RATE] = w.crank[row, SPEED], 0.0
+    load = w.moment[0]
+    if m.static_moment != 0.0:
+        sin_a, cos_a = sine_cosine(w.crank[row, ANGLE] + t.throws[0].phase)
+        load += m.static_moment * (m.gravity_x * sin_a - m.gravity_y * cos_a)
+    w.crank[row, MOMENT] = -load
+    if m.inverse_inertia == 0.0:
+        return
+    drive = motor_moment(w.crank[row, SPEED], m)
+    turning = m.inverse_inertia * (drive + load) / (1.0 - m.inverse_inertia * w.moment[1])
+    w.crank[row, SPEED_RATE] = turning
+    w.crank[row, MOMENT] = drive
+    for k in range(t.throws.shape[0]):
+        if t.throws[k].crankpin_rung == JOINT_COMPLIANT:
+            continue
+        b = w.stage[row, k]
+        for c in range(6, 12):
+            b.rate[c] += turning * b.rate_per_turn[c]
+        for c in range(_VALVES):
+            b.force[c] += turning * b.force_per_turn[c]
+
+
+@kernel
+def _hermite(
+    before: float, rate_before: float, after: float, rate_after: float, h: float, s: float
+) -> float:
+    """Cubic through both ends of a step, a fraction s into it."""
+    r = 1.0 - s
+    return r * r * ((1.0 + 2.0 * s) * before + s * h * rate_before) + s * s * (
+        (1.0 + 2.0 * r) * after - r * h * rate_after
+    )
+
+
+@kernel
+def _interpolate(k: int, w: Any, i: int, h: float, s: float) -> None:
+    """State of crank and one throw a fraction s into the step from row i, into row 2."""
+    y, z = w.crank, 1 - i
+    for c in range(2):
+        y[2, c] = _hermite(y[i, c], y[i, 2 + c], y[z, c], y[z, 2 + c], h, s)
+    here, before, after = w.stage[2, k], w.stage[i, k], w.stage[z, k]
+    for c in range(PER_THROW):
+        here.y[c] = _hermite(before.y[c], before.rate[c], after.y[c], after.rate[c], h, s)
+
+
+@kernel
+def _locate_change(k: int, j: int, w: Any, i: int, h: float, t: Any) -> Any:
+    """Fraction of the step at which one contact changes: Illinois on the dense output."""
+    low, high = 0.0, 1.0
+    f_low, f_high = w.stage[i, k].margin[j], w.stage[1 - i, k].margin[j]
+    share = 0.5
+    while f_low <= 0.0:  # changed just now, at rounding: it must hold before it changes again
+        if share < 1e-4:
+            return 0.0  # it never holds: it asks for the change at once
+        _interpolate(k, w, i, h, share)
+        low, f_low = share, _contact_margin(k, j, w, 2, t)
+        share *= 0.5
+    for _ in range(60):
+        s = high - f_high * (high - low) / (f_high - f_low)
+        _interpolate(k, w, i, h, s)
+        f = _contact_margin(k, j, w, 2, t)
+        if f > 0.0:
+            low, f_low = s, f
+            f_high *= 0.5
+        else:
+            high, f_high = s, f
+            f_low *= 0.5
+        if abs(f) < 1e-9:
+            return s
+        if high - low < 1e-12:
+            break
+    return high
+
+
+@kernel
+def _first_change(w: Any, i: int, h: float, locate: bool, t: Any) -> Any:
+    """Earliest contact that asks for a change within the step: when, throw (-1: none), contact."""
+    first, throw, contact = 1.0, -1, 0
+    for k in range(t.throws.shape[0]):
+        after = w.stage[1 - i, k]
+        for j in range(CONTACTS):
+            if after.margin[j] < 0.0:
+                share = _locate_change(k, j, w, i, h, t) if locate else 1.0
+                if throw < 0 or share < first:
+                    first, throw, contact = share, k, j
+    return first, throw, contact
+
+
+@kernel
+def _advance(w: Any, row: int, i: int, share: float, slope: int) -> None:
+    """State of a row: that of row i moved along the rates of row `slope` over `share` [s]."""
+    for c in range(2):
+        w.crank[row, c] = w.crank[i, c] + share * w.crank[slope, 2 + c]
+    for k in range(w.stage.shape[1]):
+        here, start, rate = w.stage[row, k], w.stage[i, k], w.stage[slope, k]
+        for c in range(PER_THROW):
+            here.y[c] = start.y[c] + share * rate.rate[c]
+
+
+@kernel
+def _mean(first: float, second: float, third: float, last: float) -> float:
+    return first + 2.0 * (second + third) + last
+
+
+@kernel
+def _finish(w: Any, i: int, h: float) -> None:
+    """State at the end of the step from row i, by the weighted mean of the four rates."""
+    sixth, y = h / 6.0, w.crank
+    for c in range(2):
+        rate = _mean(y[i, 2 + c], y[2, 2 + c], y[3, 2 + c], y[4, 2 + c])
+        y[1 - i, c] = y[i, c] + sixth * rate
+    for k in range(w.stage.shape[1]):
+        end, a, b = w.stage[1 - i, k], w.stage[i, k], w.stage[2, k]
+        c_, d = w.stage[3, k], w.stage[4, k]
+        for c in range(PER_THROW):
+            end.y[c] = a.y[c] + sixth * _mean(a.rate[c], b.rate[c], c_.rate[c], d.rate[c])
+
+
+@kernel
+def _stages(w: Any, i: int, h: float, passed: float, whole: float, fresh: bool, t: Any) -> None:
+    """Runge-Kutta from row i to the other over `h`, with the contacts held as they are.
+
+    `passed` of the `whole` step lie behind. The derivative at the start is made anew unless it is
+    `fresh`; that at the end is left for the next step.
+    """
+    for stage in range(1 if fresh else 0, 5):
+        row, share = i, 0.0
+        if stage == 4:
+            row, share = 1 - i, 1.0
+            _finish(w, i, h)
+        elif stage > 0:
+            row = 1 + stage
+            share = 1.0 if stage == 3 else 0.5
+            _advance(w, row, i, share * h, i if stage == 1 else stage)
+        _derivative(w, row, (passed + share * h) / whole, t)
+
+
+@kernel
+def _flip(k: int, j: int, w: Any, i: int, t: Any) -> int:
+    """Open or close one contact; 1 where it closed more slowly than its law's floor."""
+    held = w.held[k]
+    held.touching[j] = 1 - held.touching[j]
+    if held.touching[j] == 0:
+        return 0
+    held.impact[j] = max(w.stage[i, k].approach[j], 0.0)
+    return 1 if held.impact[j] < t.contacts[k, min(j, GUIDE)].speed_floor else 0
+
+
+@kernel
+def _change(throw: int, contact: int, w: Any, i: int, t: Any, tally: Any) -> None:
+    """Change a contact, and all that ask for it at the same instant.
+
+    Both corners of a piston that stands straight do: one of them left for later would be late by
+    what is left of the step.
+    """
+    for k in range(t.throws.shape[0]):
+        for j in range(CONTACTS):
+            if (k == throw and j == contact) or w.stage[i, k].margin[j] < 0.0:
+                tally.counts[CHANGES] += 1
+                tally.counts[FLOORED] += _flip(k, j, w, i, t)
+
+
+@kernel
+def _record_forces(w: Any, i: int, weight: float, forces: Any, step: int, tally: Any) -> None:
+    """Add the impulse of one part of the step to the step's mean forces."""
+    y = w.crank
+    forces[step, 0] += weight * _mean(y[i, MOMENT], y[2, MOMENT], y[3, MOMENT], y[4, MOMENT])
+    for k in range(w.stage.shape[1]):
+        a, b, c, d = w.stage[i, k], w.stage[2, k], w.stage[3, k], w.stage[4, k]
+        f = 1 + len(FORCES) * k
+        for n in range(_VALVES):
+            forces[step, f + n] += weight * _mean(a.force[n], b.force[n], c.force[n], d.force[n])
+        tally.peak[0] = max(tally.peak[0], max(a.normal, max(b.normal, c.normal)))
+
+
+@kernel
+def _step(w: Any, i: int, h: float, fresh: bool, t: Any, forces: Any, step: int, tally: Any) -> Any:
+    """One whole step, cut wherever a contact closes or opens.
+
+    Returns the row it ended in, and whether that row's derivative is fresh.
+    """
+    left, taken, cuts, k, j = h, h, 0, -1, 0
+    while left > 0.0:
+        _stages(w, i, taken, h - left, h, fresh, t)
+        fresh = True
+        if k < 0:  # not yet cut
+            locate = cuts < _MOST_CUTS * t.throws.shape[0]
+            share, k, j = _first_change(w, i, taken, locate, t)
+            if k >= 0 and locate:
+                taken *= share
+                cuts += 1
+                continue
+            tally.counts[NOT_LOCATED] += k >= 0
+        _record_forces(w, i, taken / (6.0 * h), forces, step, tally)
+        i = 1 - i
+        if k >= 0:
+            _change(k, j, w, i, t, tally)
+            fresh, k = False, -1
+        left = 0.0 if taken == left else left - taken
+        taken = left
+    return i, fresh
+
+
+@kernel
+def _breathe(w: Any, i: int, h: float, t: Any, chamber: Any, forces: Any, step: int) -> int:
+    """Step every chamber along its piston's path; its pressure for the next step."""
+    fault = 0
+    for k in range(t.throws.shape[0]):
+        q, b, held = t.throws[k], w.stage[i, k], w.held[k]
+        if q.pressure_rung != PRESSURE_CHAMBER:
+            continue
+        last, before, v_before = chamber[k, 0], chamber[k, 6], chamber[k, 7]
+        fault += chamber_step(
+            chamber[k], held.flow, t.liquid[k], h, before, v_before, b.y[3], b.y[9], q.substeps
+        )
+        chamber[k, 6], chamber[k, 7] = b.y[3], b.y[9]
+        held.pressure[0], held.pressure[1] = chamber[k, 0], 2.0 * chamber[k, 0] - last
+        f = 1 + len(FORCES) * k
+        forces[step, f + _VALVES] = held.flow[2] / h
+        forces[step, f + _VALVES + 1] = held.flow[3] / h
+    return fault
+
+
+@kernel
+def _fault(w: Any, i: int) -> int:
+    total = w.crank[i, ANGLE] + w.crank[i, SPEED]
+    for k in range(w.stage.shape[1]):
+        b = w.stage[i, k]
+        for c in range(PER_THROW):
+            total += b.y[c]
+        if b.overlap > OVERLAP_LIMIT:
+            return 2
+        if abs(b.y[2]) > 1.5:  # rad
+            return 3
+    return 0 if math.isfinite(total) else 1
+
+
+CHANGES, NOT_LOCATED, FLOORED, IN_TENSION, WITH_VAPOUR = range(5)
+"""What a run counts: contacts that closed or opened; steps with more than could be located;
+closings below the law's speed floor; steps with a link in tension; steps with vapour."""
+
+
+class _Record(NamedTuple):
+    """What a run leaves behind; the last two have one row where they are not needed."""
+
+    turns: NDArray[np.float64]  # (n_steps + 1, 2): crank angle and speed
+    forces: NDArray[np.float64]  # (n_steps, 1 + n_throws * len(FORCES))
+    states: NDArray[np.float64]  # (n_steps + 1, n_throws, PER_THROW)
+    chambers: NDArray[np.float64]  # (n_steps + 1, n_throws, 8)
+
+
+class _Tally(NamedTuple):
+    counts: NDArray[np.int64]  # (5,)
+    peak: NDArray[np.float64]  # (1,): largest normal force
+
+
+@kernel
+def _is_compliant(q: Any, j: int) -> Any:
+    rung = q.crankpin_rung if j == CRANKPIN else q.wristpin_rung if j == WRISTPIN else q.guide_rung
+    return rung == JOINT_COMPLIANT
+
+
+@kernel
+def _begin(w: Any, t: Any, chamber: Any) -> bool:
+    """Contacts closed from the start, chambers; true where any chamber breathes."""
+    breathing = False
+    for k in range(t.throws.shape[0]):
+        q, b, held = t.throws[k], w.stage[0, k], w.held[k]
+        breathing |= q.pressure_rung == PRESSURE_CHAMBER
+        chamber[k, 6], chamber[k, 7] = b.y[3], b.y[9]
+        held.pressure[0] = held.pressure[1] = chamber[k, 0]
+        for j in range(CONTACTS):
+            for row in range(5):
+                w.stage[row, k].margin[j] = _NO_CHANGE
+            if _is_compliant(q, j):  # closed is what would close if it were open
+                held.touching[j] = 1 if _contact_margin(k, j, w, 0, t) < 0.0 else 0
+    return breathing
+
+
+@kernel
+def _keep(w: Any, i: int, chamber: Any, r: Any, row: int) -> None:
+    r.turns[row, 0], r.turns[row, 1] = w.crank[i, ANGLE], w.crank[i, SPEED]
+    for k in range(chamber.shape[0]):
+        if r.states.shape[0] > 1:
+            for c in range(PER_THROW):
+                r.states[row, k, c] = w.stage[i, k].y[c]
+        if r.chambers.shape[0] > 1:
+            for c in range(chamber.shape[1]):
+                r.chambers[row, k, c] = chamber[k, c]
+
+
+@kernel
+def _integrate(h: float, t: Any, w: Any, chamber: Any, r: Any, tally: Any) -> Any:
+    """March from row 0 of the scratch; returns status code and steps done."""
+    breathing = _begin(w, t, chamber)
+    i, fresh = 0, False
+    _keep(w, i, chamber, r, 0)
+    for step in range(r.forces.shape[0]):
+        i, fresh = _step(w, i, h, fresh, t, r.forces, step, tally)
+        code = _fault(w, i)
+        if breathing:
+            if _breathe(w, i, h, t, chamber, r.forces, step) != 0:
+                code = 4
+            fresh = False  # the step felt an extrapolated pressure, the next one knows better
+        for k in range(t.throws.shape[0]):
+            tally.counts[IN_TENSION] += w.stage[i, k].link < 0.0
+            tally.counts[WITH_VAPOUR] += chamber[k, 1] > 0.0
+        _keep(w, i, chamber, r, step + 1)
+        if code != 0:
+            return code, step + 1
+    return 0, r.forces.shape[0]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -96,11 +1029,15 @@ class CrankRun:
 
     Attributes
     ----------
-    states : numpy.ndarray [shape=(n_steps + 1, 6)]
-        Columns as :data:`STATE`, at the ends of the steps; the state in the middle of a step, to
-        which its forces belong, is the mean of two rows.
-    forces : numpy.ndarray [shape=(n_steps, 4)]
-        Columns as :data:`FORCES`, mean over each step.
+    turns : numpy.ndarray [shape=(n_steps + 1, 2)]
+        Crank angle [rad] and speed [rad/s] at the ends of the steps.
+    forces : numpy.ndarray [shape=(n_steps, 1 + 9 n_throws)]
+        Drive moment [N m], then per throw the columns of :data:`FORCES` [N], means over each step.
+    bodies : numpy.ndarray [shape=(n_steps + 1, n_throws, 12)] or None
+        Columns as :data:`BODY`, then their rates, at the ends of the steps; the state in the
+        middle of a step, to which its forces belong, is the mean of two rows. None where not kept.
+    chambers : numpy.ndarray [shape=(n_steps + 1, n_throws, 6)] or None
+        Columns as ``CHAMBER_STATE``; None where nothing breathes.
     step : float
         [s]
     status : Status
@@ -108,452 +1045,104 @@ class CrankRun:
     peak_normal_force : float
         Largest contact force met inside the steps [N].
     contact_changes, cuts_refused : int
-        Closings plus openings located; steps with more than could be located.
+        Closings plus openings; steps with more than could be located.
+    floored_closings : int
+        Contacts that closed more slowly than the speed floor of their law.
+    tension_steps : int
+        Steps at whose end a massless link was in tension: contact would be lost.
+    vapour_steps : int
+        Steps, summed over throws, at whose end a chamber held vapour.
     """
 
-    states: NDArray[np.float64]
+    turns: NDArray[np.float64]
     forces: NDArray[np.float64]
+    bodies: NDArray[np.float64] | None
+    chambers: NDArray[np.float64] | None
     step: float
-    status: Status
     peak_normal_force: float
-    contact_changes: int
-    cuts_refused: int
+    status: Status = Status.OK
+    contact_changes: int = 0
+    cuts_refused: int = 0
+    floored_closings: int = 0
+    tension_steps: int = 0
+    vapour_steps: int = 0
+
+    def force(self, name: str, throw: int = 0) -> NDArray[np.float64]:
+        """One column of the forces, by its name in :data:`FORCES` [N]."""
+        return self.forces[:, 1 + len(FORCES) * throw + FORCES.index(name)]
 
 
-@kernel
-def _gap(state: Any, p: Any) -> Any:
-    """Penetration, its rate, the normal, and the sliding velocity of the pin over the eye."""
-    alpha, omega, x, u, beta, b = state
-    sin_a, cos_a = sine_cosine(alpha)
-    sin_b, cos_b = sine_cosine(beta)
-    d_x = p.crank_radius * cos_a + p.rod_length * cos_b - x
-    d_y = p.crank_radius * sin_a - p.rod_length * sin_b
-    v_x = -p.crank_radius * sin_a * omega - p.rod_length * sin_b * b - u
-    v_y = p.crank_radius * cos_a * omega - p.rod_length * cos_b * b
-    distance = math.sqrt(d_x * d_x + d_y * d_y)
-    if distance > 0.0:
-        n_x, n_y = d_x / distance, d_y / distance
-    else:  # centred pin: the normal along the stroke is as good as any, and never NaN
-        n_x, n_y = 1.0, 0.0
-    normal_speed = v_x * n_x + v_y * n_y
-    sliding = v_y * n_x - v_x * n_y + omega * p.pin_radius + b * p.eye_radius
-    return distance - p.clearance, normal_speed, n_x, n_y, sliding, sin_a, cos_a, sin_b, cos_b
-
-
-@kernel
-def _piston_force(alpha: float, p: CrankParameters) -> float:
-    if p.pressure_rung == PRESSURE_NONE:
-        return 0.0
-    force: float = two_level_pressure(alpha, p.suction_force, p.discharge_force, p.rise_angle)
-    return force
-
-
-@kernel
-def _piston_forces(angle: NDArray[np.float64], p: Any) -> NDArray[np.float64]:
-    force = np.empty(angle.size)
-    for i in range(angle.size):
-        force[i] = _piston_force(angle[i], p)
-    return force
-
-
-@kernel
-def _derivative(state: Any, contact: bool, p: Any) -> Any:
-    """Rate of the state; forces pin x, pin y, piston, normal; penetration and the law's force."""
-    sigma, normal_speed, n_x, n_y, sliding, sin_a, cos_a, sin_b, cos_b = _gap(state, p)
-    b = state[5]
-    law = kelvin_voigt(sigma, normal_speed, p.stiffness, p.damping)
-    normal, tangential, f_x, f_y = 0.0, 0.0, 0.0, 0.0
-    if contact:
-        normal = law
-        tangential = tangential_force(
-            sliding, normal, p.friction, p.friction_speed, p.tangential_damping
-        )
-        f_x = normal * n_x - tangential * n_y
-        f_y = normal * n_y + tangential * n_x
-    piston = _piston_force(state[0], p)
-    m12 = p.static_moment * sin_b
-    rhs_x = f_x - piston - p.moving_mass * p.gravity_x - p.static_moment * cos_b * b * b
-    rhs_b = (
-        p.rod_length * (f_x * sin_b + f_y * cos_b)
-        - p.eye_radius * tangential
-        - p.static_moment * (p.gravity_x * sin_b + p.gravity_y * cos_b)
-    )
-    inverse = 1.0 / (p.moving_mass * p.rod_inertia - m12 * m12)
-    x_acc = (p.rod_inertia * rhs_x - m12 * rhs_b) * inverse
-    b_acc = (p.moving_mass * rhs_b - m12 * rhs_x) * inverse
-    crank_acc = p.inverse_crank_inertia * (
-        p.drive_moment + p.crank_radius * (f_x * sin_a - f_y * cos_a) - p.pin_radius * tangential
-    )
-    rate = (state[1], crank_acc, state[3], x_acc, b, b_acc)
-    return rate, f_x, f_y, piston, normal, sigma, law
-
-
-@kernel
-def _moved(state: Any, rate: Any, h: float) -> Any:
-    return (
-        state[0] + h * rate[0],
-        state[1] + h * rate[1],
-        state[2] + h * rate[2],
-        state[3] + h * rate[3],
-        state[4] + h * rate[4],
-        state[5] + h * rate[5],
-    )
-
-
-@kernel
-def _mean_rate(k1: Any, k2: Any, k3: Any, k4: Any) -> Any:
-    return (
-        (k1[0] + 2.0 * (k2[0] + k3[0]) + k4[0]) / 6.0,
-        (k1[1] + 2.0 * (k2[1] + k3[1]) + k4[1]) / 6.0,
-        (k1[2] + 2.0 * (k2[2] + k3[2]) + k4[2]) / 6.0,
-        (k1[3] + 2.0 * (k2[3] + k3[3]) + k4[3]) / 6.0,
-        (k1[4] + 2.0 * (k2[4] + k3[4]) + k4[4]) / 6.0,
-        (k1[5] + 2.0 * (k2[5] + k3[5]) + k4[5]) / 6.0,
-    )
-
-
-@kernel
-def _runge_kutta(state: Any, first: Any, h: float, contact: bool, p: Any) -> Any:
-    """One step with the contact held open or closed; impulses of the forces along with it.
-
-    `first` is the derivative at `state`; the one at the end is returned for the next step.
-    """
-    k1, x1, y1, p1, n1, _, _ = first
-    k2, x2, y2, p2, n2, _, _ = _derivative(_moved(state, k1, 0.5 * h), contact, p)
-    k3, x3, y3, p3, n3, _, _ = _derivative(_moved(state, k2, 0.5 * h), contact, p)
-    k4, x4, y4, p4, _, _, _ = _derivative(_moved(state, k3, h), contact, p)
-    after = _moved(state, _mean_rate(k1, k2, k3, k4), h)
-    sixth = h / 6.0
-    return (
-        after,
-        _derivative(after, contact, p),
-        sixth * (x1 + 2.0 * (x2 + x3) + x4),
-        sixth * (y1 + 2.0 * (y2 + y3) + y4),
-        sixth * (p1 + 2.0 * (p2 + p3) + p4),
-        max(n1, n2, n3),
-    )
-
-
-@kernel
-def _margin(sigma: float, law_force: float, contact: bool, p: CrankParameters) -> float:
-    """Positive while the contact stays as it is, negative once it should change [N]."""
-    if p.release == RELEASE_AT_ZERO_PENETRATION:
-        return p.stiffness * sigma if contact else -p.stiffness * sigma
-    return law_force if contact else -min(p.stiffness * sigma, law_force)
-
-
-@kernel
-def _hermite(
-    before: float, rate_before: float, after: float, rate_after: float, h: float, s: float
-) -> float:
-    r = 1.0 - s
-    return r * r * ((1.0 + 2.0 * s) * before + s * h * rate_before) + s * s * (
-        (1.0 + 2.0 * r) * after - r * h * rate_after
-    )
-
-
-@kernel
-def _between(before: Any, rate_before: Any, after: Any, rate_after: Any, h: float, s: float) -> Any:
-    """State a fraction s into the step, by the cubic through both ends."""
-    return (
-        _hermite(before[0], rate_before[0], after[0], rate_after[0], h, s),
-        _hermite(before[1], rate_before[1], after[1], rate_after[1], h, s),
-        _hermite(before[2], rate_before[2], after[2], rate_after[2], h, s),
-        _hermite(before[3], rate_before[3], after[3], rate_after[3], h, s),
-        _hermite(before[4], rate_before[4], after[4], rate_after[4], h, s),
-        _hermite(before[5], rate_before[5], after[5], rate_after[5], h, s),
-    )
-
-
-@kernel
-def _locate_change(
-    before: Any, first: Any, after: Any, last: Any, h: float, contact: bool, p: Any
-) -> float:
-    """Fraction of the step at which the contact changes: Illinois on the dense output."""
-    low, high = 0.0, 1.0
-    f_low = _margin(first[5], first[6], contact, p)
-    f_high = _margin(last[5], last[6], contact, p)
-    if f_low <= 0.0:  # just changed, at rounding: the next change is the one at the end
-        return 1.0
-    for _ in range(60):
-        s = high - f_high * (high - low) / (f_high - f_low)
-        sigma, normal_speed = _gap(_between(before, first[0], after, last[0], h, s), p)[:2]
-        law = kelvin_voigt(sigma, normal_speed, p.stiffness, p.damping)
-        f = _margin(sigma, law, contact, p)
-        if f > 0.0:
-            low, f_low = s, f
-            f_high *= 0.5
-        else:
-            high, f_high = s, f
-            f_low *= 0.5
-        if high - low < 1e-12 or abs(f) < 1e-9:
-            break
-    return high
-
-
-@kernel
-def _step(state: Any, first: Any, contact: bool, h: float, p: Any) -> Any:
-    """One whole step, cut wherever the contact closes or opens."""
-    left, cuts, refused = h, 0, 0
-    impulse_x, impulse_y, impulse_p, peak = 0.0, 0.0, 0.0, 0.0
-    while left > 0.0:
-        after, last, i_x, i_y, i_p, n = _runge_kutta(state, first, left, contact, p)
-        taken = left
-        changed = _margin(last[5], last[6], contact, p) < 0.0
-        if changed and cuts < _MOST_CUTS:
-            taken = left * _locate_change(state, first, after, last, left, contact, p)
-            after, last, i_x, i_y, i_p, n = _runge_kutta(state, first, taken, contact, p)
-            cuts += 1
-        elif changed:
-            refused = 1
-        state, first = after, last
-        impulse_x += i_x
-        impulse_y += i_y
-        impulse_p += i_p
-        peak = max(peak, n)
-        if changed:
-            contact = not contact
-            first = _derivative(state, contact, p)
-        left = 0.0 if taken == left else left - taken
-    return state, first, contact, impulse_x, impulse_y, impulse_p, peak, cuts, refused
-
-
-@kernel
-def _fault(state: Any, sigma: float, p: Any) -> int:
-    total = state[0] + state[1] + state[2] + state[3] + state[4] + state[5] + sigma
-    if not math.isfinite(total):
-        return 1
-    if sigma > _OVERLAP_LIMIT * p.pin_radius:
-        return 2
-    if abs(state[4]) > 1.5:  # rad
-        return 3
-    return 0
-
-
-@kernel
-def _integrate(
-    start: Any, h: float, p: Any, states: NDArray[np.float64], forces: NDArray[np.float64]
-) -> Any:
-    """March; returns status code, steps done, peak force, contact changes, refused cuts."""
-    state = start
-    first = _derivative(state, False, p)
-    contact = _margin(first[5], first[6], False, p) < 0.0
-    first = _derivative(state, contact, p)
-    peak, changes, refused = 0.0, 0, 0
-    for column in range(6):
-        states[0, column] = state[column]
-    rod_velocity = p.rod_centre * math.cos(state[4]) * state[5]
-    rod_mass = p.static_moment / p.rod_centre if p.rod_centre > 0.0 else 0.0
-    weight = p.moving_mass * p.gravity_y
-    for i in range(forces.shape[0]):
-        state, first, contact, i_x, i_y, i_p, n, cuts, late = _step(state, first, contact, h, p)
-        for column in range(6):
-            states[i + 1, column] = state[column]
-        velocity = p.rod_centre * math.cos(state[4]) * state[5]
-        forces[i, 0] = i_x / h
-        forces[i, 1] = i_y / h
-        forces[i, 2] = (rod_mass * (velocity - rod_velocity) - i_y) / h + weight
-        forces[i, 3] = i_p / h
-        rod_velocity = velocity
-        peak = max(peak, n)
-        changes += cuts
-        refused += late
-        code = _fault(state, first[5], p)
-        if code != 0:
-            return code, i + 1, peak, changes, refused
-    return 0, forces.shape[0], peak, changes, refused
-
-
-def parameters(scene: PumpScene) -> CrankParameters:
-    """Kernel parameters of a scene."""
-    joint, rod, pressure = scene.joint.crankpin, scene.rod, scene.pressure
-    area = math.pi / 4 * scene.piston.diameter**2
-    rung = {"none": PRESSURE_NONE, "two-level": PRESSURE_TWO_LEVEL}[pressure.rung]
-    return CrankParameters(
-        crank_radius=scene.crank.radius,
-        rod_length=rod.length,
-        rod_centre=rod.centre_of_mass,
-        moving_mass=rod.mass + scene.piston.mass,
-        static_moment=rod.mass * rod.centre_of_mass,
-        rod_inertia=rod.inertia + rod.mass * rod.centre_of_mass**2,
-        inverse_crank_inertia=0.0,
-        drive_moment=0.0,
-        gravity_x=scene.gravity * math.sin(scene.stroke_inclination),
-        gravity_y=scene.gravity * math.cos(scene.stroke_inclination),
-        clearance=joint.clearance_radial,
-        pin_radius=joint.pin_diameter / 2,
-        eye_radius=joint.pin_diameter / 2 + joint.clearance_radial,
-        stiffness=joint.stiffness,
-        damping=joint.damping,
-        friction=joint.friction,
-        friction_speed=joint.friction_speed,
-        tangential_damping=joint.tangential_damping,
-        release=RELEASE_AT_ZERO_FORCE,
-        pressure_rung=rung,
-        suction_force=area * pressure.suction,
-        discharge_force=area * pressure.discharge,
-        rise_angle=pressure.rise_angle,
-    )
-
-
-def contact_frequency(scene: PumpScene) -> float:
-    """Largest angular frequency of the mechanism on its undamped contact spring [rad/s].
-
-    The mass felt at the eye depends on the direction; its least value over a revolution sets the
-    fastest contact, and so the step.
-    """
-    p = parameters(scene)
-    return math.sqrt(p.stiffness * _largest_mobility(p))
-
-
-def contact_rate(scene: PumpScene) -> float:
-    """Fastest rate of the damped contact [1/s]: largest root of ``s^2 + C/m s + K/m``.
-
-    The contact's angular frequency while it oscillates; beyond critical damping the faster of
-    its two decays, which is what limits an explicit step.
-    """
-    p = parameters(scene)
-    half = p.damping * _largest_mobility(p) / 2
-    square = p.stiffness * _largest_mobility(p)
-    return half + math.sqrt(half**2 - square) if half**2 > square else math.sqrt(square)
-
-
-def _largest_mobility(p: CrankParameters) -> float:
-    largest = math.asin(min(1.0, p.crank_radius / p.rod_length))
-    return max(_mobility(beta, p) for beta in np.linspace(0.0, largest, 5))
-
-
-def _mobility(beta: float, p: CrankParameters) -> float:
-    """Largest acceleration of the eye per unit force [1/kg]."""
-    coupling = p.static_moment * math.sin(beta)
-    mass = np.array([[p.moving_mass, coupling], [coupling, p.rod_inertia]])
-    arm = p.rod_length * np.array([math.sin(beta), math.cos(beta)])
-    jacobian = np.array([[1.0, arm[0]], [0.0, arm[1]]])
-    return float(np.linalg.eigvalsh(jacobian @ np.linalg.solve(mass, jacobian.T))[-1])
-
-
-def ideal_motion(scene: PumpScene, angle: NDArray[np.float64]) -> IdealCrank:
-    """The rung *ideal*: inverse dynamics without clearance at the crank angles given [rad]."""
-    p = parameters(scene)
-    force = _piston_forces(np.ravel(angle).astype(float), p).reshape(np.shape(angle))
-    return ideal_crank(
-        angle,
-        speed=2 * math.pi * scene.drive.speed,
-        crank_radius=p.crank_radius,
-        rod_length=p.rod_length,
-        rod_mass=scene.rod.mass,
-        rod_centre=p.rod_centre,
-        rod_inertia=scene.rod.inertia,
-        piston_mass=scene.piston.mass,
-        piston_force=force,
-        gravity_x=p.gravity_x,
-        gravity_y=p.gravity_y,
-    )
-
-
-def start_state(scene: PumpScene, angle: float) -> tuple[float, ...]:
-    """State in which the pin rests in its eye with the force that an ideal joint would carry."""
-    p = parameters(scene)
-    ideal = ideal_motion(scene, np.array([angle]))
-    force = np.array([ideal.pin_force_x[0], ideal.pin_force_y[0]])
-    size = float(np.hypot(*force))
-    direction = force / size if size > 0 else np.array([1.0, 0.0])
-    offset = (p.clearance + size / p.stiffness) * direction
-    sin_b = (p.crank_radius * math.sin(angle) - offset[1]) / p.rod_length
-    # out of reach only where the contact is far too soft: the run then says so by its status
-    beta = math.asin(min(1.0, max(-1.0, sin_b)))
-    piston = p.crank_radius * math.cos(angle) + p.rod_length * math.cos(beta) - offset[0]
-    return (
-        angle,
-        2 * math.pi * scene.drive.speed,
-        float(piston),
-        float(ideal.piston_velocity[0]),
-        beta,
-        float(ideal.beta_rate[0]),
-    )
-
-
-def pin_offset(scene: PumpScene, states: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Position of the pin's centre from the eye's [m].
-
-    Parameters
-    ----------
-    scene : PumpScene
-    states : numpy.ndarray [shape=(n, 6)]
-        Columns as :data:`STATE`.
-
-    Returns
-    -------
-    numpy.ndarray [shape=(n, 2)]
-        x along the stroke, y across it. Its length exceeds the radial clearance by the
-        penetration where there is contact.
-    """
-    alpha, piston, beta = states[:, 0], states[:, 2], states[:, 4]
-    radius, length = scene.crank.radius, scene.rod.length
-    along = radius * np.cos(alpha) + length * np.cos(beta) - piston
-    return np.column_stack([along, radius * np.sin(alpha) - length * np.sin(beta)])
-
-
-def run_compliant(
-    p: CrankParameters, start: tuple[float, ...], *, step: float, n_steps: int
+def run_mechanism(
+    t: Tables,
+    *,
+    angle: float,
+    speed: float,
+    bodies: NDArray[np.float64],
+    step: float,
+    n_steps: int,
+    chambers: NDArray[np.float64] | None = None,
+    keep_states: bool = True,
 ) -> CrankRun:
-    """The rung *compliant*: integrate the mechanism with contact in its clearance.
+    """Integrate the mechanism with contact in its clearances.
 
     Parameters
     ----------
-    p : CrankParameters
+    t : Tables
         Validated by the scene; a kernel trusts it.
-    start : tuple of float
-        Columns as :data:`STATE`.
+    angle, speed : float
+        Of the crank at the start [rad], [rad/s].
+    bodies : numpy.ndarray [shape=(n_throws, 12)]
+        Columns as :data:`BODY`, then their rates. What ideal joints and links hold together must
+        be together.
     step : float
-        [s], at most ``LARGEST_STEP_PER_CONTACT_TIME`` over :func:`contact_rate`.
+        [s]
     n_steps : int
         Steps to take.
+    chambers : numpy.ndarray [shape=(n_throws, 6)], optional
+        State of the chambers at the start.
+    keep_states : bool
+        Keep the bodies at the ends of all steps.
 
     Returns
     -------
     CrankRun
         Cut off at the step in which it failed where the status is not OK.
     """
-    states = np.empty((n_steps + 1, len(STATE)))
-    forces = np.empty((n_steps, len(FORCES)))
-    code, done, peak, changes, refused = _integrate(start, step, p, states, forces)
+    n = len(t.throws)
+    rows = n_steps + 1 if keep_states else 1
+    breathing = bool(np.any(t.throws["pressure_rung"] == PRESSURE_CHAMBER))
+    w = _Work(
+        crank=np.zeros((5, 5)),
+        stage=np.zeros((5, n), STAGE),
+        held=np.zeros(n, HELD),
+        moment=np.zeros(2),
+        matrix=np.zeros((4, 6)),
+        place=np.zeros((4, 6)),
+    )
+    w.crank[0, ANGLE], w.crank[0, SPEED] = angle, speed
+    w.stage["y"][0] = bodies
+    chamber = np.zeros((n, 8))
+    if chambers is not None:
+        chamber[:, :6] = chambers
+    r = _Record(
+        turns=np.empty((n_steps + 1, 2)),
+        forces=np.zeros((n_steps, 1 + n * len(FORCES))),
+        states=np.empty((rows, n, PER_THROW)),
+        chambers=np.empty((n_steps + 1 if breathing else 1, n, 8)),
+    )
+    tally = _Tally(counts=np.zeros(5, np.int64), peak=np.zeros(1))
+    code, done = _integrate(step, t, w, chamber, r, tally)
     return CrankRun(
-        states=states[: done + 1],
-        forces=forces[:done],
+        turns=r.turns[: done + 1],
+        forces=r.forces[:done],
+        bodies=r.states[: done + 1] if keep_states else None,
+        chambers=r.chambers[: done + 1, :, :6] if breathing else None,
         step=step,
         status=Status(code),
-        peak_normal_force=peak,
-        contact_changes=changes,
-        cuts_refused=refused,
-    )
-
-
-def run_ideal(scene: PumpScene, *, step: float, n_steps: int, start_angle: float) -> CrankRun:
-    """The rung *ideal* in the form of a run: forces at the middle of each step."""
-    speed = 2 * math.pi * scene.drive.speed
-    angle = start_angle + speed * step * np.arange(n_steps + 1.0)
-    ends = ideal_motion(scene, angle)
-    middle = ideal_motion(scene, 0.5 * (angle[:-1] + angle[1:]))
-    force = middle.wrist_force_x - scene.piston.mass * (
-        middle.piston_acceleration + parameters(scene).gravity_x
-    )
-    states = np.column_stack(
-        [
-            angle,
-            np.full(n_steps + 1, speed),
-            ends.piston,
-            ends.piston_velocity,
-            ends.beta,
-            ends.beta_rate,
-        ]
-    )
-    return CrankRun(
-        states=states,
-        forces=np.column_stack([middle.pin_force_x, middle.pin_force_y, middle.guide_force, force]),
-        step=step,
-        status=Status.OK,
-        peak_normal_force=float(np.hypot(middle.pin_force_x, middle.pin_force_y).max()),
-        contact_changes=0,
-        cuts_refused=0,
+        peak_normal_force=float(tally.peak[0]),
+        contact_changes=int(tally.counts[CHANGES]),
+        cuts_refused=int(tally.counts[NOT_LOCATED]),
+        floored_closings=int(tally.counts[FLOORED]),
+        tension_steps=int(tally.counts[IN_TENSION]),
+        vapour_steps=int(tally.counts[WITH_VAPOUR]),
     )

@@ -10,12 +10,16 @@ from wearstate.sim.casing import (
     PASS_BAND,
     Modes,
     band_limited_acceleration,
+    casing_inputs,
     decimate,
     decimation_filter,
     edge_samples,
     exact_oscillator,
     housing_acceleration,
 )
+from wearstate.sim.parts import SceneError
+from wearstate.sim.pump_parts import FORCE_PLACES
+from wearstate.sim.scene import load_scene
 
 FS = 25_600.0
 FACTORS = [1, 2, 3, 5, 8]
@@ -291,3 +295,33 @@ def test_a_constant_is_kept_and_only_the_edges_are_spoilt(factor):
     # At most the ripple.
     assert_allclose(kept[edge : 300 - edge], 5.0, rtol=1.2e-3)
     assert abs(kept[0, 0] - 5.0) > 0.2  # the filter runs into zeros there
+
+
+# --- where the forces act
+
+
+@given(
+    st.dictionaries(st.sampled_from(FORCE_PLACES), st.floats(-1, 1)),
+    st.dictionaries(st.tuples(st.sampled_from(FORCE_PLACES), st.integers(1, 12)), st.floats(-1, 1)),
+    st.sampled_from(FORCE_PLACES),
+    st.integers(1, 12),
+)
+def test_the_shape_of_a_throw_wins_over_that_of_the_place(places, throws, place, throw):
+    shape = places | {f"{where}_{k}": value for (where, k), value in throws.items()}
+    found = casing_inputs(shape, place, throw)
+    if (place, throw) in throws:
+        assert found == throws[place, throw]
+    else:
+        assert found == places.get(place, 0.0)
+
+
+@pytest.mark.parametrize("key", ["suction_valve", "discharge_valve_1", "bearing_y_1"])
+def test_a_scene_takes_valves_and_single_throws(key):
+    scene = load_scene("bilge-pump", {f"casing.modes.0.shape.{key}": 0.2})
+    assert scene.casing.modes[0].shape[key] == 0.2
+
+
+@pytest.mark.parametrize("key", ["bearing_y_0", "bearing_y_2", "bearing_y_01", "valve", "guide_z"])
+def test_a_throw_or_place_that_the_pump_lacks_is_refused(key):
+    with pytest.raises(SceneError, match=f"shape.{key} is no place of this scene; "):
+        load_scene("bilge-pump", {f"casing.modes.0.shape.{key}": 0.2})

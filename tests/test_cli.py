@@ -11,7 +11,7 @@ import h5py
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from wearstate.datasets.recipe import recipe_text
+from wearstate.datasets.recipe_file import recipe_text
 from wearstate.datasets.record import DataSet
 from wearstate.diagnose import demo
 from wearstate.diagnose.cli import _json_text, cli
@@ -383,7 +383,7 @@ def tiny_recipe(tmp_path, monkeypatch):
     """24 records of 12 draws, 0.6 s each: as few as can be trained on."""
     text = recipe_text("bilge-pump-small").replace("records = 120", "records = 24")
     path = tmp_path / "tiny.toml"
-    path.write_text(text.replace("[fixed]", '[fixed]\nduration = "0.6 s"'))
+    path.write_text(f'{text}[fixed]\nduration = "0.6 s"\n')
     monkeypatch.setattr(demo, "RECIPE", str(path))
 
 

@@ -23,9 +23,11 @@ MAY_IMPORT = {
 
 SIM_FLOORS = [
     {"assemble"},
+    {"pump"},
     {"ladder"},
+    {"crank_setup"},
     {"slider_crank", "orbit", "shaft_line", "casing"},
-    {"film", "impedance", "bearing", "contact", "hydraulics"},
+    {"film", "impedance", "bearing", "contact", "hydraulics", "frf_table"},
     {"integrate", "analytic", "scene"},
     {"pump_parts"},
     {"hydraulic_parts"},

@@ -398,14 +398,14 @@ def test_unknown_channel_unit_reads_well():
     "change",
     [
         ("records = 120", "# another comment\nrecords = 400"),
-        ("records_per_group = 2", "records_per_group = 1"),
-        ('scene = "bilge-pump"', 'scene = "bilge-pump"\n# the same machine'),
+        ("records = 120", "records = 120\nrecords_per_group = 1"),
+        ("records = 120", 'records = 120\nscene = "bilge-pump"'),
     ],
 )
 def test_a_copied_recipe_is_no_new_machine(trained, tmp_path, change):
     """The draws come from the recipe's name and the seed; its text may change as it likes."""
     from wearstate.datasets.generate import generate
-    from wearstate.datasets.recipe import recipe_text
+    from wearstate.datasets.recipe_file import recipe_text
 
     text = recipe_text("bilge-pump-small")
     assert change[0] in text

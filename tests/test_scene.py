@@ -14,6 +14,7 @@ from numpy.testing import assert_allclose
 from pydantic import ValidationError
 from wearstate.sim.analytic import kelvin_voigt_restitution
 from wearstate.sim.assemble import simulate
+from wearstate.sim.crank_setup import contact_frequency, ideal_motion
 from wearstate.sim.parts import UNITS, FixedTable, SceneError, to_si
 from wearstate.sim.scene import (
     SCENE_FOLDER,
@@ -23,7 +24,6 @@ from wearstate.sim.scene import (
     scene_table,
     scene_text,
 )
-from wearstate.sim.slider_crank import contact_frequency, ideal_motion
 
 EVERY_UNIT = [(dimension, unit) for dimension, units in UNITS.items() for unit in units]
 CRANKPIN = "joint.crankpin"
@@ -252,7 +252,7 @@ def test_override_leaves_the_table_alone():
         ({"tacho.name": "t" * 65}, "must have <= 64 characters"),
         ({"rod.mass": math.nan}, "rod.mass = nan kg must be finite"),
         ({"rod.mass": 10**400}, "rod.mass = inf kg must be finite"),
-        ({"pressure.rung": 3}, "pressure.rung = 3 must be 'none' or 'two-level'"),
+        ({"pressure.rung": 3}, "pressure.rung = 3 must be 'none', 'constant', 'two-level'"),
     ],
 )
 def test_every_kind_of_fault_has_its_own_words(changes, says):

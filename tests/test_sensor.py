@@ -5,7 +5,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
-from wearstate.sim.sensor import digitise, tacho_pulses
+from wearstate.sim.assemble import simulate
+from wearstate.sim.parts import SceneError, channels_of
+from wearstate.sim.scene import load_scene, override, scene_from_table, scene_table, scene_text
+from wearstate.sim.sensor import (
+    anti_alias_poles,
+    digitise,
+    low_pass,
+    low_pass_response,
+    mounting_poles,
+    tacho_pulses,
+)
 
 
 def clean(x, **changes):
@@ -72,6 +82,225 @@ def test_nothing_leaves_the_range(values, bits, full_scale):
     assert np.all(np.isfinite(signal))
     assert abs(signal).max() <= full_scale * (1 + 1e-6)
     assert clipped == sum(abs(v) > full_scale for v in values)
+
+
+# --- the mounted sensor and the filter before the converter
+
+
+@pytest.mark.parametrize("zeta", [0.01, 0.03, 0.3])
+def test_mounting_resonance(zeta):
+    f0 = 25e3
+    poles = mounting_poles(f0, zeta)
+    response = low_pass_response(np.array([0.0, f0 / 3, f0, 10 * f0]), poles)
+    assert_allclose(response[0], 1.0, rtol=1e-14)  # rounding
+    r = np.array([1 / 3, 1.0, 10.0])
+    assert_allclose(response[1:], 1 / (1 - r**2 + 2j * zeta * r), rtol=1e-12)
+    # Named apart: the gain at the resonance, a quarter of a turn behind; a third of it reads 12 %
+    # too much, the usual rule for the useful band.
+    assert_allclose(response[2], -0.5j / zeta, rtol=1e-12)
+    if zeta < 0.1:
+        assert_allclose(abs(response[1]), 9 / 8, rtol=1e-3 if zeta < 0.02 else 5e-3)
+
+
+@pytest.mark.parametrize("kind", ["butterworth", "bessel"])
+@pytest.mark.parametrize("order", [1, 2, 4, 8, 10])
+def test_anti_alias_filter(kind, order):
+    cutoff = 10e3
+    poles = anti_alias_poles(kind, cutoff, order)
+    far = 1e3 * cutoff
+    level = abs(low_pass_response(np.array([0.0, cutoff, far, 2 * far]), poles))
+    assert_allclose(level[0], 1.0, rtol=1e-12)
+    assert_allclose(level[1], np.sqrt(0.5), rtol=1e-6)  # scipy seeks the Bessel one to 1e-8
+    # 6.02 dB an octave and order; terms of (cutoff / far)^2 are left, ten times for Bessel.
+    assert_allclose(level[2] / level[3], 2.0**order, rtol=1e-4)
+    f = np.linspace(0, 3 * cutoff, 50)
+    falling = abs(low_pass_response(f, poles))
+    assert np.all(np.diff(falling) < 1e-14)  # rounding, where it is flat
+    if kind == "butterworth":
+        assert_allclose(falling, (1 + (f / cutoff) ** (2 * order)) ** -0.5, rtol=1e-10)
+    else:  # the delay of a Bessel filter is the same throughout its pass band
+        phase = np.unwrap(np.angle(low_pass_response(np.linspace(1, cutoff / 4, 30), poles)))
+        delay = -np.diff(phase)
+        # Flat as (f / cutoff)^(2 order): of the first order 1 / (1 + r^2), a sixteenth.
+        assert np.ptp(delay) / delay[0] < (0.07 if order == 1 else 0.04)
+
+
+FS = 25_600.0
+
+
+@pytest.mark.parametrize(
+    "poles", [mounting_poles(25e3, 0.03), anti_alias_poles("butterworth", 9e3, 8)]
+)
+@pytest.mark.parametrize("f", [200.0, 5000.0, 9000.0, 11_000.0])
+def test_a_sine_has_level_and_phase_of_the_response(poles, f):
+    time = np.arange(8000) / FS
+    out = low_pass(np.sin(2 * np.pi * f * time), FS, poles)
+    wave = np.exp(2j * np.pi * f * time[2000:6000])
+    design = np.column_stack([wave.imag, wave.real])
+    sine, cosine = np.linalg.lstsq(design, out[2000:6000], rcond=None)[0]
+    # The sine's ends ring at the band edge, 1 / (pi n) at n > 2,000 samples, out of step with it.
+    expected = complex(low_pass_response(np.array([f]), poles)[0])
+    assert_allclose(sine + 1j * cosine, expected, atol=3e-4)
+
+
+@pytest.mark.parametrize("f0", [30.0, 25e3])
+def test_nothing_wraps_round_and_nothing_comes_early(f0):
+    x = np.zeros((2, 4000))
+    x[0, 2000] = 1.0
+    x[1, -50:] = 1.0
+    out = low_pass(x, FS, mounting_poles(f0, 0.03))
+    assert abs(out).max() > 1e-3
+    # A sample is as narrow as the band; its ringing sinks as 1 / n, at half the rate. A pole
+    # within the band leaves none; one above it a response that jumps at the band's edge.
+    early = 2e-3 * abs(out).max(axis=1)
+    assert abs(out[0, :1500]).max() < early[0]
+    assert abs(out[1, :3000]).max() < early[1]
+
+
+def test_a_steady_beginning_makes_no_transient():
+    assert_allclose(low_pass(np.full(300, 7.0), FS, mounting_poles(40.0, 0.03)), 7.0, rtol=1e-12)
+
+
+def test_a_slow_resonance_rings_as_its_step_response():
+    f0, zeta = 60.0, 0.05
+    x = np.zeros(6000)
+    rise = np.arange(1, 41) / 41
+    x[1000:1040] = 0.5 - 0.5 * np.cos(np.pi * rise)  # 1.6 ms, a tenth of the period
+    x[1040:] = 1.0
+    out = low_pass(x, FS, mounting_poles(f0, zeta))
+    time = (np.arange(1100, 6000) - 1020) / FS
+    w, wd = 2 * np.pi * f0, 2 * np.pi * f0 * np.sqrt(1 - zeta**2)
+    step = np.exp(-zeta * w * time) * (np.cos(wd * time) + zeta * w / wd * np.sin(wd * time))
+    # A rise over T passes f0 as 1 - (1 - 8 / pi^2) (pi f0 T)^2 / 2 or so: 1e-2.
+    assert_allclose(out[1100:], 1 - step, atol=1e-2)
+
+
+@pytest.mark.parametrize("bits", [16, 24])
+def test_noise_floor_of_a_converter(bits):
+    full_scale, n = 100.0, 200_000
+    step = 2 * full_scale / 2**bits
+    x = 0.3 * step * np.random.default_rng(4).standard_normal(n)  # of the last bit only
+    signal, _ = clean(x, bits=bits, full_scale=full_scale)
+    error = signal - np.round(x / step) * step
+    assert abs(error).max() == 0  # float32 holds so few steps exactly
+    busy = np.random.default_rng(5).uniform(-20 * step, 20 * step, n)
+    floor = (clean(busy, bits=bits, full_scale=full_scale)[0] - busy).std()
+    assert_allclose(floor, step / np.sqrt(12), rtol=6e-3)  # rms of n samples: 0.14 %, four of them
+
+
+# --- what a scene says of it
+
+
+def pump(**changes):
+    return load_scene("bilge-pump", {f"sensors.0.{name}": v for name, v in changes.items()})
+
+
+def test_units_and_defaults_of_the_front_end():
+    sensor = pump(
+        mounting_resonance="25 kHz",
+        mounting_damping="3 %",
+        anti_alias="bessel",
+        anti_alias_cutoff="10 kHz",
+        anti_alias_order=4,
+    ).sensors[0]
+    assert (sensor.mounting_resonance, sensor.mounting_damping) == (25_000.0, 0.03)
+    assert (sensor.anti_alias_cutoff, sensor.anti_alias_order) == (10_000.0, 4)
+    plain = pump().sensors[0]
+    assert (plain.mounting_resonance, plain.anti_alias, plain.axes) == (None, "none", ())
+
+
+@pytest.mark.parametrize(
+    ("changes", "says"),
+    [
+        ({"mounting_resonance": "25 kHz"}, "mounting_resonance = 25000 needs mounting_damping"),
+        ({"mounting_damping": 0.03}, "mounting_damping = 0.03 needs mounting_resonance beside it"),
+        ({"mounting_resonance": "0.5 Hz", "mounting_damping": 0.1}, "= 0.5 Hz must be >= 1"),
+        ({"mounting_resonance": "9 kHz", "mounting_damping": 1}, "mounting_damping = 1 must be <"),
+        ({"anti_alias": "butterworth", "anti_alias_order": 4}, "needs anti_alias_cutoff beside"),
+        ({"anti_alias_order": 4}, "anti_alias_order = 4 needs anti_alias = 'butterworth' or"),
+        ({"anti_alias": "chebyshev"}, "must be 'none', 'butterworth' or 'bessel'"),
+        ({"anti_alias_order": 11}, "sensors.0.anti_alias_order = 11 must be <= 10"),
+        ({"axes": ["x", "x"]}, "axes = ['x', 'x'] must be different; remove one"),
+        ({"axes": ["u"]}, "sensors.0.axes.0 = 'u' must be 'x', 'y' or 'z'"),
+        ({"axes": ["x"]}, "direction = 'along the stroke' must be empty beside axes"),
+        ({"axes": ["x"], "direction": "", "name": "a" * 63}, "name has 63 characters, must have"),
+    ],
+)
+def test_faults_of_the_front_end(changes, says):
+    with pytest.raises(SceneError) as caught:
+        pump(**changes)
+    assert any(says in fault and "sensors.0" in fault for fault in caught.value.faults), (
+        caught.value.faults
+    )
+
+
+def triaxial(**changes):
+    table = scene_table(scene_text("bilge-pump"))
+    head = {"name": "head", "axes": ["x", "y", "z"], "place": "cylinder head", "range": "200 g"}
+    table["sensors"] = [head, table["sensors"][1]]
+    for mode in table["casing"]["modes"]:
+        mode["shape"]["head_x"] = mode["shape"].pop("acc_x")
+        mode["shape"] |= {"head_y": mode["shape"]["acc_y"], "head_z": 0.03}
+    table |= {"duration": "0.25 s"}
+    return scene_from_table(override(table, {"sensors.1.noise": 0, **changes}))
+
+
+def test_a_triaxial_sensor_has_three_channels():
+    scene = triaxial()
+    assert [s.name for s in scene.accelerometers] == ["head_x", "head_y", "head_z", "acc_y"]
+    channels = channels_of(scene)
+    assert [channel.name for channel in channels[:3]] == ["head_x", "head_y", "head_z"]
+    assert channels[2].direction == "along the shaft"
+    assert {channel.place for channel in channels[:3]} == {"cylinder head"}
+    assert scene_from_table(scene.model_dump()) == scene
+
+
+def test_an_axis_measures_what_a_sensor_of_its_own_would():
+    signal = simulate(triaxial(), seed=1).signal
+    single = load_scene(
+        "bilge-pump", {"duration": "0.25 s", "sensors.0.noise": 0, "sensors.1.noise": 0}
+    )
+    alone = simulate(single, seed=1).signal
+    assert_array_equal(signal[[0, 3]], alone[:2])
+    assert_array_equal(signal[1], signal[3])  # the shapes of head_y and acc_y are the same
+    assert signal[2].std() > 0.1
+    doubled = simulate(triaxial(**{"sensors.0.gain": 2.0}), seed=1).signal
+    step = 2 * triaxial().sensors[0].range / 2**24
+    assert_allclose(doubled[:3], 2 * signal[:3], atol=2 * step)  # one path moves all its axes
+    assert_array_equal(doubled[3], signal[3])
+
+
+def test_a_missing_axis_is_named():
+    with pytest.raises(SceneError, match=r"casing\.modes\.0\.shape\.head_w is no place") as caught:
+        triaxial(**{"casing.modes.0.shape": {"head_w": 1.0, "head_x": 0.1, "acc_y": 0.1}})
+    assert any("shape.head_z is missing" in fault for fault in caught.value.faults)
+
+
+def test_a_recording_passes_mounting_and_filter():
+    quiet = {"duration": "0.25 s", "sensors.0.noise": 0, "sensors.1.noise": 0}
+    plain = simulate(load_scene("bilge-pump", quiet), seed=1).signal
+    mounted = {"sensors.0.mounting_resonance": "9 kHz", "sensors.0.mounting_damping": 0.05}
+    filtered = {
+        "sensors.0.anti_alias": "butterworth",
+        "sensors.0.anti_alias_cutoff": "2 kHz",
+        "sensors.0.anti_alias_order": 6,
+    }
+    filter_poles = anti_alias_poles("butterworth", 2e3, 6)
+    for changes, poles in (
+        (mounted, mounting_poles(9e3, 0.05)),
+        (filtered, filter_poles),
+        (mounted | filtered, np.concatenate([mounting_poles(9e3, 0.05), filter_poles])),
+    ):
+        found = simulate(load_scene("bilge-pump", {**quiet, **changes}), seed=1).signal
+        expected = low_pass(plain[0].astype(float), FS, poles)
+        # Cut out of the run before or after the filter: the same once the start has died away,
+        # exp(-2800 / s * 20 ms), but for the band edge's ringing at the cuts and two roundings.
+        step = 2 * load_scene("bilge-pump").sensors[0].range / 2**24
+        away = slice(512, -512)
+        atol = 1e-3 * plain[0].std() + step
+        assert_allclose(found[0][away], expected[away], rtol=0, atol=atol)
+        assert abs(found[0][away] - plain[0][away]).max() > 100 * atol
+        assert_array_equal(found[1], plain[1])  # the other sensor has neither
 
 
 # --- the tacho

@@ -3,6 +3,7 @@
 import cmath
 import math
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -11,10 +12,11 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy.integrate import quad
 from wearstate.diagnose.verify import rebound
+from wearstate.sim import crank_setup as cs
 from wearstate.sim import slider_crank as sc
 from wearstate.sim.analytic import ideal_crank, kelvin_voigt_restitution
 from wearstate.sim.contact import RELEASE_AT_ZERO_FORCE, RELEASE_AT_ZERO_PENETRATION
-from wearstate.sim.hydraulics import PRESSURE_NONE, two_level_pressure
+from wearstate.sim.hydraulics import two_level_pressure
 from wearstate.sim.jit import sine_cosine
 from wearstate.sim.scene import load_scene
 
@@ -68,14 +70,26 @@ def crank_by_newton_euler(scene, angle, piston_force):
     }
 
 
+def pushes(scene, angle):
+    """Force of a two-level pressure on the piston, positive towards the crank [N]."""
+    p, area = scene.pressure, math.pi / 4 * scene.piston.diameter**2
+    return np.array(
+        [
+            area * two_level_pressure(a, p.suction, p.discharge, p.rise_angle)
+            if p.rung == "two-level"
+            else 0.0
+            for a in angle
+        ]
+    )
+
+
 # --- the ideal crank
 
 
 @pytest.mark.parametrize("scene", [PUMP, BENCHMARK, TILTED], ids=lambda s: s.name)
 def test_ideal_crank_against_newton_and_euler(scene):
-    ideal = sc.ideal_motion(scene, REVOLUTION)
-    p = sc.parameters(scene)
-    push = np.array([sc._piston_force(a, p) for a in REVOLUTION])
+    ideal = cs.ideal_motion(scene, REVOLUTION)
+    push = pushes(scene, REVOLUTION)
     for name, expected in crank_by_newton_euler(scene, REVOLUTION, push).items():
         # Two algebraically equal forms: rounding, on the scale of the largest value.
         assert_allclose(
@@ -89,8 +103,8 @@ def test_ideal_crank_rates_are_derivatives():
     # of 1e-16 / h; the harmonics of a rod ratio 5/12 keep derivatives within 1e3 of the value.
     weights = np.array([-1, 9, -45, 0, 45, -9, 1]) / (60 * h)
     omega = 2 * np.pi * BENCHMARK.drive.speed
-    around = sc.ideal_motion(BENCHMARK, REVOLUTION[:, None] + h * np.arange(-3, 4))
-    here = sc.ideal_motion(BENCHMARK, REVOLUTION)
+    around = cs.ideal_motion(BENCHMARK, REVOLUTION[:, None] + h * np.arange(-3, 4))
+    here = cs.ideal_motion(BENCHMARK, REVOLUTION)
     for value, rate in (
         ("piston", "piston_velocity"),
         ("piston_velocity", "piston_acceleration"),
@@ -105,7 +119,7 @@ def test_ideal_crank_rates_are_derivatives():
 @pytest.mark.parametrize("scene", [BENCHMARK, TILTED], ids=lambda s: s.name)
 def test_drive_does_no_work_over_a_revolution_without_pressure(scene):
     free = load_scene(scene.name, {"pressure.rung": "none", "stroke_inclination": 0.6})
-    moment = sc.ideal_motion(free, REVOLUTION[:-1]).crank_moment
+    moment = cs.ideal_motion(free, REVOLUTION[:-1]).crank_moment
     # The mean over a period of an analytic function: the trapezoidal rule is exact to rounding.
     assert abs(moment.mean()) < 1e-13 * abs(moment).max()
 
@@ -137,7 +151,7 @@ def test_drive_does_the_work_of_the_pressure(rise):
     work = area * span * (2 * radius - late(0.0) - late(math.pi))
 
     def moment(a):
-        return float(sc.ideal_motion(scene, np.array([a])).crank_moment[0])
+        return float(cs.ideal_motion(scene, np.array([a])).crank_moment[0])
 
     pieces = [0.0, ramp, math.pi, math.pi + ramp, 2 * math.pi]
     done = sum(quad(moment, a, b, epsrel=1e-11, limit=200)[0] for a, b in pairwise(pieces))
@@ -147,22 +161,47 @@ def test_drive_does_the_work_of_the_pressure(rise):
 
 def test_ideal_run_records_the_ideal_forces_in_mid_step():
     step, start = 1e-4, 0.4
-    run = sc.run_ideal(TILTED, step=step, n_steps=3000, start_angle=start)
-    omega, p = 2 * np.pi * TILTED.drive.speed, sc.parameters(TILTED)
+    scene = load_scene(
+        "bilge-pump",
+        {"stroke_inclination": "35 deg", "joint.crankpin.rung": "ideal", "crank.unbalance": 0.3},
+    )
+    run = cs.run_scene(scene, step=step, n_steps=3000, start_angle=start)
+    omega = 2 * np.pi * scene.drive.speed
     middle = start + omega * step * (np.arange(3000) + 0.5)
-    push = np.array([sc._piston_force(a, p) for a in middle])
+    push = pushes(scene, middle)
     assert np.ptp(push) > 1000  # N: both levels are met
-    expected = crank_by_newton_euler(TILTED, middle, push)
-    columns = [expected["pin_force_x"], expected["pin_force_y"], expected["guide_force"], push]
-    # Rounding of angle and forces, on the scale of the pin force.
-    assert_allclose(run.forces, np.column_stack(columns), rtol=0, atol=1e-11 * 3000)
-    assert run.states.shape == (3001, 6)
+    expected = crank_by_newton_euler(scene, middle, push)
+    expected["piston_force"] = -push
+    for name, source, sign in (
+        ("pin_x", "pin_force_x", 1),
+        ("pin_y", "pin_force_y", 1),
+        ("wrist_x", "wrist_force_x", -1),  # of the pin on the rod, there of the rod on the pin
+        ("wrist_y", "wrist_force_y", -1),
+        ("guide_y", "guide_force", 1),
+        ("piston_x", "piston_force", 1),
+    ):
+        # Rounding of angle and forces, on the scale of the pin force.
+        assert_allclose(
+            run.force(name), sign * expected[source], rtol=0, atol=1e-11 * 3000, err_msg=name
+        )
+    along = math.sin(scene.stroke_inclination) * np.sin(middle)
+    weight = scene.gravity * (math.cos(scene.stroke_inclination) * np.cos(middle) - along)
+    drive = expected["crank_moment"] + scene.crank.unbalance * weight
+    assert_allclose(run.forces[:, 0], drive, rtol=0, atol=1e-11 * 3000)
+    assert run.bodies.shape == (3001, 1, 12)
     ends = start + omega * step * np.arange(3001)
-    assert_allclose(run.states[:, 0], ends, rtol=1e-14)
-    at_ends = crank_by_newton_euler(TILTED, ends, 0.0)
-    assert_allclose(run.states[:, 2], at_ends["piston"], rtol=1e-13)
-    assert_allclose(run.states[:, 3], at_ends["piston_velocity"], rtol=0, atol=1e-12)
-    assert run.peak_normal_force == np.hypot(*run.forces[:, :2].T).max()
+    assert_allclose(run.turns[:, 0], ends, rtol=1e-14)
+    assert np.all(run.turns[:, 1] == omega)
+    at_ends = crank_by_newton_euler(scene, ends, 0.0)
+    assert_allclose(run.bodies[:, 0, 3], at_ends["piston"], rtol=1e-13)
+    assert_allclose(run.bodies[:, 0, 9], at_ends["piston_velocity"], rtol=0, atol=1e-12)
+    pin = scene.crank.radius * np.exp(1j * ends)
+    to_pin = (pin - at_ends["piston"]) / scene.rod.length
+    centre = at_ends["piston"] + scene.rod.centre_of_mass * to_pin
+    assert_allclose(run.bodies[:, 0, 0], centre.real, rtol=1e-13)
+    assert_allclose(run.bodies[:, 0, 1], centre.imag, rtol=0, atol=1e-15)
+    pin_force = np.hypot(run.force("pin_x"), run.force("pin_y"))
+    assert run.peak_normal_force == pin_force.max()
 
 
 def test_pressure_levels_and_ramps():
@@ -192,7 +231,7 @@ def test_pressure_levels_and_ramps():
 def test_restitution_of_the_mechanism(ratio, release, expected):
     closed = kelvin_voigt_restitution(ratio, release_at_zero_force=release == RELEASE_AT_ZERO_FORCE)
     assert_allclose(closed, expected, atol=5e-7)  # half of the last printed digit
-    default = rebound(ratio, release, step_per_contact_time=sc.STEP_PER_CONTACT_TIME)
+    default = rebound(ratio, release, step_per_contact_time=cs.STEP_PER_CONTACT_TIME)
     assert_allclose(default, closed, atol=1e-4)  # what the default step is chosen for
     # Order 4: a tenth of the step leaves 1e-4 of that error, and rounding.
     assert_allclose(rebound(ratio, release), closed, atol=2e-8)
@@ -201,16 +240,127 @@ def test_restitution_of_the_mechanism(ratio, release, expected):
 # --- energy of the free crank
 
 
-def free_crank(scene=TILTED, **changes):
-    """Parameters without drive and losses: the crank has an inertia, nothing takes energy out."""
-    free = {
-        "pressure_rung": PRESSURE_NONE,
-        "friction": 0.0,
-        "tangential_damping": 0.0,
-        "damping": 0.0,
-        "inverse_crank_inertia": 1 / 0.5,  # a small flywheel [kg m^2]
-    }
-    return sc.parameters(scene)._replace(**{**free, **changes})
+class Lumped(NamedTuple):
+    """A throw in its least coordinates, which the library does not use."""
+
+    crank_radius: float
+    rod_length: float
+    moving_mass: float
+    static_moment: float
+    rod_inertia: float  # about the wrist pin
+    inverse_crank_inertia: float
+    gravity_x: float
+    gravity_y: float
+    clearance: float
+    pin_radius: float
+    eye_radius: float
+    stiffness: float
+    friction_speed: float
+
+
+def lumped(scene, t):
+    """Of a scene and its tables with changes."""
+    rod, pin = scene.rod, t.contacts[0, sc.CRANKPIN]
+    radius = scene.joint.crankpin.pin_diameter / 2
+    return Lumped(
+        crank_radius=scene.crank.radius,
+        rod_length=rod.length,
+        moving_mass=rod.mass + scene.piston.mass,
+        static_moment=rod.mass * rod.centre_of_mass,
+        rod_inertia=rod.inertia + rod.mass * rod.centre_of_mass**2,
+        inverse_crank_inertia=t.machine.inverse_inertia,
+        gravity_x=scene.gravity * math.sin(scene.stroke_inclination),
+        gravity_y=scene.gravity * math.cos(scene.stroke_inclination),
+        clearance=float(pin["clearance"]),
+        pin_radius=radius,
+        eye_radius=radius + float(pin["clearance"]),
+        stiffness=float(pin["stiffness"]),
+        friction_speed=float(pin["friction_speed"]),
+    )
+
+
+def with_pin(t, **changes):
+    """Tables with a changed contact of the crank pin."""
+    contacts = t.contacts.copy()
+    for name, value in changes.items():
+        contacts[name][0, sc.CRANKPIN] = value
+    return t._replace(contacts=contacts)
+
+
+FREE = load_scene("bilge-pump", {"stroke_inclination": "35 deg", "pressure.rung": "none"})
+
+
+def free_crank(step=1e-5, **changes):
+    """Tables without drive and losses: the crank has an inertia, nothing takes energy out."""
+    t = with_pin(
+        cs.tables(FREE, step),
+        **{"friction": 0.0, "tangential_damping": 0.0, "damping": 0.0, **changes},
+    )
+    return t._replace(machine=t.machine._replace(inverse_inertia=1 / 0.5))  # a flywheel [kg m^2]
+
+
+def bodies_of(state, scene=FREE):
+    """Row of the bodies from crank angle and speed, piston and rod angle with their rates."""
+    _, _, x, u, beta, b = state
+    centre = scene.rod.centre_of_mass
+    sin_b, cos_b = math.sin(beta), math.cos(beta)
+    rod = [x - centre * cos_b, centre * sin_b, beta]
+    rates = [u + centre * sin_b * b, centre * cos_b * b, b]
+    return np.array([[*rod, x, 0.0, 0.0, *rates, u, 0.0, 0.0]])
+
+
+def states_of(run):
+    """Crank angle and speed, piston and its velocity, rod angle and its rate, by columns."""
+    return np.column_stack([run.turns, run.bodies[:, 0][:, [3, 9, 2, 8]]])
+
+
+def run_from(t, state, *, step, n_steps, scene=FREE):
+    """Run from a state in the coordinates of `states_of`."""
+    return sc.run_mechanism(
+        t,
+        angle=state[0],
+        speed=state[1],
+        bodies=bodies_of(state, scene),
+        step=step,
+        n_steps=n_steps,
+    )
+
+
+def run_worn(scene, t, *, step, n_steps, angle=0.3):
+    """Run from the library's own start."""
+    return sc.run_mechanism(
+        t,
+        angle=angle,
+        speed=2 * np.pi * scene.drive.speed,
+        bodies=cs.start_state(scene, angle, t),
+        step=step,
+        n_steps=n_steps,
+    )
+
+
+def scratch(state, contact):
+    """Scratch of the kernels with a state in its row 0."""
+    w = sc._Work(
+        crank=np.zeros((5, 5)),
+        stage=np.zeros((5, 1), sc.STAGE),
+        held=np.zeros(1, sc.HELD),
+        moment=np.zeros(2),
+        matrix=np.zeros((4, 6)),
+        place=np.zeros((4, 6)),
+    )
+    w.crank[0, :2] = state[:2]
+    w.stage["y"][0] = bodies_of(state)
+    w.stage["margin"] = 1.0  # a contact that is none asks for no change
+    w.held["touching"][0, sc.CRANKPIN] = contact
+    return w
+
+
+def rate_of(state, contact, t):
+    """Rates of a state in the coordinates of `states_of`."""
+    w = scratch(state, contact)
+    sc._derivative(w, 0, 0.0, t)
+    rate = w.stage["rate"][0, 0]
+    return np.array([*w.crank[0, 2:4], *rate[[3, 9, 2, 8]]])
 
 
 def mechanical_energy(state, p):
@@ -231,27 +381,29 @@ def mechanical_energy(state, p):
     return kinetic + height + np.where(sigma.real > 0, 0.5 * p.stiffness * sigma * sigma, 0.0)
 
 
-def thrown(angle, p, scene=TILTED):
+def thrown(angle, t):
     """A start in free flight: the pin is kicked off its side of the eye."""
-    start = list(sc.start_state(scene, angle))
-    start[2] += 0.5 * p.clearance
-    return tuple(start)
+    x, _, beta = (float(cs.start_state(FREE, angle, t)[0, column]) for column in (3, 9, 2))
+    ideal = cs.ideal_motion(FREE, np.array([angle]))
+    x += 0.5 * float(t.contacts[0, 0]["clearance"])
+    speed = 2 * np.pi * FREE.drive.speed
+    return (angle, speed, x, float(ideal.piston_velocity[0]), beta, float(ideal.beta_rate[0]))
 
 
-def worst_energy_error(p, step, angle):
-    run = sc.run_compliant(p, thrown(angle, p), step=step, n_steps=math.ceil(0.25 / step))
+def worst_energy_error(step, angle):
+    t = free_crank(step)
+    run = run_from(t, thrown(angle, t), step=step, n_steps=math.ceil(0.25 / step))
     assert run.status.ok
-    energy = mechanical_energy(run.states.T, p)
+    energy = mechanical_energy(states_of(run).T, lumped(FREE, t))
     return abs(energy / energy[0] - 1).max(), run
 
 
 def test_undamped_contact_keeps_the_energy():
-    p = free_crank()
-    default = sc.STEP_PER_CONTACT_TIME / sc.contact_frequency(PUMP)
+    default = cs.STEP_PER_CONTACT_TIME / cs.contact_frequency(PUMP)
     angles = 0.7 + np.arange(8)
     rms = []
     for part in (1, 2, 4):
-        pairs = [worst_energy_error(p, default / part, angle) for angle in angles]
+        pairs = [worst_energy_error(default / part, angle) for angle in angles]
         rms.append(math.sqrt(np.mean([error**2 for error, _ in pairs])))
         assert min(run.contact_changes for _, run in pairs) >= 200  # 100 closings, 100 openings
         assert sum(run.cuts_refused for _, run in pairs) == 0
@@ -263,26 +415,28 @@ def test_undamped_contact_keeps_the_energy():
     assert 3.5 <= order <= 6.5
 
 
-def energy_error_without_location(p, step, angle, n_steps):
+def energy_error_without_location(t, step, angle, n_steps):
     """As the solver, but a contact change waits for the end of its step."""
-    state, contact = thrown(angle, p), False
-    before = mechanical_energy(np.array(state), p)
+    w, i = scratch(thrown(angle, t), False), 0
     for _ in range(n_steps):
-        first = sc._derivative(state, contact, p)
-        state, last = sc._runge_kutta(state, first, step, contact, p)[:2]
-        contact = contact != (sc._margin(last[5], last[6], contact, p) < 0)
-    return abs(mechanical_energy(np.array(state), p) / before - 1)
+        sc._stages(w, i, step, 0.0, step, False, t)
+        i = 1 - i
+        if w.stage["margin"][i, 0, 0] < 0:
+            w.held["touching"][0, 0] = 1 - w.held["touching"][0, 0]
+    end = [*w.crank[i, :2], *w.stage["y"][i, 0, [3, 9, 2, 8]]]
+    start, p = np.array(thrown(angle, t)), lumped(FREE, t)
+    return abs(mechanical_energy(np.array(end), p) / mechanical_energy(start, p) - 1)
 
 
 def test_energy_needs_the_contact_located():
-    p = free_crank()
-    step = 0.25 * sc.STEP_PER_CONTACT_TIME / sc.contact_frequency(PUMP)
+    step = 0.25 * cs.STEP_PER_CONTACT_TIME / cs.contact_frequency(PUMP)
+    t = free_crank(step)
     n_steps = math.ceil(0.05 / step)
     cut, uncut = [], []
     for angle in 0.7 + np.arange(4):
-        uncut.append(energy_error_without_location(p, step, angle, n_steps))
-        run = sc.run_compliant(p, thrown(angle, p), step=step, n_steps=n_steps)
-        energy = mechanical_energy(run.states[[0, -1]].T, p)
+        uncut.append(energy_error_without_location(t, step, angle, n_steps))
+        run = run_from(t, thrown(angle, t), step=step, n_steps=n_steps)
+        energy = mechanical_energy(states_of(run)[[0, -1]].T, lumped(FREE, t))
         cut.append(abs(energy[1] / energy[0] - 1))
     print(f"\nenergy error without location {max(uncut):.2e}, with it {max(cut):.2e}")
     # A change found late by up to a step costs K (v h)^2 each time; found in time, order 4.
@@ -308,10 +462,10 @@ def touching_state(numbers, p):
     return (alpha, omega, piston, u, beta, b)
 
 
-def power_into(state, p):
+def power_into(state, t):
     """Rate of the mechanical energy, by a complex step along the equations of motion: exact."""
-    rate = sc._derivative(state, True, p)[0]
-    return mechanical_energy(np.array(state) + 1e-30j * np.array(rate), p).imag / 1e-30
+    along = np.array(state) + 1e-30j * rate_of(state, True, t)
+    return mechanical_energy(along, lumped(FREE, t)).imag / 1e-30
 
 
 def sliding_speed(numbers, state, p):
@@ -328,35 +482,37 @@ def sliding_speed(numbers, state, p):
 @given(numbers=states)
 @settings(max_examples=200, deadline=None)
 def test_conservative_forces_keep_the_energy(numbers):
-    p = free_crank()
+    t = free_crank()
+    p = lumped(FREE, t)
     state = touching_state(numbers, p)
     # Rounding of the products of velocities and forces that cancel.
     scale = p.stiffness * numbers[4] * (abs(numbers[1]) + abs(numbers[3]) + abs(numbers[5]) + 1)
     rounding = 1e-10 * (scale + mechanical_energy(np.array(state), p).real * 100 + 1)
-    assert abs(power_into(state, p)) <= rounding
+    assert abs(power_into(state, t)) <= rounding
 
 
 @given(numbers=states, friction=st.floats(0, 0.5), viscous=st.floats(0, 100))
 @settings(max_examples=300, deadline=None)
 def test_friction_takes_its_power_out(numbers, friction, viscous):
-    p = free_crank(friction=friction, tangential_damping=viscous)
+    t = free_crank(friction=friction, tangential_damping=viscous)
+    p = lumped(FREE, t)
     state = touching_state(numbers, p)
     slide = sliding_speed(numbers, state, p)
     normal = p.stiffness * numbers[4]
     force = friction * normal * slide / math.hypot(slide, p.friction_speed) + viscous * slide
     scale = normal * (abs(numbers[1]) + abs(numbers[3]) + abs(numbers[5]) + 1)
     rounding = 1e-8 * (scale + mechanical_energy(np.array(state), p).real * 100 + 1)
-    power = power_into(state, p)
+    power = power_into(state, t)
     assert power <= rounding
     # All of it, neither more nor less, is force times sliding speed of the two surfaces.
     assert abs(power + force * slide) <= rounding
 
 
 def test_energy_of_a_run_with_friction_only_falls():
-    p = free_crank(friction=0.05, tangential_damping=12.0)
-    step = 0.3 / sc.contact_frequency(PUMP)
-    run = sc.run_compliant(p, thrown(0.7, p), step=step, n_steps=math.ceil(0.5 / step))
-    energy = mechanical_energy(run.states.T, p)
+    step = 0.3 / cs.contact_frequency(PUMP)
+    t = free_crank(step, friction=0.05, tangential_damping=12.0)
+    run = run_from(t, thrown(0.7, t), step=step, n_steps=math.ceil(0.5 / step))
+    energy = mechanical_energy(states_of(run).T, lumped(FREE, t))
     # The integrator's own error at this step, seen without friction, is below 1e-5.
     assert np.max(energy - np.minimum.accumulate(energy)) < 1e-5 * energy[0]
     assert energy[-1] < 0.99 * energy[0]
@@ -368,19 +524,19 @@ def test_energy_of_a_run_with_friction_only_falls():
 
 @pytest.fixture(scope="module")
 def fine_run():
-    """Worn pump at a twentieth of the contact time, without friction, and its parameters."""
+    """Worn pump at a twentieth of the contact time, without friction, in least coordinates."""
     worn = {"joint.crankpin.diametral_clearance": "0.31 mm", "stroke_inclination": "35 deg"}
     scene = load_scene("bilge-pump", worn)
-    p = sc.parameters(scene)._replace(friction=0.0, tangential_damping=0.0)
-    step = 0.05 / sc.contact_frequency(scene)
-    run = sc.run_compliant(p, sc.start_state(scene, 0.3), step=step, n_steps=math.ceil(0.5 / step))
+    step = 0.05 / cs.contact_frequency(scene)
+    t = with_pin(cs.tables(scene, step), friction=0.0, tangential_damping=0.0)
+    run = run_worn(scene, t, step=step, n_steps=math.ceil(0.5 / step))
     assert run.contact_changes > 10
-    return scene, p, run
+    return scene, lumped(scene, t), run
 
 
 def smooth_steps(run, p):
     """Inner step ends whose two neighbours on either side see no change of contact or ramp."""
-    alpha, _, x, _, beta, _ = run.states.T
+    alpha, _, x, _, beta, _ = states_of(run).T
     d_x = p.crank_radius * np.cos(alpha) + p.rod_length * np.cos(beta) - x
     d_y = p.crank_radius * np.sin(alpha) - p.rod_length * np.sin(beta)
     side = np.hypot(d_x, d_y) > p.clearance
@@ -403,13 +559,14 @@ def test_mass_times_acceleration_is_the_recorded_force(fine_run):
     h = run.step
     inner = smooth_steps(run, p)
     assert len(inner) > 0.5 * len(run.forces)
-    pin_x, pin_y, guide, piston = run.forces.T
-    x, beta = run.states[:, 2], run.states[:, 4]
+    names = ("pin_x", "pin_y", "guide_y", "piston_x")
+    pin_x, pin_y, guide, piston = (run.force(name) for name in names)
+    x, beta = run.bodies[:, 0, 3], run.bodies[:, 0, 2]
     rod_mass = scene.rod.mass
     first_moment_x = p.moving_mass * x - p.static_moment * np.cos(beta)
     first_moment_y = p.static_moment * np.sin(beta)
     assert_allclose(rod_mass * scene.rod.centre_of_mass, p.static_moment, rtol=1e-15)
-    along = beside(pin_x - piston) - p.moving_mass * p.gravity_x
+    along = beside(pin_x + piston) - p.moving_mass * p.gravity_x
     across = beside(pin_y + guide) - p.moving_mass * p.gravity_y
     # The second difference weighs the force by a triangle over two steps, the mean of two step
     # means by a box: they differ by h^2/12 of the force's second derivative, that is by
@@ -423,13 +580,14 @@ def test_mass_times_acceleration_is_the_recorded_force(fine_run):
 
 
 def test_guide_force_balances_the_rods_moment(fine_run):
-    """Euler about the rod's centre of mass, which the recorded guide force never used."""
+    """Euler about the rod's centre of mass, from recorded forces and positions alone."""
     scene, p, run = fine_run
     inner = smooth_steps(run, p)
-    pin_x, pin_y, guide, piston = (beside(column) for column in run.forces.T)
-    x, beta = run.states[:, 2], run.states[:, 4]
+    names = ("pin_x", "pin_y", "guide_y", "piston_x")
+    pin_x, pin_y, guide, piston = (beside(run.force(name)) for name in names)
+    x, beta = run.bodies[:, 0, 3], run.bodies[:, 0, 2]
     acceleration = second_difference(x, run.step)
-    wrist_x = scene.piston.mass * (acceleration + p.gravity_x) + piston  # rod on piston
+    wrist_x = scene.piston.mass * (acceleration + p.gravity_x) - piston  # rod on piston
     wrist_y = scene.piston.mass * p.gravity_y - guide
     cos_b, sin_b = np.cos(beta), np.sin(beta)
     pin_arm = scene.rod.length - scene.rod.centre_of_mass
@@ -440,25 +598,32 @@ def test_guide_force_balances_the_rods_moment(fine_run):
     # As above, on the scale of the pin force times its arm.
     assert error.max() < 1e-3 * pin_arm * np.nanmax(np.abs(pin_x))
     assert np.abs(guide[inner]).max() > 100  # N: there is something to balance
+    # ... and the recorded force of the wrist pin is that same one, on the rod
+    for recorded, expected in (("wrist_x", -wrist_x), ("wrist_y", -wrist_y)):
+        error = np.abs(beside(run.force(recorded)) - expected)[inner]
+        assert error.max() < 1e-3 * np.nanmax(np.abs(pin_x))
 
 
 def test_recorded_impulse_is_the_change_of_momentum():
     """Over any span, also across contact changes: forces are recorded as exact impulses."""
     scene = load_scene("bilge-pump", {"joint.crankpin.diametral_clearance": "0.31 mm"})
-    p = sc.parameters(scene)
-    # The integrator sums the same stage forces into velocities and impulses; only the coupling
-    # term sin(b) b' is differentiated in between, at order 4: 256 times less at a quarter.
+    # The integrator sums the same stage forces into velocities and impulses; in the least
+    # coordinates the coupling sin(b) b' is differentiated in between, at order 4: 256 times less
+    # at a quarter. In those of the bodies momentum is a sum, and only rounding is left.
     for part, tolerance in ((1, 1e-9), (4, 4e-12)):
-        step = 0.3 / part / sc.contact_frequency(scene)
-        run = sc.run_compliant(
-            p, sc.start_state(scene, 0.3), step=step, n_steps=math.ceil(0.4 / step)
-        )
-        _, _, _, u, beta, b = run.states.T
-        momentum = p.moving_mass * u + p.static_moment * np.sin(beta) * b
-        force = run.forces[:, 0] - run.forces[:, 3] - p.moving_mass * p.gravity_x
-        missing = momentum[1:] - momentum[0] - np.cumsum(force) * step
-        print(f"\nmomentum off by {abs(missing).max() / np.ptp(momentum):.1e} of its swing")
-        assert abs(missing).max() < tolerance * np.ptp(momentum)
+        step = 0.3 / part / cs.contact_frequency(scene)
+        t = cs.tables(scene, step)
+        run = run_worn(scene, t, step=step, n_steps=math.ceil(0.4 / step))
+        p = lumped(scene, t)
+        _, _, _, u, beta, b = states_of(run).T
+        force = run.force("pin_x") + run.force("piston_x") - p.moving_mass * p.gravity_x
+        impulse = np.cumsum(force) * step
+        least = p.moving_mass * u + p.static_moment * np.sin(beta) * b
+        bodies = scene.rod.mass * run.bodies[:, 0, 6] + scene.piston.mass * run.bodies[:, 0, 9]
+        for momentum, bound in ((least, tolerance), (bodies, 1e-12)):
+            missing = abs(momentum[1:] - momentum[0] - impulse).max()
+            print(f"\nmomentum off by {missing / np.ptp(momentum):.1e} of its swing")
+            assert missing < bound * np.ptp(momentum)
         assert run.contact_changes > 10
 
 
@@ -466,40 +631,37 @@ def test_recorded_impulse_is_the_change_of_momentum():
 
 
 def test_a_centred_pin_has_a_finite_normal():
-    p = free_crank()
-    state = (0.0, 31.4, p.crank_radius + p.rod_length, 0.1, 0.0, 2.0)
-    gap = sc._gap(state, p)
-    assert np.all(np.isfinite(gap))
-    assert gap[0] == -p.clearance
-    assert math.hypot(gap[2], gap[3]) == 1.0
+    assert sc._polar(0.0, 0.0, 3.0, 4.0) == (0.0, 3.0, 1.0, 0.0)
+    t = free_crank()
+    state = (0.0, 31.4, FREE.crank.radius + FREE.rod.length, 0.1, 0.0, 2.0)
     for contact in (False, True):
-        rate = sc._derivative(state, contact, p)[0]
-        assert np.all(np.isfinite(rate))
-    run = sc.run_compliant(p, state, step=1e-5, n_steps=200)
+        assert np.all(np.isfinite(rate_of(state, contact, t)))
+    run = run_from(t, state, step=1e-5, n_steps=200)
     assert run.status.ok
-    assert np.all(np.isfinite(run.states))
+    assert np.all(np.isfinite(run.bodies))
+
+
+def outward_push(scene, run):
+    """Mean force of every step along the direction of the pin in its eye [N]."""
+    angle = 0.5 * (run.turns[1:, 0] + run.turns[:-1, 0])
+    middle = 0.5 * (run.bodies[1:, 0] + run.bodies[:-1, 0])
+    offset = cs.pin_offsets(scene, angle, middle)[:, :2]
+    outward = offset / np.hypot(*offset.T)[:, None]
+    return run.force("pin_x") * outward[:, 0] + run.force("pin_y") * outward[:, 1]
 
 
 def test_the_contact_never_pulls():
     scene = load_scene("bilge-pump", {"joint.crankpin.diametral_clearance": "0.31 mm"})
-    p = sc.parameters(scene)._replace(friction=0.0, tangential_damping=0.0)
-    step = 0.1 / sc.contact_frequency(scene)
-    run = sc.run_compliant(p, sc.start_state(scene, 0.3), step=step, n_steps=40_000)
-    middle = 0.5 * (run.states[1:] + run.states[:-1])
-    outward = np.array([sc._gap(tuple(s), p)[2:4] for s in middle])
-    push = np.einsum("ij,ij->i", run.forces[:, :2], outward)
+    step = 0.1 / cs.contact_frequency(scene)
+    t = with_pin(cs.tables(scene, step), friction=0.0, tangential_damping=0.0)
+    run = run_worn(scene, t, step=step, n_steps=40_000)
+    push = outward_push(scene, run)
     # Without friction the mean force of a step is along the normal, which turns by 1e-3 within it.
     assert push.min() > -1e-3 * push.max()
     # ... and the variant that releases at zero penetration does pull: the test can tell.
-    pulling = sc.run_compliant(
-        p._replace(release=RELEASE_AT_ZERO_PENETRATION),
-        sc.start_state(scene, 0.3),
-        step=step,
-        n_steps=40_000,
-    )
-    middle = 0.5 * (pulling.states[1:] + pulling.states[:-1])
-    outward = np.array([sc._gap(tuple(s), p)[2:4] for s in middle])
-    assert np.einsum("ij,ij->i", pulling.forces[:, :2], outward).min() < -0.01 * push.max()
+    sticky = with_pin(t, release=RELEASE_AT_ZERO_PENETRATION)
+    pulling = run_worn(scene, sticky, step=step, n_steps=40_000)
+    assert outward_push(scene, pulling).min() < -0.01 * push.max()
     assert run.peak_normal_force >= push.max() > 0
 
 
@@ -524,18 +686,17 @@ def shrinking():
             },
         )
         per_revolution = 2 ** math.ceil(
-            math.log2(0.2 * sc.contact_frequency(scene) / sc.STEP_PER_CONTACT_TIME)
+            math.log2(0.2 * cs.contact_frequency(scene) / cs.STEP_PER_CONTACT_TIME)
         )
         step = 1 / (scene.drive.speed * per_revolution)
         n_steps = 5 * per_revolution
-        run = sc.run_compliant(
-            sc.parameters(scene), sc.start_state(scene, 0.0), step=step, n_steps=n_steps
-        )
-        ideal = sc.run_ideal(scene, step=step, n_steps=n_steps, start_angle=0.0)
+        run = cs.run_scene(scene, step=step, n_steps=n_steps, start_angle=0.0, keep_states=True)
+        rigid = load_scene("bilge-pump", {"joint.crankpin.rung": "ideal"})
+        ideal = cs.run_scene(rigid, step=step, n_steps=n_steps, start_angle=0.0)
         last = slice(per_revolution, None)  # the first revolution settles
-        error = np.abs(run.states[last, 2] - ideal.states[last, 2]).max()
+        error = np.abs(run.bodies[last, 0, 3] - ideal.bodies[last, 0, 3]).max()
         real, wanted = (
-            np.fft.rfft(r.forces[last, :2].reshape(4, per_revolution, 2), axis=1)[:, :20]
+            np.fft.rfft(r.forces[last, 1:3].reshape(4, per_revolution, 2), axis=1)[:, :20]
             for r in (run, ideal)
         )
         found[millimetres * 1e-3] = (
@@ -573,14 +734,14 @@ def test_low_orders_of_the_pin_force_approach_the_ideal_joint(shrinking):
 
 def test_contact_frequency_bounds_every_direction():
     """The largest eigenfrequency of mechanism on contact spring, by brute force."""
-    p = sc.parameters(PUMP)
+    t = free_crank()
+    p = lumped(FREE, t)
     worst = 0.0
     for alpha in np.linspace(0, 2 * np.pi, 73):
         for direction in np.linspace(0, np.pi, 37):
             state = touching_state((alpha, 0.0, direction, 0.0, 1e-6, 0.0), p)
             deeper = touching_state((alpha, 0.0, direction, 0.0, 2e-6, 0.0), p)
-            bare = p._replace(damping=0.0, friction=0.0, tangential_damping=0.0)
-            pushes = [sc._derivative(s, True, bare)[0] for s in (state, deeper)]
+            rates = [rate_of(s, True, t) for s in (state, deeper)]
             normal = np.array([math.cos(direction), math.sin(direction)])
             beta = state[4]
             eye = [
@@ -590,11 +751,11 @@ def test_contact_frequency_bounds_every_direction():
                         p.rod_length * math.cos(beta) * r[5],
                     ]
                 )
-                for r in pushes
+                for r in rates
             ]
             worst = max(worst, (eye[1] - eye[0]) @ normal / 1e-6)
     # The grid misses the worst direction by at most 2.5 degrees: (1 - cos) = 1e-3.
-    assert_allclose(math.sqrt(worst), sc.contact_frequency(PUMP), rtol=2e-3)
+    assert_allclose(math.sqrt(worst), cs.contact_frequency(PUMP), rtol=2e-3)
 
 
 def test_sine_cosine_against_libm():

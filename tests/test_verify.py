@@ -12,28 +12,43 @@ from wearstate.sim.contact import RELEASE_AT_ZERO_FORCE
 
 def test_every_check_passes():
     results = verify.run_checks()
-    assert len(results) == 14
+    assert len(results) == sum(len(table) for table in verify._TABLES.values())
     assert [r.name for r in results if not r.passed] == []
+
+
+def test_no_table_is_empty():
+    """A check that nobody counts can vanish unnoticed."""
+    counts = {file: len(table) for file, table in verify._TABLES.items()}
+    assert counts == {
+        "slider_crank.csv": 16,
+        "restitution.csv": 6,
+        "contact.csv": 71,
+        "pump.csv": 45,
+    }
 
 
 def test_every_line_says_where_it_is_from():
     for check in verify.checks():
         assert len(check.source) > 20, check.name
         assert set(check.trust.split("+")) <= {"R", "M", "V", "H"}, check.name
-        assert 0 < check.tolerance <= 1e-4 * abs(check.expected), check.name
 
 
-def test_no_tolerance_exceeds_the_last_printed_digit():
+def test_no_tolerance_exceeds_what_the_source_can_tell():
     for check in verify.checks():
-        # half a unit of the last digit of a number printed with at least six
-        assert check.tolerance <= 0.51e-5 * abs(check.expected), check.name
+        if check.kind == "relative":  # closed forms against a discretised model
+            assert check.tolerance <= 5e-3, check.name
+            continue
+        # half a unit of the last printed digit, of numbers printed with at least two of them
+        # (a ripple of .56 % stands as 0.0056)
+        assert check.tolerance <= 1e-2 * abs(check.expected), check.name
 
 
-@pytest.mark.parametrize("wrong", [1.00001, 0.99999, math.nan])
-def test_a_wrong_value_fails(wrong):
+@pytest.mark.parametrize("off", [3.0, -3.0, math.nan])
+def test_a_wrong_value_fails(off):
     for check in verify.checks():
-        # 1e-5 of the value is above every tolerance (the test before)
-        broken = dataclasses.replace(check, obtain=lambda c=check: wrong * c.expected)
+        scale = abs(check.expected) if check.kind == "relative" else 1.0
+        wrong = check.expected + off * check.tolerance * scale
+        broken = dataclasses.replace(check, obtain=lambda value=wrong: value)
         assert not verify._judge(broken).passed
 
 

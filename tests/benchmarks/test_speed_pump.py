@@ -1,6 +1,7 @@
 """Speed of one recording of the bilge pump. Results are asserted, times are only printed."""
 
 import numpy as np
+import pytest
 from wearstate.sim.assemble import simulate
 from wearstate.sim.integrate import Status
 from wearstate.sim.scene import load_scene
@@ -21,3 +22,25 @@ def test_speed_of_a_recording(benchmark):
     # second: knocks of 50 m/s^2 for some 20 ms of each 100 give 5 to 25 m/s^2. A pump without
     # knocks has 0.5.
     assert np.all((rms > 5) & (rms < 25))
+
+
+@pytest.mark.parametrize(
+    ("scene", "overrides"),
+    [
+        ("bilge-pump", {"pressure.rung": "chamber"}),
+        ("bilge-pump", {"pressure.rung": "chamber", "joint.wristpin.rung": "compliant"}),
+        ("triplex-pump", {}),
+    ],
+)
+def test_speed_with_valves(benchmark, scene, overrides):
+    """One throw with valves, eight casing modes; the same with two worn pins; three throws."""
+    pump = load_scene(scene, overrides)
+    simulate(pump, seed=0)  # compile, or read the cache
+    result = benchmark(simulate, pump, seed=1)
+    if benchmark.enabled:
+        rate = pump.duration * len(pump.throws) / benchmark.stats.stats.median
+        print(f"\n{rate:.1f} simulated throw-seconds per second on one core")
+    assert result.status is Status.OK
+    assert result.numerics["clipped_samples"] == 0
+    assert result.numerics["cavitating_share"] == 0
+    assert result.numerics["lift_left"] == 0

@@ -1,0 +1,263 @@
+"""The parts of a scene that make the pressure in a pump cylinder: liquid, lines and valves."""
+
+import math
+from typing import Literal, Self
+
+from pydantic import Field, model_validator
+
+from .parts import (
+    DAMPING_MOST,
+    HEAVIEST,
+    LIGHTEST,
+    LONGEST,
+    PRESSURE_MOST,
+    STIFFEST,
+    Angle,
+    Area,
+    Damping,
+    Density,
+    Length,
+    Mass,
+    Part,
+    Pressure,
+    Ratio,
+    Stiffness,
+    Volume,
+)
+
+STANDARD_ATMOSPHERE = 101325.0  # Pa, ISO 2533; gauge pressures count from it
+
+_DENSITY_LEAST, _DENSITY_MOST = 100.0, 20e3  # kg/m^3, from liquid gas to mercury
+_MODULUS_LEAST = 1e7  # Pa, a tenth of the softest liquid
+_MODULUS_MOST = 1e12  # Pa, five hundred times water: practically rigid
+_AIR_MOST = 0.2  # beyond it a pump no longer primes, and bubbles are no longer small
+_FRICTION_MOST = 1.0  # Darcy-Weisbach; a rough pipe has 0.1
+_LOSS_MOST = 1e4
+_VOLUME_LEAST, _VOLUME_MOST = 1e-9, 1e3  # m^3
+_LEVEL_MOST = 1e4  # m
+_MOST_VALVES = 100
+_CONTACT_FASTEST = 1e6  # rad/s, a ball of a gram on hard steel has half of it
+
+
+class Liquid(Part):
+    """What is pumped; the defaults are fresh water at 20 degC with some air."""
+
+    density: Density = Field(
+        default=998.2, ge=_DENSITY_LEAST, le=_DENSITY_MOST, description="at atmospheric pressure"
+    )
+    bulk_modulus: Pressure = Field(
+        default=2.18e9,
+        ge=_MODULUS_LEAST,
+        le=_MODULUS_MOST,
+        description="of the liquid alone, at atmospheric pressure",
+    )
+    air_fraction: Ratio = Field(
+        default=0.002,
+        ge=0,
+        le=_AIR_MOST,
+        description="volume of free air over the volume of the mixture at atmospheric pressure",
+    )
+    air_exponent: Ratio = Field(
+        default=1.4,
+        ge=1,
+        le=5 / 3,
+        description="polytropic exponent of the air: 1 isothermal, 1.4 isentropic",
+    )
+    vapour_pressure: Pressure = Field(
+        default=2339.0, ge=1, le=PRESSURE_MOST, description="absolute, of the liquid as it is"
+    )
+
+
+class Line(Part):
+    """A pipe between a reservoir or air vessel and the pump, for the rung *heads*.
+
+    Its pressure drop is ``rho (f L / D + K) u |u| / 2``, its inertia ``rho L du/dt``.
+    """
+
+    rise: Length = Field(
+        default=0.0,
+        ge=-_LEVEL_MOST,
+        le=_LEVEL_MOST,
+        description="height of the line's downstream end above its upstream end",
+    )
+    length: Length = Field(
+        default=0.3, ge=0, le=LONGEST, description="of moving liquid, up to the next air vessel"
+    )
+    diameter: Length = Field(default=0.08, gt=0, le=LONGEST)
+    friction_factor: Ratio = Field(
+        default=0.02, ge=0, le=_FRICTION_MOST, description="f of Darcy and Weisbach"
+    )
+    minor_loss: Ratio = Field(
+        default=1.5, ge=0, le=_LOSS_MOST, description="sum of the loss coefficients of fittings"
+    )
+
+
+class Valve(Part):
+    """The self-acting plate valves of one side of a cylinder.
+
+    All figures but `leak_area` are of one of `count` equal valves. The default is a group that
+    suits a bilge pump of 100 mm bore and stroke at 300 rpm: some 15 kPa at full flow.
+    """
+
+    count: int = Field(default=4, ge=1, le=_MOST_VALVES, description="equal valves side by side")
+    diameter: Length = Field(default=0.045, gt=0, le=LONGEST, description="of the seat opening")
+    mass: Mass = Field(
+        default=0.1, ge=LIGHTEST, le=HEAVIEST, description="plate, a third of the spring, water"
+    )
+    stiffness: Stiffness = Field(default=3.3e3, ge=0, le=STIFFEST, description="of the spring")
+    preload_lift: Length = Field(
+        default=3e-3, ge=0, le=LONGEST, description="spring compression on the closed valve"
+    )
+    damping: Damping = Field(
+        default=2.0, ge=0, le=DAMPING_MOST, description="of the plate moving in the liquid"
+    )
+    max_lift: Length = Field(default=8e-3, gt=0, le=LONGEST, description="up to the stop")
+    discharge_coefficient: Ratio = Field(
+        default=0.65, gt=0, le=1, description="flow over that of the gap without losses"
+    )
+    force_coefficient: Ratio = Field(
+        default=1.0, gt=0, le=2, description="force over pressure drop times seat area"
+    )
+    seat_stiffness: Stiffness = Field(
+        default=50e6, gt=0, le=STIFFEST, description="contact with the seat and with the stop"
+    )
+    seat_damping: Damping = Field(
+        default=1.3e3, ge=0, le=DAMPING_MOST, description="contact with the seat and with the stop"
+    )
+    leak_area: Area = Field(
+        default=0.0, ge=0, le=_VOLUME_MOST, description="of all paths past the closed valves"
+    )
+    stuck_lift: Length | None = Field(
+        default=None, ge=0, description="lift of valves that do not move; 0: stuck shut"
+    )
+    resistance: Ratio = Field(
+        default=10.0,
+        ge=0,
+        le=_LOSS_MOST,
+        description="loss coefficient on the speed in the seat opening, for the rung heads",
+    )
+    equivalent_length: Length = Field(
+        default=0.1,
+        ge=0,
+        le=LONGEST,
+        description="of liquid in the seat opening with the valve's inertia, for the rung heads",
+    )
+
+    @model_validator(mode="after")
+    def _can_work(self) -> Self:
+        faults = [*self._lift_faults(), *self._contact_faults()]
+        if faults:
+            raise ValueError("\n".join(faults))
+        return self
+
+    def _lift_faults(self) -> list[str]:
+        faults = []
+        if self.max_lift > self.diameter / 4:
+            faults.append(
+                f"max_lift = {self.max_lift:g} m must be <= diameter / 4 = {self.diameter / 4:g} m;"
+                " above it the seat opening throttles, not the gap"
+            )
+        if self.stuck_lift is not None and self.stuck_lift > self.max_lift:
+            faults.append(
+                f"stuck_lift = {self.stuck_lift:g} m must be <= max_lift = {self.max_lift:g} m; "
+                "the stop ends the lift"
+            )
+        return faults
+
+    def _contact_faults(self) -> list[str]:
+        rate = math.sqrt(self.seat_stiffness / self.mass)
+        if rate <= _CONTACT_FASTEST:
+            return []
+        return [
+            f"seat_stiffness = {self.seat_stiffness:g} N/m gives a contact of {rate:g} rad/s on "
+            f"mass = {self.mass:g} kg, must be <= {_CONTACT_FASTEST:g} rad/s; soften the seat"
+        ]
+
+
+class CylinderPressure(Part):
+    """Gauge pressure on the piston face.
+
+    ``none``: no pressure. ``constant``: `discharge` all the time. ``two-level``: `suction` and
+    `discharge` by turns, over `rise_angle`. ``heads``: the quasi-static energy balance of the two
+    lines, whose far ends are at `suction` and `discharge`. ``chamber``: a compressible chamber
+    with self-acting valves, `suction` and `discharge` being the pressures before and after them.
+    """
+
+    rung: Literal["none", "constant", "two-level", "heads", "chamber"] = "two-level"
+    suction: Pressure = Field(default=0.0, ge=-STANDARD_ATMOSPHERE, description="gauge")
+    discharge: Pressure = Field(default=0.0, le=PRESSURE_MOST, description="gauge")
+    rise_angle: Angle = Field(
+        default=math.radians(3.0),
+        ge=math.radians(0.5),
+        le=math.radians(90.0),
+        description="crank angle after a dead centre over which the pressure changes level",
+    )
+    flow: Literal["exact", "two-harmonic"] = Field(
+        default="exact", description="flow of the rung heads"
+    )
+    liquid: Liquid = Liquid()
+    suction_line: Line | None = None
+    discharge_line: Line | None = None
+    suction_valve: Valve | None = None
+    discharge_valve: Valve | None = None
+    dead_volume: Volume | None = Field(
+        default=None,
+        ge=_VOLUME_LEAST,
+        le=_VOLUME_MOST,
+        description="of the chamber with the piston at its top dead centre",
+    )
+
+    @model_validator(mode="after")
+    def _fit_for_the_rung(self) -> Self:
+        faults = [
+            *self._level_faults(),
+            *self._missing(),
+            *self._vapour_faults(),
+            *self._deadlock(),
+        ]
+        if faults:
+            raise ValueError("\n".join(faults))
+        return self
+
+    def _level_faults(self) -> list[str]:
+        if self.discharge >= self.suction:
+            return []
+        return [
+            f"discharge = {self.discharge:g} Pa must be >= suction = {self.suction:g} Pa; swap them"
+        ]
+
+    def _missing(self) -> list[str]:
+        return [
+            f"{name} is missing; the rung '{self.rung}' needs it (an empty table takes defaults)"
+            if name != "dead_volume"
+            else f"{name} is missing; the rung '{self.rung}' needs it, about half the swept volume"
+            for name in _NEEDS.get(self.rung, ())
+            if getattr(self, name) is None
+        ]
+
+    def _vapour_faults(self) -> list[str]:
+        vapour = self.liquid.vapour_pressure - STANDARD_ATMOSPHERE
+        if self.rung not in _NEEDS or self.suction > vapour:
+            return []
+        return [
+            f"suction = {self.suction:g} Pa must be > the liquid's vapour pressure = {vapour:g} Pa "
+            "gauge; raise it or cool the liquid"
+        ]
+
+    def _deadlock(self) -> list[str]:
+        inlet, outlet = self.suction_valve, self.discharge_valve
+        if self.rung != "chamber" or inlet is None or outlet is None:
+            return []
+        if outlet.stuck_lift != 0 or (inlet.stuck_lift or 0) > 0:
+            return []
+        return [
+            "discharge_valve.stuck_lift = 0 m must be > 0 m or the suction valve stuck open: "
+            "a cylinder without a way out bursts, and there is no relief valve in the model"
+        ]
+
+
+_NEEDS = {
+    "heads": ("suction_line", "discharge_line"),
+    "chamber": ("suction_valve", "discharge_valve", "dead_volume"),
+}
+"""Rung -> what it cannot do without."""

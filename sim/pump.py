@@ -1,0 +1,572 @@
+"""A reciprocating pump, from its scene to its recording."""
+
+import math
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .casing import (
+    Modes,
+    band_limited_acceleration,
+    casing_inputs,
+    decimate,
+    edge_samples,
+    table_acceleration,
+)
+from .crank_setup import (
+    LARGEST_STEP_PER_CONTACT_TIME,
+    STEP_PER_CONTACT_DECAY,
+    STEP_PER_CONTACT_TIME,
+    contact_frequency,
+    contact_rate,
+    contact_table,
+    joint_rungs,
+    pin_offsets,
+    run_scene,
+)
+from .frf_table import Accelerance, load_accelerance
+from .hydraulics import lift_left
+from .integrate import SimulationError, Solution, Status
+from .ladder import joint_faults, limits
+from .parts import Accelerometer, Scene, SceneError, channels_of, specific_key
+from .pump_parts import CRANK_PLACES, FORCE_PLACES, GUIDE_PLACES, VALVE_PLACES, PumpScene
+from .sensor import (
+    anti_alias_poles,
+    digitise,
+    low_pass,
+    mounting_poles,
+    tacho_pulses,
+)
+from .slider_crank import FORCES, GUIDE, JOINT_COMPLIANT, JOINT_LINK, CrankRun
+
+_FEWEST_STEPS = 2  # per sample: the casing runs once a step, and needs twice the sample rate
+
+_MOST_STEPS = 1000
+"""Steps per sample: beyond it a step says more about a slip than about accuracy."""
+
+_MEMORY = 4e9  # byte, what one run may take: a data set runs one on every core
+_BYTES_PER_STEP = 3 * 10 * 8  # of one throw: forces and chamber as doubles, two passes over them
+
+_LIFT_LEFT = 0.05
+"""Of the stop's lift: a valve that is open by more so long after its stroke does not close."""
+
+_MOSTLY = 0.5  # of all contacts: the floor, not the law, decides what they lose
+
+_LATE = math.radians(60.0)  # after the dead centre; a fast pump's valves close 30 degrees late
+
+
+def check_pump(scene: Scene) -> None:
+    """Check what only the physics can tell: rungs, step, sampling, files.
+
+    Raises
+    ------
+    SceneError
+        Every fault at once.
+    """
+    steps_per_sample(cast(PumpScene, scene))
+    _measured_casing(cast(PumpScene, scene))
+
+
+def simulate_pump(scene: Scene, seed: int, truth: bool, raise_on_failure: bool) -> Solution:
+    """Simulate one recording; see :func:`wearstate.sim.assemble.simulate`."""
+    pump = cast(PumpScene, scene)
+    try:
+        factor = steps_per_sample(pump)
+    except LimitError as error:
+        if raise_on_failure:
+            raise
+        return _failed(pump, error.status, {})
+    step = 1 / (pump.sample_rate * factor)
+    plan = _Plan(pump, factor)
+    run = run_scene(
+        pump, step=step, n_steps=plan.n_steps, start_angle=plan.first_angle, keep_states=truth
+    )
+    status = _valve_status(pump, run, plan) if run.status.ok else run.status
+    numerics = _numerics(pump, run, plan)
+    if not status.ok:
+        if raise_on_failure:
+            raise SimulationError(status, pump.name)
+        return _failed(pump, status, numerics)
+    places, on_casing = casing_forces(pump, run)
+    acceleration, casing_numerics = _housing(pump, places, on_casing, 1 / step, factor)
+    signal, clipped = _measured(pump, acceleration, plan.turned(run), plan, seed)
+    numerics |= casing_numerics
+    numerics["clipped_samples"] = clipped
+    return Solution(
+        signal=signal,
+        sample_rate=pump.sample_rate,
+        channels=channels_of(pump),
+        truth=_truth(run, plan) if truth else {},
+        status=status,
+        numerics=numerics,
+        warnings=_warnings(numerics),
+    )
+
+
+def _failed(scene: PumpScene, status: Status, numerics: dict[str, float | int | str]) -> Solution:
+    n_samples = round(scene.duration * scene.sample_rate)
+    return Solution(
+        signal=np.zeros((len(channels_of(scene)), n_samples), dtype=np.float32),
+        sample_rate=scene.sample_rate,
+        channels=channels_of(scene),
+        status=status,
+        numerics=numerics,
+    )
+
+
+class _Plan:
+    """Which steps are run, and which samples are kept."""
+
+    def __init__(self, scene: PumpScene, factor: int) -> None:
+        rate, speed = scene.sample_rate, scene.drive.speed
+        edge = edge_samples(factor)
+        settling = math.ceil(scene.settling_revolutions / speed * rate) + edge
+        self.scene = scene
+        self.factor = factor
+        self.n_samples = round(scene.duration * rate)
+        self.n_steps = (settling + self.n_samples + edge) * factor
+        self.kept = slice(settling, settling + self.n_samples)
+        # a sample stands for the middle of its first step, see decimate
+        before = (settling * factor + 0.5) / (rate * factor)
+        self.first_angle = scene.drive.start_angle - 2 * math.pi * speed * before
+        self.angle = scene.drive.start_angle + 2 * math.pi * speed * (
+            np.arange(self.n_samples) / rate
+        )
+
+    def turned(self, run: CrankRun) -> NDArray[np.float64]:
+        """Crank angle at the samples [rad]: exact at constant speed, else as the run made it."""
+        if self.scene.drive.rung == "constant-speed":
+            return self.angle
+        return self.at_samples(run.turns[:, 0])
+
+    def at_samples(self, ends: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Values at the samples from those at the ends of all steps, first axis time.
+
+        A sample stands for the middle of a step: its value is the mean of the step's two ends.
+        """
+        first, step = self.kept.start * self.factor, self.factor
+        last = first + self.n_samples * step
+        return np.asarray(0.5 * (ends[first:last:step] + ends[first + 1 : last + 1 : step]))
+
+
+class LimitError(SceneError):
+    """A scene beyond the limits of its methods; the status says which."""
+
+    def __init__(self, name: str, faults: list[str], status: Status) -> None:
+        self.status = status
+        super().__init__(name, faults)
+
+
+def steps_per_sample(scene: PumpScene) -> int:
+    """Integration steps per sample: what the contact needs, or what the scene asks for.
+
+    Raises
+    ------
+    SceneError
+        All of: an invalid rung, a recording shorter than a revolution or two samples, a pulse
+        shorter than two samples. Or: a step of less than a thousandth of a sample, a run that
+        needs more than 4 GB.
+    LimitError
+        A step too long for the contact, a clearance that its contact does not resolve, a
+        pressure below that of the vapour; with the status a sweep records.
+    """
+    faults = joint_faults(scene)
+    if faults:
+        raise SceneError(scene.name, [*faults, *_sampling_faults(scene)])
+    faults = _sampling_faults(scene)
+    beyond = limits(scene)
+    step = 0.5 / scene.sample_rate
+    rate = contact_rate(scene)
+    if rate > 0:
+        longest = LARGEST_STEP_PER_CONTACT_TIME / rate
+        needed = min(
+            STEP_PER_CONTACT_TIME / contact_frequency(scene), STEP_PER_CONTACT_DECAY / rate
+        )
+        step = min(scene.numerics.step or needed, step)
+        if (scene.numerics.step or 0.0) > longest:
+            fault = (
+                f"numerics.step = {scene.numerics.step:g} s must be <= {longest:.3g} s, the "
+                f"contact's rate being {1 / longest:.4g} 1/s; shorten it, or lower "
+                "joint.crankpin.stiffness and damping"
+            )
+            beyond.append((Status.STEP, fault))
+    elif scene.numerics.step:
+        step = min(scene.numerics.step, step)
+    if faults:
+        raise SceneError(scene.name, [*faults, *(fault for _, fault in beyond)])
+    if beyond:
+        raise LimitError(scene.name, [fault for _, fault in beyond], beyond[0][0])
+    wanted = 1 / (scene.sample_rate * step)
+    faults = [fault for fault in (_step_fault(scene, wanted), _size_fault(scene, wanted)) if fault]
+    if faults:
+        raise SceneError(scene.name, faults)
+    return max(_FEWEST_STEPS, math.ceil(wanted - 1e-9))
+
+
+def _step_fault(scene: PumpScene, steps: float) -> str | None:
+    if steps - 1e-9 <= _MOST_STEPS:  # the bound itself, whatever its rounding
+        return None
+    shortest = 1 / (scene.sample_rate * _MOST_STEPS)
+    if scene.numerics.step is not None:
+        return (
+            f"numerics.step = {scene.numerics.step:g} s must be >= {shortest:.3g} s, "
+            f"{_MOST_STEPS} steps a sample; lengthen it, or raise sample_rate"
+        )
+    return (
+        f"the contact needs steps of {shortest * _MOST_STEPS / steps:.3g} s, must be >= "
+        f"{shortest:.3g} s, {_MOST_STEPS} steps a sample; raise sample_rate, lower stiffness and "
+        "damping of the joints, or raise their speed_floor"
+    )
+
+
+def _size_fault(scene: PumpScene, steps: float) -> str | None:
+    """Refuse what would not fit the memory, before any of it is taken."""
+    time = scene.duration + scene.settling_revolutions / scene.drive.speed
+    per_step = _BYTES_PER_STEP * len(scene.throws)
+    needed = time * scene.sample_rate * max(steps, _FEWEST_STEPS) * per_step
+    if needed <= _MEMORY:
+        return None
+    return (
+        f"duration = {scene.duration:g} s at sample_rate = {scene.sample_rate:g} Hz with "
+        f"{max(steps, _FEWEST_STEPS):.0f} steps a sample needs {needed / 1e9:.3g} GB, must be <= "
+        f"{_MEMORY / 1e9:g} GB; shorten duration or settling_revolutions, lower sample_rate, "
+        "lengthen numerics.step, or raise a joint's speed_floor"
+    )
+
+
+def _sampling_faults(scene: PumpScene) -> list[str]:
+    revolution = 1 / scene.drive.speed
+    faults = []
+    if scene.duration < revolution:
+        faults.append(
+            f"duration = {scene.duration:g} s must be >= one revolution = {revolution:g} s; "
+            "record longer"
+        )
+    if scene.duration * scene.sample_rate < 2:
+        faults.append(
+            f"duration = {scene.duration:g} s must be >= 2 samples = {2 / scene.sample_rate:g} s; "
+            "raise sample_rate or record longer"
+        )
+    if scene.tacho and scene.tacho.pulse_width / (2 * math.pi) * revolution < 2 / scene.sample_rate:
+        faults.append(
+            f"tacho.pulse_width = {scene.tacho.pulse_width:g} rad must last >= 2 samples; "
+            "widen the pulse or raise sample_rate"
+        )
+    return faults
+
+
+# --- casing
+
+
+def casing_forces(scene: PumpScene, run: CrankRun) -> tuple[tuple[str, ...], NDArray[np.float64]]:
+    """Forces of the mechanism on the casing, summed over the throws that one key stands for.
+
+    Parameters
+    ----------
+    scene : PumpScene
+    run : CrankRun
+        Of the scene.
+
+    Returns
+    -------
+    places : tuple of str
+        Key of every column, as in a mode shape: a place, or that of one throw.
+    forces : numpy.ndarray [shape=(n_steps, n_places)]
+        Means over each step [N]: reactions of bearing and guide, liquid on the cylinder head,
+        valves on their seats, and what the unbalanced crank itself weighs and throws.
+    """
+    keys: dict[str, int] = {}
+    signs = np.zeros((run.forces.shape[1], len(scene.throws) * len(FORCE_PLACES)))
+    for throw in range(len(scene.throws)):
+        for place, (name, sign) in _throw_on_casing(scene, throw).items():
+            column = keys.setdefault(_force_key(scene, place, throw + 1), len(keys))
+            signs[1 + len(FORCES) * throw + FORCES.index(name), column] = sign
+    forces = run.forces @ signs[:, : len(keys)]
+    if scene.crank.unbalance > 0:
+        bearings = [keys[_force_key(scene, place, 1)] for place in ("bearing_x", "bearing_y")]
+        forces[:, bearings] += _crank_throws(scene, run)
+    return tuple(keys), forces
+
+
+def _throw_on_casing(scene: PumpScene, throw: int) -> dict[str, tuple[str, float]]:
+    """Force of the mechanism behind every place of the casing, and its sign there."""
+    reactions = {
+        "bearing_x": ("pin_x", -1.0),
+        "bearing_y": ("pin_y", -1.0),
+        "guide_y": ("guide_y", -1.0),
+        "cylinder_x": ("piston_x", -1.0),
+    }
+    if _rubs(scene, throw):
+        reactions |= {place: (place, -1.0) for place in GUIDE_PLACES}
+    if scene.pressures(throw).rung == "chamber":
+        reactions |= {place: (place, 1.0) for place in VALVE_PLACES}
+    return reactions
+
+
+def _rubs(scene: PumpScene, throw: int) -> bool:
+    return joint_rungs(scene, throw)[GUIDE] == JOINT_COMPLIANT
+
+
+def _crank_throws(scene: PumpScene, run: CrankRun) -> NDArray[np.float64]:
+    """What the unbalance of the crank does to its bearing (x, y), but for its steady weight."""
+    angle = 0.5 * (run.turns[:-1, 0] + run.turns[1:, 0]) + scene.throws[0].phase
+    speed = 0.5 * (run.turns[:-1, 1] + run.turns[1:, 1])
+    spin_up = np.diff(run.turns[:, 1]) / run.step
+    sin, cos = np.sin(angle), np.cos(angle)
+    along = scene.crank.unbalance * (speed**2 * cos + spin_up * sin)
+    across = scene.crank.unbalance * (speed**2 * sin - spin_up * cos)
+    return np.column_stack([along, across])
+
+
+def _force_key(scene: PumpScene, place: str, throw: int) -> str:
+    """Key under which the casing knows a force: that of its throw where there is one."""
+    if scene.casing.frf is not None:
+        return f"{place}_{throw}"
+    keys = {key for mode in scene.casing.modes for key in mode.shape}
+    return specific_key(keys, place, throw) or place
+
+
+def _split(key: str) -> tuple[str, int]:
+    """Place and throw of a key; a place for all throws is that of the first."""
+    place, _, throw = key.rpartition("_")
+    return (key, 1) if key in FORCE_PLACES else (place, int(throw))
+
+
+def _housing(
+    scene: PumpScene,
+    places: tuple[str, ...],
+    means: NDArray[np.float64],
+    step_rate: float,
+    factor: int,
+) -> tuple[NDArray[np.float64], dict[str, float | int | str]]:
+    """Acceleration at every accelerometer, and the numerics of a measured casing."""
+    accelerance = _measured_casing(scene, places)
+    if accelerance is None:
+        modes = _modes(scene, places)
+        return band_limited_acceleration(means, step_rate, factor, modes), {}
+    run = table_acceleration(means, step_rate, factor, accelerance)
+    return run.acceleration, {
+        "frf_sha256": accelerance.sha256,
+        "frf_top_hz": float(accelerance.frequency[-1]),
+        "frf_late_share": accelerance.late_share(),
+        "frf_force_share_above": run.force_share_above,
+    }
+
+
+def _measured_casing(scene: PumpScene, places: tuple[str, ...] = ()) -> Accelerance | None:
+    """Accelerance from the scene's file, None where the casing is given as modes."""
+    if scene.casing.frf is None:
+        return None
+    sensors = [sensor.name for sensor in scene.accelerometers]
+    inputs = tuple(_split(key) for key in places or _all_places(scene))
+    try:
+        return load_accelerance(scene.casing.frf, sensors, inputs)
+    except SceneError as error:
+        raise SceneError(scene.name, error.faults) from None
+
+
+def _all_places(scene: PumpScene) -> list[str]:
+    return [
+        f"{place}_{throw + 1}"
+        for throw in range(len(scene.throws))
+        for place in (
+            *CRANK_PLACES,
+            *(GUIDE_PLACES if _rubs(scene, throw) else ()),
+            *(VALVE_PLACES if scene.pressures(throw).rung == "chamber" else ()),
+        )
+    ]
+
+
+def _modes(scene: PumpScene, places: tuple[str, ...]) -> Modes:
+    modes, sensors = scene.casing.modes, scene.accelerometers
+    inputs = [_split(key) for key in places]
+    return Modes(
+        frequency=np.array([mode.frequency for mode in modes]),
+        damping_ratio=np.array([mode.damping_ratio for mode in modes]),
+        inputs=np.array([[casing_inputs(mode.shape, *at) for at in inputs] for mode in modes]),
+        outputs=np.array([[mode.shape[s.name] for s in sensors] for mode in modes]),
+    )
+
+
+# --- recording
+
+
+def _measured(
+    scene: PumpScene,
+    acceleration: NDArray[np.float64],
+    angle: NDArray[np.float64],
+    plan: _Plan,
+    seed: int,
+) -> tuple[NDArray[np.float32], int]:
+    """Signal of every channel, and how many samples were clipped."""
+    rng = np.random.default_rng(seed)
+    rows, clipped = [], 0
+    for sensor, row in zip(scene.accelerometers, acceleration, strict=True):
+        channel, lost = digitise(
+            _front_end(sensor, row, scene.sample_rate)[plan.kept],
+            gain=sensor.gain,
+            noise=sensor.noise,
+            full_scale=sensor.range,
+            bits=sensor.bits,
+            rng=rng,
+        )
+        rows.append(channel)
+        clipped += lost
+    if scene.tacho:
+        turn = 2 * math.pi
+        width = scene.tacho.pulse_width / turn
+        rows.append(tacho_pulses(angle / turn, pulse_width=width, level=scene.tacho.level))
+    return np.stack(rows), clipped
+
+
+def _front_end(sensor: Accelerometer, row: NDArray[np.float64], fs: float) -> NDArray[np.float64]:
+    """Whole run through mounting and anti-alias filter: they have settled when it is recorded."""
+    poles: list[NDArray[np.complex128]] = []
+    if sensor.mounting_resonance is not None and sensor.mounting_damping is not None:
+        poles.append(mounting_poles(sensor.mounting_resonance, sensor.mounting_damping))
+    if sensor.anti_alias != "none" and sensor.anti_alias_cutoff and sensor.anti_alias_order:
+        poles.append(
+            anti_alias_poles(sensor.anti_alias, sensor.anti_alias_cutoff, sensor.anti_alias_order)
+        )
+    return low_pass(row, fs, np.concatenate(poles)) if poles else row
+
+
+def _valve_status(scene: PumpScene, run: CrankRun, plan: _Plan) -> Status:
+    """A valve that never shuts in time has too soft a spring for the speed."""
+    left = _lift_left(scene, run, plan)
+    return Status.VALVE_OPEN if left > _LIFT_LEFT else Status.OK
+
+
+def _lift_left(scene: PumpScene, run: CrankRun, plan: _Plan) -> float:
+    """Least lift left in the idle strokes of any free valve, over the stop's: what recurs."""
+    begin = plan.kept.start * plan.factor  # after settling
+    if run.chambers is None or len(run.turns) <= begin:  # a run may fail before
+        return 0.0
+    largest = 0.0
+    for throw in range(len(scene.throws)):
+        pressure = scene.pressures(throw)
+        angle = run.turns[begin:, 0] + scene.throws[throw].phase
+        sides = (("suction", pressure.suction_valve, 2), ("discharge", pressure.discharge_valve, 4))
+        for side, valve, column in sides:
+            if valve is None or valve.stuck_lift is not None or _cavitates(run, throw):
+                continue
+            lift = run.chambers[begin:, throw, column]
+            left = lift_left(angle, lift, side, valve.max_lift, after=_LATE)
+            if left.size:
+                largest = max(largest, float(left.min()))
+    return largest
+
+
+def _cavitates(run: CrankRun, throw: int) -> bool:
+    """Vapour keeps the suction valve open until it is refilled, whatever its spring."""
+    return run.chambers is not None and bool(np.any(run.chambers[:, throw, 1] > 0))
+
+
+def _rung_of(part: Any) -> str:
+    return "ideal" if part is None else str(part.rung)
+
+
+def _numerics(scene: PumpScene, run: CrankRun, plan: _Plan) -> dict[str, float | int | str]:
+    steps = len(run.forces)
+    numerics: dict[str, float | int | str] = {
+        "rung_joint": scene.joint.crankpin.rung,
+        "rung_wristpin": _rung_of(scene.joint.wristpin),
+        "rung_guide": _rung_of(scene.joint.guide),
+        "rung_pressure": scene.pressure.rung,
+        "rung_drive": scene.drive.rung,
+        "contact_law": scene.joint.crankpin.law,
+        "step_s": run.step,
+        "steps": steps,
+        "step_per_contact_time": run.step * contact_rate(scene),
+        "contact_changes": run.contact_changes,
+        "cuts_refused": run.cuts_refused,
+        "peak_normal_force_n": run.peak_normal_force,
+        "mean_speed_hz": float(run.turns[:, 1].mean()) / (2 * math.pi),
+    }
+    rungs = [joint_rungs(scene, throw) for throw in range(len(scene.throws))]
+    if any(JOINT_COMPLIANT in row for row in rungs) and _has_hysteresis(scene):
+        closings = max(1, run.contact_changes // 2)
+        numerics["floored_share"] = run.floored_closings / closings
+        numerics["speed_floor_m_s"] = max(
+            float(contact_table(scene, throw)["speed_floor"][:2].min())
+            for throw in range(len(scene.throws))
+        )
+    if any(JOINT_LINK in row for row in rungs):
+        numerics["tension_share"] = run.tension_steps / max(1, steps * len(rungs))
+    if run.chambers is not None:
+        numerics["cavitating_share"] = run.vapour_steps / max(1, steps * len(rungs))
+        numerics["lift_left"] = _lift_left(scene, run, plan)
+    return numerics
+
+
+def _has_hysteresis(scene: PumpScene) -> bool:
+    parts = (scene.joint.crankpin, scene.joint.wristpin, scene.joint.guide)
+    return any(part is not None and part.law != "kelvin-voigt" for part in parts)
+
+
+def _warnings(numerics: dict[str, float | int | str]) -> tuple[str, ...]:
+    """What a user must know of a run that did not fail."""
+    found = []
+    if float(numerics.get("tension_share", 0.0)) > 0:
+        found.append(
+            f"contact would be lost in {float(numerics['tension_share']):.1%} of the steps: a "
+            "massless link is in tension; set the joint's rung to 'compliant'"
+        )
+    if float(numerics.get("cavitating_share", 0.0)) > 0:
+        found.append(
+            f"a cylinder holds vapour in {float(numerics['cavitating_share']):.1%} of the steps: "
+            "the suction cavitates"
+        )
+    if float(numerics.get("floored_share", 0.0)) > _MOSTLY:
+        found.append(
+            f"{float(numerics['floored_share']):.1%} of the contacts closed more slowly than "
+            f"{float(numerics['speed_floor_m_s']):.3g} m/s, the floor of the contact law: they "
+            "were damped less than the law says"
+        )
+    if int(numerics.get("clipped_samples", 0)) > 0:
+        found.append(f"{numerics['clipped_samples']} samples clipped; widen the sensor's range")
+    return tuple(found)
+
+
+def _truth(run: CrankRun, plan: _Plan) -> dict[str, Any]:
+    """Forces, low-passed as the signal is, and states at the sample instants, per throw."""
+    truth: dict[str, Any] = {"state_alpha": plan.turned(run)}
+    truth["state_alpha_rate"] = plan.at_samples(run.turns[:, 1])
+    force = decimate(run.forces, plan.factor)[plan.kept]
+    truth["drive_moment_n_m"] = force[:, 0]
+    for throw in range(len(plan.scene.throws)):
+        suffix = f"_{throw + 1}" if throw else ""
+        own = force[:, 1 + len(FORCES) * throw :]
+        truth |= {f"{name}{suffix}": value for name, value in _throw_truth(run, plan, throw, own)}
+    return truth
+
+
+def _throw_truth(
+    run: CrankRun, plan: _Plan, throw: int, force: NDArray[np.float64]
+) -> list[tuple[str, NDArray[np.float64]]]:
+    assert run.bodies is not None  # truth was asked for
+    bodies = plan.at_samples(run.bodies[:, throw])
+    offsets = pin_offsets(plan.scene, plan.turned(run), bodies, throw)
+    found = [
+        ("pin_force_n", force[:, 0:2]),
+        ("wrist_force_n", force[:, 2:4]),
+        ("guide_force_n", force[:, 5]),
+        ("piston_pressure_force_n", -force[:, 6]),  # positive towards the crank
+        ("pin_offset_m", offsets[:, 0:2]),
+        ("wrist_offset_m", offsets[:, 2:4]),
+        ("state_piston", bodies[:, 3]),
+        ("state_piston_velocity", bodies[:, 9]),
+        ("state_piston_across", bodies[:, 4]),
+        ("state_piston_tilt", bodies[:, 5]),
+        ("state_beta", bodies[:, 2]),
+        ("state_beta_rate", bodies[:, 8]),
+    ]
+    if run.chambers is not None:
+        chamber = plan.at_samples(run.chambers[:, throw])
+        found += [
+            ("cylinder_pressure_pa", chamber[:, 0]),
+            ("suction_lift_m", chamber[:, 2]),
+            ("discharge_lift_m", chamber[:, 4]),
+        ]
+    return found
