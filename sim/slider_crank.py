@@ -257,36 +257,6 @@ def _contact_margin(k: int, j: int, w: Any, row: int, t: Any) -> Any:
 
 
 @kernel
-def _pin_contact(
-    d_x: float,
-    d_y: float,
-    v_x: float,
-    v_y: float,
-    spin: float,
-    touching: bool,
-    impact: float,
-    c: Any,
-) -> Any:
-    """Force on the rod (x, y), its tangential part, normal part; margin, approach, overlap."""
-    distance, speed, n_x, n_y = _polar(d_x, d_y, v_x, v_y)
-    overlap = distance - c.clearance
-    law = normal_force(overlap, speed, impact, c)
-    margin = _margin(overlap, law, touching, c)
-    if not touching:
-        return 0.0, 0.0, 0.0, 0.0, margin, speed, overlap
-    tangential = friction_force(v_y * n_x - v_x * n_y + spin, law, c)
-    return (
-        law * n_x - tangential * n_y,
-        law * n_y + tangential * n_x,
-        tangential,
-        law,
-        margin,
-        speed,
-        overlap,
-    )
-
-
-@kernel
 def _link_drag(d_x: float, d_y: float, v_x: float, v_y: float, spin: float, c: Any) -> Any:
     """Viscous force on the rod along a link's end (x, y), and its share between the surfaces.
 
@@ -300,18 +270,76 @@ def _link_drag(d_x: float, d_y: float, v_x: float, v_y: float, spin: float, c: A
 
 
 @kernel
+def _pin_joint(
+    joint: int,
+    rung: int,
+    d_x: float,
+    d_y: float,
+    v_x: float,
+    v_y: float,
+    spin: float,
+    b: Any,
+    held: Any,
+    c: Any,
+) -> Any:
+    """Applied force of a pin on the rod (x, y), what of it rubs, what presses, and the overlap.
+
+    `spin` is the sliding velocity that comes from turning alone.
+    """
+    if rung == JOINT_LINK:
+        f_x, f_y, rub = _link_drag(d_x, d_y, v_x, v_y, spin, c)
+        return f_x, f_y, rub, 0.0, 0.0
+    distance, speed, n_x, n_y = _polar(d_x, d_y, v_x, v_y)
+    overlap = distance - c.clearance
+    law = normal_force(overlap, speed, held.impact[joint], c)
+    touching = held.touching[joint] != 0
+    b.margin[joint], b.approach[joint] = _margin(overlap, law, touching, c), speed
+    if not touching:
+        return 0.0, 0.0, 0.0, 0.0, overlap
+    rub = friction_force(v_y * n_x - v_x * n_y + spin, law, c)
+    return law * n_x - rub * n_y, law * n_y + rub * n_x, rub, law, overlap
+
+
+@kernel
+def _guide(q: Any, b: Any, held: Any, c: Any) -> Any:
+    """Force of a guide with clearance on the piston (x, y, turning), peak normal force, overlap."""
+    f_x, f_y, moment, peak, deepest = 0.0, 0.0, 0.0, 0.0, 0.0
+    for corner in range(4):
+        j = GUIDE + corner
+        overlap, speed, r_x, r_y, side = _corner(b, q, corner, c.clearance)
+        law = normal_force(overlap, speed, held.impact[j], c)
+        touching = held.touching[j] != 0
+        b.margin[j], b.approach[j] = _margin(overlap, law, touching, c), speed
+        deepest = max(deepest, overlap)
+        if touching:
+            push = -side * law
+            drag = -friction_force(b.y[9] - b.y[11] * r_y, law, c)
+            f_x += drag
+            f_y += push
+            moment += r_x * push - r_y * drag
+            peak = max(peak, law)
+    return f_x, f_y, moment, peak, deepest
+
+
+@kernel
+def _pressure(k: int, w: Any, row: int, share: float, t: Any) -> Any:
+    """Pressure on the piston, and the mass of the liquid that moves with it."""
+    q, held = t.throws[k], w.held[k]
+    if q.pressure_rung == PRESSURE_CHAMBER:
+        before, after = held.pressure[0], held.pressure[1]
+        return before + share * (after - before), 0.0
+    angle = w.crank[row, ANGLE] + q.phase
+    return line_pressure(angle, w.crank[row, SPEED], w.stage[row, k].y[9], t.liquid[k])
+
+
+@kernel
 def _throw(k: int, w: Any, row: int, share: float, t: Any) -> None:
     """Rates and forces of one throw at constant crank speed, and per crank acceleration."""
     q, m, b, held = t.throws[k], t.machine, w.stage[row, k], w.held[k]
     sin_a, cos_a = sine_cosine(w.crank[row, ANGLE] + q.phase)
     sin_b, cos_b = sine_cosine(b.y[2])
     omega, b_rate = w.crank[row, SPEED], b.y[8]
-    if q.pressure_rung == PRESSURE_CHAMBER:
-        added = 0.0
-        before, after = held.pressure[0], held.pressure[1]
-        pressure = before + share * (after - before)
-    else:
-        pressure, added = line_pressure(w.crank[row, ANGLE] + q.phase, omega, b.y[9], t.liquid[k])
+    pressure, added = _pressure(k, w, row, share, t)
     # applied forces on rod (x, y, turning with b), piston (x, y, turning with t), and crank
     rod_x, rod_y, rod_b = -m.gravity_x * q.rod_mass, -m.gravity_y * q.rod_mass, 0.0
     on_face = -q.piston_area * pressure
@@ -319,114 +347,55 @@ def _throw(k: int, w: Any, row: int, share: float, t: Any) -> None:
     piston_t, guide_x, guide_y, crank_moment = 0.0, 0.0, 0.0, 0.0
     pin_x, pin_y, wrist_x, wrist_y = 0.0, 0.0, 0.0, 0.0
     peak, overlap_ratio = 0.0, 0.0
-    c_x, c_y, cv_x, cv_y = _crank_offset(b, omega, q, sin_a, cos_a, sin_b, cos_b)
-    if q.crankpin_rung == JOINT_COMPLIANT:
-        c = t.contacts[k, CRANKPIN]
-        eye = q.crankpin_radius + c.clearance
-        pin_x, pin_y, tangential, normal, b.margin[CRANKPIN], b.approach[CRANKPIN], overlap = (
-            _pin_contact(
-                c_x,
-                c_y,
-                cv_x,
-                cv_y,
-                omega * q.crankpin_radius + b_rate * eye,
-                held.touching[CRANKPIN] != 0,
-                held.impact[CRANKPIN],
-                c,
-            )
+    if q.crankpin_rung != JOINT_IDEAL:
+        c, radius = t.contacts[k, CRANKPIN], q.crankpin_radius
+        eye = radius + c.clearance
+        d_x, d_y, v_x, v_y = _crank_offset(b, omega, q, sin_a, cos_a, sin_b, cos_b)
+        spin = omega * radius + b_rate * eye
+        pin_x, pin_y, rub, peak, overlap = _pin_joint(
+            CRANKPIN, q.crankpin_rung, d_x, d_y, v_x, v_y, spin, b, held, c
         )
         rod_x += pin_x
         rod_y += pin_y
-        rod_b += q.rod_arm * (pin_x * sin_b + pin_y * cos_b) - eye * tangential
-        crank_moment -= q.crankpin_radius * tangential
-        peak, overlap_ratio = normal, overlap / q.crankpin_radius
-    elif q.crankpin_rung == JOINT_LINK:
-        c = t.contacts[k, CRANKPIN]
-        eye = q.crankpin_radius + c.clearance
-        spin = omega * q.crankpin_radius + b_rate * eye
-        pin_x, pin_y, tangential = _link_drag(c_x, c_y, cv_x, cv_y, spin, c)
-        rod_x += pin_x
-        rod_y += pin_y
-        rod_b += q.rod_arm * (pin_x * sin_b + pin_y * cos_b) - eye * tangential
-        crank_moment -= q.crankpin_radius * tangential
-    if q.wristpin_rung == JOINT_LINK:
-        w_x, w_y, wv_x, wv_y = _wrist_offset(b, q, sin_b, cos_b)
-        c = t.contacts[k, WRISTPIN]
-        eye = q.wristpin_radius + c.clearance
-        spin = b.y[11] * q.wristpin_radius + b_rate * eye
-        wrist_x, wrist_y, tangential = _link_drag(w_x, w_y, wv_x, wv_y, spin, c)
-        rod_x += wrist_x
-        rod_y += wrist_y
-        rod_b -= q.rod_centre * (wrist_x * sin_b + wrist_y * cos_b) + eye * tangential
-        piston_x -= wrist_x
-        piston_y -= wrist_y
-        piston_t -= q.wristpin_radius * tangential
-    elif q.wristpin_rung == JOINT_COMPLIANT:
-        w_x, w_y, wv_x, wv_y = _wrist_offset(b, q, sin_b, cos_b)
-        c = t.contacts[k, WRISTPIN]
-        eye = q.wristpin_radius + c.clearance
-        (
-            wrist_x,
-            wrist_y,
-            tangential,
-            normal,
-            b.margin[WRISTPIN],
-            b.approach[WRISTPIN],
-            overlap,
-        ) = _pin_contact(
-            w_x,
-            w_y,
-            wv_x,
-            wv_y,
-            b.y[11] * q.wristpin_radius + b_rate * eye,
-            held.touching[WRISTPIN] != 0,
-            held.impact[WRISTPIN],
-            c,
+        rod_b += q.rod_arm * (pin_x * sin_b + pin_y * cos_b) - eye * rub
+        crank_moment -= radius * rub
+        overlap_ratio = overlap / radius
+    if q.wristpin_rung != JOINT_IDEAL:
+        c, radius = t.contacts[k, WRISTPIN], q.wristpin_radius
+        eye = radius + c.clearance
+        d_x, d_y, v_x, v_y = _wrist_offset(b, q, sin_b, cos_b)
+        spin = b.y[11] * radius + b_rate * eye
+        wrist_x, wrist_y, rub, normal, overlap = _pin_joint(
+            WRISTPIN, q.wristpin_rung, d_x, d_y, v_x, v_y, spin, b, held, c
         )
         rod_x += wrist_x
         rod_y += wrist_y
-        rod_b -= q.rod_centre * (wrist_x * sin_b + wrist_y * cos_b) + eye * tangential
+        rod_b -= q.rod_centre * (wrist_x * sin_b + wrist_y * cos_b) + eye * rub
         piston_x -= wrist_x
         piston_y -= wrist_y
-        piston_t -= q.wristpin_radius * tangential
-        peak = max(peak, normal)
-        overlap_ratio = max(overlap_ratio, overlap / q.wristpin_radius)
+        piston_t -= radius * rub
+        peak, overlap_ratio = max(peak, normal), max(overlap_ratio, overlap / radius)
     if q.guide_rung == JOINT_COMPLIANT:
-        c = t.contacts[k, GUIDE]
-        for corner in range(4):
-            j = GUIDE + corner
-            overlap, speed, r_x, r_y, side = _corner(b, q, corner, c.clearance)
-            law = normal_force(overlap, speed, held.impact[j], c)
-            b.margin[j] = _margin(overlap, law, held.touching[j] != 0, c)
-            b.approach[j] = speed
-            overlap_ratio = max(overlap_ratio, overlap / q.guide_half_height)
-            if held.touching[j] != 0:
-                push = -side * law
-                drag = -friction_force(b.y[9] - b.y[11] * r_y, law, c)
-                piston_x += drag
-                piston_y += push
-                piston_t += r_x * push - r_y * drag
-                guide_x += drag
-                guide_y += push
-                peak = max(peak, law)
+        guide_x, guide_y, moment, normal, overlap = _guide(q, b, held, t.contacts[k, GUIDE])
+        piston_x += guide_x
+        piston_y += guide_y
+        piston_t += moment
+        peak, overlap_ratio = max(peak, normal), max(overlap_ratio, overlap / q.guide_half_height)
     inv_m, inv_j = q.inverse_rod_mass, q.inverse_rod_inertia
     inv_px = 1.0 / (q.piston_mass + added)
-    inv_py, inv_pt = q.inverse_piston_across, q.inverse_piston_tilt
     acc_x, acc_y, acc_b = rod_x * inv_m, rod_y * inv_m, rod_b * inv_j
-    pis_x, pis_y, pis_t = piston_x * inv_px, piston_y * inv_py, piston_t * inv_pt
-    rigid = q.crankpin_rung != JOINT_COMPLIANT
-    link = 0.0
+    pis_x, pis_y = piston_x * inv_px, piston_y * q.inverse_piston_across
+    b.link = 0.0
+    b.rate[11] = piston_t * q.inverse_piston_tilt
     if q.crankpin_rung == JOINT_COMPLIANT and q.wristpin_rung == JOINT_IDEAL:
         # two constraints of the wrist pin in closed form: the way a worn crank pin takes
-        w_x, w_y, wv_x, wv_y = _wrist_offset(b, q, sin_b, cos_b)
-        decay = m.baumgarte
-        swing = q.rod_centre * b_rate * b_rate
-        lag = q.rod_centre * acc_b
-        need_x = pis_x - acc_x + lag * sin_b + swing * cos_b + decay * (2.0 * wv_x + decay * w_x)
-        need_y = pis_y - acc_y + lag * cos_b - swing * sin_b + decay * (2.0 * wv_y + decay * w_y)
+        d_x, d_y, v_x, v_y = _wrist_offset(b, q, sin_b, cos_b)
+        swing, lag = q.rod_centre * b_rate * b_rate, q.rod_centre * acc_b
+        need_x = pis_x - acc_x + lag * sin_b + swing * cos_b + _held_back(d_x, v_x, m)
+        need_y = pis_y - acc_y + lag * cos_b - swing * sin_b + _held_back(d_y, v_y, m)
         turning = q.rod_centre * q.rod_centre * inv_j
         a_xx = inv_m + inv_px + turning * sin_b * sin_b
-        a_yy = inv_m + inv_py + turning * cos_b * cos_b
+        a_yy = inv_m + q.inverse_piston_across + turning * cos_b * cos_b
         a_xy = turning * sin_b * cos_b
         inverse = 1.0 / (a_xx * a_yy - a_xy * a_xy)
         wrist_x = (a_yy * need_x - a_xy * need_y) * inverse
@@ -435,66 +404,143 @@ def _throw(k: int, w: Any, row: int, share: float, t: Any) -> None:
         acc_y += wrist_y * inv_m
         acc_b -= q.rod_centre * (wrist_x * sin_b + wrist_y * cos_b) * inv_j
         pis_x -= wrist_x * inv_px
-        pis_y -= wrist_y * inv_py
-    elif rigid or q.wristpin_rung != JOINT_COMPLIANT:
-        (
-            acc_x,
-            acc_y,
-            acc_b,
-            pis_x,
-            pis_y,
-            pis_t,
-            pin_x,
-            pin_y,
-            wrist_x,
-            wrist_y,
-            crank_moment,
-            link,
-        ) = _constrained(
-            k,
-            w,
-            row,
-            t,
-            sin_a,
-            cos_a,
-            sin_b,
-            cos_b,
-            inv_px,
-            inv_py,
-            inv_pt,
-            acc_x,
-            acc_y,
-            acc_b,
-            pis_x,
-            pis_y,
-            pis_t,
-            pin_x,
-            pin_y,
-            wrist_x,
-            wrist_y,
-            crank_moment,
-        )
-    crank_moment += q.crank_radius * (pin_x * sin_a - pin_y * cos_a)
-    if q.guide_rung != JOINT_COMPLIANT:
-        guide_y = wrist_y + m.gravity_y * q.piston_mass
+        pis_y -= wrist_y * q.inverse_piston_across
     for i in range(6):
         b.rate[i] = b.y[6 + i]
     b.rate[6], b.rate[7], b.rate[8] = acc_x, acc_y, acc_b
-    b.rate[9], b.rate[10], b.rate[11] = pis_x, pis_y, pis_t
+    b.rate[9], b.rate[10] = pis_x, pis_y
     b.force[_PIN], b.force[_PIN + 1] = pin_x, pin_y
     b.force[_WRIST], b.force[_WRIST + 1] = wrist_x, wrist_y
+    b.normal, b.overlap = peak, overlap_ratio
+    if q.crankpin_rung != JOINT_COMPLIANT or q.wristpin_rung == JOINT_LINK:
+        crank_moment += _constrain(k, w, row, t, sin_a, cos_a, sin_b, cos_b, inv_px)
+    pin_x, pin_y = b.force[_PIN], b.force[_PIN + 1]
+    w.moment[0] += crank_moment + q.crank_radius * (pin_x * sin_a - pin_y * cos_a)
+    b.force[_FACE] = on_face - added * b.rate[9]
+    if q.guide_rung != JOINT_COMPLIANT:  # what holds the piston up
+        guide_y = b.force[_WRIST + 1] + m.gravity_y * q.piston_mass
     b.force[_GUIDE], b.force[_GUIDE + 1] = guide_x, guide_y
-    b.force[_FACE] = on_face - added * pis_x
-    w.moment[0] += crank_moment
-    b.normal, b.overlap, b.link = peak, overlap_ratio, link
-    if rigid and m.inverse_inertia > 0.0:
+    if q.crankpin_rung != JOINT_COMPLIANT and m.inverse_inertia > 0.0:
         b.force_per_turn[_FACE] = -added * b.rate_per_turn[9]
         if q.guide_rung != JOINT_COMPLIANT:
             b.force_per_turn[_GUIDE + 1] = b.force_per_turn[_WRIST + 1]
 
 
 @kernel
-def _constrained(
+def _held_back(distance: float, speed: float, m: Any) -> Any:
+    """Baumgarte's term: acceleration that brings a drifting constraint back."""
+    return m.baumgarte * (2.0 * speed + m.baumgarte * distance)
+
+
+@kernel
+def _equations(
+    joint: int,
+    n: int,
+    side: float,
+    k: int,
+    w: Any,
+    row: int,
+    t: Any,
+    sin_a: float,
+    cos_a: float,
+    sin_b: float,
+    cos_b: float,
+) -> int:
+    """Equations of one joint from number n on: what its constraint forces must accelerate.
+
+    A link's force has friction across it, on one side of the eye in compression (`side` 1), on
+    the other in tension (-1). Returns the number of the next equation.
+    """
+    q, m, b, c = t.throws[k], t.machine, w.stage[row, k], t.contacts[k, joint]
+    omega, b_rate = w.crank[row, SPEED], b.y[8]
+    if joint == CRANKPIN:
+        rung, arm, radius, spin = q.crankpin_rung, q.rod_arm, q.crankpin_radius, omega
+        d_x, d_y, v_x, v_y = _crank_offset(b, omega, q, sin_a, cos_a, sin_b, cos_b)
+        pull = q.crank_radius * omega * omega
+        apart_x, apart_y = -pull * cos_a, -pull * sin_a
+        turn_x, turn_y = -q.crank_radius * sin_a, q.crank_radius * cos_a
+    else:
+        rung, arm, radius, spin = q.wristpin_rung, -q.rod_centre, q.wristpin_radius, b.y[11]
+        d_x, d_y, v_x, v_y = _wrist_offset(b, q, sin_b, cos_b)
+        apart_x, apart_y = b.rate[9], b.rate[10]
+        turn_x, turn_y = 0.0, 0.0
+    apart_x -= b.rate[6] + arm * (b.rate[8] * sin_b + b_rate * b_rate * cos_b)
+    apart_y -= b.rate[7] + arm * (b.rate[8] * cos_b - b_rate * b_rate * sin_b)
+    if rung == JOINT_IDEAL:
+        w.place[n, 0] = w.place[n + 1, 0] = joint
+        w.place[n, 1] = w.place[n, 4] = w.place[n + 1, 2] = w.place[n + 1, 5] = 1.0
+        w.place[n, 2] = w.place[n, 5] = w.place[n + 1, 1] = w.place[n + 1, 4] = 0.0
+        w.place[n, 3] = w.place[n + 1, 3] = 0.0
+        w.matrix[n, 4] = apart_x + _held_back(d_x, v_x, m)
+        w.matrix[n + 1, 4] = apart_y + _held_back(d_y, v_y, m)
+        w.matrix[n, 5], w.matrix[n + 1, 5] = turn_x, turn_y
+        return n + 2
+    distance, speed, n_x, n_y = _polar(d_x, d_y, v_x, v_y)
+    swing = v_y * n_x - v_x * n_y
+    sliding = swing + radius * spin + (radius + c.clearance) * b_rate
+    share = side * (friction_force(sliding, 1.0, c) - c.tangential_damping * sliding)
+    w.place[n, 0], w.place[n, 3] = joint, share
+    w.place[n, 1], w.place[n, 2] = n_x - share * n_y, n_y + share * n_x
+    w.place[n, 4], w.place[n, 5] = n_x, n_y
+    across = swing * swing / distance
+    back = _held_back(distance - c.clearance, speed, m)
+    w.matrix[n, 4] = apart_x * n_x + apart_y * n_y + across + back
+    w.matrix[n, 5] = turn_x * n_x + turn_y * n_y
+    return n + 1
+
+
+@kernel
+def _unit_swing(j: int, k: int, w: Any, t: Any, sin_b: float, cos_b: float) -> Any:
+    """Angular acceleration of the rod per unit of constraint force j."""
+    q, crank = t.throws[k], w.place[j, 0] == CRANKPIN
+    arm = q.rod_arm if crank else -q.rod_centre
+    radius = q.crankpin_radius if crank else q.wristpin_radius
+    eye = radius + t.contacts[k, CRANKPIN if crank else WRISTPIN].clearance
+    along = w.place[j, 1] * sin_b + w.place[j, 2] * cos_b
+    return (arm * along - eye * w.place[j, 3]) * q.inverse_rod_inertia
+
+
+@kernel
+def _mobilities(n: int, k: int, w: Any, t: Any, sin_b: float, cos_b: float, inv_px: float) -> None:
+    """What every unit constraint force does to every equation."""
+    q = t.throws[k]
+    for j in range(n):
+        u_x, u_y = w.place[j, 1], w.place[j, 2]
+        swing = _unit_swing(j, k, w, t, sin_b, cos_b)
+        for i in range(n):
+            reach = q.rod_arm if w.place[i, 0] == CRANKPIN else -q.rod_centre
+            e_x = u_x * q.inverse_rod_mass + reach * swing * sin_b
+            e_y = u_y * q.inverse_rod_mass + reach * swing * cos_b
+            if w.place[j, 0] == WRISTPIN and w.place[i, 0] == WRISTPIN:
+                e_x += u_x * inv_px
+                e_y += u_y * q.inverse_piston_across
+            w.matrix[i, j] = e_x * w.place[i, 4] + e_y * w.place[i, 5]
+
+
+@kernel
+def _add_force(
+    size: float, j: int, k: int, rate: Any, force: Any, w: Any, t: Any, swing: float, inv_px: float
+) -> Any:
+    """Add constraint force j to rates and forces of a throw; its friction's moment on the crank."""
+    q = t.throws[k]
+    f_x, f_y, rub = size * w.place[j, 1], size * w.place[j, 2], size * w.place[j, 3]
+    rate[6] += f_x * q.inverse_rod_mass
+    rate[7] += f_y * q.inverse_rod_mass
+    rate[8] += size * swing
+    if w.place[j, 0] == CRANKPIN:
+        force[_PIN] += f_x
+        force[_PIN + 1] += f_y
+        return -q.crankpin_radius * rub
+    force[_WRIST] += f_x
+    force[_WRIST + 1] += f_y
+    rate[9] -= f_x * inv_px
+    rate[10] -= f_y * q.inverse_piston_across
+    rate[11] -= q.wristpin_radius * rub * q.inverse_piston_tilt
+    return 0.0
+
+
+@kernel
+def _constrain(
     k: int,
     w: Any,
     row: int,
@@ -504,171 +550,51 @@ def _constrained(
     sin_b: float,
     cos_b: float,
     inv_px: float,
-    inv_py: float,
-    inv_pt: float,
-    acc_x: float,
-    acc_y: float,
-    acc_b: float,
-    pis_x: float,
-    pis_y: float,
-    pis_t: float,
-    pin_x: float,
-    pin_y: float,
-    wrist_x: float,
-    wrist_y: float,
-    crank_moment: float,
 ) -> Any:
-    """Add the constraint forces of ideal joints and links to the accelerations.
+    """Add the constraint forces of ideal joints and links; their friction's moment on the crank.
 
     Unknowns are forces along given directions at either end of the rod; the equations ask the
     relative acceleration of pin and eye to be what keeps them together.
     """
     q, m, b = t.throws[k], t.machine, w.stage[row, k]
-    inv_m, inv_j = q.inverse_rod_mass, q.inverse_rod_inertia
-    omega, b_rate, decay = w.crank[row, SPEED], b.y[8], m.baumgarte
-    square = b_rate * b_rate
-    least, at_pin, at_wrist = 0.0, 1.0, 1.0  # +1: link in compression, -1: in tension
-    for _ in range(4):
+    least, at_pin, at_wrist, n = 1.0, 1.0, 1.0, 0
+    for _ in range(4):  # until every link has its friction on the side that its sign asks for
         n = 0
-        for joint in range(2):
-            rung = q.crankpin_rung if joint == CRANKPIN else q.wristpin_rung
-            if rung == JOINT_COMPLIANT:
-                continue
-            c = t.contacts[k, joint]
-            if joint == CRANKPIN:
-                d_x, d_y, v_x, v_y = _crank_offset(b, omega, q, sin_a, cos_a, sin_b, cos_b)
-                arm, radius, spin = q.rod_arm, q.crankpin_radius, omega
-                pull = q.crank_radius * omega * omega
-                of_pin_x, of_pin_y = -pull * cos_a, -pull * sin_a
-                turn_x, turn_y = -q.crank_radius * sin_a, q.crank_radius * cos_a
-            else:
-                d_x, d_y, v_x, v_y = _wrist_offset(b, q, sin_b, cos_b)
-                arm, radius, spin = -q.rod_centre, q.wristpin_radius, b.y[11]
-                of_pin_x, of_pin_y = pis_x, pis_y
-                turn_x, turn_y = 0.0, 0.0
-            apart_x = of_pin_x - acc_x - arm * (acc_b * sin_b + square * cos_b)
-            apart_y = of_pin_y - acc_y - arm * (acc_b * cos_b - square * sin_b)
-            if rung == JOINT_IDEAL:
-                for axis in range(2):
-                    w.place[n, 0] = joint
-                    w.place[n, 1], w.place[n, 2] = 1.0 - axis, float(axis)
-                    w.place[n, 3], w.place[n, 4], w.place[n, 5] = 0.0, 1.0 - axis, float(axis)
-                    w.matrix[n, 4] = (
-                        apart_x + decay * (2.0 * v_x + decay * d_x)
-                        if axis == 0
-                        else apart_y + decay * (2.0 * v_y + decay * d_y)
-                    )
-                    w.matrix[n, 5] = turn_x if axis == 0 else turn_y
-                    n += 1
-                continue
-            distance, speed, n_x, n_y = _polar(d_x, d_y, v_x, v_y)
-            eye = radius + c.clearance
-            slide = v_y * n_x - v_x * n_y
-            share = friction_force(slide + radius * spin + eye * b_rate, 1.0, c)
-            share -= c.tangential_damping * (slide + radius * spin + eye * b_rate)
-            share *= at_pin if joint == CRANKPIN else at_wrist
-            w.place[n, 0] = joint
-            w.place[n, 1], w.place[n, 2] = n_x - share * n_y, n_y + share * n_x
-            w.place[n, 3], w.place[n, 4], w.place[n, 5] = share, n_x, n_y
-            w.matrix[n, 4] = (
-                apart_x * n_x
-                + apart_y * n_y
-                + slide * slide / distance
-                + decay * (2.0 * speed + decay * (distance - c.clearance))
-            )
-            w.matrix[n, 5] = turn_x * n_x + turn_y * n_y
-            n += 1
-        for j in range(n):
-            at_crank = w.place[j, 0] == CRANKPIN
-            arm = q.rod_arm if at_crank else -q.rod_centre
-            radius = q.crankpin_radius if at_crank else q.wristpin_radius
-            eye = radius + t.contacts[k, CRANKPIN if at_crank else WRISTPIN].clearance
-            u_x, u_y = w.place[j, 1], w.place[j, 2]
-            swing = (arm * (u_x * sin_b + u_y * cos_b) - eye * w.place[j, 3]) * inv_j
-            for i in range(n):
-                reach = q.rod_arm if w.place[i, 0] == CRANKPIN else -q.rod_centre
-                e_x = u_x * inv_m + reach * swing * sin_b
-                e_y = u_y * inv_m + reach * swing * cos_b
-                if not at_crank and w.place[i, 0] == WRISTPIN:
-                    e_x += u_x * inv_px
-                    e_y += u_y * inv_py
-                w.matrix[i, j] = e_x * w.place[i, 4] + e_y * w.place[i, 5]
+        if q.crankpin_rung != JOINT_COMPLIANT:
+            n = _equations(CRANKPIN, n, at_pin, k, w, row, t, sin_a, cos_a, sin_b, cos_b)
+        if q.wristpin_rung != JOINT_COMPLIANT:
+            n = _equations(WRISTPIN, n, at_wrist, k, w, row, t, sin_a, cos_a, sin_b, cos_b)
+        _mobilities(n, k, w, t, sin_b, cos_b, inv_px)
         _eliminate(w, n)
-        least, consistent = 1.0, True
-        for j in range(n):
-            at_crank = w.place[j, 0] == CRANKPIN
-            if (q.crankpin_rung if at_crank else q.wristpin_rung) != JOINT_LINK:
-                continue
-            size = w.matrix[j, 4]
-            side = -1.0 if size < 0.0 else 1.0
-            least = min(least, size)
-            consistent &= side == (at_pin if at_crank else at_wrist)
-            if at_crank:  # friction acts on the other side of the eye
-                at_pin = side
-            else:
-                at_wrist = side
-        if consistent:
+        least, was_pin, was_wrist = 1.0, at_pin, at_wrist
+        if q.crankpin_rung == JOINT_LINK:  # the first equation
+            least = min(least, w.matrix[0, 4])
+            at_pin = -1.0 if w.matrix[0, 4] < 0.0 else 1.0
+        if q.wristpin_rung == JOINT_LINK:  # the last one
+            least = min(least, w.matrix[n - 1, 4])
+            at_wrist = -1.0 if w.matrix[n - 1, 4] < 0.0 else 1.0
+        if at_pin == was_pin and at_wrist == was_wrist:
             break
+    b.link = min(least, 0.0)
     per_turn = m.inverse_inertia > 0.0 and q.crankpin_rung != JOINT_COMPLIANT
     if per_turn:
-        for i in range(6):
-            b.rate_per_turn[6 + i] = 0.0
-        for i in range(_VALVES):
-            b.force_per_turn[i] = 0.0
-    moment_per_turn = 0.0
+        for c in range(6, PER_THROW):
+            b.rate_per_turn[c] = 0.0
+        for c in range(_VALVES):
+            b.force_per_turn[c] = 0.0
+    moment, rubbing = 0.0, 0.0
     for j in range(n):
-        at_crank = w.place[j, 0] == CRANKPIN
-        arm = q.rod_arm if at_crank else -q.rod_centre
-        radius = q.crankpin_radius if at_crank else q.wristpin_radius
-        eye = radius + t.contacts[k, CRANKPIN if at_crank else WRISTPIN].clearance
-        u_x, u_y, share = w.place[j, 1], w.place[j, 2], w.place[j, 3]
-        swing = (arm * (u_x * sin_b + u_y * cos_b) - eye * share) * inv_j
-        size = w.matrix[j, 4]
-        acc_x += size * u_x * inv_m
-        acc_y += size * u_y * inv_m
-        acc_b += size * swing
-        if at_crank:
-            pin_x += size * u_x
-            pin_y += size * u_y
-            crank_moment -= size * radius * share
-        else:
-            wrist_x += size * u_x
-            wrist_y += size * u_y
-            pis_x -= size * u_x * inv_px
-            pis_y -= size * u_y * inv_py
-            pis_t -= size * radius * share * inv_pt
+        swing = _unit_swing(j, k, w, t, sin_b, cos_b)
+        moment += _add_force(w.matrix[j, 4], j, k, b.rate, b.force, w, t, swing, inv_px)
         if per_turn:
             more = w.matrix[j, 5]
-            b.rate_per_turn[6] += more * u_x * inv_m
-            b.rate_per_turn[7] += more * u_y * inv_m
-            b.rate_per_turn[8] += more * swing
-            if at_crank:
-                b.force_per_turn[_PIN] += more * u_x
-                b.force_per_turn[_PIN + 1] += more * u_y
-                moment_per_turn += more * (
-                    q.crank_radius * (u_x * sin_a - u_y * cos_a) - radius * share
-                )
-            else:
-                b.force_per_turn[_WRIST] += more * u_x
-                b.force_per_turn[_WRIST + 1] += more * u_y
-                b.rate_per_turn[9] -= more * u_x * inv_px
-                b.rate_per_turn[10] -= more * u_y * inv_py
-                b.rate_per_turn[11] -= more * radius * share * inv_pt
-    w.moment[1] += moment_per_turn
-    return (
-        acc_x,
-        acc_y,
-        acc_b,
-        pis_x,
-        pis_y,
-        pis_t,
-        pin_x,
-        pin_y,
-        wrist_x,
-        wrist_y,
-        crank_moment,
-        min(least, 0.0),
-    )
+            rubbing += _add_force(
+                more, j, k, b.rate_per_turn, b.force_per_turn, w, t, swing, inv_px
+            )
+    if per_turn:
+        along, across = b.force_per_turn[_PIN], b.force_per_turn[_PIN + 1]
+        w.moment[1] += rubbing + q.crank_radius * (along * sin_a - across * cos_a)
+    return moment
 
 
 @kernel
