@@ -69,6 +69,61 @@ def add_mechanism(system, crank, start):
     return rotor, wrist, pin, eye
 
 
+def add_jointed_mechanism(system, crank, start):
+    """The same as a user would build it: three bodies, revolute joints, a guided piston, a drive.
+
+    Returns nodes of crank, rod and piston, markers of pin and eye.
+    """
+    alpha, omega, x, u, beta, b = start
+    places = [(0.0, alpha, 0.0, omega), (x, math.pi - beta, u, -b), (x, 0.0, u, 0.0)]
+    nodes = [
+        system.AddNode(
+            items.NodeRigidBody2D(
+                referenceCoordinates=[0.0, 0.0, 0.0],
+                initialCoordinates=[along, 0.0, angle],
+                initialVelocities=[speed, 0.0, spin],
+            )
+        )
+        for along, angle, speed, spin in places
+    ]
+    inertia = crank["rod_inertia"] + crank["rod_mass"] * crank["rod_centre"] ** 2
+    bodies = [
+        system.AddObject(
+            items.ObjectRigidBody2D(
+                nodeNumber=node, mass=mass, inertia=turning, centerOfMass=[centre, 0.0]
+            )
+        )
+        for node, mass, turning, centre in (
+            (nodes[0], 1.0, 1.0, 0.0),  # of a crank at constant speed these do not matter
+            (nodes[1], crank["rod_mass"], inertia, crank["rod_centre"]),
+            (nodes[2], crank["piston_mass"], 1.0, 0.0),
+        )
+    ]
+    ground = system.AddObject(items.ObjectGround())
+    joined = ((ground, bodies[0]), (bodies[1], bodies[2]))
+    for pair in joined:
+        markers = [system.AddMarker(items.MarkerBodyPosition(bodyNumber=body)) for body in pair]
+        system.AddObject(items.ObjectJointRevolute2D(markerNumbers=markers))
+    fixed = system.AddMarker(
+        items.MarkerNodeCoordinate(nodeNumber=system.AddNode(items.NodePointGround()), coordinate=0)
+    )
+    guided = ((nodes[2], 1, 0.0, False), (nodes[2], 2, 0.0, False), (nodes[0], 2, omega, True))
+    for node, coordinate, value, of_speed in guided:
+        moving = system.AddMarker(
+            items.MarkerNodeCoordinate(nodeNumber=node, coordinate=coordinate)
+        )
+        system.AddObject(
+            items.ObjectConnectorCoordinate(
+                markerNumbers=[fixed, moving], offset=value, velocityLevel=of_speed
+            )
+        )
+    pin, eye = (
+        system.AddMarker(items.MarkerBodyRigid(bodyNumber=body, localPosition=[arm, 0.0, 0.0]))
+        for body, arm in ((bodies[0], crank["crank_radius"]), (bodies[1], crank["rod_length"]))
+    )
+    return nodes[0], nodes[1], pin, eye
+
+
 def add_hollow_sphere(system, crank, pin, eye, penetration):
     """Exudyn's own contact: linear spring and dashpot, released at zero penetration."""
     history = system.AddNode(
@@ -126,10 +181,12 @@ def penetration(crank, start):
 class Crank:
     """One assembled system, ready for one run."""
 
-    def __init__(self, crank, start, contact, *, record):
+    def __init__(self, crank, start, contact, *, record, jointed=False):
         self.container = exudyn.SystemContainer()
         self.system = self.container.AddSystem()
-        rotor, wrist, pin, eye = add_mechanism(self.system, crank, start)
+        self.angle = 3 if jointed else 1  # column of the crank's angle after the time
+        build = add_jointed_mechanism if jointed else add_mechanism
+        rotor, wrist, pin, eye = build(self.system, crank, start)
         if contact == HOLLOW_SPHERE:
             add_hollow_sphere(self.system, crank, pin, eye, penetration(crank, start))
         else:  # the expression must outlive the run
@@ -168,7 +225,7 @@ class Crank:
             )
             # back from the direction of the rod to the rod angle
             turned = (math.pi if kind == 0 else 0.0) - wrist[:, 3]
-            columns.append(np.column_stack([rotor[:, 1], wrist[:, 1], turned]))
+            columns.append(np.column_stack([rotor[:, self.angle], wrist[:, 1], turned]))
         return rotor[:, 0], *columns
 
 
@@ -212,7 +269,7 @@ def hermite(at, times, values, rates):
 
 def sampled_states(crank, start, setting, at, revolution):
     """States at the times `at` [shape=(len(at), 6)], or None where Exudyn gives up."""
-    run = Crank(crank, start, setting["contact"], record=True)
+    run = Crank(crank, start, setting["contact"], record=True, jointed=setting["jointed"])
     try:
         run.solve(setting, at[-1], revolution)
     except exudyn.SolverError as error:
@@ -233,7 +290,10 @@ def seconds_per_second(crank, start, setting, revolution, job):
     horizon = job["timing_revolutions"] * revolution
     times = []
     for _ in range(job["repeats"]):
-        long, short = (Crank(crank, start, setting["contact"], record=False) for _ in range(2))
+        long, short = (
+            Crank(crank, start, setting["contact"], record=False, jointed=setting["jointed"])
+            for _ in range(2)
+        )
         setup = short.solve(setting, 1e-3 * revolution, revolution)
         times.append((long.solve(setting, horizon, revolution) - setup) / horizon)
     return float(np.median(times))

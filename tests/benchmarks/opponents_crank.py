@@ -385,7 +385,23 @@ def exudyn_settings():
         ("hollow sphere", "ExplicitMidpoint", 1),
     ]
     settings = [
-        {"contact": contact, "solver": solver, "recovery": recovery, "steps": steps}
+        {
+            "contact": "hollow sphere",
+            "solver": "GeneralizedAlpha",
+            "recovery": 0,
+            "steps": steps,
+            "jointed": True,
+        }
+        for steps in (1024, 2048, 4096, 8192, 16384, 32768)
+    ]
+    settings += [
+        {
+            "contact": contact,
+            "solver": solver,
+            "recovery": recovery,
+            "steps": steps,
+            "jointed": False,
+        }
         for contact, solver, recovery in fixed
         for steps in (
             (1024, 1448, 2048, 2896, 4096, 5792, 8192, 11585, 16384)
@@ -399,6 +415,7 @@ def exudyn_settings():
                 "contact": contact,
                 "solver": solver,
                 "recovery": recovery,
+                "jointed": False,
                 "steps": 256,  # the largest step of the adaptive ones
                 "tolerance": tolerance,
                 "scale": 1e-2,
@@ -446,7 +463,8 @@ def exudyn_curves(python, references, repeats):
         answer = ask_exudyn(python, [setting], repeats) or {"runs": []}
         for run in answer["runs"]:
             cuts = f", cut, recovery {run['recovery']}" if run["recovery"] else ""
-            name = f"Exudyn {answer['version']} {run['solver']}, {run['contact']}{cuts}"
+            built = ", bodies and joints" if run["jointed"] else ""
+            name = f"Exudyn {answer['version']} {run['solver']}, {run['contact']}{cuts}{built}"
             states = np.array(run.pop("states"))
             reference = references[EXUDYN_CONTACT[run["contact"]]]
             point = {**run, "errors": errors(states, reference)}
@@ -515,13 +533,15 @@ def main():
     curves, apart = measure(options.exudyn, options.repeats)
     base = curves[0]
     lsoda = [c for c in curves if c.name.startswith("LSODA")]
-    exudyn = joined("Exudyn", [c for c in curves if c.name.startswith("Exudyn")])
+    of_exudyn = [c for c in curves if c.name.startswith("Exudyn")]
+    jointed = joined("Exudyn, bodies and joints", [c for c in of_exudyn if "joints" in c.name])
+    exudyn = joined("Exudyn, tuned", [c for c in of_exudyn if "joints" not in c.name])
     dop = joined("DOP853", [c for c in curves if c.name.startswith("DOP853")])
-    found = ratios(base, [*lsoda, dop, exudyn])
+    found = ratios(base, [*lsoda, dop, exudyn, jointed])
     for key, ratio in found.items():
         print(f"{key}: {'not reached' if ratio is None else f'{ratio:.0f} x'}", file=sys.stderr)
     if options.plot:
-        draw([base, *lsoda, dop, exudyn], options.plot)
+        draw([base, *lsoda, dop, exudyn, jointed], options.plot)
     curves = [{"name": curve.name, "points": curve.points} for curve in curves]
     json.dump({"references_apart": apart, "ratios": found, "curves": curves}, sys.stdout)
 
