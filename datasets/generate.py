@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 from ..sim.assemble import simulate
 from ..sim.integrate import Solution
 from ..sim.parts import Scene, SceneError, channels_of
-from ..sim.pump_parts import PumpScene
 from ..sim.wear import grade
+from .draws import value_at
 from .recipe import (
+    CONDITIONS,
     LARGEST_SEED,
     MOST_RECORDS,
     Recipe,
@@ -39,6 +40,7 @@ NUMERICS = {
     "rung_guide": "S16",
     "rung_pressure": "S16",
     "rung_drive": "S16",
+    "rung_film": "S16",
     "contact_law": "S24",
     "frf_sha256": "S64",
     "mean_speed_hz": "<f8",
@@ -48,6 +50,8 @@ NUMERICS = {
     "contact_changes": "<i8",
     "cuts_refused": "<i8",
     "peak_normal_force_n": "<f8",
+    "min_film_m": "<f8",
+    "peak_eccentricity": "<f8",
     "cavitating_share": "<f8",
     "lift_left": "<f8",
     "tension_share": "<f8",
@@ -231,8 +235,8 @@ def _limits(scene: Scene, severity: str) -> dict[str, Any]:
     if wear is None:
         return {}
     return {
-        "grade_edges": wear.grade_edges_diametral,
-        "condemning_limit": wear.condemning_diametral,
+        "grade_edges": wear.grade_edges,
+        "condemning_limit": wear.condemning,
         "limit_source": wear.source,
     }
 
@@ -336,17 +340,18 @@ def save_solution(
         The file exists, or cannot be written.
     """
     severity = clearances(scene)
-    limits = _limits(scene, _PUMP_SEVERITY)
+    primary = next(iter(severity), "")
+    limits = _limits(scene, primary)
     row = {
         "record_id": "0",
         "seed": seed,
         "status": solution.status.name.lower(),
-        "speed_hz": scene.drive.speed if isinstance(scene, PumpScene) else float("nan"),
+        "speed_hz": value_at(scene, CONDITIONS["speed_hz"]),
         **severity,
         **_numerics(solution),
     }
-    if _PUMP_SEVERITY in severity and limits:
-        row["grade"] = grade(severity[_PUMP_SEVERITY], limits["grade_edges"])
+    if limits:
+        row["grade"] = grade(severity[primary], limits["grade_edges"])
     head = Attributes(
         sample_rate=solution.sample_rate,
         channels=solution.channels,
@@ -370,6 +375,3 @@ def save_solution(
     except BaseException:
         writer.part.unlink(missing_ok=True)  # a single recording is made anew, not gone on with
         raise
-
-
-_PUMP_SEVERITY = "diametral_clearance_crankpin_m"

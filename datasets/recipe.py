@@ -20,9 +20,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from ..sim.parts import Part, Ratio, Scene, SceneError, validate_table
+from ..sim.journal_parts import ScarLimits
+from ..sim.parts import Part, Ratio, Scene, SceneError, Wear, validate_table
 from ..sim.parts import beside as files_beside
-from ..sim.pump_parts import Wear
 from ..sim.scene import override, scene_folder, scene_from_table, scene_table, scene_text
 from ..sim.wear import grade
 from .draws import Axis, Bound, Draw, Range, axes_of, has_value, matches, value_at
@@ -35,6 +35,8 @@ SEVERITIES = {
     "throws.*.joint.crankpin.diametral_clearance": "diametral_clearance_crankpin_{}_m",
     "throws.*.joint.wristpin.diametral_clearance": "diametral_clearance_wristpin_{}_m",
     "throws.*.joint.guide.diametral_clearance": "diametral_clearance_guide_{}_m",
+    "bearing.diametral_clearance": "diametral_clearance_bearing_m",
+    "bearing.scar_depth": "scar_depth_bearing_m",
 }
 """Manifest column of every scene value that says how worn a machine is. A new one is one row.
 
@@ -47,6 +49,8 @@ LIMITS = {
     "joint.wristpin.diametral_clearance": "wear_wristpin",
     "throws.*.joint.crankpin.diametral_clearance": "wear",
     "throws.*.joint.wristpin.diametral_clearance": "wear_wristpin",
+    "bearing.diametral_clearance": "wear",
+    "bearing.scar_depth": "wear_scar",
 }
 """Scene table with the wear limits of a severity. One without a row has no grade."""
 
@@ -55,6 +59,9 @@ CONDITIONS = {
     "discharge_pressure_pa": "pressure.discharge",
     "suction_pressure_pa": "pressure.suction",
     "start_angle_rad": "drive.start_angle",
+    "static_load_n": "load.static",
+    "viscosity_pa_s": "oil.dynamic_viscosity",
+    "unbalance_kg_m": "rotor.unbalance",
 }
 """Manifest column of every operating condition -> its place in the scene."""
 
@@ -494,14 +501,14 @@ def _wearing(
                 axis=axis,
                 column=column,
                 grade_column=further if result else "grade",
-                edges=() if limits is None else limits.grade_edges_diametral,
+                edges=() if limits is None else limits.grade_edges,
             )
         )
     return tuple(result)
 
 
 def clearances(scene: Scene) -> dict[str, float]:
-    """Every clearance of a scene that acts, by its manifest column [m].
+    """Every severity of a scene that acts, by its manifest column [m].
 
     None of an ideal joint; those of one throw only where they are not those of all.
 
@@ -523,7 +530,7 @@ def clearances(scene: Scene) -> dict[str, float]:
         for number in range(len(entries)):
             path = pattern.replace("*", str(number))
             joint = path.removesuffix(".diametral_clearance")
-            if not has_value(scene, path) or value_at(scene, joint).rung == "ideal":
+            if not has_value(scene, path) or _rung_of(scene, joint) == "ideal":
                 continue
             value = getattr(value_at(scene, joint), "clearance_diametral", value_at(scene, path))
             if not star or value != found.get(SEVERITIES[pattern.partition("*.")[2]]):
@@ -531,7 +538,12 @@ def clearances(scene: Scene) -> dict[str, float]:
     return found
 
 
-def wear_limits(scene: Scene, column: str) -> Wear | None:
+def _rung_of(scene: Scene, path: str) -> str:
+    """Rung of the part at a path; empty of one that has none, or of a plain number."""
+    return str(getattr(value_at(scene, path), "rung", ""))
+
+
+def wear_limits(scene: Scene, column: str) -> Wear | ScarLimits | None:
     """Wear limits that a scene has for a severity, None where it has none.
 
     Parameters

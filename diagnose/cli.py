@@ -494,6 +494,7 @@ def evaluate(model_file: Path, data: Path, jobs: int | None, as_json: bool) -> N
 
 def _score_lines(result: dict[str, Any], card: dict[str, Any]) -> list[str]:
     from .evaluate import confounder_lines
+    from .report import severity_word
 
     if not result:
         return ["not judged: no machine draw was held out"]
@@ -508,7 +509,8 @@ def _score_lines(result: dict[str, Any], card: dict[str, Any]) -> list[str]:
         return [*lines, "  none is familiar: no figure can be given for this machine"]
     return [
         *lines,
-        f"  clearance error   {1e6 * result['mae_m']:.1f} um mean, "
+        f"  {severity_word(card['severity'])} error".ljust(20)
+        + f"{1e6 * result['mae_m']:.1f} um mean, "
         f"{100 * result['mae_share_of_limit']:.1f} % of the condemning limit "
         f"{1e3 * card['condemning_limit_m']:.3g} mm "
         f"({1e6 * result['mae_all_m']:.1f} um with the unfamiliar)",

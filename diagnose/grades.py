@@ -11,7 +11,7 @@ ADVICE = (
     "No action; keep the usual interval.",
     "No action now; shorten the interval between recordings and watch the trend.",
     "Plan the renewal of the bearing at the next stop; order the part.",
-    "The clearance is beyond the condemning limit: stop and renew the bearing.",
+    "The wear is beyond the condemning limit: stop and renew the bearing.",
 )
 
 WARNING_GRADE = 2

@@ -8,18 +8,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..datasets.record import DataError
+from ..features.orbit import full_spectrum
 from ..features.spectrum import decibel, power_lines
 from ..sim.integrate import Solution
+from ..sim.journal_parts import JournalScene
 from ..sim.parts import Scene
 from ..sim.pump_parts import PumpScene
 
 _FORMATS = (".png", ".svg", ".pdf")
 _COLOURS = ("#1f5a94", "#b3541e", "#4f7d3a")
 _REVOLUTIONS = 2
+_MOST_ORDERS = 4.0  # of a full spectrum, to either side
 
 
 def plot_simulation(scene: Scene, solution: Solution, path: Path) -> None:
-    """Draw acceleration, spectrum, joint force and pin orbit of a simulated recording.
+    """Draw a simulated recording with what its sensors do not see: forces, pressures, orbits.
 
     Parameters
     ----------
@@ -106,4 +109,80 @@ def _orbit(axes: Any, scene: PumpScene, offset: NDArray[np.float64]) -> None:
     axes.grid(alpha=0.3)
 
 
-_DRAWERS: dict[str, Callable[[Any, Scene, Solution], None]] = {"reciprocating-pump": _draw_pump}
+# --- journal bearing
+
+
+def _draw_journal(figure: Any, scene: Scene, solution: Solution) -> None:
+    """What the figures of Ma, Lu, Chen (2010) show, over tau, and the spectrum of the orbit."""
+    journal = cast(JournalScene, scene)
+    truth = solution.truth
+    panels = figure.subplot_mosaic(
+        [["orbit", "position", "force"], ["load", "pressure", "spectrum"]]
+    )
+    tau = 2 * np.pi * journal.drive.speed * np.arange(solution.signal.shape[1])
+    tau /= solution.sample_rate
+    place = truth["journal_m"] / journal.bearing.clearance_radial
+    _clearance_circle(panels["orbit"], place)
+    _pair(panels["position"], tau, place, ("X", "Y"))
+    _label(panels["position"], "τ = ωt", "over the radial clearance", "Journal centre")
+    _pair(panels["force"], tau, truth["film_force_n"] / 1e3, ("F_X", "F_Y"))
+    _label(panels["force"], "τ = ωt", "on the journal [kN]", "Film force")
+    _pair(panels["load"], tau, truth["load_n"] / 1e3, ("along X", "along Y"))
+    _label(panels["load"], "τ = ωt", "on the journal [kN]", "Weight, load and unbalance")
+    _film(panels["pressure"], tau, journal, truth)
+    _full_spectrum(panels["spectrum"], journal, solution)
+
+
+def _pair(axes: Any, tau: NDArray[Any], columns: NDArray[Any], names: tuple[str, str]) -> None:
+    for column, name in enumerate(names):
+        axes.plot(tau, columns[:, column], lw=0.8, color=_COLOURS[column], label=name)
+
+
+def _clearance_circle(axes: Any, place: NDArray[Any]) -> None:
+    """Orbit in the unit circle, X downwards as the load points, Y to the right."""
+    circle = np.exp(2j * np.pi * np.linspace(0, 1, 181))
+    axes.plot(circle.real, circle.imag, color="black", lw=1)
+    axes.plot(place[:, 1], place[:, 0], lw=0.6, color=_COLOURS[0])
+    axes.plot(*place[0, ::-1], "o", ms=4, color=_COLOURS[2], label="first sample")
+    axes.plot(*place[-1, ::-1], "s", ms=4, color=_COLOURS[1], label="last")
+    axes.set(xlabel="Y", ylabel="X, along the load", title="Journal in its clearance")
+    axes.set_aspect("equal", adjustable="box")
+    axes.invert_yaxis()
+    axes.grid(alpha=0.3)
+    axes.legend(fontsize=8, loc="upper right")
+
+
+def _film(
+    axes: Any,
+    tau: NDArray[Any],
+    scene: JournalScene,
+    truth: dict[str, NDArray[Any]],
+) -> None:
+    """Peak pressure, where the rung knows it, and the thinnest film on an axis of its own."""
+    if "peak_pressure_pa" in truth:
+        peak = truth["peak_pressure_pa"] / 1e6
+        axes.plot(tau, peak, lw=0.8, color=_COLOURS[0], label="peak pressure")
+    _label(axes, "τ = ωt", "peak pressure [MPa]", "Film: peak pressure, least thickness")
+    beside = axes.twinx()
+    thin = truth["min_film_m"] / scene.bearing.clearance_radial
+    beside.plot(tau, thin, lw=0.8, color=_COLOURS[1], label="least thickness")
+    beside.set_ylabel("least thickness over C")
+    beside.set_ylim(0, None)
+    beside.margins(x=0)
+    beside.legend(fontsize=8, loc="lower right")
+
+
+def _full_spectrum(axes: Any, scene: JournalScene, solution: Solution) -> None:
+    """Radii of forward and backward motion over the order, from the true orbit."""
+    path = 1e6 * (solution.truth["journal_m"] @ np.array([1.0, 1.0j]))
+    frequency, vector = full_spectrum(path, solution.sample_rate)
+    order = frequency / scene.drive.speed
+    axes.plot(order, np.abs(vector), lw=0.8, color=_COLOURS[0], label="orbit")
+    _label(axes, "backward   [orders]   forward", "radius [µm]", "Full spectrum of the orbit")
+    axes.set_xlim(-_MOST_ORDERS, _MOST_ORDERS)
+
+
+_DRAWERS: dict[str, Callable[[Any, Scene, Solution], None]] = {
+    "reciprocating-pump": _draw_pump,
+    "journal-bearing": _draw_journal,
+}

@@ -12,8 +12,10 @@ from numpy.typing import NDArray
 
 from .. import __version__
 from ..datasets.record import Recording
+from ..features.orbit import displacement, full_spectrum, keyphasor_marks
 from ..features.order import crank_angle_map, pulse_times, shaft_phase
 from ..features.spectrum import decibel, line_band_edges, power_lines
+from ..features.table import probe_rows
 from .estimate import Estimate, WearModel, input_faults
 from .grades import ADVICE, GRADE_NAMES
 
@@ -24,6 +26,7 @@ _GRADE_COLOURS = ("#3a923a", "#c8b400", "#e07b00", "#c03a2b")
 _LINE_COLOURS = ("#1f5a94", "#b3541e", "#4f7d3a", "#7a4a8c")
 _LOWEST_SHOWN = 10.0  # Hz, of a spectrum
 _MOST_POINTS = 4000  # of a curve in a plot; more cannot be seen
+_MOST_ORDERS = 4.0  # of a full spectrum, to either side
 
 
 def report_table(recording: Recording, model: WearModel, estimate: Estimate) -> dict[str, Any]:
@@ -97,6 +100,17 @@ def quantity_name(severity: str) -> str:
     return f"{kind.replace('_', ' ')}, {place}{f' {number[1]}' if number else ''}"
 
 
+def severity_word(severity: str) -> str:
+    """What a severity column measures, in one or two words.
+
+    Examples
+    --------
+    >>> severity_word("diametral_clearance_crankpin_m"), severity_word("scar_depth_bearing_m")
+    ('clearance', 'scar depth')
+    """
+    return quantity_name(severity).split(",")[0].removeprefix("diametral ")
+
+
 def feature_words(name: str) -> str:
     """Feature name for people.
 
@@ -106,8 +120,10 @@ def feature_words(name: str) -> str:
     'acc_x, 40 to 50°, 4350 to 5250 Hz, level [dB]'
     >>> feature_words("acc_y.kurtosis")
     'acc_y, kurtosis'
+    >>> feature_words("orbit.order_0.5.major_db")
+    'orbit, order 0.5, major [dB]'
     """
-    owner, *parts = name.split(".")
+    owner, *parts = re.split(r"\.(?![0-9])", name)  # an order may be 0.5
     words = [owner]
     for part in parts:
         span = re.fullmatch(r"(angle|band)_(\d+)_(\d+)", part)
@@ -129,7 +145,8 @@ def report_text(table: dict[str, Any]) -> str:
     else:
         lines += [
             f"Verdict     grade {estimate['grade']} ({estimate['grade_name']})",
-            f"Clearance   {_millimetres(estimate)} mm, {quantity_name(limits['severity'])}",
+            f"{severity_word(limits['severity']).capitalize():11} {_millimetres(estimate)} mm, "
+            f"{quantity_name(limits['severity'])}",
             f"Limit       {1e3 * limits['condemning_limit_m']:.3g} mm ({limits['source']})",
             f"Familiarity p = {estimate['p_value']:.2g} (unfamiliar at {estimate['p_limit']:.2g})",
         ]
@@ -181,7 +198,10 @@ def report_html(table: dict[str, Any], recording: Recording) -> str:
     estimate = table["estimate"]
     graded = estimate["verdict"] == "graded"
     figures = [("Waveform", _waveform(recording)), ("Spectrum", _spectrum(recording))]
-    if graded:
+    probes = probe_rows([channel.quantity for channel in recording.vibration_channels])
+    if probes is not None:
+        figures.insert(0, ("Shaft orbit, with dots at the tacho pulses", _orbit(recording, probes)))
+    elif graded:
         figures.insert(0, ("Energy over crank angle and frequency", _angle_map(recording)))
     return environment.get_template("report.html.j2").render(
         table=table,
@@ -314,6 +334,32 @@ def _log_frequency(axes: Any, which: str) -> None:
     axes.set(**{f"{which}scale": "log"})
     axes.minorticks_off()
     axes.set(**{f"{which}ticks": ticks, f"{which}ticklabels": [f"{tick:g}" for tick in ticks]})
+
+
+def _orbit(recording: Recording, probes: tuple[int, int]) -> str:
+    """Orbit of the shaft as the probes see it, and its two-sided spectrum in orders."""
+    rate = recording.sample_rate
+    z = 1e6 * displacement(*(recording.vibration[row] for row in probes))
+    figure = _figure(3.6)
+    path, lines = figure.subplots(1, 2, width_ratios=(1, 1.4))
+    figure.subplots_adjust(wspace=0.3)
+    n = min(len(z), _MOST_POINTS)
+    path.plot(z[:n].real, z[:n].imag, lw=0.6, color=_LINE_COLOURS[0])
+    path.set_aspect("equal", adjustable="datalim")
+    path.set(xlabel="x, between the probes [µm]", ylabel="y [µm]")
+    frequency, vector = full_spectrum(z, rate)
+    unit = "Hz"
+    if recording.tacho_signal is not None:
+        pulses = pulse_times(recording.tacho_signal, rate)[:: recording.pulses_per_revolution]
+        marks = keyphasor_marks(z, rate, pulses[pulses < n / rate])
+        path.plot(marks.real, marks.imag, ".", ms=4, color="black")
+        frequency, unit = frequency / ((len(pulses) - 1) / (pulses[-1] - pulses[0])), "orders"
+        lines.set_xlim(-_MOST_ORDERS, _MOST_ORDERS)
+    lines.plot(frequency, np.abs(vector), lw=0.8, color=_LINE_COLOURS[0])
+    lines.set(xlabel=f"backward   [{unit}]   forward", ylabel="radius [µm]")
+    for axes in (path, lines):
+        axes.grid(alpha=0.3)
+    return _encoded(figure)
 
 
 def _angle_map(recording: Recording) -> str:

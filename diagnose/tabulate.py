@@ -98,6 +98,7 @@ def recording_features(recording: Recording) -> tuple[tuple[str, ...], NDArray[n
             tacho=recording.tacho_signal,
             pulses_per_revolution=recording.pulses_per_revolution,
             channel_names=recording.vibration_names,
+            quantities=[channel.quantity for channel in recording.vibration_channels],
         )
     except ValueError as error:
         raise DataError(f"{recording.source or 'recording'}: {error}") from error

@@ -127,8 +127,8 @@ def _further_aim(head: Attributes, target: str, path: str | Path) -> _Aim:
         )
     return _Aim(
         column=target,
-        edges=limits.grade_edges_diametral,
-        condemning=limits.condemning_diametral,
+        edges=limits.grade_edges,
+        condemning=limits.condemning,
         source=limits.source,
     )
 

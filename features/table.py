@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from . import order
+from . import orbit, order
 from .spectrum import band_edges, decibel, levels_from_lines, line_band_edges, power_lines
 from .statistics import Amplitude, Real
 
@@ -17,6 +17,9 @@ Float = NDArray[np.float64]
 
 LARGEST_SAMPLE = 1e9
 """Largest believable sample [unit of x]: beyond it, squares leave the range of float32."""
+
+DISPLACEMENT = "displacement"
+"""Quantity of a proximity probe; two of them make an orbit."""
 
 FEWEST_SAMPLES = 64
 """Shortest record that is given a spectrum."""
@@ -42,6 +45,8 @@ class Settings:
         Bins in one revolution.
     orders : tuple of float
         Shaft orders [-].
+    orbit_orders : tuple of float
+        Orders of the filtered orbits [-].
     impact_threshold : float
         Least short-time energy of an impact, in medians [-].
 
@@ -58,6 +63,7 @@ class Settings:
     high: float | None = None
     angle_bins: int = 36
     orders: tuple[float, ...] = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0)
+    orbit_orders: tuple[float, ...] = (0.5, 1.0, 2.0)
     impact_threshold: float = order.IMPACT_THRESHOLD
 
     def band_edges(self, fs: float) -> Float:
@@ -89,6 +95,8 @@ class Analysis:
         Tacho pulse times [s].
     pulses_per_revolution : int
         Pulses in one revolution.
+    probes : tuple of int, optional
+        Rows of the two proximity probes of an orbit, see :mod:`wearstate.features.orbit`.
     settings : Settings
         Bands, bins and orders.
 
@@ -107,9 +115,12 @@ class Analysis:
         *,
         pulses: Float | None = None,
         pulses_per_revolution: int = 1,
+        probes: tuple[int, int] | None = None,
         settings: Settings = STANDARD,
     ) -> None:
         self.amplitude = Amplitude(vibration)
+        self._readings = vibration
+        self._probes = probes
         self.fs = fs
         self.settings = settings
         self._pulses = pulses
@@ -141,6 +152,19 @@ class Analysis:
             self.fs,
             pulses_per_revolution=self.pulses_per_revolution,
         )
+
+    @cached_property
+    def path(self) -> orbit.Complex:
+        """Orbit with its mean [unit of x, shape=(n_samples,)]; ValueError without two probes."""
+        if self._probes is None:
+            raise ValueError("n_probes must be 2: the feature needs displacement; give quantities")
+        first, second = self._probes
+        return orbit.displacement(self._readings[first], self._readings[second])
+
+    @cached_property
+    def filtered(self) -> tuple[orbit.Complex, orbit.Complex]:
+        """Forward and backward vectors [unit of x, shape=(n_orbit_orders,) each]."""
+        return orbit.filtered_orbits(self.path, self.phase, self.settings.orbit_orders)
 
     @cached_property
     def energy(self) -> Real:
@@ -182,8 +206,10 @@ class Feature:
         Unit of its values; "x" stands for the unit of the signal.
     needs : {"vibration", "tacho"}
         "tacho" if it cannot be had without one.
-    scope : {"channel", "pair", "shaft"}
-        Whether it exists once per channel, per pair of channels, or per record.
+    scope : {"channel", "pair", "shaft", "orbit"}
+        Whether it exists once per channel, per pair of channels, per record, or per orbit.
+    casing : bool
+        Whether it tells something of the knocks of a casing only, and nothing of an orbit.
     labels : callable
         ``labels(settings, fs)`` names its values within one channel, pair or record.
     function : callable
@@ -200,7 +226,8 @@ class Feature:
     name: str
     unit: str
     needs: Literal["vibration", "tacho"] = "vibration"
-    scope: Literal["channel", "pair", "shaft"] = "channel"
+    scope: Literal["channel", "pair", "shaft", "orbit"] = "channel"
+    casing: bool = False
     labels: Callable[[Settings, float], tuple[str, ...]]
     function: Callable[[Analysis], Real]
     reference: str
@@ -274,6 +301,52 @@ def _speed(analysis: Analysis) -> Float:
 def _speed_variation(analysis: Analysis) -> Float:
     intervals = np.diff(analysis.pulses)
     return np.asarray(intervals.std() / intervals.mean())
+
+
+def _orbit_labels(*parts: str) -> Callable[[Settings, float], tuple[str, ...]]:
+    """One label for every part of every filtered orbit."""
+    return lambda settings, _fs: tuple(
+        f"order_{k:g}.{part}" for k in settings.orbit_orders for part in parts
+    )
+
+
+def _centreline(analysis: Analysis) -> Float:
+    mean = orbit.centreline(analysis.path)
+    radius = abs(mean)
+    turn = mean / radius if radius > 0 else 0j
+    level = float(decibel(radius**2))
+    return np.array([mean.real, mean.imag, level, turn.real, turn.imag])
+
+
+def _orbit_sizes(analysis: Analysis) -> Float:
+    forward, backward = analysis.filtered
+    sizes = (*orbit.semi_axes(forward, backward), np.abs(forward), np.abs(backward))
+    return decibel(np.stack(sizes, axis=-1) ** 2)
+
+
+def _orbit_shapes(analysis: Analysis) -> Float:
+    forward, backward = analysis.filtered
+    twice = 2 * orbit.inclination(forward, backward)  # an axis is the same after half a turn
+    shapes = (
+        orbit.ellipticity(forward, backward),
+        orbit.precession(forward, backward),
+        np.cos(twice),
+        np.sin(twice),
+    )
+    return np.stack(shapes, axis=-1)
+
+
+def _mark(analysis: Analysis) -> Float:
+    """Direction of the synchronous orbit at the mark, its high spot."""
+    forward, backward = orbit.filtered_orbits(analysis.path, analysis.phase, [1.0])
+    mark = complex(orbit.orbit_path(forward[0], backward[0], 0.0))
+    turn = mark / abs(mark) if mark != 0 else 0j
+    return np.array([turn.real, turn.imag])
+
+
+def _whirl(analysis: Analysis) -> Float:
+    ratio, radius = orbit.whirl(analysis.path, analysis.fs, float(_speed(analysis)))
+    return np.array([ratio, float(decibel(radius**2))])
 
 
 _DEAD_CENTRES = _named(
@@ -362,6 +435,7 @@ CATALOGUE: tuple[Feature, ...] = (
         name="crank_angle_map",
         unit="dB re 1 x^2",
         needs="tacho",
+        casing=True,
         labels=_map_labels,
         function=_map_levels,
         reference="order.crank_angle_map",
@@ -370,6 +444,7 @@ CATALOGUE: tuple[Feature, ...] = (
         name="angle_harmonics",
         unit="dB",
         needs="tacho",
+        casing=True,
         labels=_HARMONICS,
         function=lambda a: order.angle_harmonics(a.profile),
         reference="order.angle_harmonics",
@@ -378,6 +453,7 @@ CATALOGUE: tuple[Feature, ...] = (
         name="dead_centre_levels",
         unit="dB",
         needs="tacho",
+        casing=True,
         labels=_DEAD_CENTRES,
         function=lambda a: order.dead_centre_levels(a.profile),
         reference="order.dead_centre_levels",
@@ -386,6 +462,7 @@ CATALOGUE: tuple[Feature, ...] = (
         name="angle_kurtosis",
         unit="-",
         needs="tacho",
+        casing=True,
         labels=_named("angle_kurtosis"),
         function=lambda a: order.angle_kurtosis(a.profile),
         reference="order.angle_kurtosis",
@@ -394,6 +471,7 @@ CATALOGUE: tuple[Feature, ...] = (
         name="impacts_per_revolution",
         unit="1/rev",
         needs="tacho",
+        casing=True,
         labels=_named("impacts_per_revolution"),
         function=_impacts,
         reference="order.impacts_per_revolution",
@@ -428,29 +506,123 @@ CATALOGUE: tuple[Feature, ...] = (
 """Every feature, in the order of the row."""
 
 
-def catalogue(*, tacho: bool) -> tuple[Feature, ...]:
+ORBIT_CATALOGUE: tuple[Feature, ...] = (
+    Feature(
+        name="centreline",
+        unit="x, rad, -",
+        scope="orbit",
+        labels=_named(
+            "centreline.x",
+            "centreline.y",
+            "centreline.radius_db",
+            "centreline.attitude_cos",
+            "centreline.attitude_sin",
+        ),
+        function=_centreline,
+        reference="orbit.centreline",
+    ),
+    Feature(
+        name="largest_excursion",
+        unit="dB re 1 x^2",
+        scope="orbit",
+        labels=_named("largest_excursion_db"),
+        function=lambda a: decibel(orbit.largest_excursion(a.path) ** 2),
+        reference="orbit.largest_excursion; ISO 20816-1:2016",
+    ),
+    Feature(
+        name="filtered_orbits",
+        unit="dB re 1 x^2",
+        needs="tacho",
+        scope="orbit",
+        labels=_orbit_labels("major_db", "minor_db", "forward_db", "backward_db"),
+        function=_orbit_sizes,
+        reference="orbit.filtered_orbits, orbit.semi_axes",
+    ),
+    Feature(
+        name="orbit_shapes",
+        unit="-",
+        needs="tacho",
+        scope="orbit",
+        labels=_orbit_labels("ellipticity", "precession", "inclination_cos", "inclination_sin"),
+        function=_orbit_shapes,
+        reference="orbit.ellipticity, orbit.precession, orbit.inclination",
+    ),
+    Feature(
+        name="keyphasor_mark",
+        unit="-",
+        needs="tacho",
+        scope="orbit",
+        labels=_named("mark_cos", "mark_sin"),
+        function=_mark,
+        reference="orbit.orbit_path",
+    ),
+    Feature(
+        name="whirl",
+        unit="-, dB re 1 x^2",
+        needs="tacho",
+        scope="orbit",
+        labels=_named("whirl_ratio", "whirl_db"),
+        function=_whirl,
+        reference="orbit.whirl; Grandke, IEEE Trans. Instrum. Meas. 32 (1983) 350-355",
+    ),
+)
+"""Features of a pair of proximity probes at right angles, after those of `CATALOGUE`."""
+
+
+def catalogue(*, tacho: bool, orbit: bool = False, casing: bool = True) -> tuple[Feature, ...]:
     """Features that a recording can have.
 
     Parameters
     ----------
     tacho : bool
         Whether it has a tacho.
+    orbit : bool
+        Whether it has two proximity probes.
+    casing : bool
+        Whether it has any other channel, whose knocks are worth a map over the shaft angle.
 
     Returns
     -------
     tuple of Feature
-        The rows of `CATALOGUE` whose needs are met, in order.
+        The rows of `CATALOGUE`, then of `ORBIT_CATALOGUE`, whose needs are met, in order.
 
     Examples
     --------
     >>> len(catalogue(tacho=False)) < len(catalogue(tacho=True)) == len(CATALOGUE)
     True
+    >>> [feature.name for feature in catalogue(tacho=False, orbit=True)][-1]
+    'largest_excursion'
     """
-    return tuple(f for f in CATALOGUE if tacho or f.needs != "tacho")
+    rows = (*CATALOGUE, *ORBIT_CATALOGUE) if orbit else CATALOGUE
+    return tuple(
+        row for row in rows if (tacho or row.needs != "tacho") and (casing or not row.casing)
+    )
+
+
+def probe_rows(quantities: Sequence[str]) -> tuple[int, int] | None:
+    """Channels of the two proximity probes of an orbit; None unless there are exactly two.
+
+    Parameters
+    ----------
+    quantities : sequence of str
+        Of every vibration channel.
+
+    Examples
+    --------
+    >>> probe_rows(["acceleration", "displacement", "displacement"])
+    (1, 2)
+    """
+    rows = [i for i, quantity in enumerate(quantities) if quantity == DISPLACEMENT]
+    return (rows[0], rows[1]) if len(rows) == 2 else None
 
 
 def feature_names(
-    channel_names: Sequence[str], fs: float, *, tacho: bool = True, settings: Settings = STANDARD
+    channel_names: Sequence[str],
+    fs: float,
+    *,
+    tacho: bool = True,
+    quantities: Sequence[str] | None = None,
+    settings: Settings = STANDARD,
 ) -> tuple[str, ...]:
     """Names of the values of `feature_row`, without a recording.
 
@@ -462,18 +634,21 @@ def feature_names(
         Sample rate [Hz]; it decides the bands, whose edges are part of the name.
     tacho : bool
         Whether there is a tacho.
+    quantities : sequence of str, optional
+        Quantity of every channel; all ``acceleration`` by default.
     settings : Settings
         Bands, bins and orders.
 
     Returns
     -------
     tuple of str
-        ``channel.label``, ``first_over_second.label`` and ``shaft.label``.
+        ``channel.label``, ``first_over_second.label``, ``shaft.label`` and ``orbit.label``.
 
     Raises
     ------
     ValueError
-        If a channel name is empty or repeated, or a band does not fit below fs / 2.
+        If a channel name is empty or repeated, the numbers of names and quantities differ, or a
+        band does not fit below fs / 2.
 
     Examples
     --------
@@ -481,12 +656,36 @@ def feature_names(
     >>> names[0], names[8], names[18 + 20]
     ('acc_x.rms', 'acc_x.band_50_66.level_db', 'acc_x.angle_000_010.band_150_250.level_db')
     """
-    return _feature_names(tuple(channel_names), float(fs), tacho, settings)
+    kinds = _quantities(quantities, len(channel_names))
+    return _feature_names(tuple(channel_names), float(fs), tacho, kinds, settings)
+
+
+def _quantities(given: Sequence[str] | None, n_channels: int) -> tuple[str, ...]:
+    if given is None:
+        return ("acceleration",) * n_channels
+    if len(given) != n_channels:
+        raise ValueError(
+            f"quantities has {len(given)} entries, must have {n_channels}; give one of each channel"
+        )
+    return tuple(given)
+
+
+def _rows_for(quantities: tuple[str, ...], tacho: bool) -> tuple[Feature, ...]:
+    """Catalogue rows of a recording with these channels."""
+    return catalogue(
+        tacho=tacho,
+        orbit=probe_rows(quantities) is not None,
+        casing=any(quantity != DISPLACEMENT for quantity in quantities),
+    )
 
 
 @lru_cache(maxsize=64)
 def _feature_names(
-    channels: tuple[str, ...], fs: float, tacho: bool, settings: Settings
+    channels: tuple[str, ...],
+    fs: float,
+    tacho: bool,
+    quantities: tuple[str, ...],
+    settings: Settings,
 ) -> tuple[str, ...]:
     if not channels or not all(channels) or len(set(channels)) < len(channels):
         raise ValueError(f"channel_names = {list(channels)} must be non-empty and unique; rename")
@@ -494,10 +693,11 @@ def _feature_names(
         "channel": channels,
         "pair": tuple(f"{a}_over_{b}" for a, b in combinations(channels, 2)),
         "shaft": ("shaft",),
+        "orbit": ("orbit",),
     }
     names = tuple(
         f"{owner}.{label}"
-        for feature in catalogue(tacho=tacho)
+        for feature in _rows_for(quantities, tacho)
         for labels in (feature.labels(settings, fs),)
         for owner in owners[feature.scope]
         for label in labels
@@ -517,6 +717,7 @@ def feature_row(
     tacho: ArrayLike | None = None,
     pulses_per_revolution: int = 1,
     channel_names: Sequence[str] | None = None,
+    quantities: Sequence[str] | None = None,
     settings: Settings = STANDARD,
 ) -> tuple[tuple[str, ...], Float]:
     """All features of one recording.
@@ -524,8 +725,8 @@ def feature_row(
     Parameters
     ----------
     vibration : array_like, shape (n_channels, n_samples) or (n_samples,)
-        Accelerations [m/s^2, or one other unit for all channels]. float32 stays float32 in the
-        transforms.
+        Accelerations [m/s^2, or one other unit for all channels], displacements with their mean
+        [m]. float32 stays float32 in the transforms.
     fs : float
         Sample rate [Hz].
     tacho : array_like, shape (n_samples,), optional
@@ -535,6 +736,9 @@ def feature_row(
         records no longer compares.
     channel_names : sequence of str, optional
         Names of the channels; ``ch_0``, ``ch_1``, … by default.
+    quantities : sequence of str, optional
+        Quantity of every channel; all ``acceleration`` by default. With exactly two of
+        ``displacement`` the features of their orbit are added.
     settings : Settings
         Bands, bins and orders.
 
@@ -575,15 +779,19 @@ def feature_row(
     pulses = None
     if tacho is not None:
         pulses = _pulses(tacho, fs, signals.shape[-1])
-    names = feature_names(channels, fs, tacho=tacho is not None, settings=settings)
+    kinds = _quantities(quantities, len(signals))
+    names = feature_names(
+        channels, fs, tacho=tacho is not None, quantities=kinds, settings=settings
+    )
     analysis = Analysis(
         signals,
         fs,
         pulses=pulses,
         pulses_per_revolution=pulses_per_revolution,
+        probes=probe_rows(kinds),
         settings=settings,
     )
-    parts = [np.ravel(f.function(analysis)) for f in catalogue(tacho=tacho is not None)]
+    parts = [np.ravel(f.function(analysis)) for f in _rows_for(kinds, tacho is not None)]
     return names, np.concatenate(parts, dtype=np.float64)
 
 

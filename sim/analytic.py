@@ -285,3 +285,93 @@ def conformal_stiffness(modulus: float, length: float) -> float:
     if not length > 0:
         raise ValueError(f"length = {length} m must be > 0; it is measured along the pin")
     return math.pi / 2 * modulus * length
+
+
+def sommerfeld_film(eccentricity_ratio: float) -> float:
+    """Sommerfeld number of a long bearing with a full film, whose attitude angle is 90 degrees.
+
+    Parameters
+    ----------
+    eccentricity_ratio : float
+        In (0, 1).
+
+    Returns
+    -------
+    float
+        ``S = eta N L D / W (R / C)^2 = (2 + e^2) sqrt(1 - e^2) / (12 pi^2 e)``, N in revolutions
+        per second.
+
+    Raises
+    ------
+    ValueError
+        The eccentricity ratio is out of range.
+
+    Notes
+    -----
+    Negative pressure is kept, as in a bearing that is flooded under high ambient pressure.
+
+    References
+    ----------
+    Sommerfeld (1904), Zeitschrift fuer Mathematik und Physik 50, 97-155.
+
+    Examples
+    --------
+    >>> round(sommerfeld_film(0.5), 5)
+    0.03291
+    """
+    e = _eccentricity_ratio(eccentricity_ratio)
+    return (2 + e * e) * math.sqrt(1 - e * e) / (12 * math.pi**2 * e)
+
+
+def ocvirk_film(eccentricity_ratio: float, length_to_diameter: float) -> tuple[float, float]:
+    """Sommerfeld number and attitude angle of a short bearing with half a film.
+
+    Parameters
+    ----------
+    eccentricity_ratio : float
+        In (0, 1).
+    length_to_diameter : float
+        L / D > 0; short is up to about 1/4.
+
+    Returns
+    -------
+    tuple of float
+        S, and the angle from the load to the line of centres [rad].
+
+    Raises
+    ------
+    ValueError
+        An argument is out of range.
+
+    Notes
+    -----
+    ``S (L/D)^2 = (1 - e^2)^2 / (pi e sqrt(pi^2 (1 - e^2) + 16 e^2))`` and
+    ``tan phi = pi sqrt(1 - e^2) / (4 e)``.
+
+    References
+    ----------
+    Ocvirk (1952), NACA TN 2808. Friswell, Penny, Garvey, Lees (2010), Dynamics of Rotating
+    Machines, 177-181.
+
+    Examples
+    --------
+    >>> s, attitude = ocvirk_film(0.266298, 0.3)  # Friswell, example 5.5.1
+    >>> round(s, 3), round(math.degrees(attitude), 2)
+    (3.571, 70.62)
+    """
+    e = _eccentricity_ratio(eccentricity_ratio)
+    if not length_to_diameter > 0:
+        raise ValueError(f"length_to_diameter = {length_to_diameter} must be > 0")
+    rest = 1 - e * e
+    root = math.sqrt(math.pi**2 * rest + 16 * e * e)
+    number = rest * rest / (math.pi * e * root) / length_to_diameter**2
+    return number, math.atan2(math.pi * math.sqrt(rest), 4 * e)
+
+
+def _eccentricity_ratio(value: float) -> float:
+    if not 0 < value < 1:
+        raise ValueError(
+            f"eccentricity_ratio = {value} must be in (0, 1); at 0 the film carries nothing, "
+            "at 1 the journal touches"
+        )
+    return value

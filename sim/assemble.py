@@ -3,6 +3,7 @@
 from collections.abc import Callable
 
 from .integrate import Solution
+from .journal import check_journal, simulate_journal
 from .parts import Scene
 from .pump import check_pump, simulate_pump
 
@@ -64,7 +65,11 @@ def check(scene: Scene) -> None:
 
 _SIMULATORS: dict[str, Callable[[Scene, int, bool, bool], Solution]] = {
     "reciprocating-pump": simulate_pump,
+    "journal-bearing": simulate_journal,
 }
 """A new machine is one row."""
 
-_CHECKS: dict[str, Callable[[Scene], None]] = {"reciprocating-pump": check_pump}
+_CHECKS: dict[str, Callable[[Scene], None]] = {
+    "reciprocating-pump": check_pump,
+    "journal-bearing": check_journal,
+}

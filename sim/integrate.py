@@ -21,6 +21,13 @@ class Status(IntEnum):
     UNRESOLVED = 6
     VAPOUR = 7
     VALVE_OPEN = 8
+    SQUEEZE = 9
+    THIN_FILM = 10
+    OVERLOAD = 11
+    TOUCH = 12
+    WALL = 13
+    NO_PRESSURE = 14
+    TOO_MANY_STEPS = 15
 
     @property
     def ok(self) -> bool:
@@ -60,6 +67,32 @@ _STATUS_TEXT = {
     Status.VALVE_OPEN: (
         "a valve does not close in its idle stroke; raise the valve's stiffness or preload_lift, "
         "or lower the speed"
+    ),
+    Status.SQUEEZE: (
+        "the step is too long for the squeeze stiffness of the film; shorten numerics.step, or set "
+        "numerics.integrator = 'adaptive'"
+    ),
+    Status.THIN_FILM: (
+        "the journal came nearer to the shell than the film's mesh or map resolves; lower load or "
+        "unbalance, refine film.n_theta, or give bearing.wall a contact law"
+    ),
+    Status.OVERLOAD: (
+        "no film of this bearing carries the load that rests on the journal; lower load.static, or "
+        "raise speed, oil.viscosity or bearing.length"
+    ),
+    Status.TOUCH: (
+        "the journal touches its shell; lower load or unbalance, or give bearing.wall a contact law"
+    ),
+    Status.WALL: (
+        "the journal sinks into its shell by more than a tenth of the clearance, beyond the "
+        "contact law; raise bearing.wall.stiffness"
+    ),
+    Status.NO_PRESSURE: (
+        "the film solver found no pressure at some steps; set film.rung = 'map', or raise "
+        "film.n_theta"
+    ),
+    Status.TOO_MANY_STEPS: (
+        "the adaptive integrator used up its steps; raise numerics.tolerance or shorten duration"
     ),
 }
 

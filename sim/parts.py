@@ -11,6 +11,7 @@ import reprlib
 from collections.abc import Container, Mapping, Sequence
 from contextlib import suppress
 from decimal import Decimal
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Generic, Literal, Self, TypeVar
 
@@ -58,8 +59,12 @@ UNITS: dict[str, dict[str, float]] = {
     "volume": {"m^3": 1.0, "L": 1e-3, "cm^3": 1e-6, "mm^3": 1e-9},
     "area": {"m^2": 1.0, "cm^2": 1e-4, "mm^2": 1e-6},
     "moment": {"N m": 1.0, "kN m": 1e3},
+    "temperature": {"K": 1.0},
+    "kinematic viscosity": {"m^2/s": 1.0, "mm^2/s": 1e-6, "cSt": 1e-6},
     "unbalance": {"kg m": 1.0, "kg mm": 1e-3, "g mm": 1e-6},
     "Hertz stiffness": {"N/m^1.5": 1.0},
+    "force": {"N": 1.0, "kN": 1e3, "MN": 1e6},
+    "viscosity": {"Pa s": 1.0, "mPa s": 1e-3, "cP": 1e-3},
 }
 """Factor to SI of every unit string, by dimension. The first unit of a row is the SI one."""
 
@@ -82,14 +87,14 @@ ANGLE_MOST = 1e4  # rad, beyond it a cosine has lost four digits
 _ACCELERATION_LEAST, _ACCELERATION_MOST = 1e-9, 1e7  # m/s^2, a shock sensor ends at 1e6
 _SHAPE_MOST = 1e3  # kg^-0.5, the mode of a milligram
 _LEVEL_LEAST, _LEVEL_MOST = 1e-3, 1e4  # V
-_GAIN_LEAST, _GAIN_MOST = 1e-3, 1e3
+GAIN_LEAST, GAIN_MOST = 1e-3, 1e3
 _MODE_SLOWEST, _MODE_FASTEST = 1e-6, 1e6  # Hz, a floating casing has almost none
 _RATE_LEAST, _RATE_MOST = 1.0, 1e6  # Hz, of sampling
 _RECORDING_LONGEST = 3600.0  # s
 _STEP_LEAST = 1e-12  # s
 _SETTLING_MOST = 1000
-_MOST_SENSORS, _MOST_MODES = 64, 1000
-_NAME_LONGEST = 64
+MOST_SENSORS, _MOST_MODES = 64, 1000
+NAME_LONGEST = 64
 _FILTER_SLOWEST = 1.0  # Hz, of mounting and anti-alias filter: below it no signal is left
 _FILTER_STEEPEST = 10  # order; eight is usual
 _DAMPING_LEAST = 1e-3  # glued steel has some 0.01
@@ -188,9 +193,15 @@ Ratio = Annotated[float, _parser("ratio"), _Dimension("ratio")]
 Density = Annotated[float, _parser("density"), _Dimension("density")]
 Volume = Annotated[float, _parser("volume"), _Dimension("volume")]
 Area = Annotated[float, _parser("area"), _Dimension("area")]
+Temperature = Annotated[float, _parser("temperature"), _Dimension("temperature")]
+KinematicViscosity = Annotated[
+    float, _parser("kinematic viscosity"), _Dimension("kinematic viscosity")
+]
 Moment = Annotated[float, _parser("moment"), _Dimension("moment")]
 Unbalance = Annotated[float, _parser("unbalance"), _Dimension("unbalance")]
 HertzStiffness = Annotated[float, _parser("Hertz stiffness"), _Dimension("Hertz stiffness")]
+Force = Annotated[float, _parser("force"), _Dimension("force")]
+Viscosity = Annotated[float, _parser("viscosity"), _Dimension("viscosity")]
 ModeShape = Annotated[
     float,
     _parser("mode shape"),
@@ -277,11 +288,16 @@ def beside(table: Mapping[str, Any], folder: Path) -> Mapping[str, Any]:
     >>> beside({"casing": {"frf": {"file": "pump.csv"}}}, Path("scenes"))["casing"]["frf"]
     {'folder': 'scenes', 'file': 'pump.csv'}
     """
-    casing = table.get("casing")
-    if not isinstance(casing, Mapping) or not isinstance(casing.get("frf"), Mapping):
-        return table
-    frf = {"folder": str(folder), **casing["frf"]}
-    return {**table, "casing": {**casing, "frf": frf}}
+    result = dict(table)
+    for owner, key in _FILES:
+        part = result.get(owner)
+        if isinstance(part, Mapping) and isinstance(part.get(key), Mapping):
+            result[owner] = {**part, key: {"folder": str(folder), **part[key]}}
+    return result
+
+
+_FILES = (("casing", "frf"), ("load", "record"))
+"""Tables of a scene that name a file."""
 
 
 def specific_key(keys: Container[str], place: str, throw: int) -> str | None:
@@ -317,14 +333,14 @@ class Accelerometer(Part):
     :func:`single_axis`.
     """
 
-    name: str = Field(min_length=1, max_length=_NAME_LONGEST)
+    name: str = Field(min_length=1, max_length=NAME_LONGEST)
     axes: tuple[Literal["x", "y", "z"], ...] = Field(
         default=(), max_length=3, description="one channel for each; none: a single axis"
     )
     place: str = Field(default="", description="where it sits, for the report")
     direction: str = Field(default="", description="which way it points, for the report")
     gain: Ratio = Field(
-        default=1.0, ge=_GAIN_LEAST, le=_GAIN_MOST, description="true sensitivity over nominal"
+        default=1.0, ge=GAIN_LEAST, le=GAIN_MOST, description="true sensitivity over nominal"
     )
     noise: Acceleration = Field(
         default=0.0, ge=0, le=_ACCELERATION_MOST, description="rms of white noise"
@@ -363,9 +379,9 @@ class Accelerometer(Part):
                 f"direction = {self.direction!r} must be empty beside axes, which have their own; "
                 "remove it"
             )
-        if self.axes and len(self.name) > _NAME_LONGEST - 2:
+        if self.axes and len(self.name) > NAME_LONGEST - 2:
             faults.append(
-                f"name has {len(self.name)} characters, must have <= {_NAME_LONGEST - 2} for the "
+                f"name has {len(self.name)} characters, must have <= {NAME_LONGEST - 2} for the "
                 "axis to follow; shorten it"
             )
         return faults
@@ -419,9 +435,54 @@ def single_axis(sensors: Sequence[Accelerometer]) -> tuple[Accelerometer, ...]:
 class Tacho(Part):
     """A rectangular pulse per revolution, rising at crank angle zero."""
 
-    name: str = Field(default="tacho", min_length=1, max_length=_NAME_LONGEST)
+    name: str = Field(default="tacho", min_length=1, max_length=NAME_LONGEST)
     pulse_width: Angle = Field(default=math.radians(10.0), gt=0, le=math.pi)
     level: Voltage = Field(default=5.0, ge=_LEVEL_LEAST, le=_LEVEL_MOST)
+
+
+class Wear(Part):
+    """Limits of a clearance, all diametral, with their source."""
+
+    as_new_diametral: Length = Field(
+        gt=0, le=LONGEST, description="smallest clearance of a new joint"
+    )
+    condemning_diametral: Length = Field(
+        gt=0, le=LONGEST, description="the joint must be renewed above it"
+    )
+    grade_edges_diametral: tuple[Length, Length, Length] = Field(
+        description="clearance at which grades 1, 2 and 3 begin"
+    )
+    source: str = Field(min_length=1)
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        values = (self.as_new_diametral, *self.grade_edges_diametral)
+        if any(low >= high for low, high in pairwise(values)):
+            raise ValueError(
+                "as_new_diametral and grade_edges_diametral = "
+                f"{', '.join(f'{v:g} m' for v in values)} must rise strictly; reorder them"
+            )
+        if self.grade_edges_diametral[-1] != self.condemning_diametral:
+            raise ValueError(
+                f"grade_edges_diametral[2] = {self.grade_edges_diametral[-1]:g} m must equal "
+                f"condemning_diametral = {self.condemning_diametral:g} m; grade 3 is condemned"
+            )
+        return self
+
+    @property
+    def as_new(self) -> float:
+        """Smallest clearance of a new joint [m]."""
+        return self.as_new_diametral
+
+    @property
+    def grade_edges(self) -> tuple[float, float, float]:
+        """Clearance at which grades 1, 2 and 3 begin [m]."""
+        return self.grade_edges_diametral
+
+    @property
+    def condemning(self) -> float:
+        """Clearance above which the joint must be renewed [m]."""
+        return self.condemning_diametral
 
 
 class Numerics(Part):
@@ -447,7 +508,6 @@ class Scene(Part):
         default=3, ge=1, le=_SETTLING_MOST, description="run before the recording"
     )
     accuracy: Ratio = Field(default=0.02, gt=0, lt=1, description="error the features may carry")
-    sensors: tuple[Accelerometer, ...] = Field(min_length=1, max_length=_MOST_SENSORS)
     tacho: Tacho | None = Tacho()
     numerics: Numerics = Numerics()
 
@@ -458,10 +518,9 @@ class Scene(Part):
             raise ValueError("\n".join(faults))
         return self
 
-    @property
-    def accelerometers(self) -> tuple[Accelerometer, ...]:
-        """One accelerometer for every channel: triaxial ones taken apart, see `single_axis`."""
-        return single_axis(self.sensors)
+    def sensor_channels(self) -> tuple[Channel, ...]:
+        """Channels of the sensors, in order; every machine has its own."""
+        raise NotImplementedError(self.machine)
 
     @classmethod
     def cross_faults(cls, parts: Mapping[str, Any]) -> list[str]:
@@ -471,7 +530,7 @@ class Scene(Part):
 
 
 def channels_of(scene: Scene) -> tuple[Channel, ...]:
-    """Channels of a recording of this scene, accelerometers first, then the tacho.
+    """Channels of a recording of this scene, sensors first, then the tacho.
 
     Examples
     --------
@@ -479,19 +538,26 @@ def channels_of(scene: Scene) -> tuple[Channel, ...]:
     >>> [channel.name for channel in channels_of(load_scene("bilge-pump"))]
     ['acc_x', 'acc_y', 'tacho']
     """
-    sensors = tuple(
-        Channel(
-            name=sensor.name,
-            unit="m/s^2",
-            quantity="acceleration",
-            place=sensor.place,
-            direction=sensor.direction,
-        )
-        for sensor in scene.accelerometers
-    )
+    sensors = scene.sensor_channels()
     if scene.tacho is None:
         return sensors
     return (*sensors, Channel(name=scene.tacho.name, unit="V", quantity="tacho"))
+
+
+def name_faults(sensors: Sequence[str], tacho: Tacho | None) -> list[str]:
+    """Channel names that are given more than once, as sentences.
+
+    Examples
+    --------
+    >>> name_faults(["acc", "acc"], None)
+    ["sensors: name 'acc' is given 2 times, must be unique; rename one"]
+    """
+    names = [*sensors, *([tacho.name] if tacho else [])]
+    return [
+        f"sensors: name '{name}' is given {names.count(name)} times, must be unique; rename one"
+        for name in sorted(set(names))
+        if names.count(name) > 1
+    ]
 
 
 def validate_table(model: type[Table], table: Mapping[str, Any], name: str) -> Table:

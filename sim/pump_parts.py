@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Mapping
-from itertools import pairwise
 from typing import Any, Literal, Self
 
 from pydantic import Field, model_validator
@@ -17,6 +16,7 @@ from .parts import (
     INERTIA_MOST,
     LIGHTEST,
     LONGEST,
+    MOST_SENSORS,
     SLIDING_LEAST,
     SLIDING_MOST,
     STANDARD_GRAVITY,
@@ -41,10 +41,13 @@ from .parts import (
     Tacho,
     Unbalance,
     Velocity,
+    Wear,
     merged,
+    name_faults,
     nearest,
     single_axis,
 )
+from .sensor import Channel
 
 _MOMENT_MOST = 1e9  # N m
 _UNBALANCE_MOST = 1e6  # kg m
@@ -334,36 +337,6 @@ class Throw(Part):
     pressure: CylinderPressure | None = None
 
 
-class Wear(Part):
-    """Limits of the crank-pin clearance, all diametral, with their source."""
-
-    as_new_diametral: Length = Field(
-        gt=0, le=LONGEST, description="smallest clearance of a new joint"
-    )
-    condemning_diametral: Length = Field(
-        gt=0, le=LONGEST, description="the joint must be renewed above it"
-    )
-    grade_edges_diametral: tuple[Length, Length, Length] = Field(
-        description="clearance at which grades 1, 2 and 3 begin"
-    )
-    source: str = Field(min_length=1)
-
-    @model_validator(mode="after")
-    def _ordered(self) -> Self:
-        values = (self.as_new_diametral, *self.grade_edges_diametral)
-        if any(low >= high for low, high in pairwise(values)):
-            raise ValueError(
-                "as_new_diametral and grade_edges_diametral = "
-                f"{', '.join(f'{v:g} m' for v in values)} must rise strictly; reorder them"
-            )
-        if self.grade_edges_diametral[-1] != self.condemning_diametral:
-            raise ValueError(
-                f"grade_edges_diametral[2] = {self.grade_edges_diametral[-1]:g} m must equal "
-                f"condemning_diametral = {self.condemning_diametral:g} m; grade 3 is condemned"
-            )
-        return self
-
-
 CRANK_PLACES = ("bearing_x", "bearing_y", "guide_y", "cylinder_x")
 """Where the crank mechanism pushes on the casing: x along the stroke, y across it."""
 
@@ -395,6 +368,7 @@ class PumpScene(Scene):
     wear: Wear | None = None
     wear_wristpin: Wear | None = None
     casing: Casing
+    sensors: tuple[Accelerometer, ...] = Field(min_length=1, max_length=MOST_SENSORS)
 
     @model_validator(mode="before")
     @classmethod
@@ -403,6 +377,24 @@ class PumpScene(Scene):
         if not isinstance(table, Mapping) or not isinstance(table.get("throws"), (list, tuple)):
             return table
         return {**table, "throws": [_merged_throw(table, throw) for throw in table["throws"]]}
+
+    @property
+    def accelerometers(self) -> tuple[Accelerometer, ...]:
+        """One accelerometer for every channel: triaxial ones taken apart, see `single_axis`."""
+        return single_axis(self.sensors)
+
+    def sensor_channels(self) -> tuple[Channel, ...]:
+        """One channel of acceleration for every axis of every accelerometer."""
+        return tuple(
+            Channel(
+                name=sensor.name,
+                unit="m/s^2",
+                quantity="acceleration",
+                place=sensor.place,
+                direction=sensor.direction,
+            )
+            for sensor in self.accelerometers
+        )
 
     def joints(self, throw: int) -> PumpJoints:
         """Joints of one throw, counted from 0."""
@@ -460,12 +452,7 @@ def _rod_faults(crank: Crank, joint: PumpJoints, rod: Rod) -> list[str]:
 
 
 def _name_faults(sensors: tuple[Accelerometer, ...], tacho: Tacho | None) -> list[str]:
-    names = [sensor.name for sensor in single_axis(sensors)] + ([tacho.name] if tacho else [])
-    return [
-        f"sensors: name '{name}' is given {names.count(name)} times, must be unique; rename one"
-        for name in sorted(set(names))
-        if names.count(name) > 1
-    ]
+    return name_faults([sensor.name for sensor in single_axis(sensors)], tacho)
 
 
 def _shape_faults(

@@ -11,13 +11,17 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from .journal_parts import JournalScene
 from .parts import Scene, SceneError, beside, nearest, validate_table, without_twin
 from .pump_parts import PumpScene
 
 SCENE_FOLDER = Path(__file__).parent / "scenes"
 
 
-MACHINES: dict[str, type[Scene]] = {"reciprocating-pump": PumpScene}
+MACHINES: dict[str, type[Scene]] = {
+    "reciprocating-pump": PumpScene,
+    "journal-bearing": JournalScene,
+}
 """The scene type of every machine. A new machine is one row."""
 
 

@@ -19,6 +19,7 @@ from wearstate.datasets.recipe import (
     STRATA,
     load_recipe,
     sample_records,
+    wear_limits,
 )
 from wearstate.datasets.recipe_file import RecipeError, recipe_names
 from wearstate.datasets.record import DataError, DataSet, DataSetWriter
@@ -318,8 +319,8 @@ def test_severity_is_stratified_from_the_start(standard):
 
 def test_no_two_recipes_share_a_machine():
     first = [next(sample_records(load_recipe(name))).drawn for name in recipe_names()]
-    frictions = {drawn["joint.crankpin.friction"] for drawn in first}
-    assert len(frictions) == len(recipe_names())
+    gains = {drawn["sensors.0.gain"] for drawn in first}
+    assert len(gains) == len(recipe_names())
 
 
 def test_the_shifted_set_lies_outside_the_standard_one():
@@ -341,8 +342,9 @@ def test_every_record_holds_twenty_revolutions(name):
     recipe = load_recipe(name)
     slowest = min(axis.bands[0][0] for axis in recipe.record if axis.path == "drive.speed")
     assert recipe.scene.duration * slowest >= 20
-    assert recipe.scene.wear.as_new_diametral == recipe.severity.bands[0][0]
-    assert_allclose(recipe.severity.bands[0][1], 1.5 * recipe.scene.wear.condemning_diametral)
+    limits = wear_limits(recipe.scene, recipe.severity_columns[0])
+    assert limits.as_new == recipe.severity.bands[0][0]
+    assert_allclose(recipe.severity.bands[0][1], 1.5 * limits.condemning)
 
 
 # -- recipes at fault --------------------------------------------------------------------------

@@ -23,16 +23,20 @@ MAY_IMPORT = {
 
 SIM_FLOORS = [
     {"assemble"},
-    {"pump"},
+    {"pump", "journal"},
     {"ladder"},
     {"crank_setup"},
     {"slider_crank", "orbit", "shaft_line", "casing"},
-    {"film", "impedance", "bearing", "contact", "hydraulics", "frf_table"},
+    {"impedance", "bearing", "film_mass", "contact", "hydraulics", "frf_table"},
+    {"film"},
+    {"film_relax"},
+    {"film_direct"},
+    {"film_line", "film_short"},
     {"integrate", "analytic", "scene"},
-    {"pump_parts"},
+    {"pump_parts", "journal_parts"},
     {"hydraulic_parts"},
     {"parts"},
-    {"sensor", "jit", "wear"},
+    {"sensor", "jit", "wear", "viscosity"},
 ]
 """Inside sim, from the roof to the ground; a file imports from lower floors or its own."""
 

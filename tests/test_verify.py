@@ -24,6 +24,9 @@ def test_no_table_is_empty():
         "restitution.csv": 6,
         "contact.csv": 71,
         "pump.csv": 45,
+        "film.csv": 143,
+        "bearing.csv": 103,
+        "cavitation.csv": 19,
     }
 
 
@@ -35,6 +38,13 @@ def test_every_line_says_where_it_is_from():
 
 def test_no_tolerance_exceeds_what_the_source_can_tell():
     for check in verify.checks():
+        if check.name.startswith(("Lund-Thomsen", "Someya")):  # printed to 0.01 and 0.1 degrees
+            assert check.tolerance <= 0.06 * abs(check.expected) + 0.15 + 1e-9, check.name
+            continue
+        if check.name.startswith("Raimondi-Boyd"):  # differences on a mesh of 1958
+            scale = 1.0 if check.kind == "relative" else abs(check.expected)
+            assert check.tolerance <= 0.03 * scale, check.name
+            continue
         if check.kind == "relative":  # closed forms against a discretised model
             assert check.tolerance <= 5e-3, check.name
             continue
