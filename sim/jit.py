@@ -1,13 +1,14 @@
 """Compiled kernels whose cache cannot go stale.
 
 numba keys a cached kernel by its own file only, so a change in a callee of another file would go
-unnoticed. Here the cache folder carries a hash of every source of ``sim``; an unwritable folder
-means no cache instead of an error at import.
+unnoticed. Here the cache folder carries a hash of every source of ``sim`` that a kernel can see; an
+unwritable folder means no cache instead of an error at import.
 """
 
 import hashlib
 import math
 import os
+import re
 import shutil
 import tempfile
 from collections.abc import Callable
@@ -27,6 +28,8 @@ _OPTIONS: dict[str, Any] = {
     "_nrt": False,
 }
 
+_IMPORT = re.compile(r"^from \.(\w+) import", re.MULTILINE)  # tests/test_layers.py holds us to it
+
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
@@ -38,7 +41,7 @@ def cache_folder() -> Path | None:
     ``~/.cache/wearstate``. Folders of other sources that are older are removed.
     """
     digest = hashlib.sha256()
-    for source in sorted(Path(__file__).parent.glob("*.py")):
+    for source in kernel_sources(Path(__file__).parent):
         digest.update(source.read_bytes())
     try:
         base = _base_folder()
@@ -50,6 +53,31 @@ def cache_folder() -> Path | None:
     except (OSError, RuntimeError):  # RuntimeError: no home directory
         return None
     return folder
+
+
+def kernel_sources(folder: Path) -> list[Path]:
+    """Files of a flat package that hold kernels, and all that they import from it, sorted.
+
+    A kernel takes its callees and constants from there; other files may change freely.
+
+    Examples
+    --------
+    >>> names = {path.stem for path in kernel_sources(Path(__file__).parent)}
+    >>> {"jit", "contact"} <= names, "assemble" in names
+    (True, False)
+    """
+    imports = {
+        path: [folder / f"{name}.py" for name in _IMPORT.findall(path.read_text(encoding="utf-8"))]
+        for path in folder.glob("*.py")
+    }
+    this = folder / Path(__file__).name
+    found, ahead = set(), [path for path, names in imports.items() if this in names]
+    while ahead:
+        path = ahead.pop()
+        if path not in found:
+            found.add(path)
+            ahead.extend(imports.get(path, []))
+    return sorted(found)
 
 
 def _base_folder() -> Path:
@@ -67,7 +95,7 @@ def _forget_all_but_newest(base: Path, keep: int = 4) -> None:
 
 
 def kernel(function: Function) -> Function:
-    """Compile a function of floats, integers and arrays, cached by all sources of ``sim``."""
+    """Compile a function of floats, integers and arrays, cached by the sources it can see."""
     folder = cache_folder()
     if folder is None:
         return numba.njit(**_OPTIONS)(function)  # type: ignore[no-any-return]

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 import wearstate
+from wearstate.sim.jit import kernel_sources
 
 ROOT = Path(wearstate.__file__).parent
 PACKAGES = ("sim", "features", "datasets", "diagnose")
@@ -23,17 +24,18 @@ MAY_IMPORT = {
 
 SIM_FLOORS = [
     {"assemble"},
-    {"pump", "journal"},
+    {"pump", "journal", "shaft_line"},
     {"ladder"},
     {"crank_setup"},
-    {"slider_crank", "orbit", "shaft_line", "casing"},
+    {"slider_crank", "orbit", "casing", "shaft_film", "shaft_response"},
     {"impedance", "bearing", "film_mass", "contact", "hydraulics", "frf_table"},
-    {"film"},
+    {"rotor", "alignment"},
+    {"film", "beam"},
     {"film_relax"},
     {"film_direct"},
     {"film_line", "film_short"},
     {"integrate", "analytic", "scene"},
-    {"pump_parts", "journal_parts"},
+    {"pump_parts", "journal_parts", "shaft_parts"},
     {"hydraulic_parts"},
     {"parts"},
     {"sensor", "jit", "wear", "viscosity"},
@@ -141,6 +143,20 @@ def test_arrows_point_down(name):
 def test_every_file_of_sim_has_a_floor():
     stems = {name.split(".")[1] for name in SOURCES if name.startswith("sim.")} - {"__init__"}
     assert stems <= set().union(*SIM_FLOORS)
+
+
+def test_the_kernel_cache_is_keyed_by_all_that_a_kernel_can_see():
+    sim = {name: tree for name, tree in SOURCES.items() if name.startswith("sim.")}
+    graph = {name: set(filter(ours, imports_of(name, tree))) for name, tree in sim.items()}
+    seen, queue = set(), [name for name, targets in graph.items() if "sim.jit" in targets]
+    while queue:
+        name = queue.pop()
+        if name not in seen:
+            seen.add(name)
+            queue.extend(graph[name])
+    found = {f"sim.{path.stem}" for path in kernel_sources(ROOT / "sim")}
+    assert "sim.film_short" in found
+    assert found ^ seen == set()
 
 
 def reaches_itself(name, graph):
