@@ -52,6 +52,8 @@ NUMERICS = {
     "peak_normal_force_n": "<f8",
     "min_film_m": "<f8",
     "peak_eccentricity": "<f8",
+    "least_reaction_n": "<f8",
+    "motion_share": "<f8",
     "cavitating_share": "<f8",
     "lift_left": "<f8",
     "tension_share": "<f8",

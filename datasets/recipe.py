@@ -37,6 +37,9 @@ SEVERITIES = {
     "throws.*.joint.guide.diametral_clearance": "diametral_clearance_guide_{}_m",
     "bearing.diametral_clearance": "diametral_clearance_bearing_m",
     "bearing.scar_depth": "scar_depth_bearing_m",
+    "bearings.*.wear_down": "wear_down_bearing_{}_m",
+    "bearings.*.sag": "sag_bearing_{}_m",
+    "coupling.parallel_offset": "parallel_offset_coupling_m",
 }
 """Manifest column of every scene value that says how worn a machine is. A new one is one row.
 
@@ -51,6 +54,9 @@ LIMITS = {
     "throws.*.joint.wristpin.diametral_clearance": "wear_wristpin",
     "bearing.diametral_clearance": "wear",
     "bearing.scar_depth": "wear_scar",
+    "bearings.*.wear_down": "wear_down",
+    "bearings.*.sag": "wear_sag",
+    "coupling.parallel_offset": "wear_coupling",
 }
 """Scene table with the wear limits of a severity. One without a row has no grade."""
 
@@ -62,6 +68,8 @@ CONDITIONS = {
     "static_load_n": "load.static",
     "viscosity_pa_s": "oil.dynamic_viscosity",
     "unbalance_kg_m": "rotor.unbalance",
+    "hull_deflection_m": "hull.deflection",
+    "thrust_n": "propeller.thrust",
 }
 """Manifest column of every operating condition -> its place in the scene."""
 
@@ -510,7 +518,8 @@ def _wearing(
 def clearances(scene: Scene) -> dict[str, float]:
     """Every severity of a scene that acts, by its manifest column [m].
 
-    None of an ideal joint; those of one throw only where they are not those of all.
+    None of an ideal joint; those of one throw only where they are not those of all; of the bearings
+    of a shaft the first, and those with a fault.
 
     Parameters
     ----------
@@ -533,7 +542,9 @@ def clearances(scene: Scene) -> dict[str, float]:
             if not has_value(scene, path) or _rung_of(scene, joint) == "ideal":
                 continue
             value = getattr(value_at(scene, joint), "clearance_diametral", value_at(scene, path))
-            if not star or value != found.get(SEVERITIES[pattern.partition("*.")[2]]):
+            twin = SEVERITIES.get(pattern.partition("*.")[2])
+            own = value != found.get(twin) if twin else number == 0 or value != 0
+            if not star or own:
                 found[str(severity_column(path))] = float(value)
     return found
 

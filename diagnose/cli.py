@@ -21,6 +21,9 @@ from .. import __version__
 EXIT_FAILED, EXIT_BAD_INPUT, EXIT_WARNING, EXIT_ALARM, EXIT_UNFAMILIAR = 1, 2, 3, 4, 5
 
 _FAIL_ON_HELP = "Exit 3 at a warning, 4 at an alarm, 5 when unfamiliar; alarm: only 4 and 5."
+_ALIGN_FAIL_ON_HELP = (
+    "Exit 3 where a limit is not met, 4 where a bearing lifts or no moves help; alarm: only 4."
+)
 
 
 class _Group(click.Group):
@@ -580,6 +583,96 @@ def _report_exit(verdict: str, grade: int | None, fail_on: str | None) -> int:
     if grade >= ALARM_GRADE:
         return EXIT_ALARM
     return EXIT_WARNING if fail_on == "warning" and grade >= WARNING_GRADE else 0
+
+
+@cli.command()
+@click.argument("scene_name", metavar="SCENE")
+@click.option("--set", "pairs", multiple=True, metavar="PATH=VALUE", help="Replace a scene value.")
+@click.option(
+    "--condition",
+    type=click.Choice(["cold", "hot", "running", "all"]),
+    default="all",
+    show_default=True,
+    help="In which the limits must hold.",
+)
+@click.option("--calibrate/--no-calibrate", default=True, show_default=True, help="Look for moves.")
+@click.option(
+    "--prefer",
+    type=click.Choice(["least", "fewest"]),
+    default="least",
+    show_default=True,
+    help="Least sum of moves, or fewest bearings moved.",
+)
+@click.option("--jack", metavar="BEARING", help="Jacking test beside this bearing.")
+@click.option(
+    "--test",
+    "rig_test",
+    type=click.Choice(["hammer", "shaker"]),
+    help="Simulated test of the running shaft before and after the moves.",
+)
+@click.option("--push", metavar="BEARING", help="Where --test pushes the shaft up; aftmost.")
+@click.option("--test-plot", type=_PATH, help="Picture of --test to write.")
+@click.option("--plot", type=_PATH, help="Picture to write (.png, .svg or .pdf).")
+@click.option("-o", "--output", type=_PATH, help="HTML page to write.")
+@click.option("--fail-on", type=click.Choice(["warning", "alarm"]), help=_ALIGN_FAIL_ON_HELP)
+@_force_option
+@_json_option
+def align(
+    scene_name: str,
+    pairs: Sequence[str],
+    condition: str,
+    calibrate: bool,
+    prefer: str,
+    jack: str | None,
+    rig_test: str | None,
+    push: str | None,
+    test_plot: Path | None,
+    plot: Path | None,
+    output: Path | None,
+    fail_on: str | None,
+    force: bool,
+    as_json: bool,
+) -> None:
+    """Bearing loads of the shaft line SCENE, and the moves that bring them within limits."""
+    from ..sim.scene import load_scene
+    from .align import align as judge
+    from .align import align_table, align_text, save_figure, save_html
+
+    if rig_test is None and (push or test_plot):
+        raise click.UsageError("--push and --test-plot need --test")
+    if rig_test is not None and not calibrate:
+        raise click.UsageError("--test compares before and after the moves: it needs --calibrate")
+    outputs = [(plot, _PICTURE), (output, _PAGE), (test_plot, _PICTURE)]
+    _check_outputs([scene_name], outputs, force)
+    scene = load_scene(scene_name, _overrides(pairs))
+    found = judge(scene, condition=condition, mend=calibrate, prefer=prefer, jack=jack)
+    if plot is not None:
+        save_figure(found, plot)
+    if output is not None:
+        save_html(found, output)
+    tested, words = _tested(scene, found.calibration, rig_test, push, test_plot)
+    files = [str(path) for path, _ in outputs if path and path.exists()]
+    text = "\n".join([align_text(found), *words, *files])
+    _emit({**align_table(found), "test": tested, "files": files}, as_json, text)
+    levels = {"warning": EXIT_WARNING, "alarm": EXIT_ALARM}
+    code = levels.get(found.verdict, 0) if fail_on else 0
+    raise click.exceptions.Exit(0 if fail_on == "alarm" and code == EXIT_WARNING else code)
+
+
+def _tested(
+    scene: Any, calibration: Any, kind: str | None, push: str | None, picture: Path | None
+) -> tuple[dict[str, Any] | None, list[str]]:
+    """Table and text of the simulated test before and after the moves, if one was asked for."""
+    if kind is None:
+        return None, []
+    from .rig import calibrated_test, rig_figure, rig_table, rig_text
+
+    result = calibrated_test(scene, calibration, kind, push=push)
+    if result is None:
+        return None, ["", "no test: nothing moves, so nothing changes"]
+    if picture is not None:
+        rig_figure(result).savefig(picture, dpi=110)
+    return rig_table(result), ["", rig_text(result)]
 
 
 @cli.command()

@@ -14,6 +14,8 @@ from ..sim.integrate import Solution
 from ..sim.journal_parts import JournalScene
 from ..sim.parts import Scene
 from ..sim.pump_parts import PumpScene
+from ..sim.shaft_line import ShaftState, shaft_state
+from ..sim.shaft_parts import ShaftScene
 
 _FORMATS = (".png", ".svg", ".pdf")
 _COLOURS = ("#1f5a94", "#b3541e", "#4f7d3a")
@@ -89,7 +91,7 @@ def _label(axes: Any, x: str, y: str, title: str) -> None:
     axes.set(xlabel=x, ylabel=y, title=title)
     axes.grid(alpha=0.3)
     axes.margins(x=0)
-    if axes.lines:
+    if axes.get_legend_handles_labels()[0]:
         axes.legend(fontsize=8, loc="upper right")
 
 
@@ -182,7 +184,74 @@ def _full_spectrum(axes: Any, scene: JournalScene, solution: Solution) -> None:
     axes.set_xlim(-_MOST_ORDERS, _MOST_ORDERS)
 
 
+# --- propulsion shaft
+
+
+def _draw_shaft(figure: Any, scene: Scene, solution: Solution) -> None:
+    """The line with what it carries, its journals in their bores, and what its sensors see."""
+    shaft = cast(ShaftScene, scene)
+    state = shaft_state(shaft)
+    panels = figure.subplot_mosaic(
+        [["line", "line", "line"], ["bores", "force", "spectrum"]], height_ratios=(1, 1.3)
+    )
+    _shaft_line(panels["line"], shaft, state)
+    _bores(panels["bores"], state, solution.truth["journal_m"])
+    turns = np.arange(solution.signal.shape[1]) / solution.sample_rate * shaft.drive.speed
+    n = int(np.searchsorted(turns, _REVOLUTIONS))
+    for i in range(len(shaft.bearings)):
+        up = solution.truth["film_force_n"][:n, i, 0] / 1e3
+        panels["force"].plot(turns[:n], up, lw=0.8, color=f"C{i}")
+    _label(panels["force"], "revolutions", "film on the shaft, up [kN]", "Bearing forces")
+    names = [bearing.name for bearing in shaft.bearings]
+    for sensor, row in zip(shaft.sensors, solution.signal, strict=False):
+        frequency, level = _density(row, solution.sample_rate)
+        colour = f"C{names.index(sensor.bearing)}"
+        panels["spectrum"].plot(frequency, level, lw=0.6, color=colour)
+    unit = "PSD [dB re 1 (m/s²)²/Hz]"
+    _label(panels["spectrum"], "frequency [Hz]", unit, "Housing acceleration")
+    panels["spectrum"].set_xscale("log")
+
+
+def _shaft_line(axes: Any, scene: ShaftScene, state: ShaftState) -> None:
+    """Heights of the shaft over the length, and the reaction of every bearing."""
+    film = state.film
+    height = 1e3 * film.deflection[0::4]
+    axes.plot(state.beam.stations, height, lw=1, color=_COLOURS[0])
+    room = float(np.ptp(height)) or 1.0
+    for bearing, reaction in zip(scene.bearings, film.reactions[:, 0], strict=True):
+        at = height[state.beam.node(bearing.station)]
+        ends = [bearing.station - bearing.length / 2, bearing.station + bearing.length / 2]
+        axes.plot(ends, [at, at], lw=5, color="black", alpha=0.4)
+        axes.annotate(
+            f"{bearing.name}\n{reaction / 1e3:.1f} kN",
+            (bearing.station, at + 0.08 * room),
+            ha="center",
+            va="bottom",
+            fontsize=8,
+        )
+    for disc in scene.discs:
+        axes.plot(disc.station, height[state.beam.node(disc.station)], "o", ms=4, color="black")
+    axes.set_ylim(height.min() - 0.15 * room, height.max() + 0.45 * room)
+    _label(axes, "station from aft [m]", "height [mm]", "Deflected line, running")
+
+
+def _bores(axes: Any, state: ShaftState, path: NDArray[Any]) -> None:
+    """Paths of the journals over their clearances, seen from aft; tells the colours for all."""
+    circle = np.exp(2j * np.pi * np.linspace(0, 1, 181))
+    axes.plot(circle.real, circle.imag, color="black", lw=1)
+    for i, bearing in enumerate(state.film.bearings):
+        place = path[:, i] / bearing.worn.clearance
+        axes.plot(place[:, 1], place[:, 0], lw=0.6, color=f"C{i}", label=bearing.name)
+        middle = place.mean(axis=0)
+        axes.plot(middle[1], middle[0], "+", ms=6, color=f"C{i}")
+    axes.set(xlabel="to starboard", ylabel="up", title="Journals over their clearances")
+    axes.set_aspect("equal", adjustable="box")
+    axes.grid(alpha=0.3)
+    axes.legend(fontsize=6, loc="upper right")
+
+
 _DRAWERS: dict[str, Callable[[Any, Scene, Solution], None]] = {
     "reciprocating-pump": _draw_pump,
     "journal-bearing": _draw_journal,
+    "propulsion-shaft": _draw_shaft,
 }

@@ -292,7 +292,7 @@ def _waveform(recording: Recording) -> str:
         shown, scale = ("µm", 1e6) if channel.unit == "m" else (channel.unit, 1.0)
         colour = _LINE_COLOURS[i % 4]
         axes[i].fill_between(time, scale * low, scale * high, lw=0.5, color=colour, alpha=0.9)
-        axes[i].set_ylabel(f"{channel.name} [{shown}]")
+        axes[i].set_ylabel(f"{channel.name}\n[{shown}]", fontsize=8)
         axes[i].grid(alpha=0.3)
         axes[i].margins(x=0)
     axes[-1].set_xlabel("time [s]")

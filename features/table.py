@@ -670,13 +670,29 @@ def _quantities(given: Sequence[str] | None, n_channels: int) -> tuple[str, ...]
     return tuple(given)
 
 
-def _rows_for(quantities: tuple[str, ...], tacho: bool) -> tuple[Feature, ...]:
+def _rows_for(
+    quantities: tuple[str, ...], tacho: bool, fs: float, settings: Settings
+) -> tuple[Feature, ...]:
     """Catalogue rows of a recording with these channels."""
+    probes = probe_rows(quantities)
     return catalogue(
         tacho=tacho,
-        orbit=probe_rows(quantities) is not None,
-        casing=any(quantity != DISPLACEMENT for quantity in quantities),
+        orbit=probes is not None,
+        casing=any(quantity != DISPLACEMENT for quantity in quantities)
+        and (probes is None or _map_fits(fs, settings)),
     )
+
+
+def _map_fits(fs: float, settings: Settings) -> bool:
+    """Whether the map over the shaft angle has its bands below fs / 2.
+
+    A shaft line is sampled slowly, for its orders; it has no knocks that are worth a map.
+    """
+    try:
+        settings.map_edges(fs)
+    except ValueError:
+        return False
+    return True
 
 
 @lru_cache(maxsize=64)
@@ -697,7 +713,7 @@ def _feature_names(
     }
     names = tuple(
         f"{owner}.{label}"
-        for feature in _rows_for(quantities, tacho)
+        for feature in _rows_for(quantities, tacho, fs, settings)
         for labels in (feature.labels(settings, fs),)
         for owner in owners[feature.scope]
         for label in labels
@@ -791,7 +807,8 @@ def feature_row(
         probes=probe_rows(kinds),
         settings=settings,
     )
-    parts = [np.ravel(f.function(analysis)) for f in _rows_for(kinds, tacho is not None)]
+    rows = _rows_for(kinds, tacho is not None, fs, settings)
+    parts = [np.ravel(feature.function(analysis)) for feature in rows]
     return names, np.concatenate(parts, dtype=np.float64)
 
 

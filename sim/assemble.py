@@ -6,6 +6,7 @@ from .integrate import Solution
 from .journal import check_journal, simulate_journal
 from .parts import Scene
 from .pump import check_pump, simulate_pump
+from .shaft_line import check_shaft, simulate_shaft
 
 
 def simulate(
@@ -66,10 +67,12 @@ def check(scene: Scene) -> None:
 _SIMULATORS: dict[str, Callable[[Scene, int, bool, bool], Solution]] = {
     "reciprocating-pump": simulate_pump,
     "journal-bearing": simulate_journal,
+    "propulsion-shaft": simulate_shaft,
 }
 """A new machine is one row."""
 
 _CHECKS: dict[str, Callable[[Scene], None]] = {
     "reciprocating-pump": check_pump,
     "journal-bearing": check_journal,
+    "propulsion-shaft": check_shaft,
 }

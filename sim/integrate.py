@@ -28,6 +28,12 @@ class Status(IntEnum):
     WALL = 13
     NO_PRESSURE = 14
     TOO_MANY_STEPS = 15
+    LINE_OVERLOAD = 16
+    LINE_EDGE = 17
+    LINE_BALANCE = 18
+    LINE_COARSE = 19
+    LINE_MOTION = 20
+    LINE_UNSTABLE = 21
 
     @property
     def ok(self) -> bool:
@@ -93,6 +99,30 @@ _STATUS_TEXT = {
     ),
     Status.TOO_MANY_STEPS: (
         "the adaptive integrator used up its steps; raise numerics.tolerance or shorten duration"
+    ),
+    Status.LINE_OVERLOAD: (
+        "the film of a bearing cannot carry what the line puts on it; lower the bearing's offset, "
+        "or raise oil viscosity, speed or the bearing's length"
+    ),
+    Status.LINE_EDGE: (
+        "the shaft touches the edge of a bearing; bring the slope of its bore nearer to that of "
+        "the shaft, lower its offset, or raise its diametral_clearance"
+    ),
+    Status.LINE_BALANCE: (
+        "shaft and oil films found no balance; bring the offsets nearer to a fair line, or refine "
+        "film.n_theta and film.n_z"
+    ),
+    Status.LINE_COARSE: (
+        "the film of a bearing is too thin for its mesh; raise film.n_theta, or lower the "
+        "bearing's offset"
+    ),
+    Status.LINE_MOTION: (
+        "the journal would move by more than its film is thick, beyond the linear response; lower "
+        "unbalance, blade_rate or turbulence"
+    ),
+    Status.LINE_UNSTABLE: (
+        "the line is unstable on its films and would whirl without bound; load the bearings more "
+        "evenly, or lower the speed"
     ),
 }
 

@@ -14,6 +14,7 @@ from typing import Any
 from .journal_parts import JournalScene
 from .parts import Scene, SceneError, beside, nearest, validate_table, without_twin
 from .pump_parts import PumpScene
+from .shaft_parts import ShaftScene
 
 SCENE_FOLDER = Path(__file__).parent / "scenes"
 
@@ -21,6 +22,7 @@ SCENE_FOLDER = Path(__file__).parent / "scenes"
 MACHINES: dict[str, type[Scene]] = {
     "reciprocating-pump": PumpScene,
     "journal-bearing": JournalScene,
+    "propulsion-shaft": ShaftScene,
 }
 """The scene type of every machine. A new machine is one row."""
 

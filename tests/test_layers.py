@@ -29,6 +29,7 @@ SIM_FLOORS = [
     {"crank_setup"},
     {"slider_crank", "orbit", "casing", "shaft_film", "shaft_response"},
     {"impedance", "bearing", "film_mass", "contact", "hydraulics", "frf_table"},
+    {"calibration", "jacking"},
     {"rotor", "alignment"},
     {"film", "beam"},
     {"film_relax"},

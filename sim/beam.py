@@ -1,0 +1,818 @@
+"""A shaft as a beam in two planes: finite elements with two nodes, assembled once, sparse.
+
+x runs along the shaft from aft, y up, z to starboard; the shaft turns from y to z. Every node has
+four coordinates, in the order y, slope_y, z, slope_z, and node k starts at coordinate 4 k. A slope
+is the turn of the cross-section, dy/dx or dz/dx where shear is left out; the moments that do work
+on the slopes are called up and side after their planes.
+
+================  ======  ===============  ===========================================
+theory            shear   rotary, gyro     valid
+================  ======  ===============  ===========================================
+euler-bernoulli   no      discs only       wave lengths above about 30 diameters
+rayleigh          no      discs and shaft  little is gained without the shear
+timoshenko        yes     discs and shaft  wave lengths above about 2 diameters
+================  ======  ===============  ===========================================
+"""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.sparse import coo_array
+
+Vector = NDArray[np.float64]
+Index = NDArray[np.int64]
+Sparse = Any  # scipy.sparse.csc_array; scipy has no types
+
+STANDARD_GRAVITY = 9.80665
+"""Acceleration of gravity [m/s^2] (CGPM 1901)."""
+
+THEORIES = ("euler-bernoulli", "rayleigh", "timoshenko")
+"""Of the shaft, in the order of what they hold."""
+
+COORDINATES = ("y", "slope_y", "z", "slope_z")
+"""Of one node, in order."""
+
+_SAME = 1e-9  # of the shaft's length: stations nearer than this are one
+_NEAREST = 1e-4  # of the shaft's length: with an element so short reactions round to 1e-7
+_MOST_NODES = 20_000
+
+
+@dataclass(frozen=True, kw_only=True)
+class Section:
+    """A piece of the shaft of one material and one cross-section.
+
+    Attributes
+    ----------
+    length : float
+        [m]
+    outer_diameter, inner_diameter : float
+        [m]; 0 <= inner < outer.
+    young, shear_modulus : float
+        [Pa]
+    density : float
+        [kg/m^3]
+
+    Examples
+    --------
+    >>> section = Section(length=1.0, outer_diameter=0.2, young=2.11e11, shear_modulus=8.12e10,
+    ...                   density=7810.0)
+    >>> round(section.bending_stiffness / 1e6, 3)  # MN m^2
+    16.572
+    """
+
+    length: float
+    outer_diameter: float
+    inner_diameter: float = 0.0
+    young: float
+    shear_modulus: float
+    density: float
+
+    @property
+    def area(self) -> float:
+        """Of the cross-section [m^2]."""
+        return math.pi / 4 * (self.outer_diameter**2 - self.inner_diameter**2)
+
+    @property
+    def second_moment(self) -> float:
+        """Of the cross-section about a diameter [m^4]."""
+        return math.pi / 64 * (self.outer_diameter**4 - self.inner_diameter**4)
+
+    @property
+    def bending_stiffness(self) -> float:
+        """E I [N m^2]."""
+        return self.young * self.second_moment
+
+    @property
+    def poisson(self) -> float:
+        """E / 2 G - 1."""
+        return self.young / (2 * self.shear_modulus) - 1
+
+
+@dataclass(frozen=True, kw_only=True)
+class Disc:
+    """A rigid body on the shaft: propeller, coupling, wheel.
+
+    Attributes
+    ----------
+    station : float
+        [m]
+    mass : float
+        [kg]
+    polar_inertia, diametral_inertia : float
+        About the shaft's axis and about a diameter through the station [kg m^2].
+    entrained_mass : float
+        Of the water that moves with it [kg]: inertia without weight.
+    entrained_polar, entrained_diametral : float
+        The same of rotation [kg m^2]. The water is not taken to spin with the body, so it makes
+        no gyroscopic moment, and `entrained_polar` has no part in bending: it is kept here with
+        the propeller's other numbers.
+    buoyancy : float
+        Upward [N]; it lessens the weight.
+    """
+
+    station: float
+    mass: float
+    polar_inertia: float = 0.0
+    diametral_inertia: float = 0.0
+    entrained_mass: float = 0.0
+    entrained_polar: float = 0.0
+    entrained_diametral: float = 0.0
+    buoyancy: float = 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class PointLoad:
+    """Steady force and moment at a station.
+
+    Attributes
+    ----------
+    station : float
+        [m]
+    up, side : float
+        Force along y and z [N].
+    moment_up, moment_side : float
+        Moment that turns slope_y and slope_z up [N m].
+    """
+
+    station: float
+    up: float = 0.0
+    side: float = 0.0
+    moment_up: float = 0.0
+    moment_side: float = 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class DistributedLoad:
+    """Steady force spread evenly over a stretch of the shaft.
+
+    Attributes
+    ----------
+    start, end : float
+        Stations [m], start < end.
+    up, side : float
+        Along y and z [N/m].
+    """
+
+    start: float
+    end: float
+    up: float = 0.0
+    side: float = 0.0
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class InternalForces:
+    """Bending moment and shear along the shaft, ready to be drawn.
+
+    Every station but the first and the last stands twice, for just aft and just forward of it,
+    since a force makes the shear jump and a moment the bending moment.
+
+    Attributes
+    ----------
+    stations : numpy.ndarray [shape=(2 n - 2,)]
+        [m]
+    moment_up, moment_side : numpy.ndarray [shape=(2 n - 2,)]
+        ``E I y''`` [N m]: positive where the shaft sags, with tension below.
+    shear_up, shear_side : numpy.ndarray [shape=(2 n - 2,)]
+        ``dM/dx`` [N]: the sum of all upward forces aft of the station.
+    """
+
+    stations: Vector
+    moment_up: Vector
+    moment_side: Vector
+    shear_up: Vector
+    shear_side: Vector
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Elements:
+    """The elements between neighbouring stations; the fields are [shape=(n - 1,)].
+
+    Attributes
+    ----------
+    length : numpy.ndarray
+        [m]
+    bending, mass, rotary : numpy.ndarray
+        E I [N m^2], rho A [kg/m], rho I [kg m]; the last is zero where the theory has none.
+    shear_ratio : numpy.ndarray
+        ``12 E I / (k G A L^2)``; zero where the theory has no shear.
+    up, side : numpy.ndarray
+        Steady load with the shaft's own weight [N/m].
+    """
+
+    length: Vector
+    bending: Vector
+    mass: Vector
+    rotary: Vector
+    shear_ratio: Vector
+    up: Vector
+    side: Vector
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Beam:
+    """A shaft free of all supports: ``M q'' + Omega G q' + K q = f``.
+
+    Attributes
+    ----------
+    stations : numpy.ndarray [shape=(n,)]
+        Of the nodes, rising from 0 at the aft end [m].
+    mass, stiffness, gyroscopic : scipy.sparse.csc_array [shape=(4 n, 4 n)]
+        Symmetric, symmetric, skew. The gyroscopic one is multiplied by the speed [rad/s].
+    load : numpy.ndarray [shape=(4 n,)]
+        Steady forces and moments, with gravity.
+    weight : float
+        Of shaft and discs, less buoyancy [N].
+    elements : Elements
+    sections, discs, loads : tuple
+        As given.
+    theory : str
+    shear_coefficient : float or str or None
+        As given.
+    gravity : float
+        [m/s^2]
+    """
+
+    stations: Vector
+    mass: Sparse
+    stiffness: Sparse
+    gyroscopic: Sparse
+    load: Vector
+    weight: float
+    elements: Elements
+    sections: tuple[Section, ...]
+    discs: tuple[Disc, ...]
+    loads: tuple[PointLoad | DistributedLoad, ...]
+    theory: str
+    shear_coefficient: float | str | None
+    gravity: float
+
+    @property
+    def length(self) -> float:
+        """Of the shaft [m]."""
+        return float(self.stations[-1])
+
+    @property
+    def n_dof(self) -> int:
+        """Count of the coordinates, four for each node."""
+        return 4 * self.stations.size
+
+    @property
+    def downward_load(self) -> float:
+        """What all bearings carry together: the weight and every given load [N]."""
+        return -float(self.load[0::4].sum())
+
+    def node(self, station: float) -> int:
+        """Index of the node at a station.
+
+        Raises
+        ------
+        ValueError
+            No node stands there; the message names the nearest.
+        """
+        nearest = int(np.argmin(np.abs(self.stations - station)))
+        if not abs(self.stations[nearest] - station) <= 2 * _SAME * self.length:
+            raise ValueError(
+                f"station = {station:g} m is no node, the nearest is {self.stations[nearest]:g} m; "
+                "name it in `stations` of assemble_beam"
+            )
+        return nearest
+
+    def dof(self, station: float, coordinate: str) -> int:
+        """Index of a coordinate of the node at a station.
+
+        Parameters
+        ----------
+        station : float
+            [m]
+        coordinate : str
+            "y", "slope_y", "z" or "slope_z".
+
+        Raises
+        ------
+        ValueError
+            No node stands there, or there is no such coordinate.
+        """
+        if coordinate not in COORDINATES:
+            raise ValueError(f"coordinate = '{coordinate}' must be one of {', '.join(COORDINATES)}")
+        return 4 * self.node(station) + COORDINATES.index(coordinate)
+
+    def moments_and_shear(self, deflection: ArrayLike) -> InternalForces:
+        """Bending moment and shear of a deflected shaft at rest.
+
+        Parameters
+        ----------
+        deflection : array_like [shape=(4 n,)]
+            Of every coordinate [m], [rad], as a static solution gives it.
+
+        Returns
+        -------
+        InternalForces
+            With the share of the steady load inside the elements: exact at the nodes.
+
+        Raises
+        ------
+        ValueError
+            The deflection has another shape.
+        """
+        q = np.asarray(deflection, dtype=float)
+        if q.shape != (self.n_dof,):
+            raise ValueError(
+                f"deflection of shape {q.shape} must be ({self.n_dof},); give every coordinate"
+            )
+        e = self.elements
+        shear_up, moment_up = _cut_forces(e, q[0::4], q[1::4], e.up)
+        shear_side, moment_side = _cut_forces(e, q[2::4], q[3::4], e.side)
+        return InternalForces(
+            stations=np.repeat(self.stations, 2)[1:-1],
+            moment_up=moment_up,
+            moment_side=moment_side,
+            shear_up=shear_up,
+            shear_side=shear_side,
+        )
+
+
+def assemble_beam(
+    sections: Sequence[Section],
+    *,
+    discs: Sequence[Disc] = (),
+    loads: Sequence[PointLoad | DistributedLoad] = (),
+    stations: Sequence[float] = (),
+    longest_element: float | None = None,
+    theory: str = "timoshenko",
+    shear_coefficient: float | str | None = None,
+    gravity: float = STANDARD_GRAVITY,
+) -> Beam:
+    """Mass, stiffness, gyroscopic matrix and steady load of a stepped shaft.
+
+    Parameters
+    ----------
+    sections : sequence of Section
+        From aft forward; the first begins at station 0.
+    discs, loads : sequence
+        Each at its own station; loads are steady.
+    stations : sequence of float
+        Where further nodes shall stand: bearings, sensors, places of forces [m].
+    longest_element : float, optional
+        Upper bound of the elements' length [m]; by default nodes stand only where something is.
+    theory : str
+        One of ``THEORIES``.
+    shear_coefficient : float or str
+        k in (0, 1], the share of the cross-section that carries the shear, or "cowper" for
+        Cowper's of each section; must be given for *timoshenko*, has no part in the others.
+    gravity : float
+        Downward [m/s^2].
+
+    Returns
+    -------
+    Beam
+
+    Raises
+    ------
+    ValueError
+        Something is out of its range, off the shaft, or too near something else; all faults at
+        once, each with the value, the bound and a cure.
+
+    Notes
+    -----
+    The element's deflection is a cubic and its slope a quadratic that meet the equations of the
+    unloaded beam, so that the nodes of a static solution are exact whatever the mesh, also under
+    even loads, of which each node gets ``(q L / 2, +-q L^2 / 12)``. Mass, rotary inertia and
+    gyroscopic matrix come of the same shapes (consistent). Natural frequencies converge from above:
+    by ``(beta h)^4 / 1440`` with elements of length h and the wave number beta; *timoshenko* adds
+    ``s (beta h)^2 / 24`` at most, with the share of shear over bending
+    ``s = E I beta^2 / (k G A)``. Rounding grows with the inverse cube of the shortest element over
+    the shaft, which therefore is bounded below.
+
+    Cowper's coefficient of a hollow circle, with m the inner over the outer diameter, is
+    ``6 (1 + nu) (1 + m^2)^2 / ((7 + 6 nu) (1 + m^2)^2 + (20 + 12 nu) m^2)``. Line-shafting
+    programs often take k = 1.
+
+    References
+    ----------
+    Nelson (1980), A finite rotating shaft element using Timoshenko beam theory, Journal of
+    Mechanical Design 102(4), 793-803, doi:10.1115/1.3254824. Friswell, Penny, Garvey, Lees (2010),
+    Dynamics of Rotating Machines, Cambridge University Press, 5.4. Cowper (1966), Journal of
+    Applied Mechanics 33(2), 335-340, doi:10.1115/1.3625046.
+
+    Examples
+    --------
+    A bar of 1 m pinned at its ends sinks in the middle by 5 W L^3 / (384 E I):
+
+    >>> bar = Section(length=1.0, outer_diameter=0.02, young=2e11, shear_modulus=8e10,
+    ...               density=7800.0)
+    >>> beam = assemble_beam([bar], stations=[0.5], theory="euler-bernoulli")
+    >>> free = np.setdiff1d(np.arange(beam.n_dof), [beam.dof(s, c) for s in (0, 1) for c in "yz"])
+    >>> q = np.linalg.solve(beam.stiffness[free][:, free].toarray(), beam.load[free])
+    >>> middle = q[list(free).index(beam.dof(0.5, "y"))]
+    >>> round(float(middle / (-5 * beam.weight / (384 * bar.bending_stiffness))), 9)
+    1.0
+    """
+    faults = list(_faults(sections, discs, loads, stations, longest_element, gravity))
+    faults += _theory_faults(theory, shear_coefficient)
+    if faults:
+        raise ValueError("\n".join(faults))
+    ends = np.cumsum([0.0, *(section.length for section in sections)])
+    nodes = _nodes(ends, _named_stations(discs, loads, stations), longest_element)
+    elements = _elements(nodes, ends, sections, loads, theory, shear_coefficient, gravity)
+    load = _steady_load(nodes, elements, discs, loads, gravity)
+    own = float(elements.mass @ elements.length) * gravity
+    return Beam(
+        stations=nodes,
+        mass=_mass(nodes, elements, discs),
+        stiffness=_stiffness(elements),
+        gyroscopic=_gyroscopic(nodes, elements, discs),
+        load=load,
+        weight=own + sum(disc.mass * gravity - disc.buoyancy for disc in discs),
+        elements=elements,
+        sections=tuple(sections),
+        discs=tuple(discs),
+        loads=tuple(loads),
+        theory=theory,
+        shear_coefficient=shear_coefficient,
+        gravity=gravity,
+    )
+
+
+def cowper_coefficient(poisson: float, diameter_ratio: float = 0.0) -> float:
+    """Shear coefficient k of a solid or hollow circle.
+
+    Parameters
+    ----------
+    poisson : float
+        Ratio in (-1, 0.5].
+    diameter_ratio : float
+        Inner over outer diameter, in [0, 1).
+
+    Returns
+    -------
+    float
+        k, the shear area over the area.
+
+    Raises
+    ------
+    ValueError
+        An argument is out of range.
+
+    References
+    ----------
+    Cowper (1966), Journal of Applied Mechanics 33(2), 335-340, doi:10.1115/1.3625046.
+
+    Examples
+    --------
+    >>> round(cowper_coefficient(0.3), 4), round(cowper_coefficient(0.3, 0.999999), 4)
+    (0.8864, 0.5306)
+    """
+    if not -1 < poisson <= 0.5:
+        raise ValueError(f"poisson = {poisson} must be in (-1, 0.5]; metals have about 0.3")
+    if not 0 <= diameter_ratio < 1:
+        raise ValueError(f"diameter_ratio = {diameter_ratio} must be in [0, 1); inner over outer")
+    square = (1 + diameter_ratio**2) ** 2
+    hollow = (20 + 12 * poisson) * diameter_ratio**2
+    return 6 * (1 + poisson) * square / ((7 + 6 * poisson) * square + hollow)
+
+
+# --- what is refused
+
+
+def _faults(
+    sections: Sequence[Section],
+    discs: Sequence[Disc],
+    loads: Sequence[PointLoad | DistributedLoad],
+    stations: Sequence[float],
+    longest_element: float | None,
+    gravity: float,
+) -> Iterator[str]:
+    if not sections:
+        yield "sections is empty, must hold at least one; give the shaft's pieces from aft"
+    found = [f for i, s in enumerate(sections) for f in _section_faults(f"sections[{i}]", s)]
+    yield from found
+    for i, disc in enumerate(discs):
+        yield from _disc_faults(f"discs[{i}]", disc)
+    for i, load in enumerate(loads):
+        yield from _load_faults(f"loads[{i}]", load)
+    if not math.isfinite(gravity):
+        yield f"gravity = {gravity} m/s^2 must be finite; the earth has {STANDARD_GRAVITY}"
+    if longest_element is not None and not longest_element > 0:
+        yield f"longest_element = {longest_element} m must be > 0; leave it out for no bound"
+        found.append("")
+    if sections and not found:
+        yield from _place_faults(sections, discs, loads, stations, longest_element)
+
+
+def _section_faults(name: str, section: Section) -> Iterator[str]:
+    for quantity, unit in (
+        ("length", "m"),
+        ("outer_diameter", "m"),
+        ("young", "Pa"),
+        ("shear_modulus", "Pa"),
+        ("density", "kg/m^3"),
+    ):
+        value = getattr(section, quantity)
+        if not 0 < value < math.inf:
+            yield f"{name}.{quantity} = {value} {unit} must be > 0 and finite; check the unit"
+    if not 0 <= section.inner_diameter < section.outer_diameter:
+        yield (
+            f"{name}.inner_diameter = {section.inner_diameter} m must be >= 0 and < "
+            f"outer_diameter = {section.outer_diameter} m; 0 is a solid shaft"
+        )
+
+
+def _disc_faults(name: str, disc: Disc) -> Iterator[str]:
+    for quantity, unit in (
+        ("mass", "kg"),
+        ("polar_inertia", "kg m^2"),
+        ("diametral_inertia", "kg m^2"),
+        ("entrained_mass", "kg"),
+        ("entrained_polar", "kg m^2"),
+        ("entrained_diametral", "kg m^2"),
+        ("buoyancy", "N"),
+    ):
+        value = getattr(disc, quantity)
+        if not 0 <= value < math.inf:
+            yield f"{name}.{quantity} = {value} {unit} must be >= 0 and finite; check the unit"
+    if disc.polar_inertia > 2 * (1 + 1e-6) * disc.diametral_inertia:  # printed numbers are rounded
+        yield (
+            f"{name}.polar_inertia = {disc.polar_inertia} kg m^2 must be <= 2 diametral_inertia = "
+            f"{2 * disc.diametral_inertia} kg m^2, that of the flattest disc; check which is which"
+        )
+
+
+def _load_faults(name: str, load: PointLoad | DistributedLoad) -> Iterator[str]:
+    quantities = [("up", "N/m"), ("side", "N/m")]
+    if isinstance(load, PointLoad):
+        quantities = [("up", "N"), ("side", "N"), ("moment_up", "N m"), ("moment_side", "N m")]
+    elif not load.start < load.end:
+        yield f"{name}.start = {load.start} m must be < end = {load.end} m; turn them round"
+    for quantity, unit in quantities:
+        value = getattr(load, quantity)
+        if not math.isfinite(value):
+            yield f"{name}.{quantity} = {value} {unit} must be finite; leave out what is not there"
+
+
+def _place_faults(
+    sections: Sequence[Section],
+    discs: Sequence[Disc],
+    loads: Sequence[PointLoad | DistributedLoad],
+    stations: Sequence[float],
+    longest_element: float | None,
+) -> Iterator[str]:
+    ends = np.cumsum([0.0, *(section.length for section in sections)])
+    length = float(ends[-1])
+    named = _named_stations(discs, loads, stations)
+    slack = _SAME * length
+    off = [(n, s) for n, s in named if not -slack <= s <= length + slack]
+    for name, station in off:
+        yield f"{name} = {station} m must be in [0, {length:g}] m, on the shaft; move it"
+    if off:
+        return
+    nodes = _merged(ends, named)
+    for left, right in pairwise(nodes):
+        if right - left < _NEAREST * length:
+            yield (
+                f"stations {left:.9g} m and {right:.9g} m are {right - left:.3g} m apart, must be "
+                f"one or >= {_NEAREST:g} of the shaft's length = {_NEAREST * length:.3g} m; "
+                "move one onto the other"
+            )
+    if longest_element is not None and length / longest_element + nodes.size > _MOST_NODES:
+        yield (
+            f"longest_element = {longest_element} m must be >= {length / _MOST_NODES:.3g} m, for "
+            f"{_MOST_NODES} nodes at most; a fifth of the least wave length will do"
+        )
+
+
+def _theory_faults(theory: str, shear_coefficient: float | str | None) -> Iterator[str]:
+    if theory not in THEORIES:
+        yield f"theory = '{theory}' must be one of {', '.join(THEORIES)}"
+    if theory != "timoshenko" or shear_coefficient == "cowper":
+        return
+    if not isinstance(shear_coefficient, (int, float)) or not 0 < shear_coefficient <= 1:
+        yield (
+            f"shear_coefficient = {shear_coefficient!r} must be in (0, 1] or 'cowper'; a form "
+            "factor above 1 is its inverse, and 1 takes the whole cross-section"
+        )
+
+
+# --- mesh
+
+
+def _named_stations(
+    discs: Sequence[Disc],
+    loads: Sequence[PointLoad | DistributedLoad],
+    stations: Sequence[float],
+) -> list[tuple[str, float]]:
+    """Name in a message and station of everything that wants a node."""
+    named = [(f"stations[{i}]", float(station)) for i, station in enumerate(stations)]
+    named += [(f"discs[{i}].station", disc.station) for i, disc in enumerate(discs)]
+    for i, load in enumerate(loads):
+        places = ("station",) if isinstance(load, PointLoad) else ("start", "end")
+        named += [(f"loads[{i}].{place}", getattr(load, place)) for place in places]
+    return named
+
+
+def _merged(ends: Vector, named: list[tuple[str, float]]) -> Vector:
+    """Rising stations, each once; the ends of sections take precedence."""
+    slack = _SAME * ends[-1]
+    others = np.array([station for _, station in named], dtype=float)
+    if others.size:
+        nearest = np.abs(others[:, None] - ends).min(axis=1)
+        others = np.sort(others[nearest > slack])
+        others = others[np.diff(others, prepend=-math.inf) > slack]
+    return np.sort(np.concatenate([ends, others]))
+
+
+def _nodes(ends: Vector, named: list[tuple[str, float]], longest_element: float | None) -> Vector:
+    nodes = _merged(ends, named)
+    if longest_element is None:
+        return nodes
+    gaps = np.diff(nodes)
+    # a gap of a whole number of elements must not get one more by rounding
+    counts = np.maximum(1, np.ceil(gaps / longest_element * (1 - _SAME))).astype(int)
+    owner = np.repeat(np.arange(gaps.size), counts)
+    step = np.arange(owner.size) - np.repeat(np.cumsum(counts) - counts, counts)
+    return np.append(nodes[owner] + gaps[owner] * (step / counts[owner]), nodes[-1])
+
+
+def _elements(
+    nodes: Vector,
+    ends: Vector,
+    sections: Sequence[Section],
+    loads: Sequence[PointLoad | DistributedLoad],
+    theory: str,
+    shear_coefficient: float | str | None,
+    gravity: float,
+) -> Elements:
+    length, middle = np.diff(nodes), (nodes[:-1] + nodes[1:]) / 2
+    of = np.searchsorted(ends, middle) - 1
+    bending = np.array([section.bending_stiffness for section in sections])[of]
+    mass = np.array([section.density * section.area for section in sections])[of]
+    rotary = np.array([section.density * section.second_moment for section in sections])[of]
+    shear_ratio = np.zeros(length.size)
+    if theory == "timoshenko":
+        area = np.array([_shear_stiffness(section, shear_coefficient) for section in sections])[of]
+        shear_ratio = 12 * bending / (area * length**2)
+    up, side = -mass * gravity, np.zeros(length.size)
+    for load in loads:
+        if isinstance(load, DistributedLoad):
+            under = (load.start < middle) & (middle < load.end)
+            up, side = up + load.up * under, side + load.side * under
+    return Elements(
+        length=length,
+        bending=bending,
+        mass=mass,
+        rotary=np.zeros(length.size) if theory == "euler-bernoulli" else rotary,
+        shear_ratio=shear_ratio,
+        up=up,
+        side=side,
+    )
+
+
+def _shear_stiffness(section: Section, shear_coefficient: float | str | None) -> float:
+    """``k G A`` [N]."""
+    if shear_coefficient == "cowper":
+        ratio = section.inner_diameter / section.outer_diameter
+        k = cowper_coefficient(section.poisson, ratio)
+    else:
+        assert isinstance(shear_coefficient, (int, float))  # checked with the other arguments
+        k = float(shear_coefficient)
+    return k * section.shear_modulus * section.area
+
+
+# --- matrices of one plane, [shape=(n_elements, 4, 4)], of (w1, slope1, w2, slope2)
+
+
+def _plane_matrix(rows: Sequence[Sequence[Any]], length: Vector) -> Vector:
+    """Symmetric matrices from the upper triangle, the slopes scaled by the element's length."""
+    full = np.empty((length.size, 4, 4))
+    for i, row in enumerate(rows):
+        for j, value in enumerate(row, start=i):
+            full[:, i, j] = full[:, j, i] = value * length ** (i % 2 + j % 2)
+    return full
+
+
+def _plane_stiffness(e: Elements) -> Vector:
+    s = e.shear_ratio
+    rows: list[list[Any]] = [[12.0, 6.0, -12.0, 6.0], [4 + s, -6.0, 2 - s], [12.0, -6.0], [4 + s]]
+    scale: Vector = e.bending / (e.length**3 * (1 + s))
+    return scale[:, None, None] * _plane_matrix(rows, e.length)
+
+
+def _plane_mass(e: Elements) -> Vector:
+    """Of the translation."""
+    s = e.shear_ratio
+    ends, turns = 312 + 588 * s + 280 * s**2, 44 + 77 * s + 35 * s**2
+    across, skewed = 108 + 252 * s + 140 * s**2, 26 + 63 * s + 35 * s**2
+    own, other = 8 + 14 * s + 7 * s**2, 6 + 14 * s + 7 * s**2
+    rows = [[ends, turns, across, -skewed], [own, skewed, -other], [ends, -turns], [own]]
+    scale = e.mass * e.length / (840 * (1 + s) ** 2)
+    return scale[:, None, None] * _plane_matrix(rows, e.length)
+
+
+def _plane_rotary(e: Elements) -> Vector:
+    """Of the rotation about a diameter."""
+    s = e.shear_ratio
+    turns, own, other = 3 - 15 * s, 4 + 5 * s + 10 * s**2, -1 - 5 * s + 5 * s**2
+    rows: list[list[Any]] = [
+        [36.0, turns, -36.0, turns],
+        [own, -turns, other],
+        [36.0, -turns],
+        [own],
+    ]
+    scale: Vector = e.rotary / (30 * e.length * (1 + s) ** 2)
+    return scale[:, None, None] * _plane_matrix(rows, e.length)
+
+
+# --- assembly
+
+
+def _sparse(n_dof: int, parts: Sequence[tuple[Any, Any, Any]]) -> Sparse:
+    """Sum of (rows, columns, values) of any shapes; exact zeros are dropped."""
+    rows, columns, values = (np.concatenate([np.ravel(p[k]) for p in parts]) for k in range(3))
+    matrix = coo_array((values, (rows, columns)), shape=(n_dof, n_dof)).tocsc()
+    matrix.eliminate_zeros()
+    return matrix
+
+
+def _block(n_elements: int, rows: int, columns: int) -> tuple[Index, Index]:
+    """Places of a plane matrix: `rows` and `columns` are 0 for the plane of y, 2 for that of z."""
+    local = np.array([0, 1, 4, 5])
+    first = 4 * np.arange(n_elements)[:, None, None]
+    shape = (n_elements, 4, 4)
+    i = np.broadcast_to(first + rows + local[:, None], shape)
+    j = np.broadcast_to(first + columns + local, shape)
+    return i, j
+
+
+def _both_planes(plane: Vector) -> list[tuple[Any, Any, Any]]:
+    return [(*_block(len(plane), start, start), plane) for start in (0, 2)]
+
+
+def _stiffness(e: Elements) -> Sparse:
+    return _sparse(4 * (e.length.size + 1), _both_planes(_plane_stiffness(e)))
+
+
+def _mass(nodes: Vector, e: Elements, discs: Sequence[Disc]) -> Sparse:
+    parts: list[tuple[Any, Any, Any]] = _both_planes(_plane_mass(e) + _plane_rotary(e))
+    for disc in discs:
+        moved = disc.mass + disc.entrained_mass
+        turned = disc.diametral_inertia + disc.entrained_diametral
+        at = _first_dof(nodes, disc.station) + np.arange(4)
+        parts.append((at, at, [moved, turned, moved, turned]))
+    return _sparse(4 * nodes.size, parts)
+
+
+def _gyroscopic(nodes: Vector, e: Elements, discs: Sequence[Disc]) -> Sparse:
+    polar = 2 * _plane_rotary(e)  # a circle's polar moment is twice that about a diameter
+    parts: list[tuple[Any, Any, Any]] = [
+        (*_block(len(polar), 0, 2), polar),
+        (*_block(len(polar), 2, 0), -polar),
+    ]
+    for disc in discs:
+        turn = _first_dof(nodes, disc.station) + np.array([1, 3])
+        parts.append((turn, turn[::-1], [disc.polar_inertia, -disc.polar_inertia]))
+    return _sparse(4 * nodes.size, parts)
+
+
+def _steady_load(
+    nodes: Vector,
+    e: Elements,
+    discs: Sequence[Disc],
+    loads: Sequence[PointLoad | DistributedLoad],
+    gravity: float,
+) -> Vector:
+    load = np.zeros((nodes.size, 4))
+    for column, spread in ((0, e.up), (2, e.side)):
+        force, moment = spread * e.length / 2, spread * e.length**2 / 12
+        load[:-1, column] += force
+        load[1:, column] += force
+        load[:-1, column + 1] += moment
+        load[1:, column + 1] -= moment
+    flat = load.ravel()
+    for disc in discs:
+        flat[_first_dof(nodes, disc.station)] += disc.buoyancy - disc.mass * gravity
+    for point in loads:
+        if isinstance(point, PointLoad):
+            first = _first_dof(nodes, point.station)
+            flat[first : first + 4] += point.up, point.moment_up, point.side, point.moment_side
+    return flat
+
+
+def _first_dof(nodes: Vector, station: float) -> int:
+    return 4 * int(np.argmin(np.abs(nodes - station)))
+
+
+def _cut_forces(
+    e: Elements, deflection: Vector, slope: Vector, spread: Vector
+) -> tuple[Vector, Vector]:
+    """Shear and moment at both ends of every element, [shape=(2 n_elements,)]."""
+    ends = np.stack([deflection[:-1], slope[:-1], deflection[1:], slope[1:]], axis=1)
+    force = np.einsum("eij,ej->ei", _plane_stiffness(e), ends)
+    even, turn = spread * e.length / 2, spread * e.length**2 / 12
+    force -= np.stack([even, turn, even, -turn], axis=1)
+    shear = np.stack([force[:, 0], -force[:, 2]], axis=1)
+    moment = np.stack([-force[:, 1], force[:, 3]], axis=1)
+    return shear.ravel(), moment.ravel()
