@@ -109,7 +109,7 @@ _STATUS_TEXT = {
         "the shaft, lower its offset, or raise its diametral_clearance"
     ),
     Status.LINE_BALANCE: (
-        "shaft and oil films found no balance; bring the offsets nearer to a fair line, or refine "
+        "shaft and oil films found no balance; bring the offsets nearer to a fair line, or raise "
         "film.n_theta and film.n_z"
     ),
     Status.LINE_COARSE: (
