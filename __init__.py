@@ -22,6 +22,8 @@ _PUBLIC = {
     "DataSet": ".datasets.record",
     "generate": ".datasets.generate",
     "read_recording": ".datasets.importers",
+    "import_recordings": ".datasets.import_set",
+    "SourceOptions": ".datasets.sources",
     "load_model": ".diagnose.modelfile",
 }
 

@@ -1,111 +1,55 @@
-"""Recordings from files: one reader per suffix, units converted only where they are declared."""
+"""One measured recording from a file, and what files hold."""
 
-import zlib
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from io import BytesIO
+from collections.abc import Sequence
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from ..sim.parts import UNITS, to_si
-from ..sim.sensor import Channel
-from .record import DataError, DataSet, Recording
+from .import_plan import channels_of_source, sparing_tacho
+from .labels import refusal
+from .record import LARGEST_RECORD, DataError, DataSet, Recording
+from .source_part import Source, SourceOptions
+from .sources import list_sources, open_source
 
-LARGEST_INFLATED = 2**30
-"""Largest believable content of a MAT file [byte]: beyond it a small file is a trap."""
-
-POUND_FORCE = 4.4482216152605
-"""[N], exact: international pound times standard gravity."""
-
-_MAT_HEADER = 128  # byte, MAT-file Level 5
-_MAT_COMPRESSED = 15  # miCOMPRESSED
-_LEVEL_7_3 = b"MATLAB 7.3"
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Options:
-    """What the caller declares about a file that does not say it."""
-
-    record: int
-    fs: float | None
-    unit: str | None
-    variable: str | None
-
-
-@dataclass(frozen=True, kw_only=True)
-class MatLayout:
-    """Where a known MAT layout keeps its numbers, all fields of one struct.
-
-    Attributes
-    ----------
-    name : str
-        Of the data set, for messages.
-    struct, signal, sample_rate : str
-        Names of the struct and its fields.
-    unit : str
-        Unit of the signal, by the documentation of the data set.
-    conditions : dict
-        Field -> manifest column and factor to SI.
-    """
-
-    name: str
-    struct: str
-    signal: str
-    sample_rate: str
-    unit: str
-    conditions: Mapping[str, tuple[str, float]]
-
-
-MAT_LAYOUTS = (
-    MatLayout(
-        name="MFPT bearing fault data set",
-        struct="bearing",
-        signal="gs",
-        sample_rate="sr",
-        unit="g",
-        conditions={"rate": ("speed_hz", 1.0), "load": ("load_n", POUND_FORCE)},
-    ),
-)
-"""A new layout is one row."""
+_PIECE = 2**20  # numbers read at once
+_DATA_SETS = (".h5", ".hdf5")
 
 
 def read_recording(
     path: str | Path,
+    options: SourceOptions | None = None,
     *,
-    record: int = 0,
-    fs: float | None = None,
-    unit: str | None = None,
-    variable: str | None = None,
+    tacho: str | None = None,
+    pulses_per_revolution: int = 1,
 ) -> Recording:
     """Read one recording from a file.
 
     Parameters
     ----------
     path : str or Path
-        Data set of this program (``.h5``, ``.hdf5``) or MATLAB 5 to 7 (``.mat``).
-    record : int
-        Record of a data set; 0 in every other file.
-    fs : float, optional
-        Sample rate [Hz], where the file does not give it.
-    unit : {"m/s^2", "g"}, optional
-        Unit of the signal, where the file's format does not declare it. Never guessed.
-    variable : str, optional
-        Array to read from a ``.mat`` file of unknown layout; ``struct.field`` for a field. One
-        channel, or the longer side is time.
+        A data set of this program, or any format that :func:`~.sources.open_source` reads.
+    options : SourceOptions, optional
+        What the file does not declare; ``record`` chooses one of a data set. Units are declared
+        or refused, never guessed.
+    tacho : str, optional
+        Name of the tacho channel; a data set knows its own.
+    pulses_per_revolution : int
+        Of the tacho.
 
     Returns
     -------
     Recording
-        Accelerations in m/s^2.
+        In SI units.
 
     Raises
     ------
     DataError
-        The file is missing, truncated, damaged or of a format not known; it does not declare
-        sample rate or unit and neither does the caller; what it declares contradicts the caller.
+        The file is missing, truncated, damaged or of a format not known; nobody declares its
+        sample rate or a unit; what it declares contradicts the caller; it is too long.
 
     Examples
     --------
@@ -114,209 +58,161 @@ def read_recording(
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     file = Path(folder) / "pump.mat"
     ...     savemat(file, {"x": np.ones(16)})
-    ...     read_recording(file, variable="x", fs=1000.0, unit="g").signal[0, 0]
+    ...     item = read_recording(file, SourceOptions(fs=1000.0, unit="g"))
+    ...     item.signal[0, 0]
     np.float32(9.80665)
     """
-    file = Path(path)
-    reader = READERS.get(file.suffix.lower())
-    if reader is None:
-        raise DataError(
-            f"{file}: suffix '{file.suffix}' must be one of {', '.join(READERS)}; convert the file"
+    file, given = Path(path), options or SourceOptions()
+    if file.suffix.lower() in _DATA_SETS and given.dtype is None and _is_ours(file):
+        return _of_data_set(file, given, tacho)
+    with open_source(file, sparing_tacho(given, tacho)) as source:
+        channels = channels_of_source(source, tacho)
+        _refuse_long(source)
+        return Recording(
+            signal=read_window(source, 0, source.n_samples),
+            sample_rate=float(source.sample_rate or 0.0),
+            channels=channels,
+            tacho=tacho,
+            pulses_per_revolution=pulses_per_revolution,
+            origin="measured",
+            row=dict(source.conditions),
+            source=file.name,
         )
-    if not file.is_file():
-        raise DataError(f"{file} is no file; check the path")
-    if fs is not None and not (np.isfinite(fs) and fs > 0):
-        raise DataError(f"fs = {fs} Hz must be > 0 and finite; give the sample rate")
-    if unit is not None and unit not in UNITS["acceleration"]:
-        known = ", ".join(UNITS["acceleration"])
-        raise DataError(f"unit = {unit!r} must be one of {known}; convert the signal")
-    return reader(file, _Options(record=record, fs=fs, unit=unit, variable=variable))
 
 
-def _read_data_set(file: Path, options: _Options) -> Recording:
+def _is_ours(file: Path) -> bool:
+    """Whether an HDF5 file says that it is a data set; also where it cannot be read at all."""
+    try:
+        with h5py.File(file, "r") as handle:
+            return bool({"created_by", "schema_version"} & set(handle.attrs))
+    except (OSError, RuntimeError, KeyError, ValueError):
+        return True  # the reader of data sets has words for it
+
+
+def _of_data_set(file: Path, options: SourceOptions, tacho: str | None) -> Recording:
+    default = SourceOptions()
+    wrong = [
+        field.name
+        for field in fields(SourceOptions)
+        if field.name not in ("record", "fs")
+        and getattr(options, field.name) != getattr(default, field.name)
+    ]
     with DataSet(file) as data:
-        declared = data.attributes.sample_rate
-        if options.fs is not None and options.fs != declared:
-            raise _contradiction(file, "fs", f"{options.fs:g} Hz", f"{declared:g} Hz")
-        if options.unit is not None or options.variable is not None:
-            raise DataError(f"{file} declares its own units and channels; leave out those options")
+        head = data.attributes
+        faults = [f"{', '.join(wrong)} must not be given; it declares its own"] if wrong else []
+        if options.fs not in (None, head.sample_rate):
+            faults.append(f"fs = {options.fs:.10g} Hz must be {head.sample_rate:.10g} Hz; leave it")
+        if tacho not in (None, head.tacho):
+            faults.append(f"tacho = {tacho!r} must be {head.tacho!r}, as declared; leave it out")
         if not 0 <= options.record < len(data):
-            raise DataError(
-                f"{file}: record = {options.record} must be >= 0 and < {len(data)}; choose another"
+            faults.append(
+                f"record = {options.record} must be >= 0 and < {len(data)}; choose another"
             )
+        if faults:
+            raise DataError("\n".join(f"{file}: {fault}" for fault in faults))
         return data[options.record]
 
 
-def _read_mat(file: Path, options: _Options) -> Recording:
-    if options.record != 0:
-        raise DataError(f"{file}: record = {options.record} must be 0; the file holds one")
-    content = _mat_content(file)
-    if options.variable is None:
-        for layout in MAT_LAYOUTS:
-            fields = _fields(content.get(layout.struct))
-            if {layout.signal, layout.sample_rate} <= set(fields):
-                return _from_layout(file, layout, fields, options)
-    return _from_variable(file, content, options)
+def _refuse_long(source: Source) -> None:
+    size = 4 * len(source.channels) * source.n_samples
+    if size > LARGEST_RECORD:
+        raise DataError(
+            f"{source.path}: its {len(source.channels)} x {source.n_samples} samples have {size} "
+            f"byte, must be <= {LARGEST_RECORD}; import it with segment, then choose a record"
+        )
 
 
-def _mat_content(file: Path) -> dict[str, Any]:
-    """Every variable of a MAT file by name.
+def read_window(source: Source, start: int, n_samples: int) -> NDArray[np.float32]:
+    """Read some samples of all channels, in pieces, so that only their float32 is held.
+
+    Parameters
+    ----------
+    source : Source
+    start, n_samples : int
+        First sample and how many, within the source.
+
+    Returns
+    -------
+    numpy.ndarray [shape=(n_channels, n_samples)]
+        In the units of the source.
 
     Raises
     ------
     DataError
-        It cannot be read.
+        A sample is not finite or beyond single precision, or the file is damaged there.
     """
-    from scipy.io import loadmat  # slow to import, and only for this format
-
-    raw = file.read_bytes()
-    if raw.startswith(_LEVEL_7_3):
-        raise DataError(f"{file} is MATLAB 7.3, must be 5 to 7; save it again with '-v7'")
-    _refuse_cut(file, raw)
-    try:
-        content: dict[str, Any] = loadmat(BytesIO(raw), squeeze_me=False)
-    # the parser meets bytes of any origin and raises errors of any type; none may pass as data
-    except Exception as error:
-        text = " ".join(str(error).split()) or type(error).__name__
-        raise DataError(f"{file} cannot be read ({text}); take an intact copy") from error
-    return {name: value for name, value in content.items() if not name.startswith("__")}
-
-
-def _refuse_cut(file: Path, raw: bytes) -> None:
-    """Walk the top-level elements: each must lie within the file and inflate to a sane size."""
-    order = {b"IM": "<", b"MI": ">"}.get(raw[126:_MAT_HEADER])
-    if order is None:
-        raise DataError(f"{file} has no MAT 5 header; it is cut short, or save it with '-v7'")
-    place, inflated = _MAT_HEADER, 0
-    while place < len(raw):
-        if place + 8 > len(raw):
-            raise _cut(file, place + 8, len(raw))
-        kind, size = np.frombuffer(raw, dtype=f"{order}u4", count=2, offset=place).tolist()
-        if place + 8 + size > len(raw):
-            raise _cut(file, place + 8 + size, len(raw))
-        element = memoryview(raw)[place + 8 : place + 8 + size]
-        inflated += _inflated_size(file, element) if kind == _MAT_COMPRESSED else size
-        if inflated > LARGEST_INFLATED:
-            raise DataError(
-                f"{file} holds more than {LARGEST_INFLATED} byte, the largest believed; split it"
-            )
-        place += 8 + size
-    if inflated == 0:
-        raise DataError(f"{file} holds 0 variables, must be >= 1; it is cut short")
-
-
-def _inflated_size(file: Path, element: memoryview) -> int:
-    inflater = zlib.decompressobj()
-    total, rest = 0, bytes(element)
-    try:
-        while rest and not inflater.eof and total <= LARGEST_INFLATED:
-            total += len(inflater.decompress(rest, 1 << 22))
-            rest = inflater.unconsumed_tail
-    except zlib.error as error:
-        raise DataError(f"{file} cannot be read ({error}); take an intact copy") from error
-    if not inflater.eof and total <= LARGEST_INFLATED:
-        raise DataError(f"{file} ends within a compressed variable; take an intact copy")
-    return total
-
-
-def _cut(file: Path, needed: int, size: int) -> DataError:
-    return DataError(f"{file} has {size} byte, must be >= {needed}; take an intact copy")
-
-
-def _fields(value: Any) -> dict[str, NDArray[Any]]:
-    """Fields of a 1 x 1 struct; none of anything else."""
-    names = getattr(getattr(value, "dtype", None), "names", None)
-    if not names or value.size != 1:
-        return {}
-    return {name: np.asarray(value.reshape(-1)[0][name]) for name in names}
-
-
-def _from_layout(
-    file: Path, layout: MatLayout, fields: Mapping[str, NDArray[Any]], options: _Options
-) -> Recording:
-    if options.unit not in (None, layout.unit):
-        raise _contradiction(file, "unit", str(options.unit), f"{layout.unit} ({layout.name})")
-    rate = _scalar(file, layout.sample_rate, fields[layout.sample_rate])
-    if options.fs not in (None, rate):
-        raise _contradiction(file, "fs", f"{options.fs} Hz", f"{rate:g} Hz")
-    row = {
-        column: factor * _scalar(file, field, fields[field])
-        for field, (column, factor) in layout.conditions.items()
-        if field in fields
-    }
-    return _recording(file, layout.signal, fields[layout.signal], rate, layout.unit, row)
-
-
-def _from_variable(file: Path, content: Mapping[str, Any], options: _Options) -> Recording:
-    arrays = _numeric_arrays(content)
-    listing = ", ".join(f"{name} {array.shape}" for name, array in arrays.items()) or "none"
-    if options.variable not in arrays:
+    window = np.empty((len(source.channels), n_samples), dtype=np.float32)
+    step = max(1, _PIECE // len(source.channels))
+    for first in range(0, n_samples, step):
+        last = min(first + step, n_samples)
+        with np.errstate(over="ignore"):  # becomes inf, refused below
+            window[:, first:last] = source.read(start + first, start + last)
+    if not np.isfinite(window).all():
+        row, at = np.argwhere(~np.isfinite(window))[0].tolist()
         raise DataError(
-            f"{file}: variable = {options.variable!r} must be one of its numeric arrays: "
-            f"{listing}; give variable, fs and unit"
+            f"{source.path}: channel '{source.channels[row].name}' is beyond 3.4e38 at index "
+            f"{start + at}, must fit single precision; check its unit"
         )
-    if options.fs is None or options.unit is None:
-        raise DataError(
-            f"{file}: fs = {options.fs} and unit = {options.unit} must both be given for "
-            f"variable {options.variable}; the file does not declare them"
-        )
-    array = arrays[options.variable]
-    return _recording(file, options.variable, array, options.fs, options.unit, {})
+    return window
 
 
-def _numeric_arrays(content: Mapping[str, Any]) -> dict[str, NDArray[Any]]:
-    found = {}
-    for name, value in content.items():
-        fields = {f"{name}.{field}": array for field, array in _fields(value).items()}
-        found.update(fields or {name: np.asarray(value)})
+def list_contents(
+    files: Sequence[str | Path], options: SourceOptions | None = None
+) -> list[dict[str, Any]]:
+    """What files hold, ready for JSON: nothing is read of their signals.
+
+    Parameters
+    ----------
+    files : sequence of str or Path
+    options : SourceOptions, optional
+        Layout and declarations; of what is chosen (variable, channels) nothing is used.
+
+    Returns
+    -------
+    list of dict
+        A file after the other: ``file``, ``recordings`` (each with ``variable``, ``channels``,
+        ``sample_rate_hz``, ``samples``, ``duration_s``, ``conditions``, ``undeclared``).
+
+    Raises
+    ------
+    DataError
+        Files cannot be read; all at once.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     np.save(Path(folder) / "x.npy", np.ones((2, 9)))
+    ...     [found] = list_contents([Path(folder) / "x.npy"], SourceOptions(fs=9.0))
+    >>> [(part["samples"], part["duration_s"]) for part in found["recordings"]]
+    [(9, 1.0)]
+    """
+    found, faults = [], []
+    for file in files:
+        try:
+            parts = list_sources(file, options)
+        except DataError as error:
+            faults += str(error).split("\n")
+            continue
+        found.append({"file": str(file), "recordings": [_described(part) for part in parts]})
+        for part in parts:
+            part.close()
+    if faults:
+        raise refusal(faults)
+    return found
+
+
+def _described(source: Source) -> dict[str, Any]:
+    rate = source.sample_rate
     return {
-        name: array
-        for name, array in found.items()
-        if array.dtype.kind in "iuf" and array.ndim == 2 and array.size > 1
+        "variable": source.part,
+        "channels": [
+            {"name": c.name, "unit": c.unit, "quantity": c.quantity, "unit_in_file": c.unit_in_file}
+            for c in source.channels
+        ],
+        "sample_rate_hz": rate,
+        "samples": source.n_samples,
+        "duration_s": None if rate is None else source.n_samples / rate,
+        "conditions": dict(source.conditions),
+        "undeclared": list(source.undeclared),
     }
-
-
-def _scalar(file: Path, name: str, value: NDArray[Any]) -> float:
-    """One number, also where the file holds it as text."""
-    try:
-        return float(value.reshape(-1)[0]) if value.size == 1 else float("")
-    except (TypeError, ValueError):
-        raise DataError(f"{file}: {name} = {value!r} must be one number; mend the file") from None
-
-
-def _recording(
-    file: Path, name: str, array: NDArray[Any], fs: float, unit: str, row: dict[str, Any]
-) -> Recording:
-    if array.dtype.kind not in "iuf" or array.ndim != 2 or array.size == 0:
-        raise DataError(
-            f"{file}: {name} is {array.dtype} {array.shape}, must be real numbers (samples, "
-            "channels); choose another variable"
-        )
-    rows = array if array.shape[0] < array.shape[1] else array.T
-    names = [name] if len(rows) == 1 else [f"{name}_{i}" for i in range(len(rows))]
-    factor = to_si(f"1 {unit}", "acceleration")
-    with np.errstate(over="ignore"):  # becomes inf, which a recording refuses by name
-        signal = (rows.astype(np.float64) * factor).astype(np.float32)
-    channels = tuple(
-        Channel(name=n, unit="m/s^2", quantity="acceleration", unit_in_file=unit) for n in names
-    )
-    return Recording(
-        signal=signal,
-        sample_rate=fs,
-        channels=channels,
-        origin="measured",
-        row=row,
-        source=file.name,
-    )
-
-
-def _contradiction(file: Path, what: str, given: str, declared: str) -> DataError:
-    return DataError(f"{file}: {what} = {given} must be {declared}, as declared; leave it out")
-
-
-READERS: dict[str, Callable[[Path, _Options], Recording]] = {
-    ".h5": _read_data_set,
-    ".hdf5": _read_data_set,
-    ".mat": _read_mat,
-}
-"""Suffix -> reader. A new format is one row."""

@@ -35,8 +35,8 @@ class _Group(click.Group):
         except (ValueError, RuntimeError) as error:
             if not type(error).__module__.startswith(__name__.split(".")[0]):
                 raise  # not ours: a defect, with its traceback
-            # the library's word is an argument, here it is an option
-            click.echo(f"Error: {error}".replace("use force", "use --force"), err=True)
+            command = self.get_command(context, context.invoked_subcommand or "")
+            click.echo(f"Error: {_as_options(str(error), command)}", err=True)
             bad_input = isinstance(error, ValueError)
             raise click.exceptions.Exit(EXIT_BAD_INPUT if bad_input else EXIT_FAILED) from None
         except BrokenPipeError:
@@ -49,6 +49,19 @@ class _Group(click.Group):
         except MemoryError:
             click.echo("Error: out of memory; use fewer jobs or shorter recordings", err=True)
             raise click.exceptions.Exit(EXIT_FAILED) from None
+
+
+def _as_options(text: str, command: click.Command | None) -> str:
+    """The library speaks of arguments, here they are options: ``fs = 0`` is ``--fs = 0``."""
+    for param in command.params if command else ():
+        option = next((name for name in param.opts if name.startswith("--")), "")
+        word = option.removeprefix("--").replace("-", "_")
+        if "_" in word:
+            text = re.sub(rf"(?<![\w'-]){word}(?![\w'])", option, text)
+        elif word:  # may be a plain word elsewhere
+            place = rf"(?m)(^|: |\b(?:give|with|use) ){word}(?= = | must | to | and | if |[;,)]|$)"
+            text = re.sub(place, rf"\1{option}", text)
+    return text
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -101,6 +114,116 @@ _jobs_option = click.option(
 _seed_option = click.option(
     "--seed", type=click.IntRange(0, _LARGEST_SEED), default=0, show_default=True
 )
+
+
+def _source_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Options about a measured file, the same for every command that reads one."""
+    for option in reversed(_SOURCE_OPTIONS):
+        command = option(command)
+    return command
+
+
+_SOURCE_OPTIONS = (
+    click.option("--fs", type=float, help="Sample rate [Hz], where the file has none."),
+    click.option(
+        "--unit",
+        multiple=True,
+        metavar="[CHANNEL=]UNIT",
+        help="Unit of a channel, or of all others, where the file declares none.",
+    ),
+    click.option(
+        "--sensitivity",
+        multiple=True,
+        metavar="[CHANNEL=]TEXT",
+        help="Of the sensor on a channel in volts: '100 mV/g'.",
+    ),
+    click.option(
+        "--full-scale",
+        multiple=True,
+        metavar="[CHANNEL=]TEXT",
+        help="What the largest integer of a WAV file is worth: '10 V'.",
+    ),
+    click.option(
+        "--channels",
+        multiple=True,
+        metavar="NAME,…",
+        help="Channels wanted, in order, NEW=OLD to rename; where the file names none, all names.",
+    ),
+    click.option(
+        "--variable", multiple=True, help="Array, data set or group, where the file holds several."
+    ),
+    click.option("--tacho", help="Name of the tacho channel."),
+    click.option(
+        "--pulses-per-revolution",
+        type=click.IntRange(1),
+        default=1,
+        show_default=True,
+        help="Of the tacho.",
+    ),
+    click.option("--record", type=click.IntRange(0), default=0, help="Of several, counted from 0."),
+    click.option("--delimiter", help="Of a text file: ',', ';', tab, space."),
+    click.option("--decimal", type=click.Choice([".", ","]), help="Of a text file."),
+    click.option(
+        "--header", type=click.IntRange(0), help="Lines above the numbers of a text file."
+    ),
+    click.option("--time-column", help="Name or number (from 1) of the times; 0: there is none."),
+    click.option("--dtype", help="Of headerless binary: '<int16', '>float32'."),
+    click.option("--n-channels", type=click.IntRange(1), help="Of headerless binary."),
+    click.option(
+        "--offset", type=click.IntRange(0), default=0, help="Bytes to skip in headerless binary."
+    ),
+    click.option(
+        "--order",
+        type=click.Choice(["interleaved", "blocks"]),
+        help="Of binary and arrays: sample by sample, or channel by channel.",
+    ),
+)
+
+
+def _declared(given: Mapping[str, Any]) -> Any:
+    """Options about a measured file, as the library takes them."""
+    from ..datasets.sources import SourceOptions
+
+    column = given["time_column"]
+    return SourceOptions(
+        variable=given["variable"] or None,
+        channels=tuple(name for text in given["channels"] for name in text.split(",")),
+        unit=_each_channel(given["unit"], "--unit"),
+        sensitivity=_each_channel(given["sensitivity"], "--sensitivity"),
+        full_scale=_each_channel(given["full_scale"], "--full-scale"),
+        time_column=int(column) if column is not None and column.isdecimal() else column,
+        **{name: given[name] for name in _PLAIN_OPTIONS},
+    )
+
+
+_PLAIN_OPTIONS = (
+    *("fs", "record", "delimiter", "decimal", "header"),
+    *("dtype", "n_channels", "offset", "order"),
+)
+
+
+def _each_channel(texts: Sequence[str], option: str) -> Any:
+    """``channel=value`` for one channel, ``value`` for the others; None without any."""
+    from ..datasets.import_plan import EachChannel
+
+    named: dict[str, str] = {}
+    others: list[str] = []
+    for text in texts:
+        name, sign, value = text.rpartition("=")
+        if not value.strip() or (sign and not name) or name in named:
+            raise click.BadParameter(
+                f"'{text}' must read [CHANNEL=]VALUE, once for a channel", param_hint=option
+            )
+        if sign:
+            named[name] = value
+        else:
+            others.append(value)
+    if len(others) > 1:
+        raise click.BadParameter(
+            f"{', '.join(map(repr, others))} cannot all be for every channel; write CHANNEL=VALUE",
+            param_hint=option,
+        )
+    return EachChannel(named, others=others[0] if others else None) if texts else None
 
 
 def _emit(value: dict[str, Any], as_json: bool, text: str) -> None:
@@ -391,33 +514,281 @@ def _generated_text(summary: Any) -> str:
     return "\n".join(lines)
 
 
-@cli.command()
-@click.argument("file", type=_PATH)
-@_json_option
-def info(file: Path, as_json: bool) -> None:
-    """What a data set, recording or model is, checked."""
-    from .info import describe, description_text
+class _Segment(click.ParamType[float | None]):
+    """A time with or without its unit, or ``whole``, which is None."""
 
-    described = describe(file)
-    _emit(described, as_json, description_text(described))
+    name = "segment"
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> float | None:
+        from ..sim.parts import to_si
+
+        text = str(value).strip()
+        if text == "whole":
+            return None
+        try:
+            return to_si(f"{text} s" if _NUMBER.fullmatch(text) else text, "time")
+        except ValueError as error:
+            self.fail(f"{value!r} {error}; or write whole", param, ctx)
 
 
-@cli.command()
-@click.argument("data", type=_PATH)
-@click.option("-o", "--output", type=_PATH, required=True, help="Table (.parquet, .csv, .h5).")
+@cli.command("import")
+@click.argument("files", metavar="FILES…", nargs=-1, required=True, type=_PATH)
+@click.option("-o", "--output", type=_PATH, help="Data set to write (.h5).")
+@click.option("--list", "only_list", is_flag=True, help="Show what is in FILES; write nothing.")
+@_source_options
+@click.option("--labels", type=_PATH, help="CSV with a column 'file' and one for every label.")
+@click.option(
+    "--label", "pairs", multiple=True, metavar="NAME=VALUE", help="The same label for all files."
+)
+@click.option("--speed", help="Shaft speed of all files, like '1500 rpm'.")
+@click.option(
+    "--severity", multiple=True, metavar="LABEL", help="Label [m] that says how worn it is."
+)
+@click.option(
+    "--limits", metavar="SCENE|LENGTHS", help="Grades: of a scene, or '0.1 mm, 0.2 mm, 0.3 mm'."
+)
+@click.option(
+    "--group-by",
+    type=click.Choice(["file", "folder", "column"]),
+    help="What is one machine: column 'group' of the labels if it is there, else the file.",
+)
+@click.option(
+    "--segment",
+    type=_Segment(),
+    default="whole",
+    metavar="SECONDS|whole",
+    help="Cut the files into records of this length.",
+)
+@click.option(
+    "--overlap", type=_Share(0, 0.99), default=0.0, help="Part of a record the next one repeats."
+)
 @_jobs_option
 @_force_option
 @_json_option
-def features(data: Path, output: Path, jobs: int | None, force: bool, as_json: bool) -> None:
-    """Feature table of a data set (.parquet, .csv or .h5), manifest beside it."""
-    from .tabulate import feature_table, save_table
+def import_files(
+    files: Sequence[Path],
+    output: Path | None,
+    only_list: bool,
+    limits: str | None,
+    jobs: int | None,
+    as_json: bool,
+    **given: Any,
+) -> None:
+    """Bring measured FILES into one data set: WAV, MATLAB, CSV, HDF5, NPY, UFF58, TDMS, binary.
+
+    Rate and units are declared, by the files or here, or refused: they are never guessed.
+    """
+    from ..datasets.import_set import import_recordings
+    from ..datasets.importers import list_contents
+    from ..datasets.labels import read_limits
+    from .import_text import contents_text, imported_table, imported_text
+
+    if only_list:
+        found = list_contents(files, _declared(given))
+        _emit({"files": found}, as_json, contents_text(found))
+        return
+    if output is None:
+        raise click.UsageError("-o/--output must name the data set to write; or ask for --list")
+    _check_outputs([*files, *filter(None, [given["labels"]])], [(output, _DATA)], given["force"])
+    labels = _labels(given)
+    with _progress("importing") as progress:
+        summary = import_recordings(
+            files,
+            output,
+            options=_declared(given),
+            labels=labels,
+            limits=read_limits(limits, labels.severities) if limits else None,
+            jobs=_workers(jobs),
+            progress=progress,
+            **{name: given[name] for name in _IMPORT_OPTIONS},
+        )
+    _emit(imported_table(summary), as_json, imported_text(summary))
+
+
+_IMPORT_OPTIONS = (
+    *("tacho", "pulses_per_revolution", "group_by"),
+    *("segment", "overlap", "force"),
+)
+
+
+def _labels(given: Mapping[str, Any]) -> Any:
+    """Labels of a table and of words."""
+    from ..datasets.labels import read_labels
+
+    constants: dict[str, str] = {}
+    speed = [f"speed_hz={given['speed']}"] if given["speed"] else []
+    for pair in (*given["pairs"], *speed):
+        name, sign, value = (part.strip() for part in pair.partition("="))
+        if not sign or not name or name in constants:
+            raise click.BadParameter(
+                f"'{pair}' must read NAME=VALUE, once for a name", param_hint="--label"
+            )
+        constants[name] = value
+    return read_labels(given["labels"], constants, given["severity"])
+
+
+class _Numbers(click.ParamType[tuple[float, ...]]):
+    """Numbers parted by commas."""
+
+    name = "numbers"
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> Any:
+        if not isinstance(value, str):
+            return value
+        try:
+            return tuple(float(part) for part in value.split(","))
+        except ValueError:
+            self.fail(f"{value!r} must be numbers parted by commas", param, ctx)
+
+
+_KINDS = (  # as wearstate.diagnose.signal_plots, which is too heavy to import for --help
+    *("auto", "waveform", "spectrum", "waterfall", "orders"),
+    *("angle", "envelope", "frf", "orbit"),
+)
+_PLOT_OPTIONS = ("draw", "force_channel", "speed_hz", "bearing")
+
+
+@cli.command()
+@click.argument("file", type=_PATH, required=False)
+@click.option("--fft", "of_fft", is_flag=True, help="Who computes Fourier transforms, timed here.")
+@click.option("--plot", type=_PATH, help="Picture of a recording to write (.png, .svg or .pdf).")
+@click.option("--kind", type=click.Choice(_KINDS), help="What to plot; by default all it supports.")
+@click.option("--draw", multiple=True, metavar="NAME", help="Channel to plot; all by default.")
+@click.option("--force-channel", metavar="NAME", help="Force of a transfer function to plot.")
+@click.option("--speed-hz", type=float, help="Shaft speed [Hz], where the file has none.")
+@click.option(
+    "--bearing",
+    type=_Numbers(),
+    metavar="N,d,D[,DEG]",
+    help="Rollers, their diameter, pitch diameter, contact angle: for its fault lines.",
+)
+@_source_options
+@_force_option
+@_json_option
+def info(
+    file: Path | None,
+    of_fft: bool,
+    plot: Path | None,
+    kind: str | None,
+    tacho: str | None,
+    pulses_per_revolution: int,
+    force: bool,
+    as_json: bool,
+    **given: Any,
+) -> None:
+    """What a data set, recording or model is, checked; and pictures of a recording."""
+    from .info import describe, describe_fft, description_text, fft_text, picture_text, plot_file
+
+    wanted = {name: given.pop(name) for name in _PLOT_OPTIONS}
+    if of_fft == (file is not None):
+        raise click.UsageError("give either a FILE or --fft")
+    if plot is None and (kind or any(wanted.values())):
+        raise click.UsageError("what to plot is given, but no --plot to write it to")
+    if file is None:
+        facts = describe_fft()
+        _emit(facts, as_json, fft_text(facts))
+        return
+    _check_outputs([file], [(plot, _PICTURE)], force)
+    read: dict[str, Any] = {"tacho": tacho, "pulses_per_revolution": pulses_per_revolution}
+    described = describe(file, _declared(given), **read)
+    text = description_text(described)
+    if plot is not None:
+        described["plot"] = plot_file(
+            file, plot, _declared(given), kind=kind or _KINDS[0], **read, **wanted
+        )
+        text += f"\n{picture_text(described['plot'])}"
+    _emit(described, as_json, text)
+
+
+_FEATURE_SETS = ("standard", "core", "complete")  # as wearstate.features.catalogue.SetName
+
+
+@cli.command()
+@click.argument("data", type=_PATH, required=False)
+@click.option("-o", "--output", type=_PATH, help="Table (.parquet, .csv, .h5).")
+@click.option("--list", "listing", is_flag=True, help="What there is: unit, needs, reference.")
+@click.option(
+    "--set",
+    "feature_set",
+    type=click.Choice(_FEATURE_SETS),
+    help="What models are trained on (default); all but the dearest; everything.",
+)
+@click.option("--only", multiple=True, metavar="NAMES", help="Only these, parted by commas.")
+@click.option("--machine", metavar="KIND", help="Kind of machine, for its ISO zone.")
+@click.option("--speed-hz", type=float, help="Nominal shaft speed [Hz].")
+@click.option(
+    "--bearing",
+    type=_Numbers(),
+    metavar="N,d,D[,DEG]",
+    help="Rollers, their diameter, pitch diameter, contact angle: for its fault lines.",
+)
+@click.option(
+    "--band", "bands", type=_Numbers(), multiple=True, metavar="LOW,HIGH", help="Band level [Hz]."
+)
+@click.option(
+    "--envelope-band", type=_Numbers(), metavar="LOW,HIGH", help="Band of the envelope [Hz]."
+)
+@click.option(
+    "--speed-band",
+    type=_Numbers(),
+    metavar="LOW,HIGH",
+    help="Where the speed is looked for without a tacho [Hz].",
+)
+@_jobs_option
+@_force_option
+@_json_option
+def features(
+    data: Path | None,
+    output: Path | None,
+    listing: bool,
+    feature_set: str | None,
+    only: Sequence[str],
+    jobs: int | None,
+    force: bool,
+    as_json: bool,
+    **about: Any,
+) -> None:
+    """Feature table of the data set DATA (.parquet, .csv or .h5), manifest beside it."""
+    if listing:
+        if data is not None or output is not None:
+            raise click.UsageError("--list stands alone: it reads and writes no file")
+        _emit_catalogue(feature_set or _FEATURE_SETS[-1], as_json)
+        return
+    if data is None or output is None:
+        raise click.UsageError("give DATA and --output, or --list")
+    if only and feature_set:
+        raise click.UsageError("give either --set or --only: names are looked for in every set")
+    from .tabulate import absent_in, choice_of, feature_table, save_table
 
     _check_outputs([data], [(output, _TABLE)], force)
+    names = [name.strip() for part in only for name in part.split(",")]
+    about["speed_band_hz"] = about.pop("speed_band")
+    wanted: Any = feature_set or _FEATURE_SETS[0]
+    choice = choice_of(wanted, names, **about)
+    absent = absent_in(data, choice)
+    if feature_set and absent:
+        click.echo(f"absent, as --json explains: {', '.join(absent)}", err=True)
     with _progress("features") as progress:
-        table = feature_table(data, jobs=_workers(jobs), progress=progress)
+        table = feature_table(data, choice=choice, jobs=_workers(jobs), progress=progress)
     save_table(table, output)
     size = {"path": str(output), "records": len(table.values), "features": len(table.names)}
-    _emit(size, as_json, f"{output}: {size['records']} records, {size['features']} features")
+    text = f"{output}: {size['records']} records, {size['features']} features"
+    _emit({**size, "absent": absent}, as_json, text)
+
+
+def _emit_catalogue(feature_set: Any, as_json: bool) -> None:
+    """The catalogue, one line a feature."""
+    from ..features.table import catalogue
+
+    rows = catalogue(feature_set)
+    columns = ("name", "unit", "set", "needs", "reference")
+    widths = [max(len(row[c]) for row in rows) for c in columns[:-1]]
+    lines = [columns, *(tuple(row[c] for c in columns) for row in rows)]
+    text = "\n".join(
+        "  ".join([*(cell.ljust(w) for cell, w in zip(line, widths, strict=False)), line[-1]])
+        for line in lines
+    )
+    _emit({"features": list(rows)}, as_json, text)
 
 
 # --- models -------------------------------------------------------------------------------------
@@ -534,10 +905,7 @@ _FEW_RECORDS = 30
 @click.argument("recording_file", metavar="RECORDING", type=_PATH)
 @click.option("--model", "model_file", type=_PATH, required=True)
 @click.option("-o", "--output", type=_PATH, help="HTML page to write.")
-@click.option("--record", type=int, default=0, help="Record of a data set file.")
-@click.option("--fs", type=float, default=None, help="Sample rate [Hz], where the file has none.")
-@click.option("--unit", default=None, help="Unit of the signal, where the file declares none.")
-@click.option("--variable", default=None, help="Array of a MATLAB file of unknown layout.")
+@_source_options
 @click.option("--fail-on", type=click.Choice(["warning", "alarm"]), help=_FAIL_ON_HELP)
 @_force_option
 @_json_option
@@ -545,13 +913,12 @@ def report(
     recording_file: Path,
     model_file: Path,
     output: Path | None,
-    record: int,
-    fs: float | None,
-    unit: str | None,
-    variable: str | None,
+    tacho: str | None,
+    pulses_per_revolution: int,
     fail_on: str | None,
     force: bool,
     as_json: bool,
+    **given: Any,
 ) -> None:
     """The verdict on RECORDING: wear grade and clearance with interval, or unfamiliar."""
     from ..datasets.importers import read_recording
@@ -560,7 +927,12 @@ def report(
 
     _check_outputs([recording_file, model_file], [(output, _PAGE)], force)
     model = load_model(model_file)
-    recording = read_recording(recording_file, record=record, fs=fs, unit=unit, variable=variable)
+    recording = read_recording(
+        recording_file,
+        _declared(given),
+        tacho=tacho,
+        pulses_per_revolution=pulses_per_revolution,
+    )
     estimate = model.estimate(recording)
     table = report_table(recording, model, estimate)
     if output is not None:

@@ -1,24 +1,46 @@
 """What a file is, checked while reading it."""
 
-from collections.abc import Mapping
+import time
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
+
+import numpy as np
+import scipy
 
 from ..datasets.importers import read_recording
-from ..datasets.record import DataError, DataSet
+from ..datasets.record import DataError, DataSet, Recording
+from ..datasets.source_part import SourceOptions
+from ..features import fft
 from ..sim.sensor import Channel
 from .modelfile import load_model
-from .tabulate import confounders_in
+from .panel import save_picture
+from .signal_plots import AUTO, plot_recording
+from .signal_view import View
+from .tabulate import choice_of, confounders_in
 
 
-def describe(path: Path) -> dict[str, Any]:
+def describe(
+    path: Path,
+    options: SourceOptions | None = None,
+    *,
+    tacho: str | None = None,
+    pulses_per_revolution: int = 1,
+) -> dict[str, Any]:
     """Describe a data set, a recording or a model.
 
     Parameters
     ----------
     path : Path
-        ``.h5``, ``.mat`` or ``.wsm``.
+        A data set or model of this program, or a measured file.
+    options : SourceOptions, optional
+        What a measured file does not declare.
+    tacho : str, optional
+        Name of the tacho channel of a measured file.
+    pulses_per_revolution : int
+        Of that tacho.
 
     Returns
     -------
@@ -37,7 +59,9 @@ def describe(path: Path) -> dict[str, Any]:
         return _describe_model(path)
     if path.suffix in (".h5", ".hdf5", ".part"):
         return _describe_data(path)
-    return _describe_recording(path)
+    return _describe_recording(
+        read_recording(path, options, tacho=tacho, pulses_per_revolution=pulses_per_revolution)
+    )
 
 
 def description_text(described: Mapping[str, Any]) -> str:
@@ -158,8 +182,7 @@ def _counts(column: Any) -> dict[str, int]:
     return {str(value): int(count) for value, count in column.value_counts().sort_index().items()}
 
 
-def _describe_recording(path: Path) -> dict[str, Any]:
-    recording = read_recording(path)
+def _describe_recording(recording: Recording) -> dict[str, Any]:
     rows = zip(recording.vibration_names, recording.vibration, strict=True)
     return {
         "kind": "recording",
@@ -172,3 +195,200 @@ def _describe_recording(path: Path) -> dict[str, Any]:
         "rms_about_mean": {name: float(row.std()) for name, row in rows},
         "manifest": {str(key): value for key, value in recording.row.items()},
     }
+
+
+# --- pictures
+
+
+def plot_file(
+    path: Path,
+    picture: Path,
+    options: SourceOptions | None = None,
+    *,
+    kind: str = AUTO,
+    draw: Sequence[str] = (),
+    force_channel: str | None = None,
+    speed_hz: float | None = None,
+    bearing: Sequence[float] | None = None,
+    tacho: str | None = None,
+    pulses_per_revolution: int = 1,
+) -> dict[str, Any]:
+    """Draw a recording of a file into a picture.
+
+    Parameters
+    ----------
+    path : Path
+        Data set, of which `options` name the record, or measured file.
+    picture : Path
+        ``.png``, ``.svg`` or ``.pdf``.
+    options, tacho, pulses_per_revolution
+        As of :func:`describe`.
+    kind : str
+        A key of :data:`.signal_plots.KINDS`, or ``auto`` for all that the recording supports.
+    draw : sequence of str
+        Channels; all by default.
+    force_channel : str, optional
+        Force of a transfer function; the only channel in N by default.
+    speed_hz : float, optional
+        Shaft speed, where there is no tacho and the file declares none [Hz].
+    bearing : sequence of float, optional
+        Rollers, their diameter, pitch diameter (one unit for both) and, if it is not 0, contact
+        angle [deg].
+
+    Returns
+    -------
+    dict
+        ``path``, ``drawn`` (kinds) and ``left_out`` (kind to what the recording lacks for it).
+
+    Raises
+    ------
+    DataError
+        The file is a model or cannot be read, an argument is out of its bounds, or the recording
+        lacks what the kind needs.
+    """
+    if path.suffix == ".wsm":
+        raise DataError(f"{path} is a model, must be a recording or data set; name one to plot")
+    about = choice_of(speed_hz=speed_hz, bearing=bearing).settings
+    view = View(
+        recording=read_recording(
+            path, options, tacho=tacho, pulses_per_revolution=pulses_per_revolution
+        ),
+        channels=draw,
+        force=force_channel,
+        speed_hz=about.speed_hz,
+        bearing=about.bearing,
+    )
+    made = plot_recording(view, kind)
+    save_picture(made.figure, picture)
+    return {"path": str(picture), "drawn": list(made.drawn), "left_out": made.left_out}
+
+
+def picture_text(made: Mapping[str, Any]) -> str:
+    """What :func:`plot_file` drew, for people.
+
+    Examples
+    --------
+    >>> made = {"path": "a.png", "drawn": ["waveform", "spectrum"]}
+    >>> print(picture_text({**made, "left_out": {"orbit": "needs 2 displacement channels, has 0"}}))
+    plotted      a.png: waveform, spectrum
+    not plotted  orbit: needs 2 displacement channels, has 0
+    """
+    lines = [f"plotted      {made['path']}: {', '.join(made['drawn'])}"]
+    lines += [f"not plotted  {kind}: {lack}" for kind, lack in made["left_out"].items()]
+    return "\n".join(lines)
+
+
+# --- the library that computes Fourier transforms
+
+_TIMED: tuple[tuple[fft.Kind, int, int, str], ...] = (
+    ("rfft", 600, 256, "float32"),
+    ("rfft", 3, 8192, "float32"),
+    ("rfft", 12, 8192, "float32"),
+    ("rfft", 3, 25_600, "float32"),
+    ("rfft", 3, 25_600, "float64"),
+    ("irfft", 3, 25_600, "complex64"),
+    ("ifft", 3, 25_600, "complex64"),
+    ("rfft", 1, 122_880, "float32"),
+    ("rfft", 3, 25_601, "float32"),
+)
+"""Transform, rows, length [samples] and type of what the features transform."""
+
+
+def describe_fft() -> dict[str, Any]:
+    """Describe who computes Fourier transforms, both libraries timed on this machine.
+
+    Returns
+    -------
+    dict
+        Mode, versions and the wisdom file; under ``choices`` one dict for each of a few
+        transforms: the engine chosen and the least time of each [s]. Versions and times of a
+        library that is not installed are None.
+
+    Raises
+    ------
+    FFTModeError
+        The environment asks for a mode that does not exist.
+    """
+    library = fft.fftw_library()
+    path = fft.wisdom_file()
+    return {
+        "kind": "fft",
+        "mode": fft.fft_mode(),
+        "modes": list(fft.MODES),
+        "scipy": scipy.__version__,
+        "pyfftw": None if library is None else library.__version__,
+        "fftw": None if library is None else library.fftw_version,
+        "threads": 1,
+        "wisdom_file": None if path is None else str(path),
+        "wisdom_kept": path is not None and path.is_file(),
+        "choices": [_choice(*timed) for timed in _TIMED],
+    }
+
+
+def _choice(kind: fft.Kind, rows: int, n: int, dtype: str) -> dict[str, Any]:
+    """One transform: who is chosen, and the time of both [s]."""
+    columns = n // 2 + 1 if kind == "irfft" else n
+    data = np.random.default_rng(0).standard_normal((rows, columns)).astype(dtype)
+    engines: dict[str, float | None] = {"scipy": None, "fftw": None}
+    for engine in engines if fft.fftw_library() is not None else ("scipy",):
+        chosen = cast(fft.Engine, engine)
+        engines[engine] = _least_time(partial(fft.transform, kind, data, n, engine=chosen))
+    return {
+        "transform": kind,
+        "rows": rows,
+        "samples": n,
+        "dtype": dtype,
+        "engine": fft.engine_in_force(kind, n, rows, dtype),
+        **{f"{engine}_s": least for engine, least in engines.items()},
+    }
+
+
+def _least_time(function: Callable[[], Any], repeats: int = 15) -> float:
+    """Least duration of several calls [s]; the first, which may plan, is not counted."""
+    function()
+    least = float("inf")
+    for _ in range(repeats):
+        start = time.perf_counter()
+        function()
+        least = min(least, time.perf_counter() - start)
+    return least
+
+
+def fft_text(facts: Mapping[str, Any]) -> str:
+    """What :func:`describe_fft` found, for people.
+
+    Examples
+    --------
+    >>> facts = {"mode": "auto", "modes": ["auto", "scipy"], "scipy": "1.17", "fftw": None}
+    >>> facts |= {"pyfftw": None, "wisdom_file": None, "wisdom_kept": False}
+    >>> row = {"transform": "rfft", "rows": 3, "samples": 8192, "dtype": "float32"}
+    >>> print(fft_text({**facts, "choices": [row | {"engine": "scipy", "scipy_s": 9e-5}]}))
+    mode    auto (WEARSTATE_FFT: auto, scipy), one thread
+    scipy   1.17
+    FFTW    not installed
+    wisdom  none
+    <BLANKLINE>
+    transform         data                     scipy       FFTW  chosen
+    rfft              3 x 8192 float32       90.0 us       none  scipy
+    """
+    fftw = f"{facts['fftw']}, pyfftw {facts['pyfftw']}" if facts["pyfftw"] else "not installed"
+    wisdom = facts["wisdom_file"] if facts["wisdom_kept"] else "none"
+    lines = [
+        f"mode    {facts['mode']} (WEARSTATE_FFT: {', '.join(facts['modes'])}), one thread",
+        f"scipy   {facts['scipy']}",
+        f"FFTW    {fftw}",
+        f"wisdom  {wisdom}",
+        "",
+        f"{'transform':16}  {'data':19}  {'scipy':>9}  {'FFTW':>9}  chosen",
+    ]
+    for choice in facts["choices"]:
+        data = f"{choice['rows']} x {choice['samples']} {choice['dtype']}"
+        times = [_microseconds(choice.get(f"{engine}_s")) for engine in ("scipy", "fftw")]
+        lines.append(
+            f"{choice['transform']:16}  {data:19}  {times[0]:>9}  {times[1]:>9}  {choice['engine']}"
+        )
+    return "\n".join(lines)
+
+
+def _microseconds(duration: float | None) -> str:
+    return "none" if duration is None else f"{1e6 * duration:.1f} us"

@@ -7,18 +7,16 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from ..datasets.record import DataError
 from ..features.orbit import full_spectrum
-from ..features.spectrum import decibel, power_lines
+from ..features.spectrum import decibel, power_spectral_density
 from ..sim.integrate import Solution
 from ..sim.journal_parts import JournalScene
 from ..sim.parts import Scene
 from ..sim.pump_parts import PumpScene
 from ..sim.shaft_line import ShaftState, shaft_state
 from ..sim.shaft_parts import ShaftScene
+from .panel import COLOURS, save_picture
 
-_FORMATS = (".png", ".svg", ".pdf")
-_COLOURS = ("#1f5a94", "#b3541e", "#4f7d3a")
 _REVOLUTIONS = 2
 _MOST_ORDERS = 4.0  # of a full spectrum, to either side
 
@@ -41,12 +39,10 @@ def plot_simulation(scene: Scene, solution: Solution, path: Path) -> None:
     """
     from matplotlib.figure import Figure
 
-    if path.suffix not in _FORMATS:
-        raise DataError(f"{path}: suffix must be one of {', '.join(_FORMATS)}; rename it")
     figure = Figure(figsize=(11, 7), layout="constrained")
     figure.suptitle(f"{scene.name} (simulated)")
     _DRAWERS[scene.machine](figure, scene, solution)
-    figure.savefig(path, dpi=110)
+    save_picture(figure, path)
 
 
 def _draw_pump(figure: Any, scene: Scene, solution: Solution) -> None:
@@ -60,7 +56,7 @@ def _draw_pump(figure: Any, scene: Scene, solution: Solution) -> None:
         for channel, row in zip(solution.channels, solution.signal, strict=True)
         if channel.quantity == "acceleration"
     ]
-    for (name, row), colour in zip(accelerations, _COLOURS, strict=False):
+    for (name, row), colour in zip(accelerations, COLOURS, strict=False):
         panels["wave"].plot(turns, row[:n], lw=0.5, color=colour, label=name)
         frequency, level = _density(row, rate)
         panels["spectrum"].plot(frequency / 1e3, level, lw=0.6, color=colour, label=name)
@@ -69,7 +65,7 @@ def _draw_pump(figure: Any, scene: Scene, solution: Solution) -> None:
     panels["spectrum"].set_xscale("log")
     for column, name in enumerate("xy"):
         force = solution.truth["pin_force_n"][:n, column] / 1e3
-        panels["force"].plot(turns, force, lw=0.6, color=_COLOURS[column], label=name)
+        panels["force"].plot(turns, force, lw=0.6, color=COLOURS[column], label=name)
     _label(panels["force"], "crank revolutions", "pin on rod [kN]", "Crank-pin force")
     _pressures(panels["pressure"], pump, solution, turns)
     _orbit(panels["orbit"], pump, solution.truth["pin_offset_m"][:n])
@@ -81,7 +77,7 @@ def _pressures(axes: Any, scene: PumpScene, solution: Solution, turns: NDArray[n
     for throw in range(len(scene.throws)):
         suffix = f"_{throw + 1}" if throw else ""
         force = solution.truth[f"piston_pressure_force_n{suffix}"][: turns.size]
-        colour = _COLOURS[throw % len(_COLOURS)]
+        colour = COLOURS[throw % len(COLOURS)]
         if area > 0:
             axes.plot(turns, force / area / 1e6, lw=0.8, color=colour, label=f"{throw + 1}")
     _label(axes, "crank revolutions", "gauge pressure [MPa]", "Cylinder pressure")
@@ -96,16 +92,15 @@ def _label(axes: Any, x: str, y: str, title: str) -> None:
 
 
 def _density(row: NDArray[np.float32], rate: float) -> tuple[NDArray[Any], NDArray[Any]]:
-    lines = power_lines(row, rate)
-    frequency = np.linspace(0, rate / 2, lines.shape[-1])
-    return frequency[1:], decibel(lines[1:] / frequency[1])
+    frequency, density = power_spectral_density(row, rate)
+    return frequency[1:], decibel(density[1:])
 
 
 def _orbit(axes: Any, scene: PumpScene, offset: NDArray[np.float64]) -> None:
     """Path of the pin's centre in its clearance circle."""
     circle = np.exp(2j * np.pi * np.linspace(0, 1, 181)) * scene.joint.crankpin.clearance_radial
     axes.plot(1e3 * circle.real, 1e3 * circle.imag, color="black", lw=1)
-    axes.plot(1e3 * offset[:, 0], 1e3 * offset[:, 1], lw=0.5, color=_COLOURS[0])
+    axes.plot(1e3 * offset[:, 0], 1e3 * offset[:, 1], lw=0.5, color=COLOURS[0])
     axes.set(xlabel="x, along the stroke [mm]", ylabel="y [mm]", title="Pin in its clearance")
     axes.set_aspect("equal", adjustable="datalim")
     axes.grid(alpha=0.3)
@@ -137,16 +132,16 @@ def _draw_journal(figure: Any, scene: Scene, solution: Solution) -> None:
 
 def _pair(axes: Any, tau: NDArray[Any], columns: NDArray[Any], names: tuple[str, str]) -> None:
     for column, name in enumerate(names):
-        axes.plot(tau, columns[:, column], lw=0.8, color=_COLOURS[column], label=name)
+        axes.plot(tau, columns[:, column], lw=0.8, color=COLOURS[column], label=name)
 
 
 def _clearance_circle(axes: Any, place: NDArray[Any]) -> None:
     """Orbit in the unit circle, X downwards as the load points, Y to the right."""
     circle = np.exp(2j * np.pi * np.linspace(0, 1, 181))
     axes.plot(circle.real, circle.imag, color="black", lw=1)
-    axes.plot(place[:, 1], place[:, 0], lw=0.6, color=_COLOURS[0])
-    axes.plot(*place[0, ::-1], "o", ms=4, color=_COLOURS[2], label="first sample")
-    axes.plot(*place[-1, ::-1], "s", ms=4, color=_COLOURS[1], label="last")
+    axes.plot(place[:, 1], place[:, 0], lw=0.6, color=COLOURS[0])
+    axes.plot(*place[0, ::-1], "o", ms=4, color=COLOURS[2], label="first sample")
+    axes.plot(*place[-1, ::-1], "s", ms=4, color=COLOURS[1], label="last")
     axes.set(xlabel="Y", ylabel="X, along the load", title="Journal in its clearance")
     axes.set_aspect("equal", adjustable="box")
     axes.invert_yaxis()
@@ -163,11 +158,11 @@ def _film(
     """Peak pressure, where the rung knows it, and the thinnest film on an axis of its own."""
     if "peak_pressure_pa" in truth:
         peak = truth["peak_pressure_pa"] / 1e6
-        axes.plot(tau, peak, lw=0.8, color=_COLOURS[0], label="peak pressure")
+        axes.plot(tau, peak, lw=0.8, color=COLOURS[0], label="peak pressure")
     _label(axes, "τ = ωt", "peak pressure [MPa]", "Film: peak pressure, least thickness")
     beside = axes.twinx()
     thin = truth["min_film_m"] / scene.bearing.clearance_radial
-    beside.plot(tau, thin, lw=0.8, color=_COLOURS[1], label="least thickness")
+    beside.plot(tau, thin, lw=0.8, color=COLOURS[1], label="least thickness")
     beside.set_ylabel("least thickness over C")
     beside.set_ylim(0, None)
     beside.margins(x=0)
@@ -179,7 +174,7 @@ def _full_spectrum(axes: Any, scene: JournalScene, solution: Solution) -> None:
     path = 1e6 * (solution.truth["journal_m"] @ np.array([1.0, 1.0j]))
     frequency, vector = full_spectrum(path, solution.sample_rate)
     order = frequency / scene.drive.speed
-    axes.plot(order, np.abs(vector), lw=0.8, color=_COLOURS[0], label="orbit")
+    axes.plot(order, np.abs(vector), lw=0.8, color=COLOURS[0], label="orbit")
     _label(axes, "backward   [orders]   forward", "radius [µm]", "Full spectrum of the orbit")
     axes.set_xlim(-_MOST_ORDERS, _MOST_ORDERS)
 
@@ -216,7 +211,7 @@ def _shaft_line(axes: Any, scene: ShaftScene, state: ShaftState) -> None:
     """Heights of the shaft over the length, and the reaction of every bearing."""
     film = state.film
     height = 1e3 * film.deflection[0::4]
-    axes.plot(state.beam.stations, height, lw=1, color=_COLOURS[0])
+    axes.plot(state.beam.stations, height, lw=1, color=COLOURS[0])
     room = float(np.ptp(height)) or 1.0
     for bearing, reaction in zip(scene.bearings, film.reactions[:, 0], strict=True):
         at = height[state.beam.node(bearing.station)]

@@ -1,6 +1,7 @@
 """A data set's signals turned into its feature table."""
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -12,7 +13,11 @@ from numpy.typing import NDArray
 
 from ..datasets.record import DataError, DataSet, Recording
 from ..datasets.workers import in_order
-from ..features.table import feature_row
+from ..features.analysis import STANDARD, Settings
+from ..features.catalogue import SetName
+from ..features.envelope import BearingFrequencies, bearing_frequencies
+from ..features.needs import Layout
+from ..features.table import absent_features, feature_names, feature_row
 
 _BATCH = 16  # records a worker reads at a time: 20 MB, and few enough to keep both cores busy
 
@@ -71,13 +76,180 @@ def confounders_in(manifest: pd.DataFrame) -> dict[str, NDArray[np.bool_]]:
 _CONFOUNDER = "confounder_"
 
 
-def recording_features(recording: Recording) -> tuple[tuple[str, ...], NDArray[np.float64]]:
+@dataclass(frozen=True, kw_only=True)
+class Choice:
+    """Which features of a recording are wanted; by default those that models are trained on.
+
+    Attributes
+    ----------
+    feature_set, only, settings
+        As of :func:`wearstate.features.table.feature_row`.
+    """
+
+    feature_set: SetName = "standard"
+    only: tuple[str, ...] | None = None
+    settings: Settings = STANDARD
+
+
+USUAL = Choice()
+"""What models are trained on."""
+
+
+def choice_of(
+    feature_set: SetName = "standard",
+    only: Sequence[str] = (),
+    *,
+    machine: str | None = None,
+    speed_hz: float | None = None,
+    speed_band_hz: Sequence[float] | None = None,
+    bearing: Sequence[float] | None = None,
+    bands: Sequence[Sequence[float]] = (),
+    envelope_band: Sequence[float] | None = None,
+) -> Choice:
+    """Choice of features from plain numbers and words, as a command line has them.
+
+    Parameters
+    ----------
+    feature_set : {"standard", "core", "complete"}
+        Which rows.
+    only : sequence of str
+        Names of features or values; all of the set if empty.
+    machine : str, optional
+        Kind of machine, a key of :data:`wearstate.features.iso.KINDS`.
+    speed_hz : float, optional
+        Nominal shaft speed [Hz].
+    speed_band_hz : sequence of float, optional
+        Where the speed is looked for without a tacho, low and high [Hz].
+    bearing : sequence of float, optional
+        Rollers, their diameter, pitch diameter (one unit for both) and, if it is not 0, contact
+        angle [deg].
+    bands : sequence of sequence of float
+        Bands of your own, low and high [Hz].
+    envelope_band : sequence of float, optional
+        Low and high [Hz].
+
+    Returns
+    -------
+    Choice
+        For :func:`feature_table`.
+
+    Raises
+    ------
+    DataError
+        A number of values is wrong, or the geometry is none; all faults at once.
+
+    Examples
+    --------
+    >>> choice_of("core", bearing=[8, 20.0, 120.0]).settings.bearing.outer
+    3.3333333333333335
+    """
+    faults: list[str] = []
+    pairs = [
+        _pair(values, name, faults)
+        for name, values in (
+            ("speed_band", speed_band_hz),
+            ("envelope_band", envelope_band),
+            *(("band", band) for band in bands),
+        )
+    ]
+    geometry = _geometry(bearing, faults)
+    if speed_hz is not None and not 0 < speed_hz < math.inf:
+        faults.append(f"speed_hz = {speed_hz} Hz must be > 0 and finite; give the nominal speed")
+    if faults:
+        raise DataError("\n".join(faults))
+    settings = Settings(
+        machine=machine,
+        speed_hz=speed_hz,
+        speed_band_hz=pairs[0],
+        envelope_band=pairs[1],
+        bands=tuple(pair for pair in pairs[2:] if pair is not None),
+        bearing=geometry,
+    )
+    return Choice(feature_set=feature_set, only=tuple(only) or None, settings=settings)
+
+
+def _pair(
+    values: Sequence[float] | None, name: str, faults: list[str]
+) -> tuple[float, float] | None:
+    if values is None:
+        return None
+    if len(values) != 2 or not 0 <= values[0] < values[1] < math.inf:
+        faults.append(f"{name} = {list(values)} Hz must be two rising numbers; give LOW,HIGH")
+        return None
+    return values[0], values[1]
+
+
+def _geometry(values: Sequence[float] | None, faults: list[str]) -> BearingFrequencies | None:
+    if values is None:
+        return None
+    if len(values) not in (3, 4) or values[0] != round(values[0]):
+        faults.append(
+            f"bearing = {list(values)} must be a whole number of rollers, their diameter, the "
+            "pitch diameter and at most a contact angle [deg]; give N,d,D or N,d,D,ANGLE"
+        )
+        return None
+    angle = math.radians(values[3]) if len(values) == 4 else 0.0
+    try:
+        return bearing_frequencies(int(values[0]), values[1], values[2], contact_angle=angle)
+    except ValueError as error:
+        faults.append(str(error))
+        return None
+
+
+def absent_in(path: str | Path, choice: Choice) -> dict[str, str]:
+    """Features of a choice that a data set cannot have, told by its first record.
+
+    Parameters
+    ----------
+    path : str or Path
+        Data set file.
+    choice : Choice
+        Which features.
+
+    Returns
+    -------
+    dict
+        Name -> why, with what helps; empty where single features were asked for.
+
+    Raises
+    ------
+    DataError
+        The file cannot be read; or a feature that was asked for by name does not exist, or is not
+        to be had of it.
+    """
+    with DataSet(path) as data:
+        if len(data) == 0:
+            raise DataError(f"{path}: 0 records, must be > 0; generate or import some")
+        layout = recording_layout(data[0], choice.settings)
+    try:
+        if choice.only is None:
+            return absent_features(layout, choice.feature_set)
+        feature_names(
+            layout.channels,
+            layout.fs,
+            tacho=layout.tacho,
+            pulses_per_revolution=layout.pulses_per_revolution,
+            quantities=layout.quantities,
+            n_samples=layout.n_samples,
+            settings=choice.settings,
+            only=choice.only,
+        )
+    except ValueError as error:
+        raise DataError(f"{path}: {error}") from error
+    return {}
+
+
+def recording_features(
+    recording: Recording, choice: Choice = USUAL
+) -> tuple[tuple[str, ...], NDArray[np.float64]]:
     """Feature row of one recording.
 
     Parameters
     ----------
     recording : Recording
         With or without tacho.
+    choice : Choice
+        Which features.
 
     Returns
     -------
@@ -99,13 +271,46 @@ def recording_features(recording: Recording) -> tuple[tuple[str, ...], NDArray[n
             pulses_per_revolution=recording.pulses_per_revolution,
             channel_names=recording.vibration_names,
             quantities=[channel.quantity for channel in recording.vibration_channels],
+            feature_set=choice.feature_set,
+            only=choice.only,
+            settings=choice.settings,
         )
     except ValueError as error:
         raise DataError(f"{recording.source or 'recording'}: {error}") from error
 
 
+def recording_layout(recording: Recording, settings: Settings = STANDARD) -> Layout:
+    """What a recording offers the catalogue.
+
+    Parameters
+    ----------
+    recording : Recording
+        With or without tacho.
+    settings : Settings
+        Kind of machine, geometry of a bearing.
+
+    Returns
+    -------
+    Layout
+        For :func:`wearstate.features.table.absent_features`.
+    """
+    return Layout(
+        channels=recording.vibration_names,
+        quantities=tuple(channel.quantity for channel in recording.vibration_channels),
+        fs=recording.sample_rate,
+        tacho=recording.tacho is not None,
+        pulses_per_revolution=recording.pulses_per_revolution,
+        n_samples=recording.signal.shape[-1],
+        settings=settings,
+    )
+
+
 def feature_table(
-    path: str | Path, *, jobs: int = 1, progress: Progress | None = None
+    path: str | Path,
+    *,
+    choice: Choice = USUAL,
+    jobs: int = 1,
+    progress: Progress | None = None,
 ) -> FeatureTable:
     """Features of every record of a data set that was simulated without failure.
 
@@ -113,6 +318,8 @@ def feature_table(
     ----------
     path : str or Path
         Data set file.
+    choice : Choice
+        Which features.
     jobs : int
         Worker processes; the table does not depend on it.
     progress : callable, optional
@@ -135,7 +342,7 @@ def feature_table(
         batches = (usable[i : i + _BATCH] for i in range(0, usable.size, _BATCH))
         rows: list[NDArray[np.float64]] = []
         names: tuple[str, ...] = ()
-        for part, found in in_order(partial(_batch_features, data), batches, jobs=jobs):
+        for part, found in in_order(partial(_batch_features, data, choice), batches, jobs=jobs):
             rows += part
             names = names or found
             if progress is not None:
@@ -145,12 +352,12 @@ def feature_table(
 
 
 def _batch_features(
-    data: DataSet, indices: NDArray[np.intp]
+    data: DataSet, choice: Choice, indices: NDArray[np.intp]
 ) -> tuple[list[NDArray[np.float64]], tuple[str, ...]]:
     rows: list[NDArray[np.float64]] = []
     names: tuple[str, ...] = ()
     for index in indices:
-        names, values = recording_features(data[int(index)])
+        names, values = recording_features(data[int(index)], choice)
         rows.append(values)
     data.close()
     return rows, names

@@ -193,7 +193,8 @@ def _check_regular(times: Float, intervals: Float, duration: float) -> None:
         worst = int(np.argmax(jumps))
         raise ValueError(
             f"ratio of pulse intervals = {jumps[worst]:.3g} at {times[worst + 1]:.6g} s must be < "
-            f"{INTERVAL_JUMP}; a pulse is missing or false there: set the tacho level or cut it out"
+            f"{INTERVAL_JUMP}; a pulse is missing or false there, or the shaft stands still: set "
+            "the tacho level, mend the pulses, or cut it out"
         )
     silence = max(times[0] / intervals[0], (duration - times[-1]) / intervals[-1])
     if silence >= INTERVAL_JUMP:

@@ -1,4 +1,7 @@
-"""Band levels from a spectrum calibrated by Parseval's theorem."""
+"""Spectra calibrated by Parseval's theorem: amplitudes, densities, tones and band levels."""
+
+from functools import lru_cache
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,6 +17,9 @@ HIGHEST_EDGE_HZ = 11_500.0
 
 NYQUIST_SHARE = 0.45
 """Default upper edge as a share of the sample rate, clear of the anti-alias filter's slope [-]."""
+
+HANN_BANDWIDTH = 1.5
+"""Equivalent noise bandwidth of Hann's window [lines]: a tone's own line holds 1 / 1.5 of it."""
 
 LINE_SPACING_HZ = 4.0
 """Widest line spacing of the default spectrum [Hz]: four lines in the lowest default band."""
@@ -70,7 +76,7 @@ def band_edges(
     >>> band_edges(25_600.0, n_bands=2, low=100.0, high=10_000.0).round().tolist()
     [100.0, 1000.0, 10000.0]
     """
-    top = _upper_edge(fs, high)
+    top = upper_edge(fs, high)
     _check_band_limits(fs, n_bands, low, top)
     return np.asarray(np.geomspace(low, top, n_bands + 1), dtype=np.float64)
 
@@ -110,7 +116,7 @@ def line_band_edges(
     >>> line_band_edges(25_600.0, 256, n_bands=4, low=200.0, high=1600.0).tolist()
     [150.0, 250.0, 450.0, 850.0, 1550.0]
     """
-    top = _upper_edge(fs, high)
+    top = upper_edge(fs, high)
     _check_band_limits(fs, n_bands, low, top)
     spacing = fs / nperseg
     first = max(1, round(low / spacing))
@@ -135,7 +141,8 @@ def _line_counts(first: int, last: int, n_bands: int) -> NDArray[np.float64]:
     return np.asarray(opening, dtype=np.float64)
 
 
-def _upper_edge(fs: float, high: float | None) -> float:
+def upper_edge(fs: float, high: float | None = None) -> float:
+    """Upper edge as given, or the default [Hz]: 11.5 kHz or 0.45 fs, whichever is less."""
     return min(NYQUIST_SHARE * fs, HIGHEST_EDGE_HZ) if high is None else high
 
 
@@ -172,7 +179,7 @@ def line_weights(n_samples: int, fs: float, edges: ArrayLike) -> NDArray[np.floa
     Returns
     -------
     ndarray, shape (n_samples // 2 + 1, n_bands)
-        Shares between 0 and 1 [-].
+        Shares between 0 and 1 [-], read only.
 
     Raises
     ------
@@ -194,12 +201,65 @@ def line_weights(n_samples: int, fs: float, edges: ArrayLike) -> NDArray[np.floa
             f"edges = {bounds[0]:.6g} … {bounds[-1]:.6g} Hz must lie in 0 … fs / 2 = "
             f"{fs / 2:.6g} Hz; drop the bands outside"
         )
+    return _shares(n_samples, fs, tuple(pairwise(bounds.tolist())))
+
+
+def band_weights(n_samples: int, fs: float, bands: ArrayLike) -> NDArray[np.float64]:
+    """Share of every spectral line that falls into bands of any place, which may overlap.
+
+    Parameters
+    ----------
+    n_samples : int
+        Length of the transform.
+    fs : float
+        Sample rate [Hz].
+    bands : array_like, shape (n_bands, 2)
+        Lower and upper edge of each [Hz].
+
+    Returns
+    -------
+    ndarray, shape (n_samples // 2 + 1, n_bands)
+        Shares between 0 and 1 [-], as of `line_weights`, read only.
+
+    Raises
+    ------
+    ValueError
+        Unless 0 <= lower < upper <= fs / 2 for every band; all faulty bands are named.
+
+    Examples
+    --------
+    >>> band_weights(8, 8.0, [[0.5, 1.5], [1.0, 4.0]])[:, 1].tolist()
+    [0.0, 0.5, 1.0, 1.0, 1.0]
+    """
+    pairs = np.asarray(bands, dtype=np.float64)
+    if pairs.ndim != 2 or pairs.shape[1] != 2 or pairs.shape[0] == 0:
+        raise ValueError(f"bands of shape {pairs.shape} must be (n_bands >= 1, 2); give pairs")
+    wrong = [pair for pair in pairs.tolist() if not 0 <= pair[0] < pair[1] <= fs / 2]
+    if wrong:
+        raise ValueError(
+            "; ".join(
+                f"band {low:.6g} … {high:.6g} Hz must rise within 0 … fs / 2 = {fs / 2:.6g} Hz"
+                for low, high in wrong
+            )
+            + "; mend or drop it"
+        )
+    return _shares(n_samples, fs, tuple((low, high) for low, high in pairs.tolist()))
+
+
+@lru_cache(maxsize=8)  # the same for every record of a data set, and dearer than its transform
+def _shares(
+    n_samples: int, fs: float, bands: tuple[tuple[float, float], ...]
+) -> NDArray[np.float64]:
+    """Overlap of the cells of the lines with bands, over the width of the cells; read only."""
+    lower, upper = np.array(bands).T
     cells = (np.arange(n_samples // 2 + 2) - 0.5) * fs / n_samples
     cells = np.clip(cells, 0.0, fs / 2)
-    lower = np.maximum(cells[:-1, np.newaxis], bounds[:-1])
-    upper = np.minimum(cells[1:, np.newaxis], bounds[1:])
+    bottom = np.maximum(cells[:-1, np.newaxis], lower)
+    top = np.minimum(cells[1:, np.newaxis], upper)
     width = np.diff(cells)[:, np.newaxis]
-    return np.asarray(np.clip(upper - lower, 0.0, None) / width)
+    shares = np.asarray(np.clip(top - bottom, 0.0, None) / width)
+    shares.setflags(write=False)
+    return shares
 
 
 def one_sided_scale(window: Real) -> NDArray[np.float64]:
@@ -404,3 +464,245 @@ def levels_from_lines(lines: ArrayLike, fs: float, edges: ArrayLike) -> NDArray[
     """
     power = np.asarray(lines)
     return decibel(power @ line_weights(2 * (power.shape[-1] - 1), fs, edges))
+
+
+# --- calibrated spectra
+
+
+def line_frequencies(n_lines: int, fs: float) -> NDArray[np.float64]:
+    """Frequencies of the lines of a one-sided spectrum of even length.
+
+    Parameters
+    ----------
+    n_lines : int
+        Number of lines, >= 2.
+    fs : float
+        Sample rate [Hz].
+
+    Returns
+    -------
+    ndarray, shape (n_lines,)
+        From 0 to fs / 2 [Hz].
+
+    Raises
+    ------
+    ValueError
+        If there are fewer than two lines.
+
+    Examples
+    --------
+    >>> line_frequencies(3, 8.0).tolist()
+    [0.0, 2.0, 4.0]
+    """
+    if n_lines < 2:
+        raise ValueError(f"n_lines = {n_lines} must be >= 2; give a spectrum")
+    return np.asarray(np.arange(n_lines) * (fs / (2 * (n_lines - 1))), dtype=np.float64)
+
+
+def amplitude_spectrum(
+    x: ArrayLike, fs: float, *, nperseg: int | None = None, rms: bool = False
+) -> tuple[NDArray[np.float64], Real]:
+    """Spectrum that reads the amplitude of a tone, as an analyser shows it.
+
+    Parameters
+    ----------
+    x : array_like, shape (..., n_samples)
+        Signal [any unit]; its mean is removed.
+    fs : float
+        Sample rate [Hz].
+    nperseg : int, optional
+        Segment length [samples], even; the whole record by default.
+    rms : bool
+        Whether to give rms instead of peak values.
+
+    Returns
+    -------
+    frequency : ndarray, shape (nperseg // 2 + 1,)
+        [Hz].
+    amplitude : ndarray, shape (..., nperseg // 2 + 1)
+        Of the tone on each line [unit of x]; averaged as mean squares over the segments.
+
+    Raises
+    ------
+    ValueError
+        As `power_lines`.
+
+    Notes
+    -----
+    Corrected for Hann's coherent gain: exact for a tone on a line, up to 15.1 % (1.42 dB) low
+    between two; `strongest_tone` mends that. Noise reads by its density times 1.5 line spacings.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> frequency, amplitude = amplitude_spectrum(np.sin(np.pi * np.arange(64) / 4), 64.0)
+    >>> float(frequency[8]), round(float(amplitude[8]), 6)
+    (8.0, 1.0)
+    """
+    lines = power_lines(x, fs, nperseg=whole_segment(x) if nperseg is None else nperseg)
+    squares = lines * lines.dtype.type(HANN_BANDWIDTH * (1 if rms else 2))
+    return line_frequencies(lines.shape[-1], fs), np.asarray(np.sqrt(squares))
+
+
+def whole_segment(x: ArrayLike) -> int:
+    """Longest even segment [samples]: that which reads a record as one."""
+    n = np.shape(x)[-1] if np.ndim(x) else 0
+    return n - n % 2
+
+
+def power_spectral_density(
+    x: ArrayLike, fs: float, *, nperseg: int | None = None
+) -> tuple[NDArray[np.float64], Real]:
+    """Mean square per hertz, averaged over half-overlapping Hann segments.
+
+    Parameters
+    ----------
+    x : array_like, shape (..., n_samples)
+        Signal [any unit]; its mean is removed.
+    fs : float
+        Sample rate [Hz].
+    nperseg : int, optional
+        Segment length [samples]; see `default_nperseg`.
+
+    Returns
+    -------
+    frequency : ndarray, shape (nperseg // 2 + 1,)
+        [Hz].
+    density : ndarray, shape (..., nperseg // 2 + 1)
+        One-sided [(unit of x)^2 / Hz]; its sum times the spacing is the mean square.
+
+    Raises
+    ------
+    ValueError
+        As `power_lines`.
+
+    Notes
+    -----
+    `scipy.signal.welch` of the signal less its mean, with ``detrend=False``.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> frequency, density = power_spectral_density(np.tile([1.0, -1.0], 64), 64.0, nperseg=32)
+    >>> round(float(density.sum() * frequency[1]), 6)
+    1.0
+    """
+    lines = power_lines(x, fs, nperseg=nperseg)
+    frequency = line_frequencies(lines.shape[-1], fs)
+    return frequency, np.asarray(lines / lines.dtype.type(frequency[1]))
+
+
+def strongest_tone(
+    x: ArrayLike,
+    fs: float,
+    *,
+    band: tuple[float, float] | None = None,
+    nperseg: int | None = None,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Frequency and amplitude of the highest peak of a spectrum, between its lines.
+
+    Parameters
+    ----------
+    x : array_like, shape (..., n_samples)
+        Signal [any unit].
+    fs : float
+        Sample rate [Hz].
+    band : tuple of float, optional
+        Where to look [Hz]; everywhere by default.
+    nperseg : int, optional
+        Segment length [samples], even; the whole record by default.
+
+    Returns
+    -------
+    frequency, amplitude : ndarray, shape (...)
+        [Hz] and peak value [unit of x]; 0 and 0 where nothing moves.
+
+    Raises
+    ------
+    ValueError
+        As `power_lines`, or if the band holds no line between the first and the last.
+
+    Notes
+    -----
+    From the ratio of the two highest neighbouring lines (Grandke), exact for one steady complex
+    tone. The mirror image of a real one, k lines from 0 or fs / 2, disturbs the amplitude by
+    less than ``0.02 / k^3`` of it and the frequency by less than ``0.1 / k^3`` line spacings.
+    Another tone, d lines away, does so by up to ``0.4 / d^3`` and ``1.1 / d^3`` times its share
+    of the amplitude, from d = 5 on (all measured, worst phase).
+
+    References
+    ----------
+    T. Grandke, "Interpolation algorithms for discrete Fourier transforms of weighted signals",
+    IEEE Trans. Instrum. Meas. 32 (1983) 350-355, doi:10.1109/TIM.1983.4315077.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> tone = 3 * np.sin(2 * np.pi * 100.3 * np.arange(1024) / 1024)
+    >>> [round(float(value), 4) for value in strongest_tone(tone, 1024.0)]
+    [100.3, 3.0]
+    """
+    mean_squares = power_lines(x, fs, nperseg=whole_segment(x) if nperseg is None else nperseg)
+    lines = np.asarray(mean_squares, dtype=np.float64)
+    frequency = line_frequencies(lines.shape[-1], fs)
+    low, high = band or (0.0, fs / 2)
+    inside = (frequency >= low) & (frequency <= high)
+    inside[[0, -1]] = False
+    if not inside.any():
+        raise ValueError(
+            f"band = {low:.6g} … {high:.6g} Hz must hold a line of {frequency[1]:.6g} Hz spacing "
+            f"below fs / 2 = {fs / 2:.6g} Hz; widen it or record longer"
+        )
+    top = np.argmax(np.where(inside, lines, -1.0), axis=-1)
+    below, peak, above = (_pick(lines, top + step) for step in (-1, 0, 1))
+    side = np.where(above >= below, 1, -1)
+    beside = np.sqrt(np.maximum(above, below) / np.where(peak > 0, peak, 1))
+    # A neighbour beyond half the peak's own amplitude pulls towards it, by half a line at most.
+    shift = np.clip((2 * beside - 1) / (1 + beside), 0, 0.5)
+    amplitude = np.sqrt(2 * HANN_BANDWIDTH * peak) * _hann_loss(shift)
+    place = (top + side * shift) * frequency[1]
+    return np.where(peak == 0, 0.0, place), np.asarray(amplitude)
+
+
+def _pick(lines: NDArray[np.float64], index: NDArray[np.intp]) -> NDArray[np.float64]:
+    """One line of every channel."""
+    return np.asarray(np.take_along_axis(lines, index[..., np.newaxis], axis=-1)[..., 0])
+
+
+def _hann_loss(shift: NDArray[np.float64]) -> NDArray[np.float64]:
+    """What a Hann line reads low off a tone, as the factor that mends it."""
+    return np.asarray((1 - shift**2) / np.sinc(shift))
+
+
+# --- bands of any place
+
+
+def levels_in_bands(lines: ArrayLike, fs: float, bands: ArrayLike) -> NDArray[np.float64]:
+    """Levels in bands of any place, of a spectrum that has already been computed.
+
+    Parameters
+    ----------
+    lines : array_like, shape (..., n_lines)
+        Mean square per line [(unit of x)^2], as from `power_lines`.
+    fs : float
+        Sample rate [Hz].
+    bands : array_like, shape (n_bands, 2)
+        Lower and upper edge of each [Hz]; they may overlap.
+
+    Returns
+    -------
+    ndarray, shape (..., n_bands)
+        Levels [dB re 1 (unit of x)^2].
+
+    Raises
+    ------
+    ValueError
+        As `band_weights`.
+
+    Examples
+    --------
+    >>> levels_in_bands([0.0, 1.0, 1.0, 0.0, 0.0], 8.0, [[0.5, 1.5], [0.5, 2.5]]).round(2).tolist()
+    [0.0, 3.01]
+    """
+    power = np.asarray(lines)
+    return decibel(power @ band_weights(2 * (power.shape[-1] - 1), fs, bands))

@@ -8,6 +8,9 @@ from numpy.typing import ArrayLike, NDArray
 
 Real = NDArray[np.floating[Any]]
 
+ENTROPY_BINS = 64
+"""Bins of the amplitude distribution behind the entropy: at most 6 bit."""
+
 
 def centred(x: ArrayLike) -> Real:
     """Signal minus its mean; exactly zero for a constant signal.
@@ -103,6 +106,38 @@ class Amplitude:
         return _ratio(np.ones_like(self.peak), self._relative_mean)
 
     @cached_property
+    def clearance_factor(self) -> Real:
+        """Peak over the squared mean root of the absolute value [-]."""
+        root = np.asarray(np.sqrt(np.abs(self._relative)).mean(axis=-1))
+        return _ratio(np.ones_like(self.peak), root**2)
+
+    @cached_property
+    def k_factor(self) -> Real:
+        """Peak times rms [(unit of x)^2]."""
+        return np.asarray(self.peak * self.rms)
+
+    @cached_property
+    def zero_crossings(self) -> Real:
+        """Changes of sign about the mean, per interval between samples [-]."""
+        signs = _signs(self.centred)
+        changes = np.count_nonzero(signs[..., 1:] != signs[..., :-1], axis=-1)
+        share = changes / max(1, signs.shape[-1] - 1)
+        known = np.where(np.isfinite(self.peak), share, np.nan)
+        return np.asarray(known, dtype=self.centred.dtype)
+
+    @cached_property
+    def entropy(self) -> Real:
+        """Shannon entropy of 64 equal bins from the lowest to the highest sample [bit]."""
+        highest, lowest = self._relative.max(axis=-1), self._relative.min(axis=-1)
+        width = np.where(highest > lowest, highest - lowest, 1)[..., np.newaxis]
+        place = (self._relative - lowest[..., np.newaxis]) * (ENTROPY_BINS / width)
+        bins = np.minimum(place.astype(np.intp), ENTROPY_BINS - 1).reshape(-1, place.shape[-1])
+        counts = np.stack([np.bincount(row, minlength=ENTROPY_BINS) for row in bins])
+        share = counts / place.shape[-1]
+        bits = -np.sum(share * np.log2(np.where(share > 0, share, 1)), axis=-1)
+        return np.asarray(np.abs(bits).reshape(highest.shape), dtype=self.centred.dtype)
+
+    @cached_property
     def skewness(self) -> Real:
         """Third standardised moment [-]."""
         third = np.vecdot(self._square, self._relative) / self._relative.shape[-1]
@@ -140,10 +175,25 @@ class Amplitude:
         return np.asarray(np.abs(self._relative).mean(axis=-1))
 
 
+def _signs(signal: Real) -> NDArray[np.bool_]:
+    """Whether each sample is above 0; a sample at 0 goes with the one before it."""
+    above = signal > 0
+    zero = signal == 0
+    if zero.any():
+        latest = np.where(zero, 0, np.arange(signal.shape[-1]))
+        latest = np.maximum.accumulate(latest, axis=-1)
+        above = np.take_along_axis(above, latest, axis=-1)
+        # Before the first sample off 0 there is none to go with: nothing is crossed there.
+        first = np.argmin(zero, axis=-1)[..., np.newaxis]
+        begun = np.arange(signal.shape[-1]) >= first
+        above = np.where(begun, above, np.take_along_axis(above, first, axis=-1))
+    return np.asarray(above)
+
+
 def _ratio(above: Real, below: Real) -> Real:
     """Quotient that is 0 where the denominator is 0: the value of a constant signal."""
     out: Real = np.zeros_like(np.asarray(below))
-    return np.asarray(np.divide(above, below, out=out, where=np.asarray(below) > 0))
+    return np.asarray(np.divide(above, below, out=out, where=np.asarray(below) != 0))
 
 
 def rms(x: ArrayLike) -> Real:
@@ -363,3 +413,149 @@ def kurtosis(x: ArrayLike) -> Real:
     1.0
     """
     return Amplitude(x).kurtosis
+
+
+def clearance_factor(x: ArrayLike) -> Real:
+    """Peak over the squared mean root of the absolute value: single impacts weigh most in it.
+
+    Parameters
+    ----------
+    x : array_like, shape (..., n_samples)
+        Signal [any unit].
+
+    Returns
+    -------
+    ndarray, shape (...)
+        ``peak(x) / mean(sqrt |x - mean(x)|)**2`` [-], 1.719 for a sine; 0 for a constant signal,
+        by convention. NaN gives NaN.
+
+    Raises
+    ------
+    ValueError
+        If there is no sample.
+
+    References
+    ----------
+    Y. Lei, Z. He, Y. Zi, "A new approach to intelligent fault diagnosis of rotating machinery",
+    Expert Syst. Appl. 35 (2008) 1593-1600, doi:10.1016/j.eswa.2007.08.072.
+
+    Examples
+    --------
+    >>> float(clearance_factor([1.0, -1.0, 1.0, -1.0]))
+    1.0
+    """
+    return Amplitude(x).clearance_factor
+
+
+def k_factor(x: ArrayLike) -> Real:
+    """Peak times rms: grows with the size of the events and with that of the rest.
+
+    Parameters
+    ----------
+    x : array_like, shape (..., n_samples)
+        Signal [any unit].
+
+    Returns
+    -------
+    ndarray, shape (...)
+        ``peak(x) rms(x)`` [(unit of x)^2], A^2 / sqrt 2 for a sine; 0 for a constant signal. Like
+        the peak, it grows with the length of a random record. NaN gives NaN.
+
+    Raises
+    ------
+    ValueError
+        If there is no sample.
+
+    References
+    ----------
+    A. Sturm, R. Foerster, N. Hippmann, D. Kinsky, "Waelzlagerdiagnostik an Maschinen und Anlagen"
+    (1986), whose index K(t) is this product as new over this product now.
+
+    Examples
+    --------
+    >>> float(k_factor([2.0, -2.0, 2.0, -2.0]))
+    4.0
+    """
+    return Amplitude(x).k_factor
+
+
+def zero_crossing_rate(x: ArrayLike, fs: float) -> Real:
+    """Changes of sign about the mean in a second.
+
+    Parameters
+    ----------
+    x : array_like, shape (..., n_samples)
+        Signal [any unit].
+    fs : float
+        Sample rate [Hz].
+
+    Returns
+    -------
+    ndarray, shape (...)
+        Crossings over the duration from the first to the last sample [1/s]: 2 f for a sine of
+        frequency f, ``2 sqrt(m2 / m0)`` for Gaussian noise, with the moments
+        ``m_i = integral f^i S(f) df`` (Rice), less the crossings that come twice between two
+        samples. A sample at the mean goes with the one before it, so that touching it is no
+        crossing. 0 for a constant signal and for one sample.
+
+    Raises
+    ------
+    ValueError
+        If there is no sample, or fs is not above 0.
+
+    References
+    ----------
+    S. O. Rice, "Mathematical analysis of random noise", Bell Syst. Tech. J. 23 (1944) 282-332,
+    doi:10.1002/j.1538-7305.1944.tb00874.x.
+
+    Examples
+    --------
+    >>> float(zero_crossing_rate([1.0, -1.0, 1.0, -1.0], 100.0))
+    100.0
+    """
+    if not (np.isfinite(fs) and fs > 0):
+        raise ValueError(f"fs = {fs} Hz must be > 0 and finite; give the sample rate")
+    rate = Amplitude(x).zero_crossings
+    return np.asarray(rate * rate.dtype.type(fs))
+
+
+def entropy(x: ArrayLike) -> Real:
+    """Shannon entropy of the amplitude distribution.
+
+    Parameters
+    ----------
+    x : array_like, shape (..., n_samples)
+        Signal [any unit].
+
+    Returns
+    -------
+    ndarray, shape (...)
+        ``-sum_i p_i log2 p_i`` over 64 bins of equal width from the lowest to the highest sample
+        [bit]: 6 for a uniform distribution, 5.72 for a sine, 1 for a square wave, 0 for a
+        constant signal. Few large events make it small, since they widen the bins.
+
+    Raises
+    ------
+    ValueError
+        If there is no sample, or a sample is not finite.
+
+    Notes
+    -----
+    Each bin holds its lower edge, so a sign flip can move the samples that lie on edges. The
+    estimate is low by about ``63 / (2 ln 2 n_samples)`` bit (Miller), 0.002 bit at 25,600
+    samples.
+
+    References
+    ----------
+    C. E. Shannon, "A mathematical theory of communication", Bell Syst. Tech. J. 27 (1948)
+    379-423, doi:10.1002/j.1538-7305.1948.tb01338.x.
+
+    Examples
+    --------
+    >>> float(entropy([1.0, -1.0, 1.0, -1.0]))
+    1.0
+    """
+    amplitude = Amplitude(x)
+    if not np.isfinite(amplitude.peak).all():
+        raise ValueError("x has non-finite samples, must have 0; cut or mend the recording")
+    return amplitude.entropy

@@ -200,7 +200,9 @@ def test_a_recording_with_nan_or_shorter_than_a_revolution(tmp_path, small_model
     wave = np.random.default_rng(0).standard_normal(5000)
     wave[17] = np.nan
     savemat(tmp_path / "nan.mat", {"bearing": {"gs": wave, "sr": 25600.0, "rate": 25.0}})
-    refused("report", tmp_path / "nan.mat", "--model", small_model, says=["1 sample", "index 17"])
+    refused(
+        "report", tmp_path / "nan.mat", "--model", small_model, says=["'gs' is nan", "index 17"]
+    )
     short = tmp_path / "short.h5"
     run("simulate", "bilge-pump", "--set", "duration=0.21 s", "-o", short)
     refused("report", short, "--model", small_model, says=["tacho"])
@@ -357,6 +359,21 @@ def test_info_is_si_in_json_and_units_in_text(tmp_path, small_set, small_model):
     assert all(key == key.lower() and " " not in key for key in [*data, *model])
     assert "grade edges     0.13, 0.22, 0.31 mm" in run("info", small_model).stdout
     assert "sample rate       25600 Hz" in run("info", small_set).stdout
+
+
+def test_info_tells_who_transforms():
+    facts = strict(run("info", "--fft", "--json").stdout)
+    assert (facts["kind"], facts["mode"], facts["threads"]) == ("fft", "auto", 1)
+    assert facts["pyfftw"] is not None
+    chosen = {(c["transform"], c["rows"], c["samples"], c["dtype"]): c for c in facts["choices"]}
+    assert chosen["rfft", 3, 25_600, "float32"]["engine"] == "fftw"
+    assert chosen["rfft", 600, 256, "float32"]["engine"] == "scipy"
+    assert all(0 < c["scipy_s"] < 1 and 0 < c["fftw_s"] < 1 for c in facts["choices"])
+    text = run("info", "--fft").stdout
+    assert "mode    auto (WEARSTATE_FFT: auto, measure, scipy), one thread" in text
+    assert text.count("fftw\n") + text.count("scipy\n") == len(facts["choices"])
+    refused("info", says=["give either a FILE or --fft"])
+    refused("info", "a.h5", "--fft", says=["give either a FILE or --fft"])
 
 
 def test_rms_is_that_of_the_vibration_about_its_mean(tmp_path):

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
-from wearstate.features import orbit, order, table
+from wearstate.features import analysis as shared
+from wearstate.features import catalogue, orbit, order, table
 
 FS = 5120.0
 SPEED = 50.0
@@ -137,6 +138,81 @@ def test_too_short_a_record_has_no_line_to_whirl_on():
         orbit.whirl(np.ones(128), FS, SPEED)
 
 
+def test_mounting_angles_of_drawings():
+    """Y at 45 degrees left, X at 45 degrees right, of shafts that turn either way."""
+    for clockwise in (False, True):
+        at = orbit.probe_angles(-45, 45, clockwise=clockwise)
+        # towards the left probe is up and left; x points right, or left where the shaft turns so
+        towards_left = orbit.displacement([1.0], [0.0], angles=at)[0]
+        left = 1 if clockwise else -1
+        assert towards_left == pytest.approx((left + 1j) / math.sqrt(2), abs=1e-15)
+        # forward is the way the shaft turns: from the bottom to the right if counter-clockwise
+        z = orbit.displacement(*readings(ellipse(1, 1), at), angles=at)
+        [forward], [backward] = orbit.filtered_orbits(z, TURNS, [1.0])
+        assert abs(forward) == pytest.approx(1, abs=1e-12)
+        assert abs(backward) < 1e-12
+    with pytest.raises(ValueError, match="must be finite"):
+        orbit.probe_angles(math.nan, 45)
+
+
+@pytest.mark.parametrize("sensitivity", [-7874.0, 4000.0])
+def test_gaps_and_a_shaft_that_rises_from_rest(sensitivity):
+    """A shaft at rest at the bottom of a clearance of 0.1 mm rises to 0.06 mm below the middle."""
+    clearance, at = 1e-4, orbit.probe_angles(-45, 45)
+    moved = np.full(50, (2e-5 - 6e-5j) - (-1j * clearance))
+    # the gap shrinks by the motion towards the probe
+    volts = [-9.0 - sensitivity * towards for towards in readings(moved, at)]
+    probes = [orbit.gap_displacement(v, rest_v=-9.0, sensitivity=sensitivity) for v in volts]
+    found = orbit.centreline(orbit.displacement(*probes, angles=at), rest=-1j * clearance)
+    # volts of 9 hold 1e-15 / 4000 m
+    assert found == pytest.approx(2e-5 - 6e-5j, abs=1e-17)
+    with pytest.raises(ValueError, match=r"sensitivity = 0\.0 V/m must be finite and not 0"):
+        orbit.gap_displacement([1.0], rest_v=0.0, sensitivity=0.0)
+
+
+# --- run-out
+
+SCRATCH = {1: 2e-5 * np.exp(0.4j), 2: 8e-6j, 3: 3e-6}
+
+
+def surface(turns, offset=0.0):
+    """What a probe reads of the surface below it [m]."""
+    return sum(np.real(a * np.exp(2j * np.pi * k * (turns + offset))) for k, a in SCRATCH.items())
+
+
+def test_slow_roll_vectors_leave_the_motion():
+    slow_turns = 3.0 * np.arange(N) / FS
+    at = orbit.PROBE_ANGLES
+    slow = orbit.displacement(surface(slow_turns), surface(slow_turns, 0.25), angles=at)
+    motion = ellipse(2e-5, 1e-5, 0.3)
+    first, second = readings(motion, at)
+    z = orbit.displacement(first + surface(TURNS), second + surface(TURNS, 0.25), angles=at)
+    rolled = orbit.filtered_orbits(slow, slow_turns, [1.0, 2.0])
+    found = orbit.filtered_orbits(z, TURNS, [1.0, 2.0], slow_roll=rolled)
+    # 2.4 revolutions of slow roll are cut to two, the last sample of them in part: 1 / 1707 of a
+    # revolution of trapezoids: (2 pi 3 / 1707)^2 of 3e-5
+    assert_allclose(found[0], [1.5e-5 * np.exp(0.3j), 0], rtol=0, atol=5e-9)
+    assert_allclose(found[1], [5e-6 * np.exp(0.3j), 0], rtol=0, atol=5e-9)
+    raw = orbit.filtered_orbits(z, TURNS, [1.0, 2.0])
+    assert abs(raw[0][0] - found[0][0]) > 5e-6
+    with pytest.raises(ValueError, match=r"slow_roll has shapes \(2,\) and \(2,\), must be \(1,\)"):
+        orbit.filtered_orbits(z, TURNS, [1.0], slow_roll=rolled)
+
+
+def test_the_run_out_waveform_leaves_the_motion_and_the_position():
+    slow_turns = 3.0 * np.arange(16 * N) / FS - 0.2
+    offsets = np.array([[0.0], [0.25]])
+    waveform = orbit.runout(7e-5 + surface(slow_turns, offsets), slow_turns)
+    points = np.arange(128) / 128
+    # orders up to 3 of 128 points: the interpolation's 5e-5 of the sum of 3.1e-5
+    assert_allclose(waveform, surface(points, offsets), rtol=0, atol=2e-9)
+    fast_turns = TURNS - 0.37
+    motion = ellipse(2e-5, 1e-5, 0.3, turns=fast_turns) + (1e-5 - 3e-5j)
+    probes = np.stack(readings(motion)) + surface(fast_turns, offsets)
+    found = orbit.displacement(*orbit.subtract_runout(probes, fast_turns, waveform))
+    assert_allclose(found, motion, rtol=0, atol=2 * math.sqrt(2) * 2e-9)
+
+
 def test_centreline_excursion_and_marks():
     z = ellipse(4e-5, 2e-5) + (3e-5 - 4e-5j)
     assert abs(orbit.centreline(z)) == pytest.approx(5e-5, rel=1e-12)
@@ -235,11 +311,11 @@ def test_without_a_tacho_the_centreline_is_left():
 
 def test_every_orbit_feature_is_one_function_with_a_reference():
     probes, tacho = machine()
-    analysis = table.Analysis(probes, FS, pulses=order.pulse_times(tacho, FS), probes=(0, 1))
-    every = (*table.CATALOGUE, *table.ORBIT_CATALOGUE)
+    analysis = shared.Analysis(probes, FS, pulses=order.pulse_times(tacho, FS), probes=(0, 1))
+    every = (*catalogue.CATALOGUE, *catalogue.ORBIT_CATALOGUE)
     assert len({feature.name for feature in every}) == len(every)
-    for feature in table.ORBIT_CATALOGUE:
-        assert np.size(feature.function(analysis)) == len(feature.labels(table.STANDARD, FS))
+    for feature in catalogue.ORBIT_CATALOGUE:
+        assert np.size(feature.function(analysis)) == len(feature.labels(shared.STANDARD, FS))
         assert feature.reference
         assert feature.unit
 

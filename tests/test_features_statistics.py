@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
+from scipy.special import gamma
 from wearstate.features import statistics
 from wearstate.features.fft import rfft
 
@@ -121,3 +122,122 @@ def test_rfft_keeps_precision_and_axis(dtype, kept):
     # Eight products: a few units in the last place.
     assert_allclose(spectrum, matrix @ x, atol=50 * np.finfo(dtype).eps)
     assert_array_equal(spectrum, rfft(x.T).T)
+
+
+# --- clearance and K factors, zero crossings, entropy
+
+
+def test_sine_of_the_further_statistics():
+    n, cycles = 480_000, 12
+    x = 3 * np.sin(2 * np.pi * cycles * (np.arange(n) + 0.5) / n) + 7
+    # mean sqrt |sin| = Gamma(3/4) / (sqrt(pi) Gamma(5/4)) = 0.76276; the sum over 40,000 samples
+    # a cycle stops short of its cusps by 1e-6, and of the peak by 3e-9.
+    root = gamma(0.75) / (np.sqrt(np.pi) * gamma(1.25))
+    assert_allclose(statistics.clearance_factor(x), root**-2, rtol=2e-6)
+    assert_allclose(statistics.k_factor(x), 9 / np.sqrt(2), rtol=1e-8)
+    # Two crossings a cycle, but none is seen at the very start: 23 in n - 1 intervals.
+    assert_allclose(statistics.zero_crossing_rate(x, 1000.0), 23 * 1000 / (n - 1), rtol=ROUNDING)
+    # The arcsine distribution's share of each bin; samples near edges move by 1e-4 of a bin.
+    share = np.diff(np.arcsin(np.linspace(-1, 1, 65))) / np.pi
+    assert_allclose(statistics.entropy(x), -np.sum(share * np.log2(share)), atol=1e-4)
+
+
+def test_entropy_of_known_distributions():
+    levels = np.repeat(np.arange(64.0), [3] * 64)
+    assert_allclose(statistics.entropy(levels), 6.0, rtol=ROUNDING)
+    assert_allclose(statistics.entropy([0.0, 0.0, 0.0, 1.0]), 2 - 0.75 * np.log2(3), rtol=ROUNDING)
+    # Bins follow the range: twice the outlier, fewer bins for the rest.
+    x = np.random.default_rng(0).standard_normal(25_600)
+    x[0] = 10
+    small = statistics.entropy(x)
+    x[0] = 20
+    assert statistics.entropy(x) < small - 0.5
+
+
+def test_zero_crossings_of_noise_follow_rice():
+    x = np.random.default_rng(3).standard_normal(400_000)
+    # White noise changes sign every second sample; binomial: sqrt(1 / (4 n)) = 8e-4, four of them.
+    assert_allclose(statistics.zero_crossing_rate(x, 1.0), 0.5, atol=3.2e-3)
+
+
+@pytest.mark.parametrize(
+    ("x", "crossings"),
+    [
+        ([1, 0, 1, -2], 1),  # touched, not crossed
+        ([-1, 0, -1, 2], 1),
+        ([1, 0, -1], 1),  # one crossing through a sample at 0
+        ([0, 0, 1, -1], 1),  # none before the first sample off 0
+        ([0, 0, -1, 1], 1),
+        ([1, -1, 1, -1], 3),
+    ],
+)
+def test_samples_at_zero_cross_nothing(x, crossings):
+    for sign in (1, -1):
+        rate = statistics.zero_crossing_rate(sign * np.array(x, float), 1.0)
+        assert_allclose(rate * (len(x) - 1), crossings, rtol=ROUNDING)
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    gain=st.floats(1e-6, 1e6),
+    sign=st.sampled_from([-1, 1]),
+    offset=st.floats(-100, 100),
+)
+def test_invariance_of_the_further_statistics(seed, gain, sign, offset):
+    x = np.random.default_rng(seed).gumbel(size=(2, 300))
+    y = sign * gain * (x + offset)
+    # As above: an offset of 100 costs two digits of sixteen.
+    assert_allclose(statistics.clearance_factor(y), statistics.clearance_factor(x), rtol=1e-10)
+    assert_allclose(statistics.k_factor(y), gain**2 * statistics.k_factor(x), rtol=1e-10)
+    rate = statistics.zero_crossing_rate(x, 10.0)
+    assert_array_equal(statistics.zero_crossing_rate(y, 10.0), rate)
+    # The lowest and the highest sample lie on edges, where rounding and a flip decide: one sample
+    # of 300 from one bin to the next moves the entropy by log2(300) / 300 = 0.03 at most, twice.
+    assert_allclose(statistics.entropy(y), statistics.entropy(x), atol=0.06)
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("x", [np.zeros(100), np.full(100, 9.81), np.ones(1)])
+def test_further_statistics_of_a_constant(x, dtype):
+    x = x.astype(dtype)
+    for value in (
+        statistics.clearance_factor(x),
+        statistics.k_factor(x),
+        statistics.entropy(x),
+        statistics.zero_crossing_rate(x, 1.0),
+    ):
+        assert value == 0
+        assert value.dtype == dtype
+
+
+def test_further_statistics_keep_axes_and_permute():
+    x = np.random.default_rng(2).standard_normal((3, 2, 500)).astype(np.float32)
+    for function in (
+        statistics.clearance_factor,
+        statistics.k_factor,
+        statistics.entropy,
+        lambda y: statistics.zero_crossing_rate(y, 1.0),
+    ):
+        value = function(x)
+        assert value.shape == (3, 2)
+        assert value.dtype == np.float32
+        # Each channel alone: the same sums, in the order of another layout.
+        assert_allclose(function(x[::-1, ::-1]), value[::-1, ::-1], rtol=ROUNDING_32)
+        assert_allclose(function(x[1, 0]), value[1, 0], rtol=ROUNDING_32)
+
+
+def test_nan_is_no_number_and_no_silent_one():
+    x = np.random.default_rng(2).standard_normal((2, 50))
+    x[0, 3] = np.nan
+    rate = statistics.zero_crossing_rate(x, 1.0)
+    assert np.isnan(rate[0])
+    assert np.isfinite(rate[1])
+    for name in (*RATIOS, *SIZES, "clearance_factor", "k_factor"):
+        value = getattr(statistics, name)(x)
+        assert np.isnan(value[0]), name
+        assert np.isfinite(value[1]), name
+    with pytest.raises(ValueError, match="non-finite samples"):
+        statistics.entropy(x)
+    with pytest.raises(ValueError, match=r"fs = 0\.0 Hz must be > 0"):
+        statistics.zero_crossing_rate([1.0, 2.0], 0.0)

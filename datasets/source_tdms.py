@@ -1,0 +1,189 @@
+"""TDMS (LabVIEW) through the extra ``wearstate[tdms]``: metadata first, samples in pieces."""
+
+import importlib
+import logging
+import math
+import struct
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .record import DataError
+from .source_part import Contents, Part, PartChannel, SourceOptions, cut, damaged, foreign
+
+_LEAD_IN = 28  # byte
+_UNFINISHED = 0xFFFFFFFFFFFFFFFF
+_BIG_ENDIAN = 1 << 6
+_MOST_CHANNELS = 10_000
+_UNITS = ("unit_string", "NI_UnitDescription")
+
+
+def tdms_contents(path: Path, options: SourceOptions) -> Contents:
+    """Groups of a TDMS file; channels of one length and step in a group are one recording.
+
+    Raises
+    ------
+    DataError
+        The library is not installed; the file is no TDMS, cut short, unfinished or damaged.
+    """
+    del options
+    try:
+        nptdms: Any = importlib.import_module("nptdms")
+    except ImportError:
+        raise DataError(
+            f"{path} needs nptdms, which is not installed; pip install 'wearstate[tdms]'"
+        ) from None
+    _walk_segments(path)
+    # opened here: the library would believe an index file beside it, which may be another's
+    handle = path.open("rb")
+    try:
+        with _no_warning(path):
+            file = nptdms.TdmsFile.open(handle)
+            contents = _groups(path, file, path.stat().st_size)
+    except DataError:
+        handle.close()
+        raise
+    # the library raises errors of any type on damaged bytes
+    except Exception as error:
+        handle.close()
+        raise damaged(path, error) from error
+    return Contents(parts=contents.parts, others=contents.others, close=handle.close)
+
+
+@contextmanager
+def _no_warning(path: Path) -> Iterator[None]:
+    """What the library only warns of on its console is damage."""
+    console = importlib.import_module("nptdms.log").log_manager.console_handler
+    said: list[str] = []
+
+    def listen(record: logging.LogRecord) -> bool:
+        said.append(record.getMessage())
+        return False
+
+    console.addFilter(listen)
+    try:
+        yield
+    finally:
+        console.removeFilter(listen)
+    if said:
+        raise damaged(path, ValueError(said[0]))
+
+
+def _walk_segments(path: Path) -> None:
+    """Every segment must lie within the file and end where the next begins."""
+    size, place = path.stat().st_size, 0
+    with path.open("rb") as handle:
+        if handle.read(4) != b"TDSm":
+            raise foreign(path, "TDMS")
+        while place < size:
+            handle.seek(place)
+            head = handle.read(_LEAD_IN)
+            if len(head) < _LEAD_IN or head[:4] != b"TDSm":
+                raise DataError(f"{path} has no segment at byte {place}; take an intact copy")
+            order = ">" if struct.unpack("<I", head[4:8])[0] & _BIG_ENDIAN else "<"
+            length, raw = struct.unpack(f"{order}QQ", head[12:28])
+            if length == _UNFINISHED:
+                raise DataError(
+                    f"{path} ends with an unfinished segment; the recording was not closed, record "
+                    "again or repair it in the program that wrote it"
+                )
+            if place + _LEAD_IN + length > size:
+                raise cut(path, size, place + _LEAD_IN + length)
+            if raw > length:
+                raise DataError(
+                    f"{path}: samples begin {raw} byte into a segment of {length}, must be <=; "
+                    "take an intact copy"
+                )
+            place += _LEAD_IN + length
+
+
+def _groups(path: Path, file: Any, size: int) -> Contents:
+    parts: list[Part] = []
+    others: list[str] = []
+    total = 0
+    for group in file.groups():
+        channels = []
+        for channel in group.channels():
+            dtype = _dtype(channel)
+            if dtype is None or len(channel) == 0:
+                others.append(f"{group.name}/{channel.name}")
+                continue
+            total += len(channel) * dtype.itemsize
+            channels.append(channel)
+        if total > size or len(channels) > _MOST_CHANNELS:
+            raise DataError(
+                f"{path} declares {total} byte of samples and has {size}, must hold all; take an "
+                "intact copy"
+            )
+        parts += _group_parts(path, str(group.name), channels)
+    return Contents(parts=tuple(parts), others=tuple(others))
+
+
+def _dtype(channel: Any) -> np.dtype[Any] | None:
+    """Type of stored real numbers, None of anything else."""
+    stored = getattr(channel.data_type, "nptype", None)
+    if stored is None or channel.data_type.__name__ == "DaqMxRawData":
+        return np.dtype("f8") if channel.data_type.__name__ == "DaqMxRawData" else None
+    return np.dtype(stored) if np.dtype(stored).kind in "iuf" else None
+
+
+def _group_parts(path: Path, group: str, channels: Sequence[Any]) -> list[Part]:
+    """One part of channels that fit together; else one of each."""
+    rates = [_rate(path, channel) for channel in channels]
+    alike = len({(len(c), rate) for c, rate in zip(channels, rates, strict=True)}) == 1
+    sets = [list(channels)] if alike else [[channel] for channel in channels]
+    return [
+        Part(
+            name=group if alike else f"{group}/{members[0].name}",
+            about=f"({len(members)}, {len(members[0])})",
+            channels=tuple(PartChannel(name=str(c.name), unit=_unit(c)) for c in members),
+            named=True,
+            n_samples=len(members[0]),
+            fetch=partial(_fetch, path, tuple(members)),
+            sample_rate=_rate(path, members[0]),
+            # the step is a double, its inverse need not be
+            rate_doubt=4 * float(np.finfo(float).eps),
+        )
+        for members in sets
+    ]
+
+
+def _rate(path: Path, channel: Any) -> float | None:
+    step = channel.properties.get("wf_increment")
+    if step is None:
+        return None
+    if not isinstance(step, (int, float)) or not (math.isfinite(step) and step > 0):
+        raise DataError(
+            f"{path}: wf_increment of {channel.name} is {step!r}, must be a number > 0; take an "
+            "intact copy"
+        )
+    return 1.0 / float(step)
+
+
+def _unit(channel: Any) -> str | None:
+    found = (channel.properties.get(name) for name in _UNITS)
+    return next((str(unit).strip() for unit in found if unit and str(unit).strip()), None)
+
+
+def _fetch(
+    path: Path, members: Sequence[Any], start: int, stop: int, rows: tuple[int, ...]
+) -> NDArray[np.float64]:
+    try:
+        with _no_warning(path):
+            found = [
+                np.asarray(
+                    members[row].read_data(offset=start, length=stop - start), dtype=np.float64
+                )
+                for row in rows
+            ]
+    except DataError:
+        raise
+    except Exception as error:  # as above
+        raise damaged(path, error) from error
+    shortest = min(len(row) for row in found)
+    return np.stack([row[:shortest] for row in found])

@@ -1,0 +1,266 @@
+"""What a feature needs, and what a recording offers: known before a sample is read."""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+from . import envelope, iso, speed
+from .analysis import ACCELERATION, DISPLACEMENT, FEWEST_BLOCKS, FORCE, STANDARD, Settings
+
+
+@dataclass(frozen=True, kw_only=True)
+class Layout:
+    """What a recording offers the catalogue.
+
+    Parameters
+    ----------
+    channels : tuple of str
+        Names of the vibration channels.
+    quantities : tuple of str
+        Quantity of each.
+    fs : float
+        Sample rate [Hz].
+    tacho : bool
+        Whether there is a tacho.
+    pulses_per_revolution : int
+        Pulses in one revolution.
+    n_samples : int, optional
+        Length of the record; None where it is long enough for anything.
+    settings : Settings
+        Choices, and what no signal tells.
+
+    Examples
+    --------
+    >>> Layout(channels=("a",), quantities=("acceleration",), fs=1000.0).probes is None
+    True
+    """
+
+    channels: tuple[str, ...]
+    quantities: tuple[str, ...]
+    fs: float
+    tacho: bool = False
+    pulses_per_revolution: int = 1
+    n_samples: int | None = None
+    settings: Settings = STANDARD
+
+    @property
+    def duration(self) -> float:
+        """Length of the record [s]."""
+        return math.inf if self.n_samples is None else self.n_samples / self.fs
+
+    @property
+    def probes(self) -> tuple[int, int] | None:
+        """Channels of the two proximity probes of an orbit; None unless there are exactly two."""
+        rows = self.rows_of(DISPLACEMENT)
+        return (rows[0], rows[1]) if len(rows) == 2 else None
+
+    def rows_of(self, quantity: str) -> tuple[int, ...]:
+        """Channels of a quantity."""
+        return tuple(i for i, kind in enumerate(self.quantities) if kind == quantity)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Need:
+    """One thing that a feature cannot do without.
+
+    Parameters
+    ----------
+    text : str
+        What it is, as `features --list` shows it.
+    fault : callable
+        ``fault(layout)`` says what is wrong and what helps, or nothing where the need is met.
+
+    Examples
+    --------
+    >>> NEEDS["tacho"].fault(Layout(channels=("a",), quantities=("acceleration",), fs=1e3))
+    'tacho = none must be there; record one'
+    """
+
+    text: str
+    fault: Callable[[Layout], str]
+
+
+def _tacho(layout: Layout) -> str:
+    return "" if layout.tacho else "tacho = none must be there; record one"
+
+
+def _mark(layout: Layout) -> str:
+    pulses = layout.pulses_per_revolution
+    return "" if pulses == 1 else f"pulses_per_revolution = {pulses} must be 1; use a keyphasor"
+
+
+def _casing(layout: Layout) -> str:
+    if set(layout.quantities) == {DISPLACEMENT}:
+        return "channels other than displacement = 0 must be >= 1; an orbit has no knocks"
+    # A shaft line is sampled slowly, for its orders; it has no knocks that are worth a map.
+    return "" if layout.probes is None else _refusal(layout.settings.map_edges, layout.fs)
+
+
+def _refusal(choice: Callable[[float], object], fs: float) -> str:
+    """Why a setting does not suit a sample rate."""
+    try:
+        choice(fs)
+    except ValueError as error:
+        return str(error)
+    return ""
+
+
+def _probes(layout: Layout) -> str:
+    count = len(layout.rows_of(DISPLACEMENT))
+    return "" if count == 2 else f"displacement channels = {count} must be 2; give quantities"
+
+
+def _force(layout: Layout) -> str:
+    count = len(layout.rows_of(FORCE))
+    if count != 1:
+        return f"force channels = {count} must be 1; give quantities"
+    if len(layout.channels) == 1:
+        return "responses = 0 must be >= 1; record one beside the force"
+    if fault := _refusal(layout.settings.frf_edges, layout.fs):
+        return fault
+    nperseg = layout.settings.frf_nperseg(layout.fs)
+    return _duration(layout, (FEWEST_BLOCKS + 1) / 2 * nperseg / layout.fs, "raise frf_spacing_hz")
+
+
+def _reference(layout: Layout) -> str:
+    return _given(layout.settings.reference, "reference", "measure one")
+
+
+def _reference_modes(layout: Layout) -> str:
+    known = layout.settings.reference
+    return _given(known and known.modes, "reference.modes", "fit the reference")
+
+
+def _given(value: object, name: str, cure: str) -> str:
+    return f"{name} = None must be given; {cure}" if value is None else ""
+
+
+def _duration(layout: Layout, least: float, cure: str) -> str:
+    # A record of exactly that length must not fail by rounding.
+    if layout.duration >= least * (1 - 1e-12):
+        return ""
+    return f"duration = {layout.duration:.6g} s must be >= {least:.6g} s; record longer or {cure}"
+
+
+def _samples(least: int) -> Callable[[Layout], str]:
+    def fault(layout: Layout) -> str:
+        return _duration(layout, least / layout.fs, "sample faster")
+
+    return fault
+
+
+def _acceleration(layout: Layout) -> str:
+    count = len(layout.rows_of(ACCELERATION))
+    return "" if count else "acceleration channels = 0 must be >= 1; give quantities"
+
+
+def _severity(layout: Layout) -> str:
+    if fault := _acceleration(layout):
+        return fault
+    band = layout.settings.severity_band()
+    return _rate(layout, band[1]) or _duration(
+        layout, iso.FEWEST_LINES_BELOW / band[0], "choose another kind of machine"
+    )
+
+
+def _rate(layout: Layout, high: float) -> str:
+    if layout.fs >= 2 * high:
+        return ""
+    return f"fs = {layout.fs:.6g} Hz must be >= {2 * high:.6g} Hz; sample faster"
+
+
+def _machine(layout: Layout) -> str:
+    settings = layout.settings
+    if settings.machine is None:
+        return "machine = None must be given; name its kind"
+    if not iso.machine_kind(settings.machine).reciprocating and settings.speed_hz is None:
+        return f"speed_hz = None must be given for {settings.machine}; give the nominal speed"
+    return ""
+
+
+def _bearing(layout: Layout) -> str:
+    return _given(layout.settings.bearing, "bearing", "give its geometry")
+
+
+def _speed(layout: Layout) -> str:
+    known = layout.tacho or layout.settings.speed_hz is not None
+    return "" if known else "speed_hz = None must be given without a tacho; give either"
+
+
+def _speed_band(layout: Layout) -> str:
+    band = layout.settings.speed_band_hz
+    if band is None:
+        return "speed_band_hz = None must be given; say where the speed may lie"
+    return _duration(layout, 2 * speed.FEWEST_REVOLUTIONS / band[0], "raise its lower end")
+
+
+def _bands(layout: Layout) -> str:
+    return "" if layout.settings.bands else "bands = () must hold one or more; give them"
+
+
+def _octaves(layout: Layout) -> str:
+    fault = _refusal(layout.settings.octave_centres, layout.fs)
+    width = layout.settings.octave_low * (10**0.05 - 10**-0.05)
+    return fault or _duration(layout, 1 / width, "raise octave_low")
+
+
+def _spacing(layout: Layout) -> str:
+    low, high = layout.settings.spacing_band_hz
+    return _rate(layout, 2 * high) or _duration(layout, 2 / low, "raise spacing_band_hz")
+
+
+def _envelope(layout: Layout) -> str:
+    low, high = layout.settings.envelope_edges(layout.fs)
+    # One line more: both edges may lie between lines.
+    least = (envelope.FEWEST_LINES + 1) / (high - low) if high > low else math.inf
+    return _rate(layout, high) or _duration(layout, least, "widen envelope_band")
+
+
+NEEDS: Mapping[str, Need] = MappingProxyType(
+    {
+        "tacho": Need(text="tacho", fault=_tacho),
+        "mark": Need(text="one pulse per revolution", fault=_mark),
+        "casing": Need(text="a channel that is no displacement", fault=_casing),
+        "probes": Need(text="two displacement probes", fault=_probes),
+        "acceleration": Need(text="acceleration", fault=_severity),
+        "machine": Need(text="kind of machine, and speed of a rotating one", fault=_machine),
+        "speed": Need(text="tacho or nominal speed", fault=_speed),
+        "bearing": Need(text="bearing geometry", fault=_bearing),
+        "speed band": Need(text="band of the speed", fault=_speed_band),
+        "bands": Need(text="bands of your own", fault=_bands),
+        "octaves": Need(text="record that resolves the lowest third octave", fault=_octaves),
+        "spacing": Need(text="record of two periods of the least spacing", fault=_spacing),
+        "envelope": Need(text="band of eight lines", fault=_envelope),
+        "frames": Need(text="256 samples", fault=_samples(256)),
+        "cycles": Need(text="768 samples", fault=_samples(768)),
+        "force": Need(text="force channel", fault=_force),
+        "reference": Need(text="reference transfer function", fault=_reference),
+        "reference modes": Need(text="modes of the reference", fault=_reference_modes),
+    }
+)
+"""Every need by its name in `Feature.needs`."""
+
+
+def shortcomings(needs: tuple[str, ...], layout: Layout) -> str:
+    """Why a recording cannot have a feature; empty where it can.
+
+    Parameters
+    ----------
+    needs : tuple of str
+        Keys of `NEEDS`.
+    layout : Layout
+        What the recording offers.
+
+    Returns
+    -------
+    str
+        Every unmet need, parted by semicolons.
+
+    Examples
+    --------
+    >>> shortcomings((), Layout(channels=("a",), quantities=("acceleration",), fs=1e3))
+    ''
+    """
+    faults = (NEEDS[need].fault(layout) for need in needs)
+    return "; ".join(fault for fault in faults if fault)
