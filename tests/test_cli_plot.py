@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from wearstate.datasets.record import Attributes, DataSet, DataSetWriter, Recording
+from wearstate.datasets.record import Attributes, DataError, DataSet, DataSetWriter, Recording
 from wearstate.diagnose.cli import _KINDS, cli
 from wearstate.diagnose.info import plot_file
 from wearstate.diagnose.report import _figures
@@ -112,9 +112,9 @@ def test_nothing_is_overwritten_unasked(data, tmp_path):
     assert picture.read_text() == "mine"
 
 
-def test_a_model_has_no_picture(tmp_path, small_model):
-    picture = tmp_path / "p.png"
-    assert "is a model" in run("info", small_model, "--plot", picture, code=2).stderr
+def test_a_model_has_no_picture(tmp_path):
+    with pytest.raises(DataError, match="is a model, must be a recording"):
+        plot_file(tmp_path / "a.wsm", tmp_path / "p.png")
 
 
 def test_measured_bearings_without_a_word_about_the_band(realdata, tmp_path):
