@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,7 @@ from ..sim.assemble import simulate
 from ..sim.integrate import Solution
 from ..sim.parts import Scene, SceneError, channels_of
 from ..sim.wear import grade
+from .choice import Choice, choose, with_choice
 from .draws import value_at
 from .recipe import (
     CONDITIONS,
@@ -31,7 +32,13 @@ from .recipe import (
     wear_limits,
 )
 from .recipe_file import RecipeError
-from .record import Attributes, DataError, DataSetWriter
+from .record import (
+    Attributes,
+    DataError,
+    DataSetWriter,
+    refuse_output,
+    unfinished_attributes,
+)
 from .workers import in_order
 
 NUMERICS = {
@@ -60,6 +67,9 @@ NUMERICS = {
     "floored_share": "<f8",
     "residual": "<f8",
     "estimated_error": "<f8",
+    "stability_margin": "<f8",
+    "least_damping_ratio": "<f8",
+    "least_damped_hz": "<f8",
     "clipped_samples": "<i8",
 }
 """Manifest columns taken from a solution; -1, NaN or empty where it does not give them."""
@@ -88,6 +98,9 @@ class Summary:
         Text of the first few failures of this run.
     n_clipped : int
         Records with saturated samples.
+    fidelity : Choice or None
+        Rungs that were chosen for the whole set, with what they save; None where they are as
+        written.
     """
 
     path: Path
@@ -98,6 +111,7 @@ class Summary:
     failures: dict[str, int]
     first_failures: tuple[str, ...]
     n_clipped: int
+    fidelity: Choice | None = None
 
 
 @dataclass(frozen=True)
@@ -120,7 +134,9 @@ def generate(
     jobs: int = 1,
     force: bool = False,
     truth: bool = False,
+    fidelity: Literal["auto", "given"] | None = None,
     progress: Callable[[int, int], None] | None = None,
+    say: Callable[[str], None] | None = None,
 ) -> Summary:
     """Simulate a labelled data set into a file.
 
@@ -142,8 +158,13 @@ def generate(
         Replace an existing file and start an unfinished one anew.
     truth : bool
         Store the hidden quantities of each record.
+    fidelity : {"auto", "given"}, optional
+        Least rungs that the scene's accuracy needs, or those that are written; as the recipe says
+        by default, else as its scene does. Chosen once, and stored before the first record.
     progress : callable, optional
         Called with (records done, records in all) after each.
+    say : callable, optional
+        Called with a line about each pilot of the choice.
 
     Returns
     -------
@@ -178,11 +199,14 @@ def generate(
         raise DataError(f"jobs = {jobs} must be >= 1; give the number of cores")
     _refuse_bounds(plan, count, seed)
     jobs = min(jobs, count)
-    tally = _Tally(count)
-    with _writer(plan, count, path, seed=seed, force=force, truth=truth) as writer:
+    choice = _chosen(plan, path, fidelity=fidelity, seed=seed, force=force, say=say)
+    plan = with_choice(plan, choice)
+    tally = _Tally(count, choice)
+    error = None if choice is None else choice.estimated_error
+    with _writer(plan, count, path, seed=seed, force=force, truth=truth, choice=choice) as writer:
         tally.n_resumed = int(np.count_nonzero(writer.done))
         samples = sample_records(plan, count, seed=seed, skip=writer.done.copy())
-        for outcome in in_order(partial(_simulated, truth=truth), samples, jobs=jobs):
+        for outcome in in_order(partial(_simulated, truth=truth, error=error), samples, jobs=jobs):
             writer.write(outcome.index, outcome.signal, outcome.row, outcome.truth)
             tally.note(outcome)
             if progress is not None:
@@ -190,6 +214,31 @@ def generate(
         rows = writer.manifest()
         writer.finish()
     return tally.summary(writer.path, rows)
+
+
+def _chosen(
+    plan: Recipe,
+    path: str | Path,
+    *,
+    fidelity: str | None,
+    seed: int,
+    force: bool,
+    say: Callable[[str], None] | None,
+) -> Choice | None:
+    """The choice that an unfinished file already holds, or a new one; None for rungs as written."""
+    refuse_output(Path(path).absolute(), force)
+    wanted = fidelity or plan.table.fidelity or plan.scene.fidelity
+    if wanted == "given":
+        return None
+    begun = None if force else unfinished_attributes(path)
+    if begun is None:
+        return choose(plan, seed=seed, say=say)
+    if not begun.fidelity:
+        raise DataError(
+            f"{path}.part: fidelity = 'given', must be 'auto' to go on with it; repeat the command "
+            "that began it, or use force to start anew"
+        )
+    return Choice.load(begun.fidelity)
 
 
 def _refuse_bounds(plan: Recipe, count: int, seed: int) -> None:
@@ -203,11 +252,18 @@ def _refuse_bounds(plan: Recipe, count: int, seed: int) -> None:
 
 
 def _writer(
-    plan: Recipe, count: int, path: str | Path, *, seed: int, force: bool, truth: bool
+    plan: Recipe,
+    count: int,
+    path: str | Path,
+    *,
+    seed: int,
+    force: bool,
+    truth: bool,
+    choice: Choice | None,
 ) -> DataSetWriter:
     return DataSetWriter(
         path,
-        _attributes(plan, seed, truth),
+        _attributes(plan, seed, truth, choice),
         n_records=count,
         n_samples=round(plan.scene.duration * plan.scene.sample_rate),
         columns={**plan.columns, **NUMERICS},
@@ -215,7 +271,7 @@ def _writer(
     )
 
 
-def _attributes(plan: Recipe, seed: int, truth: bool) -> Attributes:
+def _attributes(plan: Recipe, seed: int, truth: bool, choice: Choice | None) -> Attributes:
     scene = plan.scene
     return Attributes(
         sample_rate=scene.sample_rate,
@@ -226,6 +282,7 @@ def _attributes(plan: Recipe, seed: int, truth: bool) -> Attributes:
         recipe=plan.text,
         scene=plan.scene_text,
         overrides=overrides_text(plan),
+        fidelity="" if choice is None else choice.dump(),
         seed=seed,
         truth=truth,
         **_limits(scene, plan.severity_columns[0]),
@@ -243,17 +300,18 @@ def _limits(scene: Scene, severity: str) -> dict[str, Any]:
     }
 
 
-def _simulated(sample: Sample, *, truth: bool) -> _Outcome:
-    """Simulate one record; runs in a worker."""
+def _simulated(sample: Sample, *, truth: bool, error: float | None) -> _Outcome:
+    """Simulate one record; runs in a worker. An error measured on pilots replaces its own guess."""
     try:
         solution = simulate(sample.scene, seed=sample.seed, truth=truth, raise_on_failure=False)
     except SceneError as error:
         return _refused(sample, str(error))
     status = solution.status
+    row = {**sample.row, "status": status.name.lower(), **_numerics(solution)}
     return _Outcome(
         index=sample.index,
         signal=solution.signal,
-        row={**sample.row, "status": status.name.lower(), **_numerics(solution)},
+        row=row if error is None else {**row, "estimated_error": error},
         truth={name: array.astype(np.float32) for name, array in solution.truth.items()},
         fault="" if status.ok else status.text,
     )
@@ -281,8 +339,8 @@ def _numerics(solution: Solution) -> dict[str, Any]:
 class _Tally:
     """Counts of a run."""
 
-    def __init__(self, count: int) -> None:
-        self.count = count
+    def __init__(self, count: int, choice: Choice | None) -> None:
+        self.count, self.choice = count, choice
         self.n_resumed = 0
         self.faults: list[str] = []
 
@@ -307,6 +365,7 @@ class _Tally:
             failures=dict(status),
             first_failures=tuple(self.faults),
             n_clipped=int(np.count_nonzero(rows["clipped_samples"] > 0)),
+            fidelity=self.choice,
         )
 
 

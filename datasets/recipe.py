@@ -128,6 +128,9 @@ class RecipeTable(Part):
     description: str = ""
     scene: str = Field(min_length=1, description="a built-in scene or a file")
     records: int = Field(ge=1, le=MOST_RECORDS, description="records made unless told otherwise")
+    fidelity: Literal["given", "auto"] | None = Field(
+        default=None, description="rungs as written or as the accuracy needs; as the scene says"
+    )
     records_per_group: int = Field(
         default=1, ge=1, le=MOST_RECORDS, description="records of each machine drawn"
     )

@@ -204,6 +204,8 @@ class Attributes:
         Their TOML text.
     overrides : str
         JSON table of what replaced values of the recipe.
+    fidelity : str
+        JSON of the choice of rungs for the whole set; empty where they are as written.
     seed : int
         Seed of the data set.
     truth : bool
@@ -224,6 +226,7 @@ class Attributes:
     recipe: str = ""
     scene: str = ""
     overrides: str = "{}"
+    fidelity: str = ""
     seed: int = 0
     truth: bool = False
     created_by: str = f"wearstate {__version__}"
@@ -240,7 +243,7 @@ class Attributes:
             )
 
 
-_TEXTS = ("recipe", "scene", "overrides", "limit_source", "created_by", "libraries")
+_TEXTS = ("recipe", "scene", "overrides", "fidelity", "limit_source", "created_by", "libraries")
 
 
 def _texts(attributes: Attributes) -> dict[str, str]:
@@ -283,7 +286,8 @@ def _attributes_of(stored: Mapping[str, Any]) -> Attributes:
         condemning_limit=float(stored["condemning_limit_m"]),
         seed=int(stored["seed"]),
         truth=bool(stored["truth"]),
-        **{name: str(stored[name]) for name in _TEXTS},
+        # a set made before rungs could be chosen has none
+        **{name: str({"fidelity": "", **stored}[name]) for name in _TEXTS},
     )
 
 
@@ -510,6 +514,26 @@ def _part(path: Path) -> Path:
     return path.with_name(path.name + ".part")
 
 
+def unfinished_attributes(path: str | Path) -> Attributes | None:
+    """What an unfinished file of a data set says of itself; None where there is none.
+
+    Parameters
+    ----------
+    path : str or Path
+        Of the finished file.
+
+    Raises
+    ------
+    DataError
+        The unfinished file cannot be read.
+    """
+    part = _part(Path(path).absolute())
+    if not part.is_file():
+        return None
+    with _refusing(part, f"unfinished file (or delete it; {part.stem})"), h5py.File(part) as file:
+        return _attributes_of(_stored_attributes(file, part))
+
+
 class DataSetWriter:
     """Writes a data set file, record by record, so that a killed run can go on.
 
@@ -568,7 +592,7 @@ class DataSetWriter:
         self._shape = (n_records, len(attributes.channels), n_samples)
         self._dtype = np.dtype([*{**_HEAD, **(columns or {}), **_TAIL}.items()])
         self._file: Any = None
-        _refuse_output(self.path, force)
+        refuse_output(self.path, force)
         if force:
             self.part.unlink(missing_ok=True)
         if not self.part.exists():
@@ -719,7 +743,21 @@ class DataSetWriter:
         self.close()
 
 
-def _refuse_output(path: Path, force: bool) -> None:
+def refuse_output(path: Path, force: bool) -> None:
+    """Refuse a file that cannot be written, or exists and may not be replaced.
+
+    Parameters
+    ----------
+    path : Path
+        Absolute.
+    force : bool
+        It may be replaced.
+
+    Raises
+    ------
+    DataError
+        Its name ends in ``.part``, it is a folder or in none, or it exists.
+    """
     if path.suffix == ".part":
         raise DataError(f"{path}: the name must not end in .part, kept for unfinished files")
     if not path.parent.is_dir():

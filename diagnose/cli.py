@@ -12,7 +12,7 @@ import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import click
 
@@ -254,6 +254,7 @@ def _workers(jobs: int | None) -> int:
 
 
 _DATA, _MODEL, _PAGE = (".h5", ".hdf5"), (".wsm",), (".html", ".htm")
+_CHART = (".svg", ".png", ".pdf", ".html", ".json", ".csv")
 _PICTURE, _TABLE = (".png", ".svg", ".pdf"), (".parquet", ".csv", ".h5")
 
 _Output = tuple[Path | None, tuple[str, ...]]
@@ -415,12 +416,16 @@ def simulate(
 ) -> None:
     """Simulate one recording of SCENE (a built-in name or a TOML file)."""
     from ..datasets.generate import save_solution
+    from ..datasets.quantities import resolved, with_estimate
     from ..sim.assemble import simulate as run
     from ..sim.scene import load_scene
 
     _check_outputs([scene_name], [(output, _DATA), (plot, _PICTURE)], force)
-    machine = load_scene(scene_name, _overrides(pairs))
+    machine, resolution = resolved(load_scene(scene_name, _overrides(pairs)))
     solution = run(machine, seed=seed, truth=truth or plot is not None)
+    if resolution is not None:
+        solution = with_estimate(solution, resolution)
+        click.echo(f"fidelity: {resolution.text}", err=True)
     if output is not None:
         save_solution(machine, solution, output, seed=seed, force=force, truth=truth)
     if plot is not None:
@@ -461,6 +466,12 @@ def simulate(
 )
 @click.option("-o", "--output", type=_PATH, required=True, help="Data set to write (.h5).")
 @click.option("--truth", is_flag=True, help="Also store forces and orbit.")
+@click.option(
+    "--fidelity",
+    type=click.Choice(["auto", "given"]),
+    default=None,
+    help="Least rungs that the accuracy needs, or as written; what the recipe says by default.",
+)
 @_seed_option
 @_jobs_option
 @_force_option
@@ -470,6 +481,7 @@ def generate(
     records: int | None,
     output: Path,
     truth: bool,
+    fidelity: Literal["auto", "given"] | None,
     seed: int,
     jobs: int | None,
     force: bool,
@@ -493,7 +505,9 @@ def generate(
             jobs=_workers(jobs),
             force=force,
             truth=truth,
+            fidelity=fidelity,
             progress=progress,
+            say=lambda text: click.echo(text, err=True),
         )
     value = {**asdict(summary), "path": str(summary.path)}
     _emit(value, as_json, _generated_text(summary))
@@ -505,6 +519,8 @@ def _generated_text(summary: Any) -> str:
         f"{summary.path}: {summary.n_records} simulated records of {summary.n_groups} machine "
         f"draws ({grades})"
     ]
+    if summary.fidelity is not None:
+        lines.append(f"  fidelity: {summary.fidelity.text}")
     if summary.n_resumed:
         lines.append(f"  {summary.n_resumed} of them from an earlier, interrupted run")
     lines += [f"  {count} failed: {status}" for status, count in summary.failures.items()]
@@ -852,11 +868,52 @@ def train(
 
 @cli.command()
 @click.argument("model_file", metavar="MODEL", type=_PATH)
-@click.argument("data", type=_PATH)
+@click.argument("data", type=_PATH, required=False)
+@click.option(
+    "--across-fidelity",
+    is_flag=True,
+    help="MODEL is a recipe: train on each of its rungs, judge on the best.",
+)
+@click.option(
+    "-n",
+    "--records",
+    type=click.IntRange(20, _MOST_RECORDS),
+    default=None,
+    help="Of every rung, with --across-fidelity; 120 by default.",
+)
+@click.option("--effect", "effects", multiple=True, help="With --across-fidelity: only this one.")
+@click.option("--set", "pairs", multiple=True, metavar="PATH=VALUE", help="Replace a scene value.")
+@click.option(
+    "--folder",
+    type=_PathType(path_type=Path, file_okay=False, exists=True),
+    help="Keep the data sets of --across-fidelity, and use those that are there.",
+)
 @_jobs_option
 @_json_option
-def evaluate(model_file: Path, data: Path, jobs: int | None, as_json: bool) -> None:
-    """Judge MODEL on the machine draws of DATA that it has not seen."""
+def evaluate(
+    model_file: Path,
+    data: Path | None,
+    across_fidelity: bool,
+    records: int | None,
+    effects: Sequence[str],
+    pairs: Sequence[str],
+    folder: Path | None,
+    jobs: int | None,
+    as_json: bool,
+) -> None:
+    """Judge MODEL on the machine draws of DATA that it has not seen.
+
+    With --across-fidelity: what training on a cheaper model of the machine costs.
+    """
+    if across_fidelity:
+        if data is not None:
+            raise click.UsageError("--across-fidelity makes its own data: name a recipe only")
+        _judge_across(model_file, records or _ACROSS, effects, pairs, folder, jobs, as_json)
+        return
+    if data is None:
+        raise click.UsageError("Missing argument 'DATA'.")
+    if records or effects or pairs or folder:
+        raise click.UsageError("-n, --effect, --set and --folder need --across-fidelity")
     from .evaluate import evaluate_model
     from .modelfile import load_model
 
@@ -864,6 +921,36 @@ def evaluate(model_file: Path, data: Path, jobs: int | None, as_json: bool) -> N
     with _progress("features") as progress:
         result = evaluate_model(model, data, jobs=_workers(jobs), progress=progress)
     _emit(result, as_json, "\n".join(_score_lines(result, model.card)))
+
+
+_ACROSS = 120  # records
+
+
+def _judge_across(
+    recipe: Path,
+    records: int,
+    effects: Sequence[str],
+    pairs: Sequence[str],
+    folder: Path | None,
+    jobs: int | None,
+    as_json: bool,
+) -> None:
+    """Losses of training on cheaper rungs; the data sets vanish unless a folder is given."""
+    from tempfile import TemporaryDirectory
+
+    from .across import across_fidelity, across_table, across_text
+
+    with TemporaryDirectory() as passing:
+        found = across_fidelity(
+            str(recipe),
+            records,
+            folder or Path(passing),
+            effects=effects,
+            overrides=_overrides(pairs),
+            jobs=_workers(jobs),
+            say=lambda text: click.echo(text, err=True),
+        )
+    _emit(across_table(found), as_json, across_text(found))
 
 
 def _score_lines(result: dict[str, Any], card: dict[str, Any]) -> list[str]:
@@ -1045,6 +1132,99 @@ def _tested(
     if picture is not None:
         rig_figure(result).savefig(picture, dpi=110)
     return rig_table(result), ["", rig_text(result)]
+
+
+@cli.command()
+@click.argument("scene_name", metavar="SCENE")
+@click.option("--set", "pairs", multiple=True, metavar="PATH=VALUE", help="Replace a scene value.")
+@click.option("--map", "map_name", help="One map only; all that the machine has by default.")
+@click.option("--size", type=click.IntRange(3, 60), help="Cells along either axis.")
+@click.option(
+    "--budget",
+    type=_Share(min=1.0, max=86_400.0),
+    help="Seconds; what it leaves no time for is drawn as not run. None by default.",
+)
+@click.option("-o", "--output", type=_PATH, help="Picture to write (.png, .svg or .pdf).")
+@_force_option
+@_json_option
+def stability(
+    scene_name: str,
+    pairs: Sequence[str],
+    map_name: str | None,
+    size: int | None,
+    budget: float | None,
+    output: Path | None,
+    force: bool,
+    as_json: bool,
+) -> None:
+    """Where each method fails on SCENE: stable, wrong or unstable, by its method or physically."""
+    from ..sim.scene import load_scene
+    from .stability import save_figure, stability_table, stability_text
+    from .stability_maps import atlas
+
+    _check_outputs([scene_name], [(output, _PICTURE)], force)
+    machine = load_scene(scene_name, _overrides(pairs))
+    with _progress("running cells") as progress:
+        maps = atlas(machine, name=map_name, budget=budget, size=size, progress=progress)
+    files = [str(output)] if output is not None else []
+    if output is not None:
+        save_figure(machine, maps, output)
+    text = "\n".join([stability_text(machine, maps), *files])
+    _emit({**stability_table(machine, maps), "files": files}, as_json, text)
+
+
+@cli.command()
+@click.argument("subject", metavar="SCENE|DATA")
+@click.option("--set", "pairs", multiple=True, metavar="PATH=VALUE", help="Replace a scene value.")
+@click.option(
+    "--accuracy",
+    type=_Share(1e-6, 0.5),
+    default=None,
+    help="Error that every quantity may carry; the scene's own by default.",
+)
+@click.option(
+    "--budget",
+    type=_Share(1.0, 1e6),
+    default=None,
+    help="Seconds after which nothing further is begun.",
+)
+@click.option("-o", "--output", type=_PATH, help="Chart (.svg, .png, .pdf, .html, .json, .csv).")
+@_jobs_option
+@_force_option
+@_json_option
+def chart(
+    subject: str,
+    pairs: Sequence[str],
+    accuracy: float | None,
+    budget: float | None,
+    output: Path | None,
+    jobs: int | None,
+    force: bool,
+    as_json: bool,
+) -> None:
+    """Speed against accuracy: of the rungs and steps of SCENE, or the diagnosis on DATA (.h5)."""
+    from .chart import chart_table, chart_text, scene_chart
+
+    _check_outputs([subject], [(output, _CHART)], force)
+    of_data = subject.endswith(_DATA)
+    if of_data and (pairs or accuracy is not None):
+        raise click.UsageError("--set and --accuracy are for a scene, not for a data set")
+    with _progress("measuring") as progress:
+        if of_data:
+            from .chart_models import model_chart
+
+            found = model_chart(subject, budget=budget, jobs=_workers(jobs), progress=progress)
+        else:
+            from ..sim.scene import load_scene
+
+            machine = load_scene(subject, _overrides(pairs))
+            found = scene_chart(machine, accuracy=accuracy, budget=budget, progress=progress)
+    if output is not None:
+        from .chart_figure import save_chart
+
+        save_chart(found, output)
+    files = [str(output)] if output is not None else []
+    _emit({**chart_table(found), "files": files}, as_json, "\n".join([chart_text(found), *files]))
 
 
 @cli.command()

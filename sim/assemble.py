@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from .integrate import Solution
 from .journal import check_journal, simulate_journal
-from .parts import Scene
+from .parts import Scene, SceneError
 from .pump import check_pump, simulate_pump
 from .shaft_line import check_shaft, simulate_shaft
 
@@ -34,7 +34,8 @@ def simulate(
     ------
     SceneError
         A rung is not valid for the scene, the step is too long for the contact, the recording is
-        shorter than a revolution, or pulses or modes cannot be sampled.
+        shorter than a revolution, or pulses or modes cannot be sampled; or its fidelity is not
+        resolved.
     SimulationError
         The run failed and `raise_on_failure` is true.
 
@@ -45,6 +46,7 @@ def simulate(
     >>> simulate(scene, seed=1).signal.shape
     (3, 5120)
     """
+    _refuse_unresolved(scene)
     return _SIMULATORS[scene.machine](scene, seed, truth, raise_on_failure)
 
 
@@ -62,6 +64,16 @@ def check(scene: Scene) -> None:
     >>> check(load_scene("bilge-pump"))
     """
     _CHECKS[scene.machine](scene)
+
+
+def _refuse_unresolved(scene: Scene) -> None:
+    """Which rungs a scene needs is judged by features, which this floor does not know."""
+    if scene.fidelity == "auto":
+        fault = (
+            "fidelity = 'auto' must be resolved before a run; set fidelity = 'given', or call "
+            "wearstate.datasets.quantities.resolved(scene)"
+        )
+        raise SceneError(scene.name, [fault])
 
 
 _SIMULATORS: dict[str, Callable[[Scene, int, bool, bool], Solution]] = {

@@ -610,7 +610,8 @@ def _newton(
     """Newton's method, each step halved until it brings the force closer."""
     now, evaluations = force(position), 1
     status = BearingStatus.NO_CONVERGENCE
-    while evaluations < _MOST_ITERATIONS and now.ok and np.any(now.force):
+    # a rung far outside its validity may lose its stiffness to rounding
+    while evaluations < _MOST_ITERATIONS and now.ok and np.any(now.force) and _finite(now):
         if _residual(now, load) <= tolerance:
             status = BearingStatus.OK
             break
@@ -630,6 +631,10 @@ def _newton(
             break
         position, now = trial, after
     return _Found(position, _residual(now, load), evaluations, status)
+
+
+def _finite(now: _Force) -> bool:
+    return bool(np.all(np.isfinite(now.stiffness)) and np.all(np.isfinite(now.force)))
 
 
 def _residual(now: _Force, load: Vector) -> float:

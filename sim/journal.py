@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import cast
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .contact import CONTACT
-from .film import FilmGeometry, Groove, dufrane_scar
+from .film import LEAST_CELLS, FilmGeometry, Groove, dufrane_scar
 from .impedance import impedance_map
 from .integrate import SimulationError, Solution, Status
 from .journal_parts import JournalLoad, JournalScene
@@ -326,10 +326,38 @@ def check_journal(scene: Scene) -> None:
         Every fault at once.
     """
     journal = cast(JournalScene, scene)
-    faults = _sampling_faults(journal)
+    faults = [*_sampling_faults(journal), *_method_faults(journal)]
     if faults:
         raise SceneError(journal.name, faults)
     journal_load(journal)
+
+
+_LONGEST_STEP = {"euler": 0.1, "rk4": 0.5}
+"""Of the fixed integrators [rad]: by 0.34 of its step euler shifts the threshold of whirl, and a
+dozen steps a turn are few for any load."""
+
+_LONGEST_SHORT = 1.0  # L/D of a short film: it carries half as much again as the bearing does
+
+
+def _method_faults(scene: JournalScene) -> list[str]:
+    """A step that is stable but too long to be right, and a rung outside its validity."""
+    faults = []
+    speed, told = math.tau * scene.drive.speed, scene.numerics.step
+    longest = _LONGEST_STEP.get(scene.numerics.integrator, math.inf)
+    step = min(told or _STEP / speed, 1 / scene.sample_rate)
+    if step * speed > longest:
+        faults.append(
+            f"numerics.step = {step:g} s must be <= {longest / speed:.3g} s, {longest:g} rad of "
+            "the shaft, for the orbit to be right; shorten it, or set numerics.integrator = "
+            "'adaptive'"
+        )
+    ratio = scene.bearing.length / scene.bearing.diameter
+    if scene.film.rung == "short" and ratio > _LONGEST_SHORT:
+        faults.append(
+            f"film.rung = 'short' of L/D = {ratio:.3g} must be <= {_LONGEST_SHORT:g}, it knows no "
+            "flow round the circle; set film.rung = 'map'"
+        )
+    return faults
 
 
 def _sampling_faults(scene: JournalScene) -> list[str]:
@@ -394,7 +422,10 @@ def simulate_journal(scene: Scene, seed: int, truth: bool, raise_on_failure: boo
     status = _STATUS[run.status]
     if status.ok and plan.n_samples > len(run.tau) - plan.settling:
         status = Status.DIVERGED
+    if status.ok and _coarse(journal, run.position[plan.kept]):
+        status = Status.THIN_FILM
     numerics = _numerics(journal, scale, plan, run)
+    numerics |= _guards(journal, film, run)
     if not status.ok:
         if raise_on_failure:
             raise SimulationError(status, journal.name)
@@ -507,6 +538,23 @@ def film_gap(scene: JournalScene, position: Float) -> Float:
     return thinnest
 
 
+def _coarse(scene: JournalScene, position: Float) -> bool:
+    """Whether the thinnest film of an orbit spans too few nodes of its mesh to be right.
+
+    A wall takes over where the film ends.
+    """
+    if scene.film.rung == "short" or scene.bearing.wall is not None:
+        return False
+    geometry = film_geometry(scene)
+    least = film_gap(scene, position)
+    x, y = position[int(np.argmin(least))]
+    angle = math.tau * np.arange(geometry.n_theta) / geometry.n_theta
+    gap = 1 - x * np.cos(angle) - y * np.sin(angle)
+    if geometry.bore is not None:
+        gap += geometry.bore
+    return bool(np.count_nonzero(gap < 2 * least.min()) < LEAST_CELLS)
+
+
 def _numerics(scene: JournalScene, scale: JournalScale, plan: _Plan, run: OrbitRun) -> Numerics:
     kept = run.position[plan.settling :]
     numerics: Numerics = {
@@ -524,6 +572,64 @@ def _numerics(scene: JournalScene, scale: JournalScale, plan: _Plan, run: OrbitR
         numerics["peak_eccentricity"] = float(np.hypot(kept[:, 0], kept[:, 1]).max())
         numerics["min_film_m"] = scale.clearance * float(film_gap(scene, kept).min())
     return numerics
+
+
+def _guards(scene: JournalScene, film: Film, run: OrbitRun) -> Numerics:
+    """What is left of the step's stability, and the error that the integrator expects."""
+    method = scene.numerics.integrator
+    if method == "adaptive":  # L-stable: no step is too long for a squeezed film
+        return {"stability_margin": 1.0, "estimated_error": scene.numerics.tolerance}
+    if not len(run.position):
+        return {}
+    step = run.end / max(1, run.steps)
+    alpha = journal_scale(scene).alpha
+    rate = alpha * squeeze_rate(film, run)
+    return {
+        "stability_margin": 1 - step * rate / _STABLE[method],
+        "estimated_error": step / 2 if method == "euler" else step**4 / 120,
+    }
+
+
+_STABLE = {"euler": 2.0, "rk4": 2.785}
+"""Step times damping at which a fixed-step integrator becomes unstable, on the real axis."""
+
+_NUDGE = 1e-4  # of the clearance per radian: the film is near to linear in so small a rate
+
+
+def squeeze_rate(film: Film, run: OrbitRun) -> float:
+    """Largest damping of the film at the outermost place of an orbit.
+
+    Parameters
+    ----------
+    film : Film
+    run : OrbitRun
+        Not empty.
+
+    Returns
+    -------
+    float
+        Largest eigenvalue of the symmetric part of ``-dF/dV``, over that of the unit of force;
+        times alpha it is the rate at which a squeeze dies down [1/rad].
+
+    Examples
+    --------
+    >>> from .orbit import load, run_orbit
+    >>> film = short_film(0.5)
+    >>> run = run_orbit(film, load(alpha=1.0), duration=0.1)
+    >>> bool(abs(squeeze_rate(film, run) / (4 * 0.5**2 * math.pi / 2) - 1) < 0.1)
+    True
+    """
+    outermost = int(np.argmax(np.hypot(*run.position.T)))
+    nudges = _NUDGE * np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
+    there = replace(
+        run,
+        tau=np.zeros(len(nudges)),
+        position=np.repeat(run.position[[outermost]], len(nudges), axis=0),
+        velocity=run.velocity[outermost] + nudges,
+    )
+    force = film_trace(film, there).force
+    damping = -np.stack([force[0] - force[1], force[2] - force[3]]) / (2 * _NUDGE)
+    return float(np.linalg.eigvalsh((damping + damping.T) / 2)[-1])
 
 
 def _warnings(numerics: Numerics) -> tuple[str, ...]:

@@ -1,14 +1,25 @@
-"""Rungs of each effect, as tables from the cheapest to the best.
+"""Rungs of each effect, as tables from the cheapest to the best, and what a run of a scene costs.
 
-A rung is one row: a name, what it assumes, where it comes from, what it costs, and when it is
-not valid, with the cure. The kernels choose by the codes that go with the names; nothing else
-knows which rungs there are.
+A rung is one row: a name, what it assumes, where it is valid, where it comes from, what it costs,
+and the values that put it into a scene. The kernels choose by the codes that go with the names;
+nothing else knows which rungs there are. Steps, tolerances and meshes are effects as well, with
+levels by factors of the one that is written. Alternatives that no order ranks, contact laws,
+friction laws, modes or a measured casing, are choices of a scene and no rungs.
 """
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Any, TypeVar, cast
+
+from pydantic import BaseModel
 
 from .crank_setup import (
+    STEP_PER_CONTACT_DECAY,
+    STEP_PER_CONTACT_TIME,
+    contact_frequency,
+    contact_rate,
     contact_table,
     hydraulics_of,
     joint_loads,
@@ -18,8 +29,13 @@ from .crank_setup import (
 )
 from .hydraulics import PRESSURE_HEADS, lowest_pressure
 from .integrate import Status
+from .journal_parts import Film, JournalScene
+from .parts import Scene, SceneError, validate_table
 from .pump_parts import Guide, PumpScene, RevoluteJoint
+from .shaft_parts import ShaftScene
 from .slider_crank import JOINT_COMPLIANT, OVERLAP_LIMIT
+
+AnyScene = TypeVar("AnyScene", bound=Scene)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,19 +45,29 @@ class Rung:
     Attributes
     ----------
     name : str
-        As in the scene.
+        As in the scene; of a numerical effect the factor on what is written, such as ``x2``.
     assumes : str
         The model in one line.
+    valid : str
+        Where it may be used.
+    needs : str
+        What the scene must give.
     reference : str
         Source.
     nanoseconds_per_step : float
-        Tabulated cost of the effect on one throw, on one core of a 2020s server, for ranking only.
+        Tabulated cost of the effect on one throw, or of one solve of a film, on one core of a
+        2020s server, for ranking only.
+    values : mapping of str to object
+        Dotted path -> value that puts the rung into the scene it was made for.
     """
 
     name: str
     assumes: str
-    reference: str
-    nanoseconds_per_step: float
+    reference: str = ""
+    nanoseconds_per_step: float = 0.0
+    valid: str = "always"
+    needs: str = ""
+    values: Mapping[str, Any] = field(default_factory=dict)
 
 
 JOINT_RUNGS = (
@@ -54,13 +80,17 @@ JOINT_RUNGS = (
     Rung(
         name="link",
         assumes="a massless link as long as the radial clearance: contact is never lost",
-        reference="Earles, Wu 1973; valid while the link is in compression",
+        reference="Earles, Wu 1973",
+        valid="while the link is in compression: no step of the run in tension",
+        needs="a clearance",
         nanoseconds_per_step=120.0,
     ),
     Rung(
         name="compliant",
         assumes="free flight and the contact law's force, with friction, in the clearance circle",
         reference="Xia et al. 2017, eqs 1-15 with their signs mended",
+        valid="penetration below a tenth of the pin's radius, and 4 clearances under the load",
+        needs="a clearance, a contact law with its stiffness; of a guide the piston's inertia",
         nanoseconds_per_step=140.0,
     ),
 )
@@ -70,31 +100,34 @@ PRESSURE_RUNGS = (
     Rung(
         name="none",
         assumes="no pressure",
-        reference="",
         nanoseconds_per_step=0.0,
     ),
     Rung(
         name="constant",
         assumes="a plunger against a constant pressure",
-        reference="",
+        needs="pressure.discharge",
         nanoseconds_per_step=1.0,
     ),
     Rung(
         name="two-level",
         assumes="suction and discharge pressure by turns",
         reference="quasi-static limit of the rung above",
+        needs="pressure.suction and pressure.discharge",
         nanoseconds_per_step=20.0,
     ),
     Rung(
         name="heads",
         assumes="incompressible liquid: energy balance of the lines, liquid inertia as added mass",
         reference="Xia et al. 2017, eqs 16-27 with their misprints mended",
+        valid="while the liquid's pressure stays above that of its vapour",
+        needs="both lines and valves",
         nanoseconds_per_step=30.0,
     ),
     Rung(
         name="chamber",
         assumes="compressible chamber with air and vapour, self-acting valves, leaks",
         reference="Westphal 1893 for the plates' displacement; Hosea, Shampine 1996 for the solver",
+        needs="both lines and valves, pressure.dead_volume",
         nanoseconds_per_step=350.0,
     ),
 )
@@ -104,19 +137,67 @@ DRIVE_RUNGS = (
     Rung(
         name="constant-speed",
         assumes="the crank turns evenly whatever it carries",
-        reference="",
         nanoseconds_per_step=0.0,
     ),
     Rung(
         name="motor",
         assumes="asynchronous motor and flywheel: the speed gives way",
         reference="Kloss 1929",
+        needs="drive.motor",
         nanoseconds_per_step=30.0,
     ),
 )
 """Rungs of the drive."""
 
-LADDERS = {"joint": JOINT_RUNGS, "pressure": PRESSURE_RUNGS, "drive": DRIVE_RUNGS}
+FILM_RUNGS = (
+    Rung(
+        name="short",
+        assumes="flow round the circle neglected: a closed form",
+        reference="Ocvirk 1952; Dubois, Ocvirk 1953",
+        valid="a plain aligned bore, L/D below a half or so",
+        nanoseconds_per_step=120.0,
+    ),
+    Rung(
+        name="map",
+        assumes="the direct film of a plain aligned bore, interpolated in a table of it",
+        reference="Childs, Moes, van Leeuwen 1977 for the idea",
+        valid="a plain aligned bore without feed pressure",
+        nanoseconds_per_step=250.0,
+    ),
+    Rung(
+        name="direct",
+        assumes="Reynolds' equation with cavitation, solved on the mesh at every call",
+        reference="Reynolds 1886; active sets for the complementarity",
+        valid="laminar, isothermal, a film thicker than its mesh resolves",
+        nanoseconds_per_step=40_000.0,
+    ),
+)
+"""Rungs of an oil film; the cost of the last is on the mesh of 72 by 17."""
+
+BEAM_RUNGS = (
+    Rung(
+        name="euler-bernoulli",
+        assumes="no shear, no rotary inertia",
+        reference="Euler 1744",
+        valid="wavelengths above ten diameters",
+        nanoseconds_per_step=1.0,
+    ),
+    Rung(
+        name="timoshenko",
+        assumes="shear and rotary inertia",
+        reference="Timoshenko 1921; Cowper 1966",
+        nanoseconds_per_step=1.0,
+    ),
+)
+"""Rungs of a shaft's beam."""
+
+LADDERS = {
+    "joint": JOINT_RUNGS,
+    "pressure": PRESSURE_RUNGS,
+    "drive": DRIVE_RUNGS,
+    "film": FILM_RUNGS,
+    "beam": BEAM_RUNGS,
+}
 """Effect -> its rungs. A new rung is one row, its code in the kernel, and one test."""
 
 
@@ -204,3 +285,478 @@ def _torn(scene: PumpScene) -> list[tuple[Status, str]]:
             )
             found.append((Status.VAPOUR, text))
     return found
+
+
+def pump_step(scene: PumpScene) -> float:
+    """Longest step of a pump: what is written, else what its contact or its casing needs [s].
+
+    Examples
+    --------
+    >>> from wearstate.sim.scene import load_scene
+    >>> round(1e6 * pump_step(load_scene("bilge-pump")), 2)
+    19.53
+    """
+    casing = 0.5 / scene.sample_rate  # it runs once a step, and needs twice the sample rate
+    if scene.numerics.step is not None:
+        return min(scene.numerics.step, casing)
+    rate = contact_rate(scene)
+    if rate == 0:
+        return casing
+    needed = min(STEP_PER_CONTACT_TIME / contact_frequency(scene), STEP_PER_CONTACT_DECAY / rate)
+    return min(needed, casing)
+
+
+# --- effects
+
+
+@dataclass(frozen=True, kw_only=True)
+class Effect:
+    """One effect of one scene, with its rungs.
+
+    Attributes
+    ----------
+    name : str
+        As ``pinned`` names it.
+    machine : str
+    rungs : tuple of Rung
+        Cheapest first, each with the values that put it into the scene.
+    current : callable
+        Scene -> name of the rung that is written.
+    refusal : callable
+        Scene, name of a rung -> why the scene does not admit it, or None.
+    numerical : bool
+        A step, a tolerance or a mesh: its error goes to zero with the level.
+    """
+
+    name: str
+    machine: str
+    rungs: tuple[Rung, ...]
+    current: Callable[[Scene], str]
+    refusal: Callable[[Scene, str], str | None]
+    numerical: bool = False
+
+    def rung(self, name: str) -> Rung:
+        """Rung of that name.
+
+        Raises
+        ------
+        KeyError
+            There is none.
+        """
+        return {rung.name: rung for rung in self.rungs}[name]
+
+
+def effects_of(scene: Scene) -> tuple[Effect, ...]:
+    """Effects of a scene, each with its rungs; an effect that is absent has no entry.
+
+    Parameters
+    ----------
+    scene : Scene
+
+    Returns
+    -------
+    tuple of Effect
+
+    Examples
+    --------
+    >>> from wearstate.sim.scene import load_scene
+    >>> pump = load_scene("bilge-pump")
+    >>> [(effect.name, effect.current(pump)) for effect in effects_of(pump)][:3]
+    [('crankpin', 'compliant'), ('wristpin', 'ideal'), ('guide', 'ideal')]
+    """
+    return tuple(
+        effect for build in _EFFECTS[scene.machine] for effect in build(scene) if effect.rungs
+    )
+
+
+def admissible(effect: Effect, scene: Scene) -> tuple[Rung, ...]:
+    """Rungs of an effect that the scene admits, cheapest first.
+
+    Examples
+    --------
+    >>> from wearstate.sim.scene import load_scene
+    >>> worn = load_scene("journal-bearing", {"bearing.scar_depth": "5 um", "film.rung": "direct"})
+    >>> [rung.name for rung in admissible(effects_of(worn)[0], worn)]
+    ['direct']
+    """
+    return tuple(rung for rung in effect.rungs if effect.refusal(scene, rung.name) is None)
+
+
+def with_values(scene: AnyScene, values: Mapping[str, Any]) -> AnyScene:
+    """The scene with values replaced by dotted path, validated anew.
+
+    Parameters
+    ----------
+    scene : Scene
+    values : mapping of str to object
+        Dotted path -> value, entries of lists by their number.
+
+    Returns
+    -------
+    Scene
+
+    Raises
+    ------
+    SceneError
+        Every fault of the new scene at once.
+
+    Examples
+    --------
+    >>> from wearstate.sim.scene import load_scene
+    >>> with_values(load_scene("bilge-pump"), {"pressure.rung": "none"}).pressure.rung
+    'none'
+    """
+    tree: dict[str, Any] = {}
+    for path, value in values.items():
+        *above, last = path.split(".")
+        node = tree
+        for key in above:
+            node = node.setdefault(key, {})
+        node[last] = value
+    return validate_table(type(scene), _grafted(scene, tree), scene.name)
+
+
+def _grafted(node: Any, tree: Mapping[str, Any]) -> Any:
+    """Fields of a part as a table, with a tree of new values in it; the rest stays validated."""
+    if isinstance(node, tuple):
+        return [
+            _grafted(entry, tree[str(i)]) if str(i) in tree else entry
+            for i, entry in enumerate(node)
+        ]
+    own = {
+        name: getattr(node, name)
+        for name, part in cast(type[BaseModel], type(node)).model_fields.items()
+        if getattr(node, name) is not None or part.default is not None
+    }
+    for key, value in tree.items():
+        own[key] = _grafted(getattr(node, key), value) if isinstance(value, Mapping) else value
+    return own
+
+
+def _refused(rungs: tuple[Rung, ...], scene: Scene, name: str) -> str | None:
+    """Why a scene with that rung is none: its first fault."""
+    rung = next(rung for rung in rungs if rung.name == name)
+    try:
+        changed = with_values(scene, rung.values)
+    except SceneError as error:
+        return error.faults[0]
+    return _beyond(changed)
+
+
+def _beyond(scene: Scene) -> str | None:
+    if not isinstance(scene, PumpScene):
+        return None
+    faults = joint_faults(scene) or [fault for _, fault in limits(scene)]
+    return faults[0] if faults else None
+
+
+def _effect(
+    name: str,
+    scene: Scene,
+    rungs: Iterable[Rung],
+    current: Callable[[Any], str],
+    *,
+    numerical: bool = False,
+) -> Effect:
+    rows = tuple(rungs)
+    return Effect(
+        name=name,
+        machine=scene.machine,
+        rungs=rows,
+        current=current,
+        refusal=partial(_refused, rows),
+        numerical=numerical,
+    )
+
+
+def _written(table: tuple[Rung, ...], paths: Iterable[str]) -> Iterator[Rung]:
+    """Rows of a table of rungs, each with the values that put it at the paths."""
+    places = tuple(paths)
+    for rung in table:
+        yield replace(rung, values=dict.fromkeys(places, rung.name))
+
+
+STEP_LEVELS = (4.0, 2.0, 1.0, 0.5, 0.25)
+"""Factors on a step that is written; the last is the finest."""
+
+FINE_LEVELS = (4.0, 2.0, 1.0, 0.5)
+"""Factors on a mesh width, an element, or the steps of an adaptive integrator."""
+
+
+def level_name(factor: float) -> str:
+    """Name of a level of a numerical effect.
+
+    Examples
+    --------
+    >>> [level_name(factor) for factor in (2.0, 1.0, 0.25)]
+    ['x2', 'x1', 'x1/4']
+    """
+    return f"x{factor:g}" if factor >= 1 else f"x1/{1 / factor:g}"
+
+
+def _levels(
+    what: str, factors: Iterable[float], values: Callable[[float], Mapping[str, Any] | None]
+) -> Iterator[Rung]:
+    """Levels of a numerical effect; a factor that cannot be written has none."""
+    for factor in factors:
+        found = values(factor)
+        if found is not None:
+            assumes = f"{what} of {factor:g} times what is written"
+            yield Rung(name=level_name(factor), assumes=assumes, values=found)
+
+
+def _as_written(_scene: Scene) -> str:
+    return level_name(1.0)
+
+
+# --- reciprocating pump
+
+
+def _joint_effects(scene: Scene) -> Iterator[Effect]:
+    pump = cast(PumpScene, scene)
+    for name in ("crankpin", "wristpin", "guide"):
+        part = getattr(pump.joint, name)
+        if part is None:
+            continue
+        table = tuple(r for r in JOINT_RUNGS if name != "guide" or r.name != "link")
+        rungs = _written(table, _throw_paths(pump, "joint", f"{name}.rung"))
+        yield _effect(name, scene, rungs, partial(_joint_rung, name))
+
+
+def _joint_rung(name: str, scene: Scene) -> str:
+    return str(getattr(cast(PumpScene, scene).joint, name).rung)
+
+
+def _throw_paths(scene: PumpScene, table: str, leaf: str) -> Iterator[str]:
+    """Path of a value in the scene's own table, and in that of every throw that has its own."""
+    yield f"{table}.{leaf}"
+    for i, throw in enumerate(scene.throws):
+        if getattr(throw, table) is not None:
+            yield f"throws.{i}.{table}.{leaf}"
+
+
+def _pressure_effect(scene: Scene) -> Iterator[Effect]:
+    pump = cast(PumpScene, scene)
+    if pump.piston.diameter > 0:  # else there is nothing to push on
+        rungs = _written(PRESSURE_RUNGS, _throw_paths(pump, "pressure", "rung"))
+        yield _effect("pressure", scene, rungs, lambda one: str(one.pressure.rung))
+
+
+def _drive_effect(scene: Scene) -> Iterator[Effect]:
+    if cast(PumpScene, scene).drive.motor is not None:
+        rungs = _written(DRIVE_RUNGS, ["drive.rung"])
+        yield _effect("drive", scene, rungs, lambda one: str(one.drive.rung))
+
+
+def _stiffest(scene: PumpScene) -> PumpScene:
+    """The scene with every contact that it can have: a step that is stable there is so anywhere."""
+    for effect in _joint_effects(scene):
+        rung = effect.rungs[-1]
+        if effect.refusal(scene, rung.name) is None:
+            scene = with_values(scene, rung.values)
+    return scene
+
+
+def _pump_step_effect(scene: Scene) -> Iterator[Effect]:
+    longest = pump_step(_stiffest(cast(PumpScene, scene)))
+    # a step is a whole part of a sample, and no longer than a half: what is coarser is the same
+    coarsest = max(1.0, 0.5 / scene.sample_rate / longest)
+
+    def values(factor: float) -> Mapping[str, Any] | None:
+        return {"numerics.step": factor * longest} if factor <= coarsest else None
+
+    rungs = _levels("a step", STEP_LEVELS, values)
+    yield _effect("step", scene, rungs, _as_written, numerical=True)
+
+
+# --- journal bearing
+
+
+def _film_effect(scene: Scene) -> Iterator[Effect]:
+    rungs = _written(FILM_RUNGS, ["film.rung"])
+    yield _effect("film", scene, rungs, lambda one: str(one.film.rung))
+
+
+def _mesh_effect(scene: Scene) -> Iterator[Effect]:
+    film = cast(JournalScene | ShaftScene, scene).film
+    # a line solves its films some hundred times, an orbit thousands of times: what each can afford
+    factors = FINE_LEVELS if isinstance(scene, JournalScene) else STEP_LEVELS
+    rungs = _levels("a mesh width of the film", factors, partial(_mesh, film))
+    yield _effect("mesh", scene, rungs, _as_written, numerical=True)
+
+
+def _mesh(film: Film, factor: float) -> Mapping[str, Any] | None:
+    """Nodes of a mesh so many times as wide: cells divide evenly, a node stays in the middle."""
+    round_, over = film.n_theta / factor, (film.n_z - 1) / factor
+    if round_ % 1 or over % 2 or round_ < _FEWEST_ROUND or over < _FEWEST_OVER:
+        return None
+    return {"film.n_theta": int(round_), "film.n_z": int(over) + 1}
+
+
+_FEWEST_ROUND, _FEWEST_OVER = 24, 6
+
+
+def _integrator_effect(scene: Scene) -> Iterator[Effect]:
+    journal = cast(JournalScene, scene)
+    numerics = journal.numerics
+    if numerics.integrator == "adaptive":
+
+        def tolerance(factor: float) -> Mapping[str, Any] | None:
+            # error of a step goes with its fourth power: so steps have the factor's length
+            value = numerics.tolerance * factor**4
+            return {"numerics.tolerance": value} if 1e-12 <= value <= 1e-2 else None
+
+        rungs = _levels("steps", FINE_LEVELS, tolerance)
+        yield _effect("tolerance", scene, rungs, _as_written, numerical=True)
+        return
+    longest = journal_step(journal)
+    coarsest = 1 / (journal.sample_rate * longest) * (1 + 1e-9)
+    factors = [factor for factor in STEP_LEVELS if factor <= coarsest]
+    rungs = _levels("a step", factors, lambda factor: {"numerics.step": factor * longest})
+    yield _effect("step", scene, rungs, _as_written, numerical=True)
+
+
+JOURNAL_STEP = 0.02
+"""Shaft angle of a step that the scene does not give, the source paper's [rad]."""
+
+
+def journal_step(scene: JournalScene) -> float:
+    """Step of a journal's fixed-step integrator: what is written, a whole part of a sample [s]."""
+    told = scene.numerics.step or JOURNAL_STEP / (math.tau * scene.drive.speed)
+    sample = 1 / scene.sample_rate
+    return sample / math.ceil(sample / told * (1 - 1e-9))
+
+
+# --- propulsion shaft
+
+
+def _beam_effect(scene: Scene) -> Iterator[Effect]:
+    rungs = _written(BEAM_RUNGS, ["shaft.theory"])
+    yield _effect("beam", scene, rungs, lambda one: str(one.shaft.theory))
+
+
+def _element_effect(scene: Scene) -> Iterator[Effect]:
+    length = cast(ShaftScene, scene).shaft.longest_element
+    rungs = _levels(
+        "elements of the beam",
+        FINE_LEVELS,
+        lambda factor: {"shaft.longest_element": factor * length},
+    )
+    yield _effect("elements", scene, rungs, _as_written, numerical=True)
+
+
+_EFFECTS: dict[str, tuple[Callable[[Scene], Iterator[Effect]], ...]] = {
+    "reciprocating-pump": (_joint_effects, _pressure_effect, _drive_effect, _pump_step_effect),
+    "journal-bearing": (_film_effect, _mesh_effect, _integrator_effect),
+    "propulsion-shaft": (_film_effect, _beam_effect, _element_effect, _mesh_effect),
+}
+"""What has rungs in a machine. A new effect is one row, its name in ``parts.EFFECTS``, one test."""
+
+VALIDITY = {"tension_share": 0.0}
+"""Numerics of a run -> most of it within the validity of its rungs."""
+
+
+# --- cost
+
+
+def cost_of(scene: Scene) -> float:
+    """Time that a run takes by the tables: predicted steps times tabulated cost [s].
+
+    Parameters
+    ----------
+    scene : Scene
+
+    Returns
+    -------
+    float
+        For ranking: the same on every machine.
+
+    Examples
+    --------
+    >>> from wearstate.sim.scene import load_scene
+    >>> cheap = load_scene("bilge-pump", {"joint.crankpin.rung": "ideal"})
+    >>> cost_of(cheap) < cost_of(load_scene("bilge-pump"))
+    True
+    """
+    return _COSTS[scene.machine](scene)
+
+
+def pump_steps(scene: PumpScene) -> int:
+    """Steps of a pump's run, settling included, but for the filters' edges."""
+    time = scene.duration + scene.settling_revolutions / scene.drive.speed
+    return math.ceil(time * scene.sample_rate) * math.ceil(
+        1 / (scene.sample_rate * pump_step(scene)) - 1e-9
+    )
+
+
+_MECHANISM = 60.0  # ns of a step of one throw beside its effects
+_MODE = 12.0  # ns of a step of one casing mode and its sensors
+_CASING_FIXED = 200.0  # ns of a step beside: low-pass and bookkeeping
+
+
+def _pump_cost(scene: Scene) -> float:
+    pump = cast(PumpScene, scene)
+    per_step = _CASING_FIXED + _MODE * len(pump.casing.modes) + _price("drive", pump.drive.rung)
+    for throw in range(len(pump.throws)):
+        per_step += _MECHANISM + _price("pressure", pump.pressures(throw).rung)
+        for part in joint_parts(pump, throw):
+            per_step += _price("joint", "ideal" if part is None else part.rung)
+    return 1e-9 * per_step * pump_steps(pump)
+
+
+def _price(effect: str, name: str) -> float:
+    return next(r.nanoseconds_per_step for r in LADDERS[effect] if r.name == name)
+
+
+_MESH = 72 * 17  # nodes on which a solve is tabulated
+_CALLS_PER_STEP = {"euler": 1, "rk4": 4, "adaptive": 10}
+_STEPS_PER_TURN = 16.0  # of the adaptive integrator at the tolerance below
+_TOLERANCE = 1e-5
+_MAP_SHARE = 96 * 97 / 100  # solves of a map's table, shared by the records of a small data set
+_SAMPLE = 1_500.0  # ns of one sample of one recording of an orbit
+
+
+def journal_calls(scene: JournalScene) -> float:
+    """Solves of the film that a run is expected to ask for."""
+    turns = scene.duration * scene.drive.speed + scene.settling_revolutions
+    numerics = scene.numerics
+    if numerics.integrator == "adaptive":
+        finer = math.sqrt(math.sqrt(_TOLERANCE / numerics.tolerance))
+        steps = turns * _STEPS_PER_TURN * finer
+    else:
+        steps = turns / (scene.drive.speed * journal_step(scene))
+    return steps * _CALLS_PER_STEP[numerics.integrator]
+
+
+def _nodes(film: Film) -> float:
+    return film.n_theta * film.n_z / _MESH
+
+
+def _journal_cost(scene: Scene) -> float:
+    journal = cast(JournalScene, scene)
+    film = journal.film
+    solve = _price("film", film.rung) * (_nodes(film) if film.rung == "direct" else 1.0)
+    table = _MAP_SHARE * _price("film", "direct") * _nodes(film) if film.rung == "map" else 0.0
+    samples = journal.duration * journal.sample_rate
+    return 1e-9 * (journal_calls(journal) * solve + table + samples * _SAMPLE)
+
+
+_BALANCE = 60  # solves of each bearing's film until shaft and films are balanced
+_ELEMENT = 300_000.0  # ns of one element: matrices, free modes, balance
+_CHANNEL = 120.0  # ns of one sample of one channel
+
+
+def _shaft_cost(scene: Scene) -> float:
+    shaft = cast(ShaftScene, scene)
+    film = _BALANCE * len(shaft.bearings) * _price("film", shaft.film.rung) * _nodes(shaft.film)
+    elements = sum(math.ceil(s.length / shaft.shaft.longest_element) for s in shaft.sections)
+    samples = shaft.duration * shaft.sample_rate * (len(shaft.sensors) + len(shaft.probes))
+    return 1e-9 * (film + elements * _ELEMENT + samples * _CHANNEL)
+
+
+_COSTS: dict[str, Callable[[Scene], float]] = {
+    "reciprocating-pump": _pump_cost,
+    "journal-bearing": _journal_cost,
+    "propulsion-shaft": _shaft_cost,
+}
+"""Cost of a run of every machine. A new machine is one row."""

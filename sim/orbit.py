@@ -738,7 +738,8 @@ def _fixed_call(work: _Work, s: _Settings) -> int:
             _keep_stage(work, call)
         if call < stages - 1:
             return _MORE
-        if y[_STATE, 0] ** 2 + y[_STATE, 1] ** 2 > s.safe * s.safe:
+        # at the centre too, where nothing is safe
+        if y[_STATE, 0] ** 2 + y[_STATE, 1] ** 2 >= s.safe * s.safe:
             return _MORE
     else:
         _difference(work, _column(s.method, call))

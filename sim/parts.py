@@ -491,10 +491,19 @@ class Numerics(Part):
     step: Time | None = Field(default=None, ge=_STEP_LEAST, description="largest integration step")
 
 
+EFFECTS: dict[str, tuple[str, ...]] = {
+    "reciprocating-pump": ("crankpin", "wristpin", "guide", "pressure", "drive", "step"),
+    "journal-bearing": ("film", "mesh", "tolerance", "step"),
+    "propulsion-shaft": ("film", "beam", "elements", "mesh"),
+}
+"""Effects of every machine, as ``pinned`` names them; their rungs are in :mod:`.ladder`."""
+
+
 class Scene(Part):
     """What every machine's scene holds.
 
-    ``accuracy`` is stored with the scene and not yet used to choose rungs or the step.
+    With ``fidelity = "auto"`` the rungs and the numerics written in a scene are replaced by the
+    cheapest that keep to ``accuracy``, but for the effects that ``pinned`` names.
     """
 
     name: str = Field(min_length=1)
@@ -508,12 +517,19 @@ class Scene(Part):
         default=3, ge=1, le=_SETTLING_MOST, description="run before the recording"
     )
     accuracy: Ratio = Field(default=0.02, gt=0, lt=1, description="error the features may carry")
+    fidelity: Literal["given", "auto"] = Field(
+        default="given", description="rungs and numerics as written, or as the accuracy needs"
+    )
+    pinned: tuple[str, ...] = Field(
+        default=(), description="effects that stay as they are written whatever the fidelity"
+    )
     tacho: Tacho | None = Tacho()
     numerics: Numerics = Numerics()
 
     @model_validator(mode="after")
     def _cross_checks(self) -> Self:
         faults = self.cross_faults({name: getattr(self, name) for name in type(self).model_fields})
+        faults += pinned_faults(self.machine, self.pinned)
         if faults:
             raise ValueError("\n".join(faults))
         return self
@@ -527,6 +543,22 @@ class Scene(Part):
         """Faults between parts, of those parts that are there; each machine has its own."""
         del parts
         return []
+
+
+def pinned_faults(machine: str, pinned: Sequence[str]) -> list[str]:
+    """Names that are no effects of a machine, as sentences.
+
+    Examples
+    --------
+    >>> pinned_faults("reciprocating-pump", ["presure"])
+    ["pinned: 'presure' is no effect of a reciprocating-pump; did you mean 'pressure'?"]
+    """
+    known = EFFECTS.get(machine)  # none: the machine itself is at fault
+    return [
+        f"pinned: '{name}' is no effect of a {machine}{nearest(name, known)}"
+        for name in pinned
+        if known and name not in known
+    ]
 
 
 def channels_of(scene: Scene) -> tuple[Channel, ...]:
@@ -587,7 +619,9 @@ def validate_table(model: type[Table], table: Mapping[str, Any], name: str) -> T
             for line in _fault_lines(model, entry)
         ]
         if issubclass(model, Scene) and () not in places:
-            faults += model.cross_faults(_valid_parts(model, table))
+            parts = _valid_parts(model, table)
+            faults += model.cross_faults(parts)
+            faults += pinned_faults(parts.get("machine", ""), parts.get("pinned", ()))
         raise SceneError(name, faults) from None
 
 

@@ -810,7 +810,7 @@ def check_shaft(scene: Scene) -> None:
     shaft = cast(ShaftScene, scene)
     faults = _sampling_faults(shaft)
     try:
-        alignment_line(shaft)
+        faults += _mesh_faults(shaft, alignment_line(shaft).beam)
     except ValueError as error:
         faults += str(error).splitlines()
     if faults:
@@ -846,6 +846,25 @@ def _sampling_faults(scene: ShaftScene) -> list[str]:
     return faults
 
 
+def _mesh_faults(scene: ShaftScene, beam: Beam) -> list[str]:
+    """A mesh that has less than an element to a half-wave within the band of the recording.
+
+    The frequency of a half-wave on one element is 11 % high.
+    """
+    steel = scene.shaft
+    slimmest = min(s.outer_diameter**2 + s.inner_diameter**2 for s in scene.sections)
+    omega = math.pi * scene.sample_rate
+    half_wave = math.pi * (steel.young / steel.density * slimmest / 16 / omega**2) ** 0.25
+    longest = float(np.diff(beam.stations).max())
+    if longest <= half_wave:
+        return []
+    return [
+        f"shaft.longest_element = {steel.longest_element:g} m makes elements of {longest:.3g} m, "
+        f"must be <= {half_wave:.3g} m, half a bending wave at half of sample_rate = "
+        f"{scene.sample_rate:g} Hz; shorten it, or lower sample_rate"
+    ]
+
+
 def simulate_shaft(scene: Scene, seed: int, truth: bool, raise_on_failure: bool) -> Solution:
     """Simulate one recording; see :func:`wearstate.sim.assemble.simulate`."""
     shaft = cast(ShaftScene, scene)
@@ -856,6 +875,7 @@ def simulate_shaft(scene: Scene, seed: int, truth: bool, raise_on_failure: bool)
     reduced = None
     if status.ok:
         reduced = reduced_rotor(shaft, state)
+        numerics |= _guards(shaft, reduced)
         status, culprit = _judged(shaft, state, reduced, numerics)
     if reduced is None or not status.ok:
         if raise_on_failure:
@@ -873,6 +893,25 @@ def simulate_shaft(scene: Scene, seed: int, truth: bool, raise_on_failure: bool)
         numerics=numerics,
         warnings=_warnings(shaft, state, numerics),
     )
+
+
+def _guards(scene: ShaftScene, reduced: ReducedRotor) -> Numerics:
+    """The least damped motion, which is how far the line is from unstable; error of the basis."""
+    swinging = reduced.poles[np.abs(reduced.poles.imag) > 0]
+    ratios = -swinging.real / np.abs(swinging)
+    least = int(np.argmin(ratios))
+    guards: Numerics = {
+        "least_damping_ratio": float(ratios[least]),
+        "least_damped_hz": float(abs(swinging[least].imag)) / math.tau,
+        "stability_margin": float(ratios[least]),
+    }
+    harmonics = harmonic_forces(scene)
+    if harmonics:
+        places: list[Place] = [(b.name, axis) for b in scene.bearings for axis in "yz"]
+        forces = list(dict.fromkeys(place for each in harmonics for place in each.forces))
+        lines = [each.frequency for each in harmonics]
+        guards["estimated_error"] = reduced.measured_error(lines, places, forces)
+    return guards
 
 
 def reduced_rotor(scene: ShaftScene, state: ShaftState) -> ReducedRotor:

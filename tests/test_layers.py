@@ -23,6 +23,7 @@ MAY_IMPORT = {
 """Package -> packages below it. sim and features know nothing of each other."""
 
 SIM_FLOORS = [
+    {"fidelity"},
     {"assemble"},
     {"pump", "journal", "shaft_line"},
     {"ladder"},
@@ -35,7 +36,7 @@ SIM_FLOORS = [
     {"film_relax"},
     {"film_direct"},
     {"film_line", "film_short"},
-    {"integrate", "analytic", "scene"},
+    {"integrate", "analytic", "scene", "steppers"},
     {"pump_parts", "journal_parts", "shaft_parts"},
     {"hydraulic_parts"},
     {"parts"},

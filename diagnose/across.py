@@ -1,0 +1,377 @@
+"""Does fidelity matter for the verdict? Trained on a cheap rung, judged on the best.
+
+The same machines are drawn for every rung: records of one number differ in the model alone, so
+that the loss is a paired difference over held-out machine draws.
+"""
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..datasets.generate import generate
+from ..datasets.recipe import Recipe, load_recipe
+from ..datasets.record import DataError
+from ..datasets.splits import group_folds
+from ..sim.fidelity import Difference
+from ..sim.ladder import Effect, admissible, cost_of, effects_of, with_values
+from ..sim.parts import Scene, nearest
+from .tabulate import FeatureTable, feature_table
+from .train import fit_severity
+
+Float = NDArray[np.float64]
+
+_FOLDS = 5
+_FEWEST_DRAWS = 10  # two a fold
+_BEYOND = 2.0  # times the trained severities: a report says "more than" and gives no figure
+_FLIPS = 4_999  # random signs of the paired test: its least p-value is 1 in 5,000
+
+
+@dataclass(frozen=True, kw_only=True)
+class Loss:
+    """What training on one rung costs.
+
+    Attributes
+    ----------
+    effect, rung : str
+        The one effect that is lowered, and to what.
+    cost : float
+        Tabulated, over that of the best rungs.
+    error : Difference
+        Mean absolute error on the best rungs over the condemning limit, trained on this one.
+    loss : Difference
+        Of that error against training on the best rungs, paired by machine draw.
+    p_value : float
+        Of no loss or gain, by random signs of the draws' differences; two-sided.
+    records : int
+        That both could simulate.
+    reason : str
+        Why there is no figure; empty where there is one.
+    """
+
+    effect: str
+    rung: str
+    cost: float
+    error: Difference
+    loss: Difference
+    p_value: float
+    records: int
+    reason: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Across:
+    """Losses of every rung below the best.
+
+    Attributes
+    ----------
+    recipe : str
+    best : mapping of str to str
+        Effect -> rung that all are judged on.
+    error : Difference
+        Trained and judged on the best rungs.
+    losses : tuple of Loss
+    records, draws : int
+    """
+
+    recipe: str
+    best: Mapping[str, str]
+    error: Difference
+    losses: tuple[Loss, ...]
+    records: int
+    draws: int
+
+
+def across_fidelity(
+    name: str | Path,
+    n: int,
+    folder: Path,
+    *,
+    effects: Sequence[str] = (),
+    overrides: Mapping[str, Any] | None = None,
+    seed: int = 0,
+    jobs: int = 1,
+    say: Callable[[str], None] | None = None,
+) -> Across:
+    """Generate a recipe on every rung of its effects, train on each, judge on the best.
+
+    Parameters
+    ----------
+    name : str or Path
+        Recipe.
+    n : int
+        Records of every rung.
+    folder : Path
+        For the data sets, one a rung; those that are there are used again.
+    effects : sequence of str
+        Only these are raised and lowered, others stay as written; all but steps and meshes by
+        default.
+    overrides : mapping, optional
+        Dotted path of the scene -> value.
+    seed : int
+        Of the data sets and the folds.
+    jobs : int
+        Worker processes.
+    say : callable, optional
+        Called with a line about every rung.
+
+    Returns
+    -------
+    Across
+
+    Raises
+    ------
+    DataError
+        An effect is unknown or has one rung only, or there are too few machine draws.
+    RecipeError
+        The recipe is at fault.
+    """
+    plain = load_recipe(name, overrides)
+    chosen = _effects(plain.scene, effects)
+    best = {effect.name: admissible(effect, plain.scene)[-1].name for effect in chosen}
+    table, limit = _made(plain, chosen, best, name, overrides, n, folder, seed, jobs, say)
+    assert table is not None
+    court = _Court(table, limit, plain.severity_columns[0], seed)
+    losses = []
+    for effect in chosen:
+        for rung in admissible(effect, plain.scene)[:-1]:
+            rungs = {**best, effect.name: rung.name}
+            cost = _cost(plain.scene, chosen, rungs) / _cost(plain.scene, chosen, best)
+            try:
+                other, _ = _made(plain, chosen, rungs, name, overrides, n, folder, seed, jobs, say)
+            except DataError as error:
+                losses.append(_no_loss(effect.name, rung.name, cost, str(error)))
+                continue
+            losses.append(court.loss(effect.name, rung.name, cost, other))
+    return Across(
+        recipe=plain.name,
+        best=best,
+        error=court.mean(court.own),
+        losses=tuple(losses),
+        records=len(table.values),
+        draws=len(np.unique(court.draws)),
+    )
+
+
+def _effects(scene: Scene, wanted: Sequence[str]) -> list[Effect]:
+    known = {effect.name: effect for effect in effects_of(scene)}
+    faults = [
+        f"effect = '{name}' is none of this scene{nearest(name, tuple(known))}"
+        for name in wanted
+        if name not in known
+    ]
+    found = [
+        effect
+        for name, effect in known.items()
+        if (name in wanted or (not wanted and not effect.numerical))
+        and len(admissible(effect, scene)) > 1
+    ]
+    if not faults and not found:
+        faults = [f"{scene.name}: 0 effects have two rungs, must be >= 1; name one with --effect"]
+    if faults:
+        raise DataError("\n".join(faults))
+    return found
+
+
+def _values(effects: Sequence[Effect], rungs: Mapping[str, str]) -> dict[str, Any]:
+    return {
+        path: value
+        for effect in effects
+        for path, value in effect.rung(rungs[effect.name]).values.items()
+    }
+
+
+def _cost(scene: Scene, effects: Sequence[Effect], rungs: Mapping[str, str]) -> float:
+    return cost_of(with_values(scene, _values(effects, rungs)))
+
+
+def _made(
+    plain: Recipe,
+    effects: Sequence[Effect],
+    rungs: Mapping[str, str],
+    name: str | Path,
+    overrides: Mapping[str, Any] | None,
+    n: int,
+    folder: Path,
+    seed: int,
+    jobs: int,
+    say: Callable[[str], None] | None,
+) -> tuple[FeatureTable, float]:
+    """Features of the data set on these rungs, and its condemning limit."""
+    from ..datasets.record import DataSet
+
+    words = "-".join(f"{effect}_{rung}" for effect, rung in rungs.items()).replace("/", "o")
+    path = folder / f"{plain.name}-{words}-{n}-{seed}.h5"
+    if say is not None:
+        say(", ".join(f"{effect} {rung}" for effect, rung in rungs.items()))
+    if not path.exists():
+        recipe = load_recipe(name, {**(overrides or {}), **_values(effects, rungs)})
+        generate(recipe, n, path, seed=seed, jobs=jobs, fidelity="given")
+    with DataSet(path) as data:
+        limit = data.attributes.condemning_limit
+    if not math.isfinite(limit):
+        raise DataError(f"{plain.name}: condemning_limit = {limit} m must be given; label the set")
+    return feature_table(path, jobs=jobs), limit
+
+
+class _Court:
+    """Errors on the best rungs, by folds of whole machine draws."""
+
+    def __init__(self, best: FeatureTable, limit: float, column: str, seed: int) -> None:
+        self.best, self.limit, self.seed = best, limit, seed
+        self.truth = best.manifest[column].to_numpy(dtype=float)
+        self.draws = best.manifest["group"].to_numpy()
+        if len(np.unique(self.draws)) < _FEWEST_DRAWS:
+            raise DataError(
+                f"{len(np.unique(self.draws))} machine draws, must be >= {_FEWEST_DRAWS}; "
+                "ask for more records"
+            )
+        self.folds = group_folds(self.draws, n=_FOLDS, seed=seed)
+        self.ids = best.manifest["record_id"].to_numpy()
+        self.own = self.errors(best, np.ones(len(self.ids), dtype=bool))
+
+    def errors(self, table: FeatureTable, usable: NDArray[np.bool_]) -> Float:
+        """Absolute errors over the limit of every best record, trained on another table's.
+
+        `usable` says which best records the table has, too; only those are trained on.
+        """
+        rows = {record: i for i, record in enumerate(table.manifest["record_id"])}
+        found = np.empty_like(self.truth)
+        for train, test in self.folds:
+            kept = train[usable[train]]
+            values = table.values[[rows[record] for record in self.ids[kept]]]
+            model, _ = fit_severity(values, self.truth[kept], self.draws[kept], self.seed)
+            low, high = self.truth[kept].min() / _BEYOND, self.truth[kept].max() * _BEYOND
+            found[test] = np.exp(
+                np.clip(model.predict(self.best.values[test]), math.log(low), math.log(high))
+            )
+        return np.asarray(np.abs(found - self.truth) / self.limit)
+
+    def loss(self, effect: str, rung: str, cost: float, other: FeatureTable) -> Loss:
+        """Loss of one rung, against training on the best rungs of the same records."""
+        usable = np.isin(self.ids, other.manifest["record_id"].to_numpy())
+        left = len(np.unique(self.draws[usable]))
+        if left < _FEWEST_DRAWS or other.names != self.best.names:
+            return _no_loss(effect, rung, cost, f"{left} machine draws could be simulated")
+        there = self.errors(other, usable)
+        here = self.own if usable.all() else self.errors(self.best, usable)
+        means = _draw_means(there - here, self.draws)
+        return Loss(
+            effect=effect,
+            rung=rung,
+            cost=cost,
+            error=self.mean(there),
+            loss=_difference(means),
+            p_value=sign_flip_test(means, seed=self.seed),
+            records=int(usable.sum()),
+        )
+
+    def mean(self, errors: Float) -> Difference:
+        """Mean over draws."""
+        return _difference(_draw_means(errors, self.draws))
+
+
+def _no_loss(effect: str, rung: str, cost: float, reason: str) -> Loss:
+    nothing = Difference(mean=math.nan, standard_error=math.nan)
+    return Loss(
+        effect=effect,
+        rung=rung,
+        cost=cost,
+        error=nothing,
+        loss=nothing,
+        p_value=math.nan,
+        records=0,
+        reason=reason.splitlines()[0],
+    )
+
+
+def _draw_means(values: Float, draws: NDArray[Any]) -> Float:
+    return np.array([values[draws == draw].mean() for draw in np.unique(draws)])
+
+
+def _difference(means: Float) -> Difference:
+    spread = float(means.std(ddof=1) / math.sqrt(len(means)))
+    return Difference(mean=float(means.mean()), standard_error=spread)
+
+
+def sign_flip_test(differences: Float, *, seed: int = 0) -> float:
+    """Two-sided p-value of paired differences whose sign would be chance without an effect.
+
+    Parameters
+    ----------
+    differences : numpy.ndarray [shape=(n,)]
+        One a pair.
+    seed : int
+        Of the random signs.
+
+    Returns
+    -------
+    float
+        Share of :data:`_FLIPS` sign patterns whose mean is as far from zero, the one observed
+        among them; of 12 pairs and fewer all patterns.
+
+    References
+    ----------
+    Fisher, "The design of experiments", Oliver and Boyd 1935, section 21.
+
+    Examples
+    --------
+    >>> sign_flip_test(np.ones(5))
+    0.0625
+    """
+    n = len(differences)
+    if n <= _ALL_SIGNS:
+        codes = np.arange(2**n)[:, None] >> np.arange(n) & 1
+        means = np.abs((2 * codes - 1) @ differences)
+        return float(np.mean(means >= abs(differences.sum()) * (1 - _ROUNDING)))
+    signs = np.random.default_rng(seed).choice([-1.0, 1.0], (_FLIPS, n))
+    means = np.abs(signs @ differences)
+    count = np.count_nonzero(means >= abs(differences.sum()) * (1 - _ROUNDING))
+    return float((1 + count) / (1 + _FLIPS))
+
+
+_ALL_SIGNS = 12
+_ROUNDING = 1e-12
+
+
+def across_table(found: Across) -> dict[str, Any]:
+    """As plain values."""
+    return {
+        "recipe": found.recipe,
+        "judged_on": dict(found.best),
+        "records": found.records,
+        "draws": found.draws,
+        "error_share_of_limit": asdict(found.error),
+        "losses": [asdict(loss) for loss in found.losses],
+    }
+
+
+def across_text(found: Across) -> str:
+    """As lines for a terminal."""
+    best = ", ".join(f"{effect} {rung}" for effect, rung in found.best.items())
+    return "\n".join(
+        [
+            f"{found.recipe} (simulated): {found.records} records of {found.draws} machine draws, "
+            f"judged on {best}",
+            f"  trained there, too: error {found.error.error:.2%} of the limit "
+            f"(± {found.error.standard_error:.2%})",
+            *_loss_lines(found.losses),
+        ]
+    )
+
+
+def _loss_lines(losses: Sequence[Loss]) -> Iterator[str]:
+    yield f"  {'trained on':28} {'cost':>7} {'error':>8} {'loss':>8} {'±':>7} {'p':>7}"
+    for loss in losses:
+        name = f"{loss.effect} {loss.rung}"
+        if loss.reason:
+            yield f"  {name:28} {loss.cost:7.3g}  none: {loss.reason}"
+            continue
+        yield (
+            f"  {name:28} {loss.cost:7.3g} {loss.error.mean:8.2%} {loss.loss.mean:+8.2%} "
+            f"{loss.loss.standard_error:7.2%} {loss.p_value:7.2g}"
+        )

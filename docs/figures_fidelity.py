@@ -1,0 +1,48 @@
+"""Charts and atlases of the built-in scenes: ``python docs/figures_fidelity.py [NAME …]``.
+
+All simulated. A chart is speed against accuracy of every rung and step (``wearstate chart``), an
+atlas shows where each method fails (``wearstate stability``). Up to some minutes a scene on one
+core; the text of every chart goes to stdout.
+"""
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from wearstate.diagnose.chart import Chart, chart_text, scene_chart
+from wearstate.diagnose.chart_figure import save_chart
+from wearstate.diagnose.stability import save_figure
+from wearstate.diagnose.stability_maps import atlas
+from wearstate.sim.scene import load_scene, scene_names
+
+BUDGET = 120.0
+"""Seconds of a chart and of an atlas; what they leave no time for is said in the picture."""
+
+SHORTER: dict[str, dict[str, Any]] = {
+    "bilge-pump": {"duration": "0.8 s"},  # four revolutions
+    "triplex-pump": {"duration": "0.8 s"},
+    "journal-bearing": {"duration": "0.4 s"},  # twenty
+}
+"""Scenes whose recording is cut, so that a budget of minutes sees all rungs."""
+
+
+def chart(name: str, budget: float | None = BUDGET) -> Chart:
+    """Chart of a scene, with its rungs as written where they are pinned."""
+    return scene_chart(load_scene(name, SHORTER.get(name)), budget=budget)
+
+
+def main(names: Sequence[str], folder: Path) -> None:
+    folder.mkdir(parents=True, exist_ok=True)
+    for name in names or scene_names():
+        found = chart(name)
+        save_chart(found, folder / f"chart-{name}.png")
+        print(chart_text(found), end="\n\n", flush=True)
+        scene = load_scene(name)
+        maps = atlas(scene, budget=BUDGET)
+        if maps:
+            save_figure(scene, maps, folder / f"atlas-{name}.png")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:], Path(__file__).parent / "img")

@@ -1,0 +1,40 @@
+"""The script behind the page on fidelity: every scene it shortens exists, a chart comes of one."""
+
+import importlib.util
+import re
+from pathlib import Path
+
+import pytest
+import wearstate
+from wearstate.sim.scene import load_scene, scene_names
+
+DOCS = Path(wearstate.__file__).parent / "docs"
+
+
+@pytest.fixture(scope="module")
+def figures():
+    spec = importlib.util.spec_from_file_location("figures_fidelity", DOCS / "figures_fidelity.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_only_built_in_scenes_are_shortened(figures):
+    assert set(figures.SHORTER) <= set(scene_names())
+    for name, values in figures.SHORTER.items():
+        assert load_scene(name, values).duration < load_scene(name).duration
+
+
+def test_every_picture_of_the_page_is_there():
+    shown = re.findall(r"\]\((img/[^)]+)\)", (DOCS / "fidelity.md").read_text(encoding="utf-8"))
+    assert len(shown) > 4
+    assert [name for name in shown if not (DOCS / name).is_file()] == []
+
+
+def test_a_chart_keeps_to_its_budget(figures, monkeypatch):
+    small = {"film.n_theta": 24, "film.n_z": 5, "duration": "0.05 s"}
+    monkeypatch.setitem(figures.SHORTER, "journal-bearing", small)
+    chart = figures.chart("journal-bearing", budget=1e-3)
+    assert chart.status == "out of budget"
+    assert chart.winner == "reference" or chart.winner.startswith("film")
+    assert "out of budget" in chart.pruned[0]

@@ -1,0 +1,254 @@
+"""Rungs as data: every row fits its scene, refuses what is not valid, and is ranked by its cost."""
+
+import math
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from wearstate.sim.assemble import simulate
+from wearstate.sim.journal import journal_film, squeeze_rate
+from wearstate.sim.ladder import (
+    LADDERS,
+    admissible,
+    cost_of,
+    effects_of,
+    journal_calls,
+    level_name,
+    pump_step,
+    pump_steps,
+    with_values,
+)
+from wearstate.sim.orbit import load, run_orbit, short_film
+from wearstate.sim.parts import EFFECTS, SceneError
+from wearstate.sim.scene import load_scene, scene_names
+
+PUMPS = ("bilge-pump", "slider-crank-benchmark", "triplex-pump")
+JOURNALS = tuple(name for name in scene_names() if name.startswith("journal"))
+
+
+def effect(scene, name):
+    return next(each for each in effects_of(scene) if each.name == name)
+
+
+# --- rows
+
+
+@pytest.mark.parametrize("name", scene_names())
+def test_every_rung_goes_into_its_scene_and_is_found_there(name):
+    scene = load_scene(name)
+    for each in effects_of(scene):
+        assert each.name in EFFECTS[scene.machine]
+        for rung in admissible(each, scene):
+            changed = with_values(scene, rung.values)
+            if each.numerical:
+                assert effect(changed, each.name).current(changed) == "x1"
+            else:
+                assert each.current(changed) == rung.name
+
+
+def test_every_effect_of_a_machine_is_found_in_one_of_its_scenes():
+    found = {machine: set() for machine in EFFECTS}
+    for name in scene_names():
+        changes = [{}]
+        if name == "journal-step":
+            changes.append({"numerics.integrator": "rk4"})
+        for change in changes:
+            scene = load_scene(name, change)
+            found[scene.machine] |= {each.name for each in effects_of(scene)}
+    assert found == {machine: set(names) for machine, names in EFFECTS.items()}
+
+
+def test_an_absent_effect_is_absent():
+    names = [each.name for each in effects_of(load_scene("slider-crank-benchmark"))]
+    assert names == ["crankpin", "step"]  # no wrist pin, no guide, no bore, no motor
+
+
+def test_rungs_are_tabulated_from_the_cheapest():
+    for rungs in LADDERS.values():
+        costs = [rung.nanoseconds_per_step for rung in rungs]
+        assert costs == sorted(costs)
+        assert all(rung.assumes and rung.valid for rung in rungs)
+
+
+@pytest.mark.parametrize(
+    ("name", "changes", "where", "rung", "cure"),
+    [
+        ("triplex-pump", {}, "pressure", "heads", "suction_line is missing"),
+        ("bilge-pump", {"joint.crankpin.diametral_clearance": 0}, "crankpin", "link", "clearance"),
+        ("bilge-pump", {"drive.speed": "900 rpm"}, "pressure", "heads", "vapour"),
+        ("propulsion-shaft", {}, "film", "map", "knows no tilted journal"),
+        (
+            "journal-bearing",
+            {"bearing.scar_depth": "5 um", "film.rung": "direct"},
+            "film",
+            "short",
+            "plain bore only",
+        ),
+    ],
+)
+def test_what_a_scene_does_not_admit_is_refused_with_the_reason(name, changes, where, rung, cure):
+    if name == "bilge-pump" and "drive.speed" not in changes:
+        changes = {**changes, "joint.crankpin.rung": "ideal"}
+    scene = load_scene(name, changes)
+    each = effect(scene, where)
+    assert cure in each.refusal(scene, rung)
+    assert rung not in [row.name for row in admissible(each, scene)]
+    assert each.current(scene) in [row.name for row in admissible(each, scene)]
+
+
+def test_levels_go_by_factors_of_two():
+    scene = load_scene("slider-crank-benchmark")
+    rungs = effect(scene, "step").rungs
+    steps = [rung.values["numerics.step"] for rung in rungs]
+    assert [rung.name for rung in rungs] == [level_name(f) for f in (4, 2, 1, 0.5, 0.25)]
+    assert_allclose(np.divide(steps[:-1], steps[1:]), 2.0)
+    assert_allclose(steps[2], pump_step(scene), rtol=1e-12)  # what is written is the middle
+    meshes = effect(load_scene("journal-bearing"), "mesh").rungs
+    assert [tuple(rung.values.values()) for rung in meshes] == [(36, 9), (72, 17), (144, 33)]
+
+
+def test_a_step_is_stable_for_every_rung_of_the_joints():
+    """The levels hold whichever joints are chosen: none is refused for the stiffest contact."""
+    scene = load_scene("triplex-pump")
+    rungs = {each.name: admissible(each, scene)[-1] for each in effects_of(scene)}
+    values = {path: value for rung in rungs.values() for path, value in rung.values.items()}
+    coarse = effect(scene, "step").rungs[0].values
+    assert effect(scene, "step").refusal(with_values(scene, values), "x1") is None
+    assert pump_step(with_values(scene, {**values, **coarse})) <= 0.5 / scene.sample_rate
+
+
+# --- values
+
+
+def test_values_change_nothing_else():
+    for name in scene_names():
+        scene = load_scene(name)
+        assert with_values(scene, {}) == scene
+        changed = with_values(scene, {"accuracy": 0.05}).model_dump()
+        assert changed == {**scene.model_dump(), "accuracy": 0.05}
+
+
+def test_a_scene_without_a_tacho_stays_without():
+    scene = load_scene("bilge-pump", {"tacho": None})
+    assert with_values(scene, {"joint.crankpin.rung": "ideal"}).tacho is None
+
+
+def test_a_throw_with_its_own_joint_gets_the_rung_too():
+    own = {"throws.1.joint": {"crankpin": {"diametral_clearance": "0.1 mm"}}}
+    scene = load_scene("triplex-pump", own)
+    changed = with_values(scene, effect(scene, "crankpin").rung("ideal").values)
+    assert [changed.joints(throw).crankpin.rung for throw in range(3)] == ["ideal"] * 3
+    assert_allclose(changed.joints(1).crankpin.clearance_diametral, 1e-4)
+
+
+def test_an_unknown_effect_is_refused_with_the_nearest():
+    with pytest.raises(SceneError, match=r"'presure' is no effect .*did you mean 'pressure'"):
+        load_scene("bilge-pump", {"pinned": ["presure"]})
+    # beside other faults too
+    with pytest.raises(SceneError, match="2 fault"):
+        load_scene("bilge-pump", {"pinned": ["presure"], "accuracy": 2})
+    with pytest.raises(SceneError, match="fidelity = "):
+        load_scene("bilge-pump", {"fidelity": "best"})
+
+
+# --- cost: counted, never timed
+
+
+@pytest.mark.parametrize("name", PUMPS)
+def test_predicted_steps_are_those_of_a_pumps_run(name):
+    scene = load_scene(name, {"duration": 1.5 / load_scene(name).drive.speed})
+    numerics = simulate(scene, seed=1).numerics
+    # the filters of the casing need a hundred samples or so at either end
+    per_sample = round(1 / (scene.sample_rate * numerics["step_s"]))
+    assert 0 <= numerics["steps"] - pump_steps(scene) < 260 * per_sample
+    assert numerics["step_s"] <= pump_step(scene) * (1 + 1e-9)
+
+
+@pytest.mark.parametrize("name", JOURNALS)
+@pytest.mark.parametrize("tolerance", [1e-6, 1e-4])
+def test_predicted_calls_are_those_of_an_orbit(name, tolerance):
+    scene = load_scene(name, {"film.rung": "short", "numerics.tolerance": tolerance})
+    calls = simulate(scene, seed=1).numerics["film_calls"]
+    # how lively an orbit is cannot be seen in its scene; a rung differs by more
+    assert 1 / 4 < calls / journal_calls(scene) < 4
+
+
+def test_a_fixed_step_asks_for_as_many_solves_as_predicted():
+    scene = load_scene("journal-step", {"film.rung": "short", "numerics.integrator": "rk4"})
+    calls = simulate(scene, seed=1).numerics["film_calls"]
+    assert calls == pytest.approx(journal_calls(scene), rel=0.05)  # whole steps to a sample
+
+
+@pytest.mark.parametrize("name", scene_names())
+def test_a_better_rung_or_a_finer_level_costs_no_less(name):
+    scene = load_scene(name)
+    # the same step for all, as a choice has it: what is left to itself depends on the contact
+    steps = [each.rungs[-1].values for each in effects_of(scene) if each.name == "step"]
+    for each in effects_of(scene):
+        same = steps[0] if steps and each.name != "step" else {}
+        costs = [
+            cost_of(with_values(scene, {**same, **rung.values})) for rung in admissible(each, scene)
+        ]
+        if each.name == "film" and "map" in [rung.name for rung in each.rungs]:
+            costs = [costs[0], costs[-1]]  # a table pays or does not, by the length of the run
+        assert costs == sorted(costs), each.name
+
+
+# --- guards
+
+
+def test_margin_and_expected_error_of_a_pump_follow_its_step():
+    steps = (1e-6, 2e-6)
+    changes = [{"numerics.step": step, "duration": "0.2 s"} for step in steps]
+    short, long = (simulate(load_scene("bilge-pump", c), seed=1).numerics for c in changes)
+    ratio = long["step_s"] / short["step_s"]
+    assert_allclose((1 - long["stability_margin"]) / (1 - short["stability_margin"]), ratio)
+    assert_allclose(long["estimated_error"] / short["estimated_error"], ratio**4)  # its order
+    assert 0 < long["stability_margin"] < short["stability_margin"] < 1
+
+
+def test_squeeze_rate_of_a_short_bearing():
+    """Centred journal: squeezed oil holds pressure on one half of the circle, pi/2 of cos^2."""
+    film = short_film(0.5)
+    run = run_orbit(film, load(alpha=1.0), duration=0.1)
+    # P = 6 (L/D)^2 ... integrated over the length: 4 (L/D)^2 a unit of cos; wedge none at rest
+    assert_allclose(squeeze_rate(film, run), 4 * 0.25 * math.pi / 2, rtol=1e-3)
+
+
+@pytest.mark.parametrize("integrator", ["euler", "rk4"])
+def test_margin_of_an_orbit_says_where_its_step_becomes_unstable(integrator):
+    """Doubling the step until the run is refused: the margin shrinks with it."""
+    changes = {
+        "film.rung": "short",
+        "numerics.integrator": integrator,
+        "sample_rate": 400,
+        "tacho": None,
+    }
+    margins, step = [], 2e-5
+    while step < 2e-3:
+        scene = load_scene("journal-bearing", {**changes, "numerics.step": step})
+        result = simulate(scene, seed=1, raise_on_failure=False)
+        if not result.status.ok:
+            break
+        margins.append(result.numerics["stability_margin"])
+        step *= 2
+    assert not result.status.ok
+    assert result.status.name == "SQUEEZE"
+    assert margins[0] > 0.5
+    assert margins == sorted(margins, reverse=True)
+    # twice the step doubles what is used up, and that was too much
+    assert 2 * (1 - margins[-1]) > 1 - 0.2
+
+
+def test_an_adaptive_orbit_is_stable_at_any_step():
+    numerics = simulate(load_scene("journal-bearing"), seed=1).numerics
+    assert numerics["stability_margin"] == 1.0
+    assert numerics["estimated_error"] == load_scene("journal-bearing").numerics.tolerance
+    assert journal_film(load_scene("journal-bearing")) is not None
+
+
+def test_guards_of_a_line_are_its_least_damped_motion_and_the_error_of_its_basis():
+    numerics = simulate(load_scene("shaft-rig"), seed=1).numerics
+    assert 0 < numerics["stability_margin"] == numerics["least_damping_ratio"] < 0.1
+    assert numerics["least_damped_hz"] > 0
+    assert 0 < numerics["estimated_error"] < 1e-3
