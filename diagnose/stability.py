@@ -428,9 +428,13 @@ _LINES: tuple[dict[str, Any], ...] = (
 )
 
 
+_DECADES = 300
+"""Range of an axis, end over end, below which 1, 2 and 5 are marked in each decade."""
+
+
 def _draw_panel(panel: Any, plan: Plan, codes: NDArray[np.int64]) -> None:
     from matplotlib.colors import BoundaryNorm, ListedColormap
-    from matplotlib.ticker import NullFormatter
+    from matplotlib.ticker import LogLocator, NullFormatter
 
     colours = ListedColormap([_COLOUR[verdict] for verdict in Verdict])
     norm = BoundaryNorm(np.arange(len(Verdict) + 1) - 0.5, len(Verdict))
@@ -440,8 +444,12 @@ def _draw_panel(panel: Any, plan: Plan, codes: NDArray[np.int64]) -> None:
         scale("log" if axis.log else "linear")
     panel.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
     for axis, ticks in ((plan.x, panel.xaxis), (plan.y, panel.yaxis)):
-        if axis.log and axis.values[-1] > 20 * axis.values[0]:
-            ticks.set_minor_formatter(NullFormatter())  # decades say enough
+        if not axis.log:
+            continue
+        ticks.set_minor_formatter(NullFormatter())  # decades say enough, where there are several
+        if axis.values[-1] < _DECADES * axis.values[0]:
+            ticks.set_major_locator(LogLocator(subs=(1, 2, 5)))
+            ticks.set_major_formatter("{x:g}")
     panel.tick_params(labelsize=8)
 
 
