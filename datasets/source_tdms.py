@@ -1,8 +1,10 @@
 """TDMS (LabVIEW) through the extra ``wearstate[tdms]``: metadata first, samples in pieces."""
 
 import importlib
+import io
 import logging
 import math
+import os
 import struct
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -40,7 +42,7 @@ def tdms_contents(path: Path, options: SourceOptions) -> Contents:
         ) from None
     _walk_segments(path)
     # opened here: the library would believe an index file beside it, which may be another's
-    handle = path.open("rb")
+    handle = _Bounded(io.FileIO(path))
     try:
         with _no_warning(path):
             file = nptdms.TdmsFile.open(handle)
@@ -55,23 +57,31 @@ def tdms_contents(path: Path, options: SourceOptions) -> Contents:
     return Contents(parts=contents.parts, others=contents.others, close=handle.close)
 
 
+class _Bounded(io.BufferedReader):
+    """A file that never sets memory aside for more than it holds, whatever length is declared."""
+
+    def read(self, size: int | None = -1, /) -> bytes:
+        """Bytes from here, at most to the end."""
+        if size is None or size < 0:
+            return super().read()
+        left = os.fstat(self.fileno()).st_size - self.tell()
+        return super().read(min(size, max(left, 0)))
+
+
 @contextmanager
 def _no_warning(path: Path) -> Iterator[None]:
     """What the library only warns of on its console is damage."""
     console = importlib.import_module("nptdms.log").log_manager.console_handler
-    said: list[str] = []
 
-    def listen(record: logging.LogRecord) -> bool:
-        said.append(record.getMessage())
-        return False
+    def refuse(record: logging.LogRecord) -> bool:
+        # at the first one: a forged length would have it warn, and keep texts, a million times
+        raise damaged(path, ValueError(record.getMessage()))
 
-    console.addFilter(listen)
+    console.addFilter(refuse)
     try:
         yield
     finally:
-        console.removeFilter(listen)
-    if said:
-        raise damaged(path, ValueError(said[0]))
+        console.removeFilter(refuse)
 
 
 def _walk_segments(path: Path) -> None:

@@ -983,6 +983,21 @@ def test_tdms_groups_segments_and_units(tdms):
     assert values(path, variable="plant").shape == (1, 50)
 
 
+def test_tdms_sets_no_memory_aside_for_a_length_that_cannot_be(tdms):
+    path = tdms([("rig", "x", SIGNAL[0], {"wf_increment": 0.1, "unit_string": "g"})])
+    content = path.read_bytes()
+    place = content.index(b"/'rig'") - 4  # its length, of 6 byte, becomes 1 GiB and 6 byte
+    path.write_bytes(content[: place + 3] + b"\x40" + content[place + 4 :])
+    tracemalloc.start()
+    try:
+        with pytest.raises(DataError):
+            open_source(path)
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert peak < 2**24
+
+
 def test_tdms_at_fault(tdms):
     path = tdms([("rig", "x", SIGNAL[0], {"wf_increment": -1.0})])
     assert "wf_increment of x is -1.0, must be a number > 0" in refusal(path)
