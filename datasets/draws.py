@@ -7,6 +7,7 @@ from typing import Any, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
+from scipy.special import ndtri
 
 from ..sim.parts import Part, Ratio, Scene, SceneError
 from ..sim.scene import override, scene_from_table
@@ -96,10 +97,16 @@ class Range:
     kind: Kind
     bands: tuple[tuple[float, float], ...]
 
-    def value(self, rng: np.random.Generator) -> float:
-        """Draw one."""
+    @property
+    def entries(self) -> tuple[str, ...]:
+        """Name of the one coordinate that it is drawn from."""
+        return (self.path,)
+
+    def value(self, coordinates: Sequence[float]) -> float:
+        """Value at a coordinate in (0, 1), rising with it [coordinates: shape=(1,)]."""
         scaled = [(self.kind.scale(low), self.kind.scale(high)) for low, high in self.bands]
-        left = rng.random() * sum(high - low for low, high in scaled)
+        [left] = coordinates
+        left *= sum(high - low for low, high in scaled)
         for low, high in scaled:
             if left <= high - low:
                 return self.kind.back(low + left)
@@ -129,10 +136,15 @@ class Vector:
     base: Mapping[str, float]
     scale: float
 
-    def value(self, rng: np.random.Generator) -> dict[str, float]:
-        """Draw one."""
+    @property
+    def entries(self) -> tuple[str, ...]:
+        """Names of the coordinates that it is drawn from, one for each number."""
+        return tuple(f"{self.path}.{key}" for key in self.base)
+
+    def value(self, coordinates: Sequence[float]) -> dict[str, float]:
+        """Table at coordinates in (0, 1), as far along any direction [shape=(n_numbers,)]."""
         centre = np.array(list(self.base.values()))
-        change = rng.standard_normal(centre.size)
+        change = ndtri(np.asarray(coordinates))  # normal, so that no direction is favoured
         change *= self.scale * np.linalg.norm(centre) / np.linalg.norm(change)
         return dict(zip(self.base, (centre + change).tolist(), strict=True))
 

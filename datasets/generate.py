@@ -4,7 +4,8 @@ Workers simulate, this process alone writes. A killed run is resumed by the same
 """
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -19,6 +20,7 @@ from ..sim.parts import Scene, SceneError, channels_of
 from ..sim.wear import grade
 from .choice import Choice, choose, with_choice
 from .draws import value_at
+from .pool import WorkersError
 from .recipe import (
     CONDITIONS,
     LARGEST_SEED,
@@ -36,9 +38,11 @@ from .record import (
     Attributes,
     DataError,
     DataSetWriter,
+    WriteError,
     refuse_output,
     unfinished_attributes,
 )
+from .split_file import Drawn, default_splits, split_names
 from .workers import in_order
 
 NUMERICS = {
@@ -123,6 +127,11 @@ class _Outcome:
     row: dict[str, Any]
     truth: dict[str, NDArray[np.float32]]
     fault: str
+    refused: Sample | None = None
+
+
+class Stopped(KeyboardInterrupt):
+    """A run was stopped by hand; says what is kept and how to go on."""
 
 
 def generate(
@@ -132,6 +141,7 @@ def generate(
     *,
     seed: int = 0,
     jobs: int = 1,
+    scheduler: str | None = None,
     force: bool = False,
     truth: bool = False,
     fidelity: Literal["auto", "given"] | None = None,
@@ -154,6 +164,9 @@ def generate(
     jobs : int
         Processes that simulate, >= 1; no more are started than there are records. Signal and
         manifest are the same for any number.
+    scheduler : str, optional
+        Address of a Dask scheduler, ``tcp://HOST:PORT``, whose workers simulate instead of `jobs`
+        processes here; the same bytes again, on processors of one kind.
     force : bool
         Replace an existing file and start an unfinished one anew.
     truth : bool
@@ -164,7 +177,7 @@ def generate(
     progress : callable, optional
         Called with (records done, records in all) after each.
     say : callable, optional
-        Called with a line about each pilot of the choice.
+        Called with a line about each pilot of the choice, and about workers.
 
     Returns
     -------
@@ -177,9 +190,12 @@ def generate(
         The recipe is at fault; nothing is written.
     DataError
         The file exists, an unfinished one is of another run, `jobs` is below one, there is no
-        room, or every record failed (the file stays, to be looked at).
-    KeyboardInterrupt
-        As it came; the unfinished file is closed and can be gone on with.
+        room, `scheduler` cannot be used, or every record failed (the file stays, to be looked at).
+    WorkersError, WriteError
+        Workers or scheduler were lost, or the disk is full or failing. What is written stays in
+        the unfinished file, and the same call goes on with it.
+    Stopped
+        A KeyboardInterrupt came; as above.
 
     Notes
     -----
@@ -198,22 +214,68 @@ def generate(
     if jobs < 1:
         raise DataError(f"jobs = {jobs} must be >= 1; give the number of cores")
     _refuse_bounds(plan, count, seed)
-    jobs = min(jobs, count)
+    if scheduler is not None:
+        from .cluster import refuse_scheduler
+
+        refuse_scheduler(scheduler)
     choice = _chosen(plan, path, fidelity=fidelity, seed=seed, force=force, say=say)
     plan = with_choice(plan, choice)
     tally = _Tally(count, choice)
     error = None if choice is None else choice.estimated_error
-    with _writer(plan, count, path, seed=seed, force=force, truth=truth, choice=choice) as writer:
+    work = partial(_simulated, truth=truth, error=error)
+    with (
+        _writer(plan, count, path, seed=seed, force=force, truth=truth, choice=choice) as writer,
+        _going_on(writer),
+    ):
         tally.n_resumed = int(np.count_nonzero(writer.done))
         samples = sample_records(plan, count, seed=seed, skip=writer.done.copy())
-        for outcome in in_order(partial(_simulated, truth=truth, error=error), samples, jobs=jobs):
-            writer.write(outcome.index, outcome.signal, outcome.row, outcome.truth)
-            tally.note(outcome)
-            if progress is not None:
-                progress(int(np.count_nonzero(writer.done)), count)
+        jobs = min(jobs, max(1, count - tally.n_resumed))
+        found = in_order(work, samples, jobs=jobs, scheduler=scheduler, say=say)
+        with closing(found) as outcomes:
+            for outcome in outcomes:
+                if scheduler is not None and outcome.refused is not None:
+                    _refuse_refusal(outcome, work)
+                writer.write(outcome.index, outcome.signal, outcome.row, outcome.truth)
+                tally.note(outcome)
+                if progress is not None:
+                    progress(int(np.count_nonzero(writer.done)), count)
         rows = writer.manifest()
+        _write_splits(writer, rows, plan, seed)
         writer.finish()
     return tally.summary(writer.path, rows)
+
+
+@contextmanager
+def _going_on(writer: DataSetWriter) -> Iterator[None]:
+    """Tell with whatever stops a run what is kept, and how to go on."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        raise Stopped(f"stopped; {_kept(writer)}") from None
+    except (WorkersError, WriteError) as error:
+        raise type(error)(f"{error}; {_kept(writer)}") from error
+    except DataError:
+        writer.close()
+        if not writer.done.any():  # workers that cannot be used: nothing has begun
+            writer.part.unlink(missing_ok=True)
+        raise
+
+
+def _kept(writer: DataSetWriter) -> str:
+    kept = np.count_nonzero(writer.done)
+    return (
+        f"{kept} of {len(writer.done)} records are kept in {writer.part.name}: repeat the command "
+        "to go on"
+    )
+
+
+def _refuse_refusal(outcome: _Outcome, work: Callable[[Sample], _Outcome]) -> None:
+    """A worker elsewhere may only lack a file that the scene names: ask again here."""
+    if outcome.refused is not None and work(outcome.refused).refused is None:
+        raise WorkersError(
+            f"record {outcome.index} is refused by a worker ({outcome.fault}) and simulated here; "
+            "give the workers the files that the scene names, under the same path"
+        )
 
 
 def _chosen(
@@ -267,8 +329,18 @@ def _writer(
         n_records=count,
         n_samples=round(plan.scene.duration * plan.scene.sample_rate),
         columns={**plan.columns, **NUMERICS},
+        splits=split_names(plan),
         force=force,
     )
+
+
+def _write_splits(writer: DataSetWriter, rows: NDArray[np.void], plan: Recipe, seed: int) -> None:
+    severity = plan.severity_columns[0]
+    drawn = Drawn(columns=rows, severity=severity, recipe=plan, seed=seed)
+    if not drawn.usable.size:
+        return
+    for name, split in default_splits(drawn).items():
+        writer.write_split(name, split.sides(len(rows)), split.attribute())
 
 
 def _attributes(plan: Recipe, seed: int, truth: bool, choice: Choice | None) -> Attributes:
@@ -324,6 +396,7 @@ def _refused(sample: Sample, text: str) -> _Outcome:
         row={**sample.row, "status": REFUSED},
         truth={},
         fault=text,
+        refused=sample,
     )
 
 

@@ -2,17 +2,15 @@
 
 Record `i` depends on the recipe's name, the seed and `i` alone: not on how many records there
 are, in which order or where they are made. Nor does a draw depend on which severities and
-confounders stand beside it: each has a random stream of its own.
+confounders stand beside it: each is randomised by its own name.
 """
 
-import hashlib
 import json
-import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any, Literal, Self
 
@@ -25,8 +23,12 @@ from ..sim.parts import Part, Ratio, Scene, SceneError, Wear, validate_table
 from ..sim.parts import beside as files_beside
 from ..sim.scene import override, scene_folder, scene_from_table, scene_table, scene_text
 from ..sim.wear import grade
+from .correlation import Copula, Correlation, copula_of
 from .draws import Axis, Bound, Draw, Range, axes_of, has_value, matches, value_at
+from .held_out import HeldOut, Region, regions_of
+from .life import LIFE_COLUMNS, LifeTable, Lives, Moment, life_faults
 from .recipe_file import RecipeError, beside, read_recipe
+from .sampling import BLOCK, SET, Dimension, Points, Sampling, number_of
 
 SEVERITIES = {
     "joint.crankpin.diametral_clearance": "diametral_clearance_crankpin_m",
@@ -73,7 +75,7 @@ CONDITIONS = {
 }
 """Manifest column of every operating condition -> its place in the scene."""
 
-STRATA = 16
+STRATA = BLOCK
 """Severities of each run of this many records fall in as many equal parts of the range."""
 
 MOST_RECORDS = 10**8
@@ -85,9 +87,12 @@ LARGEST_SEED = 2**63 - 1
 RESERVED = ("none", "combined")
 """Names that no confounder may have: tables use them for records without any and with several."""
 
-# independent random streams of one data set; the first four are older than the others, and their
-# numbers decide the records of every recipe
-_MACHINE, _RECORD, _NOISE, _SEVERITY, _FURTHER_SEVERITY, _PRESENCE, _CONFOUNDER = range(7)
+# independent random streams of one data set; their numbers decide the records of every recipe
+_MACHINE, _RECORD, _NOISE, _PRESENCE, _CONFOUNDER, _LIFE, _MOMENT = range(7)
+
+_SEVERITIES_OF_SET = 1
+"""Dimensions of a Sobol sequence kept for severities: the first one is even together with the first
+two draws of its record, speed and load; one more of either moves none of the other."""
 
 
 class Severity(Part):
@@ -134,6 +139,10 @@ class RecipeTable(Part):
     records_per_group: int = Field(
         default=1, ge=1, le=MOST_RECORDS, description="records of each machine drawn"
     )
+    sampling: Sampling = Field(default="sobol", description="how even the draws are")
+    machines_of: str = Field(
+        default="", max_length=64, description="recipe whose machines these are, under one seed"
+    )
     fixed: dict[str, Bound | bool] = Field(
         default={}, description="scene values replaced in every record, by dotted path in quotes"
     )
@@ -143,6 +152,11 @@ class RecipeTable(Part):
     machine: tuple[Draw, ...] = Field(default=(), description="drawn once per group")
     record: tuple[Draw, ...] = Field(default=(), description="drawn for every record")
     confounder: tuple[Confounder, ...] = Field(default=(), description="faults beside the wear")
+    correlation: tuple[Correlation, ...] = Field(default=(), description="draws that go together")
+    held_out: tuple[Region, ...] = Field(default=(), description="to test on, not to train on")
+    life: LifeTable | None = Field(
+        default=None, description="machines over their lives: their wear gives the first severity"
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -235,6 +249,10 @@ class Recipe:
         Nuisance and conditions, in the order in which they are drawn.
     confounders : mapping
         Name of a random stream -> confounders that share it because they exclude each other.
+    copulas : mapping
+        Level, ``severity``, ``machine`` or ``record`` -> correlation of its draws.
+    held_out : tuple of HeldOut
+        Regions to test on.
     """
 
     table: RecipeTable
@@ -246,11 +264,18 @@ class Recipe:
     machine: tuple[Axis, ...]
     record: tuple[Axis, ...]
     confounders: Mapping[str, tuple[Fault, ...]]
+    copulas: Mapping[str, Copula]
+    held_out: tuple[HeldOut, ...]
 
     @property
     def name(self) -> str:
         """Name of the recipe; part of every seed."""
         return self.table.name
+
+    @property
+    def machine_name(self) -> str:
+        """Name of the recipe whose machines are drawn; part of their seed."""
+        return self.table.machines_of or self.name
 
     @property
     def severity(self) -> Range:
@@ -270,7 +295,7 @@ class Recipe:
     @cached_property
     def conditions(self) -> dict[str, str]:
         """Rows of `CONDITIONS` that this scene has."""
-        return {name: path for name, path in CONDITIONS.items() if has_value(self.scene, path)}
+        return _conditions(self.scene)
 
     @cached_property
     def columns(self) -> dict[str, str]:
@@ -283,8 +308,25 @@ class Recipe:
             **dict.fromkeys(further, "i1"),
             **dict.fromkeys(presence, "?"),
             **dict.fromkeys(values, "<f8"),
+            **({} if self.table.life is None else LIFE_COLUMNS),
             **dict.fromkeys(self.conditions, "<f8"),
         }
+
+    @cached_property
+    def lives(self) -> Lives | None:
+        """Lives of the machines; None where severities are drawn."""
+        if self.table.life is None:
+            return None
+        low, high = self.severity.bands[0]
+        return Lives(
+            table=self.table.life,
+            base=self.base,
+            path=self.severity.path,
+            low=low,
+            high=high,
+            limit=self.severities[0].edges[-1],
+            recordings=self.table.records_per_group,
+        )
 
     @property
     def faults(self) -> tuple[Fault, ...]:
@@ -297,7 +339,8 @@ class Recipe:
 
     def _sequence(self, seed: int, stream: int, *key: int) -> np.random.SeedSequence:
         # the name keeps two recipes with one seed from drawing the same machines
-        return np.random.SeedSequence([seed, _number(self.name)], spawn_key=(stream, *key))
+        name = self.machine_name if stream == _MACHINE else self.name
+        return np.random.SeedSequence([seed, number_of(name)], spawn_key=(stream, *key))
 
     def noise_seed(self, seed: int, index: int) -> int:
         """Seed of the sensor noise of one record."""
@@ -305,9 +348,8 @@ class Recipe:
         return int(state[0])
 
 
-def _number(word: str) -> int:
-    """64 bits of a word, the same on every machine."""
-    return int.from_bytes(hashlib.sha256(word.encode()).digest()[:8], "big")
+def _conditions(scene: Scene) -> dict[str, str]:
+    return {name: path for name, path in CONDITIONS.items() if has_value(scene, path)}
 
 
 def load_recipe(name_or_path: str | Path, overrides: Mapping[str, Any] | None = None) -> Recipe:
@@ -329,7 +371,7 @@ def load_recipe(name_or_path: str | Path, overrides: Mapping[str, Any] | None = 
     ------
     RecipeError
         Every fault at once: of the tables, of paths the scene does not have, of bounds the scene
-        refuses.
+        refuses, of correlations and held-out regions, of a recipe with other machines.
 
     Examples
     --------
@@ -345,27 +387,108 @@ def load_recipe(name_or_path: str | Path, overrides: Mapping[str, Any] | None = 
         base = dict(files_beside(scene_table(scene, table.scene), scene_folder(place)))
     except SceneError as error:
         raise RecipeError(str(name_or_path), error.faults) from None
-    faults: list[str] = []
-    base = _with_fixed(base, {**table.fixed, **(overrides or {})}, faults)
-    if faults:
+    faults = _machine_faults(table, source.machines_folder)
+    texts = {"text": source.text, "scene_text": scene}
+    return _resolved(table, base, dict(overrides or {}), texts, faults)
+
+
+def _resolved(
+    table: RecipeTable,
+    scene: dict[str, Any],
+    overrides: Mapping[str, Any],
+    texts: Mapping[str, str],
+    faults: list[str],
+) -> Recipe:
+    """A recipe against the table of its scene; raises every fault, those found before as well."""
+    n_before = len(faults)
+    base = _with_fixed(scene, {**table.fixed, **overrides}, faults)
+    if len(faults) > n_before:
         raise RecipeError(table.name, faults)
-    axes = axes_of(_places(table), base, faults)
+    places = _places(table)
+    axes = axes_of(places, base, faults)
     faults += _severity_faults(table.severity)
     faults += _path_clashes([axis.path for found in axes.values() for axis in found])
     faults += _confounder_faults(table.confounder)
+    copulas = copula_of(table.correlation, _levels(places, axes), faults)
+    held_out = _held_out(table, axes, base, faults) if len(axes) == len(places) else ()
+    faults += _life_faults(table, axes, base)
     if faults:
         raise RecipeError(table.name, faults)
     return Recipe(
         table=table,
-        text=source.text,
-        scene_text=scene,
-        overrides=dict(overrides or {}),
+        **texts,
+        overrides=overrides,
         base=base,
         severities=_wearing(table.severity, _of(axes, "severity"), scene_from_table(base)),
         machine=tuple(_of(axes, "machine")),
         record=tuple(_of(axes, "record")),
         confounders=_fault_sets(table.confounder, axes),
+        copulas=copulas,
+        held_out=held_out,
     )
+
+
+def _life_faults(
+    table: RecipeTable, axes: Mapping[str, list[Axis]], base: Mapping[str, Any]
+) -> list[str]:
+    """What of a life does not fit the first severity, where that is sound itself."""
+    worn = next(iter(axes.get("severity.0", ())), None)
+    column = severity_column(table.severity[0].path)
+    if table.life is None or not isinstance(worn, Range) or column is None:
+        return []
+    limits = wear_limits(scene_from_table(base), column)
+    condemning = None if limits is None else limits.condemning
+    low, high = worn.bands[0]
+    return life_faults(table.life, worn.path, low, high, condemning)
+
+
+def _machine_faults(table: RecipeTable, folder: Path) -> list[str]:
+    """Machines are another recipe's only if all that decides them is the same there."""
+    if not table.machines_of:
+        return []
+    file = folder / f"{table.machines_of}.toml"
+    try:
+        source = read_recipe(file if file.is_file() else table.machines_of)
+        other = validate_table(RecipeTable, source.table, table.machines_of)
+    except SceneError as error:
+        return [f"machines_of: {fault}" for fault in error.faults]
+    if other.machines_of or other.name != table.machines_of:
+        told = other.machines_of or other.name
+        return [
+            f"machines_of = '{table.machines_of}' must be the recipe that draws them; name '{told}'"
+        ]
+    return [
+        f"machines_of = '{other.name}': {name} must be as it is there; extend that recipe and "
+        "leave it"
+        for name in ("scene", "sampling", "machine", "correlation")
+        if getattr(other, name) != getattr(table, name)
+    ]
+
+
+def _levels(
+    places: Mapping[str, Draw], axes: Mapping[str, list[Axis]]
+) -> dict[str, list[tuple[Draw, Sequence[Axis]]]]:
+    """Draws that may be correlated, with their axes, by list of the recipe."""
+    levels: dict[str, list[tuple[Draw, Sequence[Axis]]]] = {
+        "severity": [],
+        "machine": [],
+        "record": [],
+    }
+    for place, draw in places.items():
+        level = place.split(".")[0]
+        if level in levels:
+            levels[level].append((draw, axes.get(place, ())))
+    return levels
+
+
+def _held_out(
+    table: RecipeTable, axes: Mapping[str, list[Axis]], base: Mapping[str, Any], faults: list[str]
+) -> tuple[HeldOut, ...]:
+    paths = [severity.path for severity in table.severity]
+    columns = {column: path for path in paths if (column := severity_column(path))}
+    columns |= _conditions(scene_from_table(base))
+    drawn = [axis for name in ("severity", "machine", "record") for axis in _of(axes, name)]
+    return regions_of(table.held_out, columns, drawn, _of(axes, "confounder"), base, faults)
 
 
 def _with_fixed(
@@ -608,20 +731,17 @@ def sample_records(
 
     Notes
     -----
-    Severities are log-uniform. Every block of `STRATA` records holds one value of each severity in
-    each of that many equal parts of its (logarithmic) range, in an order of its own and at a random
-    place within its part (a Latin hypercube), so that small sets are balanced. A golden-ratio
-    sequence would be as even, but fixes the step between the records of one machine; here it is as
-    good as random.
+    The recipe's ``sampling`` says how even the draws are, see :class:`~.sampling.Points`: those of
+    machines over the machines, those of records, severities among them, over the records. Machine
+    and record are paired at random. Severities are log-uniform; whatever the sampling, every block
+    of `STRATA` records holds one value of each severity in each of that many equal parts of its
+    (logarithmic) range, in shuffled order, so that small sets are balanced.
+
+    With a ``life`` the first severity is not drawn: a group is one machine over its life, its
+    records in the order of time, see :class:`~.life.Lives`.
 
     Confounders come and go with their probabilities, independently of each other but for those
     that exclude each other. Where one is absent, the scene's own value stays.
-
-    References
-    ----------
-    McKay, Beckman and Conover, "A comparison of three methods for selecting values of input
-    variables in the analysis of output from a computer code", Technometrics 21 (1979) 239-245,
-    doi:10.2307/1268522.
 
     Examples
     --------
@@ -632,17 +752,65 @@ def sample_records(
     count = recipe.table.records if n is None else n
     if count < 1 or seed < 0:
         raise RecipeError(recipe.name, [f"n = {count} must be >= 1 and seed = {seed} must be >= 0"])
+    sources = _sources(recipe, seed)
     for index in range(count):
         if skip is None or not skip[index]:
-            yield _sample(recipe, index, seed)
+            yield _sample(recipe, sources, index, seed)
 
 
-def _sample(recipe: Recipe, index: int, seed: int) -> Sample:
+@dataclass(frozen=True)
+class _Source:
+    """Where the draws of one level come from."""
+
+    axes: Sequence[Axis]
+    points: Points
+    copula: Copula | None
+
+    def values(self, number: int) -> dict[str, Any]:
+        """Values of one machine or record by path."""
+        point = self.points.at(number)
+        left = iter((point if self.copula is None else self.copula(point)).tolist())
+        return {axis.path: axis.value([next(left) for _ in axis.entries]) for axis in self.axes}
+
+
+def _sources(recipe: Recipe, seed: int) -> dict[str, _Source]:
+    method = recipe.table.sampling
+    # free draws of a severity would leave a small set without a grade
+    balanced: Sampling = "latin-hypercube" if method == "random" else method
+    machine, record = (partial(recipe.rng, seed, stream) for stream in (_MACHINE, _RECORD))
+    worn = [wearing.axis for wearing in recipe.severities]
+    points = {
+        "machine": Points(method, machine, _dimensions(recipe.machine, range(SET))),
+        "record": Points(
+            method, record, _dimensions(recipe.record, range(_SEVERITIES_OF_SET, SET))
+        ),
+        "severity": Points(balanced, record, _dimensions(worn, range(_SEVERITIES_OF_SET))),
+    }
+    axes: dict[str, Sequence[Axis]] = {
+        "machine": recipe.machine,
+        "record": recipe.record,
+        "severity": worn,
+    }
+    return {name: _Source(axes[name], points[name], recipe.copulas.get(name)) for name in points}
+
+
+def _dimensions(axes: Sequence[Axis], places: range) -> list[Dimension]:
+    """Dimensions of some draws, in these places of one Sobol sequence after the other."""
+    names = [entry for axis in axes for entry in axis.entries]
+    return [
+        Dimension(name=name, slot=SET * (k // len(places)) + places[k % len(places)])
+        for k, name in enumerate(names)
+    ]
+
+
+def _sample(recipe: Recipe, sources: Mapping[str, _Source], index: int, seed: int) -> Sample:
     group = index // recipe.table.records_per_group
-    machine, record = recipe.rng(seed, _MACHINE, group), recipe.rng(seed, _RECORD, index)
-    drawn: dict[str, Any] = {axis.path: axis.value(machine) for axis in recipe.machine}
-    drawn |= {axis.path: axis.value(record) for axis in recipe.record}
-    drawn |= _worn(recipe, index, seed)
+    drawn = sources["machine"].values(group)
+    drawn |= sources["record"].values(index)
+    drawn |= sources["severity"].values(index)
+    life = _moment(recipe, group, index, seed)
+    if life is not None:
+        drawn[recipe.severity.path] = life.severity
     faults = _confounded(recipe, group, index, seed)
     drawn |= {path: value for values in faults.values() for path, value in values.items()}
     scene = scene_from_table(override(recipe.base, drawn))
@@ -652,24 +820,20 @@ def _sample(recipe: Recipe, index: int, seed: int) -> Sample:
         "group": group,
         "seed": noise_seed,
         **_severity_labels(recipe, drawn),
+        **({} if life is None else life.labels),
         **_confounder_labels(recipe, faults),
         **{name: value_at(scene, path) for name, path in recipe.conditions.items()},
     }
     return Sample(index=index, group=group, seed=noise_seed, row=row, drawn=drawn, scene=scene)
 
 
-def _worn(recipe: Recipe, index: int, seed: int) -> dict[str, float]:
-    """Severities of one record by path: one of each stratum in every block."""
-    block, place = divmod(index, STRATA)
-    values = {}
-    for number, wearing in enumerate(recipe.severities):
-        # by its name, so that it does not depend on the others
-        key = (_FURTHER_SEVERITY, _number(wearing.column)) if number else (_SEVERITY,)
-        rng = recipe.rng(seed, *key, block)
-        fraction = (rng.permutation(STRATA)[place] + rng.random(STRATA)[place]) / STRATA
-        low, high = wearing.axis.bands[0]
-        values[wearing.axis.path] = math.exp(math.log(low) + fraction * math.log(high / low))
-    return values
+def _moment(recipe: Recipe, group: int, index: int, seed: int) -> Moment | None:
+    """Where in the life of its machine a record is; None where severities are drawn."""
+    if recipe.lives is None:
+        return None
+    place = index - group * recipe.table.records_per_group
+    machine, record = recipe.rng(seed, _LIFE, group), recipe.rng(seed, _MOMENT, index)
+    return recipe.lives.moment(machine, record, place)
 
 
 def _confounded(recipe: Recipe, group: int, index: int, seed: int) -> dict[str, dict[str, float]]:
@@ -677,14 +841,13 @@ def _confounded(recipe: Recipe, group: int, index: int, seed: int) -> dict[str, 
     found = {}
     for word, members in recipe.confounders.items():
         which = group if members[0].table.per == "machine" else index
-        left = recipe.rng(seed, _PRESENCE, _number(word), which).random()
+        left = recipe.rng(seed, _PRESENCE, number_of(word), which).random()
         for member in members:
             if 0 <= left < member.table.probability:
-                key = (_CONFOUNDER, _number(member.table.name), which)
-                # from the same number at every place that the path stands for
-                found[member.table.name] = {
-                    axis.path: axis.value(recipe.rng(seed, *key)) for axis in member.axes
-                }
+                key = (_CONFOUNDER, number_of(member.table.name), which)
+                # the same number at every place that the path stands for
+                place = recipe.rng(seed, *key).random()
+                found[member.table.name] = {axis.path: axis.value([place]) for axis in member.axes}
             left -= member.table.probability
     return found
 
@@ -743,3 +906,36 @@ def recorded_scene(scene: str, recipe: str, overrides: str) -> Scene:
     if faults:
         raise SceneError("scene", faults)
     return scene_from_table(table)
+
+
+def recorded_recipe(scene: str, recipe: str, overrides: str) -> Recipe:
+    """Recipe of a data set, from the texts in its file: draws the records again.
+
+    Parameters
+    ----------
+    scene, recipe, overrides : str
+        As `Attributes` has them.
+
+    Returns
+    -------
+    Recipe
+
+    Raises
+    ------
+    RecipeError
+        The texts are no recipe and its scene, as those of a measured data set.
+
+    Examples
+    --------
+    >>> recipe = load_recipe("bilge-pump-small")
+    >>> again = recorded_recipe(recipe.scene_text, recipe.text, overrides_text(recipe))
+    >>> next(sample_records(again)).drawn == next(sample_records(recipe)).drawn
+    True
+    """
+    try:
+        table = validate_table(RecipeTable, scene_table(recipe, "recipe"), "recipe")
+        base = scene_table(scene)
+    except SceneError as error:
+        raise RecipeError("recipe", error.faults) from None
+    texts = {"text": recipe, "scene_text": scene}
+    return _resolved(table, base, json.loads(overrides or "{}"), texts, [])

@@ -16,7 +16,13 @@ LONGEST_CHAIN = 8
 """Recipes in one chain of ``extends``: more, and no reader knows what is drawn."""
 
 _OWN = ("name", "description", "extends", "without")  # what each recipe says of itself
-_LISTS = {"severity": "path", "machine": "path", "record": "path", "confounder": "name"}
+_LISTS = {
+    "severity": "path",
+    "machine": "path",
+    "record": "path",
+    "confounder": "name",
+    "held_out": "name",
+}
 """List of a recipe -> the key that tells its entries apart."""
 
 
@@ -36,11 +42,14 @@ class RecipeSource:
         TOML: the file's own, or, where it extends another, all of it in one.
     folder : Path
         Where the scene that it names is looked for first.
+    machines_folder : Path
+        Where the recipe that ``machines_of`` names is looked for first.
     """
 
     table: dict[str, Any]
     text: str
     folder: Path
+    machines_folder: Path
 
 
 def recipe_names() -> list[str]:
@@ -103,14 +112,15 @@ def read_recipe(name_or_path: str | Path) -> RecipeSource:
     """
     chain = list(_chain(name_or_path))
     table: dict[str, Any] = {}
-    folder = Path()
+    folders = {"scene": Path(), "machines_of": Path()}
     for place, own in reversed(chain):
         _refuse_without(own, table, place)
-        if "scene" in own:
-            folder = place.parent
+        folders |= {key: place.parent for key in folders if key in own}
         table = merged(table, own)
     text = recipe_text(name_or_path) if len(chain) == 1 else toml_text(table)
-    return RecipeSource(table=table, text=text, folder=folder)
+    return RecipeSource(
+        table=table, text=text, folder=folders["scene"], machines_folder=folders["machines_of"]
+    )
 
 
 def _chain(name_or_path: str | Path) -> Iterator[tuple[Path, dict[str, Any]]]:
@@ -179,9 +189,9 @@ def merged(base: Mapping[str, Any], own: Mapping[str, Any]) -> dict[str, Any]:
     -------
     dict
         Name and description are `own` alone. ``fixed`` is joined key by key. Draws, severities
-        (by path) and confounders (by name) that `own` lists in ``without`` are left out; one that
-        it gives itself replaces that of `base`, whole and in its place; new ones follow in their
-        order. Anything else of `own` replaces.
+        (by path), confounders and held-out regions (by name) that `own` lists in ``without`` are
+        left out; one that it gives itself replaces that of `base`, whole and in its place; new
+        ones follow in their order. Anything else of `own` replaces, correlations as one list.
 
     Notes
     -----

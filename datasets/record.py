@@ -4,12 +4,15 @@ import hashlib
 import json
 import math
 import os
+import re
 import shutil
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
+from functools import cached_property
 from importlib.metadata import version
+from itertools import pairwise
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Literal, Self
@@ -48,6 +51,10 @@ _READ_FAULTS = (OSError, RuntimeError, KeyError, TypeError, ValueError, Attribut
 
 class DataError(ValueError):
     """A data set or recording cannot be used; names quantity, value, bound and cure."""
+
+
+class WriteError(RuntimeError):
+    """A data set file cannot be written on; names file, cause and cure. What is in it stays."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -236,11 +243,29 @@ class Attributes:
 
     def __post_init__(self) -> None:
         _check_header(self, "data set")
+        _check_wear(self)
         long = [name for name, text in _texts(self).items() if len(text.encode()) > LARGEST_TEXT]
         if long:
             raise DataError(
                 f"data set: text of {', '.join(long)} must be <= {LARGEST_TEXT} byte; shorten it"
             )
+
+
+def _check_wear(item: Attributes) -> None:
+    """Refuse severities and limits that contradict each other."""
+    faults = []
+    if len(set(item.severities)) != len(item.severities):
+        faults.append(f"severities {list(item.severities)} must be unique; name each once")
+    edges = item.grade_edges
+    if any(not low < high for low, high in pairwise((0.0, *edges))):
+        faults.append(f"grade_edges = {list(edges)} m must be > 0 and rise; correct the limits")
+    if edges and not item.condemning_limit >= edges[-1]:
+        faults.append(
+            f"condemning_limit = {item.condemning_limit:g} m must be >= {edges[-1]:g} m, the last "
+            "grade edge; correct the limits"
+        )
+    if faults:
+        raise DataError("\n".join(f"data set: {fault}" for fault in faults))
 
 
 _TEXTS = ("recipe", "scene", "overrides", "fidelity", "limit_source", "created_by", "libraries")
@@ -291,7 +316,23 @@ def _attributes_of(stored: Mapping[str, Any]) -> Attributes:
     )
 
 
-def _checksum(signal: NDArray[np.float32]) -> int:
+def _named(path: Path, stored: Mapping[str, Any]) -> Attributes:
+    """Attributes of a file; what is wrong with them names it."""
+    try:
+        return _attributes_of(stored)
+    except DataError as error:
+        faults = str(error).replace("data set: ", "").split("\n")
+        raise DataError("\n".join(f"{path}: {fault}" for fault in faults)) from None
+
+
+def signal_checksum(signal: NDArray[np.float32]) -> int:
+    """Checksum of a record's signal, as its manifest row holds it.
+
+    Examples
+    --------
+    >>> signal_checksum(np.zeros((1, 2), dtype=np.float32))
+    1696784233
+    """
     return zlib.crc32(signal.data)
 
 
@@ -325,8 +366,17 @@ class DataSet:
     Raises
     ------
     DataError
-        There is no such file, it is unfinished (``.part``), truncated or damaged, of another
-        program, or of another schema version.
+        There is no such file, it is unfinished (``.part``), truncated, damaged or altered, of
+        another program, or of another schema version.
+
+    Attributes
+    ----------
+    attributes : Attributes
+        What holds for every record.
+    rows : numpy.ndarray [shape=(n_records,)]
+        Labels, conditions and numerics, structured as in the file.
+    unhashed : tuple of str
+        Those of `HASHES` that the file lacks: one made before there were hashes.
 
     Examples
     --------
@@ -339,20 +389,30 @@ class DataSet:
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path).absolute()
         self._file: Any = None
+        self._signals: Any = None
+        self._intact = bytearray()
         self._pid = -1
         _refuse_by_name(self.path)
         with _refusing(self.path, "file"):
             stored = _stored_attributes(self._handle(), self.path)
         with _refusing(self.path, "attributes"):
-            self.attributes = _attributes_of(stored)
+            self.attributes = _named(self.path, stored)
         with _refusing(self.path, "layout"):
             _check_layout(self._handle(), self.attributes, self.path)
         with _refusing(self.path, "manifest"):
-            self.manifest = _decoded(self._handle()["manifest"][:])
-        _refuse_unfinished(self.manifest["done"].to_numpy(), self.path)
+            self.rows: NDArray[np.void] = self._handle()["manifest"][:]
+        _refuse_unfinished(self.rows["done"], self.path)
+        _refuse_other_hashes(stored, self.rows, self.path)
+        self.unhashed = tuple(sorted(set(HASHES) - set(stored)))
 
     def __len__(self) -> int:
-        return len(self.manifest)
+        return len(self.rows)
+
+    @cached_property
+    def manifest(self) -> pd.DataFrame:
+        """The rows as a table with texts decoded; made when first asked for."""
+        with _refusing(self.path, "manifest"):
+            return _decoded(self.rows)
 
     def __getitem__(self, index: int) -> Recording:
         """Read one record.
@@ -365,14 +425,9 @@ class DataSet:
             The stored signal is damaged or not finite.
         """
         number = self._number(index)
-        with _refusing(self.path, f"record {number}"):
-            signal = self._handle()["signal"][number]
-        row = {str(key): value for key, value in self.manifest.iloc[number].items()}
-        if _checksum(signal) != row["signal_crc32"]:
-            raise DataError(
-                f"{self.path}: signal of record {number} has checksum {_checksum(signal)}, must "
-                f"be {row['signal_crc32']}; take an intact copy"
-            )
+        signal = self.stored_signal(number)
+        row = self.row(number)
+        self._refuse_damaged(number, signal)
         head = self.attributes
         return Recording(
             signal=signal,
@@ -384,6 +439,53 @@ class DataSet:
             row=row,
             source=f"{self.path.name}[{number}]",
         )
+
+    def _refuse_damaged(self, number: int, signal: NDArray[np.float32]) -> None:
+        """Look at the checksum of a record when it is read first; it is most of the time then."""
+        if self._intact[number]:
+            return
+        found, wanted = signal_checksum(signal), int(self.rows["signal_crc32"][number])
+        if found != wanted:
+            raise DataError(
+                f"{self.path}: signal of record {number} has checksum {found}, must be {wanted}; "
+                "take an intact copy"
+            )
+        self._intact[number] = True
+
+    @property
+    def stored_shape(self) -> tuple[int, int, int]:
+        """Records, channels and samples of the file."""
+        n_records, n_channels, n_samples = self._signal().shape
+        return n_records, n_channels, n_samples
+
+    def row(self, index: int) -> dict[str, Any]:
+        """Labels, conditions and numerics of one record, without its signal.
+
+        Raises
+        ------
+        IndexError
+            `index` is not below the number of records.
+        DataError
+            They are damaged.
+        """
+        number = self._number(index)
+        with _refusing(self.path, f"record {number}"):
+            return _plain_row(self.rows[number])
+
+    def stored_signal(self, index: int) -> NDArray[np.float32]:
+        """Signal of one record as the file holds it, its checksum not looked at.
+
+        Raises
+        ------
+        IndexError
+            `index` is not below the number of records.
+        DataError
+            It cannot be read.
+        """
+        number = self._number(index)
+        with _refusing(self.path, f"record {number}"):
+            signal: NDArray[np.float32] = self._signal()[number]
+            return signal
 
     def truth(self, index: int) -> dict[str, NDArray[np.float32]]:
         """Hidden quantities of one record, by name; empty where none are stored.
@@ -400,6 +502,52 @@ class DataSet:
             group = self._handle().get("truth", {})
             return {name: group[name][number] for name in group}
 
+    @cached_property
+    def splits(self) -> dict[str, dict[str, Any]]:
+        """How each stored split was made, by name: ``kind``, ``text``, ``machines_apart`` and more.
+
+        Raises
+        ------
+        DataError
+            They are damaged.
+        """
+        with _refusing(self.path, "splits"):
+            stored = self._handle().get("splits", {})
+            about = {name: bytes(stored[name].attrs["about"]).decode() for name in stored}
+            return {name: json.loads(text) for name, text in about.items() if text.strip()}
+
+    def split(self, name: str) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Records of the two sides of a stored split; a record may be in neither.
+
+        Parameters
+        ----------
+        name : str
+            Key of `splits`.
+
+        Returns
+        -------
+        train, test : numpy.ndarray [shape=(n_train,)], [shape=(n_test,)]
+            Record numbers, rising.
+
+        Raises
+        ------
+        DataError
+            There is no such split, or it is damaged.
+        """
+        if name not in self.splits:
+            raise DataError(
+                f"{self.path}: split = {name!r} must be one of {', '.join(self.splits) or '(none)'}"
+                "; choose one, or add it with wearstate splits"
+            )
+        with _refusing(self.path, f"split {name}"):
+            sides = self._handle()["splits"][name][:]
+        if sides.shape != (len(self),) or not np.isin(sides, (-1, 0, 1)).all():
+            raise DataError(
+                f"{self.path}: split {name} must be -1, 0 or 1 for each of {len(self)} records; "
+                "add it again with wearstate splits"
+            )
+        return np.flatnonzero(sides == 0), np.flatnonzero(sides == 1)
+
     def _number(self, index: int) -> int:
         number = index + len(self) if index < 0 else index
         if not 0 <= number < len(self):
@@ -410,14 +558,23 @@ class DataSet:
         # an HDF5 handle must not cross a fork
         if self._file is None or self._pid != os.getpid():
             self._file = h5py.File(self.path, "r")
+            self._signals = None
             self._pid = os.getpid()
         return self._file
+
+    def _signal(self) -> Any:
+        # looked up once: by name takes as long as a third of reading a second of signal
+        file = self._handle()
+        if self._signals is None:
+            self._signals = file["signal"]
+            self._intact = bytearray(len(self))
+        return self._signals
 
     def close(self) -> None:
         """Close the file; reading opens it again."""
         if self._file is not None and self._pid == os.getpid():
             self._file.close()
-        self._file = None
+        self._file = self._signals = None
 
     def __enter__(self) -> Self:
         return self
@@ -431,7 +588,8 @@ class DataSet:
         self.close()
 
     def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "_file": None, "_pid": -1}
+        own = {k: v for k, v in self.__dict__.items() if k not in ("manifest", "splits")}
+        return {**own, "_file": None, "_signals": None, "_pid": -1}
 
 
 def _refuse_by_name(path: Path) -> None:
@@ -502,6 +660,92 @@ def _refuse_unfinished(done: NDArray[np.bool_], path: Path) -> None:
         )
 
 
+HASHES = ("attributes_sha256", "manifest_sha256")
+"""Attributes that hold the hash of all other attributes, and of the manifest."""
+
+
+def attributes_hash(stored: Mapping[str, Any]) -> str:
+    """Hash of a file's attributes, the hashes left out.
+
+    Parameters
+    ----------
+    stored : mapping
+        As h5py gives them.
+
+    Examples
+    --------
+    >>> attributes_hash({"seed": "1"}) == attributes_hash({"seed": "1", "manifest_sha256": "x"})
+    True
+    """
+    plain = {
+        name: value.item() if isinstance(value, np.generic) else value
+        for name, value in stored.items()
+        if name not in HASHES
+    }
+    return _sha256(json.dumps(plain, sort_keys=True, default=str))
+
+
+def manifest_hash(rows: NDArray[np.void]) -> str:
+    """Hash of a manifest: its columns with their types, and every row.
+
+    Parameters
+    ----------
+    rows : numpy.ndarray [shape=(n_records,)]
+        Structured, as in the file.
+
+    Examples
+    --------
+    >>> one = np.zeros(1, dtype=[("grade", "i1")])
+    >>> manifest_hash(one) == manifest_hash(one.view([("group", "i1")]))
+    False
+    """
+    columns = [(name, rows.dtype[name].str) for name in rows.dtype.names or ()]
+    digest = hashlib.sha256(json.dumps(columns).encode())
+    digest.update(np.ascontiguousarray(rows).view(np.uint8).data)
+    return digest.hexdigest()
+
+
+def stamped(stored: Mapping[str, Any], rows: NDArray[np.void]) -> dict[str, Any]:
+    """A file's attributes with the hashes that belong to them.
+
+    Parameters
+    ----------
+    stored : mapping
+        Attributes; hashes among them are replaced.
+    rows : numpy.ndarray [shape=(n_records,)]
+        Manifest, structured.
+    """
+    found = {name: value for name, value in stored.items() if name not in HASHES}
+    hashes = zip(HASHES, (attributes_hash(found), manifest_hash(rows)), strict=True)
+    return {**found, **{name: np.bytes_(value) for name, value in hashes}}
+
+
+def _refuse_other_hashes(stored: Mapping[str, Any], rows: NDArray[np.void], path: Path) -> None:
+    """Refuse altered labels; a file made before there were hashes is read as it is."""
+    made = stamped(stored, rows)
+    faults = [
+        f"{path}: {name} is {_hex(stored[name])[:8]}…, must be {_hex(made[name])[:8]}…; take an "
+        "intact copy, or delete that attribute where the change was wanted"
+        for name in HASHES
+        if name in stored and _hex(stored[name]) != _hex(made[name])
+    ]
+    if faults:
+        raise DataError("\n".join(faults))
+
+
+def _hex(value: Any) -> str:
+    # the hash itself may be what is damaged
+    return value.decode(errors="replace") if isinstance(value, bytes) else str(value)
+
+
+def _plain_row(row: np.void) -> dict[str, Any]:
+    """Manifest values of one record, as Python has them."""
+    return {
+        name: value.decode() if isinstance(value, bytes) else value
+        for name, value in zip(row.dtype.names or (), row.item(), strict=True)
+    }
+
+
 def _decoded(rows: NDArray[np.void]) -> pd.DataFrame:
     columns = {}
     for name in rows.dtype.names or ():
@@ -537,10 +781,11 @@ def unfinished_attributes(path: str | Path) -> Attributes | None:
 class DataSetWriter:
     """Writes a data set file, record by record, so that a killed run can go on.
 
-    All space is laid out before the first record, in ``<path>.part``; from then on only bytes
-    inside it change, first the signal, then its manifest row with ``done``. `finish` renames.
-    A run that is killed loses the records in flight. A checksum per record finds those that a
-    power cut has lost; they are written again.
+    All space is taken before the first record, in ``<path>.part``; from then on only bytes inside
+    it change, first the signal, then its manifest row with ``done``. `finish` renames. A run that
+    is killed loses the records in flight. A checksum per record finds those that a power cut has
+    lost; they are written again. Hidden quantities tell their shapes with the first record that
+    has any: the file is then laid out anew beside itself, once.
 
     Parameters
     ----------
@@ -552,14 +797,16 @@ class DataSetWriter:
         Both >= 1.
     columns : mapping
         Further manifest columns: name -> numpy type, in order.
+    splits : sequence of str
+        Names of the splits that may be written.
     force : bool
         Replace an existing file, and start an unfinished one anew.
 
     Raises
     ------
     DataError
-        The file exists, the folder does not or has no room, or an unfinished file is of another
-        run. Nothing is left behind.
+        The file exists, the folder does not or has no room or may not be written, or an
+        unfinished file is of another run, or is being written. Nothing is left behind.
 
     Examples
     --------
@@ -584,6 +831,7 @@ class DataSetWriter:
         n_records: int,
         n_samples: int,
         columns: Mapping[str, str] | None = None,
+        splits: Sequence[str] = (),
         force: bool = False,
     ) -> None:
         self.path = Path(path).absolute()
@@ -591,27 +839,49 @@ class DataSetWriter:
         self.attributes = attributes
         self._shape = (n_records, len(attributes.channels), n_samples)
         self._dtype = np.dtype([*{**_HEAD, **(columns or {}), **_TAIL}.items()])
+        self._splits = tuple(splits)
         self._file: Any = None
         refuse_output(self.path, force)
+        _refuse_busy(self.part)
         if force:
             self.part.unlink(missing_ok=True)
         if not self.part.exists():
             self._lay_out()
         self._resume()
 
-    def _lay_out(self) -> None:
+    def _lay_out(self, truth: Mapping[str, tuple[int, ...]] | None = None) -> None:
         """Make the empty ``.part`` under another name first: it is whole or it is not there."""
-        _refuse_size(self._shape, self._dtype, self.path.parent)
+        hidden = sum(math.prod(shape) for shape in (truth or {}).values())
+        _refuse_size(self._shape, self._dtype, hidden, self.path.parent)
         fresh = self.part.with_name(self.part.name + ".new")
         try:
-            with h5py.File(fresh, "w") as file:
-                file.attrs.update(_file_attributes(self.attributes))
+            with _laying_out(self.path), h5py.File(fresh, "w") as file:
+                empty = np.zeros(0, dtype=self._dtype)
+                # both hashes in place from the start, so that finishing changes no structure
+                file.attrs.update(stamped(_file_attributes(self.attributes), empty))
                 _create(file, "signal", self._shape, np.dtype(np.float32), chunk=True)
                 _create(file, "manifest", self._shape[:1], self._dtype, chunk=False)
+                for name in self._splits:
+                    lay_out_split(file, name, self._shape[0])
+                for name, shape in (truth or {}).items():
+                    shape = (self._shape[0], *shape)
+                    _create(file, f"truth/{name}", shape, np.dtype(np.float32), chunk=True)
+                self._copy_done(file)
+            with _laying_out(self.path):
+                _take_space(fresh)
             os.replace(fresh, self.part)
         except BaseException:
             fresh.unlink(missing_ok=True)
             raise
+
+    def _copy_done(self, file: Any) -> None:
+        """Take over what the file at hand holds, when it is laid out anew."""
+        if self._file is None:
+            return
+        hidden = [f"truth/{name}" for name in self._file.get("truth", {})]
+        for name in ("signal", *hidden, "manifest"):
+            for index in np.flatnonzero(self.done):
+                file[name][index] = self._file[name][index]
 
     def _resume(self) -> None:
         with _refusing(self.part, f"unfinished file (or delete it; {self.path.name})"):
@@ -647,7 +917,7 @@ class DataSetWriter:
         done = np.array(rows["done"], dtype=bool)
         for index in np.flatnonzero(done):
             signal = self._signal[index]
-            done[index] = _checksum(signal) == rows["signal_crc32"][index]
+            done[index] = signal_checksum(signal) == rows["signal_crc32"][index]
         return done
 
     def write(
@@ -674,6 +944,8 @@ class DataSetWriter:
         ------
         DataError
             Signal or row do not fit the file, or a sample is not finite.
+        WriteError
+            The disk is full or failing. The records marked done are whole.
         """
         samples = np.ascontiguousarray(signal, dtype=np.float32)
         if samples.shape != self._shape[1:]:
@@ -687,29 +959,50 @@ class DataSetWriter:
                 f"signal of record {index} has {bad} sample(s) that are not finite, must be 0; "
                 "write zeros and a status that says why"
             )
-        values = {**row, "done": True, "signal_crc32": _checksum(samples)}
+        values = {**row, "done": True, "signal_crc32": signal_checksum(samples)}
         filled = _filled(self._dtype, values, index)
-        # the chunk as it is: no selection, no conversion, a third of the time
-        self._signal.id.write_direct_chunk((index, 0, 0), samples)
-        for name, array in (truth or {}).items():
-            self._hidden(name, array)[index] = array
-        # a row that says done must never precede its signal
-        self._file.flush()
-        self._manifest[index] = filled
-        self._file.flush()
+        self._make_place(truth or {})
+        with _writing(self.part):
+            # the chunk as it is: no selection, no conversion, a third of the time
+            self._signal.id.write_direct_chunk((index, 0, 0), samples)
+            for name, array in (truth or {}).items():
+                self._file[f"truth/{name}"][index] = array
+            # a row that says done must never precede its signal
+            self._file.flush()
+            self._manifest[index] = filled
+            self._file.flush()
         self.done[index] = True
 
-    def _hidden(self, name: str, array: NDArray[Any]) -> Any:
-        key = f"truth/{name}"
-        if key not in self._file:
-            shape = (self._shape[0], *np.shape(array))
-            _create(self._file, key, shape, np.dtype(np.float32), chunk=True)
-        return self._file[key]
+    def _make_place(self, truth: Mapping[str, NDArray[Any]]) -> None:
+        """Place for hidden quantities, in a new file: a structure half changed cannot be read."""
+        there = self._file.get("truth", {})
+        if all(name in there for name in truth):
+            return
+        shapes = {name: tuple(there[name].shape[1:]) for name in there}
+        self._lay_out({**shapes, **{name: np.shape(array) for name, array in truth.items()}})
+        self.close()
+        self._resume()
 
     def manifest(self) -> NDArray[np.void]:
         """Manifest rows as they stand [shape=(n_records,)]."""
         rows: NDArray[np.void] = self._manifest[:]
         return rows
+
+    def write_split(self, name: str, sides: NDArray[np.int8], about: str) -> None:
+        """Write a split that place was laid out for.
+
+        Parameters
+        ----------
+        name : str
+            Of the split.
+        sides : numpy.ndarray [shape=(n_records,)]
+            0 train, 1 test, -1 neither.
+        about : str
+            How it was made, as JSON.
+        """
+        if f"splits/{name}" not in self._file:  # in one begun before there were splits
+            lay_out_split(self._file, name, self._shape[0])
+        fill_split(self._file, name, sides, about)
 
     def finish(self) -> None:
         """Close the file and give it its name.
@@ -718,8 +1011,17 @@ class DataSetWriter:
         ------
         DataError
             Not every record is done.
+        WriteError
+            The disk is full or failing; the unfinished file stays.
         """
         _refuse_unfinished(self.done, self.part)
+        with _writing(self.part):
+            self._seal()
+
+    def _seal(self) -> None:
+        hashed = np.bytes_(manifest_hash(self.manifest()))
+        if "manifest_sha256" in self._file.attrs:  # not in one begun before there were hashes
+            self._file.attrs.modify("manifest_sha256", hashed)
         self.close()
         with self.part.open("rb") as handle:
             os.fsync(handle.fileno())
@@ -740,7 +1042,11 @@ class DataSetWriter:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        self.close()
+        try:
+            self.close()
+        except (OSError, RuntimeError):  # the disk is still full: the first error tells it
+            if error is None:
+                raise
 
 
 def refuse_output(path: Path, force: bool) -> None:
@@ -768,10 +1074,64 @@ def refuse_output(path: Path, force: bool) -> None:
         raise DataError(f"{path} exists; choose another name or use force to replace it")
 
 
-def _refuse_size(shape: tuple[int, int, int], row: np.dtype[Any], folder: Path) -> None:
+def _refuse_busy(part: Path) -> None:
+    """Refuse a file that another run is writing: it must not be taken from under it."""
+    if not part.exists():
+        return
+    try:
+        h5py.File(part, "r+").close()
+    except OSError as error:
+        if "lock" in str(error):
+            raise DataError(f"{part} is being written by another run; wait for its end") from error
+
+
+@contextmanager
+def _writing(path: Path) -> Iterator[None]:
+    """Turn what the disk says into one message."""
+    try:
+        yield
+    except WriteError:
+        raise
+    except (OSError, RuntimeError) as error:
+        raise WriteError(
+            f"{path} cannot be written ({_cause(error)}); mend the disk or make room"
+        ) from error
+
+
+@contextmanager
+def _laying_out(path: Path) -> Iterator[None]:
+    """The same for a file that is not there yet: another place will do."""
+    try:
+        yield
+    except (OSError, RuntimeError) as error:
+        raise DataError(
+            f"{path} cannot be made ({_cause(error)}); check rights and space, or choose another "
+            "folder"
+        ) from error
+
+
+def _cause(error: Exception) -> str:
+    """What the operating system said, without what HDF5 wraps around it."""
+    told = re.search("error message = '([^']*)'", str(error))
+    return told[1] if told else getattr(error, "strerror", None) or str(error)
+
+
+def _take_space(path: Path) -> None:
+    """Claim the disk for all that will be written: HDF5 leaves holes, a full disk cannot fill them.
+
+    A file system that copies on write, or a system without the call, can still run full.
+    """
+    if hasattr(os, "posix_fallocate"):
+        with path.open("r+b") as handle:
+            os.posix_fallocate(handle.fileno(), 0, path.stat().st_size)
+
+
+def _refuse_size(
+    shape: tuple[int, int, int], row: np.dtype[Any], hidden: int, folder: Path
+) -> None:
     if min(shape) < 1:
         raise DataError(f"signal of shape {shape} must have >= 1 record, channel and sample")
-    needed = 4 * math.prod(shape) + shape[0] * row.itemsize
+    needed = 4 * math.prod(shape) + shape[0] * (row.itemsize + 4 * hidden)
     free = shutil.disk_usage(folder).free
     if needed > free:
         raise DataError(
@@ -795,6 +1155,58 @@ def _create(
     kind = h5py.h5t.py_create(dtype, logical=True)
     h5py.h5d.create(file.id, name.encode(), kind, space, dcpl=plan, lcpl=links)
     file.flush()
+
+
+def lay_out_split(file: Any, name: str, n_records: int) -> None:
+    """Make place for a split, so that filling it changes no structure; until then it has no sides.
+
+    Parameters
+    ----------
+    file : h5py.File
+        Of a data set, writable.
+    name : str
+        Of the split; one that is there is replaced.
+    n_records : int
+        Records of the file.
+    """
+    key = f"splits/{name}"
+    if key in file:
+        del file[key]
+    _create(file, key, (n_records,), np.dtype(np.int8), chunk=False)
+    file[key][:] = -1
+    file[key].attrs["about"] = np.bytes_(b" " * _LONGEST_SPLIT)
+
+
+def fill_split(file: Any, name: str, sides: NDArray[np.int8], about: str) -> None:
+    """Write a split into the place laid out for it.
+
+    Parameters
+    ----------
+    file : h5py.File
+        Of a data set, writable.
+    name : str
+        Of the split.
+    sides : numpy.ndarray [shape=(n_records,)]
+        0 train, 1 test, -1 neither.
+    about : str
+        How it was made, as JSON.
+
+    Raises
+    ------
+    DataError
+        The text is too long.
+    """
+    text = about.encode()
+    if len(text) > _LONGEST_SPLIT:
+        raise DataError(
+            f"split {name}: its text has {len(text)} byte, must be <= {_LONGEST_SPLIT}; bound "
+            "fewer columns"
+        )
+    file[f"splits/{name}"][:] = sides
+    file[f"splits/{name}"].attrs.modify("about", np.bytes_(text.ljust(_LONGEST_SPLIT)))
+
+
+_LONGEST_SPLIT = 4000  # byte, as JSON: twenty columns with their bounds
 
 
 def _filled(dtype: np.dtype[Any], values: Mapping[str, Any], index: int) -> NDArray[np.void]:

@@ -1,23 +1,28 @@
-"""Worker processes: results in the order of the work, few in flight."""
+"""Workers: results in the order of the work, few in flight, lost processes replaced."""
 
 import gc
 import os
+import signal
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
+from concurrent.futures import BrokenExecutor, Future
+from contextlib import AbstractContextManager, contextmanager
 from typing import Any, TypeVar
 
 from threadpoolctl import threadpool_limits
 
+from .pool import AHEAD_PER_JOB, Pool, WorkersError, first_line
+
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
-AHEAD_PER_JOB = 3
-"""Items handed out and not yet taken back, per worker; bounds the memory of a run."""
-
 JOBS_PER_CORE = 4
 """More processes than this for every core only wait for each other."""
+
+ATTEMPTS = 3
+"""Times that processes may die before the oldest result in flight comes."""
 
 PARENT_CHECK = 1.0
 """Time between two looks of a worker at whether its parent lives [s]."""
@@ -30,52 +35,171 @@ _ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM
 
 
 def in_order(
-    function: Callable[[Item], Result], items: Iterable[Item], *, jobs: int
-) -> Iterator[Result]:
+    function: Callable[[Item], Result],
+    items: Iterable[Item],
+    *,
+    jobs: int,
+    scheduler: str | None = None,
+    say: Callable[[str], None] | None = None,
+) -> Generator[Result, None, None]:
     """Apply a function in worker processes and give the results in order.
 
     Parameters
     ----------
     function : callable
-        Importable by name, or a partial of such a function.
+        Importable by name, or a partial of such a function. An item is done again where its
+        worker died, so it should do nothing but return.
     items : iterable
         Drawn from only as far as the workers need.
     jobs : int
         Processes; 1 works in this one, without any other. No more are started than
         `JOBS_PER_CORE` for every core.
+    scheduler : str, optional
+        Address of a Dask scheduler, ``tcp://HOST:PORT``, whose workers are used instead; `jobs`
+        is of no account then.
+    say : callable, optional
+        Called with a line about workers that are waited for, lost or too many.
 
     Yields
     ------
     result
-        Of each item, in the order of the items. The same for any `jobs`.
+        Of each item, in the order of the items. The same for any `jobs` and `scheduler`.
+
+    Raises
+    ------
+    WorkersError
+        Worker processes died `ATTEMPTS` times in a row, or the cluster was lost.
+    DataError
+        The cluster cannot be used; see :func:`wearstate.datasets.cluster.cluster_pool`.
 
     Examples
     --------
     >>> list(in_order(abs, [-1, 2, -3], jobs=1))
     [1, 2, 3]
     """
-    jobs = min(jobs, JOBS_PER_CORE * cores())
-    if jobs == 1:
+    talk = say or _silent
+    if scheduler is None and (jobs := _bounded(jobs, talk)) == 1:
         # one thread for linear algebra, as in a worker: the same sums in the same order
         with threadpool_limits(1):
             yield from map(function, items)
         return
-    from joblib.externals.loky import get_reusable_executor
+    with _pool(function, jobs, scheduler, talk) as pool:
+        yield from _through(pool, items)
 
-    executor = get_reusable_executor(
-        max_workers=jobs, timeout=IDLE, env=_ONE_THREAD, initializer=_settle
-    )
-    waiting: deque[Any] = deque()
+
+def _silent(_: str) -> None:
+    """Say nothing."""
+
+
+def _bounded(jobs: int, say: Callable[[str], None]) -> int:
+    most = max(1, int(JOBS_PER_CORE * cores()))
+    if jobs > most:
+        say(f"jobs = {jobs} is more than {JOBS_PER_CORE} for each of {cores()} cores; {most} start")
+    return min(jobs, most)
+
+
+def _pool(
+    function: Callable[[Any], Any], jobs: int, scheduler: str | None, say: Callable[[str], None]
+) -> AbstractContextManager[Pool]:
+    if scheduler is None:
+        return _processes(function, jobs, say)
+    from .cluster import cluster_pool
+
+    return cluster_pool(function, scheduler, say)
+
+
+def _through(pool: Pool, items: Iterable[Any]) -> Iterator[Any]:
+    for item in items:
+        pool.submit(item)
+        while pool.waiting >= pool.most:
+            yield pool.take()
+    while pool.waiting:
+        yield pool.take()
+
+
+@contextmanager
+def _processes(
+    function: Callable[[Any], Any], jobs: int, say: Callable[[str], None]
+) -> Iterator[Pool]:
+    """Processes of this machine."""
+    pool = _Processes(function, jobs, say)
     try:
-        for item in items:
-            waiting.append(executor.submit(function, item))
-            if len(waiting) >= AHEAD_PER_JOB * jobs:
-                yield waiting.popleft().result()
-        while waiting:
-            yield waiting.popleft().result()
+        yield pool
     except BaseException:  # also Ctrl-C, and a caller that stops: leave no worker behind
-        executor.shutdown(wait=True, kill_workers=True)
+        pool.kill()
         raise
+
+
+class _Processes:
+    """Processes of this machine, started anew where one dies."""
+
+    def __init__(
+        self, function: Callable[[Any], Any], jobs: int, say: Callable[[str], None]
+    ) -> None:
+        self._function, self._jobs, self._say = function, jobs, say
+        self._ahead: deque[tuple[Any, Future[Any]]] = deque()
+        self._start()
+
+    def _start(self) -> None:
+        from joblib.externals.loky import get_reusable_executor
+
+        self._executor = get_reusable_executor(
+            max_workers=self._jobs, timeout=IDLE, env=_ONE_THREAD, initializer=_settle
+        )
+
+    @property
+    def waiting(self) -> int:
+        return len(self._ahead)
+
+    @property
+    def most(self) -> int:
+        return AHEAD_PER_JOB * self._jobs
+
+    def submit(self, item: Any) -> None:
+        self._ahead.append((item, self._sent(item)))
+
+    def _sent(self, item: Any) -> "Future[Any]":
+        try:
+            future: Future[Any] = self._executor.submit(self._function, item)
+        except BrokenExecutor as error:  # seen when it is taken, where attempts are counted
+            future = Future()
+            future.set_exception(error)
+        return future
+
+    def take(self) -> Any:
+        for attempt in range(1, ATTEMPTS + 1):
+            try:
+                result = self._ahead[0][1].result()
+            except BrokenExecutor as error:
+                fault = error
+            else:
+                self._ahead.popleft()
+                return result
+            if attempt < ATTEMPTS:
+                self._say("a worker process died; what it had in hand is done again")
+                self._renew()
+        raise WorkersError(
+            f"worker processes died {ATTEMPTS} times over the same work, must be < {ATTEMPTS} "
+            f"({first_line(fault)}); look for too little memory, or use fewer jobs"
+        ) from fault
+
+    def _renew(self) -> None:
+        self._start()  # loky gives a new executor for a broken one
+        self._ahead = deque(
+            (item, future if _has_come(future) else self._sent(item))
+            for item, future in self._ahead
+        )
+
+    def kill(self) -> None:
+        # loky's own way, kill_workers, fails in its thread over an item submitted just before;
+        # processes that die are what it is made for
+        for process in list((self._executor._processes or {}).values()):
+            process.terminate()
+        self._executor.shutdown(wait=True)
+
+
+def _has_come(future: "Future[Any]") -> bool:
+    return future.done() and not isinstance(future.exception(), BrokenExecutor)
 
 
 def cores() -> int:
@@ -93,6 +217,8 @@ def cores() -> int:
 
 def _settle() -> None:
     """Start a worker."""
+    # Ctrl-C reaches every process of the terminal; the one that writes ends the others
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     # loky collects garbage once a second; over every imported object that is 8 % of a run
     gc.freeze()
     threading.Thread(target=_follow, args=(os.getppid(),), daemon=True).start()

@@ -39,6 +39,11 @@ class _Group(click.Group):
             click.echo(f"Error: {_as_options(str(error), command)}", err=True)
             bad_input = isinstance(error, ValueError)
             raise click.exceptions.Exit(EXIT_BAD_INPUT if bad_input else EXIT_FAILED) from None
+        except KeyboardInterrupt as error:
+            if not str(error):
+                raise  # click says that it ends
+            click.echo(f"\n{error}", err=True)  # below the ^C of the terminal
+            raise click.exceptions.Exit(EXIT_FAILED) from None
         except BrokenPipeError:
             raise  # the reader of stdout has gone: click ends quietly
         except OSError as error:
@@ -254,6 +259,7 @@ def _workers(jobs: int | None) -> int:
 
 
 _DATA, _MODEL, _PAGE = (".h5", ".hdf5"), (".wsm",), (".html", ".htm")
+_CARD = (*_PAGE, ".md")
 _CHART = (".svg", ".png", ".pdf", ".html", ".json", ".csv")
 _PICTURE, _TABLE = (".png", ".svg", ".pdf"), (".parquet", ".csv", ".h5")
 
@@ -318,12 +324,19 @@ def _progress(what: str) -> Iterator[Callable[[int, int], None] | None]:
         yield None
         return
     from rich.console import Console
-    from rich.progress import MofNCompleteColumn, Progress, TimeRemainingColumn
+    from rich.progress import MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
     columns = (*Progress.get_default_columns()[:2], MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(what, total=None)
-        yield lambda done, total: bar.update(task, completed=done, total=total)
+    rate = TextColumn("{task.fields[rate]}")
+    with Progress(*columns, rate, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task(what, total=None, rate="")
+
+        def update(done: int, total: int) -> None:
+            speed = bar.tasks[task].speed  # of the last half minute
+            text = f"{speed:.3g}/s" if speed else ""
+            bar.update(task, completed=done, total=total, rate=text)
+
+        yield update
 
 
 def _overrides(pairs: Sequence[str]) -> dict[str, Any]:
@@ -390,6 +403,86 @@ def scene_check(file: str, as_json: bool) -> None:
     checked = load_scene(file)
     check(checked)
     _emit({"scene": checked.name, "faults": []}, as_json, f"{checked.name}: no fault")
+
+
+# --- recipes ------------------------------------------------------------------------------------
+
+
+@cli.group()
+def recipe() -> None:
+    """What data sets are drawn from: list, show, check, preview."""
+
+
+@recipe.command("list")
+@_json_option
+def recipe_list(as_json: bool) -> None:
+    """Names and descriptions of the built-in recipes."""
+    from ..datasets.recipe_file import read_recipe, recipe_names
+
+    found = {name: read_recipe(name).table.get("description", "") for name in recipe_names()}
+    _emit({"recipes": found}, as_json, "\n".join(f"{n:26} {d}" for n, d in found.items()))
+
+
+@recipe.command("show")
+@click.argument("name")
+@click.option("--whole", is_flag=True, help="With all that it extends.")
+def recipe_show(name: str, whole: bool) -> None:
+    """TOML text of a recipe: copy it, change it, check it."""
+    from ..datasets.recipe_file import read_recipe, recipe_text
+
+    click.echo(read_recipe(name).text if whole else recipe_text(name), nl=False)
+
+
+@recipe.command("check")
+@click.argument("file")
+@_json_option
+def recipe_check(file: str, as_json: bool) -> None:
+    """Check a recipe against its scene; every fault at once."""
+    from ..datasets.recipe import STRATA, load_recipe, sample_records
+    from ..sim.assemble import check
+
+    checked = load_recipe(file)
+    for sample in sample_records(checked, STRATA):
+        check(sample.scene)
+    _emit({"recipe": checked.name, "faults": []}, as_json, f"{checked.name}: no fault")
+
+
+@recipe.command("preview")
+@click.argument("name")
+@click.option(
+    "-n",
+    "--records",
+    type=click.IntRange(1, _MOST_RECORDS),
+    default=None,
+    help="Records; the recipe's by default.",
+)
+@click.option("--plot", type=_PATH, help="Picture of the draws to write (.png, .svg or .pdf).")
+@_seed_option
+@_jobs_option
+@_force_option
+@_json_option
+def recipe_preview(
+    name: str,
+    records: int | None,
+    plot: Path | None,
+    seed: int,
+    jobs: int | None,
+    force: bool,
+    as_json: bool,
+) -> None:
+    """What NAME (a built-in recipe or a TOML file) would make: draws, labels, time and size."""
+    from ..datasets.recipe import load_recipe
+    from .recipe_text import preview, preview_figure, preview_text
+
+    _check_outputs([name], [(plot, _PICTURE)], force)
+    found = preview(load_recipe(name), records, seed=seed, cores=_workers(jobs))
+    if plot is not None:
+        from .panel import save_picture
+
+        save_picture(preview_figure(found), plot)
+    files = [str(plot)] if plot else []
+    words = "\n".join([preview_text(found.table), *files])
+    _emit({**found.table, "files": files}, as_json, words)
 
 
 # --- simulation and data sets -------------------------------------------------------------------
@@ -474,6 +567,11 @@ def simulate(
 )
 @_seed_option
 @_jobs_option
+@click.option(
+    "--scheduler",
+    metavar="tcp://HOST:PORT",
+    help="Simulate on the workers of a Dask cluster instead; the same bytes.",
+)
 @_force_option
 @_json_option
 def generate(
@@ -484,6 +582,7 @@ def generate(
     fidelity: Literal["auto", "given"] | None,
     seed: int,
     jobs: int | None,
+    scheduler: str | None,
     force: bool,
     as_json: bool,
 ) -> None:
@@ -495,6 +594,8 @@ def generate(
 
     from ..datasets.generate import generate as run
 
+    if scheduler is not None and jobs is not None:
+        raise click.UsageError("--jobs is for this machine, not for the workers of --scheduler")
     _check_outputs([recipe], [(output, _DATA)], force)
     with _progress("simulating") as progress:
         summary = run(
@@ -503,6 +604,7 @@ def generate(
             output,
             seed=seed,
             jobs=_workers(jobs),
+            scheduler=scheduler,
             force=force,
             truth=truth,
             fidelity=fidelity,
@@ -667,6 +769,11 @@ _PLOT_OPTIONS = ("draw", "force_channel", "speed_hz", "bearing")
 @cli.command()
 @click.argument("file", type=_PATH, required=False)
 @click.option("--fft", "of_fft", is_flag=True, help="Who computes Fourier transforms, timed here.")
+@click.option(
+    "--verify", "check", is_flag=True, help="Check every record of a data set; exit 1 on a fault."
+)
+@click.option("--card", type=_PATH, help="Page about a data set to write (.html or .md).")
+@click.option("--licence", default="not stated", show_default=True, help="Of the data, for --card.")
 @click.option("--plot", type=_PATH, help="Picture of a recording to write (.png, .svg or .pdf).")
 @click.option("--kind", type=click.Choice(_KINDS), help="What to plot; by default all it supports.")
 @click.option("--draw", multiple=True, metavar="NAME", help="Channel to plot; all by default.")
@@ -684,6 +791,9 @@ _PLOT_OPTIONS = ("draw", "force_channel", "speed_hz", "bearing")
 def info(
     file: Path | None,
     of_fft: bool,
+    check: bool,
+    card: Path | None,
+    licence: str,
     plot: Path | None,
     kind: str | None,
     tacho: str | None,
@@ -698,6 +808,9 @@ def info(
     wanted = {name: given.pop(name) for name in _PLOT_OPTIONS}
     if of_fft == (file is not None):
         raise click.UsageError("give either a FILE or --fft")
+    if file is not None and (check or card is not None):
+        _about_set(file, check, card, licence, force, as_json)
+        return
     if plot is None and (kind or any(wanted.values())):
         raise click.UsageError("what to plot is given, but no --plot to write it to")
     if file is None:
@@ -714,6 +827,203 @@ def info(
         )
         text += f"\n{picture_text(described['plot'])}"
     _emit(described, as_json, text)
+
+
+def _about_set(
+    file: Path, check: bool, card: Path | None, licence: str, force: bool, as_json: bool
+) -> None:
+    """Check a data set, write its card, or both; a card of an unsound one is not written."""
+    from ..datasets.check import check_set, checked_table, checked_text
+
+    _check_outputs([file], [(card, _CARD)], force)
+    found: dict[str, Any] = {}
+    words = []
+    if check:
+        with _progress("checking") as progress:
+            found = checked_table(check_set(file, progress=progress))
+        words.append(checked_text(found))
+    if card is not None and found.get("sound", True):
+        from .card import write_card
+
+        write_card(file, card, licence=licence)
+        found["card"] = str(card)
+        words.append(str(card))
+    _emit(found, as_json, "\n".join(words))
+    raise click.exceptions.Exit(0 if found.get("sound", True) else EXIT_FAILED)
+
+
+@cli.command()
+@click.argument("data", type=_PATH)
+@click.option("-o", "--output", type=_PATH, required=True, help="File or folder to write.")
+@click.option(
+    "--as",
+    "kind",
+    type=click.Choice(["h5", "parquet", "npz", "wav", "csv"]),
+    help="By the suffix of the output by default; wav and csv are folders.",
+)
+@click.option("--signals", is_flag=True, help="Parquet: signals too, as columns of lists.")
+@click.option("--compress", is_flag=True, help=".h5 and .npz: smaller, with the same values.")
+@_force_option
+@_json_option
+def export(
+    data: Path,
+    output: Path,
+    kind: str | None,
+    signals: bool,
+    compress: bool,
+    force: bool,
+    as_json: bool,
+) -> None:
+    """Write the data set DATA as Parquet, NumPy or HDF5 file, or as folder of WAV or CSV files."""
+    from dataclasses import asdict
+
+    from ..datasets.export import export_set, exported_text
+
+    with _progress("exporting") as progress:
+        made = export_set(
+            data,
+            output,
+            kind=kind,
+            signals=signals,
+            compress=compress,
+            force=force,
+            progress=progress,
+        )
+    _emit({**asdict(made), "path": str(made.path)}, as_json, exported_text(made))
+
+
+_SPLITS = (  # as wearstate.datasets.split_file, which is too heavy to import for --help
+    *("machine", "speed", "load", "severity", "geometry"),
+    *("time-same-machines", "time-other-machines", "region"),
+)
+
+
+@cli.command()
+@click.argument("data", type=_PATH)
+@click.option("--add", "kinds", multiple=True, type=click.Choice(_SPLITS), help="Split to store.")
+@click.option("--defaults", is_flag=True, help="Store every split that the records allow.")
+@click.option("--name", help="To store one split under; its kind by default.")
+@click.option(
+    "--bound",
+    "bounds",
+    multiple=True,
+    metavar="COLUMN=LOW:HIGH",
+    help="Of a region, in SI; one end may be left out. Records within all bounds are tested.",
+)
+@click.option(
+    "--share",
+    type=_Share(0.01, 0.99),
+    help="Of the machines that is tested; of time-…: of a life that is trained on.",
+)
+@click.option("--seed", type=click.IntRange(0, _LARGEST_SEED), help="Of the choice of machines.")
+@_force_option
+@_json_option
+def splits(
+    data: Path,
+    kinds: Sequence[str],
+    defaults: bool,
+    name: str | None,
+    bounds: Sequence[str],
+    share: float | None,
+    seed: int | None,
+    force: bool,
+    as_json: bool,
+) -> None:
+    """Splits stored in the data set DATA, and further ones; signal and manifest stay as they are.
+
+    With --force, a split of the same name is replaced.
+    """
+    from ..datasets.record import DataSet
+    from ..datasets.split_file import default_splits, drawn_of, make_split, store_splits
+    from .audit_text import splits_table, splits_text
+
+    if name and len(kinds) != 1:
+        raise click.UsageError("--name is for one split: give --add once")
+    if not kinds and (bounds or share is not None or seed is not None):
+        raise click.UsageError("--bound, --share and --seed need --add")
+    with DataSet(data) as opened:
+        drawn = drawn_of(opened) if kinds or defaults else None
+    if drawn is not None:
+        ranges = _bounds(bounds)
+        made = list(default_splits(drawn).values()) if defaults else []
+        made += [
+            make_split(drawn, kind, name=name, bounds=ranges, share=share, seed=seed)
+            for kind in kinds
+        ]
+        store_splits(data, made, force=force)
+    with DataSet(data) as opened:
+        value = splits_table(opened)
+    _emit(value, as_json, splits_text(value))
+
+
+def _bounds(texts: Sequence[str]) -> dict[str, tuple[float, float]]:
+    """``column=low:high`` pairs; an end that is left out is infinite."""
+    found: dict[str, tuple[float, float]] = {}
+    for text in texts:
+        column, _, ends = text.partition("=")
+        low, sign, high = (part.strip() for part in ends.partition(":"))
+        good = all(not end or _NUMBER.fullmatch(end) for end in (low, high))
+        if not (column and sign and good and (low or high)) or column in found:
+            raise click.BadParameter(
+                f"'{text}' must read COLUMN=LOW:HIGH, once for a column", param_hint="--bound"
+            )
+        found[column] = (float(low or -math.inf), float(high or math.inf))
+    return found
+
+
+@cli.command()
+@click.argument("paths", metavar="FILES…", nargs=-1, type=_PATH)
+@click.option("--label", default="", metavar="COLUMN|FILE", help="What is to be told apart.")
+@click.option("--group", default="", metavar="COLUMN", help="Machine of each row.")
+@click.option(
+    "--split", default="", metavar="NAME", help="Stored split, or column with train and test."
+)
+@click.option(
+    "--nuisance",
+    multiple=True,
+    metavar="COLUMN",
+    help="Condition that must not follow the label.",
+)
+@click.option("--train", multiple=True, type=_PATH, help="File that trains, against --test.")
+@click.option("--test", multiple=True, type=_PATH, help="File that tests, against --train.")
+@click.option(
+    "--fail-on",
+    type=click.Choice(["warning", "alarm"]),
+    help="Exit 3 at a warning, 4 at an alarm; alarm: only 4.",
+)
+@_jobs_option
+@_json_option
+def audit(
+    paths: Sequence[Path],
+    label: str,
+    group: str,
+    split: str,
+    nuisance: Sequence[str],
+    train: Sequence[Path],
+    test: Sequence[Path],
+    fail_on: str | None,
+    jobs: int | None,
+    as_json: bool,
+) -> None:
+    """Leaks, copies and unfit splits in data sets (.h5) and tables (.csv, .parquet).
+
+    Columns are named, or counted from 1. Data sets and tables of `wearstate features` know their
+    label and machines.
+    """
+    from ..datasets.audit import audit as run
+    from ..datasets.audit_table import Roles
+    from .audit_text import audit_table, audit_text
+
+    if bool(train) != bool(test):
+        raise click.UsageError("--train and --test go together: give both")
+    if not paths and not train:
+        raise click.UsageError("give FILES, or --train and --test")
+    roles = Roles(label=label, group=group, split=split, nuisance=tuple(nuisance))
+    with _progress("reading records") as progress:
+        found = run(paths, roles, train=train, test=test, jobs=_workers(jobs), progress=progress)
+    _emit(audit_table(found), as_json, audit_text(found))
+    code = {"warning": EXIT_WARNING, "alarm": EXIT_ALARM}.get(found.verdict, 0) if fail_on else 0
+    raise click.exceptions.Exit(0 if fail_on == "alarm" and code == EXIT_WARNING else code)
 
 
 _FEATURE_SETS = ("standard", "core", "complete")  # as wearstate.features.catalogue.SetName

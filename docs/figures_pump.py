@@ -2,7 +2,7 @@
 
 The source paper's four figures (combined cylinder pressure, piston velocity with and without
 clearance, casing modes, transfer function), the pins in their clearance circles, a map of contact,
-flight and impact, what other faults look like, and the triplex pump.
+flight and impact, what other faults look like, the triplex pump, and lives of crank pins.
 """
 
 import sys
@@ -13,11 +13,13 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
+from wearstate.datasets.recipe import load_recipe, sample_records
 from wearstate.sim.assemble import simulate
 from wearstate.sim.crank_setup import pin_offsets, run_scene
 from wearstate.sim.hydraulics import even_phases, flow_ripple
 from wearstate.sim.pump_parts import PumpScene
 from wearstate.sim.scene import load_scene
+from wearstate.sim.wear_rate import joint_wear
 
 STEP = 1 / 51_200  # s
 SETTLING = 2  # revolutions
@@ -364,6 +366,44 @@ def kinematic_flow(scene: PumpScene, angle: NDArray[np.float64]) -> NDArray[np.f
     return total
 
 
+MACHINES = 6  # of the figure, and how many recordings each
+
+
+def life() -> Figure:
+    """Clearance against operating time, where the eye wears, and what remains."""
+    recipe = load_recipe("bilge-pump-life")
+    each = recipe.table.records_per_group
+    rows = [sample.row for sample in sample_records(recipe, MACHINES * each, seed=1)]
+    figure, axes = sheet("Crank pins of bilge pumps over their lives (simulated)", 2, 2, (11, 7.5))
+    worn, left, scar, rate = axes.flat
+    for group, colour in zip(range(MACHINES), [*COLOURS, "#c9a227"], strict=True):
+        own = rows[each * group : each * (group + 1)]
+        hours = [row["operating_hours"] / 1000 for row in own]
+        clearance = [1e3 * row["diametral_clearance_crankpin_m"] for row in own]
+        worn.plot(hours, clearance, ".-", color=colour, lw=0.8)
+        left.plot(
+            hours, [row["remaining_life_h"] / 1000 for row in own], ".-", color=colour, lw=0.8
+        )
+    worn.axhline(1e3 * recipe.severities[0].edges[-1], color="k", lw=0.8, ls="--")
+    label(worn, "operating time [1000 h]", "clearance [mm]", "Clearance; dashed: condemned", "")
+    label(left, "operating time [1000 h]", "remaining life [1000 h]", "Hours to the limit", "")
+    clearances = (0.05, 0.13, 0.22, 0.31, 0.465)  # mm
+    found = [
+        joint_wear(pump({"joint.crankpin.diametral_clearance": f"{c} mm"}), "crankpin")
+        for c in clearances
+    ]
+    angle = np.arange(found[0].eye.size)
+    scar.plot(angle, 2 * np.pi * found[0].eye, color=COLOURS[0], label="eye, from the rod's end")
+    scar.plot(angle, 2 * np.pi * found[0].pin, color=COLOURS[1], label="pin, from the crank")
+    label(scar, "angle [deg]", "depth over its mean", "Where they wear", "upper left")
+    rate.plot(clearances, [wear.power for wear in found], "o-", color=COLOURS[2])
+    rate.set_ylim(0, 1500)
+    label(
+        rate, "clearance [mm]", "force times sliding speed [W]", "How fast: hardly by clearance", ""
+    )
+    return figure
+
+
 FIGURES: dict[str, Callable[[], Figure]] = {
     "pump-pressure": pressure,
     "pump-velocity": velocity,
@@ -373,6 +413,7 @@ FIGURES: dict[str, Callable[[], Figure]] = {
     "pump-map": flight_map,
     "pump-faults": faults,
     "pump-triplex": triplex,
+    "bilge-pump-life": life,
 }
 
 

@@ -223,7 +223,7 @@ def test_recipe_and_scene_may_ask_for_it(counted, tmp_path):
 def test_an_older_file_without_the_attribute_is_read(recipe, tmp_path):
     generate(recipe, 1, tmp_path / "data.h5")
     with h5py.File(tmp_path / "data.h5", "r+") as file:
-        del file.attrs["fidelity"]
+        del file.attrs["fidelity"], file.attrs["attributes_sha256"]
     with DataSet(tmp_path / "data.h5") as data:
         assert data.attributes.fidelity == ""
 

@@ -66,7 +66,9 @@ def test_accelerance_is_that_of_one_mass_far_above_its_modes(figures):
     assert_allclose(h, mass, rtol=1e-3)
 
 
-@pytest.mark.parametrize("name", ["pump-modes", "pump-transfer", "pump-velocity"])
+@pytest.mark.parametrize(
+    "name", ["pump-modes", "pump-transfer", "pump-velocity", "bilge-pump-life"]
+)
 def test_figures_say_that_they_are_simulated(figures, name, tmp_path):
     figure = figures.FIGURES[name]()
     assert "(simulated)" in figure.get_suptitle()

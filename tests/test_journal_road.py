@@ -44,7 +44,7 @@ def trained(data):
 
 
 def test_clearance_speed_load_oil_and_unbalance_are_drawn_as_the_recipe_says():
-    recipe = load_recipe("journal-bearing")
+    recipe = load_recipe("journal-bearing-standard")
     rows = [sample.row for sample in sample_records(recipe, 400, seed=1)]
     scene = recipe.scene
     bounds = {

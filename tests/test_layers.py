@@ -25,6 +25,7 @@ MAY_IMPORT = {
 SIM_FLOORS = [
     {"fidelity"},
     {"assemble"},
+    {"wear_rate"},
     {"pump", "journal", "shaft_line"},
     {"ladder"},
     {"crank_setup"},
@@ -40,6 +41,7 @@ SIM_FLOORS = [
     {"pump_parts", "journal_parts", "shaft_parts"},
     {"hydraulic_parts"},
     {"parts"},
+    {"wear_life"},
     {"sensor", "jit", "wear", "viscosity"},
 ]
 """Inside sim, from the roof to the ground; a file imports from lower floors or its own."""

@@ -46,7 +46,7 @@ def trained(data):
 
 
 def test_faults_speed_thrust_hull_and_oil_are_drawn_as_the_recipe_says():
-    recipe = load_recipe("propulsion-shaft")
+    recipe = load_recipe("propulsion-shaft-standard")
     rows = [sample.row for sample in sample_records(recipe, 400, seed=1)]
     thrust = recipe.scene.propeller.thrust
     bounds = {
@@ -69,7 +69,7 @@ def test_faults_speed_thrust_hull_and_oil_are_drawn_as_the_recipe_says():
 
 
 def test_records_have_twenty_revolutions_at_the_slowest():
-    recipe = load_recipe("propulsion-shaft")
+    recipe = load_recipe("propulsion-shaft-standard")
     slowest = 0.85 * recipe.scene.drive.speed
     assert recipe.scene.duration * slowest >= 20
 

@@ -1,11 +1,39 @@
-"""Splits keep a machine on one side."""
+"""Splits keep a machine on one side, and are stored without touching anything else."""
 
+import json
+import pickle
+
+import h5py
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
-from wearstate.datasets.splits import check_no_leak, condition_split, group_folds, group_split
+from wearstate.datasets import split_file
+from wearstate.datasets.generate import generate
+from wearstate.datasets.recipe import load_recipe, overrides_text, sample_records
+from wearstate.datasets.record import Attributes, DataError, DataSet, DataSetWriter
+from wearstate.datasets.split_file import (
+    KINDS,
+    Drawn,
+    default_splits,
+    drawn_of,
+    machine_draws,
+    make_split,
+    split_names,
+    store_splits,
+)
+from wearstate.datasets.splits import (
+    check_no_leak,
+    condition_split,
+    group_folds,
+    group_split,
+    region_split,
+    time_split,
+)
+from wearstate.diagnose.cli import _SPLITS, cli
+from wearstate.sim.sensor import Channel
 
 MANY = st.lists(st.integers(-3, 9), min_size=2, max_size=60).filter(lambda g: len(set(g)) > 1)
 
@@ -75,3 +103,267 @@ def test_a_leak_is_named():
 def test_splits_that_cannot_be_are_refused(call, message):
     with pytest.raises(ValueError, match=message):
         call()
+
+
+def test_a_region_is_where_every_bound_holds():
+    columns = {"speed_hz": [4.0, 6.0, 6.0, 4.0], "load_n": [9.0, 1.0, 9.0, 1.0]}
+    bounds = {"speed_hz": (5.0, np.inf), "load_n": (5.0, 10.0)}
+    train, test = region_split(columns, bounds)
+    assert (train.tolist(), test.tolist()) == ([0, 1, 3], [2])
+    train, test = region_split(columns, bounds, groups=[0, 1, 1, 0])
+    assert (train.tolist(), test.tolist()) == ([0, 3], [2])
+    with pytest.raises(ValueError, match=r"range 7 to 8 of speed_hz .* from 4 to 6"):
+        region_split(columns, {"speed_hz": (7.0, 8.0)})
+
+
+LIVES = st.lists(st.lists(st.floats(0, 1e4), min_size=3, max_size=9), min_size=2, max_size=6)
+
+
+@given(LIVES, st.floats(0.1, 0.9))
+def test_time_parts_lives_by_their_hours(lives, early):
+    hours = np.concatenate(lives)
+    groups = np.repeat(np.arange(len(lives)), [len(life) for life in lives])
+    end = np.array([max(life) for life in lives])
+    if not (end > 0).all():  # a life without any hours has no late part
+        return
+    train, test = time_split(hours, groups, early=early)
+    assert_array_equal(np.sort(np.r_[train, test]), np.arange(hours.size))
+    assert (hours[train] <= early * end[groups[train]]).all()
+    assert (hours[test] > early * end[groups[test]]).all()
+
+
+def test_time_on_other_machines():
+    hours = np.tile([0.0, 10.0, 20.0, 30.0], 4)
+    groups = np.repeat([3, 5, 7, 9], 4)
+    train, test = time_split(hours, groups, early=0.5, test_fraction=0.25, seed=1)
+    check_no_leak(groups, train, test)
+    [tested] = np.unique(groups[test])
+    assert_array_equal(np.unique(groups[train]), [g for g in (3, 5, 7, 9) if g != tested])
+    assert set(hours[train]) == {0.0, 10.0}
+    assert set(hours[test]) == {20.0, 30.0}
+
+
+# --- in a file
+
+
+RECIPE = load_recipe("bilge-pump-small", {"duration": "0.25 s"})
+N = 40
+
+
+def write_set(path, *, recipe=RECIPE, n=N, seed=3, change=None, failed=()):
+    """A data set with the draws of a recipe and noise for signals: splits know no signals."""
+    channel = Channel(name="acc", unit="m/s^2", quantity="acceleration")
+    head = Attributes(
+        sample_rate=100.0,
+        channels=(channel,),
+        origin="simulated",
+        severities=recipe.severity_columns,
+        recipe=recipe.text,
+        scene=recipe.scene_text,
+        overrides=overrides_text(recipe),
+        seed=seed,
+    )
+    rng = np.random.default_rng(seed)
+    with DataSetWriter(path, head, n_records=n, n_samples=8, columns=recipe.columns) as writer:
+        for sample in sample_records(recipe, n, seed=seed):
+            status = "diverged" if sample.index in failed else "ok"
+            row = {**sample.row, "status": status, **(change or {})}
+            writer.write(sample.index, rng.standard_normal((1, 8)), row)
+        writer.finish()
+    return path
+
+
+@pytest.fixture
+def path(tmp_path):
+    return write_set(tmp_path / "data.h5")
+
+
+def contents(path):
+    with h5py.File(path) as file:
+        return file["signal"][:].tobytes(), file["manifest"][:].tobytes(), repr(dict(file.attrs))
+
+
+def test_defaults_hold_out_the_largest_fifth_and_part_machines(path):
+    with DataSet(path) as data:
+        made = default_splits(drawn_of(data))
+        manifest = data.manifest
+    assert {"machine", "speed", "load", "severity", "geometry"} <= set(made)
+    assert not any(name.startswith("time") for name in made)
+    for split in made.values():
+        check_no_leak(manifest["group"], split.train, split.test)
+    columns = {"speed": "speed_hz", "load": "discharge_pressure_pa"}
+    columns["severity"] = RECIPE.severity_columns[0]
+    for name, column in columns.items():
+        values = manifest[column].to_numpy()
+        # a fifth of 40 records lies beyond the 80 % quantile
+        assert_array_equal(made[name].test, np.sort(np.argsort(values)[-8:]))
+        assert values[made[name].train].max() < values[made[name].test].min()
+
+
+def test_geometry_is_drawn_anew_from_recipe_and_seed(path):
+    with DataSet(path) as data:
+        name, values = machine_draws(drawn_of(data))
+    drawn = [sample.drawn[name] for sample in sample_records(RECIPE, N, seed=3)]
+    assert name == "casing.modes.0.frequency"
+    assert_array_equal(values, drawn)
+
+
+def test_geometry_of_another_version_is_refused(tmp_path):
+    path = write_set(tmp_path / "old.h5", change={RECIPE.severity_columns[0]: 1e-4})
+    with DataSet(path) as data:
+        drawn = drawn_of(data)
+    with pytest.raises(DataError, match=r"record 0 drawn anew has .* of another version"):
+        machine_draws(drawn)
+    assert "geometry" not in default_splits(drawn)
+
+
+def test_failed_records_are_on_neither_side(tmp_path):
+    with DataSet(write_set(tmp_path / "f.h5", failed=(0, 7))) as data:
+        made = default_splits(drawn_of(data))
+    for split in made.values():
+        assert_array_equal(split.sides(N)[[0, 7]], [-1, -1])
+
+
+def test_storing_leaves_signal_and_manifest_as_they_are(path):
+    before = contents(path)
+    with DataSet(path) as data:
+        made = default_splits(drawn_of(data))
+    store_splits(path, list(made.values()))
+    assert contents(path) == before
+    assert [entry.name for entry in path.parent.iterdir()] == ["data.h5"]
+    with DataSet(path) as data:
+        assert set(data.splits) == set(made)
+        for name, split in made.items():
+            assert_array_equal(data.split(name)[0], split.train)
+            assert_array_equal(data.split(name)[1], split.test)
+            assert data.splits[name]["kind"] == split.kind
+            assert data.splits[name]["text"] == split.text
+        copy = pickle.loads(pickle.dumps(data))
+        assert_array_equal(copy.split("machine")[1], made["machine"].test)
+        copy.close()
+    with h5py.File(path) as file:
+        for dataset in file["splits"].values():
+            assert (dataset.shape, dataset.dtype) == ((N,), np.int8)
+
+
+def test_storing_again(path):
+    with DataSet(path) as data:
+        drawn = drawn_of(data)
+    one, two = (make_split(drawn, "machine", name="mine", share=s, seed=1) for s in (0.2, 0.5))
+    store_splits(path, [one])
+    with pytest.raises(DataError, match="split mine is stored already; use force"):
+        store_splits(path, [two])
+    store_splits(path, [two], force=True)
+    with DataSet(path) as data:
+        assert_array_equal(data.split("mine")[1], two.test)
+        assert data.splits["mine"]["share"] == 0.5
+        with pytest.raises(DataError, match="split = 'fast' must be one of mine; choose one"):
+            data.split("fast")
+
+
+def test_storing_that_fails_leaves_the_file(path, monkeypatch):
+    with DataSet(path) as data:
+        made = make_split(drawn_of(data), "machine")
+    before = path.read_bytes()
+    monkeypatch.setattr(split_file, "fill_split", lambda *_: (_ for _ in ()).throw(OSError("full")))
+    with pytest.raises(OSError, match="full"):
+        store_splits(path, [made])
+    assert path.read_bytes() == before
+    assert list(path.parent.iterdir()) == [path]
+
+
+def test_damaged_sides_are_refused(path):
+    with DataSet(path) as data:
+        made = make_split(drawn_of(data), "machine")
+    store_splits(path, [made])
+    with h5py.File(path, "r+") as file:
+        file["splits/machine"][5] = 4
+    with DataSet(path) as data, pytest.raises(DataError, match="must be -1, 0 or 1 for each of 40"):
+        data.split("machine")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"kind": "speeds"}, "kind = 'speeds' must be one of machine"),
+        ({"kind": "region"}, "region: bounds are for region"),
+        ({"kind": "speed", "bounds": {"speed_hz": (1.0, 2.0)}}, "speed: bounds are for region"),
+        ({"kind": "speed", "share": 0.5}, "speed: share and seed are for machine"),
+        ({"kind": "machine", "name": "a/b"}, "name = 'a/b' must be lower-case"),
+        ({"kind": "time-same-machines"}, "manifest has no operating_hours"),
+        ({"kind": "region", "bounds": {"speed": (0.0, 1.0)}}, "column = 'speed' must be one of"),
+        ({"kind": "region", "bounds": {"record_id": (0.0, 1.0)}}, "'record_id' holds text"),
+    ],
+)
+def test_splits_that_are_asked_for_wrongly(path, arguments, message):
+    with DataSet(path) as data, pytest.raises(DataError, match=message):
+        make_split(drawn_of(data), **arguments)
+
+
+def test_what_a_recipe_declares(tmp_path):
+    recipe = load_recipe("bilge-pump-standard", {"duration": "0.25 s"})
+    assert recipe.held_out
+    with DataSet(write_set(tmp_path / "s.h5", recipe=recipe, n=200)) as data:
+        made, manifest = default_splits(drawn_of(data)), data.manifest
+    for region in recipe.held_out:
+        split = made[region.name]
+        assert split.kind == "declared"
+        inside = np.ones(200, dtype=bool)
+        for column, (low, high) in region.bounds.items():
+            inside &= manifest[column].between(low, high).to_numpy()
+        assert_array_equal(split.test, np.flatnonzero(inside))
+    assert {region.name for region in recipe.held_out} <= set(split_names(recipe))
+
+
+def test_time_splits_of_a_life():
+    hours = np.tile([5.0, 12.0, 15.0, 20.0], 6)
+    columns = {
+        "status": np.array(["ok"] * 24),
+        "group": np.repeat(np.arange(6), 4),
+        "operating_hours": hours,
+    }
+    made = default_splits(Drawn(columns=columns, seed=2))
+    same, other = made["time-same-machines"], made["time-other-machines"]
+    assert not same.machines_apart
+    assert other.machines_apart
+    # 60 % of 20 h, that record included
+    assert set(hours[same.train]) == set(hours[other.train]) == {5.0, 12.0}
+    assert set(hours[same.test]) == set(hours[other.test]) == {15.0, 20.0}
+    check_no_leak(columns["group"], other.train, other.test)
+
+
+def test_generate_stores_them(tmp_path):
+    path = tmp_path / "g.h5"
+    generate(RECIPE, 8, path, seed=3)
+    with DataSet(path) as data:
+        made = default_splits(drawn_of(data))
+        assert set(data.splits) == set(made) >= {"machine", "geometry"}
+        for name, split in made.items():
+            assert_array_equal(data.split(name)[1], split.test)
+
+
+def run(*arguments, code=0):
+    result = CliRunner().invoke(cli, [str(a) for a in arguments], catch_exceptions=False)
+    assert result.exit_code == code, result.output
+    return result
+
+
+def test_the_command(path):
+    assert "no splits; add some" in run("splits", path).stdout
+    assert "machine:" in run("splits", path, "--defaults").stdout
+    bound = "speed_hz=5:"
+    run("splits", path, "--add", "region", "--name", "quick", "--bound", bound)
+    made = json.loads(run("splits", path, "--json").stdout)["splits"]
+    assert made["quick"]["bounds"] == {"speed_hz": [5.0, None]}
+    with DataSet(path) as data:
+        quick = (data.manifest["speed_hz"] >= 5).to_numpy()
+        assert made["quick"]["test"] == np.count_nonzero(quick)
+    assert "is stored already" in run("splits", path, "--add", "machine", code=2).stderr
+    run("splits", path, "--add", "machine", "--share", 0.5, "--force")
+    assert "--bound" in run("splits", path, "--add", "region", "--bound", "a:b", code=2).stderr
+    assert "need --add" in run("splits", path, "--share", 0.5, code=2).stderr
+    assert "--name is for one" in run("splits", path, "--name", "a", code=2).stderr
+
+
+def test_the_kinds_of_the_command_line_are_those_of_the_library():
+    assert (*KINDS, "region") == _SPLITS

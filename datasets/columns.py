@@ -1,0 +1,147 @@
+"""What the columns of a manifest mean, and their units."""
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, kw_only=True)
+class Column:
+    """A column of a manifest.
+
+    Attributes
+    ----------
+    name : str
+        In the file.
+    unit : str
+        SI, by the ending of the name; empty where it has none.
+    meaning : str
+        In words.
+    role : str
+        ``identity``, ``label``, ``condition``, ``numerics`` or ``other``.
+    """
+
+    name: str
+    unit: str
+    meaning: str
+    role: str
+
+
+_UNITS = {
+    "m": "m",
+    "hz": "Hz",
+    "n": "N",
+    "pa": "Pa",
+    "rad": "rad",
+    "s": "s",
+    "h": "h",
+    "k": "K",
+    "pa_s": "Pa s",
+    "kg_m": "kg m",
+    "hours": "h",
+    "m2_per_n": "m^2/N",
+}
+"""Ending of a name -> unit."""
+
+MEANINGS = (
+    # identity
+    ("record_id", "identity", "name of the record, unique in the file"),
+    ("group", "identity", "machine: every split keeps its records on one side"),
+    ("group_name", "identity", "machine, as the labels of a measured file name it"),
+    ("file", "identity", "measured file that the record is from"),
+    ("start_s", "identity", "where in that file the record begins"),
+    ("seed", "identity", "of the record's sensor noise"),
+    ("done", "identity", "the record is written; true in every finished file"),
+    ("status", "identity", "ok, or why the record is not to be used"),
+    ("signal_crc32", "identity", "checksum of the record's signal"),
+    # labels
+    ("grade", "label", "wear grade of the first severity, 0 as new to 3 condemned; -1 unknown"),
+    ("grade_(.+)", "label", "the same of a further severity: {0}"),
+    ("diametral_clearance_(.+)_m", "label", "diametral clearance: {0}"),
+    ("scar_depth_(.+)_m", "label", "depth of the worn scar: {0}"),
+    ("wear_down_(.+)_m", "label", "how far the bore has worn down: {0}"),
+    ("sag_(.+)_m", "label", "how far the foundation has sunk: {0}"),
+    ("parallel_offset_(.+)_m", "label", "parallel offset of the shafts: {0}"),
+    ("confounder_(.+)", "label", "whether this fault beside the wear is present: {0}"),
+    ("(.+)_value", "label", "scene value of that fault [SI], 0 where it is absent: {0}"),
+    ("operating_hours", "label", "of the machine, at the record"),
+    ("remaining_life_h", "label", "operating hours to the condemning limit, 0 beyond; NaN: never"),
+    ("life_share", "label", "age of the surface over the age at which it is renewed"),
+    ("maintenance", "label", "maintenance events so far"),
+    ("wear_rate_m2_per_n", "label", "specific wear rate of the machine"),
+    # conditions
+    ("speed_hz", "condition", "shaft speed, as set"),
+    ("mean_speed_hz", "condition", "shaft speed, mean over the record"),
+    ("discharge_pressure_pa", "condition", "pressure behind the pump, above the atmosphere"),
+    ("suction_pressure_pa", "condition", "pressure before the pump, above the atmosphere"),
+    ("start_angle_rad", "condition", "shaft angle at the first sample"),
+    ("static_load_n", "condition", "steady load of the bearing"),
+    ("viscosity_pa_s", "condition", "dynamic viscosity of the oil"),
+    ("unbalance_kg_m", "condition", "unbalance of the rotor"),
+    ("hull_deflection_m", "condition", "deflection of the hull under the bearings"),
+    ("thrust_n", "condition", "thrust of the propeller"),
+    # numerics
+    ("rung_(.+)", "numerics", "model that was run of this effect: {0}"),
+    ("contact_law", "numerics", "law of the contact in the joint"),
+    ("frf_sha256", "numerics", "hash of the measured transfer functions of the casing"),
+    ("step_s", "numerics", "time step"),
+    ("steps", "numerics", "time steps taken"),
+    ("step_per_contact_time", "numerics", "time step over the time constant of the contact"),
+    ("contact_changes", "numerics", "how often contact was made or lost"),
+    ("cuts_refused", "numerics", "changes of contact that were not located in time"),
+    ("peak_normal_force_n", "numerics", "largest force of the contact"),
+    ("min_film_m", "numerics", "least thickness of the oil film"),
+    ("peak_eccentricity", "numerics", "largest eccentricity ratio of the journal"),
+    ("least_reaction_n", "numerics", "least vertical reaction of a bearing"),
+    ("motion_share", "numerics", "largest motion of a journal over what its linear film allows"),
+    ("cavitating_share", "numerics", "part of the steps with vapour in a cylinder"),
+    ("lift_left", "numerics", "lift of a valve when it should be closed, over its largest"),
+    ("tension_share", "numerics", "part of the steps in which a massless link was pulled"),
+    ("floored_share", "numerics", "part of the contacts with a floored speed of impact"),
+    ("residual", "numerics", "of the film's solution"),
+    ("estimated_error", "numerics", "relative error of what features use, as far as it is known"),
+    ("stability_margin", "numerics", "distance from instability, 0 at the limit"),
+    ("least_damping_ratio", "numerics", "of the least damped mode"),
+    ("least_damped_hz", "numerics", "frequency of the least damped mode"),
+    ("clipped_samples", "numerics", "samples at the end of the converter's range"),
+)
+"""Name (a pattern), role, meaning. The first that fits counts; a new column is one row."""
+
+
+def describe_columns(names: Iterable[str]) -> list[Column]:
+    """Unit and meaning of manifest columns.
+
+    Parameters
+    ----------
+    names : iterable of str
+
+    Returns
+    -------
+    list of Column
+        In the same order. A label that a user brought is called so.
+
+    Examples
+    --------
+    >>> [clearance, own] = describe_columns(["diametral_clearance_crankpin_1_m", "oil_k"])
+    >>> clearance.meaning, clearance.unit
+    ('diametral clearance: crankpin 1', 'm')
+    >>> own.role, own.unit
+    ('other', 'K')
+    """
+    return [_column(name) for name in names]
+
+
+def _column(name: str) -> Column:
+    for pattern, role, meaning in MEANINGS:
+        match = re.fullmatch(pattern, name)
+        if match:
+            words = meaning.format(*(part.replace("_", " ") for part in match.groups()))
+            return Column(name=name, unit=_unit(name), meaning=words, role=role)
+    return Column(name=name, unit=_unit(name), meaning="given on import", role="other")
+
+
+def _unit(name: str) -> str:
+    if name.startswith("confounder_"):
+        return ""  # a flag, whatever its name ends in
+    ending = max((end for end in _UNITS if name.endswith(f"_{end}")), key=len, default="")
+    return _UNITS.get(ending, "")

@@ -1,0 +1,95 @@
+"""Workers of this machine: order, few in flight, processes that die."""
+
+import os
+import signal
+import sys
+import time
+
+import cloudpickle
+import pytest
+from wearstate.datasets import workers
+from wearstate.datasets.pool import WorkersError
+from wearstate.datasets.workers import in_order
+
+cloudpickle.register_pickle_by_value(sys.modules[__name__])  # workers cannot import this file
+
+
+def late(item):
+    """The earlier, the later."""
+    time.sleep(0.02 * (4 - item % 4))
+    return item, os.getpid()
+
+
+def die_once(place, item):
+    """End the process at item 3, where it was not done before."""
+    try:
+        if item == 3:
+            os.close(os.open(place, os.O_CREAT | os.O_EXCL))
+            os.kill(os.getpid(), signal.SIGKILL)
+    except FileExistsError:
+        return -item
+    return item
+
+
+class OnceAt3:
+    """die_once of a place."""
+
+    def __init__(self, place):
+        self.place = place
+
+    def __call__(self, item):
+        return die_once(self.place, item)
+
+
+def die(item):
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def refuse(item):
+    raise ValueError(f"item {item} is bad")
+
+
+def test_results_come_in_the_order_of_the_items():
+    found = list(in_order(late, range(12), jobs=2))
+    assert [item for item, _ in found] == list(range(12))
+    assert len({pid for _, pid in found}) == 2
+
+
+def test_few_items_are_in_flight():
+    drawn = []
+    items = (drawn.append(i) or i for i in range(100))
+    outcomes = in_order(abs, items, jobs=2)
+    for taken in range(1, 20):
+        next(outcomes)
+        # the one that makes it full is handed out before the oldest is taken back
+        assert len(drawn) - taken <= workers.AHEAD_PER_JOB * 2
+    outcomes.close()
+
+
+def test_a_worker_that_dies_is_replaced(tmp_path):
+    told = []
+    function = OnceAt3(str(tmp_path / "died"))
+    found = list(in_order(function, range(8), jobs=2, say=told.append))
+    assert found == [0, 1, 2, -3, 4, 5, 6, 7]
+    assert told == ["a worker process died; what it had in hand is done again"]
+
+
+def test_work_that_kills_every_worker_is_given_up():
+    told = []
+    with pytest.raises(WorkersError, match=r"died 3 times over the same work, must be < 3"):
+        list(in_order(die, range(2), jobs=2, say=told.append))
+    assert len(told) == workers.ATTEMPTS - 1
+    assert list(in_order(abs, [-1, -2], jobs=2)) == [1, 2]  # none of it is left over
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_what_the_function_raises_is_raised(jobs):
+    with pytest.raises(ValueError, match="item 5 is bad"):
+        list(in_order(refuse, [5, 6], jobs=jobs))
+
+
+def test_more_workers_than_four_a_core_are_limited_and_told(monkeypatch):
+    monkeypatch.setattr(workers, "cores", lambda: 0.5)
+    told = []
+    assert list(in_order(abs, [-1, -2], jobs=64, say=told.append)) == [1, 2]
+    assert told == ["jobs = 64 is more than 4 for each of 0.5 cores; 2 start"]
