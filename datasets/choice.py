@@ -209,8 +209,10 @@ def _pilots(recipe: Recipe, samples: Sequence[Sample]) -> list[Sample]:
 
 
 def _highest(effect: Effect, found: Sequence[Resolution]) -> str:
+    """The higher rung; a level that the recipe's own scene has not is coarser than those it has."""
     names = [rung.name for rung in effect.rungs]
-    return max((each.rungs[effect.name] for each in found), key=names.index)
+    chosen = [each.rungs[effect.name] for each in found]
+    return max(chosen, key=lambda name: names.index(name) if name in names else -1)
 
 
 def _values(
@@ -219,12 +221,12 @@ def _values(
     """Values of the rungs; of a step the least that any record asks for."""
     values: dict[str, Any] = {}
     for effect in effects:
-        own = dict(effect.rung(rungs[effect.name]).values)
-        if effect.name == "step":
-            if rungs[effect.name] == _OWN_STEP:
-                continue  # every record finds its own
-            own = {path: min(_step_of(s, rungs["step"]) for s in scenes) for path in own}
-        values |= own
+        level = rungs[effect.name]
+        if effect.name != "step":
+            values |= effect.rung(level).values
+        elif level != _OWN_STEP:  # else every record finds its own
+            [path] = effect.rungs[-1].values
+            values[path] = min(_step_of(s, level) for s in scenes)
     return values
 
 
@@ -232,8 +234,10 @@ _OWN_STEP = "x1"
 
 
 def _step_of(scene: Scene, level: str) -> float:
+    """Of the level, or of the coarsest where a scene has none so coarse."""
     [effect] = [each for each in effects_of(scene) if each.name == "step"]
-    [step] = effect.rung(level).values.values()
+    rung = {each.name: each for each in effect.rungs}.get(level, effect.rungs[0])
+    [step] = rung.values.values()
     return float(step)
 
 

@@ -17,7 +17,17 @@ from numpy.typing import NDArray
 
 from .assemble import simulate
 from .integrate import Solution
-from .ladder import VALIDITY, Effect, Rung, admissible, cost_of, effects_of, with_values
+from .ladder import (
+    STEP_LEVELS,
+    VALIDITY,
+    Effect,
+    Rung,
+    admissible,
+    cost_of,
+    effects_of,
+    level_name,
+    with_values,
+)
 from .parts import Scene, SceneError, pinned_faults
 
 Quantity = tuple[float, str, float]
@@ -30,14 +40,21 @@ Quantities = Callable[[Solution, Scene], Mapping[str, Quantity]]
 Float = NDArray[np.float64]
 
 STARTS = 32
-"""Most starts that a difference is averaged over."""
+"""Most starts that a difference is averaged over, where they are not cheap."""
+
+MOST_STARTS = 256
+"""The same where they are."""
+
+PILOT = 120.0
+"""Tabulated time that the starts of the reference may take all together, beyond STARTS [s]."""
 
 _FIRST = 4  # starts that a scattered difference is judged on at the earliest
 _CLEAR = 5.0  # a difference so many times the accuracy asked is judged on two starts
 _SIGMAS = 3.0  # beyond so many standard errors a difference is one
-_ONE_SIDED = 1.645  # standard errors at 95 %; Student's for few starts within 5 % by the factor
+_ONE_SIDED = 2.326  # standard errors at 99 %, as one looks up to seven times; Student's by a factor
 _STILL = 0.01  # of the accuracy asked: scatter below it is none
 _RESOLVED = 1.0 / 3.0  # of the accuracy asked: standard error that a judgement needs
+_TOLD = 1.0 / 6.0  # of the accuracy: a standard error that takes up two fifths of it by itself
 _HOPELESS = 2.0  # a standard error of few starts is itself uncertain by half
 _LEAST_ACCURACY = 1e-6
 _GOLDEN = 0.6180339887498949  # fractions of a turn: evenly spread for any number of starts
@@ -132,7 +149,8 @@ class Convergence:
     remaining : float
         Error left in the reference after Richardson; the last change where there is no order [-].
     converged : bool
-        The changes shrink, or are below scatter or the accuracy's third.
+        What remains is below the accuracy's third, or the last change is below scatter. Changes
+        that shrink slowly leave much.
     """
 
     effect: str
@@ -392,7 +410,7 @@ def _judgement(found: Mapping[str, Difference], starts: int, accuracy: float) ->
         return "beyond"
     if any(d.error > _CLEAR * accuracy and d.error > _SIGMAS * d.standard_error for d in each):
         return "beyond"
-    sure = _ONE_SIDED * (1 + 1.1 / (starts - 1))
+    sure = _ONE_SIDED * (1 + 2.3 / (starts - 1))
     close = all(d.error + sure * d.standard_error <= accuracy for d in each)
     return "within" if close and enough and scatter <= _RESOLVED * accuracy else "more"
 
@@ -442,7 +460,7 @@ class _Court:
 
     def doubted(self) -> list[Candidate]:
         """Combinations whose scatter stayed too large to tell, not those near the limit itself."""
-        most = _RESOLVED * self.accuracy
+        most = _TOLD * self.accuracy
         return [c for c in self.judged() if c.verdict == "doubtful" and c.standard_error > most]
 
     def _hopeless(self, found: Mapping[str, Difference], starts: int) -> bool:
@@ -508,7 +526,7 @@ def resolve(
     accuracy: float | None = None,
     pinned: Sequence[str] = (),
     *,
-    starts: int = STARTS,
+    starts: int | None = None,
     seed: int = 0,
     bench: Bench | None = None,
 ) -> Resolution:
@@ -524,8 +542,9 @@ def resolve(
         Error that each of them may carry; the scene's own by default.
     pinned : sequence of str
         Effects that stay as they are written, besides those that the scene pins.
-    starts : int
-        Most starts that a difference is averaged over.
+    starts : int, optional
+        Most starts that a difference is averaged over; by default 32, and up to 256 of a scene
+        whose reference costs so little that they take no more than two minutes by the tables.
     seed : int
         Of the starts.
     bench : Bench, optional
@@ -556,9 +575,11 @@ def resolve(
         bench or Bench(scene, quantities, seed=seed),
         _free_effects(scene, sorted(names)),
         asked,
-        starts,
+        STARTS if starts is None else starts,
     )
     _refuse_bad_reference(court)
+    if starts is None:
+        court.starts = _affordable(cost_of(with_values(scene, court.values(court.top))))
     singles = _descent(court)
     chosen = next(
         (found for found in _tries(court, singles) if found.verdict == "within"),
@@ -578,6 +599,12 @@ def resolve(
         accuracy=asked,
         runs=court.bench.runs,
     )
+
+
+def _affordable(cost: float) -> int:
+    """Starts of a reference of that cost: a power of two, as they are doubled."""
+    most = min(MOST_STARTS, max(STARTS, PILOT / cost))
+    return 1 << math.floor(math.log2(most))
 
 
 def _estimate(chosen: Candidate) -> float:
@@ -835,9 +862,10 @@ _SPARED = 1.5
 
 
 def _convergences(court: _Court) -> Iterator[Convergence]:
-    """Of every numerical effect with three levels or more."""
+    """Of every numerical effect with three levels or more; rungs between two are left out."""
+    levels = {level_name(factor) for factor in STEP_LEVELS}
     for effect in court.effects:
-        rungs = court.rungs[effect.name][-3:]
+        rungs = [rung for rung in court.rungs[effect.name] if rung.name in levels][-3:]
         if effect.numerical and len(rungs) == len(_LEVELS_SHOWN):
             found = _convergence(court, effect.name, rungs)
             if found is not None:
@@ -865,12 +893,13 @@ def _convergence(court: _Court, name: str, rungs: Sequence[Rung]) -> Convergence
     silent = abs(change[1]) <= max(_SIGMAS * noise, _ROUNDING)
     order = math.log2(abs(change[0] / change[1])) if change[0] and change[1] else math.nan
     told = not silent and math.isfinite(order) and order > 0
+    remaining = abs(change[1]) / (2**order - 1) if told else abs(change[1])
     return Convergence(
         effect=name,
         levels=tuple(rung.name for rung in rungs),
         quantity=quantity,
         steps=change,
         order=order if told else math.nan,
-        remaining=abs(change[1]) / (2**order - 1) if told else abs(change[1]),
-        converged=silent or told or abs(change[1]) <= _RESOLVED * court.accuracy,
+        remaining=remaining,
+        converged=silent or remaining <= _RESOLVED * court.accuracy,
     )

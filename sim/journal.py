@@ -15,6 +15,7 @@ from .film import LEAST_CELLS, FilmGeometry, Groove, dufrane_scar
 from .impedance import impedance_map
 from .integrate import SimulationError, Solution, Status
 from .journal_parts import JournalLoad, JournalScene
+from .ladder import JOURNAL_STEP, orbit_faults
 from .orbit import (
     Film,
     FilmTrace,
@@ -44,8 +45,6 @@ _FEWEST_PER_TURN = 8
 
 _MEMORY = 4e9  # byte, what one run may take: a data set runs one on every core
 _BYTES_PER_SAMPLE = 40 * 8  # states, forces, loads and two passes over the channels
-
-_STEP = 0.02  # rad, the source paper's; the first one of the adaptive integrator
 
 _STATUS = {
     OrbitStatus.OK: Status.OK,
@@ -326,38 +325,10 @@ def check_journal(scene: Scene) -> None:
         Every fault at once.
     """
     journal = cast(JournalScene, scene)
-    faults = [*_sampling_faults(journal), *_method_faults(journal)]
+    faults = [*_sampling_faults(journal), *orbit_faults(journal)]
     if faults:
         raise SceneError(journal.name, faults)
     journal_load(journal)
-
-
-_LONGEST_STEP = {"euler": 0.1, "rk4": 0.5}
-"""Of the fixed integrators [rad]: by 0.34 of its step euler shifts the threshold of whirl, and a
-dozen steps a turn are few for any load."""
-
-_LONGEST_SHORT = 1.0  # L/D of a short film: it carries half as much again as the bearing does
-
-
-def _method_faults(scene: JournalScene) -> list[str]:
-    """A step that is stable but too long to be right, and a rung outside its validity."""
-    faults = []
-    speed, told = math.tau * scene.drive.speed, scene.numerics.step
-    longest = _LONGEST_STEP.get(scene.numerics.integrator, math.inf)
-    step = min(told or _STEP / speed, 1 / scene.sample_rate)
-    if step * speed > longest:
-        faults.append(
-            f"numerics.step = {step:g} s must be <= {longest / speed:.3g} s, {longest:g} rad of "
-            "the shaft, for the orbit to be right; shorten it, or set numerics.integrator = "
-            "'adaptive'"
-        )
-    ratio = scene.bearing.length / scene.bearing.diameter
-    if scene.film.rung == "short" and ratio > _LONGEST_SHORT:
-        faults.append(
-            f"film.rung = 'short' of L/D = {ratio:.3g} must be <= {_LONGEST_SHORT:g}, it knows no "
-            "flow round the circle; set film.rung = 'map'"
-        )
-    return faults
 
 
 def _sampling_faults(scene: JournalScene) -> list[str]:
@@ -464,7 +435,7 @@ def _run(scene: JournalScene, film: Film, loads: Load, plan: "_Plan") -> OrbitRu
         duration=sample_step * (plan.n_all - 1),
         start=(scene.start.x, scene.start.y),
         integrator=scene.numerics.integrator,
-        step=_STEP if told is None else speed * told,
+        step=JOURNAL_STEP if told is None else speed * told,
         sample_step=sample_step,
         tolerance=scene.numerics.tolerance,
         wall=journal_wall(scene),

@@ -11,11 +11,14 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
+from itertools import accumulate, pairwise
 from typing import Any, TypeVar, cast
 
 from pydantic import BaseModel
 
+from .alignment import Seat, seat_stations
 from .crank_setup import (
+    LARGEST_STEP_PER_CONTACT_TIME,
     STEP_PER_CONTACT_DECAY,
     STEP_PER_CONTACT_TIME,
     contact_frequency,
@@ -155,21 +158,21 @@ FILM_RUNGS = (
         assumes="flow round the circle neglected: a closed form",
         reference="Ocvirk 1952; Dubois, Ocvirk 1953",
         valid="a plain aligned bore, L/D below a half or so",
-        nanoseconds_per_step=120.0,
+        nanoseconds_per_step=100.0,
     ),
     Rung(
         name="map",
         assumes="the direct film of a plain aligned bore, interpolated in a table of it",
         reference="Childs, Moes, van Leeuwen 1977 for the idea",
         valid="a plain aligned bore without feed pressure",
-        nanoseconds_per_step=250.0,
+        nanoseconds_per_step=125.0,
     ),
     Rung(
         name="direct",
         assumes="Reynolds' equation with cavitation, solved on the mesh at every call",
         reference="Reynolds 1886; active sets for the complementarity",
         valid="laminar, isothermal, a film thicker than its mesh resolves",
-        nanoseconds_per_step=40_000.0,
+        nanoseconds_per_step=17_000.0,
     ),
 )
 """Rungs of an oil film; the cost of the last is on the mesh of 72 by 17."""
@@ -241,7 +244,11 @@ def limits(scene: PumpScene) -> list[tuple[Status, str]]:
     list of (Status, str)
         Empty where every rung is valid.
     """
-    checks: tuple[Callable[[PumpScene], list[tuple[Status, str]]], ...] = (_unresolved, _torn)
+    checks: tuple[Callable[[PumpScene], list[tuple[Status, str]]], ...] = (
+        _unresolved,
+        _torn,
+        _too_long,
+    )
     return [found for check in checks for found in check(scene)]
 
 
@@ -287,6 +294,23 @@ def _torn(scene: PumpScene) -> list[tuple[Status, str]]:
     return found
 
 
+def _too_long(scene: PumpScene) -> list[tuple[Status, str]]:
+    """A step that is written, and longer than the contact can be followed with."""
+    told, rate = scene.numerics.step, contact_rate(scene)
+    if told is None or told * rate <= LARGEST_STEP_PER_CONTACT_TIME:
+        return []
+    longest = LARGEST_STEP_PER_CONTACT_TIME / rate
+    text = (
+        f"numerics.step = {told:g} s must be <= {longest:.3g} s, the contact's rate being "
+        f"{1 / longest:.4g} 1/s; shorten it, or lower joint.crankpin.stiffness and damping"
+    )
+    return [(Status.STEP, text)]
+
+
+FEWEST_STEPS = 2
+"""A sample of a pump: the casing runs once a step, and needs twice the sample rate."""
+
+
 def pump_step(scene: PumpScene) -> float:
     """Longest step of a pump: what is written, else what its contact or its casing needs [s].
 
@@ -296,7 +320,7 @@ def pump_step(scene: PumpScene) -> float:
     >>> round(1e6 * pump_step(load_scene("bilge-pump")), 2)
     19.53
     """
-    casing = 0.5 / scene.sample_rate  # it runs once a step, and needs twice the sample rate
+    casing = 1 / FEWEST_STEPS / scene.sample_rate
     if scene.numerics.step is not None:
         return min(scene.numerics.step, casing)
     rate = contact_rate(scene)
@@ -434,20 +458,24 @@ def _grafted(node: Any, tree: Mapping[str, Any]) -> Any:
 
 
 def _refused(rungs: tuple[Rung, ...], scene: Scene, name: str) -> str | None:
-    """Why a scene with that rung is none: its first fault."""
-    rung = next(rung for rung in rungs if rung.name == name)
-    try:
-        changed = with_values(scene, rung.values)
-    except SceneError as error:
-        return error.faults[0]
-    return _beyond(changed)
-
-
-def _beyond(scene: Scene) -> str | None:
-    if not isinstance(scene, PumpScene):
+    """Why a scene with that rung is none: its first fault that some other rung is without."""
+    found = _faults_of(next(rung for rung in rungs if rung.name == name), scene)
+    if not found:
         return None
-    faults = joint_faults(scene) or [fault for _, fault in limits(scene)]
-    return faults[0] if faults else None
+    shared = set(found).intersection(*(_faults_of(rung, scene) for rung in rungs))
+    return next((fault for fault in found if fault not in shared), None)
+
+
+def _faults_of(rung: Rung, scene: Scene) -> list[str]:
+    try:
+        return _BEYOND[scene.machine](with_values(scene, rung.values))
+    except SceneError as error:
+        return list(error.faults)
+
+
+def _pump_beyond(scene: Scene) -> list[str]:
+    pump = cast(PumpScene, scene)
+    return joint_faults(pump) or [fault for _, fault in limits(pump)]
 
 
 def _effect(
@@ -480,7 +508,7 @@ STEP_LEVELS = (4.0, 2.0, 1.0, 0.5, 0.25)
 """Factors on a step that is written; the last is the finest."""
 
 FINE_LEVELS = (4.0, 2.0, 1.0, 0.5)
-"""Factors on a mesh width, an element, or the steps of an adaptive integrator."""
+"""Factors on a mesh width of an orbit's film, or the steps of an adaptive integrator."""
 
 
 def level_name(factor: float) -> str:
@@ -503,6 +531,28 @@ def _levels(
         if found is not None:
             assumes = f"{what} of {factor:g} times what is written"
             yield Rung(name=level_name(factor), assumes=assumes, values=found)
+
+
+def _whole_steps(
+    path: str, scene: Scene, longest: float, fewest: int
+) -> Callable[[float], Mapping[str, Any] | None]:
+    """Values of a step's levels: a step is a whole part of a sample, and so is each level.
+
+    Halves are exact; what is coarser is rounded to the next whole number, and is left out below
+    the fewest steps of a sample or where it is none of its own.
+    """
+    written = math.ceil(1 / (scene.sample_rate * longest) - 1e-9)
+
+    def steps(factor: float) -> int:
+        return math.ceil(written / factor - 1e-9)
+
+    def values(factor: float) -> Mapping[str, Any] | None:
+        count = steps(factor)
+        if count < fewest or (factor > 1 and count == steps(factor / 2)):
+            return None
+        return {path: 1 / (scene.sample_rate * count)}
+
+    return values
 
 
 def _as_written(_scene: Scene) -> str:
@@ -559,14 +609,10 @@ def _stiffest(scene: PumpScene) -> PumpScene:
 
 def _pump_step_effect(scene: Scene) -> Iterator[Effect]:
     longest = pump_step(_stiffest(cast(PumpScene, scene)))
-    # a step is a whole part of a sample, and no longer than a half: what is coarser is the same
-    coarsest = max(1.0, 0.5 / scene.sample_rate / longest)
-
-    def values(factor: float) -> Mapping[str, Any] | None:
-        return {"numerics.step": factor * longest} if factor <= coarsest else None
-
-    rungs = _levels("a step", STEP_LEVELS, values)
-    yield _effect("step", scene, rungs, _as_written, numerical=True)
+    values = _whole_steps("numerics.step", scene, longest, FEWEST_STEPS)
+    yield _effect(
+        "step", scene, _levels("a step", STEP_LEVELS, values), _as_written, numerical=True
+    )
 
 
 # --- journal bearing
@@ -579,15 +625,33 @@ def _film_effect(scene: Scene) -> Iterator[Effect]:
 
 def _mesh_effect(scene: Scene) -> Iterator[Effect]:
     film = cast(JournalScene | ShaftScene, scene).film
-    # a line solves its films some hundred times, an orbit thousands of times: what each can afford
-    factors = FINE_LEVELS if isinstance(scene, JournalScene) else STEP_LEVELS
-    rungs = _levels("a mesh width of the film", factors, partial(_mesh, film))
+    if isinstance(scene, JournalScene):
+        rungs = list(_levels("a mesh width of the film", FINE_LEVELS, partial(_mesh, film)))
+    else:  # a line solves its films some hundred times, not thousands of times as an orbit does
+        rungs = list(_line_meshes(film))
     yield _effect("mesh", scene, rungs, _as_written, numerical=True)
 
 
-def _mesh(film: Film, factor: float) -> Mapping[str, Any] | None:
+def _line_meshes(film: Film) -> Iterator[Rung]:
+    """Levels, and between two of them the mesh that is finer round the bore alone.
+
+    A solve's time goes with the nodes round the bore, and with the cube of those along it.
+    """
+    for factor in STEP_LEVELS:
+        yield from _levels("a mesh width of the film", [factor], partial(_mesh, film))
+        values = _mesh(film, factor / 2, along=factor) if factor > STEP_LEVELS[-1] else None
+        if values is not None:
+            yield Rung(
+                name=f"{level_name(factor / 2)} round",
+                assumes=f"a mesh width of the film of {factor / 2:g} times what is written round "
+                f"the bore, {factor:g} times along it",
+                values=values,
+            )
+
+
+def _mesh(film: Film, factor: float, *, along: float | None = None) -> Mapping[str, Any] | None:
     """Nodes of a mesh so many times as wide: cells divide evenly, a node stays in the middle."""
-    round_, over = film.n_theta / factor, (film.n_z - 1) / factor
+    round_, over = film.n_theta / factor, (film.n_z - 1) / (along or factor)
     if round_ % 1 or over % 2 or round_ < _FEWEST_ROUND or over < _FEWEST_OVER:
         return None
     return {"film.n_theta": int(round_), "film.n_z": int(over) + 1}
@@ -609,10 +673,8 @@ def _integrator_effect(scene: Scene) -> Iterator[Effect]:
         rungs = _levels("steps", FINE_LEVELS, tolerance)
         yield _effect("tolerance", scene, rungs, _as_written, numerical=True)
         return
-    longest = journal_step(journal)
-    coarsest = 1 / (journal.sample_rate * longest) * (1 + 1e-9)
-    factors = [factor for factor in STEP_LEVELS if factor <= coarsest]
-    rungs = _levels("a step", factors, lambda factor: {"numerics.step": factor * longest})
+    values = _whole_steps("numerics.step", scene, journal_step(journal), 1)
+    rungs = _levels("a step", STEP_LEVELS, values)
     yield _effect("step", scene, rungs, _as_written, numerical=True)
 
 
@@ -627,7 +689,121 @@ def journal_step(scene: JournalScene) -> float:
     return sample / math.ceil(sample / told * (1 - 1e-9))
 
 
+_LONGEST_STEP = {"euler": 0.1, "rk4": 0.5}
+"""Of the fixed integrators [rad]: by 0.34 of its step euler shifts the threshold of whirl, and a
+dozen steps a turn are few for any load."""
+
+_LONGEST_SHORT = 1.0  # L/D of a short film: it carries half as much again as the bearing does
+
+
+def orbit_faults(scene: Scene) -> list[str]:
+    """A step of a journal that is stable but too long to be right, a film outside its validity.
+
+    Examples
+    --------
+    >>> from wearstate.sim.scene import load_scene
+    >>> orbit_faults(load_scene("journal-step"))
+    []
+    """
+    journal = cast(JournalScene, scene)
+    faults = []
+    speed, told = math.tau * journal.drive.speed, journal.numerics.step
+    longest = _LONGEST_STEP.get(journal.numerics.integrator, math.inf)
+    step = min(told or JOURNAL_STEP / speed, 1 / journal.sample_rate)
+    if step * speed > longest:
+        faults.append(
+            f"numerics.step = {step:g} s must be <= {longest / speed:.3g} s, {longest:g} rad of "
+            "the shaft, for the orbit to be right; shorten it, or set numerics.integrator = "
+            "'adaptive'"
+        )
+    ratio = journal.bearing.length / journal.bearing.diameter
+    if journal.film.rung == "short" and ratio > _LONGEST_SHORT:
+        faults.append(
+            f"film.rung = 'short' of L/D = {ratio:.3g} must be <= {_LONGEST_SHORT:g}, it knows no "
+            "flow round the circle; set film.rung = 'map'"
+        )
+    return faults
+
+
 # --- propulsion shaft
+
+
+def half_wave(scene: ShaftScene) -> float:
+    """Half a bending wave of the slimmest section at half of the sample rate [m].
+
+    Examples
+    --------
+    >>> from wearstate.sim.scene import load_scene
+    >>> round(half_wave(load_scene("shaft-rig")), 3)
+    0.307
+    """
+    steel = scene.shaft
+    slimmest = min(s.outer_diameter**2 + s.inner_diameter**2 for s in scene.sections)
+    omega = math.pi * scene.sample_rate
+    return float(math.pi * (steel.young / steel.density * slimmest / 16 / omega**2) ** 0.25)
+
+
+def element_lengths(scene: ShaftScene) -> list[float]:
+    """Length of each element of a shaft's beam, from aft [m].
+
+    A node is at every end of a section, disc, load, bearing, support point and at the coupling;
+    between two of them elements are even.
+
+    Examples
+    --------
+    >>> from wearstate.sim.scene import load_scene
+    >>> lengths = element_lengths(load_scene("shaft-rig"))
+    >>> len(lengths), round(max(lengths), 9)
+    (42, 0.1)
+    """
+    seats = (
+        Seat(name=b.name, station=b.station, length=b.length, points=b.points)
+        for b in scene.bearings
+    )
+    stations = {0.0, *accumulate(section.length for section in scene.sections)}
+    stations |= {disc.station for disc in scene.discs} | {load.station for load in scene.loads}
+    stations |= {*seat_stations(seats)}
+    stations |= {scene.coupling.station} if scene.coupling else set()
+    longest = scene.shaft.longest_element
+    lengths = []
+    for gap in (forward - aft for aft, forward in pairwise(sorted(stations))):
+        if gap > _SAME_PLACE * scene.length:
+            count = max(1, math.ceil(gap / longest * (1 - _SAME_PLACE)))
+            lengths += [gap / count] * count
+    return lengths
+
+
+_SAME_PLACE = 1e-9  # of the shaft's length, as the beam has it
+
+
+def element_faults(scene: Scene) -> list[str]:
+    """A mesh that has less than an element to a half-wave within the band of the recording.
+
+    The frequency of a half-wave on one element is 11 % high.
+
+    Examples
+    --------
+    >>> from wearstate.sim.scene import load_scene
+    >>> element_faults(load_scene("shaft-rig"))
+    []
+    """
+    shaft = cast(ShaftScene, scene)
+    most, longest = half_wave(shaft), max(element_lengths(shaft))
+    if longest <= most:
+        return []
+    return [
+        f"shaft.longest_element = {shaft.shaft.longest_element:g} m makes elements of "
+        f"{longest:.3g} m, must be <= {most:.3g} m, half a bending wave at half of sample_rate = "
+        f"{shaft.sample_rate:g} Hz; shorten it, or lower sample_rate"
+    ]
+
+
+_BEYOND: dict[str, Callable[[Scene], list[str]]] = {
+    "reciprocating-pump": _pump_beyond,
+    "journal-bearing": orbit_faults,
+    "propulsion-shaft": element_faults,
+}
+"""What of a scene is beyond the validity of its rungs. A new machine is one row."""
 
 
 def _beam_effect(scene: Scene) -> Iterator[Effect]:
@@ -639,7 +815,7 @@ def _element_effect(scene: Scene) -> Iterator[Effect]:
     length = cast(ShaftScene, scene).shaft.longest_element
     rungs = _levels(
         "elements of the beam",
-        FINE_LEVELS,
+        STEP_LEVELS,
         lambda factor: {"shaft.longest_element": factor * length},
     )
     yield _effect("elements", scene, rungs, _as_written, numerical=True)
@@ -708,12 +884,12 @@ def _price(effect: str, name: str) -> float:
     return next(r.nanoseconds_per_step for r in LADDERS[effect] if r.name == name)
 
 
-_MESH = 72 * 17  # nodes on which a solve is tabulated
+_MESH = 72, 17  # on which a solve is tabulated
 _CALLS_PER_STEP = {"euler": 1, "rk4": 4, "adaptive": 10}
-_STEPS_PER_TURN = 16.0  # of the adaptive integrator at the tolerance below
+_STEPS_PER_TURN = 11.0  # of the adaptive integrator at the tolerance below, in the mean of scenes
 _TOLERANCE = 1e-5
-_MAP_SHARE = 96 * 97 / 100  # solves of a map's table, shared by the records of a small data set
-_SAMPLE = 1_500.0  # ns of one sample of one recording of an orbit
+_MAP_SHARE = 2.5 * 96 * 97 / 100  # solves of a map's table, cold, shared by a hundred records
+_SAMPLE = 90.0  # ns of one sample of one recording of an orbit
 
 
 def journal_calls(scene: JournalScene) -> float:
@@ -728,30 +904,72 @@ def journal_calls(scene: JournalScene) -> float:
     return steps * _CALLS_PER_STEP[numerics.integrator]
 
 
-def _nodes(film: Film) -> float:
-    return film.n_theta * film.n_z / _MESH
+def _solve(film: Film, band: float) -> float:
+    """Time of a direct solve over that of the tabulated mesh; `band` is the share of the fill.
+
+    Every node costs by itself, and by the square of those across the band of the matrix.
+    """
+
+    def time(n_theta: int, n_z: int) -> float:
+        return n_theta * n_z * (1 - band + band * (n_z / _MESH[1]) ** 2)
+
+    return time(film.n_theta, film.n_z) / time(*_MESH)
+
+
+_BAND_ORBIT, _BAND_LINE = 0.28, 0.5  # of a tabulated solve: symmetric, started from the last; not
 
 
 def _journal_cost(scene: Scene) -> float:
     journal = cast(JournalScene, scene)
     film = journal.film
-    solve = _price("film", film.rung) * (_nodes(film) if film.rung == "direct" else 1.0)
-    table = _MAP_SHARE * _price("film", "direct") * _nodes(film) if film.rung == "map" else 0.0
+    mesh = _solve(film, _BAND_ORBIT)
+    solve = _price("film", film.rung) * (mesh if film.rung == "direct" else 1.0)
+    table = _MAP_SHARE * _price("film", "direct") * mesh if film.rung == "map" else 0.0
     samples = journal.duration * journal.sample_rate
     return 1e-9 * (journal_calls(journal) * solve + table + samples * _SAMPLE)
 
 
-_BALANCE = 60  # solves of each bearing's film until shaft and films are balanced
-_ELEMENT = 300_000.0  # ns of one element: matrices, free modes, balance
+_BALANCE = 150  # orbit's solves that balancing each bearing takes: tilted, from cold, coefficients
+_ELEMENT = 100_000.0  # ns of one element: matrices, balance
+_STATES = 1.5  # ns of a cubed state: eigenvectors
+_FORCE = 1_000_000.0  # ns of one random force: its receptance
+_FORCE_SAMPLE = 180.0  # ns of one sample of one random force
 _CHANNEL = 120.0  # ns of one sample of one channel
+_LINE = 10_000_000.0  # ns of a recording beside
+
+
+def shaft_states(scene: ShaftScene) -> int:
+    """States of a line's modes that a recording is expected to take.
+
+    Free modes up to half of the sample rate, two residual shapes for each place that is pushed,
+    in two planes; the housings.
+
+    Examples
+    --------
+    >>> from wearstate.sim.scene import load_scene
+    >>> shaft_states(load_scene("shaft-rig"))  # 128 are taken
+    124
+    """
+    modes = math.ceil(scene.length / half_wave(scene)) + 1
+    places = {bearing.station for bearing in scene.bearings}
+    places |= {disc.station for disc in scene.discs}
+    places |= {scene.coupling.station} if scene.coupling else set()
+    return 4 * (modes + 2 * len(places) + len(scene.bearings))
 
 
 def _shaft_cost(scene: Scene) -> float:
     shaft = cast(ShaftScene, scene)
-    film = _BALANCE * len(shaft.bearings) * _price("film", shaft.film.rung) * _nodes(shaft.film)
-    elements = sum(math.ceil(s.length / shaft.shaft.longest_element) for s in shaft.sections)
-    samples = shaft.duration * shaft.sample_rate * (len(shaft.sensors) + len(shaft.probes))
-    return 1e-9 * (film + elements * _ELEMENT + samples * _CHANNEL)
+    solves = _BALANCE * len(shaft.bearings) * _solve(shaft.film, _BAND_LINE)
+    samples = shaft.duration * shaft.sample_rate
+    forces = 2 * len(shaft.turbulence)
+    return 1e-9 * (
+        solves * _price("film", shaft.film.rung)
+        + len(element_lengths(shaft)) * _ELEMENT
+        + shaft_states(shaft) ** 3 * _STATES
+        + forces * (_FORCE + samples * _FORCE_SAMPLE)
+        + samples * (len(shaft.sensors) + len(shaft.probes)) * _CHANNEL
+        + _LINE
+    )
 
 
 _COSTS: dict[str, Callable[[Scene], float]] = {

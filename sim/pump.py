@@ -15,7 +15,6 @@ from .casing import (
     table_acceleration,
 )
 from .crank_setup import (
-    LARGEST_STEP_PER_CONTACT_TIME,
     contact_rate,
     contact_table,
     joint_rungs,
@@ -25,7 +24,7 @@ from .crank_setup import (
 from .frf_table import Accelerance, load_accelerance
 from .hydraulics import lift_left
 from .integrate import SimulationError, Solution, Status
-from .ladder import joint_faults, limits, pump_step
+from .ladder import FEWEST_STEPS, joint_faults, limits, pump_step
 from .parts import Accelerometer, Scene, SceneError, channels_of, specific_key
 from .pump_parts import CRANK_PLACES, FORCE_PLACES, GUIDE_PLACES, VALVE_PLACES, PumpScene
 from .sensor import (
@@ -36,8 +35,6 @@ from .sensor import (
     tacho_pulses,
 )
 from .slider_crank import FORCES, GUIDE, JOINT_COMPLIANT, JOINT_LINK, CrankRun
-
-_FEWEST_STEPS = 2  # per sample: the casing runs once a step, and needs twice the sample rate
 
 _MOST_STEPS = 1000
 """Steps per sample: beyond it a step says more about a slip than about accuracy."""
@@ -176,16 +173,6 @@ def steps_per_sample(scene: PumpScene) -> int:
     faults = _sampling_faults(scene)
     beyond = limits(scene)
     step = pump_step(scene)
-    rate = contact_rate(scene)
-    if rate > 0:
-        longest = LARGEST_STEP_PER_CONTACT_TIME / rate
-        if (scene.numerics.step or 0.0) > longest:
-            fault = (
-                f"numerics.step = {scene.numerics.step:g} s must be <= {longest:.3g} s, the "
-                f"contact's rate being {1 / longest:.4g} 1/s; shorten it, or lower "
-                "joint.crankpin.stiffness and damping"
-            )
-            beyond.append((Status.STEP, fault))
     if faults:
         raise SceneError(scene.name, [*faults, *(fault for _, fault in beyond)])
     if beyond:
@@ -194,7 +181,7 @@ def steps_per_sample(scene: PumpScene) -> int:
     faults = [fault for fault in (_step_fault(scene, wanted), _size_fault(scene, wanted)) if fault]
     if faults:
         raise SceneError(scene.name, faults)
-    return max(_FEWEST_STEPS, math.ceil(wanted - 1e-9))
+    return max(FEWEST_STEPS, math.ceil(wanted - 1e-9))
 
 
 def _step_fault(scene: PumpScene, steps: float) -> str | None:
@@ -217,12 +204,12 @@ def _size_fault(scene: PumpScene, steps: float) -> str | None:
     """Refuse what would not fit the memory, before any of it is taken."""
     time = scene.duration + scene.settling_revolutions / scene.drive.speed
     per_step = _BYTES_PER_STEP * len(scene.throws)
-    needed = time * scene.sample_rate * max(steps, _FEWEST_STEPS) * per_step
+    needed = time * scene.sample_rate * max(steps, FEWEST_STEPS) * per_step
     if needed <= _MEMORY:
         return None
     return (
         f"duration = {scene.duration:g} s at sample_rate = {scene.sample_rate:g} Hz with "
-        f"{max(steps, _FEWEST_STEPS):.0f} steps a sample needs {needed / 1e9:.3g} GB, must be <= "
+        f"{max(steps, FEWEST_STEPS):.0f} steps a sample needs {needed / 1e9:.3g} GB, must be <= "
         f"{_MEMORY / 1e9:g} GB; shorten duration or settling_revolutions, lower sample_rate, "
         "lengthen numerics.step, or raise a joint's speed_floor"
     )

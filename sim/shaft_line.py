@@ -18,6 +18,7 @@ from .beam import Beam, Disc, PointLoad, Section, assemble_beam
 from .bearing import JournalBearing
 from .film import FilmGeometry
 from .integrate import SimulationError, Solution, Status
+from .ladder import element_faults
 from .parts import Scene, SceneError, channels_of
 from .rotor import Rotor, Support
 from .sensor import digitise, tacho_pulses
@@ -810,7 +811,8 @@ def check_shaft(scene: Scene) -> None:
     shaft = cast(ShaftScene, scene)
     faults = _sampling_faults(shaft)
     try:
-        faults += _mesh_faults(shaft, alignment_line(shaft).beam)
+        alignment_line(shaft)
+        faults += element_faults(shaft)
     except ValueError as error:
         faults += str(error).splitlines()
     if faults:
@@ -844,25 +846,6 @@ def _sampling_faults(scene: ShaftScene) -> list[str]:
             f"{needed / 1e9:.3g} GB, must be <= {_MEMORY / 1e9:g} GB; shorten it or lower the rate"
         )
     return faults
-
-
-def _mesh_faults(scene: ShaftScene, beam: Beam) -> list[str]:
-    """A mesh that has less than an element to a half-wave within the band of the recording.
-
-    The frequency of a half-wave on one element is 11 % high.
-    """
-    steel = scene.shaft
-    slimmest = min(s.outer_diameter**2 + s.inner_diameter**2 for s in scene.sections)
-    omega = math.pi * scene.sample_rate
-    half_wave = math.pi * (steel.young / steel.density * slimmest / 16 / omega**2) ** 0.25
-    longest = float(np.diff(beam.stations).max())
-    if longest <= half_wave:
-        return []
-    return [
-        f"shaft.longest_element = {steel.longest_element:g} m makes elements of {longest:.3g} m, "
-        f"must be <= {half_wave:.3g} m, half a bending wave at half of sample_rate = "
-        f"{scene.sample_rate:g} Hz; shorten it, or lower sample_rate"
-    ]
 
 
 def simulate_shaft(scene: Scene, seed: int, truth: bool, raise_on_failure: bool) -> Solution:

@@ -122,19 +122,32 @@ def test_the_higher_rung_of_the_pilots_is_taken(monkeypatch):
     assert gaps == [min(drawn), max(drawn)]
 
 
-def test_a_step_is_the_least_of_what_the_records_ask_for(monkeypatch):
-    recipe = load_recipe("bilge-pump-small", {"duration": "0.25 s"})
-    rungs = {"wristpin": "ideal", "guide": "ideal", "pressure": "two-level", "drive": "motor"}
-    for level, there in (("x1/2", True), ("x1", False)):
-        one = resolution(**rungs, step=level, mesh="")
-        monkeypatch.setattr(module, "resolve", lambda *_, one=one: one)
-        choice = choose(recipe, seed=1)
-        assert ("numerics.step" in choice.values) == there
-        if there:
-            samples = list(sample_records(recipe, 64, seed=1))
-            steps = {module._step_of(sample.scene, "x1/2") for sample in samples}
-            assert len(steps) > 10
-            assert choice.values["numerics.step"] == min(steps)
+@pytest.mark.parametrize(("level", "counts"), [("x1/2", {8, 10, 12}), ("x4", {2}), ("x1", {})])
+def test_a_step_is_the_least_of_what_the_records_ask_for(monkeypatch, level, counts):
+    recipe = load_recipe("triplex-pump-small", {"duration": "0.25 s"})
+    one = resolution(wristpin="ideal", drive="motor", step=level, mesh="")
+    monkeypatch.setattr(module, "resolve", lambda *_: one)
+    choice = choose(recipe, seed=1)
+    assert ("numerics.step" in choice.values) == bool(counts)
+    if counts:
+        # whole parts of a sample; some records have no x4, and give their coarsest
+        samples = list(sample_records(recipe, 64, seed=1))
+        steps = {module._step_of(sample.scene, level) for sample in samples}
+        assert {round(1 / (recipe.scene.sample_rate * step)) for step in steps} == counts
+        assert choice.values["numerics.step"] == min(steps)
+
+
+def test_a_level_that_the_recipes_own_scene_has_not_is_the_coarser_one(monkeypatch):
+    recipe = load_recipe("triplex-pump-small", {"duration": "0.25 s"})
+    [step] = [each for each in effects_of(recipe.scene) if each.name == "step"]
+    assert "x4" not in [rung.name for rung in step.rungs]
+    levels = iter(["x4", "x2"])
+    monkeypatch.setattr(
+        module,
+        "resolve",
+        lambda *_: resolution(wristpin="ideal", drive="motor", step=next(levels), mesh=""),
+    )
+    assert choose(recipe, seed=1).rungs["step"] == "x2"
 
 
 def test_a_choice_comes_back_from_its_text():

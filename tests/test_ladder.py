@@ -1,26 +1,32 @@
 """Rungs as data: every row fits its scene, refuses what is not valid, and is ranked by its cost."""
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from wearstate.sim.assemble import simulate
+from wearstate.sim.casing import edge_samples
 from wearstate.sim.journal import journal_film, squeeze_rate
 from wearstate.sim.ladder import (
     LADDERS,
     admissible,
     cost_of,
     effects_of,
+    element_faults,
+    element_lengths,
     journal_calls,
-    level_name,
+    orbit_faults,
     pump_step,
     pump_steps,
+    shaft_states,
     with_values,
 )
 from wearstate.sim.orbit import load, run_orbit, short_film
 from wearstate.sim.parts import EFFECTS, SceneError
 from wearstate.sim.scene import load_scene, scene_names
+from wearstate.sim.shaft_line import reduced_rotor, shaft_beam, shaft_state
 
 PUMPS = ("bilge-pump", "slider-crank-benchmark", "triplex-pump")
 JOURNALS = tuple(name for name in scene_names() if name.startswith("journal"))
@@ -84,6 +90,16 @@ def test_rungs_are_tabulated_from_the_cheapest():
             "short",
             "plain bore only",
         ),
+        ("propulsion-shaft", {}, "elements", "x2", "half a bending wave"),
+        (
+            "journal-step",
+            {"numerics.integrator": "euler", "numerics.step": 1e-4, "sample_rate": 2560},
+            "step",
+            "x4",
+            "0.1 rad of the shaft",
+        ),
+        ("journal-step", {"bearing.length": "0.16 m"}, "film", "short", "must be <= 1"),
+        ("slider-crank-benchmark", {"numerics.step": 13e-6}, "step", "x2", "the contact's rate"),
     ],
 )
 def test_what_a_scene_does_not_admit_is_refused_with_the_reason(name, changes, where, rung, cure):
@@ -96,15 +112,115 @@ def test_what_a_scene_does_not_admit_is_refused_with_the_reason(name, changes, w
     assert each.current(scene) in [row.name for row in admissible(each, scene)]
 
 
-def test_levels_go_by_factors_of_two():
+def test_a_refusal_is_not_that_of_another_effect():
+    """A film outside its validity refuses no mesh: choosing may well raise the film."""
+    scene = load_scene("journal-step", {"bearing.length": "0.16 m", "film.rung": "map"})
+    written = scene.model_copy(update={"film": scene.film.model_copy(update={"rung": "short"})})
+    assert orbit_faults(written)
+    assert [r.name for r in admissible(effect(written, "mesh"), written)] == ["x2", "x1", "x1/2"]
+    assert [r.name for r in admissible(effect(written, "film"), written)] == ["map", "direct"]
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "where"),
+    [
+        ("propulsion-shaft", {"shaft.longest_element": 0.8}, "elements"),
+        (
+            "journal-step",
+            {
+                "numerics.integrator": "euler",
+                "numerics.step": 4e-4,
+                "sample_rate": 2560,
+                "tacho": None,
+            },
+            "step",
+        ),
+    ],
+)
+def test_what_a_run_refuses_no_rung_offers(name, values, where):
+    """Of scenes whose written level is refused, what is left runs."""
+    short = {"duration": 2 / load_scene(name).drive.speed}
+    scene = load_scene(name, short)
+    changed = with_values(scene, values)
+    with pytest.raises(SceneError):
+        simulate(changed, seed=1)
+    left = admissible(effect(changed, where), changed)
+    assert left
+    assert "x1" not in [rung.name for rung in left]
+    assert simulate(with_values(changed, left[0].values), seed=1).status.ok
+
+
+@pytest.mark.parametrize("name", ["propulsion-shaft", "shaft-rig"])
+def test_elements_and_states_of_a_line_are_told_without_its_beam(name):
+    written = load_scene(name).shaft.longest_element
+    for factor in (4, 1, 0.25):
+        scene = load_scene(name, {"shaft.longest_element": factor * written})
+        lengths = np.diff(shaft_beam(scene).stations)
+        assert_allclose(element_lengths(scene), lengths, rtol=1e-9)  # the same mesh, rounded
+        assert bool(element_faults(scene)) == (name == "propulsion-shaft" or factor == 4) * (
+            factor > 1
+        )
+    scene = load_scene(name)
+    states = len(reduced_rotor(scene, shaft_state(scene)).poles)
+    # housings, discs and the line's ends shift the count of modes by one or two a plane
+    assert abs(states - shaft_states(scene)) <= 4 * 3
+
+
+def test_levels_of_a_step_are_whole_parts_of_a_sample():
+    """Finer by factors of two, which the order of convergence needs; coarser as far as it goes."""
+    parts = {}
+    for name in PUMPS:
+        scene = load_scene(name)
+        rungs = effect(scene, "step").rungs
+        steps = [1 / (scene.sample_rate * rung.values["numerics.step"]) for rung in rungs]
+        parts[name] = dict(zip([rung.name for rung in rungs], steps, strict=True))
+        for each, level in zip(steps, rungs, strict=True):
+            run = with_values(scene, {**level.values, "duration": 2 / scene.drive.speed})
+            taken = simulate(run, seed=1).numerics["step_s"]
+            assert_allclose(1 / (scene.sample_rate * taken), each, rtol=1e-12)  # and so it runs
+    expected = {
+        "bilge-pump": {"x2": 2, "x1": 3, "x1/2": 6, "x1/4": 12},  # two at the least: no x4
+        "slider-crank-benchmark": {"x4": 3, "x2": 5, "x1": 9, "x1/2": 18, "x1/4": 36},
+        "triplex-pump": {"x2": 2, "x1": 4, "x1/2": 8, "x1/4": 16},
+    }
+    for name, levels in expected.items():
+        assert parts[name] == pytest.approx(levels)
+    # one more step a sample than what is written needs would be one too many
     scene = load_scene("slider-crank-benchmark")
-    rungs = effect(scene, "step").rungs
-    steps = [rung.values["numerics.step"] for rung in rungs]
-    assert [rung.name for rung in rungs] == [level_name(f) for f in (4, 2, 1, 0.5, 0.25)]
-    assert_allclose(np.divide(steps[:-1], steps[1:]), 2.0)
-    assert_allclose(steps[2], pump_step(scene), rtol=1e-12)  # what is written is the middle
+    assert 8 < 1 / (scene.sample_rate * pump_step(scene)) <= 9
+
+
+def test_meshes_of_an_orbit_go_by_factors_of_two_those_of_a_line_by_one_way_at_a_time():
     meshes = effect(load_scene("journal-bearing"), "mesh").rungs
     assert [tuple(rung.values.values()) for rung in meshes] == [(36, 9), (72, 17), (144, 33)]
+    meshes = effect(load_scene("shaft-rig"), "mesh").rungs
+    assert {rung.name: tuple(rung.values.values()) for rung in meshes} == {
+        "x2": (24, 7),
+        "x1 round": (48, 7),
+        "x1": (48, 13),
+        "x1/2 round": (96, 13),
+        "x1/2": (96, 25),
+        "x1/4 round": (192, 25),
+        "x1/4": (192, 49),
+    }
+
+
+def test_a_mesh_finer_round_the_bore_is_worth_its_rung():
+    """Nodes round the bore are cheap and most of the error: half of it for a tenth of the cost."""
+    scene = load_scene("shaft-rig", {"duration": "0.3 s"})
+    rungs = {rung.name: rung for rung in effect(scene, "mesh").rungs}
+
+    def coefficients(name):
+        state = shaft_state(with_values(scene, rungs[name].values))
+        return np.concatenate([state.film.stiffness.ravel(), state.film.positions.ravel() * 1e12])
+
+    finest = coefficients("x1/4")
+    errors = {
+        name: np.linalg.norm(coefficients(name) - finest) for name in ("x1", "x1/2 round", "x1/2")
+    }
+    assert errors["x1"] > errors["x1/2 round"] > errors["x1/2"]
+    costs = {name: cost_of(with_values(scene, rungs[name].values)) for name in errors}
+    assert costs["x1/2 round"] - costs["x1"] < 0.25 * (costs["x1/2"] - costs["x1"])
 
 
 def test_a_step_is_stable_for_every_rung_of_the_joints():
@@ -158,19 +274,38 @@ def test_an_unknown_effect_is_refused_with_the_nearest():
 def test_predicted_steps_are_those_of_a_pumps_run(name):
     scene = load_scene(name, {"duration": 1.5 / load_scene(name).drive.speed})
     numerics = simulate(scene, seed=1).numerics
-    # the filters of the casing need a hundred samples or so at either end
     per_sample = round(1 / (scene.sample_rate * numerics["step_s"]))
-    assert 0 <= numerics["steps"] - pump_steps(scene) < 260 * per_sample
+    # what is not counted: the casing's filter at either end; a sample is lost by rounding at most
+    beside = 2 * edge_samples(per_sample) * per_sample
+    assert abs(numerics["steps"] - pump_steps(scene) - beside) <= per_sample
     assert numerics["step_s"] <= pump_step(scene) * (1 + 1e-9)
 
 
-@pytest.mark.parametrize("name", JOURNALS)
-@pytest.mark.parametrize("tolerance", [1e-6, 1e-4])
-def test_predicted_calls_are_those_of_an_orbit(name, tolerance):
+def calls_of(name, tolerance):
+    """Solves of an orbit, over those that are predicted; the scene."""
     scene = load_scene(name, {"film.rung": "short", "numerics.tolerance": tolerance})
-    calls = simulate(scene, seed=1).numerics["film_calls"]
-    # how lively an orbit is cannot be seen in its scene; a rung differs by more
-    assert 1 / 4 < calls / journal_calls(scene) < 4
+    return simulate(scene, seed=1).numerics["film_calls"] / journal_calls(scene), scene
+
+
+@pytest.mark.parametrize("tolerance", [1e-6, 1e-5, 1e-4])
+def test_predicted_calls_are_those_of_orbits(tolerance):
+    """How lively an orbit is cannot be seen in its scene: right in the mean, and near enough."""
+    found = [calls_of(name, tolerance) for name in JOURNALS]
+    # a constant is fitted to the mean over these scenes at 1e-5; golden, to a tenth
+    mean = np.exp(np.mean([math.log(ratio) for ratio, _ in found]))
+    assert 1 / 1.2 < mean < 1.2
+    for ratio, scene in found:
+        # a miscount reorders films only where it exceeds the ratio of their costs
+        costs = [cost_of(with_values(scene, {"film.rung": rung})) for rung in ("map", "direct")]
+        assert max(ratio, 1 / ratio) < costs[1] / costs[0]
+
+
+@pytest.mark.parametrize("name", JOURNALS)
+def test_a_finer_tolerance_takes_more_calls_by_less_than_a_level(name):
+    """Predicted is twice as many for each level; a level further it would be four times."""
+    ratios = [calls_of(name, 1e-5 * factor**4)[0] / factor for factor in (4, 2, 1, 0.5)]
+    for coarse, fine in pairwise(ratios):
+        assert 1 < fine / coarse < 4
 
 
 def test_a_fixed_step_asks_for_as_many_solves_as_predicted():

@@ -3,26 +3,51 @@
 Each trial draws speed, load and clearance of a built-in scene by its seed, lets auto choose for
 each accuracy, and measures the choice against the best rungs on starts that the choice has not
 seen. It also looks for a combination that costs less than two thirds of the choice and would have
-done. Run as ``python tests/benchmarks/auto_trials.py [--trials 200] [--seconds 900] [SCENE …]``;
-``--calibrate`` compares tabulated with measured cost instead. Numbers go to stdout as they come.
+done. Run as ``python tests/benchmarks/auto_trials.py [--trials 200] [--seconds 900] [--out FILE]
+[SCENE …]``: a line of JSON for every trial; those that the file has are not run again, and
+``--summary`` only reads it. ``--calibrate`` compares tabulated with measured cost instead. Times
+are of the processor, of recordings as ``generate`` makes them, without their truth.
 """
 
 import argparse
+import json
+import math
 import time
+from concurrent.futures import ProcessPoolExecutor, as_completed
 from itertools import product
+from pathlib import Path
 
 import numpy as np
 from wearstate.datasets.quantities import QUANTITIES
+from wearstate.sim.assemble import simulate
 from wearstate.sim.fidelity import Bench, differences, resolve
 from wearstate.sim.ladder import admissible, cost_of, effects_of, with_values
 from wearstate.sim.parts import SceneError
 from wearstate.sim.scene import load_scene, scene_names
 
 ACCURACIES = (0.10, 0.05, 0.02, 0.01)
-FRESH_STARTS = 4
 DEAREST = 1.5  # of the cheapest combination that would have done
-SHARE_ASKED = 0.93
 CLEARLY = 5.0  # a rung that errs so many times the accuracy alone is in no combination that will do
+FRESH_STARTS = (4, 8)  # of a choice, until it is clear whether the accuracy was kept
+STILL = 0.05  # of the accuracy: scatter below it is none, and one fresh start tells as much as four
+SURE = 2.0  # standard errors
+TIMED = 10  # trials of a scene in which the speed is measured
+
+PULSE = {"duration": "0.3 s", "sample_rate": "5.12 kHz", "tacho": None}
+SHORTER = {
+    "bilge-pump": {"duration": "0.8 s"},  # four revolutions
+    "triplex-pump": {"duration": "0.8 s"},  # six
+    "journal-bearing": {"duration": "0.2 s", "settling_revolutions": 5},  # ten
+    "journal-half-sine": PULSE,  # from eight revolutions before the load until seven after it
+    "journal-rectangular-pulse": PULSE,
+    "journal-step": PULSE,
+    "journal-unbalance": {**PULSE, "duration": "0.16 s", "settling_revolutions": 6},
+    "journal-whirl": {**PULSE, "duration": "0.25 s", "start.x": 0.6},  # near its limit cycle
+    "propulsion-shaft": {"duration": "1.6 s"},  # eight revolutions
+    "shaft-rig": {"duration": "1 s"},  # ten
+}
+"""What a trial changes: the rungs and their errors stay, a reference on them takes a second or two.
+A journal's truth solves the film at every sample, and 25.6 kHz are for drawing."""
 
 DRAWS = {
     "reciprocating-pump": ("drive.speed", "joint.crankpin.diametral_clearance"),
@@ -42,7 +67,7 @@ def value_of(scene, path):
 
 def drawn(name, seed):
     """A scene with its conditions drawn; values that it gives another way stay."""
-    scene = load_scene(name)
+    scene = load_scene(name, SHORTER.get(name))
     rng = np.random.default_rng([seed, len(name)])
     values = {
         path: value_of(scene, path) * rng.uniform(1 - SPREAD, 1 + SPREAD)
@@ -58,22 +83,57 @@ def reference_values(scene):
     return {path: value for rung in tops for path, value in rung.values.items()}
 
 
-def error_of(bench, values, reference, starts=FRESH_STARTS):
-    """Largest error of the means over starts, and its standard error; infinite if it fails."""
+def apart(bench, values, reference, starts):
+    """Differences of the means over starts; None if a run is not valid."""
     own, other = (bench.outcomes(v, starts) for v in (values, reference))
     if any(outcome.fault for outcome in (*own, *other)):
-        return float("inf"), 0.0
-    found = differences([o.quantities for o in own], [o.quantities for o in other]).values()
-    worst = max(found, key=lambda each: each.error)
-    return worst.error, worst.standard_error
+        return None
+    return differences([o.quantities for o in own], [o.quantities for o in other])
 
 
-def cheapest_that_does(scene, bench, accuracy, below):
-    """Least cost under a bound of all combinations within the accuracy; the bound if there is none.
+def error_of(bench, values, reference, starts):
+    """Largest error of the means over starts; infinite if a run is not valid."""
+    found = apart(bench, values, reference, starts)
+    return math.inf if found is None else max(each.error for each in found.values())
+
+
+# --- one trial
+
+
+def verdict(bench, fresh, values, reference, accuracy):
+    """How well a choice does on fresh starts: of as many as tell, 8 at the most.
+
+    ``kept`` is false where a quantity is off by more than the accuracy and twice its own standard
+    error, ``strictly`` where it is off by more than the accuracy at all.
+    """
+    pilot = apart(bench, values, reference, 2)
+    still = max(each.standard_error for each in pilot.values()) <= STILL * accuracy
+    for starts in ((1,) if still else ()) + FRESH_STARTS:
+        found = apart(fresh, values, reference, starts)
+        if found is None:
+            return {"kept": False, "strictly": False, "error": math.inf, "worst": "not valid"}
+        alone = starts == 1
+        doubt = {name: 0.0 if alone else SURE * d.standard_error for name, d in found.items()}
+        sure = all(d.error + doubt[name] <= accuracy for name, d in found.items())
+        off = any(d.error - doubt[name] > accuracy for name, d in found.items())
+        if sure or (off and not alone):
+            break
+    worst = max(found, key=lambda name: found[name].error)
+    return {
+        "kept": not off,
+        "strictly": found[worst].error <= accuracy,
+        "error": found[worst].error,
+        "worst": worst,
+        "scatter": doubt[worst] / SURE,
+        "starts": starts,
+    }
+
+
+def cheaper_that_does(scene, bench, reference, accuracy, below):
+    """Least cost under a bound of all combinations within the accuracy; None if there is none.
 
     Every combination is run, but for those that hold a rung which alone errs `CLEARLY` too much.
     """
-    reference = reference_values(scene)
     choices = []
     for each in effects_of(scene):
         rungs = admissible(each, scene)
@@ -81,9 +141,9 @@ def cheapest_that_does(scene, bench, accuracy, below):
             [
                 rung
                 for rung in rungs
-                if rung is rungs[-1]
-                or error_of(bench, {**reference, **rung.values}, reference, 2)[0]
-                <= CLEARLY * accuracy
+                if each.numerical
+                or rung is rungs[-1]
+                or error_of(bench, {**reference, **rung.values}, reference, 1) <= CLEARLY * accuracy
             ]
         )
     combinations = [
@@ -93,95 +153,158 @@ def cheapest_that_does(scene, bench, accuracy, below):
     priced = sorted((cost_of(with_values(scene, v)), i) for i, v in enumerate(combinations))
     for cost, i in priced:
         if cost >= below:
-            break
-        if error_of(bench, combinations[i], reference, 2)[0] <= accuracy:
+            return None
+        values = combinations[i]
+        if error_of(bench, values, reference, 1) > CLEARLY * accuracy:
+            continue
+        if all(error_of(bench, values, reference, n) <= accuracy for n in (2, 8)):
             return cost
-    return below
+    return None
 
 
-def trial(name, seed, accuracies=ACCURACIES, *, brute=True):
+def seconds_of(scene, values):
+    """Processor time of a recording, the less of two."""
+    changed, times = with_values(scene, values), []
+    for seed in range(2):
+        begin = time.process_time()
+        simulate(changed, seed=seed)
+        times.append(time.process_time() - begin)
+    return min(times)
+
+
+def trial(name, seed, accuracies=ACCURACIES, *, brute=True, timed=False):
     """One row for each accuracy: what was chosen, its error on fresh starts, its cost."""
     scene = drawn(name, seed)
     quantities = QUANTITIES[scene.machine]
-    bench = Bench(scene, quantities, seed=2 * seed, clock=time.perf_counter)
-    fresh = Bench(scene, quantities, seed=2 * seed + 1, clock=time.perf_counter)
+    bench, fresh = (Bench(scene, quantities, seed=2 * seed + k) for k in range(2))
     reference = reference_values(scene)
+    slowest = seconds_of(scene, reference) if timed else math.nan
     rows = []
     for accuracy in accuracies:
         try:
             found = resolve(scene, quantities, accuracy, bench=bench)
         except SceneError as error:  # a draw that the best rungs cannot run is no trial
-            return [{"scene": name, "seed": seed, "refused": error.faults[0]}]
-        error, scatter = error_of(fresh, found.values, reference)
-        best = cheapest_that_does(scene, bench, accuracy, found.cost) if brute else found.cost
-        rows.append(
-            {
-                "scene": name,
-                "seed": seed,
-                "accuracy": accuracy,
-                "status": found.status,
-                "error": error,
-                "scatter": scatter,
-                # a difference within the scatter of the trial itself is none
-                "kept": error - 2 * scatter <= accuracy,
-                "dear": found.cost / best,
-                "saved": found.cost_of_reference / found.cost,
-                "faster": fresh.seconds(reference) / fresh.seconds(found.values),
-                "rungs": dict(found.rungs),
-            }
-        )
-    return rows
+            return {"scene": name, "seed": seed, "refused": error.faults[0]}
+        row = {
+            "accuracy": accuracy,
+            "status": found.status,
+            "estimate": found.estimated_error,
+            "saved": found.cost_of_reference / found.cost,
+            "rungs": dict(found.rungs),
+        }
+        if found.values == reference:
+            row |= {"kept": True, "strictly": True, "error": 0.0, "worst": "", "scatter": 0.0}
+        else:
+            row |= verdict(bench, fresh, found.values, reference, accuracy)
+        if brute and found.status != "unresolvable":
+            limit = found.cost / DEAREST
+            best = cheaper_that_does(scene, bench, reference, accuracy, limit)
+            row["dear"] = DEAREST if best is None else found.cost / best
+        if timed:
+            row["faster"] = slowest / seconds_of(scene, found.values)
+        rows.append(row)
+    return {"scene": name, "seed": seed, "rows": rows, "runs": bench.runs + fresh.runs}
 
 
-def summary(rows):
+# --- many
+
+
+def summary(trials):
     """Lines that say how often the accuracy was kept, and at what cost."""
     lines = []
-    for name, accuracy in sorted({(r["scene"], r["accuracy"]) for r in rows if "kept" in r}):
-        own = [r for r in rows if r.get("accuracy") == accuracy and r["scene"] == name]
-        lines.append(
-            f"{name} at {accuracy:.0%}: "
-            f"kept {np.mean([r['kept'] for r in own]):.1%} of {len(own)}, "
-            f"within {DEAREST} of the cheapest {np.mean([r['dear'] <= DEAREST for r in own]):.1%} "
-            f"(worst {max(r['dear'] for r in own):.2f}), cost over the best rungs' 1/"
-            f"{np.median([r['saved'] for r in own]):.3g}, measured 1/"
-            f"{np.median([r['faster'] for r in own]):.3g}, "
-            f"unresolvable {np.mean([r['status'] == 'unresolvable' for r in own]):.1%}"
-        )
+    for name in sorted({each["scene"] for each in trials}):
+        own = [each for each in trials if each["scene"] == name]
+        refused = sum("refused" in each for each in own)
+        if refused:
+            lines.append(f"{name}: {refused} draws that the best rungs cannot run")
+        for i, accuracy in enumerate(ACCURACIES):
+            rows = [each["rows"][i] for each in own if "rows" in each]
+            if rows:
+                lines.append(f"{name} at {accuracy:.0%}: {_line(rows)}")
     return lines
 
 
+def _line(rows):
+    dear = [row["dear"] for row in rows if "dear" in row]
+    faster = [row["faster"] for row in rows if "faster" in row]
+    worst = max(rows, key=lambda row: row["error"])
+    parts = [
+        f"kept {np.mean([row['kept'] for row in rows]):.1%} of {len(rows)}",
+        f"strictly {np.mean([row['strictly'] for row in rows]):.1%}",
+        f"worst {worst['error']:.2%} {worst['worst']}",
+        f"unresolvable {np.mean([row['status'] == 'unresolvable' for row in rows]):.1%}",
+        f"saved 1/{np.median([row['saved'] for row in rows]):.3g}",
+    ]
+    if dear:
+        share = np.mean([each <= DEAREST for each in dear])
+        parts.append(f"within {DEAREST} of the cheapest {share:.1%} (worst {max(dear):.2f})")
+    if faster:
+        parts.append(f"faster {np.median(faster):.3g} times (least {min(faster):.3g})")
+    return ", ".join(parts)
+
+
+def run_scene(name, trials, seconds, jobs, write):
+    """Trials of a scene that are not done yet, until the time is up."""
+    end = time.monotonic() + seconds
+    if jobs == 1:
+        for seed in trials:
+            if time.monotonic() >= end:
+                return
+            write(trial(name, seed, timed=seed < TIMED))
+        return
+    with ProcessPoolExecutor(jobs) as pool:
+        waiting = [pool.submit(trial, name, seed, timed=seed < TIMED) for seed in trials]
+        for each in as_completed(waiting):
+            write(each.result())
+            if time.monotonic() >= end:
+                pool.shutdown(cancel_futures=True)
+                return
+
+
 def calibrate(names):
-    """Tabulated over measured time of every rung of every effect, alone."""
+    """Tabulated and measured time of every rung of every effect, alone and below the best."""
     for name in names:
-        scene = load_scene(name)
-        bench = Bench(scene, QUANTITIES[scene.machine], clock=time.perf_counter)
-        for each in effects_of(scene):
-            for rung in admissible(each, scene):
-                bench.outcomes(rung.values, 3)
-                cost = cost_of(with_values(scene, rung.values))
-                took = bench.seconds(rung.values)
-                print(f"{name} {each.name} {rung.name}: {cost:.4f} s, measured {took:.4f} s")
+        scene = load_scene(name, SHORTER.get(name))
+        for label, base in (("as written", {}), ("else the best", reference_values(scene))):
+            for each in effects_of(scene):
+                for rung in admissible(each, scene):
+                    values = {**base, **rung.values}
+                    cost = cost_of(with_values(scene, values))
+                    took = seconds_of(scene, values)
+                    line = f"{name}, {label}, {each.name} {rung.name}: {cost:.4f} s"
+                    print(f"{line}, measured {took:.4f} s, ratio {cost / took:.2f}", flush=True)
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("scenes", nargs="*", default=scene_names())
     parser.add_argument("--trials", type=int, default=200)
-    parser.add_argument("--seconds", type=float, default=float("inf"), help="for each scene")
+    parser.add_argument("--seconds", type=float, default=math.inf, help="for each scene")
+    parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--out", type=Path, help="file of JSON lines that is gone on with")
+    parser.add_argument("--summary", action="store_true", help="of the file alone")
     parser.add_argument("--calibrate", action="store_true")
     given = parser.parse_args()
     if given.calibrate:
         calibrate(given.scenes)
         return
-    for name in given.scenes:
-        begin, rows = time.perf_counter(), []
-        for seed in range(given.trials):
-            rows += trial(name, seed)
-            if time.perf_counter() - begin > given.seconds:
-                break
-        print(
-            "\n".join([*summary(rows), *(r["refused"] for r in rows if "refused" in r)]), flush=True
-        )
+    done = []
+    if given.out and given.out.exists():
+        done = [json.loads(line) for line in given.out.read_text().splitlines() if line]
+
+    def write(result):
+        done.append(result)
+        if given.out:
+            with given.out.open("a", encoding="utf-8") as file:
+                file.write(json.dumps(result) + "\n")
+
+    for name in () if given.summary else given.scenes:
+        had = {each["seed"] for each in done if each["scene"] == name}
+        rest = [seed for seed in range(given.trials) if seed not in had]
+        run_scene(name, rest, given.seconds, given.jobs, write)
+        print("\n".join(summary([each for each in done if each["scene"] == name])), flush=True)
+    if given.summary:
+        print("\n".join(summary(done)))
 
 
 if __name__ == "__main__":
