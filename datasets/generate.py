@@ -3,12 +3,15 @@
 Workers simulate, this process alone writes. A killed run is resumed by the same call.
 """
 
+import signal
+import threading
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from types import FrameType
 from typing import Any, Literal
 
 import numpy as np
@@ -231,7 +234,7 @@ def generate(
         samples = sample_records(plan, count, seed=seed, skip=writer.done.copy())
         jobs = min(jobs, max(1, count - tally.n_resumed))
         found = in_order(work, samples, jobs=jobs, scheduler=scheduler, say=say)
-        with closing(found) as outcomes:
+        with closing(found) as outcomes, _listening() as asked:
             for outcome in outcomes:
                 if scheduler is not None and outcome.refused is not None:
                     _refuse_refusal(outcome, work)
@@ -239,10 +242,32 @@ def generate(
                 tally.note(outcome)
                 if progress is not None:
                     progress(int(np.count_nonzero(writer.done)), count)
+                if asked.is_set():
+                    raise KeyboardInterrupt
         rows = writer.manifest()
         _write_splits(writer, rows, plan, seed)
         writer.finish()
     return tally.summary(writer.path, rows)
+
+
+@contextmanager
+def _listening() -> Iterator[threading.Event]:
+    """Keep a Ctrl-C in mind: one that arrives in a callback, of HDF5 or a finaliser, is lost."""
+    asked = threading.Event()
+
+    def hear(number: int, frame: FrameType | None) -> None:
+        asked.set()
+        signal.default_int_handler(number, frame)
+
+    ours = threading.current_thread() is threading.main_thread()
+    if not ours or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+        yield asked
+        return
+    signal.signal(signal.SIGINT, hear)
+    try:
+        yield asked
+    finally:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @contextmanager

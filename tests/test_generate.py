@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 from collections import defaultdict
+from contextlib import suppress
 
 import h5py
 import numpy as np
@@ -107,6 +108,20 @@ def test_a_full_disk_is_told_with_what_is_kept(short, reference, tmp_path, monke
     monkeypatch.undo()
     assert generate(short, N, path, seed=5).n_resumed == 2
     assert content(path) == reference
+
+
+def test_a_ctrl_c_that_a_callback_loses_is_kept_in_mind(short, tmp_path):
+    done = []
+
+    def lose(count, _):
+        done.append(count)
+        with suppress(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+
+    with pytest.raises(KeyboardInterrupt, match="1 of 4 records are kept"):
+        generate(short, 4, tmp_path / "data.h5", progress=lose)
+    assert done == [1]
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals")
