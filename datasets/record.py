@@ -885,7 +885,7 @@ class DataSetWriter:
 
     def _resume(self) -> None:
         with _refusing(self.part, f"unfinished file (or delete it; {self.path.name})"):
-            self._file = h5py.File(self.part, "r+")
+            self._file = _opened(self.part)
         try:
             with _refusing(self.part, "unfinished file"):
                 self._refuse_other_run()
@@ -963,10 +963,9 @@ class DataSetWriter:
         filled = _filled(self._dtype, values, index)
         self._make_place(truth or {})
         with _writing(self.part):
-            # the chunk as it is: no selection, no conversion, a third of the time
-            self._signal.id.write_direct_chunk((index, 0, 0), samples)
+            _write_chunk(self._signal, index, samples)
             for name, array in (truth or {}).items():
-                self._file[f"truth/{name}"][index] = array
+                _write_chunk(self._file[f"truth/{name}"], index, array)
             # a row that says done must never precede its signal
             self._file.flush()
             self._manifest[index] = filled
@@ -1074,6 +1073,29 @@ def refuse_output(path: Path, force: bool) -> None:
         raise DataError(f"{path} exists; choose another name or use force to replace it")
 
 
+def _opened(part: Path) -> Any:
+    """Open for writing without HDF5's buffer: what a full disk refuses must fail at once.
+
+    HDF5 keeps what it could not write, fails over it again on closing, and ends the process with a
+    fault of memory.
+    """
+    access = h5py.h5p.create(h5py.h5p.FILE_ACCESS)
+    access.set_fclose_degree(h5py.h5f.CLOSE_STRONG)
+    access.set_sieve_buf_size(0)
+    return h5py.File(h5py.h5f.open(os.fsencode(part), h5py.h5f.ACC_RDWR, fapl=access))
+
+
+def _write_chunk(dataset: Any, index: int, values: NDArray[Any]) -> None:
+    """Write a record's chunk as it is: no cache, no selection, a third of the time."""
+    chunk = np.asarray(values, dtype=np.float32, order="C")
+    if chunk.shape != dataset.shape[1:]:
+        raise DataError(
+            f"{dataset.name} of record {index} has shape {chunk.shape}, must be "
+            f"{dataset.shape[1:]}; one file holds records of one shape"
+        )
+    dataset.id.write_direct_chunk((index, *(0,) * chunk.ndim), chunk)
+
+
 def _refuse_busy(part: Path) -> None:
     """Refuse a file that another run is writing: it must not be taken from under it."""
     if not part.exists():
@@ -1112,8 +1134,12 @@ def _laying_out(path: Path) -> Iterator[None]:
 
 def _cause(error: Exception) -> str:
     """What the operating system said, without what HDF5 wraps around it."""
-    told = re.search("error message = '([^']*)'", str(error))
-    return told[1] if told else getattr(error, "strerror", None) or str(error)
+    at: BaseException | None = error
+    while at is not None:  # closing fails after writing has, and says less
+        if told := re.search("error message = '([^']*)'", str(at)):
+            return told[1]
+        at = at.__context__
+    return getattr(error, "strerror", None) or str(error)
 
 
 def _take_space(path: Path) -> None:

@@ -144,7 +144,11 @@ class _Processes:
         from joblib.externals.loky import get_reusable_executor
 
         self._executor = get_reusable_executor(
-            max_workers=self._jobs, timeout=IDLE, env=_ONE_THREAD, initializer=_settle
+            max_workers=self._jobs,
+            timeout=IDLE,
+            env=_ONE_THREAD,
+            initializer=_settle,
+            initargs=(os.getpid(),),
         )
 
     @property
@@ -215,13 +219,13 @@ def cores() -> int:
     return os.cpu_count() or 1
 
 
-def _settle() -> None:
+def _settle(parent: int) -> None:
     """Start a worker."""
     # Ctrl-C reaches every process of the terminal; the one that writes ends the others
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     # loky collects garbage once a second; over every imported object that is 8 % of a run
     gc.freeze()
-    threading.Thread(target=_follow, args=(os.getppid(),), daemon=True).start()
+    threading.Thread(target=_follow, args=(parent,), daemon=True).start()
 
 
 def _follow(parent: int) -> None:

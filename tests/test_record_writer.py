@@ -1,6 +1,8 @@
 """The writer: nothing but bytes in their place after the layout, and every fault told."""
 
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 import h5py
@@ -154,6 +156,39 @@ def test_a_disk_that_runs_full_is_told_and_the_file_goes_on(path, monkeypatch):
         assert writer.done.tolist() == [True, False, False, False, False]
     with begin(path) as writer:
         assert writer.done[0]
+
+
+LIMITED = """
+import resource, sys
+from pathlib import Path
+import numpy as np
+from wearstate.datasets.record import Attributes, DataSetWriter, WriteError
+from wearstate.sim.sensor import Channel
+channel = Channel(name="acc", unit="m/s^2", quantity="acceleration")
+head = Attributes(sample_rate=100.0, channels=(channel,), origin="simulated")
+size = Path(sys.argv[1] + ".part").stat().st_size
+resource.setrlimit(resource.RLIMIT_FSIZE, (size // 2, size // 2))
+try:
+    with DataSetWriter(sys.argv[1], head, n_records=5, n_samples=40) as writer:
+        for index in range(5):
+            signal = np.full((1, 40), index + 1.0)
+            hidden = {"force": np.full(4000, 1.0)}
+            writer.write(index, signal, {"record_id": "r", "status": "ok"}, hidden)
+except WriteError as error:
+    print(error)
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no limits of resources")
+def test_a_write_that_fails_leaves_nothing_that_closing_fails_over(path):
+    with begin(path) as writer:
+        writer.write(4, signal_of(4), ROW, {"force": np.full(4000, 1.0)})
+    command = [sys.executable, "-P", "-c", LIMITED, str(path)]
+    run = subprocess.run(command, capture_output=True, text=True, check=False, timeout=180)
+    assert run.returncode == 0, run.stderr  # HDF5 has ended such a process by a fault of memory
+    assert "data.h5.part cannot be written (File too large); mend the disk" in run.stdout
+    with begin(path) as writer:
+        assert writer.done[4]
 
 
 def test_what_went_wrong_first_is_told_not_that_closing_fails_as_well(path, monkeypatch):
