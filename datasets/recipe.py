@@ -27,7 +27,7 @@ from .correlation import Copula, Correlation, copula_of
 from .draws import Axis, Bound, Draw, Range, axes_of, has_value, matches, value_at
 from .held_out import HeldOut, Region, regions_of
 from .life import LIFE_COLUMNS, LifeTable, Lives, Moment, life_faults
-from .recipe_file import RecipeError, beside, read_recipe
+from .recipe_file import RecipeError, beside, merged, read_recipe
 from .sampling import BLOCK, SET, Dimension, Points, Sampling, number_of
 
 SEVERITIES = {
@@ -933,7 +933,8 @@ def recorded_recipe(scene: str, recipe: str, overrides: str) -> Recipe:
     True
     """
     try:
-        table = validate_table(RecipeTable, scene_table(recipe, "recipe"), "recipe")
+        # as when it was read: a single [severity] is a list of one
+        table = validate_table(RecipeTable, merged({}, scene_table(recipe, "recipe")), "recipe")
         base = scene_table(scene)
     except SceneError as error:
         raise RecipeError("recipe", error.faults) from None

@@ -8,17 +8,15 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from ..sim.scene import scene_table
 from .draws import Range
-from .recipe import Recipe, Sample, load_recipe, sample_records
-from .recipe_file import toml_text
+from .recipe import Recipe, Sample, recorded_recipe, sample_records
+from .recipe_file import RecipeError
 from .record import Attributes, DataError, DataSet, fill_split, lay_out_split
 from .splits import Index, group_split, region_split, time_split
 
@@ -411,28 +409,16 @@ def drawn_of(data: DataSet) -> Drawn:
     return Drawn(
         columns=data.manifest,
         severity=head.severities[0] if head.severities else "",
-        recipe=recorded_recipe(head),
+        recipe=_recorded(head),
         seed=head.seed,
     )
 
 
-def recorded_recipe(head: Attributes) -> Recipe | None:
-    """Recipe of a data set, from the texts in its file; None where there is none that loads.
-
-    Parameters
-    ----------
-    head : Attributes
-        Of a data set.
-    """
-    if not head.recipe:
-        return None
+def _recorded(head: Attributes) -> Recipe | None:
+    """Recipe of a data set; None where there is none, or it is of another version."""
     try:
-        table = {**scene_table(head.recipe, "recipe"), "scene": "scene.toml"}
-        with TemporaryDirectory() as folder:
-            Path(folder, "scene.toml").write_text(head.scene, encoding="utf-8")
-            Path(folder, "recipe.toml").write_text(toml_text(table), encoding="utf-8")
-            return load_recipe(Path(folder, "recipe.toml"), json.loads(head.overrides))
-    except ValueError:  # of another version, or with files beside it
+        return recorded_recipe(head.scene, head.recipe, head.overrides) if head.recipe else None
+    except RecipeError:
         return None
 
 

@@ -6,7 +6,12 @@ from numpy.testing import assert_allclose
 from scipy.stats import norm, rankdata
 from wearstate.datasets import recipe as recipes
 from wearstate.datasets.draws import value_at
-from wearstate.datasets.recipe import load_recipe, sample_records
+from wearstate.datasets.recipe import (
+    load_recipe,
+    overrides_text,
+    recorded_recipe,
+    sample_records,
+)
 from wearstate.datasets.recipe_file import RecipeError, recipe_names
 from wearstate.sim.assemble import simulate
 from wearstate.sim.scene import load_scene
@@ -348,3 +353,10 @@ def test_an_added_severity_or_confounder_leaves_the_machines(tmp_path):
     other = next(sample_records(load_recipe("bilge-pump-standard"), seed=2))
     assert one.row["confounder_loud"]
     assert all(one.drawn[axis.path] == other.drawn[axis.path] for axis in mine.machine)
+
+
+@pytest.mark.parametrize("name", recipe_names())
+def test_it_comes_back_from_the_texts_of_a_file(name):
+    recipe = load_recipe(name)
+    again = recorded_recipe(recipe.scene_text, recipe.text, overrides_text(recipe))
+    assert next(sample_records(again)).drawn == next(sample_records(recipe)).drawn
