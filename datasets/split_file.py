@@ -302,6 +302,7 @@ def split_names(recipe: Recipe) -> tuple[str, ...]:
 
     Examples
     --------
+    >>> from wearstate.datasets.recipe import load_recipe
     >>> "machine" in split_names(load_recipe("bilge-pump-small"))
     True
     """

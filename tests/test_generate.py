@@ -110,6 +110,15 @@ def test_a_full_disk_is_told_with_what_is_kept(short, reference, tmp_path, monke
     assert content(path) == reference
 
 
+@pytest.fixture
+def interruptible():
+    """Ctrl-C as in a terminal: a job in the background of a script is started without."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("interruptible")
 def test_a_ctrl_c_that_a_callback_loses_is_kept_in_mind(short, tmp_path):
     done = []
 
@@ -133,6 +142,7 @@ def test_progress_and_ctrl_c_on_a_terminal(tmp_path):
     pid, terminal = pty.fork()
     if pid == 0:
         os.chdir(tmp_path)
+        signal.signal(signal.SIGINT, signal.SIG_DFL)  # as a terminal starts it
         os.execv(sys.executable, [*command, "-o", str(path), "-j", "2"])
     seen = ""
     while "/s" not in seen:  # the rate comes with the second record
