@@ -341,7 +341,7 @@ def moment(rig: Rig, run: Run) -> None:
         time.sleep(rig.dice.uniform(0, 2))
         return
     run.wait_for_records()
-    time.sleep(rig.dice.uniform(0, rig.seconds))
+    time.sleep(rig.dice.uniform(0, 0.6 * rig.seconds))  # a fork has its imports already
 
 
 def death(rig: Rig, kind: str, number: int) -> None:

@@ -2,6 +2,7 @@
 
 import os
 import signal
+import subprocess
 import sys
 import time
 
@@ -72,6 +73,16 @@ def test_a_worker_that_dies_is_replaced(tmp_path):
     found = list(in_order(function, range(8), jobs=2, say=told.append))
     assert found == [0, 1, 2, -3, 4, 5, 6, 7]
     assert told == ["a worker process died; what it had in hand is done again"]
+
+
+def test_a_worker_whose_parent_was_gone_before_it_settled_ends():
+    """Its parent is then already another process, which lives."""
+    script = (
+        "import os, time; from wearstate.datasets import workers; workers.PARENT_CHECK = 0.1; "
+        "workers._settle(os.getppid() + 10**6); time.sleep(60)"
+    )
+    run = subprocess.run([sys.executable, "-P", "-c", script], check=False, timeout=180)
+    assert run.returncode == 1
 
 
 def test_work_that_kills_every_worker_is_given_up():
