@@ -70,7 +70,17 @@ def sparing_tacho(options: SourceOptions, tacho: str | None) -> SourceOptions:
     options : SourceOptions
     tacho : str, optional
         Name of the tacho channel.
+
+    Raises
+    ------
+    DataError
+        A tacho was to be resampled: its pulses would be smeared.
     """
+    if tacho is not None and options.resample_to is not None:
+        raise DataError(
+            f"resample_to = {options.resample_to:.10g} Hz must not be given with tacho = "
+            f"'{tacho}', whose pulses it would smear; leave one out"
+        )
     return replace(
         options,
         unit=_sparing(options.unit, tacho),
@@ -326,7 +336,7 @@ def _rate_faults(headers: Sequence[Header]) -> list[str]:
     kinds = _kinds({header.name: f"{header.sample_rate:.10g} Hz" for header in headers})
     return [
         f"all files must have the same sample rate: {kinds}; import each rate by itself, or "
-        "resample the files before, which this program does not: scipy.signal.resample_poly does"
+        "resample_to the lowest of them"
     ]
 
 

@@ -12,7 +12,6 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import qmc
 
 Float = NDArray[np.float64]
 Rng = Callable[..., np.random.Generator]
@@ -131,6 +130,8 @@ class _Sobol:
         scrambles = [_scramble(rng(_SCRAMBLE, number_of(d.name))) for d in dimensions]
         self._maps = np.array([m for m, _ in scrambles], dtype=np.int64).reshape(-1, _DIGITS)
         self._shifts = np.array([shift for _, shift in scrambles], dtype=np.int64)
+        from scipy.stats import qmc  # half a second, which only drawing needs
+
         self._sequence = qmc.Sobol(SET, scramble=False, bits=_DIGITS)
         self._next = 0
 

@@ -63,6 +63,8 @@ class SourceOptions:
         Of binary and of arrays: sample by sample (time down the rows), or channel by channel.
     record : int
         Of an array of three dimensions, the index along the first.
+    resample_to : float, optional
+        Sample rate to bring the recording to [Hz], at most its own.
 
     Raises
     ------
@@ -90,6 +92,7 @@ class SourceOptions:
     offset: int = 0
     order: Literal["interleaved", "blocks"] | None = None
     record: int = 0
+    resample_to: float | None = None
 
     def __post_init__(self) -> None:
         faults = [text for wrong, text in _option_faults(self) if wrong]
@@ -115,6 +118,10 @@ def _option_faults(o: SourceOptions) -> list[tuple[bool, str]]:
     rate_ok = o.fs is None or (math.isfinite(o.fs) and o.fs > 0)
     return [
         (not rate_ok, f"fs = {o.fs} Hz must be > 0 and finite; give the sample rate"),
+        (
+            o.resample_to is not None and not 0 < o.resample_to < math.inf,
+            f"resample_to = {o.resample_to} Hz must be > 0 and finite; give a sample rate",
+        ),
         (
             o.decimal not in (None, ".", ","),
             f"decimal = {o.decimal!r} must be '.' or ','; choose one",

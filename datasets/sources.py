@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from ..sim.parts import nearest
 from .channel_units import FULL_SCALE, ChannelUnit, parse_sensitivity, parse_unit
 from .record import DataError
+from .resampled import resampled
 from .source_flat import npy_contents, npz_contents, raw_contents
 from .source_hdf5 import hdf5_contents
 from .source_mat import mat_contents
@@ -56,7 +57,7 @@ class Reader:
     options: frozenset[str] = frozenset()
 
 
-_EVERY = {"channels", "fs", "unit", "sensitivity"}
+_EVERY = {"channels", "fs", "unit", "sensitivity", "resample_to"}
 _ARRAY = frozenset({"variable", "order", "record"})
 _TEXT = Reader(
     name="text",
@@ -129,7 +130,8 @@ def open_source(path: str | Path, options: SourceOptions | None = None) -> Sourc
     file = Path(path)
     contents = _contents(file, given)
     try:
-        return _settled(file, _chosen(file, contents, given), given, contents.close)
+        own = _settled(file, _chosen(file, contents, given), given, contents.close)
+        return resampled(own, given.resample_to)
     except BaseException:
         contents.close()
         raise

@@ -1,10 +1,11 @@
 """Splits stored in a data set file by name, and those that every generated file gets."""
 
+import hashlib
 import json
 import os
 import re
 import shutil
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -18,7 +19,7 @@ from .draws import Range
 from .recipe import Recipe, Sample, recorded_recipe, sample_records
 from .recipe_file import RecipeError
 from .record import Attributes, DataError, DataSet, fill_split, lay_out_split
-from .splits import Index, group_split, region_split, time_split
+from .splits import Index, check_no_leak, group_split, region_split, time_split
 
 LOADS = ("discharge_pressure_pa", "static_load_n", "thrust_n", "hull_deflection_m")
 """Manifest columns that say how loaded a machine is; a data set's first one is its load."""
@@ -164,15 +165,38 @@ def machine_draws(drawn: Drawn) -> tuple[str, NDArray[np.float64]]:
     path = next((axis.path for axis in axes if axis.path not in known), None)
     if recipe is None or path is None:
         raise DataError("geometry: 0 numbers are drawn per machine, must be >= 1; use region")
+    # not the samples: each holds a scene
+    by_group = {sample.group: float(sample.drawn[path]) for sample in machine_samples(drawn)}
+    groups = np.asarray(drawn.columns["group"]).tolist()
+    return path, np.array([by_group[group] for group in groups])
+
+
+def machine_samples(drawn: Drawn) -> Iterator[Sample]:
+    """First record of each machine, drawn anew from recipe and seed.
+
+    Parameters
+    ----------
+    drawn : Drawn
+        Of a generated set.
+
+    Yields
+    ------
+    Sample
+        In rising order of record number.
+
+    Raises
+    ------
+    DataError
+        There is no recipe, or what is drawn is not what the file holds.
+    """
+    if drawn.recipe is None:
+        raise DataError("recipe: the file has none that draws its machines anew; use region")
     groups = np.asarray(drawn.columns["group"])
-    _, first, machine = np.unique(groups, return_index=True, return_inverse=True)
     others = np.ones(groups.size, dtype=bool)
-    others[first] = False
-    by_group = {}
-    for sample in sample_records(recipe, groups.size, seed=drawn.seed, skip=others):
+    others[np.unique(groups, return_index=True)[1]] = False
+    for sample in sample_records(drawn.recipe, groups.size, seed=drawn.seed, skip=others):
         _refuse_other_draw(drawn, sample)
-        by_group[sample.group] = float(sample.drawn[path])  # not the sample: it holds a scene
-    return path, np.array([by_group[group] for group in groups[first].tolist()])[machine]
+        yield sample
 
 
 def _refuse_other_draw(drawn: Drawn, sample: Sample) -> None:
@@ -421,6 +445,73 @@ def _recorded(head: Attributes) -> Recipe | None:
         return recorded_recipe(head.scene, head.recipe, head.overrides) if head.recipe else None
     except RecipeError:
         return None
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Sides:
+    """A stored split, as rows of the table of a data set's usable records.
+
+    Attributes
+    ----------
+    name, text : str
+        Of the split.
+    train, test : numpy.ndarray [shape=(n_train,)], [shape=(n_test,)]
+        Rows, rising; each side has one or more.
+    machines_apart : bool
+        False where a machine is on both sides by design.
+    sha256 : str
+        Of the sides and the signals' checksums: of one hash, the same records train and test.
+    """
+
+    name: str
+    text: str
+    train: Index
+    test: Index
+    machines_apart: bool
+    sha256: str
+
+
+def usable_sides(data: DataSet, name: str) -> Sides:
+    """A split that a file holds, of its usable records.
+
+    Parameters
+    ----------
+    data : DataSet
+    name : str
+        Of the split.
+
+    Returns
+    -------
+    Sides
+
+    Raises
+    ------
+    DataError
+        There is no such split, a machine is on both sides against its intention, or a side has no
+        usable record.
+    """
+    train, test = data.split(name)
+    about, manifest = data.splits[name], data.manifest
+    apart = bool(about.get("machines_apart", True))
+    if apart:
+        check_no_leak(manifest["group"], train, test)
+    usable = np.flatnonzero((manifest["status"] == "ok").to_numpy())
+    rows = [np.flatnonzero(np.isin(usable, side)) for side in (train, test)]
+    if not all(side.size for side in rows):
+        raise DataError(
+            f"{data.path}: split {name} trains on {rows[0].size} and tests on {rows[1].size} "
+            "usable records, must be >= 1 each; add another with wearstate splits"
+        )
+    parts = (train, test, manifest["signal_crc32"])
+    digest = b"|".join(np.asarray(part, dtype="<i8").tobytes() for part in parts)
+    return Sides(
+        name=name,
+        text=str(about.get("text", "")) or f"as the file's split {name}",
+        train=rows[0],
+        test=rows[1],
+        machines_apart=apart,
+        sha256=hashlib.sha256(digest).hexdigest(),
+    )
 
 
 def store_splits(path: str | Path, splits: Sequence[Split], *, force: bool = False) -> None:

@@ -17,10 +17,13 @@ from ..sim.parts import SceneError
 from ..sim.scene import scene_table
 from .grades import GRADE_NAMES
 from .panel import panel_figure
-from .report import _TEMPLATES, _encoded, quantity_name, save_page
+from .report import quantity_name, save_page
+from .report_figures import encoded
 from .signal_plots import make_panel
 from .signal_view import View
 from .tabulate import confounders_in
+
+_TEMPLATES = Path(__file__).parent / "templates"
 
 MOST_DRAWN = 3
 """Channels of a picture."""
@@ -268,7 +271,7 @@ def _pictures(facts: _Facts) -> Iterator[Block]:
             except DataError:
                 continue  # too short for a spectrum
             caption = f"{what}, record {index} ({facts.head.origin}). {panel.caption}"
-            yield Picture(caption=caption, address=_encoded(panel_figure(panel)))
+            yield Picture(caption=caption, address=encoded(panel_figure(panel)))
 
 
 def _columns(facts: _Facts) -> Iterator[Block]:

@@ -1,8 +1,8 @@
 """The command line. Commands call library functions and hold no physics.
 
-Results go to stdout, progress and talk to stderr. Exit codes: 0 done, 1 failed, 2 bad input; with
-``report --fail-on``: 3 warning, 4 alarm, 5 unfamiliar. Heavy imports stay inside the commands, so
-that ``--help`` answers at once.
+Results go to stdout, progress and talk to stderr. Exit codes: 0 done, 1 failed, 2 bad input (also
+where no recording can be judged); with ``report --fail-on``: 3 warning, 4 alarm, 5 unfamiliar.
+Heavy imports stay inside the commands, so that ``--help`` answers at once.
 """
 
 import json
@@ -12,7 +12,7 @@ import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import click
 
@@ -182,6 +182,9 @@ _SOURCE_OPTIONS = (
         type=click.Choice(["interleaved", "blocks"]),
         help="Of binary and arrays: sample by sample, or channel by channel.",
     ),
+    click.option(
+        "--resample-to", type=float, metavar="HZ", help="Bring measured files to this lower rate."
+    ),
 )
 
 
@@ -203,7 +206,7 @@ def _declared(given: Mapping[str, Any]) -> Any:
 
 _PLAIN_OPTIONS = (
     *("fs", "record", "delimiter", "decimal", "header"),
-    *("dtype", "n_channels", "offset", "order"),
+    *("dtype", "n_channels", "offset", "order", "resample_to"),
 )
 
 
@@ -1127,7 +1130,7 @@ def _emit_catalogue(feature_set: Any, as_json: bool) -> None:
     "--target",
     metavar="COLUMN",
     default=None,
-    help="Severity to train for; the first of DATA by default.",
+    help="Severity to train for, or label of named conditions; the first severity by default.",
 )
 @click.option(
     "--held-out",
@@ -1135,6 +1138,23 @@ def _emit_catalogue(feature_set: Any, as_json: bool) -> None:
     default=0.25,
     show_default=True,
     help="Share of the machine draws kept out of training, to judge the model.",
+)
+@click.option(
+    "--split",
+    metavar="NAME",
+    help="Split that DATA holds (wearstate splits): learn from its training side alone.",
+)
+@click.option(
+    "--baseline",
+    "healthy",
+    type=_PATH,
+    help="Healthy records of DATA's machines: a model that is told how each was when new.",
+)
+@click.option(
+    "--budget-ms",
+    type=click.FloatRange(0, min_open=True),
+    default=None,
+    help="Time that a prediction may take, beside its features [ms]; 5 by default.",
 )
 @_seed_option
 @_jobs_option
@@ -1145,35 +1165,85 @@ def train(
     output: Path,
     target: str | None,
     held_out: float,
+    split: str | None,
+    healthy: Path | None,
+    budget_ms: float | None,
     seed: int,
     jobs: int | None,
     force: bool,
     as_json: bool,
 ) -> None:
-    """Train a wear model on a labelled data set and judge it on held-out machine draws."""
+    """Train a wear model on a labelled data set and judge it on held-out machine draws.
+
+    Where the target names conditions instead of a severity: a model that tells which, judged with
+    every recording left out in turn.
+    """
     from .evaluate import score
+    from .evaluate_text import score_lines
+    from .healthy import references
     from .modelfile import save_model
+    from .own import names_classes
+    from .tabulate import feature_table
     from .train import train_model
 
-    _check_outputs([data], [(output, _MODEL)], force)
+    inputs = [data] if healthy is None else [data, healthy]
+    _check_outputs(inputs, [(output, _MODEL)], force)
+    source = click.get_current_context().get_parameter_source("held_out")
+    shared = source is not click.core.ParameterSource.DEFAULT
+    if shared and split:
+        raise click.UsageError("--split says what is held out: leave --held-out away")
+    if target is not None and names_classes(data, target):
+        if healthy or budget_ms or shared or split:
+            raise click.UsageError(
+                f"--baseline, --budget-ms, --held-out and --split are for a severity; {target} "
+                "names conditions, and every recording is left out in turn"
+            )
+        _train_classes(data, output, target, seed, _workers(jobs), force, as_json)
+        return
     with _progress("features") as progress:
         model, table, test = train_model(
             data,
             target=target,
             held_out=held_out,
+            split=split,
             seed=seed,
             jobs=_workers(jobs),
+            budget_ms=budget_ms,
+            baseline=healthy,
             progress=progress,
         )
+        reference = None
+        if healthy is not None:
+            known = feature_table(healthy, jobs=_workers(jobs), progress=progress)
+            reference = references(table, known, healthy)
     save_model(model, output, force=force)
-    result = score(model, table, test) if len(test) else {}
+    result = score(model, table, test, references=reference) if len(test) else {}
     trained = model.card["trained_on"]
     head = f"{output}: trained on {trained['records']} records of {trained['draws']} machine draws"
-    lines = [head, *_score_lines(result, model.card)]
+    lines = [head, *score_lines(result, model.card)]
     if model.notice:
         lines.append(f"Notice: {model.notice}.")
     value = {"path": str(output), "trained_on": trained, "held_out": result}
     _emit(value, as_json, "\n".join(lines))
+
+
+def _train_classes(
+    data: Path, output: Path, target: str, seed: int, jobs: int, force: bool, as_json: bool
+) -> None:
+    """A model of named conditions, judged with whole recordings left out."""
+    from .own import classes_text, train_classes
+    from .ownfile import save_class_model
+
+    with _progress("features") as progress:
+        model, result = train_classes(data, target=target, seed=seed, jobs=jobs, progress=progress)
+    save_class_model(model, output, force=force)
+    head = (
+        f"{output}: trained on {model.card['records']} records of {result['recordings']} "
+        f"recordings, to tell {', '.join(model.classes)}"
+    )
+    notice = [f"Notice: {model.notice}."] if model.notice else []
+    value = {"path": str(output), "target": target, "left_out": result, "notice": model.notice}
+    _emit(value, as_json, "\n".join([head, *classes_text(result), *notice]))
 
 
 @cli.command()
@@ -1198,6 +1268,28 @@ def train(
     type=_PathType(path_type=Path, file_okay=False, exists=True),
     help="Keep the data sets of --across-fidelity, and use those that are there.",
 )
+@click.option(
+    "--split",
+    metavar="NAME",
+    help="Split that DATA holds (wearstate splits): judge on all of its test side.",
+)
+@click.option(
+    "--retrain",
+    multiple=True,
+    metavar="NAME|all",
+    help="Train and judge anew with this part of DATA held out; may be repeated.",
+)
+@click.option("--trained-on", type=_PATH, help="MODEL's training set, for the baselines.")
+@click.option("--baseline", "healthy", type=_PATH, help="Healthy records of DATA's machines.")
+@click.option("--quick", is_flag=True, help="Leave out baselines that need packages of others.")
+@click.option(
+    "--cache",
+    type=_PathType(path_type=Path, file_okay=False, exists=True),
+    help="Folder in which features of such packages are kept.",
+)
+@click.option("-o", "--output", type=_PATH, help="Page, picture or JSON to write.")
+@_seed_option
+@_force_option
 @_jobs_option
 @_json_option
 def evaluate(
@@ -1208,29 +1300,96 @@ def evaluate(
     effects: Sequence[str],
     pairs: Sequence[str],
     folder: Path | None,
+    output: Path | None,
+    seed: int,
+    force: bool,
     jobs: int | None,
     as_json: bool,
+    **given: Any,
 ) -> None:
     """Judge MODEL on the machine draws of DATA that it has not seen.
 
-    With --across-fidelity: what training on a cheaper model of the machine costs.
+    With --split: on what this split of DATA tests. With --retrain: train as MODEL was trained, with
+    other parts of DATA held out, and judge on these. With --across-fidelity: what training on a
+    cheaper model of the machine costs.
     """
+    from .bundle import kind_of
+    from .ownfile import CLASS_MODEL
+
+    keys = ("split", "retrain", "trained_on", "healthy", "quick", "cache")
+    named = [key for key in keys if given[key]]
     if across_fidelity:
         if data is not None:
             raise click.UsageError("--across-fidelity makes its own data: name a recipe only")
-        _judge_across(model_file, records or _ACROSS, effects, pairs, folder, jobs, as_json)
+        if named or output:
+            raise click.UsageError("--across-fidelity takes no option of a judgement on DATA")
+        _judge_across(model_file, records or _ACROSS, effects, pairs, folder, seed, jobs, as_json)
         return
     if data is None:
         raise click.UsageError("Missing argument 'DATA'.")
     if records or effects or pairs or folder:
         raise click.UsageError("-n, --effect, --set and --folder need --across-fidelity")
+    if given["retrain"] and (given["trained_on"] or given["split"]):
+        raise click.UsageError(
+            "--retrain trains on DATA, by splits of its own: --trained-on and --split have no "
+            "meaning with it"
+        )
+    _check_outputs([model_file, data], [(output, _EVALUATION)], force)
+    if kind_of(model_file) == CLASS_MODEL:
+        if named or output:
+            raise click.UsageError("a model of named conditions takes no such option")
+        _judge_classes(model_file, data, seed, _workers(jobs), as_json)
+        return
+    _judge(model_file, data, output, seed, _workers(jobs), as_json, given)
+
+
+_EVALUATION = (".html", ".png", ".svg", ".pdf", ".json")
+
+
+def _judge_classes(model_file: Path, data: Path, seed: int, jobs: int, as_json: bool) -> None:
+    """Of a model of named conditions."""
+    from .own import classes_text, evaluate_classes
+    from .ownfile import load_class_model
+
+    model = load_class_model(model_file)
+    with _progress("features") as progress:
+        result = evaluate_classes(model, data, seed=seed, jobs=jobs, progress=progress)
+    _emit(result, as_json, "\n".join(classes_text(result)))
+
+
+def _judge(
+    model_file: Path,
+    data: Path,
+    output: Path | None,
+    seed: int,
+    jobs: int,
+    as_json: bool,
+    given: Mapping[str, Any],
+) -> None:
+    """Of a finished model, or by splits; text or JSON, and a file if asked for."""
     from .evaluate import evaluate_model
+    from .evaluate_figure import save_evaluation
+    from .evaluate_splits import ALL_SPLITS, case_of, evaluate_splits, one_split
+    from .evaluate_text import score_lines, splits_text
     from .modelfile import load_model
 
     model = load_model(model_file)
+    shared = {key: given[key] for key in ("healthy", "quick", "cache")}
     with _progress("features") as progress:
-        result = evaluate_model(model, data, jobs=_workers(jobs), progress=progress)
-    _emit(result, as_json, "\n".join(_score_lines(result, model.card)))
+        ways: dict[str, Any] = {**shared, "seed": seed, "jobs": jobs, "progress": progress}
+        if given["retrain"]:
+            names = ALL_SPLITS if "all" in given["retrain"] else given["retrain"]
+            case = case_of(model, data, **ways)
+            result = evaluate_splits(case, names, say=lambda text: click.echo(text, err=True))
+            whole, text = result, splits_text(result)
+        else:
+            ways |= {"trained_on": given["trained_on"], "split": given["split"]}
+            result = evaluate_model(model, data, **ways)
+            whole = one_split(result, model, data, seed)
+            text = "\n".join(score_lines(result, model.card))
+    if output is not None:
+        save_evaluation(whole, output, notice=model.notice)
+    _emit(result, as_json, text)
 
 
 _ACROSS = 120  # records
@@ -1242,6 +1401,7 @@ def _judge_across(
     effects: Sequence[str],
     pairs: Sequence[str],
     folder: Path | None,
+    seed: int,
     jobs: int | None,
     as_json: bool,
 ) -> None:
@@ -1257,101 +1417,241 @@ def _judge_across(
             folder or Path(passing),
             effects=effects,
             overrides=_overrides(pairs),
+            seed=seed,
             jobs=_workers(jobs),
             say=lambda text: click.echo(text, err=True),
         )
     _emit(across_table(found), as_json, across_text(found))
 
 
-def _score_lines(result: dict[str, Any], card: dict[str, Any]) -> list[str]:
-    from .evaluate import confounder_lines
-    from .report import severity_word
-
-    if not result:
-        return ["not judged: no machine draw was held out"]
-    base = ", ".join(f"{k.replace('_', ' ')} {v:.3f}" for k, v in result["baselines"].items())
-    lines = [
-        f"Judged on {result['records']} records of {result['draws']} unseen machine draws "
-        f"({100 * result['unfamiliar']:.1f} % called unfamiliar)"
-    ]
-    if result["records"] < _FEW_RECORDS:
-        lines.append("  so few records tell little: every figure below may be far off")
-    if result["mae_m"] is None:
-        return [*lines, "  none is familiar: no figure can be given for this machine"]
-    return [
-        *lines,
-        f"  {severity_word(card['severity'])} error".ljust(20)
-        + f"{1e6 * result['mae_m']:.1f} um mean, "
-        f"{100 * result['mae_share_of_limit']:.1f} % of the condemning limit "
-        f"{1e3 * card['condemning_limit_m']:.3g} mm "
-        f"({1e6 * result['mae_all_m']:.1f} um with the unfamiliar)",
-        f"  interval coverage {result['coverage']:.3f} (nominal {result['nominal_coverage']:.2f}), "
-        f"{result['mean_set_size']:.2f} grades touched on average",
-        f"  grade accuracy    {result['accuracy']:.3f}; an error of that size allows about "
-        f"{result['accuracy_bound']:.3f}",
-        f"  within one grade  {result['within_one_grade']:.4f}",
-        f"  baselines         {base}",
-        *confounder_lines(result["by_confounder"]),
-    ]
-
-
-_FEW_RECORDS = 30
-
-
 @cli.command()
-@click.argument("recording_file", metavar="RECORDING", type=_PATH)
+@click.argument("source", metavar="RECORDING|FOLDER", type=_PATH)
 @click.option("--model", "model_file", type=_PATH, required=True)
+@click.option("--baseline", "healthy", type=_PATH, help="Healthy recordings of the machine (.h5).")
 @click.option("-o", "--output", type=_PATH, help="HTML page to write.")
+@click.option("--machine", metavar="KIND", help="Kind of machine, for its ISO zone.")
+@click.option("--trend", is_flag=True, help="Of many recordings: severity over time, life left.")
+@click.option(
+    "--dates",
+    metavar="names|mtime|CSV|COLUMN",
+    help="Times for --trend: in file names, of files, a table file,date or file,hours, or a column "
+    "of hours in the data set (operating_hours).",
+)
+@click.option(
+    "--growth",
+    type=click.Choice(["linear", "log"]),
+    default="linear",
+    show_default=True,
+    help="Of the wear over time: abrasive, or damage that feeds itself.",
+)
+@_seed_option
 @_source_options
 @click.option("--fail-on", type=click.Choice(["warning", "alarm"]), help=_FAIL_ON_HELP)
 @_force_option
 @_json_option
 def report(
-    recording_file: Path,
+    source: Path,
     model_file: Path,
+    healthy: Path | None,
     output: Path | None,
-    tacho: str | None,
-    pulses_per_revolution: int,
+    machine: str | None,
     fail_on: str | None,
     force: bool,
     as_json: bool,
     **given: Any,
 ) -> None:
-    """The verdict on RECORDING: wear grade and clearance with interval, or unfamiliar."""
-    from ..datasets.importers import read_recording
+    """The verdict on RECORDING: wear grade and severity with interval, or why there is none.
+
+    Of a FOLDER, or a data set without --record: a table of all recordings, the most urgent first;
+    with --json one object a line. Exit 2 if nothing could be judged; with --fail-on, of many
+    recordings, the code of the worst: alarm, warning, bad input, unfamiliar. With times, only the
+    latest of a machine counts.
+    """
+    from .bundle import kind_of
+    from .healthy import Baselines
     from .modelfile import load_model
-    from .report import report_html, report_table, report_text, save_page
+    from .ownfile import CLASS_MODEL
+    from .report import known_machine
 
-    _check_outputs([recording_file, model_file], [(output, _PAGE)], force)
+    inputs = [source, model_file, *([healthy] if healthy else [])]
+    _check_outputs(inputs, [(output, _PAGE)], force)
+    known_machine(machine)
+    if kind_of(model_file) == CLASS_MODEL:
+        wear = {
+            "--baseline": healthy,
+            "-o": output,
+            "--machine": machine,
+            "--fail-on": fail_on,
+            "--trend": given["trend"],
+            "--dates": given["dates"],
+        }
+        wrong = [option for option, value in wear.items() if value]
+        if wrong:
+            raise click.UsageError(
+                f"{model_file} names conditions and knows no wear: leave {', '.join(wrong)} out, "
+                "or name a wear model"
+            )
+        _report_class(source, model_file, given, as_json)
+        return
     model = load_model(model_file)
-    recording = read_recording(
-        recording_file,
-        _declared(given),
-        tacho=tacho,
-        pulses_per_revolution=pulses_per_revolution,
-    )
-    estimate = model.estimate(recording)
-    table = report_table(recording, model, estimate)
-    if output is not None:
-        save_page(report_html(table, recording), output)
-        table["html"] = str(output)
-    if as_json:
-        click.echo(_json_text(table))
+    baselines = Baselines(healthy, model.card) if healthy else None
+    many = _holds_many(source)
+    if not many and (given["trend"] or given["dates"]):
+        raise click.UsageError("--trend and --dates are for a folder or a data set of many records")
+    told = _Told(source, model_file, model, baselines, output, machine, as_json, given)
+    verdicts = _report_many(told) if many else _report_one(told)
+    raise click.exceptions.Exit(_report_exit(verdicts, fail_on))
+
+
+def _holds_many(source: Path) -> bool:
+    """Whether a folder, or a data set of which no record is chosen."""
+    from .report_batch import record_count
+
+    asked = click.get_current_context().get_parameter_source("record")
+    chosen = asked is not click.core.ParameterSource.DEFAULT
+    return source.is_dir() or (not chosen and record_count(source) > 1)
+
+
+def _report_class(source: Path, model_file: Path, given: Mapping[str, Any], as_json: bool) -> None:
+    """The condition in recordings, each as soon as it is told; exit 2 where none can be."""
+    from ..datasets.importers import read_recording
+    from .own import name_all, naming_text
+    from .ownfile import load_class_model
+    from .report_batch import recordings_in
+
+    model = load_class_model(model_file)
+    tacho = {key: given[key] for key in ("tacho", "pulses_per_revolution")}
+    if not _holds_many(source):
+        naming = model.estimate(read_recording(source, _declared(given), **tacho))
+        notice = f"\nNotice: {model.notice}." if model.notice else ""
+        _emit({**naming.as_dict(), "notice": model.notice}, as_json, naming_text(naming) + notice)
+        verdicts = {naming.verdict}
     else:
-        click.echo(report_text(table) + (f"\nPage        {output}" if output else ""))
-    raise click.exceptions.Exit(_report_exit(estimate.verdict, estimate.grade, fail_on))
+        verdicts = set()
+        with recordings_in(source, _declared(given), **tacho, leave_out=[model_file]) as items:
+            for name, naming in name_all(items, model):
+                verdicts.add(naming.verdict)
+                _emit(
+                    {"recording": name, **naming.as_dict()},
+                    as_json,
+                    f"{name}: {naming_text(naming)}",
+                )
+        if model.notice:
+            click.echo(f"Notice: {model.notice}.", err=as_json)
+    if verdicts == {"unusable"}:
+        raise click.exceptions.Exit(EXIT_BAD_INPUT)
 
 
-def _report_exit(verdict: str, grade: int | None, fail_on: str | None) -> int:
+class _Told(NamedTuple):
+    """What both kinds of report are given."""
+
+    source: Path
+    model_file: Path
+    model: Any
+    baselines: Any
+    output: Path | None
+    machine: str | None
+    as_json: bool
+    given: Mapping[str, Any]
+
+
+_Verdict = tuple[str, int | None]
+"""Verdict and grade."""
+
+
+def _report_one(told: _Told) -> list[_Verdict]:
+    """Report on one recording."""
+    from ..datasets.importers import read_recording
+    from .report import report_table, save_page
+    from .report_text import report_text
+
+    recording = read_recording(
+        told.source,
+        _declared(told.given),
+        tacho=told.given["tacho"],
+        pulses_per_revolution=told.given["pulses_per_revolution"],
+    )
+    baseline = told.baselines.of(recording.row) if told.baselines else None
+    estimate = told.model.estimate(recording, baseline)
+    table = report_table(
+        recording,
+        told.model,
+        estimate,
+        machine=told.machine,
+        baseline=baseline,
+        files={"recording": told.source, "model": told.model_file},
+    )
+    if told.output is not None:
+        from .report_page import report_html
+
+        page = report_html(table, recording, told.model, baseline=baseline)
+        save_page(page, told.output)
+        table["html"] = str(told.output)
+    text = report_text(table) + (f"\nPage        {told.output}" if told.output else "")
+    click.echo(_json_text(table) if told.as_json else text)
+    return [(estimate.verdict, estimate.grade)]
+
+
+def _report_many(told: _Told) -> list[_Verdict]:
+    """Report on a folder or data set; of JSON one line each, as soon as it is judged."""
+    from .report import save_page
+    from .report_batch import HOURS, judge_all, recordings_in
+    from .report_text import batch_text
+
+    given = told.given
+    dates = given["dates"]
+    if given["trend"] and dates is None:
+        dates = "names" if told.source.is_dir() else HOURS
+    healthy = told.baselines and Path(told.baselines.source)
+    others = [path for path in (told.output, told.model_file, Path(dates or ""), healthy) if path]
+    with (
+        recordings_in(
+            told.source,
+            _declared(given),
+            tacho=given["tacho"],
+            pulses_per_revolution=given["pulses_per_revolution"],
+            leave_out=others,
+        ) as items,
+        _progress("judging") as progress,
+    ):
+        batch = judge_all(
+            told.source,
+            items,
+            told.model,
+            model_file=told.model_file,
+            baselines=told.baselines,
+            dates=dates,
+            growth=given["growth"],
+            seed=given["seed"],
+            tell=(lambda line: click.echo(_json_text(line))) if told.as_json else None,
+            progress=progress,
+        )
+        if told.output is not None:
+            from .report_page import batch_html
+
+            page = batch_html(batch, told.model, machine=told.machine, baselines=told.baselines)
+            save_page(page, told.output)
+    if not told.as_json:
+        click.echo(batch_text(batch) + (f"\nPage        {told.output}" if told.output else ""))
+    return [(row.verdict, row.grade) for row in batch.current]
+
+
+def _report_exit(verdicts: Sequence[_Verdict], fail_on: str | None) -> int:
+    """Nothing judged is bad input, asked or not; else only what --fail-on asks for."""
     from .grades import ALARM_GRADE, WARNING_GRADE
 
+    if all(verdict == "unusable" for verdict, _ in verdicts):
+        return EXIT_BAD_INPUT
     if fail_on is None:
         return 0
-    if verdict == "unfamiliar" or grade is None:
-        return EXIT_UNFAMILIAR
-    if grade >= ALARM_GRADE:
+    worst = max((grade for _, grade in verdicts if grade is not None), default=0)
+    if worst >= ALARM_GRADE:
         return EXIT_ALARM
-    return EXIT_WARNING if fail_on == "warning" and grade >= WARNING_GRADE else 0
+    if fail_on == "warning" and worst >= WARNING_GRADE:
+        return EXIT_WARNING
+    if any(verdict == "unusable" for verdict, _ in verdicts):
+        return EXIT_BAD_INPUT
+    return EXIT_UNFAMILIAR if any(verdict == "unfamiliar" for verdict, _ in verdicts) else 0
 
 
 @cli.command()
@@ -1381,6 +1681,7 @@ def _report_exit(verdict: str, grade: int | None, fail_on: str | None) -> int:
 )
 @click.option("--push", metavar="BEARING", help="Where --test pushes the shaft up; aftmost.")
 @click.option("--test-plot", type=_PATH, help="Picture of --test to write.")
+@_seed_option
 @click.option("--plot", type=_PATH, help="Picture to write (.png, .svg or .pdf).")
 @click.option("-o", "--output", type=_PATH, help="HTML page to write.")
 @click.option("--fail-on", type=click.Choice(["warning", "alarm"]), help=_ALIGN_FAIL_ON_HELP)
@@ -1396,6 +1697,7 @@ def align(
     rig_test: str | None,
     push: str | None,
     test_plot: Path | None,
+    seed: int,
     plot: Path | None,
     output: Path | None,
     fail_on: str | None,
@@ -1407,8 +1709,8 @@ def align(
     from .align import align as judge
     from .align import align_table, align_text, save_figure, save_html
 
-    if rig_test is None and (push or test_plot):
-        raise click.UsageError("--push and --test-plot need --test")
+    if rig_test is None and (push or test_plot or seed):
+        raise click.UsageError("--push, --test-plot and --seed need --test")
     if rig_test is not None and not calibrate:
         raise click.UsageError("--test compares before and after the moves: it needs --calibrate")
     outputs = [(plot, _PICTURE), (output, _PAGE), (test_plot, _PICTURE)]
@@ -1419,7 +1721,7 @@ def align(
         save_figure(found, plot)
     if output is not None:
         save_html(found, output)
-    tested, words = _tested(scene, found.calibration, rig_test, push, test_plot)
+    tested, words = _tested(scene, found.calibration, rig_test, push, test_plot, seed)
     files = [str(path) for path, _ in outputs if path and path.exists()]
     text = "\n".join([align_text(found), *words, *files])
     _emit({**align_table(found), "test": tested, "files": files}, as_json, text)
@@ -1429,14 +1731,19 @@ def align(
 
 
 def _tested(
-    scene: Any, calibration: Any, kind: str | None, push: str | None, picture: Path | None
+    scene: Any,
+    calibration: Any,
+    kind: str | None,
+    push: str | None,
+    picture: Path | None,
+    seed: int,
 ) -> tuple[dict[str, Any] | None, list[str]]:
     """Table and text of the simulated test before and after the moves, if one was asked for."""
     if kind is None:
         return None, []
     from .rig import calibrated_test, rig_figure, rig_table, rig_text
 
-    result = calibrated_test(scene, calibration, kind, push=push)
+    result = calibrated_test(scene, calibration, kind, push=push, seed=seed)
     if result is None:
         return None, ["", "no test: nothing moves, so nothing changes"]
     if picture is not None:
@@ -1499,6 +1806,7 @@ def stability(
     help="Seconds after which nothing further is begun.",
 )
 @click.option("-o", "--output", type=_PATH, help="Chart (.svg, .png, .pdf, .html, .json, .csv).")
+@_seed_option
 @_jobs_option
 @_force_option
 @_json_option
@@ -1508,6 +1816,7 @@ def chart(
     accuracy: float | None,
     budget: float | None,
     output: Path | None,
+    seed: int,
     jobs: int | None,
     force: bool,
     as_json: bool,
@@ -1519,11 +1828,15 @@ def chart(
     of_data = subject.endswith(_DATA)
     if of_data and (pairs or accuracy is not None):
         raise click.UsageError("--set and --accuracy are for a scene, not for a data set")
+    if seed and not of_data:
+        raise click.UsageError("--seed is of the models on a data set; a scene's chart draws none")
     with _progress("measuring") as progress:
         if of_data:
             from .chart_models import model_chart
 
-            found = model_chart(subject, budget=budget, jobs=_workers(jobs), progress=progress)
+            found = model_chart(
+                subject, seed=seed, budget=budget, jobs=_workers(jobs), progress=progress
+            )
         else:
             from ..sim.scene import load_scene
 
@@ -1573,6 +1886,7 @@ def verify(as_json: bool) -> None:
 def demo(folder: Path, seed: int, jobs: int | None, as_json: bool) -> None:
     """The whole job, small: simulate, features, train, evaluate, report."""
     from .demo import run_demo
+    from .evaluate_text import score_lines
 
     with _progress("simulating and learning") as progress:
         result = run_demo(
@@ -1582,5 +1896,5 @@ def demo(folder: Path, seed: int, jobs: int | None, as_json: bool) -> None:
             progress=progress,
             say=lambda text: click.echo(text, err=True),
         )
-    text = "\n".join([*_score_lines(result["held_out"], result["card"]), "", result["text"]])
+    text = "\n".join([*score_lines(result["held_out"], result["card"]), "", result["text"]])
     _emit({key: result[key] for key in ("files", "held_out", "report", "seconds")}, as_json, text)

@@ -12,7 +12,9 @@ from ..datasets.generate import generate
 from ..datasets.record import DataError, DataSet
 from .evaluate import score
 from .modelfile import load_model, save_model
-from .report import report_html, report_table, report_text, save_page
+from .report import report_table, save_page
+from .report_page import report_html
+from .report_text import report_text
 from .tabulate import Progress
 from .train import train_model
 
@@ -105,7 +107,7 @@ def _report_on_unseen(files: dict[str, Path], unseen: list[str]) -> dict[str, An
         number = _most_worn(rows, severity, model.card["condemning_limit_m"])
         recording = data[number]
     table = report_table(recording, model, model.estimate(recording))
-    save_page(report_html(table, recording), files["report"])
+    save_page(report_html(table, recording, model), files["report"])
     text = (
         f"{report_text(table)}\n"
         f"Truth       {1e3 * severity[number]:.3f} mm (known, because it is simulated)\n"

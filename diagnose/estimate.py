@@ -2,30 +2,54 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
+from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..datasets.record import Recording
+from ..datasets.record import DataError, Recording
+from .conformal import (
+    COVERAGE,
+    Calibration,
+    Scale,
+    Tails,
+    grade_limits,
+    grade_probabilities,
+    grade_set,
+    interval,
+    scale_inputs,
+    tails,
+)
 from .grades import GRADE_NAMES, grades_of
+from .healthy import Baseline, referenced_rows
+from .models import Blend, Linear
 from .novelty import Familiarity, novelty_p_value
+from .physical import level_channels
+from .quality import (
+    Fault,
+    Levels,
+    Look,
+    layout_faults,
+    quiet_faults,
+    sample_faults,
+    suspicions,
+)
 from .tabulate import recording_features
 
 Float = NDArray[np.float64]
+Verdict = Literal["graded", "caution", "unfamiliar", "unusable"]
+Mode = Literal["cold", "referenced"]
 
 SIMULATION_NOTICE = "trained on simulation; no measured joint of known clearance has confirmed it"
-
-COVERAGE = 0.9
-"""Nominal coverage of the interval."""
 
 UNFAMILIAR_SHARE = 0.01
 """Share of familiar recordings that may be called unfamiliar, where the calibration is large
 enough to tell so small a share; else one in its number."""
 
-_FEWEST_NEIGHBOURS = 40  # out-of-fold errors that decide an interval: its level moves by 2.5 %
-_RATE_TOLERANCE = 1e-3  # of the sample rate; band edges move as much
+_OFF_LEVEL = 3.5  # standard deviations of a level that few familiar machines reach
+_SPEED_FEATURE = "shaft.speed_hz"
 
 
 class ModelError(ValueError):
@@ -33,43 +57,53 @@ class ModelError(ValueError):
 
 
 @dataclass(frozen=True, kw_only=True)
-class LinearSeverity:
-    """Log severity as a linear function of the features.
+class Finding:
+    """What a model says of a fault beside the wear.
 
     Attributes
     ----------
-    centre, spread, weight : numpy.ndarray [shape=(n_features,)]
-        ``log severity = offset + sum(weight * (feature - centre) / spread)``
-    offset : float
-        Log of the severity in metres at the centre.
+    name : str
+        As the data set labels it.
+    probability : float
+        That it is present.
+    present : bool
+        The probability is above the threshold of the model.
+    detection_rate, false_alarm_rate : float
+        Share of present ones found, and of absent ones called present, on machines that had no
+        part in the fit.
     """
 
-    centre: Float
-    spread: Float
-    weight: Float
-    offset: float
-
-    def predict(self, features: Float) -> Float:
-        """Log severity [shape=(n_recordings,)] of feature rows [shape=(n_recordings, n)]."""
-        standard = (features - self.centre) / self.spread
-        return np.asarray(standard @ self.weight + self.offset)
+    name: str
+    probability: float
+    present: bool
+    detection_rate: float
+    false_alarm_rate: float
 
 
 @dataclass(frozen=True, kw_only=True)
-class Calibration:
-    """Out-of-fold behaviour of a model on machine draws it had not seen.
+class Head:
+    """Tells the presence of one fault beside the wear.
 
     Attributes
     ----------
-    log_estimate, log_error : numpy.ndarray [shape=(n,)]
-        Estimates of log severity, and truth minus estimate.
-    distance : numpy.ndarray [shape=(n,)]
-        Novelty distances.
+    name : str
+    blend : Blend
+        Features to 1 (absent) … 2 (present).
+    slope, offset : float
+        ``probability = 1 / (1 + exp(-(offset + slope * value)))``
+    threshold : float
+        Probability above which it is called present.
     """
 
-    log_estimate: Float
-    log_error: Float
-    distance: Float
+    name: str
+    blend: Blend
+    slope: float
+    offset: float
+    threshold: float
+
+    def probability(self, rows: Float) -> Float:
+        """Probability [shape=(n,)] of feature rows [shape=(n, n_features)]."""
+        return np.asarray(1 / (1 + np.exp(-(self.offset + self.slope * self.blend.predict(rows)))))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,45 +112,66 @@ class Estimate:
 
     Attributes
     ----------
-    verdict : {"graded", "unfamiliar"}
-        Unfamiliar: no grade is given.
+    verdict : {"graded", "caution", "unfamiliar", "unusable"}
+        Caution: graded, but read `cautions`. Unfamiliar: no grade, the machine is none of the
+        trained kind. Unusable: no grade, the recording is at fault.
+    faults : tuple of Fault
+        Of the data.
     reasons : tuple of str
-        Why it is unfamiliar; empty where graded.
+        Why there is no grade; empty where there is one.
     cautions : tuple of str
-        Conditions outside the trained range.
+        Conditions outside the trained range, faults that bar no verdict.
+    mode : {"cold", "referenced"}
+        Whether healthy recordings of the same machine were used.
     p_value : float or None
         Of the hypothesis that the recording is of the trained kind; None where it could not even
         be turned into the model's features.
     p_limit : float or None
         At or below it a recording is called unfamiliar.
+    nearest : str
+        The trained machine that is nearest; empty where unusable.
     grade : int or None
         0 to 3.
     grade_name : str
-        In words; empty where unfamiliar.
+        In words; empty without a grade.
     possible_grades : tuple of int
-        Grades that the interval touches.
+        Those that cannot be excluded.
+    grade_probabilities : tuple of float
+        Of every grade, sum 1.
     severity, low, high : float or None
         Estimate and interval [m].
     coverage : float
-        Nominal coverage of the interval.
+        Nominal coverage of the interval, and of the set.
+    confounders : tuple of Finding
+        Faults beside the wear that the model knows.
     evidence : tuple of (str, float, float, float)
-        Feature, its value, mean of as-new machines, distance in their standard deviations; the
-        features that moved the most.
+        Feature, its value, the healthy one (of the baseline, or mean of as-new machines), distance
+        in standard deviations of healthy machines; the features that moved the most.
     """
 
-    verdict: Literal["graded", "unfamiliar"]
+    verdict: Verdict
+    faults: tuple[Fault, ...] = ()
     reasons: tuple[str, ...] = ()
     cautions: tuple[str, ...] = ()
+    mode: Mode = "cold"
     p_value: float | None = None
     p_limit: float | None = None
+    nearest: str = ""
     grade: int | None = None
     grade_name: str = ""
     possible_grades: tuple[int, ...] = ()
+    grade_probabilities: tuple[float, ...] = ()
     severity: float | None = None
     low: float | None = None
     high: float | None = None
     coverage: float = COVERAGE
-    evidence: tuple[tuple[str, float, float, float], ...] = field(default=())
+    confounders: tuple[Finding, ...] = ()
+    evidence: tuple[tuple[str, float, float, float], ...] = ()
+
+    @property
+    def graded(self) -> bool:
+        """Whether there is a grade, with or without caution."""
+        return self.verdict in ("graded", "caution")
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
@@ -129,19 +184,32 @@ class WearModel:
 
     Attributes
     ----------
-    regressor : LinearSeverity
-        Features to log severity.
+    severity : Blend
+        Features to severity [m].
+    witness : Linear
+        The best straight line among the candidates: it goes on beyond the trained severities,
+        where trees stay at the last they have seen.
+    scale : Scale
+        Size of the error to expect.
     calibration : Calibration
-        Out-of-fold errors and distances.
+        Behaviour on machines that had no part in the fit.
     familiarity : Familiarity
-        The cloud of the training features.
+        The cloud of the training recordings.
+    levels : Levels
+        Level to expect of each channel.
+    heads : tuple of Head
+        Faults beside the wear.
     card : dict
         What it was trained on, its inputs, limits and ranges.
     """
 
-    regressor: LinearSeverity
+    severity: Blend
+    witness: Linear
+    scale: Scale
     calibration: Calibration
     familiarity: Familiarity
+    levels: Levels
+    heads: tuple[Head, ...] = ()
     card: dict[str, Any]
 
     @property
@@ -150,101 +218,294 @@ class WearModel:
         return SIMULATION_NOTICE if self.card["origin"] == "simulated" else ""
 
     @property
+    def mode(self) -> Mode:
+        """Whether it needs healthy recordings of the machine."""
+        return "referenced" if self.card["mode"] == "referenced" else "cold"
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Names of the features of a row."""
+        return tuple(self.card["features"])
+
+    @cached_property
     def p_limit(self) -> float:
         """A recording with this p-value or a smaller one is called unfamiliar."""
         return max(UNFAMILIAR_SHARE, 1 / (len(self.calibration.distance) + 1))
 
-    def estimate(self, recording: Recording) -> Estimate:
+    @cached_property
+    def distance_limit(self) -> float:
+        """Distance at which the p-value falls to its limit."""
+        far = np.sort(self.calibration.distance)[::-1]
+        # that many calibration recordings lie at least as far
+        rank = math.floor(self.p_limit * (len(far) + 1) + 1e-9) - 1
+        return float(np.nextafter(far[rank], math.inf)) if rank < len(far) else 0.0
+
+    @cached_property
+    def _tails(self) -> Tails:
+        return tails(self.calibration)
+
+    @cached_property
+    def _grade_limits(self) -> Float:
+        return grade_limits(self.calibration, self.card["grade_edges_m"])
+
+    @cached_property
+    def _columns(self) -> dict[str, int]:
+        return {name: i for i, name in enumerate(self.names)}
+
+    @cached_property
+    def _healthy(self) -> tuple[Float, Float]:
+        """Mean and spread of healthy features."""
+        known = self.card["healthy_features"]
+        return np.array(known["mean"]), np.array(known["spread"])
+
+    def predict(self, rows: Float, baseline: Float | None = None) -> Float:
+        """Severity of many recordings, without a word on how far it can be trusted.
+
+        Parameters
+        ----------
+        rows : numpy.ndarray [shape=(n, n_features)]
+            In the order of ``card["features"]``.
+        baseline : numpy.ndarray [shape=(n, n_features)] or [shape=(n_features,)], optional
+            Healthy rows of the same machines, of a referenced model.
+
+        Returns
+        -------
+        numpy.ndarray [shape=(n,)]
+            [m]
+
+        Raises
+        ------
+        DataError
+            The model is referenced and there is no baseline.
+        """
+        return self.severity.predict(self._inputs(rows, baseline))
+
+    def _inputs(self, rows: Float, baseline: Float | None) -> Float:
+        if self.mode == "cold":
+            return rows
+        if baseline is None:
+            raise DataError(_NO_BASELINE)
+        return referenced_rows(rows, baseline)
+
+    def estimate(self, recording: Recording, baseline: Baseline | None = None) -> Estimate:
         """Estimate the wear of the machine in a recording.
 
         Parameters
         ----------
         recording : Recording
-            Any; one that lacks the model's inputs is unfamiliar, with the reasons.
+            Any; one that lacks the model's inputs or is at fault is unusable, with the reasons.
+        baseline : Baseline, optional
+            Healthy recordings of the same machine; a referenced model needs them, a cold one only
+            tells the evidence against them.
 
         Returns
         -------
         Estimate
-            Grade and severity with interval, or unfamiliar.
 
         Raises
         ------
         DataError
-            The signal itself is unusable: not finite, or shorter than a revolution.
+            The signal cannot be turned into features.
+        ModelError
+            The program's features are not the model's.
         """
-        missing = input_faults(recording, self.card)
-        if missing:
-            return Estimate(verdict="unfamiliar", reasons=tuple(missing))
-        names, values = recording_features(recording)
-        if list(names) != self.card["features"]:
-            raise ModelError(
-                f"the model's {len(self.card['features'])} features are not the program's "
-                f"{len(names)}; retrain it: wearstate train DATA -o MODEL"
-            )
-        return self.judge(values)
+        faults = layout_faults(recording, self.card) or sample_faults(recording)
+        if any(fault.bars for fault in faults):
+            return self._unusable(faults)
+        row = self._row(recording)
+        faults += suspicions(recording, self._look(row), self._see, self._speeds()) or quiet_faults(
+            recording, self.names, row, self.levels
+        )
+        if any(fault.bars for fault in faults):
+            return self._unusable(faults)
+        features = None if baseline is None else baseline.features
+        return self.judge(row, features, conditions=recording.row, faults=faults)
 
-    def judge(self, values: Float) -> Estimate:
-        """Estimate from a feature row in the order of ``card["features"]``."""
-        row = values[None, :]
-        distance = float(self.familiarity.distance(row)[0])
-        p_value = novelty_p_value(distance, self.calibration.distance)
-        if p_value <= self.p_limit:
-            reason = _strangeness(distance, self.calibration.distance)
-            return Estimate(
-                verdict="unfamiliar", reasons=(reason,), p_value=p_value, p_limit=self.p_limit
+    def _unusable(self, faults: tuple[Fault, ...]) -> Estimate:
+        reasons = tuple(fault.text for fault in faults if fault.bars)
+        return Estimate(verdict="unusable", faults=faults, reasons=reasons, mode=self.mode)
+
+    def _row(self, recording: Recording) -> Float:
+        names, values = recording_features(recording)
+        if names != self.names:
+            raise ModelError(
+                f"the model's {len(self.names)} features are not the program's {len(names)}; "
+                "retrain it: wearstate train DATA -o MODEL"
             )
-        log_severity = float(self.regressor.predict(row)[0])
-        below, above, coverage = interval_offsets(log_severity, self.calibration)
-        low, high = math.exp(log_severity + below), math.exp(log_severity + above)
-        edges = self.card["grade_edges_m"]
-        severity = math.exp(log_severity)
-        grade = int(grades_of(severity, edges))
-        span = range(int(grades_of(low, edges)), int(grades_of(high, edges)) + 1)
-        return Estimate(
-            verdict="graded",
-            cautions=(*self._range_cautions(severity), *self._condition_cautions(values)),
-            p_value=p_value,
-            p_limit=self.p_limit,
-            grade=grade,
-            grade_name=GRADE_NAMES[grade],
-            possible_grades=tuple(span),
-            severity=severity,
-            low=low,
-            high=high,
-            coverage=coverage,
-            evidence=self._evidence(values),
+        return values
+
+    def _see(self, recording: Recording) -> Look:
+        return self._look(self._row(recording))
+
+    def _look(self, row: Float) -> Look:
+        speed = row[self._columns[_SPEED_FEATURE]] if _SPEED_FEATURE in self._columns else None
+        return Look(
+            distance=float(self.familiarity.distance(self.names, row[None, :])[0]),
+            limit=self.distance_limit,
+            free_distance=self.familiarity.free_distance(self.names, row),
+            excess_db=self._excess(row),
+            speed_hz=None if speed is None else float(speed),
         )
 
-    def _range_cautions(self, severity: float) -> list[str]:
+    def _excess(self, row: Float) -> dict[str, float]:
+        """Level of each channel above the expected one [dB]."""
+        excess = self.levels.excess(self.names, row[None, :])[0]
+        return dict(zip(level_channels(self.names), excess.tolist(), strict=True))
+
+    def _speeds(self) -> tuple[float, float] | None:
+        """Trained speeds [Hz]."""
+        for condition in self.card["conditions"]:
+            if condition["feature"] == _SPEED_FEATURE:
+                return condition["low"], condition["high"]
+        return None
+
+    def judge(
+        self,
+        row: Float,
+        baseline: Float | None = None,
+        *,
+        conditions: Mapping[str, Any] | None = None,
+        faults: tuple[Fault, ...] = (),
+    ) -> Estimate:
+        """Estimate from a feature row.
+
+        Parameters
+        ----------
+        row : numpy.ndarray [shape=(n_features,)]
+            In the order of ``card["features"]``.
+        baseline : numpy.ndarray [shape=(n_features,)], optional
+            Healthy row of the same machine.
+        conditions : mapping, optional
+            Operating conditions by the names of the card, as far as they were recorded.
+        faults : tuple of Fault
+            Found in the recording; none of them bars a verdict.
+
+        Returns
+        -------
+        Estimate
+        """
+        if self.mode == "referenced" and baseline is None:
+            return Estimate(verdict="unusable", reasons=(_NO_BASELINE,), mode=self.mode)
+        distance = float(self.familiarity.distance(self.names, row[None, :])[0])
+        known: dict[str, Any] = {
+            "faults": faults,
+            "mode": self.mode,
+            "p_value": novelty_p_value(distance, self.calibration.distance),
+            "p_limit": self.p_limit,
+            "nearest": self._nearest(row),
+        }
+        if known["p_value"] <= self.p_limit:
+            reason = _strangeness(distance, self.calibration.distance)
+            return Estimate(verdict="unfamiliar", reasons=(reason,), **known)
+        severity = float(self.predict(row[None, :], baseline)[0])
+        cautions = (
+            *(fault.text for fault in faults),
+            *self._range_cautions(severity, self._inputs(row[None, :], baseline)),
+            *self._condition_cautions(row, conditions or {}),
+            *self._level_cautions(row),
+        )
+        return Estimate(
+            verdict="caution" if cautions else "graded",
+            cautions=cautions,
+            confounders=self._findings(row),
+            evidence=self._evidence(row, baseline),
+            **known,
+            **self._grading(severity, distance),
+        )
+
+    def _grading(self, severity: float, distance: float) -> dict[str, Any]:
+        """Grade, set, probabilities and interval of an estimate."""
+        edges = self.card["grade_edges_m"]
+        scale = float(self.scale.predict(scale_inputs([severity], [distance]))[0])
+        low, high = interval(severity, scale, self._tails)
+        grade = int(grades_of(severity, edges))
+        share = grade_probabilities(severity, scale, self.calibration, edges)
+        return {
+            "grade": grade,
+            "grade_name": GRADE_NAMES[grade],
+            "possible_grades": grade_set(severity, scale, self._grade_limits, edges),
+            "grade_probabilities": tuple(share.tolist()),
+            "severity": severity,
+            "low": low,
+            "high": high,
+            "coverage": self._tails.coverage,
+        }
+
+    def _nearest(self, row: Float) -> str:
+        group, distance = self.familiarity.nearest(self.names, row)
+        trained = self.card["trained_on"]
+        kind = trained["recipe"] or trained["scene"] or "the training set"
+        return f"machine {group} of {kind}, {distance:.2g} away"
+
+    def _range_cautions(self, severity: float, inputs: Float) -> list[str]:
         """Beyond the trained severities an estimate is a bound, and a poor one."""
         low, high = self.card["severity_range_m"]
-        if low <= severity <= high:
+        straight = float(self.witness.predict(inputs)[0])
+        outside = [value for value in (severity, straight) if not low <= value <= high]
+        if not outside:
             return []
-        side, edge = ("more", high) if severity > high else ("less", low)
+        side, edge = ("more", high) if outside[0] > high else ("less", low)
+        what = "the estimate" if outside[0] == severity else "a straight line through the training"
         return [
-            f"the estimate {1e3 * severity:.3g} mm is outside the trained range {1e3 * low:.3g} to "
-            f"{1e3 * high:.3g} mm: read it, and its interval, as '{side} than {1e3 * edge:.3g} mm'"
+            f"{what}, {1e3 * outside[0]:.3g} mm, is outside the trained range {1e3 * low:.3g} to "
+            f"{1e3 * high:.3g} mm: the wear may well be '{side} than {1e3 * edge:.3g} mm'"
         ]
 
-    def _condition_cautions(self, values: Float) -> list[str]:
-        columns = {name: i for i, name in enumerate(self.card["features"])}
+    def _condition_cautions(self, row: Float, recorded: Mapping[str, Any]) -> list[str]:
+        """Conditions outside the trained range: from the signal, or as noted beside it."""
+        cautions = []
+        for condition in self.card["conditions"]:
+            name, feature = condition["name"], condition["feature"]
+            value = row[self._columns[feature]] if feature else recorded.get(name)
+            low, high = condition["low"], condition["high"]
+            if value is None or not math.isfinite(value) or low <= value <= high:
+                continue
+            cautions.append(
+                f"{name} = {value:.4g} {condition['unit']} is outside the trained range "
+                f"{low:.4g} to {high:.4g} {condition['unit']}: extrapolating"
+            )
+        return cautions
+
+    def _level_cautions(self, row: Float) -> list[str]:
+        excess = self._excess(row)
         return [
-            f"{name} = {values[columns[name]]:.3g} is outside the trained range "
-            f"{low:.3g} to {high:.3g}: extrapolating"
-            for name, (low, high) in self.card["condition_ranges"].items()
-            if not low <= values[columns[name]] <= high
+            f"the level of {channel} is {value:+.1f} dB off what its shape lets expect, must be "
+            f"within {_OFF_LEVEL * size:.1f} dB: check the sensitivity of its sensor"
+            for (channel, value), size in zip(excess.items(), self.levels.size, strict=True)
+            if abs(value) > _OFF_LEVEL * size
         ]
+
+    def _findings(self, row: Float) -> tuple[Finding, ...]:
+        findings = []
+        for head, rates in zip(self.heads, self.card["confounders"], strict=True):
+            probability = float(head.probability(row[None, :])[0])
+            findings.append(
+                Finding(
+                    name=head.name,
+                    probability=probability,
+                    present=probability > head.threshold,
+                    detection_rate=rates["detection_rate"],
+                    false_alarm_rate=rates["false_alarm_rate"],
+                )
+            )
+        return tuple(findings)
 
     def _evidence(
-        self, values: Float, most: int = 12
+        self, row: Float, baseline: Float | None, most: int = 12
     ) -> tuple[tuple[str, float, float, float], ...]:
-        """Features farthest from those of as-new machines."""
-        healthy = self.card["healthy_features"]
-        mean, spread = np.array(healthy["mean"]), np.array(healthy["spread"])
-        moved = np.where(spread > 0, (values - mean) / np.where(spread > 0, spread, 1), 0.0)
+        """Features farthest from the healthy ones: the machine's own where they are known."""
+        mean, spread = self._healthy
+        if baseline is not None:
+            mean = baseline
+        moved = np.where(spread > 0, (row - mean) / np.where(spread > 0, spread, 1), 0.0)
         order = np.argsort(-np.abs(moved))[:most]
-        names = self.card["features"]
-        return tuple((names[i], float(values[i]), float(mean[i]), float(moved[i])) for i in order)
+        return tuple((self.names[i], float(row[i]), float(mean[i]), float(moved[i])) for i in order)
+
+
+_NO_BASELINE = (
+    "the model was trained with a baseline and needs healthy recordings of this machine: give "
+    "--baseline healthy.h5, or use a model that was trained cold"
+)
 
 
 def _strangeness(distance: float, calibration: Float) -> str:
@@ -258,68 +519,6 @@ def _strangeness(distance: float, calibration: Float) -> str:
     )
 
 
-def interval_offsets(log_estimate: float, calibration: Calibration) -> tuple[float, float, float]:
-    """Offsets of log severity that bracket the truth, and with which coverage.
-
-    Parameters
-    ----------
-    log_estimate : float
-        Estimate in question.
-    calibration : Calibration
-        Out-of-fold estimates and errors.
-
-    Returns
-    -------
-    low, high : float
-        From the conformal quantiles of the errors of the nearest estimates, one tail each.
-    coverage : float
-        :data:`COVERAGE`, or the ``(n - 1) / (n + 1)`` that lies between the extremes of n errors
-        where n is too small for it.
-
-    Notes
-    -----
-    Nominal as far as errors of unseen draws near the same estimate are exchangeable with the new
-    one. Two records share a machine, and the neighbourhood has a width, so it is approximate; the
-    fits behind the errors lack a fifth of the draws, which makes the interval slightly wide.
-    """
-    gap = np.abs(calibration.log_estimate - log_estimate)
-    n = min(len(gap), max(_FEWEST_NEIGHBOURS, len(gap) // 4))
-    errors = np.sort(calibration.log_error[np.argsort(gap, kind="stable")[:n]])
-    rank = min(math.ceil((1 + COVERAGE) / 2 * (n + 1)), n)
-    return float(errors[n - rank]), float(errors[rank - 1]), min(COVERAGE, (n - 1) / (n + 1))
-
-
 def input_faults(recording: Recording, card: Mapping[str, Any]) -> list[str]:
     """What a recording lacks of a model's inputs, as sentences; empty where it fits."""
-    wanted = [c for c in card["channels"] if c["name"] != card["tacho"]]
-    units = [c["unit"] for c in wanted]
-    found = recording.vibration_channels
-    faults = []
-    if len(found) != len(wanted):
-        faults.append(
-            f"it has {len(found)} vibration channel(s), the model needs {len(wanted)}: "
-            f"{', '.join(c['name'] for c in wanted)}"
-        )
-    elif [c.name for c in found] != [c["name"] for c in wanted]:
-        faults.append(
-            f"its channels are {', '.join(c.name for c in found)}, the model needs "
-            f"{', '.join(c['name'] for c in wanted)}, in this order"
-        )
-    faults += [
-        f"channel {c.name} is in {c.unit or 'an unknown unit'}, the model needs {units[0]}"
-        for c in found
-        if c.unit not in units
-    ]
-    if (recording.tacho is None) != (card["tacho"] is None):
-        faults.append("it has no tacho, the model needs one" if card["tacho"] else "it has a tacho")
-    elif recording.pulses_per_revolution != card["pulses_per_revolution"]:
-        faults.append(
-            f"its tacho gives {recording.pulses_per_revolution} pulses per revolution, the model "
-            f"needs {card['pulses_per_revolution']}"
-        )
-    rate = card["sample_rate_hz"]
-    if abs(recording.sample_rate / rate - 1) > _RATE_TOLERANCE:
-        faults.append(
-            f"it is sampled at {recording.sample_rate:g} Hz, the model needs {rate:g} Hz: resample"
-        )
-    return faults
+    return [fault.text for fault in layout_faults(recording, card)]

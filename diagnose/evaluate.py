@@ -1,6 +1,7 @@
 """How good is a wear model on machines it has not seen, and against what."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -9,23 +10,69 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from ..datasets.record import DataError, DataSet
-from ..datasets.splits import group_folds
+from ..datasets.split_file import Sides, usable_sides
+from .baselines import Side, contest, side_of
+from .conformal import grade_limits, grade_set, interval, scale_inputs, tails
 from .estimate import Estimate, WearModel
-from .grades import accuracy_bound, grades_of
+from .foreign import kitchen
+from .grades import grades_of
+from .healthy import references
+from .scores import (
+    Judged,
+    Resamples,
+    bound_of,
+    confusion,
+    figures,
+    plain,
+    resampled,
+    share,
+)
 from .tabulate import FeatureTable, Progress, confounders_in, feature_table
 from .train import draw_identity
 
 Float = NDArray[np.float64]
+Index = NDArray[np.intp]
 
-_FOLDS = 5
-_TREE_DEPTH = 4  # 15 thresholds on one rms: more than three grades need, and no more than helps
+P_LEVELS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 0.9)
+"""Where novelty p-values are held against an even spread."""
+
+LEVELS = (0.5, 0.6, 0.7, 0.8, 0.9, 0.95)
+"""Nominal coverages at which intervals and sets are held against the truth."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Background:
+    """What a model is judged against beside the records in question.
+
+    Attributes
+    ----------
+    train : Side or None
+        Training records for the baselines; None: those of the judged table that are not judged,
+        or, where there are none, folds of the judged ones.
+    foreign : mapping
+        Source -> features by the packages of others, of all rows of the judged table, or why there
+        are none; see :func:`wearstate.diagnose.baselines.side_of`.
+    """
+
+    train: Side | None = None
+    foreign: Mapping[str, Float | str] | None = None
+
+
+NOTHING = Background()
+"""The cheap baselines only, trained on the rest of the judged table."""
 
 
 def evaluate_model(
     model: WearModel,
     path: str | Path,
     *,
+    trained_on: str | Path | None = None,
+    healthy: str | Path | None = None,
+    split: str | None = None,
+    quick: bool = False,
+    cache: Path | None = None,
     jobs: int = 1,
+    seed: int = 0,
     progress: Progress | None = None,
 ) -> dict[str, Any]:
     """Judge a model on a data set, on machine draws that it was not trained on.
@@ -36,21 +83,102 @@ def evaluate_model(
     path : str or Path
         Labelled data set. Where its machine draws are those of the training set, only the draws
         held out there are used.
+    trained_on : str or Path, optional
+        The model's training set, for the baselines. Without it they are trained on what `path`
+        has of it, or, where it has none, by folds of the judged machines, which flatters them.
+    healthy : str or Path, optional
+        Healthy records of the same machines, for a referenced model.
+    split : str, optional
+        A split that the data set's file holds: all of its test side is judged. Where the model
+        has learnt from none of its records, the baselines learn from its training side.
+    quick : bool
+        Leave out the baselines that need packages of others: these take seconds per recording.
+    cache : Path, optional
+        Folder in which features of such packages are kept.
     jobs : int
         Worker processes for the features.
+    seed : int
+        Of the resamples, and of the baselines.
     progress : callable, optional
         Called with (records done, records).
 
     Returns
     -------
     dict
-        As :func:`score`.
+        As :func:`score`; of a split ``split``, too: its ``name``, ``text`` and ``sha256``, and
+        whether the model was ``trained_with_it``.
 
     Raises
     ------
     DataError
-        The severity of the model is not labelled, its features are others, or no unseen machine
-        draw is left.
+        The severity of the model is not labelled, its features are others, no unseen machine
+        draw is left, the set named as training set is another, or the model has learnt from what
+        the split tests.
+    """
+    sides = None if split is None else _sides(path, split)
+    table, rows = judged_rows(model, path, sides=sides, jobs=jobs, progress=progress)
+    reference = None
+    if healthy is not None:
+        new = feature_table(healthy, jobs=jobs, progress=progress)
+        reference = references(table, new, healthy)
+    home, home_table = (path, table) if trained_on is None else (trained_on, None)
+    if home_table is None:
+        home_table = feature_table(home, jobs=jobs, progress=progress)
+    train = trained_rows(model, home_table)
+    if trained_on is not None and train.size == 0:
+        raise DataError(
+            f"{trained_on}: 0 records that the model was trained on, must be > 0; name its "
+            "training set"
+        )
+    if sides is not None and trained_on is None and train.size == 0:
+        train = sides.train
+    examples = train if train.size else rows
+    cook = kitchen(Path(home), examples, seed=seed, quick=quick, cache=cache, progress=progress)
+    known = cook.rows(Path(home), home_table) if train.size else None
+    background = Background(
+        train=side_of(home_table, model.card["severity"], train, known) if train.size else None,
+        foreign=cook.rows(Path(path), table),
+    )
+    result = score(model, table, rows, references=reference, background=background, seed=seed)
+    return result if sides is None else {**result, "split": _split_card(model, sides)}
+
+
+def _sides(path: str | Path, name: str) -> Sides:
+    with DataSet(path) as data:
+        return usable_sides(data, name)
+
+
+def _split_card(model: WearModel, sides: Sides) -> dict[str, Any]:
+    return {
+        "name": sides.name,
+        "text": sides.text,
+        "sha256": sides.sha256,
+        "trained_with_it": model.card["trained_on"].get("split_sha256") == sides.sha256,
+    }
+
+
+def trained_rows(model: WearModel, table: FeatureTable) -> Index:
+    """Rows of a table whose signals are, byte for byte, training signals of a model."""
+    known = table.manifest["signal_crc32"].isin(model.card["trained_on"]["training_signals"])
+    return np.flatnonzero(known)
+
+
+def judged_rows(
+    model: WearModel,
+    path: str | Path,
+    *,
+    sides: Sides | None = None,
+    jobs: int = 1,
+    progress: Progress | None = None,
+) -> tuple[FeatureTable, Index]:
+    """Feature table of a data set, and its rows that a model can be judged on.
+
+    These are the test side of a split, where one is given.
+
+    Raises
+    ------
+    DataError
+        As of :func:`evaluate_model`.
     """
     with DataSet(path) as data:
         head = data.attributes
@@ -60,8 +188,9 @@ def evaluate_model(
             "label the data set"
         )
     table = feature_table(path, jobs=jobs, progress=progress)
-    rows = unseen_rows(model, table, draw_identity(head), path)
-    return score(model, table, rows)
+    if sides is not None:
+        return table, tested_rows(model, table, sides, draw_identity(head), path)
+    return table, unseen_rows(model, table, draw_identity(head), path)
 
 
 def unseen_rows(
@@ -77,18 +206,8 @@ def unseen_rows(
     DataError
         None is left, or the features are not the model's.
     """
-    if list(table.names) != model.card["features"]:
-        raise DataError(
-            f"{path}: its {len(table.names)} features are not the model's "
-            f"{len(model.card['features'])}; use recordings with the model's channels and rate"
-        )
-    trained = model.card["trained_on"]
-    groups = table.manifest["group"]
-    known = table.manifest["signal_crc32"].isin(trained["training_signals"])
-    seen = groups.isin(groups[known])
-    if identity and identity == trained["draw_identity"]:
-        seen |= groups.isin(trained["training_groups"])
-    rows = np.flatnonzero(~seen)
+    _check_features(model, table, path)
+    rows = np.flatnonzero(~_seen_machines(model, table, identity))
     if rows.size == 0:
         raise DataError(
             f"{path}: 0 machine draws that the model has not seen, must be > 0; train with "
@@ -97,7 +216,60 @@ def unseen_rows(
     return rows
 
 
-def score(model: WearModel, table: FeatureTable, rows: NDArray[np.intp]) -> dict[str, Any]:
+def tested_rows(
+    model: WearModel, table: FeatureTable, sides: Sides, identity: str, path: str | Path
+) -> Index:
+    """Rows of a split's test side, of which the model must have seen no record and no machine.
+
+    Where machines are on both sides by design, it must have seen no record.
+
+    Raises
+    ------
+    DataError
+        It has, or the features are not the model's.
+    """
+    _check_features(model, table, path)
+    seen = np.isin(np.arange(len(table.values)), trained_rows(model, table))
+    if sides.machines_apart:
+        seen |= _seen_machines(model, table, identity)
+    leaked = sides.test[seen[sides.test]]
+    if leaked.size:
+        machines = table.manifest["group"].iloc[leaked].nunique()
+        raise DataError(
+            f"{path}: split {sides.name} tests {leaked.size} records of {machines} machines that "
+            f"the model was trained on, must be 0; train with --split {sides.name}, or judge "
+            "without --split on the machines that the model has not seen"
+        )
+    return sides.test
+
+
+def _check_features(model: WearModel, table: FeatureTable, path: str | Path) -> None:
+    if list(table.names) != model.card["features"]:
+        raise DataError(
+            f"{path}: its {len(table.names)} features are not the model's "
+            f"{len(model.card['features'])}; use recordings with the model's channels and rate"
+        )
+
+
+def _seen_machines(model: WearModel, table: FeatureTable, identity: str) -> NDArray[np.bool_]:
+    """Records of machines that the model was trained on."""
+    trained = model.card["trained_on"]
+    groups = table.manifest["group"].to_numpy()
+    seen = np.isin(groups, groups[trained_rows(model, table)])
+    if identity and identity == trained["draw_identity"]:
+        seen |= np.isin(groups, trained["training_groups"])
+    return seen
+
+
+def score(
+    model: WearModel,
+    table: FeatureTable,
+    rows: Index,
+    *,
+    references: Float | None = None,
+    background: Background = NOTHING,
+    seed: int = 0,
+) -> dict[str, Any]:
     """Errors, coverage and baselines on some rows of a table.
 
     Parameters
@@ -106,44 +278,155 @@ def score(model: WearModel, table: FeatureTable, rows: NDArray[np.intp]) -> dict
     table : FeatureTable
         With the model's features and its severity.
     rows : numpy.ndarray
-        Rows to judge on; the others serve to fit the baselines.
+        Rows to judge on.
+    references : numpy.ndarray [shape=(n_records, n_features)], optional
+        Healthy features of each row's machine, for a referenced model.
+    background : Background
+        What the baselines are trained on, and their features.
+    seed : int
+        Of the resamples and of the baselines' folds.
 
     Returns
     -------
     dict
-        ``records``, ``draws``, ``unfamiliar`` share; ``mae_all_m`` over all records, whatever
-        their familiarity; over the records called familiar, None where there is none: ``mae_m``,
-        ``mae_share_of_limit``, ``accuracy`` with ``accuracy_bound`` (about what the error in
-        metres allows), ``within_one_grade``, ``coverage`` with ``nominal_coverage`` and
-        ``mean_set_size``, ``confusion`` (true grade by row); ``baselines`` (accuracy of the
-        majority grade and of the best single rms); ``by_confounder`` as :func:`by_confounder`.
+        Ready for JSON, None where no record tells: ``records``, ``draws``; every figure of
+        :data:`wearstate.diagnose.scores.FIGURES` by name, and under ``intervals`` its 95 %
+        interval over machines; ``accuracy_bound`` (about what the error in metres allows),
+        ``nominal_coverage``, ``confusion`` (true grade by row, of the graded), ``reliability`` as
+        :func:`reliability`, ``familiarity`` as :func:`p_value_shares`, ``baselines`` as
+        :func:`wearstate.diagnose.baselines.contest`, ``by_confounder`` as :func:`by_confounder`.
     """
-    truth = table.manifest[model.card["severity"]].to_numpy(dtype=float)
-    edges = model.card["grade_edges_m"]
-    estimates = [model.judge(table.values[row]) for row in rows]
-    graded = [(row, e) for row, e in zip(rows, estimates, strict=True) if e.verdict == "graded"]
-    # an unfamiliar row may be estimated at any length: e^50 m is absurd enough to average
-    raw = np.exp(np.clip(model.regressor.predict(table.values[rows]), -50, 50))
-    return {
+    edges, limit = model.card["grade_edges_m"], model.card["condemning_limit_m"]
+    judged, estimates = judge_rows(model, table, rows, references)
+    draws = resampled(judged.groups, seed=seed)
+    found = figures(judged, edges, limit, draws)
+    mine = judged.graded
+    true = grades_of(judged.truth, edges)
+    column, foreign = model.card["severity"], background.foreign
+    others = np.setdiff1d(np.arange(len(table.values)), rows)
+    train = background.train or (side_of(table, column, others, foreign) if others.size else None)
+    test = side_of(table, column, rows, foreign)
+    given = [estimate.coverage for estimate in estimates if estimate.graded]
+    result = {
         "records": len(rows),
-        "draws": int(table.manifest["group"].iloc[rows].nunique()),
-        "unfamiliar": 1 - len(graded) / len(rows),
-        "mae_all_m": float(np.abs(raw - truth[rows]).mean()),
-        **_graded_scores(model, truth, graded),
-        "baselines": baselines(table, grades_of(truth, edges), rows),
+        "draws": draws.weight.shape[1],
+        **{name: figure.value for name, figure in found.items()},
+        "intervals": {name: [figure.low, figure.high] for name, figure in found.items()},
+        "accuracy_bound": bound_of(judged, edges),
+        "nominal_coverage": float(np.mean(given)) if given else None,
+        "confusion": confusion(true[mine], judged.grade[mine], len(edges) + 1),
+        "reliability": reliability(model, table, rows, judged, draws),
+        "familiarity": p_value_shares(estimates, draws),
+        "baselines": contest(train, test, judged, edges, limit, draws, seed=seed),
         "by_confounder": by_confounder(
             table.manifest.iloc[rows],
-            error=np.abs(raw - truth[rows]),
-            familiar=np.array([e.verdict == "graded" for e in estimates]),
-            covered=np.array([_covers(e, t) for e, t in zip(estimates, truth[rows], strict=True)]),
+            error=np.abs(judged.found - judged.truth),
+            familiar=mine,
+            covered=(judged.low <= judged.truth) & (judged.truth <= judged.high),
         ),
     }
+    return dict(plain(result))
 
 
-def _covers(estimate: Estimate, truth: float) -> bool:
-    if estimate.low is None or estimate.high is None:
-        return False
-    return estimate.low <= truth <= estimate.high
+def judge_rows(
+    model: WearModel, table: FeatureTable, rows: Index, references: Float | None = None
+) -> tuple[Judged, list[Estimate]]:
+    """What a model says of some rows of a table.
+
+    Parameters
+    ----------
+    model : WearModel
+    table : FeatureTable
+    rows : numpy.ndarray
+    references : numpy.ndarray [shape=(n_records, n_features)], optional
+        Healthy features of each row's machine, for a referenced model.
+
+    Returns
+    -------
+    judged : Judged
+        Its estimate is the model's whatever the verdict.
+    estimates : list of Estimate
+    """
+    card = model.card
+    manifest = table.manifest.iloc[rows]
+    healthy = None if references is None else references[rows]
+    estimates = [
+        model.judge(row, None if healthy is None else healthy[i], conditions=noted)
+        for i, (row, noted) in enumerate(zip(table.values[rows], _notes(manifest), strict=True))
+    ]
+    found = model.predict(table.values[rows], healthy)
+    n_grades = len(card["grade_edges_m"]) + 1
+    judged = Judged(
+        groups=manifest["group"].to_numpy(),
+        truth=manifest[card["severity"]].to_numpy(dtype=float),
+        found=found,
+        grade=grades_of(found, card["grade_edges_m"]),
+        graded=np.array([each.graded for each in estimates]),
+        cautious=np.array([each.verdict == "caution" for each in estimates]),
+        low=_numbers(each.low for each in estimates),
+        high=_numbers(each.high for each in estimates),
+        possible=np.array(
+            [[grade in each.possible_grades for grade in range(n_grades)] for each in estimates]
+        ),
+    )
+    return judged, estimates
+
+
+def _notes(manifest: pd.DataFrame) -> list[dict[str, Any]]:
+    """Manifest values of each record by name."""
+    rows = manifest.to_dict("records")
+    return [{str(name): value for name, value in row.items()} for row in rows]
+
+
+def _numbers(values: Iterable[float | None]) -> Float:
+    return np.array([np.nan if value is None else value for value in values])
+
+
+def reliability(
+    model: WearModel, table: FeatureTable, rows: Index, judged: Judged, draws: Resamples
+) -> list[dict[str, Any]]:
+    """Coverage of intervals and sets against the nominal one, over the graded records.
+
+    Returns
+    -------
+    list of dict
+        ``nominal``, and ``interval`` and ``set``: shares that hold the truth.
+    """
+    edges = model.card["grade_edges_m"]
+    true = grades_of(judged.truth, edges)
+    mine = np.flatnonzero(judged.graded)
+    distance = model.familiarity.distance(model.names, table.values[rows[mine]])
+    scale = model.scale.predict(scale_inputs(judged.found[mine], distance))
+    found = []
+    for nominal in LEVELS:
+        ends = tails(model.calibration, nominal)
+        limits = grade_limits(model.calibration, edges, nominal)
+        held = np.zeros((2, len(true)))
+        for row, size in zip(mine, scale, strict=True):
+            low, high = interval(judged.found[row], size, ends)
+            held[0, row] = low <= judged.truth[row] <= high
+            held[1, row] = true[row] in grade_set(judged.found[row], size, limits, edges)
+        shares = [share(each, judged.graded, draws) for each in held]
+        found.append({"nominal": nominal, "interval": shares[0], "set": shares[1]})
+    return found
+
+
+def p_value_shares(estimates: Sequence[Estimate], draws: Resamples) -> list[dict[str, Any]]:
+    """Share of records whose novelty p-value is at or below each of :data:`P_LEVELS`.
+
+    Familiar records have as large a share as the level, or a smaller one; of records that are
+    told apart it is near one.
+
+    Returns
+    -------
+    list of dict
+        ``p`` and ``share``; a record without features counts as p = 0.
+    """
+    found = np.array([each.p_value or 0.0 for each in estimates])
+    return [
+        {"p": level, "share": share(found <= level, np.ones(len(found)), draws)}
+        for level in P_LEVELS
+    ]
 
 
 def by_confounder(
@@ -204,135 +487,3 @@ def _part_scores(
         "mae_m": float(error[familiar].mean()) if graded else None,
         "coverage": float(covered[familiar].mean()) if graded else None,
     }
-
-
-def confounder_lines(rows: Mapping[str, Mapping[str, Any]]) -> list[str]:
-    """Errors by confounder as lines for a terminal; none where there are no confounders.
-
-    Parameters
-    ----------
-    rows : mapping
-        From :func:`by_confounder`.
-
-    Examples
-    --------
-    >>> row = {"records": 8, "unfamiliar": 0.25, "mae_m": 2e-5, "coverage": 1.0}
-    >>> print(*confounder_lines({"none": row}), sep=chr(10))
-      confounder  records  unfamiliar  mean error  coverage
-      none              8      25.0 %     20.0 um     1.000
-    """
-    if not rows:
-        return []
-    width = max(len(name) for name in (*rows, "confounder"))
-    head = f"  {'confounder':{width}}  records  unfamiliar  mean error  coverage"
-    return [head, *(_part_line(name, row, width) for name, row in rows.items())]
-
-
-def _part_line(name: str, row: Mapping[str, Any], width: int) -> str:
-    share = 100 * row["unfamiliar"]
-    line = f"  {name.replace('_', ' '):{width}}  {row['records']:7}  {share:8.1f} %"
-    if row["mae_m"] is None:
-        return f"{line}  none is familiar"
-    return f"{line}  {1e6 * row['mae_m']:7.1f} um  {row['coverage']:8.3f}"
-
-
-_GRADED_SCORES = (
-    "mae_m",
-    "mae_share_of_limit",
-    "accuracy",
-    "accuracy_bound",
-    "within_one_grade",
-    "coverage",
-    "nominal_coverage",
-    "mean_set_size",
-    "confusion",
-)
-
-
-def _graded_scores(
-    model: WearModel, truth: Float, graded: list[tuple[np.intp, Estimate]]
-) -> dict[str, Any]:
-    if not graded:
-        return dict.fromkeys(_GRADED_SCORES)
-    edges, limit = model.card["grade_edges_m"], model.card["condemning_limit_m"]
-    true = truth[[row for row, _ in graded]]
-    found = np.array([e.severity for _, e in graded], dtype=float)
-    true_grade, grade = grades_of(true, edges), grades_of(found, edges)
-    error = float(np.abs(found - true).mean())
-    inside = [e.low <= t <= e.high for t, (_, e) in zip(true, graded, strict=True)]
-    values = (
-        error,
-        error / limit,
-        float(np.mean(grade == true_grade)),
-        accuracy_bound(true, edges, error),
-        float(np.mean(np.abs(grade - true_grade) <= 1)),
-        float(np.mean(inside)),
-        float(np.mean([e.coverage for _, e in graded])),
-        float(np.mean([len(e.possible_grades) for _, e in graded])),
-        _confusion(true_grade, grade, len(edges) + 1),
-    )
-    return dict(zip(_GRADED_SCORES, values, strict=True))
-
-
-def _confusion(true: NDArray[np.intp], found: NDArray[np.intp], n: int) -> list[list[int]]:
-    counts = np.zeros((n, n), dtype=int)
-    np.add.at(counts, (true, found), 1)
-    return counts.tolist()
-
-
-def baselines(
-    table: FeatureTable, grade: NDArray[np.intp], rows: NDArray[np.intp], *, seed: int = 0
-) -> dict[str, float]:
-    """Accuracy of what costs nothing: the majority grade, and thresholds on one channel's rms.
-
-    Parameters
-    ----------
-    table : FeatureTable
-    grade : numpy.ndarray [shape=(n_records,)]
-        True grades.
-    rows : numpy.ndarray
-        Rows judged. The thresholds are fitted on all other rows, or, where there are none, by
-        folds of whole machine draws.
-    seed : int
-        Of the folds.
-
-    Returns
-    -------
-    dict
-        ``majority`` and ``single_rms`` (the best channel, which flatters the baseline).
-    """
-    result = {"majority": float(np.bincount(grade[rows]).max() / len(rows))}
-    columns = [i for i, name in enumerate(table.names) if name.endswith(".rms")]
-    sides = _baseline_sides(table.manifest["group"].to_numpy(), rows, seed)
-    if sides and columns:
-        result["single_rms"] = max(
-            _tree_accuracy(table.values[:, [column]], grade, sides, seed) for column in columns
-        )
-    return result
-
-
-def _baseline_sides(
-    groups: NDArray[Any], rows: NDArray[np.intp], seed: int
-) -> list[tuple[NDArray[np.intp], NDArray[np.intp]]]:
-    others = np.setdiff1d(np.arange(len(groups)), rows)
-    if others.size:
-        return [(others, rows)]
-    folds = min(_FOLDS, len(np.unique(groups)))
-    return list(group_folds(groups, n=folds, seed=seed)) if folds > 1 else []
-
-
-def _tree_accuracy(
-    column: Float,
-    grade: NDArray[np.intp],
-    sides: list[tuple[NDArray[np.intp], NDArray[np.intp]]],
-    seed: int,
-) -> float:
-    from sklearn.tree import DecisionTreeClassifier
-
-    right = 0
-    for train, test in sides:
-        tree = DecisionTreeClassifier(
-            max_depth=_TREE_DEPTH, min_samples_leaf=5, random_state=seed
-        ).fit(column[train], grade[train])
-        right += int((tree.predict(column[test]) == grade[test]).sum())
-    return right / sum(len(test) for _, test in sides)

@@ -1,4 +1,4 @@
-"""Wear grades: names, what to do, and the accuracy that an error in metres allows."""
+"""Wear grades: names, and the accuracy that an error in metres allows."""
 
 from collections.abc import Sequence
 
@@ -7,25 +7,18 @@ from numpy.typing import ArrayLike, NDArray
 
 GRADE_NAMES = ("as new", "worn", "plan renewal", "condemned")
 
-ADVICE = (
-    "No action; keep the usual interval.",
-    "No action now; shorten the interval between recordings and watch the trend.",
-    "Plan the renewal of the bearing at the next stop; order the part.",
-    "The wear is beyond the condemning limit: stop and renew the bearing.",
-)
-
 WARNING_GRADE = 2
 ALARM_GRADE = 3
 
 
-def grades_of(severity: ArrayLike, edges: Sequence[float]) -> NDArray[np.intp]:
+def grades_of(severity: ArrayLike, edges: ArrayLike) -> NDArray[np.intp]:
     """Grade of each severity; on an edge the higher one.
 
     Parameters
     ----------
     severity : array_like
         [m]
-    edges : sequence of float
+    edges : array_like
         Where grades 1, 2, … begin [m].
 
     Returns

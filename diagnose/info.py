@@ -15,7 +15,9 @@ from ..datasets.record import DataError, DataSet, Recording
 from ..datasets.source_part import SourceOptions
 from ..features import fft
 from ..sim.sensor import Channel
+from .bundle import kind_of
 from .modelfile import load_model
+from .ownfile import CLASS_MODEL, load_class_model
 from .panel import save_picture
 from .signal_plots import AUTO, plot_recording
 from .signal_view import View
@@ -125,7 +127,31 @@ def _value_text(value: Any) -> str:
     return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
+def _describe_class_model(path: Path) -> dict[str, Any]:
+    model = load_class_model(path)
+    card = model.card
+    return {
+        "kind": CLASS_MODEL,
+        "created_by": card["created_by"],
+        "origin": card["origin"],
+        "trained_on": {"records": card["records"]},
+        "recordings": dict(zip(model.classes, model.votes.groups_of, strict=True)),
+        "target": card["target"],
+        "channels": card["channels"],
+        "tacho": card["tacho"],
+        "sample_rate_hz": card["sample_rate_hz"],
+        "features": len(card["features"]),
+        "members": {
+            name: " + ".join(blend.names)
+            for name, blend in zip(model.classes, model.blends, strict=True)
+        },
+        "notice": model.notice,
+    }
+
+
 def _describe_model(path: Path) -> dict[str, Any]:
+    if kind_of(path) == CLASS_MODEL:
+        return _describe_class_model(path)
     model = load_model(path)
     card = model.card
     trained = card["trained_on"]
@@ -139,6 +165,9 @@ def _describe_model(path: Path) -> dict[str, Any]:
         "channels": card["channels"],
         "tacho": card["tacho"],
         "sample_rate_hz": card["sample_rate_hz"],
+        "features": len(card["features"]),
+        "mode": card["mode"],
+        "members": card["model"]["members"],
         "severity": card["severity"],
         "severity_range_m": list(card["severity_range_m"]),
         "grade_edges_m": list(card["grade_edges_m"]),

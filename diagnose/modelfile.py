@@ -1,34 +1,46 @@
-"""The file of a wear model: a zip of a card and plain arrays, checked before it is believed."""
+"""The file of a wear model: what is in it, and whether its parts fit each other."""
 
-import hashlib
-import io
-import json
-import os
-import zipfile
-import zlib
 from collections.abc import Mapping
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import Field, ValidationError, model_validator
 
-from ..datasets.record import DataError
-from .estimate import Calibration, LinearSeverity, ModelError, WearModel
+from .bundle import Bundle, load_bundle, refused, save_bundle
+from .conformal import Calibration, Scale, scale_inputs
+from .estimate import Head, ModelError, WearModel
 from .grades import GRADE_NAMES
+from .models import Linear
 from .novelty import Familiarity
+from .parts import (
+    BlendStructure,
+    ChannelCard,
+    Strict,
+    blend_arrays,
+    blend_fits,
+    blend_of,
+    blend_structure,
+    check_channels,
+    familiarity_fits,
+    linear_fits,
+    numbers_fit,
+    part_arrays,
+    part_of,
+    shapes_of,
+    spreads_fit,
+)
+from .physical import level_channels, physical_rows, shape_rows
+from .quality import Levels
 
-Float = NDArray[np.float64]
-
-MODEL_SCHEMA = 1
-
-_LARGEST_MEMBER = 2**28  # byte, of a model file's parts once unpacked
+_KIND = "wear model"
 
 
 def save_model(model: WearModel, path: str | Path, *, force: bool = False) -> None:
-    """Write a model file: card and arrays in a zip, each with its SHA-256. No code, no pickle.
+    """Write a model file: tables and arrays in a zip, each with its SHA-256. No code, no pickle.
+
+    The same model gives the same bytes.
 
     Parameters
     ----------
@@ -42,37 +54,14 @@ def save_model(model: WearModel, path: str | Path, *, force: bool = False) -> No
     ------
     DataError
         The file exists, or its folder does not.
+    ModelError
+        The model could not be read again.
     """
-    target = Path(path)
-    if target.exists() and not force:
-        raise DataError(f"{target} exists; choose another name or use force to replace it")
-    if not target.parent.is_dir():
-        raise DataError(f"{target.parent} is no folder; create it")
-    arrays = io.BytesIO()
-    np.savez(
-        arrays,
-        **{
-            f"{part}.{name}": value
-            for part in _ARRAY_PARTS
-            for name, value in asdict(getattr(model, part)).items()
-        },
+    _check_structure(model, path)
+    bundle = Bundle(
+        kind=_KIND, card=model.card, structure=_structure_of(model), arrays=_arrays_of(model)
     )
-    members = {
-        "card.json": json.dumps(model.card, indent=1, sort_keys=True).encode(),
-        "arrays.npz": arrays.getvalue(),
-    }
-    seal = {
-        "schema_version": MODEL_SCHEMA,
-        "sha256": {name: hashlib.sha256(data).hexdigest() for name, data in members.items()},
-    }
-    part = target.with_name(target.name + ".part")
-    try:
-        with zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED) as bundle:
-            for name, data in {"seal.json": json.dumps(seal).encode(), **members}.items():
-                bundle.writestr(name, data)
-        os.replace(part, target)
-    finally:
-        part.unlink(missing_ok=True)
+    save_bundle(bundle, path, force=force)
 
 
 def load_model(path: str | Path) -> WearModel:
@@ -90,145 +79,210 @@ def load_model(path: str | Path) -> WearModel:
     Raises
     ------
     ModelError
-        No such file, not a model, damaged, changed, of another version of the model format, or
-        forged so that its parts do not fit each other; the text says what helps.
+        No such file, not a wear model, damaged, changed, of another version of the format or of
+        the features, or forged so that its parts do not fit each other; the text says what helps.
     """
-    members = _members(Path(path))
-    _check_seal(_parsed(members, "seal.json", path), members, path)
-    card = _parsed(members, "card.json", path)
-    _check_card(card, path)
+    bundle = load_bundle(path, _KIND)
+    _check_card(bundle.card, path)
+    structure = _structure(bundle.structure, path)
     try:
-        with np.load(io.BytesIO(members["arrays.npz"]), allow_pickle=False) as stored:
-            arrays = {name: np.asarray(stored[name], dtype=float) for name in stored.files}
-        parts = {part: kind(**_part(arrays, part)) for part, kind in _ARRAY_PARTS.items()}
-    except (KeyError, TypeError, ValueError, *_ZIP_FAULTS) as error:
+        model = _model_of(structure, bundle.arrays, bundle.card)
+    except (KeyError, TypeError, ValueError) as error:
         raise ModelError(f"{path}: arrays.npz cannot be read ({error}); retrain it") from error
-    model = WearModel(**parts, card=card)
     _check_structure(model, path)
     return model
 
 
 _ARRAY_PARTS: dict[str, Any] = {
-    "regressor": LinearSeverity,
+    "witness": Linear,
+    "scale": Scale,
     "calibration": Calibration,
     "familiarity": Familiarity,
+    "levels": Levels,
 }
+"""Parts of a model that are plain arrays and numbers."""
 
 
-def _part(arrays: Mapping[str, Float], part: str) -> dict[str, Any]:
-    """Fields of one part; a single number comes back as a float."""
-    names = [f"{part}.{name}" for name in _ARRAY_PARTS[part].__dataclass_fields__]
-    missing = [name for name in names if name not in arrays]
-    if missing:
-        raise ValueError(f"{', '.join(missing)} missing")
-    found = {name.removeprefix(f"{part}."): arrays[name] for name in names}
-    return {name: array if array.ndim else float(array) for name, array in found.items()}
+class _HeadStructure(Strict):
+    name: str
+    slope: float
+    offset: float
+    threshold: float = Field(ge=0, le=1)
+    blend: BlendStructure
 
 
-def _members(path: Path) -> dict[str, bytes]:
-    if not path.is_file():
-        raise ModelError(f"{path} is no file; make one: wearstate train DATA -o {path.name}")
+class _Structure(Strict):
+    """Which parts a model has; their numbers are in the arrays."""
+
+    severity: BlendStructure
+    heads: list[_HeadStructure] = Field(max_length=100)
+
+
+def _structure(table: dict[str, Any], path: str | Path) -> _Structure:
     try:
-        with zipfile.ZipFile(path) as bundle:
-            too_large = [i.filename for i in bundle.infolist() if i.file_size > _LARGEST_MEMBER]
-            if too_large:
-                raise ModelError(f"{path}: {too_large[0]} is over 256 MiB; this is no model file")
-            return {name: bundle.read(name) for name in bundle.namelist()}
-    except ModelError:
-        raise
-    except _ZIP_FAULTS as error:
-        raise ModelError(f"{path} is no intact model ({error}); take an intact copy") from error
+        return _Structure.model_validate(table)
+    except ValidationError as error:
+        raise refused(path, "structure.json", error) from error
 
 
-def _parsed(members: dict[str, bytes], name: str, path: str | Path) -> dict[str, Any]:
-    try:
-        parsed = json.loads(members[name])
-    except (KeyError, ValueError) as error:
-        raise ModelError(f"{path}: {name} cannot be read; this is no intact model file") from error
-    if not isinstance(parsed, dict):
-        raise ModelError(f"{path}: {name} is no table; this is no intact model file")
-    return parsed
+def _structure_of(model: WearModel) -> dict[str, Any]:
+    return {
+        "severity": blend_structure(model.severity),
+        "heads": [
+            {
+                "name": head.name,
+                "slope": head.slope,
+                "offset": head.offset,
+                "threshold": head.threshold,
+                "blend": blend_structure(head.blend),
+            }
+            for head in model.heads
+        ],
+    }
 
 
-def _check_seal(seal: Mapping[str, Any], members: dict[str, bytes], path: str | Path) -> None:
-    if seal.get("schema_version") != MODEL_SCHEMA:
-        raise ModelError(
-            f"{path}: schema_version = {seal.get('schema_version')} must be {MODEL_SCHEMA}; "
-            "retrain it: wearstate train DATA -o MODEL"
-        )
-    sums = seal.get("sha256")
-    wanted = sums if isinstance(sums, dict) else {}
-    found = {n: hashlib.sha256(d).hexdigest() for n, d in members.items() if n != "seal.json"}
-    if found != wanted:
-        changed = sorted(n for n in {*found, *wanted} if found.get(n) != wanted.get(n))
-        raise ModelError(
-            f"{path}: checksum of {', '.join(changed)} does not fit; the file was changed or "
-            "damaged: take an intact copy or retrain"
-        )
+def _arrays_of(model: WearModel) -> dict[str, NDArray[Any]]:
+    """Every number of a model by a dotted name."""
+    found: dict[str, Any] = {}
+    for part in _ARRAY_PARTS:
+        found |= part_arrays(getattr(model, part), part)
+    blends = {"severity": model.severity} | {
+        f"heads.{i}": head.blend for i, head in enumerate(model.heads)
+    }
+    for place, blend in blends.items():
+        found |= blend_arrays(blend, place)
+    return {name: np.asarray(value) for name, value in found.items()}
+
+
+def _model_of(
+    structure: _Structure, arrays: Mapping[str, NDArray[Any]], card: dict[str, Any]
+) -> WearModel:
+    model = WearModel(
+        severity=blend_of(structure.severity, arrays, "severity"),
+        heads=tuple(
+            Head(
+                name=head.name,
+                blend=blend_of(head.blend, arrays, f"heads.{i}"),
+                slope=head.slope,
+                offset=head.offset,
+                threshold=head.threshold,
+            )
+            for i, head in enumerate(structure.heads)
+        ),
+        card=card,
+        **{part: kind(**part_of(arrays, part, kind)) for part, kind in _ARRAY_PARTS.items()},
+    )
+    more = sorted(set(arrays) - set(_arrays_of(model)))
+    if more:
+        raise ValueError(f"{', '.join(more)} belong to no part")
+    return model
 
 
 def _check_structure(model: WearModel, path: str | Path) -> None:
     """Shapes that fit each other, so that a forged file fails here and not in a prediction."""
     n = len(model.card.get("features", []))
-    r, f, c = model.regressor, model.familiarity, model.calibration
+    inputs = 2 * n if model.mode == "referenced" else n
+    names = model.names
+    try:
+        physical, shapes = (f(names, np.zeros((1, n))) for f in (physical_rows, shape_rows))
+    except ValueError as error:  # a crank-angle map with holes
+        raise ModelError(f"{path}: features do not fit each other ({error}); retrain it") from error
     fits = {
-        "regressor": _shapes(r.centre, r.spread, r.weight) == {(n,)}
-        and isinstance(r.offset, float)
-        and bool((r.spread > 0).all()),
-        "familiarity": _shapes(f.centre, f.spread, f.shift) == {(n,)}
-        and f.directions.shape == (np.size(f.variance), n)
-        and isinstance(f.residual, float)
-        and bool((f.spread > 0).all() and np.all(f.variance > 0) and f.residual > 0),
-        "calibration": len(_shapes(c.log_error, c.log_estimate, c.distance)) == 1
-        and np.ndim(c.log_error) == 1
-        and np.size(c.log_error) > 0,
-        "numbers": all(
-            np.isfinite(value).all() for part in (r, f, c) for value in vars(part).values()
-        ),
+        "severity": blend_fits(model.severity, inputs) and model.severity.low > 0,
+        "heads": all(blend_fits(head.blend, n) for head in model.heads)
+        and [h.name for h in model.heads] == [c["name"] for c in model.card["confounders"]],
+        "witness": linear_fits(model.witness, inputs),
+        "scale": _scale_fits(model.scale),
+        "calibration": _calibration_fits(model.calibration),
+        "familiarity": familiarity_fits(model.familiarity, physical.shape[1]),
+        "levels": _levels_fit(model.levels, len(level_channels(names)), shapes.shape[1]),
+        "numbers": numbers_fit(_arrays_of(model)),
     }
     bad = [name for name, good in fits.items() if not good]
     if bad:
         raise ModelError(f"{path}: {', '.join(bad)} do not fit {n} features; retrain it")
 
 
-def _shapes(*arrays: Any) -> set[tuple[int, ...]]:
-    return {np.shape(array) for array in arrays}
+def _scale_fits(scale: Scale) -> bool:
+    n = scale_inputs([1.0], [1.0]).shape[1]
+    return (
+        shapes_of(scale.centre, scale.spread, scale.weight) == {(n,)}
+        and isinstance(scale.offset, float)
+        and isinstance(scale.limit, float)
+        and scale.limit > 0
+        and spreads_fit(scale.spread)
+    )
 
 
-_ZIP_FAULTS = (
-    zipfile.BadZipFile,
-    zlib.error,
-    OSError,
-    EOFError,
-    NotImplementedError,
-    RuntimeError,
-    ValueError,
-)
-"""What zipfile raises on damaged bytes."""
+def _calibration_fits(known: Calibration) -> bool:
+    arrays = (known.estimate, known.truth, known.scale, known.distance, known.group)
+    return (
+        len(shapes_of(*arrays)) == 1
+        and np.ndim(known.group) == 1
+        and np.size(known.group) > 0
+        and all(spreads_fit(part) for part in arrays[:3])
+    )
 
 
-class _Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid", allow_inf_nan=False, strict=True)
+def _levels_fit(levels: Levels, channels: int, n: int) -> bool:
+    return (
+        shapes_of(levels.centre, levels.spread) == {(n,)}
+        and np.shape(levels.weight) == (channels, n)
+        and shapes_of(levels.offset, levels.size, levels.least) == {(channels,)}
+        and spreads_fit(levels.spread)
+    )
 
 
-class _TrainedOn(_Strict):
+class _TrainedOn(Strict):
     records: int
     draws: int
     draw_identity: str
     held_out_share: float
     split_seed: int
+    split: str = ""
+    split_sha256: str = ""
     training_groups: list[int]
     training_signals: list[int]
     scene: str
     recipe: str
 
 
-class _Healthy(_Strict):
+class _Healthy(Strict):
     mean: list[float]
     spread: list[float]
 
 
-class _Card(_Strict):
+class _Condition(Strict):
+    name: str
+    feature: str
+    unit: str
+    low: float
+    high: float
+
+
+class _Tried(Strict):
+    name: str
+    cost_ms: float
+    mae_m: float
+    on_front: bool
+
+
+class _Chosen(Strict):
+    chosen: str
+    members: dict[str, float]
+    nested_mae_m: float
+    candidates: list[_Tried]
+
+
+class _Rates(Strict):
+    name: str
+    share: float
+    detection_rate: float
+    false_alarm_rate: float
+    members: dict[str, float]
+
+
+class _Card(Strict):
     """What a card must hold, so that nothing that reads it can fail."""
 
     created_by: str
@@ -242,12 +296,17 @@ class _Card(_Strict):
     condemning_limit_m: float = Field(gt=0)
     limit_source: str
     sample_rate_hz: float = Field(gt=0)
-    channels: list[dict[str, str]] = Field(min_length=1)
+    channels: list[ChannelCard] = Field(min_length=1)
     tacho: str | None
     pulses_per_revolution: int = Field(ge=1)
     features: list[str] = Field(min_length=1)
-    condition_ranges: dict[str, list[float]]
+    conditions: list[_Condition]
     healthy_features: _Healthy
+    mode: Literal["cold", "referenced"]
+    baseline_records: int = Field(ge=0)
+    budget_ms: float = Field(gt=0)
+    model: _Chosen
+    confounders: list[_Rates]
 
     @model_validator(mode="after")
     def _fits_itself(self) -> Self:
@@ -256,12 +315,9 @@ class _Card(_Strict):
             raise ValueError("healthy_features must have one number per feature")
         if sorted(self.grade_edges_m) != self.grade_edges_m:
             raise ValueError("grade_edges_m must rise")
-        if not set(self.condition_ranges) <= set(self.features):
-            raise ValueError("condition_ranges must name features")
-        if any(len(bounds) != 2 for bounds in self.condition_ranges.values()):
-            raise ValueError("condition_ranges must be pairs")
-        if any(not {"name", "unit"} <= set(channel) for channel in self.channels):
-            raise ValueError("channels must have a name and a unit")
+        if not {c.feature for c in self.conditions} <= {"", *self.features}:
+            raise ValueError("conditions must name features")
+        check_channels(self.channels, self.tacho)
         return self
 
 
@@ -269,6 +325,4 @@ def _check_card(card: Mapping[str, Any], path: str | Path) -> None:
     try:
         _Card.model_validate(card)
     except ValidationError as error:
-        first = error.errors()[0]
-        place = ".".join(str(part) for part in first["loc"]) or "card"
-        raise ModelError(f"{path}: card.json: {place}: {first['msg']}; retrain it") from error
+        raise refused(path, "card.json", error) from error

@@ -1,106 +1,179 @@
-"""Does a recording look like anything the model was trained on? A calibrated answer."""
+"""Does a recording look like anything the model was trained on? A calibrated answer.
 
+The distance is measured in the space of :mod:`wearstate.diagnose.physical`, where speed, load and
+the casing's resonances hardly count: another machine of the kind is near, another kind is far. It
+is the mean of a distance for each way of looking at a recording, so that a machine with one odd
+trait is nearer than one that is moderately odd in all of them.
+"""
+
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .physical import coordinates_of, moved_rows, physical_rows
+
 Float = NDArray[np.float64]
 
-_SHARE = 0.95  # of the variance, kept as directions
-_MOST_DIRECTIONS = 100
-_LEAST_SPREAD = 1e-6  # of the largest: a feature that never moved says nothing
-_CLIP = 5.0  # standard deviations: one wild feature must not stand for a strange recording
+_LEAST_SPREAD = 1e-6  # of the largest: a feature that never moves says nothing
+_CLIP = 10.0  # standard deviations: one wild feature must not stand for a strange recording
+_REACH = 1.2  # another machine of the kind has its resonances within this factor of the known ones
+_FREE = ("profile", "orders", "spiky", "orbit", "other")  # kinds that know of no hertz
 
 
 @dataclass(frozen=True, kw_only=True)
 class Familiarity:
-    """The cloud of the training features: centre, spread, main directions.
+    """The cloud of the training recordings in physical space.
 
     Attributes
     ----------
-    centre, spread : numpy.ndarray [shape=(n_features,)]
-        Mean and standard deviation of each feature.
-    shift : numpy.ndarray [shape=(n_features,)]
-        Mean of the standardised features once they are clipped.
-    directions : numpy.ndarray [shape=(n_directions, n_features)]
-        Orthonormal main directions of the standardised features.
-    variance : numpy.ndarray [shape=(n_directions,)]
-        Variance along each.
-    residual : float
-        Mean square of what the directions leave, per recording.
+    centre, spread : numpy.ndarray [shape=(n_physical,)]
+        Mean and standard deviation of each coordinate.
+    whiten : numpy.ndarray [shape=(n_physical, n_physical)]
+        Turns the standardised coordinates of each kind into independent ones of variance one over
+        their number; kinds stay apart.
+    machines : numpy.ndarray [shape=(n_machines, n_physical)]
+        Mean of each machine draw in these.
+    groups : numpy.ndarray [shape=(n_machines,)]
+        Numbers of these draws.
     """
 
     centre: Float
     spread: Float
-    shift: Float
-    directions: Float
-    variance: Float
-    residual: float
+    whiten: Float
+    machines: Float
+    groups: NDArray[np.intp]
 
-    def distance(self, features: Float) -> Float:
+    def distance(self, names: Sequence[str], rows: Float) -> Float:
         """Distance of recordings from the cloud: about 1 for a training recording.
 
         Parameters
         ----------
-        features : numpy.ndarray [shape=(n_recordings, n_features)]
+        names : sequence of str
+            Of the features.
+        rows : numpy.ndarray [shape=(n_recordings, n_features)]
 
         Returns
         -------
         numpy.ndarray [shape=(n_recordings,)]
-            The larger of two: the mean squared distance along the directions, in variances; the
-            squared distance off them over its training mean.
+            Mean over the kinds of coordinates of the root mean square in each, every coordinate in
+            the spread it has once the others of its kind are known (Mahalanobis).
         """
-        standard = _standardised(features, self.centre, self.spread) - self.shift
-        along = standard @ self.directions.T
-        off = np.maximum((standard**2).sum(axis=1) - (along**2).sum(axis=1), 0.0)
-        return np.asarray(np.maximum((along**2 / self.variance).mean(axis=1), off / self.residual))
+        return np.asarray(self._by_kind(names, self._place(names, rows)).mean(axis=0))
+
+    def nearest(self, names: Sequence[str], row: Float) -> tuple[int, float]:
+        """Machine draw nearest to a recording, and how far it is, as :meth:`distance`."""
+        apart = self._by_kind(names, self.machines - self._place(names, row[None, :])).mean(axis=0)
+        best = int(np.argmin(apart))
+        return int(self.groups[best]), float(apart[best])
+
+    def free_distance(self, names: Sequence[str], row: Float) -> float:
+        """Distance of one recording by what hangs on no sample rate, as :meth:`distance`.
+
+        All but the bands, which are lost where a rate was too low. NaN where the model has nothing
+        else.
+        """
+        free = [i for i, kind in enumerate(_kinds(tuple(names))) if kind in _FREE]
+        if not free:
+            return math.nan
+        return float(self._by_kind(names, self._place(names, row[None, :]))[free].mean())
+
+    def _place(self, names: Sequence[str], rows: Float) -> Float:
+        values = physical_rows(names, rows)
+        return _standardised(values, self.centre, self.spread) @ self.whiten
+
+    def _by_kind(self, names: Sequence[str], place: Float) -> Float:
+        """Distance in each kind [shape=(n_kinds, n)]."""
+        squared = place**2
+        return np.sqrt([squared[:, here].sum(axis=1) for here in _kinds(tuple(names)).values()])
 
 
-def _standardised(features: Float, centre: Float, spread: Float) -> Float:
-    return np.asarray(np.clip((features - centre) / spread, -_CLIP, _CLIP))
+@lru_cache(maxsize=16)
+def _kinds(names: tuple[str, ...]) -> dict[str, NDArray[np.intp]]:
+    """Coordinates of each kind."""
+    kinds = coordinates_of(names).kind
+    return {str(kind): np.flatnonzero(kinds == kind) for kind in dict.fromkeys(kinds.tolist())}
 
 
-def fit_familiarity(features: Float) -> Familiarity:
-    """Learn the cloud of training features.
+def _standardised(values: Float, centre: Float, spread: Float) -> Float:
+    return np.asarray(np.clip((values - centre) / spread, -_CLIP, _CLIP))
+
+
+def fit_familiarity(names: Sequence[str], rows: Float, groups: NDArray[np.intp]) -> Familiarity:
+    """Learn the cloud of training recordings.
 
     Parameters
     ----------
-    features : numpy.ndarray [shape=(n_recordings, n_features)]
+    names : sequence of str
+        Of the features.
+    rows : numpy.ndarray [shape=(n_recordings, n_features)]
         At least three recordings.
+    groups : numpy.ndarray [shape=(n_recordings,)]
+        Machine draw of each.
 
     Returns
     -------
     Familiarity
-        Principal directions by singular values of the standardised, clipped features.
+        The covariance of each kind of coordinates, shrunk as far as so few recordings ask for, and
+        widened by what the spectra of the same machines would show with their resonances anywhere
+        up to a fifth off.
+
+    References
+    ----------
+    O. Ledoit, M. Wolf, "A well-conditioned estimator for large-dimensional covariance matrices",
+    J. Multivariate Anal. 88 (2004) 365-411, doi:10.1016/S0047-259X(03)00096-4.
 
     Examples
     --------
     >>> rng = np.random.default_rng(0)
-    >>> cloud = fit_familiarity(rng.standard_normal((100, 3)))
-    >>> far, near = cloud.distance(np.array([[9.0, 9.0, 9.0], [0.1, 0.0, 0.2]]))
+    >>> names, groups = ["a.skewness", "b.skewness"], np.arange(100)
+    >>> cloud = fit_familiarity(names, rng.standard_normal((100, 2)), groups)
+    >>> far, near = cloud.distance(names, np.array([[9.0, 9.0], [0.1, 0.2]]))
     >>> bool(far > 10 * near)
     True
     """
-    centre, spread = features.mean(axis=0), features.std(axis=0)
+    values = physical_rows(names, rows)
+    centre, tolerance = values.mean(axis=0), _tolerance(names, rows, values)
+    spread = np.sqrt(values.var(axis=0) + np.diag(tolerance))
     spread = np.maximum(spread, _LEAST_SPREAD * max(float(spread.max()), 1.0))
-    standard = _standardised(features, centre, spread)
-    shift = standard.mean(axis=0)
-    _, singular, directions = np.linalg.svd(standard - shift, full_matrices=False)
-    variance = singular**2 / len(features)
-    share = np.cumsum(variance) / variance.sum()
-    kept = min(int(np.searchsorted(share, _SHARE)) + 1, _MOST_DIRECTIONS, len(features) // 3)
-    kept = max(kept, 1)
-    # at least rounding-sized, so that features of full rank in few directions divide by no zero
-    residual = max(float(variance[kept:].sum()), 1e-9)
+    standard = _standardised(values, centre, spread)
+    whiten = np.zeros_like(tolerance)
+    for here in _kinds(tuple(names)).values():
+        block = np.ix_(here, here)
+        scale = np.outer(spread[here], spread[here])
+        whiten[block] = _whitening(standard[:, here], tolerance[block] / scale)
+    machines, place = np.unique(groups, return_inverse=True)
+    means = np.zeros((len(machines), standard.shape[1]))
+    np.add.at(means, place, standard @ whiten)
     return Familiarity(
         centre=centre,
         spread=spread,
-        shift=shift,
-        directions=directions[:kept],
-        variance=variance[:kept],
-        residual=residual,
+        whiten=whiten,
+        machines=means / np.bincount(place)[:, None],
+        groups=machines.astype(np.intp),
     )
+
+
+def _tolerance(names: Sequence[str], rows: Float, values: Float) -> Float:
+    """Covariance of what moving the spectra does, each by a factor uniform within the reach."""
+    moves = [
+        physical_rows(names, moved_rows(names, rows, factor)) - values
+        for factor in (1 / _REACH, _REACH)
+    ]
+    owner = coordinates_of(names).owner
+    alone = owner[:, None] == owner  # every place has resonances of its own
+    # of a uniform distribution the variance is a third of the square at its ends
+    return np.asarray(alone * sum(move.T @ move for move in moves) / (3 * len(moves) * len(rows)))
+
+
+def _whitening(standard: Float, tolerance: Float) -> Float:
+    from sklearn.covariance import LedoitWolf
+
+    shrunk = LedoitWolf(assume_centered=True).fit(standard).covariance_
+    return np.linalg.cholesky(np.linalg.inv(shrunk + tolerance) / standard.shape[1])
 
 
 def novelty_p_value(distance: float, calibration: Float) -> float:

@@ -1,7 +1,8 @@
 """Fit a wear model to a labelled data set, with its uncertainty and its sense of the familiar."""
 
 import hashlib
-from dataclasses import asdict, dataclass
+import json
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -9,19 +10,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import __version__
+from ..datasets.audit import machine_origin
 from ..datasets.recipe import recorded_scene, wear_limits
 from ..datasets.record import Attributes, DataError, DataSet
+from ..datasets.split_file import usable_sides
 from ..datasets.splits import check_no_leak, group_folds, group_split
-from .estimate import Calibration, LinearSeverity, WearModel
+from .conformal import Calibration, Scale, fit_scale, scale_inputs
+from .estimate import Head, WearModel
 from .grades import grades_of
-from .novelty import fit_familiarity
-from .tabulate import FeatureTable, Progress, feature_table
+from .healthy import referenced_rows, references
+from .models import BUDGET_MS, Fitted, Folds, Linear, fit_blend, fit_line
+from .novelty import Familiarity, fit_familiarity
+from .quality import Levels, fit_levels
+from .tabulate import FeatureTable, Progress, confounders_in, feature_table
 
 Float = NDArray[np.float64]
 
-_PENALTIES = (10.0, 30.0, 100.0, 300.0, 1000.0)  # ridge, for standardised features
 _FOLDS = 5
 _FEWEST_GROUPS = 10  # two a fold, so that a fold's error is no accident
+_FEWEST_FAULTS = 20  # records with and without a fault, for an error rate to within a tenth
+_PRESENT = 0.5  # a fault that is likelier there than not
+_LOGISTIC_C = 10.0  # weak: one slope on hundreds of records
 
 
 def train_model(
@@ -29,8 +38,11 @@ def train_model(
     *,
     target: str | None = None,
     held_out: float = 0.25,
+    split: str | None = None,
     seed: int = 0,
     jobs: int = 1,
+    budget_ms: float | None = None,
+    baseline: str | Path | None = None,
     progress: Progress | None = None,
 ) -> tuple[WearModel, FeatureTable, NDArray[np.intp]]:
     """Fit a wear model on a data set's training groups.
@@ -38,23 +50,31 @@ def train_model(
     Parameters
     ----------
     path : str or Path
-        Labelled data set. Of its manifest, only the target and the groups decide the fit: neither
-        conditions nor confounders are inputs.
+        Labelled data set. Of its manifest, only the target, the groups and the labels of other
+        faults decide the fit: conditions are no inputs.
     target : str, optional
         Severity column to train for; the first one of the data set unless given.
     held_out : float
         Share of the groups (machine draws) kept out of every fit, 0 <= share < 1.
+    split : str, optional
+        A split that the data set's file holds, in place of `held_out`: only its training side is
+        learnt from, its test side is what is held out. The card has its name and hash.
     seed : int
-        Of the split and the folds.
+        Of the split, the folds and the trees.
     jobs : int
         Worker processes for the features.
+    budget_ms : float, optional
+        Time that one prediction may take, beside the features [ms].
+    baseline : str or Path, optional
+        Data set of healthy records of the same machines (equal group numbers): the model is then
+        referenced, and needs healthy recordings of every machine it is asked about.
     progress : callable, optional
         Called with (records done, records).
 
     Returns
     -------
     model : WearModel
-        Regression of log severity, out-of-fold errors, familiarity, card.
+        Severity, out-of-fold behaviour, familiarity, other faults, card.
     table : FeatureTable
         All usable records.
     test : numpy.ndarray
@@ -63,26 +83,111 @@ def train_model(
     Raises
     ------
     DataError
-        No such severity column, no limits, or too few machine draws.
+        No such severity column or split, no limits, too few machine draws, machines without a
+        healthy record, or a budget that no model keeps.
     """
     with DataSet(path) as data:
         head, draws = data.attributes, data.manifest["group"].nunique()
-    aim = _aim(head, target, path)
+        sides = None if split is None else usable_sides(data, split)
+    _aim(head, target, path)  # refused before the features are computed
     _check_draws(draws, path)
     table = feature_table(path, jobs=jobs, progress=progress)
+    healthy = None if baseline is None else _healthy_table(baseline, head, jobs, progress)
+    references_ = None if healthy is None else references(table, healthy, str(baseline))
     groups = table.manifest["group"].to_numpy()
-    train, test = _split(groups, held_out, seed, path)
-    check_no_leak(groups, train, test)
-    severity = table.manifest[aim.column].to_numpy(dtype=float)
-    regressor, errors = fit_severity(table.values[train], severity[train], groups[train], seed)
-    distances = _out_of_fold_distances(table.values[train], groups[train], seed)
-    model = WearModel(
-        regressor=regressor,
-        calibration=Calibration(log_estimate=errors[0], log_error=errors[1], distance=distances),
-        familiarity=fit_familiarity(table.values[train]),
-        card=_card(head, aim, table, train, held_out, seed),
+    if sides is None:
+        train, test = _split(groups, held_out, seed, path)
+        check_no_leak(groups, train, test)
+    else:
+        train, test = sides.train, sides.test  # leaks are refused where it was read
+        held_out = len(np.unique(groups[test])) / len(np.unique(groups))
+        _check_kept(len(np.unique(groups[train])), draws, f"split {sides.name}", path)
+    model = fit_model(
+        table,
+        train,
+        head,
+        target=target,
+        references=references_,
+        held_out=held_out,
+        seed=seed,
+        budget_ms=budget_ms,
+        path=path,
     )
+    if sides is not None:
+        model.card["trained_on"].update(split=sides.name, split_sha256=sides.sha256)
+    if healthy is not None:
+        model.card.update(baseline_records=len(healthy.values))
     return model, table, test
+
+
+def fit_model(
+    table: FeatureTable,
+    train: NDArray[np.intp],
+    head: Attributes,
+    *,
+    target: str | None = None,
+    references: Float | None = None,
+    held_out: float = 0.0,
+    seed: int = 0,
+    budget_ms: float | None = None,
+    path: str | Path = "the data set",
+) -> WearModel:
+    """Fit a wear model on some rows of a feature table.
+
+    Parameters
+    ----------
+    table : FeatureTable
+    train : numpy.ndarray
+        Rows that it may learn from.
+    head : Attributes
+        Of the data set.
+    target, held_out, seed, budget_ms
+        As of :func:`train_model`; the share held out is for the card only.
+    references : numpy.ndarray [shape=(n_records, n_features)], optional
+        Healthy row of each record's machine: the model is then referenced.
+    path : str or Path
+        Of the data set, for messages.
+
+    Returns
+    -------
+    WearModel
+
+    Raises
+    ------
+    DataError
+        As of :func:`train_model`.
+    """
+    aim = _aim(head, target, path)
+    lesson = Lesson(
+        names=table.names,
+        rows=table.values[train],
+        baseline=None if references is None else references[train],
+        severity=table.manifest[aim.column].to_numpy(dtype=float)[train],
+        groups=table.manifest["group"].to_numpy()[train],
+        faults={name: here[train] for name, here in confounders_in(table.manifest).items()},
+    )
+    learnt = learn(lesson, seed=seed, budget_ms=budget_ms)
+    card = _card(head, aim, table, train, held_out, seed) | _model_card(learnt, budget_ms)
+    card["healthy_features"] = _healthy(lesson, grades_of(lesson.severity, aim.edges))
+    if references is not None:
+        card["mode"] = "referenced"
+    return _model(learnt, card)
+
+
+def _healthy_table(
+    path: str | Path, head: Attributes, jobs: int, progress: Progress | None
+) -> FeatureTable:
+    """Features of a healthy set, which must be of the same machines."""
+    with DataSet(path) as data:
+        other = data.attributes
+    mine, theirs = draw_identity(head), draw_identity(other)
+    if mine and theirs and mine != theirs:
+        raise DataError(
+            f"{path}: its machines (recipe {_name_in(other.recipe)}, seed {other.seed}) must be "
+            f"those of the data set (recipe {_name_in(head.recipe)}, seed {head.seed}); generate "
+            "it with that seed from a recipe whose machines_of names that recipe"
+        )
+    return feature_table(path, jobs=jobs, progress=progress)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -148,103 +253,187 @@ def _split(
     if not 0 <= held_out < 1:
         raise DataError(f"held_out = {held_out} must be >= 0 and < 1; try 0.25")
     kept = draws - max(1, round(held_out * draws)) if held_out > 0 else draws
-    if kept < _FOLDS:
-        raise DataError(
-            f"{path}: held_out = {held_out} leaves {kept} of {draws} usable machine draws to train "
-            f"on, must be >= {_FOLDS}; hold out less or generate more records"
-        )
+    _check_kept(kept, draws, f"held_out = {held_out}", path)
     if held_out == 0:
         return np.arange(len(groups)), np.arange(0)
     return group_split(groups, test_fraction=held_out, seed=seed)
 
 
-def fit_severity(
-    features: Float, severity: Float, groups: NDArray[Any], seed: int
-) -> tuple[LinearSeverity, tuple[Float, Float]]:
-    """Ridge regression of log severity, its penalty chosen by folds of whole groups.
+def _check_kept(kept: int, draws: int, what: str, path: str | Path) -> None:
+    if kept < _FOLDS:
+        raise DataError(
+            f"{path}: {what} leaves {kept} of {draws} usable machine draws to train on, must be "
+            f">= {_FOLDS}; hold out less or generate more records"
+        )
 
-    Parameters
+
+@dataclass(frozen=True, kw_only=True)
+class Lesson:
+    """What a model learns from.
+
+    Attributes
     ----------
-    features : numpy.ndarray [shape=(n, n_features)]
+    names : tuple of str
+        Of the features.
+    rows : numpy.ndarray [shape=(n, n_features)]
+    baseline : numpy.ndarray [shape=(n, n_features)] or None
+        Healthy rows of the same machines.
     severity : numpy.ndarray [shape=(n,)]
         [m], > 0.
     groups : numpy.ndarray [shape=(n,)]
-        Machine draw of each record; a draw is never in two folds.
+        Machine draw of each record.
+    faults : dict
+        Name -> presence [shape=(n,)] of each fault beside the wear.
+    """
+
+    names: tuple[str, ...]
+    rows: Float
+    baseline: Float | None
+    severity: Float
+    groups: NDArray[np.intp]
+    faults: dict[str, NDArray[np.bool_]] = field(default_factory=dict)
+
+    @property
+    def inputs(self) -> Float:
+        """What the severity is told from."""
+        return self.rows if self.baseline is None else referenced_rows(self.rows, self.baseline)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Learnt:
+    """All that is fitted, with its behaviour on groups that it had not seen.
+
+    Attributes
+    ----------
+    severity : Fitted
+    witness : Linear
+    scale : Scale
+    calibration : Calibration
+    familiarity : Familiarity
+    levels : Levels
+    heads : tuple of (Head, dict)
+        With their error rates, for the card.
+    """
+
+    severity: Fitted
+    witness: Linear
+    scale: Scale
+    calibration: Calibration
+    familiarity: Familiarity
+    levels: Levels
+    heads: tuple[tuple[Head, dict[str, Any]], ...]
+
+
+def learn(lesson: Lesson, *, seed: int = 0, budget_ms: float | None = None) -> Learnt:
+    """Fit everything, by folds of whole groups.
+
+    Parameters
+    ----------
+    lesson : Lesson
     seed : int
-        Of the folds.
+        Of the folds and the trees.
+    budget_ms : float, optional
+        Of :func:`wearstate.diagnose.models.fit_blend`.
 
     Returns
     -------
-    regressor : LinearSeverity
-        Fitted on all records.
-    errors : tuple of numpy.ndarray
-        Out-of-fold estimates of log severity, and their errors (truth minus estimate).
+    Learnt
 
     Raises
     ------
     DataError
-        A severity is not positive.
+        A severity is not positive, or no model is within the budget.
     """
-    if not (severity > 0).all():
+    if not (lesson.severity > 0).all():
         raise DataError(
-            f"severity = {severity.min():g} m must be > 0 in every record; label them all"
+            f"severity = {lesson.severity.min():g} m must be > 0 in every record; label them all"
         )
-    target = np.log(severity)
-    folds = _folds(groups, seed)
-    trials = [_out_of_fold(penalty, features, target, folds) for penalty in _PENALTIES]
-    errors = [float(np.abs(np.exp(trial) - severity).mean()) for trial in trials]
-    best = int(np.argmin(errors))
-    regressor = _fit_ridge(_PENALTIES[best], features, target)
-    return regressor, (trials[best], target - trials[best])
-
-
-def _fit_ridge(penalty: float, features: Float, target: Float) -> LinearSeverity:
-    from sklearn.linear_model import Ridge
-    from sklearn.preprocessing import StandardScaler
-
-    scaler = StandardScaler().fit(features)
-    ridge = Ridge(penalty).fit(scaler.transform(features), target)
-    return LinearSeverity(
-        centre=scaler.mean_,
-        spread=scaler.scale_,  # one where a feature is constant
-        weight=ridge.coef_,
-        offset=float(ridge.intercept_),
+    folds = group_folds(lesson.groups, n=_FOLDS, seed=seed)
+    try:
+        severity = fit_blend(lesson.inputs, lesson.severity, folds, seed=seed, budget_ms=budget_ms)
+    except ValueError as error:
+        raise DataError(str(error)) from error
+    distance = _out_of_fold_distances(lesson, folds)
+    inputs = scale_inputs(severity.estimate, distance)
+    scale = fit_scale(inputs, np.log(lesson.severity / severity.estimate))
+    return Learnt(
+        severity=severity,
+        witness=fit_line(lesson.inputs, lesson.severity, severity.options, seed=seed),
+        scale=scale,
+        calibration=Calibration(
+            estimate=severity.estimate,
+            truth=lesson.severity,
+            scale=scale.predict(inputs),
+            distance=distance,
+            group=lesson.groups,
+        ),
+        familiarity=fit_familiarity(lesson.names, lesson.rows, lesson.groups),
+        levels=fit_levels(lesson.names, lesson.rows, folds),
+        heads=tuple(
+            _head(name, lesson.rows, here, folds, seed=seed)
+            for name, here in lesson.faults.items()
+            if min(here.sum(), (~here).sum()) >= _FEWEST_FAULTS
+        ),
     )
 
 
-def _folds(groups: NDArray[Any], seed: int) -> list[tuple[NDArray[np.intp], NDArray[np.intp]]]:
-    return list(group_folds(groups, n=_FOLDS, seed=seed))
-
-
-def _out_of_fold(
-    penalty: float,
-    features: Float,
-    target: Float,
-    folds: list[tuple[NDArray[np.intp], NDArray[np.intp]]],
-) -> Float:
-    estimate = np.empty_like(target)
-    for train, test in folds:
-        fitted = _fit_ridge(penalty, features[train], target[train])
-        estimate[test] = fitted.predict(features[test])
-    return estimate
-
-
-def _out_of_fold_distances(features: Float, groups: NDArray[Any], seed: int) -> Float:
+def _out_of_fold_distances(lesson: Lesson, folds: Folds) -> Float:
     """Novelty distances of records from clouds that their machine draw had no part in."""
-    distance = np.empty(len(features))
-    for train, test in _folds(groups, seed):
-        distance[test] = fit_familiarity(features[train]).distance(features[test])
+    distance = np.empty(len(lesson.rows))
+    for train, test in folds:
+        cloud = fit_familiarity(lesson.names, lesson.rows[train], lesson.groups[train])
+        distance[test] = cloud.distance(lesson.names, lesson.rows[test])
     return distance
+
+
+def _head(
+    name: str, rows: Float, here: NDArray[np.bool_], folds: Folds, *, seed: int
+) -> tuple[Head, dict[str, Any]]:
+    """A fault's presence as 1 or 2, regressed, and its out-of-fold value turned to probability."""
+    from sklearn.linear_model import LogisticRegression
+
+    fitted = fit_blend(rows, 1.0 + here.astype(np.float64), folds, seed=seed)
+    value = fitted.estimate[:, None]
+    logistic = LogisticRegression(C=_LOGISTIC_C).fit(value, here)
+    found = logistic.predict_proba(value)[:, 1] > _PRESENT
+    head = Head(
+        name=name,
+        blend=fitted.blend,
+        slope=float(logistic.coef_[0, 0]),
+        offset=float(logistic.intercept_[0]),
+        threshold=_PRESENT,
+    )
+    return head, {
+        "name": name,
+        "share": float(here.mean()),
+        "detection_rate": float(found[here].mean()),
+        "false_alarm_rate": float(found[~here].mean()),
+        "members": fitted.members,
+    }
+
+
+def _model(learnt: Learnt, card: dict[str, Any]) -> WearModel:
+    return WearModel(
+        severity=learnt.severity.blend,
+        witness=learnt.witness,
+        scale=learnt.scale,
+        calibration=learnt.calibration,
+        familiarity=learnt.familiarity,
+        levels=learnt.levels,
+        heads=tuple(head for head, _ in learnt.heads),
+        card=card,
+    )
 
 
 def draw_identity(head: Attributes) -> str:
     """Hash of what decides the machine draws: equal groups of equal identity are one machine.
 
-    Recipes draw from their name and the data set's seed alone, so their texts, record numbers
-    and comments do not make other machines. Empty for a set that no recipe made.
+    Recipes draw machines from their name (or that of the recipe whose machines they take) and the
+    data set's seed alone, so their texts, record numbers and comments do not make other machines.
+    Empty for a set that no recipe made.
     """
-    recipe = _name_in(head.recipe)
-    return hashlib.sha256(f"{recipe} {head.seed}".encode()).hexdigest() if recipe else ""
+    origin = machine_origin(head)
+    return hashlib.sha256(json.dumps(origin).encode()).hexdigest() if origin else ""
 
 
 def _card(
@@ -258,15 +447,6 @@ def _card(
     """Everything a reader of the model must know, as JSON."""
     manifest = table.manifest.iloc[train]
     severity = manifest[aim.column].to_numpy(dtype=float)
-    columns = {name: i for i, name in enumerate(table.names)}
-    ranges = {
-        name: [
-            float(table.values[train, columns[name]].min()),
-            float(table.values[train, columns[name]].max()),
-        ]
-        for name in table.names
-        if name == "shaft.speed_hz" or name.endswith(".rms")
-    }
     return {
         "created_by": f"wearstate {__version__}",
         "origin": head.origin,
@@ -276,6 +456,8 @@ def _card(
             "draw_identity": draw_identity(head),
             "held_out_share": held_out,
             "split_seed": seed,
+            "split": "",
+            "split_sha256": "",
             "training_groups": sorted({int(g) for g in manifest["group"]}),
             "training_signals": sorted({int(crc) for crc in manifest["signal_crc32"]}),
             "scene": _name_in(head.scene),
@@ -291,15 +473,75 @@ def _card(
         "tacho": head.tacho,
         "pulses_per_revolution": head.pulses_per_revolution,
         "features": list(table.names),
-        "condition_ranges": ranges,
-        "healthy_features": _healthy(table.values[train], grades_of(severity, aim.edges)),
+        "conditions": _conditions(table, train),
+        "mode": "cold",
+        "baseline_records": 0,
     }
 
 
-def _healthy(values: Float, grade: NDArray[Any]) -> dict[str, list[float]]:
-    """Mean and spread of the features of as-new machines, the reference of the evidence."""
-    rows = values[grade == 0] if (grade == 0).any() else values
-    return {"mean": rows.mean(axis=0).tolist(), "spread": rows.std(axis=0).tolist()}
+def _conditions(table: FeatureTable, train: NDArray[np.intp]) -> list[dict[str, Any]]:
+    """Trained ranges: of what the signal tells, and of what was noted beside it."""
+    columns = [
+        {"name": name, "feature": name, "unit": "Hz" if name.endswith("hz") else ""}
+        | _range(table.values[train, i])
+        for i, name in enumerate(table.names)
+        if name == "shaft.speed_hz" or name.endswith(".rms")
+    ]
+    manifest = table.manifest.iloc[train]
+    return columns + [
+        {"name": name, "feature": "", "unit": unit} | _range(manifest[name].to_numpy(dtype=float))
+        for name, unit in _NOTED.items()
+        if name in manifest and manifest[name].nunique() > 1
+    ]
+
+
+_NOTED = {
+    "discharge_pressure_pa": "Pa",
+    "suction_pressure_pa": "Pa",
+    "static_load_n": "N",
+    "viscosity_pa_s": "Pa s",
+    "hull_deflection_m": "m",
+    "thrust_n": "N",
+}
+"""Operating conditions that no vibration tells, by their manifest columns, with their units."""
+
+
+def _range(values: Float) -> dict[str, float]:
+    return {"low": float(values.min()), "high": float(values.max())}
+
+
+def _model_card(learnt: Learnt, budget_ms: float | None) -> dict[str, Any]:
+    """What was tried, what was chosen, and how it errs."""
+    severity = learnt.severity
+    return {
+        "budget_ms": BUDGET_MS if budget_ms is None else budget_ms,
+        "model": {
+            "chosen": severity.chosen,
+            "members": severity.members,
+            "nested_mae_m": float(np.abs(severity.estimate - learnt.calibration.truth).mean()),
+            "candidates": [
+                {
+                    "name": option.name,
+                    "cost_ms": option.cost_ms,
+                    "mae_m": option.error,
+                    "on_front": option.on_front,
+                }
+                for option in severity.options
+            ],
+        },
+        "confounders": [rates for _, rates in learnt.heads],
+    }
+
+
+def _healthy(lesson: Lesson, grade: NDArray[Any]) -> dict[str, list[float]]:
+    """Mean and spread of the features of as-new machines, the reference of the evidence.
+
+    Of a referenced model the spread is that about each machine's own baseline.
+    """
+    kept = grade == 0 if (grade == 0).any() else np.ones(len(grade), dtype=bool)
+    rows = lesson.rows[kept]
+    apart = rows if lesson.baseline is None else rows - lesson.baseline[kept]
+    return {"mean": rows.mean(axis=0).tolist(), "spread": apart.std(axis=0).tolist()}
 
 
 def _name_in(toml_text: str) -> str:

@@ -13,7 +13,6 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import least_squares, linear_sum_assignment
-from scipy.signal import find_peaks
 
 from .spectrum import decibel
 
@@ -244,6 +243,8 @@ def find_resonances(
     >>> find_resonances(f, value).tolist()
     [30, 70]
     """
+    from scipy.signal import find_peaks  # half a second, which no report needs
+
     _, functions = _functions(frequency, value)
     if not prominence > 0:
         raise ValueError(f"prominence = {prominence} dB must be > 0; 6 dB is usual")

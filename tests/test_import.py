@@ -142,7 +142,7 @@ def test_files_that_differ_are_named_at_once(files, tmp_path):
     text = refused(everything, tmp_path / "x.h5", "same sample rate")
     assert "100 Hz in a.wav, b.wav, c.wav, short.wav; 200 Hz in fast.wav" in text
     assert "shortest short.wav with 0.99 s (99 samples), longest a.wav with 2.5 s" in text
-    assert "scipy.signal.resample_poly" in text
+    assert "import each rate by itself, or resample_to the lowest of them" in text
     text = refused(everything, tmp_path / "x.h5", "shorter than the segment of 2 s", segment=2.0)
     assert "1 of 5 files" in text
 
@@ -504,7 +504,7 @@ def test_a_simulated_set_comes_back_with_the_same_features(small_set, tmp_path):
     for column in ("group", "grade", CLEARANCE, "signal_crc32"):
         assert_array_equal(after.manifest[column], before.manifest[column])
     ours, theirs = train_model(small_set)[0], train_model(path)[0]
-    assert_array_equal(theirs.regressor.weight, ours.regressor.weight)
+    assert_array_equal(theirs.predict(after.values), ours.predict(before.values))
     assert (theirs.notice, ours.notice != "") == ("", True)  # origin: measured
 
 

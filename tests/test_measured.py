@@ -42,17 +42,19 @@ def test_sample_rate_length_and_unit(mfpt, name):
 
 
 @pytest.mark.parametrize("name", FILES)
-def test_the_report_on_it_is_unfamiliar(mfpt, small_model, name):
+def test_as_it_is_the_report_cannot_judge_it_and_says_what_it_lacks(mfpt, small_model, name):
+    """One channel, no tacho, another rate: nothing of the machine can be said."""
     from click.testing import CliRunner
     from wearstate.diagnose.cli import cli
 
     arguments = ["report", str(mfpt / name), "--model", str(small_model), "--json"]
     done = CliRunner().invoke(cli, arguments)
-    assert done.exit_code == 0
     table = json.loads(done.stdout)
-    assert table["estimate"]["verdict"] == "unfamiliar"
+    assert table["estimate"]["verdict"] == "unusable"
+    assert [fault["kind"] for fault in table["estimate"]["faults"]] == ["layout", "tacho", "rate"]
     assert "g" in table["recording"]["channels"][0]["unit_in_file"]
-    assert CliRunner().invoke(cli, [*arguments, "--fail-on", "alarm"]).exit_code == 5
+    assert done.exit_code == 2
+    assert CliRunner().invoke(cli, [*arguments, "--fail-on", "alarm"]).exit_code == 2
 
 
 def made_to_match(recording, speed):
@@ -101,4 +103,4 @@ def test_it_is_the_vibration_that_is_unfamiliar(mfpt, small_model, name, speed, 
     assert estimate.verdict == "unfamiliar"
     assert estimate.p_value is not None
     assert estimate.p_value <= model.p_limit <= 0.012
-    assert _report_exit(estimate.verdict, estimate.grade, "alarm") == 5
+    assert _report_exit([(estimate.verdict, estimate.grade)], "alarm") == 5

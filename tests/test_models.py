@@ -10,16 +10,12 @@ import zipfile
 import numpy as np
 import pytest
 from wearstate.datasets.record import Channel, DataError, DataSet, Recording
-from wearstate.diagnose.estimate import (
-    Calibration,
-    ModelError,
-    interval_offsets,
-)
-from wearstate.diagnose.evaluate import baselines, evaluate_model, score
+from wearstate.diagnose.estimate import ModelError
+from wearstate.diagnose.evaluate import evaluate_model, score
 from wearstate.diagnose.grades import accuracy_bound, grades_of
 from wearstate.diagnose.modelfile import load_model, save_model
-from wearstate.diagnose.novelty import fit_familiarity, novelty_p_value
-from wearstate.diagnose.train import fit_severity, train_model
+from wearstate.diagnose.models import CANDIDATES, Blend
+from wearstate.diagnose.train import Lesson, learn, train_model
 from wearstate.sim.wear import grade
 
 
@@ -47,86 +43,6 @@ def test_accuracy_bound_against_a_simulated_estimator():
     assert accuracy_bound(true, edges, error) == pytest.approx(observed, abs=0.004)
 
 
-# --- intervals and novelty ----------------------------------------------------------------------
-
-
-def test_interval_covers_nominally_where_the_error_grows_with_the_estimate():
-    """Coverage of a fresh point over many calibrations, at a narrow and at a wide place."""
-    rng = np.random.default_rng(2)
-    for place in (0.2, 0.8):
-        covered = []
-        for _ in range(400):
-            estimate = rng.uniform(0, 1, 400)
-            error = rng.standard_normal(400) * (0.1 + estimate)
-            offsets = interval_offsets(
-                place, Calibration(log_estimate=estimate, log_error=error, distance=error)
-            )
-            covered.append(offsets[0] <= rng.standard_normal() * (0.1 + place) <= offsets[1])
-            assert offsets[2] == 0.9
-        # 400 trials at 0.9: standard error 0.015; the neighbourhood's width adds at most 0.01
-        assert np.mean(covered) == pytest.approx(0.9, abs=0.055)
-
-
-@pytest.mark.parametrize("n", [3, 8, 16, 60])
-def test_the_interval_keeps_what_it_claims_however_few_errors_there_are(n):
-    rng = np.random.default_rng(9)
-    covered = []
-    for _ in range(3000):
-        error = rng.standard_normal(n)
-        calibration = Calibration(log_estimate=np.zeros(n), log_error=error, distance=error)
-        low, high, coverage = interval_offsets(0.0, calibration)
-        covered.append(low <= rng.standard_normal() <= high)
-    # Between the extremes of n errors lie (n - 1) / (n + 1) of the next: .5, .78, .88.
-    assert coverage == pytest.approx(min(0.9, (n - 1) / (n + 1)))
-    # 3,000 trials: four standard errors are 0.037 at one half, 0.022 at 0.9; a whole rank is
-    # 1 / (n + 1) more than asked.
-    assert coverage - 0.037 < np.mean(covered) < coverage + 0.037 + 2 / (n + 1)
-
-
-def test_p_value_of_familiar_recordings_is_uniform():
-    rng = np.random.default_rng(3)
-    values = [novelty_p_value(d[0], d[1:]) for d in rng.standard_normal((4000, 100))]
-    # a conformal p-value is uniform on k/100; 4 standard errors of the share are 0.019
-    assert np.mean(np.array(values) <= 0.1) == pytest.approx(0.1 * 100 / 101, abs=0.02)
-
-
-def test_familiarity_sees_what_leaves_the_cloud_in_a_direction_it_never_took():
-    rng = np.random.default_rng(4)
-    flat = np.column_stack([rng.standard_normal((200, 2)), 1e-3 * rng.standard_normal(200)])
-    cloud = fit_familiarity(flat)
-    inside, outside = cloud.distance(np.array([[1.0, 1.0, 0.0], [0.0, 0.0, 0.1]]))
-    # 100 standard deviations, clipped at 5, in one feature of three
-    assert outside > 10 * inside
-
-
-def test_familiarity_sees_usual_values_in_an_unusual_combination():
-    """Forty features driven by five causes: a recording that no causes can make."""
-    rng = np.random.default_rng(12)
-    mixing = rng.standard_normal((5, 40))
-    seen = rng.standard_normal((300, 5)) @ mixing + 0.01 * rng.standard_normal((300, 40))
-    cloud = fit_familiarity(seen)
-    usual = rng.standard_normal((1, 5)) @ mixing
-    shuffled = rng.permutation(usual[0])[None, :]  # the same values, at other features
-    assert np.abs((shuffled - cloud.centre) / cloud.spread).max() < 5
-    # Along the five directions it may lie anywhere near; off them by the noise's 0.01 it should.
-    assert cloud.distance(shuffled)[0] > 100 * cloud.distance(usual)[0]
-
-
-def test_one_wild_feature_counts_as_five_standard_deviations_and_no_more():
-    rng = np.random.default_rng(11)
-    cloud = fit_familiarity(rng.standard_normal((300, 40)))
-    point = np.zeros((3, 40))
-    point[:, 0] = [6.0, 1e3, 1e9]
-    distance = cloud.distance(point)
-    assert distance[0] == distance[1] == distance[2]
-
-
-def test_familiarity_survives_constant_features():
-    rng = np.random.default_rng(5)
-    cloud = fit_familiarity(np.column_stack([rng.standard_normal(50), np.full(50, 7.0)]))
-    assert np.isfinite(cloud.distance(np.array([[0.0, 7.0], [0.0, 8.0]]))).all()
-
-
 # --- training -----------------------------------------------------------------------------------
 
 
@@ -142,18 +58,19 @@ def test_severity_cannot_be_learnt_from_the_identity_of_a_machine():
     rng = np.random.default_rng(6)
     groups = np.repeat(np.arange(40), 3)
     severity = np.exp(np.repeat(rng.standard_normal(40), 3))  # constant in a group
-    names = np.eye(40)[groups]
-    _, (_, error) = fit_severity(names, severity, groups, seed=0)
-    assert np.std(error) > 0.9 * np.std(np.log(severity))
+    names = ("a.rms", *(f"a.order_{i:02d}.level_db" for i in range(40)))
+    rows = np.hstack([np.ones((120, 1)), np.eye(40)[groups]])
+    known = learn(
+        Lesson(names=names, rows=rows, baseline=None, severity=severity, groups=groups)
+    ).calibration
+    assert np.std(np.log(known.truth / known.estimate)) > 0.9 * np.std(np.log(severity))
 
 
 def test_training_depends_on_the_seed_alone(trained, small_set):
     model, table, _ = trained
     again, table_2, _ = train_model(small_set, seed=0, jobs=2)
     assert np.array_equal(table.values, table_2.values)
-    assert np.array_equal(
-        model.regressor.predict(table.values), again.regressor.predict(table.values)
-    )
+    assert np.array_equal(model.predict(table.values), again.predict(table.values))
     assert again.card == model.card
 
 
@@ -170,11 +87,10 @@ def test_held_out_machines_get_a_grade_and_a_clearance(trained):
 
 
 def test_one_rms_alone_does_not_solve_the_task(trained):
-    model, table, _ = trained
-    severity = table.manifest[model.card["severity"]].to_numpy()
-    grade = grades_of(severity, model.card["grade_edges_m"])
-    # by folds over all 120 records; the same bound as for the 2,000 of the standard recipe
-    assert baselines(table, grade, np.arange(len(grade)))["single_rms"] <= 0.60
+    model, table, test = trained
+    told = score(model, table, test)["baselines"]
+    # on 30 records of 15 machines; the bound for the 2,000 of the standard recipe is 0.60
+    assert told["single_rms"]["accuracy"]["value"] <= 0.70
 
 
 def test_the_training_set_is_judged_on_its_held_out_draws_only(trained, small_set):
@@ -200,10 +116,16 @@ def test_too_few_machines_are_refused(tmp_path):
 def test_estimate_of_a_held_out_recording(trained, small_set):
     model, _table, test = trained
     with DataSet(small_set) as data:
-        estimate = model.estimate(data[int(test[0])])
-    assert estimate.verdict == "graded"
+        estimates = [model.estimate(data[int(row)]) for row in test[:5]]
+    plain = [estimate for estimate in estimates if estimate.verdict == "graded"]
+    assert len(plain) >= 3  # two records in a hundred are odd, and so small a model errs
+    estimate = plain[0]
+    assert estimate.graded
+    assert estimate.cautions == estimate.reasons == estimate.faults == ()
     assert estimate.low < estimate.severity < estimate.high
     assert estimate.grade in estimate.possible_grades
+    assert sum(estimate.grade_probabilities) == pytest.approx(1.0)
+    assert re.fullmatch(r"machine \d+ of bilge-pump-small, [0-9.]+ away", estimate.nearest)
     json.dumps(estimate.as_dict(), allow_nan=False)
 
 
@@ -222,9 +144,7 @@ def changed(recording, **changes):
         ("swapped", "its channels are acc_y, acc_x"),
     ],
 )
-def test_a_recording_without_the_inputs_is_unfamiliar_and_says_why(
-    trained, small_set, what, reason
-):
+def test_a_recording_without_the_inputs_is_unusable_and_says_why(trained, small_set, what, reason):
     model = trained[0]
     with DataSet(small_set) as data:
         whole = data[0]
@@ -237,12 +157,14 @@ def test_a_recording_without_the_inputs_is_unfamiliar_and_says_why(
         "swapped": {"channels": (y, x, tacho)},
     }[what]
     estimate = model.estimate(changed(whole, **alike))
-    assert estimate.verdict == "unfamiliar"
+    assert estimate.verdict == "unusable"
+    assert not estimate.graded
     assert re.search(reason, " ".join(estimate.reasons))
+    assert [fault.text for fault in estimate.faults] == list(estimate.reasons)
     assert estimate.grade is None
 
 
-@pytest.mark.parametrize("kind", ["noise", "silence", "tone"])
+@pytest.mark.parametrize("kind", ["noise", "tone"])
 def test_a_recording_of_something_else_is_unfamiliar(trained, small_set, kind):
     model = trained[0]
     with DataSet(small_set) as data:
@@ -251,7 +173,6 @@ def test_a_recording_of_something_else_is_unfamiliar(trained, small_set, kind):
     n = whole.signal.shape[1]
     strange = {
         "noise": 10 * rng.standard_normal((2, n)),
-        "silence": np.zeros((2, n)),
         "tone": np.tile(20 * np.sin(2 * np.pi * 997 * np.arange(n) / 25600), (2, 1)),
     }[kind]
     estimate = model.estimate(changed(whole, signal=np.vstack([strange, whole.signal[2:]])))
@@ -261,20 +182,37 @@ def test_a_recording_of_something_else_is_unfamiliar(trained, small_set, kind):
 
 def test_a_condition_outside_the_trained_range_is_named(trained, small_set):
     model = trained[0]
-    model = dataclasses.replace(
-        model, card={**model.card, "condition_ranges": {"shaft.speed_hz": [1.0, 2.0]}}
-    )
-    with DataSet(small_set) as data:
-        estimate = model.estimate(data[0])
-    assert "outside the trained range 1 to 2" in estimate.cautions[0]
-
-
-def test_a_recording_shorter_than_a_revolution_is_refused(trained, small_set):
+    conditions = [
+        {"name": "shaft.speed_hz", "feature": "shaft.speed_hz", "unit": "Hz", "low": 1, "high": 2},
+        {"name": "discharge_pressure_pa", "feature": "", "unit": "Pa", "low": 1.0, "high": 2.0},
+    ]
+    model = dataclasses.replace(model, card={**model.card, "conditions": conditions})
     with DataSet(small_set) as data:
         whole = data[0]
+    row = trained[1].values[0]
+    estimate = model.judge(row, conditions=whole.row)
+    assert estimate.verdict == "caution"
+    assert "shaft.speed_hz" in estimate.cautions[0]
+    assert "outside the trained range 1 to 2 Hz" in estimate.cautions[0]
+    assert "discharge_pressure_pa" in estimate.cautions[1]
+    assert len(model.judge(row).cautions) == 1  # what was not recorded cannot be outside
+
+
+def test_what_was_noted_beside_the_recordings_is_a_condition(trained, small_set):
+    model, table, test = trained
+    train = np.setdiff1d(np.arange(len(table.values)), test)
+    pressure = table.manifest["discharge_pressure_pa"].to_numpy()[train]
+    [found] = [c for c in model.card["conditions"] if c["name"] == "discharge_pressure_pa"]
+    assert (found["low"], found["high"]) == (pressure.min(), pressure.max())
+
+
+def test_a_recording_shorter_than_a_revolution_is_unusable(trained, small_set):
+    with DataSet(small_set) as data:
+        whole = data[0]
+    estimate = trained[0].estimate(changed(whole, signal=whole.signal[:, :2000]))
+    assert estimate.verdict == "unusable"
     # none of the tacho's pulses, or one: as the shaft stands at the first sample
-    with pytest.raises(DataError, match=r"shorter than a revolution|must have >= 2; record two"):
-        trained[0].estimate(changed(whole, signal=whole.signal[:, :2000]))
+    assert re.search(r"shorter than a revolution|must have >= 2; record two", estimate.reasons[0])
 
 
 # --- the file -----------------------------------------------------------------------------------
@@ -317,25 +255,51 @@ def test_a_model_of_another_version_is_refused_with_the_cure(trained, tmp_path):
         seal = json.loads(bundle.read("seal.json"))
     changes = {"seal.json": json.dumps({**seal, "schema_version": 99}).encode()}
     rewritten(tmp_path / "good.wsm", tmp_path / "other.wsm", changes)
-    with pytest.raises(ModelError, match=r"schema_version = 99 must be 1; retrain it"):
+    with pytest.raises(ModelError, match=r"schema_version = 99 must be 2; retrain it"):
         load_model(tmp_path / "other.wsm")
+
+
+@pytest.fixture(scope="module")
+def both(trained):
+    """The model with a line and trees in its blend, whichever was chosen."""
+    model, table, _ = trained
+    severity = table.manifest[model.card["severity"]].to_numpy(dtype=float)
+    rows = {candidate.name: candidate for candidate in CANDIDATES}
+    blend = Blend(
+        names=("ridge 30", "trees"),
+        parts=tuple(rows[n].fit(table.values, severity, 0) for n in ("ridge 30", "trees")),
+        weights=np.array([0.25, 0.75]),
+        low=1e-5,
+        high=1e-3,
+    )
+    return dataclasses.replace(model, severity=blend)
 
 
 @pytest.mark.parametrize(
     ("name", "forgery"),
     [
-        ("regressor.weight", np.ones(3)),
-        ("regressor.weight", np.float64(1.0)),
-        ("regressor.spread", None),
-        ("regressor.offset", np.ones(2)),
-        ("familiarity.variance", np.zeros(4)),
-        ("familiarity.residual", np.float64(-1.0)),
-        ("calibration.log_error", np.array([np.nan])),
+        ("severity.weights", np.array([-1.0, 2.0])),
+        ("severity.0.weight", np.ones(3)),
+        ("severity.0.weight", np.float64(1.0)),
+        ("severity.0.spread", None),
+        ("severity.0.offset", np.ones(2)),
+        ("severity.1.left", np.array([7])),
+        ("severity.1.root", np.array([-1])),
+        ("severity.1.root", np.array([10**9])),
+        ("severity.1.depth", np.int64(10**9)),
+        ("severity.2.root", np.array([0])),
+        ("witness.weight", np.ones(3)),
+        ("scale.weight", np.ones(7)),
+        ("familiarity.whiten", np.zeros((4, 4))),
+        ("levels.offset", np.zeros(9)),
+        ("calibration.truth", np.array([np.nan])),
+        ("calibration.scale", np.array([-1.0])),
+        ("calibration.group", np.array([0.5])),
         ("calibration.distance", np.array(["text"], dtype=object)),
     ],
 )
-def test_a_forged_model_with_a_right_checksum_is_refused(trained, tmp_path, name, forgery):
-    save_model(trained[0], tmp_path / "good.wsm")
+def test_a_forged_model_with_a_right_checksum_is_refused(both, tmp_path, name, forgery):
+    save_model(both, tmp_path / "good.wsm")
     with zipfile.ZipFile(tmp_path / "good.wsm") as bundle:
         seal = json.loads(bundle.read("seal.json"))
         with np.load(io.BytesIO(bundle.read("arrays.npz"))) as stored:
@@ -484,7 +448,7 @@ def test_a_wrong_sensitivity_is_not_graded_in_silence(trained, small_set, factor
             whole = data[int(row)]
             scaled = whole.signal * np.array([[factor], [factor], [1.0]], dtype=np.float32)
             estimate = model.estimate(changed(whole, signal=scaled))
-            assert estimate.verdict == "unfamiliar" or estimate.cautions
+            assert estimate.verdict in ("unfamiliar", "unusable", "caution")
 
 
 def test_a_set_that_is_all_unfamiliar_is_a_result(trained):
@@ -507,7 +471,8 @@ def test_a_card_that_does_not_fit_is_refused(trained, tmp_path):
         ("grade_edges_m", [3e-4, 2e-4, 1e-4]),
         ("healthy_features", {}),
         ("trained_on", {}),
-        ("condition_ranges", {"nope": [0.0, 1.0]}),
+        ("conditions", [{"name": "a", "feature": "no", "unit": "", "low": 0.0, "high": 1.0}]),
+        ("mode", "warm"),
         ("condemning_limit_m", None),
         ("origin", "elsewhere"),
         ("features", []),
@@ -533,35 +498,13 @@ def test_holding_out_too_much_is_refused(small_set):
             train_model(small_set, held_out=share)
 
 
-def test_the_penalty_is_the_one_with_the_least_error_out_of_fold(monkeypatch):
-    from wearstate.diagnose import train
-
-    rng = np.random.default_rng(10)
-    features = rng.standard_normal((60, 20))
-    severity = np.exp(0.3 * features.sum(axis=1) / 3 + 0.05 * rng.standard_normal(60))
-    groups = np.arange(60)
-
-    def error(estimate):
-        return np.abs(np.exp(estimate) - severity).mean()
-
-    alone = []
-    for penalty in train._PENALTIES:
-        with monkeypatch.context() as patch:
-            patch.setattr(train, "_PENALTIES", (penalty,))
-            alone.append(error(fit_severity(features, severity, groups, seed=0)[1][0]))
-    assert max(alone) > 1.05 * min(alone)  # the choice matters here
-    assert error(fit_severity(features, severity, groups, seed=0)[1][0]) == min(alone)
-
-
 def test_within_one_grade_and_accuracy_are_those_of_the_confusion(trained):
     """Estimates four times too large: many grades are off by two."""
     model, table, test = trained
-    wrong = dataclasses.replace(
-        model,
-        regressor=dataclasses.replace(
-            model.regressor, offset=model.regressor.offset + float(np.log(4))
-        ),
-    )
+    part = next(part for part in model.severity.parts if part.log)
+    fourfold = dataclasses.replace(part, offset=part.offset + float(np.log(4)))
+    severity = Blend(names=("fourfold",), parts=(fourfold,), weights=np.ones(1), low=1e-6, high=1.0)
+    wrong = dataclasses.replace(model, severity=severity)
     result = score(wrong, table, test)
     counts = np.array(result["confusion"])
     near = sum(counts[i, j] for i in range(4) for j in range(4) if abs(i - j) <= 1)

@@ -17,12 +17,14 @@ from wearstate.datasets.record import Attributes, DataError, DataSet, DataSetWri
 from wearstate.datasets.split_file import (
     KINDS,
     Drawn,
+    Split,
     default_splits,
     drawn_of,
     machine_draws,
     make_split,
     split_names,
     store_splits,
+    usable_sides,
 )
 from wearstate.datasets.splits import (
     check_no_leak,
@@ -280,6 +282,54 @@ def test_damaged_sides_are_refused(path):
         file["splits/machine"][5] = 4
     with DataSet(path) as data, pytest.raises(DataError, match="must be -1, 0 or 1 for each of 40"):
         data.split("machine")
+
+
+def halves(name, train, test, *, apart=True):
+    return Split(name=name, kind="region", train=train, test=test, text="", machines_apart=apart)
+
+
+def test_sides_are_rows_of_the_usable_records(tmp_path):
+    path = write_set(tmp_path / "f.h5", failed=(0, 7, 30))
+    store_splits(path, [halves("half", np.arange(20), np.arange(20, N))])
+    with DataSet(path) as data:
+        sides = usable_sides(data, "half")
+    # records 0 and 7 are missing below 20, record 30 beyond: rows of a table of 37
+    assert_array_equal(sides.train, np.arange(18))
+    assert_array_equal(sides.test, np.arange(18, 37))
+    assert (sides.name, sides.machines_apart) == ("half", True)
+
+
+def test_sides_that_cannot_serve_are_refused(path):
+    with DataSet(path) as data:
+        group = data.manifest["group"].to_numpy()
+    second = np.append(False, group[1:] == group[:-1])
+    mixed = np.flatnonzero(~second), np.flatnonzero(second)
+    store_splits(
+        path,
+        [
+            halves("leaky", *mixed),
+            halves("meant", *mixed, apart=False),
+            halves("empty", np.arange(N), np.arange(0)),
+        ],
+    )
+    with DataSet(path) as data:
+        with pytest.raises(DataError, match=rf"{second.sum()} group\(s\) are on both sides"):
+            usable_sides(data, "leaky")
+        assert not usable_sides(data, "meant").machines_apart
+        with pytest.raises(DataError, match=r"split empty trains on 40 and tests on 0 usable"):
+            usable_sides(data, "empty")
+
+
+def test_the_hash_of_a_split_is_of_its_sides_and_signals(tmp_path):
+    def digest(file, seed, edge):
+        path = write_set(tmp_path / file, seed=seed)
+        store_splits(path, [halves("mine", np.arange(edge), np.arange(edge, N))])
+        with DataSet(path) as data:
+            return usable_sides(data, "mine").sha256
+
+    first, again = digest("a.h5", 3, 20), digest("b.h5", 3, 20)
+    assert first == again
+    assert len({first, digest("c.h5", 3, 22), digest("d.h5", 4, 20)}) == 3
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,563 @@
+"""Regressions of severity, from fast to strong, and the choice among them by cost and error.
+
+A candidate is one row of :data:`CANDIDATES`. What it fits is a part made of plain arrays, so that a
+model file holds numbers only, and a prediction needs no library but numpy.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import accumulate, pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Float = NDArray[np.float64]
+Index = NDArray[np.intp]
+Folds = Sequence[tuple[Index, Index]]
+
+_TREES = 100
+_LEAST_WEIGHT = 0.02  # of a blend: a part that says less is left out, and its time saved
+_TIE = 0.01  # of the error: a blend that is no better than this is not worth its time
+_FAR = 2.0  # estimates end this factor beyond the trained severities
+
+
+# --- fitted parts
+
+
+@dataclass(frozen=True, kw_only=True)
+class Linear:
+    """A target as a linear function of the features.
+
+    Attributes
+    ----------
+    centre, spread, weight : numpy.ndarray [shape=(n_features,)]
+        ``offset + sum(weight * (feature - centre) / spread)`` is the target, or its logarithm.
+    offset : float
+        At the centre.
+    log : bool
+        The logarithm was fitted.
+    """
+
+    centre: Float
+    spread: Float
+    weight: Float
+    offset: float
+    log: bool
+
+    def predict(self, rows: Float) -> Float:
+        """Target [shape=(n,)] of feature rows [shape=(n, n_features)]."""
+        value = (rows - self.centre) / self.spread @ self.weight + self.offset
+        return _back(np.asarray(value), self.log)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Forest:
+    """Regression trees, all in one table of nodes; their leaves add up.
+
+    Attributes
+    ----------
+    feature : numpy.ndarray [shape=(n_nodes,)]
+        Column that a node asks for.
+    threshold : numpy.ndarray [shape=(n_nodes,)]
+        The way leads to `left` where the feature, in single precision, is at most this.
+    left, right : numpy.ndarray [shape=(n_nodes,)]
+        Nodes that follow; a leaf follows itself.
+    value : numpy.ndarray [shape=(n_nodes,)]
+        What a leaf adds.
+    root : numpy.ndarray [shape=(n_trees,)]
+        First node of each tree.
+    depth : int
+        Steps from a root to the farthest leaf.
+    offset : float
+        Added to the sum of the leaves.
+    log : bool
+        The logarithm of the target was fitted.
+    """
+
+    feature: NDArray[np.intp]
+    threshold: Float
+    left: NDArray[np.intp]
+    right: NDArray[np.intp]
+    value: Float
+    root: NDArray[np.intp]
+    depth: int
+    offset: float
+    log: bool
+
+    def predict(self, rows: Float) -> Float:
+        """Target [shape=(n,)] of feature rows [shape=(n, n_features)]."""
+        single = np.asarray(rows, dtype=np.float32)  # as the trees were grown
+        place = np.arange(len(rows))[:, None]
+        node = np.repeat(self.root[None, :], len(rows), axis=0)
+        for _ in range(self.depth):
+            below = single[place, self.feature[node]] <= self.threshold[node]
+            node = np.where(below, self.left[node], self.right[node])
+        return _back(self.value[node].sum(axis=1) + self.offset, self.log)
+
+
+Part = Linear | Forest
+
+
+def _back(value: Float, log: bool) -> Float:
+    # e^50 is absurd enough, and finite
+    return np.exp(np.clip(value, -50.0, 50.0)) if log else value
+
+
+@dataclass(frozen=True, kw_only=True)
+class Blend:
+    """A weighted mean of parts.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Candidate that each part is of.
+    parts : tuple of Linear or Forest
+    weights : numpy.ndarray [shape=(n_parts,)]
+        Positive, of sum 1.
+    low, high : float
+        Estimates outside are set to the bound: a factor of two beyond what was trained, where an
+        estimate is a bound anyway.
+
+    Examples
+    --------
+    >>> one = np.ones(1)
+    >>> flat = Linear(centre=0 * one, spread=one, weight=one, offset=2.0, log=False)
+    >>> Blend(names=("a",), parts=(flat,), weights=np.ones(1), low=0.0, high=9.0).predict(
+    ...     np.array([[1.0], [50.0]])
+    ... ).tolist()
+    [3.0, 9.0]
+    """
+
+    names: tuple[str, ...]
+    parts: tuple[Part, ...]
+    weights: Float
+    low: float
+    high: float
+
+    def predict(self, rows: Float) -> Float:
+        """Target [shape=(n,)] of feature rows [shape=(n, n_features)]."""
+        found = np.stack([part.predict(rows) for part in self.parts], axis=1)
+        return np.clip(found @ self.weights, self.low, self.high)
+
+
+# --- candidates
+
+
+def _ridge(penalty: float, *, log: bool) -> Callable[[Float, Float, int], Part]:
+    def fit(rows: Float, target: Float, _seed: int) -> Part:
+        from sklearn.linear_model import Ridge
+        from sklearn.preprocessing import StandardScaler
+
+        scaler = StandardScaler().fit(rows)
+        ridge = Ridge(penalty).fit(scaler.transform(rows), np.log(target) if log else target)
+        return Linear(
+            centre=scaler.mean_,
+            spread=scaler.scale_,  # one where a feature is constant
+            weight=np.asarray(ridge.coef_, dtype=float),
+            offset=float(ridge.intercept_),
+            log=log,
+        )
+
+    return fit
+
+
+def _fit_trees(rows: Float, target: Float, seed: int) -> Part:
+    """Extremely randomised trees."""
+    from sklearn.ensemble import ExtraTreesRegressor
+
+    model = ExtraTreesRegressor(
+        _TREES, min_samples_leaf=2, max_features=0.2, random_state=seed
+    ).fit(rows.astype(np.float32), np.log(target))
+    tables = [
+        _Tree(
+            feature=tree.feature,
+            threshold=tree.threshold,
+            left=tree.children_left,
+            right=tree.children_right,
+            value=tree.value[:, 0, 0] / _TREES,
+            leaf=tree.children_left < 0,
+        )
+        for tree in (estimator.tree_ for estimator in model.estimators_)
+    ]
+    return _forest(tables, offset=0.0, log=True)
+
+
+def _fit_boosting(rows: Float, target: Float, seed: int) -> Part:
+    """Boosted trees over histograms of the features."""
+    from sklearn.ensemble import HistGradientBoostingRegressor
+
+    model = HistGradientBoostingRegressor(
+        max_iter=200, learning_rate=0.08, max_leaf_nodes=15, max_features=0.1, random_state=seed
+    ).fit(rows.astype(np.float32), np.log(target))
+    nodes = [step[0].nodes for step in model._predictors]  # no public way to the trees
+    tables = [
+        _Tree(
+            feature=table["feature_idx"].astype(np.intp),
+            threshold=table["num_threshold"],
+            left=table["left"].astype(np.intp),
+            right=table["right"].astype(np.intp),
+            value=table["value"],
+            leaf=table["is_leaf"].astype(bool),
+        )
+        for table in nodes
+    ]
+    return _forest(tables, offset=float(np.ravel(model._baseline_prediction)[0]), log=True)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Tree:
+    """Nodes of one tree, numbered from its root 0; of a leaf only the value counts."""
+
+    feature: NDArray[Any]
+    threshold: NDArray[Any]
+    left: NDArray[Any]
+    right: NDArray[Any]
+    value: NDArray[Any]
+    leaf: NDArray[np.bool_]
+
+
+def _forest(tables: Sequence[_Tree], *, offset: float, log: bool) -> Forest:
+    starts = [0, *accumulate(len(tree.value) for tree in tables)]
+    itself = [np.arange(a, b) for a, b in pairwise(starts)]
+
+    def joined(pick: Callable[[_Tree, int], NDArray[Any]]) -> NDArray[Any]:
+        return np.concatenate([pick(tree, i) for i, tree in enumerate(tables)])
+
+    return Forest(
+        feature=joined(lambda tree, _: np.where(tree.leaf, 0, tree.feature)).astype(np.intp),
+        threshold=joined(lambda tree, _: np.where(tree.leaf, 0.0, tree.threshold)),
+        left=joined(lambda tree, i: np.where(tree.leaf, itself[i], tree.left + starts[i])),
+        right=joined(lambda tree, i: np.where(tree.leaf, itself[i], tree.right + starts[i])),
+        value=joined(lambda tree, _: np.where(tree.leaf, tree.value, 0.0)),
+        root=np.array(starts[:-1], dtype=np.intp),
+        depth=max(_depth(tree) for tree in tables),
+        offset=offset,
+        log=log,
+    )
+
+
+def _depth(tree: _Tree) -> int:
+    level, found = np.zeros(1, dtype=np.intp), 0
+    while not tree.leaf[level].all():
+        inner = level[~tree.leaf[level]]
+        level, found = np.concatenate([tree.left[inner], tree.right[inner]]), found + 1
+    return found
+
+
+@dataclass(frozen=True, kw_only=True)
+class Candidate:
+    """One way to fit a target.
+
+    Attributes
+    ----------
+    name : str
+    cost_ms : float
+        Of one prediction [ms].
+    fit : callable
+        ``fit(rows, target, seed)`` gives the part; the target is > 0.
+    """
+
+    name: str
+    cost_ms: float
+    fit: Callable[[Float, Float, int], Part]
+
+
+_PENALTIES = (3.0, 30.0, 300.0)  # of ridges on standardised features
+_LINES = len(_PENALTIES)
+
+CANDIDATES: tuple[Candidate, ...] = (
+    *(
+        Candidate(name=f"ridge {penalty:g}", cost_ms=0.02, fit=_ridge(penalty, log=True))
+        for penalty in _PENALTIES
+    ),
+    *(
+        Candidate(name=f"plain ridge {penalty:g}", cost_ms=0.02, fit=_ridge(penalty, log=False))
+        for penalty in _PENALTIES
+    ),
+    Candidate(name="trees", cost_ms=0.4, fit=_fit_trees),
+    Candidate(name="boosting", cost_ms=0.4, fit=_fit_boosting),
+)
+"""From fast to strong, lines of the logarithm first. The costs are tabulated, not timed at each
+training, so that the choice is the same on every computer: measured for one recording of 1,500
+features on one core of 2.5 GHz."""
+
+BUDGET_MS = 5.0
+"""Time that a prediction may take unless told otherwise [ms]."""
+
+
+# --- the choice
+
+
+@dataclass(frozen=True, kw_only=True)
+class Option:
+    """A candidate alone, or a blend of the first few, with what it costs and how it errs.
+
+    Attributes
+    ----------
+    name : str
+    members : tuple of int
+        Places in the list of candidates.
+    cost_ms : float
+        Of one prediction [ms].
+    error : float
+        Mean absolute error on groups that had no part in the fit [unit of the target].
+    on_front : bool
+        No other option is as cheap and better.
+    """
+
+    name: str
+    members: tuple[int, ...]
+    cost_ms: float
+    error: float
+    on_front: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fitted:
+    """A chosen blend with its behaviour on groups that it had not seen.
+
+    Attributes
+    ----------
+    blend : Blend
+        Fitted on all records.
+    estimate : numpy.ndarray [shape=(n,)]
+        Estimates of every record by parts, weights and choice that its group had no part in.
+    options : tuple of Option
+        All that was looked at, within the budget or not.
+    chosen : str
+        Name of the option.
+    """
+
+    blend: Blend
+    estimate: Float
+    options: tuple[Option, ...]
+    chosen: str
+
+    @property
+    def members(self) -> dict[str, float]:
+        """Weight of each candidate of the blend."""
+        return dict(zip(self.blend.names, self.blend.weights.tolist(), strict=True))
+
+
+def fit_blend(
+    rows: Float,
+    target: Float,
+    folds: Folds,
+    *,
+    seed: int = 0,
+    budget_ms: float | None = None,
+    candidates: Sequence[Candidate] = CANDIDATES,
+) -> Fitted:
+    """Fit every affordable candidate and keep the best of them, or a blend.
+
+    Parameters
+    ----------
+    rows : numpy.ndarray [shape=(n, n_features)]
+    target : numpy.ndarray [shape=(n,)]
+        > 0.
+    folds : sequence of (numpy.ndarray, numpy.ndarray)
+        Records to fit on and to judge on; no group is on both sides.
+    seed : int
+        Of the trees.
+    budget_ms : float, optional
+        Time that one prediction may take [ms]; :data:`BUDGET_MS` unless given.
+    candidates : sequence of Candidate
+        From fast to strong.
+
+    Returns
+    -------
+    Fitted
+
+    Raises
+    ------
+    ValueError
+        No candidate is within the budget.
+
+    Notes
+    -----
+    Each candidate is fitted once per fold, which gives every record an estimate of each that it
+    had no part in. Weights (least squares, none negative) and choice for a fold are then made
+    from the estimates in the other folds, so the error of the whole, choice included, is that of
+    unseen groups; only a handful of weights has met them through the fits behind those
+    estimates. The choice is the cheapest option within one per cent of the least error.
+
+    References
+    ----------
+    L. Breiman, "Stacked regressions", Machine Learning 24 (1996) 49-64,
+    doi:10.1007/BF00117832; M. van der Laan, E. Polley, A. Hubbard, "Super learner", Stat. Appl.
+    Genet. Mol. Biol. 6 (2007) 25, doi:10.2202/1544-6115.1309.
+
+    Examples
+    --------
+    >>> rng = np.random.default_rng(0)
+    >>> rows = rng.standard_normal((60, 3))
+    >>> folds = [(np.r_[0:30], np.r_[30:60]), (np.r_[30:60], np.r_[0:30])]
+    >>> found = fit_blend(rows, np.exp(rows[:, 0]), folds, candidates=CANDIDATES[:2])
+    >>> found.chosen
+    'ridge 3'
+    """
+    limit = BUDGET_MS if budget_ms is None else budget_ms
+    usable = [item for item in candidates if item.cost_ms <= limit]
+    if not usable:
+        cheapest = min(candidate.cost_ms for candidate in candidates)
+        raise ValueError(
+            f"budget_ms = {limit:g} ms must be >= {cheapest:g} ms, the cheapest model; raise it"
+        )
+    bounds = (float(target.min()) / _FAR, float(target.max()) * _FAR)
+    table = np.column_stack(
+        [np.clip(_out_of_fold(item, rows, target, folds, seed), *bounds) for item in usable]
+    )
+    return _chosen(usable, table, rows, target, folds, seed=seed, limit=limit, bounds=bounds)
+
+
+def fit_line(rows: Float, target: Float, options: Sequence[Option], *, seed: int = 0) -> Linear:
+    """Fit the best of the straight lines among the candidates.
+
+    Parameters
+    ----------
+    rows, target, seed
+        As of :func:`fit_blend`.
+    options : sequence of Option
+        What it found; a line is within every budget.
+
+    Returns
+    -------
+    Linear
+        Of the logarithm of the target: it can be told at any size.
+    """
+    lines = {candidate.name: candidate for candidate in CANDIDATES[:_LINES]}
+    best = min((o for o in options if o.name in lines), key=lambda option: option.error)
+    part = lines[best.name].fit(rows, target, seed)
+    assert isinstance(part, Linear)
+    return part
+
+
+def _out_of_fold(
+    candidate: Candidate, rows: Float, target: Float, folds: Folds, seed: int
+) -> Float:
+    estimate = np.empty(len(target))
+    for train, test in folds:
+        estimate[test] = candidate.fit(rows[train], target[train], seed).predict(rows[test])
+    return estimate
+
+
+def _chosen(
+    usable: Sequence[Candidate],
+    table: Float,
+    rows: Float,
+    target: Float,
+    folds: Folds,
+    *,
+    seed: int,
+    limit: float,
+    bounds: tuple[float, float],
+) -> Fitted:
+    names = _option_members(usable)
+    crossed = {name: _crossed(table[:, m], target, folds) for name, m in names.items()}
+    everyone = np.arange(len(target))
+    options = _options(usable, names, crossed, target, everyone)
+    best = _best(options, limit)
+    estimate = np.empty(len(target))
+    for train, test in folds:
+        pick = _best(_options(usable, names, crossed, target, train), limit)
+        estimate[test] = crossed[pick.name][test]
+    weights = blend_weights(table[:, list(best.members)], target)
+    kept = np.flatnonzero(weights)
+    members = [usable[best.members[i]] for i in kept]
+    blend = Blend(
+        names=tuple(item.name for item in members),
+        parts=tuple(item.fit(rows, target, seed) for item in members),
+        weights=weights[kept],
+        low=bounds[0],
+        high=bounds[1],
+    )
+    return Fitted(blend=blend, estimate=estimate, options=_front(options), chosen=best.name)
+
+
+def _option_members(usable: Sequence[Candidate]) -> dict[str, tuple[int, ...]]:
+    """Every candidate alone, and the blends of all up to each price."""
+    alone = {item.name: (i,) for i, item in enumerate(usable)}
+    prices = sorted({item.cost_ms for item in usable})
+    groups = [tuple(i for i, c in enumerate(usable) if c.cost_ms <= price) for price in prices]
+    return alone | {f"blend of {len(group)}": group for group in groups if len(group) > 1}
+
+
+def _crossed(table: Float, target: Float, folds: Folds) -> Float:
+    """Blend of out-of-fold estimates, the weights of each fold from the other folds."""
+    estimate = np.empty(len(target))
+    for train, test in folds:
+        estimate[test] = table[test] @ blend_weights(table[train], target[train])
+    return estimate
+
+
+def _options(
+    usable: Sequence[Candidate],
+    names: dict[str, tuple[int, ...]],
+    crossed: dict[str, Float],
+    target: Float,
+    where: Index,
+) -> list[Option]:
+    return [
+        Option(
+            name=name,
+            members=members,
+            cost_ms=sum(usable[i].cost_ms for i in members),
+            error=float(np.abs(crossed[name][where] - target[where]).mean()),
+        )
+        for name, members in names.items()
+    ]
+
+
+def _best(options: Sequence[Option], limit: float) -> Option:
+    """Cheapest within the tie of the least error; of equally cheap ones the better."""
+    within = [option for option in options if option.cost_ms <= limit]
+    least = min(option.error for option in within)
+    close = [option for option in within if option.error <= (1 + _TIE) * least]
+    return min(close, key=lambda option: (option.cost_ms, option.error))
+
+
+def _front(options: Sequence[Option]) -> tuple[Option, ...]:
+    from dataclasses import replace
+
+    return tuple(
+        replace(
+            one,
+            on_front=not any(
+                (o.cost_ms <= one.cost_ms and o.error < one.error)
+                or (o.cost_ms < one.cost_ms and o.error <= one.error)
+                for o in options
+            ),
+        )
+        for one in options
+    )
+
+
+def blend_weights(table: Float, target: Float) -> Float:
+    """Weights of estimates, none negative and of sum 1, with the least squares of the error.
+
+    Parameters
+    ----------
+    table : numpy.ndarray [shape=(n, n_estimates)]
+    target : numpy.ndarray [shape=(n,)]
+
+    Returns
+    -------
+    numpy.ndarray [shape=(n_estimates,)]
+        Weights below 2 % are set to 0.
+
+    Examples
+    --------
+    >>> truth = np.array([1.0, 2.0, 3.0, 4.0])
+    >>> blend_weights(np.column_stack([truth + [1, -1, 1, -1], truth - [1, -1, 1, -1]]), truth)
+    array([0.5, 0.5])
+    """
+    from scipy.optimize import nnls
+
+    if table.shape[1] == 1:
+        return np.ones(1)
+    # one heavy equation holds the sum at 1
+    heavy = 1e3 * float(np.abs(target).max()) * np.sqrt(len(target))
+    weights, _ = nnls(np.vstack([table, np.full(table.shape[1], heavy)]), np.append(target, heavy))
+    weights = np.where(weights >= _LEAST_WEIGHT * weights.sum(), weights, 0.0)
+    return np.asarray(weights / weights.sum())

@@ -1,0 +1,276 @@
+"""The physical space, and how far a recording lies from the familiar."""
+
+import numpy as np
+import pytest
+from wearstate.datasets.record import DataSet
+from wearstate.diagnose.novelty import fit_familiarity, novelty_p_value
+from wearstate.diagnose.physical import (
+    columns_of,
+    coordinates_of,
+    level_rows,
+    moved_rows,
+    physical_rows,
+    shape_rows,
+)
+from wearstate.diagnose.tabulate import recording_features
+from wearstate.features.table import feature_names, feature_row
+
+NAMES = tuple(f"a.shape_{i}" for i in range(40))
+"""Features that the physical space takes as they are."""
+
+
+def cloud_of(rows):
+    return fit_familiarity(NAMES[: rows.shape[1]], rows, np.arange(len(rows)))
+
+
+def distances(cloud, rows):
+    return cloud.distance(NAMES[: rows.shape[1]], rows)
+
+
+# --- the physical space
+
+
+def test_every_feature_of_the_row_has_its_place_once():
+    names = feature_names(["x", "y"], 25_600.0)
+    owners = columns_of(names)
+    found = [
+        i
+        for columns in owners.values()
+        for part in ("level", "bands", "orders", "spiky", "again", "other", "cells")
+        for i in getattr(columns, part)
+    ]
+    left = {names[i] for i in set(range(len(names))) - set(found)}
+    assert sorted(found) == sorted(set(found))
+    assert left == {"shaft.speed_hz", "shaft.speed_variation"}
+    assert owners["x"].angles == 36
+    assert len(owners["x"].cells) == 720
+
+
+@pytest.fixture(scope="module")
+def recording(small_set):
+    with DataSet(small_set) as data:
+        return data[0]
+
+
+def test_the_space_knows_no_level(recording):
+    rng = np.random.default_rng(0)
+    noise = rng.standard_normal((2, 40_000))
+    tacho = (np.arange(40_000) % 5_000 < 100).astype(float)
+    names, row = feature_row(noise, 25_600.0, tacho=tacho, channel_names=["x", "y"])
+    _, louder = feature_row(9.80665 * noise, 25_600.0, tacho=tacho, channel_names=["x", "y"])
+    for space in (physical_rows, shape_rows):
+        # sums over thousands of samples in other magnitudes: rounding only
+        np.testing.assert_allclose(space(names, row[None]), space(names, louder[None]), atol=1e-8)
+    lift = level_rows(names, louder[None]) - level_rows(names, row[None])
+    np.testing.assert_allclose(lift, 20 * np.log10(9.80665), rtol=1e-9)
+
+
+def test_a_resonance_that_moves_by_a_fifth_moves_the_space_less_than_the_row():
+    """White noise through one resonator, at 3 and at 3.6 kHz: narrow bands jump, wide ones lean."""
+    from scipy.signal import iirpeak, lfilter
+
+    noise = np.random.default_rng(1).standard_normal(100_000)
+    names, rows = None, []
+    for centre in (3000.0, 3600.0):
+        wave = lfilter(*iirpeak(centre, 20, fs=25_600.0), noise) + 0.03 * noise
+        names, row = feature_row(wave, 25_600.0, channel_names=["x"])
+        rows.append(row)
+    rows = np.array(rows)
+    bands = [i for i, name in enumerate(names) if ".band_" in name]
+    narrow = np.abs(np.diff(rows[:, bands], axis=0)).max()
+    wide = np.abs(np.diff(physical_rows(names, rows)[:, :5], axis=0)).max()
+    assert narrow > 10  # dB
+    assert wide < 0.6 * narrow
+
+
+BANDS = tuple(f"{a}.band_{50 * 2**i}_{100 * 2**i}.level_db" for a in "xy" for i in range(8))
+"""Two channels of eight octaves."""
+
+
+def test_moved_spectra_are_those_of_the_moved_resonance():
+    """A spectrum given as a function of frequency, moved by the function's own argument."""
+
+    def spectrum(hertz):  # quadratic in the logarithm: linear interpolation errs by its curvature
+        return -3.0 * np.log2(hertz / 1000) ** 2
+
+    middle = np.sqrt(2) * 50 * 2.0 ** np.arange(8)
+    row = np.tile(spectrum(middle), 2)[None]
+    inner = np.r_[1:7, 9:15]  # the ends are held: what comes from beyond is not known
+    for factor in (1 / 1.2, 1.2):
+        moved = moved_rows(BANDS, row, factor)[0]
+        # a quarter octave between points one octave apart: 3 x 2 x .26 x .74 / 2 = 0.6 dB at most
+        wanted = np.tile(spectrum(middle / factor), 2)
+        np.testing.assert_allclose(moved[inner], wanted[inner], atol=0.6)
+    assert moved_rows(BANDS, row, 2.0)[0, 1:8] == pytest.approx(row[0, :7])
+    assert np.array_equal(moved_rows(BANDS, row, 1.0), row)
+
+
+def test_every_coordinate_has_an_owner_and_a_kind(recording):
+    names, row = recording_features(recording)
+    found = coordinates_of(names)
+    assert found.owner.shape == found.kind.shape == physical_rows(names, row[None])[0].shape
+    assert set(found.owner) == {"acc_x", "acc_y", "acc_x_over_acc_y"}
+    assert set(found.kind) == {"profile", "wide", "orders", "spiky", "other"}
+    assert np.count_nonzero(found.kind == "profile") == 2 * 18
+
+
+def test_a_turn_of_the_profile_is_seen(recording):
+    """The same energy a quarter turn later is another machine."""
+    names, row = recording_features(recording)
+    cells = columns_of(names)["acc_x"].cells
+    turned = row.copy()
+    turned[cells] = np.roll(row[cells].reshape(36, -1), 9, axis=0).ravel()
+    apart = physical_rows(names, np.array([row, turned]))
+    assert np.abs(np.diff(apart, axis=0)).max() > 3  # dB
+
+
+def test_silence_has_a_place_too():
+    tacho = (np.arange(40_000) % 5_000 < 100).astype(float)
+    names, row = feature_row(np.zeros((2, 40_000)), 25_600.0, tacho=tacho)
+    for space in (physical_rows, shape_rows, level_rows):
+        assert np.isfinite(space(names, row[None])).all()
+
+
+# --- the distance
+
+
+def test_a_training_recording_is_one_away():
+    """The mean square over coordinates of variance one, for any covariance."""
+    rng = np.random.default_rng(2)
+    rows = rng.standard_normal((4000, 10)) @ rng.standard_normal((10, 10))
+    distance = distances(cloud_of(rows), rows)
+    # 40,000 squares: the mean is known to 0.7 %; shrinking the covariance adds as little
+    assert np.sqrt((distance**2).mean()) == pytest.approx(1.0, abs=0.03)
+
+
+def test_it_is_the_mahalanobis_distance_where_nothing_needs_shrinking():
+    rng = np.random.default_rng(3)
+    mixing = rng.standard_normal((3, 3))
+    rows = rng.standard_normal((20_000, 3)) @ mixing
+    points = rng.standard_normal((20, 3))
+    inverse = np.linalg.inv(mixing.T @ mixing)
+    wanted = np.sqrt(np.einsum("ij,jk,ik->i", points, inverse, points) / 3)
+    # the covariance of 20,000 is known to 1 %, its inverse along the least axis to some more
+    np.testing.assert_allclose(distances(cloud_of(rows), points), wanted, rtol=0.05)
+
+
+def test_familiarity_sees_what_leaves_the_cloud_in_a_direction_it_never_took():
+    rng = np.random.default_rng(4)
+    flat = np.column_stack([rng.standard_normal((200, 2)), 1e-3 * rng.standard_normal(200)])
+    inside, outside = distances(cloud_of(flat), np.array([[1.0, 1.0, 0.0], [0.0, 0.0, 0.1]]))
+    # 100 standard deviations, clipped at ten, in one feature of three
+    assert outside > 5 * inside
+
+
+def test_familiarity_sees_usual_values_in_an_unusual_combination():
+    """Forty features driven by five causes: a recording that no causes can make."""
+    rng = np.random.default_rng(12)
+    mixing = rng.standard_normal((5, 40))
+    seen = rng.standard_normal((300, 5)) @ mixing + 0.01 * rng.standard_normal((300, 40))
+    cloud = cloud_of(seen)
+    usual = rng.standard_normal((1, 5)) @ mixing
+    shuffled = rng.permutation(usual[0])[None, :]  # the same values, at other features
+    assert np.abs((shuffled - cloud.centre) / cloud.spread).max() < 5
+    # Along the five causes it may lie anywhere near; off them by the noise's 0.01 it should.
+    assert distances(cloud, shuffled)[0] > 10 * distances(cloud, usual)[0]
+
+
+def test_one_wild_feature_counts_as_ten_standard_deviations_and_no_more():
+    rng = np.random.default_rng(11)
+    cloud = cloud_of(rng.standard_normal((300, 40)))
+    point = np.zeros((3, 40))
+    point[:, 0] = [12.0, 1e3, 1e9]
+    found = distances(cloud, point)
+    assert found[0] == found[1] == found[2]
+
+
+def resonant(centre, rng):
+    """Band levels of machines with one resonance each, at `centre` times 500 Hz."""
+    middle = np.sqrt(2) * 50 * 2.0 ** np.arange(8)
+    octaves = np.log2(middle / (500 * centre[:, None]))
+    levels = np.tile(-10 * np.log10(1 + (2 * octaves) ** 2), 2)
+    return levels + 0.5 * rng.standard_normal(levels.shape)
+
+
+def test_a_resonance_a_fifth_off_is_still_of_the_kind_and_one_an_octave_off_is_not():
+    """Trained on resonances within 3 %: what another machine of the kind may have is near."""
+    rng = np.random.default_rng(7)
+    known = resonant(rng.uniform(0.97, 1.03, 600), rng)
+    cloud = fit_familiarity(BANDS, known, np.arange(600))
+    centres = {"same": 1.0, "lower": 1 / 1.2, "higher": 1.2, "octave": 2.0}
+    found = {
+        name: np.median(cloud.distance(BANDS, resonant(np.full(50, centre), rng)))
+        for name, centre in centres.items()
+    }
+    # The ends of a uniform distribution are 1.7 standard deviations out, and interpolating between
+    # octaves errs by as much again; without the tolerance they are 3 and 5 times as far.
+    assert found["lower"] < 2.5 * found["same"]
+    assert found["higher"] < 2.5 * found["same"]
+    assert found["octave"] > 5 * found["same"]
+
+
+KINDS = (
+    *(f"a.order_{i:02d}.level_db" for i in range(1, 11)),
+    *(f"a.shape_{i}" for i in range(10)),
+    *(f"a.peak_{i}.kurtosis" for i in range(10)),
+)
+
+
+def test_odd_in_every_way_is_farther_than_very_odd_in_one():
+    """The mean over the ways of looking, not over all coordinates."""
+    rng = np.random.default_rng(8)
+
+    def rows(n, size):
+        orders, other, spiky = (s * rng.standard_normal((n, 10)) for s in size)
+        return np.hstack([orders, other, np.exp(spiky)])
+
+    cloud = fit_familiarity(KINDS, rows(3000, (1, 1, 1)), np.arange(3000))
+    one, every = (
+        np.median(cloud.distance(KINDS, rows(200, size))) for size in ((1, 4, 1), (2.5, 2.5, 2.5))
+    )
+    # the root mean square over all would be sqrt((1 + 16 + 1) / 3) = 2.45 and 2.5. Means: 2 and
+    # 2.5; one order is told by the others (their mean is taken out), which adds a few per cent
+    assert one == pytest.approx(2.0, rel=0.08)
+    assert every == pytest.approx(2.5, rel=0.08)
+
+
+def test_what_hangs_on_no_rate_leaves_the_bands_out():
+    rng = np.random.default_rng(9)
+    names = (*BANDS, "x.skewness", "y.skewness")
+    rows = np.hstack([resonant(np.ones(400), rng), rng.standard_normal((400, 2))])
+    cloud = fit_familiarity(names, rows, np.arange(400))
+    lost, odd = rows[0].copy(), rows[0].copy()
+    lost[4:8] -= 40  # the upper bands of a channel
+    odd[-2:] = 6.0
+    whole = cloud.free_distance(names, rows[0])
+    assert cloud.free_distance(names, lost) == pytest.approx(whole, rel=1e-12)
+    assert cloud.free_distance(names, odd) > 5  # six standard deviations in both of two
+    assert cloud.distance(names, lost[None])[0] > 2 * cloud.distance(names, rows[:1])[0]
+    only_bands = fit_familiarity(BANDS, rows[:, :16], np.arange(400))
+    assert np.isnan(only_bands.free_distance(BANDS, rows[0, :16]))
+
+
+def test_familiarity_survives_constant_features():
+    rng = np.random.default_rng(5)
+    cloud = cloud_of(np.column_stack([rng.standard_normal(50), np.full(50, 7.0)]))
+    assert np.isfinite(distances(cloud, np.array([[0.0, 7.0], [0.0, 8.0]]))).all()
+
+
+def test_the_nearest_machine_is_the_one_it_comes_from():
+    rng = np.random.default_rng(6)
+    groups = np.repeat(np.arange(100, 130), 4)
+    own = rng.standard_normal((30, 10))
+    rows = own[groups - 100] + 0.1 * rng.standard_normal((120, 10))
+    cloud = fit_familiarity(NAMES[:10], rows, groups)
+    found = [cloud.nearest(NAMES[:10], row + 0.1 * rng.standard_normal(10))[0] for row in rows]
+    assert np.mean(np.array(found) == groups) > 0.95
+    group, distance = cloud.nearest(NAMES[:10], rows[groups == 107].mean(axis=0))
+    assert group == 107
+    assert distance == pytest.approx(0, abs=1e-9)
+
+
+def test_p_value_of_familiar_recordings_is_uniform():
+    rng = np.random.default_rng(3)
+    values = [novelty_p_value(d[0], d[1:]) for d in rng.standard_normal((4000, 100))]
+    # a conformal p-value is uniform on k/100; 4 standard errors of the share are 0.019
+    assert np.mean(np.array(values) <= 0.1) == pytest.approx(0.1 * 100 / 101, abs=0.02)

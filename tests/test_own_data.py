@@ -1,0 +1,235 @@
+"""Recordings of your own: brought to one rate, named conditions learnt, judged by recording."""
+
+import glob
+import json
+import re
+import shlex
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from wearstate.datasets.import_set import import_recordings
+from wearstate.datasets.labels import read_labels
+from wearstate.datasets.record import DataError, DataSet
+from wearstate.datasets.sources import SourceOptions, open_source
+from wearstate.diagnose.cli import cli
+from wearstate.diagnose.estimate import ModelError
+from wearstate.diagnose.modelfile import load_model
+from wearstate.diagnose.own import evaluate_classes, set_of, train_classes
+from wearstate.diagnose.ownfile import load_class_model, save_class_model
+
+RATE = 4000.0
+
+
+def tone(path, hz, rate, seconds=1.0):
+    n = round(seconds * rate)
+    np.save(path, np.sin(2 * np.pi * hz * np.arange(n) / rate)[None, :])
+    return path
+
+
+@pytest.mark.parametrize(("rate", "to"), [(8000.0, 4000.0), (10_000.0, 4000.0), (6000.0, 4000.0)])
+def test_a_tone_keeps_its_samples_at_another_rate(tmp_path, rate, to):
+    """Against the closed form: the same sine sampled at the new rate."""
+    path = tone(tmp_path / "x.npy", 700.0, rate)
+    with open_source(path, SourceOptions(fs=rate, unit="m/s^2", resample_to=to)) as source:
+        whole = source.read()[0]
+        piece = source.read(1001, 1502)[0]
+        assert source.sample_rate == to
+        assert source.conditions["sample_rate_in_file_hz"] == rate
+    wanted = np.sin(2 * np.pi * 700.0 * np.arange(len(whole)) / to)
+    # the filter's ripple of 80 dB; its length fades the ends
+    assert np.abs(whole - wanted)[100:-100].max() < 2e-4
+    assert np.allclose(piece, whole[1001:1502], atol=1e-12)  # rounding
+
+
+@pytest.mark.parametrize(("hz", "least", "most"), [(1800.0, 0.998, 1.002), (2100.0, 0, 2e-4)])
+def test_what_the_new_rate_cannot_hold_is_gone_and_the_rest_is_kept(tmp_path, hz, least, most):
+    path = tone(tmp_path / "x.npy", hz, 8000.0)
+    with open_source(path, SourceOptions(fs=8000.0, unit="m/s^2", resample_to=4000.0)) as source:
+        level = np.sqrt(2) * source.read()[0][200:-200].std()
+    assert least <= level <= most  # 0.01 dB in the band, 80 dB beyond
+
+
+@pytest.mark.parametrize(
+    ("to", "text"),
+    [(9000.0, "must be <= its rate 8000 Hz"), (7999.0, "ratio of whole numbers"), (-1.0, "> 0")],
+)
+def test_rates_that_cannot_be_had_are_refused(tmp_path, to, text):
+    path = tone(tmp_path / "x.npy", 700.0, 8000.0)
+    with pytest.raises(DataError, match=text):
+        open_source(path, SourceOptions(fs=8000.0, unit="g", resample_to=to))
+
+
+def test_a_tacho_is_not_resampled(tmp_path):
+    path = tone(tmp_path / "x.npy", 700.0, 8000.0)
+    options = SourceOptions(fs=8000.0, unit="g", channels=("t",), resample_to=4000.0)
+    with pytest.raises(DataError, match="smear"):
+        import_recordings([path], tmp_path / "o.h5", options=options, tacho="t")
+
+
+# --- named conditions ---------------------------------------------------------------------------
+
+
+def made(folder, name, *, seed, hz, n=4, rate=RATE):
+    """Files of noise in which a resonance rings; the machines differ in level."""
+    rng = np.random.default_rng(seed)
+    paths = []
+    for i in range(n):
+        x = rng.standard_normal(round(2 * rate))
+        t = np.arange(round(0.05 * rate)) / rate
+        ring = np.exp(-200 * t) * np.sin(2 * np.pi * hz * t)
+        x = rng.uniform(0.5, 2.0) * (np.convolve(x, ring)[: len(x)] + 0.1 * x)
+        np.save(folder / f"{name}_{i}.npy", x[None, :])
+        paths.append(folder / f"{name}_{i}.npy")
+    return paths
+
+
+def own_set(folder, kinds, *, name="own.h5", seed=0):
+    """Data set of recordings by kind -> frequency of the resonance [Hz]."""
+    files = {kind: made(folder, kind, seed=seed + i, hz=hz) for i, (kind, hz) in enumerate(kinds)}
+    table = folder / "labels.csv"
+    rows = [f"{path.name},{kind}" for kind, paths in files.items() for path in paths]
+    table.write_text("file,condition\n" + "\n".join(rows) + "\n")
+    import_recordings(
+        [path for paths in files.values() for path in paths],
+        folder / name,
+        options=SourceOptions(fs=RATE, unit="m/s^2", channels=("acc",)),
+        labels=read_labels(table),
+        segment=0.5,
+        force=True,
+    )
+    return folder / name
+
+
+KINDS = (("cracked", 900.0), ("sound", 500.0))
+
+
+@pytest.fixture(scope="module")
+def trained(tmp_path_factory):
+    path = own_set(tmp_path_factory.mktemp("own"), KINDS)
+    return path, *train_classes(path, target="condition", seed=0)
+
+
+def test_conditions_that_differ_are_told_apart_by_recordings_left_out(trained):
+    _path, model, result = trained
+    assert model.classes == ("cracked", "sound")
+    assert (result["recordings_right"], result["recordings_judged"]) == (8, 8)
+    # of 8 recordings nobody can say more than this, however right they are
+    assert result["recordings_interval"][0] == pytest.approx(0.025 ** (1 / 8))
+    # four recordings of a class promise 4 / 5 at most
+    assert result["nominal_coverage"] == {"cracked": 0.8, "sound": 0.8}
+    json.dumps(result, allow_nan=False)
+
+
+def test_conditions_that_do_not_differ_are_not_told_apart(tmp_path):
+    """Windows of one recording are alike, which must be of no help."""
+    path = own_set(tmp_path, (("a", 700.0), ("b", 700.0)), seed=5)
+    _model, result = train_classes(path, target="condition", seed=0)
+    assert result["accuracy"] < 0.85
+    assert result["recordings_right"] <= 6  # 7 or 8 of 8 by chance: 9 in 256
+
+
+def test_the_file_gives_the_same_answers_and_the_seed_the_same_bytes(trained, tmp_path):
+    path, model, _result = trained
+    save_class_model(model, tmp_path / "a.wsm")
+    again, _ = train_classes(path, target="condition", seed=0)
+    save_class_model(again, tmp_path / "b.wsm")
+    assert (tmp_path / "a.wsm").read_bytes() == (tmp_path / "b.wsm").read_bytes()
+    read = load_class_model(tmp_path / "a.wsm")
+    with DataSet(path) as data:
+        assert read.estimate(data[0]) == model.estimate(data[0])
+        assert read.estimate(data[0]).name == "cracked"
+    with pytest.raises(ModelError, match="is a class model, must be a wear model"):
+        load_model(tmp_path / "a.wsm")
+
+
+def test_a_recording_of_something_else_is_unfamiliar(trained, tmp_path):
+    model = trained[1]
+    other = own_set(tmp_path, (("hum", 100.0), ("hiss", 1700.0)), seed=9)
+    with DataSet(other) as data:
+        verdicts = [model.estimate(data[i]).verdict for i in range(len(data))]
+    assert verdicts.count("unfamiliar") >= 0.9 * len(verdicts)
+
+
+def test_new_recordings_are_judged_and_known_ones_are_not(trained, tmp_path):
+    path, model, _result = trained
+    fresh = own_set(tmp_path, KINDS, seed=20)
+    result = evaluate_classes(model, fresh)
+    assert (result["recordings"], result["recordings_right"]) == (8, 8)
+    with pytest.raises(DataError, match="has not seen"):
+        evaluate_classes(model, path)
+
+
+def run(*arguments, code=0):
+    result = CliRunner().invoke(cli, [str(argument) for argument in arguments])
+    assert result.exit_code == code, result.output + repr(result.exception)
+    return result
+
+
+def test_the_report_names_one_or_many_and_refuses_what_is_of_wear(trained, tmp_path):
+    path, model, _result = trained
+    save_class_model(model, tmp_path / "a.wsm")
+    common = ("--model", tmp_path / "a.wsm")
+    one = run("report", path, "--record", 1, *common).stdout
+    assert one.startswith("cracked; cannot be excluded: cracked")
+    with DataSet(path) as data:
+        names = [model.estimate(item).name for item in data]
+    lines = [
+        json.loads(line) for line in run("report", path, *common, "--json").stdout.splitlines()
+    ]
+    assert [line["name"] for line in lines] == names
+    assert lines[1]["recording"] == f"{path.name}[1]"
+    folder = tmp_path / "folder"
+    folder.mkdir()
+    (folder / "cut.h5").write_bytes(path.read_bytes()[:5000])
+    assert "cut.h5: unusable: file cannot be read" in run("report", folder, *common, code=2).stdout
+    said = run("report", path, *common, "--fail-on", "alarm", "--trend", code=2).stderr
+    assert "names conditions and knows no wear: leave --fail-on, --trend out" in said
+
+
+def test_labels_that_cannot_be_learnt_are_refused(trained, tmp_path):
+    with pytest.raises(DataError, match="target = 'kind' must be one of its columns"):
+        train_classes(trained[0], target="kind")
+    with pytest.raises(DataError, match="is a column of fractions"):
+        train_classes(trained[0], target="start_s")
+    alone = own_set(tmp_path, (("a", 700.0),))
+    with pytest.raises(DataError, match=r"1 classes of >= 3 recordings \(4 of a\), must be >= 2"):
+        train_classes(alone, target="condition")
+
+
+def test_a_set_is_never_empty():
+    assert set_of(np.array([0.4, 0.3, 0.3]), np.array([0.9, 0.9, 0.9])) == (0,)
+
+
+def blocks(page, kind):
+    """Contents of the blocks of code of one kind."""
+    found = re.findall(r"^```(\w*)\n(.*?)^```$", page, flags=re.DOTALL | re.MULTILINE)
+    return [text for name, text in found if name == kind]
+
+
+def test_the_example_of_the_page_runs_as_written(realdata, tmp_path, monkeypatch):
+    """Inner against outer race, measured; the healthy file has twice the rate of the others."""
+    page = (Path(__file__).parents[1] / "docs" / "own-data.md").read_text()
+    labels, *shown = blocks(page, "")
+    [folder] = realdata.glob("mfpt_*")
+    for file in folder.glob("*.mat"):
+        (tmp_path / file.name).symlink_to(file)
+    (tmp_path / "labels.csv").write_text(labels)
+    monkeypatch.chdir(tmp_path)
+    said = {}
+    for line in "".join(blocks(page, "sh")).splitlines():
+        _, *words = shlex.split(line)
+        whole = [name for word in words for name in (sorted(glob.glob(word)) or [word])]
+        said[" ".join(words[:2])] = run(*whole).stdout
+    assert (
+        "1. warning, bearings.h5: classes of condition with fewer than 3"
+        in said["audit bearings.h5"]
+    )
+    assert "2. " not in said["audit bearings.h5"]
+    assert said["train bearings.h5"] == shown[0]
+    assert said["report OuterRaceFault_vload_7.mat"].startswith("outer;")
+    assert said["report baseline_1.mat"] == shown[1]
+    refused = run("report", "baseline_1.mat", "--model", "bearings.wsm", code=2).stdout
+    assert "sampled at 97656 Hz, the model needs 48828 Hz" in refused
+    assert "has not seen" in run("evaluate", "bearings.wsm", "bearings.h5", code=2).stderr
