@@ -5,11 +5,13 @@ from dataclasses import dataclass
 from typing import Literal
 
 from .estimate import Estimate
-from .grades import grades_of
+from .grades import ALARM_GRADE, WARNING_GRADE, grades_of
 from .trend import Outlook, span_words
 
 Action = Literal["none", "watch", "confirm", "plan", "stop", "mend"]
-Confidence = Literal["sure", "maybe_worse", "maybe_better", "caution", "unfamiliar", "unusable"]
+Confidence = Literal[
+    "sure", "maybe_better", "maybe_worse", "maybe_condemned", "caution", "unfamiliar", "unusable"
+]
 
 RULE_OF_THUMB = "rule of thumb, not of a standard"
 """What a horizon of the table rests on: the usual shortening of intervals as a part wears."""
@@ -58,6 +60,12 @@ _RULES: dict[tuple[int | None, Confidence], _Rule] = {
         sentence="No action; first wear cannot be excluded, so record again sooner than usual.",
         days=30,
     ),
+    (0, "maybe_condemned"): _Rule(
+        action="confirm",
+        sentence="Record again and measure at the next stop: it reads as new, but so uncertainly "
+        "that the condemning limit may be passed.",
+        days=7,
+    ),
     (0, "caution"): _Rule(
         action="watch",
         sentence="No action now, but do not rely on it: mend what the cautions name and record "
@@ -74,6 +82,12 @@ _RULES: dict[tuple[int | None, Confidence], _Rule] = {
         sentence="Record again soon and measure at the next stop: {work} may already be due for "
         "planning.",
         days=14,
+    ),
+    (1, "maybe_condemned"): _Rule(
+        action="confirm",
+        sentence="Record again and measure at the next opportunity: the condemning limit may "
+        "already be passed, and {work} be due.",
+        days=7,
     ),
     (1, "maybe_better"): _Rule(
         action="watch", sentence="No action now; record again and watch the trend.", days=30
@@ -204,20 +218,20 @@ def confidence_of(estimate: Estimate, edges: Sequence[float]) -> Confidence:
     Returns
     -------
     str
-        Where grades on both sides are possible, ``maybe_worse``; caution goes before both.
+        Where grades on both sides are possible, the worse; caution goes before both.
     """
-    if estimate.verdict != "graded" or estimate.grade is None:
-        return "caution" if estimate.verdict == "graded" else estimate.verdict
-    least, most = _doubt(estimate, edges)
-    if most > estimate.grade:
-        return "maybe_worse"
-    return "maybe_better" if least < estimate.grade else "sure"
+    if estimate.verdict == "graded" and estimate.grade is not None:
+        return _doubt(estimate, estimate.grade, edges)
+    return "caution" if estimate.verdict == "graded" else estimate.verdict
 
 
-def _doubt(estimate: Estimate, edges: Sequence[float]) -> tuple[int, int]:
-    """Least and largest grade that set or interval leaves open."""
+def _doubt(estimate: Estimate, grade: int, edges: Sequence[float]) -> Confidence:
+    """What the grades that set or interval leaves open make of a grade."""
     grades = (*estimate.possible_grades, *touched_grades(estimate, edges))
-    return min(grades), max(grades)
+    if max(grades) > grade:
+        far = max(grades) >= ALARM_GRADE and grade < WARNING_GRADE
+        return "maybe_condemned" if far else "maybe_worse"
+    return "maybe_better" if min(grades) < grade else "sure"
 
 
 def work_words(quantity: str) -> str:
@@ -289,10 +303,11 @@ def advise(
 
 def _days(rule: _Rule, estimate: Estimate, edges: Sequence[float]) -> float | None:
     """A caution makes no one more patient than the doubt itself would."""
-    grade = estimate.grade
-    if rule.days is None or grade is None or _doubt(estimate, edges)[1] <= grade:
-        return rule.days
-    return min(rule.days, _RULES[grade, "maybe_worse"].days or 0)
+    if rule.days is None or estimate.grade is None:
+        return None
+    doubt = _doubt(estimate, estimate.grade, edges)
+    worse = doubt in ("maybe_worse", "maybe_condemned")
+    return min(rule.days, _RULES[estimate.grade, doubt].days or 0) if worse else rule.days
 
 
 def _with_outlook(plain: Advice, outlook: Outlook) -> Advice:

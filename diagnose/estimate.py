@@ -25,7 +25,7 @@ from .conformal import (
 from .grades import GRADE_NAMES, grades_of
 from .healthy import Baseline, referenced_rows
 from .models import Blend, Linear
-from .novelty import Familiarity, novelty_p_value
+from .novelty import Familiarity, free_distance, novelty_p_value
 from .physical import level_channels
 from .quality import (
     Fault,
@@ -49,6 +49,7 @@ UNFAMILIAR_SHARE = 0.01
 enough to tell so small a share; else one in its number."""
 
 _OFF_LEVEL = 3.5  # standard deviations of a level that few familiar machines reach
+_MUCH_WORSE = 1.5  # times the error: that of twenty recordings is known to a sixth
 _SPEED_FEATURE = "shaft.speed_hz"
 
 
@@ -313,13 +314,14 @@ class WearModel:
         if any(fault.bars for fault in faults):
             return self._unusable(faults)
         row = self._row(recording)
-        faults += suspicions(recording, self._look(row), self._see, self._speeds()) or quiet_faults(
+        look = self._look(row)
+        faults += suspicions(recording, look, self._see, self._speeds()) or quiet_faults(
             recording, self.names, row, self.levels
         )
         if any(fault.bars for fault in faults):
             return self._unusable(faults)
         features = None if baseline is None else baseline.features
-        return self.judge(row, features, conditions=recording.row, faults=faults)
+        return self._judge(row, look, features, recording.row, faults)
 
     def _unusable(self, faults: tuple[Fault, ...]) -> Estimate:
         reasons = tuple(fault.text for fault in faults if fault.bars)
@@ -339,10 +341,11 @@ class WearModel:
 
     def _look(self, row: Float) -> Look:
         speed = row[self._columns[_SPEED_FEATURE]] if _SPEED_FEATURE in self._columns else None
+        apart = self.familiarity.by_kind(self.names, row[None, :])[0]
         return Look(
-            distance=float(self.familiarity.distance(self.names, row[None, :])[0]),
+            distance=float(apart.mean()),
             limit=self.distance_limit,
-            free_distance=self.familiarity.free_distance(self.names, row),
+            free_distance=free_distance(self.names, apart),
             excess_db=self._excess(row),
             speed_hz=None if speed is None else float(speed),
         )
@@ -384,33 +387,44 @@ class WearModel:
         -------
         Estimate
         """
+        return self._judge(row, self._look(row), baseline, conditions or {}, faults)
+
+    def _judge(
+        self,
+        row: Float,
+        look: Look,
+        baseline: Float | None,
+        conditions: Mapping[str, Any],
+        faults: tuple[Fault, ...],
+    ) -> Estimate:
         if self.mode == "referenced" and baseline is None:
             return Estimate(verdict="unusable", reasons=(_NO_BASELINE,), mode=self.mode)
-        distance = float(self.familiarity.distance(self.names, row[None, :])[0])
         known: dict[str, Any] = {
             "faults": faults,
             "mode": self.mode,
-            "p_value": novelty_p_value(distance, self.calibration.distance),
+            "p_value": novelty_p_value(look.distance, self.calibration.distance),
             "p_limit": self.p_limit,
             "nearest": self._nearest(row),
         }
         if known["p_value"] <= self.p_limit:
-            reason = _strangeness(distance, self.calibration.distance)
+            reason = _strangeness(look.distance, self.calibration.distance)
             return Estimate(verdict="unfamiliar", reasons=(reason,), **known)
         severity = float(self.predict(row[None, :], baseline)[0])
+        findings = self._findings(row)
         cautions = (
             *(fault.text for fault in faults),
             *self._range_cautions(severity, self._inputs(row[None, :], baseline)),
-            *self._condition_cautions(row, conditions or {}),
-            *self._level_cautions(row),
+            *self._condition_cautions(row, conditions),
+            *self._level_cautions(look),
+            *self._finding_cautions(findings),
         )
         return Estimate(
             verdict="caution" if cautions else "graded",
             cautions=cautions,
-            confounders=self._findings(row),
+            confounders=findings,
             evidence=self._evidence(row, baseline),
             **known,
-            **self._grading(severity, distance),
+            **self._grading(severity, look.distance),
         )
 
     def _grading(self, severity: float, distance: float) -> dict[str, Any]:
@@ -466,14 +480,26 @@ class WearModel:
             )
         return cautions
 
-    def _level_cautions(self, row: Float) -> list[str]:
-        excess = self._excess(row)
+    def _level_cautions(self, look: Look) -> list[str]:
         return [
             f"the level of {channel} is {value:+.1f} dB off what its shape lets expect, must be "
             f"within {_OFF_LEVEL * size:.1f} dB: check the sensitivity of its sensor"
-            for (channel, value), size in zip(excess.items(), self.levels.size, strict=True)
+            for (channel, value), size in zip(look.excess_db.items(), self.levels.size, strict=True)
             if abs(value) > _OFF_LEVEL * size
         ]
+
+    def _finding_cautions(self, findings: tuple[Finding, ...]) -> list[str]:
+        """Faults that the intervals, which are for all machines alike, do not allow for."""
+        cautions = []
+        for finding, rates in zip(findings, self.card["confounders"], strict=True):
+            worse, usual = rates["mae_with_m"], rates["mae_without_m"]
+            if finding.present and worse > _MUCH_WORSE * usual:
+                name = finding.name.replace("_", " ")
+                cautions.append(
+                    f"{name} looks present, and with it estimates erred by {1e3 * worse:.2g} mm "
+                    f"instead of {1e3 * usual:.2g} mm: mend it and record again"
+                )
+        return cautions
 
     def _findings(self, row: Float) -> tuple[Finding, ...]:
         findings = []

@@ -279,6 +279,8 @@ class _Rates(Strict):
     share: float
     detection_rate: float
     false_alarm_rate: float
+    mae_with_m: float
+    mae_without_m: float
     members: dict[str, float]
 
 

@@ -162,12 +162,20 @@ def _ridge(penalty: float, *, log: bool) -> Callable[[Float, Float, int], Part]:
     return fit
 
 
+def _share(tried: int, rows: Float) -> float:
+    """Share of the features that a node may choose from: as many, however many there are.
+
+    A fixed share starves the trees of a short row, in which few features tell of the wear.
+    """
+    return min(1.0, tried / int(rows.shape[1]))
+
+
 def _fit_trees(rows: Float, target: Float, seed: int) -> Part:
     """Extremely randomised trees."""
     from sklearn.ensemble import ExtraTreesRegressor
 
     model = ExtraTreesRegressor(
-        _TREES, min_samples_leaf=2, max_features=0.2, random_state=seed
+        _TREES, min_samples_leaf=2, max_features=_share(320, rows), random_state=seed
     ).fit(rows.astype(np.float32), np.log(target))
     tables = [
         _Tree(
@@ -188,7 +196,11 @@ def _fit_boosting(rows: Float, target: Float, seed: int) -> Part:
     from sklearn.ensemble import HistGradientBoostingRegressor
 
     model = HistGradientBoostingRegressor(
-        max_iter=200, learning_rate=0.08, max_leaf_nodes=15, max_features=0.1, random_state=seed
+        max_iter=200,
+        learning_rate=0.08,
+        max_leaf_nodes=15,
+        max_features=_share(160, rows),
+        random_state=seed,
     ).fit(rows.astype(np.float32), np.log(target))
     nodes = [step[0].nodes for step in model._predictors]  # no public way to the trees
     tables = [

@@ -62,40 +62,76 @@ class Familiarity:
             Mean over the kinds of coordinates of the root mean square in each, every coordinate in
             the spread it has once the others of its kind are known (Mahalanobis).
         """
-        return np.asarray(self._by_kind(names, self._place(names, rows)).mean(axis=0))
+        return np.asarray(self.by_kind(names, rows).mean(axis=1))
+
+    def by_kind(self, names: Sequence[str], rows: Float) -> Float:
+        """Distance of recordings in each kind of coordinates, of :func:`kinds_of`.
+
+        Returns
+        -------
+        numpy.ndarray [shape=(n_recordings, n_kinds)]
+        """
+        return _lengths(names, self._place(names, rows))
 
     def nearest(self, names: Sequence[str], row: Float) -> tuple[int, float]:
         """Machine draw nearest to a recording, and how far it is, as :meth:`distance`."""
-        apart = self._by_kind(names, self.machines - self._place(names, row[None, :])).mean(axis=0)
+        apart = _lengths(names, self.machines - self._place(names, row[None, :])).mean(axis=1)
         best = int(np.argmin(apart))
         return int(self.groups[best]), float(apart[best])
-
-    def free_distance(self, names: Sequence[str], row: Float) -> float:
-        """Distance of one recording by what hangs on no sample rate, as :meth:`distance`.
-
-        All but the bands, which are lost where a rate was too low. NaN where the model has nothing
-        else.
-        """
-        free = [i for i, kind in enumerate(_kinds(tuple(names))) if kind in _FREE]
-        if not free:
-            return math.nan
-        return float(self._by_kind(names, self._place(names, row[None, :]))[free].mean())
 
     def _place(self, names: Sequence[str], rows: Float) -> Float:
         values = physical_rows(names, rows)
         return _standardised(values, self.centre, self.spread) @ self.whiten
 
-    def _by_kind(self, names: Sequence[str], place: Float) -> Float:
-        """Distance in each kind [shape=(n_kinds, n)]."""
-        squared = place**2
-        return np.sqrt([squared[:, here].sum(axis=1) for here in _kinds(tuple(names)).values()])
+
+def free_distance(names: Sequence[str], by_kind: Float) -> float:
+    """Distance of one recording by what hangs on no sample rate.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Of the features.
+    by_kind : numpy.ndarray [shape=(n_kinds,)]
+        Of :meth:`Familiarity.by_kind`.
+
+    Returns
+    -------
+    float
+        As :meth:`Familiarity.distance`, but for the bands, which are lost where a rate was too low;
+        NaN where the model has nothing else.
+
+    Examples
+    --------
+    >>> free_distance(["a.order_01.level_db", "a.kurtosis"], np.array([1.0, 2.0]))
+    1.5
+    """
+    free = [kind in _FREE for kind in kinds_of(tuple(names))]
+    return float(by_kind[free].mean()) if any(free) else math.nan
 
 
 @lru_cache(maxsize=16)
-def _kinds(names: tuple[str, ...]) -> dict[str, NDArray[np.intp]]:
-    """Coordinates of each kind."""
+def kinds_of(names: tuple[str, ...]) -> dict[str, NDArray[np.intp]]:
+    """Physical coordinates of each kind.
+
+    Examples
+    --------
+    >>> list(kinds_of(("a.order_01.level_db", "a.kurtosis")))
+    ['orders', 'spiky']
+    """
     kinds = coordinates_of(names).kind
     return {str(kind): np.flatnonzero(kinds == kind) for kind in dict.fromkeys(kinds.tolist())}
+
+
+@lru_cache(maxsize=16)
+def _members(names: tuple[str, ...]) -> Float:
+    """One where a coordinate is of a kind [shape=(n_physical, n_kinds)]."""
+    kinds = coordinates_of(names).kind
+    return np.asarray(kinds[:, None] == list(kinds_of(names)), dtype=np.float64)
+
+
+def _lengths(names: Sequence[str], place: Float) -> Float:
+    """Length of whitened coordinates in each kind [shape=(n, n_kinds)]."""
+    return np.sqrt(place**2 @ _members(tuple(names)))
 
 
 def _standardised(values: Float, centre: Float, spread: Float) -> Float:
@@ -141,7 +177,7 @@ def fit_familiarity(names: Sequence[str], rows: Float, groups: NDArray[np.intp])
     spread = np.maximum(spread, _LEAST_SPREAD * max(float(spread.max()), 1.0))
     standard = _standardised(values, centre, spread)
     whiten = np.zeros_like(tolerance)
-    for here in _kinds(tuple(names)).values():
+    for here in kinds_of(tuple(names)).values():
         block = np.ix_(here, here)
         scale = np.outer(spread[here], spread[here])
         whiten[block] = _whitening(standard[:, here], tolerance[block] / scale)

@@ -225,8 +225,10 @@ def _parts(columns: Columns, rows: Float) -> dict[str, Float]:
     if columns.orders:
         levels = rows[:, columns.orders]
         parts["orders"] = levels - levels.mean(axis=1, keepdims=True)
-    parts["spiky"] = np.log(np.maximum(rows[:, columns.spiky], _LEAST_FACTOR))
-    parts["other"] = rows[:, columns.other]
+    if columns.spiky:
+        parts["spiky"] = np.log(np.maximum(rows[:, columns.spiky], _LEAST_FACTOR))
+    if columns.other:
+        parts["other"] = rows[:, columns.other]
     return parts
 
 
@@ -240,10 +242,16 @@ def _profile(energy: Float) -> Float:
 def _wide(levels: Float) -> Float:
     """Shares of the energy in wide bands that overlap by half."""
     energy = 10 ** (levels / 10)
-    place = np.linspace(0, levels.shape[1] - 1, _WIDE_BANDS)
-    reach = np.abs(np.arange(levels.shape[1])[:, None] - place) / (place[1] - place[0])
-    share = energy @ np.clip(1 - reach, 0, 1) / _total(energy, np.sum)
+    share = energy @ _wide_weights(levels.shape[1]) / _total(energy, np.sum)
     return np.asarray(10 * np.log10(share + _SILENCE))
+
+
+@lru_cache(maxsize=16)
+def _wide_weights(bands: int) -> Float:
+    """Part of each narrow band in each wide one [shape=(bands, 5)]."""
+    place = np.linspace(0, bands - 1, _WIDE_BANDS)
+    reach = np.abs(np.arange(bands)[:, None] - place) / (place[1] - place[0])
+    return np.asarray(np.clip(1 - reach, 0, 1))
 
 
 def _total(energy: Float, how: Callable[..., Float]) -> Float:
@@ -279,7 +287,7 @@ def shape_rows(names: Sequence[str], rows: Float) -> Float:
     ]
     if _SPEED in names:
         parts.append(np.log(np.maximum(rows[:, [names.index(_SPEED)]], _LEAST_FACTOR)))
-    return np.hstack(parts)
+    return np.hstack(parts) if parts else np.zeros((len(rows), 0))
 
 
 def level_rows(names: Sequence[str], rows: Float) -> Float:

@@ -466,10 +466,11 @@ def grades_words(grades: tuple[int, ...] | list[int]) -> str:
 
     Examples
     --------
-    >>> grades_words((1, 2))
-    '1 (worn) or 2 (plan renewal)'
+    >>> grades_words((0, 1, 2))
+    '0 (as new), 1 (worn) or 2 (plan renewal)'
     """
-    return " or ".join(f"{grade} ({GRADE_NAMES[grade]})" for grade in grades)
+    *first, last = [f"{grade} ({GRADE_NAMES[grade]})" for grade in grades]
+    return f"{', '.join(first)} or {last}" if first else last
 
 
 def possible_words(estimate: Estimate, edges: Sequence[float]) -> str:

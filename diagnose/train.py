@@ -369,11 +369,7 @@ def learn(lesson: Lesson, *, seed: int = 0, budget_ms: float | None = None) -> L
         ),
         familiarity=fit_familiarity(lesson.names, lesson.rows, lesson.groups),
         levels=fit_levels(lesson.names, lesson.rows, folds),
-        heads=tuple(
-            _head(name, lesson.rows, here, folds, seed=seed)
-            for name, here in lesson.faults.items()
-            if min(here.sum(), (~here).sum()) >= _FEWEST_FAULTS
-        ),
+        heads=_heads(lesson, folds, np.abs(severity.estimate - lesson.severity), seed=seed),
     )
 
 
@@ -384,6 +380,21 @@ def _out_of_fold_distances(lesson: Lesson, folds: Folds) -> Float:
         cloud = fit_familiarity(lesson.names, lesson.rows[train], lesson.groups[train])
         distance[test] = cloud.distance(lesson.names, lesson.rows[test])
     return distance
+
+
+def _heads(
+    lesson: Lesson, folds: Folds, error: Float, *, seed: int
+) -> tuple[tuple[Head, dict[str, Any]], ...]:
+    """A head for each fault, and its rates: with the error of severity with and without it."""
+    found = []
+    for name, here in lesson.faults.items():
+        if min(here.sum(), (~here).sum()) < _FEWEST_FAULTS:
+            continue
+        head, rates = _head(name, lesson.rows, here, folds, seed=seed)
+        rates |= {"mae_with_m": float(error[here].mean())}
+        rates |= {"mae_without_m": float(error[~here].mean())}
+        found.append((head, rates))
+    return tuple(found)
 
 
 def _head(

@@ -67,6 +67,9 @@ def test_worse_is_never_more_patient():
         assert days == sorted(days, reverse=True)
     for grade in range(3):
         assert _RULES[grade, "maybe_worse"].days <= _RULES[grade, "sure"].days
+    for grade in range(2):
+        assert _RULES[grade, "maybe_condemned"].days < _RULES[grade, "maybe_worse"].days
+        assert _RULES[grade, "maybe_condemned"].days <= _RULES[2, "sure"].days
     assert {_RULES[3, c].action for c in ("sure", "maybe_better", "caution")} == {"stop"}
     assert _RULES[0, "sure"].action == "none"
 
@@ -77,6 +80,9 @@ def test_worse_is_never_more_patient():
         (estimate(1), "sure"),
         (estimate(1, (1, 2)), "maybe_worse"),
         (estimate(1, (0, 1)), "maybe_better"),
+        (estimate(1, (1, 2, 3)), "maybe_condemned"),
+        (estimate(0, (0, 1, 2, 3)), "maybe_condemned"),
+        (estimate(0, (0, 1, 2)), "maybe_worse"),
         (estimate(1, (0, 1, 2)), "maybe_worse"),
         (estimate(1, (0, 1), "caution"), "caution"),
     ],
@@ -107,6 +113,12 @@ def test_a_caution_makes_no_one_more_patient():
         doubtful = advise(estimate(grade, (grade, grade + 1), "caution"), PIN, EDGES)
         assert doubtful.days <= _RULES[grade, "maybe_worse"].days
         assert doubtful.sentence == advise(estimate(grade, None, "caution"), PIN, EDGES).sentence
+
+
+def test_a_caution_alone_changes_no_horizon():
+    for grade in range(4):
+        told = advise(estimate(grade, None, "caution"), PIN, EDGES)
+        assert told.days == _RULES[grade, "caution"].days
 
 
 def test_a_trend_may_only_hasten():

@@ -12,7 +12,8 @@ from click.testing import CliRunner
 from wearstate.datasets.recipe_file import recipe_text
 from wearstate.datasets.record import DataError, DataSet
 from wearstate.diagnose import demo
-from wearstate.diagnose.cli import _json_text, cli
+from wearstate.diagnose.cli import cli
+from wearstate.diagnose.command_options import json_text
 
 
 def run(*arguments, code=0):
@@ -389,10 +390,10 @@ def test_rms_is_that_of_the_vibration_about_its_mean(tmp_path):
 
 
 def test_json_has_null_for_what_is_not_finite():
-    text = _json_text({"a": float("nan"), "b": [np.float32("inf"), np.int64(3)], "c": (1.5,)})
+    text = json_text({"a": float("nan"), "b": [np.float32("inf"), np.int64(3)], "c": (1.5,)})
     assert strict(text) == {"a": None, "b": [None, 3], "c": [1.5]}
     with pytest.raises(TypeError, match="not JSON serializable"):
-        _json_text({"a": object()})
+        json_text({"a": object()})
 
 
 @pytest.fixture
@@ -446,10 +447,10 @@ def test_a_caution_stands_beside_the_verdict_of_the_page(tmp_path, small_model):
 def test_the_bounds_of_the_options_are_those_of_the_library():
     """The command line repeats two numbers, because importing them would slow its help."""
     from wearstate.datasets import recipe
-    from wearstate.diagnose import cli as module
+    from wearstate.diagnose import command_options as module
 
-    assert module._MOST_RECORDS == recipe.MOST_RECORDS
-    assert module._LARGEST_SEED == recipe.LARGEST_SEED
+    assert module.MOST_RECORDS == recipe.MOST_RECORDS
+    assert module.LARGEST_SEED == recipe.LARGEST_SEED
 
 
 @pytest.mark.parametrize(

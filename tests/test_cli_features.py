@@ -9,7 +9,8 @@ import pytest
 from click.testing import CliRunner
 from numpy.testing import assert_allclose
 from wearstate.datasets.record import DataSet
-from wearstate.diagnose.cli import _FEATURE_SETS, cli
+from wearstate.diagnose.cli import cli
+from wearstate.diagnose.commands_data import _FEATURE_SETS
 from wearstate.diagnose.tabulate import choice_of, feature_table
 from wearstate.features import iso
 from wearstate.features.catalogue import SETS, SetName

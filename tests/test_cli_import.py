@@ -8,7 +8,7 @@ from click.testing import CliRunner
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.io import wavfile
 from wearstate.datasets.record import DataSet
-from wearstate.diagnose.cli import _as_options, cli
+from wearstate.diagnose.cli import as_options, cli
 from wearstate.sim.parts import STANDARD_GRAVITY
 
 RAMP = np.arange(400.0)
@@ -192,10 +192,10 @@ def test_plain_words_are_no_options():
         "column 'time_column' is 'fs'",
         "/data/fs/unit.csv: is cut",
     ):
-        assert _as_options(text, command) == text
-    assert _as_options("use force to replace it", command) == "use --force to replace it"
-    assert _as_options("a: fs = 1 Hz must be", command) == "a: --fs = 1 Hz must be"
-    assert _as_options("use force", None) == "use force"
+        assert as_options(text, command) == text
+    assert as_options("use force to replace it", command) == "use --force to replace it"
+    assert as_options("a: fs = 1 Hz must be", command) == "a: --fs = 1 Hz must be"
+    assert as_options("use force", None) == "use force"
 
 
 def test_inputs_and_outputs_are_kept(wavs, tmp_path):

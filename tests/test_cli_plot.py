@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from wearstate.datasets.record import Attributes, DataError, DataSet, DataSetWriter, Recording
-from wearstate.diagnose.cli import _KINDS, cli
+from wearstate.diagnose.cli import cli
+from wearstate.diagnose.commands_data import _KINDS
 from wearstate.diagnose.info import plot_file
 from wearstate.diagnose.report_figures import report_pictures
 from wearstate.diagnose.signal_plots import AUTO, KINDS

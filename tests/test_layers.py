@@ -48,7 +48,13 @@ SIM_FLOORS = [
 
 HEAVY = {
     "matplotlib": set(),  # inside functions only
-    "click": {"diagnose.cli"},
+    "click": {
+        "diagnose.cli",
+        "diagnose.command_options",
+        "diagnose.commands_machine",
+        "diagnose.commands_data",
+        "diagnose.commands_wear",
+    },
     "rich": set(),
     "sklearn": {"diagnose"},
     "joblib": {"diagnose", "datasets"},

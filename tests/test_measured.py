@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import resample_poly
 from wearstate.datasets.importers import read_recording
 from wearstate.datasets.record import Channel, Recording
-from wearstate.diagnose.cli import _report_exit
+from wearstate.diagnose.commands_wear import report_exit
 from wearstate.diagnose.modelfile import load_model
 from wearstate.sim.parts import STANDARD_GRAVITY
 from wearstate.sim.sensor import tacho_pulses
@@ -103,4 +103,4 @@ def test_it_is_the_vibration_that_is_unfamiliar(mfpt, small_model, name, speed, 
     assert estimate.verdict == "unfamiliar"
     assert estimate.p_value is not None
     assert estimate.p_value <= model.p_limit <= 0.012
-    assert _report_exit([(estimate.verdict, estimate.grade)], "alarm") == 5
+    assert report_exit([(estimate.verdict, estimate.grade)], "alarm") == 5

@@ -10,11 +10,11 @@ import zipfile
 import numpy as np
 import pytest
 from wearstate.datasets.record import Channel, DataError, DataSet, Recording
-from wearstate.diagnose.estimate import ModelError
+from wearstate.diagnose.estimate import Head, ModelError
 from wearstate.diagnose.evaluate import evaluate_model, score
 from wearstate.diagnose.grades import accuracy_bound, grades_of
 from wearstate.diagnose.modelfile import load_model, save_model
-from wearstate.diagnose.models import CANDIDATES, Blend
+from wearstate.diagnose.models import CANDIDATES, Blend, Linear
 from wearstate.diagnose.train import Lesson, learn, train_model
 from wearstate.sim.wear import grade
 
@@ -64,6 +64,34 @@ def test_severity_cannot_be_learnt_from_the_identity_of_a_machine():
         Lesson(names=names, rows=rows, baseline=None, severity=severity, groups=groups)
     ).calibration
     assert np.std(np.log(known.truth / known.estimate)) > 0.9 * np.std(np.log(severity))
+
+
+def test_the_error_with_a_fault_is_told_beside_that_without():
+    """A fault that adds noise to the one feature that tells the wear."""
+    rng = np.random.default_rng(2)
+    groups, faulty = np.repeat(np.arange(80), 2), np.repeat(np.arange(80) % 3 == 0, 2)
+    severity = np.exp(rng.uniform(-1, 1, 160))
+    told = np.log(severity) + np.where(faulty, 0.5, 0.05) * rng.standard_normal(160)
+    rows = np.column_stack([told, 1 + faulty + 0.1 * rng.standard_normal(160), np.ones(160)])
+    found = learn(
+        Lesson(
+            names=("a.shape_1", "a.kurtosis", "a.rms"),
+            rows=rows,
+            baseline=None,
+            severity=severity,
+            groups=groups,
+            faults={"noisy": faulty},
+        ),
+        budget_ms=0.05,
+    )
+    [(head, rates)] = found.heads
+    error = np.abs(found.severity.estimate - severity)
+    assert (head.name, rates["name"]) == ("noisy", "noisy")
+    assert rates["mae_with_m"] == pytest.approx(error[faulty].mean())
+    assert rates["mae_without_m"] == pytest.approx(error[~faulty].mean())
+    # ten times the noise; the line leans back for it, and errs more on the others
+    assert rates["mae_with_m"] > 2 * rates["mae_without_m"]
+    assert rates["detection_rate"] > 0.95  # ten standard deviations apart
 
 
 def test_training_depends_on_the_seed_alone(trained, small_set):
@@ -196,6 +224,39 @@ def test_a_condition_outside_the_trained_range_is_named(trained, small_set):
     assert "outside the trained range 1 to 2 Hz" in estimate.cautions[0]
     assert "discharge_pressure_pa" in estimate.cautions[1]
     assert len(model.judge(row).cautions) == 1  # what was not recorded cannot be outside
+
+
+def with_a_fault(model, *, slope, mae_with_m):
+    """The model with a head that says the same of every recording, present for a slope above 0."""
+    n = len(model.names)
+    flat = Linear(centre=np.zeros(n), spread=np.ones(n), weight=np.zeros(n), offset=1.0, log=False)
+    blend = Blend(names=("flat",), parts=(flat,), weights=np.ones(1), low=0.5, high=4.0)
+    head = Head(name="stuck_valve", blend=blend, slope=slope, offset=0.0, threshold=0.5)
+    rates = {"name": "stuck_valve", "share": 0.1, "detection_rate": 0.9, "false_alarm_rate": 0.1}
+    rates |= {"mae_with_m": mae_with_m, "mae_without_m": 1e-5, "members": {"flat": 1.0}}
+    card = {**model.card, "confounders": [rates]}
+    return dataclasses.replace(model, heads=(head,), card=card)
+
+
+@pytest.mark.parametrize(
+    ("slope", "mae_with_m", "warns"),
+    [(5.0, 3e-5, True), (5.0, 1.2e-5, False), (-5.0, 3e-5, False)],
+)
+def test_a_fault_with_which_estimates_err_much_more_is_a_caution(
+    trained, tmp_path, slope, mae_with_m, warns
+):
+    """Present and worse, present and as good, absent."""
+    model, table, _ = trained
+    plain = next(row for row in table.values if model.judge(row).verdict == "graded")
+    faulty = with_a_fault(model, slope=slope, mae_with_m=mae_with_m)
+    estimate = faulty.judge(plain)
+    assert estimate.confounders[0].present == (slope > 0)
+    assert estimate.verdict == ("caution" if warns else "graded")
+    if warns:
+        assert "stuck valve looks present" in estimate.cautions[0]
+        assert "0.03 mm instead of 0.01 mm" in estimate.cautions[0]
+    save_model(faulty, tmp_path / "faulty.wsm")
+    assert load_model(tmp_path / "faulty.wsm").judge(plain) == estimate
 
 
 def test_what_was_noted_beside_the_recordings_is_a_condition(trained, small_set):

@@ -1,9 +1,12 @@
 """The physical space, and how far a recording lies from the familiar."""
 
+import runpy
+from pathlib import Path
+
 import numpy as np
 import pytest
 from wearstate.datasets.record import DataSet
-from wearstate.diagnose.novelty import fit_familiarity, novelty_p_value
+from wearstate.diagnose.novelty import fit_familiarity, free_distance, novelty_p_value
 from wearstate.diagnose.physical import (
     columns_of,
     coordinates_of,
@@ -181,7 +184,7 @@ def test_one_wild_feature_counts_as_ten_standard_deviations_and_no_more():
     point = np.zeros((3, 40))
     point[:, 0] = [12.0, 1e3, 1e9]
     found = distances(cloud, point)
-    assert found[0] == found[1] == found[2]
+    np.testing.assert_allclose(found, found[0], rtol=1e-12)  # sums in another order
 
 
 def resonant(centre, rng):
@@ -242,12 +245,16 @@ def test_what_hangs_on_no_rate_leaves_the_bands_out():
     lost, odd = rows[0].copy(), rows[0].copy()
     lost[4:8] -= 40  # the upper bands of a channel
     odd[-2:] = 6.0
-    whole = cloud.free_distance(names, rows[0])
-    assert cloud.free_distance(names, lost) == pytest.approx(whole, rel=1e-12)
-    assert cloud.free_distance(names, odd) > 5  # six standard deviations in both of two
+    found = cloud.by_kind(names, np.array([rows[0], lost, odd]))
+    np.testing.assert_allclose(
+        found.mean(axis=1), cloud.distance(names, np.array([rows[0], lost, odd]))
+    )
+    whole, without, strange = (free_distance(names, apart) for apart in found)
+    assert without == pytest.approx(whole, rel=1e-12)
+    assert strange > 5  # six standard deviations in both of two
     assert cloud.distance(names, lost[None])[0] > 2 * cloud.distance(names, rows[:1])[0]
     only_bands = fit_familiarity(BANDS, rows[:, :16], np.arange(400))
-    assert np.isnan(only_bands.free_distance(BANDS, rows[0, :16]))
+    assert np.isnan(free_distance(BANDS, only_bands.by_kind(BANDS, rows[:1, :16])[0]))
 
 
 def test_familiarity_survives_constant_features():
@@ -274,3 +281,19 @@ def test_p_value_of_familiar_recordings_is_uniform():
     values = [novelty_p_value(d[0], d[1:]) for d in rng.standard_normal((4000, 100))]
     # a conformal p-value is uniform on k/100; 4 standard errors of the share are 0.019
     assert np.mean(np.array(values) <= 0.1) == pytest.approx(0.1 * 100 / 101, abs=0.02)
+
+
+def test_another_machine_made_to_match_is_refused(small_model, small_set, tmp_path):
+    """A sample of tests/benchmarks/strangers.py: journals in the rate and channels of the pump."""
+    from wearstate.datasets.generate import generate
+    from wearstate.diagnose.modelfile import load_model
+
+    script = runpy.run_path(str(Path(__file__).parent / "benchmarks" / "strangers.py"))
+    journals = tmp_path / "journals.h5"
+    generate("journal-bearing-small", 4, journals, seed=0)
+    with DataSet(small_set) as data:
+        own, speeds = data[0], data.manifest["speed_hz"].to_numpy()
+    strangers = script["of_machine"](journals, 4, own, speeds, np.random.default_rng(0))
+    told = script["campaign"](load_model(small_model), strangers)
+    assert told["journals, stretched"] == {"unfamiliar": 4}
+    assert set(told["journals, own time"]) <= {"unfamiliar", "no features"}

@@ -25,14 +25,21 @@ def task():
     return rows, target, np.repeat(np.arange(100), 3)
 
 
-def test_flattened_trees_say_what_the_library_says(task):
+@pytest.mark.parametrize(("more", "of_trees", "of_boosting"), [(0, 1.0, 1.0), (620, 0.5, 0.25)])
+def test_flattened_trees_say_what_the_library_says(task, more, of_trees, of_boosting):
+    """A node chooses from 320 or 160 features, or from all where there are fewer."""
     from sklearn.ensemble import ExtraTreesRegressor, HistGradientBoostingRegressor
 
     rows, target, _ = task
+    rows = np.hstack([rows, np.random.default_rng(1).standard_normal((300, more))])
     single = rows.astype(np.float32)
-    trees = ExtraTreesRegressor(100, min_samples_leaf=2, max_features=0.2, random_state=3)
+    trees = ExtraTreesRegressor(100, min_samples_leaf=2, max_features=of_trees, random_state=3)
     boosting = HistGradientBoostingRegressor(
-        max_iter=200, learning_rate=0.08, max_leaf_nodes=15, max_features=0.1, random_state=3
+        max_iter=200,
+        learning_rate=0.08,
+        max_leaf_nodes=15,
+        max_features=of_boosting,
+        random_state=3,
     )
     for name, model in (("trees", trees), ("boosting", boosting)):
         theirs = np.exp(model.fit(single[:200], np.log(target[:200])).predict(single))

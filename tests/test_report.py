@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from wearstate.datasets.record import Attributes, DataError, DataSet, DataSetWriter, Recording
-from wearstate.diagnose.cli import _report_exit, cli
+from wearstate.diagnose.cli import cli
+from wearstate.diagnose.commands_wear import report_exit
 from wearstate.diagnose.estimate import Estimate, Finding
 from wearstate.diagnose.healthy import Baseline, Baselines
 from wearstate.diagnose.modelfile import load_model, save_model
@@ -531,8 +532,9 @@ def test_a_short_life_hastens_the_advice(model, tmp_path):
         batch = judge_all(data, items, model, dates="operating_hours")
     [now] = batch.current
     outlook = batch.trends[""].outlook
-    # (300 - 260) µm at 2 µm an hour
-    assert outlook.remaining_low_h < 20 < outlook.remaining_high_h
+    # (300 - 260) µm at 2 µm an hour; the estimates err by up to 8 %, 20 µm, 10 h
+    assert outlook.remaining_h == pytest.approx(20, abs=10)
+    assert outlook.remaining_low_h < outlook.remaining_h < outlook.remaining_high_h
     assert now.horizon.startswith("within")
     assert "can be reached before" in now.advice
 
@@ -596,7 +598,7 @@ def test_an_empty_folder_is_refused(tmp_path, model_file):
     ],
 )
 def test_exit_codes(verdicts, fail_on, code):
-    assert _report_exit(verdicts, fail_on) == code
+    assert report_exit(verdicts, fail_on) == code
 
 
 def test_the_command_goes_all_the_way(tmp_path, model_file):

@@ -1,0 +1,351 @@
+"""Commands about one machine: scenes, simulation, alignment, stability, charts, literature."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import click
+
+from .command_options import (
+    CHART_SUFFIXES,
+    DATA_SUFFIXES,
+    EXIT_ALARM,
+    EXIT_FAILED,
+    EXIT_WARNING,
+    PAGE_SUFFIXES,
+    PATH,
+    PICTURE_SUFFIXES,
+    Share,
+    check_outputs,
+    emit,
+    force_option,
+    jobs_option,
+    json_option,
+    overrides_of,
+    progress_bar,
+    seed_option,
+    worker_count,
+)
+
+_ALIGN_FAIL_ON_HELP = (
+    "Exit 3 where a limit is not met, 4 where a bearing lifts or no moves help; alarm: only 4."
+)
+
+
+@click.group()
+def scene() -> None:
+    """The machines: list, show, check."""
+
+
+@scene.command("list")
+@json_option
+def scene_list(as_json: bool) -> None:
+    """Names and descriptions of the built-in scenes."""
+    from ..sim.scene import load_scene, scene_names
+
+    scenes = {name: load_scene(name).description for name in scene_names()}
+    emit({"scenes": scenes}, as_json, "\n".join(f"{n:24} {d}" for n, d in scenes.items()))
+
+
+@scene.command("show")
+@click.argument("name")
+def scene_show(name: str) -> None:
+    """TOML text of a scene: copy it, change it, check it."""
+    from ..sim.parts import SceneError
+    from ..sim.scene import scene_table, scene_text
+
+    text = scene_text(name)
+    if not isinstance(scene_table(text, name).get("machine"), str):
+        raise SceneError(name, ["machine is missing, must be a text; this file is no scene"])
+    click.echo(text, nl=False)
+
+
+@scene.command("check")
+@click.argument("file")
+@json_option
+def scene_check(file: str, as_json: bool) -> None:
+    """Check a scene file; every fault at once."""
+    from ..sim.assemble import check
+    from ..sim.scene import load_scene
+
+    checked = load_scene(file)
+    check(checked)
+    emit({"scene": checked.name, "faults": []}, as_json, f"{checked.name}: no fault")
+
+
+@click.command()
+@click.argument("scene_name", metavar="SCENE")
+@click.option("--set", "pairs", multiple=True, metavar="PATH=VALUE", help="Replace a scene value.")
+@click.option("-o", "--output", type=PATH, help="Recording to write (.h5).")
+@click.option("--plot", type=PATH, help="Picture to write (.png, .svg or .pdf).")
+@click.option("--truth", is_flag=True, help="Also store forces and orbit.")
+@seed_option
+@force_option
+@json_option
+def simulate(
+    scene_name: str,
+    pairs: Sequence[str],
+    output: Path | None,
+    plot: Path | None,
+    truth: bool,
+    seed: int,
+    force: bool,
+    as_json: bool,
+) -> None:
+    """Simulate one recording of SCENE (a built-in name or a TOML file)."""
+    from ..datasets.generate import save_solution
+    from ..datasets.quantities import resolved, with_estimate
+    from ..sim.assemble import simulate as run
+    from ..sim.scene import load_scene
+
+    check_outputs([scene_name], [(output, DATA_SUFFIXES), (plot, PICTURE_SUFFIXES)], force)
+    machine, resolution = resolved(load_scene(scene_name, overrides_of(pairs)))
+    solution = run(machine, seed=seed, truth=truth or plot is not None)
+    if resolution is not None:
+        solution = with_estimate(solution, resolution)
+        click.echo(f"fidelity: {resolution.text}", err=True)
+    if output is not None:
+        save_solution(machine, solution, output, seed=seed, force=force, truth=truth)
+    if plot is not None:
+        from .plots import plot_simulation
+
+        plot_simulation(machine, solution, plot)
+    vibration = [
+        (channel, float(row.std()))
+        for channel, row in zip(solution.channels, solution.signal, strict=True)
+        if channel.quantity != "tacho"
+    ]
+    rms = {channel.name: value for channel, value in vibration}
+    shown = ", ".join(f"{channel.name} {value:.3g} {channel.unit}" for channel, value in vibration)
+    files = [str(path) for path in (output, plot) if path]
+    for warning in solution.warnings:
+        click.echo(f"warning: {warning}", err=True)
+    emit(
+        {
+            "scene": machine.name,
+            "rms": rms,
+            "numerics": solution.numerics,
+            "warnings": list(solution.warnings),
+            "files": files,
+        },
+        as_json,
+        "\n".join([f"{machine.name} (simulated): {shown} rms about the mean", *files]),
+    )
+
+
+@click.command()
+@click.argument("scene_name", metavar="SCENE")
+@click.option("--set", "pairs", multiple=True, metavar="PATH=VALUE", help="Replace a scene value.")
+@click.option(
+    "--condition",
+    type=click.Choice(["cold", "hot", "running", "all"]),
+    default="all",
+    show_default=True,
+    help="In which the limits must hold.",
+)
+@click.option("--calibrate/--no-calibrate", default=True, show_default=True, help="Look for moves.")
+@click.option(
+    "--prefer",
+    type=click.Choice(["least", "fewest"]),
+    default="least",
+    show_default=True,
+    help="Least sum of moves, or fewest bearings moved.",
+)
+@click.option("--jack", metavar="BEARING", help="Jacking test beside this bearing.")
+@click.option(
+    "--test",
+    "rig_test",
+    type=click.Choice(["hammer", "shaker"]),
+    help="Simulated test of the running shaft before and after the moves.",
+)
+@click.option("--push", metavar="BEARING", help="Where --test pushes the shaft up; aftmost.")
+@click.option("--test-plot", type=PATH, help="Picture of --test to write.")
+@seed_option
+@click.option("--plot", type=PATH, help="Picture to write (.png, .svg or .pdf).")
+@click.option("-o", "--output", type=PATH, help="HTML page to write.")
+@click.option("--fail-on", type=click.Choice(["warning", "alarm"]), help=_ALIGN_FAIL_ON_HELP)
+@force_option
+@json_option
+def align(
+    scene_name: str,
+    pairs: Sequence[str],
+    condition: str,
+    calibrate: bool,
+    prefer: str,
+    jack: str | None,
+    rig_test: str | None,
+    push: str | None,
+    test_plot: Path | None,
+    seed: int,
+    plot: Path | None,
+    output: Path | None,
+    fail_on: str | None,
+    force: bool,
+    as_json: bool,
+) -> None:
+    """Bearing loads of the shaft line SCENE, and the moves that bring them within limits."""
+    from ..sim.scene import load_scene
+    from .align import align as judge
+    from .align import align_table, align_text, save_figure, save_html
+
+    if rig_test is None and (push or test_plot or seed):
+        raise click.UsageError("--push, --test-plot and --seed need --test")
+    if rig_test is not None and not calibrate:
+        raise click.UsageError("--test compares before and after the moves: it needs --calibrate")
+    outputs = [(plot, PICTURE_SUFFIXES), (output, PAGE_SUFFIXES), (test_plot, PICTURE_SUFFIXES)]
+    check_outputs([scene_name], outputs, force)
+    scene = load_scene(scene_name, overrides_of(pairs))
+    found = judge(scene, condition=condition, mend=calibrate, prefer=prefer, jack=jack)
+    if plot is not None:
+        save_figure(found, plot)
+    if output is not None:
+        save_html(found, output)
+    tested, words = _tested(scene, found.calibration, rig_test, push, test_plot, seed)
+    files = [str(path) for path, _ in outputs if path and path.exists()]
+    text = "\n".join([align_text(found), *words, *files])
+    emit({**align_table(found), "test": tested, "files": files}, as_json, text)
+    levels = {"warning": EXIT_WARNING, "alarm": EXIT_ALARM}
+    code = levels.get(found.verdict, 0) if fail_on else 0
+    raise click.exceptions.Exit(0 if fail_on == "alarm" and code == EXIT_WARNING else code)
+
+
+def _tested(
+    scene: Any,
+    calibration: Any,
+    kind: str | None,
+    push: str | None,
+    picture: Path | None,
+    seed: int,
+) -> tuple[dict[str, Any] | None, list[str]]:
+    """Table and text of the simulated test before and after the moves, if one was asked for."""
+    if kind is None:
+        return None, []
+    from .rig import calibrated_test, rig_figure, rig_table, rig_text
+
+    result = calibrated_test(scene, calibration, kind, push=push, seed=seed)
+    if result is None:
+        return None, ["", "no test: nothing moves, so nothing changes"]
+    if picture is not None:
+        rig_figure(result).savefig(picture, dpi=110)
+    return rig_table(result), ["", rig_text(result)]
+
+
+@click.command()
+@click.argument("scene_name", metavar="SCENE")
+@click.option("--set", "pairs", multiple=True, metavar="PATH=VALUE", help="Replace a scene value.")
+@click.option("--map", "map_name", help="One map only; all that the machine has by default.")
+@click.option("--size", type=click.IntRange(3, 60), help="Cells along either axis.")
+@click.option(
+    "--budget",
+    type=Share(min=1.0, max=86_400.0),
+    help="Seconds; what it leaves no time for is drawn as not run. None by default.",
+)
+@click.option("-o", "--output", type=PATH, help="Picture to write (.png, .svg or .pdf).")
+@force_option
+@json_option
+def stability(
+    scene_name: str,
+    pairs: Sequence[str],
+    map_name: str | None,
+    size: int | None,
+    budget: float | None,
+    output: Path | None,
+    force: bool,
+    as_json: bool,
+) -> None:
+    """Where each method fails on SCENE: stable, wrong or unstable, by its method or physically."""
+    from ..sim.scene import load_scene
+    from .stability import save_figure, stability_table, stability_text
+    from .stability_maps import atlas
+
+    check_outputs([scene_name], [(output, PICTURE_SUFFIXES)], force)
+    machine = load_scene(scene_name, overrides_of(pairs))
+    with progress_bar("running cells") as progress:
+        maps = atlas(machine, name=map_name, budget=budget, size=size, progress=progress)
+    files = [str(output)] if output is not None else []
+    if output is not None:
+        save_figure(machine, maps, output)
+    text = "\n".join([stability_text(machine, maps), *files])
+    emit({**stability_table(machine, maps), "files": files}, as_json, text)
+
+
+@click.command()
+@click.argument("subject", metavar="SCENE|DATA")
+@click.option("--set", "pairs", multiple=True, metavar="PATH=VALUE", help="Replace a scene value.")
+@click.option(
+    "--accuracy",
+    type=Share(1e-6, 0.5),
+    default=None,
+    help="Error that every quantity may carry; the scene's own by default.",
+)
+@click.option(
+    "--budget",
+    type=Share(1.0, 1e6),
+    default=None,
+    help="Seconds after which nothing further is begun.",
+)
+@click.option("-o", "--output", type=PATH, help="Chart (.svg, .png, .pdf, .html, .json, .csv).")
+@seed_option
+@jobs_option
+@force_option
+@json_option
+def chart(
+    subject: str,
+    pairs: Sequence[str],
+    accuracy: float | None,
+    budget: float | None,
+    output: Path | None,
+    seed: int,
+    jobs: int | None,
+    force: bool,
+    as_json: bool,
+) -> None:
+    """Speed against accuracy: of the rungs and steps of SCENE, or the diagnosis on DATA (.h5)."""
+    from .chart import chart_table, chart_text, scene_chart
+
+    check_outputs([subject], [(output, CHART_SUFFIXES)], force)
+    of_data = subject.endswith(DATA_SUFFIXES)
+    if of_data and (pairs or accuracy is not None):
+        raise click.UsageError("--set and --accuracy are for a scene, not for a data set")
+    if seed and not of_data:
+        raise click.UsageError("--seed is of the models on a data set; a scene's chart draws none")
+    with progress_bar("measuring") as progress:
+        if of_data:
+            from .chart_models import model_chart
+
+            found = model_chart(
+                subject, seed=seed, budget=budget, jobs=worker_count(jobs), progress=progress
+            )
+        else:
+            from ..sim.scene import load_scene
+
+            machine = load_scene(subject, overrides_of(pairs))
+            found = scene_chart(machine, accuracy=accuracy, budget=budget, progress=progress)
+    if output is not None:
+        from .chart_figure import save_chart
+
+        save_chart(found, output)
+    files = [str(output)] if output is not None else []
+    emit({**chart_table(found), "files": files}, as_json, "\n".join([chart_text(found), *files]))
+
+
+@click.command()
+@json_option
+def verify(as_json: bool) -> None:
+    """Every literature check: expected, obtained, tolerance, source. Exit 1 if one fails."""
+    from dataclasses import asdict
+
+    from .verify import run_checks
+
+    results = run_checks()
+    failed = sum(not result.passed for result in results)
+    lines = [f"{'check':44} {'expected':>14} {'obtained':>14} {'tolerance':>10}  source"]
+    lines += [
+        f"{r.name:44} {r.expected:14.8g} {r.obtained:14.8g} {r.tolerance:10.2g}  "
+        f"{'' if r.passed else 'FAILED '}[{r.trust}] {r.source}"
+        for r in results
+    ]
+    lines.append(f"{len(results) - failed} passed, {failed} failed")
+    checks = [{**asdict(r), "passed": r.passed} for r in results]
+    emit({"checks": checks, "failed": failed}, as_json, "\n".join(lines))
+    raise click.exceptions.Exit(EXIT_FAILED if failed else 0)

@@ -1,0 +1,595 @@
+"""Commands about the wear: train, evaluate, report, and the demonstration of it all."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import click
+
+from .command_options import (
+    EXIT_ALARM,
+    EXIT_BAD_INPUT,
+    EXIT_UNFAMILIAR,
+    EXIT_WARNING,
+    MODEL_SUFFIXES,
+    MOST_RECORDS,
+    PAGE_SUFFIXES,
+    PATH,
+    PathType,
+    Share,
+    check_outputs,
+    declared_source,
+    emit,
+    force_option,
+    jobs_option,
+    json_option,
+    json_text,
+    overrides_of,
+    progress_bar,
+    seed_option,
+    source_options,
+    worker_count,
+)
+
+_FAIL_ON_HELP = "Exit 3 at a warning, 4 at an alarm, 5 when unfamiliar; alarm: only 4 and 5."
+
+
+@click.command()
+@click.argument("data", type=PATH)
+@click.option("-o", "--output", type=PATH, required=True, help="Model to write (.wsm).")
+@click.option(
+    "--target",
+    metavar="COLUMN",
+    default=None,
+    help="Severity to train for, or label of named conditions; the first severity by default.",
+)
+@click.option(
+    "--held-out",
+    type=Share(0, 0.9),
+    default=0.25,
+    show_default=True,
+    help="Share of the machine draws kept out of training, to judge the model.",
+)
+@click.option(
+    "--split",
+    metavar="NAME",
+    help="Split that DATA holds (wearstate splits): learn from its training side alone.",
+)
+@click.option(
+    "--baseline",
+    "healthy",
+    type=PATH,
+    help="Healthy records of DATA's machines: a model that is told how each was when new.",
+)
+@click.option(
+    "--budget-ms",
+    type=click.FloatRange(0, min_open=True),
+    default=None,
+    help="Time that a prediction may take, beside its features [ms]; 5 by default.",
+)
+@seed_option
+@jobs_option
+@force_option
+@json_option
+def train(
+    data: Path,
+    output: Path,
+    target: str | None,
+    held_out: float,
+    split: str | None,
+    healthy: Path | None,
+    budget_ms: float | None,
+    seed: int,
+    jobs: int | None,
+    force: bool,
+    as_json: bool,
+) -> None:
+    """Train a wear model on a labelled data set and judge it on held-out machine draws.
+
+    Where the target names conditions instead of a severity: a model that tells which, judged with
+    every recording left out in turn.
+    """
+    from .evaluate import score
+    from .evaluate_text import score_lines
+    from .healthy import references
+    from .modelfile import save_model
+    from .own import names_classes
+    from .tabulate import feature_table
+    from .train import train_model
+
+    inputs = [data] if healthy is None else [data, healthy]
+    check_outputs(inputs, [(output, MODEL_SUFFIXES)], force)
+    source = click.get_current_context().get_parameter_source("held_out")
+    shared = source is not click.core.ParameterSource.DEFAULT
+    if shared and split:
+        raise click.UsageError("--split says what is held out: leave --held-out away")
+    if target is not None and names_classes(data, target):
+        if healthy or budget_ms or shared or split:
+            raise click.UsageError(
+                f"--baseline, --budget-ms, --held-out and --split are for a severity; {target} "
+                "names conditions, and every recording is left out in turn"
+            )
+        _train_classes(data, output, target, seed, worker_count(jobs), force, as_json)
+        return
+    with progress_bar("features") as progress:
+        model, table, test = train_model(
+            data,
+            target=target,
+            held_out=held_out,
+            split=split,
+            seed=seed,
+            jobs=worker_count(jobs),
+            budget_ms=budget_ms,
+            baseline=healthy,
+            progress=progress,
+        )
+        reference = None
+        if healthy is not None:
+            known = feature_table(healthy, jobs=worker_count(jobs), progress=progress)
+            reference = references(table, known, healthy)
+    save_model(model, output, force=force)
+    result = score(model, table, test, references=reference) if len(test) else {}
+    trained = model.card["trained_on"]
+    head = f"{output}: trained on {trained['records']} records of {trained['draws']} machine draws"
+    lines = [head, *score_lines(result, model.card)]
+    if model.notice:
+        lines.append(f"Notice: {model.notice}.")
+    value = {"path": str(output), "trained_on": trained, "held_out": result}
+    emit(value, as_json, "\n".join(lines))
+
+
+def _train_classes(
+    data: Path, output: Path, target: str, seed: int, jobs: int, force: bool, as_json: bool
+) -> None:
+    """A model of named conditions, judged with whole recordings left out."""
+    from .own import classes_text, train_classes
+    from .ownfile import save_class_model
+
+    with progress_bar("features") as progress:
+        model, result = train_classes(data, target=target, seed=seed, jobs=jobs, progress=progress)
+    save_class_model(model, output, force=force)
+    head = (
+        f"{output}: trained on {model.card['records']} records of {result['recordings']} "
+        f"recordings, to tell {', '.join(model.classes)}"
+    )
+    notice = [f"Notice: {model.notice}."] if model.notice else []
+    value = {"path": str(output), "target": target, "left_out": result, "notice": model.notice}
+    emit(value, as_json, "\n".join([head, *classes_text(result), *notice]))
+
+
+@click.command()
+@click.argument("model_file", metavar="MODEL", type=PATH)
+@click.argument("data", type=PATH, required=False)
+@click.option(
+    "--across-fidelity",
+    is_flag=True,
+    help="MODEL is a recipe: train on each of its rungs, judge on the best.",
+)
+@click.option(
+    "-n",
+    "--records",
+    type=click.IntRange(20, MOST_RECORDS),
+    default=None,
+    help="Of every rung, with --across-fidelity; 120 by default.",
+)
+@click.option("--effect", "effects", multiple=True, help="With --across-fidelity: only this one.")
+@click.option("--set", "pairs", multiple=True, metavar="PATH=VALUE", help="Replace a scene value.")
+@click.option(
+    "--folder",
+    type=PathType(path_type=Path, file_okay=False, exists=True),
+    help="Keep the data sets of --across-fidelity, and use those that are there.",
+)
+@click.option(
+    "--split",
+    metavar="NAME",
+    help="Split that DATA holds (wearstate splits): judge on all of its test side.",
+)
+@click.option(
+    "--retrain",
+    multiple=True,
+    metavar="NAME|all",
+    help="Train and judge anew with this part of DATA held out; may be repeated.",
+)
+@click.option("--trained-on", type=PATH, help="MODEL's training set, for the baselines.")
+@click.option("--baseline", "healthy", type=PATH, help="Healthy records of DATA's machines.")
+@click.option("--quick", is_flag=True, help="Leave out baselines that need packages of others.")
+@click.option(
+    "--cache",
+    type=PathType(path_type=Path, file_okay=False, exists=True),
+    help="Folder in which features of such packages are kept.",
+)
+@click.option("-o", "--output", type=PATH, help="Page, picture or JSON to write.")
+@seed_option
+@force_option
+@jobs_option
+@json_option
+def evaluate(
+    model_file: Path,
+    data: Path | None,
+    across_fidelity: bool,
+    records: int | None,
+    effects: Sequence[str],
+    pairs: Sequence[str],
+    folder: Path | None,
+    output: Path | None,
+    seed: int,
+    force: bool,
+    jobs: int | None,
+    as_json: bool,
+    **given: Any,
+) -> None:
+    """Judge MODEL on the machine draws of DATA that it has not seen.
+
+    With --split: on what this split of DATA tests. With --retrain: train as MODEL was trained, with
+    other parts of DATA held out, and judge on these. With --across-fidelity: what training on a
+    cheaper model of the machine costs.
+    """
+    from .bundle import kind_of
+    from .ownfile import CLASS_MODEL
+
+    keys = ("split", "retrain", "trained_on", "healthy", "quick", "cache")
+    named = [key for key in keys if given[key]]
+    if across_fidelity:
+        if data is not None:
+            raise click.UsageError("--across-fidelity makes its own data: name a recipe only")
+        if named or output:
+            raise click.UsageError("--across-fidelity takes no option of a judgement on DATA")
+        _judge_across(model_file, records or _ACROSS, effects, pairs, folder, seed, jobs, as_json)
+        return
+    if data is None:
+        raise click.UsageError("Missing argument 'DATA'.")
+    if records or effects or pairs or folder:
+        raise click.UsageError("-n, --effect, --set and --folder need --across-fidelity")
+    if given["retrain"] and (given["trained_on"] or given["split"]):
+        raise click.UsageError(
+            "--retrain trains on DATA, by splits of its own: --trained-on and --split have no "
+            "meaning with it"
+        )
+    check_outputs([model_file, data], [(output, _EVALUATION)], force)
+    if kind_of(model_file) == CLASS_MODEL:
+        if named or output:
+            raise click.UsageError("a model of named conditions takes no such option")
+        _judge_classes(model_file, data, seed, worker_count(jobs), as_json)
+        return
+    _judge(model_file, data, output, seed, worker_count(jobs), as_json, given)
+
+
+_EVALUATION = (".html", ".png", ".svg", ".pdf", ".json")
+
+
+def _judge_classes(model_file: Path, data: Path, seed: int, jobs: int, as_json: bool) -> None:
+    """Of a model of named conditions."""
+    from .own import classes_text, evaluate_classes
+    from .ownfile import load_class_model
+
+    model = load_class_model(model_file)
+    with progress_bar("features") as progress:
+        result = evaluate_classes(model, data, seed=seed, jobs=jobs, progress=progress)
+    emit(result, as_json, "\n".join(classes_text(result)))
+
+
+def _judge(
+    model_file: Path,
+    data: Path,
+    output: Path | None,
+    seed: int,
+    jobs: int,
+    as_json: bool,
+    given: Mapping[str, Any],
+) -> None:
+    """Of a finished model, or by splits; text or JSON, and a file if asked for."""
+    from .evaluate import evaluate_model
+    from .evaluate_figure import save_evaluation
+    from .evaluate_splits import ALL_SPLITS, case_of, evaluate_splits, one_split
+    from .evaluate_text import score_lines, splits_text
+    from .modelfile import load_model
+
+    model = load_model(model_file)
+    shared = {key: given[key] for key in ("healthy", "quick", "cache")}
+    with progress_bar("features") as progress:
+        ways: dict[str, Any] = {**shared, "seed": seed, "jobs": jobs, "progress": progress}
+        if given["retrain"]:
+            names = ALL_SPLITS if "all" in given["retrain"] else given["retrain"]
+            case = case_of(model, data, **ways)
+            result = evaluate_splits(case, names, say=lambda text: click.echo(text, err=True))
+            whole, text = result, splits_text(result)
+        else:
+            ways |= {"trained_on": given["trained_on"], "split": given["split"]}
+            result = evaluate_model(model, data, **ways)
+            whole = one_split(result, model, data, seed)
+            text = "\n".join(score_lines(result, model.card))
+    if output is not None:
+        save_evaluation(whole, output, notice=model.notice)
+    emit(result, as_json, text)
+
+
+_ACROSS = 120  # records
+
+
+def _judge_across(
+    recipe: Path,
+    records: int,
+    effects: Sequence[str],
+    pairs: Sequence[str],
+    folder: Path | None,
+    seed: int,
+    jobs: int | None,
+    as_json: bool,
+) -> None:
+    """Losses of training on cheaper rungs; the data sets vanish unless a folder is given."""
+    from tempfile import TemporaryDirectory
+
+    from .across import across_fidelity, across_table, across_text
+
+    with TemporaryDirectory() as passing:
+        found = across_fidelity(
+            str(recipe),
+            records,
+            folder or Path(passing),
+            effects=effects,
+            overrides=overrides_of(pairs),
+            seed=seed,
+            jobs=worker_count(jobs),
+            say=lambda text: click.echo(text, err=True),
+        )
+    emit(across_table(found), as_json, across_text(found))
+
+
+@click.command()
+@click.argument("source", metavar="RECORDING|FOLDER", type=PATH)
+@click.option("--model", "model_file", type=PATH, required=True)
+@click.option("--baseline", "healthy", type=PATH, help="Healthy recordings of the machine (.h5).")
+@click.option("-o", "--output", type=PATH, help="HTML page to write.")
+@click.option("--machine", metavar="KIND", help="Kind of machine, for its ISO zone.")
+@click.option("--trend", is_flag=True, help="Of many recordings: severity over time, life left.")
+@click.option(
+    "--dates",
+    metavar="names|mtime|CSV|COLUMN",
+    help="Times for --trend: in file names, of files, a table file,date or file,hours, or a column "
+    "of hours in the data set (operating_hours).",
+)
+@click.option(
+    "--growth",
+    type=click.Choice(["linear", "log"]),
+    default="linear",
+    show_default=True,
+    help="Of the wear over time: abrasive, or damage that feeds itself.",
+)
+@seed_option
+@source_options
+@click.option("--fail-on", type=click.Choice(["warning", "alarm"]), help=_FAIL_ON_HELP)
+@force_option
+@json_option
+def report(
+    source: Path,
+    model_file: Path,
+    healthy: Path | None,
+    output: Path | None,
+    machine: str | None,
+    fail_on: str | None,
+    force: bool,
+    as_json: bool,
+    **given: Any,
+) -> None:
+    """The verdict on RECORDING: wear grade and severity with interval, or why there is none.
+
+    Of a FOLDER, or a data set without --record: a table of all recordings, the most urgent first;
+    with --json one object a line. Exit 2 if nothing could be judged; with --fail-on, of many
+    recordings, the code of the worst: alarm, warning, bad input, unfamiliar. With times, only the
+    latest of a machine counts.
+    """
+    from .bundle import kind_of
+    from .healthy import Baselines
+    from .modelfile import load_model
+    from .ownfile import CLASS_MODEL
+    from .report import known_machine
+
+    inputs = [source, model_file, *([healthy] if healthy else [])]
+    check_outputs(inputs, [(output, PAGE_SUFFIXES)], force)
+    known_machine(machine)
+    if kind_of(model_file) == CLASS_MODEL:
+        wear = {
+            "--baseline": healthy,
+            "-o": output,
+            "--machine": machine,
+            "--fail-on": fail_on,
+            "--trend": given["trend"],
+            "--dates": given["dates"],
+        }
+        wrong = [option for option, value in wear.items() if value]
+        if wrong:
+            raise click.UsageError(
+                f"{model_file} names conditions and knows no wear: leave {', '.join(wrong)} out, "
+                "or name a wear model"
+            )
+        _report_class(source, model_file, given, as_json)
+        return
+    model = load_model(model_file)
+    baselines = Baselines(healthy, model.card) if healthy else None
+    many = _holds_many(source)
+    if not many and (given["trend"] or given["dates"]):
+        raise click.UsageError("--trend and --dates are for a folder or a data set of many records")
+    told = _Told(source, model_file, model, baselines, output, machine, as_json, given)
+    verdicts = _report_many(told) if many else _report_one(told)
+    raise click.exceptions.Exit(report_exit(verdicts, fail_on))
+
+
+def _holds_many(source: Path) -> bool:
+    """Whether a folder, or a data set of which no record is chosen."""
+    from .report_batch import record_count
+
+    asked = click.get_current_context().get_parameter_source("record")
+    chosen = asked is not click.core.ParameterSource.DEFAULT
+    return source.is_dir() or (not chosen and record_count(source) > 1)
+
+
+def _report_class(source: Path, model_file: Path, given: Mapping[str, Any], as_json: bool) -> None:
+    """The condition in recordings, each as soon as it is told; exit 2 where none can be."""
+    from ..datasets.importers import read_recording
+    from .own import name_all, naming_text
+    from .ownfile import load_class_model
+    from .report_batch import recordings_in
+
+    model = load_class_model(model_file)
+    tacho = {key: given[key] for key in ("tacho", "pulses_per_revolution")}
+    if not _holds_many(source):
+        naming = model.estimate(read_recording(source, declared_source(given), **tacho))
+        notice = f"\nNotice: {model.notice}." if model.notice else ""
+        emit({**naming.as_dict(), "notice": model.notice}, as_json, naming_text(naming) + notice)
+        verdicts = {naming.verdict}
+    else:
+        verdicts = set()
+        with recordings_in(
+            source, declared_source(given), **tacho, leave_out=[model_file]
+        ) as items:
+            for name, naming in name_all(items, model):
+                verdicts.add(naming.verdict)
+                emit(
+                    {"recording": name, **naming.as_dict()},
+                    as_json,
+                    f"{name}: {naming_text(naming)}",
+                )
+        if model.notice:
+            click.echo(f"Notice: {model.notice}.", err=as_json)
+    if verdicts == {"unusable"}:
+        raise click.exceptions.Exit(EXIT_BAD_INPUT)
+
+
+class _Told(NamedTuple):
+    """What both kinds of report are given."""
+
+    source: Path
+    model_file: Path
+    model: Any
+    baselines: Any
+    output: Path | None
+    machine: str | None
+    as_json: bool
+    given: Mapping[str, Any]
+
+
+_Verdict = tuple[str, int | None]
+"""Verdict and grade."""
+
+
+def _report_one(told: _Told) -> list[_Verdict]:
+    """Report on one recording."""
+    from ..datasets.importers import read_recording
+    from .report import report_table, save_page
+    from .report_text import report_text
+
+    recording = read_recording(
+        told.source,
+        declared_source(told.given),
+        tacho=told.given["tacho"],
+        pulses_per_revolution=told.given["pulses_per_revolution"],
+    )
+    baseline = told.baselines.of(recording.row) if told.baselines else None
+    estimate = told.model.estimate(recording, baseline)
+    table = report_table(
+        recording,
+        told.model,
+        estimate,
+        machine=told.machine,
+        baseline=baseline,
+        files={"recording": told.source, "model": told.model_file},
+    )
+    if told.output is not None:
+        from .report_page import report_html
+
+        page = report_html(table, recording, told.model, baseline=baseline)
+        save_page(page, told.output)
+        table["html"] = str(told.output)
+    text = report_text(table) + (f"\nPage        {told.output}" if told.output else "")
+    click.echo(json_text(table) if told.as_json else text)
+    return [(estimate.verdict, estimate.grade)]
+
+
+def _report_many(told: _Told) -> list[_Verdict]:
+    """Report on a folder or data set; of JSON one line each, as soon as it is judged."""
+    from .report import save_page
+    from .report_batch import HOURS, judge_all, recordings_in
+    from .report_text import batch_text
+
+    given = told.given
+    dates = given["dates"]
+    if given["trend"] and dates is None:
+        dates = "names" if told.source.is_dir() else HOURS
+    healthy = told.baselines and Path(told.baselines.source)
+    others = [path for path in (told.output, told.model_file, Path(dates or ""), healthy) if path]
+    with (
+        recordings_in(
+            told.source,
+            declared_source(given),
+            tacho=given["tacho"],
+            pulses_per_revolution=given["pulses_per_revolution"],
+            leave_out=others,
+        ) as items,
+        progress_bar("judging") as progress,
+    ):
+        batch = judge_all(
+            told.source,
+            items,
+            told.model,
+            model_file=told.model_file,
+            baselines=told.baselines,
+            dates=dates,
+            growth=given["growth"],
+            seed=given["seed"],
+            tell=(lambda line: click.echo(json_text(line))) if told.as_json else None,
+            progress=progress,
+        )
+        if told.output is not None:
+            from .report_page import batch_html
+
+            page = batch_html(batch, told.model, machine=told.machine, baselines=told.baselines)
+            save_page(page, told.output)
+    if not told.as_json:
+        click.echo(batch_text(batch) + (f"\nPage        {told.output}" if told.output else ""))
+    return [(row.verdict, row.grade) for row in batch.current]
+
+
+def report_exit(verdicts: Sequence[_Verdict], fail_on: str | None) -> int:
+    """Nothing judged is bad input, asked or not; else only what --fail-on asks for."""
+    from .grades import ALARM_GRADE, WARNING_GRADE
+
+    if all(verdict == "unusable" for verdict, _ in verdicts):
+        return EXIT_BAD_INPUT
+    if fail_on is None:
+        return 0
+    worst = max((grade for _, grade in verdicts if grade is not None), default=0)
+    if worst >= ALARM_GRADE:
+        return EXIT_ALARM
+    if fail_on == "warning" and worst >= WARNING_GRADE:
+        return EXIT_WARNING
+    if any(verdict == "unusable" for verdict, _ in verdicts):
+        return EXIT_BAD_INPUT
+    return EXIT_UNFAMILIAR if any(verdict == "unfamiliar" for verdict, _ in verdicts) else 0
+
+
+@click.command()
+@click.option(
+    "--folder",
+    type=PathType(path_type=Path, file_okay=False),
+    default=Path("demo"),
+    show_default=True,
+    help="Where its files go: new, empty, or an earlier demo's, whose files are replaced.",
+)
+@seed_option
+@jobs_option
+@json_option
+def demo(folder: Path, seed: int, jobs: int | None, as_json: bool) -> None:
+    """The whole job, small: simulate, features, train, evaluate, report."""
+    from .demo import run_demo
+    from .evaluate_text import score_lines
+
+    with progress_bar("simulating and learning") as progress:
+        result = run_demo(
+            folder,
+            seed=seed,
+            jobs=worker_count(jobs),
+            progress=progress,
+            say=lambda text: click.echo(text, err=True),
+        )
+    text = "\n".join([*score_lines(result["held_out"], result["card"]), "", result["text"]])
+    emit({key: result[key] for key in ("files", "held_out", "report", "seconds")}, as_json, text)
