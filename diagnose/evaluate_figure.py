@@ -50,7 +50,8 @@ def evaluation_figure(result: Result) -> Any:
     panels = _panels(result)
     rows = (len(panels) + 1) // 2
     figure = Figure(figsize=(2 * _WIDTH, _HEIGHT * rows), layout="constrained")
-    figure.suptitle(f"{result['data']}: {quantity_name(result['severity'])}", fontsize=11)
+    what = f"{quantity_name(result['severity'])}, {result['origin']}"
+    figure.suptitle(f"{result['data']}: {what}", fontsize=11)
     for place, (_, _, draw) in enumerate(panels, start=1):
         draw(figure.add_subplot(rows, 2, place))
     return figure

@@ -5,7 +5,7 @@ model file holds numbers only, and a prediction needs no library but numpy.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from itertools import accumulate, pairwise
 from typing import Any
 
@@ -118,6 +118,9 @@ class Blend:
     low, high : float
         Estimates outside are set to the bound: a factor of two beyond what was trained, where an
         estimate is a bound anyway.
+    unseen : numpy.ndarray [shape=(n_stretches, 2)]
+        Targets from and to which no training record had any: where the lines among the parts
+        point there, they stand alone, as trees know only what they have seen.
 
     Examples
     --------
@@ -134,11 +137,48 @@ class Blend:
     weights: Float
     low: float
     high: float
+    unseen: Float = field(default_factory=lambda: np.empty((0, 2)))
 
     def predict(self, rows: Float) -> Float:
         """Target [shape=(n,)] of feature rows [shape=(n, n_features)]."""
         found = np.stack([part.predict(rows) for part in self.parts], axis=1)
-        return np.clip(found @ self.weights, self.low, self.high)
+        value = found @ self.weights
+        lines = self.weights * [isinstance(part, Linear) for part in self.parts]
+        if len(self.unseen) and lines.any():
+            line = np.clip(found @ lines / lines.sum(), self.low, self.high)
+            first, last = self.unseen.T
+            value = np.where(((first < line[:, None]) & (line[:, None] < last)).any(1), line, value)
+        return np.clip(value, self.low, self.high)
+
+
+def knowing_unseen(blend: Blend, target: Float, reach: float) -> Blend:
+    """A blend that leaves to its lines what no training record had.
+
+    Parameters
+    ----------
+    blend : Blend
+    target : numpy.ndarray [shape=(n,)]
+        Of the training records.
+    reach : float
+        A line that points no farther than this from a training record points at something seen:
+        twice its own mean error, in the unit of the target.
+
+    Returns
+    -------
+    Blend
+
+    Examples
+    --------
+    >>> one = np.ones(1)
+    >>> flat = Linear(centre=0 * one, spread=one, weight=one, offset=0.0, log=False)
+    >>> blend = Blend(names=("a",), parts=(flat,), weights=one, low=0.5, high=9.0)
+    >>> knowing_unseen(blend, np.array([1.0, 1.1, 4.0]), 0.2).unseen.round(1).tolist()
+    [[0.5, 0.8], [1.3, 3.8], [4.2, 9.0]]
+    """
+    known = np.unique(target)
+    first = np.append(blend.low, known + reach)
+    last = np.append(known - reach, blend.high)
+    return replace(blend, unseen=np.column_stack([first, last])[first < last])
 
 
 # --- candidates
@@ -445,6 +485,11 @@ def fit_line(rows: Float, target: Float, options: Sequence[Option], *, seed: int
     return part
 
 
+def least_line_error(options: Sequence[Option]) -> float:
+    """Error of the best straight line, of the target or of its logarithm [unit of the target]."""
+    return min(option.error for option in options if option.name in _line_names())
+
+
 def _out_of_fold(
     candidate: Candidate, rows: Float, target: Float, folds: Folds, seed: int
 ) -> Float:
@@ -474,9 +519,11 @@ def _chosen(
     for train, test in folds:
         pick = _best(_options(usable, names, crossed, target, train), limit)
         estimate[test] = crossed[pick.name][test]
-    weights = blend_weights(table[:, list(best.members)], target)
-    kept = np.flatnonzero(weights)
-    members = [usable[best.members[i]] for i in kept]
+    weights = _with_a_line(
+        usable, options, best, blend_weights(table[:, list(best.members)], target)
+    )
+    kept = np.flatnonzero(weights).tolist()
+    members = [usable[i] for i in kept]
     blend = Blend(
         names=tuple(item.name for item in members),
         parts=tuple(item.fit(rows, target, seed) for item in members),
@@ -485,6 +532,22 @@ def _chosen(
         high=bounds[1],
     )
     return Fitted(blend=blend, estimate=estimate, options=_front(options), chosen=best.name)
+
+
+def _with_a_line(
+    usable: Sequence[Candidate], options: Sequence[Option], best: Option, weights: Float
+) -> Float:
+    """Weights of all usable candidates; the best line is kept, as trees know only what they saw."""
+    everyone = np.zeros(len(usable))
+    everyone[list(best.members)] = weights
+    lines = [o for o in options if len(o.members) == 1 and o.name in _line_names()]
+    if lines and not everyone[[o.members[0] for o in lines]].any():
+        everyone[min(lines, key=lambda option: option.error).members[0]] = _LEAST_WEIGHT
+    return np.asarray(everyone / everyone.sum())
+
+
+def _line_names() -> set[str]:
+    return {candidate.name for candidate in CANDIDATES[: 2 * _LINES]}
 
 
 def _option_members(usable: Sequence[Candidate]) -> dict[str, tuple[int, ...]]:
@@ -530,8 +593,6 @@ def _best(options: Sequence[Option], limit: float) -> Option:
 
 
 def _front(options: Sequence[Option]) -> tuple[Option, ...]:
-    from dataclasses import replace
-
     return tuple(
         replace(
             one,

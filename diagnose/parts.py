@@ -80,7 +80,7 @@ def blend_structure(blend: Blend) -> dict[str, Any]:
 
 def blend_arrays(blend: Blend, place: str) -> dict[str, Any]:
     """Every number of a blend by a dotted name under `place`."""
-    found: dict[str, Any] = {f"{place}.weights": blend.weights}
+    found: dict[str, Any] = {f"{place}.weights": blend.weights, f"{place}.unseen": blend.unseen}
     for i, part in enumerate(blend.parts):
         found |= part_arrays(part, f"{place}.{i}")
     return found
@@ -106,6 +106,7 @@ def blend_of(structure: BlendStructure, arrays: Mapping[str, NDArray[Any]], plac
         weights=_number_array(arrays[f"{place}.weights"], "weights"),
         low=structure.low,
         high=structure.high,
+        unseen=_number_array(arrays[f"{place}.unseen"], "unseen"),
     )
 
 
@@ -178,6 +179,8 @@ def blend_fits(blend: Blend, n: int) -> bool:
         and bool((weights > 0).all())
         and abs(float(weights.sum()) - 1) < _ROUNDING
         and blend.low < blend.high
+        and np.ndim(blend.unseen) == 2
+        and np.shape(blend.unseen)[1] == 2
         and all(
             linear_fits(part, n) if isinstance(part, Linear) else _forest_fits(part, n)
             for part in blend.parts

@@ -2,7 +2,7 @@
 
 import hashlib
 import json
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +19,16 @@ from .conformal import Calibration, Scale, fit_scale, scale_inputs
 from .estimate import Head, WearModel
 from .grades import grades_of
 from .healthy import referenced_rows, references
-from .models import BUDGET_MS, Fitted, Folds, Linear, fit_blend, fit_line
+from .models import (
+    BUDGET_MS,
+    Fitted,
+    Folds,
+    Linear,
+    fit_blend,
+    fit_line,
+    knowing_unseen,
+    least_line_error,
+)
 from .novelty import Familiarity, fit_familiarity
 from .quality import Levels, fit_levels
 from .tabulate import FeatureTable, Progress, confounders_in, feature_table
@@ -353,6 +362,9 @@ def learn(lesson: Lesson, *, seed: int = 0, budget_ms: float | None = None) -> L
         severity = fit_blend(lesson.inputs, lesson.severity, folds, seed=seed, budget_ms=budget_ms)
     except ValueError as error:
         raise DataError(str(error)) from error
+    reach = 2 * least_line_error(severity.options)  # what lines near the ends overshoot by chance
+    blend = knowing_unseen(severity.blend, lesson.severity, reach)
+    severity = replace(severity, blend=blend)
     distance = _out_of_fold_distances(lesson, folds)
     inputs = scale_inputs(severity.estimate, distance)
     scale = fit_scale(inputs, np.log(lesson.severity / severity.estimate))

@@ -11,6 +11,8 @@ from wearstate.diagnose.models import (
     Linear,
     blend_weights,
     fit_blend,
+    knowing_unseen,
+    least_line_error,
 )
 
 ROWS = {candidate.name: candidate for candidate in CANDIDATES}
@@ -138,3 +140,55 @@ def test_estimates_end_where_nothing_was_trained(task):
     blend = fit_blend(rows, target, group_folds(groups, n=5), candidates=CANDIDATES[:1]).blend
     low, high = blend.predict(np.array([-100 * np.ones(20), 100 * np.ones(20)]))
     assert (low, high) == (target.min() / 2, target.max() * 2)
+
+
+def unseen_task(keep):
+    """A straight target of one of five features, records of some of its range left to learn from.
+
+    The level doubles over the range; noise of 0.01 blurs what trees and lines can tell.
+    """
+    rng = np.random.default_rng(5)
+    target = rng.uniform(1, 2, 900)
+    rows = rng.standard_normal((900, 5))
+    rows[:, 0] = target + 0.01 * rng.standard_normal(900)
+    learn = keep(target)
+    folds = group_folds(np.arange(learn.sum()), n=5, seed=0)
+    trees = [candidate for candidate in CANDIDATES if candidate.name in ("plain ridge 3", "trees")]
+    fitted = fit_blend(rows[learn], target[learn], folds, candidates=trees)
+    reach = 2 * least_line_error(fitted.options)
+    return fitted.blend, knowing_unseen(fitted.blend, target[learn], reach), rows, target
+
+
+@pytest.mark.parametrize(
+    ("keep", "asked"),
+    [
+        (lambda y: y < 1.5, lambda y: y > 1.6),
+        (lambda y: (y < 1.4) | (y > 1.6), lambda y: (y > 1.45) & (y < 1.55)),
+    ],
+    ids=["beyond", "between"],
+)
+def test_where_no_severity_was_seen_the_line_stands_alone(keep, asked):
+    blend, knowing, rows, target = unseen_task(keep)
+    trees = blend.parts[blend.names.index("trees")]
+    there = asked(target)
+    line = blend.parts[blend.names.index("plain ridge 3")]
+    # the least of records asked lies farther from those known than a line errs by
+    np.testing.assert_allclose(knowing.predict(rows[there]), line.predict(rows[there]), rtol=1e-12)
+    error, of_trees = (
+        np.abs(part.predict(rows[there]) - target[there]).mean() for part in (knowing, trees)
+    )
+    assert error < 0.02  # twice the mean of the noise
+    assert of_trees > 2 * error
+    known = keep(target) & (target > 1.05) & (np.abs(target - 1.5) > 0.15)
+    np.testing.assert_array_equal(knowing.predict(rows[known]), blend.predict(rows[known]))
+
+
+def test_a_line_is_kept_beside_trees_that_are_better(task):
+    rows, target, groups = task
+    trees = [candidate for candidate in CANDIDATES if candidate.name in ("ridge 300", "trees")]
+    found = fit_blend(rows[:, 4:5], target, group_folds(groups, n=5, seed=0), candidates=trees)
+    assert found.chosen == "trees"  # of |x| a line knows nothing
+    assert dict(zip(found.blend.names, found.blend.weights.round(3).tolist(), strict=True)) == {
+        "ridge 300": 0.02,
+        "trees": 0.98,
+    }
