@@ -5,6 +5,7 @@ import os
 import signal
 import threading
 import time
+import warnings
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import BrokenExecutor, Future
@@ -28,8 +29,7 @@ PARENT_CHECK = 1.0
 """Time between two looks of a worker at whether its parent lives [s]."""
 
 IDLE = 600.0
-"""Time after which an idle worker ends [s]: long, since loky has hung where workers were ending of
-idleness (after 10 s, its default) just as new work came."""
+"""Time after which an idle worker ends [s]: long, since a new one imports for seconds."""
 
 _ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 
@@ -143,6 +143,10 @@ class _Processes:
     def _start(self) -> None:
         from joblib.externals.loky import get_reusable_executor
 
+        # loky renews a worker that was idle for long, or grew by 300 MB (as one does that compiles
+        # kernels), and warns of it in the thread that hands out work: where warnings are errors
+        # that thread ends, and every later result is waited for without end
+        warnings.filterwarnings("ignore", "A worker stopped while some jobs", UserWarning)
         self._executor = get_reusable_executor(
             max_workers=self._jobs,
             timeout=IDLE,

@@ -14,12 +14,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.lib import format as npy
 from numpy.typing import NDArray
-from pydantic import ValidationError
+from pydantic import BaseModel, ValidationError
 
 from ..datasets.record import DataError
 from ..features.analysis import STANDARD
@@ -186,23 +186,33 @@ def kind_of(path: str | Path) -> str:
     return kind if isinstance(kind, str) else ""
 
 
-def refused(path: str | Path, name: str, error: ValidationError) -> ModelError:
-    """Error of a table that is not as it must be, in one line.
+Table = TypeVar("Table", bound=BaseModel)
+
+
+def checked(kind: type[Table], table: Mapping[str, Any], path: str | Path, name: str) -> Table:
+    """A table of a model file, as it must be.
 
     Parameters
     ----------
+    kind : type
+        What it must hold.
+    table : mapping
     path : str or Path
+        Of the file, for the message.
     name : str
-        Of the table.
-    error : ValidationError
+        Of the table in it.
 
-    Returns
-    -------
+    Raises
+    ------
     ModelError
+        In one line: where the first fault is and what must be there.
     """
-    first = error.errors(include_url=False, include_input=False)[0]
-    place = ".".join(str(part) for part in first["loc"]) or "table"
-    return ModelError(f"{path}: {name}: {place}: {first['msg']}; retrain it")
+    try:
+        return kind.model_validate(table)
+    except ValidationError as error:
+        first = error.errors(include_url=False, include_input=False)[0]
+        place = ".".join(str(part) for part in first["loc"]) or "table"
+        raise ModelError(f"{path}: {name}: {place}: {first['msg']}; retrain it") from error
 
 
 _FAULTS = (

@@ -325,6 +325,13 @@ class _Numbers(click.ParamType[tuple[float, ...]]):
             self.fail(f"{value!r} must be numbers parted by commas", param, ctx)
 
 
+_bearing_option = click.option(
+    "--bearing",
+    type=_Numbers(),
+    metavar="N,d,D[,DEG]",
+    help="Rollers, their diameter, pitch diameter, contact angle: for its fault lines.",
+)
+
 _KINDS = (  # as wearstate.diagnose.signal_plots, which is too heavy to import for --help
     *("auto", "waveform", "spectrum", "waterfall", "orders"),
     *("angle", "envelope", "frf", "orbit"),
@@ -346,12 +353,7 @@ _PLOT_OPTIONS = ("draw", "force_channel", "speed_hz", "bearing")
 @click.option("--draw", multiple=True, metavar="NAME", help="Channel to plot; all by default.")
 @click.option("--force-channel", metavar="NAME", help="Force of a transfer function to plot.")
 @click.option("--speed-hz", type=float, help="Shaft speed [Hz], where the file has none.")
-@click.option(
-    "--bearing",
-    type=_Numbers(),
-    metavar="N,d,D[,DEG]",
-    help="Rollers, their diameter, pitch diameter, contact angle: for its fault lines.",
-)
+@_bearing_option
 @source_options
 @force_option
 @json_option
@@ -611,12 +613,7 @@ _FEATURE_SETS = ("standard", "core", "complete")  # as wearstate.features.catalo
 @click.option("--only", multiple=True, metavar="NAMES", help="Only these, parted by commas.")
 @click.option("--machine", metavar="KIND", help="Kind of machine, for its ISO zone.")
 @click.option("--speed-hz", type=float, help="Nominal shaft speed [Hz].")
-@click.option(
-    "--bearing",
-    type=_Numbers(),
-    metavar="N,d,D[,DEG]",
-    help="Rollers, their diameter, pitch diameter, contact angle: for its fault lines.",
-)
+@_bearing_option
 @click.option(
     "--band", "bands", type=_Numbers(), multiple=True, metavar="LOW,HIGH", help="Band level [Hz]."
 )

@@ -6,9 +6,9 @@ from typing import Any, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, ValidationError, model_validator
+from pydantic import Field, model_validator
 
-from .bundle import Bundle, load_bundle, refused, save_bundle
+from .bundle import Bundle, checked, load_bundle, save_bundle
 from .conformal import Calibration, Scale, scale_inputs
 from .estimate import Head, ModelError, WearModel
 from .grades import GRADE_NAMES
@@ -28,6 +28,7 @@ from .parts import (
     numbers_fit,
     part_arrays,
     part_of,
+    refuse_more,
     shapes_of,
     spreads_fit,
 )
@@ -83,8 +84,8 @@ def load_model(path: str | Path) -> WearModel:
         the features, or forged so that its parts do not fit each other; the text says what helps.
     """
     bundle = load_bundle(path, _KIND)
-    _check_card(bundle.card, path)
-    structure = _structure(bundle.structure, path)
+    checked(_Card, bundle.card, path, "card.json")
+    structure = checked(_Structure, bundle.structure, path, "structure.json")
     try:
         model = _model_of(structure, bundle.arrays, bundle.card)
     except (KeyError, TypeError, ValueError) as error:
@@ -116,13 +117,6 @@ class _Structure(Strict):
 
     severity: BlendStructure
     heads: list[_HeadStructure] = Field(max_length=100)
-
-
-def _structure(table: dict[str, Any], path: str | Path) -> _Structure:
-    try:
-        return _Structure.model_validate(table)
-    except ValidationError as error:
-        raise refused(path, "structure.json", error) from error
 
 
 def _structure_of(model: WearModel) -> dict[str, Any]:
@@ -172,9 +166,7 @@ def _model_of(
         card=card,
         **{part: kind(**part_of(arrays, part, kind)) for part, kind in _ARRAY_PARTS.items()},
     )
-    more = sorted(set(arrays) - set(_arrays_of(model)))
-    if more:
-        raise ValueError(f"{', '.join(more)} belong to no part")
+    refuse_more(arrays, _arrays_of(model))
     return model
 
 
@@ -321,10 +313,3 @@ class _Card(Strict):
             raise ValueError("conditions must name features")
         check_channels(self.channels, self.tacho)
         return self
-
-
-def _check_card(card: Mapping[str, Any], path: str | Path) -> None:
-    try:
-        _Card.model_validate(card)
-    except ValidationError as error:
-        raise refused(path, "card.json", error) from error

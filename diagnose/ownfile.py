@@ -4,9 +4,9 @@ from pathlib import Path
 from typing import Any, Literal, Self
 
 import numpy as np
-from pydantic import Field, ValidationError, model_validator
+from pydantic import Field, model_validator
 
-from .bundle import Bundle, load_bundle, refused, save_bundle
+from .bundle import Bundle, checked, load_bundle, save_bundle
 from .estimate import ModelError
 from .novelty import Familiarity
 from .own import ClassModel, Votes
@@ -23,6 +23,7 @@ from .parts import (
     numbers_fit,
     part_arrays,
     part_of,
+    refuse_more,
     shapes_of,
 )
 from .physical import physical_rows
@@ -105,14 +106,8 @@ def load_class_model(path: str | Path) -> ClassModel:
         of the features, or forged so that its parts do not fit each other.
     """
     bundle = load_bundle(path, CLASS_MODEL)
-    try:
-        _Card.model_validate(bundle.card)
-    except ValidationError as error:
-        raise refused(path, "card.json", error) from error
-    try:
-        structure = _Structure.model_validate(bundle.structure)
-    except ValidationError as error:
-        raise refused(path, "structure.json", error) from error
+    checked(_Card, bundle.card, path, "card.json")
+    structure = checked(_Structure, bundle.structure, path, "structure.json")
     try:
         model = _model_of(structure, bundle)
     except (KeyError, TypeError, ValueError) as error:
@@ -139,9 +134,7 @@ def _model_of(structure: _Structure, bundle: Bundle) -> ClassModel:
         card=bundle.card,
         **{part: kind(**part_of(arrays, part, kind)) for part, kind in _PARTS.items()},
     )
-    more = sorted(set(arrays) - set(_arrays_of(model)))
-    if more:
-        raise ValueError(f"{', '.join(more)} belong to no part")
+    refuse_more(arrays, _arrays_of(model))
     return model
 
 

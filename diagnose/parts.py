@@ -110,6 +110,18 @@ def blend_of(structure: BlendStructure, arrays: Mapping[str, NDArray[Any]], plac
     )
 
 
+def refuse_more(arrays: Mapping[str, Any], known: Mapping[str, Any]) -> None:
+    """Refuse arrays of a file that its model has no part for.
+
+    Raises
+    ------
+    ValueError
+    """
+    more = sorted(set(arrays) - set(known))
+    if more:
+        raise ValueError(f"{', '.join(more)} belong to no part")
+
+
 _WHOLE = {"feature", "left", "right", "root", "depth", "group", "groups", "label"}
 """Fields that hold whole numbers."""
 

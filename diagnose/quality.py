@@ -99,7 +99,7 @@ def layout_faults(recording: Recording, card: Mapping[str, Any]) -> tuple[Fault,
 
 def _channel_faults(found: Sequence[Channel], card: Mapping[str, Any]) -> list[Fault]:
     wanted = [c for c in card["channels"] if c["name"] != card["tacho"]]
-    units = [c["unit"] for c in wanted]
+    units = {c["name"]: c["unit"] for c in wanted}
     names = ", ".join(c["name"] for c in wanted)
     faults = []
     if len(found) != len(wanted):
@@ -110,10 +110,10 @@ def _channel_faults(found: Sequence[Channel], card: Mapping[str, Any]) -> list[F
         text = f"its channels are {here}, the model needs {names}, in this order"
         faults.append(Fault(kind="layout", channel="", text=text))
     for c in found:
-        if c.unit not in units:
-            text = (
-                f"channel {c.name} is in {c.unit or 'an unknown unit'}, the model needs {units[0]}"
-            )
+        # under a name that the model does not know, any unit of the model's may be right
+        unit = units.get(c.name, c.unit if c.unit in units.values() else next(iter(units.values())))
+        if c.unit != unit:
+            text = f"channel {c.name} is in {c.unit or 'an unknown unit'}, the model needs {unit}"
             faults.append(Fault(kind="unit", channel=c.name, text=text))
     return faults
 

@@ -363,6 +363,7 @@ def learn(lesson: Lesson, *, seed: int = 0, budget_ms: float | None = None) -> L
     except ValueError as error:
         raise DataError(str(error)) from error
     reach = 2 * least_line_error(severity.options)  # what lines near the ends overshoot by chance
+    # random folds leave out no stretch of severity: the calibration needs no such rule
     blend = knowing_unseen(severity.blend, lesson.severity, reach)
     severity = replace(severity, blend=blend)
     distance = _out_of_fold_distances(lesson, folds)

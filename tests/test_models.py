@@ -401,6 +401,28 @@ def test_every_flipped_or_missing_byte_is_noticed_or_harmless(trained, tmp_path)
             load_model(bad)
 
 
+def test_units_are_compared_channel_by_channel():
+    """A force in m/s^2 and an acceleration in N: both units are the model's, neither is right."""
+    from wearstate.diagnose.estimate import input_faults
+
+    units = {"acc": "m/s^2", "push": "N"}
+    card = {
+        "channels": [{"name": name, "unit": unit} for name, unit in units.items()],
+        "tacho": None,
+        "pulses_per_revolution": 1,
+        "sample_rate_hz": 100.0,
+    }
+    channels = (
+        Channel(name="acc", unit="N", quantity="force"),
+        Channel(name="push", unit="m/s^2", quantity="acceleration"),
+    )
+    recording = Recording(signal=np.zeros((2, 8)), sample_rate=100.0, channels=channels)
+    assert input_faults(recording, card) == [
+        "channel acc is in N, the model needs m/s^2",
+        "channel push is in m/s^2, the model needs N",
+    ]
+
+
 def test_unknown_channel_unit_reads_well():
     channel = Channel(name="a", unit="", quantity="acceleration")
     from wearstate.diagnose.estimate import input_faults

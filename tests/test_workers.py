@@ -7,6 +7,7 @@ import sys
 import time
 
 import cloudpickle
+import numpy as np
 import pytest
 from wearstate.datasets import workers
 from wearstate.datasets.pool import WorkersError
@@ -42,6 +43,17 @@ class OnceAt3:
         return die_once(self.place, item)
 
 
+def grow_at_4(item):
+    """Keep 400 MB at item 4, when loky looks at its workers a second time; then be slow enough that
+    a new worker still finds work."""
+    if item == 4:
+        time.sleep(1.2)
+        os.kept = np.ones(50_000_000)
+    if item > 4:
+        time.sleep(0.3)
+    return item, os.getpid()
+
+
 def die(item):
     os.kill(os.getpid(), signal.SIGKILL)
 
@@ -73,6 +85,14 @@ def test_a_worker_that_dies_is_replaced(tmp_path):
     found = list(in_order(function, range(8), jobs=2, say=told.append))
     assert found == [0, 1, 2, -3, 4, 5, 6, 7]
     assert told == ["a worker process died; what it had in hand is done again"]
+
+
+def test_a_worker_that_grows_is_replaced_without_a_word():
+    """Warnings are errors here, and one in the thread that hands out work would hang the run."""
+    pytest.importorskip("psutil")  # what loky measures its workers with
+    found = list(in_order(grow_at_4, range(16), jobs=2))
+    assert [item for item, _ in found] == list(range(16))
+    assert len({pid for _, pid in found}) == 3
 
 
 def test_a_worker_whose_parent_was_gone_before_it_settled_ends():
