@@ -2,11 +2,11 @@
 
 from collections.abc import Callable
 
-from .integrate import Solution
+from .integrate import Recorder, Solution
 from .journal import check_journal, simulate_journal
 from .parts import Scene, SceneError
 from .pump import check_pump, simulate_pump
-from .shaft_line import check_shaft, simulate_shaft
+from .shaft_line import check_shaft, shaft_recorder, simulate_shaft
 
 
 def simulate(
@@ -50,6 +50,37 @@ def simulate(
     return _SIMULATORS[scene.machine](scene, seed, truth, raise_on_failure)
 
 
+def recorder(scene: Scene) -> Recorder:
+    """What makes recordings of a scene from many starts, doing once what they share.
+
+    Parameters
+    ----------
+    scene : Scene
+
+    Returns
+    -------
+    callable
+        Scene, seed, truth, raise_on_failure, as :func:`simulate`; the scene may differ from this
+        one in its start angle alone.
+
+    Raises
+    ------
+    SceneError
+        As :func:`simulate`; of a machine whose starts share nothing, only when it is called.
+
+    Examples
+    --------
+    >>> from wearstate.sim.scene import load_scene
+    >>> scene = load_scene("propulsion-shaft", {"duration": "0.4 s"})
+    >>> again = recorder(scene)
+    >>> bool((again(scene, 1, False, True).signal == simulate(scene, seed=1).signal).all())
+    True
+    """
+    _refuse_unresolved(scene)
+    share = _RECORDERS.get(scene.machine)
+    return share(scene) if share else _SIMULATORS[scene.machine]
+
+
 def check(scene: Scene) -> None:
     """Check what only the physics can tell: rungs, step, sampling.
 
@@ -76,12 +107,15 @@ def _refuse_unresolved(scene: Scene) -> None:
         raise SceneError(scene.name, [fault])
 
 
-_SIMULATORS: dict[str, Callable[[Scene, int, bool, bool], Solution]] = {
+_SIMULATORS: dict[str, Recorder] = {
     "reciprocating-pump": simulate_pump,
     "journal-bearing": simulate_journal,
     "propulsion-shaft": simulate_shaft,
 }
 """A new machine is one row."""
+
+_RECORDERS: dict[str, Callable[[Scene], Recorder]] = {"propulsion-shaft": shaft_recorder}
+"""Machines whose starts share something: what a film settles to does not know where it began."""
 
 _CHECKS: dict[str, Callable[[Scene], None]] = {
     "reciprocating-pump": check_pump,

@@ -7,6 +7,7 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 from scipy import fft, signal
 
@@ -19,6 +20,8 @@ PASS_BAND = 0.45
 """Upper edge of the flat band over the sample rate; 11.5 kHz at 25.6 kHz."""
 
 _STOP_ATTENUATION_DB = 80.0
+
+_BLOCK = 1024  # samples of a block that are made at once, some 70 of which are its ends
 
 
 def exact_oscillator(
@@ -391,10 +394,40 @@ def decimate(means: NDArray[np.float64], factor: int) -> NDArray[np.float64]:
         Row k belongs to the middle of step ``k * factor``. Within :func:`edge_samples` of either
         end the filter runs into zeros.
     """
+    n_kept = means.shape[0] // factor
+    edge = edge_samples(factor)
+    hop = _BLOCK - 2 * edge
+    n_blocks = -(-n_kept // hop)
+    padded = np.zeros((means.shape[1], (n_blocks * hop + 2 * edge) * factor))
+    padded[:, edge * factor : edge * factor + means.shape[0]] = means.T
+    blocks = sliding_window_view(padded, _BLOCK * factor, axis=1)[:, :: hop * factor]
+    spectrum = fft.rfft(blocks) * _decimation_response(factor)
+    kept = fft.irfft(_folded(spectrum, factor), _BLOCK)[:, :, edge : edge + hop]
+    return np.ascontiguousarray(kept.reshape(means.shape[1], -1)[:, :n_kept].T)
+
+
+@lru_cache(maxsize=8)
+def _decimation_response(factor: int) -> NDArray[np.float64]:
+    """Of the filter over a block; real, since it is symmetric, and led by no delay."""
     taps = decimation_filter(factor)
-    kept = signal.upfirdn(taps, means, up=1, down=factor, axis=0)
-    first = edge_samples(factor)
-    return np.asarray(kept[first : first + means.shape[0] // factor])
+    half = len(taps) // 2
+    circular = np.zeros(_BLOCK * factor)
+    circular[: half + 1], circular[-half:] = taps[half:], taps[:half]
+    return np.asarray(fft.rfft(circular).real)
+
+
+def _folded(spectrum: NDArray[np.complex128], factor: int) -> NDArray[np.complex128]:
+    """One-sided spectrum of every factor-th sample: the sum of all that look alike there."""
+    n = _BLOCK // 2
+    folded = spectrum[..., : n + 1].copy()
+    for turn in range(1, factor):
+        first = turn * _BLOCK
+        if 2 * turn < factor:
+            folded += spectrum[..., first : first + n + 1]
+        else:  # negative frequencies, mirrored
+            last = (factor - turn) * _BLOCK
+            folded += spectrum[..., last - n : last + 1][..., ::-1].conj()
+    return np.asarray(folded / factor)
 
 
 def edge_samples(factor: int) -> int:

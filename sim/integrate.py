@@ -1,7 +1,9 @@
 """What a solver returns: a frozen solution with a status. Knows no physics."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import IntEnum
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -164,3 +166,7 @@ class Solution:
     warnings: tuple[str, ...] = ()
     truth: dict[str, NDArray[np.float64]] = field(default_factory=dict)
     numerics: dict[str, float | int | str] = field(default_factory=dict)
+
+
+Recorder = Callable[[Any, int, bool, bool], Solution]
+"""Makes a recording of a scene: scene, seed, with its truth, error where it fails."""

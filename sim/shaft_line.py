@@ -7,7 +7,7 @@ response about it, in steady running. Axes are those of :mod:`wearstate.sim.shaf
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import NamedTuple, cast
 
 import numpy as np
@@ -17,7 +17,7 @@ from .alignment import AlignmentLine, Condition, Seat, seat_stations
 from .beam import Beam, Disc, PointLoad, Section, assemble_beam
 from .bearing import JournalBearing
 from .film import FilmGeometry
-from .integrate import SimulationError, Solution, Status
+from .integrate import Recorder, SimulationError, Solution, Status
 from .ladder import element_faults
 from .parts import Scene, SceneError, channels_of
 from .rotor import Rotor, Support
@@ -848,23 +848,46 @@ def _sampling_faults(scene: ShaftScene) -> list[str]:
     return faults
 
 
+class _Rest(NamedTuple):
+    """A line at rest and judged: what recordings share that differ in seed and start angle."""
+
+    state: ShaftState
+    reduced: ReducedRotor | None
+    status: Status
+    culprit: str
+    numerics: Numerics
+
+
 def simulate_shaft(scene: Scene, seed: int, truth: bool, raise_on_failure: bool) -> Solution:
     """Simulate one recording; see :func:`wearstate.sim.assemble.simulate`."""
-    shaft = cast(ShaftScene, scene)
-    check_shaft(shaft)
-    state = shaft_state(shaft, raise_on_failure=False)
-    numerics = _numerics(shaft, state)
+    return shaft_recorder(scene)(scene, seed, truth, raise_on_failure)
+
+
+def shaft_recorder(scene: Scene) -> Recorder:
+    """Recordings of one line at rest; see :func:`wearstate.sim.assemble.recorder`."""
+    return partial(_record, _rest(cast(ShaftScene, scene)))
+
+
+def _rest(scene: ShaftScene) -> _Rest:
+    check_shaft(scene)
+    state = shaft_state(scene, raise_on_failure=False)
+    numerics = _numerics(scene, state)
     status, culprit = _STATUS[state.film.status], state.film.culprit
     reduced = None
     if status.ok:
-        reduced = reduced_rotor(shaft, state)
-        numerics |= _guards(shaft, reduced)
-        status, culprit = _judged(shaft, state, reduced, numerics)
-    if reduced is None or not status.ok:
+        reduced = reduced_rotor(scene, state)
+        numerics |= _guards(scene, reduced)
+        status, culprit = _judged(scene, state, reduced, numerics)
+    return _Rest(state, reduced, status, culprit, numerics)
+
+
+def _record(rest: _Rest, scene: Scene, seed: int, truth: bool, raise_on_failure: bool) -> Solution:
+    shaft, state, numerics = cast(ShaftScene, scene), rest.state, dict(rest.numerics)
+    if rest.reduced is None or not rest.status.ok:
         if raise_on_failure:
-            raise SimulationError(status, f"{shaft.name}, bearing '{culprit}'")
-        return _failed(shaft, status, numerics)
-    motion = _Motion(shaft, state, reduced, seed, truth)
+            raise SimulationError(rest.status, f"{shaft.name}, bearing '{rest.culprit}'")
+        return _failed(shaft, rest.status, numerics)
+    motion = _Motion(shaft, state, rest.reduced, seed, truth)
     signal, clipped = _measured(shaft, state, motion, seed)
     numerics["clipped_samples"] = clipped
     return Solution(
@@ -872,7 +895,7 @@ def simulate_shaft(scene: Scene, seed: int, truth: bool, raise_on_failure: bool)
         sample_rate=shaft.sample_rate,
         channels=channels_of(shaft),
         truth=motion.truth() if truth else {},
-        status=status,
+        status=rest.status,
         numerics=numerics,
         warnings=_warnings(shaft, state, numerics),
     )

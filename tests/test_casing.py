@@ -252,6 +252,19 @@ def test_stop_band(factor):
 
 
 @pytest.mark.parametrize("factor", FACTORS)
+@pytest.mark.parametrize("n_kept", [1, 100, 971, 972, 973, 3000])
+def test_blocks_of_a_record_are_one_plain_convolution(factor, n_kept):
+    """Shorter than a block, as long, just longer, several; with steps beyond the last sample."""
+    rng = np.random.default_rng(n_kept)
+    means = rng.normal(size=(n_kept * factor + factor // 2, 2))
+    taps = decimation_filter(factor)
+    half = len(taps) // 2
+    expected = [np.convolve(column, taps)[half : half + n_kept * factor] for column in means.T]
+    # sums of some 50 * factor products of about 1 / factor
+    assert_allclose(decimate(means, factor), np.transpose(expected)[::factor], atol=1e-13)
+
+
+@pytest.mark.parametrize("factor", FACTORS)
 @pytest.mark.parametrize("offset", [0, 1, 2])
 def test_an_impulse_keeps_its_time_and_its_momentum(factor, offset):
     n = 400 * factor

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from wearstate.datasets.quantities import QUANTITIES, resolved, with_estimate
-from wearstate.sim.assemble import simulate
+from wearstate.sim.assemble import recorder, simulate
 from wearstate.sim.fidelity import (
     Bench,
     Difference,
@@ -16,6 +16,7 @@ from wearstate.sim.fidelity import (
     resolved_scene,
     study,
 )
+from wearstate.sim.integrate import SimulationError
 from wearstate.sim.ladder import cost_of, effects_of, with_values
 from wearstate.sim.parts import SceneError
 from wearstate.sim.scene import load_scene, scene_names
@@ -320,6 +321,43 @@ def test_a_budget_ends_a_study():
 
 
 # --- real machines
+
+
+def known_starts(scene, *, clock=None):
+    """What a bench hands on of five starts: signals, as quantities."""
+    kept = []
+    bench = Bench(scene, lambda run, _: kept.append(run.signal) or {}, seed=3, clock=clock)
+    bench.outcomes({}, 5)
+    return bench, kept
+
+
+@pytest.mark.parametrize("name", ["shaft-rig", "journal-half-sine", "bilge-pump"])
+def test_starts_of_a_bench_are_recordings_of_their_own(name):
+    """What starts share is done once, timed or not; the recordings are those of `simulate`."""
+    scene = load_scene(name, {"duration": "0.3 s"})
+    _, shared = known_starts(scene)
+    timed, with_clock = known_starts(scene, clock=iter(range(100)).__next__)
+    assert timed.seconds({}) == 1  # two looks at the clock a start, of the first three
+    assert next(timed.clock.__self__) == 6
+    for start, (one, other) in enumerate(zip(shared, with_clock, strict=True)):
+        number = start + 3 * 65_537
+        turn = math.tau * (number * (math.sqrt(5) - 1) / 2 % 1.0)
+        own = simulate(
+            with_values(scene, {"drive.start_angle": turn}), seed=number, truth=True
+        ).signal
+        assert_allclose(one, own, rtol=0, atol=0)
+        assert_allclose(other, own, rtol=0, atol=0)
+
+
+def test_a_line_that_fails_fails_from_every_start():
+    line = load_scene("shaft-rig", {"duration": "0.3 s", "oil.viscosity": 1e-5})
+    assert not simulate(line, seed=0, raise_on_failure=False).status.ok
+    bench = Bench(line, QUANTITIES[line.machine])
+    [outcome] = bench.outcomes({}, 3)  # no more is tried
+    assert outcome.fault
+    with pytest.raises(SimulationError):
+        recorder(line)(line, 0, False, True)
+
 
 SMALL_JOURNAL = {
     "film.n_theta": 24,

@@ -1,10 +1,29 @@
 """Speed of one recording of the bilge pump. Results are asserted, times are only printed."""
 
+import time
+
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
+from scipy import signal
 from wearstate.sim.assemble import simulate
+from wearstate.sim.casing import decimate, decimation_filter, edge_samples
 from wearstate.sim.integrate import Status
 from wearstate.sim.scene import load_scene
+
+
+def test_speed_of_the_low_pass_against_scipy(benchmark):
+    """Two sensors, 4.8 s at 400 kHz down to 25 kHz; the opponent is ``scipy.signal.upfirdn``."""
+    factor = 16
+    means = np.random.default_rng(0).normal(size=(4_800 * 25 * factor, 2))
+    begin = time.perf_counter()
+    theirs = signal.upfirdn(decimation_filter(factor), means, down=factor, axis=0)
+    took = time.perf_counter() - begin
+    own = benchmark(decimate, means, factor)
+    if benchmark.enabled:
+        print(f"\nupfirdn takes {took / benchmark.stats.stats.min:.1f} times as long")
+    edge = edge_samples(factor)
+    assert_allclose(own, theirs[edge : edge + len(own)], atol=1e-13)
 
 
 def test_speed_of_a_recording(benchmark):

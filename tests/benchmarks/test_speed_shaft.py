@@ -24,11 +24,14 @@ import time
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 from threadpoolctl import threadpool_limits
 from wearstate.sim.alignment import AlignmentLine, Seat, influence, reactions
+from wearstate.sim.assemble import recorder, simulate
 from wearstate.sim.beam import Disc, Section, assemble_beam
+from wearstate.sim.ladder import admissible, effects_of, with_values
 from wearstate.sim.rotor import Rotor, Support
+from wearstate.sim.scene import load_scene
 from wearstate.sim.shaft_response import (
     Broadband,
     Harmonic,
@@ -208,6 +211,28 @@ def test_speed_of_a_record(benchmark):
     if seconds:
         print(f"\n{1e3 * seconds:.0f} ms")
         assert seconds <= 0.3
+
+
+def test_speed_of_starts_that_share_their_state_of_rest(benchmark):
+    """Eight starts of the rig on its best rungs, as ``auto`` and ``chart`` run them, beside
+    eight recordings that each solve the line anew."""
+    scene = load_scene("shaft-rig", {"duration": "1 s"})
+    best = {p: v for e in effects_of(scene) for p, v in admissible(e, scene)[-1].values.items()}
+    scene = with_values(scene, best)
+    alone = simulate(scene, seed=7)  # compile, or read the cache
+    begin = time.perf_counter()
+    for seed in range(8):
+        simulate(scene, seed=seed)
+    took = time.perf_counter() - begin
+
+    def shared():
+        record = recorder(scene)
+        return [record(scene, seed, False, True) for seed in range(8)]
+
+    found, seconds = timed(benchmark, shared)
+    assert_array_equal(found[7].signal, alone.signal)
+    if seconds:
+        print(f"\n{1e3 * seconds:.0f} ms together, {took / seconds:.1f} times as long each alone")
 
 
 def test_speed_against_ross(benchmark):
