@@ -268,8 +268,16 @@ def _beyond(drawn: Drawn, kind: str, choices: Sequence[str]) -> Split:
     column = next((name for name in choices if name in drawn.names), None)
     if column is None:
         raise DataError(f"{kind}: the manifest has none of {', '.join(choices)}; use region")
-    low = float(np.quantile(drawn.values(column), BEYOND))
-    return _region(drawn, {column: (low, np.inf)}, name=kind, kind=kind)
+    return _region(drawn, {column: _largest(drawn.values(column))}, name=kind, kind=kind)
+
+
+def _largest(values: NDArray[Any]) -> tuple[float, float]:
+    """Bounds of what is held out of these values."""
+    if values.size == 0:
+        raise DataError(
+            "0 records are usable, must be >= 1: all failed; see the manifest's status for why"
+        )
+    return float(np.quantile(values, BEYOND)), np.inf
 
 
 def _severity(drawn: Drawn) -> Split:
@@ -280,8 +288,7 @@ def _severity(drawn: Drawn) -> Split:
 
 def _geometry(drawn: Drawn) -> Split:
     path, values = machine_draws(drawn)
-    low = float(np.quantile(values[drawn.usable], BEYOND))
-    bounds = {path: (low, np.inf)}
+    bounds = {path: _largest(values[drawn.usable])}
     return _region(drawn, bounds, name="geometry", kind="geometry", extra={path: values})
 
 

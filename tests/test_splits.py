@@ -227,6 +227,15 @@ def test_failed_records_are_on_neither_side(tmp_path):
         assert_array_equal(split.sides(N)[[0, 7]], [-1, -1])
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_set_that_failed_as_a_whole_has_no_splits(tmp_path, kind):
+    with DataSet(write_set(tmp_path / "f.h5", failed=range(N))) as data:
+        drawn = drawn_of(data)
+        assert default_splits(drawn) == {}
+        with pytest.raises(DataError, match="must"):
+            make_split(drawn, kind)
+
+
 def test_storing_leaves_signal_and_manifest_as_they_are(path):
     before = contents(path)
     with DataSet(path) as data:
