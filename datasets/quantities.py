@@ -177,14 +177,14 @@ def shaft_quantities(solution: Solution, scene: Scene) -> dict[str, Quantity]:
 
 
 def _resonance(solution: Solution) -> dict[str, Quantity]:
-    """Frequency and damping ratio of the least damped motion."""
+    """Frequency of the first resonance; damping ratio of the least damped motion.
+
+    Not the frequency of the latter: two motions may be damped alike, and whichever is a little
+    less so on one mesh or another would make it jump.
+    """
     numerics: dict[str, Any] = solution.numerics
-    if "least_damped_hz" not in numerics:
-        return {}
-    return {
-        "resonance_hz": relative(numerics["least_damped_hz"]),
-        "resonance_damping": relative(numerics["least_damping_ratio"]),
-    }
+    names = {"resonance_hz": "first_resonance_hz", "least_damping": "least_damping_ratio"}
+    return {own: relative(numerics[name]) for own, name in names.items() if name in numerics}
 
 
 def _orders(solution: Solution, scene: ShaftScene) -> dict[str, Quantity]:

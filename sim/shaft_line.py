@@ -60,6 +60,9 @@ _MOVED_WARNING = 0.3
 """Peak motion over the least film at which the films' stiffness has changed by about its own size,
 ``(1 + 0.3)^3`` to one, and the linear response is a fair guess no more."""
 
+_RESONANT = 0.1
+"""Damping ratio below which a motion is called a resonance: amplified five times and more."""
+
 _PEAK = 4.0  # of the rms of a Gaussian motion: passed once in 16,000 independent values
 _DENSITY_LINES = 200  # of a turbulence's spectrum up to half the sample rate
 _LIFTED = 0.05  # of the mean reaction: a bearing that carries less is told of
@@ -902,15 +905,18 @@ def _record(rest: _Rest, scene: Scene, seed: int, truth: bool, raise_on_failure:
 
 
 def _guards(scene: ShaftScene, reduced: ReducedRotor) -> Numerics:
-    """The least damped motion, which is how far the line is from unstable; error of the basis."""
+    """Least damping, which is how far the line is from unstable; first resonance; basis' error."""
     swinging = reduced.poles[np.abs(reduced.poles.imag) > 0]
     ratios = -swinging.real / np.abs(swinging)
     least = int(np.argmin(ratios))
+    resonant = np.abs(swinging[ratios < _RESONANT].imag)
     guards: Numerics = {
         "least_damping_ratio": float(ratios[least]),
         "least_damped_hz": float(abs(swinging[least].imag)) / math.tau,
         "stability_margin": float(ratios[least]),
     }
+    if resonant.size:
+        guards["first_resonance_hz"] = float(resonant.min()) / math.tau
     harmonics = harmonic_forces(scene)
     if harmonics:
         places: list[Place] = [(b.name, axis) for b in scene.bearings for axis in "yz"]
