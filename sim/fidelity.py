@@ -48,7 +48,7 @@ MOST_STARTS = 256
 PILOT = 120.0
 """Tabulated time that the starts of the reference may take all together, beyond STARTS [s]."""
 
-_TIMED = 3  # starts of a rung that are timed, each of which does all that a recording takes
+_TIMED = 8  # starts of a rung that are timed, each of which does all that a recording takes
 _FIRST = 4  # starts that a scattered difference is judged on at the earliest
 _CLEAR = 5.0  # a difference so many times the accuracy asked is judged on two starts
 _SIGMAS = 3.0  # beyond so many standard errors a difference is one

@@ -324,10 +324,10 @@ def test_a_budget_ends_a_study():
 
 
 def known_starts(scene, *, clock=None):
-    """What a bench hands on of five starts: signals, as quantities."""
+    """What a bench hands on of ten starts: signals, as quantities."""
     kept = []
     bench = Bench(scene, lambda run, _: kept.append(run.signal) or {}, seed=3, clock=clock)
-    bench.outcomes({}, 5)
+    bench.outcomes({}, 10)
     return bench, kept
 
 
@@ -337,8 +337,8 @@ def test_starts_of_a_bench_are_recordings_of_their_own(name):
     scene = load_scene(name, {"duration": "0.3 s"})
     _, shared = known_starts(scene)
     timed, with_clock = known_starts(scene, clock=iter(range(100)).__next__)
-    assert timed.seconds({}) == 1  # two looks at the clock a start, of the first three
-    assert next(timed.clock.__self__) == 6
+    assert timed.seconds({}) == 1  # two looks at the clock a start, of the first eight
+    assert next(timed.clock.__self__) == 16
     for start, (one, other) in enumerate(zip(shared, with_clock, strict=True)):
         number = start + 3 * 65_537
         turn = math.tau * (number * (math.sqrt(5) - 1) / 2 % 1.0)
