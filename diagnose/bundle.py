@@ -237,7 +237,28 @@ def _members(path: Path) -> dict[str, bytes]:
         with zipfile.ZipFile(path) as file:
             return _unpacked(file, _BOUNDS)
     except _FAULTS as error:
+        version = _schema_version(path)
+        if version not in (None, BUNDLE_SCHEMA):  # its members may be others
+            raise _other_version(path, "schema_version", version, BUNDLE_SCHEMA) from error
         raise ModelError(f"{path} is no intact model ({error}); take an intact copy") from error
+
+
+def _schema_version(path: Path) -> Any:
+    """What a file says of its version; None where that cannot be read."""
+    try:
+        with zipfile.ZipFile(path) as file:
+            entry = file.getinfo(_SEAL)
+            _check_entry(entry, _LARGEST_TABLE)
+            return dict(json.loads(file.read(entry))).get("schema_version")
+    except _FAULTS:
+        return None
+
+
+def _other_version(path: str | Path, name: str, found: Any, wanted: Any) -> ModelError:
+    return ModelError(
+        f"{path}: {name} = {str(found)[:40]} must be {wanted}; "
+        "retrain it: wearstate train DATA -o MODEL"
+    )
 
 
 def _unpacked(file: zipfile.ZipFile, bounds: Mapping[str, int]) -> dict[str, bytes]:
@@ -274,10 +295,7 @@ def _check_seal(
     """Of this version and kind, and each member as it was written."""
     for name, wanted in (("schema_version", BUNDLE_SCHEMA), ("features", feature_version())):
         if seal.get(name) != wanted:
-            raise ModelError(
-                f"{path}: {name} = {str(seal.get(name))[:40]} must be {wanted}; "
-                "retrain it: wearstate train DATA -o MODEL"
-            )
+            raise _other_version(path, name, seal.get(name), wanted)
     if seal.get("kind") != kind:
         raise ModelError(
             f"{path} is a {str(seal.get('kind'))[:40]}, must be a {kind}; name one, or retrain it"
