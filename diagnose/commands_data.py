@@ -74,15 +74,18 @@ def recipe_check(file: str, as_json: bool) -> None:
     emit({"recipe": checked.name, "faults": []}, as_json, f"{checked.name}: no fault")
 
 
-@recipe.command("preview")
-@click.argument("name")
-@click.option(
+_records_option = click.option(
     "-n",
     "--records",
     type=click.IntRange(1, MOST_RECORDS),
     default=None,
     help="Records; the recipe's by default.",
 )
+
+
+@recipe.command("preview")
+@click.argument("name")
+@_records_option
 @click.option("--plot", type=PATH, help="Picture of the draws to write (.png, .svg or .pdf).")
 @seed_option
 @jobs_option
@@ -114,13 +117,7 @@ def recipe_preview(
 
 @click.command()
 @click.argument("recipe")
-@click.option(
-    "-n",
-    "--records",
-    type=click.IntRange(1, MOST_RECORDS),
-    default=None,
-    help="Records; the recipe's by default.",
-)
+@_records_option
 @click.option("-o", "--output", type=PATH, required=True, help="Data set to write (.h5).")
 @click.option("--truth", is_flag=True, help="Also store forces and orbit.")
 @click.option(

@@ -21,7 +21,8 @@ PASS_BAND = 0.45
 
 _STOP_ATTENUATION_DB = 80.0
 
-_BLOCK = 1024  # samples of a block that are made at once, some 70 of which are its ends
+_BLOCK = 1024  # samples of a block, some 50 of which are its ends
+_AT_ONCE = 16  # blocks: more are no faster, and a long record must not double in memory
 
 
 def exact_oscillator(
@@ -401,8 +402,12 @@ def decimate(means: NDArray[np.float64], factor: int) -> NDArray[np.float64]:
     padded = np.zeros((means.shape[1], (n_blocks * hop + 2 * edge) * factor))
     padded[:, edge * factor : edge * factor + means.shape[0]] = means.T
     blocks = sliding_window_view(padded, _BLOCK * factor, axis=1)[:, :: hop * factor]
-    spectrum = fft.rfft(blocks) * _decimation_response(factor)
-    kept = fft.irfft(_folded(spectrum, factor), _BLOCK)[:, :, edge : edge + hop]
+    kept = np.empty((means.shape[1], n_blocks, hop))
+    for first in range(0, n_blocks, _AT_ONCE):
+        some = slice(first, first + _AT_ONCE)
+        spectrum = fft.rfft(blocks[:, some])
+        spectrum *= _decimation_response(factor)
+        kept[:, some] = fft.irfft(_folded(spectrum, factor), _BLOCK)[..., edge : edge + hop]
     return np.ascontiguousarray(kept.reshape(means.shape[1], -1)[:, :n_kept].T)
 
 

@@ -252,9 +252,9 @@ def test_stop_band(factor):
 
 
 @pytest.mark.parametrize("factor", FACTORS)
-@pytest.mark.parametrize("n_kept", [1, 100, 971, 972, 973, 3000])
+@pytest.mark.parametrize("n_kept", [1, 100, 971, 972, 973, 3000, 17_000])
 def test_blocks_of_a_record_are_one_plain_convolution(factor, n_kept):
-    """Shorter than a block, as long, just longer, several; with steps beyond the last sample."""
+    """From less than a block to more than are made at once; with steps beyond the last sample."""
     rng = np.random.default_rng(n_kept)
     means = rng.normal(size=(n_kept * factor + factor // 2, 2))
     taps = decimation_filter(factor)

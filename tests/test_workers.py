@@ -43,15 +43,22 @@ class OnceAt3:
         return die_once(self.place, item)
 
 
-def grow_at_4(item):
-    """Keep 400 MB at item 4, when loky looks at its workers a second time; then be slow enough that
-    a new worker still finds work."""
-    if item == 4:
-        time.sleep(1.2)
-        os.kept = np.ones(50_000_000)
-    if item > 4:
-        time.sleep(0.3)
-    return item, os.getpid()
+class GrowAt4:
+    """Keep 400 MB at item 4, when loky looks at its workers a second time; later items wait until
+    the worker that takes the place of that one has come."""
+
+    def __init__(self, folder):
+        self.folder = folder
+
+    def __call__(self, item):
+        open(f"{self.folder}/{os.getpid()}", "w").close()
+        if item == 4:
+            time.sleep(1.2)
+            os.kept = np.ones(50_000_000)
+        end = time.monotonic() + 60
+        while item > 4 and len(os.listdir(self.folder)) < 3 and time.monotonic() < end:
+            time.sleep(0.02)
+        return item, os.getpid()
 
 
 def die(item):
@@ -87,10 +94,10 @@ def test_a_worker_that_dies_is_replaced(tmp_path):
     assert told == ["a worker process died; what it had in hand is done again"]
 
 
-def test_a_worker_that_grows_is_replaced_without_a_word():
+def test_a_worker_that_grows_is_replaced_without_a_word(tmp_path):
     """Warnings are errors here, and one in the thread that hands out work would hang the run."""
     pytest.importorskip("psutil")  # what loky measures its workers with
-    found = list(in_order(grow_at_4, range(16), jobs=2))
+    found = list(in_order(GrowAt4(str(tmp_path)), range(16), jobs=2))
     assert [item for item, _ in found] == list(range(16))
     assert len({pid for _, pid in found}) == 3
 
