@@ -42,10 +42,10 @@ Float = NDArray[np.float64]
 STARTS = 32
 """Most starts that a difference is averaged over, where they are not cheap."""
 
-MOST_STARTS = 256
+MOST_STARTS = 512
 """The same where they are."""
 
-PILOT = 120.0
+PILOT = 180.0
 """Tabulated time that the starts of the reference may take all together, beyond STARTS [s]."""
 
 _TIMED = 8  # starts of a rung that are timed, each of which does all that a recording takes
@@ -554,8 +554,8 @@ def resolve(
     pinned : sequence of str
         Effects that stay as they are written, besides those that the scene pins.
     starts : int, optional
-        Most starts that a difference is averaged over; by default 32, and up to 256 of a scene
-        whose reference costs so little that they take no more than two minutes by the tables.
+        Most starts that a difference is averaged over; by default 32, and up to 512 of a scene
+        whose reference costs so little that they take no more than three minutes by the tables.
     seed : int
         Of the starts.
     bench : Bench, optional
@@ -781,17 +781,21 @@ def study(
     court = _Court(own, effects, asked, starts)
     _refuse_bad_reference(court)
     end = clock() + budget if clock and budget is not None else math.inf
-    kept, pruned = _undominated(court, lambda: clock is not None and clock() >= end)
+
+    def over() -> bool:
+        return clock is not None and clock() >= end
+
+    kept, pruned = _undominated(court, over)
+    convergence = tuple(_convergences(court, over))
     combinations = _by_cost(court, kept)
     found, late = [court.judge(court.top)], False
     for done, rungs in enumerate(combinations):
-        late = clock is not None and clock() >= end
+        late = over()
         if late:
             break
         found.append(court.judge(rungs))
         if progress:
             progress(done + 1, len(combinations))
-    convergence = tuple(_convergences(court))
     unique = {tuple(sorted(c.rungs.items())): c for c in (*court.judged(), *found)}
     candidates = sorted(unique.values(), key=lambda c: (c.cost, c.error))
     return Study(
@@ -872,13 +876,13 @@ _SPARED = 1.5
 """Predicted errors up to this factor behind the front are run all the same: sums are guesses."""
 
 
-def _convergences(court: _Court) -> Iterator[Convergence]:
+def _convergences(court: _Court, late: Callable[[], bool]) -> Iterator[Convergence]:
     """Of every numerical effect with three levels or more; rungs between two are left out."""
     levels = {level_name(factor) for factor in STEP_LEVELS}
     for effect in court.effects:
         rungs = [rung for rung in court.rungs[effect.name] if rung.name in levels][-3:]
         if effect.numerical and len(rungs) == len(_LEVELS_SHOWN):
-            found = _convergence(court, effect.name, rungs)
+            found = _convergence(court, effect.name, rungs, late)
             if found is not None:
                 yield found
 
@@ -887,30 +891,46 @@ _LEVELS_SHOWN = range(3)
 _ROUNDING = 1e-9  # of relative changes: signals have single precision, truth has double
 
 
-def _convergence(court: _Court, name: str, rungs: Sequence[Rung]) -> Convergence | None:
+def _convergence(
+    court: _Court, name: str, rungs: Sequence[Rung], late: Callable[[], bool]
+) -> Convergence | None:
+    """Convergence over the starts that its levels were judged on, or more while they scatter."""
     judged = [court.judge({**court.top, name: rung}) for rung in rungs]
-    starts = min((c.starts for c in judged[:-1]), default=0)
-    levels = [
-        [o.quantities for o in court.bench.outcomes(c.values, starts)]
-        for c in judged
-        if c.verdict != "invalid"
-    ]
-    if len(levels) < len(_LEVELS_SHOWN):
-        return None
-    first, last = (differences(a, b) for a, b in pairwise(levels))
-    quantity = max(last, key=lambda each: last[each].error)
-    change = (first[quantity].mean, last[quantity].mean)
-    noise = last[quantity].standard_error
-    silent = abs(change[1]) <= max(_SIGMAS * noise, _ROUNDING)
-    order = math.log2(abs(change[0] / change[1])) if change[0] and change[1] else math.nan
+    starts, found = min(c.starts for c in judged[:-1]), None
+    while True:
+        runs = [court.bench.outcomes(c.values, starts) for c in judged]
+        if any(outcome.fault for row in runs for outcome in row):
+            return found
+        levels = [[outcome.quantities for outcome in row] for row in runs]
+        first, last = (differences(a, b) for a, b in pairwise(levels))
+        quantity = max(last, key=lambda each: last[each].error)
+        found = _order(name, rungs, quantity, first[quantity].mean, last[quantity], court.accuracy)
+        scatter = max(each.standard_error for each in last.values()) / court.accuracy
+        settled = scatter <= (_RESOLVED if starts >= _FIRST else _STILL)
+        if settled or 2 * starts > court.starts or late():
+            return found
+        starts *= 2
+
+
+def _order(
+    effect: str,
+    rungs: Sequence[Rung],
+    quantity: str,
+    before: float,
+    last: Difference,
+    accuracy: float,
+) -> Convergence:
+    """What the last two changes of a quantity say of the finest level."""
+    silent = last.error <= max(_SIGMAS * last.standard_error, _ROUNDING)
+    order = math.log2(abs(before / last.mean)) if before and last.mean else math.nan
     told = not silent and math.isfinite(order) and order > 0
-    remaining = abs(change[1]) / (2**order - 1) if told else abs(change[1])
+    remaining = last.error / (2**order - 1) if told else last.error
     return Convergence(
-        effect=name,
+        effect=effect,
         levels=tuple(rung.name for rung in rungs),
         quantity=quantity,
-        steps=change,
+        steps=(before, last.mean),
         order=order if told else math.nan,
         remaining=remaining,
-        converged=silent or remaining <= _RESOLVED * court.accuracy,
+        converged=silent or remaining <= _RESOLVED * accuracy,
     )

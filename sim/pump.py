@@ -425,11 +425,13 @@ def _lift_left(scene: PumpScene, run: CrankRun, plan: _Plan) -> float:
         return 0.0
     largest = 0.0
     for throw in range(len(scene.throws)):
+        if _cavitates(run, throw):
+            continue
         pressure = scene.pressures(throw)
         angle = run.turns[begin:, 0] + scene.throws[throw].phase
         sides = (("suction", pressure.suction_valve, 2), ("discharge", pressure.discharge_valve, 4))
         for side, valve, column in sides:
-            if valve is None or valve.stuck_lift is not None or _cavitates(run, throw):
+            if valve is None or valve.stuck_lift is not None:
                 continue
             lift = run.chambers[begin:, throw, column]
             left = lift_left(angle, lift, side, valve.max_lift, after=_LATE)
@@ -516,13 +518,19 @@ def _truth(run: CrankRun, plan: _Plan) -> dict[str, Any]:
     """Forces, low-passed as the signal is, and states at the sample instants, per throw."""
     truth: dict[str, Any] = {"state_alpha": plan.turned(run)}
     truth["state_alpha_rate"] = plan.at_samples(run.turns[:, 1])
-    force = decimate(run.forces, plan.factor)[plan.kept]
+    throws = range(len(plan.scene.throws))
+    columns = [1 + len(FORCES) * throw + FORCES.index(name) for throw in throws for name in _KEPT]
+    force = decimate(run.forces[:, [0, *columns]], plan.factor)[plan.kept]  # it costs by the column
     truth["drive_moment_n_m"] = force[:, 0]
-    for throw in range(len(plan.scene.throws)):
+    for throw in throws:
         suffix = f"_{throw + 1}" if throw else ""
-        own = force[:, 1 + len(FORCES) * throw :]
+        own = force[:, 1 + len(_KEPT) * throw :]
         truth |= {f"{name}{suffix}": value for name, value in _throw_truth(run, plan, throw, own)}
     return truth
+
+
+_KEPT = ("pin_x", "pin_y", "wrist_x", "wrist_y", "guide_y", "piston_x")
+"""Forces of a throw in the truth."""
 
 
 def _throw_truth(
@@ -534,8 +542,8 @@ def _throw_truth(
     found = [
         ("pin_force_n", force[:, 0:2]),
         ("wrist_force_n", force[:, 2:4]),
-        ("guide_force_n", force[:, 5]),
-        ("piston_pressure_force_n", -force[:, 6]),  # positive towards the crank
+        ("guide_force_n", force[:, 4]),
+        ("piston_pressure_force_n", -force[:, 5]),  # positive towards the crank
         ("pin_offset_m", offsets[:, 0:2]),
         ("wrist_offset_m", offsets[:, 2:4]),
         ("state_piston", bodies[:, 3]),

@@ -285,6 +285,25 @@ def test_convergence_is_what_is_left_and_not_the_last_change(order, left, conver
     assert_allclose([convergence.order, convergence.remaining], [order, left], rtol=1e-9)
 
 
+@pytest.mark.parametrize("seed", range(8))
+def test_scatter_of_few_starts_is_no_lack_of_convergence(seed):
+    """The coarsest level is seen to be wrong on two starts; the finer two differ by scatter."""
+
+    class Knocking(KnownBench):
+        def _run(self, values, start):
+            coarse = round(values["numerics.step"] / self.finest) >= CONVERGENCE_ORDER**2
+            rng = np.random.default_rng([start, seed, round(1e9 * values["numerics.step"])])
+            sizes = 1 + 0.5 * coarse + 0.03 * rng.standard_normal(11)
+            return Outcome({f"band_{i}": (x, "relative", 0.0) for i, x in enumerate(sizes)}, "")
+
+    kept = ["crankpin", "guide", "pressure", "drive", "wristpin"]
+    bench = Knocking({})
+    found = study(bench.scene, bench.quantities, accuracy=0.02, pinned=kept, bench=bench)
+    [convergence] = found.convergence
+    assert convergence.converged
+    assert abs(convergence.steps[-1]) < 0.03  # of two starts half of the seeds have more
+
+
 def test_rungs_between_two_levels_are_no_levels_of_convergence():
     line = load_scene("shaft-rig", {"duration": "0.3 s"})
     kept = ["film", "beam", "elements"]
@@ -299,13 +318,13 @@ def test_a_cheap_scene_is_averaged_over_more_starts():
     scatter = 0.05  # wants (3 * 0.05 / 0.02)^2 * 2 = 113 starts for a third of the accuracy
     errors = {IDEAL_CRANK: 9.0, LINK_CRANK: 9.0}
     statuses = {}
-    for duration in ("4.8 s", "0.4 s"):
+    for duration in ("8 s", "0.4 s"):
         bench = KnownBench(errors, scatter=scatter)
         bench.scene = load_scene("bilge-pump", {"duration": duration})
         found = chosen(bench, 0.02, pinned=["wristpin", "guide", "pressure", "drive"])
         statuses[duration] = found.status
         assert chosen(bench, 0.02, starts=32).status == "unresolvable"
-    assert statuses == {"4.8 s": "unresolvable", "0.4 s": "resolved"}
+    assert statuses == {"8 s": "unresolvable", "0.4 s": "resolved"}
 
 
 def test_a_budget_ends_a_study():

@@ -195,11 +195,12 @@ def trial(name, seed, accuracies=ACCURACIES, *, brute=True, timed=False):
             "saved": found.cost_of_reference / found.cost,
             "rungs": dict(found.rungs),
         }
+        promised = found.status != "unresolvable"
         if found.values == reference:
             row |= {"kept": True, "strictly": True, "error": 0.0, "worst": "", "scatter": 0.0}
-        else:
+        elif promised:
             row |= verdict(bench, fresh, found.values, reference, accuracy)
-        if brute and found.status != "unresolvable":
+        if brute and promised:
             limit = found.cost / DEAREST
             best = cheaper_that_does(scene, bench, reference, accuracy, limit)
             row["dear"] = DEAREST if best is None else found.cost / best
