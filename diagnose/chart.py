@@ -372,7 +372,7 @@ def _finding(points: Sequence[Point], found: Study) -> tuple[str, str, str]:
         return "", "out of budget", "no winner: nothing ran within the budget"
     winner = good[0]
     doubted = [p for p in points if p.verdict == "doubtful" and p.seconds < winner.seconds]
-    if doubted:
+    if doubted and found.status != "out of budget":  # where more starts might have told
         return (
             "",
             "unresolvable",

@@ -433,6 +433,8 @@ class _Court:
         self, bench: Bench, effects: Sequence[Effect], accuracy: float, starts: int
     ) -> None:
         self.bench, self.effects, self.accuracy, self.starts = bench, effects, accuracy, starts
+        self.late: Callable[[], bool] = lambda: False
+        self.cut = False  # a judgement went without the starts that it was too late for
         scene = bench.scene
         self.rungs = {effect.name: admissible(effect, scene) for effect in effects}
         self.top = {name: rungs[-1] for name, rungs in self.rungs.items() if rungs}
@@ -461,7 +463,10 @@ class _Court:
             verdict = _judgement(found, starts, self.accuracy)
             if verdict != "more":
                 return self._candidate(rungs, found, starts, verdict, _why(found, verdict))
-            if 2 * starts > self.starts or self._hopeless(found, starts):
+            more = 2 * starts <= self.starts and not self._hopeless(found, starts)
+            late = more and self.late()
+            self.cut |= late
+            if late or not more:
                 return self._candidate(rungs, found, starts, "doubtful", _why(found, "doubtful"))
             starts *= 2
 
@@ -733,7 +738,7 @@ def study(
     *,
     accuracy: float | None = None,
     pinned: Sequence[str] = (),
-    starts: int = STARTS,
+    starts: int | None = None,
     budget: float | None = None,
     clock: Callable[[], float] | None = None,
     progress: Callable[[int, int], None] | None = None,
@@ -751,10 +756,10 @@ def study(
         The scene's own by default; says when scatter is small enough.
     pinned : sequence of str
         Effects that stay as they are written, besides those that the scene pins.
-    starts : int
-        Most starts that a difference is averaged over.
+    starts : int, optional
+        Most starts that a difference is averaged over; by default as :func:`resolve`.
     budget : float, optional
-        Seconds of `clock` after which no further combination is begun.
+        Seconds of `clock` after which no further combination is begun, nor more starts of one.
     clock : callable, optional
         Seconds, such as ``time.perf_counter``; without, nothing is timed.
     progress : callable, optional
@@ -778,19 +783,19 @@ def study(
     asked = _checked(accuracy, scene)
     effects = _free_effects(scene, sorted({*pinned, *scene.pinned}))
     own = bench or Bench(scene, quantities, seed=seed, clock=clock)
-    court = _Court(own, effects, asked, starts)
+    court = _Court(own, effects, asked, STARTS if starts is None else starts)
     _refuse_bad_reference(court)
+    if starts is None:
+        court.starts = _affordable(cost_of(with_values(scene, court.values(court.top))))
     end = clock() + budget if clock and budget is not None else math.inf
 
-    def over() -> bool:
-        return clock is not None and clock() >= end
-
-    kept, pruned = _undominated(court, over)
-    convergence = tuple(_convergences(court, over))
+    court.late = lambda: clock is not None and clock() >= end
+    kept, pruned = _undominated(court)
+    convergence = tuple(_convergences(court))
     combinations = _by_cost(court, kept)
     found, late = [court.judge(court.top)], False
     for done, rungs in enumerate(combinations):
-        late = over()
+        late = court.late()
         if late:
             break
         found.append(court.judge(rungs))
@@ -810,7 +815,7 @@ def study(
             if r not in court.rungs[e.name]
         ),
         pruned=tuple(pruned),
-        status=_study_status(candidates, convergence, late),
+        status=_study_status(candidates, convergence, late or court.cut),
     )
 
 
@@ -819,26 +824,28 @@ def _study_status(
 ) -> str:
     if not all(each.converged for each in convergence):
         return "not converged"
-    if any(each.verdict == "doubtful" for each in candidates):
-        return "unresolvable"
-    return "out of budget" if late else "resolved"
+    if late:
+        return "out of budget"
+    doubtful = any(each.verdict == "doubtful" for each in candidates)
+    return "unresolvable" if doubtful else "resolved"
 
 
-def _undominated(
-    court: _Court, late: Callable[[], bool]
-) -> tuple[dict[str, list[Rung]], list[str]]:
-    """Rungs of each effect that no cheaper one is as good as, by their errors alone."""
+def _undominated(court: _Court) -> tuple[dict[str, list[Rung]], list[str]]:
+    """Rungs of each effect that no cheaper one is as good as, by their errors alone.
+
+    The cheapest are judged first: a budget is then spent on what a user is after.
+    """
     kept: dict[str, list[Rung]] = {}
     pruned: list[str] = []
     for name, rungs in court.rungs.items():
         kept[name] = [court.top[name]]
         best = 0.0
         ahead: list[tuple[Rung, Candidate]] = []
-        for rung in reversed(rungs[:-1]):
-            if late():
+        for rung in rungs[:-1]:
+            if court.late():
                 pruned.append(f"{name} = {rung.name}: out of budget")
                 continue
-            ahead.append((rung, court.judge({**court.top, name: rung})))
+            ahead.insert(0, (rung, court.judge({**court.top, name: rung})))
         for i, (rung, single) in enumerate(ahead):
             cheaper = [other for _, other in ahead[i + 1 :] if other.cost <= single.cost]
             best = min((other.error for other in cheaper), default=math.inf)
@@ -876,13 +883,13 @@ _SPARED = 1.5
 """Predicted errors up to this factor behind the front are run all the same: sums are guesses."""
 
 
-def _convergences(court: _Court, late: Callable[[], bool]) -> Iterator[Convergence]:
+def _convergences(court: _Court) -> Iterator[Convergence]:
     """Of every numerical effect with three levels or more; rungs between two are left out."""
     levels = {level_name(factor) for factor in STEP_LEVELS}
     for effect in court.effects:
         rungs = [rung for rung in court.rungs[effect.name] if rung.name in levels][-3:]
         if effect.numerical and len(rungs) == len(_LEVELS_SHOWN):
-            found = _convergence(court, effect.name, rungs, late)
+            found = _convergence(court, effect.name, rungs)
             if found is not None:
                 yield found
 
@@ -891,9 +898,7 @@ _LEVELS_SHOWN = range(3)
 _ROUNDING = 1e-9  # of relative changes: signals have single precision, truth has double
 
 
-def _convergence(
-    court: _Court, name: str, rungs: Sequence[Rung], late: Callable[[], bool]
-) -> Convergence | None:
+def _convergence(court: _Court, name: str, rungs: Sequence[Rung]) -> Convergence | None:
     """Convergence over the starts that its levels were judged on, or more while they scatter."""
     judged = [court.judge({**court.top, name: rung}) for rung in rungs]
     starts, found = min(c.starts for c in judged[:-1]), None
@@ -907,7 +912,7 @@ def _convergence(
         found = _order(name, rungs, quantity, first[quantity].mean, last[quantity], court.accuracy)
         scatter = max(each.standard_error for each in last.values()) / court.accuracy
         settled = scatter <= (_RESOLVED if starts >= _FIRST else _STILL)
-        if settled or 2 * starts > court.starts or late():
+        if settled or 2 * starts > court.starts or court.late():
             return found
         starts *= 2
 

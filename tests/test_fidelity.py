@@ -341,6 +341,28 @@ def test_a_budget_ends_a_study():
     assert found.status == "out of budget"
 
 
+def test_a_budget_that_cuts_the_averaging_is_not_called_scatter():
+    """Told with 512 starts; in time for a few the rung is not unresolvable, only not told yet."""
+    statuses = {}
+    for budget in (None, 20.0):
+        ticks = iter(range(10_000_000))
+        bench = KnownBench({}, scatter=0.05)
+        bench.scene = load_scene("bilge-pump", {"duration": "0.4 s"})
+        kept = ["crankpin", "wristpin", "guide", "pressure", "drive"]
+        clock = None if budget is None else lambda ticks=ticks: float(next(ticks))
+        found = study(
+            bench.scene,
+            bench.quantities,
+            accuracy=0.02,
+            pinned=kept,
+            bench=bench,
+            budget=budget,
+            clock=clock,
+        )
+        statuses[budget] = found.status
+    assert statuses == {None: "resolved", 20.0: "out of budget"}
+
+
 # --- real machines
 
 
