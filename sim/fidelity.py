@@ -912,8 +912,11 @@ def _convergence(court: _Court, name: str, rungs: Sequence[Rung]) -> Convergence
         found = _order(name, rungs, quantity, first[quantity].mean, last[quantity], court.accuracy)
         scatter = max(each.standard_error for each in last.values()) / court.accuracy
         settled = scatter <= (_RESOLVED if starts >= _FIRST else _STILL)
-        if settled or 2 * starts > court.starts or court.late():
+        if settled or 2 * starts > court.starts:
             return found
+        if court.late():  # few scattered starts show nothing
+            court.cut = True
+            return None
         starts *= 2
 
 

@@ -360,6 +360,7 @@ def test_a_budget_that_cuts_the_averaging_is_not_called_scatter():
             clock=clock,
         )
         statuses[budget] = found.status
+        assert all(each.converged for each in found.convergence)  # and no order of a few starts
     assert statuses == {None: "resolved", 20.0: "out of budget"}
 
 

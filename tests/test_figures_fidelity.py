@@ -23,6 +23,8 @@ def test_only_built_in_scenes_are_shortened(figures):
     assert set(figures.SHORTER) <= set(scene_names())
     for name, values in figures.SHORTER.items():
         assert load_scene(name, values).duration < load_scene(name).duration
+    for name, values in figures.COARSER.items():
+        assert load_scene(name, values).accuracy > load_scene(name).accuracy
 
 
 def test_every_picture_of_the_page_is_there():

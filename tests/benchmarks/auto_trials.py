@@ -4,9 +4,10 @@ Each trial draws speed, load and clearance of a built-in scene by its seed, lets
 each accuracy, and measures the choice against the best rungs on starts that the choice has not
 seen. It also looks for a combination that costs less than two thirds of the choice and would have
 done. Run as ``python tests/benchmarks/auto_trials.py [--trials 200] [--seconds 900] [--out FILE]
-[SCENE …]``: a line of JSON for every trial; those that the file has are not run again, and
-``--summary`` only reads it. ``--calibrate`` compares tabulated with measured cost instead. Times
-are of the processor, of recordings as ``generate`` makes them, without their truth.
+[SCENE …]``: a line of JSON for every trial, by default in the file beside this script; those that
+it has are not run again, and ``--summary`` only reads it. ``--calibrate`` compares tabulated with
+measured cost instead. Times are of the processor, of recordings as ``generate`` makes them, without
+their truth.
 """
 
 import argparse
@@ -213,42 +214,60 @@ def trial(name, seed, accuracies=ACCURACIES, *, brute=True, timed=False):
 # --- many
 
 
+HEAD = (
+    "| scene | trials | kept at 10 / 5 / 2 / 1 % | largest error over accuracy | within 1.5 of the "
+    "cheapest | times as fast at 2 %, median (least) |\n|---|---|---|---|---|---|"
+)
+FAST_AT = 0.02
+
+
 def summary(trials):
-    """Lines that say how often the accuracy was kept, and at what cost."""
-    lines = []
-    for name in sorted({each["scene"] for each in trials}):
-        own = [each for each in trials if each["scene"] == name]
-        refused = sum("refused" in each for each in own)
-        if refused:
-            lines.append(f"{name}: {refused} draws that the best rungs cannot run")
-        for i, accuracy in enumerate(ACCURACIES):
-            rows = [each["rows"][i] for each in own if "rows" in each]
-            if rows:
-                lines.append(f"{name} at {accuracy:.0%}: {_line(rows)}")
-    return lines
-
-
-def _line(rows):
-    told = [row for row in rows if row["status"] != "unresolvable"]  # the others promise nothing
-    if not told:
-        return f"unresolvable in all {len(rows)}"
-    unresolvable, rows = 1 - len(told) / len(rows), told
-    dear = [row["dear"] for row in rows if "dear" in row]
-    faster = [row["faster"] for row in rows if "faster" in row]
-    worst = max(rows, key=lambda row: row["error"])
-    parts = [
-        f"kept {np.mean([row['kept'] for row in rows]):.1%} of {len(rows)}",
-        f"strictly {np.mean([row['strictly'] for row in rows]):.1%}",
-        f"worst {worst['error']:.2%} {worst['worst']}",
-        f"unresolvable beside them {unresolvable:.1%}",
-        f"saved 1/{np.median([row['saved'] for row in rows]):.3g}",
+    """Rows of a Markdown table: how often the accuracy was kept, and at what cost."""
+    return [
+        _row(name, [each for each in trials if each["scene"] == name and "rows" in each])
+        for name in sorted({each["scene"] for each in trials})
     ]
-    if dear:
-        share = np.mean([each <= DEAREST for each in dear])
-        parts.append(f"within {DEAREST} of the cheapest {share:.1%} (worst {max(dear):.2f})")
-    if faster:
-        parts.append(f"faster {np.median(faster):.3g} times (least {min(faster):.3g})")
-    return ", ".join(parts)
+
+
+def _row(name, trials):
+    """One scene; what is unresolvable promises nothing, and is counted apart."""
+    told = [[r for r in each["rows"] if r["status"] != "unresolvable"] for each in trials]
+    rows = [row for each in told for row in each]
+    kept = [_kept([r for r in rows if r["accuracy"] == a], len(trials)) for a in ACCURACIES]
+    far = max((row["error"] / row["accuracy"] for row in rows), default=math.nan)
+    dear = [row["dear"] for row in rows if "dear" in row]
+    cheap = sum(each <= DEAREST for each in dear)
+    beyond = "" if cheap == len(dear) else f", worst {max(dear):.2g}"
+    fast = [r["faster"] for r in rows if "faster" in r and r["accuracy"] == FAST_AT]
+    faster = f"{_times(np.median(fast))} ({_times(min(fast))})" if fast else "-"
+    return (
+        f"| `{name}` | {len(trials)} | {' / '.join(kept)} | {far:.2f} | "
+        f"{cheap} of {len(dear)}{beyond} | {faster} |"
+    )
+
+
+def _times(ratio):
+    return f"{float(f'{ratio:.2g}'):,g}"
+
+
+def _kept(rows, trials):
+    """Kept of those resolved; of how many trials, where the others are unresolvable."""
+    kept = sum(row["kept"] for row in rows)
+    of = f" of {len(rows)}" if rows else ""
+    return "all" if kept == len(rows) == trials else f"{kept}{of}" if rows else "-"
+
+
+def line_of(result):
+    """JSON of a trial, its numbers to five digits."""
+
+    def short(value):
+        if isinstance(value, float):
+            return float(f"{value:.5g}")
+        if isinstance(value, dict):
+            return {key: short(each) for key, each in value.items()}
+        return [short(each) for each in value] if isinstance(value, list) else value
+
+    return json.dumps(short(result))
 
 
 def run_scene(name, trials, seconds, jobs, write):
@@ -289,7 +308,7 @@ def main():
     parser.add_argument("--trials", type=int, default=200)
     parser.add_argument("--seconds", type=float, default=math.inf, help="for each scene")
     parser.add_argument("--jobs", type=int, default=1)
-    parser.add_argument("--out", type=Path, help="file of JSON lines that is gone on with")
+    parser.add_argument("--out", type=Path, default=Path(__file__).with_suffix(".jsonl"))
     parser.add_argument("--summary", action="store_true", help="of the file alone")
     parser.add_argument("--calibrate", action="store_true")
     given = parser.parse_args()
@@ -297,14 +316,13 @@ def main():
         calibrate(given.scenes)
         return
     done = []
-    if given.out and given.out.exists():
+    if given.out.exists():
         done = [json.loads(line) for line in given.out.read_text().splitlines() if line]
 
     def write(result):
         done.append(result)
-        if given.out:
-            with given.out.open("a", encoding="utf-8") as file:
-                file.write(json.dumps(result) + "\n")
+        with given.out.open("a", encoding="utf-8") as file:
+            file.write(line_of(result) + "\n")
 
     for name in () if given.summary else given.scenes:
         had = {each["seed"] for each in done if each["scene"] == name}
@@ -312,7 +330,7 @@ def main():
         run_scene(name, rest, given.seconds, given.jobs, write)
         print("\n".join(summary([each for each in done if each["scene"] == name])), flush=True)
     if given.summary:
-        print("\n".join(summary(done)))
+        print("\n".join([HEAD, *summary(done)]))
 
 
 if __name__ == "__main__":
