@@ -179,7 +179,7 @@ class Study:
     refused : tuple of str
         Rungs that the scene does not admit, with the reason.
     pruned : tuple of str
-        Rungs that another is better and cheaper than.
+        Rungs that another is better and cheaper than, and what a budget left out.
     status : str
         ``resolved``, ``unresolvable``, ``not converged``, or ``out of budget``.
     """
@@ -791,7 +791,7 @@ def study(
 
     court.late = lambda: clock is not None and clock() >= end
     kept, pruned = _undominated(court)
-    convergence = tuple(_convergences(court))
+    convergence = tuple(_convergences(court, pruned))
     combinations = _by_cost(court, kept)
     found, late = [court.judge(court.top)], False
     for done, rungs in enumerate(combinations):
@@ -883,8 +883,11 @@ _SPARED = 1.5
 """Predicted errors up to this factor behind the front are run all the same: sums are guesses."""
 
 
-def _convergences(court: _Court) -> Iterator[Convergence]:
-    """Of every numerical effect with three levels or more; rungs between two are left out."""
+def _convergences(court: _Court, pruned: list[str]) -> Iterator[Convergence]:
+    """Of every numerical effect with three levels or more; rungs between two are left out.
+
+    What a budget left no time for is added to `pruned`.
+    """
     levels = {level_name(factor) for factor in STEP_LEVELS}
     for effect in court.effects:
         rungs = [rung for rung in court.rungs[effect.name] if rung.name in levels][-3:]
@@ -892,6 +895,8 @@ def _convergences(court: _Court) -> Iterator[Convergence]:
             found = _convergence(court, effect.name, rungs)
             if found is not None:
                 yield found
+            elif court.late():
+                pruned.append(f"convergence over {effect.name}: out of budget")
 
 
 _LEVELS_SHOWN = range(3)
