@@ -45,7 +45,7 @@ STARTS = 32
 MOST_STARTS = 512
 """The same where they are."""
 
-PILOT = 180.0
+PILOT = 140.0
 """Tabulated time that the starts of the reference may take all together, beyond STARTS [s]."""
 
 _TIMED = 8  # starts of a rung that are timed, each of which does all that a recording takes
@@ -560,7 +560,7 @@ def resolve(
         Effects that stay as they are written, besides those that the scene pins.
     starts : int, optional
         Most starts that a difference is averaged over; by default 32, and up to 512 of a scene
-        whose reference costs so little that they take no more than three minutes by the tables.
+        whose reference costs so little that they take no more than 140 s by the tables.
     seed : int
         Of the starts.
     bench : Bench, optional
