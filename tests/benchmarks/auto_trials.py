@@ -106,8 +106,10 @@ def verdict(bench, fresh, values, reference, accuracy):
     """How well a choice does on fresh starts: of as many as tell, 64 at the most.
 
     ``kept`` is false where a quantity is off by more than the accuracy and twice its own standard
-    error (four times, before all 64 have run), ``strictly`` where it is off by more than the
-    accuracy at all.
+    error, ``strictly`` where it is off by more than the accuracy at all. Before all 64 have run it
+    takes four times for the former, twice the other way for its contrary, both with Student's
+    factor: knocks scatter within two bounds rather than about a mean, and the first four may well
+    lie near the same one.
     """
     pilot = apart(bench, values, reference, 2)
     still = max(each.standard_error for each in pilot.values()) <= STILL * accuracy
@@ -116,10 +118,12 @@ def verdict(bench, fresh, values, reference, accuracy):
         if found is None:
             return {"kept": False, "strictly": False, "error": math.inf, "worst": "not valid"}
         alone = starts == 1
+        last = starts == FRESH_STARTS[-1]
         doubt = {name: 0.0 if alone else d.standard_error for name, d in found.items()}
-        sure = all(d.error + SURE * doubt[name] <= accuracy for name, d in found.items())
-        sigmas = SURE if starts == FRESH_STARTS[-1] else CLEAR
-        off = any(d.error - sigmas * doubt[name] > accuracy for name, d in found.items())
+        student = 1.0 if alone or last else 1 + 2.3 / (starts - 1)  # of 99 %
+        near, far = SURE * student, SURE if last else CLEAR * student
+        sure = all(d.error + near * doubt[name] <= accuracy for name, d in found.items())
+        off = any(d.error - far * doubt[name] > accuracy for name, d in found.items())
         if sure or (off and not alone):
             break
     worst = max(found, key=lambda name: found[name].error)
