@@ -30,6 +30,7 @@ ACCURACIES = (0.10, 0.05, 0.02, 0.01)
 DEAREST = 1.5  # of the cheapest combination that would have done
 CLEARLY = 5.0  # a rung that errs so many times the accuracy alone is in no combination that will do
 FRESH_STARTS = (4, 8, 32, 64)  # of a choice, until it is clear whether the accuracy was kept
+LEAST_OFF = 32  # of them: fewer may lie at one end of a scatter that has two
 STILL = 0.05  # of the accuracy: scatter below it is none, and one fresh start tells as much as four
 SURE = 2.0  # standard errors
 CLEAR = 4.0  # the same, of few starts: one quantity in ten is off by 2 of eight starts' by chance
@@ -107,9 +108,9 @@ def verdict(bench, fresh, values, reference, accuracy):
 
     ``kept`` is false where a quantity is off by more than the accuracy and twice its own standard
     error, ``strictly`` where it is off by more than the accuracy at all. Before all 64 have run it
-    takes four times for the former, twice the other way for its contrary, both with Student's
-    factor: knocks scatter within two bounds rather than about a mean, and the first four may well
-    lie near the same one.
+    takes four times that and 32 starts to be off, twice with Student's factor to be kept: knocks
+    scatter within two bounds rather than about a mean, and the first four may well lie near the
+    same one.
     """
     pilot = apart(bench, values, reference, 2)
     still = max(each.standard_error for each in pilot.values()) <= STILL * accuracy
@@ -121,10 +122,10 @@ def verdict(bench, fresh, values, reference, accuracy):
         last = starts == FRESH_STARTS[-1]
         doubt = {name: 0.0 if alone else d.standard_error for name, d in found.items()}
         student = 1.0 if alone or last else 1 + 2.3 / (starts - 1)  # of 99 %
-        near, far = SURE * student, SURE if last else CLEAR * student
+        near, far = SURE * student, SURE if last else CLEAR
         sure = all(d.error + near * doubt[name] <= accuracy for name, d in found.items())
         off = any(d.error - far * doubt[name] > accuracy for name, d in found.items())
-        if sure or (off and not alone):
+        if sure or (off and starts >= LEAST_OFF):
             break
     worst = max(found, key=lambda name: found[name].error)
     return {
