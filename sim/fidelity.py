@@ -45,7 +45,7 @@ STARTS = 32
 MOST_STARTS = 512
 """The same where they are."""
 
-PILOT = 140.0
+PILOT = 128.0
 """Tabulated time that the starts of the reference may take all together, beyond STARTS [s]."""
 
 _TIMED = 8  # starts of a rung that are timed, each of which does all that a recording takes
@@ -470,6 +470,10 @@ class _Court:
                 return self._candidate(rungs, found, starts, "doubtful", _why(found, "doubtful"))
             starts *= 2
 
+    def knows(self, rungs: Mapping[str, Rung]) -> bool:
+        """Whether a combination has been judged."""
+        return tuple(sorted((name, rung.name) for name, rung in rungs.items())) in self._kept
+
     def judged(self) -> tuple[Candidate, ...]:
         """Every combination that was judged."""
         return tuple(self._kept.values())
@@ -560,7 +564,7 @@ def resolve(
         Effects that stay as they are written, besides those that the scene pins.
     starts : int, optional
         Most starts that a difference is averaged over; by default 32, and up to 512 of a scene
-        whose reference costs so little that they take no more than 140 s by the tables.
+        whose reference costs so little that they take no more than 128 s by the tables.
     seed : int
         Of the starts.
     bench : Bench, optional
@@ -905,7 +909,10 @@ _ROUNDING = 1e-9  # of relative changes: signals have single precision, truth ha
 
 def _convergence(court: _Court, name: str, rungs: Sequence[Rung]) -> Convergence | None:
     """Convergence over the starts that its levels were judged on, or more while they scatter."""
-    judged = [court.judge({**court.top, name: rung}) for rung in rungs]
+    combinations = [{**court.top, name: rung} for rung in rungs]
+    if court.late() and not all(court.knows(each) for each in combinations[:-1]):
+        return None  # a budget that is spent begins no further combination
+    judged = [court.judge(each) for each in combinations]
     starts, found = min(c.starts for c in judged[:-1]), None
     while True:
         runs = [court.bench.outcomes(c.values, starts) for c in judged]

@@ -39,5 +39,5 @@ def test_a_chart_keeps_to_its_budget(figures, monkeypatch):
     monkeypatch.setitem(figures.SHORTER, "journal-bearing", small)
     chart = figures.chart("journal-bearing", budget=1e-3)
     assert chart.status == "out of budget"
-    assert chart.winner in {point.name for point in chart.points if point.verdict != "doubtful"}
+    assert chart.winner == "reference" or chart.winner.startswith("film")
     assert "out of budget" in chart.pruned[0]
