@@ -52,7 +52,7 @@ _TIMED = 8  # starts of a rung that are timed, each of which does all that a rec
 _FIRST = 4  # starts that a scattered difference is judged on at the earliest
 _CLEAR = 5.0  # a difference so many times the accuracy asked is judged on two starts
 _SIGMAS = 3.0  # beyond so many standard errors a difference is one
-_ONE_SIDED = 2.326  # standard errors at 99 %, as one looks up to seven times; Student's by a factor
+_ONE_SIDED = 2.326  # standard errors at 99 %, as one looks up to seven times
 _STILL = 0.01  # of the accuracy asked: scatter below it is none
 _RESOLVED = 1.0 / 3.0  # of the accuracy asked: standard error that a judgement needs
 _TOLD = 1.0 / 6.0  # of the accuracy: a standard error that takes up two fifths of it by itself
@@ -417,12 +417,12 @@ def _judgement(found: Mapping[str, Difference], starts: int, accuracy: float) ->
     each = found.values()
     scatter = max(d.standard_error for d in each)
     enough = starts >= _FIRST or scatter <= _STILL * accuracy
-    if any(d.error - _SIGMAS * d.standard_error > accuracy for d in each) and enough:
+    few = 1 + 2.3 / (starts - 1)  # Student's: the standard error of few starts is itself a guess
+    if any(d.error - few * _SIGMAS * d.standard_error > accuracy for d in each) and enough:
         return "beyond"
     if any(d.error > _CLEAR * accuracy and d.error > _SIGMAS * d.standard_error for d in each):
         return "beyond"
-    sure = _ONE_SIDED * (1 + 2.3 / (starts - 1))
-    close = all(d.error + sure * d.standard_error <= accuracy for d in each)
+    close = all(d.error + few * _ONE_SIDED * d.standard_error <= accuracy for d in each)
     return "within" if close and enough and scatter <= _RESOLVED * accuracy else "more"
 
 
@@ -599,7 +599,7 @@ def resolve(
     )
     _refuse_bad_reference(court)
     if starts is None:
-        court.starts = _affordable(cost_of(with_values(scene, court.values(court.top))))
+        court.starts = affordable_starts(cost_of(with_values(scene, court.values(court.top))))
     singles = _descent(court)
     chosen = next(
         (found for found in _tries(court, singles) if found.verdict == "within"),
@@ -621,8 +621,14 @@ def resolve(
     )
 
 
-def _affordable(cost: float) -> int:
-    """Starts of a reference of that cost: a power of two, as they are doubled."""
+def affordable_starts(cost: float) -> int:
+    """Most starts of a reference of that cost [s]: a power of two, as they are doubled.
+
+    Examples
+    --------
+    >>> [affordable_starts(cost) for cost in (0.1, 1.0, 60.0)]
+    [512, 128, 32]
+    """
     most = min(MOST_STARTS, max(STARTS, PILOT / cost))
     return 1 << math.floor(math.log2(most))
 
@@ -790,7 +796,7 @@ def study(
     court = _Court(own, effects, asked, STARTS if starts is None else starts)
     _refuse_bad_reference(court)
     if starts is None:
-        court.starts = _affordable(cost_of(with_values(scene, court.values(court.top))))
+        court.starts = affordable_starts(cost_of(with_values(scene, court.values(court.top))))
     end = clock() + budget if clock and budget is not None else math.inf
 
     court.late = lambda: clock is not None and clock() >= end

@@ -10,6 +10,7 @@ friction laws, modes or a measured casing, are choices of a scene and no rungs.
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from fractions import Fraction
 from functools import partial
 from itertools import accumulate, pairwise
 from typing import Any, TypeVar, cast
@@ -507,6 +508,9 @@ def _written(table: tuple[Rung, ...], paths: Iterable[str]) -> Iterator[Rung]:
 STEP_LEVELS = (4.0, 2.0, 1.0, 0.5, 0.25)
 """Factors on a step that is written; the last is the finest."""
 
+PUMP_STEP_LEVELS = (4.0, 2.0, 4 / 3, 1.0, 0.5, 0.25)
+"""The same of a pump, whose steps are few to a sample: from two to four is a long way."""
+
 FINE_LEVELS = (4.0, 2.0, 1.0, 0.5)
 """Factors on a mesh width of an orbit's film, or the steps of an adaptive integrator."""
 
@@ -516,10 +520,10 @@ def level_name(factor: float) -> str:
 
     Examples
     --------
-    >>> [level_name(factor) for factor in (2.0, 1.0, 0.25)]
-    ['x2', 'x1', 'x1/4']
+    >>> [level_name(factor) for factor in (2.0, 4 / 3, 1.0, 0.25)]
+    ['x2', 'x4/3', 'x1', 'x1/4']
     """
-    return f"x{factor:g}" if factor >= 1 else f"x1/{1 / factor:g}"
+    return f"x{Fraction(factor).limit_denominator(16)}"
 
 
 def _levels(
@@ -529,7 +533,7 @@ def _levels(
     for factor in factors:
         found = values(factor)
         if found is not None:
-            assumes = f"{what} of {factor:g} times what is written"
+            assumes = f"{what} of {factor:.3g} times what is written"
             yield Rung(name=level_name(factor), assumes=assumes, values=found)
 
 
@@ -538,8 +542,9 @@ def _whole_steps(
 ) -> Callable[[float], Mapping[str, Any] | None]:
     """Values of a step's levels: a step is a whole part of a sample, and so is each level.
 
-    Halves are exact; what is coarser is rounded to the next whole number, and is left out below
-    the fewest steps of a sample or where it is none of its own.
+    Halves are exact; twice and four times are rounded to the next whole number, and are left out
+    below the fewest steps of a sample or where they are none of their own. A level between two of
+    them is there only where it is exact.
     """
     written = math.ceil(1 / (scene.sample_rate * longest) - 1e-9)
 
@@ -548,7 +553,8 @@ def _whole_steps(
 
     def values(factor: float) -> Mapping[str, Any] | None:
         count = steps(factor)
-        if count < fewest or (factor > 1 and count == steps(factor / 2)):
+        between = factor not in STEP_LEVELS and not math.isclose(count * factor, written)
+        if count < fewest or between or (factor > 1 and count == steps(factor / 2)):
             return None
         return {path: 1 / (scene.sample_rate * count)}
 
@@ -610,9 +616,8 @@ def _stiffest(scene: PumpScene) -> PumpScene:
 def _pump_step_effect(scene: Scene) -> Iterator[Effect]:
     longest = pump_step(_stiffest(cast(PumpScene, scene)))
     values = _whole_steps("numerics.step", scene, longest, FEWEST_STEPS)
-    yield _effect(
-        "step", scene, _levels("a step", STEP_LEVELS, values), _as_written, numerical=True
-    )
+    rungs = _levels("a step", PUMP_STEP_LEVELS, values)
+    yield _effect("step", scene, rungs, _as_written, numerical=True)
 
 
 # --- journal bearing

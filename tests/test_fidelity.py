@@ -327,6 +327,20 @@ def test_a_cheap_scene_is_averaged_over_more_starts():
     assert statuses == {"4.8 s": "unresolvable", "0.4 s": "resolved"}
 
 
+def test_few_starts_at_one_end_of_a_scatter_are_no_error():
+    """The first four lie close together and far off; the others show that they were the same."""
+
+    class TwoEnds(KnownBench):
+        def _run(self, values, start):
+            fine = math.isclose(values["numerics.step"], self.finest)
+            end = 0.045 if start // 4 % 2 == 0 else -0.045
+            return _outcome(0.0 if fine else end + (0.0087 if start % 2 else -0.0087), "")
+
+    kept = ["crankpin", "guide", "pressure", "drive", "wristpin"]
+    found = chosen(TwoEnds({}), 0.02, pinned=kept)
+    assert (found.status, found.rungs["step"]) == ("resolved", "x2")
+
+
 def test_a_budget_ends_a_study():
     ticks = iter(range(10_000))
     bench = KnownBench({IDEAL_WRIST: 0.03})

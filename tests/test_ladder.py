@@ -181,7 +181,7 @@ def test_levels_of_a_step_are_whole_parts_of_a_sample():
     expected = {
         "bilge-pump": {"x2": 2, "x1": 3, "x1/2": 6, "x1/4": 12},  # two at the least: no x4
         "slider-crank-benchmark": {"x4": 3, "x2": 5, "x1": 9, "x1/2": 18, "x1/4": 36},
-        "triplex-pump": {"x2": 2, "x1": 4, "x1/2": 8, "x1/4": 16},
+        "triplex-pump": {"x2": 2, "x4/3": 3, "x1": 4, "x1/2": 8, "x1/4": 16},
     }
     for name, levels in expected.items():
         assert parts[name] == pytest.approx(levels)

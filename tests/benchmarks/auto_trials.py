@@ -21,7 +21,7 @@ from pathlib import Path
 import numpy as np
 from wearstate.datasets.quantities import QUANTITIES
 from wearstate.sim.assemble import simulate
-from wearstate.sim.fidelity import Bench, differences, resolve
+from wearstate.sim.fidelity import Bench, affordable_starts, differences, resolve
 from wearstate.sim.ladder import admissible, cost_of, effects_of, with_values
 from wearstate.sim.parts import SceneError
 from wearstate.sim.scene import load_scene, scene_names
@@ -84,6 +84,13 @@ def reference_values(scene):
     """Values of the highest admissible rung of every effect."""
     tops = [admissible(each, scene)[-1] for each in effects_of(scene)]
     return {path: value for rung in tops for path, value in rung.values.items()}
+
+
+def starts_of(name, scene):
+    """Most starts of a choice: they last as long as those of the scene as it is written."""
+    written = load_scene(name)
+    starts = affordable_starts(cost_of(with_values(written, reference_values(written))))
+    return 1 << math.floor(math.log2(starts * written.duration / scene.duration))
 
 
 def apart(bench, values, reference, starts):
@@ -184,14 +191,14 @@ def seconds_of(scene, values):
 def trial(name, seed, accuracies=ACCURACIES, *, brute=True, timed=False):
     """One row for each accuracy: what was chosen, its error on fresh starts, its cost."""
     scene = drawn(name, seed)
-    quantities = QUANTITIES[scene.machine]
+    quantities, starts = QUANTITIES[scene.machine], starts_of(name, scene)
     bench, fresh = (Bench(scene, quantities, seed=2 * seed + k) for k in range(2))
     reference = reference_values(scene)
     slowest = seconds_of(scene, reference) if timed else math.nan
     rows = []
     for accuracy in accuracies:
         try:
-            found = resolve(scene, quantities, accuracy, bench=bench)
+            found = resolve(scene, quantities, accuracy, starts=starts, bench=bench)
         except SceneError as error:  # a draw that the best rungs cannot run is no trial
             return {"scene": name, "seed": seed, "refused": error.faults[0]}
         row = {
