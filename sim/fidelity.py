@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import stdtrit
 
 from .assemble import recorder, simulate
 from .integrate import Recorder, Solution
@@ -50,9 +51,9 @@ PILOT = 128.0
 
 _TIMED = 8  # starts of a rung that are timed, each of which does all that a recording takes
 _FIRST = 4  # starts that a scattered difference is judged on at the earliest
-_CLEAR = 5.0  # a difference so many times the accuracy asked is judged on two starts
 _SIGMAS = 3.0  # beyond so many standard errors a difference is one
-_ONE_SIDED = 2.326  # standard errors at 99 %, as one looks up to seven times
+_SURELY_OFF = 0.99865  # chance of as much, by Student's distribution
+_SURELY_NEAR = 0.99  # as one looks up to seven times
 _STILL = 0.01  # of the accuracy asked: scatter below it is none
 _RESOLVED = 1.0 / 3.0  # of the accuracy asked: standard error that a judgement needs
 _TOLD = 1.0 / 6.0  # of the accuracy: a standard error that takes up two fifths of it by itself
@@ -416,13 +417,11 @@ def _judgement(found: Mapping[str, Difference], starts: int, accuracy: float) ->
     """``within``, ``beyond``, or ``more``: further starts are needed to tell."""
     each = found.values()
     scatter = max(d.standard_error for d in each)
+    far, near = (float(stdtrit(starts - 1, chance)) for chance in (_SURELY_OFF, _SURELY_NEAR))
+    if any(d.error - far * d.standard_error > accuracy for d in each):
+        return "beyond"
     enough = starts >= _FIRST or scatter <= _STILL * accuracy
-    few = 1 + 2.3 / (starts - 1)  # Student's: the standard error of few starts is itself a guess
-    if any(d.error - few * _SIGMAS * d.standard_error > accuracy for d in each) and enough:
-        return "beyond"
-    if any(d.error > _CLEAR * accuracy and d.error > _SIGMAS * d.standard_error for d in each):
-        return "beyond"
-    close = all(d.error + few * _ONE_SIDED * d.standard_error <= accuracy for d in each)
+    close = all(d.error + near * d.standard_error <= accuracy for d in each)
     return "within" if close and enough and scatter <= _RESOLVED * accuracy else "more"
 
 

@@ -287,7 +287,7 @@ def test_convergence_is_what_is_left_and_not_the_last_change(order, left, conver
 
 @pytest.mark.parametrize("seed", range(8))
 def test_scatter_of_few_starts_is_no_lack_of_convergence(seed):
-    """The coarsest level is seen to be wrong on two starts; the finer two differ by scatter."""
+    """The coarsest level is seen to be wrong on few starts; the finer two differ by scatter."""
 
     class Knocking(KnownBench):
         def _run(self, values, start):

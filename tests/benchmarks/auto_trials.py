@@ -30,6 +30,7 @@ ACCURACIES = (0.10, 0.05, 0.02, 0.01)
 DEAREST = 1.5  # of the cheapest combination that would have done
 CLEARLY = 5.0  # a rung that errs so many times the accuracy alone is in no combination that will do
 FRESH_STARTS = (4, 8, 32, 64)  # of a choice, until it is clear whether the accuracy was kept
+BRUTE_STARTS = (2, 8, 64)  # of a cheaper combination, until it is clear
 LEAST_OFF = 32  # of them: fewer may lie at one end of a scatter that has two
 STILL = 0.05  # of the accuracy: scatter below it is none, and one fresh start tells as much as four
 SURE = 2.0  # standard errors
@@ -101,10 +102,28 @@ def apart(bench, values, reference, starts):
     return differences([o.quantities for o in own], [o.quantities for o in other])
 
 
-def error_of(bench, values, reference, starts):
-    """Largest error of the means over starts; infinite if a run is not valid."""
-    found = apart(bench, values, reference, starts)
-    return math.inf if found is None else max(each.error for each in found.values())
+def student(starts):
+    """Factor on standard errors of few starts, at 99 %."""
+    return 1 + 2.3 / (starts - 1)
+
+
+def off(found, starts, accuracy):
+    """Whether differences are beyond the accuracy for sure; what is not valid is."""
+    if found is None:
+        return True
+    doubt = SURE * student(starts)
+    return any(d.error - doubt * d.standard_error > accuracy for d in found.values())
+
+
+def would_do(bench, values, reference, accuracy):
+    """Whether a combination keeps the accuracy, on as many starts as tell."""
+    for starts in BRUTE_STARTS:
+        found = apart(bench, values, reference, starts)
+        if off(found, starts, accuracy):
+            return False
+        if max(d.standard_error for d in found.values()) <= STILL * accuracy:
+            break
+    return max(d.error for d in found.values()) <= accuracy
 
 
 # --- one trial
@@ -128,15 +147,15 @@ def verdict(bench, fresh, values, reference, accuracy):
         alone = starts == 1
         last = starts == FRESH_STARTS[-1]
         doubt = {name: 0.0 if alone else d.standard_error for name, d in found.items()}
-        student = 1.0 if alone or last else 1 + 2.3 / (starts - 1)  # of 99 %
-        near, far = SURE * student, SURE if last else CLEAR
+        few = 1.0 if alone or last else student(starts)
+        near, far = SURE * few, SURE if last else CLEAR
         sure = all(d.error + near * doubt[name] <= accuracy for name, d in found.items())
-        off = any(d.error - far * doubt[name] > accuracy for name, d in found.items())
-        if sure or (off and starts >= LEAST_OFF):
+        beyond = any(d.error - far * doubt[name] > accuracy for name, d in found.items())
+        if sure or (beyond and starts >= LEAST_OFF):
             break
     worst = max(found, key=lambda name: found[name].error)
     return {
-        "kept": not off,
+        "kept": not beyond,
         "strictly": found[worst].error <= accuracy,
         "error": found[worst].error,
         "worst": worst,
@@ -159,7 +178,9 @@ def cheaper_that_does(scene, bench, reference, accuracy, below):
                 for rung in rungs
                 if each.numerical
                 or rung is rungs[-1]
-                or error_of(bench, {**reference, **rung.values}, reference, 1) <= CLEARLY * accuracy
+                or not off(
+                    apart(bench, {**reference, **rung.values}, reference, 2), 2, CLEARLY * accuracy
+                )
             ]
         )
     combinations = [
@@ -170,10 +191,7 @@ def cheaper_that_does(scene, bench, reference, accuracy, below):
     for cost, i in priced:
         if cost >= below:
             return None
-        values = combinations[i]
-        if error_of(bench, values, reference, 1) > CLEARLY * accuracy:
-            continue
-        if all(error_of(bench, values, reference, n) <= accuracy for n in (2, 8)):
+        if would_do(bench, combinations[i], reference, accuracy):
             return cost
     return None
 
