@@ -263,7 +263,11 @@ def _row(name, trials):
     """One scene; what is unresolvable promises nothing, and is counted apart."""
     told = [[r for r in each["rows"] if r["status"] != "unresolvable"] for each in trials]
     rows = [row for each in told for row in each]
-    kept = [_kept([r for r in rows if r["accuracy"] == a], len(trials)) for a in ACCURACIES]
+    tried = [sum(r["accuracy"] == a for each in trials for r in each["rows"]) for a in ACCURACIES]
+    kept = [
+        _kept([r for r in rows if r["accuracy"] == a], n, len(trials))
+        for a, n in zip(ACCURACIES, tried, strict=True)
+    ]
     far = max((row["error"] / row["accuracy"] for row in rows), default=math.nan)
     dear = [row["dear"] for row in rows if "dear" in row]
     cheap = sum(each <= DEAREST for each in dear)
@@ -280,11 +284,13 @@ def _times(ratio):
     return f"{float(f'{ratio:.2g}'):,g}"
 
 
-def _kept(rows, trials):
-    """Kept of those resolved; of how many trials, where the others are unresolvable."""
+def _kept(rows, tried, trials):
+    """Kept of those resolved; in how many trials, where the others are unresolvable."""
     kept = sum(row["kept"] for row in rows)
-    of = f" of {len(rows)}" if rows else ""
-    return "all" if kept == len(rows) == trials else f"{kept}{of}" if rows else "-"
+    if kept == len(rows) == trials:
+        return "all"
+    within = "" if tried == len(rows) else f" in {tried}"
+    return f"{kept} of {len(rows)}{within}" if tried else "-"
 
 
 def line_of(result):
