@@ -8,7 +8,7 @@ import time
 import warnings
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator
-from concurrent.futures import BrokenExecutor, Future
+from concurrent.futures import BrokenExecutor, Future, wait
 from contextlib import AbstractContextManager, contextmanager
 from typing import Any, TypeVar
 
@@ -30,6 +30,9 @@ PARENT_CHECK = 1.0
 
 IDLE = 600.0
 """Time after which an idle worker ends [s]: long, since a new one imports for seconds."""
+
+UNHEARD = 5.0
+"""Time after which a result that has not come is looked for among processes that died [s]."""
 
 _ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 
@@ -177,7 +180,7 @@ class _Processes:
     def take(self) -> Any:
         for attempt in range(1, ATTEMPTS + 1):
             try:
-                result = self._ahead[0][1].result()
+                result = self._come(self._ahead[0][1])
             except BrokenExecutor as error:
                 fault = error
             else:
@@ -191,6 +194,15 @@ class _Processes:
             f"({first_line(fault)}); look for too little memory, or use fewer jobs"
         ) from fault
 
+    def _come(self, future: "Future[Any]") -> Any:
+        """Result of a future, also where a process died with half of its result sent."""
+        while True:
+            wait([future], UNHEARD)
+            if future.done():
+                return future.result()
+            if any(process.exitcode for process in self._workers()):
+                self._end()
+
     def _renew(self) -> None:
         self._start()  # loky gives a new executor for a broken one
         self._ahead = deque(
@@ -201,9 +213,19 @@ class _Processes:
     def kill(self) -> None:
         # loky's own way, kill_workers, fails in its thread over an item submitted just before;
         # processes that die are what it is made for
-        for process in list((self._executor._processes or {}).values()):
-            process.terminate()
+        self._end()
         self._executor.shutdown(wait=True)
+
+    def _end(self) -> None:
+        """End all processes, and the wait for the rest of a result that one of them was sending."""
+        results = self._executor._result_queue
+        for process in self._workers():
+            process.terminate()
+        if results is not None:  # this process holds an end to write at: without it, no end of file
+            results._writer.close()
+
+    def _workers(self) -> list[Any]:
+        return list((self._executor._processes or {}).values())
 
 
 def _has_come(future: "Future[Any]") -> bool:

@@ -43,6 +43,24 @@ class OnceAt3:
         return die_once(self.place, item)
 
 
+class HalfAt1:
+    """At item 1 end the process with half of a result sent, where it was not done before."""
+
+    def __init__(self, place):
+        self.place = place
+
+    def __call__(self, item):
+        if item == 1 and not os.path.exists(self.place):
+            open(self.place, "w").close()
+            frame = sys._getframe()
+            while "result_queue" not in frame.f_locals:
+                frame = frame.f_back
+            length = (1 << 30).to_bytes(4, "big")
+            os.write(frame.f_locals["result_queue"]._writer.fileno(), length + b"half")
+            os.kill(os.getpid(), signal.SIGKILL)
+        return item
+
+
 class GrowAt4:
     """Keep 400 MB at item 4, when loky looks at its workers a second time; later items wait until
     the worker that takes the place of that one has come."""
@@ -92,6 +110,23 @@ def test_a_worker_that_dies_is_replaced(tmp_path):
     found = list(in_order(function, range(8), jobs=2, say=told.append))
     assert found == [0, 1, 2, -3, 4, 5, 6, 7]
     assert told == ["a worker process died; what it had in hand is done again"]
+
+
+def test_a_worker_that_dies_with_half_a_result_sent_is_replaced(tmp_path, monkeypatch):
+    monkeypatch.setattr(workers, "UNHEARD", 0.5)
+    told = []
+    work = HalfAt1(str(tmp_path / "half"))
+    assert list(in_order(work, range(4), jobs=2, say=told.append)) == [0, 1, 2, 3]
+    assert told == ["a worker process died; what it had in hand is done again"]
+
+
+def test_a_stop_does_not_wait_for_half_a_result(tmp_path):
+    results = in_order(HalfAt1(str(tmp_path / "half")), range(4), jobs=2)
+    assert next(results) == 0
+    while not (tmp_path / "half").exists():
+        time.sleep(0.01)
+    time.sleep(0.5)  # until the half has come
+    results.close()
 
 
 def test_a_worker_that_grows_is_replaced_without_a_word(tmp_path):
