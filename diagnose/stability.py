@@ -167,6 +167,11 @@ class StabilityMap:
     verdicts: dict[str, NDArray[np.int64]]
     words: dict[str, list[list[str]]]
 
+    @property
+    def whole(self) -> bool:
+        """Whether no cell was left out."""
+        return all(np.all(codes != Verdict.NOT_RUN) for codes in self.verdicts.values())
+
     def share(self, method: str) -> dict[Verdict, float]:
         """Share of the cells of every verdict that occurs.
 
@@ -195,7 +200,11 @@ class Budget:
 
 
 def measure(
-    plan: Plan, budget: Budget | None = None, progress: Callable[[int, int], None] | None = None
+    plan: Plan,
+    budget: Budget | None = None,
+    progress: Callable[[int, int], None] | None = None,
+    *,
+    begun: StabilityMap | None = None,
 ) -> StabilityMap:
     """Run every cell of a map, the coarse picture first.
 
@@ -206,16 +215,24 @@ def measure(
         Cells that it leaves no time for stay "not run".
     progress : callable, optional
         ``(done, all)``.
+    begun : StabilityMap, optional
+        Of the same plan, cut short by a budget: only what it left is run.
 
     Returns
     -------
     StabilityMap
     """
     shape = len(plan.y.values), len(plan.x.values)
-    verdicts = {name: np.zeros(shape, np.int64) for name in plan.judges}
-    words = {name: [[""] * shape[1] for _ in range(shape[0])] for name in plan.judges}
+    if begun is None:
+        verdicts = {name: np.zeros(shape, np.int64) for name in plan.judges}
+        words = {name: [[""] * shape[1] for _ in range(shape[0])] for name in plan.judges}
+    else:
+        verdicts = {name: codes.copy() for name, codes in begun.verdicts.items()}
+        words = {name: [list(row) for row in rows] for name, rows in begun.words.items()}
     order = [(i, j, name) for i, j in coarse_first(shape) for name in plan.judges]
     for done, (i, j, name) in enumerate(order, start=1):
+        if verdicts[name][i, j] != Verdict.NOT_RUN:
+            continue
         if budget is not None and budget.spent:
             break
         verdict, word = plan.judges[name](plan.x.values[j], plan.y.values[i])

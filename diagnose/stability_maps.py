@@ -6,7 +6,7 @@ one row of :data:`MAPS`.
 
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from typing import Any, NamedTuple, cast
 
@@ -1142,7 +1142,8 @@ def atlas(
     name : str, optional
         Of a map of this machine.
     budget : float, optional
-        Seconds in all; every map gets an even share of what is left.
+        Seconds in all; every map gets an even share of what is left, and those that it cuts short
+        go on with what the others leave.
     size : int, optional
         Cells along either axis; each map has its own.
     progress : callable, optional
@@ -1162,15 +1163,25 @@ def atlas(
         raise SceneError(
             scene.name, [f"map = '{name}' is unknown for a {scene.machine}{nearest(name, makers)}"]
         )
+    plans = _plans(scene, [name] if name is not None else list(makers), size)
     end = None if budget is None else time.monotonic() + budget
-    chosen = [name] if name is not None else list(makers)
-    found = []
-    for place, each in enumerate(chosen):
-        plan = makers[each](scene, size)
-        if isinstance(plan, str):
-            if name is not None:
-                raise SceneError(scene.name, [f"map = '{name}': {plan}"])
-            continue
-        share = None if end is None else (end - time.monotonic()) / (len(chosen) - place)
-        found.append(measure(plan, Budget(share), progress))
-    return tuple(found)
+    found: dict[str, StabilityMap] = {}
+    for _ in range(2):
+        waiting = [p for p in plans if p.name not in found or not found[p.name].whole]
+        for place, plan in enumerate(waiting):
+            share = None if end is None else (end - time.monotonic()) / (len(waiting) - place)
+            begun = found.get(plan.name)
+            found[plan.name] = measure(plan, Budget(share), progress, begun=begun)
+    return tuple(found.values())
+
+
+def _plans(scene: Scene, names: Sequence[str], size: int | None) -> list[Plan]:
+    """Those that the scene has something to draw in; of one alone, its refusal is an error."""
+    plans = []
+    for name in names:
+        plan = MAPS[scene.machine][name](scene, size)
+        if isinstance(plan, Plan):
+            plans.append(plan)
+        elif len(names) == 1:
+            raise SceneError(scene.name, [f"map = '{name}': {plan}"])
+    return plans

@@ -2,12 +2,15 @@
 
 import json
 import math
+from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
 from numpy.testing import assert_allclose
 from wearstate.datasets.record import DataError
+from wearstate.diagnose import stability, stability_maps
 from wearstate.diagnose.cli import cli
 from wearstate.diagnose.stability import (
     Axis,
@@ -240,6 +243,53 @@ def test_a_map_keeps_verdicts_and_words_in_their_cells():
 def test_what_the_budget_leaves_no_time_for_is_not_run():
     found = measure(tiny(lambda _x, _y: (Verdict.ACCURATE, "")), Budget(-1.0))
     assert found.share("method") == {Verdict.NOT_RUN: 1.0}
+
+
+def test_a_map_that_was_cut_short_goes_on_where_it_ended():
+    runs = []
+
+    class Allowance:
+        spent = False
+
+    allowance = Allowance()
+
+    def judge(x, y):
+        runs.append((x, y))
+        allowance.spent = len(runs) == 2
+        return Verdict.ACCURATE, f"run {len(runs)}"
+
+    half = measure(tiny(judge), allowance)
+    assert not half.whole
+    whole = measure(half.plan, begun=half)
+    assert whole.whole
+    assert len(runs) == len(set(runs)) == 6
+    assert sorted(word for row in whole.words["method"] for word in row) == [
+        f"run {k}" for k in range(1, 7)
+    ]
+    assert half.share("method")[Verdict.NOT_RUN] == 4 / 6
+
+
+def test_a_map_goes_on_with_what_the_others_leave_of_a_budget(monkeypatch):
+    now = [0.0]
+
+    def judge_of(seconds):
+        def judge(_x, _y):
+            now[0] += seconds
+            return Verdict.ACCURATE, ""
+
+        return judge
+
+    scene = load_scene("bilge-pump")
+    slow = replace(tiny(judge_of(2.0)), name="slow")
+    quick = replace(tiny(judge_of(0.1)), name="quick")
+    makers = {"slow": lambda *_: slow, "quick": lambda *_: quick}
+    monkeypatch.setitem(MAPS, scene.machine, makers)
+    for module in (stability, stability_maps):
+        monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: now[0]))
+    maps = atlas(scene, budget=14.0)  # the slow one takes 12 s, its even share is 7
+    assert [found.plan.name for found in maps] == ["slow", "quick"]
+    assert [found.whole for found in maps] == [True, True]
+    assert_allclose(now[0], 12.6)
 
 
 @pytest.mark.parametrize("scene", ["bilge-pump", "journal-bearing", "propulsion-shaft"])

@@ -103,7 +103,7 @@ def apart(bench, values, reference, starts):
 
 
 def student(starts):
-    """Factor on standard errors of few starts, at 99 %."""
+    """Factor on standard errors of few starts, about Student's at 99 % from four starts on."""
     return 1 + 2.3 / (starts - 1)
 
 
