@@ -39,9 +39,9 @@ def chart_figure(chart: Chart) -> Any:
     from matplotlib.figure import Figure
 
     rows = min(len(chart.front), _MOST_ROWS)
-    figure = Figure(figsize=(13, 6.2 + 0.38 * rows + 1.2), layout="constrained")
+    figure = Figure(figsize=(13, 6.7 + 0.38 * rows + 1.2), layout="constrained")
     figure.suptitle(f"{chart.title}\n{_wrapped(chart.verdict, 130)}", fontsize=11)
-    ratios = (5.0, 0.38 * rows + 1.2)
+    ratios = (5.5, 0.38 * rows + 1.2)
     right = "levels" if chart.convergence else "points"
     mosaic: Any = [["points", "points", right], ["quantities"] * 3]
     panels = figure.subplot_mosaic(mosaic, height_ratios=ratios)
@@ -76,16 +76,6 @@ def _draw_points(axes: Any, chart: Chart) -> None:
     for number, point in enumerate(chart.points):
         if point in finite:
             _draw_point(axes, point, number)
-    for number, point in enumerate(front, start=1):
-        axes.annotate(
-            str(number),
-            (point.seconds, _shown(point)),
-            xytext=(6, 6),
-            textcoords="offset points",
-            fontsize=9,
-            weight="bold",
-            color=_FRONT,
-        )
     if chart.accuracy is not None:
         axes.axhline(100 * chart.accuracy, color=_LIMIT, lw=1, ls="--", label="accuracy asked")
     if chart.remaining > 0:
@@ -109,7 +99,43 @@ def _draw_points(axes: Any, chart: Chart) -> None:
     _plain_numbers(axes.xaxis)
     _plain_numbers(axes.yaxis)
     axes.grid(alpha=0.3, which="both")
-    axes.legend(fontsize=8, loc="best")
+    _number(axes, front)
+    _legend_below(axes, ncols=3)
+
+
+def _number(axes: Any, front: list[Point]) -> None:
+    """Numbers above the points of the front, below where the one before is too near."""
+    from matplotlib.patheffects import withStroke
+
+    to_panel = axes.transData + axes.transAxes.inverted()
+    before, below = np.array([-1.0, -1.0]), True
+    for number, point in enumerate(front, start=1):
+        place = (point.seconds, _shown(point))
+        here = to_panel.transform(place)
+        below = bool(np.all(np.abs(here - before) < _NEAR)) and not below
+        before = here
+        axes.annotate(
+            str(number),
+            place,
+            xytext=(6, -6 if below else 6),
+            textcoords="offset points",
+            va="top" if below else "bottom",
+            fontsize=9,
+            weight="bold",
+            color=_FRONT,
+            path_effects=[withStroke(linewidth=2, foreground="white")],
+            zorder=4,
+        )
+
+
+_NEAR = (0.03, 0.08)  # of the panel's width and height: two numbers would touch
+
+
+def _legend_below(axes: Any, ncols: int) -> None:
+    """Where no point can lie under it."""
+    axes.legend(
+        fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=ncols, frameon=False
+    )
 
 
 def _fastest(chart: Chart) -> str:
@@ -175,7 +201,7 @@ def _draw_convergence(axes: Any, chart: Chart) -> None:
     if chart.accuracy is not None:
         axes.axhline(100 * chart.accuracy / 3, color=_LIMIT, lw=1, ls=":", label="accuracy / 3")
     axes.grid(alpha=0.3, which="both")
-    axes.legend(fontsize=7, loc="best")
+    _legend_below(axes, ncols=1)
 
 
 def _convergence_label(each: Convergence) -> str:
@@ -240,7 +266,9 @@ def _table_points(chart: Chart) -> list[tuple[int, Point]]:
 def _percent(value: float) -> str:
     if not math.isfinite(value):
         return ""
-    return "0" if value < _FLOOR else f"{value:.2g}" if value < 100 else f"{value:.0f}"
+    if value >= 100:
+        return f"{value:.0f}"
+    return "0" if value < _FLOOR else f"{value:.1g}" if value < 10 * _FLOOR else f"{value:.2g}"
 
 
 def chart_svg(chart: Chart) -> str:
