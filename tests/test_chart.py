@@ -258,6 +258,17 @@ def test_the_picture_says_simulated_and_numbers_its_front(chart):
     assert (x, y) == ("log", "log")
 
 
+def test_numbers_of_near_points_and_the_legend_do_not_touch():
+    near = candidate(3.9, 1e-5, tolerance="x2")  # beside the reference, which takes 4 s
+    figure = chart_figure(chart_from(SHORT, near, COARSE))
+    figure.draw_without_rendering()
+    axes = figure.axes[0]
+    boxes = [text.get_window_extent() for text in axes.texts]
+    assert len(boxes) == 4
+    assert not [pair for pair in itertools.combinations(boxes, 2) if pair[0].overlaps(pair[1])]
+    assert not axes.get_legend().get_window_extent().overlaps(axes.get_window_extent())
+
+
 # -- real scenes
 
 
