@@ -10,7 +10,10 @@ The few public names below load lazily, so that ``import wearstate`` stays cheap
 """
 
 from importlib import import_module
-from typing import Any
+
+TYPE_CHECKING = False  # not from typing: with -m, a typing.py of the current folder would be run
+if TYPE_CHECKING:
+    from typing import Any
 
 __version__ = "0.1.0"
 
@@ -30,7 +33,7 @@ _PUBLIC = {
 __all__ = ["__version__", *_PUBLIC]
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> "Any":
     """Import the public name on first use."""
     if name not in _PUBLIC:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -1,5 +1,10 @@
 """Run the command line as ``python -m wearstate``."""
 
+import sys
+
+if not sys.flags.safe_path:
+    del sys.path[0]  # the current folder, put first by -m: no file there may be run for a module
+
 from .diagnose.cli import main
 
 main()

@@ -1,6 +1,5 @@
 """Is a data set fit to train and judge on: leaks, copies, splits that share machines."""
 
-import json
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
@@ -10,15 +9,15 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ..sim.parts import SceneError
-from ..sim.scene import scene_table
 from .audit_columns import cancelling_pairs, class_scaled, constant_columns
 from .audit_label import confounded, lone_machines, readable
 from .audit_records import Copy, Sketches, copies, pairs_in, sketch
 from .audit_rows import cross_copies, crossing, row_copies, shared_machines
 from .audit_table import (
+    LARGEST,
     NO_ROLES,
     SHOWN,
+    SMALLEST,
     Finding,
     Roles,
     Severity,
@@ -27,7 +26,8 @@ from .audit_table import (
     manifest_table,
     read_table,
 )
-from .record import Attributes, DataError, DataSet
+from .machines import machine_origin
+from .record import DataError, DataSet
 
 Verdict = Literal["alarm", "warning", "clean"]
 
@@ -292,7 +292,10 @@ def _unchecked(item: _Looked, files: int) -> Iterator[str]:
         yield f"{name}: no machine of another file, for its numbers hold in it alone; audit the .h5"
     gaps = int((~np.isfinite(table.values)).any(axis=0).sum())
     if gaps:
-        yield f"{name}: {gaps} column(s) with missing values, for anything but single columns"
+        yield (
+            f"{name}: {gaps} column(s) with missing values (also beyond {SMALLEST:g} to "
+            f"{LARGEST:g} in size), for anything but single columns"
+        )
 
 
 # --- signals
@@ -393,32 +396,11 @@ def _between_draws(looked: Sequence[_Looked]) -> Iterator[Finding]:
     """Machines that two simulated sets drew alike: from one recipe, or from another's machines."""
     sets = [(item, item.data) for item in looked if item.data is not None]
     for (one, first), (two, second) in combinations(sets, 2):
-        origin = machine_origin(first.attributes)
-        if origin is None or origin != machine_origin(second.attributes):
+        origin, other = (
+            machine_origin(data.attributes.recipe, data.attributes.seed) for data in (first, second)
+        )
+        if origin is None or origin != other:
             continue
         both = np.intersect1d(first.manifest["group"], second.manifest["group"])
         if both.size:
             yield _between(one, two, "shared-machines", both.size, both[:SHOWN].tolist())
-
-
-def machine_origin(head: Attributes) -> tuple[str, int] | None:
-    """What decides the machines of a simulated set: equal groups of equal origin are one machine.
-
-    Parameters
-    ----------
-    head : Attributes
-        Of a data set.
-
-    Returns
-    -------
-    tuple of (str, int) or None
-        Name of the recipe that draws the machines, and seed; None of a measured set.
-    """
-    if not head.recipe:
-        return None
-    try:
-        table = scene_table(head.recipe, "recipe")
-    except SceneError:
-        return None
-    name = table.get("machines_of") or table.get("name")
-    return None if not name else (json.dumps(name), head.seed)

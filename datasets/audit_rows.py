@@ -65,10 +65,12 @@ def copied_rows(values: Float) -> Pairs:
     """
     finite = values[:, np.isfinite(values).all(axis=0)]
     first, repeats = _first_of_equal(finite)
-    kept = np.array([np.unique(c).size > FEW_DISTINCT * first.size for c in finite[first].T], bool)
+    fewest = max(1.0, FEW_DISTINCT * first.size)
+    kept = np.array([np.unique(c).size > fewest for c in finite[first].T], bool)
     if not kept.any():
-        return np.empty((0, 2), dtype=np.intp)
+        return repeats
     measured = finite[first][:, kept]
+    measured = measured / np.abs(measured).max(axis=0)  # squares of the largest would be infinite
     scaled = (measured - measured.mean(axis=0)) / measured.std(axis=0)
     rank = _rank(scaled)
     # n rows in q independent columns agree to t deviations by chance n^2 t^q / 2 times
@@ -93,7 +95,10 @@ def _first_of_equal(values: Float) -> tuple[NDArray[np.intp], Pairs]:
 def _rank(scaled: Float) -> int:
     """About how many independent columns there are, from at most 64 of them."""
     probe = scaled[:, :: max(1, scaled.shape[1] // 64)]
-    weights = np.linalg.svd(probe, compute_uv=False) ** 2
+    try:
+        weights = np.linalg.svd(probe, compute_uv=False) ** 2
+    except np.linalg.LinAlgError:  # the iteration of LAPACK may fail; the symmetric one does not
+        weights = np.clip(np.linalg.eigvalsh(probe.T @ probe), 0.0, None)
     return max(1, int(weights.sum() ** 2 / (weights**2).sum()))
 
 

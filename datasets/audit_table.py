@@ -8,6 +8,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from .hdf5_values import HDF5_FAULTS, is_plain
 from .labels import listed
 from .record import DataError, DataSet
 
@@ -22,6 +23,9 @@ FEWEST = 3
 
 FEW_DISTINCT = 0.5
 """Of the rows: a column with fewer values is counted, not measured."""
+
+SMALLEST, LARGEST = 1e-100, 1e100
+"""Sizes of numbers that are compared, beside 0: their squares, products and ratios are finite."""
 
 SHOWN = 10
 """Columns, rows and records that a finding names."""
@@ -175,7 +179,7 @@ def is_data_set(path: Path) -> bool:
     try:
         with h5py.File(path) as file:
             return "signal" in file and "manifest" in file
-    except OSError:
+    except HDF5_FAULTS:
         return True  # let the reader of data sets say what is wrong with it
 
 
@@ -217,6 +221,7 @@ def read_table(path: str | Path, roles: Roles = NO_ROLES) -> Table:
     free = [name for name in features if name not in held]
     numeric = [name for name in free if frame[name].dtype.kind in "biuf"]
     values = frame[numeric].to_numpy(dtype=float) if numeric else np.empty((len(frame), 0))
+    values = comparable(values)
     split = taken.get("split")
     return Table(
         source=place.name,
@@ -227,11 +232,38 @@ def read_table(path: str | Path, roles: Roles = NO_ROLES) -> Table:
         label=codes,
         classes=classes,
         graded=graded,
-        groups=_words(frame[taken["group"]]) if "group" in taken else None,
-        nuisance={name: _numbers(frame[name]) for name in nuisance},
+        groups=_machines(frame[taken["group"]], place) if "group" in taken else None,
+        nuisance={name: comparable(_numbers(frame[name])) for name in nuisance},
         sides={split: _sides(frame[split], place)} if split else {},
         numbered=ours and taken.get("group") == "group",
     )
+
+
+def comparable(values: Float) -> Float:
+    """Numbers with those of a size that no check can compute with made missing.
+
+    Parameters
+    ----------
+    values : numpy.ndarray
+
+    Examples
+    --------
+    >>> comparable(np.array([1e308, -2.0, 0.0, 1e-320]))
+    array([nan, -2.,  0., nan])
+    """
+    size = np.abs(values)
+    return np.where((size <= LARGEST) & ((size >= SMALLEST) | (size == 0)), values, np.nan)
+
+
+def _machines(column: Any, place: Path) -> NDArray[np.str_]:
+    """Machine of each row; a row without one would be taken for a machine of its own."""
+    missing = np.flatnonzero(column.isna().to_numpy())
+    if missing.size:
+        raise DataError(
+            f"{place}: group {column.name!r} is missing in {missing.size} of {len(column)} rows, "
+            f"must be in 0, first in row {missing[0] + 1}; name the machine or leave the rows out"
+        )
+    return _words(column)
 
 
 def _own_roles(frame: Any, roles: Roles) -> Roles:
@@ -331,9 +363,12 @@ def coded(label: Any, name: str) -> tuple[tuple[str, ...], NDArray[np.intp] | No
     if label is None:
         return (), None, None
     found: NDArray[Any] = np.asarray(label)
-    if found.dtype.kind == "f" and not np.isfinite(found).all():
-        bad = int(np.count_nonzero(~np.isfinite(found)))
-        raise DataError(f"label {name}: {bad} rows have none, must be 0; leave them out")
+    if found.dtype.kind == "f" and not np.isfinite(comparable(found)).all():
+        bad = int(np.count_nonzero(~np.isfinite(comparable(found))))
+        raise DataError(
+            f"label {name}: {bad} rows have none of {SMALLEST:g} to {LARGEST:g} in size (or 0), "
+            "must be 0 rows; leave them out"
+        )
     if found.dtype.kind not in "biuf":
         found = found.astype(str)
     classes, codes = np.unique(found, return_inverse=True)
@@ -438,16 +473,21 @@ def _hdf5_frame(path: Path) -> Any:
             columns = {
                 name: node[:]
                 for name, node in file.items()
-                if isinstance(node, h5py.Dataset) and node.ndim == 1 and node.dtype.names is None
+                if isinstance(node, h5py.Dataset)
+                and is_plain(node.id.get_type())
+                and node.ndim == 1
+                and node.dtype.names is None
             }
-    except OSError as error:
+    except HDF5_FAULTS as error:
         raise DataError(f"{path} cannot be read ({error}); take an intact copy") from None
     if len({len(column) for column in columns.values()}) != 1:
         raise DataError(
             f"{path}: its {len(columns)} one-dimensional datasets must be >= 1 and of one length "
             "to be a table; convert it to CSV"
         )
-    text = {n: np.char.decode(c, "utf-8") for n, c in columns.items() if c.dtype.kind == "S"}
+    text = {
+        n: np.char.decode(c, "utf-8", "replace") for n, c in columns.items() if c.dtype.kind == "S"
+    }
     return pd.DataFrame({**columns, **text})
 
 
@@ -499,14 +539,16 @@ def manifest_table(data: DataSet, roles: Roles, names: Sequence[str], values: Fl
     return Table(
         source=data.path.name,
         names=tuple(names),
-        values=values,
+        values=comparable(values),
         texts={"record_id": manifest["record_id"].to_numpy(dtype=str)},
         label_name=label_name,
         label=codes,
         classes=classes,
         graded=graded if graded is not None else continuous,
         groups=manifest[roles.group or "group"].to_numpy(),
-        nuisance={str(name): manifest[name].to_numpy(dtype=float) for name in conditions},
+        nuisance={
+            str(name): comparable(manifest[name].to_numpy(dtype=float)) for name in conditions
+        },
         sides={name: _stored_sides(data, name)[usable] for name in wanted},
         shared=frozenset(name for name, is_apart in apart.items() if not is_apart),
     )

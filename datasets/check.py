@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from ..sim.wear import grade
 from .draws import Range
+from .plausible import doubts_of, scene_in
 from .recipe import Recipe, recorded_recipe
 from .record import DataError, DataSet, signal_checksum
 from .splits import check_no_leak
@@ -144,12 +145,15 @@ class _Signals:
     zero: Flags
     constant: Flags
     n_bytes: int
+    doubts: Mapping[str, Sequence[tuple[int, str]]]  # check -> records and what is told of each
 
 
 def _read_signals(data: DataSet, progress: Callable[[int, int], None] | None) -> _Signals:
     """Look at every signal once, in the order of the file."""
     n = len(data)
     flags = np.zeros((4, n), dtype=bool)
+    doubts: dict[str, list[tuple[int, str]]] = {}
+    scene, speeds = scene_in(data.attributes), _speeds(data.rows)
     n_bytes = 0
     checksums = data.rows["signal_crc32"]
     for index in range(n):
@@ -160,12 +164,31 @@ def _read_signals(data: DataSet, progress: Callable[[int, int], None] | None) ->
         else:
             flags[:, index] = _signal_flags(signal, int(checksums[index]))
             n_bytes += signal.nbytes
+            if not flags[:2, index].any() and data.rows["status"][index] == b"ok":
+                for doubt in doubts_of(signal, data.attributes, scene, speeds[index]):
+                    doubts.setdefault(doubt.check, []).append((index, doubt.text))
         if progress is not None:
             progress(index + 1, n)
     damaged, infinite, zero, constant = flags
     return _Signals(
-        damaged=damaged, infinite=infinite, zero=zero, constant=constant, n_bytes=n_bytes
+        damaged=damaged,
+        infinite=infinite,
+        zero=zero,
+        constant=constant,
+        n_bytes=n_bytes,
+        doubts=doubts,
     )
+
+
+def _speeds(rows: NDArray[np.void]) -> NDArray[np.float64]:
+    """Speed of every record by the manifest, its mean before the one set [Hz]; NaN without."""
+    found = np.full(len(rows), math.nan)
+    for name in _SPEEDS:  # the last one has the last word
+        if name in (rows.dtype.names or ()):
+            told = np.asarray(rows[name], dtype=float)
+            known = np.isfinite(told) & (told > 0)
+            found[known] = told[known]
+    return found
 
 
 def _signal_flags(signal: NDArray[np.float32], checksum: int) -> tuple[bool, bool, bool, bool]:
@@ -465,6 +488,16 @@ def _check_clipped(seen: _Seen) -> Iterator[Finding]:
         yield from _note("clipped", text, seen.rows["clipped_samples"] > 0)
 
 
+def _check_plausible(seen: _Seen) -> Iterator[Finding]:
+    """Records that are whole, and hardly meant; one that never changes has a note of its own."""
+    for check, found in seen.signals.doubts.items():
+        if check != "still":
+            records, texts = zip(*found, strict=True)
+            where = f"{check}, such as record {records[0]}" if len(found) > 1 else check
+            text = f"{where}: {texts[0]}"
+            yield Finding(severity="note", check="plausible", text=text, records=records)
+
+
 _CHECKS: tuple[Callable[[_Seen], Iterator[Finding]], ...] = (
     _check_hashes,
     _check_signals,
@@ -477,6 +510,7 @@ _CHECKS: tuple[Callable[[_Seen], Iterator[Finding]], ...] = (
     _check_lives,
     _check_splits,
     _check_clipped,
+    _check_plausible,
 )
 """Every check; a new one is one function and one row."""
 

@@ -47,7 +47,10 @@ _ALONE = threading.Lock()
 
 @contextmanager
 def cluster_pool(
-    function: Callable[[Any], Any], scheduler: str, say: Callable[[str], None]
+    function: Callable[[Any], Any],
+    scheduler: str,
+    say: Callable[[str], None],
+    watch: Callable[[], None],
 ) -> Iterator[Pool]:
     """Workers of a Dask cluster that is running, to be used by :func:`.workers.in_order`.
 
@@ -63,6 +66,8 @@ def cluster_pool(
         Its address, ``tcp://HOST:PORT``; ``tls://`` with the certificates of Dask's own settings.
     say : callable
         Called with a line about what is waited for.
+    watch : callable
+        Called every `LOOK` seconds while a result is waited for; may raise to stop.
 
     Yields
     ------
@@ -83,7 +88,7 @@ def cluster_pool(
         try:
             _await_worker(client, scheduler, say)
             _check_workers(client, say)
-            yield _Cluster(client, function, scheduler)
+            yield _Cluster(client, function, scheduler, watch)
         except _gone():
             raise _lost(scheduler) from None
         finally:
@@ -93,8 +98,14 @@ def cluster_pool(
 class _Cluster:
     """Items sent to a scheduler, and those of its results that were not yet fetched."""
 
-    def __init__(self, client: Any, function: Callable[[Any], Any], scheduler: str) -> None:
-        self._client, self._scheduler = client, scheduler
+    def __init__(
+        self,
+        client: Any,
+        function: Callable[[Any], Any],
+        scheduler: str,
+        watch: Callable[[], None],
+    ) -> None:
+        self._client, self._scheduler, self._watch = client, scheduler, watch
         self._function = partial(_done_alone, function, _fingerprint())
         self._unpacked = _unpacker()
         self._ahead: deque[Any] = deque()
@@ -133,6 +144,7 @@ class _Cluster:
             try:
                 found: BaseException | None = future.exception(timeout=LOOK)
             except TimeoutError:
+                self._watch()
                 if self._client.status != "running":
                     raise _lost(self._scheduler) from None
                 if self._client.nthreads():

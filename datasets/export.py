@@ -3,7 +3,6 @@
 import json
 import math
 import shlex
-import shutil
 import zipfile
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -14,9 +13,21 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from ..sim.atomic import replacing
 from .channel_units import known_unit
-from .labels import FILE, GRADE, RESERVED
-from .record import DataError, DataSet, Recording, refuse_output, stamped
+from .csv_cells import safe_frame
+from .hdf5_values import write_values
+from .labels import GRADE, RESERVED
+from .machines import FILE
+from .record import (
+    DataError,
+    DataSet,
+    Recording,
+    fill_split,
+    lay_out_split,
+    refuse_output,
+    stamped,
+)
 
 ABOUT = "export.json"
 """File of an exported folder that says what it is; only a folder with it is ever replaced."""
@@ -127,9 +138,16 @@ def export_set(
     _refuse_options(way, signals=signals, compress=compress)
     with DataSet(path) as data:
         _refuse_target(target, data.path, way, force)
-        job = _Job(data=data, way=way, signals=signals, compress=compress, progress=progress)
+        job = _Job(
+            data=data,
+            way=way,
+            target=target,
+            signals=signals,
+            compress=compress,
+            progress=progress,
+        )
         _refuse_rate(job)
-        _write_whole(target, job)
+        _write_whole(target, job, force)
         return Exported(
             path=target,
             kind=way.name,
@@ -176,6 +194,7 @@ class _Job:
         *,
         data: DataSet,
         way: _Format,
+        target: Path,
         signals: bool,
         compress: bool,
         progress: Callable[[int, int], None] | None,
@@ -183,6 +202,7 @@ class _Job:
         self.data = data
         self.head = data.attributes
         self.way = way
+        self.target = target
         self.signals = signals
         self.compress = compress
         self.progress = progress
@@ -292,22 +312,14 @@ def _refuse_rate(job: _Job) -> None:
         )
 
 
-def _write_whole(target: Path, job: _Job) -> None:
+def _write_whole(target: Path, job: _Job, force: bool) -> None:
     """Write under another name, then rename: the output is whole or not there."""
-    part = target.with_name(target.name + ".part")
-    if part.exists():
-        raise DataError(f"{part} exists, left by an interrupted run; delete it or choose another")
-    try:
+    with replacing(target, force=force) as fresh:
         if job.way.folder:
-            part.mkdir()
-        job.way.write(job, part)
-        if target.is_dir():
-            shutil.rmtree(target)
-        part.replace(target)
-    finally:
-        if part.is_dir():
-            shutil.rmtree(part)
-        part.unlink(missing_ok=True)
+            fresh.mkdir()
+        job.way.write(job, fresh)
+        if force:  # what it allows to replace may have changed
+            _refuse_target(target, job.data.path, job.way, force)
 
 
 # --- HDF5 ---------------------------------------------------------------------------------------
@@ -316,15 +328,19 @@ def _write_whole(target: Path, job: _Job) -> None:
 def _write_hdf5(job: _Job, path: Path) -> None:
     """A copy with the same values in every dataset; hashes are added where there were none."""
     with h5py.File(job.data.path, "r") as old, h5py.File(path, "w") as new:
-        new.attrs.update(stamped(dict(old.attrs), job.data.rows))
+        write_values(new, stamped(job.data.stored, job.data.rows))
         new.create_dataset("manifest", data=job.data.rows)
         _copy_records(new, "signal", old["signal"], job, (r.signal for _, r in job.records()))
         for name in old.get("truth", {}):
             source = old["truth"][name]
             rows = (source[i] for i in job.indices)
             _copy_records(new, f"truth/{name}", source, job, rows)
-        if "splits" in old:
-            old.copy("splits", new)
+        for name, about in job.data.splits.items():
+            lay_out_split(new, name, len(job.data))
+            train, test = job.data.split(name)
+            sides = np.full(len(job.data), -1, dtype=np.int8)
+            sides[train], sides[test] = 0, 1
+            fill_split(new, name, sides, json.dumps(about))
 
 
 def _copy_records(new: Any, name: str, source: Any, job: _Job, rows: Iterator[Any]) -> None:
@@ -394,11 +410,9 @@ def _add_array(
 
 def _attributes_json(job: _Job) -> str:
     """The file's attributes, as plain JSON."""
-    with h5py.File(job.data.path, "r") as file:
-        stored = dict(file.attrs)
     plain = {
         name: value.item() if isinstance(value, np.generic) else value
-        for name, value in sorted(stored.items())
+        for name, value in sorted(job.data.stored.items())
         if not name.endswith(("attributes_sha256", "manifest_sha256"))
     }
     known = {k: None if isinstance(v, float) and math.isnan(v) else v for k, v in plain.items()}
@@ -476,7 +490,7 @@ def _write_csv(job: _Job, folder: Path) -> None:
         table = pd.DataFrame({heads[0]: time})  # with every digit
         for head, row in zip(heads[1:], record.signal, strict=True):
             table[head] = row
-        table.to_csv(folder / job.file_name(index), index=False)
+        safe_frame(table).to_csv(folder / job.file_name(index), index=False)
     _write_labels(job, folder)
 
 
@@ -492,11 +506,10 @@ def _write_labels(job: _Job, folder: Path) -> None:
     }
     told = {FILE: [job.file_name(index) for index in job.indices]}
     told |= {name: column for name, column in cells.items() if any(column)}
-    pd.DataFrame(told).to_csv(folder / LABELS, index=False)
-    final = folder.with_name(folder.name.removesuffix(".part"))
+    safe_frame(pd.DataFrame(told)).to_csv(folder / LABELS, index=False)
     about = {
         "attributes": json.loads(_attributes_json(job)),
-        "import": job.import_command(final),
+        "import": job.import_command(Path(job.target.name)),  # beside it: same bytes anywhere
         "left_out": len(job.data) - len(job.indices),
     }
     (folder / ABOUT).write_text(json.dumps(about, indent=1), encoding="utf-8")

@@ -18,11 +18,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..sim.assemble import simulate
+from ..sim.atomic import OutputError
 from ..sim.integrate import Solution
 from ..sim.parts import Scene, SceneError, channels_of
 from ..sim.wear import grade
 from .choice import Choice, choose, with_choice
 from .draws import value_at
+from .lock import holding
 from .pool import WorkersError
 from .recipe import (
     CONDITIONS,
@@ -41,6 +43,7 @@ from .record import (
     Attributes,
     DataError,
     DataSetWriter,
+    LostError,
     WriteError,
     refuse_output,
     unfinished_attributes,
@@ -192,11 +195,16 @@ def generate(
     RecipeError
         The recipe is at fault; nothing is written.
     DataError
-        The file exists, an unfinished one is of another run, `jobs` is below one, there is no
-        room, `scheduler` cannot be used, or every record failed (the file stays, to be looked at).
+        The file exists, another run is writing it, an unfinished one is of another run, `jobs` is
+        below one, there is no room, `scheduler` cannot be used, or every record failed (the file
+        stays, to be looked at).
     WorkersError, WriteError
         Workers or scheduler were lost, or the disk is full or failing. What is written stays in
         the unfinished file, and the same call goes on with it.
+    LostError
+        The unfinished file was deleted, moved or replaced; nothing is kept.
+    OutputError
+        A file of that name appeared meanwhile; the finished one keeps the unfinished one's name.
     Stopped
         A KeyboardInterrupt came; as above.
 
@@ -221,33 +229,40 @@ def generate(
         from .cluster import refuse_scheduler
 
         refuse_scheduler(scheduler)
-    choice = _chosen(plan, path, fidelity=fidelity, seed=seed, force=force, say=say)
-    plan = with_choice(plan, choice)
-    tally = _Tally(count, choice)
-    error = None if choice is None else choice.estimated_error
-    work = partial(_simulated, truth=truth, error=error)
-    with (
-        _writer(plan, count, path, seed=seed, force=force, truth=truth, choice=choice) as writer,
-        _going_on(writer),
-    ):
-        tally.n_resumed = int(np.count_nonzero(writer.done))
-        samples = sample_records(plan, count, seed=seed, skip=writer.done.copy())
-        jobs = min(jobs, max(1, count - tally.n_resumed))
-        found = in_order(work, samples, jobs=jobs, scheduler=scheduler, say=say)
-        with closing(found) as outcomes, _listening() as asked:
-            for outcome in outcomes:
-                if scheduler is not None and outcome.refused is not None:
-                    _refuse_refusal(outcome, work)
-                writer.write(outcome.index, outcome.signal, outcome.row, outcome.truth)
-                tally.note(outcome)
-                if progress is not None:
-                    progress(int(np.count_nonzero(writer.done)), count)
-                if asked.is_set():
-                    raise KeyboardInterrupt
-        rows = writer.manifest()
-        _write_splits(writer, rows, plan, seed)
-        writer.finish()
-    return tally.summary(writer.path, rows)
+    output = Path(path).absolute()
+    refuse_output(output, force)
+    with holding(output, say):
+        choice = _chosen(plan, path, fidelity=fidelity, seed=seed, force=force, say=say)
+        plan = with_choice(plan, choice)
+        tally = _Tally(count, choice)
+        error = None if choice is None else choice.estimated_error
+        work = partial(_simulated, truth=truth, error=error)
+        with (
+            _writer(
+                plan, count, path, seed=seed, force=force, truth=truth, choice=choice
+            ) as writer,
+            _going_on(writer),
+        ):
+            tally.n_resumed = int(np.count_nonzero(writer.done))
+            samples = sample_records(plan, count, seed=seed, skip=writer.done.copy())
+            jobs = min(jobs, max(1, count - tally.n_resumed))
+            found = in_order(
+                work, samples, jobs=jobs, scheduler=scheduler, say=say, watch=writer.refuse_lost
+            )
+            with closing(found) as outcomes, _listening() as asked:
+                for outcome in outcomes:
+                    if scheduler is not None and outcome.refused is not None:
+                        _refuse_refusal(outcome, work)
+                    writer.write(outcome.index, outcome.signal, outcome.row, outcome.truth)
+                    tally.note(outcome)
+                    if progress is not None:
+                        progress(int(np.count_nonzero(writer.done)), count)
+                    if asked.is_set():
+                        raise KeyboardInterrupt
+            rows = writer.manifest()
+            _write_splits(writer, rows, plan, seed)
+            writer.finish()
+        return tally.summary(writer.path, rows)
 
 
 @contextmanager
@@ -277,6 +292,8 @@ def _going_on(writer: DataSetWriter) -> Iterator[None]:
         yield
     except KeyboardInterrupt:
         raise Stopped(f"stopped; {_kept(writer)}") from None
+    except LostError:  # says itself that nothing is kept
+        raise
     except (WorkersError, WriteError) as error:
         raise type(error)(f"{error}; {_kept(writer)}") from error
     except DataError:
@@ -287,6 +304,10 @@ def _going_on(writer: DataSetWriter) -> Iterator[None]:
 
 
 def _kept(writer: DataSetWriter) -> str:
+    try:
+        writer.refuse_lost()
+    except LostError as error:
+        return str(error)
     kept = np.count_nonzero(writer.done)
     return (
         f"{kept} of {len(writer.done)} records are kept in {writer.part.name}: repeat the command "
@@ -525,12 +546,20 @@ def save_solution(
     columns = {**dict.fromkeys((*severity, "speed_hz"), "<f8"), **NUMERICS}
     n_samples = solution.signal.shape[1]
     writer = DataSetWriter(
-        path, head, n_records=1, n_samples=n_samples, columns=columns, force=force
+        path,
+        head,
+        n_records=1,
+        n_samples=n_samples,
+        columns=columns,
+        force=force,
+        resumable=False,
     )
     try:
         with writer:
             writer.write(0, solution.signal, row, solution.truth if truth else None)
             writer.finish()
+    except OutputError:
+        raise  # the recording is whole, and its text says where
     except BaseException:
         writer.part.unlink(missing_ok=True)  # a single recording is made anew, not gone on with
         raise

@@ -11,6 +11,7 @@ from ..sim.parts import nearest
 from ..sim.sensor import Channel
 from .labels import listed, refusal
 from .record import LARGEST_RECORD, DataError
+from .source_flat import numbered
 from .source_part import Source, SourceOptions
 from .sources import open_source
 from .workers import in_order
@@ -63,26 +64,17 @@ class EachChannel(Mapping[str, str]):
 
 
 def sparing_tacho(options: SourceOptions, tacho: str | None) -> SourceOptions:
-    """The same options, where unit and sensitivity of all channels leave the tacho out.
+    """The same options, with the tacho, which unit and sensitivity of all channels leave out.
 
     Parameters
     ----------
     options : SourceOptions
     tacho : str, optional
         Name of the tacho channel.
-
-    Raises
-    ------
-    DataError
-        A tacho was to be resampled: its pulses would be smeared.
     """
-    if tacho is not None and options.resample_to is not None:
-        raise DataError(
-            f"resample_to = {options.resample_to:.10g} Hz must not be given with tacho = "
-            f"'{tacho}', whose pulses it would smear; leave one out"
-        )
     return replace(
         options,
+        tacho=tacho,
         unit=_sparing(options.unit, tacho),
         sensitivity=_sparing(options.sensitivity, tacho),
     )
@@ -147,6 +139,12 @@ class Header:
         Per channel.
     conditions : mapping
         Manifest columns that the file declares, in SI.
+    named : bool
+        File or caller name the channels.
+    n_records : int
+        Rows that are records of their own, each of `n_samples`.
+    empty : tuple of str
+        Channels of NaN alone, which are left out.
     """
 
     path: Path
@@ -155,6 +153,9 @@ class Header:
     sample_rate: float
     n_samples: int
     conditions: Mapping[str, float]
+    named: bool = True
+    n_records: int = 1
+    empty: tuple[str, ...] = ()
 
     @property
     def duration(self) -> float:
@@ -208,9 +209,10 @@ def _refuse_twice(paths: Sequence[Path]) -> None:
 
 
 def _names(paths: Sequence[Path]) -> list[str]:
-    """Path of each file below the folder that all share."""
+    """Path of each file below the folder that all share; bytes that are no UTF-8 as numbers."""
     base = os.path.commonpath([path.parent for path in paths])
-    return [path.relative_to(base).as_posix() for path in paths]
+    names = [path.relative_to(base).as_posix() for path in paths]
+    return [os.fsencode(name).decode(errors="backslashreplace") for name in names]
 
 
 def _header(options: SourceOptions, tacho: str | None, item: tuple[Path, str]) -> Header | str:
@@ -227,7 +229,10 @@ def _header(options: SourceOptions, tacho: str | None, item: tuple[Path, str]) -
                 channels=channels,
                 sample_rate=float(source.sample_rate or 0.0),
                 n_samples=source.n_samples,
+                n_records=source.n_records,
+                empty=source.empty,
                 conditions=dict(source.conditions),
+                named=source.named or tacho is not None,
             )
     except DataError as error:
         return str(error)
@@ -251,7 +256,7 @@ class Plan:
     n_samples : int
         Of every record.
     starts : tuple of range
-        First sample of every record, by file.
+        First sample of every record, by file; the same in each of its rows that are records.
     """
 
     headers: tuple[Header, ...]
@@ -263,13 +268,14 @@ class Plan:
     @property
     def n_records(self) -> int:
         """Records of all files."""
-        return sum(len(starts) for starts in self.starts)
+        pairs = zip(self.headers, self.starts, strict=True)
+        return sum(header.n_records * len(starts) for header, starts in pairs)
 
     @property
     def left_over(self) -> tuple[float, ...]:
         """Time at the end of each file that fills no record [s]."""
         return tuple(
-            (header.n_samples - starts[-1] - self.n_samples) / self.sample_rate
+            header.n_records * (header.n_samples - starts[-1] - self.n_samples) / self.sample_rate
             for header, starts in zip(self.headers, self.starts, strict=True)
         )
 
@@ -295,6 +301,7 @@ def plan_records(headers: Sequence[Header], segment: float | None, overlap: floa
     faults = _bound_faults(segment, overlap)
     if faults:
         raise refusal(faults)
+    headers = _numbered_alike(headers)
     faults = [*_rate_faults(headers), *_channel_faults(headers)]
     n_samples = headers[0].n_samples
     if segment is not None:
@@ -336,7 +343,7 @@ def _rate_faults(headers: Sequence[Header]) -> list[str]:
     kinds = _kinds({header.name: f"{header.sample_rate:.10g} Hz" for header in headers})
     return [
         f"all files must have the same sample rate: {kinds}; import each rate by itself, or "
-        "resample_to the lowest of them"
+        "resample_to one of them"
     ]
 
 
@@ -351,6 +358,25 @@ def _channel_faults(headers: Sequence[Header]) -> list[str]:
     return [
         f"all files must have the same channels: {_kinds(words)}; choose those that all have "
         "with channels, as new=old to rename; where the files name none, name them all there"
+    ]
+
+
+def _numbered_alike(headers: Sequence[Header]) -> Sequence[Header]:
+    """The same names for channels that no file names: its own stem is not what they have alike."""
+    names = {tuple(channel.name for channel in header.channels) for header in headers}
+    counts = {len(header.channels) for header in headers}
+    if any(header.named for header in headers) or len(names) == 1 or len(counts) > 1:
+        return headers
+    common = [part.name for part in numbered("channel", counts.pop())]
+    return [
+        replace(
+            header,
+            channels=tuple(
+                replace(channel, name=name)
+                for channel, name in zip(header.channels, common, strict=True)
+            ),
+        )
+        for header in headers
     ]
 
 

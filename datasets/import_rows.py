@@ -8,11 +8,12 @@ from typing import Any, Literal
 
 from ..sim.wear import grade
 from .import_plan import Header
-from .labels import FILE, GRADE, GROUP, Labels, Limits, Value, refusal
+from .labels import GRADE, GROUP, Labels, Limits, Value, refusal
+from .machines import FILE, GROUP_NAME
 
 GroupBy = Literal["file", "folder", "column"]
 
-GROUP_NAME, START, MEAN_SPEED = "group_name", "start_s", "mean_speed_hz"
+START, MEAN_SPEED, ROW = "start_s", "mean_speed_hz", "row_in_file"
 
 _LARGEST_GROUP = 2**63 - 1  # of the manifest's integers
 
@@ -88,6 +89,7 @@ def file_rows(
         FILE: _text_type([header.name for header in headers]),
         GROUP_NAME: _text_type(names),
         START: "<f8",
+        **({ROW: "<i8"} if any(header.n_records > 1 for header in headers) else {}),
         **labels.numpy_types(),
         **dict.fromkeys(sorted({name for own in declared for name in own}), "<f8"),
         **({MEAN_SPEED: "<f8"} if tacho is not None else {}),

@@ -5,6 +5,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -12,13 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..features.order import pulse_times
+from ..sim.atomic import OutputError
 from .import_plan import Header, Plan, plan_records, read_headers, sparing_tacho, worth_workers
-from .import_rows import GROUP_NAME, MEAN_SPEED, START, FileRows, GroupBy, file_rows
+from .import_rows import MEAN_SPEED, ROW, START, FileRows, GroupBy, file_rows
 from .importers import read_window
-from .labels import FILE, Labels, Limits, refusal
-from .record import Attributes, DataError, DataSet, DataSetWriter
+from .labels import Labels, Limits, refusal
+from .machines import FILE, GROUP_NAME
+from .record import Attributes, DataError, DataSet, DataSetWriter, refuse_output
 from .source_part import SourceOptions
-from .sources import open_source
+from .sources import open_records
 from .workers import in_order
 
 NO_PULSES = "no_tacho_pulses"
@@ -55,6 +58,8 @@ class ImportSummary:
         Rows of the labels about other files.
     twins : tuple of (str, str)
         Files of different groups that hold a same record, byte for byte.
+    empty : dict
+        File -> its channels of NaN alone, which are left out.
     """
 
     path: Path
@@ -72,6 +77,7 @@ class ImportSummary:
     speeds: tuple[float, ...]
     unused_rows: int
     twins: tuple[tuple[str, str], ...]
+    empty: dict[str, tuple[str, ...]]
 
 
 def import_recordings(
@@ -98,7 +104,7 @@ def import_recordings(
         Of any formats; of one sample rate and the same channels. Records are sorted by their
         names.
     path : str or Path
-        File to write; ``<path>.part`` until finished.
+        File to write, whole or not at all.
     options : SourceOptions, optional
         What the files do not declare.
     tacho : str, optional
@@ -154,12 +160,14 @@ def import_recordings(
     ...         data[2].vibration[0], summary.n_groups
     (array([9.80665, 9.80665, 9.80665], dtype=float32), 1)
     """
-    target = _free(Path(path), force)
+    target = Path(path)
+    refuse_output(target.absolute(), force)
     reading = _Reading(
         options=sparing_tacho(options or SourceOptions(), tacho),
         tacho=tacho,
         pulses_per_revolution=pulses_per_revolution,
     )
+    _refuse_chosen_row(reading.options)
     _refuse_counts(tacho, pulses_per_revolution, jobs)
     headers = read_headers(files, reading.options, tacho, jobs=jobs)
     plan = plan_records(headers, segment, overlap)
@@ -171,7 +179,8 @@ def import_recordings(
         n_records=plan.n_records,
         n_samples=plan.n_samples,
         columns=table.columns,
-        force=True,  # what must not be replaced is refused above
+        force=force,
+        resumable=False,
     )
     try:
         with writer:
@@ -179,10 +188,20 @@ def import_recordings(
             _write(writer, records, table, plan.n_records, progress)
             _refuse_silent(writer.manifest(), tacho)
             writer.finish()
+    except OutputError:
+        raise  # the data set is whole, and the text says where
     except BaseException:
         writer.part.unlink(missing_ok=True)  # made anew, not gone on with
         raise
     return _summary(target, plan, known, table)
+
+
+def _refuse_chosen_row(options: SourceOptions) -> None:
+    if options.rows is not None and options.record:
+        raise DataError(
+            f"record = {options.record} must not be given with rows = {options.rows}, all of which "
+            "are imported; leave it out"
+        )
 
 
 def _refuse_counts(tacho: str | None, pulses_per_revolution: int, jobs: int) -> None:
@@ -198,19 +217,6 @@ def _refuse_counts(tacho: str | None, pulses_per_revolution: int, jobs: int) -> 
         )
     if faults:
         raise refusal(faults)
-
-
-def _free(path: Path, force: bool) -> Path:
-    """Output that may be written; an unfinished file may be hours of another command's work."""
-    part = path.with_name(path.name + ".part")
-    if not force:
-        for there in (path, part):
-            if there.exists():
-                left = ", left by an interrupted run" if there == part else ""
-                raise DataError(
-                    f"{there} exists{left}; choose another name or use force to replace it"
-                )
-    return path
 
 
 def _attributes(
@@ -258,10 +264,11 @@ def _records(
     reading: _Reading, n_samples: int, header: Header, starts: Sequence[int]
 ) -> Iterator[_Record]:
     """Records of one file, one after the other."""
-    with open_source(header.path, reading.options) as source:
-        for start in starts:
-            signal = read_window(source, start, n_samples)
-            row = {START: start / header.sample_rate, "status": "ok"}
+    sources = open_records(header.path, reading.options)
+    with sources[0]:
+        for number, start in product(range(header.n_records), starts):
+            signal = read_window(sources[number], start, n_samples)
+            row = {START: start / header.sample_rate, ROW: number, "status": "ok"}
             if reading.tacho is not None:
                 names = [channel.name for channel in header.channels]
                 speed = _speed(signal[names.index(reading.tacho)], header.sample_rate, reading)
@@ -293,11 +300,12 @@ def _batches(plan: Plan) -> Iterator[_Files]:
     waiting: _Files = []
     size = 0
     for header, starts in zip(plan.headers, plan.starts, strict=True):
-        if waiting and size + frame * len(starts) > _BATCH:
+        own = frame * header.n_records * len(starts)
+        if waiting and size + own > _BATCH:
             yield waiting
             waiting, size = [], 0
         waiting.append((header, starts))
-        size += frame * len(starts)
+        size += own
     yield waiting
 
 
@@ -305,13 +313,16 @@ def _all_records(reading: _Reading, plan: Plan, jobs: int) -> Iterator[tuple[Hea
     """Records in order; workers read the small files, this process the large ones."""
     frame = plan.n_samples * len(plan.channels)
     batches = list(_batches(plan))
-    large = [frame * sum(len(starts) for _, starts in files) > _BATCH for files in batches]
+    large = [
+        frame * sum(header.n_records * len(starts) for header, starts in files) > _BATCH
+        for files in batches
+    ]
     small = [files for files, big in zip(batches, large, strict=True) if not big]
     workers = worth_workers([header.path for header in plan.headers], jobs)
     read = partial(_batch, reading, plan.n_samples)
     pieces = in_order(read, small, jobs=max(1, min(workers, len(small))))
     for files, big in zip(batches, large, strict=True):
-        owners = (header for header, starts in files for _ in starts)
+        owners = (header for header, starts in files for _ in range(header.n_records * len(starts)))
         records = _records(reading, plan.n_samples, *files[0]) if big else next(pieces)
         yield from zip(owners, records, strict=True)
 
@@ -326,6 +337,8 @@ def _write(
     rows = {str(row[FILE]): row for row in table.rows}
     for index, (header, record) in enumerate(records):
         row = {**rows[header.name], **record.row, "record_id": str(index)}
+        if ROW not in table.columns:
+            del row[ROW]
         writer.write(index, record.signal, row)
         if progress is not None:
             progress(index + 1, n_records)
@@ -348,7 +361,7 @@ def _summary(path: Path, plan: Plan, labels: Labels, table: FileRows) -> ImportS
         manifest = data.manifest
         twins = _twins(data)
     ends = zip(plan.headers, plan.left_over, strict=True)
-    own = {FILE, GROUP_NAME, START, *labels.severities}
+    own = {FILE, GROUP_NAME, START, ROW, *labels.severities}
     return ImportSummary(
         path=path,
         n_records=plan.n_records,
@@ -365,6 +378,7 @@ def _summary(path: Path, plan: Plan, labels: Labels, table: FileRows) -> ImportS
         speeds=_range(manifest[MEAN_SPEED]) if MEAN_SPEED in manifest else (),
         unused_rows=table.unused,
         twins=twins,
+        empty={header.name: header.empty for header in plan.headers if header.empty},
     )
 
 

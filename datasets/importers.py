@@ -1,5 +1,6 @@
 """One measured recording from a file, and what files hold."""
 
+import logging
 from collections.abc import Sequence
 from dataclasses import fields
 from pathlib import Path
@@ -9,12 +10,14 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from .hdf5_values import HDF5_FAULTS
 from .import_plan import channels_of_source, sparing_tacho
 from .labels import refusal
 from .record import LARGEST_RECORD, DataError, DataSet, Recording
 from .source_part import Source, SourceOptions
 from .sources import list_sources, open_source
 
+_LOG = logging.getLogger(__name__)
 _PIECE = 2**20  # numbers read at once
 _DATA_SETS = (".h5", ".hdf5")
 
@@ -67,6 +70,8 @@ def read_recording(
         return _of_data_set(file, given, tacho)
     with open_source(file, sparing_tacho(given, tacho)) as source:
         channels = channels_of_source(source, tacho)
+        if source.empty:
+            _LOG.warning("%s: left out, nothing but NaN: %s", source.path, ", ".join(source.empty))
         _refuse_long(source)
         return Recording(
             signal=read_window(source, 0, source.n_samples),
@@ -85,7 +90,7 @@ def _is_ours(file: Path) -> bool:
     try:
         with h5py.File(file, "r") as handle:
             return bool({"created_by", "schema_version"} & set(handle.attrs))
-    except (OSError, RuntimeError, KeyError, ValueError):
+    except HDF5_FAULTS:
         return True  # the reader of data sets has words for it
 
 
@@ -118,7 +123,7 @@ def _refuse_long(source: Source) -> None:
     if size > LARGEST_RECORD:
         raise DataError(
             f"{source.path}: its {len(source.channels)} x {source.n_samples} samples have {size} "
-            f"byte, must be <= {LARGEST_RECORD}; import it with segment, then choose a record"
+            f"byte, must be <= {LARGEST_RECORD}; cut it: wearstate import --segment"
         )
 
 
@@ -212,6 +217,7 @@ def _described(source: Source) -> dict[str, Any]:
         ],
         "sample_rate_hz": rate,
         "samples": source.n_samples,
+        "records": source.n_records,
         "duration_s": None if rate is None else source.n_samples / rate,
         "conditions": dict(source.conditions),
         "undeclared": list(source.undeclared),

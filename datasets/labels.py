@@ -13,13 +13,15 @@ from pathlib import Path, PurePosixPath
 
 from ..sim.parts import UNITS, nearest, to_si
 from ..sim.scene import load_scene
-from .recipe import SEVERITIES, wear_limits
+from .csv_cells import plain_cell
+from .machines import FILE
+from .recipe import SEVERITIES, clearances, wear_limits
 from .record import DataError
 
 Value = float | int | bool | str
 """A label: NaN, -1 or empty where it is not known."""
 
-FILE, GROUP, GRADE = "file", "group", "grade"
+GROUP, GRADE = "group", "grade"
 CONFOUNDER = "confounder_"
 
 RESERVED = (
@@ -354,7 +356,7 @@ def _rows(path: Path, text: str, delimiter: str) -> Iterator[tuple[int, list[str
     try:
         for cells in reader:
             if any(cell.strip() for cell in cells):
-                yield reader.line_num, [cell.strip() for cell in cells]
+                yield reader.line_num, [plain_cell(cell.strip()) for cell in cells]
     except csv.Error as error:
         raise DataError(f"{path} line {reader.line_num}: {error}; mend it") from None
 
@@ -493,13 +495,32 @@ def _severities(
             faults.append(f"severity {name} is no label{nearest(name, list(columns))}")
         elif not _SEVERITY.fullmatch(name):
             faults.append(
-                f"severity {name} must name kind, place and metres like "
-                "'scar_depth_bearing_m'; rename it"
+                f"severity {name} must name kind, place and metres; rename the label to "
+                f"{known_severities(name)}, as recipes and models do, or alike"
             )
         elif any(isinstance(value, float) and value < 0 for value in columns[name]):
             worst = min(value for value in columns[name] if isinstance(value, float))
             faults.append(f"severity {name} = {worst:g} m must be >= 0; check the sign")
     return names
+
+
+def known_severities(name: str) -> str:
+    """Severities that recipes know, those with the same words first.
+
+    Parameters
+    ----------
+    name : str
+        As a person calls it.
+
+    Examples
+    --------
+    >>> known_severities("sag")
+    'sag_bearing_1_m'
+    """
+    known = [column.replace("{}", "1") for column in SEVERITIES.values()]
+    words = set(name.removesuffix("_m").split("_"))
+    alike = [column for column in known if words & set(column.split("_"))]
+    return listed(alike or known)
 
 
 # --- limits -------------------------------------------------------------------------------------
@@ -553,10 +574,13 @@ def read_limits(text: str, severities: Sequence[str]) -> Limits:
         )
     if "," in text:
         return Limits(edges=_edges(text), source="given on import")
-    found = wear_limits(load_scene(text), severities[0])
+    scene = load_scene(text)
+    found = wear_limits(scene, severities[0])
     if found is None:
+        own = [name for name in clearances(scene) if wear_limits(scene, name) is not None]
         raise DataError(
-            f"scene {text} has no wear limits of {severities[0]}, must have; give lengths like "
+            f"scene {text} has no wear limits of {severities[0]}, it has those of "
+            f"{listed(own) or 'none'}; name the label so, or give lengths like "
             "'0.13 mm, 0.22 mm, 0.31 mm'"
         )
     return Limits(edges=tuple(found.grade_edges), source=found.source)

@@ -21,7 +21,14 @@ from pydantic import Field, model_validator
 from ..sim.journal_parts import ScarLimits
 from ..sim.parts import Part, Ratio, Scene, SceneError, Wear, validate_table
 from ..sim.parts import beside as files_beside
-from ..sim.scene import override, scene_folder, scene_from_table, scene_table, scene_text
+from ..sim.scene import (
+    MACHINES,
+    override,
+    scene_folder,
+    scene_from_table,
+    scene_table,
+    scene_text,
+)
 from ..sim.wear import grade
 from .correlation import Copula, Correlation, copula_of
 from .draws import Axis, Bound, Draw, Range, axes_of, has_value, matches, value_at
@@ -29,6 +36,7 @@ from .held_out import HeldOut, Region, regions_of
 from .life import LIFE_COLUMNS, LifeTable, Lives, Moment, life_faults
 from .recipe_file import RecipeError, beside, merged, read_recipe
 from .sampling import BLOCK, SET, Dimension, Points, Sampling, number_of
+from .wear_bounds import bound_of_limits
 
 SEVERITIES = {
     "joint.crankpin.diametral_clearance": "diametral_clearance_crankpin_m",
@@ -99,8 +107,8 @@ class Severity(Part):
     """What wears, log-uniform and continuous between two bounds."""
 
     path: str = Field(description="dotted path of the scene's value that wears")
-    low: Bound = Field(description="as new")
-    high: Bound = Field(description="1.5 times the condemning limit is the custom")
+    low: Bound = Field(description="a length, or 'as new' by the limits of the scene")
+    high: Bound = Field(description="a length, or '150 % of limit', which is the custom")
 
 
 class Confounder(Draw):
@@ -387,7 +395,7 @@ def load_recipe(name_or_path: str | Path, overrides: Mapping[str, Any] | None = 
         base = dict(files_beside(scene_table(scene, table.scene), scene_folder(place)))
     except SceneError as error:
         raise RecipeError(str(name_or_path), error.faults) from None
-    faults = _machine_faults(table, source.machines_folder)
+    faults = [*source.foreign, *_machine_faults(table, source.machines_folder)]
     texts = {"text": source.text, "scene_text": scene}
     return _resolved(table, base, dict(overrides or {}), texts, faults)
 
@@ -404,13 +412,14 @@ def _resolved(
     base = _with_fixed(scene, {**table.fixed, **overrides}, faults)
     if len(faults) > n_before:
         raise RecipeError(table.name, faults)
-    places = _places(table)
-    axes = axes_of(places, base, faults)
+    in_metres = _with_limits(table, scene_from_table(base), faults)
+    places = _places(in_metres)
+    axes = axes_of(places, _with_lists(base), faults)
     faults += _severity_faults(table.severity)
     faults += _path_clashes([axis.path for found in axes.values() for axis in found])
     faults += _confounder_faults(table.confounder)
     copulas = copula_of(table.correlation, _levels(places, axes), faults)
-    held_out = _held_out(table, axes, base, faults) if len(axes) == len(places) else ()
+    held_out = _held_out(in_metres, axes, base, faults) if len(axes) == len(places) else ()
     faults += _life_faults(table, axes, base)
     if faults:
         raise RecipeError(table.name, faults)
@@ -426,6 +435,83 @@ def _resolved(
         copulas=copulas,
         held_out=held_out,
     )
+
+
+def _with_lists(base: Mapping[str, Any]) -> dict[str, Any]:
+    """Table of a scene with the lists that it leaves out, empty: a ``*`` there draws nothing."""
+    fields = MACHINES[base["machine"]].model_fields
+    return {**{name: [] for name, field in fields.items() if field.default == ()}, **base}
+
+
+def _with_limits(table: RecipeTable, scene: Scene, faults: list[str]) -> RecipeTable:
+    """Bounds of wear that are told by limits in metres, by those of the scene."""
+
+    def metres(bound: Bound | None, column: str | None, place: str) -> Bound | None:
+        if bound is None or column is None:
+            return bound
+        try:
+            return bound_of_limits(bound, wear_limits(scene, column))
+        except ValueError as error:
+            faults.append(f"{place} = {bound!r} of {column} {error}")
+            return 1.0  # a length, so that what else is wrong is found
+
+    ends = ("low", "high")
+    worn = tuple(
+        each.model_copy(
+            update={
+                end: metres(getattr(each, end), severity_column(each.path), f"severity.{i}.{end}")
+                for end in ends
+            }
+        )
+        for i, each in enumerate(table.severity)
+    )
+    regions = tuple(
+        region.model_copy(
+            update={
+                "bounds": {
+                    column: bounds.model_copy(
+                        update={
+                            end: metres(
+                                getattr(bounds, end), column, f"held_out '{region.name}': {end}"
+                            )
+                            for end in ends
+                        }
+                    )
+                    for column, bounds in region.bounds.items()
+                }
+            }
+        )
+        for region in table.held_out
+    )
+    return table.model_copy(update={"severity": worn, "held_out": regions})
+
+
+def limit_faults(recipe: Recipe) -> list[str]:
+    """What keeps the records of a recipe from being graded.
+
+    Parameters
+    ----------
+    recipe : Recipe
+
+    Returns
+    -------
+    list of str
+        Empty where the first severity has limits.
+
+    Examples
+    --------
+    >>> limit_faults(load_recipe("bilge-pump-small"))
+    []
+    """
+    first = recipe.severities[0]
+    if first.edges:
+        return []
+    table = LIMITS.get(_pattern(first.axis.path))
+    cure = f"add its table [{table}]" if table else "put a severity that has limits first"
+    return [
+        f"severity.0: the scene {recipe.table.scene} has no wear limits of {first.column}, must "
+        f"have: every grade would be -1, and no wear model could be trained; {cure}"
+    ]
 
 
 def _life_faults(
@@ -494,6 +580,26 @@ def _held_out(
 def _with_fixed(
     base: dict[str, Any], fixed: Mapping[str, Any], faults: list[str]
 ) -> dict[str, Any]:
+    """Scene table with values replaced; limits that are changed lose their source."""
+    return _with_own_sources(base, _replaced(base, fixed, faults))
+
+
+_NO_SOURCE = "given by the recipe in place of those of the scene"
+
+
+def _with_own_sources(before: Mapping[str, Any], after: dict[str, Any]) -> dict[str, Any]:
+    """Limits that are no longer those of their source must not cite it."""
+    own = {
+        name: {**after[name], "source": _NO_SOURCE}
+        for name in sorted(set(LIMITS.values()))
+        if name in before
+        and after[name] != before[name]
+        and after[name].get("source") == before[name].get("source")
+    }
+    return {**after, **own}
+
+
+def _replaced(base: dict[str, Any], fixed: Mapping[str, Any], faults: list[str]) -> dict[str, Any]:
     together = base
     with suppress(SceneError):  # values may need each other: a rung and what it asks for
         for pattern, value in fixed.items():

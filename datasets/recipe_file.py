@@ -9,6 +9,7 @@ from typing import Any
 
 from ..sim.parts import SceneError
 from ..sim.scene import scene_table
+from .wear_bounds import foreign_bounds
 
 RECIPE_FOLDER = Path(__file__).parent / "recipes"
 
@@ -44,12 +45,15 @@ class RecipeSource:
         Where the scene that it names is looked for first.
     machines_folder : Path
         Where the recipe that ``machines_of`` names is looked for first.
+    foreign : tuple of str
+        Faults: bounds of wear that a recipe of another scene was extended with.
     """
 
     table: dict[str, Any]
     text: str
     folder: Path
     machines_folder: Path
+    foreign: tuple[str, ...] = ()
 
 
 def recipe_names() -> list[str]:
@@ -113,14 +117,41 @@ def read_recipe(name_or_path: str | Path) -> RecipeSource:
     chain = list(_chain(name_or_path))
     table: dict[str, Any] = {}
     folders = {"scene": Path(), "machines_of": Path()}
+    foreign: list[str] = []
     for place, own in reversed(chain):
         _refuse_without(own, table, place)
+        foreign = _foreign(own, table, foreign)
         folders |= {key: place.parent for key in folders if key in own}
         table = merged(table, own)
     text = recipe_text(name_or_path) if len(chain) == 1 else toml_text(table)
     return RecipeSource(
-        table=table, text=text, folder=folders["scene"], machines_folder=folders["machines_of"]
+        table=table,
+        text=text,
+        folder=folders["scene"],
+        machines_folder=folders["machines_of"],
+        foreign=tuple(foreign),
     )
+
+
+def _foreign(own: Mapping[str, Any], base: Mapping[str, Any], before: list[str]) -> list[str]:
+    """Bounds of wear that stay those of the scene before, where a recipe names another."""
+    scene, other = own.get("scene", base.get("scene")), base.get("scene")
+    if other is None or scene == other:
+        return before
+    kept = {}
+    for name in ("severity", "held_out"):
+        given = [_told(e, _LISTS[name]) for e in _tables(own.get(name))]
+        anew = {*given, *map(str, own.get("without", []))}
+        kept[name] = [e for e in _tables(base.get(name)) if _told(e, _LISTS[name]) not in anew]
+    return foreign_bounds(kept, str(scene), str(other))
+
+
+def _tables(value: Any) -> list[Mapping[str, Any]]:
+    """Entries of a list that are tables."""
+    entries = _entries(value)
+    if not isinstance(entries, list):
+        return []
+    return [entry for entry in entries if isinstance(entry, Mapping)]
 
 
 def _chain(name_or_path: str | Path) -> Iterator[tuple[Path, dict[str, Any]]]:

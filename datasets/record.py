@@ -23,7 +23,17 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from .. import __version__
-from ..sim.sensor import Channel
+from ..sim.atomic import fresh_name, put_in_place
+from ..sim.sensor import Channel, rate_fault
+from .hdf5_values import (
+    HDF5_FAULTS,
+    fill_room,
+    is_plain,
+    make_room,
+    plain_values,
+    write_values,
+)
+from .machines import machine_identities
 
 SCHEMA_VERSION = 1
 
@@ -44,9 +54,6 @@ _HEAD = {
     "grade": "i1",
 }
 _TAIL = {"signal_crc32": "<u4"}
-
-_READ_FAULTS = (OSError, RuntimeError, KeyError, TypeError, ValueError, AttributeError, MemoryError)
-"""What h5py raises on damaged bytes."""
 
 
 class DataError(ValueError):
@@ -79,6 +86,8 @@ class Recording:
         Manifest values: conditions, severities, grade, numerics; may be empty.
     source : str
         File name, for messages and reports.
+    machine : str
+        Identity of the machine, as of :func:`~.machines.machine_identities`; empty where unknown.
 
     Raises
     ------
@@ -101,6 +110,7 @@ class Recording:
     origin: Literal["simulated", "measured"] = "measured"
     row: Mapping[str, Any] = field(default_factory=dict)
     source: str = ""
+    machine: str = ""
 
     def __post_init__(self) -> None:
         shape = np.shape(self.signal)
@@ -146,6 +156,12 @@ class Recording:
         return self.signal[rows]
 
     @property
+    def declared_speed_hz(self) -> float | None:
+        """Shaft speed by the manifest: the record's mean, else as set [Hz]; None without one."""
+        declared = (float(self.row.get(name, math.nan)) for name in ("mean_speed_hz", "speed_hz"))
+        return next((speed for speed in declared if 0 < speed < math.inf), None)
+
+    @property
     def tacho_signal(self) -> NDArray[np.float32] | None:
         """Signal of the tacho [shape=(n_samples,)], None without one."""
         return None if self.tacho is None else self.signal[self.names.index(self.tacho)]
@@ -155,8 +171,8 @@ def _check_header(item: "Recording | Attributes", where: str) -> None:
     """Refuse a sample rate, channel names or a tacho that contradict each other."""
     names = [channel.name for channel in item.channels]
     faults = []
-    if not (np.isfinite(item.sample_rate) and item.sample_rate > 0):
-        faults.append(f"sample_rate = {item.sample_rate} Hz must be > 0 and finite; give fs")
+    if fault := rate_fault("sample_rate", item.sample_rate, "give it in Hz"):
+        faults.append(fault)
     if not names or len(set(names)) != len(names):
         faults.append(f"channel names {names} must be unique and at least one; rename them")
     if item.tacho is not None and item.tacho not in names:
@@ -213,6 +229,8 @@ class Attributes:
         JSON table of what replaced values of the recipe.
     fidelity : str
         JSON of the choice of rungs for the whole set; empty where they are as written.
+    merged_from : str
+        JSON of the data sets that were merged into this one; empty where it is none of those.
     seed : int
         Seed of the data set.
     truth : bool
@@ -234,6 +252,7 @@ class Attributes:
     scene: str = ""
     overrides: str = "{}"
     fidelity: str = ""
+    merged_from: str = ""
     seed: int = 0
     truth: bool = False
     created_by: str = f"wearstate {__version__}"
@@ -268,7 +287,12 @@ def _check_wear(item: Attributes) -> None:
         raise DataError("\n".join(f"data set: {fault}" for fault in faults))
 
 
-_TEXTS = ("recipe", "scene", "overrides", "fidelity", "limit_source", "created_by", "libraries")
+_TEXTS = (
+    *("recipe", "scene", "overrides", "fidelity", "merged_from"),
+    *("limit_source", "created_by", "libraries"),
+)
+_LATER_TEXTS = {"fidelity": "", "merged_from": ""}
+"""Texts that older files lack."""
 
 
 def _texts(attributes: Attributes) -> dict[str, str]:
@@ -312,7 +336,7 @@ def _attributes_of(stored: Mapping[str, Any]) -> Attributes:
         seed=int(stored["seed"]),
         truth=bool(stored["truth"]),
         # a set made before rungs could be chosen has none
-        **{name: str({"fidelity": "", **stored}[name]) for name in _TEXTS},
+        **{name: str({**_LATER_TEXTS, **stored}[name]) for name in _TEXTS},
     )
 
 
@@ -347,7 +371,7 @@ def _refusing(path: Path, what: str) -> Iterator[None]:
         yield
     except DataError:
         raise
-    except _READ_FAULTS as error:
+    except HDF5_FAULTS as error:
         text = " ".join(str(error).split())
         cure = "wait for the other program" if "lock" in text else "take an intact copy"
         raise DataError(f"{path}: {what} cannot be read ({text}); {cure}") from error
@@ -373,6 +397,8 @@ class DataSet:
     ----------
     attributes : Attributes
         What holds for every record.
+    stored : dict
+        The same and the hashes, as numbers and texts by name in the file.
     rows : numpy.ndarray [shape=(n_records,)]
         Labels, conditions and numerics, structured as in the file.
     unhashed : tuple of str
@@ -394,16 +420,17 @@ class DataSet:
         self._pid = -1
         _refuse_by_name(self.path)
         with _refusing(self.path, "file"):
-            stored = _stored_attributes(self._handle(), self.path)
+            handle = self._handle()
         with _refusing(self.path, "attributes"):
-            self.attributes = _named(self.path, stored)
+            self.stored = _stored_attributes(handle, self.path)
+            self.attributes = _named(self.path, self.stored)
         with _refusing(self.path, "layout"):
             _check_layout(self._handle(), self.attributes, self.path)
         with _refusing(self.path, "manifest"):
             self.rows: NDArray[np.void] = self._handle()["manifest"][:]
         _refuse_unfinished(self.rows["done"], self.path)
-        _refuse_other_hashes(stored, self.rows, self.path)
-        self.unhashed = tuple(sorted(set(HASHES) - set(stored)))
+        _refuse_other_hashes(self.stored, self.rows, self.path)
+        self.unhashed = tuple(sorted(set(HASHES) - set(self.stored)))
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -413,6 +440,12 @@ class DataSet:
         """The rows as a table with texts decoded; made when first asked for."""
         with _refusing(self.path, "manifest"):
             return _decoded(self.rows)
+
+    @cached_property
+    def machines(self) -> tuple[str, ...]:
+        """Identity of the machine of each record; empty where unknown."""
+        head = self.attributes
+        return machine_identities(self.rows, head.recipe, head.seed)
 
     def __getitem__(self, index: int) -> Recording:
         """Read one record.
@@ -438,6 +471,7 @@ class DataSet:
             origin=head.origin,
             row=row,
             source=f"{self.path.name}[{number}]",
+            machine=self.machines[number],
         )
 
     def _refuse_damaged(self, number: int, signal: NDArray[np.float32]) -> None:
@@ -513,8 +547,11 @@ class DataSet:
         """
         with _refusing(self.path, "splits"):
             stored = self._handle().get("splits", {})
-            about = {name: bytes(stored[name].attrs["about"]).decode() for name in stored}
-            return {name: json.loads(text) for name, text in about.items() if text.strip()}
+            about = {
+                name: plain_values(self.path, stored[name], f"splits/{name}")["about"].strip()
+                for name in stored
+            }
+            return {name: _table(text) for name, text in about.items() if text}
 
     def split(self, name: str) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         """Records of the two sides of a stored split; a record may be in neither.
@@ -604,7 +641,8 @@ def _refuse_by_name(path: Path) -> None:
 
 
 def _stored_attributes(file: Any, path: Path) -> dict[str, Any]:
-    stored = dict(file.attrs)
+    # of a foreign file nothing else is read
+    stored = plain_values(path, file) if "created_by" in file.attrs else {}
     if not str(stored.get("created_by", "")).startswith("wearstate "):
         raise DataError(
             f"{path}: created_by = {stored.get('created_by')!r}, must begin with 'wearstate'; the "
@@ -621,8 +659,9 @@ def _stored_attributes(file: Any, path: Path) -> dict[str, Any]:
 def _check_layout(file: Any, attributes: Attributes, path: Path) -> None:
     """Refuse a layout that the attributes contradict, before anything large is read."""
     signal, manifest = file["signal"], file["manifest"]
-    _check_storage(signal, path)
-    _check_storage(manifest, path)
+    beside = [node for group in ("truth", "splits") for node in file.get(group, {}).values()]
+    for dataset in (signal, manifest, *beside):
+        _check_storage(dataset, path)
     wanted = (len(manifest), len(attributes.channels))
     if signal.shape[:2] != wanted or signal.ndim != 3 or signal.dtype != np.float32:
         raise DataError(
@@ -640,6 +679,8 @@ def _check_layout(file: Any, attributes: Attributes, path: Path) -> None:
 
 def _check_storage(dataset: Any, path: Path) -> None:
     """Refuse sizes that the file cannot hold, and data kept in other files."""
+    if not is_plain(dataset.id.get_type()):
+        raise DataError(f"{path}: {dataset.name} must hold numbers and texts; take an intact copy")
     if dataset.is_virtual or dataset.external:
         raise DataError(f"{path}: {dataset.name} is kept in other files; copy it into one file")
     record = dataset.nbytes // max(len(dataset), 1)
@@ -650,6 +691,14 @@ def _check_storage(dataset: Any, path: Path) -> None:
             f"{path}: {dataset.name} declares {record} byte per record (must be <= "
             f"{LARGEST_RECORD}) and holds {stored} of {dataset.nbytes} byte; take an intact copy"
         )
+
+
+def _table(text: str) -> dict[str, Any]:
+    """A JSON table; anything else is damage."""
+    found = json.loads(text)
+    if not isinstance(found, dict):
+        raise ValueError(f"{_short(found)} must be a table")
+    return found
 
 
 def _refuse_unfinished(done: NDArray[np.bool_], path: Path) -> None:
@@ -758,6 +807,15 @@ def _part(path: Path) -> Path:
     return path.with_name(path.name + ".part")
 
 
+def _identity(path: Path) -> tuple[int, int] | None:
+    """What tells a file from another of its name; None where there is none."""
+    try:
+        found = path.stat()
+    except FileNotFoundError:
+        return None
+    return found.st_dev, found.st_ino
+
+
 def unfinished_attributes(path: str | Path) -> Attributes | None:
     """What an unfinished file of a data set says of itself; None where there is none.
 
@@ -776,6 +834,10 @@ def unfinished_attributes(path: str | Path) -> Attributes | None:
         return None
     with _refusing(part, f"unfinished file (or delete it; {part.stem})"), h5py.File(part) as file:
         return _attributes_of(_stored_attributes(file, part))
+
+
+class LostError(WriteError):
+    """The file being written is not where it was; the text says what became of its records."""
 
 
 class DataSetWriter:
@@ -801,6 +863,8 @@ class DataSetWriter:
         Names of the splits that may be written.
     force : bool
         Replace an existing file, and start an unfinished one anew.
+    resumable : bool
+        False: the unfinished file has a name of its own, and one that another run left stays.
 
     Raises
     ------
@@ -833,9 +897,11 @@ class DataSetWriter:
         columns: Mapping[str, str] | None = None,
         splits: Sequence[str] = (),
         force: bool = False,
+        resumable: bool = True,
     ) -> None:
         self.path = Path(path).absolute()
-        self.part = _part(self.path)
+        self.part = _part(self.path) if resumable else fresh_name(self.path)
+        self._force = force
         self.attributes = attributes
         self._shape = (n_records, len(attributes.channels), n_samples)
         self._dtype = np.dtype([*{**_HEAD, **(columns or {}), **_TAIL}.items()])
@@ -853,12 +919,12 @@ class DataSetWriter:
         """Make the empty ``.part`` under another name first: it is whole or it is not there."""
         hidden = sum(math.prod(shape) for shape in (truth or {}).values())
         _refuse_size(self._shape, self._dtype, hidden, self.path.parent)
-        fresh = self.part.with_name(self.part.name + ".new")
+        fresh = fresh_name(self.path)
         try:
             with _laying_out(self.path), h5py.File(fresh, "w") as file:
                 empty = np.zeros(0, dtype=self._dtype)
                 # both hashes in place from the start, so that finishing changes no structure
-                file.attrs.update(stamped(_file_attributes(self.attributes), empty))
+                write_values(file, stamped(_file_attributes(self.attributes), empty))
                 _create(file, "signal", self._shape, np.dtype(np.float32), chunk=True)
                 _create(file, "manifest", self._shape[:1], self._dtype, chunk=False)
                 for name in self._splits:
@@ -887,6 +953,7 @@ class DataSetWriter:
         with _refusing(self.part, f"unfinished file (or delete it; {self.path.name})"):
             self._file = _opened(self.part)
         try:
+            self._identity = _identity(self.part)
             with _refusing(self.part, "unfinished file"):
                 self._refuse_other_run()
                 self._signal, self._manifest = self._file["signal"], self._file["manifest"]
@@ -896,7 +963,7 @@ class DataSetWriter:
             raise
 
     def _refuse_other_run(self) -> None:
-        stored, wanted = dict(self._file.attrs), _file_attributes(self.attributes)
+        stored, wanted = plain_values(self.part, self._file), _file_attributes(self.attributes)
         for name, value in wanted.items():
             if not _same(stored.get(name), value):
                 raise DataError(
@@ -946,7 +1013,10 @@ class DataSetWriter:
             Signal or row do not fit the file, or a sample is not finite.
         WriteError
             The disk is full or failing. The records marked done are whole.
+        LostError
+            The unfinished file is not in its place any more.
         """
+        self.refuse_lost()
         samples = np.ascontiguousarray(signal, dtype=np.float32)
         if samples.shape != self._shape[1:]:
             raise DataError(
@@ -982,6 +1052,22 @@ class DataSetWriter:
         self.close()
         self._resume()
 
+    def refuse_lost(self) -> None:
+        """Refuse to go on where the unfinished file is not in its place any more.
+
+        Raises
+        ------
+        LostError
+            It was deleted, moved or replaced.
+        """
+        if _identity(self.part) != self._identity:
+            written = np.count_nonzero(self.done)
+            raise LostError(
+                f"{self.part} is gone: it was deleted, moved or replaced during the run, and its "
+                f"{written} records with it; 0 of {len(self.done)} are kept here. Repeat the "
+                "command to start anew"
+            )
+
     def manifest(self) -> NDArray[np.void]:
         """Manifest rows as they stand [shape=(n_records,)]."""
         rows: NDArray[np.void] = self._manifest[:]
@@ -1012,19 +1098,22 @@ class DataSetWriter:
             Not every record is done.
         WriteError
             The disk is full or failing; the unfinished file stays.
+        LostError
+            The unfinished file is not in its place any more.
+        OutputError
+            A file of its name appeared meanwhile; the unfinished file stays.
         """
+        self.refuse_lost()
         _refuse_unfinished(self.done, self.part)
         with _writing(self.part):
             self._seal()
 
     def _seal(self) -> None:
-        hashed = np.bytes_(manifest_hash(self.manifest()))
+        hashed = manifest_hash(self.manifest()).encode()
         if "manifest_sha256" in self._file.attrs:  # not in one begun before there were hashes
-            self._file.attrs.modify("manifest_sha256", hashed)
+            fill_room(self._file, "manifest_sha256", hashed)
         self.close()
-        with self.part.open("rb") as handle:
-            os.fsync(handle.fileno())
-        os.replace(self.part, self.path)
+        put_in_place(self.part, self.path, force=self._force)
 
     def close(self) -> None:
         """Close the file; unless finished, the ``.part`` stays for the next run."""
@@ -1172,6 +1261,7 @@ def _create(
     """Create a dataset with all its space, so that later writes touch no structure."""
     plan = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
     plan.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
+    plan.set_obj_track_times(False)  # the same data, the same bytes
     if chunk:
         plan.set_chunk((1, *shape[1:]))
         plan.set_fill_time(h5py.h5d.FILL_TIME_NEVER)
@@ -1200,7 +1290,7 @@ def lay_out_split(file: Any, name: str, n_records: int) -> None:
         del file[key]
     _create(file, key, (n_records,), np.dtype(np.int8), chunk=False)
     file[key][:] = -1
-    file[key].attrs["about"] = np.bytes_(b" " * _LONGEST_SPLIT)
+    make_room(file[key], "about", _LONGEST_SPLIT)
 
 
 def fill_split(file: Any, name: str, sides: NDArray[np.int8], about: str) -> None:
@@ -1229,7 +1319,7 @@ def fill_split(file: Any, name: str, sides: NDArray[np.int8], about: str) -> Non
             "fewer columns"
         )
     file[f"splits/{name}"][:] = sides
-    file[f"splits/{name}"].attrs.modify("about", np.bytes_(text.ljust(_LONGEST_SPLIT)))
+    fill_room(file[f"splits/{name}"], "about", text)
 
 
 _LONGEST_SPLIT = 4000  # byte, as JSON: twenty columns with their bounds

@@ -1,4 +1,4 @@
-"""A recording brought to another sample rate while it is read, without aliasing."""
+"""A recording brought to another sample rate while it is read, without aliasing or images."""
 
 from dataclasses import replace
 from fractions import Fraction
@@ -9,44 +9,52 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .record import DataError
-from .source_part import Source
+from .resampled_tacho import ResampledTacho
+from .source_part import Fetch, Source
 
 RATE_IN_FILE = "sample_rate_in_file_hz"
 """Manifest column: rate before resampling."""
+
+BANDWIDTH = "bandwidth_hz"
+"""Manifest column: highest frequency of a resampled signal that the filter has let pass whole."""
 
 _MOST_STEPS = 1000  # of a ratio of rates, up or down: the filter grows with it
 _EXACT = 1e-6  # relative error of a rate, a hundredth of a line in 10,000 lines
 _HALF_LENGTH = 64  # of the filter, in samples of the lower rate
 _CUTOFF = 0.95  # of the lower Nyquist frequency: -6 dB
 _BETA = 8.0  # of the Kaiser window: 80 dB
+_PASSED = 0.9  # of the lower Nyquist frequency: flat to 0.01 dB
 
 
-def resampled(source: Source, rate: float | None) -> Source:
-    """The same recording at a lower rate.
+def resampled(source: Source, rate: float | None, tacho: str | None = None) -> Source:
+    """The same recording at another rate.
 
     Parameters
     ----------
     source : Source
         Its rate declared.
     rate : float or None
-        Wanted [Hz], at most that of the source; None leaves it as it is.
+        Wanted [Hz]; None leaves it as it is.
+    tacho : str, optional
+        Channel that is resampled by its edges, not by the filter.
 
     Returns
     -------
     Source
-        Read piece by piece like the first; the rate of the file is one of its conditions.
+        Read piece by piece like the first; the rate of the file and the band that it holds are
+        among its conditions. A raised rate adds samples, no band.
 
     Raises
     ------
     DataError
-        The rate is higher than that of the file, or their ratio is of too large whole numbers.
+        The ratio of the rates is of too large whole numbers.
 
     Notes
     -----
-    Polyphase, with a linear-phase filter (Kaiser window): flat to 0.01 dB up to 0.9 of the new
-    Nyquist frequency, 80 dB down from it on. The samples do not depend on the pieces in which they
-    are read. Before the first and after the last sample of the file the signal counts as 0, which
-    fades the first and last 64 samples.
+    Polyphase, with a linear-phase filter (Kaiser window): flat to 0.01 dB up to 0.9 of the
+    lower of both Nyquist frequencies, 80 dB down from it on. The samples do not depend on the
+    pieces in which they are read. Before the first and after the last sample of the file the signal
+    counts as 0, which fades the first and last 64 samples of the lower rate.
 
     Examples
     --------
@@ -63,22 +71,18 @@ def resampled(source: Source, rate: float | None) -> Source:
     if rate is None or source.sample_rate is None or rate == source.sample_rate:
         return source
     ratio = _ratio(source, rate)
+    band = _PASSED / 2 * min(rate, source.sample_rate)
     return replace(
         source,
         sample_rate=rate,
         n_samples=-(-source.n_samples * ratio.numerator // ratio.denominator),
-        conditions={**source.conditions, RATE_IN_FILE: source.sample_rate},
-        fetch=_Resampling(source, ratio),
+        conditions={**source.conditions, RATE_IN_FILE: source.sample_rate, BANDWIDTH: band},
+        fetch=_with_tacho(source, _Resampling(source, ratio), tacho, float(ratio)),
     )
 
 
 def _ratio(source: Source, rate: float) -> Fraction:
     own = float(source.sample_rate or 0.0)
-    if rate > own:
-        raise DataError(
-            f"{source.path}: resample_to = {rate:.10g} Hz must be <= its rate {own:.10g} Hz, or "
-            "there would be a band without signal; take the lowest rate of the files"
-        )
     ratio = Fraction(rate / own).limit_denominator(_MOST_STEPS)
     if abs(float(ratio) * own / rate - 1) > _EXACT:
         raise DataError(
@@ -86,6 +90,28 @@ def _ratio(source: Source, rate: float) -> Fraction:
             f"ratio of whole numbers <= {_MOST_STEPS}; nearest {float(ratio) * own:.10g} Hz"
         )
     return ratio
+
+
+def _with_tacho(source: Source, filtered: Fetch, tacho: str | None, ratio: float) -> Fetch:
+    """Fetches the tacho by its edges, the other channels through the filter."""
+    names = [channel.name for channel in source.channels]
+    if tacho not in names:
+        return filtered
+    own = source.rows[names.index(tacho)]
+
+    def read(start: int, stop: int) -> NDArray[np.float64]:
+        return np.asarray(source.fetch(start, stop, (own,))[0], dtype=np.float64)
+
+    pulses = ResampledTacho(source.path, read, source.n_samples, ratio)
+
+    def fetch(start: int, stop: int, rows: tuple[int, ...]) -> NDArray[Any]:
+        others = tuple(row for row in rows if row != own)
+        signals = dict(zip(others, filtered(start, stop, others), strict=True)) if others else {}
+        if own in rows:
+            signals[own] = pulses(start, stop)
+        return np.stack([signals[row] for row in rows])
+
+    return fetch
 
 
 @cache
@@ -109,7 +135,7 @@ class _Resampling:
         from scipy.signal import resample_poly
 
         # whole blocks: `down` samples of the file become `up` new ones
-        margin = _HALF_LENGTH // self.up + 2  # half the filter, in them
+        margin = _HALF_LENGTH // min(self.up, self.down) + 2  # half the filter, in them
         block = max(0, start // self.up - margin)
         last = min(self.source.n_samples, (stop // self.up + 1 + margin) * self.down)
         numbers = self.source.fetch(block * self.down, last, rows).astype(np.float64)

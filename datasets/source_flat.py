@@ -17,6 +17,7 @@ from .record import DataError
 from .source_part import (
     LARGEST_INFLATED,
     MOST_CHANNELS,
+    MOST_ROWS,
     Contents,
     Part,
     PartChannel,
@@ -51,7 +52,7 @@ class Flat:
     offset : int
         Of the first number [byte].
     code : str
-        Numpy code, or ``<i3``, ``>i3`` of 24 bits.
+        Numpy code, or ``<i3``, ``>i3`` of 24 bits, ``<i5`` to ``>i7`` of 40 to 56.
     n_channels, n_samples : int
         Shape.
     interleaved : bool
@@ -97,20 +98,22 @@ class Flat:
         else:
             raw = self.place()[place : place + size]
         whole = len(raw) // self.width * self.width
-        if self.width == 3:
-            return _widened(np.frombuffer(raw, dtype=np.uint8, count=whole), self.code[0])
+        if self.code[1] == "i" and self.width not in (1, 2, 4, 8):
+            bytes_ = np.frombuffer(raw, dtype=np.uint8, count=whole)
+            return _widened(bytes_, self.code[0], self.width)
         return np.frombuffer(raw, dtype=self.code, count=whole // self.width)
 
 
-def _widened(raw: NDArray[np.uint8], order: str) -> NDArray[np.int32]:
-    """Integers of 24 bits as integers of 32."""
-    wide = np.zeros((len(raw) // 3, 4), dtype=np.uint8)
-    # the three bytes become the upper ones, and the shift brings the sign down with them
+def _widened(raw: NDArray[np.uint8], order: str, width: int) -> NDArray[Any]:
+    """Integers of 3 byte as integers of 4, of 5 to 7 byte as integers of 8."""
+    size = 4 if width == 3 else 8
+    wide = np.zeros((len(raw) // width, size), dtype=np.uint8)
+    # the bytes become the upper ones, and the shift brings the sign down with them
     if order == "<":
-        wide[:, 1:] = raw.reshape(-1, 3)
+        wide[:, size - width :] = raw.reshape(-1, width)
     else:
-        wide[:, :3] = raw.reshape(-1, 3)
-    return wide.view(f"{order}i4")[:, 0].astype(np.int32) >> 8
+        wide[:, :width] = raw.reshape(-1, width)
+    return wide.view(f"{order}i{size}")[:, 0].astype(f"=i{size}") >> 8 * (size - width)
 
 
 def flat_code(text: str) -> str:
@@ -178,6 +181,9 @@ def raw_contents(path: Path, options: SourceOptions) -> Contents:
     code, count = flat_code(options.dtype), options.n_channels
     size = path.stat().st_size - options.offset
     frame = count * int(code[2:])
+    # channel by channel, what is missing would shift all channels but the first
+    if options.partial and options.order != "blocks":
+        size = size // frame * frame
     if size < frame or size % frame:
         raise DataError(
             f"{path}: {size} byte behind offset {options.offset} must be a multiple >= 1 of "
@@ -248,22 +254,28 @@ def array_axes(shape: Sequence[int], options: SourceOptions, name: str) -> Axes:
             f"{name} has shape {tuple(shape)}, must have 1 to 3 axes and no empty one; choose "
             "another variable"
         )
+    if options.rows is not None and len(shape) == 3:
+        raise DataError(
+            f"{name} has shape {tuple(shape)}, must have 2 axes for rows = {options.rows}; leave "
+            "rows out and choose one with record"
+        )
     n_records = shape[0] if len(shape) == 3 else 1
-    if options.record >= n_records:
+    if options.rows is None and options.record >= n_records:
         raise DataError(
             f"{name}: record = {options.record} must be >= 0 and < {n_records}; choose another"
         )
     # one axis is one channel
     first, last = (1, *shape)[-2:]
-    if first == last != 1 and options.order is None:
+    order = "blocks" if options.rows is not None and options.order is None else options.order
+    if first == last != 1 and order is None:
         raise DataError(
             f"{name} has shape {tuple(shape)}, whose sides are equal; give order, 'interleaved' "
             "(time down the rows) or 'blocks' (a row is a channel)"
         )
-    blocks = first <= last if options.order is None else options.order == "blocks"
+    blocks = first <= last if order is None else order == "blocks"
     channels_first = blocks or len(shape) == 1
     n_channels, n_samples = (first, last) if channels_first else (last, first)
-    if n_channels > MOST_CHANNELS:
+    if n_channels > (MOST_CHANNELS if options.rows is None else MOST_ROWS):
         raise DataError(
             f"{name} has {n_channels} channels, must have <= {MOST_CHANNELS}; give order or "
             "choose another variable"

@@ -1,10 +1,7 @@
 """HDF5 of other programs, and MATLAB 7.3, which is HDF5 inside; read in pieces."""
 
-import json
 import math
 import re
-import subprocess
-import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -16,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..sim.parts import to_si
+from .hdf5_values import HDF5_FAULTS, Place, is_loose_text, plain_value, texts_apart
 from .record import DataError
 from .source_flat import Axes, array_axes, numbered
 from .source_mat_tree import MOST_LEAVES, Leaf, Tree, tree_contents
@@ -32,21 +30,6 @@ from .source_part import (
 
 _DEEPEST = 32
 _LONGEST_TEXT = 4096
-_FAULTS = (
-    OSError,
-    RuntimeError,
-    KeyError,
-    TypeError,
-    ValueError,
-    AttributeError,
-    IndexError,
-    OverflowError,
-    NotImplementedError,
-    MemoryError,
-    UnicodeError,
-)
-"""What h5py raises on damaged bytes."""
-
 _UNIT_NAMES = ("unit", "units", "Unit", "Units")
 _RATE_NAME = re.compile(r"(?:fs|sampl(?:e|ing)[_ ]?(?:rate|frequency))([_ ]?hz)?", re.IGNORECASE)
 
@@ -82,7 +65,7 @@ def hdf5_contents(path: Path, options: SourceOptions) -> Contents:
     except DataError:
         file.close()
         raise
-    except _FAULTS as error:
+    except HDF5_FAULTS as error:
         file.close()
         raise damaged(path, error) from error
     return Contents(parts=tuple(parts), others=tuple(others), close=file.close)
@@ -91,7 +74,7 @@ def hdf5_contents(path: Path, options: SourceOptions) -> Contents:
 def _opened(path: Path) -> Any:
     try:
         return h5py.File(path, "r")
-    except _FAULTS as error:
+    except HDF5_FAULTS as error:
         if not h5py.is_hdf5(path):
             raise foreign(path, "HDF5") from None
         raise damaged(path, error) from error
@@ -150,16 +133,8 @@ def _hdf5_part(path: Path, name: str, item: Any, axes: Axes, texts: "_Texts") ->
     )
 
 
-_Texts = dict[tuple[str, str], str]
+_Texts = dict[Place, str]
 """Texts by data set and attribute."""
-
-_READ_TEXTS = """
-import json, sys, h5py
-with h5py.File(sys.argv[1], "r") as file:
-    found = [file[name].attrs[key] for name, key in json.load(sys.stdin)]
-print(json.dumps([text if isinstance(text, str) else "" for text in found]))
-"""
-_LONGEST_READING = 10.0  # s; a twentieth of it is usual
 
 
 def _texts_apart(path: Path, arrays: Sequence[tuple[str, Any]]) -> _Texts:
@@ -177,29 +152,13 @@ def _texts_apart(path: Path, arrays: Sequence[tuple[str, Any]]) -> _Texts:
         for name, item in arrays
         for key in item.attrs
         if (key in _UNIT_NAMES or _RATE_NAME.fullmatch(key))
-        and isinstance(kind := item.attrs.get_id(key).get_type(), h5py.h5t.TypeStringID)
-        and kind.is_variable_str()
+        and is_loose_text(item.attrs.get_id(key))
     ]
-    if not asked:
-        return {}
-    command = [sys.executable, "-c", _READ_TEXTS, str(path)]
     try:
-        done = subprocess.run(
-            command,
-            input=json.dumps(asked),
-            capture_output=True,
-            text=True,
-            check=True,
-            timeout=_LONGEST_READING,
-        )
-        texts = json.loads(done.stdout)
-    except (subprocess.SubprocessError, OSError, ValueError) as error:
-        names = ", ".join(f"{name}.{key}" for name, key in asked[:3])
-        raise DataError(
-            f"{path}: the texts of {names} cannot be read ({type(error).__name__}); take an intact "
-            "copy"
-        ) from error
-    return {place: text.strip() for place, text in zip(asked, texts, strict=True)}
+        texts = texts_apart(path, asked)
+    except ValueError as error:
+        raise DataError(f"{path}: {error}; take an intact copy") from error
+    return {place: text.strip() for place, text in texts.items()}
 
 
 def refuse_storage(path: Path, name: str, item: Any) -> None:
@@ -241,35 +200,18 @@ def _fetch(
     try:
         if item.ndim == 1:
             return np.asarray(item[span])[None]
+        if axes.channels_first and len(rows) == 1:
+            return np.asarray(item[(*lead, rows[0], span)])[None]
         raw = item[(*lead, slice(None), span) if axes.channels_first else (*lead, span)]
-    except _FAULTS as error:
+    except HDF5_FAULTS as error:
         raise damaged(path, error) from error
     table = np.asarray(raw) if axes.channels_first else np.asarray(raw).T
     return table[list(rows)]
 
 
-def _attribute(item: Any, key: str) -> Any:
-    """One number or text of fixed length, None of anything else.
-
-    The type is looked at before the value: on damaged types of other kinds the HDF5 library
-    crashes; see also :func:`_texts_apart`.
-    """
-    if key not in item.attrs:
-        return None
-    attribute = item.attrs.get_id(key)
-    kind = attribute.get_type()
-    plain = isinstance(kind, (h5py.h5t.TypeIntegerID, h5py.h5t.TypeFloatID)) or (
-        isinstance(kind, h5py.h5t.TypeStringID) and not kind.is_variable_str()
-    )
-    if not plain or attribute.get_space().get_simple_extent_npoints() != 1:
-        return None
-    value = item.attrs[key]
-    return value.reshape(-1)[0] if isinstance(value, np.ndarray) else value
-
-
 def _text(item: Any, key: str) -> str:
     """An attribute as text, empty where it is none."""
-    value = _attribute(item, key)
+    value = plain_value(item, key)
     if isinstance(value, bytes):
         return value.decode("utf-8", errors="replace").strip()
     return value.strip() if isinstance(value, str) else ""
@@ -286,7 +228,7 @@ def _declared_rate(item: Any, texts: Mapping[str, str]) -> float | None:
                 return to_si(text, "frequency")
             except ValueError:
                 continue
-        value = _attribute(item, key)
+        value = plain_value(item, key)
         if match.group(1) and isinstance(value, (int, float, np.number)):
             return float(value)
     return None
@@ -309,7 +251,7 @@ def mat73_contents(path: Path, options: SourceOptions) -> Contents:
     except DataError:
         file.close()
         raise
-    except _FAULTS as error:
+    except HDF5_FAULTS as error:
         file.close()
         raise damaged(path, error) from error
     return replace(contents, close=file.close)

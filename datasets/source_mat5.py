@@ -7,16 +7,16 @@ size; a matrix is an element of elements; a compressed element holds one matrix.
 import math
 import zlib
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from .record import DataError
-from .source_flat import Axes, Flat
-from .source_mat_tree import MOST_LEAVES, Leaf, Tree
-from .source_part import LARGEST_INFLATED, Fetch, cut, damaged
+from .source_flat import Flat
+from .source_mat_tree import MOST_LEAVES, Leaf, Tree, fetch_of
+from .source_part import LARGEST_INFLATED, cut, damaged
 
 _HEADER = 128  # byte
 _MATRIX, _COMPRESSED = 14, 15
@@ -79,7 +79,9 @@ def mat5_tree(path: Path) -> Tree:
         head = handle.read(_HEADER)
     order = {b"IM": "<", b"MI": ">"}.get(head[126:_HEADER])
     if order is None:
-        raise DataError(f"{path} has no MAT 5 header; it is cut short, or save it with '-v7'")
+        raise DataError(
+            f"{path} has no MAT 5 header; it is cut short or no MATLAB file; take an intact copy"
+        )
     found: Tree = {}
     place, inflated = _HEADER, 0
     while place < size:
@@ -102,7 +104,8 @@ def mat5_tree(path: Path) -> Tree:
         place += 8 + length
     if not found:
         raise DataError(f"{path} holds 0 variables, must be >= 1; it is cut short")
-    return {name: leaf for name, leaf in found.items() if not name.startswith("__")}
+    # what MATLAB keeps for function handles has no name
+    return {name: leaf for name, leaf in found.items() if name and not name.startswith("__")}
 
 
 def _mapped(path: Path, order: str, place: int, length: int) -> _Bytes:
@@ -211,17 +214,7 @@ def _numeric(path: Path, name: str, shape: tuple[int, ...], kind: int, data: _By
         n_samples=count,
         interleaved=False,
     )
-    return Leaf(shape=shape, kind="numeric", reader=partial(_fetch_of, layout))
-
-
-def _fetch_of(column_major: Flat, axes: Axes) -> Fetch:
-    """First index fastest: what runs along the first axis lies together."""
-    return replace(
-        column_major,
-        n_channels=axes.n_channels,
-        n_samples=axes.n_samples,
-        interleaved=axes.channels_first,
-    ).fetch
+    return Leaf(shape=shape, kind="numeric", reader=partial(fetch_of, layout))
 
 
 def _char(shape: tuple[int, ...], kind: int, data: _Bytes) -> Leaf:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Literal
 
 from .record import DataError
-from .source_flat import Axes, array_axes, numbered
+from .source_flat import Axes, Flat, array_axes, numbered
 from .source_part import Contents, Fetch, Part, PartChannel, SourceOptions
 
 POUND_FORCE = 4.4482216152605
@@ -61,6 +61,24 @@ class Leaf:
 
 Tree = dict[str, Leaf]
 """Variables by name."""
+
+
+def fetch_of(column_major: Flat, axes: Axes) -> Fetch:
+    """How an array is read whose first index runs fastest.
+
+    Parameters
+    ----------
+    column_major : Flat
+        All its numbers, one after the other.
+    axes : Axes
+        Which of its axes is which.
+    """
+    return replace(
+        column_major,
+        n_channels=axes.n_channels,
+        n_samples=axes.n_samples,
+        interleaved=axes.channels_first,
+    ).fetch
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,8 +1,7 @@
 """Vocabulary of the readers: what a file holds, what the caller declares, what comes of both."""
 
-import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Literal, Self
@@ -10,6 +9,7 @@ from typing import Any, Literal, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from ..sim.sensor import rate_fault
 from .record import DataError
 
 LARGEST_INFLATED = 2**30
@@ -18,11 +18,39 @@ LARGEST_INFLATED = 2**30
 MOST_CHANNELS = 4096
 """Beyond it an array is an image or a table, not a recording."""
 
+MOST_ROWS = 100_000
+"""Rows believed of one array to be records."""
+
 _SHOWN = 24
 """Parts that a message names before it counts the rest."""
 
+DECLARED = "declared_samples"
+"""Manifest column: samples that a file declares, where it holds fewer of them."""
+
 Fetch = Callable[[int, int, tuple[int, ...]], NDArray[Any]]
 """Numbers as the file holds them [shape=(n_rows, stop - start)], by start, stop and rows."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Profile:
+    """Recordings as a model wants them, for what neither file nor caller says.
+
+    Attributes
+    ----------
+    source : str
+        Where it is from, for messages.
+    channels : tuple of str
+        Names, in order.
+    units : mapping
+        Of channels whose unit nobody else declares.
+    sample_rate : float
+        [Hz]
+    """
+
+    source: str
+    channels: tuple[str, ...]
+    units: Mapping[str, str]
+    sample_rate: float
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,10 +61,11 @@ class SourceOptions:
     ----------
     variable : str or sequence of str, optional
         Array, data set or group to read, where a file holds several; several of one length
-        become channels of one recording. ``struct.field`` for a field.
+        become channels of one recording. ``struct.field`` for a field. A pattern (``*_time``) that
+        fits one name of the file names the channel by its letters.
     channels : sequence of str
-        Where the file names its channels, those wanted, in order; ``new=old`` renames. Elsewhere
-        the names of all of them.
+        Those wanted, in order, under the names that a listing shows; ``new=old`` renames. Where the
+        file names none, new names for all of them will do.
     fs : float, optional
         Sample rate [Hz].
     unit : str or mapping, optional
@@ -62,9 +91,19 @@ class SourceOptions:
     order : {"interleaved", "blocks"}, optional
         Of binary and of arrays: sample by sample (time down the rows), or channel by channel.
     record : int
-        Of an array of three dimensions, the index along the first.
+        Of an array of three dimensions, the index along the first; of rows that are records, the
+        row.
+    rows : {"records"}, optional
+        Of text and of arrays of two dimensions: every row is a record of one channel; of arrays
+        every column with ``order="interleaved"``. Several variables become channels.
     resample_to : float, optional
-        Sample rate to bring the recording to [Hz], at most its own.
+        Sample rate to bring the recording to [Hz].
+    tacho : str, optional
+        Channel that is resampled by the times of its edges.
+    partial : bool
+        Of a WAV, TDMS or binary file that is cut short, read the samples that are there.
+    like : Profile, optional
+        Channels, units and rate where nothing else says them; a rate that differs is refused.
 
     Raises
     ------
@@ -92,7 +131,11 @@ class SourceOptions:
     offset: int = 0
     order: Literal["interleaved", "blocks"] | None = None
     record: int = 0
+    rows: Literal["records"] | None = None
     resample_to: float | None = None
+    tacho: str | None = None
+    partial: bool = False
+    like: Profile | None = None
 
     def __post_init__(self) -> None:
         faults = [text for wrong, text in _option_faults(self) if wrong]
@@ -115,13 +158,14 @@ class SourceOptions:
 
 
 def _option_faults(o: SourceOptions) -> list[tuple[bool, str]]:
-    rate_ok = o.fs is None or (math.isfinite(o.fs) and o.fs > 0)
+    rates = {"fs": o.fs, "resample_to": o.resample_to}
+    bad = [
+        rate_fault(name, rate, "give a sample rate in Hz")
+        for name, rate in rates.items()
+        if rate is not None
+    ]
     return [
-        (not rate_ok, f"fs = {o.fs} Hz must be > 0 and finite; give the sample rate"),
-        (
-            o.resample_to is not None and not 0 < o.resample_to < math.inf,
-            f"resample_to = {o.resample_to} Hz must be > 0 and finite; give a sample rate",
-        ),
+        *((bool(text), text) for text in bad),
         (
             o.decimal not in (None, ".", ","),
             f"decimal = {o.decimal!r} must be '.' or ','; choose one",
@@ -138,6 +182,10 @@ def _option_faults(o: SourceOptions) -> list[tuple[bool, str]]:
         (
             o.order not in (None, "interleaved", "blocks"),
             f"order = {o.order!r} must be 'interleaved' or 'blocks'; choose one",
+        ),
+        (
+            o.rows not in (None, "records"),
+            f"rows = {o.rows!r} must be 'records'; leave it out for rows that are none",
         ),
         (o.record < 0, f"record = {o.record} must be >= 0; choose another"),
         (
@@ -187,6 +235,10 @@ class Part:
         Data set whose documentation declares rate and unit; such a part is chosen first.
     extras : tuple of str
         Further names that a unit may be declared for: the column of times.
+    n_records : int
+        Records of this layout beside each other, this one among them.
+    empty : tuple of str
+        Channels of NaN alone, which are left out.
     """
 
     name: str
@@ -202,6 +254,37 @@ class Part:
     conditions: Mapping[str, float] = field(default_factory=dict)
     known_as: str = ""
     extras: tuple[str, ...] = ()
+    n_records: int = 1
+    empty: tuple[str, ...] = ()
+
+    def row_as_record(self, row: int) -> "Part":
+        """One channel as a recording of its own, named like the others.
+
+        Raises
+        ------
+        DataError
+            There is no such row.
+        """
+        count = len(self.channels)
+        if row >= count:
+            raise DataError(
+                f"{self.name or 'the file'}: record = {row} must be >= 0 and < {count}, its rows; "
+                "choose another"
+            )
+        own = self.channels[row]
+        stem = own.name.removesuffix(f"_{row}") if count > 1 else own.name
+        fetch = self.fetch
+
+        def fetch_row(start: int, stop: int, rows: tuple[int, ...]) -> NDArray[Any]:
+            return fetch(start, stop, tuple(row for _ in rows))
+
+        return replace(
+            self,
+            about=f"({count} records of {self.n_samples})",
+            channels=(replace(own, name=stem),),
+            fetch=fetch_row,
+            n_records=count,
+        )
 
 
 def _nothing() -> None:
@@ -276,6 +359,12 @@ class Source:
         Manifest columns that the file declares: ``speed_hz``, ``load_n``, in SI.
     undeclared : tuple of str
         What is missing before the numbers mean something, each with its cure.
+    named : bool
+        File or caller name the channels.
+    n_records : int
+        Records of this layout in the file, this one among them.
+    empty : tuple of str
+        Channels of NaN alone, which are left out.
 
     Notes
     -----
@@ -294,6 +383,9 @@ class Source:
     rows: tuple[int, ...]
     factors: tuple[float, ...]
     close: Callable[[], None] = _nothing
+    named: bool = True
+    n_records: int = 1
+    empty: tuple[str, ...] = ()
 
     def refuse_undeclared(self) -> None:
         """Raise a DataError that names every rate and unit that nobody declares."""
@@ -363,9 +455,10 @@ class Source:
         self.close()
 
 
-def cut(path: Path, size: int, needed: int) -> DataError:
-    """Error about a file that is shorter than it says."""
-    return DataError(f"{path} has {size} byte, must be >= {needed}; take an intact copy")
+def cut(path: Path, size: int, needed: int, *, partial: bool = False) -> DataError:
+    """Error about a file shorter than it says; `partial` where what is there can be read."""
+    more = ", or read what is there with partial" if partial else ""
+    return DataError(f"{path} has {size} byte, must be >= {needed}; take an intact copy{more}")
 
 
 def damaged(path: Path, error: BaseException) -> DataError:

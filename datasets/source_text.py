@@ -1,5 +1,6 @@
 """CSV, TSV and other columns of numbers, read in pieces by an index of their lines."""
 
+import csv
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -12,8 +13,19 @@ from numpy.typing import NDArray
 
 from ..sim.parts import UNITS, nearest
 from .channel_units import known_unit
+from .csv_cells import plain_cell
 from .record import DataError
-from .source_part import MOST_CHANNELS, Contents, Part, PartChannel, SourceOptions, foreign
+from .source_clock import is_stamp_pattern, stamp_ns, stamp_resolution, stamp_seconds
+from .source_flat import numbered, stem_of
+from .source_part import (
+    MOST_CHANNELS,
+    MOST_ROWS,
+    Contents,
+    Part,
+    PartChannel,
+    SourceOptions,
+    foreign,
+)
 from .source_time import even_rate, printed_resolution
 
 BLOCK = 4096
@@ -21,6 +33,8 @@ BLOCK = 4096
 
 _HEAD = 2**18  # byte, looked at to find header and separators
 _LONGEST_LINE = 2**16  # byte
+_LONGEST_ROW = 2**23  # byte, where a line is a record
+_FEWEST_ROWS = 3  # that are looked at, header or not
 _SAMPLE = 64  # lines of numbers that must agree on the layout
 _MOST_HEADER = 200  # lines
 _PIECE = 2**22  # byte, read at once
@@ -87,25 +101,32 @@ class Lines:
         Lines.
     before : int
         Lines of the file that precede, for messages.
+    block : int
+        Lines between two places.
     """
 
     path: Path
     places: NDArray[np.int64]
     count: int
     before: int
+    block: int = BLOCK
 
     def read(self, start: int, stop: int) -> list[bytes]:
         """Lines [start, stop), fewer where the file has shrunk."""
-        first = start // BLOCK
-        last = min(-(-stop // BLOCK), len(self.places) - 1)
+        first = start // self.block
+        last = min(-(-stop // self.block), len(self.places) - 1)
         with self.path.open("rb") as handle:
             handle.seek(int(self.places[first]))
             raw = handle.read(int(self.places[last] - self.places[first]))
-        return raw.split(b"\n")[start - first * BLOCK : stop - first * BLOCK]
+        return raw.split(b"\n")[start - first * self.block : stop - first * self.block]
 
 
-def index_lines(path: Path, begin: int, before: int, end: int | None = None) -> Lines:
+def index_lines(
+    path: Path, begin: int, before: int, end: int | None = None, *, records: bool = False
+) -> Lines:
     """Index the lines of a file from a place on; blank ones at its end are left out.
+
+    Where lines are `records` they are long, and each has its place.
 
     Raises
     ------
@@ -113,6 +134,7 @@ def index_lines(path: Path, begin: int, before: int, end: int | None = None) -> 
         A line is longer than any table's.
     """
     stop = _end_of_text(path, begin) if end is None else end
+    block, longest = (1, _LONGEST_ROW) if records else (BLOCK, _LONGEST_LINE)
     places, count, place, last = [begin], 0, begin, begin
     with path.open("rb") as handle:
         handle.seek(begin)
@@ -121,10 +143,11 @@ def index_lines(path: Path, begin: int, before: int, end: int | None = None) -> 
             if not raw:
                 break
             ends = place + 1 + np.flatnonzero(np.frombuffer(raw, dtype=np.uint8) == 10)
-            _refuse_long(path, before + count, np.concatenate([[last], ends, [place + len(raw)]]))
+            lengths = np.diff(np.concatenate([[last], ends, [place + len(raw)]]))
+            _refuse_long(path, before + count, lengths, longest)
             # line k begins where line k - 1 ends
-            skip = -(count + 1) % BLOCK
-            places.extend(ends[skip::BLOCK].tolist())
+            skip = -(count + 1) % block
+            places.extend(ends[skip::block].tolist())
             count += len(ends)
             last = int(ends[-1]) if len(ends) else last
             place += len(raw)
@@ -132,14 +155,16 @@ def index_lines(path: Path, begin: int, before: int, end: int | None = None) -> 
         count += 1  # the last line has no end
     if places[-1] == stop and len(places) > 1:
         places.pop()
-    return Lines(path=path, places=np.array([*places, stop]), count=count, before=before)
+    return Lines(
+        path=path, places=np.array([*places, stop]), count=count, before=before, block=block
+    )
 
 
-def _refuse_long(path: Path, number: int, ends: NDArray[np.int64]) -> None:
-    if np.diff(ends).max(initial=0) > _LONGEST_LINE:
+def _refuse_long(path: Path, number: int, lengths: NDArray[np.int64], longest: int) -> None:
+    if lengths.max(initial=0) > longest:
         raise DataError(
-            f"{path}: a line behind line {number} has more than {_LONGEST_LINE} byte, the longest "
-            "believed; is it text with line feeds?"
+            f"{path}: a line behind line {number} has more than {longest} byte, the longest "
+            "believed; is it text with line feeds, or are its rows records (rows)?"
         )
 
 
@@ -170,15 +195,21 @@ def text_contents(path: Path, options: SourceOptions) -> Contents:
         It is binary, empty, has no or several readings, lines of different length, a cell that is
         no number, or times that are not even.
     """
-    head = _head(path)
+    records = options.rows is not None
+    head = _head(path, _LONGEST_ROW if records else _HEAD)
     lines = head.split("\n")
+    if records:  # long ones: a few tell the layout
+        fits = np.cumsum([len(line) for line in lines]) <= _HEAD
+        lines = lines[: max(_FEWEST_ROWS, int(np.count_nonzero(fits)))]
     dialect = _dialect(path, lines, options)
     columns = _columns(path, lines, dialect, options)
     begin = len("\n".join(lines[: dialect.first]).encode(_BYTES)) + (dialect.first > 0)
     begin += _bom(path)
-    index = index_lines(path, begin, dialect.first)
+    index = index_lines(path, begin, dialect.first, records=records)
     table = Table(lines=index, dialect=dialect)
-    time = _time_column(path, columns, options)
+    if records:
+        return _line_records(path, table, options)
+    time = _time_column(path, columns, _stamp_columns(table), options)
     rate, doubt, note = _rate(path, table, columns, time, options)
     kept = [c for c in dialect.numeric if c != time]
     if not kept:
@@ -202,6 +233,32 @@ def text_contents(path: Path, options: SourceOptions) -> Contents:
     return Contents(parts=(part,), others=tuple(words))
 
 
+def _line_records(path: Path, table: "Table", options: SourceOptions) -> Contents:
+    """Lines as recordings of one channel; columns that hold words are left out."""
+    if options.time_column:
+        raise DataError(
+            f"{path}: time_column = {options.time_column!r} must not be given with rows = "
+            f"{options.rows}; leave it out"
+        )
+    columns, count = table.dialect.numeric, table.lines.count
+    if count > MOST_ROWS:
+        raise DataError(f"{path} has {count} rows, must have <= {MOST_ROWS}; split it")
+
+    def fetch(start: int, stop: int, rows: tuple[int, ...]) -> NDArray[Any]:
+        wanted = columns[start:stop]
+        return np.stack([table.read(row, row + 1, wanted)[:, 0] for row in rows])
+
+    part = Part(
+        name="",
+        about=f"({count}, {len(columns)})",
+        channels=numbered(stem_of(path), count),
+        named=False,
+        n_samples=len(columns),
+        fetch=fetch,
+    )
+    return Contents(parts=(part,))
+
+
 # --- the head
 
 
@@ -213,10 +270,10 @@ def _bom(path: Path) -> int:
         return 3 if handle.read(3) == b"\xef\xbb\xbf" else 0
 
 
-def _head(path: Path) -> str:
+def _head(path: Path, size: int) -> str:
     """First lines, one character a byte; the last one is whole or left out."""
     with path.open("rb") as handle:
-        raw = handle.read(_HEAD)
+        raw = handle.read(size)
         whole = not handle.read(1)
     if raw[:2] in (b"\xff\xfe", b"\xfe\xff"):
         raise DataError(f"{path} is UTF-16, must be UTF-8 or ASCII; save it as CSV UTF-8")
@@ -230,7 +287,7 @@ def _head(path: Path) -> str:
     if not whole:
         text = text.rpartition("\n")[0]
     if not text.strip():
-        raise DataError(f"{path} has no line that ends within {_HEAD} byte, must have; check it")
+        raise DataError(f"{path} has no line that ends within {size} byte, must have; check it")
     return text.rstrip(" \t\r\n\x1a")
 
 
@@ -259,8 +316,10 @@ def split_cells(line: str, delimiter: str) -> list[str]:
 
 def _quoted(line: str, delimiter: str) -> list[str]:
     """Cells of a line whose quotation marks may hold the delimiter."""
-    outside = re.compile(rf'{re.escape(delimiter)}(?=(?:[^"]*"[^"]*")*[^"]*$)')
-    return outside.split(line)
+    try:
+        return next(csv.reader([line], delimiter=delimiter, skipinitialspace=True), [])
+    except csv.Error:  # a cell longer than any name
+        return line.split(delimiter)
 
 
 def _dialect(path: Path, lines: list[str], options: SourceOptions) -> Dialect:
@@ -336,6 +395,8 @@ def _refuse_broken(path: Path, lines: list[str], dialect: Dialect, options: Sour
     if options.header is not None:
         return
     for number, line in enumerate(lines[: dialect.first], start=1):
+        if line.lstrip().startswith(("#", "%")):
+            continue
         cells = [cell for cell in split_cells(line, dialect.delimiter) if cell]
         count = sum(_is_number(cell, dialect.decimal) for cell in cells)
         if count and 2 * count >= len(cells):
@@ -435,7 +496,7 @@ def _columns(
     alone = dialect.n_columns == 1  # then a blank belongs to the name
     rows = [
         [
-            _words(cell).strip()
+            plain_cell(_words(cell).strip())
             for cell in split_cells(lines[i].lstrip("#%"), "\n" if alone else dialect.delimiter)
         ]
         for i in above[-2:]
@@ -459,14 +520,15 @@ def _columns(
 
 def _unit_row(cells: Sequence[str]) -> list[str | None] | None:
     """Units of a line that holds nothing else."""
-    bare = [cell.strip("[]() ") for cell in cells]
+    # a dash is no unit, as in the cell of a counter
+    bare = ["" if text == "-" else text for text in (cell.strip("[]() ") for cell in cells)]
     if not any(bare) or not all(_is_unit(cell) for cell in bare if cell):
         return None
     return [cell or None for cell in bare]
 
 
 def _is_unit(text: str) -> bool:
-    return text in UNITS["time"] or known_unit(text)
+    return text in UNITS["time"] or known_unit(text) or is_stamp_pattern(text)
 
 
 def _named(cell: str, index: int) -> _Column:
@@ -483,7 +545,20 @@ def _named(cell: str, index: int) -> _Column:
 # --- the time
 
 
-def _time_column(path: Path, columns: Sequence[_Column], options: SourceOptions) -> int | None:
+def _stamp_columns(table: "Table") -> list[int]:
+    """Columns that begin and end with a time stamp."""
+    ends = (0, table.lines.count - 1)
+    return [
+        column
+        for column in range(table.dialect.n_columns)
+        if column not in table.dialect.numeric
+        and all(stamp_ns(table.cells(at, at + 1, column)[0]) is not None for at in ends)
+    ]
+
+
+def _time_column(
+    path: Path, columns: Sequence[_Column], stamped: Sequence[int], options: SourceOptions
+) -> int | None:
     wanted, names = options.time_column, [column.name for column in columns]
     if wanted == 0:
         return None
@@ -500,6 +575,8 @@ def _time_column(path: Path, columns: Sequence[_Column], options: SourceOptions)
             )
         return names.index(wanted)
     found = [i for i, c in enumerate(columns) if c.named and _TIME_NAME.fullmatch(c.name)]
+    # of a date and a time each in its column, the latter has the name
+    found = found if len(found) == 1 else list(stamped)
     return found[0] if len(found) == 1 else None
 
 
@@ -515,25 +592,23 @@ def _rate(
         return None, 0.0, ""
     column = columns[time]
     if time not in table.dialect.numeric:
-        raise DataError(
-            f"{path}: column {column.name!r} holds words, must hold numbers to give the time; "
-            "give time_column = 0 and fs"
-        )
-    cells = [
-        split_cells(line.decode(_BYTES), table.dialect.delimiter)
-        for line in table.lines.read(max(0, table.lines.count - _SAMPLE), table.lines.count)
-    ]
-    resolution = printed_resolution(row[time] for row in cells if len(row) > time)
+        return *_stamped_rate(path, table, column, time, options), ""
+    tail = table.cells(max(0, table.lines.count - _SAMPLE), table.lines.count, time)
     clock = even_rate(
         path,
         column.name,
         lambda start, stop: table.read(start, stop, (time,))[0],
         table.lines.count,
-        resolution,
+        printed_resolution(tail),
+        place=partial(_place, table, time),
     )
     match = _TIME_NAME.fullmatch(column.name)
-    given = options.unit.get(column.name) if isinstance(options.unit, Mapping) else None
+    # a unit for all other channels is none for the times
+    named = isinstance(options.unit, Mapping) and column.name in list(options.unit)
+    given = options.per_channel("unit", column.name) if named else None
     unit = given or column.unit or (match and match.group(1))
+    if unit is None and options.fs is not None:
+        _refuse_other_step(path, column.name, clock.step, options.fs)
     if unit is None:
         return None, 0.0, f"column {column.name!r} has no unit; give it one, like 's', or fs"
     if unit not in UNITS["time"]:
@@ -543,6 +618,57 @@ def _rate(
         )
     return 1.0 / (clock.step * UNITS["time"][unit]), clock.doubt, ""
 
+
+def _stamped_rate(
+    path: Path, table: "Table", column: _Column, time: int, options: SourceOptions
+) -> tuple[float, float]:
+    """Sample rate by time stamps, and its relative doubt."""
+    if isinstance(options.unit, Mapping) and column.name in list(options.unit):
+        raise DataError(
+            f"{path}: unit {options.unit[column.name]!r} of column {column.name!r} must not be "
+            "given; it holds time stamps; leave it out"
+        )
+
+    def refuse(index: int, text: str) -> DataError:
+        return DataError(
+            f"{path}: column {column.name!r} is {text[:40]!r} in line "
+            f"{table.lines.before + index + 1}, must be a number or a time stamp like "
+            "'2024-05-01T12:00:00.123' or '12:00:00.123' to give the time; mend it, or give "
+            "time_column = 0 and fs"
+        )
+
+    count = table.lines.count
+    cells = partial(table.cells, column=time)
+    clock = even_rate(
+        path,
+        column.name,
+        stamp_seconds(cells, refuse),
+        count,
+        stamp_resolution(cells(max(0, count - _SAMPLE), count)),
+        place=partial(_place, table, time),
+    )
+    return 1.0 / clock.step, clock.doubt
+
+
+def _place(table: "Table", time: int, index: int) -> str:
+    """A time as it is printed, and its line."""
+    [text] = table.cells(index, index + 1, time)
+    return f"{text} (line {table.lines.before + index + 1})"
+
+
+def _refuse_other_step(path: Path, name: str, step: float, fs: float) -> None:
+    """Refuse a rate that times without a unit fit in none."""
+    rates = {unit: 1.0 / (step * factor) for unit, factor in UNITS["time"].items()}
+    if any(abs(rate / fs - 1) <= _RATE_DOUBT for rate in rates.values()):
+        return
+    told = ", ".join(f"{rate:.6g} Hz if in {unit}" for unit, rate in rates.items())
+    raise DataError(
+        f"{path}: fs = {fs:.10g} Hz must fit the times of column {name!r}, whose step {step:.6g} "
+        f"says {told}; correct fs, or give time_column = 0 if the times are wrong"
+    )
+
+
+_RATE_DOUBT = 0.01  # of a rate against times that may be printed coarsely
 
 # --- the numbers
 
@@ -580,6 +706,20 @@ class Table:
         if len(numbers) != len(text):
             raise self._fault(text, start, columns)
         return np.asarray(numbers.T, dtype=np.float64)
+
+    def cells(self, start: int, stop: int, column: int) -> list[str]:
+        """Texts of one column.
+
+        Raises
+        ------
+        DataError
+            A line has another number of cells.
+        """
+        text = [row.decode(_BYTES) for row in self.lines.read(start, stop)]
+        rows = [split_cells(line, self.dialect.delimiter) for line in text]
+        if len(rows) != stop - start or any(len(row) != self.dialect.n_columns for row in rows):
+            raise self._fault(text, start, ())
+        return [row[column] for row in rows]
 
     def _fault(self, text: Sequence[str], start: int, columns: Sequence[int]) -> DataError:
         path, width = self.lines.path, self.dialect.n_columns

@@ -43,6 +43,8 @@ def even_rate(
     times: Callable[[int, int], NDArray[np.float64]],
     count: int,
     resolution: float,
+    *,
+    place: Callable[[int], str] = "index {}".format,
 ) -> Clock:
     """Step of times that are even, checked piece by piece.
 
@@ -56,12 +58,14 @@ def even_rate(
         How many there are.
     resolution : float
         Value of the last printed digit, 0 for binary numbers; same unit as the times.
+    place : callable
+        Value and line of the time at an index, for messages.
 
     Raises
     ------
     DataError
-        Fewer than two, not finite or not rising; or not even beyond what rounding to the last
-        digit explains, with the jitter measured.
+        Fewer than two, not finite, or not rising, with those that do not; or not even beyond what
+        rounding to the last digit explains, with the jitter measured.
 
     Examples
     --------
@@ -73,7 +77,9 @@ def even_rate(
         raise DataError(f"{path}: column {name!r} has {count} time(s), must have >= 2; {cure}")
     first, last = float(times(0, 1)[0]), float(times(count - 1, count)[0])
     step = (last - first) / (count - 1)
+    coarse = "" if resolution <= step / 2 else f" (they are printed to {resolution:g} only)"
     if not (np.isfinite(step) and step > 0):
+        _refuse_repeats(path, name, times, count, place, coarse, cure)
         raise DataError(
             f"{path}: times of column {name!r} go from {first:g} to {last:g}, must rise; {cure}"
         )
@@ -81,14 +87,42 @@ def even_rate(
     rounding = resolution if resolution <= step / 2 else 0.0
     limit = MOST_JITTER * step + rounding + 2 * np.spacing(max(abs(first), abs(last)))
     jitter, at = _jitter(times, count, first, step)
+    if not jitter <= limit or limit >= step / 2:  # at half a step two may be one
+        _refuse_repeats(path, name, times, count, place, coarse, cure)
     if not jitter <= limit:
-        coarse = "" if rounding == resolution else f" (they are printed to {resolution:g} only)"
         raise DataError(
             f"{path}: times of column {name!r} are off an even grid by up to {jitter:g}, "
-            f"{100 * jitter / step:.3g} % of the mean step {step:g}, at index {at}, must be <= "
+            f"{100 * jitter / step:.3g} % of the mean step {step:g}, at {place(at)}, must be <= "
             f"{limit:g}{coarse}; resample the recording to an even rate, or {cure}"
         )
     return Clock(step=step, doubt=resolution / (last - first) + 4 * np.finfo(float).eps)
+
+
+def _refuse_repeats(
+    path: Path,
+    name: str,
+    times: Callable[[int, int], NDArray[np.float64]],
+    count: int,
+    place: Callable[[int], str],
+    coarse: str,
+    cure: str,
+) -> None:
+    """Refuse times that repeat or go back."""
+    places: list[int] = []
+    for start in range(0, count - 1, _BLOCK):
+        stop = min(start + _BLOCK + 1, count)
+        places += (start + 1 + np.flatnonzero(np.diff(times(start, stop)) <= 0)).tolist()
+    if not places:
+        return
+    shown = [f"{place(i)} behind {place(i - 1)}" for i in places[:_SHOWN]]
+    more = f" and {len(places) - _SHOWN} more" if len(places) > _SHOWN else ""
+    raise DataError(
+        f"{path}: times of column {name!r} must rise{coarse}, do not at {len(places)} of {count}: "
+        f"{', '.join(shown)}{more}; remove the lines that repeat, or {cure}"
+    )
+
+
+_SHOWN = 3  # times that a message names
 
 
 def _jitter(

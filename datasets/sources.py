@@ -6,8 +6,10 @@ by the caller and converted, or refused; they are never guessed from the numbers
 """
 
 import math
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
+from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Literal
 
@@ -15,9 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..sim.parts import nearest
+from ..sim.sensor import rate_fault
 from .channel_units import FULL_SCALE, ChannelUnit, parse_sensitivity, parse_unit
 from .record import DataError
 from .resampled import resampled
+from .source_empty import without_empty
 from .source_flat import npy_contents, npz_contents, raw_contents
 from .source_hdf5 import hdf5_contents
 from .source_mat import mat_contents
@@ -35,7 +39,15 @@ from .source_text import text_contents
 from .source_uff import uff_contents
 from .source_wav import wav_contents
 
-__all__ = ["READERS", "Source", "SourceChannel", "SourceOptions", "list_sources", "open_source"]
+__all__ = [
+    "READERS",
+    "Source",
+    "SourceChannel",
+    "SourceOptions",
+    "list_sources",
+    "open_records",
+    "open_source",
+]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,23 +69,23 @@ class Reader:
     options: frozenset[str] = frozenset()
 
 
-_EVERY = {"channels", "fs", "unit", "sensitivity", "resample_to"}
-_ARRAY = frozenset({"variable", "order", "record"})
+_EVERY = {"channels", "fs", "unit", "sensitivity", "resample_to", "tacho", "like"}
+_ARRAY = frozenset({"variable", "order", "record", "rows"})
 _TEXT = Reader(
     name="text",
     contents=text_contents,
-    options=frozenset({"delimiter", "decimal", "header", "time_column"}),
+    options=frozenset({"delimiter", "decimal", "header", "time_column", "rows", "record"}),
 )
 _RAW = Reader(
     name="headerless binary",
     contents=raw_contents,
-    options=frozenset({"dtype", "n_channels", "offset", "order"}),
+    options=frozenset({"dtype", "n_channels", "offset", "order", "partial"}),
 )
 _HDF5 = Reader(name="HDF5", contents=hdf5_contents, options=_ARRAY)
 _UFF = Reader(name="UFF", contents=uff_contents, options=frozenset({"variable"}))
 
 READERS: dict[str, Reader] = {
-    ".wav": Reader(name="WAV", contents=wav_contents, options=frozenset({"full_scale"})),
+    ".wav": Reader(name="WAV", contents=wav_contents, options=frozenset({"full_scale", "partial"})),
     ".mat": Reader(name="MATLAB", contents=mat_contents, options=_ARRAY),
     ".csv": _TEXT,
     ".tsv": _TEXT,
@@ -85,7 +97,9 @@ READERS: dict[str, Reader] = {
     ".uff": _UFF,
     ".unv": _UFF,
     ".uf": _UFF,
-    ".tdms": Reader(name="TDMS", contents=tdms_contents, options=frozenset({"variable"})),
+    ".tdms": Reader(
+        name="TDMS", contents=tdms_contents, options=frozenset({"variable", "partial"})
+    ),
     ".bin": _RAW,
     ".raw": _RAW,
 }
@@ -98,7 +112,7 @@ def open_source(path: str | Path, options: SourceOptions | None = None) -> Sourc
     Parameters
     ----------
     path : str or Path
-        WAV, MATLAB 5 to 7.3, CSV/TSV, HDF5, NPY, NPZ, UFF58, TDMS, or headerless binary.
+        WAV, MATLAB 4 to 7.3, CSV/TSV, HDF5, NPY, NPZ, UFF58, TDMS, or headerless binary.
     options : SourceOptions, optional
         What the file does not declare, and what of it is wanted.
 
@@ -130,11 +144,56 @@ def open_source(path: str | Path, options: SourceOptions | None = None) -> Sourc
     file = Path(path)
     contents = _contents(file, given)
     try:
-        own = _settled(file, _chosen(file, contents, given), given, contents.close)
-        return resampled(own, given.resample_to)
+        return _opened(file, contents, given, given.record)
     except BaseException:
         contents.close()
         raise
+
+
+def open_records(path: str | Path, options: SourceOptions | None = None) -> tuple[Source, ...]:
+    """Open all records of a file: its rows where they are records, else the one there is.
+
+    Parameters
+    ----------
+    path, options
+        As for :func:`open_source`; `record` is left aside where rows are records.
+
+    Returns
+    -------
+    tuple of Source
+        Closing one closes all: they share the file.
+
+    Raises
+    ------
+    DataError
+        As :func:`open_source`.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     np.save(Path(folder) / "x.npy", np.ones((3, 50)))
+    ...     found = open_records(Path(folder) / "x.npy", SourceOptions(rows="records", fs=9.0))
+    ...     len(found), found[0].n_samples, found[0].channels[0].name
+    (3, 50, 'x')
+    """
+    given = options or SourceOptions()
+    if given.rows is None:
+        return (open_source(path, given),)
+    file = Path(path)
+    contents = _contents(file, given)
+    try:
+        first = _opened(file, contents, given, 0)
+        rest = range(1, first.n_records)
+        return (first, *(_opened(file, contents, given, record) for record in rest))
+    except BaseException:
+        contents.close()
+        raise
+
+
+def _opened(file: Path, contents: Contents, given: SourceOptions, record: int) -> Source:
+    part = without_empty(_chosen(file, contents, given, record))
+    return resampled(_settled(file, part, given, contents.close), given.resample_to, given.tacho)
 
 
 def list_sources(path: str | Path, options: SourceOptions | None = None) -> tuple[Source, ...]:
@@ -166,10 +225,13 @@ def list_sources(path: str | Path, options: SourceOptions | None = None) -> tupl
     """
     given = options or SourceOptions()
     file = Path(path)
-    plain = replace(given, variable=None, channels=(), unit=None, sensitivity=None, full_scale=None)
+    plain = replace(
+        given, like=None, variable=None, channels=(), unit=None, sensitivity=None, full_scale=None
+    )
     contents = _contents(file, given)
     try:
-        return tuple(_settled(file, part, plain, contents.close) for part in contents.parts)
+        parts = [_of_record(file, part, given, 0) for part in contents.parts]
+        return tuple(_settled(file, part, plain, contents.close) for part in parts)
     except BaseException:
         contents.close()
         raise
@@ -206,9 +268,19 @@ def _refuse_options(file: Path, reader: Reader, options: SourceOptions) -> None:
 # --- which part
 
 
-def _chosen(file: Path, contents: Contents, options: SourceOptions) -> Part:
+def _of_record(file: Path, part: Part, options: SourceOptions, record: int) -> Part:
+    """The part, or one of its rows where these are records."""
+    if options.rows is None:
+        return part
+    try:
+        return part.row_as_record(record)
+    except DataError as error:
+        raise DataError(f"{file}: {error}") from None
+
+
+def _chosen(file: Path, contents: Contents, options: SourceOptions, record: int) -> Part:
     names = [part.name for part in contents.parts]
-    wanted = options.variables
+    wanted = [_fitting(file, pattern, names) for pattern in options.variables]
     if wanted:
         missing = [name for name in wanted if name not in names]
         if missing:
@@ -216,12 +288,15 @@ def _chosen(file: Path, contents: Contents, options: SourceOptions) -> Part:
                 f"{file}: variable = {', '.join(map(repr, missing))} must be one of its arrays: "
                 f"{contents.listing()}{nearest(missing[0], names) if names else ''}"
             )
-        return _merged(file, [contents.parts[names.index(name)] for name in wanted])
+        found = [contents.parts[names.index(name)] for name in wanted]
+        found = [_of_record(file, part, options, record) for part in found]
+        pairs = zip(found, options.variables, strict=True)
+        return _merged(file, [_by_pattern(part, pattern) for part, pattern in pairs])
     known = [part for part in contents.parts if part.known_as]
     if len(known) == 1:
-        return known[0]
+        return _of_record(file, known[0], options, record)
     if len(names) == 1:
-        return contents.parts[0]
+        return _of_record(file, contents.parts[0], options, record)
     if not names:
         raise DataError(
             f"{file} holds no recording that can be read: {contents.listing()}; export one"
@@ -232,13 +307,37 @@ def _chosen(file: Path, contents: Contents, options: SourceOptions) -> Part:
     )
 
 
+def _fitting(file: Path, pattern: str, names: Sequence[str]) -> str:
+    """The one name that fits a pattern; a name is a pattern that fits itself."""
+    if pattern in names:
+        return pattern
+    found = [name for name in names if fnmatchcase(name, pattern)]
+    if len(found) > 1:
+        raise DataError(
+            f"{file}: variable = {pattern!r} fits {', '.join(found)}, must fit one; narrow it"
+        )
+    return found[0] if found else pattern
+
+
+def _by_pattern(part: Part, pattern: str) -> Part:
+    """A part under what its name has in common with those of other files: the pattern's letters."""
+    common = re.sub(r"\[[^\]]*\]|[*?]", "", pattern).strip("_. ")
+    if part.name == pattern or not common:
+        return part
+    renamed = tuple(
+        replace(channel, name=channel.name.replace(part.name, common)) for channel in part.channels
+    )
+    return replace(part, name=common, channels=renamed)
+
+
 def _merged(file: Path, parts: Sequence[Part]) -> Part:
     """Several parts of one length as the channels of one recording."""
     if len(parts) == 1:
         return parts[0]
     lengths = {part.name: part.n_samples for part in parts}
     rates = {part.name: part.sample_rate for part in parts}
-    for what, values in (("samples", lengths), ("Hz", rates)):
+    counts = {part.name: part.n_records for part in parts}
+    for what, values in (("samples", lengths), ("Hz", rates), ("records", counts)):
         if len(set(values.values())) > 1:
             raise DataError(
                 f"{file}: {', '.join(f'{name} has {n} {what}' for name, n in values.items())}, "
@@ -279,7 +378,9 @@ def _settled(file: Path, part: Part, options: SourceOptions, close: Callable[[],
     faults: list[str] = []
     missing: list[str] = []
     rate = _rate(part, options, faults, missing)
-    rows, names = _rows(part, options.channels, faults)
+    like = options.like
+    _refuse_unlike(rate, options, faults)
+    rows, names = _rows(part, options.channels or (like.channels if like else ()), faults)
     _refuse_strangers(part, options, names, faults)
     meanings = [
         _meaning(part, row, name, options, faults, missing)
@@ -293,6 +394,9 @@ def _settled(file: Path, part: Part, options: SourceOptions, close: Callable[[],
         path=file,
         part=part.name,
         channels=tuple(channel for channel, _ in meanings),
+        named=part.named or bool(options.channels),
+        n_records=part.n_records,
+        empty=part.empty,
         sample_rate=rate,
         n_samples=part.n_samples,
         conditions=part.conditions,
@@ -309,10 +413,12 @@ def _rate(
 ) -> float | None:
     given = options.fs
     declared = None if part.sample_rate is None else _whole(part.sample_rate, part.rate_doubt)
-    if declared is not None and not (math.isfinite(declared) and declared > 0):
-        faults.append(f"sample_rate = {declared} Hz must be > 0 and finite; take an intact copy")
+    if declared is not None and (fault := rate_fault("sample_rate", declared, _OTHER_RATE)):
+        faults.append(fault)
         return None
     if declared is None:
+        if given is None and options.like is not None:
+            return options.like.sample_rate
         if given is None:
             note = f" ({part.rate_note})" if part.rate_note else ""
             missing.append(f"fs must be given; the file does not declare the sample rate{note}")
@@ -326,6 +432,22 @@ def _rate(
         f"{f' ({part.known_as})' if part.known_as else ''}; leave it out"
     )
     return None
+
+
+def _refuse_unlike(rate: float | None, options: SourceOptions, faults: list[str]) -> None:
+    """Refuse a rate that is not the profile's, unless the caller asks for one."""
+    if options.like is None or rate is None or options.resample_to is not None:
+        return
+    wanted = options.like.sample_rate
+    if abs(rate / wanted - 1) > _SAME_RATE:
+        faults.append(
+            f"sample rate = {rate:.10g} Hz must be {wanted:.10g} Hz, as in {options.like.source}; "
+            f"give --resample-to {wanted:.10g}"
+        )
+
+
+_SAME_RATE = 1e-5  # relative, as of rates that printed times tell
+_OTHER_RATE = "take an intact copy, or correct the unit of the time"
 
 
 def _whole(rate: float, doubt: float) -> float:
@@ -342,11 +464,18 @@ def _rows(part: Part, wanted: Sequence[str], faults: list[str]) -> tuple[list[in
     if len(there) > MOST_CHANNELS or not there:
         faults.append(f"has {len(there)} channels, must be >= 1 and <= {MOST_CHANNELS}; split it")
         return [], []
-    if wanted and not part.named:
+    shown = [e if e in there else _split(e)[1] or e for e in wanted]
+    if dead := [name for name in shown if name in part.empty]:
+        faults += [
+            f"channel {n!r} holds nothing but NaN, must hold numbers; leave it" for n in dead
+        ]
+        return [], []
+    if wanted and not part.named and not all(name in there for name in shown):
         names = list(wanted)
         if len(names) != len(there):
             faults.append(
-                f"channels = {names} must name all {len(there)} channels; the file names none"
+                f"channels = {names} must name all {len(there)} channels, which the file leaves "
+                f"unnamed, or choose of {', '.join(there[:_SHOWN_NAMES])} as new=old"
             )
             return [], []
     elif wanted:
@@ -363,6 +492,9 @@ def _rows(part: Part, wanted: Sequence[str], faults: list[str]) -> tuple[list[in
     return rows, names
 
 
+_SHOWN_NAMES = 8
+
+
 def _split(entry: str) -> tuple[str, str]:
     new, _, old = entry.partition("=")
     return new, old
@@ -372,7 +504,7 @@ def _refuse_strangers(
     part: Part, options: SourceOptions, names: Sequence[str], faults: list[str]
 ) -> None:
     """What is declared by name must be about a channel that is there, or was."""
-    known = {*names, *(channel.name for channel in part.channels), *part.extras}
+    known = {*names, *(channel.name for channel in part.channels), *part.extras, *part.empty}
     for what in _MEANINGS:
         given = getattr(options, what)
         for name in given if isinstance(given, Mapping) else ():
@@ -408,6 +540,8 @@ def _meaning(
         return blank, 1.0
     try:
         text = given if given is not None else declared
+        if text is None and options.like is not None and part.bits == 0:
+            text = options.like.units.get(name)
         unit, origin = _unit_of(part, text, options.per_channel("full_scale", name))
         unit, origin = _sensed(unit, origin, options.per_channel("sensitivity", name))
     except LookupError as error:

@@ -2,7 +2,6 @@
 
 import hashlib
 import json
-import os
 import re
 import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -15,6 +14,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from ..sim.atomic import replacing
 from .draws import Range
 from .recipe import Recipe, Sample, recorded_recipe, sample_records
 from .recipe_file import RecipeError
@@ -555,13 +555,9 @@ def store_splits(path: str | Path, splits: Sequence[Split], *, force: bool = Fal
             f"{place.parent}: {free / 1e9:.1f} GB are free, must be >= {size / 1e9:.1f} GB for a "
             "copy; make room"
         )
-    fresh = place.with_name(place.name + ".new")
-    try:
+    with replacing(place, force=True) as fresh:
         shutil.copy(place, fresh)
         with h5py.File(fresh, "r+") as file:
             for split in splits:
                 lay_out_split(file, split.name, n_records)
                 fill_split(file, split.name, split.sides(n_records), split.attribute())
-        os.replace(fresh, place)
-    finally:
-        fresh.unlink(missing_ok=True)

@@ -1,6 +1,7 @@
 """Workers: results in the order of the work, few in flight, lost processes replaced."""
 
 import gc
+import logging
 import os
 import signal
 import threading
@@ -34,7 +35,14 @@ IDLE = 600.0
 UNHEARD = 5.0
 """Time after which a result that has not come is looked for among processes that died [s]."""
 
+WATCH = 1.0
+"""Time between two looks, while waiting, at whether the run still makes sense [s]."""
+
 _ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+
+_SAFE_PATH = "PYTHONSAFEPATH"
+"""Environment variable that keeps the current folder off the path of a starting Python: a file
+there may be named like a module."""
 
 
 def in_order(
@@ -44,6 +52,7 @@ def in_order(
     jobs: int,
     scheduler: str | None = None,
     say: Callable[[str], None] | None = None,
+    watch: Callable[[], None] | None = None,
 ) -> Generator[Result, None, None]:
     """Apply a function in worker processes and give the results in order.
 
@@ -62,6 +71,8 @@ def in_order(
         is of no account then.
     say : callable, optional
         Called with a line about workers that are waited for, lost or too many.
+    watch : callable, optional
+        Called every `WATCH` seconds while a result of a worker is waited for; may raise to stop.
 
     Yields
     ------
@@ -80,18 +91,22 @@ def in_order(
     >>> list(in_order(abs, [-1, 2, -3], jobs=1))
     [1, 2, 3]
     """
-    talk = say or _silent
+    talk, look = say or _silent, watch or _nothing
     if scheduler is None and (jobs := _bounded(jobs, talk)) == 1:
         # one thread for linear algebra, as in a worker: the same sums in the same order
         with threadpool_limits(1):
             yield from map(function, items)
         return
-    with _pool(function, jobs, scheduler, talk) as pool:
+    with _pool(function, jobs, scheduler, talk, look) as pool:
         yield from _through(pool, items)
 
 
 def _silent(_: str) -> None:
     """Say nothing."""
+
+
+def _nothing() -> None:
+    """Look at nothing."""
 
 
 def _bounded(jobs: int, say: Callable[[str], None]) -> int:
@@ -102,13 +117,17 @@ def _bounded(jobs: int, say: Callable[[str], None]) -> int:
 
 
 def _pool(
-    function: Callable[[Any], Any], jobs: int, scheduler: str | None, say: Callable[[str], None]
+    function: Callable[[Any], Any],
+    jobs: int,
+    scheduler: str | None,
+    say: Callable[[str], None],
+    watch: Callable[[], None],
 ) -> AbstractContextManager[Pool]:
     if scheduler is None:
-        return _processes(function, jobs, say)
+        return _processes(function, jobs, say, watch)
     from .cluster import cluster_pool
 
-    return cluster_pool(function, scheduler, say)
+    return cluster_pool(function, scheduler, say, watch)
 
 
 def _through(pool: Pool, items: Iterable[Any]) -> Iterator[Any]:
@@ -122,24 +141,46 @@ def _through(pool: Pool, items: Iterable[Any]) -> Iterator[Any]:
 
 @contextmanager
 def _processes(
-    function: Callable[[Any], Any], jobs: int, say: Callable[[str], None]
+    function: Callable[[Any], Any],
+    jobs: int,
+    say: Callable[[str], None],
+    watch: Callable[[], None],
 ) -> Iterator[Pool]:
     """Processes of this machine."""
-    pool = _Processes(function, jobs, say)
+    with _safe_path():
+        pool = _Processes(function, jobs, say, watch)
+        try:
+            yield pool
+        except BaseException:  # also Ctrl-C, and a caller that stops: leave no worker behind
+            pool.kill()
+            raise
+
+
+@contextmanager
+def _safe_path() -> Iterator[None]:
+    """Also for the processes that loky starts beside its workers, which take no environment."""
+    if os.environ.get(_SAFE_PATH):
+        yield
+        return
+    os.environ[_SAFE_PATH] = "1"
     try:
-        yield pool
-    except BaseException:  # also Ctrl-C, and a caller that stops: leave no worker behind
-        pool.kill()
-        raise
+        yield
+    finally:
+        os.environ.pop(_SAFE_PATH, None)
 
 
 class _Processes:
     """Processes of this machine, started anew where one dies."""
 
     def __init__(
-        self, function: Callable[[Any], Any], jobs: int, say: Callable[[str], None]
+        self,
+        function: Callable[[Any], Any],
+        jobs: int,
+        say: Callable[[str], None],
+        watch: Callable[[], None],
     ) -> None:
-        self._function, self._jobs, self._say = function, jobs, say
+        self._function, self._jobs = function, jobs
+        self._say, self._watch = say, watch
         self._ahead: deque[tuple[Any, Future[Any]]] = deque()
         self._start()
 
@@ -153,7 +194,7 @@ class _Processes:
         self._executor = get_reusable_executor(
             max_workers=self._jobs,
             timeout=IDLE,
-            env=_ONE_THREAD,
+            env={**_ONE_THREAD, _SAFE_PATH: "1"},
             initializer=_settle,
             initargs=(os.getpid(),),
         )
@@ -196,10 +237,15 @@ class _Processes:
 
     def _come(self, future: "Future[Any]") -> Any:
         """Result of a future, also where a process died with half of its result sent."""
+        unheard = time.monotonic() + UNHEARD
         while True:
-            wait([future], UNHEARD)
+            wait([future], WATCH)
             if future.done():
                 return future.result()
+            self._watch()
+            if time.monotonic() < unheard:
+                continue
+            unheard = time.monotonic() + UNHEARD
             if any(process.exitcode for process in self._workers()):
                 self._end()
 
@@ -249,6 +295,8 @@ def _settle(parent: int) -> None:
     """Start a worker."""
     # Ctrl-C reaches every process of the terminal; the one that writes ends the others
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    # the parent has said what is wrong with the kernel cache
+    logging.getLogger(f"{__name__.partition('.')[0]}.sim.jit").setLevel(logging.ERROR)
     # loky collects garbage once a second; over every imported object that is 8 % of a run
     gc.freeze()
     threading.Thread(target=_follow, args=(parent,), daemon=True).start()

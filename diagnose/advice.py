@@ -10,7 +10,14 @@ from .trend import Outlook, span_words
 
 Action = Literal["none", "watch", "confirm", "plan", "stop", "mend"]
 Confidence = Literal[
-    "sure", "maybe_better", "maybe_worse", "maybe_condemned", "caution", "unfamiliar", "unusable"
+    "sure",
+    "maybe_better",
+    "maybe_worse",
+    "maybe_condemned",
+    "caution",
+    "unfamiliar",
+    "unusable",
+    "unreferenced",
 ]
 
 RULE_OF_THUMB = "rule of thumb, not of a standard"
@@ -149,6 +156,12 @@ _RULES: dict[tuple[int | None, Confidence], _Rule] = {
         "named and record again.",
         days=None,
     ),
+    (None, "unreferenced"): _Rule(
+        action="mend",
+        sentence="No grade is given, which does not mean that the machine is sound. The recording "
+        "need not be made again: judge it with healthy recordings of the machine (--baseline).",
+        days=None,
+    ),
 }
 """Grade and confidence -> what to do; a grade 0 cannot be better, a grade 3 not worse."""
 
@@ -220,6 +233,8 @@ def confidence_of(estimate: Estimate, edges: Sequence[float]) -> Confidence:
     str
         Where grades on both sides are possible, the worse; caution goes before both.
     """
+    if estimate.unreferenced:
+        return "unreferenced"
     if estimate.verdict == "graded" and estimate.grade is not None:
         return _doubt(estimate, estimate.grade, edges)
     return "caution" if estimate.verdict == "graded" else estimate.verdict

@@ -1,7 +1,5 @@
 """The alignment of a shaft line: as a table for JSON, as text, as a picture, as one HTML page."""
 
-import base64
-import io
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -25,11 +23,13 @@ from ..sim.jacking import Jacking, jacking
 from ..sim.parts import Scene
 from ..sim.shaft_line import alignment_conditions, alignment_line
 from ..sim.shaft_parts import ShaftScene
+from .page import render, short_name
+from .picture import encoded, save_picture
 from .report import save_page
+from .rig import EXPECTED, BeforeAfter, rig_figure, rig_text
 
 ALIGN_SCHEMA = 1
 
-_TEMPLATES = Path(__file__).parent / "templates"
 _BEFORE, _AFTER, _LIMIT = "#1f5a94", "#b3541e", "#7a828b"
 _TINY = 5e-6  # m, of a move: less than the last digit shown
 _MISLEADS = 0.02  # of a reaction, when jacking says another
@@ -49,6 +49,8 @@ class Alignment:
     calibration : Calibration or None
     jacking : Jacking or None
         In the first condition.
+    margin : float
+        Share of each limit that was asked for as a distance from it.
     """
 
     name: str
@@ -56,6 +58,7 @@ class Alignment:
     states: tuple[LineState, ...]
     calibration: Calibration | None
     jacking: Jacking | None
+    margin: float = 0.0
 
     @property
     def unmet(self) -> tuple[Check, ...]:
@@ -77,6 +80,8 @@ def align(
     condition: str = "all",
     mend: bool = True,
     prefer: str = "least",
+    target: str = "limits",
+    margin: float = 0.0,
     jack: str | None = None,
 ) -> Alignment:
     """Judge the alignment of a scene, and find the moves that mend it.
@@ -89,7 +94,8 @@ def align(
         A name of the scene's conditions, or "all".
     mend : bool
         Look for moves.
-    prefer : str
+    prefer, target : str
+    margin : float
         As of :func:`wearstate.sim.calibration.calibrate`.
     jack : str, optional
         Bearing to jack.
@@ -116,12 +122,16 @@ def align(
         )
     line, conditions = _line_of(scene), _conditions_of(scene, condition)
     states = tuple(reactions(line, one) for one in conditions)
+    calibration = None
+    if mend:
+        calibration = calibrate(line, conditions, prefer=prefer, target=target, margin=margin)
     return Alignment(
         name=scene.name,
         line=line,
         states=states,
-        calibration=calibrate(line, conditions, prefer=prefer) if mend else None,
+        calibration=calibration,
         jacking=jacking(line, jack, conditions[0]) if jack is not None else None,
+        margin=margin,
     )
 
 
@@ -223,6 +233,8 @@ def _calibration_table(found: Calibration | None) -> dict[str, Any] | None:
         "conditions": [_state_rows(state) for state in found.after],
         "unmet": [limit.text for limit in found.unmet],
         "blocks": [block.text for block in found.blocks],
+        "margin": found.margin,
+        "touched": [limit.text for limit in found.touched],
     }
 
 
@@ -252,7 +264,7 @@ def align_text(found: Alignment) -> str:
     blocks = [_headline(found), *(_state_text(state) for state in found.states)]
     blocks.append(_influence_text(found))
     if found.calibration is not None:
-        blocks.append(_calibration_text(found.calibration))
+        blocks.append(_calibration_text(found.calibration, found.margin))
     if found.jacking is not None:
         blocks.append(_jacking_text(found.jacking, found.states[0].condition.name))
     return "\n\n".join(blocks)
@@ -288,7 +300,7 @@ def _bearing_row(state: LineState, i: int) -> tuple[str, ...]:
         seat.name,
         f"{seat.station:.2f}",
         _fixed(1e3 * seat.offset, 2),
-        _fixed(load / 1e3, 1),
+        _kilonewton(state, i),
         _fixed(100 * load / float(state.reactions.sum()), 1),
         _fixed(float(state.pressures[i]) / 1e6, 2),
         _fixed(1e3 * float(state.relative_slopes[i]), 3),
@@ -321,6 +333,12 @@ _WORDS = {
     "mean pressure": ("small", "large"),
     "slope": ("steep, nose down", "steep, nose up"),
 }
+
+
+def _kilonewton(state: LineState, i: int) -> str:
+    """A reaction with digits that tell a hundredth of the line's mean."""
+    mean = float(state.reactions.mean()) / 1e3
+    return _fixed(float(state.reactions[i]) / 1e3, 1 if mean >= 10 else 2 if mean >= 1 else 3)
 
 
 def _fixed(value: float, digits: int) -> str:
@@ -356,11 +374,13 @@ def _influence_text(found: Alignment) -> str:
     return f"{head}\n{_columns(rows)}"
 
 
-def _calibration_text(found: Calibration) -> str:
+def _calibration_text(found: Calibration, margin: float) -> str:
     lines = [f"calibration: {found.status.text}"]
+    if found.status is not CalibrationStatus.WITHIN:
+        lines += _move_lines(found)
+    lines += [f"  {text}" for text in _margin_lines(found, margin)]
     if found.status is CalibrationStatus.WITHIN:
-        return lines[0]
-    lines += _move_lines(found)
+        return "\n".join(lines)
     lines += [f"  not met: {limit.text}" for limit in found.unmet]
     lines += [f"  blocked by: {text}" for text in _block_texts(found.blocks)]
     if found.moved:
@@ -393,11 +413,29 @@ def _move_lines(found: Calibration) -> list[str]:
     return lines
 
 
+def _margin_lines(found: Calibration, asked: float) -> list[str]:
+    """How far from the limits the line is after the moves, where that was asked or is nothing."""
+    if not found.status.ok:
+        return []
+    kept = f"{100 * found.margin:.3g} %"
+    if asked > found.margin:
+        return [f"a margin of {100 * asked:.3g} % of each limit cannot be kept; {kept} is"]
+    if asked:
+        return [f"every limit is kept with a margin of {kept}"]
+    names = list(dict.fromkeys(limit.bearing for limit in found.touched))
+    if not names:
+        return []
+    return [
+        f"on a limit after the moves: {', '.join(names)}; --margin 0.1 keeps 10 % of it away from "
+        "every limit"
+    ]
+
+
 def _before_after(found: Calibration) -> list[tuple[str, ...]]:
     rows = [("bearing", *(state.condition.name for state in found.before))]
     for i, name in enumerate(found.line.names):
         cells = (
-            f"{_fixed(old.reactions[i] / 1e3, 1)} -> {_fixed(new.reactions[i] / 1e3, 1)}"
+            f"{_kilonewton(old, i)} -> {_kilonewton(new, i)}"
             for old, new in zip(found.before, found.after, strict=True)
         )
         rows.append((name, *cells))
@@ -439,7 +477,7 @@ def align_figure(found: Alignment) -> Any:
     rows = 4 if found.jacking is not None else 3
     figure = Figure(figsize=(10, 3 * rows), layout="constrained")
     names = ", ".join(state.condition.name for state in found.states)
-    figure.suptitle(f"{found.name}: alignment (computed), {names}")
+    figure.suptitle(f"{short_name(found.name, 60)}: alignment (computed), {names}")
     axes = figure.subplots(rows, 1)
     _draw_deflection(axes[0], found)
     _draw_moment(axes[1], found)
@@ -449,9 +487,9 @@ def align_figure(found: Alignment) -> Any:
     return figure
 
 
-def save_figure(found: Alignment, path: Path) -> None:
+def save_figure(found: Alignment, path: Path, *, force: bool = True) -> None:
     """Draw :func:`align_figure` into a .png, .svg or .pdf file."""
-    align_figure(found).savefig(path, dpi=110)
+    save_picture(align_figure(found), path, force=force)
 
 
 def _drawn(found: Alignment) -> list[tuple[LineState, str, str]]:
@@ -474,7 +512,7 @@ def _draw_deflection(axes: Any, found: Alignment) -> None:
             axes.plot(middle, ends, color=colour, lw=4, alpha=0.5, solid_capstyle="butt")
     for seat in found.line.seats:
         place = {"xycoords": ("data", "axes fraction"), "ha": "center", "fontsize": 8}
-        axes.annotate(seat.name, (seat.station, 1.02), color=_LIMIT, **place)
+        axes.annotate(short_name(seat.name, 20), (seat.station, 1.02), color=_LIMIT, **place)
     _finish(axes, "height [mm]", "Shaft and bottoms of the bores", pad=18)  # names stand below it
 
 
@@ -508,9 +546,21 @@ def _draw_reactions(axes: Any, found: Alignment) -> None:
                 axes.hlines(bound / 1e3, i - 0.45, i + 0.45, color=_LIMIT, ls="--", lw=1)
     highest = max(float(state.reactions.max()) for state, _ in pairs)
     axes.set_ylim(0, 1.35 * highest / 1e3)  # limits far above it say little
-    axes.set_xticks(range(n), found.line.names)
-    axes.set(ylabel="reaction [kN]", title="Reactions; dashed: limits")
+    axes.legend(handles=_meanings(pairs), fontsize=8, loc="upper right", ncols=3)
+    axes.set_xticks(range(n), [short_name(name, 20) for name in found.line.names])
+    axes.set(ylabel="reaction [kN]", title="Reactions")
     axes.grid(axis="y", alpha=0.3)
+
+
+def _meanings(pairs: Sequence[tuple[LineState, str]]) -> list[Any]:
+    """What the colours of the bars and the dashes mean."""
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    names = {_BEFORE: "as set", _AFTER: "after the moves"}
+    colours = dict.fromkeys(colour for _, colour in pairs)
+    bars = [Patch(color=colour, label=names[colour]) for colour in colours]
+    return [*bars, Line2D([], [], color=_LIMIT, ls="--", lw=1, label="limit")]
 
 
 _ABOVE = {"rotation": 90, "fontsize": 7, "ha": "center", "va": "bottom"}
@@ -522,7 +572,9 @@ def _draw_jacking(axes: Any, found: Jacking) -> None:
     second = found.zero_load + found.second_slope * found.lifts
     axes.plot(lift, second / 1e3, "--", color=_LIMIT, label="second line, drawn back")
     axes.plot(1e3 * found.free_lift, found.free_load / 1e3, "o", color=_AFTER, label="comes free")
-    axes.set(xlabel="lift [mm]", ylabel="load [kN]", title=f"Jacking of {found.bearing}")
+    axes.set(
+        xlabel="lift [mm]", ylabel="load [kN]", title=f"Jacking of {short_name(found.bearing)}"
+    )
     axes.grid(alpha=0.3)
     axes.legend(fontsize=8)
 
@@ -535,18 +587,24 @@ def _finish(axes: Any, label: str, title: str, *, pad: float = 6.0) -> None:
     axes.legend(fontsize=8)
 
 
-def align_html(found: Alignment) -> str:
-    """One self-contained page: verdict, tables, picture, moves."""
-    import jinja2
+def align_html(found: Alignment, tested: BeforeAfter | None = None, *, note: str = "") -> str:
+    """One self-contained page: verdict, tables, picture, moves, and a simulated test of them.
 
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(_TEMPLATES),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-    )
-    image = io.BytesIO()
-    align_figure(found).savefig(image, format="png", dpi=110)
-    page: str = environment.get_template("align.html.j2").render(
+    Parameters
+    ----------
+    found : Alignment
+    tested : BeforeAfter, optional
+        Of :func:`wearstate.diagnose.rig.calibrated_test`.
+    note : str
+        Why there is no test, where one was asked for.
+
+    Returns
+    -------
+    str
+        HTML.
+    """
+    return render(
+        "align.html.j2",
         found=found,
         colour=_COLOURS[found.verdict],
         headline=_headline(found),
@@ -558,10 +616,12 @@ def align_html(found: Alignment) -> str:
         moves=_move_lines(found.calibration) if found.calibration else [],
         before_after=_before_after(found.calibration) if found.calibration else [],
         jack=_jacking_text(found.jacking, found.states[0].condition.name) if found.jacking else "",
-        image="data:image/png;base64," + base64.b64encode(image.getvalue()).decode(),
+        image=encoded(align_figure(found)),
+        margins=_margin_lines(found.calibration, found.margin) if found.calibration else [],
+        tested=None if tested is None else _tested(tested),
+        note=note,
         fixed=_fixed,
     )
-    return page
 
 
 _COLOURS = {"within": "#3a923a", "warning": "#e07b00", "alarm": "#c03a2b"}
@@ -578,6 +638,40 @@ def _state_cells(state: LineState) -> dict[str, Any]:
     }
 
 
-def save_html(found: Alignment, path: Path) -> None:
+def _tested(result: BeforeAfter) -> dict[str, Any]:
+    """A simulated test for the page: its heading, summary, picture and peaks."""
+    heading, *_ = rig_text(result).splitlines()
+    rows = [
+        (
+            peak.channel,
+            peak.verdict,
+            f"{peak.frequency_before:.1f}",
+            f"{peak.level_before:.1f}",
+            f"{peak.change:+.1f}",
+            f"{peak.interval[0]:+.1f} … {peak.interval[1]:+.1f}",
+            f"{peak.model_change:+.1f}",
+            EXPECTED[peak.expected],
+        )
+        for peak in result.changes
+    ]
+    return {
+        "heading": heading,
+        "summary": result.summary,
+        "rows": rows,
+        "image": encoded(rig_figure(result, columns=_TEST_COLUMNS)),
+    }
+
+
+_TEST_COLUMNS = 3  # of the picture of a test, on a page
+
+
+def save_html(
+    found: Alignment,
+    path: Path,
+    tested: BeforeAfter | None = None,
+    *,
+    note: str = "",
+    force: bool = True,
+) -> None:
     """Write :func:`align_html` whole, or not at all."""
-    save_page(align_html(found), path)
+    save_page(align_html(found, tested, note=note), path, force=force)

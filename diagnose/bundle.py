@@ -7,7 +7,6 @@ import hashlib
 import io
 import json
 import math
-import os
 import zipfile
 import zlib
 from collections.abc import Mapping
@@ -24,6 +23,7 @@ from pydantic import BaseModel, ValidationError
 from ..datasets.record import DataError
 from ..features.analysis import STANDARD
 from ..features.table import catalogue
+from ..sim.atomic import replacing
 from .estimate import ModelError
 
 BUNDLE_SCHEMA = 2
@@ -98,25 +98,18 @@ def save_bundle(bundle: Bundle, path: str | Path, *, force: bool = False) -> Non
         raise DataError(f"{target} exists; choose another name or use force to replace it")
     if not target.parent.is_dir():
         raise DataError(f"{target.parent} is no folder; create it")
-    part = target.with_name(target.name + ".part")
-    try:
-        with zipfile.ZipFile(part, "w") as file:
-            for name, data in _sealed(bundle).items():
-                entry = zipfile.ZipInfo(name)  # of 1980: a date would make other bytes
-                entry.compress_type = zipfile.ZIP_DEFLATED
-                file.writestr(entry, data)
-        os.replace(part, target)
-    finally:
-        part.unlink(missing_ok=True)
+    with replacing(target, force=force) as fresh, zipfile.ZipFile(fresh, "w") as file:
+        for name, data in _sealed(bundle).items():
+            entry = zipfile.ZipInfo(name)  # of 1980: a date would make other bytes
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            file.writestr(entry, data)
 
 
 def _sealed(bundle: Bundle) -> dict[str, bytes]:
-    arrays = io.BytesIO()
-    np.savez(arrays, allow_pickle=False, **bundle.arrays)
     members = {
         _CARD: json.dumps(bundle.card, indent=1, sort_keys=True).encode(),
         _STRUCTURE: json.dumps(bundle.structure, indent=1).encode(),
-        _ARRAYS: arrays.getvalue(),
+        _ARRAYS: _packed(bundle.arrays),
     }
     seal = {
         "schema_version": BUNDLE_SCHEMA,
@@ -125,6 +118,16 @@ def _sealed(bundle: Bundle) -> dict[str, bytes]:
         "sha256": {name: hashlib.sha256(data).hexdigest() for name, data in members.items()},
     }
     return {_SEAL: json.dumps(seal).encode(), **members}
+
+
+def _packed(arrays: Mapping[str, NDArray[Any]]) -> bytes:
+    """As :func:`numpy.savez`, which takes objects, or before 2.1 the switch that forbids them."""
+    content = io.BytesIO()
+    with zipfile.ZipFile(content, "w") as file:
+        for name, array in arrays.items():
+            with file.open(f"{name}.npy", "w", force_zip64=True) as handle:
+                npy.write_array(handle, np.asanyarray(array), allow_pickle=False)
+    return content.getvalue()
 
 
 # --- reading

@@ -16,14 +16,13 @@ from ..datasets.record import DataError, DataSet, manifest_hash
 from ..sim.parts import SceneError
 from ..sim.scene import scene_table
 from .grades import GRADE_NAMES
+from .page import render
 from .panel import panel_figure
+from .picture import encoded
 from .report import quantity_name, save_page
-from .report_figures import encoded
 from .signal_plots import make_panel
 from .signal_view import View
 from .tabulate import confounders_in
-
-_TEMPLATES = Path(__file__).parent / "templates"
 
 MOST_DRAWN = 3
 """Channels of a picture."""
@@ -77,7 +76,9 @@ class Card:
     sections: tuple[tuple[str, list[Block]], ...]
 
 
-def write_card(path: str | Path, card: Path, *, licence: str = "not stated") -> None:
+def write_card(
+    path: str | Path, card: Path, *, licence: str = "not stated", force: bool = True
+) -> None:
     """Write the page about a data set, whole or not at all.
 
     Parameters
@@ -88,6 +89,8 @@ def write_card(path: str | Path, card: Path, *, licence: str = "not stated") -> 
         ``.md``: tables; ``.html``: pictures of each class too, in one file.
     licence : str
         Of the data, as its owner states it.
+    force : bool
+        Replace an existing file.
 
     Raises
     ------
@@ -98,7 +101,8 @@ def write_card(path: str | Path, card: Path, *, licence: str = "not stated") -> 
         raise DataError(f"{card}: suffix {card.suffix!r} must be .html or .md; rename it")
     text = card_markdown if card.suffix == ".md" else card_html
     with DataSet(path) as data:
-        save_page(text(data_card(data, licence=licence, pictures=card.suffix != ".md")), card)
+        page = text(data_card(data, licence=licence, pictures=card.suffix != ".md"))
+    save_page(page, card, force=force)
 
 
 def data_card(data: DataSet, *, licence: str = "not stated", pictures: bool = True) -> Card:
@@ -535,13 +539,6 @@ def card_html(card: Card) -> str:
     str
         HTML.
     """
-    import jinja2
-
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(_TEMPLATES),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-    )
     sections = [
         (
             name,
@@ -552,7 +549,7 @@ def card_html(card: Card) -> str:
         )
         for name, blocks in card.sections
     ]
-    return environment.get_template("card.html.j2").render(card=card, sections=sections)
+    return render("card.html.j2", card=card, sections=sections)
 
 
 def _kind(block: Block) -> str:

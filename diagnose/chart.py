@@ -12,8 +12,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from ..datasets.csv_cells import safe_cell
 from ..datasets.quantities import QUANTITIES
 from ..sim.assemble import simulate
+from ..sim.atomic import replacing
 from ..sim.fidelity import Candidate, Convergence, Difference, Study, study
 from ..sim.ladder import with_values
 from ..sim.parts import Scene
@@ -533,16 +535,14 @@ def convergence_text(each: Convergence) -> str:
     )
 
 
-def save_rows(chart: Chart, path: Path) -> None:
+def save_rows(chart: Chart, path: Path, *, force: bool = True) -> None:
     """Write :func:`chart_rows` as CSV, whole or not at all."""
     import csv
 
-    part = path.with_name(path.name + ".part")
-    try:
-        with part.open("w", newline="", encoding="utf-8") as handle:
-            writer = csv.writer(handle)
-            writer.writerow(CSV_HEAD)
-            writer.writerows(chart_rows(chart))
-        part.replace(path)
-    finally:
-        part.unlink(missing_ok=True)
+    with (
+        replacing(path, force=force) as fresh,
+        fresh.open("w", newline="", encoding="utf-8") as handle,
+    ):
+        writer = csv.writer(handle)
+        writer.writerow(CSV_HEAD)
+        writer.writerows([safe_cell(cell) for cell in row] for row in chart_rows(chart))

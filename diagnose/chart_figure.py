@@ -1,6 +1,5 @@
 """Pictures and pages of a chart: the front, the convergence of the reference, every quantity."""
 
-import io
 import json
 import math
 import re
@@ -14,9 +13,10 @@ import numpy as np
 
 from ..sim.fidelity import Convergence
 from .chart import Chart, Point, chart_table, convergence_text, remaining_error, save_rows
+from .page import render, visible
+from .picture import picture_bytes, save_picture
 from .report import save_page
 
-_TEMPLATES = Path(__file__).parent / "templates"
 _FRONT, _OTHER, _DOUBTFUL, _LIMIT = "#1f5a94", "#9aa3ab", "#e07b39", "#b3261e"
 _WINNER = "#3a923a"
 _FLOOR = 1e-3  # %, the least error that is drawn; the reference sits on it
@@ -282,11 +282,8 @@ def chart_svg(chart: Chart) -> str:
     -------
     str
     """
-    text = io.StringIO()
-    chart_figure(chart).savefig(text, format="svg", metadata={"Date": None})
-    return _PLACE.sub(
-        lambda found: found[0] + _pointer(chart.points[int(found[1])]), text.getvalue()
-    )
+    text = picture_bytes(chart_figure(chart), ".svg").decode()
+    return _PLACE.sub(lambda found: found[0] + _pointer(chart.points[int(found[1])]), text)
 
 
 _PLACE = re.compile(r'<g id="point-(\d+)">')
@@ -296,7 +293,7 @@ def _pointer(point: Point) -> str:
     words = (
         f"{point.name}: {point.seconds:.3g} s, error {point.error:.2%} ({point.worst or 'none'})"
     )
-    return f"<title>{escape(words)}</title>"
+    return f"<title>{escape(visible(words))}</title>"
 
 
 def chart_html(chart: Chart) -> str:
@@ -310,26 +307,19 @@ def chart_html(chart: Chart) -> str:
     -------
     str
     """
-    import jinja2
-
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(_TEMPLATES),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-    )
     svg = chart_svg(chart)
     numbers = {id(point): number for number, point in enumerate(chart.front, start=1)}
-    page: str = environment.get_template("chart.html.j2").render(
+    return render(
+        "chart.html.j2",
         chart=chart,
         svg=svg[svg.index("<svg") :],
         rows=[(numbers.get(id(point), ""), point) for point in chart.points],
         convergence=[convergence_text(each) for each in chart.convergence],
         finite=math.isfinite,
     )
-    return page
 
 
-def save_chart(chart: Chart, path: Path) -> None:
+def save_chart(chart: Chart, path: Path, *, force: bool = True) -> None:
     """Write a chart in the form that the suffix asks for, whole or not at all.
 
     Parameters
@@ -337,21 +327,24 @@ def save_chart(chart: Chart, path: Path) -> None:
     chart : Chart
     path : Path
         One of :data:`SUFFIXES`.
+    force : bool
+        Replace an existing file.
 
     Raises
     ------
     KeyError
         Another suffix.
     """
-    _WRITERS[path.suffix](chart, path)
+    if path.suffix == ".csv":
+        save_rows(chart, path, force=force)
+    elif path.suffix in (".png", ".pdf"):
+        save_picture(chart_figure(chart), path, force=force)
+    else:
+        save_page(_PAGES[path.suffix](chart), path, force=force)
 
 
-def _save_picture(chart: Chart, path: Path) -> None:
-    chart_figure(chart).savefig(path, dpi=100)
-
-
-def _save_json(chart: Chart, path: Path) -> None:
-    save_page(json.dumps(_strict(chart_table(chart)), indent=1, allow_nan=False), path)
+def _json(chart: Chart) -> str:
+    return json.dumps(_strict(chart_table(chart)), indent=1, allow_nan=False)
 
 
 def _strict(value: Any) -> Any:
@@ -363,14 +356,11 @@ def _strict(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-_WRITERS: dict[str, Callable[[Chart, Path], None]] = {
-    ".svg": lambda chart, path: save_page(chart_svg(chart), path),
-    ".png": _save_picture,
-    ".pdf": _save_picture,
-    ".html": lambda chart, path: save_page(chart_html(chart), path),
-    ".json": _save_json,
-    ".csv": save_rows,
+_PAGES: dict[str, Callable[[Chart], str]] = {
+    ".svg": chart_svg,
+    ".html": chart_html,
+    ".json": _json,
 }
 
-SUFFIXES = tuple(_WRITERS)
+SUFFIXES = (".svg", ".png", ".pdf", ".html", ".json", ".csv")
 """Forms in which a chart can be written."""

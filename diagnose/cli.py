@@ -12,11 +12,18 @@ from typing import Any
 import click
 
 from .. import __version__
-from .command_options import (
-    EXIT_BAD_INPUT,
-    EXIT_FAILED,
+from .command_options import EXIT_BAD_INPUT, EXIT_FAILED, as_options
+from .commands_data import (
+    audit,
+    export,
+    features,
+    generate,
+    import_files,
+    info,
+    merge,
+    recipe,
+    splits,
 )
-from .commands_data import audit, export, features, generate, import_files, info, recipe, splits
 from .commands_machine import align, chart, scene, simulate, stability, verify
 from .commands_wear import demo, evaluate, report, train
 
@@ -43,25 +50,12 @@ class _Group(click.Group):
             raise  # the reader of stdout has gone: click ends quietly
         except OSError as error:
             # files are written under another name first, which says nothing to the caller
-            text = re.sub(r"\.part(\.new)?\b", "", str(error))
+            text = re.sub(r"\.part\b|\.[0-9a-f]{8}\.tmp\b", "", str(error))
             click.echo(f"Error: {text}; check path, rights and space", err=True)
             raise click.exceptions.Exit(EXIT_BAD_INPUT) from None
         except MemoryError:
             click.echo("Error: out of memory; use fewer jobs or shorter recordings", err=True)
             raise click.exceptions.Exit(EXIT_FAILED) from None
-
-
-def as_options(text: str, command: click.Command | None) -> str:
-    """The library speaks of arguments, here they are options: ``fs = 0`` is ``--fs = 0``."""
-    for param in command.params if command else ():
-        option = next((name for name in param.opts if name.startswith("--")), "")
-        word = option.removeprefix("--").replace("-", "_")
-        if "_" in word:
-            text = re.sub(rf"(?<![\w'-]){word}(?![\w'])", option, text)
-        elif word:  # may be a plain word elsewhere
-            place = rf"(?m)(^|: |\b(?:give|with|use) ){word}(?= = | must | to | and | if |[;,)]|$)"
-            text = re.sub(place, rf"\1{option}", text)
-    return text
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -89,6 +83,7 @@ for _command in (
     recipe,
     generate,
     import_files,
+    merge,
     info,
     export,
     splits,

@@ -9,6 +9,7 @@ import re
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import wraps
 from pathlib import Path
 from typing import Any
 
@@ -59,12 +60,40 @@ seed_option = click.option(
 
 def source_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """Options about a measured file, the same for every command that reads one."""
+
+    @wraps(command)
+    def with_profile(*args: Any, like: Path | None = None, **given: Any) -> Any:
+        return command(*args, **_filled(like, given))
+
+    found: Callable[..., Any] = with_profile
     for option in reversed(_SOURCE_OPTIONS):
-        command = option(command)
-    return command
+        found = option(found)
+    return found
+
+
+def _filled(like: Path | None, given: dict[str, Any]) -> dict[str, Any]:
+    """Options about a file with what a profile says; what the caller says stands."""
+    if like is None:
+        return {**given, "like": None}
+    from .like import read_profile
+
+    profile, tacho, pulses = read_profile(like)
+    told = dict(given)
+    if told["tacho"] is None:
+        told["tacho"] = tacho
+    asked = click.get_current_context().get_parameter_source("pulses_per_revolution")
+    if asked is click.core.ParameterSource.DEFAULT and told["tacho"] is not None:
+        told["pulses_per_revolution"] = pulses
+    return {**told, "like": profile}
 
 
 _SOURCE_OPTIONS = (
+    click.option(
+        "--like",
+        type=PATH,
+        metavar="MODEL|JSON",
+        help="Channels, units, rate and tacho as of a model, or of what `info --json` printed.",
+    ),
     click.option("--fs", type=float, help="Sample rate [Hz], where the file has none."),
     click.option(
         "--unit",
@@ -102,6 +131,11 @@ _SOURCE_OPTIONS = (
         help="Of the tacho.",
     ),
     click.option("--record", type=click.IntRange(0), default=0, help="Of several, counted from 0."),
+    click.option(
+        "--rows",
+        type=click.Choice(["records"]),
+        help="Every row of an array or a text file is a record of one channel.",
+    ),
     click.option("--delimiter", help="Of a text file: ',', ';', tab, space."),
     click.option("--decimal", type=click.Choice([".", ","]), help="Of a text file."),
     click.option(
@@ -119,7 +153,10 @@ _SOURCE_OPTIONS = (
         help="Of binary and arrays: sample by sample, or channel by channel.",
     ),
     click.option(
-        "--resample-to", type=float, metavar="HZ", help="Bring measured files to this lower rate."
+        "--partial", is_flag=True, help="Of a WAV, TDMS or binary file cut short: what is there."
+    ),
+    click.option(
+        "--resample-to", type=float, metavar="HZ", help="Bring measured files to this rate."
     ),
 )
 
@@ -141,8 +178,8 @@ def declared_source(given: Mapping[str, Any]) -> Any:
 
 
 _PLAIN_OPTIONS = (
-    *("fs", "record", "delimiter", "decimal", "header"),
-    *("dtype", "n_channels", "offset", "order", "resample_to"),
+    *("fs", "record", "rows", "delimiter", "decimal", "header"),
+    *("dtype", "n_channels", "offset", "order", "resample_to", "partial", "like"),
 )
 
 
@@ -297,3 +334,25 @@ def _number_or_text(text: str) -> Any:
         return text
     whole = re.fullmatch("[-+]?[0-9]{1,18}", text)
     return int(text) if whole else float(text)
+
+
+def as_options(text: str, command: click.Command | None) -> str:
+    """The library speaks of arguments, here they are options: ``fs = 0`` is ``--fs = 0``."""
+    for param in command.params if command else ():
+        option = next((name for name in param.opts if name.startswith("--")), "")
+        word = option.removeprefix("--").replace("-", "_")
+        for name in {word, param.name, *_OTHER_NAMES.get(option, ())} if option else ():
+            text = _with_option(text, str(name), option)
+    return text
+
+
+_OTHER_NAMES = {"--speed-band": ("band_hz",)}
+"""What functions below the command call the value of an option."""
+
+
+def _with_option(text: str, word: str, option: str) -> str:
+    if "_" in word:
+        return re.sub(rf"(?<![\w'-]){word}(?![\w'])", option, text)
+    # may be a plain word elsewhere
+    place = rf"(?m)((?:^|: |\b(?:give|with|use) )){word}(?= = | must | to | and | if |[;,)]|$)"
+    return re.sub(rf"(; ){word}(?= = )", rf"\1{option}", re.sub(place, rf"\1{option}", text))

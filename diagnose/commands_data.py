@@ -20,6 +20,7 @@ from .command_options import (
     PICTURE_SUFFIXES,
     TABLE_SUFFIXES,
     Share,
+    as_options,
     check_outputs,
     declared_source,
     emit,
@@ -64,14 +65,25 @@ def recipe_show(name: str, whole: bool) -> None:
 @click.argument("file")
 @json_option
 def recipe_check(file: str, as_json: bool) -> None:
-    """Check a recipe against its scene; every fault at once."""
-    from ..datasets.recipe import STRATA, load_recipe, sample_records
+    """Check a recipe against its scene; every fault, and warnings of what is hardly meant."""
+    from ..datasets.recipe import STRATA, limit_faults, load_recipe, sample_records
+    from ..datasets.recipe_file import RecipeError
     from ..sim.assemble import check
+    from ..sim.plausibility import scene_doubts
 
     checked = load_recipe(file)
+    if faults := limit_faults(checked):
+        raise RecipeError(checked.name, faults)
+    doubts: dict[str, str] = {}  # each with the first record that has it
     for sample in sample_records(checked, STRATA):
         check(sample.scene)
-    emit({"recipe": checked.name, "faults": []}, as_json, f"{checked.name}: no fault")
+        for doubt in scene_doubts(sample.scene):
+            doubts.setdefault(doubt.check, f"record {sample.index}: {doubt.text}")
+    warnings = list(doubts.values())
+    told = f", {len(warnings)} warning(s)" if warnings else ""
+    lines = [f"{checked.name}: no fault{told}", *(f"warning: {text}" for text in warnings)]
+    table = {"recipe": checked.name, "faults": [], "warnings": warnings}
+    emit(table, as_json, "\n".join(lines))
 
 
 _records_option = click.option(
@@ -107,9 +119,9 @@ def recipe_preview(
     check_outputs([name], [(plot, PICTURE_SUFFIXES)], force)
     found = preview(load_recipe(name), records, seed=seed, cores=worker_count(jobs))
     if plot is not None:
-        from .panel import save_picture
+        from .picture import save_picture
 
-        save_picture(preview_figure(found), plot)
+        save_picture(preview_figure(found), plot, force=force)
     files = [str(plot)] if plot else []
     words = "\n".join([preview_text(found.table), *files])
     emit({**found.table, "files": files}, as_json, words)
@@ -193,7 +205,7 @@ def _generated_text(summary: Any) -> str:
     return "\n".join(lines)
 
 
-class _Segment(click.ParamType[float | None]):
+class _Segment(click.ParamType):  # type: ignore[type-arg]  # generic from click 8.3 on
     """A time with or without its unit, or ``whole``, which is None."""
 
     name = "segment"
@@ -260,7 +272,7 @@ def import_files(
     from ..datasets.import_set import import_recordings
     from ..datasets.importers import list_contents
     from ..datasets.labels import read_limits
-    from .import_text import contents_text, imported_table, imported_text
+    from .import_text import contents_text, empty_text, imported_table, imported_text
 
     if only_list:
         found = list_contents(files, declared_source(given))
@@ -283,7 +295,42 @@ def import_files(
             progress=progress,
             **{name: given[name] for name in _IMPORT_OPTIONS},
         )
+    if left_out := empty_text(summary):
+        click.echo(f"left out, nothing but NaN: {left_out}", err=True)
     emit(imported_table(summary), as_json, imported_text(summary))
+
+
+@click.command()
+@click.argument("files", metavar="FILES…", nargs=-1, required=True, type=PATH)
+@click.option("-o", "--output", type=PATH, required=True, help="Data set to write (.h5).")
+@click.option(
+    "--duplicates",
+    type=click.Choice(["refuse", "drop"]),
+    default="refuse",
+    show_default=True,
+    help="Records whose id and signal an earlier data set has.",
+)
+@force_option
+@json_option
+def merge(
+    files: Sequence[Path],
+    output: Path,
+    duplicates: Literal["refuse", "drop"],
+    force: bool,
+    as_json: bool,
+) -> None:
+    """Write the records of several data sets with the same channels and rate as one.
+
+    Machines of different data sets stay apart; the column `source` tells where a record is from.
+    """
+    from dataclasses import asdict
+
+    from ..datasets.merge import merge_sets, merged_text
+
+    check_outputs(files, [(output, DATA_SUFFIXES)], force)
+    with progress_bar("merging") as progress:
+        made = merge_sets(files, output, duplicates=duplicates, force=force, progress=progress)
+    emit({**asdict(made), "path": str(made.path)}, as_json, merged_text(made))
 
 
 _IMPORT_OPTIONS = (
@@ -308,7 +355,7 @@ def _labels(given: Mapping[str, Any]) -> Any:
     return read_labels(given["labels"], constants, given["severity"])
 
 
-class _Numbers(click.ParamType[tuple[float, ...]]):
+class _Numbers(click.ParamType):  # type: ignore[type-arg]
     """Numbers parted by commas."""
 
     name = "numbers"
@@ -322,11 +369,51 @@ class _Numbers(click.ParamType[tuple[float, ...]]):
             self.fail(f"{value!r} must be numbers parted by commas", param, ctx)
 
 
+_speed_option = click.option(
+    "--speed-hz",
+    type=float,
+    help="Shaft speed [Hz] where there is no tacho; by default the one stored in the file.",
+)
+
+
+class _Bearing(_Numbers):
+    """Rollers, two lengths and an angle, each with or without its unit."""
+
+    name = "bearing"
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> Any:
+        from ..sim.parts import to_si
+
+        if not isinstance(value, str):
+            return value
+        parts = [part.strip() for part in value.split(",")]
+        with_unit = [not NUMBER.fullmatch(part) for part in parts[1:3]]
+        if any(with_unit) and not all(with_unit):
+            self.fail(f"{value!r} must give both diameters with their unit, or neither", param, ctx)
+        try:
+            parts[1:3] = [
+                str(to_si(part, "length")) if unit else part
+                for part, unit in zip(parts[1:3], with_unit, strict=True)
+            ]
+        except ValueError as error:
+            self.fail(f"{value!r} {error}", param, ctx)
+        if len(parts) > 3:
+            parts[3] = parts[3].removesuffix("deg").removesuffix("°")
+        return super().convert(",".join(parts), param, ctx)
+
+
 _bearing_option = click.option(
     "--bearing",
-    type=_Numbers(),
+    type=_Bearing(),
     metavar="N,d,D[,DEG]",
     help="Rollers, their diameter, pitch diameter, contact angle: for its fault lines.",
+)
+
+_exponential_option = click.option(
+    "--exponential",
+    type=Share(1e-6, 1.0),
+    default=1.0,
+    help="Impact test: window sunk to this at the end of a block, 1: none; damping is corrected.",
 )
 
 _KINDS = (  # as wearstate.diagnose.signal_plots, which is too heavy to import for --help
@@ -349,8 +436,9 @@ _PLOT_OPTIONS = ("draw", "force_channel", "speed_hz", "bearing")
 @click.option("--kind", type=click.Choice(_KINDS), help="What to plot; by default all it supports.")
 @click.option("--draw", multiple=True, metavar="NAME", help="Channel to plot; all by default.")
 @click.option("--force-channel", metavar="NAME", help="Force of a transfer function to plot.")
-@click.option("--speed-hz", type=float, help="Shaft speed [Hz], where the file has none.")
+@_speed_option
 @_bearing_option
+@_exponential_option
 @source_options
 @force_option
 @json_option
@@ -372,6 +460,7 @@ def info(
     from .info import describe, describe_fft, description_text, fft_text, picture_text, plot_file
 
     wanted = {name: given.pop(name) for name in _PLOT_OPTIONS}
+    exponential = given.pop("exponential")
     if of_fft == (file is not None):
         raise click.UsageError("give either a FILE or --fft")
     if file is not None and (check or card is not None):
@@ -389,7 +478,14 @@ def info(
     text = description_text(described)
     if plot is not None:
         described["plot"] = plot_file(
-            file, plot, declared_source(given), kind=kind or _KINDS[0], **read, **wanted
+            file,
+            plot,
+            declared_source(given),
+            kind=kind or _KINDS[0],
+            exponential=exponential,
+            force=force,
+            **read,
+            **wanted,
         )
         text += f"\n{picture_text(described['plot'])}"
     emit(described, as_json, text)
@@ -411,7 +507,7 @@ def _about_set(
     if card is not None and found.get("sound", True):
         from .card import write_card
 
-        write_card(file, card, licence=licence)
+        write_card(file, card, licence=licence, force=force)
         found["card"] = str(card)
         words.append(str(card))
     emit(found, as_json, "\n".join(words))
@@ -609,8 +705,9 @@ _FEATURE_SETS = ("standard", "core", "complete")  # as wearstate.features.catalo
 )
 @click.option("--only", multiple=True, metavar="NAMES", help="Only these, parted by commas.")
 @click.option("--machine", metavar="KIND", help="Kind of machine, for its ISO zone.")
-@click.option("--speed-hz", type=float, help="Nominal shaft speed [Hz].")
+@_speed_option
 @_bearing_option
+@_exponential_option
 @click.option(
     "--band", "bands", type=_Numbers(), multiple=True, metavar="LOW,HIGH", help="Band level [Hz]."
 )
@@ -619,6 +716,7 @@ _FEATURE_SETS = ("standard", "core", "complete")  # as wearstate.features.catalo
 )
 @click.option(
     "--speed-band",
+    "speed_band_hz",
     type=_Numbers(),
     metavar="LOW,HIGH",
     help="Where the speed is looked for without a tacho [Hz].",
@@ -647,22 +745,27 @@ def features(
         raise click.UsageError("give DATA and --output, or --list")
     if only and feature_set:
         raise click.UsageError("give either --set or --only: names are looked for in every set")
-    from .tabulate import absent_in, choice_of, feature_table, save_table
+    from .tabulate import absent_in, choice_of, feature_table, impact_notes, save_table
 
     check_outputs([data], [(output, TABLE_SUFFIXES)], force)
     names = [name.strip() for part in only for name in part.split(",")]
-    about["speed_band_hz"] = about.pop("speed_band")
     wanted: Any = feature_set or _FEATURE_SETS[0]
     choice = choice_of(wanted, names, **about)
-    absent = absent_in(data, choice)
+    command = click.get_current_context().command
+    absent = {name: as_options(why, command) for name, why in absent_in(data, choice).items()}
     if feature_set and absent:
         click.echo(f"absent, as --json explains: {', '.join(absent)}", err=True)
+    elif slow := [name for name, why in absent.items() if why.startswith("fs = ")]:
+        click.echo(f"absent: {', '.join(slow)}: {absent[slow[0]]}", err=True)
     with progress_bar("features") as progress:
         table = feature_table(data, choice=choice, jobs=worker_count(jobs), progress=progress)
-    save_table(table, output)
+    save_table(table, output, force=force)
     size = {"path": str(output), "records": len(table.values), "features": len(table.names)}
     text = f"{output}: {size['records']} records, {size['features']} features"
-    emit({**size, "absent": absent}, as_json, text)
+    struck = impact_notes(data) if any("frf." in name for name in table.names) else {}
+    for note, count in struck.items():
+        click.echo(f"impact test, {count} records: {note}", err=True)
+    emit({**size, "absent": absent, "impacts": struck}, as_json, text)
 
 
 def _emit_catalogue(feature_set: Any, as_json: bool) -> None:

@@ -64,13 +64,17 @@ def scene_show(name: str) -> None:
 @click.argument("file")
 @json_option
 def scene_check(file: str, as_json: bool) -> None:
-    """Check a scene file; every fault at once."""
+    """Check a scene file; every fault at once, and warnings of what is hardly meant."""
     from ..sim.assemble import check
+    from ..sim.plausibility import scene_doubts
     from ..sim.scene import load_scene
 
     checked = load_scene(file)
     check(checked)
-    emit({"scene": checked.name, "faults": []}, as_json, f"{checked.name}: no fault")
+    warnings = [doubt.text for doubt in scene_doubts(checked)]
+    told = f", {len(warnings)} warning(s)" if warnings else ""
+    lines = [f"{checked.name}: no fault{told}", *(f"warning: {text}" for text in warnings)]
+    emit({"scene": checked.name, "faults": [], "warnings": warnings}, as_json, "\n".join(lines))
 
 
 @click.command()
@@ -109,7 +113,7 @@ def simulate(
     if plot is not None:
         from .plots import plot_simulation
 
-        plot_simulation(machine, solution, plot)
+        plot_simulation(machine, solution, plot, force=force)
     vibration = [
         (channel, float(row.std()))
         for channel, row in zip(solution.channels, solution.signal, strict=True)
@@ -151,6 +155,20 @@ def simulate(
     show_default=True,
     help="Least sum of moves, or fewest bearings moved.",
 )
+@click.option(
+    "--target",
+    type=click.Choice(["limits", "even"]),
+    default="limits",
+    show_default=True,
+    help="limits: least moves that meet them; even: also reactions as even as they allow.",
+)
+@click.option(
+    "--margin",
+    type=Share(0.0, 0.9),
+    default=0.0,
+    show_default=True,
+    help="Keep this share of each limit away from it.",
+)
 @click.option("--jack", metavar="BEARING", help="Jacking test beside this bearing.")
 @click.option(
     "--test",
@@ -172,6 +190,8 @@ def align(
     condition: str,
     calibrate: bool,
     prefer: str,
+    target: str,
+    margin: float,
     jack: str | None,
     rig_test: str | None,
     push: str | None,
@@ -190,17 +210,31 @@ def align(
 
     if rig_test is None and (push or test_plot or seed):
         raise click.UsageError("--push, --test-plot and --seed need --test")
+    if not calibrate and (margin or target != "limits" or prefer != "least"):
+        raise click.UsageError(
+            "--margin, --target and --prefer are of the moves: leave out --no-calibrate"
+        )
     if rig_test is not None and not calibrate:
         raise click.UsageError("--test compares before and after the moves: it needs --calibrate")
     outputs = [(plot, PICTURE_SUFFIXES), (output, PAGE_SUFFIXES), (test_plot, PICTURE_SUFFIXES)]
     check_outputs([scene_name], outputs, force)
     scene = load_scene(scene_name, overrides_of(pairs))
-    found = judge(scene, condition=condition, mend=calibrate, prefer=prefer, jack=jack)
+    found = judge(
+        scene,
+        condition=condition,
+        mend=calibrate,
+        prefer=prefer,
+        target=target,
+        margin=margin,
+        jack=jack,
+    )
+    result, tested, words = _tested(
+        scene, found.calibration, rig_test, push, test_plot, seed, force
+    )
     if plot is not None:
-        save_figure(found, plot)
+        save_figure(found, plot, force=force)
     if output is not None:
-        save_html(found, output)
-    tested, words = _tested(scene, found.calibration, rig_test, push, test_plot, seed)
+        save_html(found, output, result, note="" if result else "".join(words), force=force)
     files = [str(path) for path, _ in outputs if path and path.exists()]
     text = "\n".join([align_text(found), *words, *files])
     emit({**align_table(found), "test": tested, "files": files}, as_json, text)
@@ -216,18 +250,20 @@ def _tested(
     push: str | None,
     picture: Path | None,
     seed: int,
-) -> tuple[dict[str, Any] | None, list[str]]:
-    """Table and text of the simulated test before and after the moves, if one was asked for."""
+    force: bool,
+) -> tuple[Any, dict[str, Any] | None, list[str]]:
+    """Result, table and text of the simulated test of the moves, if one was asked for."""
     if kind is None:
-        return None, []
+        return None, None, []
+    from .picture import save_picture
     from .rig import calibrated_test, rig_figure, rig_table, rig_text
 
     result = calibrated_test(scene, calibration, kind, push=push, seed=seed)
     if result is None:
-        return None, ["", "no test: nothing moves, so nothing changes"]
+        return None, None, ["", "no test: nothing moves, so nothing changes"]
     if picture is not None:
-        rig_figure(result).savefig(picture, dpi=110)
-    return rig_table(result), ["", rig_text(result)]
+        save_picture(rig_figure(result), picture, force=force)
+    return result, rig_table(result), ["", rig_text(result)]
 
 
 @click.command()
@@ -264,7 +300,7 @@ def stability(
         maps = atlas(machine, name=map_name, budget=budget, size=size, progress=progress)
     files = [str(output)] if output is not None else []
     if output is not None:
-        save_figure(machine, maps, output)
+        save_figure(machine, maps, output, force=force)
     text = "\n".join([stability_text(machine, maps), *files])
     emit({**stability_table(machine, maps), "files": files}, as_json, text)
 
@@ -324,7 +360,7 @@ def chart(
     if output is not None:
         from .chart_figure import save_chart
 
-        save_chart(found, output)
+        save_chart(found, output, force=force)
     files = [str(output)] if output is not None else []
     emit({**chart_table(found), "files": files}, as_json, "\n".join([chart_text(found), *files]))
 

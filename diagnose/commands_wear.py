@@ -94,7 +94,6 @@ def train(
     from .healthy import references
     from .modelfile import save_model
     from .own import names_classes
-    from .tabulate import feature_table
     from .train import train_model
 
     inputs = [data] if healthy is None else [data, healthy]
@@ -125,8 +124,9 @@ def train(
         )
         reference = None
         if healthy is not None:
-            known = feature_table(healthy, jobs=worker_count(jobs), progress=progress)
-            reference = references(table, known, healthy)
+            reference, _ = references(
+                table, data, healthy, jobs=worker_count(jobs), progress=progress
+            )
     save_model(model, output, force=force)
     result = score(model, table, test, references=reference) if len(test) else {}
     trained = model.card["trained_on"]
@@ -251,7 +251,7 @@ def evaluate(
             raise click.UsageError("a model of named conditions takes no such option")
         _judge_classes(model_file, data, seed, worker_count(jobs), as_json)
         return
-    _judge(model_file, data, output, seed, worker_count(jobs), as_json, given)
+    _judge(model_file, data, output, seed, worker_count(jobs), force, as_json, given)
 
 
 _EVALUATION = (".html", ".png", ".svg", ".pdf", ".json")
@@ -274,6 +274,7 @@ def _judge(
     output: Path | None,
     seed: int,
     jobs: int,
+    force: bool,
     as_json: bool,
     given: Mapping[str, Any],
 ) -> None:
@@ -299,7 +300,7 @@ def _judge(
             whole = one_split(result, model, data, seed)
             text = "\n".join(score_lines(result, model.card))
     if output is not None:
-        save_evaluation(whole, output, notice=model.notice)
+        save_evaluation(whole, output, notice=model.notice, force=force)
     emit(result, as_json, text)
 
 
@@ -409,7 +410,7 @@ def report(
     many = _holds_many(source)
     if not many and (given["trend"] or given["dates"]):
         raise click.UsageError("--trend and --dates are for a folder or a data set of many records")
-    told = _Told(source, model_file, model, baselines, output, machine, as_json, given)
+    told = _Told(source, model_file, model, baselines, output, machine, as_json, force, given)
     verdicts = _report_many(told) if many else _report_one(told)
     raise click.exceptions.Exit(report_exit(verdicts, fail_on))
 
@@ -424,9 +425,9 @@ def _holds_many(source: Path) -> bool:
 
 
 def _report_class(source: Path, model_file: Path, given: Mapping[str, Any], as_json: bool) -> None:
-    """The condition in recordings, each as soon as it is told; exit 2 where none can be."""
+    """The condition in recordings; of JSON each as soon as it is told. Exit 2 where none can be."""
     from ..datasets.importers import read_recording
-    from .own import name_all, naming_text
+    from .own import name_all, naming_text, namings_summary
     from .ownfile import load_class_model
     from .report_batch import recordings_in
 
@@ -438,17 +439,19 @@ def _report_class(source: Path, model_file: Path, given: Mapping[str, Any], as_j
         emit({**naming.as_dict(), "notice": model.notice}, as_json, naming_text(naming) + notice)
         verdicts = {naming.verdict}
     else:
-        verdicts = set()
+        verdicts, lines = set(), []
+        namings = []
         with recordings_in(
             source, declared_source(given), **tacho, leave_out=[model_file]
         ) as items:
             for name, naming in name_all(items, model):
                 verdicts.add(naming.verdict)
-                emit(
-                    {"recording": name, **naming.as_dict()},
-                    as_json,
-                    f"{name}: {naming_text(naming)}",
-                )
+                namings.append(naming)
+                lines.append(f"{name}: {naming_text(naming)}")
+                if as_json:
+                    emit({"recording": name, **naming.as_dict()}, as_json, "")
+        if not as_json:
+            click.echo("\n".join([f"{source.name}: {namings_summary(namings)}", *lines]))
         if model.notice:
             click.echo(f"Notice: {model.notice}.", err=as_json)
     if verdicts == {"unusable"}:
@@ -465,6 +468,7 @@ class _Told(NamedTuple):
     output: Path | None
     machine: str | None
     as_json: bool
+    force: bool
     given: Mapping[str, Any]
 
 
@@ -484,7 +488,7 @@ def _report_one(told: _Told) -> list[_Verdict]:
         tacho=told.given["tacho"],
         pulses_per_revolution=told.given["pulses_per_revolution"],
     )
-    baseline = told.baselines.of(recording.row) if told.baselines else None
+    baseline = told.baselines.of(recording) if told.baselines else None
     estimate = told.model.estimate(recording, baseline)
     table = report_table(
         recording,
@@ -498,7 +502,7 @@ def _report_one(told: _Told) -> list[_Verdict]:
         from .report_page import report_html
 
         page = report_html(table, recording, told.model, baseline=baseline)
-        save_page(page, told.output)
+        save_page(page, told.output, force=told.force)
         table["html"] = str(told.output)
     text = report_text(table) + (f"\nPage        {told.output}" if told.output else "")
     click.echo(json_text(table) if told.as_json else text)
@@ -543,7 +547,7 @@ def _report_many(told: _Told) -> list[_Verdict]:
             from .report_page import batch_html
 
             page = batch_html(batch, told.model, machine=told.machine, baselines=told.baselines)
-            save_page(page, told.output)
+            save_page(page, told.output, force=told.force)
     if not told.as_json:
         click.echo(batch_text(batch) + (f"\nPage        {told.output}" if told.output else ""))
     return [(row.verdict, row.grade) for row in batch.current]

@@ -115,7 +115,8 @@ class Estimate:
     ----------
     verdict : {"graded", "caution", "unfamiliar", "unusable"}
         Caution: graded, but read `cautions`. Unfamiliar: no grade, the machine is none of the
-        trained kind. Unusable: no grade, the recording is at fault.
+        trained kind. Unusable: no grade, the recording is at fault, or there is
+        no healthy reference for a model that needs one.
     faults : tuple of Fault
         Of the data.
     reasons : tuple of str
@@ -173,6 +174,11 @@ class Estimate:
     def graded(self) -> bool:
         """Whether there is a grade, with or without caution."""
         return self.verdict in ("graded", "caution")
+
+    @property
+    def unreferenced(self) -> bool:
+        """Unusable for want of the healthy reference alone: the recording itself is sound."""
+        return self.reasons == (NO_BASELINE,)
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
@@ -285,7 +291,7 @@ class WearModel:
         if self.mode == "cold":
             return rows
         if baseline is None:
-            raise DataError(_NO_BASELINE)
+            raise DataError(NO_BASELINE)
         return referenced_rows(rows, baseline)
 
     def estimate(self, recording: Recording, baseline: Baseline | None = None) -> Estimate:
@@ -398,7 +404,7 @@ class WearModel:
         faults: tuple[Fault, ...],
     ) -> Estimate:
         if self.mode == "referenced" and baseline is None:
-            return Estimate(verdict="unusable", reasons=(_NO_BASELINE,), mode=self.mode)
+            return Estimate(verdict="unusable", reasons=(NO_BASELINE,), mode=self.mode)
         known: dict[str, Any] = {
             "faults": faults,
             "mode": self.mode,
@@ -528,10 +534,11 @@ class WearModel:
         return tuple((self.names[i], float(row[i]), float(mean[i]), float(moved[i])) for i in order)
 
 
-_NO_BASELINE = (
+NO_BASELINE = (
     "the model was trained with a baseline and needs healthy recordings of this machine: give "
     "--baseline healthy.h5, or use a model that was trained cold"
 )
+"""Reason of a verdict that lacks nothing but the reference."""
 
 
 def _strangeness(distance: float, calibration: Float) -> str:

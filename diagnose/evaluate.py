@@ -9,14 +9,14 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from ..datasets.record import DataError, DataSet
+from ..datasets.record import Attributes, DataError, DataSet
 from ..datasets.split_file import Sides, usable_sides
 from .baselines import Side, contest, side_of
 from .conformal import grade_limits, grade_set, interval, scale_inputs, tails
 from .estimate import Estimate, WearModel
 from .foreign import kitchen
 from .grades import grades_of
-from .healthy import references
+from .healthy import references, refuse_strangers
 from .scores import (
     Judged,
     Resamples,
@@ -116,11 +116,12 @@ def evaluate_model(
         the split tests.
     """
     sides = None if split is None else _sides(path, split)
+    if healthy is not None:
+        refuse_strangers(path, healthy)
     table, rows = judged_rows(model, path, sides=sides, jobs=jobs, progress=progress)
     reference = None
     if healthy is not None:
-        new = feature_table(healthy, jobs=jobs, progress=progress)
-        reference = references(table, new, healthy)
+        reference, _ = references(table, path, healthy, jobs=jobs, progress=progress)
     home, home_table = (path, table) if trained_on is None else (trained_on, None)
     if home_table is None:
         home_table = feature_table(home, jobs=jobs, progress=progress)
@@ -182,11 +183,7 @@ def judged_rows(
     """
     with DataSet(path) as data:
         head = data.attributes
-    if model.card["severity"] not in head.severities:
-        raise DataError(
-            f"{path}: severities = {list(head.severities)}, must hold {model.card['severity']}; "
-            "label the data set"
-        )
+    refuse_other_severity(model, head, path)
     table = feature_table(path, jobs=jobs, progress=progress)
     if sides is not None:
         return table, tested_rows(model, table, sides, draw_identity(head), path)
@@ -241,6 +238,23 @@ def tested_rows(
             "without --split on the machines that the model has not seen"
         )
     return sides.test
+
+
+def refuse_other_severity(model: WearModel, head: Attributes, path: str | Path) -> None:
+    """Refuse a data set that is not labelled with the severity of a model.
+
+    Raises
+    ------
+    DataError
+        Names both.
+    """
+    wanted = model.card["severity"]
+    if wanted not in head.severities:
+        raise DataError(
+            f"{path}: severities = {', '.join(head.severities) or 'none'}, must hold that of the "
+            f"model, {wanted}; if one of them is the same wear, import it under that name: "
+            f"--severity {wanted}"
+        )
 
 
 def _check_features(model: WearModel, table: FeatureTable, path: str | Path) -> None:

@@ -1,19 +1,17 @@
 """Pictures and page of an evaluation: errors by split, confusion, reliability, what is found."""
 
-import base64
-import io
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from .evaluate_text import best_baseline
 from .grades import GRADE_NAMES
-from .panel import DOTS_PER_INCH
+from .page import render, short_name
+from .picture import encoded, save_picture
 from .report import quantity_name, save_page
 
 Result = Mapping[str, Any]
 
-_TEMPLATES = Path(__file__).parent / "templates"
 _OURS, _IDEAL, _SECOND = "#1f5a94", "#9aa3ab", "#e07b39"
 _RIVALS = {
     "majority": ("#b8bfc6", "s"),
@@ -51,7 +49,7 @@ def evaluation_figure(result: Result) -> Any:
     rows = (len(panels) + 1) // 2
     figure = Figure(figsize=(2 * _WIDTH, _HEIGHT * rows), layout="constrained")
     what = f"{quantity_name(result['severity'])}, {result['origin']}"
-    figure.suptitle(f"{result['data']}: {what}", fontsize=11)
+    figure.suptitle(f"{short_name(result['data'], 60)}: {what}", fontsize=11)
     for place, (_, _, draw) in enumerate(panels, start=1):
         draw(figure.add_subplot(rows, 2, place))
     return figure
@@ -117,7 +115,7 @@ def draw_errors(axes: Any, splits: Sequence[Result]) -> None:
                     ms=6,
                     label=name.replace("_", " ") if place == 0 else None,
                 )
-    axes.set_yticks(range(len(splits)), [split["name"] for split in splits])
+    axes.set_yticks(range(len(splits)), [short_name(split["name"]) for split in splits])
     axes.set_ylim(len(splits) - 0.5, -0.5)
     axes.set_xscale("log")
     axes.xaxis.set_major_formatter("{x:g}")
@@ -208,7 +206,7 @@ def draw_familiarity(axes: Any, splits: Sequence[Result]) -> None:
             [row["share"]["value"] for row in rows],
             marker=".",
             lw=2.2 if split is splits[0] else 1.0,
-            label=split["name"],
+            label=short_name(split["name"]),
         )
     axes.set(xlabel="novelty p-value", ylabel="share of records at or below", ylim=(-0.02, 1.02))
     axes.grid(alpha=0.3)
@@ -248,7 +246,7 @@ def draw_floors(axes: Any, rows: Sequence[Result], limit: float) -> None:
     new = 100 * rows[0]["healthy_below_m"] / limit
     axes.axvline(new, color=_IDEAL, ls="--", label="healthy up to here")
     axes.legend(fontsize=8, loc="lower center", bbox_to_anchor=(0.4, 1.0), frameon=False)
-    axes.set_yticks(range(len(rows)), [row["condition"] for row in rows], fontsize=8)
+    axes.set_yticks(range(len(rows)), [short_name(row["condition"]) for row in rows], fontsize=8)
     axes.set(ylim=(len(rows) - 0.5, -0.5), xlim=(0, 1.03 * edge))
     axes.set_xlabel("least wear found [% of the condemning limit]")
     axes.grid(axis="x", alpha=0.3)
@@ -272,16 +270,10 @@ def evaluation_html(result: Result, *, notice: str = "") -> str:
     str
         HTML.
     """
-    import jinja2
-
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(_TEMPLATES),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-    )
     made = made_splits(result)
     panels = _panels(result) if made else []
-    return environment.get_template("evaluate.html.j2").render(
+    return render(
+        "evaluate.html.j2",
         result=result,
         made=made,
         absent=[split for split in result["splits"] if split["missing"]],
@@ -298,13 +290,13 @@ def _picture(draw: Callable[[Any], None]) -> str:
 
     figure = Figure(figsize=(_WIDTH, _HEIGHT), layout="constrained")
     draw(figure.add_subplot())
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=DOTS_PER_INCH)
-    return "data:image/png;base64," + base64.b64encode(buffer.getvalue()).decode()
+    return encoded(figure)
 
 
-def save_evaluation(result: Result, path: Path, *, notice: str = "") -> None:
+def save_evaluation(result: Result, path: Path, *, notice: str = "", force: bool = True) -> None:
     """Write an evaluation as a page, as a picture or as JSON, by the suffix.
+
+    Measured times (``cost``) are left out: the same evaluation gives the same bytes.
 
     Parameters
     ----------
@@ -314,6 +306,8 @@ def save_evaluation(result: Result, path: Path, *, notice: str = "") -> None:
         ``.html``, ``.png``, ``.svg``, ``.pdf`` or ``.json``.
     notice : str
         Of the model, for the page.
+    force : bool
+        Replace an existing file.
 
     Raises
     ------
@@ -323,13 +317,13 @@ def save_evaluation(result: Result, path: Path, *, notice: str = "") -> None:
     import json
 
     from ..datasets.record import DataError
-    from .panel import save_picture
 
+    lasting = {name: value for name, value in result.items() if name != "cost"}
     if path.suffix == ".json":
-        save_page(json.dumps(result, allow_nan=False, indent=1) + "\n", path)
+        save_page(json.dumps(lasting, allow_nan=False, indent=1) + "\n", path, force=force)
     elif path.suffix == ".html":
-        save_page(evaluation_html(result, notice=notice), path)
+        save_page(evaluation_html(result, notice=notice), path, force=force)
     elif not made_splits(result):
         raise DataError(f"{path}: 0 splits could be made, must be > 0 for a picture; write .html")
     else:
-        save_picture(evaluation_figure(result), path)
+        save_picture(evaluation_figure(result), path, force=force)

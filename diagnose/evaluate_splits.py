@@ -22,7 +22,7 @@ from .baselines import (
     side_of,
 )
 from .estimate import WearModel
-from .evaluate import Background, judge_rows, score
+from .evaluate import Background, judge_rows, refuse_other_severity, score
 from .foreign import (
     LEFT_OUT,
     PACKAGES,
@@ -200,11 +200,7 @@ def case_of(
     card = model.card
     with DataSet(path) as data:
         head = data.attributes
-    if card["severity"] not in head.severities:
-        raise DataError(
-            f"{path}: severities = {list(head.severities)}, must hold {card['severity']}; label "
-            "the data set"
-        )
+    refuse_other_severity(model, head, path)
     if (model.mode == "referenced") != (healthy is not None):
         raise DataError(
             f"{path}: the model is {model.mode}, and healthy recordings are "
@@ -213,8 +209,7 @@ def case_of(
     table = feature_table(path, jobs=jobs, progress=progress)
     reference = None
     if healthy is not None:
-        known = feature_table(healthy, jobs=jobs, progress=progress)
-        reference = references(table, known, healthy)
+        reference, _ = references(table, path, healthy, jobs=jobs, progress=progress)
     train, _ = group_split(table.manifest["group"].to_numpy(), test_fraction=TEST_SHARE, seed=seed)
     cook = kitchen(Path(path), train, seed=seed, quick=quick, cache=cache, progress=progress)
 

@@ -6,12 +6,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
-from ..datasets.import_rows import GROUP_NAME
 from ..datasets.record import DataError, DataSet, Recording
 from .quality import layout_faults, sample_faults
-from .tabulate import FeatureTable, recording_features
+from .tabulate import FeatureTable, Progress, feature_table, recording_features
 
 Float = NDArray[np.float64]
 
@@ -60,46 +60,117 @@ def referenced_rows(rows: Float, baseline: Float) -> Float:
 
 
 def references(
-    table: FeatureTable, healthy: FeatureTable, path: str | Path = "the healthy set"
-) -> Float:
-    """Mean healthy row of the machine of each record.
+    table: FeatureTable,
+    path: str | Path,
+    healthy: str | Path,
+    *,
+    jobs: int = 1,
+    progress: Progress | None = None,
+) -> tuple[Float, int]:
+    """Mean healthy row of the machine of each record, paired by what tells the machine.
 
     Parameters
     ----------
     table : FeatureTable
         Records in question.
-    healthy : FeatureTable
-        Healthy records of the same machines: the same numbers in the column ``group``.
     path : str or Path
-        Of the healthy set, for messages.
+        Their data set.
+    healthy : str or Path
+        Data set of healthy records of the same machines: drawn by the same recipe under the same
+        seed, or measured and named alike. Equal numbers alone make no machine the same.
+    jobs : int
+        Worker processes for the features.
+    progress : callable, optional
+        Called with (records done, records).
 
     Returns
     -------
-    numpy.ndarray [shape=(n_records, n_features)]
+    rows : numpy.ndarray [shape=(n_records, n_features)]
+    records : int
+        Healthy records in all.
 
     Raises
     ------
     DataError
-        The features are others, or machines have no healthy record.
+        As of :func:`refuse_strangers`, or the features are others.
     """
-    if healthy.names != table.names:
+    refuse_strangers(path, healthy)
+    known = feature_table(healthy, jobs=jobs, progress=progress)
+    if known.names != table.names:
         raise DataError(
-            f"{path}: its {len(healthy.names)} features are not the {len(table.names)} of the data "
-            "set; use the same channels and rate"
+            f"{healthy}: its {len(known.names)} features are not the {len(table.names)} of the "
+            "data set; use the same channels and rate"
         )
-    groups = healthy.manifest["group"].to_numpy()
-    wanted = table.manifest["group"].to_numpy()
-    missing = np.setdiff1d(wanted, groups)
-    if missing.size:
-        raise DataError(
-            f"{path}: {missing.size} machine draws have no healthy record, must be 0: "
-            f"{_few(missing.tolist())}; generate them with the same seed and as many machines"
+    return _means(known.values, _machines_in(healthy), _machines_in(path)), len(known.values)
+
+
+def refuse_strangers(path: str | Path, healthy: str | Path) -> None:
+    """Refuse a healthy set that is not known to be of the machines of another set.
+
+    Parameters
+    ----------
+    path, healthy : str or Path
+        As of :func:`references`.
+
+    Raises
+    ------
+    DataError
+        A set does not tell its machines, machines have no healthy record, or records of the
+        healthy set are of worn machines; all at once.
+    """
+    wanted, machines = _machines_in(path), _machines_in(healthy)
+    sets = ((path, wanted, healthy), (healthy, machines, path))
+    faults = [_unknown_words(own, names, other) for own, names, other in sets if "" in names]
+    missing = [] if faults else sorted(set(wanted.tolist()) - set(machines.tolist()))
+    if missing:
+        faults.append(
+            f"{healthy}: {len(missing)} machines of {path} have no healthy record, must be 0: "
+            f"{_few(missing)}; it has {_few(sorted(set(machines.tolist())))}; {_SAME_MACHINES}"
         )
-    machines, place = np.unique(groups, return_inverse=True)
-    means = np.zeros((len(machines), len(table.names)))
-    np.add.at(means, place, healthy.values)
+    with DataSet(healthy) as data:
+        faults += _worn_words(healthy, data.manifest[data.manifest["status"] == "ok"])
+    if faults:
+        raise DataError("\n".join(faults))
+
+
+_SAME_MACHINES = (
+    "generate it with the same seed from a recipe whose machines_of names the other's recipe, or "
+    "import both with the same names of machines in the label group"
+)
+
+
+def _machines_in(path: str | Path) -> NDArray[np.str_]:
+    """Machine of each usable record, as the rows of its feature table."""
+    with DataSet(path) as data:
+        usable = (data.manifest["status"] == "ok").to_numpy()
+        return np.array(data.machines, dtype=str)[usable]
+
+
+def _unknown_words(path: str | Path, machines: NDArray[np.str_], other: str | Path) -> str:
+    return (
+        f"{path}: {int((machines == '').sum())} of {len(machines)} records do not tell their "
+        f"machine, must be 0 to pair them with those of {other} (numbers and file names are no "
+        "machines); import with the label group, or --group-by folder"
+    )
+
+
+def _worn_words(path: str | Path, rows: pd.DataFrame) -> list[str]:
+    worn = int((rows["grade"] > 0).sum())
+    if not worn:
+        return []
+    return [
+        f"{path}: {worn} of {len(rows)} recordings have a grade above 0, must be of a healthy "
+        "machine; leave them out"
+    ]
+
+
+def _means(values: Float, machines: NDArray[np.str_], wanted: NDArray[np.str_]) -> Float:
+    """Mean row of each wanted machine."""
+    names, place = np.unique(machines, return_inverse=True)
+    means = np.zeros((len(names), values.shape[1]))
+    np.add.at(means, place, values)
     means /= np.bincount(place)[:, None]
-    return np.asarray(means[np.searchsorted(machines, wanted)])
+    return np.asarray(means[np.searchsorted(names, wanted)])
 
 
 def _few(numbers: Sequence[object]) -> str:
@@ -157,13 +228,14 @@ def baseline_of(
 
 
 class Baselines:
-    """Healthy recordings in a data set: of the machine in question, or of several by their names.
+    """Healthy recordings in a data set: of the machine in question, or of several by identity.
 
     Parameters
     ----------
     path : str or Path
-        Data set. Simulated machines go by the column ``group``, measured ones by ``group_name``;
-        measured recordings of none of its names are taken to be of the same machine as all of it.
+        Data set. Machines go by :attr:`wearstate.datasets.record.DataSet.machines`, never by
+        number; a set of one machine, or of files without names, is taken to be of the machine of
+        a recording that does not tell its own.
     card : mapping
         Of the model.
 
@@ -182,23 +254,21 @@ class Baselines:
         self.source = str(path)
         self._path, self._card = Path(path), card
         with DataSet(path) as data:
-            self._rows = data.manifest[data.manifest["status"] == "ok"]
-            self._simulated = data.attributes.origin == "simulated"
-        worn = self._rows["grade"] > 0
-        if worn.any():
-            raise DataError(
-                f"{path}: {int(worn.sum())} of {len(worn)} recordings have a grade above 0, must "
-                "be of a healthy machine; leave them out"
-            )
-        self._found: dict[Any, Baseline] = {}
+            usable = (data.manifest["status"] == "ok").to_numpy()
+            self._records = np.flatnonzero(usable)
+            self._machines = np.array(data.machines, dtype=str)[usable]
+            worn = _worn_words(path, data.manifest[usable])
+        if worn:
+            raise DataError(worn[0])
+        self._found: dict[str, Baseline] = {}
 
-    def of(self, row: Mapping[str, Any]) -> Baseline:
-        """That of one machine; read when it is first asked for.
+    def of(self, recording: Recording) -> Baseline:
+        """That of the machine of a recording; read when it is first asked for.
 
         Parameters
         ----------
-        row : mapping
-            What its data set knows of the recording in question.
+        recording : Recording
+            In question.
 
         Returns
         -------
@@ -207,30 +277,30 @@ class Baselines:
         Raises
         ------
         DataError
-            None of several machines is this one; as of :func:`baseline_of`.
+            It is not known to be of a machine in the set; as of :func:`baseline_of`.
         """
-        key, records = self._machine(row)
-        if key not in self._found:
+        machine = recording.machine
+        self._refuse_stranger(machine, recording.source or "the recording")
+        if machine not in self._found:
+            records = self._records[self._machines == machine] if machine else self._records
             with DataSet(self._path) as data:
                 healthy = (data[int(i)] for i in records)
-                self._found[key] = baseline_of(healthy, self._card, self.source)
-        return self._found[key]
+                self._found[machine] = baseline_of(healthy, self._card, self.source)
+        return self._found[machine]
 
-    def _machine(self, row: Mapping[str, Any]) -> tuple[Any, NDArray[np.intp]]:
-        """Name of the machine and the healthy records of it; None and all where all are of it."""
-        column = "group" if self._simulated else GROUP_NAME
-        names = self._rows.get(column)
-        records = self._rows.index.to_numpy()
-        if names is None or names.nunique() <= 1:
-            return None, records
-        name = row.get(column)
-        mine = (names == name).to_numpy()
-        if mine.any():
-            return name, records[mine]
-        if not self._simulated:
-            return None, records
-        raise DataError(
-            f"{self.source} has healthy recordings of {names.nunique()} machines, must have some "
-            f"of this one ({'not named' if name is None else f'{column} {name}'}); give a data set "
-            "of its recordings only"
-        )
+    def _refuse_stranger(self, machine: str, name: str) -> None:
+        known = sorted(set(self._machines.tolist()))
+        if machine in known or len(known) == 0:
+            return  # without any, reading tells
+        here = _few([one or "a machine without a name" for one in known])
+        if machine:
+            raise DataError(
+                f"{self.source} has healthy recordings of {here}, must have some of {machine}, "
+                f"which {name} is of; {_SAME_MACHINES}"
+            )
+        if len(known) > 1:
+            raise DataError(
+                f"{self.source} has healthy recordings of {len(known)} machines ({here}), must "
+                f"have those of one: {name} does not tell its machine; give a data set of its "
+                "recordings only"
+            )

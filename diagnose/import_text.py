@@ -1,5 +1,6 @@
 """What an import made, and what files hold, in words."""
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
@@ -56,6 +57,20 @@ def _span(values: Sequence[float]) -> str:
     return " to ".join(dict.fromkeys(f"{value:.4g}" for value in values))
 
 
+def empty_text(summary: ImportSummary) -> str:
+    """Channels that were left out because they hold no number; empty where there are none.
+
+    Parameters
+    ----------
+    summary : ImportSummary
+    """
+    kinds = Counter(summary.empty.values())
+    return "; ".join(
+        f"{', '.join(names)} in {count} of {summary.n_files} file(s)"
+        for names, count in kinds.most_common()
+    )
+
+
 def _omissions(summary: ImportSummary) -> list[str]:
     lines = [
         f"  {count} with status {status}, which features leaves out"
@@ -104,6 +119,8 @@ def _part_lines(part: Mapping[str, Any]) -> list[str]:
     size = f"{part['samples']} samples, rate not declared"
     if rate is not None:
         size = f"{part['samples']} samples at {rate:.10g} Hz, {part['duration_s']:.6g} s"
+    if part["records"] > 1:
+        size = f"{part['records']} records of {size}"
     channels = [f"{c['name']} [{c['unit_in_file'] or 'not declared'}]" for c in part["channels"]]
     conditions = [f"{name} = {value:.6g}" for name, value in part["conditions"].items()]
     about = [", ".join(words) for words in (channels, conditions) if words]

@@ -11,14 +11,17 @@ import numpy as np
 import scipy
 
 from ..datasets.importers import read_recording
+from ..datasets.plausible import recording_doubts, scene_in
 from ..datasets.record import DataError, DataSet, Recording
 from ..datasets.source_part import SourceOptions
 from ..features import fft
+from ..sim.parts import Scene
 from ..sim.sensor import Channel
 from .bundle import kind_of
 from .modelfile import load_model
 from .ownfile import CLASS_MODEL, load_class_model
-from .panel import save_picture
+from .picture import save_picture
+from .quality import sample_faults
 from .signal_plots import AUTO, plot_recording
 from .signal_view import View
 from .tabulate import choice_of, confounders_in
@@ -80,9 +83,11 @@ def description_text(described: Mapping[str, Any]) -> str:
     kind         recording
     sample rate  25600 Hz
     """
-    lines = dict(_line(key, value) for key, value in described.items())
+    facts = {key: value for key, value in described.items() if key != "warnings"}
+    lines = dict(_line(key, value) for key, value in facts.items())
     width = max(len(name) for name in lines)
-    return "\n".join(f"{name:{width}}  {value}" for name, value in lines.items())
+    told = [f"{name:{width}}  {value}" for name, value in lines.items()]
+    return "\n".join([*told, *(f"warning: {text}" for text in described.get("warnings", ()))])
 
 
 def _line(key: str, value: Any) -> tuple[str, str]:
@@ -179,8 +184,9 @@ def _describe_model(path: Path) -> dict[str, Any]:
 def _describe_data(path: Path) -> dict[str, Any]:
     with DataSet(path) as data:
         head, manifest = data.attributes, data.manifest
+        warnings = _Warnings(scene_in(head), single=len(data) == 1)
         for index in range(len(data)):  # every signal against its checksum
-            data[index]
+            warnings.look(index, data[index])
         first = data[0]
     return {
         "kind": "data set" if len(manifest) > 1 else "recording",
@@ -204,7 +210,44 @@ def _describe_data(path: Path) -> dict[str, Any]:
         },
         "condemning_limit_m": head.condemning_limit if head.limit_source else None,
         "limit_source": head.limit_source,
+        "warnings": warnings.texts(),
     }
+
+
+class _Warnings:
+    """What of the records of a file is hardly meant: one text for every check, and a count."""
+
+    def __init__(self, scene: Scene | None, *, single: bool) -> None:
+        self.scene, self.single = scene, single
+        self.found: dict[str, list[tuple[int, str]]] = {}
+
+    def look(self, index: int, recording: Recording) -> None:
+        """Note what is in doubt of one record; one that failed is told by its status."""
+        if recording.row.get("status", "ok") == "ok":
+            for check, text in _doubts(recording, self.scene, run=self.single):
+                self.found.setdefault(check, []).append((index, text))
+
+    def texts(self) -> list[str]:
+        """All of them; of a set, each check with its first record."""
+        if self.single:
+            return [text for found in self.found.values() for _, text in found]
+        return [
+            f"{check} in {len(found)} record(s), such as record {found[0][0]}: {found[0][1]}"
+            for check, found in self.found.items()
+        ]
+
+
+def _doubts(
+    recording: Recording, scene: Scene | None = None, *, run: bool = False
+) -> list[tuple[str, str]]:
+    """Check and text of what is hardly meant, and of saturated channels of a measured one."""
+    texts = [
+        (doubt.check, doubt.text) for doubt in recording_doubts(recording, scene, scene_too=run)
+    ]
+    if recording.origin == "simulated":  # the converter has counted its clipped samples
+        return texts
+    faults = (fault for fault in sample_faults(recording) if fault.kind == "saturated")
+    return [*texts, *((fault.kind, fault.text) for fault in faults)]
 
 
 def _counts(column: Any) -> dict[str, int]:
@@ -223,6 +266,7 @@ def _describe_recording(recording: Recording) -> dict[str, Any]:
         "duration_s": recording.duration,
         "rms_about_mean": {name: float(row.std()) for name, row in rows},
         "manifest": {str(key): value for key, value in recording.row.items()},
+        "warnings": [text for _, text in _doubts(recording)],
     }
 
 
@@ -239,8 +283,10 @@ def plot_file(
     force_channel: str | None = None,
     speed_hz: float | None = None,
     bearing: Sequence[float] | None = None,
+    exponential: float = 1.0,
     tacho: str | None = None,
     pulses_per_revolution: int = 1,
+    force: bool = True,
 ) -> dict[str, Any]:
     """Draw a recording of a file into a picture.
 
@@ -259,10 +305,15 @@ def plot_file(
     force_channel : str, optional
         Force of a transfer function; the only channel in N by default.
     speed_hz : float, optional
-        Shaft speed, where there is no tacho and the file declares none [Hz].
+        Shaft speed, where there is no tacho; it goes before the one in the file [Hz].
     bearing : sequence of float, optional
         Rollers, their diameter, pitch diameter (one unit for both) and, if it is not 0, contact
         angle [deg].
+    force : bool
+        Replace an existing picture.
+
+    exponential : float
+        What the exponential window of an impact test has sunk to at the end of a block [-].
 
     Returns
     -------
@@ -277,7 +328,7 @@ def plot_file(
     """
     if path.suffix == ".wsm":
         raise DataError(f"{path} is a model, must be a recording or data set; name one to plot")
-    about = choice_of(speed_hz=speed_hz, bearing=bearing).settings
+    about = choice_of(speed_hz=speed_hz, bearing=bearing, exponential=exponential).settings
     view = View(
         recording=read_recording(
             path, options, tacho=tacho, pulses_per_revolution=pulses_per_revolution
@@ -286,9 +337,10 @@ def plot_file(
         force=force_channel,
         speed_hz=about.speed_hz,
         bearing=about.bearing,
+        exponential=about.exponential,
     )
     made = plot_recording(view, kind)
-    save_picture(made.figure, picture)
+    save_picture(made.figure, picture, force=force)
     return {"path": str(picture), "drawn": list(made.drawn), "left_out": made.left_out}
 
 

@@ -1,8 +1,10 @@
 """The file of a wear model: what is in it, and whether its parts fit each other."""
 
+import json
 from collections.abc import Mapping
+from itertools import pairwise
 from pathlib import Path
-from typing import Any, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +19,9 @@ from .novelty import Familiarity
 from .parts import (
     BlendStructure,
     ChannelCard,
+    Portion,
+    Pulses,
+    RateHz,
     Strict,
     blend_arrays,
     blend_fits,
@@ -58,6 +63,7 @@ def save_model(model: WearModel, path: str | Path, *, force: bool = False) -> No
     ModelError
         The model could not be read again.
     """
+    checked(_Card, json.loads(json.dumps(model.card)), path, "card.json")  # as it will be read
     _check_structure(model, path)
     bundle = Bundle(
         kind=_KIND, card=model.card, structure=_structure_of(model), arrays=_arrays_of(model)
@@ -108,7 +114,7 @@ class _HeadStructure(Strict):
     name: str
     slope: float
     offset: float
-    threshold: float = Field(ge=0, le=1)
+    threshold: Portion
     blend: BlendStructure
 
 
@@ -225,11 +231,17 @@ def _levels_fit(levels: Levels, channels: int, n: int) -> bool:
     )
 
 
+_MOST_WEAR_M = 10.0  # clearance, wear-down or offset beyond any machine
+
+_Wear = Annotated[float, Field(gt=0, le=_MOST_WEAR_M)]
+_Worn = Annotated[float, Field(ge=0, le=_MOST_WEAR_M)]
+
+
 class _TrainedOn(Strict):
-    records: int
-    draws: int
+    records: int = Field(ge=1)
+    draws: int = Field(ge=1)
     draw_identity: str
-    held_out_share: float
+    held_out_share: Portion
     split_seed: int
     split: str = ""
     split_sha256: str = ""
@@ -268,11 +280,11 @@ class _Chosen(Strict):
 
 class _Rates(Strict):
     name: str
-    share: float
-    detection_rate: float
-    false_alarm_rate: float
-    mae_with_m: float
-    mae_without_m: float
+    share: Portion
+    detection_rate: Portion
+    false_alarm_rate: Portion
+    mae_with_m: float = Field(ge=0)
+    mae_without_m: float = Field(ge=0)
     members: dict[str, float]
 
 
@@ -283,16 +295,16 @@ class _Card(Strict):
     origin: Literal["simulated", "measured"]
     trained_on: _TrainedOn
     severity: str = Field(pattern=r"^\w+_\w+_m$")
-    severity_range_m: list[float] = Field(min_length=2, max_length=2)
-    grade_edges_m: list[float] = Field(
+    severity_range_m: list[_Worn] = Field(min_length=2, max_length=2)
+    grade_edges_m: list[_Wear] = Field(
         min_length=len(GRADE_NAMES) - 1, max_length=len(GRADE_NAMES) - 1
     )
-    condemning_limit_m: float = Field(gt=0)
+    condemning_limit_m: _Wear
     limit_source: str
-    sample_rate_hz: float = Field(gt=0)
+    sample_rate_hz: RateHz
     channels: list[ChannelCard] = Field(min_length=1)
     tacho: str | None
-    pulses_per_revolution: int = Field(ge=1)
+    pulses_per_revolution: Pulses
     features: list[str] = Field(min_length=1)
     conditions: list[_Condition]
     healthy_features: _Healthy
@@ -307,9 +319,23 @@ class _Card(Strict):
         n = len(self.features)
         if len(self.healthy_features.mean) != n or len(self.healthy_features.spread) != n:
             raise ValueError("healthy_features must have one number per feature")
-        if sorted(self.grade_edges_m) != self.grade_edges_m:
-            raise ValueError("grade_edges_m must rise")
+        edges, limit = self.grade_edges_m, self.condemning_limit_m
+        if not all(low < high for low, high in pairwise(edges)):
+            raise ValueError(f"grade_edges_m = {edges} m must rise, each above the one before")
+        if limit < edges[-1]:
+            raise ValueError(f"condemning_limit_m = {limit:g} m must be >= the last grade edge")
+        for name, (low, high) in self._ranges():
+            if low > high:
+                raise ValueError(f"{name} = {low:g} to {high:g} must rise")
         if not {c.feature for c in self.conditions} <= {"", *self.features}:
             raise ValueError("conditions must name features")
         check_channels(self.channels, self.tacho)
         return self
+
+    def _ranges(self) -> list[tuple[str, tuple[float, float]]]:
+        """What has a low and a high end."""
+        low, high = self.severity_range_m
+        return [
+            ("severity_range_m", (low, high)),
+            *((f"condition {one.name}", (one.low, one.high)) for one in self.conditions),
+        ]

@@ -4,6 +4,7 @@ There is no clearance in metres here and no grade: a recording is of one of the 
 with a set of those that cannot be excluded, or of none that is known.
 """
 
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property
@@ -17,9 +18,9 @@ from .. import __version__
 from ..datasets.record import Attributes, DataError, DataSet, Recording
 from ..datasets.splits import check_no_leak, group_folds
 from .conformal import COVERAGE, record_weights, weighted_quantile
-from .estimate import ModelError
+from .estimate import UNFAMILIAR_SHARE, ModelError
 from .models import CANDIDATES, Blend, Folds, fit_blend
-from .novelty import Familiarity, fit_familiarity, novelty_p_value
+from .novelty import Familiarity, fit_familiarity
 from .quality import layout_faults, sample_faults
 from .report_batch import Item, fault_of
 from .scores import Figure, resampled, share
@@ -31,7 +32,7 @@ Index = NDArray[np.intp]
 _FEWEST = 3  # recordings of a class that is judged: one out, two to learn from
 _MOST_CLASSES = 20
 _MOST_FOLDS = 10  # of whole recordings; each by itself up to so many
-_UNFAMILIAR = 0.01  # of familiar recordings may be called unfamiliar
+_FEWEST_TO_KNOW = 10  # recordings of the training; with fewer, most strangers pass for known
 _USED = ("plain ridge", "trees")  # candidates that a handful of recordings can carry
 
 
@@ -52,7 +53,9 @@ class Naming:
     shares : dict
         Class -> share of the votes, sum 1.
     p_value : float or None
-        Of the hypothesis that the recording is of the trained kind.
+        Of the hypothesis that the recording is of a trained class.
+    p_limit : float or None
+        At or below it a recording is called unfamiliar.
     """
 
     verdict: Literal["named", "unfamiliar", "unusable"]
@@ -61,6 +64,7 @@ class Naming:
     possible: tuple[str, ...] = ()
     shares: Mapping[str, float]
     p_value: float | None = None
+    p_limit: float | None = None
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
@@ -80,7 +84,7 @@ class Votes:
     group : numpy.ndarray [shape=(n_records,)]
         Recording, or machine, of each record.
     distance : numpy.ndarray [shape=(n_records,)]
-        From the cloud of the other recordings.
+        From the nearest of the classes' clouds, those of the other recordings.
     """
 
     shares: Float
@@ -94,6 +98,33 @@ class Votes:
         return tuple(
             len(np.unique(self.group[self.label == c])) for c in range(self.shares.shape[1])
         )
+
+    @cached_property
+    def p_limit(self) -> float:
+        """A recording with this p-value or a smaller one is called unfamiliar."""
+        return max(UNFAMILIAR_SHARE, 1 / (len(np.unique(self.group)) + 1))
+
+    def p_value(self, distance: float) -> float:
+        """Conformal p-value of "this recording is of a trained class", recordings as the units.
+
+        Windows of one recording are no cases of their own: together they count as one, by the
+        share of them that lies as far.
+
+        Examples
+        --------
+        >>> label = np.zeros(4, dtype=int)
+        >>> votes = Votes(
+        ...     shares=np.ones((4, 1)),
+        ...     label=label,
+        ...     group=np.array([0, 0, 0, 1]),
+        ...     distance=np.array([1.0, 1.0, 1.0, 3.0]),
+        ... )
+        >>> round(votes.p_value(2.0), 3), round(votes.p_value(4.0), 3)
+        (0.667, 0.333)
+        """
+        groups, place = np.unique(self.group, return_inverse=True)
+        farther = np.bincount(place, weights=self.distance >= distance)
+        return float((1 + (farther / np.bincount(place)).sum()) / (len(groups) + 1))
 
     @cached_property
     def coverages(self) -> tuple[float, ...]:
@@ -128,15 +159,16 @@ class ClassModel:
         One a class: features to 1 (another) … 2 (this one).
     votes : Votes
         On the training records.
-    familiarity : Familiarity
-        The cloud of the training recordings.
+    familiarity : tuple of Familiarity
+        The cloud of the training recordings of each class: between two classes lies neither. Of a
+        class of too few recordings, that of all.
     card : dict
         What it was trained on, its inputs and classes.
     """
 
     blends: tuple[Blend, ...]
     votes: Votes
-    familiarity: Familiarity
+    familiarity: tuple[Familiarity, ...]
     card: dict[str, Any]
 
     @property
@@ -157,7 +189,17 @@ class ClassModel:
             for name, count in zip(self.classes, self.votes.groups_of, strict=True)
             if count < _FEWEST
         ]
+        recordings = len(np.unique(self.votes.group))
+        if recordings < _FEWEST_TO_KNOW:
+            few.append(
+                f"trained on {recordings} recordings, must be >= {_FEWEST_TO_KNOW} to know "
+                "strangers: a condition of none of its classes may well be named as one of them"
+            )
         return "; ".join(few)
+
+    def distance(self, rows: Float) -> Float:
+        """From the nearest class [shape=(n,)] of feature rows [shape=(n, n_features)]."""
+        return _nearest_distance(self.familiarity, self.names, rows)
 
     def predict(self, rows: Float) -> Float:
         """Shares [shape=(n, n_classes)] of feature rows [shape=(n, n_features)]."""
@@ -198,20 +240,22 @@ class ClassModel:
         """Tell the condition from a feature row [shape=(n_features,)]."""
         shares = self.predict(row[None, :])[0]
         told = {name: float(value) for name, value in zip(self.classes, shares, strict=True)}
-        known = self.votes.distance
-        p_value = novelty_p_value(
-            float(self.familiarity.distance(self.names, row[None, :])[0]), known
-        )
-        if p_value <= max(_UNFAMILIAR, 1 / (len(known) + 1)):
-            reason = f"unlike all trained recordings (p = {p_value:.2g})"
-            return Naming(verdict="unfamiliar", reasons=(reason,), shares=told, p_value=p_value)
+        distance = float(self.distance(row[None, :])[0])
+        p_value, p_limit = self.votes.p_value(distance), self.votes.p_limit
+        judged: dict[str, Any] = {"shares": told, "p_value": p_value, "p_limit": p_limit}
+        if p_value <= p_limit:
+            reason = (
+                f"unlike the recordings of every class (p = {p_value:.2g}, unfamiliar at "
+                f"{p_limit:.2g} or less): {distance:.3g} from the nearest, of the trained ones the "
+                f"farthest {self.votes.distance.max():.3g}"
+            )
+            return Naming(verdict="unfamiliar", reasons=(reason,), **judged)
         kept = set_of(shares, self.votes.limits)
         return Naming(
             verdict="named",
             name=self.classes[int(shares.argmax())],
             possible=tuple(self.classes[c] for c in kept),
-            shares=told,
-            p_value=p_value,
+            **judged,
         )
 
 
@@ -367,19 +411,36 @@ def fit_classes(
             shares=_shares(np.stack([part.estimate for part in fitted], axis=1)),
             label=truth.astype(np.intp),
             group=groups.astype(np.intp),
-            distance=_left_out_distances(table, groups, folds),
+            distance=_left_out_distances(table, truth, groups, folds),
         ),
-        familiarity=fit_familiarity(table.names, table.values, groups),
+        familiarity=_clouds(table, truth, groups, np.arange(len(groups))),
         card=_card(head, table, classes.tolist(), target, seed),
     )
 
 
-def _left_out_distances(table: FeatureTable, groups: Index, folds: Folds) -> Float:
+def _left_out_distances(table: FeatureTable, truth: Index, groups: Index, folds: Folds) -> Float:
+    """Of each record, from clouds that its recording had no part in."""
     distance = np.empty(len(groups))
     for train, test in folds:
-        cloud = fit_familiarity(table.names, table.values[train], groups[train])
-        distance[test] = cloud.distance(table.names, table.values[test])
+        clouds = _clouds(table, truth, groups, train)
+        distance[test] = _nearest_distance(clouds, table.names, table.values[test])
     return distance
+
+
+def _clouds(
+    table: FeatureTable, truth: Index, groups: Index, rows: Index
+) -> tuple[Familiarity, ...]:
+    """Cloud of each class by some rows; by all of them where a class has too few recordings."""
+    clouds = []
+    for c in np.unique(truth):
+        few = len(np.unique(groups[truth == c])) < _FEWEST
+        here = rows if few else rows[truth[rows] == c]
+        clouds.append(fit_familiarity(table.names, table.values[here], groups[here]))
+    return tuple(clouds)
+
+
+def _nearest_distance(clouds: Sequence[Familiarity], names: Sequence[str], rows: Float) -> Float:
+    return np.asarray(np.min([cloud.distance(names, rows) for cloud in clouds], axis=0))
 
 
 def _card(
@@ -458,7 +519,7 @@ def evaluate_classes(
         shares=model.predict(table.values[rows]),
         label=np.searchsorted(model.classes, labels[rows]).astype(np.intp),
         group=groups[rows],
-        distance=model.familiarity.distance(model.names, table.values[rows]),
+        distance=model.distance(table.values[rows]),
     )
     return score_votes(votes, model.classes, limits=model.votes.limits, seed=seed)
 
@@ -651,6 +712,25 @@ def name_all(items: Sequence[Item], model: ClassModel) -> Iterator[tuple[str, Na
         yield item.name, naming
 
 
+def namings_summary(namings: Sequence[Naming]) -> str:
+    """How many recordings there are, and what was found in them.
+
+    Parameters
+    ----------
+    namings : sequence of Naming
+
+    Examples
+    --------
+    >>> strange = Naming(verdict="unfamiliar", shares={})
+    >>> namings_summary([strange, strange])
+    'no condition is named, 2 recordings: 2 unfamiliar'
+    """
+    words = Counter(naming.name or naming.verdict for naming in namings)
+    told = ", ".join(f"{count} {word}" for word, count in words.most_common())
+    none = "" if any(naming.name for naming in namings) else "no condition is named, "
+    return f"{none}{len(namings)} recordings: {told}"
+
+
 def naming_text(naming: Naming) -> str:
     """What a model says of one recording, in lines.
 
@@ -668,4 +748,10 @@ def naming_text(naming: Naming) -> str:
     if naming.verdict != "named":
         return f"{naming.verdict}: {'; '.join(naming.reasons)}"
     votes = ", ".join(f"{name} {share:.2f}" for name, share in naming.shares.items())
-    return f"{naming.name}; cannot be excluded: {', '.join(naming.possible)}\n  votes  {votes}"
+    known = ""
+    if naming.p_value is not None and naming.p_limit is not None:
+        known = (
+            f"\n  familiar: p = {naming.p_value:.2g} (unfamiliar at {naming.p_limit:.2g} or less)"
+        )
+    possible = ", ".join(naming.possible)
+    return f"{naming.name}; cannot be excluded: {possible}\n  votes  {votes}{known}"

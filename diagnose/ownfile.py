@@ -13,6 +13,8 @@ from .own import ClassModel, Votes
 from .parts import (
     BlendStructure,
     ChannelCard,
+    Pulses,
+    RateHz,
     Strict,
     blend_arrays,
     blend_fits,
@@ -31,7 +33,6 @@ from .physical import physical_rows
 CLASS_MODEL = "class model"
 """Word of such a file for its kind."""
 
-_PARTS: dict[str, Any] = {"votes": Votes, "familiarity": Familiarity}
 _ROUNDING = 1e-9
 
 
@@ -47,10 +48,10 @@ class _Card(Strict):
     records: int = Field(ge=1)
     split_seed: int
     training_signals: list[int]
-    sample_rate_hz: float = Field(gt=0)
+    sample_rate_hz: RateHz
     channels: list[ChannelCard] = Field(min_length=1)
     tacho: str | None
-    pulses_per_revolution: int = Field(ge=1)
+    pulses_per_revolution: Pulses
     features: list[str] = Field(min_length=1)
 
     @model_validator(mode="after")
@@ -120,8 +121,9 @@ def _arrays_of(model: ClassModel) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for i, blend in enumerate(model.blends):
         found |= blend_arrays(blend, f"blends.{i}")
-    for part in _PARTS:
-        found |= part_arrays(getattr(model, part), part)
+    for i, cloud in enumerate(model.familiarity):
+        found |= part_arrays(cloud, f"familiarity.{i}")
+    found |= part_arrays(model.votes, "votes")
     return {name: np.asarray(value) for name, value in found.items()}
 
 
@@ -131,8 +133,12 @@ def _model_of(structure: _Structure, bundle: Bundle) -> ClassModel:
         blends=tuple(
             blend_of(one, arrays, f"blends.{i}") for i, one in enumerate(structure.blends)
         ),
+        votes=Votes(**part_of(arrays, "votes", Votes)),
+        familiarity=tuple(
+            Familiarity(**part_of(arrays, f"familiarity.{i}", Familiarity))
+            for i in range(len(structure.blends))
+        ),
         card=bundle.card,
-        **{part: kind(**part_of(arrays, part, kind)) for part, kind in _PARTS.items()},
     )
     refuse_more(arrays, _arrays_of(model))
     return model
@@ -149,7 +155,8 @@ def _check(model: ClassModel, path: str | Path) -> None:
         "blends": len(model.blends) == len(model.classes)
         and all(blend_fits(blend, n) for blend in model.blends),
         "votes": _votes_fit(model.votes, len(model.classes)),
-        "familiarity": familiarity_fits(model.familiarity, physical.shape[1]),
+        "familiarity": len(model.familiarity) == len(model.classes)
+        and all(familiarity_fits(cloud, physical.shape[1]) for cloud in model.familiarity),
         "numbers": numbers_fit(_arrays_of(model)),
     }
     bad = [name for name, good in fits.items() if not good]

@@ -3,30 +3,22 @@
 Figures are matplotlib's without pyplot, in fixed margins.
 """
 
-import io
 import textwrap
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..datasets.record import DataError
+from .page import short_name
 from .signal_view import Trace, Turning, View
-
-FORMATS = (".png", ".svg", ".pdf")
-"""Suffixes of a picture."""
 
 COLOURS = ("#1f5a94", "#b3541e", "#4f7d3a", "#7a4a8c", "#8a7a14", "#2a8a8a", "#a0405f", "#5b6470")
 """Of channels, one after the other."""
 
 WIDTH = 8.0
 """Of a panel [inch]."""
-
-DOTS_PER_INCH = 110
-"""Of a picture in points."""
 
 RIGHT_OF_MAP = 0.55
 """Margin that holds the unit beside a bar of colours [inch]."""
@@ -45,6 +37,7 @@ _LEFT, _RIGHT, _BOTTOM, _TOP = 0.85, 0.25, 0.5, 0.12  # inch, round a panel
 _LINE_HEIGHT = 0.17  # inch, of a line of a caption
 _LETTERS = 118  # of a caption in a line
 _HEAD = 0.45  # inch, of the sheet's heading
+_HEADING_LETTERS = 80  # of it in the width of a panel
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -89,39 +82,6 @@ def panel_figure(panel: Panel) -> Any:
     return figure
 
 
-def save_picture(figure: Any, path: Path) -> None:
-    """Write a figure whole or not at all, the same bytes every time.
-
-    Parameters
-    ----------
-    figure : matplotlib.figure.Figure
-    path : Path
-        ``.png``, ``.svg`` or ``.pdf``.
-
-    Raises
-    ------
-    DataError
-        Another suffix.
-    """
-    import matplotlib as mpl
-
-    if path.suffix not in FORMATS:
-        raise DataError(f"{path}: suffix must be one of {', '.join(FORMATS)}; rename it")
-    undated: dict[str, Any] = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
-    picture = io.BytesIO()
-    # the names of an SVG's parts are random without a salt
-    with mpl.rc_context({"svg.hashsalt": "wearstate"}):
-        figure.savefig(
-            picture, format=path.suffix[1:], dpi=DOTS_PER_INCH, metadata=undated.get(path.suffix)
-        )
-    part = path.with_name(path.name + ".part")
-    try:
-        part.write_bytes(picture.getvalue())
-        part.replace(path)
-    finally:
-        part.unlink(missing_ok=True)
-
-
 def columns_of(panels: Sequence[Panel]) -> list[list[Panel]]:
     """Panels in two columns about equally high; one panel in one."""
     if len(panels) == 1:
@@ -154,7 +114,15 @@ def sheet(heading: str, columns: Sequence[Sequence[Panel]]) -> Any:
     height = max(sum(map(_full_height, column)) for column in columns)
     figure = Figure(figsize=(WIDTH * len(columns), _HEAD + height))
     head, body = np.ravel(figure.subfigures(2, 1, height_ratios=[_HEAD, height], squeeze=False))
-    head.text(0.15 / (WIDTH * len(columns)), 0.45, heading, va="center", fontsize=12, weight="bold")
+    room = _HEADING_LETTERS * len(columns)
+    head.text(
+        0.15 / (WIDTH * len(columns)),
+        0.45,
+        short_name(heading, room),
+        va="center",
+        fontsize=12,
+        weight="bold",
+    )
     halves = np.ravel(body.subfigures(1, len(columns), squeeze=False))
     for half, column in zip(halves, columns, strict=True):
         heights = [_full_height(panel) for panel in column]
@@ -200,7 +168,7 @@ def name_inside(axes: Any, trace: Trace) -> None:
     axes.text(
         0.008,
         0.96,
-        trace.name,
+        short_name(trace.name, 90),
         transform=axes.transAxes,
         va="top",
         fontsize=8,

@@ -5,21 +5,19 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
 from ..features.envelope import (
-    DEEPEST_LEVEL,
-    FEWEST_SAMPLES_LOG2,
     FaultLine,
     Kurtogram,
+    envelope_span,
     envelope_spectrum,
     fault_line,
     kurtogram,
+    kurtogram_levels,
 )
 from .panel import (
     COLOURS,
-    CURSOR_ORDERS,
     MOST_POINTS,
     LackError,
     Panel,
@@ -32,7 +30,6 @@ from .signal_view import Float, Trace, View, number, thinned
 
 _FAULT_COLOURS = {"outer": "#b02a1c", "inner": "#7a4a8c", "roller": "#4f7d3a", "cage": "#b3741e"}
 _HARMONICS = 3  # of a fault
-_SHOWN_HZ = 500.0  # when neither speed nor bearing is known
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -57,7 +54,9 @@ def envelope_panel(view: View) -> Panel:
     if view.bearing is not None and view.speed is None:
         raise LackError("needs the shaft speed to place the bearing's lines; give speed or tacho")
     spectra = [_envelope_of(trace, view) for trace in traces]
-    highest = min(_envelope_span(view), *(float(item.frequency[-1]) for item in spectra))
+    highest = min(
+        envelope_span(view.speed, view.bearing), *(float(item.frequency[-1]) for item in spectra)
+    )
     caption = "Envelope spectrum in the band of the highest kurtosis (kurtogram)"
     if view.bearing is not None:
         caption += "; dashed lines: bearing geometry, with what is found there and its score"
@@ -72,24 +71,10 @@ def envelope_panel(view: View) -> Panel:
     )
 
 
-def _envelope_span(view: View) -> float:
-    """Highest frequency that is shown [Hz]."""
-    if view.speed is None:
-        return _SHOWN_HZ
-    if view.bearing is None:
-        return (CURSOR_ORDERS + 0.5) * view.speed
-    return (_HARMONICS + 0.5) * view.bearing.inner * view.speed
-
-
-def _depth(view: View) -> int:
-    """Levels of the kurtogram: its narrowest band still holds the lines that are shown."""
-    wide = int(np.log2(max(view.rate / 2 / _envelope_span(view), 2)))
-    deepest = view.n_samples.bit_length() - 1 - FEWEST_SAMPLES_LOG2
-    return max(1, min(DEEPEST_LEVEL, wide, deepest))
-
-
 def _envelope_of(trace: Trace, view: View) -> _Envelope:
-    found = kurtogram(trace.values, view.rate, levels=_depth(view))
+    span = envelope_span(view.speed, view.bearing)
+    levels = kurtogram_levels(view.n_samples, view.rate, span)
+    found = kurtogram(trace.values, view.rate, levels=levels)
     frequency, amplitude = envelope_spectrum(trace.values, view.rate, found.band, kind="plain")
     faults = {}
     if view.bearing is not None and view.speed is not None:

@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..features import frf
+from ..features import frf, impact
 from ..features.analysis import FORCE
 from ..features.spectrum import decibel
+from .page import short_name
 from .panel import (
     COLOURS,
     LackError,
@@ -20,7 +21,6 @@ from .panel import (
 )
 from .signal_view import Trace, View, number
 
-_BLOW_SHARE = 0.02  # of the samples of a hammer's force reach the trigger level, or fewer
 _BLOCKS = 10  # whole blocks in a continuous force, overlapped by half
 _FINEST_HZ = 0.25  # between lines
 _DEPTH_DB = 20.0  # shown of a confidence disc that holds zero
@@ -38,16 +38,17 @@ def frf_panel(view: View) -> Panel:
     if not responses:
         raise LackError("needs a response beside the force; record one")
     rows = np.stack([trace.values for trace in responses])
-    spectra, words = _averaged(force.values, rows, view.rate)
+    spectra, words = _averaged(force.values, rows, view.rate, view.exponential)
     # zero frequency holds the drift of the sensors, the last lines the anti-alias filter
     kept = spectra.between(float(spectra.frequency[1]), _SHOWN_SHARE * view.rate)
-    estimate = frf.estimate_frf(kept, confidence=_CONFIDENCE)
+    estimate = _estimate(kept)
     return Panel(
         kind="frf",
         caption=(
             f"Transfer function over {force.name}: H1 of {words}, lines of "
-            f"{number(float(spectra.frequency[1]))} Hz; shaded: {100 * _CONFIDENCE:.0f} % "
-            f"confidence{others}"
+            f"{number(float(spectra.frequency[1]))} Hz"
+            + (f"; shaded: {100 * _CONFIDENCE:.0f} % confidence" if kept.blocks > 1 else "")
+            + others
         ),
         height=3.6 * len(responses) + 0.6,
         draw=partial(_draw_frf, responses=responses, force=force, estimate=estimate),
@@ -55,51 +56,59 @@ def frf_panel(view: View) -> Panel:
 
 
 def _averaged(
-    force: NDArray[np.float32], responses: NDArray[np.float32], fs: float
+    force: NDArray[np.float32], responses: NDArray[np.float32], fs: float, last: float
 ) -> tuple[frf.Spectra, str]:
     """Spectra of a hammer's blows or of a continuous force, and words about the averages."""
-    level = force - np.median(force)
-    pressing = level if level.max() >= -level.min() else -level  # a cell may count pull positive
-    beyond = np.mean(pressing >= frf.TRIGGER_SHARE * pressing.max())
-    if not 0 < beyond < _BLOW_SHARE:
-        longest = min(force.size / _BLOCKS, fs / _FINEST_HZ)
-        nperseg = 1 << int(np.log2(max(longest, 8)))
-        spectra = frf.welch_spectra(force, responses, fs, nperseg=nperseg)
-        return spectra, f"{spectra.blocks} windows (Hann, half overlapped)"
-    blows = _blows(pressing, fs)
-    spectra = frf.block_spectra(blows.cut(level), blows.cut(responses), fs)
-    rejected = f", {len(blows.rejected)} left out" if blows.rejected else ""
-    return spectra, f"{spectra.blocks} blows{rejected}"
+    if impact.is_impact(force):
+        spectra, found = impact.impact_spectra(force, responses, fs, last=last)
+        return spectra, found.text
+    longest = min(force.size / _BLOCKS, fs / _FINEST_HZ)
+    nperseg = 1 << int(np.log2(max(longest, 8)))
+    spectra = frf.welch_spectra(force, responses, fs, nperseg=nperseg)
+    return spectra, f"{spectra.blocks} windows (Hann, half overlapped)"
 
 
-def _blows(force: NDArray[np.float32], fs: float) -> frf.Blows:
-    """Blows of a hammer, in blocks as long as the usual time between two."""
-    pretrigger = max(1, round(0.002 * fs))
-    short = frf.find_blows(force, fs, nperseg=8 * pretrigger, pretrigger=pretrigger)
-    gaps = np.diff([*short.starts, force.size])
-    nperseg = int(0.9 * np.median(gaps)) // 2 * 2
-    return frf.find_blows(force, fs, nperseg=nperseg, pretrigger=pretrigger)
+def _estimate(spectra: frf.Spectra) -> frf.Frf:
+    """H1 with what is known of its confidence: nothing from one blow."""
+    if spectra.blocks > 1:
+        return frf.estimate_frf(spectra, confidence=_CONFIDENCE)
+    unknown = np.full(spectra.response.shape, np.nan)
+    return frf.Frf(
+        frequency=spectra.frequency,
+        value=frf.h1(spectra),
+        coherence=unknown,
+        radius=np.zeros(spectra.response.shape),
+        averages=spectra.averages,
+        estimator="h1",
+        confidence=_CONFIDENCE,
+        decay=spectra.decay,
+    )
 
 
 def _draw_frf(place: Any, *, responses: Sequence[Trace], force: Trace, estimate: frf.Frf) -> None:
     axes = stack(place, 3 * len(responses), height_ratios=[3, 1.3, 1.3] * len(responses))
     x = estimate.frequency
     low, high = estimate.magnitude_interval
+    known = bool(np.isfinite(estimate.coherence).all())
     for i, trace in enumerate(responses):
         colour = COLOURS[i % len(COLOURS)]
         level, phase, share = axes[3 * i : 3 * i + 3]
         value = decibel(np.abs(estimate.value[i]) ** 2)
         # a disc that holds zero reaches down for ever
         floor = np.maximum(decibel(low[i] ** 2), value - _DEPTH_DB)
-        level.fill_between(x, floor, decibel(high[i] ** 2), color=colour, alpha=0.3, lw=0)
-        level.plot(x, value, lw=0.8, color=colour, label=trace.name)
+        if known:
+            level.fill_between(x, floor, decibel(high[i] ** 2), color=colour, alpha=0.3, lw=0)
+        level.plot(x, value, lw=0.8, color=colour, label=short_name(trace.name))
         level.set_ylabel(f"[dB re 1 {_ratio(trace, force)}]", fontsize=8)
         name_inside(level, trace)
         angle = np.angle(estimate.value[i], deg=True)
         phase.plot(x, angle, ".", ms=1.5, color=colour)
         phase.set(ylim=(-190, 190), yticks=[-180, -90, 0, 90, 180])
         phase.set_ylabel("phase\n[deg]", fontsize=8)
-        share.plot(x, estimate.coherence[i], lw=0.8, color=colour)
+        if known:
+            share.plot(x, estimate.coherence[i], lw=0.8, color=colour)
+        else:
+            share.text(0.5, 0.5, "one blow: not defined", transform=share.transAxes, ha="center")
         share.set(ylim=(0, 1.05))
         share.set_ylabel("coherence\n[-]", fontsize=8)
     axes[-1].set_xlabel("frequency [Hz]")

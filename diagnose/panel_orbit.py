@@ -9,6 +9,7 @@ import numpy as np
 
 from ..features import orbit
 from ..features.analysis import DISPLACEMENT
+from .page import short_name
 from .panel import (
     COLOURS,
     MOST_POINTS,
@@ -82,7 +83,7 @@ def _orbit_of(view: View, first: Trace, second: Trace) -> _Orbit:
         around = np.linspace(0, 2 * np.pi, 181)
         first_order = orbit.centreline(z) + orbit.orbit_path(ahead[0], behind[0], around)
     return _Orbit(
-        title=f"{first.name}, {second.name}",
+        title=f"{short_name(first.name, 24)}, {short_name(second.name, 24)}",
         unit=first.unit,
         path=z[:n],
         first_order=first_order,

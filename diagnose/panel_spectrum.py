@@ -14,6 +14,7 @@ from ..features.spectrum import (
     power_spectral_density,
 )
 from ..features.table import FEWEST_SAMPLES
+from .page import short_name
 from .panel import (
     COLOURS,
     CURSOR_ORDERS,
@@ -69,7 +70,8 @@ def _draw_waveform(
 ) -> None:
     axes = stack(place, len(traces))
     for i, (trace, (time, values)) in enumerate(zip(traces, curves, strict=True)):
-        axes[i].plot(time, values, lw=0.6, color=COLOURS[i % len(COLOURS)], label=trace.name)
+        colour, name = COLOURS[i % len(COLOURS)], short_name(trace.name)
+        axes[i].plot(time, values, lw=0.6, color=colour, label=name)
         axes[i].set_ylabel(f"[{trace.unit}]", fontsize=9)
         name_inside(axes[i], trace)
         for mark in marks:
@@ -170,7 +172,7 @@ def _draw_density(axes: Any, group: _Spectra, span: tuple[float, float]) -> None
     shown = []
     for (i, trace), (frequency, level) in zip(group.traces, group.density, strict=True):
         colour = COLOURS[i % len(COLOURS)]
-        axes.plot(frequency, level, lw=0.7, color=colour, label=trace.name)
+        axes.plot(frequency, level, lw=0.7, color=colour, label=short_name(trace.name))
         shown.append(level[frequency >= span[0]])
     lowest = min(float(level.min()) for level in shown)
     highest = max(float(level.max()) for level in shown)
@@ -186,7 +188,7 @@ def _draw_density(axes: Any, group: _Spectra, span: tuple[float, float]) -> None
 def _draw_orders(axes: Any, group: _Spectra, speed: float | None) -> None:
     for (i, trace), (frequency, amplitude) in zip(group.traces, group.orders, strict=True):
         colour = COLOURS[i % len(COLOURS)]
-        axes.plot(frequency, amplitude, lw=0.7, color=colour, label=trace.name)
+        axes.plot(frequency, amplitude, lw=0.7, color=colour, label=short_name(trace.name))
     highest = float(axes.get_lines()[0].get_xdata()[-1])
     from_zero(axes, [amplitude for _, amplitude in group.orders])
     axes.set_xlim(0, highest)

@@ -2,12 +2,13 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
-from typing import Any, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from ..sim.sensor import RATE_LEAST, RATE_MOST
 from .models import Blend, Forest, Linear
 from .novelty import Familiarity
 
@@ -17,6 +18,18 @@ _DEEPEST = 256  # steps down a tree: four times what 10^5 records grow
 
 _PART_KINDS: dict[str, Any] = {"linear": Linear, "forest": Forest}
 """Kinds of the parts of a blend."""
+
+
+_MOST_PULSES = 10**6  # of a tacho in a revolution: an encoder of 20 bit
+
+RateHz = Annotated[float, Field(ge=RATE_LEAST, le=RATE_MOST)]
+"""Sample rate that a recording can have [Hz]."""
+
+Pulses = Annotated[int, Field(ge=1, le=_MOST_PULSES)]
+"""Pulses of a tacho in a revolution."""
+
+Portion = Annotated[float, Field(ge=0, le=1)]
+"""A share, rate or probability."""
 
 
 class Strict(BaseModel):

@@ -15,13 +15,15 @@ from ..sim.parts import Scene
 from ..sim.pump_parts import PumpScene
 from ..sim.shaft_line import ShaftState, shaft_state
 from ..sim.shaft_parts import ShaftScene
-from .panel import COLOURS, save_picture
+from .page import short_name
+from .panel import COLOURS
+from .picture import save_picture
 
 _REVOLUTIONS = 2
 _MOST_ORDERS = 4.0  # of a full spectrum, to either side
 
 
-def plot_simulation(scene: Scene, solution: Solution, path: Path) -> None:
+def plot_simulation(scene: Scene, solution: Solution, path: Path, *, force: bool = True) -> None:
     """Draw a simulated recording with what its sensors do not see: forces, pressures, orbits.
 
     Parameters
@@ -31,6 +33,8 @@ def plot_simulation(scene: Scene, solution: Solution, path: Path) -> None:
         With truth.
     path : Path
         ``.png``, ``.svg`` or ``.pdf``.
+    force : bool
+        Replace an existing file.
 
     Raises
     ------
@@ -40,9 +44,9 @@ def plot_simulation(scene: Scene, solution: Solution, path: Path) -> None:
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(11, 7), layout="constrained")
-    figure.suptitle(f"{scene.name} (simulated)")
+    figure.suptitle(f"{short_name(scene.name, 90)} (simulated)")
     _DRAWERS[scene.machine](figure, scene, solution)
-    save_picture(figure, path)
+    save_picture(figure, path, force=force)
 
 
 def _draw_pump(figure: Any, scene: Scene, solution: Solution) -> None:
@@ -52,7 +56,7 @@ def _draw_pump(figure: Any, scene: Scene, solution: Solution) -> None:
     turns = np.arange(n) / rate * pump.drive.speed + pump.drive.start_angle / (2 * np.pi)
     panels = figure.subplot_mosaic([["wave", "wave", "orbit"], ["force", "pressure", "spectrum"]])
     accelerations = [
-        (channel.name, row)
+        (short_name(channel.name), row)
         for channel, row in zip(solution.channels, solution.signal, strict=True)
         if channel.quantity == "acceleration"
     ]
@@ -218,7 +222,7 @@ def _shaft_line(axes: Any, scene: ShaftScene, state: ShaftState) -> None:
         ends = [bearing.station - bearing.length / 2, bearing.station + bearing.length / 2]
         axes.plot(ends, [at, at], lw=5, color="black", alpha=0.4)
         axes.annotate(
-            f"{bearing.name}\n{reaction / 1e3:.1f} kN",
+            f"{short_name(bearing.name, 24)}\n{reaction / 1e3:.1f} kN",
             (bearing.station, at + 0.08 * room),
             ha="center",
             va="bottom",
@@ -236,7 +240,8 @@ def _bores(axes: Any, state: ShaftState, path: NDArray[Any]) -> None:
     axes.plot(circle.real, circle.imag, color="black", lw=1)
     for i, bearing in enumerate(state.film.bearings):
         place = path[:, i] / bearing.worn.clearance
-        axes.plot(place[:, 1], place[:, 0], lw=0.6, color=f"C{i}", label=bearing.name)
+        name = short_name(bearing.name, 24)
+        axes.plot(place[:, 1], place[:, 0], lw=0.6, color=f"C{i}", label=name)
         middle = place.mean(axis=0)
         axes.plot(middle[1], middle[0], "+", ms=6, color=f"C{i}")
     axes.set(xlabel="to starboard", ylabel="up", title="Journals over their clearances")

@@ -104,10 +104,12 @@ def _channel_faults(found: Sequence[Channel], card: Mapping[str, Any]) -> list[F
     faults = []
     if len(found) != len(wanted):
         text = f"it has {len(found)} vibration channel(s), the model needs {len(wanted)}: {names}"
+        text += _mapping([c.name for c in found], [c["name"] for c in wanted])
         faults.append(Fault(kind="layout", channel="", text=text))
     elif [c.name for c in found] != [c["name"] for c in wanted]:
         here = ", ".join(c.name for c in found)
         text = f"its channels are {here}, the model needs {names}, in this order"
+        text += _mapping([c.name for c in found], [c["name"] for c in wanted])
         faults.append(Fault(kind="layout", channel="", text=text))
     for c in found:
         # under a name that the model does not know, any unit of the model's may be right
@@ -116,6 +118,28 @@ def _channel_faults(found: Sequence[Channel], card: Mapping[str, Any]) -> list[F
             text = f"channel {c.name} is in {c.unit or 'an unknown unit'}, the model needs {unit}"
             faults.append(Fault(kind="unit", channel=c.name, text=text))
     return faults
+
+
+def _mapping(found: Sequence[str], wanted: Sequence[str]) -> str:
+    """What is missing, and how channels of other names can stand for it.
+
+    Examples
+    --------
+    >>> _mapping(["ch1", "ch2", "z"], ["x", "y", "z"])
+    '; missing x, y: if ch1, ch2 are these, give --channels x=ch1,y=ch2,z'
+    >>> _mapping(["x"], ["x", "y"])
+    '; missing y'
+    """
+    missing = [name for name in wanted if name not in found]
+    spare = [name for name in found if name not in wanted]
+    if not missing:
+        return f": give --channels {','.join(wanted)}"
+    told = f"; missing {', '.join(missing)}"
+    if len(spare) < len(missing):
+        return told
+    stand = dict(zip(missing, spare, strict=False))
+    names = ",".join(f"{name}={stand[name]}" if name in stand else name for name in wanted)
+    return f"{told}: if {', '.join(stand.values())} are these, give --channels {names}"
 
 
 def _tacho_layout_faults(recording: Recording, card: Mapping[str, Any]) -> list[Fault]:

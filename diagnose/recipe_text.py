@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..datasets.draws import Draw, Range, matches
 from ..datasets.generate import NUMERICS
-from ..datasets.recipe import Recipe, Sample, sample_records
+from ..datasets.recipe import Recipe, Sample, limit_faults, sample_records
 from ..sim.ladder import cost_of, effects_of
 from ..sim.parts import channels_of
 from .grades import GRADE_NAMES
@@ -84,6 +84,7 @@ class Preview:
             "drawn_records": len(samples),
             **_costs(recipe, n, samples, cores),
             "labels": _labels(recipe, samples),
+            "ungraded": limit_faults(recipe),
             "confounders": _shares(recipe, samples),
             "held_out": _regions(recipe, samples),
             "draws": [_summary(recipe, *draw) for draw in _draws(recipe)],
@@ -222,6 +223,7 @@ def preview_text(table: Mapping[str, Any]) -> str:
     for column, grades in table["labels"].items():
         shown = ", ".join(f"{grades[str(i)]} {name}" for i, name in enumerate(GRADE_NAMES))
         lines.append(f"  {column}: {shown}")
+    lines += [f"  no grades: {text}" for text in table["ungraded"]]
     lines += [f"  confounder {n}: {share:.1%}" for n, share in table["confounders"].items()]
     lines += [
         f"  held out '{name}': {region['share']:.1%}, {_bounds(region['bounds'])}"

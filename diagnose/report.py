@@ -12,6 +12,7 @@ from typing import Any
 from .. import __version__
 from ..datasets.record import DataError, Recording
 from ..features import iso
+from ..sim.atomic import write_whole
 from .advice import advise, touched_grades
 from .estimate import Estimate, WearModel, input_faults
 from .grades import GRADE_NAMES
@@ -27,6 +28,9 @@ longer than the report."""
 
 MAP_CELL = re.compile(r"(.+)\.angle_(\d+)_(\d+)\.band_(\d+)_(\d+)\.level_db")
 """Name of a level in a bin of the crank angle and a band of frequency."""
+
+NO_REFERENCE = "Healthy reference missing"
+"""Headline of a sound recording whose model needs healthy recordings of the machine."""
 
 _CHANCE = 0.05  # that the farthest feature of a healthy machine lies beyond
 _SURE = 0.9  # confidence in the boundaries of a zone, below which they are to be confirmed
@@ -134,6 +138,8 @@ def headline(estimate: Estimate) -> str:
     """
     if estimate.verdict == "unfamiliar":
         return "Unfamiliar: no grade is given"
+    if estimate.unreferenced:
+        return f"{NO_REFERENCE}: no grade is given"
     if estimate.verdict == "unusable":
         return "Unusable recording: no grade is given"
     words = f"Grade {estimate.grade} of {len(GRADE_NAMES) - 1}: {estimate.grade_name}"
@@ -532,11 +538,7 @@ def zone_words(table: Mapping[str, Any]) -> str:
     )
 
 
-def save_page(html: str, path: Path) -> None:
-    """Write a page whole, or not at all."""
-    part = path.with_name(path.name + ".part")
-    try:
-        part.write_text(html, encoding="utf-8")
-        part.replace(path)
-    finally:
-        part.unlink(missing_ok=True)
+def save_page(html: str, path: Path, *, force: bool = True) -> None:
+    """Write a page whole, or not at all; without `force`, only where nothing is."""
+    # a file's name may hold bytes that are no UTF-8
+    write_whole(path, html.encode(errors="backslashreplace"), force=force)

@@ -15,13 +15,14 @@ import numpy as np
 
 from .. import __version__
 from ..datasets.importers import read_recording
+from ..datasets.machines import GROUP_NAME
 from ..datasets.record import DataError, DataSet, Recording
 from ..datasets.sources import READERS, SourceOptions
 from .advice import Advice, advise
 from .estimate import Estimate, ModelError, WearModel
 from .grades import GRADE_NAMES, WARNING_GRADE
 from .healthy import Baselines
-from .report import REPORT_SCHEMA, headline, limits_table, model_table, quantity_name
+from .report import NO_REFERENCE, REPORT_SCHEMA, headline, limits_table, model_table, quantity_name
 from .tabulate import Progress
 from .trend import Growth, Outlook, Trend, date_in, fit_trend, hours_of, read_dates
 
@@ -150,15 +151,19 @@ class Batch:
         """Current recordings of each grade from the worst, and those without."""
         words = [(grade, GRADE_NAMES[grade]) for grade in reversed(range(len(GRADE_NAMES)))]
         found = {name: sum(row.grade == grade for row in self.current) for grade, name in words}
+        alone = sum(row.headline == NO_REFERENCE for row in self.current)
         for verdict in ("unusable", "unfamiliar"):
             found[verdict] = sum(row.verdict == verdict for row in self.current)
-        return found
+        found["unusable"] -= alone
+        return found | {"without healthy reference": alone}
 
     def summary(self) -> str:
         """How many there are, and how the current ones are."""
         told = ", ".join(f"{count} {name}" for name, count in self.counts().items() if count)
         past = len(self.rows) - len(self.current)
         whole = f"{len(self.rows)} recordings"
+        if all(row.grade is None for row in self.current):
+            whole = f"no grade is given, {whole}"
         return f"{whole}, the latest {len(self.current)}: {told}" if past else f"{whole}: {told}"
 
 
@@ -239,7 +244,7 @@ def _records(file: Path, data: DataSet, *, close: bool = False) -> list[Item]:
     return [
         Item(
             name=file.name if len(data) == 1 else f"{file.name}[{i}]",
-            machine=str(row["group"]) if several else "",
+            machine=str(row.get(GROUP_NAME, row["group"])) if several else "",
             path=file,
             row=row,
             load=partial(_read_record, data, i, close=close),
@@ -414,8 +419,9 @@ def judge_all(
 def _judged(item: Item, model: WearModel, baselines: Baselines | None) -> Estimate:
     """A recording that cannot be read is unusable, and does not stop the others."""
     try:
-        baseline = None if baselines is None else baselines.of(item.row)
-        return model.estimate(item.load(), baseline)
+        recording = item.load()
+        baseline = None if baselines is None else baselines.of(recording)
+        return model.estimate(recording, baseline)
     except ModelError:
         raise  # would be so for each of them
     except (ValueError, OSError) as error:

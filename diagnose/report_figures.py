@@ -1,11 +1,8 @@
 """Pictures of the report: the estimate among the grades, what moved, the signals, a trend."""
 
-import base64
-import io
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from functools import partial
 from typing import Any
 
@@ -14,7 +11,9 @@ from numpy.typing import NDArray
 
 from ..datasets.record import DataError, Recording
 from .estimate import WearModel
-from .panel import DOTS_PER_INCH, RIGHT_OF_MAP, Panel, log_frequency, panel_figure, stack
+from .page import short_name
+from .panel import RIGHT_OF_MAP, Panel, log_frequency, panel_figure, stack
+from .picture import encoded
 from .report import MAP_CELL
 from .signal_plots import make_panel
 from .signal_view import View
@@ -31,7 +30,6 @@ NO_GRADE_COLOUR = "#5b6470"
 _LEAST_SPAN_DB = 6.0  # of the colours of a map: less is nothing
 _MOST_MAPS = 2
 _NARROW = 0.12  # of the gauge: a band that holds no name
-_HOURS_A_DAY = 24.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,13 +50,6 @@ class Picture:
     alt: str
     data: str
     wide: bool = True
-
-
-def encoded(figure: Any) -> str:
-    """PNG of a figure as a data address."""
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=DOTS_PER_INCH)
-    return "data:image/png;base64," + base64.b64encode(buffer.getvalue()).decode()
 
 
 def _picture(panel: Panel, alt: str) -> Picture:
@@ -221,7 +212,7 @@ def _draw_moved(place: Any, *, maps: Sequence[_Moved]) -> None:
         log_frequency(axis, "y")
         axis.set_ylim(item.band[0], item.band[-1])
         axis.set_xticks(np.arange(0, 361, 45))
-        axis.set_ylabel(f"{item.channel}\nfrequency [Hz]", fontsize=9)
+        axis.set_ylabel(f"{short_name(item.channel, 24)}\nfrequency [Hz]", fontsize=9)
     axes[-1].set_xlabel("crank angle after the tacho pulse [deg]")
 
 
@@ -282,51 +273,71 @@ def _gauge_figure(estimate: Mapping[str, Any], limits: Mapping[str, Any]) -> Any
 
 def trend_picture(trend: Trend, limits: Mapping[str, Any], heading: str) -> Picture:
     """Severity with intervals over time, the line since the last maintenance and its band."""
+    from matplotlib.figure import Figure
+
     said = trend.outlook.text if trend.outlook else f"no line: {trend.reason}"
-    panel = Panel(
-        kind="trend",
-        caption=f"Trend of {heading}: {said}",
-        height=3.6,
-        draw=partial(_draw_trend, trend=trend, limits=limits),
-    )
-    return _picture(panel, f"Trend of {heading}: {said}")
+    caption = f"Trend of {heading}: {said}"
+    figure = Figure(figsize=_TREND_SIZE, layout="constrained")
+    _draw_trend(figure.add_subplot(), trend, limits)
+    return Picture(caption=caption, alt=caption, data=encoded(figure), wide=False)
 
 
-def _draw_trend(place: Any, *, trend: Trend, limits: Mapping[str, Any]) -> None:
-    axes = place.add_subplot()
-    dated = trend.clock == "calendar"
-    origin = trend.time_h[0] if dated else 0.0
-    scale = _HOURS_A_DAY if dated else 1.0
-    time, ahead = (trend.time_h - origin) / scale, (trend.ahead_h - origin) / scale
+_TREND_SIZE = (6.0, 3.9)  # inches: on a phone the crossing of the limit is seen without scrolling
+
+
+def _draw_trend(axes: Any, trend: Trend, limits: Mapping[str, Any]) -> None:
+    time, ahead = _moments(trend, trend.time_h), _moments(trend, trend.ahead_h)
     low, value, high = (1e3 * row for row in (trend.low, trend.severity, trend.high))
     errors = [np.maximum(value - low, 0), np.maximum(high - value, 0)]
-    axes.errorbar(time, value, yerr=errors, fmt="o", ms=4, color="black", lw=0.8, label="estimate")
+    held = f"{100 * trend.coverage:.3g} %"
+    label = f"estimate, {held} interval"
+    axes.errorbar(time, value, yerr=errors, fmt="o", ms=4, color="black", lw=0.8, label=label)
     if ahead.size:
         band = 1e3 * trend.line_low, 1e3 * trend.line_high
-        axes.fill_between(ahead, *band, color="#1f5a94", alpha=0.2, lw=0, label="band")
-        axes.plot(ahead, 1e3 * trend.line, color="#1f5a94", label="line")
+        axes.fill_between(
+            ahead, *band, color=_LINE_COLOUR, alpha=0.2, lw=0, label=f"{held} band of the line"
+        )
+        axes.plot(ahead, 1e3 * trend.line, color=_LINE_COLOUR, label="line")
     limit = 1e3 * limits["condemning_limit_m"]
-    axes.axhline(limit, color="#c03a2b", lw=1.5, label="condemning limit")
+    axes.axhline(limit, color="#c03a2b", lw=1.5, label=f"condemning limit {limit:.3g} mm")
     for i in trend.starts[1:]:
-        axes.axvline((time[i - 1] + time[i]) / 2, color="0.4", ls="--", lw=1)
+        between = _moments(trend, (trend.time_h[i - 1 : i] + trend.time_h[i : i + 1]) / 2)[0]
+        axes.axvline(between, color="0.4", ls="--", lw=1)
         axes.annotate(
             "maintenance",
-            ((time[i - 1] + time[i]) / 2, 0.02),
+            (between, 0.02),
             xycoords=("data", "axes fraction"),
             rotation=90,
             fontsize=7,
             ha="right",
         )
-    axes.set_ylim(0, 1.25 * max(limit, float(high.max())))  # room for the legend
+    axes.set_ylim(0, 1.1 * max(limit, float(high.max())))
     axes.margins(x=0.02)
     axes.grid(alpha=0.3)
-    axes.legend(fontsize=8, loc="upper left", ncols=4)
-    axes.set_ylabel(f"{limits['quantity'].split(',')[0]} [mm]")
-    axes.set_xlabel(_time_label(trend))
+    axes.legend(fontsize=8, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, frameon=False)
+    axes.set_ylabel(f"{short_name(limits['quantity'].split(',')[0])} [mm]")
+    _tell_time(axes, trend)
 
 
-def _time_label(trend: Trend) -> str:
+_LINE_COLOUR = "#1f5a94"
+
+
+def _moments(trend: Trend, hours: Float) -> NDArray[Any]:
+    """Hours as an axis wants them: dates of the calendar, or hours of operation."""
     if trend.clock == "operating":
-        return "operating hours [h]"
-    first = datetime.fromtimestamp(3600 * float(trend.time_h[0]), UTC)
-    return f"days since {first:%Y-%m-%d}"
+        return hours
+    return (3600 * hours).round().astype("datetime64[s]")
+
+
+def _tell_time(axes: Any, trend: Trend) -> None:
+    """Dates where dates were given."""
+    if trend.clock == "operating":
+        axes.set_xlabel("operating hours [h]")
+        return
+    from matplotlib import dates
+
+    untyped: Any = dates
+    locator = untyped.AutoDateLocator(minticks=3, maxticks=7)
+    axes.xaxis.set_major_locator(locator)
+    axes.xaxis.set_major_formatter(untyped.ConciseDateFormatter(locator))
+    axes.set_xlabel("date (UTC)")

@@ -2,13 +2,13 @@
 
 import re
 import textwrap
-from pathlib import Path
 from typing import Any
 
 from ..datasets.record import DataError, Recording
 from .advice import brief_words
 from .estimate import Estimate, WearModel
 from .healthy import Baseline, Baselines
+from .page import render
 from .report import (
     feature_words,
     finding_words,
@@ -26,7 +26,6 @@ from .report_figures import (
     trend_picture,
 )
 
-_TEMPLATES = Path(__file__).parent / "templates"
 _MOST_ROWS = 1000  # of the table of a batch: a page for reading
 _MOST_DETAILS = 3  # recordings of a batch with pictures
 _MOST_TRENDS = 6
@@ -164,7 +163,7 @@ def _details(
     for row in [row for row in batch.current if row.grade is not None][:_MOST_DETAILS]:
         try:
             recording = batch.items[row.number].load()
-            baseline = None if baselines is None else baselines.of(recording.row)
+            baseline = None if baselines is None else baselines.of(recording)
             estimate = model.estimate(recording, baseline)
         except DataError:
             continue  # it has gone since
@@ -198,27 +197,15 @@ def _few(
 
 
 def _rendered(name: str, **context: Any) -> str:
-    import jinja2
-
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(_TEMPLATES),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    return (
-        environment.get_template(name)
-        .render(
-            **context,
-            colour=_colour,
-            millimetres=millimetres,
-            finding_words=finding_words,
-            zone_words=zone_words,
-            words=feature_words,
-            sentence=_sentence,
-        )
-        .lstrip()
+    return render(
+        name,
+        **context,
+        colour=_colour,
+        millimetres=millimetres,
+        finding_words=finding_words,
+        zone_words=zone_words,
+        words=feature_words,
+        sentence=_sentence,
     )
 
 

@@ -43,6 +43,7 @@ from ..sim.shaft_response import (
     reduce_rotor,
     time_response,
 )
+from .page import short_name
 
 Float = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -639,6 +640,16 @@ class PeakChange:
     model_change: float
     verdict: str
 
+    @property
+    def scatter(self) -> float:
+        """Half the width of the interval [dB]."""
+        return (self.interval[1] - self.interval[0]) / 2
+
+    @property
+    def expected(self) -> bool:
+        """Whether the true change is larger than the scatter: about every second test shows it."""
+        return abs(self.model_change) > self.scatter
+
 
 def find_frf_peaks(frf: Frf, *, prominence: float = _PROMINENCE_DB) -> tuple[NDArray[np.intp], ...]:
     """Peaks of the magnitude that stand out of their surroundings and of their scatter.
@@ -1231,7 +1242,26 @@ def _summary(result: BeforeAfter) -> str:
             )
     truths = [peak.model_change for peak in result.changes]
     texts.append(f"In the model these peaks change by {min(truths):+.1f} … {max(truths):+.1f} dB.")
-    return " ".join(texts)
+    return " ".join([*texts, _power(result.changes)])
+
+
+def _power(changes: Sequence[PeakChange]) -> str:
+    """What such a test can show of the moves at all."""
+    scatter = [peak.scatter for peak in changes]
+    shown = [peak for peak in changes if peak.expected]
+    told = (
+        f"The change of a peak scatters by ±{min(scatter):.1f} to ±{max(scatter):.1f} dB in this "
+        "test; in the model "
+    )
+    if not shown:
+        return f"{told}no peak changes by more, so the test cannot show what these moves do."
+    most = max(shown, key=lambda peak: abs(peak.model_change) / peak.scatter)
+    one = len(shown) == 1
+    return (
+        f"{told}{len(shown)} of {len(changes)} peaks {'changes' if one else 'change'} by more and "
+        f"may show it, first of all {most.channel} at "
+        f"{most.frequency_before:.1f} Hz ({most.model_change:+.1f} dB)."
+    )
 
 
 def rig_table(result: BeforeAfter) -> dict[str, Any]:
@@ -1254,7 +1284,10 @@ def rig_table(result: BeforeAfter) -> dict[str, Any]:
         "averages": [test.frf.averages for test in (result.before, result.after)],
         "rejected": [*result.before.rejected, *result.after.rejected],
         "summary": result.summary,
-        "peaks": [asdict(peak) for peak in result.changes],
+        "peaks": [
+            asdict(peak) | {"scatter": peak.scatter, "expected": peak.expected}
+            for peak in result.changes
+        ],
     }
 
 
@@ -1279,16 +1312,20 @@ def rig_text(result: BeforeAfter) -> str:
     if result.changes:
         lines.append(
             f"  {'bearing':22} {'Hz':>7} {'dB re 1 (m/s²)/N':>17} {'change dB':>10} "
-            f"{'interval':>15} {'model':>6}"
+            f"{'interval':>15} {'model':>6}  {'verdict':10} by model"
         )
     for peak in result.changes:
         low, high = peak.interval
         lines.append(
             f"  {peak.channel:22} {peak.frequency_before:7.1f} {peak.level_before:17.1f} "
             f"{peak.change:+10.1f} {f'{low:+.1f} … {high:+.1f}':>15} {peak.model_change:+6.1f}"
-            f"  {peak.verdict}"
+            f"  {peak.verdict:10} {EXPECTED[peak.expected]}"
         )
     return "\n".join(lines)
+
+
+EXPECTED = {True: "may show", False: "too small"}
+"""Whether the change in the model is larger than the scatter of the test."""
 
 
 def _in_words(place: Place) -> str:
@@ -1301,7 +1338,9 @@ def _in_words(place: Place) -> str:
 # --- picture
 
 
-def rig_figure(result: BeforeAfter, *, channels: Sequence[str] | None = None) -> Any:
+def rig_figure(
+    result: BeforeAfter, *, channels: Sequence[str] | None = None, columns: int | None = None
+) -> Any:
     """Accelerance at the bearings before and after, with confidence, model and coherence.
 
     Parameters
@@ -1309,6 +1348,8 @@ def rig_figure(result: BeforeAfter, *, channels: Sequence[str] | None = None) ->
     result : BeforeAfter
     channels : sequence of str, optional
         Those to draw; all by default.
+    columns : int, optional
+        Channels beside each other; all by default.
 
     Returns
     -------
@@ -1327,17 +1368,28 @@ def rig_figure(result: BeforeAfter, *, channels: Sequence[str] | None = None) ->
     if unknown:
         known = ", ".join(result.before.channels)
         raise RigError(f"channels = {', '.join(unknown)} must be of {known}")
-    figure = Figure(figsize=(1 + 3.6 * len(names), 5.6), layout="constrained")
-    figure.suptitle(f"{result.scene}: accelerance before and after calibration (simulated test)")
-    panels = figure.subplots(
-        2, len(names), sharex=True, sharey="row", height_ratios=[3, 1], squeeze=False
+    across = min(columns or len(names), len(names))
+    down = math.ceil(len(names) / across)
+    figure = Figure(figsize=(1 + 3.6 * across, 5.6 * down), layout="constrained")
+    figure.suptitle(
+        f"{short_name(result.scene, 60)}: accelerance before and after the moves (simulated test)"
     )
-    for column, name in zip(panels.T, names, strict=True):
-        _draw_channel(column, result, name)
+    panels = figure.subplots(
+        2 * down, across, sharex=True, sharey="row", height_ratios=[3, 1] * down, squeeze=False
+    )
     highest = max(float(_level(t.model).max()) for t in (result.before, result.after))
-    panels[0, 0].set_ylim(highest - _SHOWN_DB, highest + _SHOWN_DB / 10)
-    panels[0, 0].set_ylabel("accelerance [dB re 1 (m/s²)/N]")
-    panels[1, 0].set_ylabel("coherence")
+    for place in range(down * across):
+        row, column = divmod(place, across)
+        pair = panels[2 * row : 2 * row + 2, column]
+        if place < len(names):
+            _draw_channel(pair, result, names[place])
+        else:
+            for axes in pair:
+                axes.set_axis_off()
+    for level, coherence in zip(panels[::2, 0], panels[1::2, 0], strict=True):
+        level.set_ylim(highest - _SHOWN_DB, highest + _SHOWN_DB / 10)
+        level.set_ylabel("accelerance [dB re 1 (m/s²)/N]")
+        coherence.set_ylabel("coherence")
     panels[0, -1].legend(fontsize=8, loc="lower right")
     return figure
 
@@ -1365,7 +1417,7 @@ def _draw_channel(column: Any, result: BeforeAfter, name: str) -> None:
         )
         column[1].plot(frf.frequency, frf.coherence[row], color=colour, lw=0.7)
     _mark(column[0], [peak for peak in result.changes if peak.channel == name])
-    column[0].set_title(name, fontsize=10)
+    column[0].set_title(short_name(name, 30), fontsize=10)
     column[1].set(xlabel="frequency [Hz]", ylim=(0, 1.02))
     for axes in column:
         axes.grid(alpha=0.3)

@@ -78,9 +78,11 @@ class View:
         Name of the channel that holds the force of a transfer function; the only channel in N by
         default.
     speed_hz : float, optional
-        Shaft speed where the recording has no tacho and declares none [Hz].
+        Shaft speed where the recording has no tacho; it goes before the declared one [Hz].
     bearing : BearingFrequencies, optional
         Of a rolling bearing at one revolution per second, that is in orders.
+    exponential : float
+        What the exponential window of an impact test has sunk to at the end of a block [-].
 
     Raises
     ------
@@ -101,6 +103,7 @@ class View:
     force: str | None = None
     speed_hz: float | None = None
     bearing: BearingFrequencies | None = None
+    exponential: float = 1.0
 
     def __post_init__(self) -> None:
         known = self.recording.vibration_names
@@ -175,14 +178,11 @@ class View:
 
     @cached_property
     def speed(self) -> float | None:
-        """Mean shaft speed [Hz]: as given, by the tacho, or as declared; None where unknown."""
-        if self.speed_hz is not None:
-            return self.speed_hz
+        """Mean shaft speed [Hz]: by the tacho, as given, or as declared; None where unknown."""
         if isinstance(self.turning, Turning):
             phase = self.turning.phase
             return float((phase[-1] - phase[0]) / (self.n_samples - 1) * self.rate)
-        declared = float(self.recording.row.get("speed_hz", math.nan))
-        return declared if 0 < declared < math.inf else None
+        return self.recording.declared_speed_hz if self.speed_hz is None else self.speed_hz
 
     @property
     def heading(self) -> str:

@@ -17,10 +17,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..datasets.record import DataError
 from ..sim.parts import Scene
+from .page import short_name
+from .picture import save_picture
 
-_FORMATS = (".png", ".svg", ".pdf")
 _COARSEST = 4  # every fourth cell first: a run that is cut short has seen all of the plane
 
 
@@ -379,7 +379,9 @@ def _reasons(found: StabilityMap, method: str) -> list[tuple[str, int]]:
 _MOST_REASONS = 4
 
 
-def save_figure(scene: Scene, maps: Sequence[StabilityMap], path: Path) -> None:
+def save_figure(
+    scene: Scene, maps: Sequence[StabilityMap], path: Path, *, force: bool = True
+) -> None:
     """Draw maps on one sheet, a row of panels each.
 
     Parameters
@@ -394,9 +396,7 @@ def save_figure(scene: Scene, maps: Sequence[StabilityMap], path: Path) -> None:
     DataError
         Another suffix.
     """
-    if path.suffix not in _FORMATS:
-        raise DataError(f"{path}: suffix must be one of {', '.join(_FORMATS)}; rename it")
-    atlas_figure(scene, maps).savefig(path, dpi=100)
+    save_picture(atlas_figure(scene, maps), path, force=force)
 
 
 def atlas_figure(scene: Scene, maps: Sequence[StabilityMap]) -> Any:
@@ -424,7 +424,7 @@ def atlas_figure(scene: Scene, maps: Sequence[StabilityMap]) -> Any:
 
 def _draw(sheet: Any, scene: Scene, found: StabilityMap) -> None:
     plan = found.plan
-    sheet.suptitle(f"{scene.name} (simulated): {plan.title}", fontsize=11)
+    sheet.suptitle(f"{short_name(scene.name, 60)} (simulated): {plan.title}", fontsize=11)
     panels = sheet.subplots(1, len(found.verdicts), squeeze=False, sharex=True, sharey=True)[0]
     lines: dict[str, Any] = {}
     for panel, (method, codes) in zip(panels, found.verdicts.items(), strict=True):

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..sim.analytic import kelvin_voigt_restitution
 from ..sim.assemble import simulate
-from ..sim.bearing import BearingError, BearingStatus, coefficients, equilibrium, stability
+from ..sim.bearing import BearingError, BearingStatus, equilibrium, whirl
 from ..sim.crank_setup import (
     LARGEST_STEP_PER_CONTACT_TIME,
     contact_rate,
@@ -718,8 +718,7 @@ def _margin(scene: JournalScene, weight: float, speed: float) -> float:
         found = equilibrium(film_geometry(here), (weight / unit, 0.0), rung=rung)
     except BearingError:
         return -math.inf  # too slow to carry the load: the journal lies on its shell
-    method = "analytic" if rung == "direct" else "displacement"
-    limit = stability(coefficients(found, method=method).per_load(weight / unit)).mass
+    limit = whirl(found).threshold.mass
     if limit == 0:
         return math.inf
     return math.log(scale.force / weight / limit) if math.isfinite(limit) else -math.inf

@@ -1,8 +1,9 @@
 """A data set's signals turned into its feature table."""
 
 import math
+from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -11,13 +12,16 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from ..datasets.csv_cells import safe_frame
 from ..datasets.record import DataError, DataSet, Recording
 from ..datasets.workers import in_order
-from ..features.analysis import STANDARD, Settings
+from ..features.analysis import FORCE, STANDARD, Settings
 from ..features.catalogue import SetName
 from ..features.envelope import BearingFrequencies, bearing_frequencies
+from ..features.impact import find_impacts, is_impact
 from ..features.needs import Layout
 from ..features.table import absent_features, feature_names, feature_row
+from ..sim.atomic import replacing
 
 _BATCH = 16  # records a worker reads at a time: 20 MB, and few enough to keep both cores busy
 
@@ -105,6 +109,7 @@ def choice_of(
     bearing: Sequence[float] | None = None,
     bands: Sequence[Sequence[float]] = (),
     envelope_band: Sequence[float] | None = None,
+    exponential: float = 1.0,
 ) -> Choice:
     """Choice of features from plain numbers and words, as a command line has them.
 
@@ -117,7 +122,7 @@ def choice_of(
     machine : str, optional
         Kind of machine, a key of :data:`wearstate.features.iso.KINDS`.
     speed_hz : float, optional
-        Nominal shaft speed [Hz].
+        Nominal shaft speed [Hz]; the one stored with each record by default.
     speed_band_hz : sequence of float, optional
         Where the speed is looked for without a tacho, low and high [Hz].
     bearing : sequence of float, optional
@@ -127,6 +132,8 @@ def choice_of(
         Bands of your own, low and high [Hz].
     envelope_band : sequence of float, optional
         Low and high [Hz].
+    exponential : float
+        What the exponential window of an impact test has sunk to at the end of a block, 0 to 1 [-].
 
     Returns
     -------
@@ -147,7 +154,7 @@ def choice_of(
     pairs = [
         _pair(values, name, faults)
         for name, values in (
-            ("speed_band", speed_band_hz),
+            ("speed_band_hz", speed_band_hz),
             ("envelope_band", envelope_band),
             *(("band", band) for band in bands),
         )
@@ -155,6 +162,8 @@ def choice_of(
     geometry = _geometry(bearing, faults)
     if speed_hz is not None and not 0 < speed_hz < math.inf:
         faults.append(f"speed_hz = {speed_hz} Hz must be > 0 and finite; give the nominal speed")
+    if not 0 < exponential <= 1:
+        faults.append(f"exponential = {exponential} must be > 0 and <= 1; 1 for no window")
     if faults:
         raise DataError("\n".join(faults))
     settings = Settings(
@@ -162,6 +171,7 @@ def choice_of(
         speed_hz=speed_hz,
         speed_band_hz=pairs[0],
         envelope_band=pairs[1],
+        exponential=exponential,
         bands=tuple(pair for pair in pairs[2:] if pair is not None),
         bearing=geometry,
     )
@@ -231,7 +241,7 @@ def absent_in(path: str | Path, choice: Choice) -> dict[str, str]:
             pulses_per_revolution=layout.pulses_per_revolution,
             quantities=layout.quantities,
             n_samples=layout.n_samples,
-            settings=choice.settings,
+            settings=layout.settings,
             only=choice.only,
         )
     except ValueError as error:
@@ -273,10 +283,18 @@ def recording_features(
             quantities=[channel.quantity for channel in recording.vibration_channels],
             feature_set=choice.feature_set,
             only=choice.only,
-            settings=choice.settings,
+            settings=_about(recording, choice.settings),
         )
     except ValueError as error:
         raise DataError(f"{recording.source or 'recording'}: {error}") from error
+
+
+def _about(recording: Recording, settings: Settings) -> Settings:
+    """Settings with the speed that is stored with a record, where none is given and one is used."""
+    used = settings.machine is not None or (settings.bearing and recording.tacho is None)
+    if settings.speed_hz is not None or not used:
+        return settings  # one and the same for all records: their plan of names is made once
+    return replace(settings, speed_hz=recording.declared_speed_hz)
 
 
 def recording_layout(recording: Recording, settings: Settings = STANDARD) -> Layout:
@@ -301,7 +319,7 @@ def recording_layout(recording: Recording, settings: Settings = STANDARD) -> Lay
         tacho=recording.tacho is not None,
         pulses_per_revolution=recording.pulses_per_revolution,
         n_samples=recording.signal.shape[-1],
-        settings=settings,
+        settings=_about(recording, settings),
     )
 
 
@@ -345,6 +363,7 @@ def feature_table(
         for part, found in in_order(partial(_batch_features, data, choice), batches, jobs=jobs):
             rows += part
             names = names or found
+            _same_names(path, names, found)
             if progress is not None:
                 progress(len(rows), usable.size)
         manifest = data.manifest.iloc[usable].reset_index(drop=True)
@@ -357,14 +376,58 @@ def _batch_features(
     rows: list[NDArray[np.float64]] = []
     names: tuple[str, ...] = ()
     for index in indices:
-        names, values = recording_features(data[int(index)], choice)
+        found, values = recording_features(data[int(index)], choice)
+        names = names or found
+        _same_names(f"{data.path}[{index}]", names, found)
         rows.append(values)
     data.close()
     return rows, names
 
 
-def save_table(table: FeatureTable, path: str | Path) -> None:
+def impact_notes(path: str | Path) -> dict[str, int]:
+    """How the blows of a data set's impact tests were averaged, and what stays unknown.
+
+    Parameters
+    ----------
+    path : str or Path
+        Data set file.
+
+    Returns
+    -------
+    dict
+        Text -> records it holds for; empty where no force is that of a hammer.
+    """
+    notes: Counter[str] = Counter()
+    with DataSet(path) as data:
+        for index in np.flatnonzero((data.manifest["status"] == "ok").to_numpy()):
+            recording = data[int(index)]
+            pairs = zip(recording.vibration_channels, recording.vibration, strict=True)
+            forces = [row for channel, row in pairs if channel.quantity == FORCE]
+            if len(forces) == 1 and is_impact(forces[0]):
+                notes[find_impacts(forces[0], recording.sample_rate).text] += 1
+    return dict(notes)
+
+
+def _same_names(where: str | Path, names: tuple[str, ...], found: tuple[str, ...]) -> None:
+    """Refuse records whose rows differ: one lacks the speed that the others have."""
+    odd = sorted(set(names) ^ set(found))
+    if odd:
+        raise DataError(
+            f"{where}: {len(odd)} features are not in every record, must be 0, as {odd[0]}; "
+            "store the speed of every record, or give speed_hz for all"
+        )
+
+
+def save_table(table: FeatureTable, path: str | Path, *, force: bool = True) -> None:
     """Write a feature table as Parquet, CSV or HDF5, by the suffix.
+
+    Parameters
+    ----------
+    table : FeatureTable
+    path : str or Path
+        ``.parquet``, ``.csv`` or ``.h5``.
+    force : bool
+        Replace an existing file.
 
     Raises
     ------
@@ -376,12 +439,8 @@ def save_table(table: FeatureTable, path: str | Path) -> None:
         raise DataError(f"{target}: suffix must be one of {', '.join(_WRITERS)}; rename it")
     if not target.parent.is_dir():
         raise DataError(f"{target.parent} is no folder; create it")
-    part = target.with_name(target.name + ".part")
-    try:
-        _WRITERS[target.suffix](table.frame(), part)
-        part.replace(target)
-    finally:
-        part.unlink(missing_ok=True)
+    with replacing(target, force=force) as fresh:
+        _WRITERS[target.suffix](table.frame(), fresh)
 
 
 def _write_parquet(frame: pd.DataFrame, path: Path) -> None:
@@ -395,7 +454,7 @@ def _write_parquet(frame: pd.DataFrame, path: Path) -> None:
 
 
 def _write_csv(frame: pd.DataFrame, path: Path) -> None:
-    frame.to_csv(path, index=False)
+    safe_frame(frame).to_csv(path, index=False)
 
 
 def _write_hdf5(frame: pd.DataFrame, path: Path) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import __version__
-from ..datasets.audit import machine_origin
+from ..datasets.machines import machine_origin
 from ..datasets.recipe import recorded_scene, wear_limits
 from ..datasets.record import Attributes, DataError, DataSet
 from ..datasets.split_file import usable_sides
@@ -18,7 +18,7 @@ from ..datasets.splits import check_no_leak, group_folds, group_split
 from .conformal import Calibration, Scale, fit_scale, scale_inputs
 from .estimate import Head, WearModel
 from .grades import grades_of
-from .healthy import referenced_rows, references
+from .healthy import referenced_rows, references, refuse_strangers
 from .models import (
     BUDGET_MS,
     Fitted,
@@ -75,8 +75,9 @@ def train_model(
     budget_ms : float, optional
         Time that one prediction may take, beside the features [ms].
     baseline : str or Path, optional
-        Data set of healthy records of the same machines (equal group numbers): the model is then
-        referenced, and needs healthy recordings of every machine it is asked about.
+        Data set of healthy records of the same machines, by identity (recipe, seed and number, or
+        declared name): the model is then referenced, and needs healthy recordings of every machine
+        it is asked about.
     progress : callable, optional
         Called with (records done, records).
 
@@ -92,17 +93,20 @@ def train_model(
     Raises
     ------
     DataError
-        No such severity column or split, no limits, too few machine draws, machines without a
-        healthy record, or a budget that no model keeps.
+        No such severity column or split, no limits, too few machine draws, machines unknown or
+        without a healthy record, or a budget that no model keeps.
     """
     with DataSet(path) as data:
         head, draws = data.attributes, data.manifest["group"].nunique()
         sides = None if split is None else usable_sides(data, split)
     _aim(head, target, path)  # refused before the features are computed
     _check_draws(draws, path)
+    if baseline is not None:
+        refuse_strangers(path, baseline)
     table = feature_table(path, jobs=jobs, progress=progress)
-    healthy = None if baseline is None else _healthy_table(baseline, head, jobs, progress)
-    references_ = None if healthy is None else references(table, healthy, str(baseline))
+    healthy, count = None, 0
+    if baseline is not None:
+        healthy, count = references(table, path, baseline, jobs=jobs, progress=progress)
     groups = table.manifest["group"].to_numpy()
     if sides is None:
         train, test = _split(groups, held_out, seed, path)
@@ -116,7 +120,7 @@ def train_model(
         train,
         head,
         target=target,
-        references=references_,
+        references=healthy,
         held_out=held_out,
         seed=seed,
         budget_ms=budget_ms,
@@ -125,7 +129,7 @@ def train_model(
     if sides is not None:
         model.card["trained_on"].update(split=sides.name, split_sha256=sides.sha256)
     if healthy is not None:
-        model.card.update(baseline_records=len(healthy.values))
+        model.card.update(baseline_records=count)
     return model, table, test
 
 
@@ -183,22 +187,6 @@ def fit_model(
     return _model(learnt, card)
 
 
-def _healthy_table(
-    path: str | Path, head: Attributes, jobs: int, progress: Progress | None
-) -> FeatureTable:
-    """Features of a healthy set, which must be of the same machines."""
-    with DataSet(path) as data:
-        other = data.attributes
-    mine, theirs = draw_identity(head), draw_identity(other)
-    if mine and theirs and mine != theirs:
-        raise DataError(
-            f"{path}: its machines (recipe {_name_in(other.recipe)}, seed {other.seed}) must be "
-            f"those of the data set (recipe {_name_in(head.recipe)}, seed {head.seed}); generate "
-            "it with that seed from a recipe whose machines_of names that recipe"
-        )
-    return feature_table(path, jobs=jobs, progress=progress)
-
-
 @dataclass(frozen=True, kw_only=True)
 class _Aim:
     """The severity to train for, with its wear limits [m]."""
@@ -215,10 +203,15 @@ def _aim(head: Attributes, target: str | None, path: str | Path) -> _Aim:
             f"{path}: target = {target!r} must be one of its severities "
             f"{', '.join(head.severities) or '(it has none)'}; choose another"
         )
-    if not head.severities or len(head.grade_edges) == 0:
+    if not head.severities:
         raise DataError(
-            f"{path}: severities = {list(head.severities)}, grade_edges = {list(head.grade_edges)} "
-            "must both be given; label the data set, or generate it from a recipe"
+            f"{path}: it has no severity, must have one to train for; label the wear in metres on "
+            "import, or generate it from a recipe"
+        )
+    if not head.grade_edges:
+        raise DataError(
+            f"{path}: {head.severities[0]} has 0 grade edges, must have 3 to be graded; give its "
+            "scene wear limits, or import with --limits"
         )
     if target in (None, head.severities[0]):
         return _Aim(
@@ -456,7 +449,7 @@ def draw_identity(head: Attributes) -> str:
     data set's seed alone, so their texts, record numbers and comments do not make other machines.
     Empty for a set that no recipe made.
     """
-    origin = machine_origin(head)
+    origin = machine_origin(head.recipe, head.seed)
     return hashlib.sha256(json.dumps(origin).encode()).hexdigest() if origin else ""
 
 
@@ -573,5 +566,5 @@ def _name_in(toml_text: str) -> str:
 
     try:
         return str(tomllib.loads(toml_text).get("name", ""))
-    except tomllib.TOMLDecodeError:
+    except (ValueError, RecursionError):  # ValueError: no TOML, or a number too long
         return ""

@@ -94,6 +94,8 @@ class Trend:
         Why there is no outlook; empty where there is one.
     clock : {"operating", "calendar"}
         What the hours are of; those of the calendar since 1970.
+    coverage : float
+        Nominal, of the intervals and of the band.
     """
 
     time_h: Float
@@ -108,6 +110,7 @@ class Trend:
     outlook: Outlook | None
     reason: str
     clock: Clock
+    coverage: float
 
 
 def fit_trend(
@@ -192,6 +195,7 @@ def fit_trend(
             outlook=None,
             reason=f"{lack}{since}, must be >= {FEWEST_POINTS} over some time; record again",
             clock=clock,
+            coverage=coverage,
         )
     lines = _lines(last, growth, coverage, np.random.default_rng(seed))
     outlook = _outlook(lines, last[0, -1], span, limit, clock, growth, coverage)
@@ -208,6 +212,7 @@ def fit_trend(
         outlook=outlook,
         reason="",
         clock=clock,
+        coverage=coverage,
     )
 
 

@@ -75,6 +75,7 @@ from ..sim.slider_crank import (
     Tables,
     run_mechanism,
 )
+from .verify_bearing import finite_bearing_checks
 
 LITERATURE_FOLDER = Path(__file__).parent / "literature"
 
@@ -621,7 +622,11 @@ def _short_threshold(eccentricity: float, quantity: str) -> float:
 
 @cache
 def _grooved_bearing(length_to_diameter: float, s: float, width: float) -> dict[str, float]:
-    """Two axial grooves across the load, on a mesh with an error below half a percent."""
+    """Two axial grooves across the load.
+
+    Error of the mesh: 0.2 % of the largest coefficient of its kind. Small ones beside it are less
+    sure of themselves: Cyy at S 0.042, an eleventh of Cxx, is 0.6 % low.
+    """
     grooves = tuple(Groove(angle=angle, width=width) for angle in (math.pi / 2, -math.pi / 2))
     geometry = FilmGeometry(
         length_to_diameter=length_to_diameter, n_theta=144, n_z=25, grooves=grooves
@@ -1126,6 +1131,7 @@ _TABLES: dict[str, dict[str, Callable[[], float]]] = {
         },
     },
     "film.csv": _film_checks(),
+    "finite_bearing.csv": finite_bearing_checks(),
     "shaft_line.csv": _shaft_checks(),
     "alignment.csv": _alignment_checks(),
 }

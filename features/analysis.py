@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from . import cepstrum, envelope, frf, iso, modal, orbit, order, resample, spectrum
+from . import cepstrum, envelope, frf, impact, iso, modal, orbit, order, resample, spectrum
 from .fft import fast_length, irfft, rfft
 from .statistics import Amplitude, Real
 from .third_octave import third_octave_centres
@@ -31,6 +31,10 @@ coherence of 0.8."""
 
 HIGHEST_ORDER = 20
 """Highest order of the stabilisation [-]: found the same modes as the usual 30 in half its time."""
+
+MOST_LINES = 1024
+"""Lines that one modal fit takes [-]; of more, each peak is fitted alone: a fit of all takes half a
+minute where blows are seconds apart."""
 
 _THINNING_PAD = 32  # samples at the lower rate between the end of a record and its start, wrapped
 
@@ -106,6 +110,9 @@ class Settings:
         Fault frequencies in orders of the shaft.
     frf_spacing_hz : float
         Widest line spacing of a transfer function [Hz].
+    exponential : float
+        What the exponential window of an impact test has sunk to at the end of a block [-]; 1 for
+        none. See `impact.impact_spectra`.
     frf_bands : int
         Its bands.
     n_modes : int
@@ -138,6 +145,7 @@ class Settings:
     speed_band_hz: Band | None = None
     bearing: envelope.BearingFrequencies | None = None
     frf_spacing_hz: float = 12.5
+    exponential: float = 1.0
     frf_bands: int = 10
     n_modes: int = 3
     reference: FrfReference | None = None
@@ -404,7 +412,7 @@ class Analysis:
     def path(self) -> orbit.Complex:
         """Orbit with its mean [unit of x, shape=(n_samples,)]; ValueError without two probes."""
         if self._probes is None:
-            raise ValueError("n_probes must be 2: the feature needs displacement; give quantities")
+            raise ValueError("n_probes = 0 must be 2; give quantities, two of them displacement")
         first, second = self._probes
         return orbit.displacement(self._readings[first], self._readings[second])
 
@@ -434,7 +442,10 @@ class Analysis:
     @cached_property
     def kurtograms(self) -> list[envelope.Kurtogram]:
         """Of every channel."""
-        return [envelope.kurtogram(row, self.fs) for row in self.vibration]
+        known = self._pulses is not None or self.settings.speed_hz is not None
+        span = envelope.envelope_span(self.speed_hz if known else None, self.settings.bearing)
+        levels = envelope.kurtogram_levels(self.vibration.shape[-1], self.fs, span)
+        return [envelope.kurtogram(row, self.fs, levels=levels) for row in self.vibration]
 
     @cached_property
     def kurtogram_fault_lines(self) -> list[list[envelope.FaultLine | None]]:
@@ -476,19 +487,23 @@ class Analysis:
 
     @cached_property
     def frf_spectra(self) -> frf.Spectra:
-        """Averaged spectra of force and responses, the lines within the bands only."""
+        """Averaged spectra of force and responses, the lines within the bands only.
+
+        Of the blows of an impact test, else of half-overlapped windows.
+        """
         force = [i for i, quantity in enumerate(self._quantities) if quantity == FORCE]
         if len(force) != 1:
             raise ValueError(
                 f"n_forces = {len(force)} must be 1: the feature needs a force channel"
             )
         edges = self.settings.frf_edges(self.fs)
-        spectra = frf.welch_spectra(
-            self.vibration[force[0]],
-            self.vibration[self.responses],
-            self.fs,
-            nperseg=self.settings.frf_nperseg(self.fs),
-        )
+        nperseg = self.settings.frf_nperseg(self.fs)
+        rows = self.vibration[force[0]], self.vibration[self.responses]
+        if impact.is_impact(rows[0]):
+            last = self.settings.exponential
+            spectra, _ = impact.impact_spectra(*rows, self.fs, least=nperseg, last=last)
+        else:
+            spectra = frf.welch_spectra(*rows, self.fs, nperseg=nperseg)
         return spectra.between(float(edges[0]), float(edges[-1]))
 
     @cached_property
@@ -500,8 +515,14 @@ class Analysis:
 
     @cached_property
     def coherence(self) -> Float:
-        """Ordinary coherence [-, shape=(n_responses, n_lines)]; 0 without a force."""
-        return frf.coherence(self.frf_spectra)
+        """Ordinary coherence [-, shape=(n_responses, n_lines)]; 0 without a force.
+
+        NaN of a single blow: one block tells no noise.
+        """
+        spectra = self.frf_spectra
+        if spectra.blocks < 2:
+            return np.full(spectra.response.shape, np.nan)
+        return frf.coherence(spectra)
 
     @cached_property
     def modes(self) -> modal.Modes | None:
@@ -513,11 +534,15 @@ class Analysis:
         if not rows:
             return None
         try:
-            return modal.modal_fit(
+            fit = (
+                modal.peak_fits if self.frf_spectra.frequency.size > MOST_LINES else modal.modal_fit
+            )
+            return fit(
                 self.frf_spectra.frequency,
                 self.response_function[rows],
                 n_modes=self.settings.n_modes,
                 quantity=MODAL_QUANTITIES.get(kinds[0], ACCELERANCE),
+                decay=self.frf_spectra.decay,
                 highest_order=min(HIGHEST_ORDER, self.frf_spectra.frequency.size // 3),
             )
         except ValueError:  # no stable pole: the functions are sound

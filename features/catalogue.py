@@ -39,6 +39,8 @@ class Feature:
         Unit of its values; "x" stands for the unit of the signal.
     needs : tuple of str
         What it cannot be had without, keys of `needs.NEEDS`; nothing but a vibration by default.
+    uses : tuple of str
+        What else it takes into account where it is there; ``tacho`` alone has a meaning.
     scope : {"channel", "housing", "response", "pair", "shaft", "orbit", "frf"}
         Whether it exists once per channel, per acceleration, per channel that is no force, per pair
         of channels, per record, per orbit, or per transfer function of one force.
@@ -58,6 +60,7 @@ class Feature:
     name: str
     unit: str
     needs: tuple[str, ...] = ()
+    uses: tuple[str, ...] = ()
     scope: Scope = "channel"
     labels: Callable[[Settings, float], tuple[str, ...]]
     function: Callable[[Analysis], NDArray[Any]]
@@ -302,8 +305,10 @@ def _frf_levels(analysis: Analysis) -> Float:
 
 
 def _frf_quality(analysis: Analysis) -> Float:
-    """Mean coherence, and the random error that goes with it, 1 at the most."""
+    """Mean coherence, and the random error that goes with it, 1 at the most; NaN of one blow."""
     mean = analysis.coherence.mean(axis=-1)
+    if np.isnan(mean).any():
+        return _stacked(mean, mean)
     error = frf.random_error(mean, analysis.frf_spectra.averages)
     return _stacked(mean, np.minimum(error, 1.0))
 
@@ -414,6 +419,7 @@ CATALOGUE: tuple[Feature, ...] = (
     Feature(
         name="band_levels",
         unit="dB re 1 x^2",
+        needs=("spectrum bands",),
         labels=_band_labels,
         function=lambda a: a.band_levels,
         reference=f"spectrum.band_levels; {_WELCH}",
@@ -767,6 +773,7 @@ COMPLETE_ROWS: tuple[Feature, ...] = (
         name="kurtogram",
         unit="Hz, Hz, -",
         needs=("frames",),
+        uses=("tacho",),
         labels=_named("kurtogram.centre_hz", "kurtogram.bandwidth_hz", "kurtogram.kurtosis"),
         function=_kurtogram,
         reference="envelope.kurtogram; Antoni, Mech. Syst. Signal Process. 21 (2007) 108-124",

@@ -55,6 +55,24 @@ SILENCE = 1e-8
 OVERLAP = 4
 """Hann frames over every sample [-]: fewer alias the cyclic frequency with the frame rate."""
 
+LONE_SHARE = 1 / 3
+"""Share of a band's fourth moment that, within `_LONE_PARTS` of the record, is a lone event [-]:
+blows that come back four times or more leave each eighth of the record less."""
+
+MOST_LONE = 3
+"""Lone events left out of a band [-]; with more, they come back."""
+
+SHOWN_ORDERS = 20.5
+"""Orders of the shaft that an envelope spectrum shows without a bearing [-]."""
+
+SHOWN_HARMONICS = 3.5
+"""Harmonics of the inner race that it shows with one [-]."""
+
+SHOWN_HZ = 500.0
+"""What it shows where the speed is unknown [Hz]."""
+
+_PARTS = 16  # of a record, in which lone events are looked for
+_LONE_PARTS = 2  # neighbours: an event may lie on the edge of two
 _FEWEST_NEIGHBOURS = 8  # lines; the median of fewer is no background
 _LINE_SILENCE = 1e-12  # of the power of all lines; below it is rounding
 _INDEPENDENCE = 0.703  # samples a flanked band holds per independent fourth moment, times its width
@@ -670,7 +688,7 @@ class Kurtogram:
         Binary logarithm of the number of bands in each row: 0, 1, log2(3), 2, log2(6) … [-].
     kurtosis : tuple of ndarray
         One per row, from the lowest band to the highest [-]: 0 of stationary Gaussian noise, -1 of
-        a tone of constant amplitude or of silence.
+        a tone of constant amplitude or of silence. Lone events are left out, see `kurtogram`.
     deviation : ndarray, shape (n_rows,)
         Standard deviation of the kurtosis of stationary Gaussian noise in each row [-].
 
@@ -766,8 +784,12 @@ def kurtogram(x: ArrayLike, fs: float, *, levels: int | None = None) -> Kurtogra
 
     With n independent samples in a band (time left times width), noise scatters by about
     ``2 / sqrt(n)`` (`Kurtogram.deviation`). The largest of all bands is then a narrow one at 2 to
-    4 times that, 7 in one record of a hundred. One single blow has a higher kurtosis than a train
-    of them: look at more than one record, or at the logarithm of the envelope.
+    4 times that, 7 in one record of a hundred.
+
+    One single blow would have a higher kurtosis than a train of them, and is no defect that comes
+    back. Where an eighth of the record holds more than a third of a band's ``<|z|^4>``, it is left
+    out of both means, and again of what is left, three times at the most. A train of four blows
+    or more is not touched, and noise next to never.
 
     References
     ----------
@@ -796,8 +818,9 @@ def kurtogram(x: ArrayLike, fs: float, *, levels: int | None = None) -> Kurtogra
         )
     counts = _bands_per_row(depth)
     lines, kept = _tapered_lines(signal, depth)
-    moments = [_band_moments(lines, count, kept) for count in counts]
-    silence = np.asarray(SILENCE * float(moments[0][0][0]))
+    parts = [_part_moments(lines, count, kept) for count in counts]
+    silence = np.asarray(SILENCE * float(parts[0][0].sum()))
+    moments = [_repeated(second, fourth) for second, fourth in parts]
     inside = (kept[1] - kept[0]) * lines.size * 4 / 3  # samples of the record left
     return Kurtogram(
         fs=fs,
@@ -805,6 +828,58 @@ def kurtogram(x: ArrayLike, fs: float, *, levels: int | None = None) -> Kurtogra
         kurtosis=tuple(_over(fourth, second**2, silence=silence) - 2 for second, fourth in moments),
         deviation=2 * np.sqrt(_INDEPENDENCE * 2 * np.array(counts) / inside),
     )
+
+
+def envelope_span(speed_hz: float | None, bearing: BearingFrequencies | None) -> float:
+    """Frequencies of the envelope that are of interest, from 0 to this.
+
+    Parameters
+    ----------
+    speed_hz : float, optional
+        Shaft speed [Hz].
+    bearing : BearingFrequencies, optional
+        In orders of the shaft.
+
+    Returns
+    -------
+    float
+        Three harmonics of the inner race, else twenty orders, else 500 [Hz].
+
+    Examples
+    --------
+    >>> envelope_span(25.0, None)
+    512.5
+    """
+    if speed_hz is None:
+        return SHOWN_HZ
+    return (SHOWN_ORDERS if bearing is None else SHOWN_HARMONICS * bearing.inner) * speed_hz
+
+
+def kurtogram_levels(n_samples: int, fs: float, span: float) -> int:
+    """Depth of a kurtogram whose narrowest bands still hold the frequencies of interest.
+
+    Parameters
+    ----------
+    n_samples : int
+        Length of the record, 256 or more.
+    fs : float
+        Sample rate [Hz].
+    span : float
+        Highest frequency of the envelope that is of interest [Hz], see `envelope_span`.
+
+    Returns
+    -------
+    int
+        For `kurtogram`, >= 1.
+
+    Examples
+    --------
+    >>> kurtogram_levels(51_200, 25_600.0, 500.0)
+    4
+    """
+    wide = int(math.log2(max(fs / 2 / span, 2)))
+    deepest = n_samples.bit_length() - 1 - FEWEST_SAMPLES_LOG2
+    return max(1, min(DEEPEST_LEVEL, wide, deepest))
 
 
 def _bands_per_row(depth: int) -> list[int]:
@@ -833,8 +908,25 @@ def _tapered_lines(signal: Real, depth: int) -> tuple[Complex, tuple[float, floa
     return np.pad(lines, margin), kept
 
 
-def _band_moments(lines: Complex, count: int, kept: tuple[float, float]) -> tuple[Float, Float]:
-    """Mean |z|^2 and |z|^4 of every band of a row [shape=(count,) each].
+def _repeated(second: Float, fourth: Float) -> tuple[Float, Float]:
+    """Mean |z|^2 and |z|^4 of every band without its lone events [shape=(count,) each].
+
+    From the parts of both means that fall into each part of the record [shape=(count, _PARTS)].
+    """
+    kept = np.ones(fourth.shape)
+    for _ in range(MOST_LONE):
+        left = fourth * kept
+        pairs = sliding_window_view(left, _LONE_PARTS, axis=-1).sum(axis=-1)
+        first = np.argmax(pairs, axis=-1)
+        lone = np.flatnonzero(pairs.max(axis=-1) > LONE_SHARE * left.sum(axis=-1))
+        for part in range(_LONE_PARTS):
+            kept[lone, first[lone] + part] = 0.0
+    share = kept.mean(axis=-1)
+    return (second * kept).sum(axis=-1) / share, (fourth * kept).sum(axis=-1) / share
+
+
+def _part_moments(lines: Complex, count: int, kept: tuple[float, float]) -> tuple[Float, Float]:
+    """What each part of the record adds to mean |z|^2 and |z|^4 [shape=(count, _PARTS) each].
 
     `lines` begin a quarter of their number below 0, with zeros, and end as far above fs / 2.
     """
@@ -846,17 +938,19 @@ def _band_moments(lines: Complex, count: int, kept: tuple[float, float]) -> tupl
     step = lines.strides[0]
     outset = lines[lines.size // 6 - (n - width) // 2 :]
     slices = as_strided(outset, (count, n), (width * step, step), writeable=False)
-    second, fourth = np.empty(count), np.empty(count)
+    second, fourth = np.empty((count, _PARTS)), np.empty((count, _PARTS))
+    begins = np.arange(_PARTS) * (past - first) // _PARTS
     rows = max(1, _CHUNK // n)
     for start in range(0, count, rows):
         part = slice(start, start + rows)
         wave = ifft(slices[part] * weight)[:, first:past].view(weight.dtype)
         np.square(wave, out=wave)
         power = wave[:, ::2] + wave[:, 1::2]
-        second[part] = power.mean(axis=-1)
+        second[part] = np.add.reduceat(power, begins, axis=-1, dtype=np.float64)
         # A dot product would wake BLAS threads, which cost more than they bring on a busy machine.
-        fourth[part] = np.square(power, out=power).mean(axis=-1)
-    return second, fourth
+        np.square(power, out=power)
+        fourth[part] = np.add.reduceat(power, begins, axis=-1, dtype=np.float64)
+    return second / (past - first), fourth / (past - first)
 
 
 def _flanks(width: int) -> Float:

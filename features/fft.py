@@ -561,11 +561,10 @@ def _remember(library: Any) -> bool:
     text = json.dumps({"sha256": _digest(wisdom), "wisdom": wisdom})
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.NamedTemporaryFile(
-            "w", dir=path.parent, prefix=path.stem, delete=False, encoding="ascii"
-        ) as file:
-            file.write(text)
-        Path(file.name).replace(path)
+        with tempfile.TemporaryDirectory(dir=path.parent, prefix=path.stem) as folder:
+            file = Path(folder, path.name)
+            file.write_text(text, encoding="ascii")
+            file.replace(path)
     except OSError:
         return False
     return True

@@ -913,16 +913,16 @@ def find_blows(
             f"level = {trigger:.6g} N must be > 0 and <= the largest force, "
             f"{pulse.max(initial=0.0):.6g} N; lower it, turn the sign, or connect the force cell"
         )
-    onsets = _onsets(pulse, trigger)
+    hits = onsets(pulse, trigger)
     starts: list[int] = []
     rejected: list[str] = []
     free = 0
-    for onset in onsets:
+    for onset in hits:
         if onset < free:
             continue
         start = int(onset) - pretrigger
         free = start + nperseg
-        fault = _fault(onsets, start, int(onset), free, pulse.size)
+        fault = _fault(hits, start, int(onset), free, pulse.size)
         if fault:
             rejected.append(f"blow at {onset / fs:.6g} s: {fault}")
         else:
@@ -932,8 +932,25 @@ def find_blows(
     return Blows(starts=np.array(starts, dtype=np.intp), nperseg=nperseg, rejected=tuple(rejected))
 
 
-def _onsets(force: Float, level: float) -> NDArray[np.intp]:
-    """Samples at which the force reaches the level, coming from below half of it."""
+def onsets(force: Float, level: float) -> NDArray[np.intp]:
+    """Samples at which a force reaches a level, coming from below half of it.
+
+    Parameters
+    ----------
+    force : ndarray, shape (n_samples,)
+        [N]
+    level : float
+        > 0 [N]
+
+    Returns
+    -------
+    ndarray of int, shape (n_onsets,)
+
+    Examples
+    --------
+    >>> onsets(np.array([0.0, 2.0, 1.0, 2.0, 0.0, 3.0]), 2.0).tolist()
+    [1, 5]
+    """
     state = (force >= level).astype(np.int8) - (force < level / 2)
     decided = np.flatnonzero(state)
     high = state[decided] > 0

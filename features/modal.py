@@ -1182,6 +1182,82 @@ def modal_fit(
     return modes
 
 
+def peak_fits(
+    frequency: ArrayLike,
+    value: ArrayLike,
+    *,
+    n_modes: int,
+    quantity: Quantity = "accelerance",
+    decay: float = 0.0,
+    highest_order: int = 10,
+) -> Modes:
+    """Modes at the highest peaks: each found in its own surroundings, then all fitted together.
+
+    Parameters
+    ----------
+    frequency, value, quantity, decay
+        As in `modal_fit`, of many lines.
+    n_modes : int
+        Peaks wanted.
+    highest_order : int
+        As in `modal_fit`, of the surroundings of one peak; 10 at the most.
+
+    Returns
+    -------
+    Modes
+        As many as were found, to the lines around the peaks.
+
+    Raises
+    ------
+    ValueError
+        If no peak is a mode, or as `fit_modes`.
+
+    Examples
+    --------
+    >>> f = np.arange(20.0, 500.0, 0.25)
+    >>> value = sum(f**2 / (f0**2 - f**2 + 0.01j * f0 * f) for f0 in (100.0, 300.0))
+    >>> peak_fits(f, value, n_modes=2).frequency.round(6).tolist()
+    [100.0, 300.0]
+    """
+    lines, functions = _functions(frequency, value)
+    peaks = find_resonances(lines, functions)
+    height = np.linalg.norm(functions[:, peaks], axis=0)
+    reach = PEAK_REACH * float(lines[1] - lines[0])
+    found: list[Modes] = []
+    near = np.zeros(lines.size, dtype=bool)
+    for peak in peaks[np.argsort(-height)][: MOST_TRIED * n_modes]:
+        if len(found) == n_modes or near[peak]:
+            continue
+        band = (float(lines[peak]) - reach, float(lines[peak]) + reach)
+        try:
+            mode = modal_fit(
+                lines, functions, band=band, n_modes=1, quantity=quantity, decay=decay,
+                highest_order=min(highest_order, 10),
+            )  # fmt: skip
+        except ValueError:  # a peak of the noise: the functions are sound
+            continue
+        found.append(mode)
+        near |= (lines >= band[0]) & (lines <= band[1])
+    if not found:
+        raise ValueError(
+            f"n_modes = 0 must be >= 1: none of {peaks.size} peaks is a mode; average more"
+        )
+    starts = np.concatenate([mode.frequency for mode in found])
+    ratios = np.concatenate([mode.damping_ratio for mode in found])
+    order = np.argsort(starts)
+    return fit_modes(
+        lines[near], functions[:, near], starts[order], ratios[order],
+        quantity=quantity, decay=decay,
+    )  # fmt: skip
+
+
+PEAK_REACH = 40
+"""Lines to either side of a peak that are fitted with it."""
+
+MOST_TRIED = 3
+"""Peaks that are tried for each mode that is wanted."""
+
+
 def _between(lines: Float, low: float, high: float) -> NDArray[np.bool_]:
     kept = (lines >= low) & (lines <= high)
     if np.count_nonzero(kept) < FEWEST_LINES:

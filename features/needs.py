@@ -3,7 +3,11 @@
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
 
 from . import envelope, iso, speed
 from .analysis import ACCELERATION, DISPLACEMENT, FEWEST_BLOCKS, FORCE, STANDARD, Settings
@@ -93,43 +97,67 @@ def _mark(layout: Layout) -> str:
 def _casing(layout: Layout) -> str:
     if set(layout.quantities) == {DISPLACEMENT}:
         return "channels other than displacement = 0 must be >= 1; an orbit has no knocks"
-    # A shaft line is sampled slowly, for its orders; it has no knocks that are worth a map.
-    return "" if layout.probes is None else _refusal(layout.settings.map_edges, layout.fs)
+    # A slow rate, as of a shaft line, shows orders; what knocks there is no map's worth of bands.
+    return _bands_fault(layout.settings.map_edges, layout.fs)
 
 
-def _refusal(choice: Callable[[float], object], fs: float) -> str:
-    """Why a setting does not suit a sample rate."""
+def _spectrum_bands(layout: Layout) -> str:
+    return _bands_fault(layout.settings.band_edges, layout.fs)
+
+
+def _bands_fault(choice: Callable[[float], NDArray[np.float64]], fs: float) -> str:
+    """Why a sample rate has no room for all bands of a row; their names tell whole hertz."""
     try:
-        choice(fs)
+        edges = choice(fs)
     except ValueError as error:
-        return str(error)
-    return ""
+        return _too_slow(fs, error)
+    named = set(pairwise(np.rint(edges).tolist()))
+    if len(named) == edges.size - 1:
+        return ""
+    return f"fs = {fs:.6g} Hz is too low: bands of {np.diff(edges).min():.2g} Hz; sample faster"
+
+
+def _too_slow(fs: float, error: ValueError) -> str:
+    """A refusal of bands, whose own cure is that of a caller who chooses them."""
+    return f"fs = {fs:.6g} Hz is too low: {str(error).split('; ')[0]}; sample faster"
+
+
+def _declared(unit: str, too_many: bool = False) -> str:
+    """What helps where channels lack a quantity or have it too often: files tell it by the unit."""
+    if too_many:
+        return "choose the channels on import: wearstate import --channels"
+    return f"declare the unit {unit} on import, or quantities in Python"
 
 
 def _probes(layout: Layout) -> str:
     count = len(layout.rows_of(DISPLACEMENT))
-    return "" if count == 2 else f"displacement channels = {count} must be 2; give quantities"
+    return (
+        ""
+        if count == 2
+        else f"displacement channels = {count} must be 2; {_declared('m', count > 2)}"
+    )
 
 
 def _force(layout: Layout) -> str:
     count = len(layout.rows_of(FORCE))
     if count != 1:
-        return f"force channels = {count} must be 1; give quantities"
+        return f"force channels = {count} must be 1; {_declared('N', count > 1)}"
     if len(layout.channels) == 1:
         return "responses = 0 must be >= 1; record one beside the force"
-    if fault := _refusal(layout.settings.frf_edges, layout.fs):
+    if fault := _bands_fault(layout.settings.frf_edges, layout.fs):
         return fault
     nperseg = layout.settings.frf_nperseg(layout.fs)
-    return _duration(layout, (FEWEST_BLOCKS + 1) / 2 * nperseg / layout.fs, "raise frf_spacing_hz")
+    least = (FEWEST_BLOCKS + 1) / 2 * nperseg / layout.fs
+    return _duration(layout, least, "in Python raise frf_spacing_hz")
 
 
 def _reference(layout: Layout) -> str:
-    return _given(layout.settings.reference, "reference", "measure one")
+    return _given(layout.settings.reference, "reference", "measure one and give it in Python")
 
 
 def _reference_modes(layout: Layout) -> str:
     known = layout.settings.reference
-    return _given(known and known.modes, "reference.modes", "fit the reference")
+    return _given(known and known.modes, "reference.modes", "fit the reference in Python")
 
 
 def _given(value: object, name: str, cure: str) -> str:
@@ -140,7 +168,7 @@ def _duration(layout: Layout, least: float, cure: str) -> str:
     # A record of exactly that length must not fail by rounding.
     if layout.duration >= least * (1 - 1e-12):
         return ""
-    return f"duration = {layout.duration:.6g} s must be >= {least:.6g} s; record longer or {cure}"
+    return f"duration = {layout.duration:.6g} s must be >= {least:.6g} s; record longer, or {cure}"
 
 
 def _samples(least: int) -> Callable[[Layout], str]:
@@ -152,7 +180,7 @@ def _samples(least: int) -> Callable[[Layout], str]:
 
 def _acceleration(layout: Layout) -> str:
     count = len(layout.rows_of(ACCELERATION))
-    return "" if count else "acceleration channels = 0 must be >= 1; give quantities"
+    return "" if count else f"acceleration channels = 0 must be >= 1; {_declared('m/s2')}"
 
 
 def _severity(layout: Layout) -> str:
@@ -192,7 +220,9 @@ def _speed_band(layout: Layout) -> str:
     band = layout.settings.speed_band_hz
     if band is None:
         return "speed_band_hz = None must be given; say where the speed may lie"
-    return _duration(layout, 2 * speed.FEWEST_REVOLUTIONS / band[0], "raise its lower end")
+    return _duration(
+        layout, 2 * speed.FEWEST_REVOLUTIONS / band[0], "raise the lower end of speed_band_hz"
+    )
 
 
 def _bands(layout: Layout) -> str:
@@ -200,14 +230,17 @@ def _bands(layout: Layout) -> str:
 
 
 def _octaves(layout: Layout) -> str:
-    fault = _refusal(layout.settings.octave_centres, layout.fs)
+    try:
+        layout.settings.octave_centres(layout.fs)
+    except ValueError as error:
+        return _too_slow(layout.fs, error)
     width = layout.settings.octave_low * (10**0.05 - 10**-0.05)
-    return fault or _duration(layout, 1 / width, "raise octave_low")
+    return _duration(layout, 1 / width, "in Python raise octave_low")
 
 
 def _spacing(layout: Layout) -> str:
     low, high = layout.settings.spacing_band_hz
-    return _rate(layout, 2 * high) or _duration(layout, 2 / low, "raise spacing_band_hz")
+    return _rate(layout, 2 * high) or _duration(layout, 2 / low, "in Python raise spacing_band_hz")
 
 
 def _envelope(layout: Layout) -> str:
@@ -221,7 +254,8 @@ NEEDS: Mapping[str, Need] = MappingProxyType(
     {
         "tacho": Need(text="tacho", fault=_tacho),
         "mark": Need(text="one pulse per revolution", fault=_mark),
-        "casing": Need(text="a channel that is no displacement", fault=_casing),
+        "casing": Need(text="a channel that is no displacement, rate for its map", fault=_casing),
+        "spectrum bands": Need(text="rate for the bands", fault=_spectrum_bands),
         "probes": Need(text="two displacement probes", fault=_probes),
         "acceleration": Need(text="acceleration", fault=_severity),
         "machine": Need(text="kind of machine, and speed of a rotating one", fault=_machine),

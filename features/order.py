@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import PchipInterpolator
 from scipy.ndimage import maximum_filter1d
 
+from .edges import averaged_edges, is_logic_level, smoothest
 from .fft import rfft
 from .spectrum import decibel, hann, line_weights, one_sided_scale
 from .statistics import Amplitude, Real, centred
@@ -62,9 +63,12 @@ def pulse_times(tacho: ArrayLike, fs: float, *, level: float | None = None) -> F
     -----
     An edge counts when the signal has gone from 30 % of the way to the nearer extreme below the
     level to as much above it, so noise smaller than that cannot count twice. Its time is
-    interpolated linearly between the two samples round the level: exact for a linear edge, within
-    0.09 sample for a step averaged over a sample. An edge already running at the first sample is
-    no edge. The default level trusts the extremes: give `level` where spikes exceed the pulses.
+    interpolated linearly between the two samples round the level; a step that was averaged over a
+    sample is placed by its area, see `edges.averaged_edges`: both exact, both without bias. A
+    sampled logic level has nothing to interpolate: each of its edges lies within a sample, and the
+    smoothest row of edges within those samples is taken, see `edges.smoothest`. An edge already
+    running at the first sample is no edge. The default level trusts the extremes: give `level`
+    where spikes exceed the pulses; every edge is then where the line through two samples meets it.
 
     Examples
     --------
@@ -84,10 +88,17 @@ def pulse_times(tacho: ArrayLike, fs: float, *, level: float | None = None) -> F
     if before.size < 2:
         raise ValueError(
             f"tacho has {before.size} rising edge(s) through {middle:.6g}, must have >= 2; "
-            "record two revolutions or more, or set level"
+            "record two revolutions or more, check the tacho"
         )
     fraction = (middle - volts[before]) / (volts[before + 1] - volts[before])
-    return np.asarray((before + fraction) / fs)
+    if level is not None:
+        return np.asarray((before + fraction) / fs)
+    if is_logic_level(volts[before] - low, volts[before + 1] - low, high - low):
+        placed = smoothest(before.astype(np.float64) + 0.5)
+    else:
+        share = (volts - low) / (high - low)
+        placed = averaged_edges(share, before, before + fraction)
+    return np.asarray(np.clip(placed, 0.0, volts.size - 1) / fs)
 
 
 def _check_tacho(volts: Float, fs: float) -> None:
@@ -193,8 +204,8 @@ def _check_regular(times: Float, intervals: Float, duration: float) -> None:
         worst = int(np.argmax(jumps))
         raise ValueError(
             f"ratio of pulse intervals = {jumps[worst]:.3g} at {times[worst + 1]:.6g} s must be < "
-            f"{INTERVAL_JUMP}; a pulse is missing or false there, or the shaft stands still: set "
-            "the tacho level, mend the pulses, or cut it out"
+            f"{INTERVAL_JUMP}; a pulse is missing or false there, or the shaft stands still: "
+            "mend the pulses, cut it out, or check the tacho"
         )
     silence = max(times[0] / intervals[0], (duration - times[-1]) / intervals[-1])
     if silence >= INTERVAL_JUMP:
@@ -367,7 +378,7 @@ def default_window(fs: float) -> tuple[int, int]:
     >>> default_window(25_600.0)
     (256, 64)
     """
-    nperseg = max(16, 1 << round(float(np.log2(WINDOW_S * fs))))
+    nperseg = max(16, 1 << max(0, round(float(np.log2(WINDOW_S * fs)))))
     return nperseg, nperseg // 4
 
 

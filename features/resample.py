@@ -242,7 +242,7 @@ def phase_places(phase: ArrayLike, turns: ArrayLike) -> Float:
     if wanted.size and not known[0] <= wanted.min() <= wanted.max() <= known[-1]:
         raise ValueError(
             f"turns = {wanted.min():.6g} … {wanted.max():.6g} rev must lie within the phase of the "
-            f"record, {known[0]:.6g} … {known[-1]:.6g} rev; ask for fewer"
+            f"record, {known[0]:.6g} … {known[-1]:.6g} rev; record longer, or ask for fewer"
         )
     return np.interp(wanted, known, np.arange(known.size, dtype=np.float64))
 
@@ -348,7 +348,7 @@ def _supported(places: Float, share: Float, n_samples: int) -> slice:
     if fits.size == 0 or fits[-1] - fits[0] + 1 != fits.size:
         raise ValueError(
             f"record = {n_samples} samples must be > {2 * reach.max(initial=_HALF_WIDTH):.6g}, the "
-            "kernel at the slowest place; record longer, or ask for more points_per_revolution"
+            "kernel at the slowest place; record longer, or in Python raise points_per_revolution"
         )
     return slice(int(fits[0]), int(fits[-1]) + 1)
 

@@ -220,7 +220,7 @@ def _plan(layout: Layout, feature_set: SetName, only: tuple[str, ...] | None) ->
     if len(set(names)) < len(names):
         raise ValueError(
             f"fs = {layout.fs} Hz makes {len(names) - len(set(names))} feature names equal, must "
-            "be 0: bands or bins are closer than 1 Hz or 1 deg; ask for fewer"
+            "be 0: bands or bins are equal, or closer than 1 Hz or 1 deg; leave some out"
         )
     return _Plan(features=features, names=names, picks=(None,) * len(features))
 
@@ -336,7 +336,8 @@ def feature_row(
     names : tuple of str
         As `feature_names`.
     values : ndarray, shape (n_features,)
-        Finite values, float64, in the order of the names. A constant channel, a dead sensor,
+        Float64, in the order of the names; finite, but coherence and random error of a single
+        blow are NaN. A constant channel, a dead sensor,
         has rms, frequencies, scores and ratios 0, levels of -200 dB, spectral kurtosis and
         kurtogram -1, and as their places the lowest line and the whole band.
 
@@ -371,9 +372,6 @@ def feature_row(
         signals = signals.astype(np.float64)
     channels = _channel_names(channel_names, len(signals))
     _check_vibration(signals, channels)
-    pulses = None
-    if tacho is not None:
-        pulses = _pulses(tacho, fs, signals.shape[-1])
     layout = Layout(
         channels=channels,
         quantities=_quantities(quantities, len(signals)),
@@ -384,6 +382,9 @@ def feature_row(
         settings=settings,
     )
     plan = _plan(layout, feature_set, None if only is None else tuple(only))
+    pulses = None
+    if tacho is not None and any(_turns(feature) for feature in plan.features):
+        pulses = _pulses(tacho, fs, signals.shape[-1])
     analysis = Analysis(
         signals,
         fs,
@@ -394,6 +395,11 @@ def feature_row(
         settings=settings,
     )
     return plan.names, _values(plan, analysis)
+
+
+def _turns(feature: Feature) -> bool:
+    """Whether a feature reads the tacho's pulses."""
+    return not {"tacho", "speed"}.isdisjoint((*feature.needs, *feature.uses))
 
 
 def _values(plan: _Plan, analysis: Analysis) -> Float:

@@ -166,7 +166,8 @@ def mend_pulses(pulses: ArrayLike, *, pulses_per_revolution: int = 1) -> tuple[F
         )
     if wrong > bound:
         reasons.append(
-            f"wrong pulses = {wrong} of {kept.size} must be <= {bound}; set the tacho level"
+            f"wrong pulses = {wrong} of {kept.size} must be <= {bound}; "
+            "check the tacho, or cut the record to where it works"
         )
     if reasons:
         raise ValueError("\n".join(reasons))

@@ -1,10 +1,12 @@
 """From a scene to a recording: only the physics that the scene needs."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 from .integrate import Recorder, Solution
 from .journal import check_journal, simulate_journal
 from .parts import Scene, SceneError
+from .plausibility import solution_doubts
 from .pump import check_pump, simulate_pump
 from .shaft_line import check_shaft, shaft_recorder, simulate_shaft
 
@@ -28,7 +30,9 @@ def simulate(
     Returns
     -------
     Solution
-        Signal, channels, status, numerics, and truth where asked for.
+        Signal, channels, status, numerics, and truth where asked for; its warnings include what
+        of scene and signal is hardly meant, see :mod:`.plausibility`. The ``estimated_error`` of
+        its numerics is that of rungs and steps: it cannot tell whether the scene is a machine.
 
     Raises
     ------
@@ -47,7 +51,11 @@ def simulate(
     (3, 5120)
     """
     _refuse_unresolved(scene)
-    return _SIMULATORS[scene.machine](scene, seed, truth, raise_on_failure)
+    solution = _SIMULATORS[scene.machine](scene, seed, truth, raise_on_failure)
+    if not solution.status.ok:
+        return solution
+    doubts = tuple(doubt.text for doubt in solution_doubts(scene, solution))
+    return replace(solution, warnings=(*solution.warnings, *doubts))
 
 
 def recorder(scene: Scene) -> Recorder:
@@ -61,7 +69,7 @@ def recorder(scene: Scene) -> Recorder:
     -------
     callable
         Scene, seed, truth, raise_on_failure, as :func:`simulate`; the scene may differ from this
-        one in its start angle alone.
+        one in its start angle alone. Warnings are those of the run, without doubts about the scene.
 
     Raises
     ------

@@ -35,6 +35,8 @@ from .alignment import (
 
 Vector = NDArray[np.float64]
 Index = NDArray[np.int64]
+_Solution = tuple[Vector, Vector, Vector]
+"""Moves [m], turns [rad], promised reactions [N]."""
 
 _MM = 1e3  # mm in a metre: the programme's lengths are near one
 _RESERVE = 1e-6  # of a mean load: a limit is met to rounding and more
@@ -43,6 +45,11 @@ _LOOSE = 2e-7  # of HiGHS for a mixed one, which is 1e-7, and a little
 _PROMISE = 1e-6  # of a mean load, between the programme and the line solved anew
 _STILL = 1e-9  # m, of a move; nobody makes a smaller one
 _PREFER = ("least", "fewest")
+_TARGETS = ("limits", "even")
+_EVEN = 1e-2  # of the least sum of squares, spent on smaller moves
+_NEARLY = 0.999  # of a margin that would leave one load only
+_JUST = 5e-3  # of a limit: nearer is on it
+_HALVINGS = 6  # of a margin that cannot be kept: to 1/64 of it
 
 
 class CalibrationStatus(IntEnum):
@@ -134,6 +141,8 @@ class Calibration:
         Reactions that the programme counted on [N].
     unmet : tuple of Check
         Limits that the moves do not bring, as they stand after the moves.
+    margin : float
+        Of each limit, that the moves keep away from it.
     blocks : tuple of Block
         Where there is no way: the bounds of moves that would have to be wider, by the least sum;
         if that helps not, the limits that are at odds with each other whatever the moves.
@@ -148,6 +157,22 @@ class Calibration:
     promised: Vector
     unmet: tuple[Check, ...]
     blocks: tuple[Block, ...]
+    margin: float = 0.0
+
+    @property
+    def touched(self) -> tuple[Check, ...]:
+        """Limits that the moves bring just within, so that little would break them again."""
+        if not self.moved:
+            return ()
+        near = [_tightened(state.line, _JUST) for state in self.after]
+        strict = [
+            limit
+            for line, state in zip(near, self.after, strict=True)
+            for limit in check(replace(state, line=line))
+            if not limit.met
+        ]
+        unmet = {(u.condition, u.bearing, u.quantity) for u in self.unmet}
+        return tuple(c for c in strict if (c.condition, c.bearing, c.quantity) not in unmet)
 
     @property
     def total_move(self) -> float:
@@ -171,9 +196,11 @@ def calibrate(
     conditions: Sequence[Condition] = (AS_SET,),
     *,
     prefer: str = "least",
+    target: str = "limits",
+    margin: float = 0.0,
     seconds: float = 20.0,
 ) -> Calibration:
-    """The least moves of the bearings that bring every limit in every condition.
+    """The moves of the bearings that bring every limit in every condition.
 
     Parameters
     ----------
@@ -184,6 +211,14 @@ def calibrate(
     prefer : str
         "least" has the least sum of moves, "fewest" the least number of bearings moved and then
         the least sum. Among equals the largest move is least.
+    target : str
+        "limits" moves as little as the limits ask; "even" moves, whether a limit is met or not,
+        until the squares of the reactions' distances from their mean have the least sum over
+        bearings and conditions, within a hundredth, by the least moves that do so.
+    margin : float
+        Distance that the line must keep from every limit, as a share of the limit, >= 0 and < 1.
+        Where the moves cannot keep it, but can keep the limits, they keep as much of it as they
+        can, to a sixty-fourth of it.
     seconds : float
         For each of the few programmes to solve.
 
@@ -196,8 +231,8 @@ def calibrate(
     Raises
     ------
     AlignmentError
-        There is no condition, two have one name, `prefer` is unknown, or a condition does not fit
-        the line.
+        There is no condition, two have one name, `prefer` or `target` is unknown, `margin` is no
+        share, "fewest" is asked for together with "even", or a condition does not fit the line.
 
     Notes
     -----
@@ -228,35 +263,150 @@ def calibrate(
     >>> found.status.name, found.moved, (1e3 * found.moves).round(3).tolist()
     ('DONE', ('middle',), [0.0, 0.906, 0.0])
     """
-    _check_question(conditions, prefer)
+    _check_question(conditions, prefer, target, margin)
     before = tuple(reactions(line, condition) for condition in conditions)
+    ask = _Ask(prefer=prefer, target=target, seconds=seconds)
+    possible = min(margin, _widest_margin(line))
+    found = _calibrated(line, before, ask, possible)
+    if margin == 0 or found.status.ok:
+        return found
+    plain = _calibrated(line, before, ask, 0.0)
+    return _with_most_margin(plain, line, before, ask, possible) if plain.status.ok else plain
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Ask:
+    """What is asked of a calibration, but for its margin."""
+
+    prefer: str
+    target: str
+    seconds: float
+
+
+def _with_most_margin(
+    plain: Calibration,
+    line: AlignmentLine,
+    before: tuple[LineState, ...],
+    ask: _Ask,
+    wanted: float,
+) -> Calibration:
+    """The calibration that keeps as much of a margin as can be, by halving."""
+    best, least, most = plain, 0.0, wanted
+    for _ in range(_HALVINGS):
+        margin = (least + most) / 2
+        found = _calibrated(line, before, ask, margin)
+        if found.status.ok:
+            best, least = found, margin
+        else:
+            most = margin
+    return best
+
+
+def _calibrated(
+    line: AlignmentLine, before: tuple[LineState, ...], ask: _Ask, margin: float
+) -> Calibration:
     still = np.zeros(len(line.seats))
-    if all(limit.met for state in before for limit in check(state)):
-        return _calibration(CalibrationStatus.WITHIN, line, before, still, still, _loads_of(before))
-    solution = _least_moves(line, before, prefer, seconds)
+    asked = _tightened(line, margin)
+    before_asked = tuple(replace(state, line=asked) for state in before)
+    kept = all(limit.met for state in before_asked for limit in check(state))
+    if kept and ask.target == "limits":
+        status = CalibrationStatus.WITHIN
+        return _calibration(status, line, before, still, still, _loads_of(before), margin)
+    solution = _wanted_moves(asked, before_asked, ask)
     status = CalibrationStatus.DONE
     if solution is None:
-        solution = _nearest(line, before, seconds)
+        solution = _nearest(asked, before_asked, ask.seconds)
         status = CalibrationStatus.INFEASIBLE
     if solution is None:
         return _unresolved(line, before)
-    found = _calibration(status, line, before, *solution)
+    found = _calibration(status, asked, before_asked, *solution, margin)
     if not _confirmed(found):
         return _unresolved(line, before)
     if found.status is CalibrationStatus.INFEASIBLE:
-        return replace(found, blocks=_blocks(line, before, seconds))
-    return found
+        return replace(found, blocks=_blocks(asked, before_asked, ask.seconds))
+    return _with_limits_of(found, line)
 
 
-def _check_question(conditions: Sequence[Condition], prefer: str) -> None:
+def _wanted_moves(line: AlignmentLine, before: Sequence[LineState], ask: _Ask) -> _Solution | None:
+    if ask.target == "even":
+        return _even_moves(line, before, ask.seconds)
+    return _least_moves(line, before, ask.prefer, ask.seconds)
+
+
+def _tightened(line: AlignmentLine, margin: float) -> AlignmentLine:
+    """The line with every limit nearer by a share of itself."""
+    if margin == 0:
+        return line
+    seats = tuple(
+        replace(
+            seat,
+            least_load=seat.least_load * (1 + margin),
+            most_load=seat.most_load * (1 - margin),
+            most_pressure=seat.most_pressure * (1 - margin),
+            most_slope=seat.most_slope * (1 - margin),
+        )
+        for seat in line.seats
+    )
+    return _with_seats(line, seats)
+
+
+def _widest_margin(line: AlignmentLine) -> float:
+    """The largest margin that leaves every bearing a load between its limits."""
+    return _NEARLY * min(
+        (seat.highest_load - seat.least_load) / (seat.highest_load + seat.least_load)
+        if math.isfinite(seat.highest_load) and seat.highest_load > 0
+        else 1.0
+        for seat in line.seats
+    )
+
+
+def _with_seats(line: AlignmentLine, seats: tuple[Seat, ...]) -> AlignmentLine:
+    """The line with other limits or bounds, which bend no shaft."""
+    other = AlignmentLine(beam=line.beam, seats=seats)
+    other.__dict__["held"] = line.held
+    return other
+
+
+def _with_limits_of(found: Calibration, line: AlignmentLine) -> Calibration:
+    """A calibration found with nearer limits, its states judged by those of the line again."""
+
+    def judged(state: LineState) -> LineState:
+        seats = tuple(
+            replace(plain, offset=seat.offset, slope=seat.slope)
+            for plain, seat in zip(line.seats, state.line.seats, strict=True)
+        )
+        return replace(state, line=_with_seats(state.line, seats))
+
+    return replace(
+        found,
+        line=line,
+        before=tuple(map(judged, found.before)),
+        after=tuple(map(judged, found.after)),
+    )
+
+
+def _check_question(
+    conditions: Sequence[Condition], prefer: str, target: str, margin: float
+) -> None:
     names = [condition.name for condition in conditions]
+    faults = []
     if not names or len(set(names)) < len(names):
-        raise AlignmentError(
+        faults.append(
             f"conditions = {', '.join(names) or 'none'} must be at least one, each named once; "
             "give them other names"
         )
-    if prefer not in _PREFER:
-        raise AlignmentError(f"prefer = '{prefer}' must be one of {', '.join(_PREFER)}; choose one")
+    for name, value, known in (("prefer", prefer, _PREFER), ("target", target, _TARGETS)):
+        if value not in known:
+            faults.append(f"{name} = '{value}' must be one of {', '.join(known)}; choose one")
+    if not 0 <= margin < 1:
+        faults.append(f"margin = {margin:g} must be >= 0 and < 1; give it as a share of each limit")
+    if prefer == "fewest" and target == "even":
+        faults.append(
+            "prefer = 'fewest' must be 'least' with target = 'even', which may move every bearing; "
+            "choose one of the two"
+        )
+    if faults:
+        raise AlignmentError("\n".join(faults))
 
 
 def _loads_of(states: Sequence[LineState]) -> Vector:
@@ -275,6 +425,7 @@ def _calibration(
     moves: Vector,
     turns: Vector,
     promised: Vector,
+    margin: float = 0.0,
 ) -> Calibration:
     moved = line.moved(moves, turns)
     after = tuple(reactions(moved, state.condition) for state in before)
@@ -291,6 +442,7 @@ def _calibration(
         promised=promised,
         unmet=unmet,
         blocks=(),
+        margin=margin,
     )
 
 
@@ -569,10 +721,6 @@ def _may_lift(state: LineState, elastic: bool) -> NDArray[np.bool_]:
     )
 
 
-_Solution = tuple[Vector, Vector, Vector]
-"""Moves [m], turns [rad], promised reactions [N]."""
-
-
 def _least_moves(
     line: AlignmentLine, before: Sequence[LineState], prefer: str, seconds: float
 ) -> _Solution | None:
@@ -586,6 +734,48 @@ def _least_moves(
     if found is None:
         return None
     return _smallest(_settled(programme, count, found.x, seconds), seconds)
+
+
+def _even_moves(
+    line: AlignmentLine, before: Sequence[LineState], seconds: float
+) -> _Solution | None:
+    """The moves that keep every limit with reactions nearest to their mean, or None."""
+    programme, apart = _evening(_programme(line, before, elastic=False))
+    settled, best = _optimum(programme, apart, seconds)
+    if best is None:
+        return None
+    return _smallest(_capped(settled, apart, best.fun * (1 + _EVEN) + _RESERVE), seconds)
+
+
+def _evening(programme: _Programme) -> tuple[_Programme, Vector]:
+    """With a column above the square of each reaction's distance from the mean, and their sum.
+
+    A column lies above tangents of the parabola: a linear programme knows no squares.
+    """
+    n, p, size = programme.n, programme.responses[0].loads.shape[0], programme.least.size
+    count = n * len(programme.responses)
+    wide = _widened(programme, count, np.inf, whole=False)
+    gather = gather_points(programme.responses[0].state.line)
+    rows, bounds = [], []
+    for c, response in enumerate(programme.responses):
+        for i, load in enumerate(gather @ response.loads * n / response.whole):
+            row = np.append(_spread(load[1:], n, p, c, size), np.zeros(count))
+            for at in _TANGENTS:
+                tangent = 2 * at * row
+                tangent[size + c * n + i] = -1.0
+                rows.append(tangent)
+                bounds.append(at**2 - 2 * at * (load[0] - 1.0))
+    evened = replace(
+        wide,
+        matrix=np.vstack([wide.matrix, rows]),
+        bound=np.append(wide.bound, bounds),
+        meaning=(*wide.meaning, *[None] * len(rows)),
+    )
+    return evened, (np.arange(size + count) >= size).astype(float)
+
+
+_TANGENTS = np.concatenate([side * np.geomspace(0.02, 4.0, 16) for side in (-1, 1)])
+"""Distances from the mean reaction, over it, where the tangents touch."""
 
 
 def _nearest(line: AlignmentLine, before: Sequence[LineState], seconds: float) -> _Solution | None:
@@ -734,9 +924,7 @@ def _with_wide_moves(line: AlignmentLine, may: NDArray[np.bool_], reach: float) 
         else seat
         for seat, wide in zip(line.seats, may, strict=True)
     )
-    free = AlignmentLine(beam=line.beam, seats=seats)
-    free.__dict__["held"] = line.held
-    return free
+    return _with_seats(line, seats)
 
 
 def _widening(

@@ -90,14 +90,15 @@ def hydraulics_of(scene: PumpScene, throw: int) -> NDArray[np.void]:
     """Hydraulics of one throw, one record."""
     return hydraulic_parameters(
         scene.pressures(throw),
-        area=_area(scene),
+        area=piston_area(scene),
         crank_radius=scene.crank.radius,
         rod_length=scene.rod.length,
         speed=2 * math.pi * scene.drive.speed,
     )
 
 
-def _area(scene: PumpScene) -> float:
+def piston_area(scene: PumpScene) -> float:
+    """Area that the liquid pushes on [m^2]."""
     return math.pi / 4 * scene.piston.diameter**2
 
 
@@ -147,7 +148,7 @@ def ideal_motion(scene: PumpScene, angle: NDArray[np.float64], throw: int = 0) -
     velocity = np.ravel(motion.piston_velocity)
     liquid = _without_memory(scene, throw)
     _line_pressures(np.ravel(own), speed, velocity, liquid, pressure, added)
-    force = _area(scene) * pressure + added * np.ravel(motion.piston_acceleration)
+    force = piston_area(scene) * pressure + added * np.ravel(motion.piston_acceleration)
     return ideal_crank(own, piston_force=force.reshape(own.shape), **known)
 
 
@@ -165,7 +166,7 @@ def _without_memory(scene: PumpScene, throw: int) -> NDArray[np.void]:
         pressure = pressure.model_copy(update={"rung": "two-level"})
     return hydraulic_parameters(
         pressure,
-        area=_area(scene),
+        area=piston_area(scene),
         crank_radius=scene.crank.radius,
         rod_length=scene.rod.length,
         speed=2 * math.pi * scene.drive.speed,
@@ -461,7 +462,7 @@ def throw_record(scene: PumpScene, throw: int, step: float) -> NDArray[np.void]:
         "piston_mass": piston.mass,
         "inverse_piston_across": 1 / piston.mass if free else 0.0,
         "inverse_piston_tilt": 1 / piston.inertia if free and piston.inertia else 0.0,
-        "piston_area": _area(scene),
+        "piston_area": piston_area(scene),
         "crankpin_rung": crankpin,
         "wristpin_rung": wristpin,
         "guide_rung": guide,

@@ -237,10 +237,12 @@ class CylinderPressure(Part):
 
     def _vapour_faults(self) -> list[str]:
         vapour = self.liquid.vapour_pressure - STANDARD_ATMOSPHERE
-        if self.rung not in _NEEDS or self.suction > vapour:
+        name = "discharge" if self.rung == "constant" else "suction"
+        lowest = getattr(self, name)
+        if self.rung == "none" or lowest > vapour:
             return []
         return [
-            f"suction = {self.suction:g} Pa must be > the liquid's vapour pressure = {vapour:g} Pa "
+            f"{name} = {lowest:g} Pa must be > the liquid's vapour pressure = {vapour:g} Pa "
             "gauge; raise it or cool the liquid"
         ]
 

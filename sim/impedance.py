@@ -26,9 +26,6 @@ doi:10.1115/1.3453019, for the reduction; the scaling is derived here.
 import hashlib
 import io
 import math
-import os
-import tempfile
-import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -36,6 +33,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from .atomic import sealed, unsealed, write_whole
 from .film import FilmGeometry, direct_film
 from .film_direct import (
     DIRECT_OK,
@@ -565,15 +563,12 @@ def _write(path: Path, found: ImpedanceMap) -> None:
     np.savez(
         content,
         coefficients=coefficients,
-        digest=np.frombuffer(hashlib.sha256(coefficients.tobytes()).digest(), np.uint8),
         scales=np.array(list(table.values()), dtype=np.float64),
         ends=np.array([found.last_eccentricity, found.accuracy]),
         errors=np.array([_numbers(found.interpolation), _numbers(found.turned)]),
     )
     try:
-        with tempfile.NamedTemporaryFile(dir=path.parent, suffix=".part", delete=False) as part:
-            part.write(content.getvalue())
-        os.replace(part.name, path)
+        write_whole(path, sealed(content.getvalue()), force=True)
     except OSError:
         return
 
@@ -585,23 +580,22 @@ def _numbers(error: MapError) -> tuple[float, float, float]:
 def _read(path: Path) -> ImpedanceMap | None:
     """None where there is no such file or its content is not what was written."""
     try:
-        with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as stored:
-            parts = {name: stored[name] for name in stored.files}
-        coefficients = np.ascontiguousarray(parts["coefficients"], dtype=np.float64)
-        digest = hashlib.sha256(coefficients.tobytes()).digest()
-        if coefficients.ndim != 4 or parts["digest"].tobytes() != digest:
-            return None
-        mirrored, *scales = (float(value) for value in parts["scales"])
-        interpolation, turned = (
-            MapError(median=float(a), most=float(b), worst=float(c)) for a, b, c in parts["errors"]
-        )
-        last, accuracy = (float(value) for value in parts["ends"])
-        return ImpedanceMap(
-            table=MapTable(coefficients, int(mirrored), *scales),
-            last_eccentricity=last,
-            accuracy=accuracy,
-            interpolation=interpolation,
-            turned=turned,
-        )
-    except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile):
+        content = unsealed(path.read_bytes())
+    except OSError:
         return None
+    if content is None:
+        return None
+    with np.load(io.BytesIO(content), allow_pickle=False) as stored:
+        parts = {name: stored[name] for name in stored.files}
+    mirrored, *scales = (float(value) for value in parts["scales"])
+    interpolation, turned = (
+        MapError(median=float(a), most=float(b), worst=float(c)) for a, b, c in parts["errors"]
+    )
+    last, accuracy = (float(value) for value in parts["ends"])
+    return ImpedanceMap(
+        table=MapTable(np.ascontiguousarray(parts["coefficients"]), int(mirrored), *scales),
+        last_eccentricity=last,
+        accuracy=accuracy,
+        interpolation=interpolation,
+        turned=turned,
+    )

@@ -70,7 +70,8 @@ _STATUS_TEXT = {
     ),
     Status.VAPOUR: (
         "the pressure falls below that of the vapour, which the rung 'heads' does not know; "
-        "set pressure.rung = 'chamber', shorten the suction line, or lower the speed"
+        "set pressure.rung = 'chamber', shorten the suction line, or lower the speed; where only "
+        "knocks do it, pressure.flow = 'two-harmonic' feels none"
     ),
     Status.VALVE_OPEN: (
         "a valve does not close in its idle stroke; raise the valve's stiffness or preload_lift, "

@@ -1,13 +1,16 @@
 """Compiled kernels whose cache cannot go stale.
 
 numba keys a cached kernel by its own file only, so a change in a callee of another file would go
-unnoticed. Here the cache folder carries a hash of every source of ``sim`` that a kernel can see; an
-unwritable folder means no cache instead of an error at import.
+unnoticed. Here the cache folder carries a hash of every source of ``sim`` that a kernel can see.
+What is cut or altered there is compiled anew and replaced; a folder that cannot be written costs
+compiling at every start, and one warning.
 """
 
 import hashlib
+import logging
 import math
 import os
+import pickle
 import re
 import shutil
 import tempfile
@@ -17,6 +20,9 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
+from numba.core import serialize
+
+from .atomic import sealed, unsealed, write_whole
 
 # Contraction to fused multiply-add is the only freedom given to the compiler. Forced inlining
 # halves the time of a crank step: its parameters would be copied at every call. Without numba's
@@ -30,6 +36,10 @@ _OPTIONS: dict[str, Any] = {
 
 _IMPORT = re.compile(r"^from \.(\w+) import", re.MULTILINE)  # tests/test_layers.py holds us to it
 
+_dumps: Any = serialize.dumps  # as numba packs: also what only its own unpickler knows
+
+_LOG = logging.getLogger(__name__)
+
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
@@ -40,7 +50,7 @@ def cache_folder() -> Path | None:
     The base is ``$WEARSTATE_CACHE``, else ``$XDG_CACHE_HOME/wearstate``, else
     ``~/.cache/wearstate``. Folders of other sources that are older are removed.
     """
-    digest = hashlib.sha256()
+    digest = hashlib.sha256(numba.__version__.encode())
     for source in kernel_sources(Path(__file__).parent):
         digest.update(source.read_bytes())
     try:
@@ -50,9 +60,26 @@ def cache_folder() -> Path | None:
         with tempfile.TemporaryFile(dir=folder):
             pass
         _forget_all_but_newest(base)
-    except (OSError, RuntimeError):  # RuntimeError: no home directory
+    except (OSError, RuntimeError) as error:  # RuntimeError: no home directory
+        _warn_unkept(str(error))
         return None
     return folder
+
+
+@cache
+def _warn_unkept(reason: str) -> None:
+    """Once for each reason."""
+    _LOG.warning(
+        "compiled kernels cannot be kept (%s), so that every start compiles: make room and rights, "
+        "or name a folder in WEARSTATE_CACHE",
+        reason,
+    )
+
+
+@cache
+def _warn_damaged(folder: Path) -> None:
+    """Once for each folder."""
+    _LOG.warning("the kernel cache %s is damaged: kernels are compiled anew and replaced", folder)
 
 
 def kernel_sources(folder: Path) -> list[Path]:
@@ -94,6 +121,64 @@ def _forget_all_but_newest(base: Path, keep: int = 4) -> None:
         shutil.rmtree(folder, ignore_errors=True)
 
 
+class _SealedFiles:
+    """Files of one kernel in place of numba's own: damage is a miss, and the next `save` mends it.
+
+    The index is behind its SHA-256; a data file is named by that of its content, so that two
+    processes which write at once cannot mix theirs up.
+    """
+
+    def __init__(self, folder: Path, stem: str, stamp: Any) -> None:
+        self._folder, self._stem, self._stamp = folder, stem, stamp
+        self._index = folder / f"{stem}.nbi"
+
+    def load(self, key: Any) -> Any:
+        """Compiled code of a signature; None where there is none that is whole."""
+        name = self._load_index().get(key)
+        if name is None:
+            return None
+        content = self._read(self._folder / name)
+        if content is None or self._name_of(content) != name:
+            _warn_damaged(self._folder)
+            return None
+        return pickle.loads(content)
+
+    def save(self, key: Any, data: Any) -> None:
+        """Keep compiled code, where that is possible."""
+        content: bytes = _dumps(data)
+        name = self._name_of(content)
+        try:
+            self._folder.mkdir(parents=True, exist_ok=True)
+            write_whole(self._folder / name, content, force=True)
+            index = _dumps((self._stamp, {**self._load_index(), key: name}))
+            write_whole(self._index, sealed(index), force=True)
+        except OSError as error:
+            _warn_unkept(str(error.strerror))
+
+    def _load_index(self) -> dict[Any, str]:
+        stored = self._read(self._index)
+        if stored is None:
+            return {}
+        content = unsealed(stored)
+        if content is None:
+            _warn_damaged(self._folder)
+            return {}
+        stamp, names = pickle.loads(content)
+        return names if stamp == self._stamp else {}
+
+    def _name_of(self, content: bytes) -> str:
+        return f"{self._stem}.{hashlib.sha256(content).hexdigest()[:32]}.nbc"
+
+    def _read(self, path: Path) -> bytes | None:
+        try:
+            return path.read_bytes()
+        except FileNotFoundError:
+            return None
+        except OSError:
+            _warn_damaged(self._folder)
+            return None
+
+
 def kernel(function: Function) -> Function:
     """Compile a function of floats, integers and arrays, cached by the sources it can see."""
     folder = cache_folder()
@@ -103,9 +188,17 @@ def kernel(function: Function) -> Function:
     before = settings.CACHE_DIR
     settings.CACHE_DIR = str(folder)  # read by numba while it decorates, restored at once
     try:
-        return numba.njit(cache=True, **_OPTIONS)(function)  # type: ignore[no-any-return]
+        compiled: Any = numba.njit(cache=True, **_OPTIONS)(function)
     finally:
         settings.CACHE_DIR = before
+    files = compiled._cache
+    place = Path(files.cache_path)
+    if not place.is_relative_to(folder):  # numba found it unwritable and took another
+        return numba.njit(**_OPTIONS)(function)  # type: ignore[no-any-return]
+    names = files._impl
+    stamp = names.locator.get_source_stamp()
+    files._cache_file = _SealedFiles(place, names.filename_base, stamp)
+    return compiled  # type: ignore[no-any-return]
 
 
 @kernel

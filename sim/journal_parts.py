@@ -284,7 +284,7 @@ class Film(Part):
         default="periodic", description="of cavitation, of the rungs map and direct"
     )
     n_theta: int = Field(default=72, ge=12, le=1440, description="nodes round the circle")
-    n_z: int = Field(default=17, ge=3, le=257, description="nodes over the length, odd")
+    n_z: int = Field(default=17, ge=5, le=257, description="nodes over the length, odd")
 
     @model_validator(mode="after")
     def _odd(self) -> Self:

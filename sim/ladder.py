@@ -25,19 +25,18 @@ from .crank_setup import (
     contact_frequency,
     contact_rate,
     contact_table,
-    hydraulics_of,
     joint_loads,
     joint_parts,
     joint_rungs,
     penetration_under,
 )
-from .hydraulics import PRESSURE_HEADS, lowest_pressure
 from .integrate import Status
 from .journal_parts import Film, JournalScene
 from .parts import Scene, SceneError, validate_table
 from .pump_parts import Guide, PumpScene, RevoluteJoint
 from .shaft_parts import ShaftScene
 from .slider_crank import JOINT_COMPLIANT, OVERLAP_LIMIT
+from .tearing import torn_by_knocks, torn_in_motion
 
 AnyScene = TypeVar("AnyScene", bound=Scene)
 
@@ -123,7 +122,7 @@ PRESSURE_RUNGS = (
         name="heads",
         assumes="incompressible liquid: energy balance of the lines, liquid inertia as added mass",
         reference="Xia et al. 2017, eqs 16-27 with their misprints mended",
-        valid="while the liquid's pressure stays above that of its vapour",
+        valid="while the liquid's pressure stays above that of its vapour, at every knock too",
         needs="both lines and valves",
         nanoseconds_per_step=30.0,
     ),
@@ -246,30 +245,74 @@ def limits(scene: PumpScene) -> list[tuple[Status, str]]:
         Empty where every rung is valid.
     """
     checks: tuple[Callable[[PumpScene], list[tuple[Status, str]]], ...] = (
-        _unresolved,
+        _sunk,
         _torn,
         _too_long,
     )
     return [found for check in checks for found in check(scene)]
 
 
-def _unresolved(scene: PumpScene) -> list[tuple[Status, str]]:
+def knock_limits(scene: PumpScene) -> list[tuple[Status, str]]:
+    """What only a trial shows of a scene that :func:`limits` lets pass, in the same form.
+
+    Parameters
+    ----------
+    scene : PumpScene
+
+    Returns
+    -------
+    list of (Status, str)
+        Also empty where the step is refused for its length, which ends any trial.
+    """
+    steps = math.ceil(1 / (scene.sample_rate * pump_step(scene)) - 1e-9)
+    if steps > MOST_STEPS:
+        return []
+    step = 1 / (scene.sample_rate * max(FEWEST_STEPS, steps))
+    return [(Status.VAPOUR, tear.text) for tear in torn_by_knocks(scene, step)]
+
+
+def _sunk(scene: PumpScene) -> list[tuple[Status, str]]:
+    """Contacts too soft for their load: beyond their law, or blind to their own clearance."""
     found = []
     for throw, path, part in _joints(scene):
         joint = ("crankpin", "wristpin", "guide").index(path.rpartition(".")[2])
         if joint_rungs(scene, throw)[joint] != JOINT_COMPLIANT:
             continue
         load = joint_loads(scene, throw)[joint]
-        gap = part.clearance_radial
         depth = penetration_under(contact_table(scene, throw)[joint], load)
-        if _UNRESOLVED * gap < depth <= OVERLAP_LIMIT * _size(part):
-            text = (
-                f"{path}: radial clearance = {gap:.3g} m must be >= {depth / _UNRESOLVED:.3g} m, a "
-                f"quarter of the penetration under {load:.3g} N, for the contact to resolve it; "
-                f"raise its stiffness, or set {path}.rung = 'ideal'"
-            )
-            found.append((Status.UNRESOLVED, text))
+        found += [*_overlaps(path, part, depth, load), *_unresolved(path, part, depth, load)]
     return found
+
+
+def _overlaps(
+    path: str, part: RevoluteJoint | Guide, depth: float, load: float
+) -> list[tuple[Status, str]]:
+    most = OVERLAP_LIMIT * _size(part)
+    if depth <= most:
+        return []
+    text = (
+        f"{path}: penetration under {load:.3g} N = {depth:.3g} m must be <= {most:.3g} m, "
+        f"{OVERLAP_LIMIT:g} of {_SIZE_OF[isinstance(part, Guide)]}, where the contact law ends; "
+        f"raise its stiffness, or set {path}.rung = 'ideal'"
+    )
+    return [(Status.OVERLAP, text)]
+
+
+def _unresolved(
+    path: str, part: RevoluteJoint | Guide, depth: float, load: float
+) -> list[tuple[Status, str]]:
+    gap = part.clearance_radial
+    if depth <= _UNRESOLVED * gap:
+        return []
+    text = (
+        f"{path}: radial clearance = {gap:.3g} m must be >= {depth / _UNRESOLVED:.3g} m, a "
+        f"quarter of the penetration under {load:.3g} N, for the contact to resolve it; "
+        f"raise its stiffness, or set {path}.rung = 'ideal'"
+    )
+    return [(Status.UNRESOLVED, text)]
+
+
+_SIZE_OF = ("the pin's radius", "half the height")
 
 
 def _size(part: RevoluteJoint | Guide) -> float:
@@ -279,20 +322,7 @@ def _size(part: RevoluteJoint | Guide) -> float:
 
 def _torn(scene: PumpScene) -> list[tuple[Status, str]]:
     """Throws whose liquid column would tear: the rung heads has no vapour."""
-    found = []
-    for throw in range(len(scene.throws)):
-        liquid = hydraulics_of(scene, throw)[0]
-        if liquid["rung"] != PRESSURE_HEADS:
-            continue
-        lowest = lowest_pressure(liquid)
-        if lowest < liquid["vapour"]:
-            text = (
-                f"pressure: the piston needs {lowest:.4g} Pa at its lowest, must be >= the "
-                f"liquid's vapour pressure = {liquid['vapour']:.4g} Pa gauge; set pressure.rung = "
-                "'chamber', shorten pressure.suction_line.length, or lower the speed"
-            )
-            found.append((Status.VAPOUR, text))
-    return found
+    return [(Status.VAPOUR, tear.text) for tear in torn_in_motion(scene)]
 
 
 def _too_long(scene: PumpScene) -> list[tuple[Status, str]]:
@@ -310,6 +340,9 @@ def _too_long(scene: PumpScene) -> list[tuple[Status, str]]:
 
 FEWEST_STEPS = 2
 """A sample of a pump: the casing runs once a step, and needs twice the sample rate."""
+
+MOST_STEPS = 1000
+"""Steps per sample: beyond it a step says more about a slip than about accuracy."""
 
 
 def pump_step(scene: PumpScene) -> float:
@@ -476,7 +509,8 @@ def _faults_of(rung: Rung, scene: Scene) -> list[str]:
 
 def _pump_beyond(scene: Scene) -> list[str]:
     pump = cast(PumpScene, scene)
-    return joint_faults(pump) or [fault for _, fault in limits(pump)]
+    beyond = joint_faults(pump) or [fault for _, fault in limits(pump)]
+    return beyond or [fault for _, fault in knock_limits(pump)]
 
 
 def _effect(

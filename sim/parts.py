@@ -26,7 +26,7 @@ from pydantic import (
     model_validator,
 )
 
-from .sensor import Channel
+from .sensor import SIMULATED_RATE_LEAST, SIMULATED_RATE_MOST, Channel
 
 _INCH = 0.0254  # m, exact by definition
 _POUND_FORCE = 4.4482216152605  # N, exact by definition
@@ -89,7 +89,6 @@ _SHAPE_MOST = 1e3  # kg^-0.5, the mode of a milligram
 _LEVEL_LEAST, _LEVEL_MOST = 1e-3, 1e4  # V
 GAIN_LEAST, GAIN_MOST = 1e-3, 1e3
 _MODE_SLOWEST, _MODE_FASTEST = 1e-6, 1e6  # Hz, a floating casing has almost none
-_RATE_LEAST, _RATE_MOST = 1.0, 1e6  # Hz, of sampling
 _RECORDING_LONGEST = 3600.0  # s
 _STEP_LEAST = 1e-12  # s
 _SETTLING_MOST = 1000
@@ -512,7 +511,7 @@ class Scene(Part):
     duration: Time = Field(
         gt=0, le=_RECORDING_LONGEST, description="length of the recording, after settling"
     )
-    sample_rate: Frequency = Field(ge=_RATE_LEAST, le=_RATE_MOST)
+    sample_rate: Frequency = Field(ge=SIMULATED_RATE_LEAST, le=SIMULATED_RATE_MOST)
     settling_revolutions: int = Field(
         default=3, ge=1, le=_SETTLING_MOST, description="run before the recording"
     )
@@ -592,6 +591,10 @@ def name_faults(sensors: Sequence[str], tacho: Tacho | None) -> list[str]:
     ]
 
 
+MOST_FAULTS = 200
+"""Faults of one input that are told one by one."""
+
+
 def validate_table(model: type[Table], table: Mapping[str, Any], name: str) -> Table:
     """Validate a plain table into any model, with every fault in the words of this program.
 
@@ -608,7 +611,8 @@ def validate_table(model: type[Table], table: Mapping[str, Any], name: str) -> T
     try:
         return model.model_validate(dict(table))
     except ValidationError as error:
-        entries = [entry for entry in error.errors() if not _other_choice(entry)]
+        found = [entry for entry in error.errors() if not _other_choice(entry)]
+        entries = found[:MOST_FAULTS]
         places = [entry["loc"] for entry in entries]
         faults = [
             line
@@ -618,6 +622,8 @@ def validate_table(model: type[Table], table: Mapping[str, Any], name: str) -> T
             or entry["type"] != "too_short"
             for line in _fault_lines(model, entry)
         ]
+        if len(found) > len(entries):
+            faults.append(f"and {len(found) - len(entries)} more; mend these first")
         if issubclass(model, Scene) and () not in places:
             parts = _valid_parts(model, table)
             faults += model.cross_faults(parts)

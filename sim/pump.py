@@ -24,7 +24,7 @@ from .crank_setup import (
 from .frf_table import Accelerance, load_accelerance
 from .hydraulics import lift_left
 from .integrate import SimulationError, Solution, Status
-from .ladder import FEWEST_STEPS, joint_faults, limits, pump_step
+from .ladder import FEWEST_STEPS, MOST_STEPS, joint_faults, knock_limits, limits, pump_step
 from .parts import Accelerometer, Scene, SceneError, channels_of, specific_key
 from .pump_parts import CRANK_PLACES, FORCE_PLACES, GUIDE_PLACES, VALVE_PLACES, PumpScene
 from .sensor import (
@@ -35,9 +35,7 @@ from .sensor import (
     tacho_pulses,
 )
 from .slider_crank import FORCES, GUIDE, JOINT_COMPLIANT, JOINT_LINK, CrankRun
-
-_MOST_STEPS = 1000
-"""Steps per sample: beyond it a step says more about a slip than about accuracy."""
+from .tearing import lowest_of_run, torn_in_run
 
 _MEMORY = 4e9  # byte, what one run may take: a data set runs one on every core
 _BYTES_PER_STEP = 3 * 10 * 8  # of one throw: forces and chamber as doubles, two passes over them
@@ -78,7 +76,7 @@ def simulate_pump(scene: Scene, seed: int, truth: bool, raise_on_failure: bool) 
     run = run_scene(
         pump, step=step, n_steps=plan.n_steps, start_angle=plan.first_angle, keep_states=truth
     )
-    status = _valve_status(pump, run, plan) if run.status.ok else run.status
+    status = _judged(pump, run, plan) if run.status.ok else run.status
     numerics = _numerics(pump, run, plan)
     if not status.ok:
         if raise_on_failure:
@@ -164,8 +162,9 @@ def steps_per_sample(scene: PumpScene) -> int:
         shorter than two samples. Or: a step of less than a thousandth of a sample, a run that
         needs more than 4 GB.
     LimitError
-        A step too long for the contact, a clearance that its contact does not resolve, a
-        pressure below that of the vapour; with the status a sweep records.
+        A step too long for the contact, a contact too soft for its law or its clearance, a
+        pressure below that of the vapour, in a trial of two revolutions too; with the status a
+        sweep records.
     """
     faults = joint_faults(scene)
     if faults:
@@ -181,21 +180,24 @@ def steps_per_sample(scene: PumpScene) -> int:
     faults = [fault for fault in (_step_fault(scene, wanted), _size_fault(scene, wanted)) if fault]
     if faults:
         raise SceneError(scene.name, faults)
+    beyond = knock_limits(scene)
+    if beyond:
+        raise LimitError(scene.name, [fault for _, fault in beyond], beyond[0][0])
     return max(FEWEST_STEPS, math.ceil(wanted - 1e-9))
 
 
 def _step_fault(scene: PumpScene, steps: float) -> str | None:
-    if steps - 1e-9 <= _MOST_STEPS:  # the bound itself, whatever its rounding
+    if steps - 1e-9 <= MOST_STEPS:  # the bound itself, whatever its rounding
         return None
-    shortest = 1 / (scene.sample_rate * _MOST_STEPS)
+    shortest = 1 / (scene.sample_rate * MOST_STEPS)
     if scene.numerics.step is not None:
         return (
             f"numerics.step = {scene.numerics.step:g} s must be >= {shortest:.3g} s, "
-            f"{_MOST_STEPS} steps a sample; lengthen it, or raise sample_rate"
+            f"{MOST_STEPS} steps a sample; lengthen it, or raise sample_rate"
         )
     return (
-        f"the contact needs steps of {shortest * _MOST_STEPS / steps:.3g} s, must be >= "
-        f"{shortest:.3g} s, {_MOST_STEPS} steps a sample; raise sample_rate, lower stiffness and "
+        f"the contact needs steps of {shortest * MOST_STEPS / steps:.3g} s, must be >= "
+        f"{shortest:.3g} s, {MOST_STEPS} steps a sample; raise sample_rate, lower stiffness and "
         "damping of the joints, or raise their speed_floor"
     )
 
@@ -412,10 +414,11 @@ def _front_end(sensor: Accelerometer, row: NDArray[np.float64], fs: float) -> ND
     return low_pass(row, fs, np.concatenate(poles)) if poles else row
 
 
-def _valve_status(scene: PumpScene, run: CrankRun, plan: _Plan) -> Status:
-    """A valve that never shuts in time has too soft a spring for the speed."""
-    left = _lift_left(scene, run, plan)
-    return Status.VALVE_OPEN if left > _LIFT_LEFT else Status.OK
+def _judged(scene: PumpScene, run: CrankRun, plan: _Plan) -> Status:
+    """A column that tears; a valve that never shuts in time, its spring too soft for the speed."""
+    if torn_in_run(scene, run, plan.kept.start * plan.factor):
+        return Status.VAPOUR
+    return Status.VALVE_OPEN if _lift_left(scene, run, plan) > _LIFT_LEFT else Status.OK
 
 
 def _lift_left(scene: PumpScene, run: CrankRun, plan: _Plan) -> float:
@@ -477,6 +480,9 @@ def _numerics(scene: PumpScene, run: CrankRun, plan: _Plan) -> dict[str, float |
             float(contact_table(scene, throw)["speed_floor"][:2].min())
             for throw in range(len(scene.throws))
         )
+    lowest = lowest_of_run(scene, run, plan.kept.start * plan.factor)
+    if math.isfinite(lowest):
+        numerics["lowest_pressure_pa"] = lowest
     if any(JOINT_LINK in row for row in rungs):
         numerics["tension_share"] = run.tension_steps / max(1, steps * len(rungs))
     if run.chambers is not None:

@@ -12,11 +12,25 @@ from pathlib import Path
 from typing import Any
 
 from .journal_parts import JournalScene
-from .parts import Scene, SceneError, beside, nearest, validate_table, without_twin
+from .parts import MOST_FAULTS, Scene, SceneError, beside, nearest, validate_table, without_twin
 from .pump_parts import PumpScene
 from .shaft_parts import ShaftScene
 
 SCENE_FOLDER = Path(__file__).parent / "scenes"
+
+LARGEST_TEXT = 2**18
+"""Longest believable text of a scene or recipe; those built in have 20,000 characters at most.
+
+The parser takes some 50 microseconds for a key, so that this is refused or read within a second.
+"""
+
+DEEPEST = 32
+"""Tables and lists in each other; those built in have six."""
+
+# from the begin of a word, and never back: a long word must not take the square of its length
+_WORD = r"""(?:(?<![\w-])[A-Za-z0-9_-]++|"[^"\n]*+"|'[^'\n]*+')"""
+_LONG_KEY = re.compile(rf"{_WORD}(?:[ \t]*+\.[ \t]*+{_WORD}){{{2 * DEEPEST}}}")
+_LONG_NUMBER = "must have <= 64 bit; write it with a point or an exponent"
 
 
 MACHINES: dict[str, type[Scene]] = {
@@ -76,12 +90,40 @@ def scene_table(text: str, name: str = "scene") -> dict[str, Any]:
     SceneError
         The text is no TOML; the message gives line and column.
     """
+    if len(text) > LARGEST_TEXT:
+        fault = f"{len(text)} characters must be <= {LARGEST_TEXT}; keep tables in files beside it"
+        raise SceneError(name, [fault])
     try:
-        return tomllib.loads(text)
+        if _LONG_KEY.search(text):  # the parser takes the square of its length
+            raise RecursionError
+        table = tomllib.loads(text)
+        faults = _unlike_toml(table)
     except RecursionError:
         raise SceneError(name, ["not TOML: lists or tables nested too deep; flatten it"]) from None
     except tomllib.TOMLDecodeError as error:
         raise SceneError(name, [f"not TOML: {error}; mend the line it names"]) from None
+    except ValueError:  # a whole number that Python does not turn
+        raise SceneError(name, [f"a whole number {_LONG_NUMBER}"]) from None
+    if faults:
+        raise SceneError(name, faults)
+    return table
+
+
+def _unlike_toml(table: Mapping[str, Any]) -> list[str]:
+    """Whole numbers longer than TOML has them; raises RecursionError where it is too deep."""
+    faults: list[str] = []
+    queue: list[tuple[tuple[str, ...], Any]] = [((), table)]
+    while queue:
+        path, node = queue.pop()
+        if len(path) > DEEPEST:
+            raise RecursionError
+        if isinstance(node, int) and node.bit_length() > 64:
+            faults.append(f"{'.'.join(path)}: a whole number {_LONG_NUMBER}")
+        if isinstance(node, Mapping):
+            queue += [((*path, key), value) for key, value in node.items()]
+        elif isinstance(node, list):
+            queue += [((*path, str(i)), value) for i, value in enumerate(node)]
+    return faults[:MOST_FAULTS]
 
 
 def scene_from_table(table: Mapping[str, Any]) -> Scene:

@@ -11,6 +11,36 @@ _FORGOTTEN = math.log(1e8)
 """Time constants after which a transient has sunk to 1e-8, below a 24-bit converter's step."""
 
 
+RATE_LEAST, RATE_MOST = 1e-3, 1e8
+"""Sample rates believed of a recording [Hz]: a level every quarter of an hour, acoustic emission.
+Beyond them a unit or an exponent has slipped."""
+
+SIMULATED_RATE_LEAST, SIMULATED_RATE_MOST = 1.0, 1e6
+"""Sample rates of a simulated recording [Hz]."""
+
+
+def rate_fault(name: str, rate: float, cure: str) -> str:
+    """What is wrong with a sample rate; empty where nothing is.
+
+    Parameters
+    ----------
+    name : str
+        Under which the rate was given.
+    rate : float
+        [Hz]
+    cure : str
+        What to do.
+
+    Examples
+    --------
+    >>> rate_fault("fs", 8e98, "give it in Hz")
+    'fs = 8e+98 Hz must be >= 0.001 Hz and <= 1e+08 Hz; give it in Hz'
+    """
+    if RATE_LEAST <= rate <= RATE_MOST:
+        return ""
+    return f"{name} = {rate} Hz must be >= {RATE_LEAST:g} Hz and <= {RATE_MOST:g} Hz; {cure}"
+
+
 @dataclass(frozen=True, kw_only=True)
 class Channel:
     """One row of a signal: what it is, in which unit, from where.
@@ -267,8 +297,8 @@ def tacho_pulses(
 ) -> NDArray[np.float32]:
     """Rectangular tacho pulses, rising at every whole revolution.
 
-    Each sample holds the mean over the interval from the sample before to itself, so that a
-    reader can interpolate an edge to a fraction of a sample.
+    Each sample holds the mean over the interval round it, half-way to either neighbour, so that a
+    reader can interpolate an edge to a fraction of a sample, and finds it where it is.
 
     Parameters
     ----------
@@ -286,11 +316,13 @@ def tacho_pulses(
 
     Examples
     --------
-    >>> tacho_pulses(np.array([-0.1, 0.1, 0.3]), pulse_width=0.5, level=4.0)
-    array([2., 2., 4.], dtype=float32)
+    >>> tacho_pulses(np.array([-0.2, 0.0, 0.2]), pulse_width=0.5, level=4.0)
+    array([0., 2., 4.], dtype=float32)
     """
     # integral of the pulse train over angle: whole pulses passed, and the part of the present one
-    whole = np.floor(revolutions)
-    area = whole * pulse_width + np.minimum(revolutions - whole, pulse_width)
-    mean = np.diff(area) / np.diff(revolutions)
-    return (level * np.concatenate([mean[:1], mean])).astype(np.float32)
+    inner = (revolutions[1:] + revolutions[:-1]) / 2
+    ends = 2 * revolutions[[0, -1]] - inner[[0, -1]]
+    border = np.concatenate([ends[:1], inner, ends[1:]])
+    whole = np.floor(border)
+    area = whole * pulse_width + np.minimum(border - whole, pulse_width)
+    return np.asarray(level * np.diff(area) / np.diff(border), dtype=np.float32)

@@ -45,10 +45,11 @@ from numpy.typing import NDArray
 from scipy.sparse.linalg import splu
 
 from .beam import Beam
-from .bearing import Coefficients, JournalBearing, perturbation, short_attitude, short_eccentricity
+from .bearing import JournalBearing, short_attitude, short_eccentricity
 from .film import FilmGeometry, FilmSolution, FilmState, FilmStatus, direct_film
 from .film_direct import DIRECT_OK, STATUS, DirectFilm, direct_tilted_force
 from .film_mass import ALL_FILM_RUNGS
+from .film_slopes import Coefficients, perturbation
 from .impedance import ImpedanceMap, impedance_map, map_force
 from .rotor import Support
 

@@ -558,12 +558,19 @@ def _turbulence_faults(
 
 
 def _film_faults(film: Film) -> list[str]:
-    if film.rung == "direct":
-        return []
-    return [
-        f"film.rung = '{film.rung}' knows no tilted journal; set film.rung = 'direct' for a shaft "
-        "line"
-    ]
+    faults = []
+    if film.rung != "direct":
+        faults.append(
+            f"film.rung = '{film.rung}' knows no tilted journal; set film.rung = 'direct' for a "
+            "shaft line"
+        )
+    if film.condition == "reynolds":
+        faults.append(
+            "film.condition = 'reynolds' must be 'periodic' or 'guembel'; it holds P = 0 on the "
+            "line of nodes at the widest gap, of which a tilted journal has no one; 'periodic' "
+            "ruptures the film by the same law and finds the line itself"
+        )
+    return faults
 
 
 _CHECKS: tuple[tuple[Any, tuple[str, ...]], ...] = (

@@ -16,6 +16,19 @@ trap 'rm -rf "$scratch"' EXIT
   || { cat "$scratch/build.log"; exit 1; }
 "$bin/python" -m venv "$scratch/env"
 "$scratch/env/bin/python" -m pip install --quiet --disable-pip-version-check "$scratch"/*.whl
+
+# The whole job with the lowest versions that pyproject.toml allows, beside the same with the newest.
+"$bin/uv" venv --quiet --python "$bin/python" "$scratch/lowest"
+"$bin/uv" pip install --quiet --python "$scratch/lowest/bin/python" --resolution lowest-direct \
+  "$scratch"/*.whl
+job() {
+  "$scratch/$1/bin/wearstate" demo --folder "$scratch/demo-$1" -j 1 > "$scratch/$1.log" 2>&1 \
+    || { cat "$scratch/$1.log"; echo "demo fails with the $2 versions"; return 1; }
+}
+job lowest lowest & lowest=$!
+job env newest
+wait "$lowest"
+
 (
   cd "$scratch"
   env/bin/wearstate --version

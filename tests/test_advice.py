@@ -13,7 +13,7 @@ from wearstate.diagnose.advice import (
     touched_grades,
     work_words,
 )
-from wearstate.diagnose.estimate import Estimate
+from wearstate.diagnose.estimate import NO_BASELINE, Estimate
 from wearstate.diagnose.trend import Outlook
 
 PIN = "diametral clearance, crankpin"
@@ -53,8 +53,9 @@ def test_every_verdict_has_its_advice():
                 advice = advise(found, PIN, EDGES)
                 assert "{" not in advice.sentence
                 assert advice.basis == RULE_OF_THUMB
-    for verdict in ("unfamiliar", "unusable"):
-        found = Estimate(verdict=verdict)
+    barred = {"unfamiliar": (), "unusable": ()}, {"unusable": (NO_BASELINE,)}
+    for verdict, reasons in (item for part in barred for item in part.items()):
+        found = Estimate(verdict=verdict, reasons=reasons)
         seen.add((None, confidence_of(found, EDGES)))
         assert "does not mean that the machine is sound" in advise(found, PIN, EDGES).sentence
     assert seen == set(_RULES)  # no row that nothing reaches

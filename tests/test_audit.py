@@ -11,13 +11,14 @@ from click.testing import CliRunner
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
-from wearstate.datasets.audit import CHECKS, Audit, audit, machine_origin, table_findings
+from wearstate.datasets.audit import CHECKS, Audit, audit, table_findings
 from wearstate.datasets.audit_columns import close_pairs, resolution
 from wearstate.datasets.audit_label import neighbour_accuracy
 from wearstate.datasets.audit_records import ANCHORS, anchors, copies, sketch
-from wearstate.datasets.audit_rows import copied_rows
+from wearstate.datasets.audit_rows import _rank, copied_rows
 from wearstate.datasets.audit_table import Roles, Table, coded, read_table
 from wearstate.datasets.generate import generate
+from wearstate.datasets.machines import machine_origin
 from wearstate.datasets.recipe import load_recipe
 from wearstate.datasets.record import Attributes, DataError, DataSet, DataSetWriter
 from wearstate.diagnose.audit_text import audit_text
@@ -532,7 +533,7 @@ def test_the_same_draw_in_two_files(tmp_path):
         assert [f.numbers["shared"] for f in shared] == ([count] if count else [])
         second.unlink()
     with DataSet(first) as data:
-        assert machine_origin(data.attributes) == ('"r"', 1)
+        assert machine_origin(data.attributes.recipe, data.attributes.seed) == ('"r"', 1)
 
 
 def test_rows_and_machines_that_two_tables_share(tmp_path):
@@ -772,3 +773,62 @@ def test_the_clean_text():
     text = audit_text(Audit(sources=(), findings=(), checked=("copied rows",), unchecked=()))
     assert text.startswith("CLEAN: nothing was found")
     assert "Looked for:\n  - copied rows\nNo audit sees:" in text
+
+
+def test_a_missing_machine_is_refused_and_huge_values_are_compared(tmp_path):
+    path, n = tmp_path / "t.csv", 40
+    huge = 1e200 * np.random.default_rng(0).standard_normal((n, 2))
+    assert len(copied_rows(huge)) == 0  # the squares are infinite
+    frame = pd.DataFrame({"m": huge[:, 0], "state": np.arange(n) % 2, "machine": np.arange(n) % 5})
+    roles = Roles(label="state", group="machine")
+    frame["machine"] = frame["machine"].where(frame["machine"] > 0)
+    frame.to_csv(path, index=False)
+    with pytest.raises(DataError, match="group 'machine' is missing in 8 of 40 rows"):
+        audit([path], roles)
+
+
+@pytest.mark.parametrize("scale", [1.7e308, 1e154, 1e-308, 5e-324])
+@pytest.mark.parametrize("state", ["word", "number"])
+def test_numbers_at_either_end_of_the_doubles_are_missing_without_a_warning(tmp_path, scale, state):
+    path, n = tmp_path / "t.csv", 60
+    rng = np.random.default_rng(0)
+    spread = rng.uniform(-1, 1, (n, 2)) * scale
+    condition = np.where(np.arange(n) % 2, "a", "b") if state == "word" else np.arange(n) / n
+    frame = pd.DataFrame(
+        {
+            "mean": spread[:, 0],
+            "rms": np.sign(spread[:, 1]) * scale,
+            "plain": rng.random(n),
+            "speed": spread[::-1, 0],
+            "state": condition,
+        }
+    )
+    frame.to_csv(path, index=False)
+    found = audit([path], Roles(label="state", nuisance=("speed",)))
+    assert any("2 column(s) with missing values (also beyond 1e-100" in u for u in found.unchecked)
+    assert found.sources[0].rows == n
+    if state == "number":
+        frame["state"] = rng.random(n) * scale
+        frame.to_csv(path, index=False)
+        with pytest.raises(DataError, match=r"label state: [0-9]+ rows have none of 1e-100 to 1e"):
+            audit([path], Roles(label="state"))
+
+
+def test_a_table_of_one_row_again_and_again(tmp_path):
+    """Its columns have no deviation to be scaled by."""
+    path = tmp_path / "t.csv"
+    pd.DataFrame({"mean": [2.5] * 30, "state": ["a", "b"] * 15}).to_csv(path, index=False)
+    codes = {finding.code: finding for finding in audit([path], Roles(label="state")).findings}
+    assert codes["copied-rows"].numbers["pairs"] == 29
+
+
+def test_the_rank_without_a_singular_value_decomposition(monkeypatch):
+    scaled = np.random.default_rng(0).standard_normal((200, 6)) @ np.diag([9, 8, 7, 1, 0.1, 0])
+    whole = _rank(scaled)
+
+    def fails(*args, **options):
+        raise np.linalg.LinAlgError("SVD did not converge")
+
+    monkeypatch.setattr(np.linalg, "svd", fails)
+    # (81 + 64 + 49 + 1)^2 / (81^2 + 64^2 + 49^2 + 1) is 2.9
+    assert _rank(scaled) == whole == 2

@@ -216,7 +216,7 @@ def test_given_is_the_default_and_changes_nothing(recipe, counted, tmp_path):
         assert generate(recipe, 2, path, **options).fidelity is None
         with h5py.File(path) as file:
             contents.append((file["signal"][:].tobytes(), file["manifest"][:].tobytes()))
-            assert file.attrs["fidelity"] == ""
+            assert file.attrs["fidelity"] == b""
     assert contents[0] == contents[1]
     assert counted == []
 

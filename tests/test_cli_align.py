@@ -143,3 +143,65 @@ def test_bad_input(arguments, says):
     result = run(*arguments, code=2)
     assert result.stdout == ""
     assert says in result.stderr
+
+
+def test_a_move_onto_a_limit_is_told_and_a_margin_keeps_away():
+    text = run(SCENE, *SAGGED).stdout
+    assert "on a limit after the moves: intermediate_aft; --margin 0.1 keeps" in text
+    kept = run(SCENE, *SAGGED, "--margin", "0.2").stdout
+    assert "every limit is kept with a margin of 20 %" in kept
+    assert "on a limit" not in kept
+    table = strict(run(SCENE, *SAGGED, "--margin", "0.2", "--json").stdout)["calibration"]
+    seats = alignment_line(load_scene(SCENE)).seats
+    for shown in table["conditions"]:
+        for seat, row in zip(seats, shown["bearings"], strict=True):
+            assert row["reaction_n"] >= 1.2 * seat.least_load * (1 - 1e-6)
+            assert abs(row["slope_rad"]) <= 0.8 * seat.most_slope * (1 + 1e-6)
+    assert table["touched"] == []
+
+
+def test_a_margin_that_cannot_be_kept_is_told_with_what_can():
+    text = run("shaft-rig", "--margin", "0.9").stdout
+    assert "a margin of 90 % of each limit cannot be kept; " in text
+    assert "calibration: the moves bring every" in text
+
+
+def test_even_reactions_differ_less_and_keep_every_limit():
+    shown = strict(run(SCENE, *SAGGED, "--target", "even", "--json").stdout)["calibration"]
+    least = strict(run(SCENE, *SAGGED, "--json").stdout)["calibration"]
+
+    def spread(table):
+        shares = [row["share"] for state in table["conditions"] for row in state["bearings"]]
+        return sum((share - 1 / 5) ** 2 for share in shares)
+
+    assert shown["unmet"] == []
+    assert spread(shown) < 0.6 * spread(least)
+
+
+def test_questions_that_do_not_go_together_are_refused():
+    needless = run(SCENE, "--no-calibrate", "--margin", "0.1", code=2)
+    assert "leave out --no-calibrate" in needless.stderr
+    both = run(SCENE, "--target", "even", "--prefer", "fewest", code=2)
+    assert "prefer = 'fewest' must be 'least'" in both.stderr
+
+
+def test_the_page_holds_the_verdict_beside_the_name_and_the_test(tmp_path):
+    page = tmp_path / "a.html"
+    text = run("shaft-rig", "--test", "shaker", "-o", page).stdout
+    html = page.read_text()
+    assert html.index('<th class="left">verdict</th>') < html.index("station <span")
+    assert html.count("data:image/png;base64,") == 2
+    assert "Simulated shaker test, pushing aft up" in html
+    assert "orange: after the moves" in html
+    # the lift of 0.06 mm moves no peak by more than the test scatters, and both say so
+    for told in (html, text):
+        assert "so the test cannot show what these moves do" in told
+    within = tmp_path / "b.html"
+    run(SCENE, "--test", "shaker", "-o", within)
+    assert "No test: nothing moves" in within.read_text()
+
+
+def test_the_picture_tells_before_from_after():
+    found = align(load_scene(SCENE, {"bearings.2.sag": "1.6 mm"}))
+    words = [text.get_text() for text in align_figure(found).axes[2].get_legend().get_texts()]
+    assert words == ["as set", "after the moves", "limit"]

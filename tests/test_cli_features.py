@@ -86,7 +86,9 @@ def test_a_set_says_what_is_absent(small_set, tmp_path):
     path = tmp_path / "t.csv"
     result = run("features", small_set, "-o", path, "--set", "core", "--json", "-j", 2)
     absent = json.loads(result.stdout)["absent"]
-    assert absent["frf_levels"] == "force channels = 0 must be 1; give quantities"
+    assert absent["frf_levels"] == (
+        "force channels = 0 must be 1; declare the unit N on import, or quantities in Python"
+    )
     assert "iso_zone" in result.stderr
     assert "velocity_rms" not in absent
     core = set(pd.read_csv(path).columns)

@@ -1,6 +1,7 @@
 """`wearstate import` and `report` on measured files: options, words, exit codes."""
 
 import json
+import os
 
 import numpy as np
 import pytest
@@ -8,7 +9,8 @@ from click.testing import CliRunner
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.io import wavfile
 from wearstate.datasets.record import DataSet
-from wearstate.diagnose.cli import as_options, cli
+from wearstate.diagnose.cli import cli
+from wearstate.diagnose.command_options import as_options
 from wearstate.sim.parts import STANDARD_GRAVITY
 
 RAMP = np.arange(400.0)
@@ -155,6 +157,7 @@ def test_measured_contents(realdata):
 def test_errors_name_the_options(wavs, tmp_path):
     path = tmp_path / "x.h5"
     wavfile.write(tmp_path / "int.wav", 200, RAMP.astype(np.int16))
+    wavfile.write(tmp_path / "mono.wav", 200, RAMP.astype(np.float32))
     np.savez(tmp_path / "n.npz", u=RAMP, v=RAMP)
     np.save(tmp_path / "n.npy", RAMP)
     unit, three = ("--unit", "g"), ("--channels", "x,y,key")
@@ -163,7 +166,7 @@ def test_errors_name_the_options(wavs, tmp_path):
         ((tmp_path / "int.wav",), ["--full-scale must be given ('10 V'"]),
         ((tmp_path / "n.npz", *unit), ["--variable must be one of", "choose with --variable"]),
         ((tmp_path / "n.npy", *unit), ["--fs must be given"]),
-        ((*wavs, *unit), ["same channels", "with --channels", "name them all"]),
+        ((*wavs, tmp_path / "mono.wav", *unit), ["same channels", "with --channels"]),
         ((*wavs, *unit, *three, "--overlap", 0.5), ["--overlap = 0.5 needs a segment"]),
         ((*wavs, *unit, *three, "--tacho", "kay"), ["did you mean 'key'"]),
         ((*wavs, *unit, *three, "--limits", "bilge-pump"), ["--limits = 'bilge-pump' must be"]),
@@ -174,7 +177,7 @@ def test_errors_name_the_options(wavs, tmp_path):
         ((*wavs, *unit, "--label", "load_n"), ["must read NAME=VALUE"]),
         ((*wavs, *unit, "--label", "a=1", "--label", "a=2"), ["once for a name"]),
         ((*wavs, *unit, "--segment", "soon"), ["has no leading number", "or write whole"]),
-        ((*wavs, "--fs", "nan"), ["--fs = nan Hz must be > 0"]),
+        ((*wavs, "--fs", "nan"), ["--fs = nan Hz must be >= 0.001"]),
         ((*wavs, "--decimal", ","), ["does not fit WAV files"]),
         ((tmp_path / "a.doc",), ["suffix '.doc' must be one of", "--n-channels"]),
     ):
@@ -211,7 +214,8 @@ def test_inputs_and_outputs_are_kept(wavs, tmp_path):
     refused("import", path, "-o", tmp_path / "y.h5", says=["is a data set of this program already"])
     part = tmp_path / "y.h5.part"
     part.write_text("hours of another run")
-    refused("import", *wavs, "-o", tmp_path / "y.h5", *options, says=["interrupted", "--force"])
+    run("import", *wavs, "-o", tmp_path / "y.h5", *options)
+    run("import", *wavs, "-o", tmp_path / "y.h5", *options, "--force")
     assert part.read_text() == "hours of another run"
 
 
@@ -236,3 +240,17 @@ def test_the_report_on_a_wav_is_that_on_the_simulation(small_set, small_model, t
     page = tmp_path / "r.html"
     run("report", path, *common, *declared, "-o", page)
     assert "pump.wav: measured" in page.read_text()
+
+
+def test_file_names_that_are_no_utf8_are_imported(tmp_path):
+    """Two such names stay apart."""
+    wavfile.write(tmp_path / "a.wav", 1000, np.sin(np.arange(400.0)).astype("f4"))
+    paths = [tmp_path / os.fsdecode(b"a" + end + b".wav") for end in (b"\xe9", b"\xe8")]
+    for path in paths:
+        path.write_bytes((tmp_path / "a.wav").read_bytes())
+    command = ["import", *map(str, paths), "-o", str(tmp_path / "o.h5"), "-j", "1"]
+    done = CliRunner().invoke(cli, [*command, "--unit", "g", "--channels", "acc"])
+    assert done.exit_code == 0, done.output
+    with DataSet(tmp_path / "o.h5") as data:
+        assert data.manifest["file"].tolist() == ["a\\xe8.wav", "a\\xe9.wav"]
+        assert data.manifest["group"].nunique() == 2

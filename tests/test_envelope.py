@@ -14,9 +14,11 @@ from wearstate.features.envelope import (
     coherence_threshold,
     cyclic_coherence,
     envelope,
+    envelope_span,
     envelope_spectrum,
     fault_line,
     kurtogram,
+    kurtogram_levels,
     spectral_kurtosis,
 )
 
@@ -492,6 +494,53 @@ def test_kurtogram_in_single_precision():
     assert single.band == double.band
     for row, expected in zip(single.kurtosis, double.kurtosis, strict=True):
         assert_allclose(row, expected, rtol=1e-4, atol=1e-4)  # sums of 24 bits
+
+
+def spikes(*places, size=200.0, n=51_200):
+    """Electrical spikes: four samples of alternating sign, loudest at half the sample rate."""
+    wave = np.zeros(n)
+    for place in places:
+        wave[place : place + 4] = size * np.array([1, -1, 1, -1])
+    return wave
+
+
+@pytest.mark.parametrize("places", [(20_000,), (25_600,), (100,), (9000, 40_000)])
+def test_lone_spikes_are_no_band_of_a_kurtogram(places):
+    noise = 0.2 * np.random.default_rng(0).standard_normal(51_200)
+    bare = kurtogram(noise, 25_600.0, levels=4)
+    found = kurtogram(noise + spikes(*places), 25_600.0, levels=4)
+    # a plain mean has a kurtosis of some thousand here; 6 as of noise alone
+    assert found.highest < 6 * found.deviation[-1]
+    assert bare.highest < 6 * bare.deviation[-1]
+
+
+@pytest.mark.parametrize("places", [(), (20_000,), (9000, 40_000)])
+@pytest.mark.parametrize("levels", [4, 7])
+def test_a_train_of_blows_wins_over_lone_spikes(places, levels):
+    train = blows(80.0, 3000.0)
+    plain = kurtogram(train, 25_600.0, levels=levels)
+    found = kurtogram(train + spikes(*places), 25_600.0, levels=levels)
+    assert found.band == plain.band
+    assert found.band[0] < 3000 < found.band[1]
+    # up to a quarter of the blows are left out with the spikes
+    assert found.highest == pytest.approx(plain.highest, rel=0.15)
+
+
+@pytest.mark.parametrize(("rate", "again"), [(0.5, False), (1.0, False), (3.0, True), (10.0, True)])
+def test_blows_come_back_from_four_a_record_on(rate, again):
+    """Two seconds: one, two, six and twenty blows."""
+    found = kurtogram(blows(rate, 3000.0, noise=0.02), 25_600.0, levels=4)
+    assert (found.highest > 10 * found.deviation[found.best[0]]) == again
+
+
+def test_the_depth_leaves_bands_that_hold_what_is_sought():
+    bearing = bearing_frequencies(8, 20.0, 120.0)
+    for speed, known in ((None, None), (25.0, None), (25.0, bearing), (2.0, bearing)):
+        span = envelope_span(speed, known)
+        levels = kurtogram_levels(51_200, 25_600.0, span)
+        assert 12_800 / 2**levels >= span
+        assert levels == 7 or 12_800 / 2 ** (levels + 1) < span
+    assert kurtogram_levels(256, 100.0, 500.0) == 1
 
 
 @pytest.mark.parametrize("wave", [np.zeros(16_384), np.full(16_384, 0.1)])

@@ -253,10 +253,16 @@ def test_names_must_be_unique(channels):
         table.feature_row(np.zeros((5, 100)), FS, channel_names=channels)
 
 
-def test_bands_closer_than_a_hertz_are_refused():
+def test_bands_closer_than_a_hertz_have_no_names_and_are_left_out():
     close = shared.Settings(n_bands=200)
+    names = table.feature_names(["a"], 200.0, tacho=False, settings=close)
+    assert "a.rms" in names
+    assert not any("band" in name for name in names)
+    with pytest.raises(ValueError, match=r"band_levels is not to be had: fs = 200 Hz is too low"):
+        table.feature_names(["a"], 200.0, tacho=False, settings=close, only=["band_levels"])
+    twice = shared.Settings(bands=((1.0, 2.0), (1.0, 2.0)))
     with pytest.raises(ValueError, match=r"feature names equal, must be 0"):
-        table.feature_names(["a"], 200.0, tacho=False, settings=close)
+        table.feature_names(["a"], 200.0, tacho=False, settings=twice, feature_set="core")
 
 
 def test_the_same_record_gives_the_same_bytes():

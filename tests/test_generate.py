@@ -5,6 +5,7 @@ import re
 import signal
 import subprocess
 import sys
+import time
 from collections import defaultdict
 from contextlib import suppress
 
@@ -24,10 +25,11 @@ from wearstate.datasets.recipe import (
     wear_limits,
 )
 from wearstate.datasets.recipe_file import RecipeError, recipe_names
-from wearstate.datasets.record import DataError, DataSet, DataSetWriter, WriteError
+from wearstate.datasets.record import DataError, DataSet, DataSetWriter, LostError, WriteError
 from wearstate.datasets.splits import group_split
 from wearstate.datasets.workers import in_order
 from wearstate.sim.assemble import simulate
+from wearstate.sim.atomic import OutputError
 from wearstate.sim.parts import SceneError
 from wearstate.sim.scene import load_scene
 
@@ -185,9 +187,121 @@ def test_a_killed_process_goes_on(short, reference, tmp_path, jobs):
     command = [sys.executable, "-P", "-c", script, str(path), jobs]
     run = subprocess.run(command, cwd=tmp_path, check=False, stdout=subprocess.PIPE, timeout=180)
     assert run.returncode == -signal.SIGKILL
-    assert os.listdir(tmp_path) == ["data.h5.part"]
+    assert sorted(os.listdir(tmp_path)) == ["data.h5.lock", "data.h5.part"]
     assert generate(short, N, path, seed=5).n_resumed == 4
     assert content(path) == reference
+
+
+# -- one output, several hands -------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_an_unfinished_file_that_is_deleted_stops_the_run_and_says_so(short, tmp_path, jobs):
+    path = tmp_path / "data.h5"
+    seen = []
+
+    def delete(done, total):
+        seen.append(done)
+        if done == 2:
+            (tmp_path / "data.h5.part").unlink()
+
+    with pytest.raises(LostError, match=r"part is gone: .* its 2 records with it; 0 of 40 are"):
+        generate(short, 40, path, seed=5, jobs=jobs, progress=delete)
+    assert seen == [1, 2]  # noticed before the next record
+    assert os.listdir(tmp_path) == []
+
+
+def slow(item):
+    time.sleep(30 * item)
+    return item
+
+
+def test_it_is_noticed_while_a_worker_is_waited_for(tmp_path):
+    part = tmp_path / "data.h5.part"
+    part.touch()
+
+    def watch():
+        if not part.exists():
+            raise LostError("gone")
+
+    results = in_order(slow, [0, 0, 1, 1], jobs=2, watch=watch)
+    assert next(results) == 0
+    part.unlink()
+    begin = time.monotonic()
+    with pytest.raises(LostError):
+        list(results)
+    assert time.monotonic() - begin < 20  # a second, and the end of the workers
+
+
+def test_ctrl_c_after_the_file_was_deleted_claims_nothing(short, tmp_path):
+    def delete_and_stop(done, total):
+        (tmp_path / "data.h5.part").unlink()
+        raise KeyboardInterrupt
+
+    with pytest.raises(Stopped, match="0 of 6 are kept"):
+        generate(short, N, tmp_path / "data.h5", progress=delete_and_stop)
+
+
+def test_an_output_that_appears_is_not_replaced(short, reference, tmp_path):
+    path = tmp_path / "data.h5"
+
+    def other(done, total):
+        path.write_text("of another run")
+
+    with pytest.raises(OutputError, match=r"has appeared .* kept as data\.h5\.part: rename it"):
+        generate(short, N, path, seed=5, progress=other)
+    assert path.read_text() == "of another run"
+    assert content(tmp_path / "data.h5.part") == reference
+    path.unlink()
+    assert generate(short, N, path, seed=5).n_resumed == N
+    assert content(path) == reference
+
+
+RIVAL = """
+import sys, time
+from pathlib import Path
+from wearstate.datasets.generate import generate
+from wearstate.datasets.recipe import load_recipe
+from wearstate.datasets.record import DataError
+
+folder, me, other, rounds = Path(sys.argv[1]), sys.argv[2], sys.argv[3], int(sys.argv[4])
+recipe = load_recipe("bilge-pump-small", {overrides!r})
+for number in range(rounds):
+    (folder / f"ready-{{number}}-{{me}}").touch()
+    while not (folder / f"ready-{{number}}-{{other}}").exists():
+        time.sleep(0.0005)
+    try:
+        generate(recipe, 2, folder / f"{{number}}.h5", seed=5)
+        print("made", flush=True)
+    except DataError as error:
+        print(error, flush=True)
+"""
+
+
+def test_of_two_runs_at_once_one_goes_on_and_the_other_says_who_holds_it(short, tmp_path):
+    rounds = 25
+    generate(short, 2, tmp_path / "reference.h5", seed=5)
+    script = RIVAL.format(overrides=SHORT)
+    rivals = [
+        subprocess.Popen(
+            [sys.executable, "-P", "-c", script, str(tmp_path), *names, str(rounds)],
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        for names in ("ab", "ba")
+    ]
+    said = [rival.communicate(timeout=500)[0].splitlines() for rival in rivals]
+    assert [len(lines) for lines in said] == [rounds, rounds]
+    held = 0
+    for number, lines in enumerate(zip(*said, strict=True)):
+        assert sorted(line == "made" for line in lines) == [False, True], lines
+        [refusal] = [line for line in lines if line != "made"]
+        holder = rivals[lines.index("made")].pid
+        assert f"is being written by process {holder} on " in refusal or "h5 exists;" in refusal
+        held += "is being written" in refusal
+        assert content(tmp_path / f"{number}.h5") == content(tmp_path / "reference.h5")
+    assert held > 0
+    assert not [*tmp_path.glob("*.lock"), *tmp_path.glob("*.part"), *tmp_path.glob("*.tmp")]
 
 
 # -- the file ----------------------------------------------------------------------------------
@@ -581,8 +695,7 @@ def test_a_failed_recording_leaves_no_unfinished_file_but_that_of_others(tmp_pat
     solution = simulate(scene, seed=0)
     other = tmp_path / "other.h5.part"
     other.write_bytes(b"of an interrupted run")
-    with pytest.raises(DataError, match="unfinished file"):
-        save_solution(scene, solution, tmp_path / "other.h5", seed=0)
+    save_solution(scene, solution, tmp_path / "other.h5", seed=0)
     assert other.read_bytes() == b"of an interrupted run"
 
     def full(*_, **__):
@@ -591,7 +704,7 @@ def test_a_failed_recording_leaves_no_unfinished_file_but_that_of_others(tmp_pat
     monkeypatch.setattr(DataSetWriter, "write", full)
     with pytest.raises(OSError, match="no space"):
         save_solution(scene, solution, tmp_path / "mine.h5", seed=0)
-    assert list(tmp_path.iterdir()) == [other]
+    assert sorted(tmp_path.iterdir()) == [tmp_path / "other.h5", other]
 
 
 def test_a_split_that_cannot_be_made_is_bad_data():

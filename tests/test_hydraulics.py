@@ -842,6 +842,14 @@ def test_what_a_rung_needs_is_named_at_once():
         ({"suction_valve": {"seat_stiffness": 1e13}}, "rad/s; soften the seat"),
         ({"discharge_valve": {"stuck_lift": 0}}, "a cylinder without a way out bursts"),
         ({"suction": "-0.1 MPa"}, "must be > the liquid's vapour pressure = -98986 Pa gauge"),
+        (
+            {"rung": "two-level", "suction": "-0.1 MPa"},
+            "suction = -100000 Pa must be > the liquid's vapour pressure = -98986 Pa gauge",
+        ),
+        (
+            {"rung": "constant", "suction": "-0.1 MPa", "discharge": "-0.1 MPa"},
+            "discharge = -100000 Pa must be > the liquid's vapour pressure = -98986 Pa gauge",
+        ),
         ({"liquid": {"density": "1 kg"}}, "has unit 'kg', not one of density"),
         ({"dead_volume": "0 L"}, "dead_volume"),
     ],

@@ -242,8 +242,8 @@ def test_the_tacho_rises_at_whole_turns():
     pulse = solution.signal[2]
     rises = np.flatnonzero((pulse[1:] > 2.5) & (pulse[:-1] <= 2.5)) + 1
     per_turn = scene.sample_rate / scene.drive.speed
-    # three quarters of a turn, then one each; a sample's pulse is the mean since the one before
-    assert_allclose(rises, (np.arange(len(rises)) + 0.75) * per_turn, atol=1.5)
+    # three quarters of a turn, then one each; a sample's pulse is the mean round it
+    assert_allclose(rises, (np.arange(len(rises)) + 0.75) * per_turn, atol=1.0)
     assert len(rises) == 5
 
 

@@ -27,13 +27,14 @@ SIM_FLOORS = [
     {"assemble"},
     {"wear_rate"},
     {"pump", "journal", "shaft_line"},
-    {"ladder"},
+    {"ladder", "plausibility"},
+    {"tearing"},
     {"crank_setup"},
     {"slider_crank", "orbit", "casing", "shaft_film", "shaft_response"},
     {"impedance", "bearing", "film_mass", "contact", "hydraulics", "frf_table"},
     {"calibration", "jacking"},
     {"rotor", "alignment"},
-    {"film", "beam"},
+    {"film", "film_slopes", "beam"},
     {"film_relax"},
     {"film_direct"},
     {"film_line", "film_short"},
@@ -42,7 +43,7 @@ SIM_FLOORS = [
     {"hydraulic_parts"},
     {"parts"},
     {"wear_life"},
-    {"sensor", "jit", "wear", "viscosity"},
+    {"sensor", "jit", "wear", "viscosity", "atomic"},
 ]
 """Inside sim, from the roof to the ground; a file imports from lower floors or its own."""
 

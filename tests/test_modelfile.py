@@ -193,3 +193,16 @@ def test_damaged_and_forged_models_do_no_harm(small_model, tmp_path):
     # most of what is forged cannot pass; swapping members of two good models can
     assert answers["refused"] >= 0.8 * FILES
     json.dumps(answers)
+
+
+def test_objects_never_get_into_a_model_file(tmp_path):
+    """Nor does a switch of numpy's writer, which versions before 2.1 stored as an array."""
+    path = tmp_path / "m.wsm"
+    numbers = Bundle(kind="k", card={}, structure={}, arrays={"a": np.arange(3.0)})
+    save_bundle(numbers, path)
+    with zipfile.ZipFile(path) as file, np.load(io.BytesIO(file.read("arrays.npz"))) as stored:
+        assert stored.files == ["a"]
+    objects = Bundle(kind="k", card={}, structure={}, arrays={"a": np.array([{}], dtype=object)})
+    with pytest.raises(ValueError, match="Object arrays cannot be saved"):
+        save_bundle(objects, path, force=True)
+    assert list(tmp_path.iterdir()) == [path]

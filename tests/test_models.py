@@ -562,6 +562,18 @@ def test_a_card_that_does_not_fit_is_refused(trained, tmp_path):
         ("grade_edges_m", ["a", 1.0, 2.0]),
         ("grade_edges_m", [1e-4] * 7),
         ("grade_edges_m", [3e-4, 2e-4, 1e-4]),
+        ("grade_edges_m", [-3e-4, -2e-4, -1e-4]),
+        ("grade_edges_m", [0.0, 2e-4, 3e-4]),
+        ("grade_edges_m", [2e-4, 2e-4, 3e-4]),
+        ("grade_edges_m", [1e-4, 2e-4, 3e8]),
+        ("condemning_limit_m", 1e-9),
+        ("severity_range_m", [4e-4, 1e-4]),
+        ("severity_range_m", [-4e-4, 1e-4]),
+        ("sample_rate_hz", 8e98),
+        ("sample_rate_hz", 1e-12),
+        ("pulses_per_revolution", 2**40),
+        ("conditions", [{"name": "a", "feature": "", "unit": "", "low": 2.0, "high": 1.0}]),
+        ("trained_on", {**card["trained_on"], "held_out_share": 1.5}),
         ("healthy_features", {}),
         ("trained_on", {}),
         ("conditions", [{"name": "a", "feature": "no", "unit": "", "low": 0.0, "high": 1.0}]),
@@ -577,6 +589,10 @@ def test_a_card_that_does_not_fit_is_refused(trained, tmp_path):
         rewritten(tmp_path / "good.wsm", tmp_path / "forged.wsm", changes)
         with pytest.raises(ModelError, match=r"card.json: .*retrain it"):
             load_model(tmp_path / "forged.wsm")
+    bad = dataclasses.replace(trained[0], card={**trained[0].card, "sample_rate_hz": 8e98})
+    with pytest.raises(ModelError, match="sample_rate_hz"):
+        save_model(bad, tmp_path / "bad.wsm")
+    assert not (tmp_path / "bad.wsm").exists()
 
 
 def test_the_notice_does_not_hang_on_a_text_in_the_file(trained):

@@ -5,6 +5,7 @@ import json
 import re
 import shlex
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
@@ -13,11 +14,22 @@ from wearstate.datasets.import_set import import_recordings
 from wearstate.datasets.labels import read_labels
 from wearstate.datasets.record import DataError, DataSet
 from wearstate.datasets.sources import SourceOptions, open_source
+from wearstate.datasets.splits import group_folds
 from wearstate.diagnose.cli import cli
 from wearstate.diagnose.estimate import ModelError
 from wearstate.diagnose.modelfile import load_model
-from wearstate.diagnose.own import evaluate_classes, set_of, train_classes
+from wearstate.diagnose.own import (
+    Votes,
+    _clouds,
+    _left_out_distances,
+    _nearest_distance,
+    evaluate_classes,
+    namings_summary,
+    set_of,
+    train_classes,
+)
 from wearstate.diagnose.ownfile import load_class_model, save_class_model
+from wearstate.diagnose.tabulate import feature_table
 
 RATE = 4000.0
 
@@ -53,19 +65,17 @@ def test_what_the_new_rate_cannot_hold_is_gone_and_the_rest_is_kept(tmp_path, hz
 
 @pytest.mark.parametrize(
     ("to", "text"),
-    [(9000.0, "must be <= its rate 8000 Hz"), (7999.0, "ratio of whole numbers"), (-1.0, "> 0")],
+    [
+        (7999.0, "ratio of whole numbers"),
+        (8001.0, "nearest 8"),
+        (-1.0, ">= 0.001"),
+        (8e98, "1e.08"),
+    ],
 )
 def test_rates_that_cannot_be_had_are_refused(tmp_path, to, text):
     path = tone(tmp_path / "x.npy", 700.0, 8000.0)
     with pytest.raises(DataError, match=text):
         open_source(path, SourceOptions(fs=8000.0, unit="g", resample_to=to))
-
-
-def test_a_tacho_is_not_resampled(tmp_path):
-    path = tone(tmp_path / "x.npy", 700.0, 8000.0)
-    options = SourceOptions(fs=8000.0, unit="g", channels=("t",), resample_to=4000.0)
-    with pytest.raises(DataError, match="smear"):
-        import_recordings([path], tmp_path / "o.h5", options=options, tacho="t")
 
 
 # --- named conditions ---------------------------------------------------------------------------
@@ -152,6 +162,50 @@ def test_a_recording_of_something_else_is_unfamiliar(trained, tmp_path):
     assert verdicts.count("unfamiliar") >= 0.9 * len(verdicts)
 
 
+def test_a_condition_near_a_trained_one_is_none_of_them(trained, tmp_path):
+    """Held against each class by itself; in one cloud over all classes 10 of these 16 would be."""
+    model = trained[1]
+    near = own_set(tmp_path, (("near", 1300.0), ("same", 500.0)), seed=9)
+    with DataSet(near) as data:
+        told = [model.estimate(item) for item in data]
+    assert [t.verdict for t in told[:16]].count("unfamiliar") >= 14
+    # exchangeable with the trained ones: of nine recordings one may be refused, here of four
+    assert [t.verdict for t in told[16:]].count("named") >= 12
+    assert told[0].p_limit == pytest.approx(1 / 9)
+    assert told[0].p_value <= told[0].p_limit
+    assert "trained on 8 recordings, must be >= 10 to know strangers" in model.notice
+    assert namings_summary(told[:1]) == "no condition is named, 1 recordings: 1 unfamiliar"
+
+
+def test_a_measured_condition_that_was_held_out_is_mostly_unfamiliar(realdata):
+    """Inner-race faults before a model of outer-race faults and the sound bearing."""
+    [folder] = realdata.glob("mfpt_*")
+    options = SourceOptions(resample_to=48828.0)
+    labels = {"Outer": "outer", "baseline": "healthy"}
+    with TemporaryDirectory() as place:
+        path = Path(place) / "two.h5"
+        files = sorted(f for f in folder.glob("*.mat") if "Inner" not in f.name)
+        table = Path(place) / "labels.csv"
+        rows = [f"{f.name},{next(v for k, v in labels.items() if k in f.name)}" for f in files]
+        table.write_text("file,condition\n" + "\n".join(rows) + "\n")
+        import_recordings(files, path, options=options, labels=read_labels(table), segment=0.25)
+        found = feature_table(path)
+        strange = Path(place) / "inner.h5"
+        import_recordings(sorted(folder.glob("Inner*.mat")), strange, options=options, segment=0.25)
+        other = feature_table(strange)
+    groups = found.manifest["group"].to_numpy()
+    _, truth = np.unique(found.manifest["condition"], return_inverse=True)
+    clouds = _clouds(found, truth, groups, np.arange(len(groups)))
+    folds = group_folds(groups, n=len(np.unique(groups)), seed=0)
+    distance = _left_out_distances(found, truth, groups, folds)
+    votes = Votes(shares=np.ones((len(groups), 1)), label=truth, group=groups, distance=distance)
+    far = _nearest_distance(clouds, other.names, other.values)
+    assert np.mean([votes.p_value(value) <= votes.p_limit for value in far]) > 0.5
+    # the trained ones themselves, each by clouds without it: one recording in six at most
+    own = [votes.p_value(value) <= votes.p_limit for value in distance]
+    assert np.mean(own) <= 1 / 6
+
+
 def test_new_recordings_are_judged_and_known_ones_are_not(trained, tmp_path):
     path, model, _result = trained
     fresh = own_set(tmp_path, KINDS, seed=20)
@@ -183,7 +237,9 @@ def test_the_report_names_one_or_many_and_refuses_what_is_of_wear(trained, tmp_p
     folder = tmp_path / "folder"
     folder.mkdir()
     (folder / "cut.h5").write_bytes(path.read_bytes()[:5000])
-    assert "cut.h5: unusable: file cannot be read" in run("report", folder, *common, code=2).stdout
+    said = run("report", folder, *common, code=2).stdout
+    assert said.startswith("folder: no condition is named, 1 recordings: 1 unusable\n")
+    assert "cut.h5: unusable: file cannot be read" in said
     said = run("report", path, *common, "--fail-on", "alarm", "--trend", code=2).stderr
     assert "names conditions and knows no wear: leave --fail-on, --trend out" in said
 

@@ -5,7 +5,7 @@ import re
 
 import numpy as np
 import pytest
-from wearstate.sim.assemble import simulate
+from wearstate.sim.assemble import check, simulate
 from wearstate.sim.integrate import SimulationError, Status
 from wearstate.sim.parts import SceneError
 from wearstate.sim.scene import load_scene
@@ -107,6 +107,33 @@ BEFORE_THE_RUN = {
         ),
         r"throws\.1\.joint\.crankpin: radial clearance = 1e-06 m must be >= .* m",
     ),
+    "overlap": (
+        Status.OVERLAP,
+        pump(crank_pin(stiffness="0.5 MN/m", damping=0)),
+        r"joint\.crankpin: penetration under .* N = .* m must be <= 0\.003 m, 0\.1 of the pin's "
+        r"radius, where the contact law ends; raise its stiffness",
+    ),
+    "guide overlaps": (
+        Status.OVERLAP,
+        pump(GUIDE, {"joint.guide.stiffness": "10 kN/m", "joint.guide.damping": 0}),
+        r"joint\.guide: penetration under .* N = .* m must be <= 0\.005 m, 0\.1 of half the height",
+    ),
+    "column torn by knocks": (
+        Status.VAPOUR,
+        pump(HEADS, crank_pin(diametral_clearance="0.4 mm")),
+        r"pressure: the knocks pull the liquid down to -.* Pa at its lowest, must be >= .* Pa "
+        r"gauge; set pressure\.rung = 'chamber', or pressure\.flow = 'two-harmonic', .*, shorten",
+    ),
+    "column of one throw torn by knocks": (
+        Status.VAPOUR,
+        pump(
+            HEADS,
+            {"throws": [{}, {"phase": 2.0}]},
+            crank_pin(rung="ideal"),
+            {"throws.1.joint": {"crankpin": {"rung": "compliant"}}},
+        ),
+        r"pressure: the knocks pull the liquid down to",
+    ),
     "column torn": (
         Status.VAPOUR,
         pump(HEADS, {"pressure.suction_line": {"length": "15 m"}}),
@@ -116,11 +143,6 @@ BEFORE_THE_RUN = {
 }
 
 IN_THE_RUN = {
-    "overlap": (
-        Status.OVERLAP,
-        pump(crank_pin(stiffness="0.5 MN/m", damping=0)),
-        "stiffness",
-    ),
     "locked": (
         Status.LOCKED,
         pump(crank_pin(rung="link"), {"rod.length": "50.1 mm", "rod.centre_of_mass": "30 mm"}),
@@ -184,6 +206,42 @@ def test_a_sweep_gets_the_status_and_zeros(status, scene, text, truth):
     assert solution.truth == {}
 
 
+@pytest.mark.parametrize(
+    ("change", "lowest"),
+    [
+        ({"pressure.rung": "constant"}, 3e5),
+        ({}, -3e4),
+        ({**HEADS, "pressure.flow": "two-harmonic"}, None),
+        (CHAMBER, None),
+        ({**CHAMBER, "pressure.suction": "-0.095 MPa"}, -101325 + 2339),  # the vapour's own
+    ],
+)
+@pytest.mark.parametrize("throws", [1, 2])
+def test_no_pressure_is_recorded_below_that_of_the_vapour(change, lowest, throws):
+    worn = crank_pin(diametral_clearance="0.4 mm")
+    scene = pump(change, worn, {"throws": [{"phase": 3.0 * k} for k in range(throws)]})
+    solution = simulate(scene, seed=0, truth=True)
+    found = solution.numerics["lowest_pressure_pa"]
+    assert found >= -101325 + 2330  # vapour of water at 20 degrees
+    if lowest is not None:
+        assert found == pytest.approx(lowest, abs=20)  # the chamber's is extrapolated over a step
+    area = np.pi / 4 * scene.piston.diameter**2
+    for throw in range(throws):
+        force = solution.truth["piston_pressure_force_n" + f"_{throw + 1}" * (throw > 0)]
+        # what is recorded is low-passed and rings about a step by a tenth
+        assert force.min() / area >= found - 0.1 * np.ptp(force) / area
+
+
+def test_without_a_pressure_none_is_told():
+    assert "lowest_pressure_pa" not in simulate(pump({"pressure.rung": "none"}), seed=0).numerics
+
+
+@pytest.mark.parametrize("stiffness", ["5 MN/m", "0.5 MN/m", "50 kN/m", "1 N/m"])
+def test_the_softer_the_contact_the_surer_it_is_refused(stiffness):
+    with pytest.raises(SceneError, match=r"joint\.crankpin: "):
+        check(pump(crank_pin(stiffness=stiffness, damping=0)))
+
+
 def test_every_status_has_a_cure():
     for status in Status:
         assert status.text
@@ -206,7 +264,8 @@ GOOD = {
     "wrist pin": pump(WRIST),
     "guide": pump(GUIDE),
     "all joints": pump(WRIST, GUIDE),
-    "heads": pump(HEADS),
+    "heads": pump(HEADS, crank_pin(rung="ideal")),
+    "heads, whose flow feels no knocks": pump(HEADS, {"pressure.flow": "two-harmonic"}),
     "chamber": pump(CHAMBER),
     "motor": pump(MOTOR),
     "triplex": pump({"throws": [{"phase": f"{angle} deg"} for angle in (0, 120, 240)]}),
@@ -215,11 +274,16 @@ GOOD = {
 }
 
 
+FEW_TURNS = "duration = "  # these runs are: they are told that they hold few revolutions
+
+
 @pytest.mark.parametrize("scene", GOOD.values(), ids=list(GOOD))
 def test_a_good_scene_raises_no_alarm(scene):
     solution = simulate(scene, seed=0)
     assert solution.status is Status.OK
-    assert solution.warnings == ()
+    told = [text for text in solution.warnings if not text.startswith(FEW_TURNS)]
+    # joints without a knock leave a quiet casing, which is no fault of the scene's limits
+    assert [text for text in told if "its own noise" not in text] == []
     assert solution.signal[0].any()
     assert np.all(np.isfinite(solution.signal))
 
@@ -247,6 +311,7 @@ WARNED = {
 def test_what_a_user_must_know_is_a_warning(scene, text, share):
     solution = simulate(scene, seed=0)
     assert solution.status is Status.OK
-    assert len(solution.warnings) == 1
-    assert re.search(text, solution.warnings[0])
+    warning, *others = solution.warnings
+    assert re.search(text, warning)
+    assert all(other.startswith(FEW_TURNS) for other in others)
     assert 0 < solution.numerics[share] <= 1

@@ -1,17 +1,28 @@
 """`wearstate recipe`: what there is, whether it is sound, and what it would make."""
 
 import json
+import re
 
 import pytest
 from click.testing import CliRunner
 from numpy.testing import assert_allclose
 from wearstate.datasets.generate import generate
-from wearstate.datasets.recipe import load_recipe, sample_records
+from wearstate.datasets.recipe import (
+    load_recipe,
+    overrides_text,
+    recorded_recipe,
+    recorded_scene,
+    sample_records,
+    wear_limits,
+)
 from wearstate.datasets.recipe_file import recipe_names, recipe_text
 from wearstate.diagnose.cli import cli
 from wearstate.diagnose.recipe_text import MOST_DRAWN, preview, preview_text
 from wearstate.sim.assemble import check
 from wearstate.sim.ladder import cost_of
+from wearstate.sim.scene import scene_text
+
+CLEARANCE = "diametral_clearance_crankpin_m"
 
 
 def run(*arguments, code=0):
@@ -60,6 +71,92 @@ def test_check_tells_every_fault_at_once(tmp_path):
     assert "3 fault(s)" in error
     for fault in ("must rise and not overlap", "did you mean 'mass'", "oil.visc is not drawn"):
         assert fault in error
+
+
+def scene_beside(folder, name, *changes):
+    """The bilge pump with some of its text replaced."""
+    text = scene_text("bilge-pump")
+    for old, new in changes:
+        assert text.count(old) == 1
+        text = text.replace(old, new)
+    (folder / name).write_text(text)
+
+
+NARROWER = (
+    ('condemning_diametral = "0.31 mm"', 'condemning_diametral = "0.25 mm"'),
+    ('"0.31 mm"]', '"0.25 mm"]'),
+)
+
+
+def test_limits_follow_the_scene_of_a_recipe_that_extends_another(tmp_path):
+    scene_beside(tmp_path, "narrow.toml", *NARROWER)
+    file = tmp_path / "mine.toml"
+    text = 'name = "mine"\nextends = "bilge-pump-standard"\nscene = "narrow.toml"\n'
+    file.write_text(text)
+    found = load_recipe(file)
+    assert_allclose(found.severity.bands, [[5e-5, 1.5 * 2.5e-4]])
+    [beyond] = [r.bounds[CLEARANCE] for r in found.held_out if r.name == "beyond_limit"]
+    assert_allclose(beyond[0], 2.5e-4)
+    assert found.severities[0].edges[-1] == 2.5e-4
+    again = recorded_recipe(found.scene_text, found.text, overrides_text(found))
+    assert again.severity.bands == found.severity.bands
+
+
+def test_lengths_of_another_scene_are_faults_of_check(tmp_path):
+    scene_beside(tmp_path, "narrow.toml", *NARROWER)
+    (tmp_path / "first.toml").write_text(
+        'name = "first"\nextends = "bilge-pump-standard"\n[[severity]]\n'
+        'path = "joint.crankpin.diametral_clearance"\nlow = "as new"\nhigh = "0.4 mm"\n'
+        f'[[held_out]]\nname = "beyond_limit"\nbounds.{CLEARANCE} = {{ low = "0.31 mm" }}\n'
+    )
+    file = tmp_path / "mine.toml"
+    text = 'name = "mine"\nextends = "first.toml"\nscene = "narrow.toml"\n'
+    file.write_text(text)
+    said = run("check", file, code=2).stderr
+    assert "2 fault(s)" in said
+    assert "high = '0.4 mm' is of the scene bilge-pump, must be of narrow.toml" in said
+    assert f"held_out beyond_limit: {CLEARANCE}, low = '0.31 mm' is of" in said
+    file.write_text(
+        text + 'without = ["beyond_limit"]\n[[severity]]\n'
+        'path = "joint.crankpin.diametral_clearance"\nlow = "as new"\nhigh = "0.3 mm"\n'
+    )
+    assert run("check", file).stdout == "mine: no fault\n"
+
+
+def test_a_scene_without_limits_is_told_before_anything_is_made(tmp_path):
+    text = scene_text("bilge-pump")
+    begin = text.index("[wear]")
+    end = text.index("[wear_wristpin]")
+    (tmp_path / "bare.toml").write_text(text[:begin] + text[end:])
+    file = tmp_path / "mine.toml"
+    own = 'name = "mine"\nextends = "bilge-pump-small"\nscene = "bare.toml"\n'
+    file.write_text(own)
+    said = run("check", file, code=2).stderr
+    assert "low = 'as new' of " + CLEARANCE + " needs wear limits" in said
+    file.write_text(
+        own + 'without = ["beyond_limit"]\n[[severity]]\n'
+        'path = "joint.crankpin.diametral_clearance"\nlow = "0.05 mm"\nhigh = "0.3 mm"\n'
+    )
+    wanted = f"the scene bare.toml has no wear limits of {CLEARANCE}, must have"
+    assert wanted in run("check", file, code=2).stderr
+    assert f"  no grades: severity.0: {wanted}" in run("preview", file, "-n", 31).stdout
+    assert wanted in table_of(file, "-n", 31)["ungraded"][0]
+
+
+def test_limits_that_a_recipe_changes_do_not_cite_the_source_of_others(tmp_path):
+    """What the data card prints as the source of the limits."""
+    file = tmp_path / "mine.toml"
+    file.write_text(
+        'name = "mine"\nextends = "bilge-pump-small"\n[fixed]\n'
+        '"wear.condemning_diametral" = "0.35 mm"\n"wear.grade_edges_diametral.2" = "0.35 mm"\n'
+    )
+    found = load_recipe(file)
+    limits = wear_limits(found.scene, CLEARANCE)
+    assert limits.condemning == found.severities[0].edges[-1] == 3.5e-4
+    assert limits.source == "given by the recipe in place of those of the scene"
+    assert recorded_scene(found.scene_text, found.text, overrides_text(found)) == found.scene
+    kept = wear_limits(load_recipe("bilge-pump-small").scene, CLEARANCE)
+    assert "given by" not in kept.source
 
 
 def test_check_looks_at_drawn_scenes(tmp_path):
@@ -164,3 +261,44 @@ def test_a_picture_of_the_draws(tmp_path):
 )
 def test_bad_input_is_exit_two(arguments, message):
     assert message in run(*arguments, code=2).stderr
+
+
+def test_a_recipe_may_extend_one_whose_lists_its_own_scene_leaves_out(tmp_path):
+    """A propulsion shaft without proximity probes draws what is left of the shipped recipe."""
+    tables = re.split(r"(?m)(?=^\[)", scene_text("propulsion-shaft"))
+    kept = [table for table in tables if not table.startswith(("[[probes]]", "[[run_out]]"))]
+    (tmp_path / "plain.toml").write_text("".join(kept))
+    recipe = tmp_path / "mine.toml"
+    recipe.write_text(
+        'name = "mine"\nextends = "propulsion-shaft-small"\nscene = "plain.toml"\nrecords = 2\n'
+        'without = ["ballast"]\n' + _OWN
+    )
+    assert run("check", recipe).stdout == "mine: no fault\n"
+    sample = next(sample_records(load_recipe(recipe)))
+    assert sample.scene.probes == ()
+    assert not any("probe" in path or "run_out" in path for path in sample.drawn)
+    recipe.write_text(recipe.read_text() + _LOST)
+    assert "'*' stands where the scene has no list" in run("check", recipe, code=2).stderr
+
+
+_OWN = """
+[[severity]]
+path = "bearings.0.wear_down"
+low = "0.03 mm"
+high = "1.35 mm"
+[[severity]]
+path = "bearings.2.sag"
+low = "0.05 mm"
+high = "1.8 mm"
+[[severity]]
+path = "coupling.parallel_offset"
+low = "0.05 mm"
+high = "2.25 mm"
+"""
+_LOST = """
+[[machine]]
+path = "prods.*.gain"
+distribution = "factor"
+low = 0.9
+high = 1.1
+"""

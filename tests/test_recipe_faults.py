@@ -136,7 +136,11 @@ def test_a_further_severity_with_limits_is_graded_by_them(tmp_path, second, monk
     wear = {"as_new": "130 mm", "condemning": "180 mm"}
     fixed = "".join(f'"wear.{name}_diametral" = "{value}"\n' for name, value in wear.items())
     edges = [f'"wear.grade_edges_diametral.{i}" = "{140 + 20 * i} mm"\n' for i in range(3)]
-    recipe = load_recipe(written(tmp_path, f"[fixed]\n{fixed}{''.join(edges)}{WORN}"))
+    # the pin keeps its range, which would follow the limits
+    pin = f'[[severity]]\npath = "{CRANKPIN}"\nlow = "0.05 mm"\nhigh = "0.465 mm"\n'
+    pin += '[[held_out]]\nname = "beyond_limit"\n'
+    pin += 'bounds.diametral_clearance_crankpin_m = { low = "0.31 mm" }\n'
+    recipe = load_recipe(written(tmp_path, f"[fixed]\n{fixed}{''.join(edges)}{pin}{WORN}"))
     rows, _, _ = drawn(recipe, 64)
     assert recipe.columns["grade_second_severity"] == "i1"
     expected = np.searchsorted([0.14, 0.16, 0.18], rows["second_severity_m"], side="right")

@@ -14,7 +14,8 @@ import h5py
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
-from wearstate.datasets import record
+from wearstate.datasets import hdf5_values, record
+from wearstate.datasets.hdf5_values import is_plain
 from wearstate.datasets.record import Attributes, DataError, DataSet, DataSetWriter, Recording
 from wearstate.sim.sensor import Channel
 
@@ -196,13 +197,78 @@ def stamp(path, name, value):
             json.dumps([{"name": "acc", "unit": "g", "quantity": "x"}]),
             "tacho = 'tacho'",
         ),
-        ("sample_rate_hz", -1.0, r"sample_rate = -1.0 Hz must be > 0"),
+        ("sample_rate_hz", -1.0, r"sample_rate = -1.0 Hz must be >= 0.001"),
         ("severities", '["size_m"]', r"manifest lacks size_m"),
     ],
 )
 def test_foreign_attributes_are_refused(path, name, value, message):
     stamp(write_all(path), name, value)
     with pytest.raises(DataError, match=message):
+        DataSet(path)
+
+
+def attributes_of(path):
+    """Type of every attribute of a file and what is in it."""
+    kinds = {}
+    with h5py.File(path) as file:
+        for name, node in {"/": file, **dict(file["splits"].items())}.items():
+            kinds |= {(name, key): node.attrs.get_id(key).get_type() for key in node.attrs}
+    return kinds
+
+
+def test_nothing_of_a_file_lies_in_a_heap_and_no_text_is_padded(path):
+    with begin(path, splits=("mine", "later")) as writer:
+        for i in range(N_RECORDS):
+            writer.write(i, signal_of(i), row_of(i))
+        writer.write_split("mine", np.zeros(N_RECORDS, np.int8), '{"kind": "µ"}')
+        writer.finish()
+    kinds = attributes_of(path)
+    assert len(kinds) > 15
+    assert all(is_plain(kind) for kind in kinds.values())
+    assert b"GCOL" not in path.read_bytes()
+    with h5py.File(path) as file:
+        assert file["splits/mine"].attrs["about"].decode() == '{"kind": "µ"}'
+    with DataSet(path) as data:
+        assert data.splits == {"mine": {"kind": "µ"}}
+        assert data.attributes == HEAD
+
+
+def loosened(path):
+    """The same file with texts of variable length, as other programs write them."""
+    with h5py.File(path, "r+") as file:
+        for name, value in dict(file.attrs).items():
+            if isinstance(value, bytes):
+                file.attrs[name] = value.decode()
+    return path
+
+
+def test_texts_of_variable_length_are_read_by_another_process(path, monkeypatch):
+    loosened(write_all(path))
+    with DataSet(path) as data:
+        assert data.attributes == HEAD
+    raw = bytearray(path.read_bytes())
+    place = raw.index(b"GCOL") + 24  # size of the first text: the library's walk stands still
+    raw[place : place + 8] = b"\xff" * 8
+    path.write_bytes(raw)
+    monkeypatch.setattr(hdf5_values, "_LONGEST_READING", 2.0)
+    with pytest.raises(DataError, match=r"attributes cannot be read \(the texts of .*intact copy"):
+        DataSet(path)
+
+
+@pytest.mark.parametrize("name", ["signal", "manifest", "splits/x", "truth/x"])
+def test_values_in_a_heap_are_refused(path, name):
+    write_all(path)
+    with h5py.File(path, "r+") as file:
+        if name in file:
+            del file[name]
+        file.create_dataset(name, data=["a"] * N_RECORDS, dtype=h5py.string_dtype())
+    with pytest.raises(DataError, match=rf"/{name} must hold numbers and texts"):
+        DataSet(path)
+
+
+def test_attributes_that_are_no_number_and_no_text_are_refused(path):
+    stamp(write_all(path), "channels", np.zeros(3))
+    with pytest.raises(DataError, match="'channels' must be one number or one text"):
         DataSet(path)
 
 
@@ -385,7 +451,7 @@ def test_a_value_beyond_float32_is_no_silent_infinity():
     [
         ({"signal": np.zeros(4)}, r"shape \(4,\), must be \(2 channels, >= 1 samples\)"),
         ({"signal": np.zeros((2, 0))}, r"shape \(2, 0\)"),
-        ({"sample_rate": 0.0}, r"sample_rate = 0.0 Hz must be > 0"),
+        ({"sample_rate": 0.0}, r"sample_rate = 0.0 Hz must be >= 0.001"),
         ({"tacho": "key"}, r"tacho = 'key' must be one of"),
         ({"channels": CHANNELS[:1] * 2}, r"\['acc', 'acc'\] must be unique"),
         ({"pulses_per_revolution": 0}, r"pulses_per_revolution = 0 must be >= 1"),

@@ -36,6 +36,7 @@ SPEED = 8.0  # Hz
 N = 10240
 LIMIT = 3e-4
 EDGES = (1e-4, 2e-4, LIMIT)
+RECIPE = 'name = "knocking"'
 COLUMN = "diametral_clearance_crankpin_m"
 CHANNELS = (
     Channel(name="acc", unit="m/s^2", quantity="acceleration", place="housing"),
@@ -65,24 +66,38 @@ def recording_of(clearance, seed=1, **changes):
     return dataclasses.replace(whole, **changes)
 
 
-def written(path, clearances, *, groups=None, hours=None, seed=0, origin="simulated"):
+def written(
+    path,
+    clearances,
+    *,
+    groups=None,
+    hours=None,
+    seed=0,
+    origin="simulated",
+    recipe=RECIPE,
+    names=(),
+    column=COLUMN,
+):
     head = Attributes(
         sample_rate=FS,
         channels=CHANNELS,
         origin=origin,
         tacho="tacho",
-        severities=(COLUMN,),
+        severities=(column,),
         grade_edges=EDGES,
         condemning_limit=LIMIT,
         limit_source="a manual",
+        recipe=recipe,
     )
     n = len(clearances)
-    columns = {COLUMN: "<f8", **({"operating_hours": "<f8"} if hours is not None else {})}
+    columns = {column: "<f8", **({"operating_hours": "<f8"} if hours is not None else {})}
+    columns |= {"group_name": "S16"} if names else {}
     with DataSetWriter(path, head, n_records=n, n_samples=N, columns=columns) as writer:
         for i, clearance in enumerate(clearances):
             row = {"record_id": str(i), "group": 0 if groups is None else int(groups[i])}
             row |= {"status": "ok", "grade": int(np.searchsorted(EDGES, clearance, "right"))}
-            row |= {COLUMN: clearance} | ({} if hours is None else {"operating_hours": hours[i]})
+            row |= {"group_name": names[i]} if names else {}
+            row |= {column: clearance} | ({} if hours is None else {"operating_hours": hours[i]})
             writer.write(i, knocking(clearance, [seed, i]), row)
         writer.finish()
     return path
@@ -356,7 +371,13 @@ def test_a_referenced_model_needs_the_machine_itself(referenced, tmp_path):
     model_file, healthy = referenced
     worn = written(tmp_path / "worn.h5", [2.5e-4], groups=[7], seed=3)
     args = ("report", worn, "--model", model_file, "--record", 0)
-    assert "give --baseline healthy.h5" in " ".join(run(*args, code=2).stdout.split())
+    said = " ".join(run(*args, code=2).stdout.split())
+    assert "give --baseline healthy.h5" in said
+    assert "Verdict Healthy reference missing: no grade is given" in said
+    assert "Unusable" not in said
+    assert "need not be made again" in said
+    whole = run("report", healthy, "--model", model_file, code=2).stdout.splitlines()[0]
+    assert whole == ("healthy.h5: no grade is given, 120 recordings: 120 without healthy reference")
     page = tmp_path / "r.html"
     told = json.loads(run(*args, "--baseline", healthy, "-o", page, "--json").stdout)
     assert told["estimate"]["mode"] == "referenced"
@@ -367,7 +388,7 @@ def test_a_referenced_model_needs_the_machine_itself(referenced, tmp_path):
     assert "farthest from the machine&#39;s healthy recordings" in shown(page.read_text())
     stranger = written(tmp_path / "other.h5", [2.5e-4], groups=[60], seed=3)
     said = run("report", stranger, *args[2:], "--baseline", healthy, code=2).stderr
-    assert "has healthy recordings of 60 machines, must have some of this one (group 60)" in said
+    assert 'must have some of machine 60 of recipe "knocking", seed 0, which other.h5[0]' in said
     said = run(*args, "--baseline", page, code=2).stderr
     assert "must be a data set (.h5); make one of the healthy recordings" in said
     said = run(*args, "--baseline", worn, code=2).stderr
@@ -382,24 +403,80 @@ def test_each_machine_of_a_batch_has_its_own_baseline(referenced, tmp_path):
     with recordings_in(data) as items:
         batch = judge_all(data, items, model, baselines=baselines)
         page = batch_html(batch, model, baselines=baselines)
-        alone = model.estimate(items[1].load(), baselines.of({"group": 5}))
+        alone = model.estimate(items[1].load(), baselines.of(items[1].load()))
+        own, other = (baselines.of(item.load()) for item in items[:2])
     rows = {row.machine: row for row in batch.rows}
     assert rows["5"].severity == alone.severity
-    assert not np.array_equal(
-        baselines.of({"group": 3}).features, baselines.of({"group": 5}).features
-    )
+    assert not np.array_equal(own.features, other.features)
     assert rows["60"].verdict == "unusable"
-    assert "must have some of this one (group 60)" in rows["60"].note
+    assert "must have some of machine 60" in rows["60"].note
     assert "some.h5[1]" in shown(page)
 
 
 def test_measured_files_without_a_common_name_are_of_one_machine(referenced, tmp_path):
     """Imported healthy files are a group each, unless named; the caller says they are of one."""
     model = load_model(referenced[0])
-    healthy = written(tmp_path / "h.h5", [4e-5] * 3, groups=range(3), seed=5, origin="measured")
-    assert Baselines(healthy, model.card).of({}).recordings == 3
+    own = {"origin": "measured", "recipe": ""}
+    healthy = written(tmp_path / "h.h5", [4e-5] * 3, groups=range(3), seed=5, **own)
+    assert Baselines(healthy, model.card).of(recording_of(1e-4)).recordings == 3
     one = written(tmp_path / "one.h5", [4e-5] * 3, groups=[8] * 3, seed=5)
-    assert Baselines(one, model.card).of({}).recordings == 3
+    assert Baselines(one, model.card).of(recording_of(1e-4)).recordings == 3
+
+
+def test_machines_are_paired_by_identity_and_never_by_number(referenced, tmp_path):
+    """A healthy set with the same numbers, but of other machines or of none that it names."""
+    model_file, _ = referenced
+    twelve = {"clearances": [4e-5] * 12, "groups": range(12), "seed": 2}
+    made = {"recipe": 'name = "own"'}
+    data = written(tmp_path / "data.h5", **twelve | {"clearances": [2e-4] * 12}, **made)
+    nameless = written(tmp_path / "nameless.h5", **twelve, origin="measured", recipe="")
+    named = written(
+        tmp_path / "named.h5", **twelve, origin="measured", recipe="", names=["north"] * 12
+    )
+    drawn = written(tmp_path / "drawn.h5", **twelve, recipe='name = "other"')
+    worn = written(tmp_path / "worn.h5", **twelve | {"clearances": [2e-4] * 12}, **made)
+    told = {
+        nameless: "12 of 12 records do not tell their machine",
+        named: "it has machine north; ",
+        drawn: 'machine 0 of recipe "other", seed 0',
+        worn: "12 of 12 recordings have a grade above 0",
+    }
+    for other, text in told.items():
+        for command in (
+            ("train", data, "-o", tmp_path / "m.wsm"),
+            ("evaluate", model_file, data, "--quick"),
+            ("report", data, "--record", 3, "--model", model_file),
+        ):
+            said = run(*command, "--baseline", other, code=2).stderr
+            assert other.name in said, said
+            assert "data.h5" in said or other == worn, said
+            assert text in said or command[0] == "report", said
+    assert not (tmp_path / "m.wsm").exists()
+    said = run("report", data, "--record", 3, "--model", model_file, "--baseline", named, code=2)
+    assert "has healthy recordings of machine north, must have some of machine 3" in said.stderr
+
+
+def test_a_model_names_its_own_severity_to_a_set_that_has_another(model_file, tmp_path):
+    data = written(tmp_path / "x.h5", [2e-4], column="slack_pin_m", recipe="")
+    said = run("evaluate", model_file, data, "--quick", code=2).stderr
+    assert f"severities = slack_pin_m, must hold that of the model, {COLUMN};" in said
+
+
+def test_measured_machines_go_by_the_names_that_they_were_imported_with(referenced, tmp_path):
+    """The numbers of the two sets differ: only the names can pair them."""
+    model = load_model(referenced[0])
+    own = {"origin": "measured", "recipe": ""}
+    healthy = written(
+        tmp_path / "h.h5", [4e-5] * 3, groups=[0, 0, 1], names=["m0", "m0", "m1"], **own
+    )
+    worn = written(tmp_path / "w.h5", [2e-4] * 2, groups=[0, 1], names=["m1", "m0"], **own)
+    baselines = Baselines(healthy, model.card)
+    with DataSet(worn) as data:
+        assert [baselines.of(item).recordings for item in data] == [1, 2]
+    with pytest.raises(DataError, match=r"2 machines \(machine m0, machine m1\).*of one"):
+        baselines.of(recording_of(1e-4))
+    lines = run("report", worn, "--model", referenced[0], "--baseline", healthy, "--json").stdout
+    assert [json.loads(line)["machine"] for line in lines.splitlines()] == ["m1", "m0"]
 
 
 def test_faults_of_a_baseline_are_told_once(referenced, tmp_path):
@@ -427,7 +504,7 @@ def test_a_cold_model_tells_the_evidence_against_a_baseline(model, model_file, t
     given = json.loads(run(*args, "--baseline", healthy).stdout)
     for key in ("verdict", "grade", "severity", "low", "high", "cautions"):
         assert given["estimate"][key] == without["estimate"][key]
-    own = Baselines(healthy, model.card).of({}).features
+    own = Baselines(healthy, model.card).of(recording_of(1e-4)).features
     for item in given["evidence"]:
         assert item["healthy"] == own[model.names.index(item["feature"])]
     assert "the estimate does not use it" in given["baseline_note"]

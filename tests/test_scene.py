@@ -5,6 +5,7 @@ import json
 import math
 import pickle
 import re
+import time
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from pydantic import ValidationError
 from wearstate.sim.analytic import kelvin_voigt_restitution
 from wearstate.sim.assemble import simulate
 from wearstate.sim.crank_setup import contact_frequency, ideal_motion
-from wearstate.sim.parts import UNITS, FixedTable, SceneError, to_si
+from wearstate.sim.parts import MOST_FAULTS, UNITS, FixedTable, SceneError, to_si
 from wearstate.sim.scene import (
     SCENE_FOLDER,
     load_scene,
@@ -507,3 +508,28 @@ def test_faults_between_parts_are_told_beside_faults_of_a_value():
     assert "drive.speed = 0 rev/s must be > 0" in text
     assert "rod.length = 0.05 m must be > crank radius" in text
     assert "did you mean 'guide_y'" in text
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("a = " + "9" * 100_000, "a whole number must have <= 64 bit"),
+        ("a = 0x" + "f" * 100_000, "a: a whole number must have <= 64 bit"),
+        ("a" + ".a" * 20_000 + " = 1", "nested too deep"),
+        ("a = " + "{a = " * 40 + "1" + "}" * 40, "nested too deep"),
+        ("".join(f"k{i} = 1\n" for i in range(90_000)), "characters must be <= 262144"),
+    ],
+)
+def test_monstrous_toml_is_refused_at_once(text, says):
+    begin = time.perf_counter()
+    with pytest.raises(SceneError, match=says):
+        scene_table(text)
+    assert time.perf_counter() - begin < 10.0  # each took minutes or a traceback
+
+
+def test_of_very_many_faults_the_first_are_told():
+    table = scene_table(scene_text("bilge-pump") + "".join(f"\nk{i} = 1" for i in range(5000)))
+    with pytest.raises(SceneError) as error:
+        scene_from_table(table)
+    assert len(error.value.faults) == MOST_FAULTS + 1
+    assert error.value.faults[-1] == f"and {5000 - MOST_FAULTS} more; mend these first"

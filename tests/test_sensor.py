@@ -309,12 +309,12 @@ def test_a_recording_passes_mounting_and_filter():
 def interpolated_edges(pulses, level):
     """Rising edges in samples, from the one or two samples that a box-filtered edge touches.
 
-    A sample holds the mean over the interval that ends at it: an edge inside the interval before
-    sample k leaves it at the fraction of the interval that lies behind the edge.
+    A sample holds the mean over the interval round it: an edge inside that of sample k leaves it at
+    the fraction of the interval that lies behind the edge.
     """
     share = pulses / level
     rising = np.flatnonzero((share[:-2] == 0) & (share[2:] == 1)) + 1
-    return rising - share[rising]
+    return rising + 0.5 - share[rising]
 
 
 @pytest.mark.parametrize("speed", [4.25, 5.0, 5.75, 83.3])

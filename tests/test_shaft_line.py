@@ -100,6 +100,11 @@ def line_of(row, scene, order):
             "film.rung = 'map' knows no tilted journal; set film.rung = 'direct'",
         ),
         (
+            {"film.condition": "reynolds"},
+            "film.condition = 'reynolds' must be 'periodic' or 'guembel'; it holds P = 0",
+        ),
+        ({"film.n_z": 3}, "film.n_z = 3 must be >= 5"),
+        (
             {"bearings.0.wear_down": "40 mm"},
             "bearings.0: diametral_clearance + wear_down = 0.0407 m",
         ),
@@ -524,7 +529,8 @@ def test_the_mesh_is_fine_enough():
 def test_a_lifted_bearing_is_a_warning():
     solution = simulate(ship(bearings__2__sag="1.8 mm", duration="1 s"), seed=1)
     assert solution.status is Status.OK
-    [warning] = solution.warnings
+    warning, short = solution.warnings
+    assert short.startswith("duration = 1 s holds 5 revolutions")
     assert warning.startswith("bearing 'intermediate_aft' carries -5")
     assert solution.numerics["least_reaction_n"] < 0
 

@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy.signal import lfilter
 from wearstate.datasets.record import DataError, Recording
-from wearstate.diagnose.panel import panel_figure, save_picture
+from wearstate.diagnose.panel import panel_figure
+from wearstate.diagnose.picture import save_picture
 from wearstate.diagnose.signal_plots import AUTO, KINDS, make_panel, plot_recording
 from wearstate.diagnose.signal_view import View, thinned
 from wearstate.features.envelope import bearing_frequencies

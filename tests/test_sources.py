@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.io import loadmat, savemat, wavfile
-from wearstate.datasets import source_flat, source_hdf5, source_mat5, source_text, source_time
+from wearstate.datasets import hdf5_values, source_flat, source_mat5, source_text, source_time
 from wearstate.datasets.channel_units import DIMENSIONS, known_units, parse_sensitivity, parse_unit
 from wearstate.datasets.record import Attributes, DataError, DataSetWriter
 from wearstate.datasets.source_part import LARGEST_INFLATED
@@ -221,9 +221,10 @@ def test_wav_integers_mean_nothing_until_declared(tmp_path):
     ("form", "data", "message"),
     [
         (pcm(channels=0), b"ab", "0 channel"),
-        (pcm(rate=0), b"ab", "sample_rate = 0.0 Hz must be > 0"),
+        (pcm(rate=0), b"ab", "sample_rate = 0.0 Hz must be >= 0.001"),
         (pcm(kind=2), b"ab", "coding 2 of 16 bits must be PCM"),
-        (pcm(bits=12), b"ab", "coding 1 of 12 bits"),
+        (pcm(bits=12), b"ab", "1 channel(s) of 12 bits in frames of 1 byte must"),
+        (pcm(bits=72), b"ab", "coding 1 of 72 bits must be PCM (1) of 1 to 64 bits"),
         (pcm(channels=2), b"abc", "3 byte of samples must be a multiple >= 1 of 4"),
         (pcm(), b"", "0 byte of samples"),
         (pcm()[:10], b"ab", "fmt chunk has 10 byte"),
@@ -396,8 +397,8 @@ def test_a_known_layout_declares_rate_unit_and_conditions(tmp_path):
 @pytest.mark.parametrize(
     ("fields", "message"),
     [
-        ({"sr": -5.0}, "sample_rate = -5.0 Hz must be > 0"),
-        ({"sr": np.nan}, "sample_rate = nan Hz must be > 0"),
+        ({"sr": -5.0}, "sample_rate = -5.0 Hz must be >= 0.001"),
+        ({"sr": np.nan}, "sample_rate = nan Hz must be >= 0.001"),
         ({"sr": "fast"}, "sr = 'fast' must be one number"),
         ({"sr": np.ones(2)}, "sr = (1, 2) must be one number"),
         ({"gs": "text"}, "gs is text (1, 4), must be real numbers"),
@@ -518,7 +519,7 @@ def test_hdf5_texts_whose_heap_is_damaged_do_not_hang(tmp_path, monkeypatch):
     place = raw.index(b"GCOL") + 24  # size of the first text: the library's walk stands still
     raw[place : place + 8] = b"\xff" * 8
     path.write_bytes(raw)
-    monkeypatch.setattr(source_hdf5, "_LONGEST_READING", 2.0)
+    monkeypatch.setattr(hdf5_values, "_LONGEST_READING", 2.0)
     assert "the texts of acc.sample_rate, acc.units cannot be read" in refusal(path)
 
 
@@ -722,7 +723,8 @@ def test_times_are_even_or_refused_with_the_jitter(tmp_path):
     off[77] += 0.1 * 0.000625
     message = refusal(timed(path, [f"{t:.7f}" for t in off]))
     assert (
-        "off an even grid by up to 6.25e-05, 10 % of the mean step 0.000625, at index 77" in message
+        "off an even grid by up to 6.25e-05, 10 % of the mean step 0.000625, at 0.0481875 (line 79)"
+        in message
     )
     assert "off an even grid" in refusal(timed(path, [f"{t:.7f}" for t in np.delete(even, 50)]))
     message = refusal(timed(path, [f"{t:.3f}" for t in even]))
@@ -1148,7 +1150,7 @@ def test_options_and_paths_at_fault(tmp_path):
             fs=-1.0, n_channels=0, offset=-3, header=-1, record=-2, order="x", decimal="x"
         )
     assert len(str(caught.value).splitlines()) == 7
-    with pytest.raises(DataError, match="fs = inf Hz must be > 0 and finite"):
+    with pytest.raises(DataError, match=r"fs = inf Hz must be >= 0\.001"):
         SourceOptions(fs=float("inf"))
     with opened(path, fs=10.0, unit="g") as source:
         for start, stop in ((-1, 5), (5, 5), (0, 51), (7, 3)):

@@ -113,7 +113,7 @@ def test_unclear_gaps_and_long_ones_are_refused():
 def test_a_bouncing_tacho_is_refused():
     even = np.arange(40) / 10
     bouncing = np.sort(np.concatenate((even, even[::3] + 0.01)))
-    with pytest.raises(ValueError, match=r"wrong pulses = .* must be <= 4; set the tacho level"):
+    with pytest.raises(ValueError, match=r"wrong pulses = .* must be <= 4; check the tacho"):
         tacho.mend_pulses(bouncing)
 
 

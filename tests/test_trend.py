@@ -263,3 +263,32 @@ def test_faults_of_a_table_come_at_once(tmp_path):
 )
 def test_spans_in_words(hours, words):
     assert span_words(hours) == words
+
+
+def test_the_picture_has_dates_where_dates_were_given():
+    from datetime import UTC, datetime
+
+    from matplotlib.figure import Figure
+    from wearstate.diagnose.report_figures import _draw_trend
+
+    start = datetime(2024, 3, 14, tzinfo=UTC).timestamp() / 3600
+    hours = start + 24 * 9.0 * np.arange(10)
+    wear = 1e-4 + 7e-8 * (hours - hours[0])
+    limits = {"condemning_limit_m": 3.1e-4, "quantity": "clearance"}
+    labels = {}
+    for clock, times in (("calendar", hours), ("operating", hours - start)):
+        found = fit_trend(times, wear, 0.9 * wear, 1.1 * wear, limit=3.1e-4, clock=clock)
+        figure = Figure()
+        axes = figure.add_subplot()
+        _draw_trend(axes, found, limits)
+        figure.draw_without_rendering()
+        ticks = [tick.get_text() for tick in axes.get_xticklabels()]
+        labels[clock] = [axes.get_xlabel(), *ticks]
+        assert figure.axes[0].get_xlim()[1] > axes.get_lines()[0].get_xdata(orig=False).max()
+        legend = [text.get_text() for text in axes.get_legend().get_texts()]
+        assert "estimate, 90 % interval" in legend
+        assert "90 % band of the line" in legend
+        assert "condemning limit 0.31 mm" in legend
+    assert labels["calendar"][0] == "date (UTC)"
+    assert {"Apr", "May", "Jun"} <= set(labels["calendar"])
+    assert labels["operating"][0] == "operating hours [h]"

@@ -26,6 +26,7 @@ def test_no_table_is_empty():
         "pump.csv": 45,
         "film.csv": 143,
         "bearing.csv": 103,
+        "finite_bearing.csv": 229,
         "cavitation.csv": 19,
         "shaft_line.csv": 57,
         "alignment.csv": 57,
@@ -46,6 +47,10 @@ def test_no_tolerance_exceeds_what_the_source_can_tell():
         if check.name.startswith("Raimondi-Boyd"):  # differences on a mesh of 1958
             scale = 1.0 if check.kind == "relative" else abs(check.expected)
             assert check.tolerance <= 0.03 * scale, check.name
+            continue
+        if check.name.startswith("two grooves near"):  # the source's own meshes lie 2 % apart
+            scale = 1.0 if check.kind == "relative" else check.expected
+            assert check.tolerance <= 0.02 * scale, check.name
             continue
         if check.kind == "relative":  # closed forms against a discretised model
             assert check.tolerance <= 5e-3, check.name

@@ -1,0 +1,64 @@
+"""Text in the cells of CSV files: a spreadsheet must not take it for a formula."""
+
+import re
+from typing import Any
+
+_FORMULA = re.compile(r"[=+\-@\t\r\n]")
+_ESCAPED = re.compile(r"'[=+\-@\t\r\n]")
+
+
+def safe_cell(value: Any) -> Any:
+    """A cell as it may be written: text that begins like a formula gets an apostrophe before it.
+
+    Numbers stay as they are, also where they are texts.
+
+    Parameters
+    ----------
+    value : object
+        Anything that a cell can hold.
+
+    Examples
+    --------
+    >>> [safe_cell(value) for value in ("=1+2", "-0.5", -0.5, "a", "@x")]
+    ["'=1+2", '-0.5', -0.5, 'a', "'@x"]
+    """
+    if not isinstance(value, str) or not _FORMULA.match(value) or _is_number(value):
+        return value
+    return f"'{value}"
+
+
+def plain_cell(text: str) -> str:
+    """Inverse of :func:`safe_cell`, for reading what it wrote.
+
+    Parameters
+    ----------
+    text : str
+        A cell.
+
+    Examples
+    --------
+    >>> plain_cell("'=1+2"), plain_cell("'quoted'")
+    ('=1+2', "'quoted'")
+    """
+    return text[1:] if _ESCAPED.match(text) else text
+
+
+def safe_frame(frame: Any) -> Any:
+    """A table (pandas.DataFrame) whose names and texts may be written as CSV.
+
+    Parameters
+    ----------
+    frame : pandas.DataFrame
+        Left as it is.
+    """
+    texts = [name for name, kind in frame.dtypes.items() if kind.kind in "OUT" or kind == "str"]
+    changed = {name: [safe_cell(value) for value in frame[name]] for name in texts}
+    return frame.assign(**changed).rename(columns=safe_cell)
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return text == text.strip()

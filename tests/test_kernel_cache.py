@@ -1,0 +1,100 @@
+"""A damaged kernel cache mends itself, with one warning; code that is not whole is never run."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+CODE = "from wearstate.sim.jit import sine_cosine\nprint(sine_cosine(0.5)[0])"
+SINE = "0.479425538604203"
+
+
+def start(cache, code=CODE):
+    environment = os.environ | {"WEARSTATE_CACHE": str(cache)}
+    return subprocess.Popen(
+        [sys.executable, "-P", "-c", code],
+        env=environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def run(cache, code=CODE):
+    """Warnings of one process that needs a kernel."""
+    process = start(cache, code)
+    out, err = process.communicate(timeout=300)
+    assert process.returncode == 0, err
+    assert out.strip().startswith(SINE)
+    return err.splitlines()
+
+
+@pytest.fixture(scope="module")
+def filled(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("cache")
+    assert run(folder) == []
+    return folder
+
+
+def files(folder, ending):
+    return sorted(folder.glob(f"kernels-*/*/*{ending}"))
+
+
+def test_the_cache_is_used(filled):
+    before = {path: path.stat().st_mtime_ns for path in filled.rglob("*.nb*")}
+    assert len(before) == 2  # one index, one file of code
+    assert run(filled) == []
+    assert {path: path.stat().st_mtime_ns for path in filled.rglob("*.nb*")} == before
+
+
+def emptied(content):
+    return b""
+
+
+def cut(content):
+    return content[: len(content) // 2]
+
+
+def flipped(content):
+    middle = len(content) // 2
+    return content[:middle] + bytes([content[middle] ^ 1]) + content[middle + 1 :]
+
+
+@pytest.mark.parametrize("damage", [emptied, cut, flipped])
+@pytest.mark.parametrize("ending", [".nbi", ".nbc"])
+def test_damage_is_mended_with_one_warning(filled, ending, damage):
+    [path] = files(filled, ending)
+    whole = path.read_bytes()
+    path.write_bytes(damage(whole))
+    [warning] = run(filled)
+    assert "is damaged: kernels are compiled anew and replaced" in warning
+    assert run(filled) == []
+
+
+def test_processes_at_once_on_a_damaged_cache(filled):
+    for path in (*files(filled, ".nbi"), *files(filled, ".nbc")):
+        path.write_bytes(b"")
+    processes = [start(filled) for _ in range(3)]
+    for process in processes:
+        out, err = process.communicate(timeout=300)
+        assert process.returncode == 0, err
+        assert out.strip().startswith(SINE)
+    assert run(filled) == []
+
+
+def test_a_full_disk_costs_one_warning(tmp_path):
+    code = (
+        "import os\nfrom wearstate.sim import jit\n"
+        "def full(*_, **__):\n    raise OSError(28, 'No space left on device')\n"
+        "jit.write_whole = full\n" + CODE
+    )
+    [warning] = run(tmp_path, code)
+    assert "cannot be kept (No space left on device)" in warning
+
+
+def test_a_place_that_cannot_be_a_folder_costs_one_warning(tmp_path):
+    (tmp_path / "file").touch()
+    [warning] = run(tmp_path / "file")
+    assert "compiled kernels cannot be kept" in warning
+    assert "WEARSTATE_CACHE" in warning

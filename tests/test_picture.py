@@ -1,0 +1,180 @@
+"""Words from data in figures and pages: taken literally, whatever stands in them."""
+
+import warnings
+import xml.etree.ElementTree as ElementTree
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.text import Text
+from wearstate.datasets.record import Channel, Recording
+from wearstate.diagnose.align import align, align_figure, align_html
+from wearstate.diagnose.page import render, short_name, visible
+from wearstate.diagnose.picture import FORMATS, encoded, picture_bytes, save_picture
+from wearstate.diagnose.plots import plot_simulation
+from wearstate.diagnose.report_figures import trend_picture
+from wearstate.diagnose.signal_plots import AUTO, KINDS, plot_recording
+from wearstate.diagnose.signal_view import View
+from wearstate.diagnose.trend import fit_trend
+from wearstate.sim.integrate import Solution, Status
+from wearstate.sim.scene import load_scene
+from wearstate.sim.sensor import Channel as SensorChannel
+
+HOSTILE = {
+    "dollar": "p$_x^{2$",
+    "two dollars": r"$\frac{a}$",
+    "odd dollar": r"price \$ $ {",
+    "markup": "a_b^c{d}\\e%f",
+    "underscore": "_first",
+    "newline": "two\nlines",
+    "long": "accelerometer " * 12,
+    "control": "bell\x07nul\x00",
+    "script": "<script>alert('&')</script>",
+    "direction": "left\u202eright\u200b\u2066",
+    "letters": "加速度 é ω",
+    "surrogate": "name\udcff",
+}
+"""Names that a file may hold."""
+
+
+def drawn(figure):
+    """An SVG of a figure, checked to be whole XML and to say nothing on the way."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        picture = picture_bytes(figure, ".svg")
+        picture_bytes(figure, ".png")
+    ElementTree.fromstring(picture)
+    return picture
+
+
+def words(artist):
+    return [] if artist is None else [text.get_text() for text in artist.findobj(Text)]
+
+
+def hostile_recording(name):
+    fs, rng = 8192.0, np.random.default_rng(5)
+    t = np.arange(round(4 * fs)) / fs
+    force, acc = rng.standard_normal((2, t.size))
+    rows = {
+        f"{name} 1": ("m/s2", "acceleration", acc + force),
+        f"{name} force": ("N", "force", force),
+        f"{name} x": ("m", "displacement", 3e-5 * np.cos(40 * np.pi * t)),
+        f"{name} y": ("m", "displacement", 2e-5 * np.sin(40 * np.pi * t)),
+        "tacho": ("V", "tacho", np.where(20 * t % 1 < 0.1, 5.0, 0.0)),
+    }
+    channels = tuple(
+        Channel(name=key, unit=unit, quantity=quantity, place="")
+        for key, (unit, quantity, _) in rows.items()
+    )
+    return Recording(
+        signal=np.stack([row for *_, row in rows.values()]),
+        sample_rate=fs,
+        channels=channels,
+        tacho="tacho",
+        pulses_per_revolution=1,
+        row={},
+        source=f"{name}.h5[0]",
+    )
+
+
+def test_a_sheet_of_every_kind_takes_a_dollar():
+    made = plot_recording(View(recording=hostile_recording(HOSTILE["dollar"])), AUTO)
+    assert made.drawn == tuple(KINDS)
+    drawn(made.figure)
+
+
+@pytest.mark.parametrize("name", HOSTILE.values(), ids=HOSTILE)
+def test_a_spectrum_names_any_channel_in_its_legend(name):
+    made = plot_recording(View(recording=hostile_recording(name)), "spectrum")
+    drawn(made.figure)
+    told = [word for axes in made.figure.findobj(Axes) for word in words(axes.get_legend())]
+    whole = visible(short_name(f"{name} 1")).replace("加速度", "\ufffd" * 3)
+    assert whole in told
+
+
+@pytest.mark.parametrize("name", HOSTILE.values(), ids=HOSTILE)
+def test_the_alignment_takes_any_name(name):
+    scene = load_scene("propulsion-shaft", {"bearings.2.sag": 1.6e-3})
+    found = align(scene, condition="cold", jack=scene.bearings[3].name)
+    seats = (*found.line.seats[:2], replace(found.line.seats[2], name=name), *found.line.seats[3:])
+    line = replace(found.line, seats=seats)
+    states = tuple(replace(state, line=line) for state in found.states)
+    hostile = replace(found, name=name, line=line, states=states)
+    drawn(align_figure(hostile))
+    page = align_html(hostile)
+    assert "<script>" not in page
+    assert not set(page) & set("\x00\x07\u202e\u200b\u2066\udcff")
+
+
+def test_a_simulated_recording_takes_any_name(tmp_path):
+    name = HOSTILE["dollar"]
+    scene = load_scene("bilge-pump", {"duration": 0.5, "name": name})
+    n = round(0.5 * scene.sample_rate)
+    noise = np.random.default_rng(0).standard_normal
+    truth = {"pin_force_n": (n, 2), "pin_offset_m": (n, 2), "piston_pressure_force_n": (n,)}
+    solution = Solution(
+        signal=noise((2, n)).astype(np.float32),
+        sample_rate=scene.sample_rate,
+        channels=(SensorChannel(name=name, unit="m/s^2", quantity="acceleration"),) * 2,
+        status=Status.OK,
+        truth={key: noise(shape) for key, shape in truth.items()},
+    )
+    plot_simulation(scene, solution, tmp_path / "x.svg")
+    ElementTree.parse(tmp_path / "x.svg")
+
+
+@pytest.mark.parametrize("name", HOSTILE.values(), ids=HOSTILE)
+def test_a_trend_takes_any_name(name):
+    hours = np.arange(10) * 500.0
+    wear = 1e-4 + 2e-8 * hours
+    limits = {"condemning_limit_m": 3.1e-4, "quantity": f"{name}, crank pin"}
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        picture = trend_picture(
+            fit_trend(hours, wear, 0.98 * wear, 1.02 * wear, limit=3.1e-4), limits, name
+        )
+    assert picture.data.startswith("data:image/png")
+
+
+@pytest.mark.parametrize("suffix", FORMATS)
+def test_any_figure_takes_any_word(tmp_path, suffix):
+    figure = Figure()
+    for place, name in enumerate(HOSTILE.values(), start=1):
+        axes = figure.add_subplot(3, 4, place)
+        axes.plot([1, 2], [1e-7, 1e5], label=short_name(name))
+        axes.set(title=name, xlabel=name)
+        axes.set_xticks([1, 2], [name, "b"])
+        axes.legend()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        save_picture(figure, tmp_path / f"x{suffix}")
+        encoded(figure)
+
+
+def test_a_dollar_is_drawn_and_powers_of_ten_stay_powers():
+    figure = Figure()
+    axes = figure.add_subplot(title="a$b$c", yscale="log")
+    axes.plot([1, 2], [1e-7, 1e5])
+    axes.set_xticks([1, 2], ["p$q$", "r"])
+    drawn(figure)
+    assert not axes.title.get_parse_math()
+    labels = axes.get_xticklabels()
+    assert [label.get_text() for label in labels] == ["p$q$", "r"]
+    assert not any(label.get_parse_math() for label in labels)
+    assert all(label.get_parse_math() for label in axes.get_yticklabels())
+
+
+def test_a_page_escapes_and_shows_every_character():
+    card = {"title": "<b>\x07\u202e", "lead": "é"}
+    page = render("card.html.j2", card=card, sections=[("s", [("text", "<i>\u200b")])])
+    assert "&lt;b&gt;\ufffd\ufffd" in page
+    assert "&lt;i&gt;\ufffd" in page
+    assert page.startswith("<!DOCTYPE html>")
+
+
+def test_names_that_differ_stay_different_in_a_legend():
+    assert short_name("x" * 30 + "1" * 30) != short_name("x" * 30 + "2" * 30)
+    assert short_name("plain") == "plain"
+    assert visible("plain é") == "plain é"
