@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 from .alignment import AlignmentLine, Condition, Seat, seat_stations
 from .beam import Beam, Disc, PointLoad, Section, assemble_beam
 from .bearing import JournalBearing
+from .exciter_parts import exciter_faults
+from .exciters import Push, read_cell
 from .film import FilmGeometry
 from .integrate import Recorder, SimulationError, Solution, Status
 from .ladder import element_faults
@@ -35,6 +37,7 @@ from .shaft_parts import (
     ShaftScene,
     Turbulence,
 )
+from .shaft_push import lead_samples, peak_push, pushed_motion, pushed_stations, pushes
 from .shaft_response import (
     Broadband,
     FreeBasis,
@@ -125,10 +128,22 @@ def _bones(scene: ShaftScene) -> _Bones:
         sections=_sections(scene),
         discs=tuple(_disc(disc) for disc in scene.discs),
         loads=tuple(_load(load) for load in scene.loads),
-        stations=(*seat_stations(_seat(bearing) for bearing in scene.bearings), *coupling),
+        stations=(
+            *seat_stations(_seat(bearing) for bearing in scene.bearings),
+            *_own_stations(scene),
+            *coupling,
+        ),
         material=scene.shaft,
         gravity=scene.gravity,
     )
+
+
+def _own_stations(scene: ShaftScene) -> tuple[float, ...]:
+    """Stations where an exciter pushes and no part of the line is."""
+    parts = {bearing.station for bearing in scene.bearings}
+    parts |= {disc.station for disc in scene.discs}
+    parts |= {scene.coupling.station} if scene.coupling else set()
+    return tuple(station for station in pushed_stations(scene) if station not in parts)
 
 
 def _sections(scene: ShaftScene) -> tuple[Section, ...]:
@@ -188,9 +203,9 @@ def _bare_beam(bones: _Bones) -> Beam:
 
 
 @lru_cache(maxsize=32)
-def _basis(bones: _Bones, bearings: tuple[float, ...], limit_hz: float) -> FreeBasis:
+def _basis(bones: _Bones, places: tuple[float, ...], limit_hz: float) -> FreeBasis:
     """Kept as the beam is: its own modes do not know films, housings or speed."""
-    forced = [*bearings, *(disc.station for disc in bones.discs), *bones.stations[-1:]]
+    forced = [*places, *(disc.station for disc in bones.discs), *bones.stations[-1:]]
     return free_basis(
         _bare_beam(bones), limit_hz=limit_hz, stations=list(dict.fromkeys(forced)), slopes=True
     )
@@ -812,7 +827,7 @@ def check_shaft(scene: Scene) -> None:
     >>> check_shaft(load_scene("propulsion-shaft"))
     """
     shaft = cast(ShaftScene, scene)
-    faults = _sampling_faults(shaft)
+    faults = [*_sampling_faults(shaft), *_pushing_faults(shaft)]
     try:
         alignment_line(shaft)
         faults += element_faults(shaft)
@@ -820,6 +835,16 @@ def check_shaft(scene: Scene) -> None:
         faults += str(error).splitlines()
     if faults:
         raise SceneError(shaft.name, faults)
+
+
+def _pushing_faults(scene: ShaftScene) -> list[str]:
+    return [
+        fault
+        for i, part in enumerate(scene.exciters)
+        for fault in exciter_faults(
+            f"exciters.{i}", part, duration=scene.duration, sample_rate=scene.sample_rate
+        )
+    ]
 
 
 def _sampling_faults(scene: ShaftScene) -> list[str]:
@@ -946,7 +971,7 @@ def reduced_rotor(scene: ShaftScene, state: ShaftState) -> ReducedRotor:
     >>> reduced_rotor(scene, shaft_state(scene)).stable
     True
     """
-    stations = tuple(bearing.station for bearing in scene.bearings)
+    stations = (*(bearing.station for bearing in scene.bearings), *pushed_stations(scene))
     basis = _basis(_bones(scene), stations, scene.sample_rate / 2)
     return reduce_rotor(state.rotor, basis, speed=state.film.speed)
 
@@ -978,7 +1003,8 @@ def peak_motion(scene: ShaftScene, reduced: ReducedRotor) -> Float:
     -------
     numpy.ndarray [shape=(n,)]
         Sum of the amplitudes of all orders, and four times the rms of the random motion, each
-        over both directions together: an upper bound but for some rare peaks [m].
+        over both directions together, and what exciters add by
+        :func:`~wearstate.sim.shaft_push.peak_push`: an upper bound but for some rare peaks [m].
 
     Examples
     --------
@@ -999,7 +1025,10 @@ def peak_motion(scene: ShaftScene, reduced: ReducedRotor) -> Float:
             np.abs(_relative(gain, axis=1)) ** 2 * density[1:, None, None], hertz[1:], axis=0
         )
     steady = np.linalg.norm(np.abs(phasors), axis=-1).sum(axis=0)
-    return np.asarray(steady + _PEAK * np.sqrt(square.sum(axis=-1)))
+    pushed = peak_push(scene, reduced, _paired(places)).reshape(-1, 2)
+    return np.asarray(
+        steady + _PEAK * np.sqrt(square.sum(axis=-1)) + np.linalg.norm(pushed, axis=-1)
+    )
 
 
 def _bore_places(scene: ShaftScene) -> list[Place]:
@@ -1009,6 +1038,13 @@ def _bore_places(scene: ShaftScene) -> list[Place]:
         for bearing in scene.bearings
         for part in ("shaft", "housing")
         for axis in "yz"
+    ]
+
+
+def _paired(places: Sequence[Place]) -> list[Place]:
+    """Journal and housing of one direction side by side."""
+    return [
+        places[4 * i + j + 2 * k] for i in range(len(places) // 4) for j in (0, 1) for k in (0, 1)
     ]
 
 
@@ -1038,6 +1074,13 @@ class _Motion:
             broadband=random_forces(scene),
             seed=seed,
         )
+        self.forces: tuple[Push, ...] = ()
+        if scene.mounted_exciters:
+            lead = lead_samples(scene, reduced)
+            led = pushes(scene, seed, lead)
+            found = found + pushed_motion(scene, reduced, led, wanted, lead=lead)
+            inside = slice(lead, lead + found.shape[1])
+            self.forces = tuple(Push(*(row[inside] for row in push)) for push in led)
         self._rows = dict(zip(wanted, found, strict=True))
 
     def acceleration(self, bearing: str, axis: str) -> Float:
@@ -1052,7 +1095,7 @@ class _Motion:
         return np.asarray(journal - housing)
 
     def truth(self) -> dict[str, Float]:
-        """Shaft angle; of every bearing the journal's place in its bore and the film's force."""
+        """Shaft angle, journals in their bores, film forces, test forces along their direction."""
         scene, film = self.scene, self.state.film
         places, forces = [], []
         for i, bearing in enumerate(scene.bearings):
@@ -1075,7 +1118,11 @@ class _Motion:
             "state_angle": shaft_angle(scene),
             "journal_m": np.stack(places, axis=1),
             "film_force_n": np.stack(forces, axis=1),
-        }
+        } | (
+            {"test_force_n": np.stack([f.along for f in self.forces], axis=1)}
+            if self.forces
+            else {}
+        )
 
 
 def _wanted(scene: ShaftScene, truth: bool) -> list[tuple[Place, str]]:
@@ -1133,6 +1180,10 @@ def _measured(
             bits=part.bits,
             rng=rng,
         )
+        rows.append(row)
+        clipped += lost
+    for exciter, push in zip(scene.mounted_exciters, motion.forces, strict=True):
+        row, lost = read_cell(exciter, push.cell, rng)
         rows.append(row)
         clipped += lost
     if scene.tacho:
@@ -1202,7 +1253,8 @@ def _warnings(scene: ShaftScene, state: ShaftState, numerics: Numerics) -> tuple
     if moved > _MOVED_WARNING:
         warnings.append(
             f"a journal moves by {moved:.0%} of its least film, and the linear response is good "
-            f"to about {_MOVED_WARNING:.0%}; lower unbalance, blade_rate or turbulence"
+            f"to about {_MOVED_WARNING:.0%}; lower unbalance, blade_rate, turbulence or the force "
+            "of exciters"
         )
     if int(numerics["clipped_samples"]) > 0:
         warnings.append(f"{numerics['clipped_samples']} samples clipped; widen the sensor's range")

@@ -12,6 +12,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
+from .exciter_parts import PlacedExciter, force_channel
 from .journal_parts import Film, Oil, ProximityProbe, RunOut, ScarLimits
 from .parts import (
     ANGLE_MOST,
@@ -332,7 +333,54 @@ class Turbulence(Part):
     corner: Frequency = Field(gt=0, le=1e6)
 
 
+class ShaftExciter(PlacedExciter):
+    """A shaker or hammer on the shaft or on a bearing's housing, while the line runs.
+
+    At rest the journals lie on metal, of which the model knows nothing: there is no test at
+    standstill.
+    """
+
+    place: str = Field(
+        default="", max_length=NAME_LONGEST, description="name of a bearing or a disc"
+    )
+    station: _Station | None = Field(default=None, description="of the shaft, instead of a place")
+    part: Literal["shaft", "housing"] = "shaft"
+    direction: Literal["up", "side"] = "up"
+
+    @model_validator(mode="after")
+    def _one_place(self) -> Self:
+        faults = []
+        if bool(self.place) == (self.station is not None):
+            faults.append(
+                f"{'both' if self.place else 'neither'} of place and station given, must be "
+                "exactly one; remove or add one"
+            )
+        if self.part == "housing" and self.place_scatter:
+            faults.append(
+                f"place_scatter = {self.place_scatter:g} m must be 0 on a housing, which does not "
+                "tilt here; set part = 'shaft' or remove it"
+            )
+        if self.part == "housing" and self.station is not None:
+            faults.append(
+                f"station = {self.station:g} m names no housing; name a bearing as place instead"
+            )
+        if faults:
+            raise ValueError("\n".join(faults))
+        return self
+
+    @property
+    def where(self) -> str:
+        """For people: ``shaft at forward``, ``housing of forward``."""
+        if self.part == "housing":
+            return f"housing of {self.place}"
+        return f"shaft at {self.place or f'{self.station:g} m'}"
+
+
 # --- what is seen of it
+
+
+DIRECTIONS = {"up": "vertical, up", "side": "horizontal, to starboard"}
+"""Of sensors and forces, as a report tells them."""
 
 
 class ShaftAccelerometer(Part):
@@ -391,6 +439,7 @@ class ShaftScene(Scene):
     propeller: Propeller | None = None
     coupling: Coupling | None = None
     turbulence: tuple[Turbulence, ...] = Field(default=(), max_length=_MOST_PARTS)
+    exciters: tuple[ShaftExciter, ...] = Field(default=(), max_length=MOST_SENSORS)
     film: Film = Film(rung="direct")
     run_out: tuple[RunOut, ...] = Field(default=(), max_length=_MOST_PARTS)
     sensors: tuple[ShaftAccelerometer, ...] = Field(default=(), max_length=MOST_SENSORS)
@@ -405,15 +454,14 @@ class ShaftScene(Scene):
         return math.fsum(section.length for section in self.sections)
 
     def sensor_channels(self) -> tuple[Channel, ...]:
-        """Accelerations of the housings first, then one displacement for every probe."""
-        directions = {"up": "vertical, up", "side": "horizontal, to starboard"}
+        """Accelerations of the housings, a displacement for every probe, then the test forces."""
         accelerations = tuple(
             Channel(
                 name=sensor.name,
                 unit="m/s^2",
                 quantity="acceleration",
                 place=f"housing of {sensor.bearing}",
-                direction=directions[sensor.direction],
+                direction=DIRECTIONS[sensor.direction],
             )
             for sensor in self.sensors
         )
@@ -427,7 +475,16 @@ class ShaftScene(Scene):
             )
             for probe in self.probes
         )
-        return accelerations + displacements
+        forces = tuple(
+            force_channel(part, part.where, DIRECTIONS[part.direction])
+            for part in self.mounted_exciters
+        )
+        return accelerations + displacements + forces
+
+    @property
+    def mounted_exciters(self) -> tuple[ShaftExciter, ...]:
+        """Those that push; the others are not there."""
+        return tuple(part for part in self.exciters if part.mounted)
 
     @classmethod
     def cross_faults(cls, parts: Mapping[str, Any]) -> list[str]:
@@ -441,9 +498,13 @@ class ShaftScene(Scene):
 
 
 def _channel_faults(
-    sensors: tuple[ShaftAccelerometer, ...], probes: tuple[ShaftProbe, ...], tacho: Tacho | None
+    sensors: tuple[ShaftAccelerometer, ...],
+    probes: tuple[ShaftProbe, ...],
+    exciters: tuple[ShaftExciter, ...],
+    tacho: Tacho | None,
 ) -> list[str]:
-    faults = name_faults([*(s.name for s in sensors), *(p.name for p in probes)], tacho)
+    names = [*(s.name for s in sensors), *(p.name for p in probes), *(e.name for e in exciters)]
+    faults = name_faults(names, tacho)
     if not sensors and not probes:
         faults.append("sensors and probes: both are empty, must have >= 1 entry; add one")
     return faults
@@ -557,6 +618,27 @@ def _turbulence_faults(
     ]
 
 
+def _exciter_faults(
+    sections: tuple[ShaftSection, ...],
+    bearings: tuple[ShaftBearing, ...],
+    discs: tuple[ShaftDisc, ...],
+    exciters: tuple[ShaftExciter, ...],
+) -> list[str]:
+    housed = [bearing.name for bearing in bearings]
+    known = {"housing": housed, "shaft": [*housed, *(disc.name for disc in discs)]}
+    stations = [(f"exciters.{i}", part.station) for i, part in enumerate(exciters)]
+    return [
+        *_outside(sections, ((name, at) for name, at in stations if at is not None)),
+        *(
+            f"exciters.{i}.place = '{part.place}' is no {'bearing' * (part.part == 'housing')}"
+            f"{'bearing and no disc' * (part.part == 'shaft')}; choose one of "
+            f"{', '.join(known[part.part])}"
+            for i, part in enumerate(exciters)
+            if part.place and part.place not in known[part.part]
+        ),
+    ]
+
+
 def _film_faults(film: Film) -> list[str]:
     faults = []
     if film.rung != "direct":
@@ -574,13 +656,14 @@ def _film_faults(film: Film) -> list[str]:
 
 
 _CHECKS: tuple[tuple[Any, tuple[str, ...]], ...] = (
-    (_channel_faults, ("sensors", "probes", "tacho")),
+    (_channel_faults, ("sensors", "probes", "exciters", "tacho")),
     (_name_faults, ("bearings", "discs")),
     (_disc_faults, ("sections", "discs", "loads", "coupling")),
     (_bearing_faults, ("sections", "bearings")),
     (_sensor_faults, ("bearings", "sensors", "probes")),
     (_propeller_faults, ("discs", "propeller")),
     (_turbulence_faults, ("bearings", "discs", "turbulence")),
+    (_exciter_faults, ("sections", "bearings", "discs", "exciters")),
     (_film_faults, ("film",)),
 )
 """Checks between parts, and the parts that each needs. A new one is one row."""
