@@ -234,7 +234,8 @@ def _unexcited_shaft(shaft: ShaftScene) -> Iterator[str]:
     propeller, coupling = shaft.propeller, shaft.coupling
     excited = (
         any(disc.unbalance for disc in shaft.discs)
-        or any(part.force for part in (*shaft.turbulence, *shaft.exciters))
+        or any(part.force for part in shaft.turbulence)
+        or bool(shaft.mounted_exciters)
         or (propeller is not None and propeller.thrust > 0 and bool(propeller.blade_rate))
         or (coupling is not None and bool(coupling.parallel_offset or coupling.angle))
     )
