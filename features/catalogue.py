@@ -2,14 +2,14 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from itertools import combinations, pairwise
+from itertools import pairwise
 from types import MappingProxyType
 from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from . import frf, modal, orbit, order, speed
+from . import frf, modal, operational, orbit, order, speed
 from .analysis import FAULTS, Analysis, Settings
 from .envelope import FaultLine
 from .spectral_shape import (
@@ -115,7 +115,7 @@ def _impacts(analysis: Analysis) -> Float:
 
 def _rms_ratios(analysis: Analysis) -> Float:
     level = decibel(analysis.amplitude.rms.astype(np.float64) ** 2)
-    first, second = np.array(list(combinations(range(level.size), 2)), dtype=int).reshape(-1, 2).T
+    first, second = operational.channel_pairs(level.size)
     return np.asarray(level[first] - level[second])
 
 
@@ -237,6 +237,27 @@ def _order_phases(analysis: Analysis) -> Float:
     size = np.abs(vectors)
     unit = vectors / np.where(size > 0, size, 1.0)
     return _stacked(unit.real, unit.imag)
+
+
+def _transmissibility_labels(settings: Settings, fs: float) -> tuple[str, ...]:
+    return tuple(
+        f"transmissibility.{band}.{part}"
+        for band in _hertz(settings.band_edges(fs))
+        for part in ("level_db", "coherence")
+    )
+
+
+def _transmissibilities(analysis: Analysis) -> Float:
+    edges = analysis.settings.band_edges(analysis.fs)
+    return _stacked(*operational.transmissibility(analysis.vibration, analysis.fs, edges))
+
+
+def _deflection_labels(settings: Settings, _fs: float) -> tuple[str, ...]:
+    return tuple(
+        f"deflection.{label.removesuffix('.level_db')}.{part}"
+        for label in _order_labels(settings, _fs)
+        for part in ("ratio_db", "phase_cos", "phase_sin")
+    )
 
 
 def _synchronous(analysis: Analysis) -> Float:
@@ -728,6 +749,24 @@ CORE_ROWS: tuple[Feature, ...] = (
         ),
         function=_synchronous,
         reference="resample.synchronous_average; McFadden, Mech. Syst. Signal Process. 1 (1987) 83",
+    ),
+    Feature(
+        name="transmissibility",
+        unit="dB, -",
+        needs=("spectrum bands",),
+        scope="pair",
+        labels=_transmissibility_labels,
+        function=_transmissibilities,
+        reference="operational.transmissibility; Devriendt, Guillaume, JSV 314 (2008) 343-356",
+    ),
+    Feature(
+        name="deflection_shape",
+        unit="dB, -",
+        needs=("tacho",),
+        scope="pair",
+        labels=_deflection_labels,
+        function=lambda a: operational.deflection_shape(a.order_vectors),
+        reference="operational.deflection_shape; Richardson, Sound and Vibration 31 (1997) 54-61",
     ),
     Feature(
         name="tacholess_speed",

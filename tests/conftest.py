@@ -1,5 +1,7 @@
 """Fixtures shared by all tests."""
 
+import fcntl
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -15,21 +17,39 @@ def realdata() -> Path:
 
 
 @pytest.fixture(scope="session")
-def small_set(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Data set of the recipe bilge-pump-small: 120 simulated records of 60 machine draws."""
-    from wearstate.datasets.generate import generate
+def common(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> Path:
+    """Folder of all test processes of this run."""
+    base = tmp_path_factory.getbasetemp()
+    folder = (base if worker_id == "master" else base.parent) / "common"
+    folder.mkdir(exist_ok=True)
+    return folder
 
-    path = tmp_path_factory.mktemp("small") / "data.h5"
-    generate("bilge-pump-small", None, path, seed=0, jobs=2)
+
+def made_once(path: Path, make: Callable[[Path], object]) -> Path:
+    """A file that the first test process to ask for it makes while the others wait."""
+    with path.with_suffix(".wait").open("w") as turn:
+        fcntl.flock(turn, fcntl.LOCK_EX)
+        if not path.exists():
+            make(path)
     return path
 
 
 @pytest.fixture(scope="session")
-def small_model(small_set: Path) -> Path:
+def small_set(common: Path) -> Path:
+    """Data set of the recipe bilge-pump-small: 120 simulated records of 60 machine draws."""
+    from wearstate.datasets.generate import generate
+
+    return made_once(
+        common / "small.h5", lambda path: generate("bilge-pump-small", None, path, seed=0, jobs=2)
+    )
+
+
+@pytest.fixture(scope="session")
+def small_model(common: Path, small_set: Path) -> Path:
     """Model file trained on `small_set`."""
     from wearstate.diagnose.modelfile import save_model
     from wearstate.diagnose.train import train_model
 
-    path = small_set.with_name("model.wsm")
-    save_model(train_model(small_set, seed=0)[0], path)
-    return path
+    return made_once(
+        common / "model.wsm", lambda path: save_model(train_model(small_set, seed=0)[0], path)
+    )

@@ -38,4 +38,5 @@ wait "$lowest"
   env/bin/wearstate verify
 )
 
-"$bin/pytest" -q
+# a file a process, so that what its tests share is made once
+"$bin/pytest" -q -n 2 --dist loadfile
