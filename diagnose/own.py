@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from .. import __version__
 from ..datasets.record import Attributes, DataError, DataSet, Recording
 from ..datasets.splits import check_no_leak, group_folds
+from .blows import NOISE_SCORE, blow_floors, blow_scores, blow_table, lacks_blows
 from .conformal import COVERAGE, record_weights, weighted_quantile
 from .estimate import UNFAMILIAR_SHARE, ModelError
 from .models import CANDIDATES, Blend, Folds, fit_blend
@@ -85,12 +86,15 @@ class Votes:
         Recording, or machine, of each record.
     distance : numpy.ndarray [shape=(n_records,)]
         From the nearest of the classes' clouds, those of the other recordings.
+    blows : numpy.ndarray [shape=(n_records, n_channels)]
+        Score of the blows in each channel; without columns where records are too short for it.
     """
 
     shares: Float
     label: Index
     group: Index
     distance: Float
+    blows: Float
 
     @cached_property
     def groups_of(self) -> tuple[int, ...]:
@@ -118,6 +122,7 @@ class Votes:
         ...     label=label,
         ...     group=np.array([0, 0, 0, 1]),
         ...     distance=np.array([1.0, 1.0, 1.0, 3.0]),
+        ...     blows=np.zeros((4, 1)),
         ... )
         >>> round(votes.p_value(2.0), 3), round(votes.p_value(4.0), 3)
         (0.667, 0.333)
@@ -139,6 +144,21 @@ class Votes:
     def limits(self) -> Float:
         """Least share with which each class is kept in a set [shape=(n_classes,)]."""
         return np.array([self._limit(c) for c in range(self.shares.shape[1])])
+
+    @cached_property
+    def blow_floors(self) -> Float:
+        """Least score of the blows in each class's recordings [shape=(n_classes, n_channels)]."""
+        mine = [self.label == c for c in range(self.shares.shape[1])]
+        return np.stack([blow_floors(self.blows[here], self.group[here]) for here in mine])
+
+    def lacking(self, blows: Float) -> tuple[int, ...]:
+        """Classes whose every recording has blows, where a recording of these scores has none."""
+        return tuple(c for c, floors in enumerate(self.blow_floors) if lacks_blows(blows, floors))
+
+    def strange(self, shares: Float, distance: float, blows: Float) -> bool:
+        """Whether a recording is of none of the classes: too far, or without their blows."""
+        kept = set_of(shares, self.limits)
+        return self.p_value(distance) <= self.p_limit or set(kept) <= set(self.lacking(blows))
 
     def _limit(self, c: int) -> float:
         if self.groups_of[c] < _FEWEST:
@@ -234,10 +254,21 @@ class ClassModel:
                 f"the model's {len(self.names)} features are not the recording's {len(names)}; "
                 "use recordings like those it was trained on, or retrain it"
             )
-        return self.judge(row)
+        return self.judge(row, blow_scores(recording))
 
-    def judge(self, row: Float) -> Naming:
-        """Tell the condition from a feature row [shape=(n_features,)]."""
+    def judge(self, row: Float, blows: Float) -> Naming:
+        """Tell the condition from features and blows.
+
+        Parameters
+        ----------
+        row : numpy.ndarray [shape=(n_features,)]
+        blows : numpy.ndarray [shape=(n_channels,)]
+            Of :func:`wearstate.diagnose.blows.blow_scores`.
+
+        Returns
+        -------
+        Naming
+        """
         shares = self.predict(row[None, :])[0]
         told = {name: float(value) for name, value in zip(self.classes, shares, strict=True)}
         distance = float(self.distance(row[None, :])[0])
@@ -251,11 +282,22 @@ class ClassModel:
             )
             return Naming(verdict="unfamiliar", reasons=(reason,), **judged)
         kept = set_of(shares, self.votes.limits)
+        if set(kept) <= set(self.votes.lacking(blows)):
+            return Naming(verdict="unfamiliar", reasons=(self._no_blows(kept, blows),), **judged)
         return Naming(
             verdict="named",
             name=self.classes[int(shares.argmax())],
             possible=tuple(self.classes[c] for c in kept),
             **judged,
+        )
+
+    def _no_blows(self, kept: Sequence[int], blows: Float) -> str:
+        """Why a recording is of none of these classes."""
+        floors = self.votes.blow_floors[list(kept)]
+        return (
+            f"without the blows of every recording of {', '.join(self.classes[c] for c in kept)}: "
+            f"score {blows.max():.2g}, noise has up to {NOISE_SCORE:g}, they have "
+            f"{floors[floors > NOISE_SCORE].min():.2g} or more"
         )
 
 
@@ -328,7 +370,8 @@ def train_classes(
     _labels_of(manifest, target, path)  # refused before the features are computed
     table = feature_table(path, jobs=jobs, progress=progress)
     labels = _labels_of(table.manifest, target, path)
-    model = fit_classes(table, labels, head, target=target, seed=seed)
+    blows = blow_table(path, len(labels), jobs=jobs)
+    model = fit_classes(table, labels, blows, head, target=target, seed=seed)
     return model, score_votes(model.votes, model.classes, seed=seed)
 
 
@@ -374,6 +417,7 @@ def _class_faults(found: Mapping[str, int], target: str) -> list[str]:
 def fit_classes(
     table: FeatureTable,
     labels: NDArray[np.str_],
+    blows: Float,
     head: Attributes,
     *,
     target: str,
@@ -386,6 +430,8 @@ def fit_classes(
     table : FeatureTable
     labels : numpy.ndarray [shape=(n_records,)]
         Of each record.
+    blows : numpy.ndarray [shape=(n_records, n_channels)]
+        Of :func:`wearstate.diagnose.blows.blow_table`.
     head : Attributes
         Of the data set.
     target, seed
@@ -412,6 +458,7 @@ def fit_classes(
             label=truth.astype(np.intp),
             group=groups.astype(np.intp),
             distance=_left_out_distances(table, truth, groups, folds),
+            blows=blows,
         ),
         familiarity=_clouds(table, truth, groups, np.arange(len(groups))),
         card=_card(head, table, classes.tolist(), target, seed),
@@ -520,15 +567,16 @@ def evaluate_classes(
         label=np.searchsorted(model.classes, labels[rows]).astype(np.intp),
         group=groups[rows],
         distance=model.distance(table.values[rows]),
+        blows=blow_table(path, len(labels), jobs=jobs)[rows],
     )
-    return score_votes(votes, model.classes, limits=model.votes.limits, seed=seed)
+    return score_votes(votes, model.classes, trained=model.votes, seed=seed)
 
 
 def score_votes(
     votes: Votes,
     classes: tuple[str, ...],
     *,
-    limits: Float | None = None,
+    trained: Votes | None = None,
     seed: int = 0,
 ) -> dict[str, Any]:
     """Errors and coverage of votes on unseen recordings.
@@ -537,8 +585,9 @@ def score_votes(
     ----------
     votes : Votes
     classes : tuple of str
-    limits : numpy.ndarray [shape=(n_classes,)], optional
-        Of the sets; those of each recording from the others unless given.
+    trained : Votes, optional
+        Of the training, by which sets and strangers are told; for each recording those of the
+        others unless given.
     seed : int
         Of the resamples.
 
@@ -547,15 +596,16 @@ def score_votes(
     dict
         Ready for JSON: ``records``, ``recordings``, ``judged`` (classes with enough recordings),
         ``accuracy``, ``coverage`` of the sets and ``mean_set_size`` over records of the judged
-        classes, under ``intervals`` their 95 % intervals over recordings; ``recordings_right`` of
+        classes, ``called_unfamiliar``, the share of them that is refused as of none of the classes,
+        under ``intervals`` their 95 % intervals over recordings; ``recordings_right`` of
         ``recordings_judged`` by majority of their records with the exact 95 % interval
         ``recordings_interval``; ``confusion`` (true class by row, of all records),
         ``nominal_coverage`` by class, ``majority`` (share of the largest class).
     """
-    enough = np.array(votes.groups_of) >= (_FEWEST if limits is None else 1)
+    enough = np.array(votes.groups_of) >= (_FEWEST if trained is None else 1)
     judged = enough[votes.label]
     found = votes.shares.argmax(axis=1)
-    kept = _sets(votes, limits)
+    kept, strange = _told(votes, trained)
     draws = resampled(votes.group[judged], seed=seed)
     ones = np.ones(int(judged.sum()))
     inside = kept[np.arange(len(found)), votes.label]
@@ -563,6 +613,7 @@ def score_votes(
         "accuracy": share((found == votes.label)[judged], ones, draws),
         "coverage": share(inside[judged], ones, draws),
         "mean_set_size": share(kept[judged].sum(axis=1), ones, draws),
+        "called_unfamiliar": share(strange[judged], ones, draws),
     }
     right, of = _recordings_right(votes, judged)
     matrix = np.zeros((len(classes), len(classes)), dtype=int)
@@ -587,15 +638,20 @@ def _ends(figure: Figure) -> list[float]:
     return [figure.low, figure.high]
 
 
-def _sets(votes: Votes, limits: Float | None) -> NDArray[np.bool_]:
-    """Membership [shape=(n_records, n_classes)]; limits of a recording are from the others."""
+def _told(votes: Votes, trained: Votes | None) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Sets [shape=(n_records, n_classes)] and strangers [shape=(n_records,)].
+
+    Without votes of a training, a recording is told by those of the others.
+    """
     kept = np.zeros(votes.shares.shape, dtype=bool)
+    strange = np.zeros(len(kept), dtype=bool)
     for group in np.unique(votes.group):
         mine = votes.group == group
-        bounds = _without(votes, mine).limits if limits is None else limits
+        by = _without(votes, mine) if trained is None else trained
         for i in np.flatnonzero(mine):
-            kept[i, list(set_of(votes.shares[i], bounds))] = True
-    return kept
+            kept[i, list(set_of(votes.shares[i], by.limits))] = True
+            strange[i] = by.strange(votes.shares[i], votes.distance[i], votes.blows[i])
+    return kept, strange
 
 
 def _without(votes: Votes, mine: NDArray[np.bool_]) -> Votes:
@@ -604,6 +660,7 @@ def _without(votes: Votes, mine: NDArray[np.bool_]) -> Votes:
         label=votes.label[~mine],
         group=votes.group[~mine],
         distance=votes.distance[~mine],
+        blows=votes.blows[~mine],
     )
 
 
@@ -671,6 +728,7 @@ def classes_text(result: Mapping[str, Any]) -> list[str]:
         f"{result['majority']:.2f}",
         f"  set coverage     {_between(result, 'coverage')} (promised {promised})",
         f"  set size         {_between(result, 'mean_set_size')}",
+        f"  refused          {_between(result, 'called_unfamiliar')} of them, as unfamiliar",
         "  named            " + " ".join(f"{name:>10}" for name in result["classes"]),
     ]
     for name, row in zip(result["classes"], result["confusion"], strict=True):

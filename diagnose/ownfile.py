@@ -172,5 +172,7 @@ def _votes_fit(votes: Votes, classes: int) -> bool:
         and votes.shares.shape == (n, classes)
         and bool((votes.shares >= 0).all())
         and bool((np.abs(votes.shares.sum(axis=1) - 1) < _ROUNDING).all())
+        and votes.blows.ndim == 2
+        and len(votes.blows) == n
         and bool(((votes.label >= 0) & (votes.label < classes)).all())
     )

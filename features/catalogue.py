@@ -302,7 +302,7 @@ def _scores(lines: list[list[FaultLine | None]]) -> Float:
 
 
 def _kurtogram(analysis: Analysis) -> Float:
-    return np.array([(k.centre, k.bandwidth, k.highest) for k in analysis.kurtograms])
+    return np.array([(k.centre, k.bandwidth, k.highest, k.score) for k in analysis.kurtograms])
 
 
 def _fault_labels(prefix: str, part: str) -> Callable[[Settings, float], tuple[str, ...]]:
@@ -810,10 +810,15 @@ CORE_ROWS: tuple[Feature, ...] = (
 COMPLETE_ROWS: tuple[Feature, ...] = (
     Feature(
         name="kurtogram",
-        unit="Hz, Hz, -",
+        unit="Hz, Hz, -, -",
         needs=("frames",),
         uses=("tacho",),
-        labels=_named("kurtogram.centre_hz", "kurtogram.bandwidth_hz", "kurtogram.kurtosis"),
+        labels=_named(
+            "kurtogram.centre_hz",
+            "kurtogram.bandwidth_hz",
+            "kurtogram.kurtosis",
+            "kurtogram.score",
+        ),
         function=_kurtogram,
         reference="envelope.kurtogram; Antoni, Mech. Syst. Signal Process. 21 (2007) 108-124",
     ),

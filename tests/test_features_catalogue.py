@@ -216,6 +216,7 @@ def test_third_octaves_are_named_as_engineers_do():
         ),
         ("kurtogram", "kurtogram.kurtosis", lambda x: kurtogram(x).highest),
         ("kurtogram", "kurtogram.centre_hz", lambda x: kurtogram(x).centre),
+        ("kurtogram", "kurtogram.score", lambda x: kurtogram(x).score),
         (
             "tacholess_speed",
             "tacholess.speed_hz",

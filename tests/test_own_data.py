@@ -15,6 +15,7 @@ from wearstate.datasets.labels import read_labels
 from wearstate.datasets.record import DataError, DataSet
 from wearstate.datasets.sources import SourceOptions, open_source
 from wearstate.datasets.splits import group_folds
+from wearstate.diagnose.blows import NOISE_SCORE, blow_scores
 from wearstate.diagnose.cli import cli
 from wearstate.diagnose.estimate import ModelError
 from wearstate.diagnose.modelfile import load_model
@@ -29,7 +30,7 @@ from wearstate.diagnose.own import (
     train_classes,
 )
 from wearstate.diagnose.ownfile import load_class_model, save_class_model
-from wearstate.diagnose.tabulate import feature_table
+from wearstate.diagnose.tabulate import feature_table, recording_features
 
 RATE = 4000.0
 
@@ -198,12 +199,88 @@ def test_a_measured_condition_that_was_held_out_is_mostly_unfamiliar(realdata):
     clouds = _clouds(found, truth, groups, np.arange(len(groups)))
     folds = group_folds(groups, n=len(np.unique(groups)), seed=0)
     distance = _left_out_distances(found, truth, groups, folds)
-    votes = Votes(shares=np.ones((len(groups), 1)), label=truth, group=groups, distance=distance)
+    votes = Votes(
+        shares=np.ones((len(groups), 1)),
+        label=truth,
+        group=groups,
+        distance=distance,
+        blows=np.zeros((len(groups), 1)),
+    )
     far = _nearest_distance(clouds, other.names, other.values)
     assert np.mean([votes.p_value(value) <= votes.p_limit for value in far]) > 0.5
     # the trained ones themselves, each by clouds without it: one recording in six at most
     own = [votes.p_value(value) <= votes.p_limit for value in distance]
     assert np.mean(own) <= 1 / 6
+
+
+def test_a_measured_sound_bearing_has_no_blows_and_is_neither_fault(realdata, tmp_path):
+    """Before a model of the two damaged races: what no distance between features tells."""
+    [folder] = realdata.glob("mfpt_*")
+    options = SourceOptions(resample_to=48828.0)
+    files = sorted(folder.glob("*Fault*.mat"))
+    table = tmp_path / "labels.csv"
+    table.write_text("file,race\n" + "".join(f"{f.name},{f.name[:5].lower()}\n" for f in files))
+    path, sound = tmp_path / "faults.h5", tmp_path / "sound.h5"
+    import_recordings(files, path, options=options, labels=read_labels(table), segment=1.0)
+    import_recordings([folder / "baseline_1.mat"], sound, options=options, segment=1.0)
+    model, result = train_classes(path, target="race", seed=0)
+    with DataSet(sound) as data:
+        told = [model.estimate(item) for item in data]
+    assert {naming.verdict for naming in told} == {"unfamiliar"}
+    assert "without the blows of every recording of outer" in told[0].reasons[0]
+    # by blows none; by distance one recording of eight may be
+    assert result["called_unfamiliar"] <= 1 / 8
+    assert min(model.votes.blow_floors.ravel()) > 3 * NOISE_SCORE
+
+
+def struck(folder, name, *, seed, rate_hz, n=4, loudness=0.8):
+    """Files of noise, and of blows that come back at a rate of the class's own."""
+    rng = np.random.default_rng(seed)
+    paths = []
+    for i in range(n):
+        x = rng.standard_normal(round(2 * RATE))
+        t = np.arange(200) / RATE
+        ring = np.exp(-300 * t) * np.sin(2 * np.pi * 1200 * t)
+        train = np.zeros(x.size)
+        if loudness:
+            train[:: round(RATE / rate_hz)] = 1.0
+        blows = np.convolve(train, ring)[: x.size]
+        x += loudness * rng.uniform(0.8, 1.2) * blows / max(blows.std(), 1e-9)
+        np.save(folder / f"{name}_{i}.npy", x[None, :])
+        paths.append(folder / f"{name}_{i}.npy")
+    return paths
+
+
+def test_a_recording_without_the_blows_of_every_class_is_of_none(tmp_path):
+    files = [
+        path
+        for kind, hz in (("inner", 30.0), ("outer", 18.0))
+        for path in struck(tmp_path, kind, seed=int(hz), rate_hz=hz)
+    ]
+    table = tmp_path / "labels.csv"
+    table.write_text("file,kind\n" + "".join(f"{f.name},{f.name[:5]}\n" for f in files))
+    shared = {"options": SourceOptions(fs=RATE, unit="g", channels=("acc",)), "segment": 0.5}
+    import_recordings(files, tmp_path / "x.h5", labels=read_labels(table), **shared)
+    model, result = train_classes(tmp_path / "x.h5", target="kind")
+    assert (model.votes.blow_floors > 2 * NOISE_SCORE).all()
+    assert result["called_unfamiliar"] <= 1 / 8  # what the distance alone may refuse
+    sound = struck(tmp_path, "sound", seed=1, rate_hz=1.0, loudness=0.0)
+    import_recordings(sound, tmp_path / "sound.h5", **shared)
+    save_class_model(model, tmp_path / "x.wsm")
+    read = load_class_model(tmp_path / "x.wsm")
+    with DataSet(tmp_path / "sound.h5") as data:
+        scores = np.array([blow_scores(item) for item in data])
+        assert {read.estimate(item).verdict for item in data} == {"unfamiliar"}
+    assert (scores <= NOISE_SCORE).all()
+    with DataSet(tmp_path / "x.h5") as data:
+        row = recording_features(data[0])[1]
+        assert read.judge(row, blow_scores(data[0])).name == "inner"
+    # blows are held against by themselves: no feature needs to be far
+    naming = read.judge(row, scores[0])
+    assert naming.verdict == "unfamiliar"
+    assert re.match(
+        r"without the blows of every recording of inner.*noise has up to 7", *naming.reasons
+    )
 
 
 def test_new_recordings_are_judged_and_known_ones_are_not(trained, tmp_path):
