@@ -745,7 +745,7 @@ def features(
         raise click.UsageError("give DATA and --output, or --list")
     if only and feature_set:
         raise click.UsageError("give either --set or --only: names are looked for in every set")
-    from .tabulate import absent_in, choice_of, feature_table, impact_notes, save_table
+    from .tabulate import absent_in, choice_of, excitation_notes, feature_table, save_table
 
     check_outputs([data], [(output, TABLE_SUFFIXES)], force)
     names = [name.strip() for part in only for name in part.split(",")]
@@ -762,10 +762,14 @@ def features(
     save_table(table, output, force=force)
     size = {"path": str(output), "records": len(table.values), "features": len(table.names)}
     text = f"{output}: {size['records']} records, {size['features']} features"
-    struck = impact_notes(data) if any("frf." in name for name in table.names) else {}
-    for note, count in struck.items():
-        click.echo(f"impact test, {count} records: {note}", err=True)
-    emit({**size, "absent": absent, "impacts": struck}, as_json, text)
+    told = (
+        excitation_notes(data, choice.settings)
+        if any("frf" in name for name in table.names)
+        else {}
+    )
+    for note, count in told.items():
+        click.echo(f"{count} records: {note}", err=True)
+    emit({**size, "absent": absent, "tests": told}, as_json, text)
 
 
 def _emit_catalogue(feature_set: Any, as_json: bool) -> None:

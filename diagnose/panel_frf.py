@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..features import frf, impact
+from ..features import frf, transfer
 from ..features.analysis import FORCE
 from ..features.spectrum import decibel
 from .page import short_name
@@ -59,13 +59,9 @@ def _averaged(
     force: NDArray[np.float32], responses: NDArray[np.float32], fs: float, last: float
 ) -> tuple[frf.Spectra, str]:
     """Spectra of a hammer's blows or of a continuous force, and words about the averages."""
-    if impact.is_impact(force):
-        spectra, found = impact.impact_spectra(force, responses, fs, last=last)
-        return spectra, found.text
     longest = min(force.size / _BLOCKS, fs / _FINEST_HZ)
     nperseg = 1 << int(np.log2(max(longest, 8)))
-    spectra = frf.welch_spectra(force, responses, fs, nperseg=nperseg)
-    return spectra, f"{spectra.blocks} windows (Hann, half overlapped)"
+    return transfer.excited_spectra(force, responses, fs, nperseg=nperseg, last=last)
 
 
 def _estimate(spectra: frf.Spectra) -> frf.Frf:

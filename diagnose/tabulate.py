@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 from ..datasets.csv_cells import safe_frame
 from ..datasets.record import DataError, DataSet, Recording
 from ..datasets.workers import in_order
-from ..features.analysis import FORCE, STANDARD, Settings
+from ..features.analysis import STANDARD, Analysis, Settings
 from ..features.catalogue import SetName
 from ..features.envelope import BearingFrequencies, bearing_frequencies
-from ..features.impact import find_impacts, is_impact
-from ..features.needs import Layout
+from ..features.needs import Layout, shortcomings
 from ..features.table import absent_features, feature_names, feature_row
+from ..features.transfer import Transfer
 from ..sim.atomic import replacing
 
 _BATCH = 16  # records a worker reads at a time: 20 MB, and few enough to keep both cores busy
@@ -384,28 +384,71 @@ def _batch_features(
     return rows, names
 
 
-def impact_notes(path: str | Path) -> dict[str, int]:
-    """How the blows of a data set's impact tests were averaged, and what stays unknown.
+def recording_transfer(recording: Recording, settings: Settings = STANDARD) -> Transfer | None:
+    """Transfer functions of a test, as its features are told from them.
+
+    Parameters
+    ----------
+    recording : Recording
+    settings : Settings
+
+    Returns
+    -------
+    Transfer or None
+        None where there is no force, no response, or too short a record.
+
+    Raises
+    ------
+    DataError
+        Several forces are copies of one another.
+    """
+    if shortcomings(("force",), recording_layout(recording, settings)):
+        return None
+    kinds = tuple(channel.quantity for channel in recording.vibration_channels)
+    analysis = Analysis(
+        recording.vibration, recording.sample_rate, quantities=kinds, settings=settings
+    )
+    try:
+        return analysis.transfer_functions
+    except ValueError as error:
+        raise DataError(f"{recording.source or 'recording'}: {error}") from error
+
+
+def excitation_notes(path: str | Path, settings: Settings = STANDARD) -> dict[str, int]:
+    """How the blows of a data set's impact tests were averaged, and what is lost in noise.
 
     Parameters
     ----------
     path : str or Path
         Data set file.
+    settings : Settings
 
     Returns
     -------
     dict
-        Text -> records it holds for; empty where no force is that of a hammer.
+        Text -> records it holds for; empty where no force is that of a hammer, and every line of
+        every transfer function is heard.
     """
     notes: Counter[str] = Counter()
+    lost: list[float] = []
     with DataSet(path) as data:
         for index in np.flatnonzero((data.manifest["status"] == "ok").to_numpy()):
-            recording = data[int(index)]
-            pairs = zip(recording.vibration_channels, recording.vibration, strict=True)
-            forces = [row for channel, row in pairs if channel.quantity == FORCE]
-            if len(forces) == 1 and is_impact(forces[0]):
-                notes[find_impacts(forces[0], recording.sample_rate).text] += 1
+            found = recording_transfer(data[int(index)], settings)
+            if found is None:
+                continue
+            if found.struck:
+                notes[f"impact test, {found.words}"] += 1
+            if found.masked.max() >= _TOLD_LOSS:
+                lost.append(float(found.masked.max()))
+    if lost:
+        notes[
+            f"up to {100 * max(lost):.0f} % of the lines of a transfer function are lost in noise "
+            "and left out; push harder, or record longer"
+        ] = len(lost)
     return dict(notes)
+
+
+_TOLD_LOSS = 0.1  # of the lines: chance alone leaves out hardly any
 
 
 def _same_names(where: str | Path, names: tuple[str, ...], found: tuple[str, ...]) -> None:

@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from . import cepstrum, envelope, frf, impact, iso, modal, orbit, order, resample, spectrum
+from . import cepstrum, envelope, frf, iso, modal, orbit, order, resample, spectrum, transfer
 from .fft import fast_length, irfft, rfft
 from .statistics import Amplitude, Real
 from .third_octave import third_octave_centres
@@ -26,41 +26,23 @@ FEWEST_OCTAVE_LINES = 4
 """Lines in the lowest third octave, where the record is long enough [-]."""
 
 FEWEST_BLOCKS = 8
-"""Half-overlapping blocks behind a transfer function [-]: its random error is then 13 % at a
-coherence of 0.8."""
+"""Half-overlapping blocks for each force behind a transfer function [-]: its random error is then
+13 % at a coherence of 0.8."""
+
+FEWEST_FRF_LINES = 8
+"""Lines of a transfer function, below which it is told nothing of [-]."""
 
 HIGHEST_ORDER = 20
 """Highest order of the stabilisation [-]: found the same modes as the usual 30 in half its time."""
+
+USUAL_WINDOW = 2048
+"""Window of a transfer function, as analysers have it [samples]."""
 
 MOST_LINES = 1024
 """Lines that one modal fit takes [-]; of more, each peak is fitted alone: a fit of all takes half a
 minute where blows are seconds apart."""
 
 _THINNING_PAD = 32  # samples at the lower rate between the end of a record and its start, wrapped
-
-
-@dataclass(frozen=True, eq=False)
-class FrfReference:
-    """Transfer functions that later ones are held against, as from `Analysis.response_function`.
-
-    Parameters
-    ----------
-    frequency : ndarray, shape (n_lines,)
-        [Hz]
-    value : ndarray, shape (n_channels, n_lines)
-        [unit of response / unit of force]
-    modes : Modes, optional
-        Of the same functions; without them there is no shift to tell.
-
-    Examples
-    --------
-    >>> FrfReference(np.ones(1), np.ones((1, 1), complex)).modes is None
-    True
-    """
-
-    frequency: Float
-    value: NDArray[np.complex128]
-    modes: modal.Modes | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -109,14 +91,19 @@ class Settings:
     bearing : BearingFrequencies, optional
         Fault frequencies in orders of the shaft.
     frf_spacing_hz : float
-        Widest line spacing of a transfer function [Hz].
+        Widest line spacing of a transfer function [Hz]; lines are closer where the record has
+        `FEWEST_BLOCKS` windows of 2,048 samples for each force.
     exponential : float
         What the exponential window of an impact test has sunk to at the end of a block [-]; 1 for
         none. See `impact.impact_spectra`.
     frf_bands : int
-        Its bands.
+        Its bands, from `band_low`.
+    profile_bands : int
+        Its narrow bands, from `profile_low`.
+    profile_low : float
+        Their lower edge, from which on modes are looked for, too [Hz].
     n_modes : int
-        Modes of it that are reported, those that stand out highest.
+        Modes of it that are reported, those that stand out highest, and antiresonances.
     reference : FrfReference, optional
         What a transfer function is held against.
 
@@ -147,8 +134,10 @@ class Settings:
     frf_spacing_hz: float = 12.5
     exponential: float = 1.0
     frf_bands: int = 10
+    profile_bands: int = 72
+    profile_low: float = 5.0
     n_modes: int = 3
-    reference: FrfReference | None = None
+    reference: transfer.FrfReference | None = None
 
     def band_edges(self, fs: float) -> Float:
         """Edges of the bands of the long spectrum [Hz, shape=(n_bands + 1,)]."""
@@ -179,14 +168,42 @@ class Settings:
         return iso.iso_band(self.machine, self.speed_hz)
 
     def frf_nperseg(self, fs: float) -> int:
-        """Length of the blocks of a transfer function [samples]: a power of two."""
+        """Least length of the windows of a transfer function [samples]: a power of two."""
         return 1 << max(3, math.ceil(math.log2(fs / self.frf_spacing_hz)))
+
+    def profile_nperseg(self, fs: float) -> int:
+        """Length of the windows where the record is long enough [samples]."""
+        return max(self.frf_nperseg(fs), USUAL_WINDOW)
 
     def frf_edges(self, fs: float) -> Float:
         """Edges of the bands of a transfer function [Hz, shape=(frf_bands + 1,)]."""
         return spectrum.line_band_edges(
             fs, self.frf_nperseg(fs), n_bands=self.frf_bands, low=self.band_low, high=self.high
         )
+
+    def profile_edges(self, fs: float) -> Float:
+        """Edges of the narrow bands of a transfer function [Hz, shape=(profile_bands + 1,)]."""
+        nperseg = self.profile_nperseg(fs)
+        return spectrum.line_band_edges(
+            fs, nperseg, n_bands=self.profile_bands, low=self.profile_low, high=self.high
+        )
+
+    def frf_band(self, fs: float) -> Band:
+        """First and last frequency of a transfer function [Hz]."""
+        line = fs / self.frf_nperseg(fs)
+        low = min(self.profile_low, self.band_low) - line / 2
+        return low, spectrum.upper_edge(fs, self.high) + line / 2
+
+
+def least_samples(nperseg: int, n_forces: int) -> float:
+    """Shortest record that has `FEWEST_BLOCKS` half-overlapping windows for each force [samples].
+
+    Examples
+    --------
+    >>> least_samples(256, 1)
+    1152.0
+    """
+    return (n_forces * FEWEST_BLOCKS + 1) / 2 * nperseg
 
 
 def _decades(frequency: float) -> float:
@@ -486,67 +503,64 @@ class Analysis:
         return [i for i, quantity in enumerate(self._quantities) if quantity != FORCE]
 
     @cached_property
-    def frf_spectra(self) -> frf.Spectra:
-        """Averaged spectra of force and responses, the lines within the bands only.
-
-        Of the blows of an impact test, else of half-overlapped windows.
-        """
-        force = [i for i, quantity in enumerate(self._quantities) if quantity == FORCE]
-        if len(force) != 1:
+    def transfer_functions(self) -> transfer.Transfer:
+        """Transfer functions of the paths, from each force to each response."""
+        forces = [i for i, quantity in enumerate(self._quantities) if quantity == FORCE]
+        if not forces or not self.responses:
             raise ValueError(
-                f"n_forces = {len(force)} must be 1: the feature needs a force channel"
+                f"n_forces = {len(forces)} and n_responses = {len(self.responses)} must be >= 1: "
+                "the feature needs both; record them"
             )
-        edges = self.settings.frf_edges(self.fs)
-        nperseg = self.settings.frf_nperseg(self.fs)
-        rows = self.vibration[force[0]], self.vibration[self.responses]
-        if impact.is_impact(rows[0]):
-            last = self.settings.exponential
-            spectra, _ = impact.impact_spectra(*rows, self.fs, least=nperseg, last=last)
-        else:
-            spectra = frf.welch_spectra(*rows, self.fs, nperseg=nperseg)
-        return spectra.between(float(edges[0]), float(edges[-1]))
+        nperseg = self.settings.profile_nperseg(self.fs)
+        if self.vibration.shape[-1] < least_samples(nperseg, len(forces)):
+            nperseg = self.settings.frf_nperseg(self.fs)
+        return transfer.measured_transfer(
+            self.vibration[forces],
+            self.vibration[self.responses],
+            self.fs,
+            nperseg=nperseg,
+            last=self.settings.exponential,
+            band=self.settings.frf_band(self.fs),
+        )
 
     @cached_property
-    def response_function(self) -> NDArray[np.complex128]:
-        """H1 [unit of x / unit of force, shape=(n_responses, n_lines)]; 0 without a force."""
-        spectra = self.frf_spectra
-        heard = spectra.force > 0
-        return np.asarray(spectra.cross / np.where(heard, spectra.force, 1.0))
+    def frf_profile(self) -> tuple[Float, NDArray[np.bool_]]:
+        """Levels of the paths in narrow bands, and which of these are heard."""
+        return transfer.profile(self.transfer_functions, self.settings.profile_edges(self.fs))
 
     @cached_property
-    def coherence(self) -> Float:
-        """Ordinary coherence [-, shape=(n_responses, n_lines)]; 0 without a force.
+    def modal_paths(self) -> list[int]:
+        """Paths that a modal fit takes: moving ones to responses of the first one's quantity.
 
-        NaN of a single blow: one block tells no noise.
+        Poles are shared, residues not: functions of another quantity have other residues.
         """
-        spectra = self.frf_spectra
-        if spectra.blocks < 2:
-            return np.full(spectra.response.shape, np.nan)
-        return frf.coherence(spectra)
+        kinds = [self._quantities[i] for i in self.responses]
+        found = self.transfer_functions
+        moving = np.any(found.value != 0, axis=-1)
+        return [
+            i for i in np.flatnonzero(moving).tolist() if kinds[i // found.n_forces] == kinds[0]
+        ]
 
     @cached_property
     def modes(self) -> modal.Modes | None:
-        """Modes of the responses of the first one's quantity; None where no pole is stable."""
-        kinds = [self._quantities[i] for i in self.responses]
-        moving = np.any(self.response_function != 0, axis=-1)
-        # Poles are shared, residues not: functions of another quantity have other residues.
-        rows = [i for i, kind in enumerate(kinds) if moving[i] and kind == kinds[0]]
-        if not rows:
-            return None
-        try:
-            fit = (
-                modal.peak_fits if self.frf_spectra.frequency.size > MOST_LINES else modal.modal_fit
-            )
-            return fit(
-                self.frf_spectra.frequency,
-                self.response_function[rows],
-                n_modes=self.settings.n_modes,
-                quantity=MODAL_QUANTITIES.get(kinds[0], ACCELERANCE),
-                decay=self.frf_spectra.decay,
-                highest_order=min(HIGHEST_ORDER, self.frf_spectra.frequency.size // 3),
-            )
-        except ValueError:  # no stable pole: the functions are sound
-            return None
+        """Modes of `modal_paths`; None where no pole is stable."""
+        kind = self._quantities[self.responses[0]]
+        return transfer.fit_transfer(
+            self.transfer_functions,
+            self.modal_paths,
+            quantity=MODAL_QUANTITIES.get(kind, ACCELERANCE),
+            n_modes=self.settings.n_modes,
+            highest_order=HIGHEST_ORDER,
+            most_lines=MOST_LINES,
+        )
+
+    @cached_property
+    def reference_modes(self) -> modal.Modes:
+        """Modes of the reference; ValueError where it has none."""
+        known = self.settings.reference
+        if known is None or known.modes is None:
+            raise ValueError("reference has no modes: the feature needs them; fit the reference")
+        return known.modes
 
 
 ACCELERANCE: Literal["accelerance"] = "accelerance"

@@ -9,7 +9,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from . import frf, modal, operational, orbit, order, speed
+from . import frf, modal, operational, orbit, order, speed, transfer
 from .analysis import FAULTS, Analysis, Settings
 from .envelope import FaultLine
 from .spectral_shape import (
@@ -23,7 +23,7 @@ from .spectrum import decibel, levels_in_bands
 from .statistics import Real
 
 Float = NDArray[np.float64]
-Scope = Literal["channel", "housing", "response", "pair", "shaft", "orbit", "frf"]
+Scope = Literal["channel", "housing", "path", "pair", "shaft", "orbit", "frf"]
 SetName = Literal["standard", "core", "complete"]
 
 
@@ -41,13 +41,14 @@ class Feature:
         What it cannot be had without, keys of `needs.NEEDS`; nothing but a vibration by default.
     uses : tuple of str
         What else it takes into account where it is there; ``tacho`` alone has a meaning.
-    scope : {"channel", "housing", "response", "pair", "shaft", "orbit", "frf"}
-        Whether it exists once per channel, per acceleration, per channel that is no force, per pair
-        of channels, per record, per orbit, or per transfer function of one force.
+    scope : {"channel", "housing", "path", "pair", "shaft", "orbit", "frf"}
+        Whether it exists once per channel, per acceleration, per path from a force to a channel
+        that is none, per pair of channels, per record, per orbit, or per test.
     labels : callable
         ``labels(settings, fs)`` names its values within one of these.
     function : callable
-        ``function(analysis)`` gives them [shape=(n_channels, …), (n_pairs, …) or (…)].
+        ``function(analysis)`` gives them [shape=(n_channels, …), (n_paths, …), (n_pairs, …) or
+        (…)].
     reference : str
         Where it is defined.
 
@@ -313,71 +314,111 @@ def _frf_band_labels(settings: Settings, fs: float) -> tuple[str, ...]:
     return tuple(f"frf.{band}.level_db" for band in _hertz(settings.frf_edges(fs)))
 
 
-def _frf_levels(analysis: Analysis) -> Float:
-    """Levels of the responses; of a silent one -200 dB."""
-    value = analysis.response_function
-    moving = np.any(value != 0, axis=-1)
-    edges = analysis.settings.frf_edges(analysis.fs)
-    levels = np.full((len(value), edges.size - 1), decibel(0.0))
-    if moving.any():
-        frequency = analysis.frf_spectra.frequency
-        levels[moving] = modal.band_response_levels(frequency, value[moving], edges)
-    return levels
-
-
-def _frf_quality(analysis: Analysis) -> Float:
-    """Mean coherence, and the random error that goes with it, 1 at the most; NaN of one blow."""
-    mean = analysis.coherence.mean(axis=-1)
-    if np.isnan(mean).any():
-        return _stacked(mean, mean)
-    error = frf.random_error(mean, analysis.frf_spectra.averages)
-    return _stacked(mean, np.minimum(error, 1.0))
-
-
-def _frf_assurance(analysis: Analysis) -> Float:
-    """Likeness to the reference, channel by channel; 0 of a silent one."""
-    value, known = analysis.response_function, analysis.settings.reference
-    if known is None or known.value.shape != value.shape:
-        shape = None if known is None else known.value.shape
-        raise ValueError(
-            f"reference has shape {shape}, must have {value.shape} as the transfer function; "
-            "measure it with the same channels, sample rate and settings"
-        )
-    likeness = np.zeros(len(value))
-    moving = np.any(value != 0, axis=-1) & np.any(known.value != 0, axis=-1)
-    if moving.any():
-        likeness[moving] = modal.frequency_response_assurance(value[moving], known.value[moving])
-    return likeness
-
-
-def _mode_labels(settings: Settings, _fs: float) -> tuple[str, ...]:
-    return tuple(
-        f"mode_{k}.{part}"
-        for k in range(1, settings.n_modes + 1)
-        for part in ("frequency_hz", "damping_ratio")
+def _frf_levels(estimator: str) -> Callable[[Analysis], Float]:
+    """Levels of the paths by an estimator."""
+    return lambda a: transfer.band_levels(
+        a.transfer_functions, a.settings.frf_edges(a.fs), estimator=estimator
     )
 
 
-def _modes(analysis: Analysis) -> Float:
-    """Frequency and damping of the modes, rising; zeros where there are fewer."""
-    table = np.zeros((analysis.settings.n_modes, 2))
-    found = analysis.modes
-    if found is not None:
-        table[: found.frequency.size] = _stacked(found.frequency, found.damping_ratio)
+def _estimator_labels(estimator: str) -> Callable[[Settings, float], tuple[str, ...]]:
+    return lambda settings, fs: tuple(
+        f"frf_{estimator}.{band}.level_db" for band in _hertz(settings.frf_edges(fs))
+    )
+
+
+def _profile_labels(settings: Settings, fs: float) -> tuple[str, ...]:
+    pairs = pairwise(settings.profile_edges(fs).tolist())
+    return tuple(f"frf.profile_{low:.5g}_{high:.5g}.level_db" for low, high in pairs)
+
+
+def _frf_quality(analysis: Analysis) -> Float:
+    """Mean coherence, random error that goes with it, 1 at the most, and share of lines left out.
+
+    NaN of one blow but for the last: nothing is left out then, for want of a reason.
+    """
+    found = analysis.transfer_functions
+    mean = found.coherence.mean(axis=-1)
+    if np.isnan(mean).any():
+        return _stacked(mean, mean, found.masked)
+    error = frf.random_error(mean, found.averages)
+    return _stacked(mean, np.minimum(error, 1.0), found.masked)
+
+
+def _frf_assurance(analysis: Analysis) -> Float:
+    """Likeness to the reference, path by path; 0 of a silent one."""
+    found, known = analysis.transfer_functions, analysis.settings.reference
+    if known is None:
+        raise ValueError("reference = None must be given: the feature needs it; measure one")
+    value, other = found.value, known.at(found.frequency, len(found.value))
+    likeness = np.zeros(len(value))
+    moving = np.any(value != 0, axis=-1) & np.any(other != 0, axis=-1)
+    if moving.any():
+        likeness[moving] = modal.frequency_response_assurance(value[moving], other[moving])
+    return likeness
+
+
+def _antiresonance_labels(settings: Settings, _fs: float) -> tuple[str, ...]:
+    return tuple(
+        f"frf.antiresonance_{k}.{part}"
+        for k in range(1, settings.n_modes + 1)
+        for part in ("frequency_hz", "depth_db")
+    )
+
+
+def _mode_labels(*parts: str) -> Callable[[Settings, float], tuple[str, ...]]:
+    """One label for every part of every mode."""
+    return lambda settings, _fs: tuple(
+        f"mode_{k}.{part}" for k in range(1, settings.n_modes + 1) for part in parts
+    )
+
+
+def _of_modes(*parts: str) -> Callable[[Analysis], Float]:
+    """Parts of the modes, rising; zeros where there are fewer."""
+
+    def values(analysis: Analysis) -> Float:
+        table = np.zeros((analysis.settings.n_modes, len(parts)))
+        found = analysis.modes
+        if found is not None:
+            table[: found.frequency.size] = _stacked(*(getattr(found, part) for part in parts))
+        return table
+
+    return values
+
+
+def _mode_shapes(analysis: Analysis) -> Float:
+    """Shape and its deviation, of every path and mode; zeros where there is none."""
+    paths = len(analysis.transfer_functions.value)
+    table = np.zeros((paths, analysis.settings.n_modes, 2))
+    if analysis.modes is not None:
+        shape = _stacked(*transfer.mode_shapes(analysis.modes))
+        table[analysis.modal_paths, : shape.shape[1]] = shape
     return table
+
+
+def _static_stiffness(analysis: Analysis) -> Float:
+    """Stiffness at rest, and of what lies above the modes; 200 dB where nothing moves."""
+    table = np.full((len(analysis.transfer_functions.value), 2), -decibel(0.0))
+    if analysis.modes is not None:
+        flexibility = _stacked(*transfer.static_flexibility(analysis.modes))
+        table[analysis.modal_paths] = -decibel(flexibility**2)
+    return table
+
+
+def _mode_changes(analysis: Analysis) -> Float:
+    count = analysis.settings.n_modes
+    return transfer.mode_changes(analysis.modes, analysis.reference_modes, count)
 
 
 def _resonance_shift(analysis: Analysis) -> Float:
     """Mean relative shift of the modes that are found again, and the share of those that are."""
-    known = analysis.settings.reference
-    if known is None or known.modes is None:
-        raise ValueError("reference has no modes: the feature needs them; fit the reference")
-    if analysis.modes is None:
-        return np.zeros(2)
-    shift = modal.resonance_shift(analysis.modes, known.modes)
-    found = len(shift.frequency)
-    mean = float(shift.frequency.mean()) if found else 0.0
-    return np.array([mean, found / max(known.modes.frequency.size, 1)])
+    known, found = analysis.reference_modes, analysis.modes
+    if found is None or found.residue.shape[0] != known.residue.shape[0]:
+        return np.zeros(2)  # a dead sensor: nothing is found again
+    shift = modal.resonance_shift(found, known)
+    count = len(shift.frequency)
+    mean = float(shift.frequency.mean()) if count else 0.0
+    return np.array([mean, count / max(known.frequency.size, 1)])
 
 
 CATALOGUE: tuple[Feature, ...] = (
@@ -588,9 +629,27 @@ ORBIT_CATALOGUE: tuple[Feature, ...] = (
 """Features of a pair of proximity probes at right angles, after those of `CATALOGUE`."""
 
 
+_RANDOM_DATA = "Bendat, Piersol, Random Data, 4th ed. (2010), chapter 9"
+
+TEST_CATALOGUE: tuple[Feature, ...] = (
+    Feature(
+        name="frf_profile",
+        unit="dB re 1 (x/N)^2",
+        needs=("force", "profile"),
+        scope="path",
+        labels=_profile_labels,
+        function=lambda a: a.frf_profile[0],
+        reference=f"transfer.profile; {_RANDOM_DATA}",
+    ),
+)
+"""Features of a test with a measured force, after those of an orbit."""
+
+
 _IEC = "IEC 61260-1:2014"
 _BEARING = "Randall, Antoni, Mech. Syst. Signal Process. 25 (2011) 485-520"
-_RANDOM_DATA = "Bendat, Piersol, Random Data, 4th ed. (2010), chapter 9"
+_SHIN = "Shin, Hammond, Fundamentals of Signal Processing (2008), chapter 9"
+_FIT = "Guillaume et al., IMAC XXI (2003)"
+_EWINS = "Ewins, Modal Testing, 2nd ed. (2000)"
 
 CORE_ROWS: tuple[Feature, ...] = (
     Feature(
@@ -779,26 +838,53 @@ CORE_ROWS: tuple[Feature, ...] = (
     Feature(
         name="frf_levels",
         unit="dB re 1 (x/N)^2",
-        needs=("force",),
-        scope="response",
+        needs=("force", "frf bands"),
+        scope="path",
         labels=_frf_band_labels,
-        function=_frf_levels,
-        reference=f"frf.h1, modal.band_response_levels; {_RANDOM_DATA}",
+        function=_frf_levels("h1"),
+        reference=f"transfer.band_levels, frf.h1, mimo.multiple_h1; {_RANDOM_DATA}",
+    ),
+    Feature(
+        name="frf_h2_levels",
+        unit="dB re 1 (x/N)^2",
+        needs=("force", "frf bands"),
+        scope="path",
+        labels=_estimator_labels("h2"),
+        function=_frf_levels("h2"),
+        reference=f"transfer.band_levels, frf.h2; {_RANDOM_DATA}",
+    ),
+    Feature(
+        name="frf_hv_levels",
+        unit="dB re 1 (x/N)^2",
+        needs=("force", "frf bands"),
+        scope="path",
+        labels=_estimator_labels("hv"),
+        function=_frf_levels("hv"),
+        reference=f"transfer.band_levels, frf.hv; {_SHIN}",
     ),
     Feature(
         name="frf_quality",
         unit="-",
         needs=("force",),
-        scope="response",
-        labels=_named("frf.coherence", "frf.random_error"),
+        scope="path",
+        labels=_named("frf.coherence", "frf.random_error", "frf.masked_share"),
         function=_frf_quality,
-        reference=f"frf.coherence, frf.random_error; {_RANDOM_DATA}",
+        reference=f"frf.coherence, frf.random_error, transfer.coherence_limit; {_RANDOM_DATA}",
+    ),
+    Feature(
+        name="antiresonances",
+        unit="Hz, dB",
+        needs=("force",),
+        scope="path",
+        labels=_antiresonance_labels,
+        function=lambda a: transfer.antiresonances(a.transfer_functions, a.settings.n_modes),
+        reference=f"transfer.antiresonances; {_EWINS}",
     ),
     Feature(
         name="frf_assurance",
         unit="-",
         needs=("force", "reference"),
-        scope="response",
+        scope="path",
         labels=_named("frf.assurance"),
         function=_frf_assurance,
         reference="modal.frequency_response_assurance; Heylen, Lammens, Swansea (1996) 48-57",
@@ -843,9 +929,36 @@ COMPLETE_ROWS: tuple[Feature, ...] = (
         unit="Hz, -",
         needs=("force",),
         scope="frf",
-        labels=_mode_labels,
-        function=_modes,
-        reference="modal.modal_fit; Guillaume et al., IMAC XXI (2003)",
+        labels=_mode_labels("frequency_hz", "damping_ratio"),
+        function=_of_modes("frequency", "damping_ratio"),
+        reference=f"modal.modal_fit; {_FIT}",
+    ),
+    Feature(
+        name="mode_deviations",
+        unit="Hz, -",
+        needs=("force",),
+        scope="frf",
+        labels=_mode_labels("frequency_deviation_hz", "damping_deviation"),
+        function=_of_modes("frequency_deviation", "damping_deviation"),
+        reference=f"modal.modal_fit; {_FIT}",
+    ),
+    Feature(
+        name="mode_shapes",
+        unit="-",
+        needs=("force",),
+        scope="path",
+        labels=_mode_labels("shape", "shape_deviation"),
+        function=_mode_shapes,
+        reference=f"transfer.mode_shapes; {_EWINS}",
+    ),
+    Feature(
+        name="static_stiffness",
+        unit="dB re 1 N/(x in m)",
+        needs=("force",),
+        scope="path",
+        labels=_named("static.stiffness_db", "static.residual_stiffness_db"),
+        function=_static_stiffness,
+        reference=f"transfer.static_flexibility; {_EWINS}",
     ),
     Feature(
         name="resonance_shift",
@@ -856,15 +969,28 @@ COMPLETE_ROWS: tuple[Feature, ...] = (
         function=_resonance_shift,
         reference="modal.resonance_shift",
     ),
+    Feature(
+        name="mode_changes",
+        unit="-, -, -, dB, -",
+        needs=("force", "reference", "reference modes"),
+        scope="frf",
+        labels=_mode_labels(
+            "frequency_shift", "shift_deviation", "damping_change", "level_change_db", "mac"
+        ),
+        function=_mode_changes,
+        reference="transfer.mode_changes, modal.resonance_shift; Allemang, IMAC I (1982) 110-116",
+    ),
 )
 """What `complete` has beside `core`: what costs most."""
 
 
+_STANDARD = (*CATALOGUE, *ORBIT_CATALOGUE, *TEST_CATALOGUE)
+
 SETS: Mapping[SetName, tuple[Feature, ...]] = MappingProxyType(
     {
-        "standard": (*CATALOGUE, *ORBIT_CATALOGUE),
-        "core": (*CATALOGUE, *ORBIT_CATALOGUE, *CORE_ROWS),
-        "complete": (*CATALOGUE, *ORBIT_CATALOGUE, *CORE_ROWS, *COMPLETE_ROWS),
+        "standard": _STANDARD,
+        "core": (*_STANDARD, *CORE_ROWS),
+        "complete": (*_STANDARD, *CORE_ROWS, *COMPLETE_ROWS),
     }
 )
 """Rows of every set: what models are trained on, all that is cheap, and everything."""

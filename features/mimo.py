@@ -30,6 +30,9 @@ class MultiFrf:
         H1, response over each force, the others at rest [unit of response / N].
     coherence : ndarray, shape (n_channels, n_lines)
         Multiple coherence, the share of the response that all forces together make, 0 to 1 [-].
+    partial : ndarray, shape (n_channels, n_forces, n_lines)
+        Partial coherence: that of a response and one force once what the other forces make is
+        taken out of both, 0 to 1 [-]; of one force alone the ordinary coherence.
     condition : ndarray, shape (n_lines,)
         Condition number of the matrix of coherences among the forces, >= 1 [-]: by its root at
         most the noise of a function grows against forces that are independent.
@@ -40,6 +43,7 @@ class MultiFrf:
     frequency: Float
     value: Complex
     coherence: Float
+    partial: Float
     condition: Float
     averages: float
 
@@ -84,6 +88,10 @@ def multiple_h1(
     responses leaves it unbiased, noise on the forces does not. More averages than forces are
     needed, and with n_forces out of n averages a coherence of nothing is ``n_forces / n``.
 
+    What the other forces leave of force k has the power ``1 / [Gxx^-1]kk``, and the response to it
+    stands beside the noise N that no force explains, so that the partial coherence is
+    ``|Hk|^2 / (|Hk|^2 + N [Gxx^-1]kk)``. Taking the others out costs ``n_forces - 1`` averages.
+
     References
     ----------
     J. S. Bendat, A. G. Piersol, "Random Data", 4th ed., Wiley 2010, chapter 7,
@@ -124,13 +132,23 @@ def multiple_h1(
     explained = np.sum(solved * cross.conj(), axis=-1).real
     power = np.diagonal(spectra, axis1=-2, axis2=-1).real[:, count:]
     share = np.divide(explained, power, out=np.zeros_like(power), where=power > 0)
+    share = np.clip(share, 0.0, 1.0)  # rounding
     return MultiFrf(
         frequency=frequency,
         value=np.asarray(np.moveaxis(solved / size[:, np.newaxis], 0, -1), dtype=np.complex128),
-        coherence=np.clip(share.T, 0.0, 1.0),  # rounding
+        coherence=share.T,
+        partial=np.moveaxis(_partial(solved, scaled, power * (1 - share)), 0, -1),
         condition=condition,
         averages=averages,
     )
+
+
+def _partial(value: Complex, forces: Complex, noise: Float) -> Float:
+    """Partial coherences (n_lines, n_channels, n_forces) of functions of forces of power one."""
+    inverse = np.diagonal(np.linalg.inv(forces), axis1=-2, axis2=-1).real
+    told = np.square(value.real) + np.square(value.imag)
+    whole = told + noise[..., np.newaxis] * inverse[:, np.newaxis]
+    return np.divide(told, whole, out=np.zeros_like(whole), where=whole > 0)
 
 
 def _records(force: ArrayLike, response: ArrayLike) -> tuple[Float, Float]:

@@ -1364,7 +1364,9 @@ def synthesise(
 # --- against a reference
 
 
-def band_response_levels(frequency: ArrayLike, value: ArrayLike, edges: ArrayLike) -> Float:
+def band_response_levels(
+    frequency: ArrayLike, value: ArrayLike, edges: ArrayLike, *, weight: ArrayLike | None = None
+) -> Float:
     """Mean level of response functions in bands.
 
     Parameters
@@ -1375,16 +1377,20 @@ def band_response_levels(frequency: ArrayLike, value: ArrayLike, edges: ArrayLik
         Response functions.
     edges : array_like, shape (n_bands + 1,)
         Ascending; a band takes the lines from its lower edge to below its upper one [Hz].
+    weight : array_like, shape (n_lines,) or (n_channels, n_lines), optional
+        Of the lines, >= 0 [-], as their coherence; all alike by default.
 
     Returns
     -------
     ndarray, shape (n_channels, n_bands)
-        ``10 log10`` of the mean of ``|H|^2`` over the lines [dB re 1 unit of value].
+        ``10 log10`` of the mean of ``|H|^2`` over the lines [dB re 1 unit of value]; NaN where
+        every line of a band has the weight 0.
 
     Raises
     ------
     ValueError
-        If the data cannot be used, edges do not ascend or a band holds no line.
+        If the data cannot be used, edges do not ascend, a band holds no line, or weights are
+        negative or of another shape.
 
     Notes
     -----
@@ -1395,6 +1401,8 @@ def band_response_levels(frequency: ArrayLike, value: ArrayLike, edges: ArrayLik
     --------
     >>> band_response_levels(range(10), [10.0] * 5 + [1.0] * 5, [0.0, 5.0, 10.0]).tolist()
     [[20.0, 0.0]]
+    >>> band_response_levels(range(4), [10.0, 1, 1, 1], [0.0, 2.0], weight=[1.0, 0, 0, 0]).tolist()
+    [[20.0]]
     """
     lines, functions = _functions(frequency, value)
     limits = np.asarray(edges, dtype=np.float64)
@@ -1405,8 +1413,20 @@ def band_response_levels(frequency: ArrayLike, value: ArrayLike, edges: ArrayLik
     if empty.size:
         named = ", ".join(f"{limits[i]:.6g} … {limits[i + 1]:.6g} Hz" for i in empty)
         raise ValueError(f"bands {named} must each hold a line; widen them")
-    total = np.add.reduceat(_square(functions[:, : places[-1]]), places[:-1], axis=-1)
-    return decibel(total / np.diff(places))
+    share = np.ones(lines.size) if weight is None else np.asarray(weight, dtype=np.float64)
+    if share.shape == lines.shape:
+        share = np.broadcast_to(share, functions.shape)
+    if share.shape != functions.shape or not np.all(share >= 0):
+        raise ValueError(
+            f"weight has shape {np.shape(weight)}, must have {functions.shape}, each >= 0; give "
+            "the coherence of every line"
+        )
+    total, shares = (
+        np.add.reduceat(lines[:, : places[-1]], places[:-1], axis=-1)
+        for lines in (share * _square(functions), share)
+    )
+    heard = shares > 0
+    return np.where(heard, decibel(total / np.where(heard, shares, 1.0)), np.nan)
 
 
 def frequency_response_assurance(value: ArrayLike, reference: ArrayLike) -> Float:

@@ -10,7 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import envelope, iso, speed
-from .analysis import ACCELERATION, DISPLACEMENT, FEWEST_BLOCKS, FORCE, STANDARD, Settings
+from .analysis import (
+    ACCELERATION,
+    DISPLACEMENT,
+    FEWEST_FRF_LINES,
+    FORCE,
+    STANDARD,
+    Settings,
+    least_samples,
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -140,15 +148,33 @@ def _probes(layout: Layout) -> str:
 
 def _force(layout: Layout) -> str:
     count = len(layout.rows_of(FORCE))
-    if count != 1:
-        return f"force channels = {count} must be 1; {_declared('N', count > 1)}"
-    if len(layout.channels) == 1:
+    if count == 0:
+        return f"force channels = 0 must be >= 1; {_declared('N')}"
+    if len(layout.channels) == count:
         return "responses = 0 must be >= 1; record one beside the force"
-    if fault := _bands_fault(layout.settings.frf_edges, layout.fs):
-        return fault
+    try:
+        low, high = layout.settings.frf_band(layout.fs)
+    except ValueError as error:
+        return _too_slow(layout.fs, error)
     nperseg = layout.settings.frf_nperseg(layout.fs)
-    least = (FEWEST_BLOCKS + 1) / 2 * nperseg / layout.fs
+    if (high - low) * nperseg < FEWEST_FRF_LINES * layout.fs:
+        return f"fs = {layout.fs:.6g} Hz is too low: lines up to {high:.4g} Hz; sample faster"
+    least = least_samples(nperseg, count) / layout.fs
     return _duration(layout, least, "in Python raise frf_spacing_hz")
+
+
+def _frf_bands(layout: Layout) -> str:
+    return _bands_fault(layout.settings.frf_edges, layout.fs)
+
+
+def _profile(layout: Layout) -> str:
+    try:
+        layout.settings.profile_edges(layout.fs)
+    except ValueError as error:
+        return _too_slow(layout.fs, error)
+    nperseg = layout.settings.profile_nperseg(layout.fs)
+    least = least_samples(nperseg, len(layout.rows_of(FORCE))) / layout.fs
+    return _duration(layout, least, "sample faster")
 
 
 def _reference(layout: Layout) -> str:
@@ -269,6 +295,8 @@ NEEDS: Mapping[str, Need] = MappingProxyType(
         "frames": Need(text="256 samples", fault=_samples(256)),
         "cycles": Need(text="768 samples", fault=_samples(768)),
         "force": Need(text="force channel", fault=_force),
+        "frf bands": Need(text="rate for its bands", fault=_frf_bands),
+        "profile": Need(text="rate for its narrow bands", fault=_profile),
         "reference": Need(text="reference transfer function", fault=_reference),
         "reference modes": Need(text="modes of the reference", fault=_reference_modes),
     }

@@ -136,8 +136,8 @@ def feature_names(
     Returns
     -------
     tuple of str
-        ``channel.label``, ``first_over_second.label``, ``shaft.label``, ``orbit.label`` and
-        ``frf.label``.
+        ``channel.label``, ``first_over_second.label``, ``shaft.label``, ``orbit.label``,
+        ``frf.label``, and of several forces ``response_per_force.label``.
 
     Raises
     ------
@@ -239,11 +239,16 @@ def _names_of(row: Feature, layout: Layout) -> tuple[str, ...]:
 def _owners(scope: Scope, layout: Layout) -> tuple[str, ...]:
     """What a feature exists once per."""
     channels = layout.channels
-    force = set(layout.rows_of(FORCE))
+    forces = [channels[i] for i in layout.rows_of(FORCE)]
+    responses = [name for name in channels if name not in forces]
     owners: Mapping[Scope, tuple[str, ...]] = {
         "channel": channels,
         "housing": tuple(channels[i] for i in layout.rows_of(ACCELERATION)),
-        "response": tuple(name for i, name in enumerate(channels) if i not in force),
+        "path": tuple(
+            name if len(forces) == 1 else f"{name}_per_{force}"
+            for name in responses
+            for force in forces
+        ),
         "pair": tuple(f"{a}_over_{b}" for a, b in combinations(channels, 2)),
     }
     return owners.get(scope, (scope,))
@@ -320,8 +325,8 @@ def feature_row(
         Names of the channels; ``ch_0``, ``ch_1``, … by default.
     quantities : sequence of str, optional
         Quantity of every channel; all ``acceleration`` by default. With exactly two of
-        ``displacement`` the features of their orbit are added, with one of ``force`` those of the
-        transfer functions from it.
+        ``displacement`` the features of their orbit are added, with one or more of ``force`` those
+        of the transfer functions from them.
     settings : Settings
         Bands, bins and orders; the kind of machine, the geometry of a bearing.
     feature_set : {"standard", "core", "complete"}

@@ -87,7 +87,7 @@ def test_a_set_says_what_is_absent(small_set, tmp_path):
     result = run("features", small_set, "-o", path, "--set", "core", "--json", "-j", 2)
     absent = json.loads(result.stdout)["absent"]
     assert absent["frf_levels"] == (
-        "force channels = 0 must be 1; declare the unit N on import, or quantities in Python"
+        "force channels = 0 must be >= 1; declare the unit N on import, or quantities in Python"
     )
     assert "iso_zone" in result.stderr
     assert "velocity_rms" not in absent
@@ -106,7 +106,7 @@ def test_the_usual_row_says_nothing(table_of):
     ("options", "message"),
     [
         (("--only", "kurtossis"), "feature 'kurtossis' is unknown; did you mean kurtosis?"),
-        (("--only", "frf_levels"), "force channels = 0 must be 1"),
+        (("--only", "frf_levels"), "force channels = 0 must be >= 1"),
         (("--set", "core", "--machine", "pump-1-smal"), "did you mean pump-1-small?"),
         (("--bearing", "8,2"), "bearing = [8.0, 2.0] must be a whole number of rollers"),
         (("--bearing", "8,3,2"), "roller_diameter = 3.0 must be > 0 and < pitch_diameter = 2.0"),

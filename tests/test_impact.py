@@ -122,7 +122,7 @@ def test_command_line_and_picture_tell_the_same(tmp_path):
         writer.write(0, 1e-6 * record([0]) * [[1e6], [1.0]], {"record_id": "0", "status": "ok"})
         writer.finish()
     done = run("features", path, "-o", out, "--only", "modes,frf_quality", "--exponential", 0.1)
-    assert "impact test, 1 records: 1 blow, H1 of the whole block: coherence" in done.stderr
+    assert "1 records: impact test, 1 blow, H1 of the whole block: coherence" in done.stderr
     frame = pd.read_csv(out)
     assert frame["probe.frf.coherence"].isna().all()
     assert "frf.mode_1.frequency_hz" in frame
