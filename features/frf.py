@@ -13,7 +13,7 @@ from scipy.special import stdtrit
 
 from .fft import rfft
 from .spectrum import hann
-from .statistics import centred
+from .statistics import Real, centred
 
 Float = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -130,7 +130,7 @@ class Frf:
         return np.maximum(size - self.radius, 0.0), size + self.radius
 
 
-def blocks_of(x: ArrayLike, nperseg: int, step: int) -> NDArray[np.float64]:
+def blocks_of(x: ArrayLike, nperseg: int, step: int) -> Real:
     """Cut a record into blocks, overlapping where `step` < `nperseg`.
 
     Parameters
@@ -143,7 +143,8 @@ def blocks_of(x: ArrayLike, nperseg: int, step: int) -> NDArray[np.float64]:
     Returns
     -------
     ndarray, shape (..., n_blocks, nperseg)
-        A view where `x` is float64; samples after the last whole block are left out.
+        A view where `x` is float32 or float64, and float64 otherwise; samples after the last whole
+        block are left out.
 
     Raises
     ------
@@ -155,7 +156,9 @@ def blocks_of(x: ArrayLike, nperseg: int, step: int) -> NDArray[np.float64]:
     >>> blocks_of(range(16), 8, 4)[:, 0].tolist()
     [0.0, 4.0, 8.0]
     """
-    signal = np.asarray(x, dtype=np.float64)
+    signal = np.asarray(x)
+    if signal.dtype != np.float32:
+        signal = signal.astype(np.float64, copy=False)
     n_samples = signal.shape[-1] if signal.ndim else 0
     if not 8 <= nperseg <= n_samples:
         raise ValueError(

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from .fft import rfft
 from .frf import blocks_of, effective_averages
 from .spectrum import hann
-from .statistics import centred
+from .statistics import Real, centred
 
 Float = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -61,7 +61,7 @@ def multiple_h1(
     Parameters
     ----------
     force : array_like, shape (n_forces, n_samples)
-        Forces [N].
+        Forces [N]; transforms of float32 stay single where the responses are, too.
     response : array_like, shape (n_samples,) or (n_channels, n_samples)
         Responses [any unit].
     fs : float
@@ -111,18 +111,19 @@ def multiple_h1(
         raise ValueError(f"overlap = {overlap} must be >= 0 and < 1; 0.5 suits Hann")
     step = nperseg - round(overlap * nperseg)
     rows = blocks_of(np.concatenate([x, y]), nperseg, step)
-    window = hann(nperseg)
+    window = hann(nperseg).astype(rows.dtype)
     averages = effective_averages(window, step, rows.shape[1])
     if averages <= x.shape[0]:
         raise ValueError(
             f"averages = {averages:.3g} must be > n_forces = {x.shape[0]}; record longer, or "
             "shorten the blocks"
         )
-    lines = rfft(np.asarray(centred(rows)) * window)[..., 1 : (nperseg + 1) // 2]
+    lines = rfft(centred(rows) * window)[..., 1 : (nperseg + 1) // 2]
     frequency = np.arange(1, lines.shape[-1] + 1) * (fs / nperseg)
     # Matrices line by line: (n_lines, n_rows, n_rows), the element (i, k) the mean of Zi conj(Zk).
-    stacked = np.moveaxis(lines.astype(np.complex128), -1, 0)
-    spectra = stacked @ np.swapaxes(stacked, -1, -2).conj() / rows.shape[1]
+    stacked = np.ascontiguousarray(np.moveaxis(lines, -1, 0))
+    products = stacked @ np.swapaxes(stacked, -1, -2).conj()
+    spectra = products.astype(np.complex128) / rows.shape[1]
     count = x.shape[0]
     size, condition = _sizes(spectra[:, :count, :count], frequency)
     scaled = spectra[:, :count, :count] / (size[:, :, np.newaxis] * size[:, np.newaxis])
@@ -148,12 +149,14 @@ def _partial(value: Complex, forces: Complex, noise: Float) -> Float:
     inverse = np.diagonal(np.linalg.inv(forces), axis1=-2, axis2=-1).real
     told = np.square(value.real) + np.square(value.imag)
     whole = told + noise[..., np.newaxis] * inverse[:, np.newaxis]
-    return np.divide(told, whole, out=np.zeros_like(whole), where=whole > 0)
+    share: Float = np.divide(told, whole, out=np.zeros_like(whole), where=whole > 0)
+    return share
 
 
-def _records(force: ArrayLike, response: ArrayLike) -> tuple[Float, Float]:
-    x = np.asarray(force, dtype=np.float64)
-    y = np.atleast_2d(np.asarray(response, dtype=np.float64))
+def _records(force: ArrayLike, response: ArrayLike) -> tuple[Real, Real]:
+    x, y = np.asarray(force), np.atleast_2d(np.asarray(response))
+    if not x.dtype == y.dtype == np.float32:
+        x, y = x.astype(np.float64, copy=False), y.astype(np.float64, copy=False)
     if x.ndim != 2 or y.ndim != 2 or x.shape[-1] != y.shape[-1] or x.shape[0] == 0:
         raise ValueError(
             f"force has shape {x.shape} and response {np.shape(response)}, must be (n_forces, "

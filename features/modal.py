@@ -1418,7 +1418,7 @@ def band_response_levels(
         share = np.broadcast_to(share, functions.shape)
     if share.shape != functions.shape or not np.all(share >= 0):
         raise ValueError(
-            f"weight has shape {np.shape(weight)}, must have {functions.shape}, each >= 0; give "
+            f"weight has shape {share.shape}, must have {functions.shape}, each >= 0; give "
             "the coherence of every line"
         )
     total, shares = (

@@ -88,7 +88,7 @@ class Transfer:
         share = np.where(np.isnan(self.coherence), 1.0, self.coherence)
         power = (1 - share) * np.abs(self.value) ** 2
         freedom = max(self.averages - 1, 1.0)
-        return np.divide(power, share * freedom, out=np.zeros_like(power), where=share > 0)
+        return _ratio(power, share * freedom)
 
     def estimate(self, estimator: str) -> Complex:
         """Functions by another estimator.
@@ -468,7 +468,8 @@ _LEAST_NOISE = 1e-6  # of a band's mean power: leakage, and no line alone decide
 
 def _ratio(above: Float, below: Float) -> Float:
     """Quotient, 0 where nothing stands below."""
-    return np.divide(above, below, out=np.zeros_like(below), where=below > 0)
+    quotient: Float = np.divide(above, below, out=np.zeros_like(below), where=below > 0)
+    return quotient
 
 
 def _noise_limits(counts: NDArray[np.intp]) -> Float:
