@@ -1401,7 +1401,8 @@ def band_response_levels(
     --------
     >>> band_response_levels(range(10), [10.0] * 5 + [1.0] * 5, [0.0, 5.0, 10.0]).tolist()
     [[20.0, 0.0]]
-    >>> band_response_levels(range(4), [10.0, 1, 1, 1], [0.0, 2.0], weight=[1.0, 0, 0, 0]).tolist()
+    >>> weight = [1.0, 0, 0, 0, 0]
+    >>> band_response_levels(range(5), [10.0, 1, 1, 1, 1], [0.0, 5.0], weight=weight).tolist()
     [[20.0]]
     """
     lines, functions = _functions(frequency, value)
