@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from wearstate.features import frf, modal, transfer
+from wearstate.features import frf, impact, modal, transfer
 from wearstate.features.analysis import Analysis, Settings
 from wearstate.features.table import feature_row
 
@@ -239,3 +239,61 @@ def test_two_forces_name_their_paths_and_one_may_be_dead():
     rows[1] = rows[0]
     with pytest.raises(ValueError, match="drive the shakers by independent noise"):
         named(rows, TWO)
+
+
+def decibels(value, other):
+    return np.abs(20 * np.log10(np.abs(value) / np.abs(other)))
+
+
+# --- another library, where it is installed
+
+BLOCK, BLOWS = 5120, 12
+
+
+def struck(seed=0):
+    """A hammer on the first mass, every 2 s, with a hand's scatter; noise on force and motion."""
+    rng = np.random.default_rng(seed)
+    force = np.zeros(BLOWS * BLOCK)
+    for k in range(BLOWS):
+        at = k * BLOCK + 40 + rng.integers(0, 200)
+        force[at : at + 5] += 100 * rng.uniform(0.5, 1.5) * np.array([0.3, 0.8, 1.0, 0.8, 0.3])
+    lines = receptance(np.fft.rfftfreq(force.size, 1 / FS))[:, :, 0].T * np.fft.rfft(force)
+    motion = np.fft.irfft(lines, force.size)
+    motion += 5e-4 * np.abs(motion).max() * rng.standard_normal(motion.shape)
+    return force + 0.01 * rng.standard_normal(force.size), motion
+
+
+@pytest.mark.parametrize("cut", ["ours", "whole periods"])
+def test_h1_of_an_impact_record_by_pyfrf(cut):
+    library = pytest.importorskip("pyFRF")
+    force, motion = struck()
+    found = transfer.measured_transfer(force[np.newaxis], motion, FS, nperseg=BLOCK)
+    assert found.words == f"{BLOWS} blows"
+    level, shape = force - np.median(force), (BLOWS, 1, BLOCK)
+    rows = motion - motion.mean(axis=-1, keepdims=True)
+    pulses, blocks = level.reshape(shape), rows.reshape(3, BLOWS, BLOCK).swapaxes(0, 1)
+    if cut == "ours":
+        blows = impact.find_impacts(force, FS).blows
+        fill = BLOCK - blows.nperseg
+        pulses = np.pad(blows.cut(level[np.newaxis]), ((0, 0), (0, 0), (0, fill)))
+        blocks = np.pad(blows.cut(rows), ((0, 0), (0, 0), (0, fill)))
+    options = {"exc_type": "f", "resp_type": "d", "fft_len": BLOCK}
+    theirs = library.FRF(int(FS), pulses, blocks, **options).get_H1()[:, 0, 1 : BLOCK // 2]
+    sure = found.coherence > 0.9
+    assert sure.mean() > 0.1
+    apart = decibels(found.value, theirs)[sure]
+    # Of other blocks other noise: a tenth of it and what lies before the blow.
+    assert (apart < 0.1).mean() > (0.9 if cut == "whole periods" else 0.9999)
+    assert np.median(apart) < 0.02
+
+
+def test_h1_of_two_shakers_by_pyfrf():
+    library = pytest.importorskip("pyFRF")
+    rows = pushed([0, 2], noise=0.05)
+    found = transfer.measured_transfer(rows[:2], rows[2:], FS, nperseg=2048)
+    options = {"window": "hann", "fft_len": 2048, "nperseg": 2048, "noverlap": 1024}
+    other = library.FRF(int(FS), rows[np.newaxis, :2], rows[np.newaxis, 2:], "f", "d", **options)
+    theirs = other.get_H1()[:, :, 1:1024].reshape(6, -1)
+    sure = found.coherence > 0.9
+    assert sure.mean() > 0.3
+    assert decibels(found.value, theirs)[sure].max() < 0.1
