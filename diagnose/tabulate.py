@@ -18,7 +18,7 @@ from ..datasets.workers import in_order
 from ..features.analysis import STANDARD, Analysis, Settings
 from ..features.catalogue import SetName
 from ..features.envelope import BearingFrequencies, bearing_frequencies
-from ..features.needs import Layout, shortcomings
+from ..features.needs import Layout, shortcomings, struck
 from ..features.table import absent_features, feature_names, feature_row
 from ..features.transfer import Transfer
 from ..sim.atomic import replacing
@@ -241,6 +241,7 @@ def absent_in(path: str | Path, choice: Choice) -> dict[str, str]:
             pulses_per_revolution=layout.pulses_per_revolution,
             quantities=layout.quantities,
             n_samples=layout.n_samples,
+            impact=layout.impact,
             settings=layout.settings,
             only=choice.only,
         )
@@ -312,13 +313,15 @@ def recording_layout(recording: Recording, settings: Settings = STANDARD) -> Lay
     Layout
         For :func:`wearstate.features.table.absent_features`.
     """
+    quantities = tuple(channel.quantity for channel in recording.vibration_channels)
     return Layout(
         channels=recording.vibration_names,
-        quantities=tuple(channel.quantity for channel in recording.vibration_channels),
+        quantities=quantities,
         fs=recording.sample_rate,
         tacho=recording.tacho is not None,
         pulses_per_revolution=recording.pulses_per_revolution,
         n_samples=recording.signal.shape[-1],
+        impact=struck(recording.vibration, quantities),
         settings=_about(recording, settings),
     )
 
@@ -455,9 +458,14 @@ def _same_names(where: str | Path, names: tuple[str, ...], found: tuple[str, ...
     """Refuse records whose rows differ: one lacks the speed that the others have."""
     odd = sorted(set(names) ^ set(found))
     if odd:
+        struck_only = any("frf." in name for name in odd)
         raise DataError(
             f"{where}: {len(odd)} features are not in every record, must be 0, as {odd[0]}; "
-            "store the speed of every record, or give speed_hz for all"
+            + (
+                "so short a record needs a single blow in its force: leave the others out"
+                if struck_only
+                else "store the speed of every record, or give speed_hz for all"
+            )
         )
 
 

@@ -131,7 +131,7 @@ class Settings:
     speed_hz: float | None = None
     speed_band_hz: Band | None = None
     bearing: envelope.BearingFrequencies | None = None
-    frf_spacing_hz: float = 12.5
+    frf_spacing_hz: float = impact.WIDEST_LINES_HZ
     exponential: float = 1.0
     frf_bands: int = 10
     profile_bands: int = 72

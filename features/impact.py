@@ -26,6 +26,12 @@ PRETRIGGER_S = 0.002
 BOUNCE_S = 0.016
 """Force within this time of a blow belongs to it [s]."""
 
+MOST_RINGING = 0.15
+"""Share of its loudest at which a response may end without a word [-]; one of noise has all."""
+
+WIDEST_LINES_HZ = 12.5
+"""Widest line spacing of a transfer function in a table [Hz]."""
+
 MOST_SHORTENED = 0.75
 """Share of the blows that the blocks must suit [-]; longer ones leave the rest out."""
 
@@ -40,12 +46,19 @@ class Impacts:
         Force without the cell's offset [N].
     blows : Blows
         The blocks, one blow each.
+    fs : float
+        Sample rate [Hz].
+    ringing : float
+        Rms of the windowed response in the last tenth of the blocks, in that of the loudest tenth
+        [-]; 0 where it is not known.
     faults : tuple of str
         What is wrong with the only blow there is; it is analysed all the same.
     """
 
     force: Float
     blows: frf.Blows
+    fs: float
+    ringing: float = 0.0
     faults: tuple[str, ...] = ()
 
     @property
@@ -54,7 +67,26 @@ class Impacts:
         count = len(self.blows.starts)
         left = len(self.blows.rejected)
         words = [f"{count} blows"] if count > 1 else [_ONE_BLOW, *self.faults]
-        return "; ".join(words) + (f", {left} left out" if left else "")
+        told = "; ".join(words) + (f", {left} left out" if left else "")
+        return "; ".join([told, *self._short])
+
+    @property
+    def _short(self) -> list[str]:
+        """What it costs that blocks are short: of the lines of a table, and of the ringing."""
+        words = []
+        resolved = self.fs / self.blows.nperseg
+        if resolved > WIDEST_LINES_HZ:
+            words.append(
+                f"blocks of {1000 * self.blows.nperseg / self.fs:.2g} ms resolve {resolved:.2g} "
+                "Hz, modes nearer than that are one; record longer"
+            )
+        if self.ringing > MOST_RINGING:
+            words.append(
+                f"the response is still at {round(self.ringing, 1):.0%} of its loudest at the end "
+                "of a block, and what is cut off leaks over all lines; record longer, or lower "
+                "--exponential"
+            )
+        return words
 
 
 _ONE_BLOW = (
@@ -113,7 +145,9 @@ def is_impact(force: ArrayLike) -> bool:
     return struck <= MOST_STRUCK and -float(pulse.min()) <= LARGEST_PULL * top
 
 
-def find_impacts(force: ArrayLike, fs: float) -> Impacts:
+def find_impacts(
+    force: ArrayLike, fs: float, response: ArrayLike | None = None, *, last: float = 1.0
+) -> Impacts:
     """Cut an impact test into its blows.
 
     Parameters
@@ -122,6 +156,10 @@ def find_impacts(force: ArrayLike, fs: float) -> Impacts:
         Force, of either sign, with an offset or without [N].
     fs : float
         Sample rate [Hz].
+    response : array_like, shape (n_channels, n_samples), optional
+        By which it is told how far it has died away at the end of a block [any unit].
+    last : float
+        What the exponential window over it has sunk to there [-]; see `impact_spectra`.
 
     Returns
     -------
@@ -163,12 +201,37 @@ def find_impacts(force: ArrayLike, fs: float) -> Impacts:
     if events.size > 1:
         found = _several(pulse, fs, events, lead)
         if found is not None:
-            return Impacts(force=level, blows=found)
+            return Impacts(
+                force=level, blows=found, fs=fs, ringing=last * _ringing(found, response)
+            )
     start = max(int(events[0]) - lead, 0)
     blows = frf.Blows(
         starts=np.array([start], dtype=np.intp), nperseg=pulse.size - start, rejected=()
     )
-    return Impacts(force=level, blows=blows, faults=tuple(_faults_of_one(pulse, hits)))
+    return Impacts(
+        force=level,
+        blows=blows,
+        fs=fs,
+        ringing=last * _ringing(blows, response),
+        faults=tuple(_faults_of_one(pulse, hits)),
+    )
+
+
+def _ringing(blows: frf.Blows, response: ArrayLike | None) -> float:
+    """Rms of the last tenth of the blocks over that of the loudest tenth, of the worst channel."""
+    tenth = blows.nperseg // _PARTS
+    if response is None or np.size(response) == 0 or tenth == 0:
+        return 0.0
+    rows = np.asarray(response, dtype=np.float64)
+    blocks = blows.cut(rows - rows.mean(axis=-1, keepdims=True))[..., : _PARTS * tenth]
+    parts = blocks.reshape(*blocks.shape[:-1], _PARTS, tenth)
+    power = np.square(parts).mean(axis=-1)
+    loudest = power.max(axis=-1)
+    share = np.divide(power[..., -1], loudest, out=np.zeros_like(loudest), where=loudest > 0)
+    return float(np.sqrt(share.max()))
+
+
+_PARTS = 10
 
 
 def _events(hits: NDArray[np.intp], bounce: int) -> NDArray[np.intp]:
@@ -265,8 +328,8 @@ def impact_spectra(
     >>> abs(frf.h1(spectra)).max().round(12).item(), len(impacts.blows.starts)
     (3.0, 1)
     """
-    impacts = find_impacts(force, fs)
     rows = np.asarray(response, dtype=np.float64)
+    impacts = find_impacts(force, fs, rows, last=last)
     rows = rows - np.mean(rows, axis=-1, keepdims=True)
     blows = impacts.blows
     window, decay = None, 0.0

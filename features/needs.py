@@ -1,7 +1,7 @@
 """What a feature needs, and what a recording offers: known before a sample is read."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from types import MappingProxyType
@@ -19,6 +19,7 @@ from .analysis import (
     Settings,
     least_samples,
 )
+from .impact import is_impact
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,6 +40,8 @@ class Layout:
         Pulses in one revolution.
     n_samples : int, optional
         Length of the record; None where it is long enough for anything.
+    impact : bool
+        Whether the force is that of a hammer: its blocks follow the record, which may be short.
     settings : Settings
         Choices, and what no signal tells.
 
@@ -54,6 +57,7 @@ class Layout:
     tacho: bool = False
     pulses_per_revolution: int = 1
     n_samples: int | None = None
+    impact: bool = False
     settings: Settings = STANDARD
 
     @property
@@ -70,6 +74,26 @@ class Layout:
     def rows_of(self, quantity: str) -> tuple[int, ...]:
         """Channels of a quantity."""
         return tuple(i for i, kind in enumerate(self.quantities) if kind == quantity)
+
+
+def struck(signals: NDArray[np.floating], quantities: Sequence[str]) -> bool:
+    """Whether a record is an impact test: of its channels one is a force, that of a hammer.
+
+    Parameters
+    ----------
+    signals : ndarray, shape (n_channels, n_samples)
+        [any unit]
+    quantities : sequence of str
+        Of each channel.
+
+    Examples
+    --------
+    >>> blow = np.arange(200) == 50
+    >>> struck(np.stack([blow, np.sin(np.arange(200))]), ("force", "acceleration"))
+    True
+    """
+    rows = [i for i, kind in enumerate(quantities) if kind == FORCE]
+    return len(rows) == 1 and is_impact(signals[rows[0]])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -159,6 +183,8 @@ def _force(layout: Layout) -> str:
     nperseg = layout.settings.frf_nperseg(layout.fs)
     if (high - low) * nperseg < FEWEST_FRF_LINES * layout.fs:
         return f"fs = {layout.fs:.6g} Hz is too low: lines up to {high:.4g} Hz; sample faster"
+    if layout.impact:
+        return ""
     least = least_samples(nperseg, count) / layout.fs
     return _duration(layout, least, "in Python raise frf_spacing_hz")
 

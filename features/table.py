@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from . import order
 from .analysis import ACCELERATION, FORCE, STANDARD, Analysis, Settings
 from .catalogue import SETS, Feature, Scope, SetName, smallest_set
-from .needs import NEEDS, Layout, shortcomings
+from .needs import NEEDS, Layout, shortcomings, struck
 from .statistics import Real
 
 Float = NDArray[np.float64]
@@ -108,6 +108,7 @@ def feature_names(
     pulses_per_revolution: int = 1,
     quantities: Sequence[str] | None = None,
     n_samples: int | None = None,
+    impact: bool = False,
     settings: Settings = STANDARD,
     feature_set: SetName = "standard",
     only: Sequence[str] | None = None,
@@ -128,6 +129,8 @@ def feature_names(
         Quantity of every channel; all ``acceleration`` by default.
     n_samples : int, optional
         Length of the record; by default long enough for every feature.
+    impact : bool
+        Whether the force is that of a hammer; its blocks follow the record, however short.
     settings : Settings
         Bands, bins and orders.
     feature_set, only
@@ -160,6 +163,7 @@ def feature_names(
         tacho=tacho,
         pulses_per_revolution=pulses_per_revolution,
         n_samples=n_samples,
+        impact=impact,
         settings=settings,
     )
     return _plan(layout, feature_set, None if only is None else tuple(only)).names
@@ -377,13 +381,15 @@ def feature_row(
         signals = signals.astype(np.float64)
     channels = _channel_names(channel_names, len(signals))
     _check_vibration(signals, channels)
+    kinds = _quantities(quantities, len(signals))
     layout = Layout(
         channels=channels,
-        quantities=_quantities(quantities, len(signals)),
+        quantities=kinds,
         fs=float(fs),
         tacho=tacho is not None,
         pulses_per_revolution=pulses_per_revolution,
         n_samples=signals.shape[-1],
+        impact=struck(signals, kinds),
         settings=settings,
     )
     plan = _plan(layout, feature_set, None if only is None else tuple(only))

@@ -32,6 +32,7 @@ SPOKEN_BY = {
     "audit_text": {"splits"},
     "estimate": {"evaluate", "report"},
     "evaluate_splits": {"evaluate"},
+    "impact": {"features", "info"},
     "quality": {"report"},
     "report": {"report"},
     "report_batch.html": {"report"},
