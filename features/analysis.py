@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from . import cepstrum, envelope, frf, iso, modal, orbit, order, resample, spectrum, transfer
 from .fft import fast_length, irfft, rfft
+from .impact import WIDEST_LINES_HZ
 from .statistics import Amplitude, Real
 from .third_octave import third_octave_centres
 
@@ -131,7 +132,7 @@ class Settings:
     speed_hz: float | None = None
     speed_band_hz: Band | None = None
     bearing: envelope.BearingFrequencies | None = None
-    frf_spacing_hz: float = impact.WIDEST_LINES_HZ
+    frf_spacing_hz: float = WIDEST_LINES_HZ
     exponential: float = 1.0
     frf_bands: int = 10
     profile_bands: int = 72
