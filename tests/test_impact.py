@@ -108,7 +108,7 @@ def test_a_blow_is_analysed_however_short_the_record(ms):
     assert "still at" not in text
     noise = np.random.default_rng(0).standard_normal((2, n))
     if ms < 340:
-        with pytest.raises(ValueError, match="duration = .* s must be >= "):
+        with pytest.raises(ValueError, match=r"duration = .* s must be >= "):
             table.feature_row(noise, FS, quantities=KINDS, only=["frf_levels"])
 
 
