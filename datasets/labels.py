@@ -476,8 +476,11 @@ def _flag(cell: str) -> bool:
 
 
 def _text(cell: str) -> str:
-    if len(cell.encode()) > _LONGEST_TEXT:
-        raise ValueError(f"has {len(cell.encode())} byte, must have <= {_LONGEST_TEXT}; shorten it")
+    size = len(cell.encode(errors="surrogatepass"))
+    if size > _LONGEST_TEXT:
+        raise ValueError(f"has {size} byte, must have <= {_LONGEST_TEXT}; shorten it")
+    if any("\ud800" <= letter <= "\udfff" for letter in cell):
+        raise ValueError("is no UTF-8 text, must be; rewrite it")
     match = _WITH_UNIT.fullmatch(cell)
     ends = [end for end, d in ENDINGS.items() if match and match.group(1) in UNITS[d]]
     if ends:

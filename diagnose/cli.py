@@ -5,7 +5,9 @@ where no recording can be judged); with ``report --fail-on``: 3 warning, 4 alarm
 Heavy imports stay inside the commands, so that ``--help`` answers at once.
 """
 
+import io
 import re
+import sys
 from collections.abc import Sequence
 from typing import Any
 
@@ -27,6 +29,9 @@ from .commands_data import (
 from .commands_machine import align, chart, scene, simulate, stability, verify
 from .commands_wear import demo, evaluate, report, train
 
+# files are written under another name first, which says nothing to the caller
+_UNFINISHED = re.compile(r"\.part\b|\.[0-9a-f]{8}\.tmp\b")
+
 
 class _Group(click.Group):
     """Turns the library's own errors into one message and an exit code."""
@@ -34,6 +39,13 @@ class _Group(click.Group):
     def invoke(self, context: click.Context) -> Any:
         try:
             return super().invoke(context)
+        except UnicodeEncodeError as error:
+            word = re.search(r"\S*[\ud800-\udfff]\S*", error.object)
+            if word is None:
+                raise
+            text = _UNFINISHED.sub("", word.group())
+            click.echo(f"Error: {text} is no UTF-8 text; rename or rewrite it", err=True)
+            raise click.exceptions.Exit(EXIT_BAD_INPUT) from None
         except (ValueError, RuntimeError) as error:
             if not type(error).__module__.startswith(__name__.split(".")[0]):
                 raise  # not ours: a defect, with its traceback
@@ -49,8 +61,7 @@ class _Group(click.Group):
         except BrokenPipeError:
             raise  # the reader of stdout has gone: click ends quietly
         except OSError as error:
-            # files are written under another name first, which says nothing to the caller
-            text = re.sub(r"\.part\b|\.[0-9a-f]{8}\.tmp\b", "", str(error))
+            text = _UNFINISHED.sub("", str(error))
             click.echo(f"Error: {text}; check path, rights and space", err=True)
             raise click.exceptions.Exit(EXIT_BAD_INPUT) from None
         except MemoryError:
@@ -59,7 +70,14 @@ class _Group(click.Group):
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the command line; ends the process with its exit code."""
+    """Run the command line; ends the process with its exit code.
+
+    What the encoding of stdout or stderr cannot say is written with a backslash: a file name need
+    not be text.
+    """
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):  # None under pythonw
+            stream.reconfigure(errors="backslashreplace")
     cli.main(args=None if arguments is None else list(arguments), prog_name="wearstate")
 
 

@@ -516,7 +516,7 @@ def _write_hdf5(frame: pd.DataFrame, path: Path) -> None:
         for name in frame.columns:
             column: Any = frame[name].to_numpy()
             text = column.dtype.kind in "OUT"
-            file[str(name)] = np.array(column.astype(str), dtype="S") if text else column
+            file[str(name)] = np.char.encode(column.astype(str), "utf-8") if text else column
 
 
 _WRITERS: dict[str, Callable[[pd.DataFrame, Path], None]] = {

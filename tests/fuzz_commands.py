@@ -8,6 +8,8 @@ names kind and number, so that ``--kind KIND --first NUMBER --files 1`` repeats 
 
 import argparse
 import contextlib
+import importlib
+import io
 import os
 import signal
 import sys
@@ -139,6 +141,26 @@ def damaged(kind: str, whole: bytes, seed: int, number: int) -> bytes:
 # --- running
 
 
+def warm_up() -> None:
+    """Import what commands import inside: forks start from a process that has it all."""
+    for name in (
+        "datasets.audit",
+        "datasets.check",
+        "datasets.export",
+        "datasets.import_set",
+        "datasets.recipe",
+        "datasets.splits",
+        "diagnose.cli",
+        "diagnose.info",
+        "diagnose.modelfile",
+        "diagnose.report",
+        "diagnose.report_batch",
+        "diagnose.tabulate",
+        "diagnose.train",
+    ):
+        importlib.import_module(f"wearstate.{name}")
+
+
 def run_forked(command: list[str], log: Path) -> tuple[int | None, float]:
     """Exit code of a command in a fork of this process, negative for a signal; None: too long."""
     begin = time.perf_counter()
@@ -162,6 +184,7 @@ def _become(command: list[str], log: Path) -> None:
     with log.open("wb") as handle:
         os.dup2(handle.fileno(), 1)
         os.dup2(handle.fileno(), 2)
+    sys.stdout, sys.stderr = (_strict(descriptor) for descriptor in (1, 2))
     code = 70
     try:
         from wearstate.diagnose.cli import main
@@ -177,6 +200,12 @@ def _become(command: list[str], log: Path) -> None:
         for stream in (sys.stdout, sys.stderr):
             stream.flush()
         os._exit(code or 0)
+
+
+def _strict(descriptor: int) -> io.TextIOWrapper:
+    """A stream of UTF-8 alone, whatever this process has: pytest has its own."""
+    raw = io.BufferedWriter(io.FileIO(descriptor, "w", closefd=False))
+    return io.TextIOWrapper(raw, encoding="utf-8", errors="strict")
 
 
 def _end_group(pid: int) -> None:
@@ -221,12 +250,7 @@ def campaign(
     say: Callable[[str], None] = print,
 ) -> list[str]:
     """So many damaged files, shared among the kinds; the faults found."""
-    # forks start from a process that has imported everything
-    import wearstate.datasets.audit
-    import wearstate.datasets.check
-    import wearstate.datasets.import_set
-    import wearstate.diagnose.info  # noqa: F401
-
+    warm_up()
     faults = []
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch)
