@@ -56,8 +56,8 @@ def hdf5_contents(path: Path, options: SourceOptions) -> Contents:
         others: list[str] = []
         for name, item in _walk(path, file):
             axes = _recording_axes(path, name, item, options)
-            if axes is None:
-                others.append(f"{name} {item.dtype} {item.shape}")
+            if isinstance(axes, str):
+                others.append(axes)
             else:
                 arrays.append((name, item, axes))
         texts = _texts_apart(path, [(name, item) for name, item, _ in arrays])
@@ -81,7 +81,7 @@ def _opened(path: Path) -> Any:
 
 
 def _walk(path: Path, file: Any) -> Iterator[tuple[str, Any]]:
-    """Data sets by path; links to other files are not followed, loops are cut."""
+    """Data sets by path, and links, which are not followed; loops are cut."""
     queue, seen, count = [("", file["/"], 0)], {file["/"].id.__hash__()}, 0
     while queue:
         prefix, group, depth = queue.pop()
@@ -91,10 +91,12 @@ def _walk(path: Path, file: Any) -> Iterator[tuple[str, Any]]:
                 raise DataError(
                     f"{path} holds > {MOST_LEAVES} data sets, the most believed; split it"
                 )
-            if not isinstance(group.get(key, getlink=True), h5py.HardLink):
+            name = f"{prefix}/{key}".lstrip("/")
+            link = group.get(key, getlink=True)
+            if not isinstance(link, h5py.HardLink):
+                yield name, link
                 continue
             item = group[key]
-            name = f"{prefix}/{key}".lstrip("/")
             if isinstance(item, h5py.Dataset):
                 yield name, item
             elif isinstance(item, h5py.Group) and depth < _DEEPEST and hash(item.id) not in seen:
@@ -102,9 +104,11 @@ def _walk(path: Path, file: Any) -> Iterator[tuple[str, Any]]:
                 queue.append((name, item, depth + 1))
 
 
-def _recording_axes(path: Path, name: str, item: Any, options: SourceOptions) -> Axes | None:
-    """What its axes are, None of what is no recording; an error where just this is asked for."""
+def _recording_axes(path: Path, name: str, item: Any, options: SourceOptions) -> Axes | str:
+    """What its axes are, or why it is no recording; an error where just this is asked for."""
     try:
+        if not isinstance(item, h5py.Dataset):
+            raise DataError(f"{path}: {name} is a link, which is not followed; copy what it names")
         if item.dtype.kind not in "iuf" or item.dtype.itemsize > 8 or item.size in (None, 0, 1):
             raise DataError(
                 f"{path}: {name} is {item.dtype} {item.shape}, must be real numbers (samples, "
@@ -112,10 +116,10 @@ def _recording_axes(path: Path, name: str, item: Any, options: SourceOptions) ->
             )
         refuse_storage(path, name, item)
         return array_axes(item.shape, options, f"{path}: {name}")
-    except DataError:
+    except DataError as error:
         if name in options.variables:
             raise
-        return None
+        return str(error).removeprefix(f"{path}: ").partition("; ")[0]
 
 
 def _hdf5_part(path: Path, name: str, item: Any, axes: Axes, texts: "_Texts") -> Part:

@@ -265,9 +265,18 @@ def _line_records(path: Path, table: "Table", options: SourceOptions) -> Content
 _BYTES = "latin-1"  # every byte is a character: nothing is lost, nothing fails
 
 
+_BOMS = re.compile("(?:\xef\xbb\xbf){0,8}")  # some programs put another one before it
+
+
 def _bom(path: Path) -> int:
     with path.open("rb") as handle:
-        return 3 if handle.read(3) == b"\xef\xbb\xbf" else 0
+        return _boms(handle.read(24).decode(_BYTES))
+
+
+def _boms(text: str) -> int:
+    """Byte of the marks that a text begins with."""
+    match = _BOMS.match(text)
+    return match.end() if match else 0
 
 
 def _head(path: Path, size: int) -> str:
@@ -276,14 +285,16 @@ def _head(path: Path, size: int) -> str:
         raw = handle.read(size)
         whole = not handle.read(1)
     if raw[:2] in (b"\xff\xfe", b"\xfe\xff"):
-        raise DataError(f"{path} is UTF-16, must be UTF-8 or ASCII; save it as CSV UTF-8")
+        code = "UTF-32" if raw[2:4] == b"\0\0" else "UTF-16"
+        raise DataError(f"{path} is {code}, must be UTF-8 or ASCII; save it as CSV UTF-8")
     if re.search(rb"\r[^\n]", raw):
         raise DataError(
             f"{path} ends lines by CR alone, must be LF or CR LF; save it with other line ends"
         )
     if b"\0" in raw or _looks_binary(raw):
         raise foreign(path, "text")
-    text = raw.decode(_BYTES).removeprefix("ï»¿")
+    text = raw.decode(_BYTES)
+    text = text[_boms(text) :]
     if not whole:
         text = text.rpartition("\n")[0]
     if not text.strip():

@@ -99,8 +99,10 @@ def other_kinds(folder: Path, model: Path | None) -> dict[str, list[Kind]]:
         ("export", "FILE", "-o", "OUT.npz"),
         ("audit", "FILE", "-j", "1"),
     )
+    whole = Kind(".h5", data_set(folder / "data.h5"), data)
     kinds = {
-        "data": [Kind(".h5", data_set(folder / "data.h5"), data)],
+        "data": [whole],
+        "data-flips": [whole],
         "scene": [
             Kind(".toml", path.read_bytes(), (("scene", "check", "FILE"),))
             for path in sorted((ROOT / "sim" / "scenes").glob("*.toml"))
@@ -119,6 +121,7 @@ def other_kinds(folder: Path, model: Path | None) -> dict[str, list[Kind]]:
     }
     if model is not None:
         kinds["model"] = [Kind(".wsm", model.read_bytes(), (("info", "FILE"),))]
+        kinds["model-flips"] = kinds["model"]
     return kinds
 
 
@@ -128,8 +131,8 @@ def kinds_of(folder: Path, model: Path | None = None) -> dict[str, list[Kind]]:
 
 
 def damaged(kind: str, whole: bytes, seed: int, number: int) -> bytes:
-    """Of data sets every second file has one to three flipped bits and no other damage."""
-    if kind == "data" and number % 2:
+    """Kinds of flips have one to three flipped bits and no other damage."""
+    if kind.endswith("-flips"):
         rng = np.random.default_rng([seed, number])
         raw = np.frombuffer(whole, np.uint8).copy()
         for place in rng.integers(0, raw.size, int(rng.integers(1, 4))):
@@ -142,7 +145,7 @@ def damaged(kind: str, whole: bytes, seed: int, number: int) -> bytes:
 
 
 def warm_up() -> None:
-    """Import what commands import inside: forks start from a process that has it all."""
+    """Import and load what commands do inside: forks start from a process that has it all."""
     for name in (
         "datasets.audit",
         "datasets.check",
@@ -159,6 +162,11 @@ def warm_up() -> None:
         "diagnose.train",
     ):
         importlib.import_module(f"wearstate.{name}")
+    from click.testing import CliRunner
+    from wearstate.diagnose.cli import cli
+
+    for scene in ("bilge-pump", "journal-bearing", "propulsion-shaft"):  # kernels of each machine
+        CliRunner().invoke(cli, ["scene", "check", scene], catch_exceptions=False)
 
 
 def run_forked(command: list[str], log: Path) -> tuple[int | None, float]:
@@ -235,8 +243,11 @@ def attempt(kind: Kind, content: bytes, number: int, folder: Path) -> tuple[int 
     for left in folder.glob("out*"):
         left.unlink()
     words = kind.commands[number % len(kind.commands)]
-    places = {"FILE": str(path), "OUT.h5": str(folder / "out.h5"), "OUT.npz": str(folder / "o.npz")}
-    places["OUT.npz"] = str(folder / "out.npz")
+    places = {
+        "FILE": str(path),
+        "OUT.h5": str(folder / "out.h5"),
+        "OUT.npz": str(folder / "out.npz"),
+    }
     code, _ = run_forked([places.get(word, word) for word in words], log)
     return code, fault_of(code, log.read_text(errors="replace"))
 

@@ -72,6 +72,10 @@ def wav24(path: Path) -> None:
     path.write_bytes(b"RIFF" + struct.pack("<I", len(body)) + body)
 
 
+def mat4(path: Path) -> None:
+    savemat(path, {"x": SIGNAL, "sr": 1000.0, "load": "100"}, format="4")
+
+
 def mat5(compressed: bool) -> Callable[[Path], None]:
     def build(path: Path) -> None:
         cell = np.empty((1, 2), dtype=object)
@@ -188,6 +192,7 @@ SEEDS: dict[str, list[Seed]] = {
         Seed(".wav", wav(np.float32)),
         Seed(".wav", wav24),
     ],
+    "mat4": [Seed(".mat", mat4), Seed(".mat", mat4, {"variable": "x"})],
     "mat5": [
         Seed(".mat", mat5(True)),
         Seed(".mat", mat5(False)),

@@ -476,7 +476,7 @@ def test_hdf5_of_another_program(tmp_path):
     assert {s.part for s in list_sources(path)} >= {"a/acc", "b", "c"}
     message = refusal(path)
     assert "b (50, 2)" in message
-    assert "words object (2,)" in message
+    assert "words is object (2,)" in message
     with opened(path, variable="b", unit="g") as source:
         assert source.sample_rate == 25.6e3
         assert_array_equal(source.read(3, 20), (SIGNAL * G)[:, 3:20])
