@@ -26,6 +26,7 @@ SIM_FLOORS = [
     {"fidelity"},
     {"assemble"},
     {"wear_rate"},
+    {"shaft_change"},
     {"pump", "journal", "shaft_line"},
     {"ladder", "plausibility"},
     {"tearing"},
