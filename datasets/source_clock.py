@@ -1,4 +1,4 @@
-"""Time stamps of text files: ISO dates and times of day, in whole nanoseconds."""
+"""Time stamps of text files: dates and times of day, in whole nanoseconds."""
 
 import re
 from collections.abc import Callable, Iterable, Sequence
@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 _STAMP = re.compile(
     r"(?:(?:(?P<year>\d{4})(?P<mark>[-/.])(?P<month>\d{1,2})(?P=mark)(?P<day>\d{1,2})"
-    r"|(?P<day_first>\d{1,2})\.(?P<month_then>\d{1,2})\.(?P<year_last>\d{4}))[T ]\s*)?"
+    r"|(?P<one>\d{1,2})(?P<between>[-/.])(?P<two>\d{1,2})(?P=between)(?P<year_last>\d{4}))"
+    r"[T ]\s*)?"
     r"(?P<hour>\d{1,2}):(?P<minute>\d{2}):(?P<second>\d{2})(?:[.,](?P<part>\d{1,9}))?"
     r"\s*(?P<zone>Z|(?P<sign>[-+])(?P<zone_hour>\d{2}):?(?P<zone_minute>\d{2})?)?",
     re.ASCII,
@@ -20,14 +21,16 @@ _SECOND = 10**9  # ns
 _DAY = 86_400 * _SECOND
 
 
-def stamp_ns(text: str) -> int | None:
+def stamp_ns(text: str, *, month_first: bool = False) -> int | None:
     """Nanoseconds of a time stamp, from midnight, or from the year 1 where it has a date.
 
     Parameters
     ----------
     text : str
-        ``hh:mm:ss`` with up to nine decimals, behind a date (``2024-05-01``, ``01.05.2024``) or
-        none, before a zone (``Z``, ``+02:00``) or none.
+        ``hh:mm:ss`` with up to nine decimals, behind a date (``2024-05-01``, ``01.05.2024``,
+        ``01/05/2024``) or none, before a zone (``Z``, ``+02:00``) or none.
+    month_first : bool
+        Of dates that end in the year, unless their marks are points.
 
     Returns
     -------
@@ -47,7 +50,7 @@ def stamp_ns(text: str) -> int | None:
     hour, minute, second = (int(found[name]) for name in ("hour", "minute", "second"))
     if hour > 23 or minute > 59 or second > 59:
         return None
-    day = _day(found)
+    day = _day(found, month_first)
     if day is None:
         return None
     part = int((found["part"] or "").ljust(9, "0"))
@@ -58,12 +61,56 @@ def stamp_ns(text: str) -> int | None:
     return day * _DAY + clock * _SECOND + part
 
 
-def _day(found: re.Match[str]) -> int | None:
+def is_stamp(text: str) -> bool:
+    """Whether a text is a time stamp, the day or the month first.
+
+    Examples
+    --------
+    >>> [is_stamp(f"{day} 12:00:00") for day in ("23/11/2026", "11/23/2026", "23/23/2026")]
+    [True, True, False]
+    """
+    return stamp_ns(text) is not None or stamp_ns(text, month_first=True) is not None
+
+
+def months_first(first: str, last: str) -> bool | None:
+    """Whether dates that end in the year begin with the month, None where nothing tells.
+
+    Parameters
+    ----------
+    first, last : str
+        Stamps of one recording, the later one last. Of the same day they need no answer.
+
+    Examples
+    --------
+    >>> months_first("11/23/2026 23:59:59", "11/24/2026 00:00:01")
+    True
+    >>> months_first("05/06/2026 10:00:00", "05/06/2026 10:00:01")
+    False
+    >>> months_first("05/06/2026 23:59:59", "06/06/2026 00:00:01") is None
+    True
+    """
+    stamps = (first, last)
+    fits = [
+        all(stamp_ns(text, month_first=m) is not None for text in stamps) for m in (False, True)
+    ]
+    found = [_STAMP.fullmatch(text.strip()) for text in stamps]
+    days = {(m["one"], m["two"], m["year_last"]) for m in found if m}
+    free = any(m is not None and m["between"] in ("/", "-") for m in found)
+    if all(fits) and free and len(days) > 1:
+        return None
+    return fits == [False, True]
+
+
+def _day(found: re.Match[str], month_first: bool) -> int | None:
     """Number of the date, 0 without one, None where the calendar has no such day."""
-    year = found["year"] or found["year_last"]
-    if year is None:
+    if found["year"]:
+        year, month, day = found["year"], found["month"], found["day"]
+    elif found["year_last"]:
+        year, one, two = found["year_last"], found["one"], found["two"]
+        swapped = month_first and found["between"] != "."
+        month, day = (one, two) if swapped else (two, one)
+    else:
         return 0
-    month, day = found["month"] or found["month_then"], found["day"] or found["day_first"]
     try:
         return date(int(year), int(month), int(day)).toordinal()
     except ValueError:
@@ -94,7 +141,9 @@ def is_stamp_pattern(text: str) -> bool:
 
 
 def stamp_seconds(
-    cells: Callable[[int, int], Sequence[str]], refuse: Callable[[int, str], Exception]
+    cells: Callable[[int, int], Sequence[str]],
+    refuse: Callable[[int, str], Exception],
+    month_first: bool = False,
 ) -> Callable[[int, int], NDArray[np.float64]]:
     """Times of stamps since the first one [s], exact to the nanosecond before they are floats.
 
@@ -104,6 +153,8 @@ def stamp_seconds(
         Stamps [start, stop).
     refuse : callable
         Error about an index and a text that is no stamp.
+    month_first : bool
+        See :func:`stamp_ns`.
 
     Returns
     -------
@@ -111,14 +162,14 @@ def stamp_seconds(
         Seconds [start, stop); times of day go on behind midnight, once.
     """
     [first_text] = cells(0, 1)
-    first = stamp_ns(first_text)
+    first = stamp_ns(first_text, month_first=month_first)
     if first is None:
         raise refuse(0, first_text)
 
     def seconds(start: int, stop: int) -> NDArray[np.float64]:
         found = np.empty(stop - start)
         for i, text in enumerate(cells(start, stop)):
-            value = stamp_ns(text)
+            value = stamp_ns(text, month_first=month_first)
             if value is None:
                 raise refuse(start + i, text)
             apart = value - first

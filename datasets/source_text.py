@@ -15,7 +15,13 @@ from ..sim.parts import UNITS, nearest
 from .channel_units import known_unit
 from .csv_cells import plain_cell
 from .record import DataError
-from .source_clock import is_stamp_pattern, stamp_ns, stamp_resolution, stamp_seconds
+from .source_clock import (
+    is_stamp,
+    is_stamp_pattern,
+    months_first,
+    stamp_resolution,
+    stamp_seconds,
+)
 from .source_flat import numbered, stem_of
 from .source_part import (
     MOST_CHANNELS,
@@ -169,8 +175,31 @@ def _refuse_long(path: Path, number: int, lengths: NDArray[np.int64], longest: i
 
 
 def _end_of_text(path: Path, begin: int) -> int:
-    """Behind the last line that is not blank."""
-    end = path.stat().st_size
+    """Behind the last line that is neither blank nor a comment."""
+    end = _end_of_ink(path, begin, path.stat().st_size)
+    for _ in range(_MOST_HEADER):
+        start = _start_of_comment(path, begin, end)
+        if start is None:
+            break
+        end = _end_of_ink(path, begin, start)
+    return end
+
+
+_COMMENTS = (b"#", b"%")
+
+
+def _start_of_comment(path: Path, begin: int, end: int) -> int | None:
+    """Place of the last line where it is a comment and not the only one."""
+    with path.open("rb") as handle:
+        place = max(begin, end - _LONGEST_LINE)
+        handle.seek(place)
+        rest, feed, line = handle.read(end - place).rpartition(b"\n")
+    comment = feed and line.lstrip(b" \t").startswith(_COMMENTS)
+    return place + len(rest) + 1 if comment else None
+
+
+def _end_of_ink(path: Path, begin: int, end: int) -> int:
+    """Behind the last line before an end that is not blank."""
     with path.open("rb") as handle:
         while end > begin:
             size = min(_PIECE, end - begin)
@@ -299,7 +328,18 @@ def _head(path: Path, size: int) -> str:
         text = text.rpartition("\n")[0]
     if not text.strip():
         raise DataError(f"{path} has no line that ends within {size} byte, must have; check it")
-    return text.rstrip(" \t\r\n\x1a")
+    return _without_comments(text)
+
+
+def _without_comments(text: str) -> str:
+    """Lines up to the last one that is neither blank nor a comment."""
+    for _ in range(_MOST_HEADER):
+        text = text.rstrip(" \t\r\n\x1a")
+        above, feed, line = text.rpartition("\n")
+        if not feed or not line.encode(_BYTES).lstrip(b" \t").startswith(_COMMENTS):
+            break
+        text = above
+    return text
 
 
 def _looks_binary(raw: bytes) -> bool:
@@ -363,6 +403,7 @@ def _dialect(path: Path, lines: list[str], options: SourceOptions) -> Dialect:
         )
         raise DataError(f"{path} can be read as {ways}; give delimiter or decimal")
     _refuse_broken(path, lines, clean[0], options)
+    _refuse_numbered(path, lines, clean[0], options)
     return clean[0]
 
 
@@ -423,6 +464,28 @@ def _refuse_broken(path: Path, lines: list[str], dialect: Dialect, options: Sour
                     f"{path}: column {column + 1} is {cell!r} in line {number} and no number in "
                     f"line {len(lines)}, must be one kind; mend it"
                 )
+
+
+def _refuse_numbered(
+    path: Path, lines: list[str], dialect: Dialect, options: SourceOptions
+) -> None:
+    """A first line that counts the columns may name them, or be the first sample."""
+    if options.header is not None or options.rows or dialect.first or dialect.n_columns < 2:
+        return
+    cells = [split_cells(line, dialect.delimiter) for line in lines[:_SAMPLE]]
+    counted = [[str(i + k) for i in range(dialect.n_columns)] for k in (0, 1)]
+    if cells[0] not in counted or len(cells) < 4:
+        return
+    if all(re.fullmatch(r"[-+]?\d+", cell) for cell in cells[1]):
+        return  # whole numbers like those below
+    steps = np.diff([_plain(row[0], dialect.decimal) for row in cells[:4]])
+    if steps[0] > 0 and np.allclose(steps, steps[0], rtol=1e-3):
+        return  # times that go on from the first line
+    told = dialect.delimiter.join(cells[0])[:40]
+    raise DataError(
+        f"{path}: line 1, {told!r}, may name the columns by number or be a sample; give header, "
+        "the lines before the numbers: 1 or 0"
+    )
 
 
 def _delimiters(path: Path, lines: list[str], options: SourceOptions) -> Sequence[str]:
@@ -563,7 +626,7 @@ def _stamp_columns(table: "Table") -> list[int]:
         column
         for column in range(table.dialect.n_columns)
         if column not in table.dialect.numeric
-        and all(stamp_ns(table.cells(at, at + 1, column)[0]) is not None for at in ends)
+        and all(is_stamp(table.cells(at, at + 1, column)[0]) for at in ends)
     ]
 
 
@@ -650,10 +713,17 @@ def _stamped_rate(
 
     count = table.lines.count
     cells = partial(table.cells, column=time)
+    [first], [last] = cells(0, 1), cells(count - 1, count)
+    month_first = months_first(first, last)
+    if month_first is None:
+        raise DataError(
+            f"{path}: dates of column {column.name!r} can begin with day or month: {first} to "
+            f"{last}; write them as 2026-11-23, or give time_column = 0 and fs"
+        )
     clock = even_rate(
         path,
         column.name,
-        stamp_seconds(cells, refuse),
+        stamp_seconds(cells, refuse, month_first),
         count,
         stamp_resolution(cells(max(0, count - _SAMPLE), count)),
         place=partial(_place, table, time),

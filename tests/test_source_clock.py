@@ -100,3 +100,35 @@ def test_what_is_no_stamp_is_named(tmp_path):
     assert "'25:00:00.0' in line 9" in refusal(written(tmp_path / "x.csv", texts))
     path = written(tmp_path / "y.csv", stamps("%H:%M:%S.%f"))
     assert "must not be given; it holds time stamps" in refusal(path, unit={"time": "s"})
+
+
+@pytest.mark.parametrize(
+    ("start", "pattern"),
+    [
+        (datetime(2026, 11, 23, 10), "%d/%m/%Y %H:%M:%S.%f"),
+        (datetime(2026, 11, 23, 10), "%m/%d/%Y %H:%M:%S.%f"),
+        (datetime(2026, 11, 23, 10), "%d-%m-%Y %H:%M:%S.%f"),
+        (datetime(2026, 11, 30, 23, 59, 59, 900000), "%d/%m/%Y %H:%M:%S.%f"),  # to 01/12
+        (datetime(2026, 11, 12, 23, 59, 59, 900000), "%m/%d/%Y %H:%M:%S.%f"),  # to 11/13
+        (datetime(2026, 6, 5, 10), "%d/%m/%Y %H:%M:%S.%f"),  # one day: the order is no matter
+    ],
+)
+def test_dates_with_slashes_are_read_where_one_reading_is_possible(tmp_path, start, pattern):
+    times = [start + timedelta(milliseconds=i) for i in range(200)]
+    path = written(tmp_path / "x.csv", [time.strftime(pattern) for time in times])
+    with open_source(path, SourceOptions()) as source:
+        assert source.sample_rate == 1000.0
+
+
+def test_dates_that_can_be_two_days_are_refused_with_a_cure(tmp_path):
+    start = datetime(2026, 6, 5, 23, 59, 59, 900000)
+    times = [start + timedelta(milliseconds=i) for i in range(200)]
+    for pattern in ("%d/%m/%Y %H:%M:%S.%f", "%m/%d/%Y %H:%M:%S.%f"):
+        path = written(tmp_path / "x.csv", [time.strftime(pattern) for time in times])
+        message = refusal(path)
+        assert "can begin with day or month" in message
+        assert "write them as 2026-11-23, or give time_column = 0 and fs" in message
+    with open_source(path, SourceOptions(time_column=0, fs=1000.0)) as source:
+        assert source.n_samples == 200
+    path = written(tmp_path / "y.csv", ["31/31/2026 10:00:00.0"] * 20)
+    assert "'31/31/2026 10:00:00.0' in line 2, must be a number or a time stamp" in refusal(path)

@@ -1273,3 +1273,51 @@ def test_one_column_keeps_its_header(tmp_path):
         [channel] = source.channels
         assert (channel.name, channel.unit) == ("acc", "m/s^2")
         assert source.n_samples == 3
+
+
+# --- the first line and the last
+
+
+@pytest.mark.parametrize("mark", ["#", "%", "  # "])
+def test_comments_at_the_end_are_no_samples(tmp_path, mark):
+    rows = "".join(f"{i / 1000:.3f},{i % 7}.5\n" for i in range(50))
+    (tmp_path / "x.csv").write_text(f"time [s],a [g]\n{rows}{mark} end\n\n{mark} 12,5\n\n")
+    with open_source(tmp_path / "x.csv", SourceOptions()) as source:
+        assert (source.n_samples, source.sample_rate) == (50, 1000.0)
+        assert source.read()[0, -1] == pytest.approx(0.5 * 9.80665)  # 49 % 7 = 0
+    long = "".join(f"{i / 1000:.3f},{i % 7}.5\n" for i in range(40_000))  # more than is looked at
+    (tmp_path / "y.csv").write_text(f"time [s],a [g]\n{long}{mark} end\n")
+    with open_source(tmp_path / "y.csv", SourceOptions()) as source:
+        assert source.read().shape == (1, 40_000)
+
+
+def test_comments_alone_are_no_table(tmp_path):
+    (tmp_path / "x.csv").write_text("# a\n" * 100_000)
+    assert "no columns of numbers" in refusal(tmp_path / "x.csv")
+
+
+def test_a_first_line_that_counts_the_columns_is_asked_about(tmp_path):
+    """Written by pandas, it names columns without a name; else it is a sample: none is lost."""
+    path = tmp_path / "x.csv"
+    rows = "".join(f"{0.3 * i % 1:.2f},{0.7 * i % 1:.2f},-0.5\n" for i in range(50))
+    for first in ("0,1,2", "1,2,3"):
+        path.write_text(f"{first}\n{rows}")
+        assert "line 1, '" + first in refusal(path, fs=1000.0, unit="g")
+        assert "give header, the lines before the numbers: 1 or 0" in refusal(path)
+        for header, count in ((0, 51), (1, 50)):
+            with open_source(path, SourceOptions(fs=1000.0, unit="g", header=header)) as source:
+                assert source.n_samples == count
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "0,1\n" + "".join(f"{i / 1000},0.5\n" for i in range(1, 50)),  # times go on
+        "0;1\n" + "".join(f"{-i};{i * i % 7}\n" for i in range(1, 50)),  # whole numbers all
+        "0\n" + "0.5\n0.25\n" * 24 + "0.5\n",  # one column
+    ],
+)
+def test_a_first_line_of_whole_numbers_is_else_a_sample(tmp_path, text):
+    (tmp_path / "x.csv").write_text(text)
+    with open_source(tmp_path / "x.csv", SourceOptions(fs=1000.0, unit="g")) as source:
+        assert source.n_samples == 50
