@@ -8,32 +8,32 @@ from typing import Any, Literal
 
 from ..sim.wear import grade
 from .import_plan import Header
-from .labels import GRADE, GROUP, Labels, Limits, Value, refusal
+from .labels import GRADE, GROUP, ROW, Labels, Limits, Value, refusal
 from .machines import FILE, GROUP_NAME
 
 GroupBy = Literal["file", "folder", "column"]
 
-START, MEAN_SPEED, ROW = "start_s", "mean_speed_hz", "row_in_file"
+START, MEAN_SPEED = "start_s", "mean_speed_hz"
 
 _LARGEST_GROUP = 2**63 - 1  # of the manifest's integers
 
 
 @dataclass(frozen=True, kw_only=True)
 class FileRows:
-    """Manifest values by file.
+    """Manifest values by file, or by row of a file where rows are labelled.
 
     Attributes
     ----------
     columns : mapping
         Columns beside those of every data set -> numpy type, in order.
-    rows : tuple of mapping
-        Values of each file; of a record only its start and its speed are missing.
+    rows : mapping
+        Name and row of a file -> values; of a record only its start and its speed are missing.
     unused : int
         Rows of the labels about other files.
     """
 
     columns: Mapping[str, str]
-    rows: tuple[Mapping[str, Any], ...]
+    rows: Mapping[tuple[str, int], Mapping[str, Any]]
     unused: int
 
 
@@ -66,16 +66,18 @@ def file_rows(
         A file has no labels or contradicts them, the grade contradicts the limits, or what
         grouping or limits need is not labelled; all at once.
     """
-    given, unused = labels.of_files([header.path for header in headers])
+    places = [(header.name, row) for header in headers for row in range(header.n_records)]
+    given, unused = _labelled(headers, labels)
+    headers = [header for header in headers for _ in range(header.n_records)]
     faults: list[str] = []
     names = _group_names(headers, given, labels, group_by, faults)
     grades = _grades(headers, given, labels, limits, faults)
     declared = _conditions(headers, given, faults)
     if faults:
-        raise refusal(faults)
+        raise refusal(list(dict.fromkeys(faults)))
     numbers = _numbers(names)
-    rows = tuple(
-        {
+    rows = {
+        place: {
             **{name: value for name, value in own.items() if name not in (GROUP, GRADE)},
             **declared[i],
             FILE: headers[i].name,
@@ -83,8 +85,8 @@ def file_rows(
             "group": numbers[names[i]],
             "grade": grades[i],
         }
-        for i, own in enumerate(given)
-    )
+        for i, (place, own) in enumerate(zip(places, given, strict=True))
+    }
     columns = {
         FILE: _text_type([header.name for header in headers]),
         GROUP_NAME: _text_type(names),
@@ -95,6 +97,16 @@ def file_rows(
         **({MEAN_SPEED: "<f8"} if tacho is not None else {}),
     }
     return FileRows(columns=columns, rows=rows, unused=unused)
+
+
+def _labelled(headers: Sequence[Header], labels: Labels) -> tuple[list[Mapping[str, Value]], int]:
+    """Labels of every row that is a record, those of a file being those of all its rows."""
+    paths, counts = [header.path for header in headers], [header.n_records for header in headers]
+    if labels.rows is not None:
+        rows, unused = labels.of_rows(paths, counts)
+        return list(rows), unused
+    files, unused = labels.of_files(paths)
+    return [own for own, count in zip(files, counts, strict=True) for _ in range(count)], unused
 
 
 def _text_type(texts: Sequence[str]) -> str:

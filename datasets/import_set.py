@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from ..features.order import pulse_times
 from ..sim.atomic import OutputError
 from .import_plan import Header, Plan, plan_records, read_headers, sparing_tacho, worth_workers
-from .import_rows import MEAN_SPEED, ROW, START, FileRows, GroupBy, file_rows
+from .import_rows import MEAN_SPEED, START, FileRows, GroupBy, file_rows
 from .importers import read_window
-from .labels import Labels, Limits, refusal
+from .labels import ROW, Labels, Limits, refusal
 from .machines import FILE, GROUP_NAME
 from .record import Attributes, DataError, DataSet, DataSetWriter, refuse_output
 from .source_part import SourceOptions
@@ -334,9 +334,9 @@ def _write(
     n_records: int,
     progress: Callable[[int, int], None] | None,
 ) -> None:
-    rows = {str(row[FILE]): row for row in table.rows}
     for index, (header, record) in enumerate(records):
-        row = {**rows[header.name], **record.row, "record_id": str(index)}
+        told = table.rows[header.name, int(record.row[ROW])]
+        row = {**told, **record.row, "record_id": str(index)}
         if ROW not in table.columns:
             del row[ROW]
         writer.write(index, record.signal, row)

@@ -21,7 +21,7 @@ from .record import DataError
 Value = float | int | bool | str
 """A label: NaN, -1 or empty where it is not known."""
 
-GROUP, GRADE = "group", "grade"
+GROUP, GRADE, ROW = "group", "grade", "row_in_file"
 CONFOUNDER = "confounder_"
 
 RESERVED = (
@@ -78,6 +78,8 @@ class Labels:
         What each row says of its file; empty without a table.
     lines : tuple of int
         Line of each row in its file.
+    rows : tuple of int, optional
+        Which row of its file each one is about, where rows are records.
     columns : mapping
         Name -> a value per row.
     constants : mapping
@@ -89,6 +91,7 @@ class Labels:
     source: str = ""
     entries: tuple[str, ...] = ()
     lines: tuple[int, ...] = ()
+    rows: tuple[int, ...] | None = None
     columns: Mapping[str, tuple[Value, ...]]
     constants: Mapping[str, Value]
     severities: tuple[str, ...] = ()
@@ -134,11 +137,62 @@ class Labels:
         if faults:
             raise refusal([f"{self.source}: {fault}" for fault in faults])
         row_of = {files[0]: row for row, files in enumerate(found) if files}
-        rows = [
-            {**{name: self.columns[name][row_of[i]] for name in self.columns}, **self.constants}
-            for i in range(len(paths))
-        ]
+        rows = [self._row(row_of[i]) for i in range(len(paths))]
         return rows, sum(not files for files in found)
+
+    def of_rows(
+        self, paths: Sequence[Path], counts: Sequence[int]
+    ) -> tuple[list[dict[str, Value]], int]:
+        """Labels of each row of each file, one file behind the other.
+
+        Parameters
+        ----------
+        paths : sequence of Path
+            Absolute.
+        counts : sequence of int
+            Rows of each.
+
+        Returns
+        -------
+        rows : list of dict
+            Name -> value, of each row of each file.
+        unused : int
+            Rows of the table about other files.
+
+        Raises
+        ------
+        DataError
+            As :meth:`of_files`, about rows.
+        """
+        found = _matches(self.entries, paths)
+        faults = self._ambiguous(found, paths)
+        places: dict[tuple[int, int], int] = {}
+        for place, (files, row) in enumerate(zip(found, self.rows or (), strict=True)):
+            for i in files:
+                line, name = self.lines[place], paths[i].name
+                if row >= counts[i]:
+                    faults.append(
+                        f"line {line}: {ROW} = {row} must be < {counts[i]}, the rows of {name} "
+                        "that are records; correct it, or give rows"
+                    )
+                elif (i, row) in places:
+                    earlier = self.lines[places[i, row]]
+                    faults.append(
+                        f"lines {earlier}, {line} are all about row {row} of {name}, must be one; "
+                        "remove the others"
+                    )
+                places.setdefault((i, row), place)
+        wanted = [(i, row) for i, count in enumerate(counts) for row in range(count)]
+        missing = [f"{paths[i].name} {row}" for i, row in wanted if (i, row) not in places]
+        if missing:
+            faults.append(f"has no row for {len(missing)} record(s), {listed(missing)}; add one")
+        if faults:
+            raise refusal([f"{self.source}: {fault}" for fault in faults])
+        rows = [self._row(places[key]) for key in wanted]
+        return rows, sum(not files for files in found)
+
+    def _row(self, place: int) -> dict[str, Value]:
+        return {**{name: self.columns[name][place] for name in self.columns}, **self.constants}
 
     def _ambiguous(self, found: Sequence[Sequence[int]], paths: Sequence[Path]) -> list[str]:
         return [
@@ -222,6 +276,7 @@ def read_labels(
     path : str or Path, optional
         Table with a header; its column ``file`` holds file names, or as much of their paths as
         tells them apart. Comma, semicolon or tab; a decimal comma where commas do not separate.
+        A column ``row_in_file`` labels single rows of files whose rows are records, from 0.
     constants : mapping, optional
         Label -> text, the same for all files.
     severities : sequence of str
@@ -253,6 +308,7 @@ def read_labels(
     """
     faults: list[str] = []
     table = _Table() if path is None else _read_table(Path(path), faults)
+    rows = _row_numbers(table, faults)
     given = {name: [text] for name, text in (constants or {}).items()}
     columns = _columns(table.columns, table.comma, table.place, faults)
     fixed = _columns(given, False, lambda _: "label", faults)
@@ -268,10 +324,25 @@ def read_labels(
         source=table.source,
         entries=tuple(table.entries),
         lines=tuple(table.lines),
+        rows=rows,
         columns=columns,
         constants={name: values[0] for name, values in fixed.items()},
         severities=found,
     )
+
+
+def _row_numbers(table: "_Table", faults: list[str]) -> tuple[int, ...] | None:
+    """Rows that a table is about, of which it has a column or not."""
+    cells = table.columns.pop(ROW, None)
+    if cells is None:
+        return None
+    wrong = [i for i, cell in enumerate(cells) if not re.fullmatch("[0-9]{1,9}", cell)]
+    faults += [
+        f"{table.place(i)}: {ROW} = {cells[i]!r} must be a whole number >= 0, the first row being "
+        "0; correct it"
+        for i in wrong
+    ]
+    return tuple(0 if i in wrong else int(cell) for i, cell in enumerate(cells))
 
 
 class _Table:

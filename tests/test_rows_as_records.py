@@ -7,6 +7,7 @@ from click.testing import CliRunner
 from scipy.io import savemat
 from wearstate.datasets.import_set import import_recordings
 from wearstate.datasets.importers import read_recording
+from wearstate.datasets.labels import read_labels
 from wearstate.datasets.record import DataError, DataSet
 from wearstate.datasets.sources import SourceOptions, open_source
 from wearstate.diagnose.cli import cli
@@ -115,3 +116,51 @@ def test_the_command_line_takes_rows(tmp_path):
     made = CliRunner().invoke(cli, ["import", *given, "-o", str(tmp_path / "o.h5")])
     assert made.exit_code == 0, made.output
     assert "180 measured records of 0.1 s from 1 file(s)" in made.output
+
+
+def labelled(folder, text):
+    for name in ("a", "b"):
+        np.save(folder / f"{name}.npy", MATRIX[:3])
+    (folder / "l.csv").write_text(text)
+    return {
+        "files": [folder / "a.npy", folder / "b.npy"],
+        "path": folder / "o.h5",
+        "options": SourceOptions(**OPTIONS),
+        "labels": read_labels(folder / "l.csv"),
+        "segment": 0.05,
+    }
+
+
+ROWS = [("a", 2, "p3", "worn"), ("b", 0, "p1", "new"), ("a", 0, "p1", "new"), ("a", 1, "p2", "new")]
+ROWS += [("b", 2, "p3", "worn"), ("b", 1, "p9", "worn"), ("c", 0, "p1", "new")]
+TABLE = "file,row_in_file,group,state\n" + "".join(f"{a}.npy,{k},{g},{s}\n" for a, k, g, s in ROWS)
+
+
+def test_single_rows_have_labels_and_machines_of_their_own(tmp_path):
+    made = import_recordings(**labelled(tmp_path, TABLE))
+    assert (made.n_records, made.n_groups, made.unused_rows) == (12, 4, 1)  # two segments a row
+    with DataSet(tmp_path / "o.h5") as data:
+        told = data.manifest[["file", "row_in_file", "group_name", "state"]].to_records(index=False)
+    found = [(str(f)[:1], int(k), str(g), str(s)) for f, k, g, s in told]
+    assert found == [row for row in sorted(ROWS[:6]) for _ in range(2)]
+
+
+def test_labels_of_rows_that_do_not_fit_are_told_all_at_once(tmp_path):
+    wrong = TABLE.replace("b.npy,1,", "b.npy,3,").replace("a.npy,1,", "a.npy,2,")
+    with pytest.raises(DataError) as caught:
+        import_recordings(**labelled(tmp_path, wrong))
+    for part in (
+        "line 7: row_in_file = 3 must be < 3, the rows of b.npy that are records; correct it",
+        "lines 2, 5 are all about row 2 of a.npy, must be one; remove the others",
+        "has no row for 2 record(s), a.npy 1, b.npy 1; add one",
+    ):
+        assert part in str(caught.value)
+    with pytest.raises(DataError, match=r"row_in_file = '1\.5' must be a whole number >= 0"):
+        labelled(tmp_path, TABLE.replace("a.npy,1,", "a.npy,1.5,"))
+
+
+def test_labels_of_files_are_those_of_all_their_rows(tmp_path):
+    import_recordings(**labelled(tmp_path, "file,state\na.npy,new\nb.npy,worn\n"))
+    with DataSet(tmp_path / "o.h5") as data:
+        assert list(data.manifest["state"]) == ["new"] * 6 + ["worn"] * 6
+        assert data.manifest["group"].nunique() == 2
