@@ -27,6 +27,7 @@ from .page import render, short_name
 from .picture import encoded, save_picture
 from .report import save_page
 from .rig import EXPECTED, BeforeAfter, rig_figure, rig_text
+from .sag_report import SagReport, next_texts, sag_figure, sag_rows
 
 ALIGN_SCHEMA = 1
 
@@ -587,7 +588,13 @@ def _finish(axes: Any, label: str, title: str, *, pad: float = 6.0) -> None:
     axes.legend(fontsize=8)
 
 
-def align_html(found: Alignment, tested: BeforeAfter | None = None, *, note: str = "") -> str:
+def align_html(
+    found: Alignment,
+    tested: BeforeAfter | None = None,
+    *,
+    measured: SagReport | None = None,
+    note: str = "",
+) -> str:
     """One self-contained page: verdict, tables, picture, moves, and a simulated test of them.
 
     Parameters
@@ -595,6 +602,8 @@ def align_html(found: Alignment, tested: BeforeAfter | None = None, *, note: str
     found : Alignment
     tested : BeforeAfter, optional
         Of :func:`wearstate.diagnose.rig.calibrated_test`.
+    measured : SagReport, optional
+        What measured tests say; `found` is then of the line where they put it.
     note : str
         Why there is no test, where one was asked for.
 
@@ -619,6 +628,7 @@ def align_html(found: Alignment, tested: BeforeAfter | None = None, *, note: str
         image=encoded(align_figure(found)),
         margins=_margin_lines(found.calibration, found.margin) if found.calibration else [],
         tested=None if tested is None else _tested(tested),
+        measured=None if measured is None else _measured(measured),
         note=note,
         fixed=_fixed,
     )
@@ -662,6 +672,20 @@ def _tested(result: BeforeAfter) -> dict[str, Any]:
     }
 
 
+def _measured(report: SagReport) -> dict[str, Any]:
+    """Sags by measured tests, for the page."""
+    head, *rows = sag_rows(report)
+    return {
+        "headline": report.headline,
+        "plausible": report.posterior.plausible,
+        "head": head,
+        "rows": rows,
+        "tests": report.tests,
+        "next": next_texts(report),
+        "image": encoded(sag_figure(report)),
+    }
+
+
 _TEST_COLUMNS = 3  # of the picture of a test, on a page
 
 
@@ -670,8 +694,9 @@ def save_html(
     path: Path,
     tested: BeforeAfter | None = None,
     *,
+    measured: SagReport | None = None,
     note: str = "",
     force: bool = True,
 ) -> None:
     """Write :func:`align_html` whole, or not at all."""
-    save_page(align_html(found, tested, note=note), path, force=force)
+    save_page(align_html(found, tested, measured=measured, note=note), path, force=force)

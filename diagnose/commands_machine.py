@@ -178,6 +178,21 @@ def simulate(
 )
 @click.option("--push", metavar="BEARING", help="Where --test pushes the shaft up; aftmost.")
 @click.option("--test-plot", type=PATH, help="Picture of --test to write.")
+@click.option(
+    "--from-test",
+    "tests",
+    type=PATH,
+    multiple=True,
+    help="Data set of measured tests of the line, with force channels: its sags.",
+)
+@click.option("--reactions", type=PATH, help="CSV of measured reactions: bearing, reaction_kn.")
+@click.option(
+    "--reactions-in",
+    type=click.Choice(["cold", "hot", "running"]),
+    default="cold",
+    show_default=True,
+    help="Condition in which --reactions were measured.",
+)
 @seed_option
 @click.option("--plot", type=PATH, help="Picture to write (.png, .svg or .pdf).")
 @click.option("-o", "--output", type=PATH, help="HTML page to write.")
@@ -196,6 +211,9 @@ def align(
     rig_test: str | None,
     push: str | None,
     test_plot: Path | None,
+    tests: Sequence[Path],
+    reactions: Path | None,
+    reactions_in: str,
     seed: int,
     plot: Path | None,
     output: Path | None,
@@ -203,10 +221,14 @@ def align(
     force: bool,
     as_json: bool,
 ) -> None:
-    """Bearing loads of the shaft line SCENE, and the moves that bring them within limits."""
+    """Bearing loads of the shaft line SCENE, and the moves that bring them within limits.
+
+    With --from-test or --reactions the line is first taken to where these put its bearings.
+    """
     from ..sim.scene import load_scene
     from .align import align as judge
     from .align import align_table, align_text, save_figure, save_html
+    from .sag_report import sag_table, sag_text
 
     if rig_test is None and (push or test_plot or seed):
         raise click.UsageError("--push, --test-plot and --seed need --test")
@@ -217,8 +239,10 @@ def align(
     if rig_test is not None and not calibrate:
         raise click.UsageError("--test compares before and after the moves: it needs --calibrate")
     outputs = [(plot, PICTURE_SUFFIXES), (output, PAGE_SUFFIXES), (test_plot, PICTURE_SUFFIXES)]
-    check_outputs([scene_name], outputs, force)
+    inputs = [*tests, *([reactions] if reactions else [])]
+    check_outputs([scene_name, *inputs], outputs, force)
     scene = load_scene(scene_name, overrides_of(pairs))
+    scene, measured = _measured(scene, tests, reactions, reactions_in)
     found = judge(
         scene,
         condition=condition,
@@ -234,13 +258,28 @@ def align(
     if plot is not None:
         save_figure(found, plot, force=force)
     if output is not None:
-        save_html(found, output, result, note="" if result else "".join(words), force=force)
+        note = "" if result else "".join(words)
+        save_html(found, output, result, measured=measured, note=note, force=force)
     files = [str(path) for path, _ in outputs if path and path.exists()]
-    text = "\n".join([align_text(found), *words, *files])
-    emit({**align_table(found), "test": tested, "files": files}, as_json, text)
+    said = [] if measured is None else [sag_text(measured), ""]
+    text = "\n".join([*said, align_text(found), *words, *files])
+    sags = None if measured is None else sag_table(measured)
+    emit({**align_table(found), "sags": sags, "test": tested, "files": files}, as_json, text)
     levels = {"warning": EXIT_WARNING, "alarm": EXIT_ALARM}
     code = levels.get(found.verdict, 0) if fail_on else 0
     raise click.exceptions.Exit(0 if fail_on == "alarm" and code == EXIT_WARNING else code)
+
+
+def _measured(
+    scene: Any, tests: Sequence[Path], reactions: Path | None, condition: str
+) -> tuple[Any, Any]:
+    """The scene where its tests put it, and what they say; as it is where there are none."""
+    if not tests and reactions is None:
+        return scene, None
+    from .sag_report import sag_report, sagged
+
+    found = sag_report(scene, tests, reactions, condition=condition)
+    return sagged(scene, found.posterior), found
 
 
 def _tested(

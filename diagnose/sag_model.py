@@ -99,7 +99,7 @@ class MeasuredTransfer:
             raise SagError("\n".join(faults))
 
 
-def measured_transfer(
+def transfer_data(
     frf: Frf,
     *,
     speed: float,
@@ -150,7 +150,7 @@ def measured_transfer(
     >>> one = np.ones((1, 4))
     >>> frf = Frf(frequency=np.arange(4.0), value=2 * one + 0j, coherence=0.8 * one, radius=one,
     ...           averages=26.0, estimator="h1", confidence=0.95)
-    >>> test = measured_transfer(frf, speed=60.0, force=("aft", "y"),
+    >>> test = transfer_data(frf, speed=60.0, force=("aft", "y"),
     ...                          responses=[("aft", "y", "housing")])
     >>> test.frequencies.size, round(float(test.covariance[0, 0, 0].real), 6)
     (3, 0.04)

@@ -20,9 +20,9 @@ from wearstate.diagnose.sag_model import (
     MeasuredTransfer,
     Prior,
     SagError,
-    measured_transfer,
     question_of,
     slopes_at,
+    transfer_data,
     trial_at,
     unknowns_of,
 )
@@ -189,7 +189,7 @@ def test_a_simulated_test_tells_the_sag_and_its_noise_is_as_predicted(rig):
     shaker = ShakerTest(force=15.0, bursts=30, quiet=5.0, force_noise=0.01, low=8.0, high=250.0)
     plant = scene_plant(sagged, force=("second", "y"), sample_rate=shaker.sample_rate)
     result = run_test(plant, shaker, seed=3)
-    test = measured_transfer(
+    test = transfer_data(
         result.frf, speed=plant.reduced.speed, force=plant.force, responses=plant.responses
     )
     found = estimate_sags(rig.scene, [test], prior=rig.prior)
