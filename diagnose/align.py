@@ -564,7 +564,7 @@ def _meanings(pairs: Sequence[tuple[LineState, str]]) -> list[Any]:
     return [*bars, Line2D([], [], color=_LIMIT, ls="--", lw=1, label="limit")]
 
 
-_ABOVE = {"rotation": 90, "fontsize": 7, "ha": "center", "va": "bottom"}
+_ABOVE = {"rotation": 90, "fontsize": 8, "ha": "center", "va": "bottom"}
 
 
 def _draw_jacking(axes: Any, found: Jacking) -> None:

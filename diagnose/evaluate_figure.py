@@ -21,7 +21,7 @@ _RIVALS = {
 }
 """Baseline -> colour and marker."""
 
-_WIDTH, _HEIGHT = 5.2, 3.8  # inches of a picture: its 8 points are 8 pixels on a phone
+_WIDTH, _HEIGHT = 4.9, 3.6  # inches of a picture: its 8 points are 8 pixels on a phone
 _BEYOND = 1.15  # of the axis: where an open end is drawn to
 
 

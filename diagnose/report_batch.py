@@ -76,6 +76,8 @@ class Row:
     possible_grades : tuple of int
     action, advice, horizon : str
         What to do and how soon.
+    days : float or None
+        The same as a number [d].
     note : str
         The first reason or caution.
     current : bool
@@ -96,18 +98,23 @@ class Row:
     action: str
     advice: str
     horizon: str
+    days: float | None
     note: str
     current: bool = True
 
     @property
-    def urgency(self) -> tuple[bool, int, float]:
-        """For sorting: what must be acted on, what could not be judged, what is fine, what was."""
+    def urgency(self) -> tuple[bool, int, float, float]:
+        """For sorting: what must be acted on, what could not be judged, what is fine, what was.
+
+        Of what must be acted on the soonest first, of equals the most worn.
+        """
         past = not self.current
         if past:
-            return (past, 0, -(self.time_h or 0.0))
+            return (past, 0, 0.0, -(self.time_h or 0.0))
         if self.grade is None:
-            return (past, 1 if self.verdict == "unusable" else 2, 0.0)
-        return (past, 0 if self.grade >= WARNING_GRADE else 3, -(self.severity or 0.0))
+            return (past, 1 if self.verdict == "unusable" else 2, 0.0, 0.0)
+        group = 0 if self.grade >= WARNING_GRADE else 3
+        return (past, group, self.days or 0.0, -(self.severity or 0.0))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -119,7 +126,7 @@ class Batch:
     source : str
         Folder or file.
     rows : tuple of Row
-        The worst first.
+        The most urgent first.
     items : tuple of Item
         By the number of their row.
     trends : dict
@@ -451,6 +458,7 @@ def _row(number: int, item: Item, time: float | None, estimate: Estimate, advice
         action=advice.action,
         advice=advice.sentence,
         horizon=advice.horizon,
+        days=advice.days,
         note="; ".join([*present, *notes[:1]]),
     )
 
@@ -533,7 +541,13 @@ def _hastened(row: Row, trend: Trend | None, model: WearModel) -> Row:
         high=row.high,
     )
     advice = _advice(found, model, trend.outlook)
-    return replace(row, action=advice.action, advice=advice.sentence, horizon=advice.horizon)
+    return replace(
+        row,
+        action=advice.action,
+        advice=advice.sentence,
+        horizon=advice.horizon,
+        days=advice.days,
+    )
 
 
 def _advice(estimate: Estimate, model: WearModel, outlook: Outlook | None = None) -> Advice:

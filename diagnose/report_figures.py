@@ -239,7 +239,7 @@ def _gauge_figure(estimate: Mapping[str, Any], limits: Mapping[str, Any]) -> Any
     """Small enough to be read on a phone."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(5.2, 1.6))
+    figure = Figure(figsize=(4.9, 1.6))
     figure.subplots_adjust(left=0.04, right=0.96, bottom=0.32, top=0.97)
     edges = [1e3 * edge for edge in limits["grade_edges_m"]]
     low, value, high = (1e3 * estimate[key] for key in ("low", "severity", "high"))
@@ -250,7 +250,7 @@ def _gauge_figure(estimate: Mapping[str, Any], limits: Mapping[str, Any]) -> Any
         axes.axvspan(bounds[i], bounds[i + 1], color=GRADE_COLOURS[i], alpha=0.25, lw=0)
         middle = (bounds[i] + bounds[i + 1]) / 2
         narrow = bounds[i + 1] - bounds[i] < _NARROW * right
-        text = str(i) if narrow else f"{i}\n{name}"
+        text = str(i) if narrow else "\n".join([str(i), *name.split()])
         axes.text(middle, 0.95, text, ha="center", va="top", fontsize=8)
     axes.errorbar(
         [value],
@@ -282,7 +282,7 @@ def trend_picture(trend: Trend, limits: Mapping[str, Any], heading: str) -> Pict
     return Picture(caption=caption, alt=caption, data=encoded(figure), wide=False)
 
 
-_TREND_SIZE = (6.0, 3.9)  # inches: on a phone the crossing of the limit is seen without scrolling
+_TREND_SIZE = (4.9, 3.6)  # inches: on a phone the crossing of the limit is seen without scrolling
 
 
 def _draw_trend(axes: Any, trend: Trend, limits: Mapping[str, Any]) -> None:
@@ -308,7 +308,7 @@ def _draw_trend(axes: Any, trend: Trend, limits: Mapping[str, Any]) -> None:
             (between, 0.02),
             xycoords=("data", "axes fraction"),
             rotation=90,
-            fontsize=7,
+            fontsize=8,
             ha="right",
         )
     axes.set_ylim(0, 1.1 * max(limit, float(high.max())))

@@ -1,0 +1,80 @@
+"""Pages on a phone: text of 8 pixels at least, tables row by row; the most urgent first."""
+
+import dataclasses
+import re
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from matplotlib.text import Text
+from wearstate.diagnose import evaluate_figure, report_figures
+from wearstate.diagnose.cli import cli
+from wearstate.diagnose.report_batch import Row
+from wearstate.diagnose.trend import fit_trend
+
+PHONE_PX = 358  # of 390 the margins of the page take 32
+LEAST_PX = 8
+
+
+def smallest_px(figure):
+    """Height of the smallest text of a picture that is shown as wide as the page [px]."""
+    figure.draw_without_rendering()
+    sizes = [text.get_fontsize() for text in figure.findobj(Text) if text.get_text().strip()]
+    return min(sizes) * PHONE_PX / (72 * figure.get_figwidth())
+
+
+def test_text_of_the_pictures_that_shrink_is_legible():
+    edges = [1e-4, 2e-4, 3e-4]
+    limits = {
+        "grade_edges_m": edges,
+        "grade_names": ["as new", "worn", "plan renewal", "condemned"],
+        "condemning_limit_m": 3e-4,
+        "quantity": "diametral clearance, crankpin",
+    }
+    estimate = {"low": 2.1e-4, "severity": 2.2e-4, "high": 2.4e-4}
+    assert smallest_px(report_figures._gauge_figure(estimate, limits)) >= LEAST_PX
+    shown = []
+    hours = 700.0 * np.arange(12)
+    wear = np.where(hours < 4000, 1e-4 + 3e-8 * hours, 1e-4)  # with a maintenance
+    trend = fit_trend(hours, wear, 0.97 * wear, 1.03 * wear, limit=3e-4)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(report_figures, "encoded", lambda figure: shown.append(figure) or "")
+        report_figures.trend_picture(trend, limits, "machine 1")
+        patch.setattr(evaluate_figure, "encoded", lambda figure: shown.append(figure) or "")
+        evaluate_figure._picture(lambda axes: axes.text(0, 0, "smallest", fontsize=8))
+    assert len(shown) == 2
+    assert min(smallest_px(figure) for figure in shown) >= LEAST_PX
+
+
+def test_every_value_of_a_table_of_bearings_tells_what_it_is(tmp_path):
+    """Where rows are stacked the head is gone: each value but the name has its own."""
+    page = tmp_path / "page.html"
+    done = CliRunner().invoke(cli, ["align", "shaft-rig", "-o", str(page)])
+    assert done.exit_code == 0, done.output
+    text = page.read_text()
+    tables = re.findall(r"<table.*?</table>", text, flags=re.DOTALL)
+    assert len(tables) == 5  # three conditions, before and after, influence
+    for table in tables:
+        assert table.startswith('<table class="stack">')
+        for row in re.findall(r"<tr>(.*?)</tr>", table, flags=re.DOTALL)[1:]:
+            cells = re.findall(r"<td[^>]*>", row)
+            assert len(cells) > 1
+            assert all("data-label=" in cell for cell in cells[1:])
+    assert 'data-label="reaction [kN]"' in text
+    assert 'data-label="third up"' in text
+
+
+def test_what_cannot_wait_is_before_what_is_worse():
+    soon = Row(
+        number=0, name="a", machine="1", time_h=None, headline="", verdict="graded", grade=3,
+        severity=4e-4, low=3.9e-4, high=4.1e-4, possible_grades=(3,), action="stop", advice="",
+        horizon="now", days=0.0, note="",
+    )  # fmt: skip
+    worse = dataclasses.replace(soon, name="b", severity=5e-4, horizon="within a day", days=1.0)
+    worn = dataclasses.replace(worse, name="c", grade=1, severity=1e-4, days=30.0)
+    unread = dataclasses.replace(soon, name="d", grade=None, verdict="unusable", days=None)
+    past = dataclasses.replace(soon, name="e", current=False, time_h=5.0)
+    rows = sorted([past, worn, unread, worse, soon], key=lambda row: row.urgency)
+    assert [row.name for row in rows] == ["a", "b", "d", "c", "e"]
+    same = [dataclasses.replace(worse, name="f", severity=s) for s in (4e-4, 6e-4)]
+    assert sorted(same, key=lambda row: row.urgency)[0].severity == 6e-4
