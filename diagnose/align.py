@@ -1,7 +1,7 @@
 """The alignment of a shaft line: as a table for JSON, as text, as a picture, as one HTML page."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -21,8 +21,21 @@ from ..sim.alignment import (
 from ..sim.calibration import Block, Calibration, CalibrationStatus, calibrate
 from ..sim.jacking import Jacking, jacking
 from ..sim.parts import Scene
+from ..sim.shaft_film import ShaftFilmError
 from ..sim.shaft_line import alignment_conditions, alignment_line
 from ..sim.shaft_parts import ShaftScene
+from .align_films import (
+    FILM_HEAD,
+    FilmState,
+    film_cells,
+    film_rows,
+    film_states,
+    pressure_figure,
+    resting,
+    transfer_figure,
+)
+from .align_margins import jack_cells, jack_rows, margin_cells, margin_rows
+from .align_tests import LineTest
 from .page import render, short_name
 from .picture import encoded, save_picture
 from .report import save_page
@@ -42,8 +55,7 @@ class Alignment:
 
     Attributes
     ----------
-    name : str
-        Of the scene.
+    scene : ShaftScene
     line : AlignmentLine
     states : tuple of LineState
         One for each condition, as the line is set.
@@ -54,12 +66,30 @@ class Alignment:
         Share of each limit that was asked for as a distance from it.
     """
 
-    name: str
+    scene: ShaftScene
     line: AlignmentLine
     states: tuple[LineState, ...]
     calibration: Calibration | None
     jacking: Jacking | None
     margin: float = 0.0
+
+    @property
+    def name(self) -> str:
+        """Of the scene."""
+        return self.scene.name
+
+    @property
+    def proposed(self) -> tuple[dict[str, float], dict[str, float]]:
+        """Moves [m] and turns [rad] by bearing; empty where none are proposed."""
+        found = self.calibration
+        if found is None or not found.moved:
+            return {}, {}
+        names = found.line.names
+        moves, turns = (
+            dict(zip(names, map(float, values), strict=True))
+            for values in (found.moves, found.turns)
+        )
+        return moves, turns
 
     @property
     def unmet(self) -> tuple[Check, ...]:
@@ -127,7 +157,7 @@ def align(
     if mend:
         calibration = calibrate(line, conditions, prefer=prefer, target=target, margin=margin)
     return Alignment(
-        name=scene.name,
+        scene=scene,
         line=line,
         states=states,
         calibration=calibration,
@@ -164,8 +194,8 @@ def align_table(found: Alignment) -> dict[str, Any]:
     -------
     dict
         ``schema_version``, ``scene``, ``verdict``, ``bearings``, ``conditions`` (the line as it
-        is set), ``influence_n_per_m``, ``calibration`` and ``jacking``, the last two null where
-        not asked for.
+        is set), ``influence_n_per_m``, ``margins``, ``jacks``, ``films`` at three speeds,
+        ``calibration`` and ``jacking``, the last two null where not asked for.
     """
     return {
         "schema_version": ALIGN_SCHEMA,
@@ -175,9 +205,17 @@ def align_table(found: Alignment) -> dict[str, Any]:
         "bearings": [_seat_row(found.line, i) for i in range(len(found.line.seats))],
         "conditions": [_state_rows(state) for state in found.states],
         "influence_n_per_m": influence(found.line, found.states[0]).tolist(),
+        "margins": margin_rows(found.states, _after(found)),
+        "jacks": jack_rows(found.states, found.calibration),
+        "films": film_rows(film_states(found.scene, *found.proposed)),
         "calibration": _calibration_table(found.calibration),
         "jacking": None if found.jacking is None else _jacking_table(found.jacking),
     }
+
+
+def _after(found: Alignment) -> tuple[LineState, ...]:
+    moved = found.calibration is not None and found.calibration.moved
+    return found.calibration.after if found.calibration is not None and moved else ()
 
 
 def _seat_row(line: AlignmentLine, i: int) -> dict[str, Any]:
@@ -612,9 +650,15 @@ def align_html(
     str
         HTML.
     """
+    moves, turns = found.proposed
+    films = film_states(found.scene, moves, turns)
     return render(
         "align.html.j2",
         found=found,
+        films=_films(films),
+        transfers=_transfers(found, moves, turns, measured),
+        margin_rows=margin_cells(margin_rows(found.states, _after(found))),
+        jack_rows=jack_cells(jack_rows(found.states, found.calibration)),
         colour=_COLOURS[found.verdict],
         headline=_headline(found),
         states=[_state_cells(state) for state in found.states],
@@ -672,6 +716,33 @@ def _tested(result: BeforeAfter) -> dict[str, Any]:
     }
 
 
+def _films(states: Sequence[FilmState]) -> dict[str, Any]:
+    """Oil films for the page; without a picture where the line does not rest."""
+    rests = any(state.film is not None for state in states)
+    return {
+        "head": FILM_HEAD,
+        "rows": film_cells(states),
+        "faults": resting(states),
+        "image": encoded(pressure_figure(states)) if rests else "",
+    }
+
+
+def _transfers(
+    found: Alignment,
+    moves: Mapping[str, float],
+    turns: Mapping[str, float],
+    measured: SagReport | None,
+) -> list[str]:
+    """Pictures of transfer functions, one for each measured test, else one of the model."""
+    tests: Sequence[LineTest | None] = (measured.tests if measured else ()) or (None,)
+    try:
+        return [
+            encoded(transfer_figure(found.scene, moves, turns, measured=test)) for test in tests
+        ]
+    except ShaftFilmError:  # said beside the table of the films
+        return []
+
+
 def _measured(report: SagReport) -> dict[str, Any]:
     """Sags by measured tests, for the page."""
     head, *rows = sag_rows(report)
@@ -680,7 +751,7 @@ def _measured(report: SagReport) -> dict[str, Any]:
         "plausible": report.posterior.plausible,
         "head": head,
         "rows": rows,
-        "tests": report.tests,
+        "tests": [test.text for test in report.tests],
         "next": next_texts(report),
         "image": encoded(sag_figure(report)),
     }

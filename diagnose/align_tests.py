@@ -26,18 +26,21 @@ _FEWEST_HEARD = 0.05  # of the lines of the band: mere noise makes some of a hun
 _LOW_HZ = 5.0
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class LineTest:
     """One test read from a file.
 
     Attributes
     ----------
     transfer : MeasuredTransfer
+    coherence : ndarray, shape (n_lines, n_resp)
+        At the lines of `transfer` [-].
     text : str
         Where it pushes, how it was averaged, how coherent it is.
     """
 
     transfer: MeasuredTransfer
+    coherence: NDArray[np.float64]
     text: str
 
 
@@ -150,7 +153,7 @@ def line_tests(
             f"{speed / math.tau:.4g} rev/s, {found.words}, median coherence {share:.2f}, "
             f"{kept.size} lines"
         )
-        tests.append(LineTest(transfer=transfer, text=text))
+        tests.append(LineTest(transfer=transfer, coherence=coherence[:, k, kept].T, text=text))
     return tuple(tests)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..sim.parts import Scene
 from ..sim.shaft_parts import ShaftScene
-from .align_tests import read_reactions, read_tests
+from .align_tests import LineTest, read_reactions, read_tests
 from .next_test import PlannedTest, candidate_places, rank_tests
 from .page import short_name
 from .sag_model import MeasuredReactions, Prior, SagError
@@ -31,15 +31,14 @@ class SagReport:
     Attributes
     ----------
     posterior : SagPosterior
-    tests : tuple of str
-        What each was, in words.
+    tests : tuple of LineTest
     reactions : MeasuredReactions or None
     planned : tuple of PlannedTest
         The most telling first.
     """
 
     posterior: SagPosterior
-    tests: tuple[str, ...]
+    tests: tuple[LineTest, ...]
     reactions: MeasuredReactions | None
     planned: tuple[PlannedTest, ...]
 
@@ -115,7 +114,7 @@ def sag_report(
     )
     return SagReport(
         posterior=posterior,
-        tests=tuple(test.text for test in read),
+        tests=tuple(read),
         reactions=jacked,
         planned=planned,
     )
@@ -167,7 +166,7 @@ def sag_table(report: SagReport) -> dict[str, Any]:
             )
         ],
         "covariance_m2": found.covariance.tolist(),
-        "tests": list(report.tests),
+        "tests": [test.text for test in report.tests],
         "next": [
             {
                 "text": one.text,
@@ -187,7 +186,7 @@ def sag_text(report: SagReport) -> str:
     found = report.posterior
     lines = [f"sags: {report.headline}"]
     lines += [f"  {' '.join(row)}" for row in _aligned(sag_rows(report))]
-    lines += [f"  {text}" for text in report.tests]
+    lines += [f"  {test.text}" for test in report.tests]
     return "\n".join([*lines, *(f"  {text}" for text in _next_texts(report, found))])
 
 

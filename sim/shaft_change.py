@@ -37,7 +37,7 @@ from .shaft_film import (
     coefficient_gradients,
     journal_shifts,
 )
-from .shaft_line import film_bearings, shaft_state
+from .shaft_line import film_bearings, running_beam
 from .shaft_parts import ShaftScene
 from .shaft_response import Place, receptance
 
@@ -197,8 +197,8 @@ def line_model(scene: ShaftScene) -> LineModel:
 
     Raises
     ------
-    ShaftFilmError, ValueError
-        As :func:`.shaft_line.shaft_state`.
+    ValueError
+        As :func:`.shaft_line.shaft_beam`.
 
     Examples
     --------
@@ -209,7 +209,7 @@ def line_model(scene: ShaftScene) -> LineModel:
     housings = [bearing.housing for bearing in scene.bearings]
     ratio = scene.shaft.damping_ratio
     return LineModel(
-        beam=shaft_state(scene).beam,
+        beam=running_beam(scene),
         bearings=film_bearings(scene),
         rung=scene.film.rung,
         housing_masses=np.array([h.mass for h in housings]),
@@ -266,7 +266,7 @@ def film_sizes(film: BeamFilm) -> tuple[Vector, Vector]:
     Examples
     --------
     >>> from wearstate.sim.scene import load_scene
-    >>> film_sizes(shaft_state(load_scene("shaft-rig")).film)[0].shape
+    >>> film_sizes(rest(line_model(load_scene("shaft-rig")), 62.8))[0].shape
     (4, 4, 4)
     """
     lengths = np.array([bearing.bearing.length for bearing in film.bearings])

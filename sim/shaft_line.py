@@ -111,6 +111,19 @@ def shaft_beam(scene: ShaftScene) -> Beam:
     return _loaded(_bare_beam(_bones(scene)), coupling_loads(scene.coupling))
 
 
+def running_beam(scene: ShaftScene) -> Beam:
+    """Beam of a scene in steady running: with its thrust as well.
+
+    Examples
+    --------
+    >>> from wearstate.sim.scene import load_scene
+    >>> len(running_beam(load_scene("propulsion-shaft")).loads)
+    2
+    """
+    share = scene.conditions.running.thrust_share
+    return _loaded(shaft_beam(scene), thrust_loads(scene, share))
+
+
 class _Bones(NamedTuple):
     """What a beam is made of; machines and records that share it share the beam."""
 
@@ -566,8 +579,7 @@ def shaft_state(
     >>> bool(abs(state.film.reactions[:, 0].sum() / state.beam.downward_load - 1) < 1e-6)
     True
     """
-    share = scene.conditions.running.thrust_share
-    beam = _loaded(shaft_beam(scene), thrust_loads(scene, share))
+    beam = running_beam(scene)
     housings = [bearing.housing for bearing in scene.bearings]
     film = beam_film(
         beam,

@@ -53,7 +53,7 @@ def test_every_value_of_a_table_of_bearings_tells_what_it_is(tmp_path):
     assert done.exit_code == 0, done.output
     text = page.read_text()
     tables = re.findall(r"<table.*?</table>", text, flags=re.DOTALL)
-    assert len(tables) == 5  # three conditions, before and after, influence
+    assert len(tables) == 8  # three conditions, before and after, margins, jacks, films, influence
     for table in tables:
         assert table.startswith('<table class="stack">')
         for row in re.findall(r"<tr>(.*?)</tr>", table, flags=re.DOTALL)[1:]:
