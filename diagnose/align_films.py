@@ -106,7 +106,7 @@ def moved_scene(
     Examples
     --------
     >>> from wearstate.sim.scene import load_scene
-    >>> moved_scene(load_scene("shaft-rig"), {"third": 1e-4}, {}).bearings[2].offset
+    >>> round(moved_scene(load_scene("shaft-rig"), {"third": 1e-4}, {}).bearings[2].offset, 9)
     -0.00015
     """
     turned = turned_scene(scene, turns)
