@@ -5,12 +5,14 @@ the edges are all that a tacho says.
 """
 
 from collections.abc import Callable
-from functools import cached_property
+from dataclasses import dataclass
+from functools import cached_property, reduce
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..features.edges import placed_edges
 from ..features.order import HYSTERESIS_SHARE
 from .record import DataError
 
@@ -25,8 +27,9 @@ _LEAST = 3.0  # new samples that a pulse, and the gap behind it, must last to sh
 class ResampledTacho:
     """Pulses at a new rate, each edge a ramp of two samples through the time of the old one.
 
-    Linear interpolation, as of :func:`~..features.order.pulse_times`, gives the times of the rising
-    edges back. A pulse shorter than three new samples is made as long.
+    :func:`~..features.order.pulse_times` finds the rising edges where it found them at the rate of
+    the file: those of a sampled logic level lie as smoothly here, and no more by the samples of the
+    file. A pulse shorter than three new samples is made as long.
 
     Parameters
     ----------
@@ -58,7 +61,7 @@ class ResampledTacho:
     @cached_property
     def _corners(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Times [new samples] and levels of the corners between which the signal is straight."""
-        low, high = self._extremes()
+        low, high = self._extremes
         middle = (low + high) / 2
         if not low < middle < high:
             return np.array([0.0]), np.array([low])
@@ -87,6 +90,7 @@ class ResampledTacho:
         latest = np.append(rise[1:] - _LEAST, np.inf)[: len(fall)]
         return np.asarray(np.minimum(np.maximum(fall, rise[: len(fall)] + _LEAST), latest))
 
+    @cached_property
     def _extremes(self) -> tuple[float, float]:
         pieces = [self.read(a, b) for a, b in self._spans(0)]
         return min(float(p.min()) for p in pieces), max(float(p.max()) for p in pieces)
@@ -97,18 +101,60 @@ class ResampledTacho:
 
     def _edges(self, level: float, margin: float, sign: float) -> NDArray[np.float64]:
         """Rising edges of the signal times `sign` [samples of the file], as in a whole record."""
-        found: list[NDArray[np.float64]] = []
-        state, last = 0, np.array([np.nan])  # of what was decided, and the latest crossing
+        found: list[_Crossings] = []
+        state, last = 0, _Crossings(before=np.array([-1]), around=np.full((1, 4), np.nan))
         for start, stop in self._spans(1):
-            volts = sign * self.read(start, stop)
-            below = np.flatnonzero((volts[:-1] < level) & (volts[1:] >= level))
-            part = (level - volts[below]) / (volts[below + 1] - volts[below])
-            crossings = np.concatenate([last, start + below + part])
+            crossings, volts = self._crossings(start, stop, level, sign)
+            crossings = last.and_then(crossings)
             sides = (volts >= level + margin).astype(np.int8) - (volts <= level - margin)
             places = np.flatnonzero(sides)
             known = np.concatenate([[state], sides[places]])
             arrived = start + places[(known[:-1] < 0) & (known[1:] > 0)]
             # every arrival has a crossing before it, perhaps in the piece before
-            found.append(crossings[np.searchsorted(crossings[1:], arrived, side="right")])
+            found.append(crossings[np.searchsorted(crossings.before[1:], arrived, side="left")])
             state, last = int(known[-1]), crossings[-1:]
-        return np.concatenate(found)
+        low, high = sorted(sign * extreme for extreme in self._extremes)
+        edges = reduce(_Crossings.and_then, found)
+        line = edges.around[:, 1:3].T
+        fraction = (level - line[0]) / (line[1] - line[0])
+        share = (edges.around - low) / (high - low)
+        placed = placed_edges(edges.before, share, edges.before + fraction)
+        return np.asarray(np.clip(placed, 0.0, self.n_samples - 1))
+
+    def _crossings(
+        self, start: int, stop: int, level: float, sign: float
+    ) -> tuple["_Crossings", NDArray[np.float64]]:
+        """Where samples [start, stop) times `sign` rise through a level, and these samples."""
+        first, past = max(0, start - 1), min(stop + 2, self.n_samples)
+        wide = np.full(stop - start + 3, np.nan)
+        wide[first - start + 1 : past - start + 1] = sign * self.read(first, past)
+        volts = wide[1 : stop - start + 1]
+        below = np.flatnonzero((volts[:-1] < level) & (volts[1:] >= level))
+        around = wide[below[:, np.newaxis] + np.arange(4)]
+        return _Crossings(before=start + below, around=around), volts
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Crossings:
+    """Rises through a level.
+
+    Attributes
+    ----------
+    before : numpy.ndarray [shape=(n,)]
+        Last sample below the level.
+    around : numpy.ndarray [shape=(n, 4)]
+        Samples from the one in front of that to the two behind it, NaN outside the file.
+    """
+
+    before: NDArray[np.intp]
+    around: NDArray[np.float64]
+
+    def __getitem__(self, key: "slice | NDArray[np.intp]") -> "_Crossings":
+        return _Crossings(before=self.before[key], around=self.around[key])
+
+    def and_then(self, other: "_Crossings") -> "_Crossings":
+        """Both, one behind the other."""
+        return _Crossings(
+            before=np.concatenate([self.before, other.before]),
+            around=np.concatenate([self.around, other.around]),
+        )

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from ..sim.atomic import replacing
 from .draws import Range
+from .lock import holding
 from .recipe import Recipe, Sample, recorded_recipe, sample_records
 from .recipe_file import RecipeError
 from .record import Attributes, DataError, DataSet, fill_split, lay_out_split
@@ -524,7 +525,8 @@ def usable_sides(data: DataSet, name: str) -> Sides:
 def store_splits(path: str | Path, splits: Sequence[Split], *, force: bool = False) -> None:
     """Add splits to a finished file; signal and manifest stay as they are.
 
-    The file is copied and the copy renamed, so that it is whole whenever this ends.
+    The file is copied and the copy renamed, so that it is whole whenever this ends. One run at a
+    time does so: the other's splits would be lost.
 
     Parameters
     ----------
@@ -538,11 +540,19 @@ def store_splits(path: str | Path, splits: Sequence[Split], *, force: bool = Fal
     Raises
     ------
     DataError
-        The file cannot be read, has splits of these names, or its folder has no room.
+        The file cannot be read, has splits of these names, another run writes it, or its folder
+        has no room.
     """
     place = Path(path).absolute()
     with DataSet(place) as data:
-        there, n_records = data.splits, len(data)
+        n_records = len(data)
+    with holding(place):
+        _store(place, splits, n_records, force)
+
+
+def _store(place: Path, splits: Sequence[Split], n_records: int, force: bool) -> None:
+    with DataSet(place) as data:
+        there = data.splits
     twice = sorted(split.name for split in splits if split.name in there)
     if twice and not force:
         raise DataError(

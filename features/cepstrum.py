@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .fft import ifft, irfft
+from .rate import check_rate
 from .spectrum import hann, line_frequencies, power_lines
 
 Float = NDArray[np.float64]
@@ -56,6 +57,7 @@ def cepstrum_of_lines(lines: ArrayLike, fs: float) -> tuple[Float, Float]:
     >>> float(quefrency[8]), round(float(cepstrum[8]), 3)
     (0.0625, 0.25)
     """
+    check_rate(fs)
     logarithm = _logarithm(lines)
     count = logarithm.shape[-1]
     whole = irfft(logarithm.astype(np.complex128), 2 * (count - 1))
@@ -116,6 +118,7 @@ def cepstrum(x: ArrayLike, fs: float, *, nperseg: int | None = None) -> tuple[Fl
     >>> round(float(quefrency[20 + np.argmax(real[20:200])]), 6)
     0.04
     """
+    check_rate(fs)
     return cepstrum_of_lines(power_lines(x, fs, nperseg=nperseg), fs)
 
 
@@ -184,6 +187,7 @@ def harmonic_spacing(
     >>> round(float(spacing))
     100
     """
+    check_rate(fs)
     if not 0 < low < high <= fs / 4:
         raise ValueError(
             f"low = {low} Hz must be > 0 and < high = {high} Hz, and that <= fs / 4 = {fs / 4} Hz; "

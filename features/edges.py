@@ -47,33 +47,35 @@ def is_logic_level(before: NDArray[np.float64], after: NDArray[np.float64], swin
     return bool(np.mean(sharp) >= _LOGIC_SHARE)
 
 
-def averaged_edges(share: Float, before: NDArray[np.intp], otherwise: Float) -> Float:
-    """Where steps rose that were averaged over a sample each.
+def placed_edges(before: NDArray[np.intp], around: Float, otherwise: Float) -> Float:
+    """Where the rising edges of a pulse train lie, by what kind of train it is.
 
     Parameters
     ----------
-    share : ndarray, shape (n_samples,)
-        Pulse train, its lowest sample 0, its highest 1 [-].
     before : ndarray, shape (n_edges,)
-        Last sample of each edge below the level.
+        Last sample of each edge below the level, increasing.
+    around : ndarray, shape (n_edges, 4)
+        Samples from the one in front of that to the two behind it, the lowest of the record 0, its
+        highest 1 [-]; NaN outside the record.
     otherwise : ndarray, shape (n_edges,)
         Places of the edges that take longer than two samples [samples].
 
     Returns
     -------
     ndarray, shape (n_edges,)
-        [samples]. Each sample is the mean over the interval round it: what lies above zero in the
-        four round the edge is what lies behind it.
+        [samples]. Of a sampled logic level the `smoothest`. Else a step that was averaged over a
+        sample lies by its area: each sample is the mean over the interval round it, so what lies
+        above zero in the four is what lies behind the edge.
 
     Examples
     --------
-    >>> averaged_edges(np.array([0.0, 0.0, 0.2, 1.0, 1.0]), np.array([2]), np.array([2.4])).round(9)
+    >>> placed_edges(np.array([2]), np.array([[0.0, 0.2, 1.0, 1.0]]), np.array([2.4])).round(9)
     array([2.3])
     """
-    inside = (before >= 1) & (before + 2 < share.size)
-    around = share[np.clip(before[:, None] + np.arange(-1, 3), 0, share.size - 1)]
+    if before.size and is_logic_level(around[:, 1], around[:, 2], 1.0):
+        return smoothest(before.astype(np.float64) + 0.5)
     flat = (abs(around[:, 0]) <= _LEVEL_SHARE) & (around[:, 3] >= 1 - _LEVEL_SHARE)
-    return np.where(inside & flat, before + 2.5 - around.sum(axis=1), otherwise)
+    return np.where(flat, before + 2.5 - around.sum(axis=1), otherwise)
 
 
 def smoothest(edges: Float) -> Float:

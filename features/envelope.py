@@ -7,6 +7,7 @@ down to zero frequency, is slow enough to read the rate of the blows from; the k
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any, Literal
 
 import numpy as np
@@ -14,6 +15,7 @@ from numpy.lib.stride_tricks import as_strided, sliding_window_view
 from numpy.typing import ArrayLike, NDArray
 
 from .fft import fast_length, fft, ifft, rfft
+from .rate import check_rate, rate_fault
 from .spectrum import hann
 from .statistics import Real, centred
 
@@ -59,6 +61,13 @@ LONE_SHARE = 1 / 3
 """Share of a band's fourth moment that, within `_LONE_PARTS` of the record, is a lone event [-]:
 blows that come back four times or more leave each eighth of the record less."""
 
+FEWEST_FRAMES, MANY_FRAMES = 64, 256
+"""Frames from which spectral kurtosis looks for lone events [-]: below the former any share may be
+one of noise, below the latter a third is that of every tenth line, half of none."""
+
+LONE_SHARE_OF_FEW = 1 / 2
+"""`LONE_SHARE` between the two [-]."""
+
 MOST_LONE = 3
 """Lone events left out of a band [-]; with more, they come back."""
 
@@ -99,7 +108,7 @@ def checked_signal(x: ArrayLike, fs: float, *, least: int = 2 * FEWEST_LINES) ->
     Raises
     ------
     ValueError
-        If a sample is not finite, there are too few, or `fs` is not > 0 and finite.
+        If a sample is not finite, there are too few, or `fs` is not believed.
 
     Examples
     --------
@@ -108,8 +117,8 @@ def checked_signal(x: ArrayLike, fs: float, *, least: int = 2 * FEWEST_LINES) ->
     """
     signal = np.asarray(x)
     faults = []
-    if not (np.isfinite(fs) and fs > 0):
-        faults.append(f"fs = {fs} Hz must be > 0 and finite; give the sample rate")
+    if fault := rate_fault(fs):
+        faults.append(fault)
     n_samples = signal.shape[-1] if signal.ndim else 0
     if n_samples < least:
         faults.append(f"n_samples = {n_samples} must be >= {least}; record longer")
@@ -619,6 +628,10 @@ def spectral_kurtosis(x: ArrayLike, fs: float, *, nperseg: int | None = None) ->
     ``2 / sqrt(K)``. The lines at either end, which overlap their own mirror image and
     scatter otherwise, are left out.
 
+    Lone events are left out by the rule of `kurtogram`, line by line, where there are 256 frames or
+    more, and from 64 on where they have half of a line's ``<|X|^4>``; K then counts the frames that
+    are left. Of noise, one line in a hundred loses some.
+
     References
     ----------
     J. Antoni, "The spectral kurtosis: a useful tool for characterising non-stationary signals",
@@ -641,29 +654,44 @@ def spectral_kurtosis(x: ArrayLike, fs: float, *, nperseg: int | None = None) ->
             f"nperseg = {length} samples must be even, >= 16 and <= 2/5 of n_samples = "
             f"{signal.shape[-1]}; choose another"
         )
-    second, fourth = _moments(signal, length, n_frames)
-    spread = _over(
-        n_frames * fourth, second**2, silence=_LINE_SILENCE * second.sum(-1, keepdims=True)
-    )
-    kurtosis = (n_frames + 1) / (n_frames - 1) * (spread - 1) - 1
-    kept = slice(2, length // 2 - 1)
-    frequency = np.arange(length // 2 + 1)[kept] * (fs / length)
-    return frequency, kurtosis[..., kept].astype(signal.dtype)
+    begins = _begins(n_frames, _PARTS if n_frames >= FEWEST_FRAMES else 1)
+    parts = _moments(signal, length, n_frames, begins)
+    share = LONE_SHARE if n_frames >= MANY_FRAMES else LONE_SHARE_OF_FEW
+    kept = _without_lone(parts[1], share)
+    second, fourth = ((part * kept).sum(axis=-1) for part in parts)
+    n_left = kept @ np.diff([*begins, n_frames])
+    silence = _LINE_SILENCE * parts[0].sum(axis=(-1, -2))[..., np.newaxis]
+    spread = _over(n_left * fourth, second**2, silence=silence)
+    kurtosis = (n_left + 1) / (n_left - 1) * (spread - 1) - 1
+    inner = slice(2, length // 2 - 1)
+    frequency = np.arange(length // 2 + 1)[inner] * (fs / length)
+    return frequency, kurtosis[..., inner].astype(signal.dtype)
 
 
-def _moments(signal: Real, length: int, n_frames: int) -> tuple[Float, Float]:
-    """Sums over the frames of |X|^2 and |X|^4 [shape=(..., n_lines)], scaled to the rms."""
+def _begins(n: int, n_parts: int) -> NDArray[np.intp]:
+    """First of the n samples or frames in each part of the record [shape=(n_parts,)]."""
+    return np.arange(n_parts) * n // n_parts
+
+
+def _moments(
+    signal: Real, length: int, n_frames: int, begins: NDArray[np.intp]
+) -> tuple[Float, Float]:
+    """Sums of |X|^2 and |X|^4 over the frames of each part, scaled to the rms.
+
+    Both [shape=(..., n_lines, n_parts)]; `begins` holds the first frame of each part.
+    """
     scale = math.sqrt(float(np.mean(np.square(signal, dtype=np.float64)))) or 1.0
     window = (hann(length) / scale).astype(signal.dtype)
     frames = sliding_window_view(signal, length, axis=-1)[..., :: length // 2, :]
-    shape = (*signal.shape[:-1], length // 2 + 1)
+    shape = (*signal.shape[:-1], length // 2 + 1, begins.size)
     second, fourth = np.zeros(shape), np.zeros(shape)
     step = max(1, _CHUNK // length)
-    for start in range(0, n_frames, step):
-        lines = rfft(frames[..., start : start + step, :] * window)
-        power = np.square(lines.real) + np.square(lines.imag)
-        second += power.sum(axis=-2)
-        fourth += np.square(power).sum(axis=-2)
+    for part, (begin, end) in enumerate(pairwise([*begins.tolist(), n_frames])):
+        for start in range(begin, end, step):
+            lines = rfft(frames[..., start : min(start + step, end), :] * window)
+            power = np.square(lines.real) + np.square(lines.imag)
+            second[..., part] += power.sum(axis=-2)
+            fourth[..., part] += np.square(power).sum(axis=-2)
     return second, fourth
 
 
@@ -886,6 +914,7 @@ def kurtogram_levels(n_samples: int, fs: float, span: float) -> int:
     >>> kurtogram_levels(51_200, 25_600.0, 500.0)
     4
     """
+    check_rate(fs)
     wide = int(math.log2(max(fs / 2 / span, 2)))
     deepest = n_samples.bit_length() - 1 - FEWEST_SAMPLES_LOG2
     return max(1, min(DEEPEST_LEVEL, wide, deepest))
@@ -922,16 +951,28 @@ def _repeated(second: Float, fourth: Float) -> tuple[Float, Float]:
 
     From the parts of both means that fall into each part of the record [shape=(count, _PARTS)].
     """
+    kept = _without_lone(fourth, LONE_SHARE)
+    share = kept.mean(axis=-1)
+    return (second * kept).sum(axis=-1) / share, (fourth * kept).sum(axis=-1) / share
+
+
+def _without_lone(fourth: Float, most: float) -> Float:
+    """Weight of each part: 0 where a lone event is, else 1 [shape=(..., n_parts)].
+
+    From what each part adds to the fourth moment, and the share that neighbours may have at the
+    most; see `kurtogram`.
+    """
     kept = np.ones(fourth.shape)
+    if fourth.shape[-1] < _LONE_PARTS:
+        return kept
     for _ in range(MOST_LONE):
         left = fourth * kept
         pairs = sliding_window_view(left, _LONE_PARTS, axis=-1).sum(axis=-1)
         first = np.argmax(pairs, axis=-1)
-        lone = np.flatnonzero(pairs.max(axis=-1) > LONE_SHARE * left.sum(axis=-1))
+        lone = np.nonzero(pairs.max(axis=-1) > most * left.sum(axis=-1))
         for part in range(_LONE_PARTS):
-            kept[lone, first[lone] + part] = 0.0
-    share = kept.mean(axis=-1)
-    return (second * kept).sum(axis=-1) / share, (fourth * kept).sum(axis=-1) / share
+            kept[(*lone, first[lone] + part)] = 0.0
+    return kept
 
 
 def _part_moments(lines: Complex, count: int, kept: tuple[float, float]) -> tuple[Float, Float]:
@@ -948,7 +989,7 @@ def _part_moments(lines: Complex, count: int, kept: tuple[float, float]) -> tupl
     outset = lines[lines.size // 6 - (n - width) // 2 :]
     slices = as_strided(outset, (count, n), (width * step, step), writeable=False)
     second, fourth = np.empty((count, _PARTS)), np.empty((count, _PARTS))
-    begins = np.arange(_PARTS) * (past - first) // _PARTS
+    begins = _begins(past - first, _PARTS)
     rows = max(1, _CHUNK // n)
     for start in range(0, count, rows):
         part = slice(start, start + rows)

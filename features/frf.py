@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.special import stdtrit
 
 from .fft import rfft
+from .rate import check_rate
 from .spectrum import hann
 from .statistics import Real, centred
 
@@ -276,6 +277,7 @@ def welch_spectra(
     >>> spectra.blocks, abs(h1(spectra)[0, 7]).round(12).item()
     (31, 3.0)
     """
+    check_rate(fs)
     x, y = _pair(force, response)
     if not 0 <= overlap < 1:
         raise ValueError(f"overlap = {overlap} must be >= 0 and < 1; 0.5 suits Hann")
@@ -353,6 +355,7 @@ def block_spectra(
     >>> np.angle(h1(spectra)[0, 16], deg=True).round(6).item()
     -90.0
     """
+    check_rate(fs)
     x = np.asarray(force, dtype=np.float64)
     y = np.asarray(response, dtype=np.float64)
     y = y[:, np.newaxis] if y.ndim == 2 else y
@@ -412,8 +415,7 @@ def _averaged(
     averages: float,
 ) -> Spectra:
     """Means over the blocks of transforms x (blocks, lines) and y (channels, blocks, lines)."""
-    if not (np.isfinite(fs) and fs > 0):
-        raise ValueError(f"fs = {fs} Hz must be > 0 and finite; give the sample rate")
+    check_rate(fs)
     frequency = np.arange(nperseg // 2 + 1, dtype=np.float64) * (fs / nperseg)
     nyquist = fs / 2
     if nperseg % 2 == 0:
@@ -907,6 +909,7 @@ def find_blows(
     >>> blows.starts.tolist(), blows.rejected
     ([40, 290], ('blow at 1.5 s: hits 2 times, must hit once',))
     """
+    check_rate(fs)
     pulse = np.asarray(force, dtype=np.float64)
     if pulse.ndim != 1 or not np.all(np.isfinite(pulse)):
         raise ValueError(f"force (shape {pulse.shape}) must be one row of finite samples")
@@ -1001,6 +1004,7 @@ def force_window(nperseg: int, fs: float, *, end: float, fall: float) -> Float:
     >>> force_window(6, 1.0, end=2.0, fall=2.0).round(3).tolist()
     [1.0, 1.0, 1.0, 0.5, 0.0, 0.0]
     """
+    check_rate(fs)
     if not end > 0 or not fall >= 0:
         raise ValueError(
             f"end = {end} s must be > 0 and fall = {fall} s must be >= 0; "

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import frf
+from .rate import check_rate
 
 Float = NDArray[np.float64]
 
@@ -186,6 +187,7 @@ def find_impacts(
     >>> found.blows.starts.tolist(), found.blows.nperseg
     ([0, 998, 1998, 2998], 900)
     """
+    check_rate(fs)
     level = np.asarray(force, dtype=np.float64)
     pulse = pressing(level)
     top = float(pulse.max(initial=0.0))
@@ -328,6 +330,7 @@ def impact_spectra(
     >>> abs(frf.h1(spectra)).max().round(12).item(), len(impacts.blows.starts)
     (3.0, 1)
     """
+    check_rate(fs)
     rows = np.asarray(response, dtype=np.float64)
     impacts = find_impacts(force, fs, rows, last=last)
     rows = rows - np.mean(rows, axis=-1, keepdims=True)

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .fft import fast_length, fast_length_within, irfft, rfft
+from .rate import rate_fault
 from .spectrum import line_weights, power_lines
 from .statistics import Real, centred
 
@@ -269,8 +270,8 @@ def _check(n_samples: int, fs: float, band: Band, periods: float) -> None:
     """Refuse bands that the sample rate or the duration cannot bear."""
     low, high = band
     faults = []
-    if not (np.isfinite(fs) and fs > 0):
-        faults.append(f"fs = {fs} Hz must be > 0 and finite; give the sample rate")
+    if fault := rate_fault(fs):
+        faults.append(fault)
     if not 0 < low < high:
         faults.append(f"low = {low} Hz must be > 0 and < high = {high} Hz; lower it or raise high")
     if high > fs / 2:

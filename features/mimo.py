@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .fft import rfft
 from .frf import blocks_of, effective_averages
+from .rate import check_rate
 from .spectrum import hann
 from .statistics import Real, centred
 
@@ -105,8 +106,7 @@ def multiple_h1(
     [3.0, -1.0]
     """
     x, y = _records(force, response)
-    if not (np.isfinite(fs) and fs > 0):
-        raise ValueError(f"fs = {fs} Hz must be > 0 and finite; give the sample rate")
+    check_rate(fs)
     if not 0 <= overlap < 1:
         raise ValueError(f"overlap = {overlap} must be >= 0 and < 1; 0.5 suits Hann")
     step = nperseg - round(overlap * nperseg)

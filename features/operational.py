@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .fft import rfft
+from .rate import check_rate
 from .spectrum import decibel, default_nperseg, hann, line_weights
 from .statistics import Real, centred
 
@@ -83,6 +84,7 @@ def transmissibility(x: ArrayLike, fs: float, edges: ArrayLike) -> tuple[Float, 
     >>> level.round(6).tolist(), coherence.round(6).tolist()
     ([[20.0, 20.0]], [[1.0, 1.0]])
     """
+    check_rate(fs)
     signals = centred(x)
     nperseg = default_nperseg(fs, signals.shape[-1])
     weights = line_weights(nperseg, fs, edges)

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .fft import fft
 from .order import order_amplitudes
+from .rate import check_rate
 from .resample import angular_resample, synchronous_average, synchronous_residual
 
 Float = NDArray[np.float64]
@@ -513,6 +514,7 @@ def full_spectrum(z: ArrayLike, fs: float) -> tuple[Float, Complex]:
     >>> [round(float(abs(vector[frequency == f][0])), 6) for f in (10, -10)]
     [2.0, 1.0]
     """
+    check_rate(fs)
     path = np.asarray(z, dtype=np.complex128)
     if path.ndim != 1 or path.size == 0:
         raise ValueError(f"z has shape {path.shape}, must be (n_samples >= 1,); give one orbit")
@@ -575,6 +577,7 @@ def whirl(
     >>> round(ratio, 4), round(radius, 4)
     (0.474, 0.3)
     """
+    check_rate(fs)
     frequency, vector = full_spectrum(z, fs)
     inside = np.flatnonzero((frequency >= band[0] * speed_hz) & (frequency <= band[1] * speed_hz))
     if inside.size < 2:
@@ -625,6 +628,7 @@ def keyphasor_marks(z: ArrayLike, fs: float, pulses: ArrayLike) -> Complex:
     >>> keyphasor_marks([0, 2, 4j], 1.0, [0.5, 1.0]).tolist()
     [(1+0j), (2+0j)]
     """
+    check_rate(fs)
     path = np.asarray(z, dtype=np.complex128)
     time = np.arange(path.size) / fs
     return np.asarray(np.interp(np.asarray(pulses, dtype=np.float64), time, path))

@@ -8,8 +8,9 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import PchipInterpolator
 from scipy.ndimage import maximum_filter1d
 
-from .edges import averaged_edges, is_logic_level, smoothest
+from .edges import placed_edges
 from .fft import rfft
+from .rate import check_rate
 from .spectrum import decibel, hann, line_weights, one_sided_scale
 from .statistics import Amplitude, Real, centred
 
@@ -64,7 +65,7 @@ def pulse_times(tacho: ArrayLike, fs: float, *, level: float | None = None) -> F
     An edge counts when the signal has gone from 30 % of the way to the nearer extreme below the
     level to as much above it, so noise smaller than that cannot count twice. Its time is
     interpolated linearly between the two samples round the level; a step that was averaged over a
-    sample is placed by its area, see `edges.averaged_edges`: both exact, both without bias. A
+    sample is placed by its area, see `edges.placed_edges`: both exact, both without bias. A
     sampled logic level has nothing to interpolate: each of its edges lies within a sample, and the
     smoothest row of edges within those samples is taken, see `edges.smoothest`. An edge already
     running at the first sample is no edge. The default level trusts the extremes: give `level`
@@ -93,19 +94,16 @@ def pulse_times(tacho: ArrayLike, fs: float, *, level: float | None = None) -> F
     fraction = (middle - volts[before]) / (volts[before + 1] - volts[before])
     if level is not None:
         return np.asarray((before + fraction) / fs)
-    if is_logic_level(volts[before] - low, volts[before + 1] - low, high - low):
-        placed = smoothest(before.astype(np.float64) + 0.5)
-    else:
-        share = (volts - low) / (high - low)
-        placed = averaged_edges(share, before, before + fraction)
+    share = np.pad((volts - low) / (high - low), (1, 2), constant_values=np.nan)
+    around = share[before[:, np.newaxis] + np.arange(4)]
+    placed = placed_edges(before, around, before + fraction)
     return np.asarray(np.clip(placed, 0.0, volts.size - 1) / fs)
 
 
 def _check_tacho(volts: Float, fs: float) -> None:
     if volts.ndim != 1 or volts.size < 2:
         raise ValueError(f"tacho has shape {volts.shape}, must be (n_samples >= 2,); give one row")
-    if not (np.isfinite(fs) and fs > 0):
-        raise ValueError(f"fs = {fs} Hz must be > 0 and finite; give the sample rate")
+    check_rate(fs)
     wrong = np.flatnonzero(~np.isfinite(volts))
     if wrong.size:
         raise ValueError(
@@ -168,6 +166,7 @@ def shaft_phase(
     >>> shaft_phase([0.1, 0.3], n_samples=5, fs=10.0).round(6).tolist()
     [-0.5, 0.0, 0.5, 1.0, 1.5]
     """
+    check_rate(fs)
     times = np.asarray(pulses, dtype=np.float64)
     _check_pulses(times, n_samples, fs, pulses_per_revolution)
     turns = np.arange(times.size) / pulses_per_revolution
@@ -378,6 +377,7 @@ def default_window(fs: float) -> tuple[int, int]:
     >>> default_window(25_600.0)
     (256, 64)
     """
+    check_rate(fs)
     nperseg = max(16, 1 << max(0, round(float(np.log2(WINDOW_S * fs)))))
     return nperseg, nperseg // 4
 
@@ -414,6 +414,7 @@ def short_time_energy(x: ArrayLike, fs: float, *, edges: ArrayLike, nperseg: int
     >>> energy.shape, round(float(energy.mean()), 4)
     ((37, 1), 0.5)
     """
+    check_rate(fs)
     signal = centred(x)
     _check_frames(nperseg, hop, signal.shape[-1])
     window = hann(nperseg)
@@ -600,6 +601,7 @@ def crank_angle_map(
     >>> energy[:, 0].round(1).tolist()
     [0.5, 0.5, 0.0, 0.0]
     """
+    check_rate(fs)
     length = default_window(fs)[0] if nperseg is None else nperseg
     step = length // 4 if hop is None else hop
     energy = short_time_energy(x, fs, edges=edges, nperseg=length, hop=step)

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import gammaincinv
 
+from .rate import check_rate
 from .spectrum import line_frequencies
 
 Float = NDArray[np.float64]
@@ -46,6 +47,7 @@ def spectral_centroid(lines: ArrayLike, fs: float) -> Float:
     >>> float(spectral_centroid([0.0, 1.0, 3.0, 0.0, 0.0], 8.0))
     1.75
     """
+    check_rate(fs)
     power = _shares(lines)
     return np.asarray(power @ line_frequencies(power.shape[-1], fs))
 
@@ -80,6 +82,7 @@ def spectral_spread(lines: ArrayLike, fs: float) -> Float:
     >>> float(spectral_spread([0.0, 1.0, 0.0, 1.0, 0.0], 8.0))
     1.0
     """
+    check_rate(fs)
     power = _shares(lines)
     frequency = line_frequencies(power.shape[-1], fs)
     away = frequency - (power @ frequency)[..., np.newaxis]
@@ -251,6 +254,7 @@ def noise_floor(
     >>> abs(float(noise_floor(lines, 2.0, n_averages=1.0)) - 1.0) < 0.05
     True
     """
+    check_rate(fs)
     power = _checked(lines)
     frequency = line_frequencies(power.shape[-1], fs)
     low, high = band or (frequency[2] if frequency.size > 2 else 0.0, frequency[-2])

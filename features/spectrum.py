@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .fft import rfft
+from .rate import check_rate, rate_fault
 from .statistics import Real, centred
 
 LEVEL_FLOOR = 1e-20
@@ -143,13 +144,14 @@ def _line_counts(first: int, last: int, n_bands: int) -> NDArray[np.float64]:
 
 def upper_edge(fs: float, high: float | None = None) -> float:
     """Upper edge as given, or the default [Hz]: 11.5 kHz or 0.45 fs, whichever is less."""
+    check_rate(fs)
     return min(NYQUIST_SHARE * fs, HIGHEST_EDGE_HZ) if high is None else high
 
 
 def _check_band_limits(fs: float, n_bands: int, low: float, high: float) -> None:
     faults = []
-    if not (np.isfinite(fs) and fs > 0):
-        faults.append(f"fs = {fs} Hz must be > 0 and finite; give the sample rate")
+    if fault := rate_fault(fs):
+        faults.append(fault)
     if n_bands < 1:
         faults.append(f"n_bands = {n_bands} must be >= 1; ask for at least one band")
     if not 0 < low < high:
@@ -191,6 +193,7 @@ def line_weights(n_samples: int, fs: float, edges: ArrayLike) -> NDArray[np.floa
     >>> line_weights(8, 8.0, [0.0, 1.0, 4.0])[:, 0].tolist()
     [1.0, 0.5, 0.0, 0.0, 0.0]
     """
+    check_rate(fs)
     bounds = np.asarray(edges, dtype=np.float64)
     if bounds.ndim != 1 or bounds.size < 2 or not np.all(np.diff(bounds) > 0):
         raise ValueError(
@@ -231,6 +234,7 @@ def band_weights(n_samples: int, fs: float, bands: ArrayLike) -> NDArray[np.floa
     >>> band_weights(8, 8.0, [[0.5, 1.5], [1.0, 4.0]])[:, 1].tolist()
     [0.0, 0.5, 1.0, 1.0, 1.0]
     """
+    check_rate(fs)
     pairs = np.asarray(bands, dtype=np.float64)
     if pairs.ndim != 2 or pairs.shape[1] != 2 or pairs.shape[0] == 0:
         raise ValueError(f"bands of shape {pairs.shape} must be (n_bands >= 1, 2); give pairs")
@@ -334,6 +338,7 @@ def default_nperseg(fs: float, n_samples: int) -> int:
     >>> default_nperseg(25_600.0, 122_880)
     8192
     """
+    check_rate(fs)
     return min(n_samples - n_samples % 2, 1 << int(np.ceil(np.log2(max(fs / LINE_SPACING_HZ, 8)))))
 
 
@@ -376,6 +381,7 @@ def power_lines(x: ArrayLike, fs: float, *, nperseg: int | None = None) -> Real:
     >>> round(float(power_lines(x, 1024.0).sum()), 6)
     4.5
     """
+    check_rate(fs)
     signal = centred(x)
     length = default_nperseg(fs, signal.shape[-1]) if nperseg is None else nperseg
     if length % 2 or not 8 <= length <= signal.shape[-1]:
@@ -462,6 +468,7 @@ def levels_from_lines(lines: ArrayLike, fs: float, edges: ArrayLike) -> NDArray[
     >>> levels_from_lines([0.0, 1.0, 0.0, 0.0, 0.0], 8.0, [0.5, 1.5]).tolist()
     [0.0]
     """
+    check_rate(fs)
     power = np.asarray(lines)
     return decibel(power @ line_weights(2 * (power.shape[-1] - 1), fs, edges))
 
@@ -494,6 +501,7 @@ def line_frequencies(n_lines: int, fs: float) -> NDArray[np.float64]:
     >>> line_frequencies(3, 8.0).tolist()
     [0.0, 2.0, 4.0]
     """
+    check_rate(fs)
     if n_lines < 2:
         raise ValueError(f"n_lines = {n_lines} must be >= 2; give a spectrum")
     return np.asarray(np.arange(n_lines) * (fs / (2 * (n_lines - 1))), dtype=np.float64)
@@ -539,6 +547,7 @@ def amplitude_spectrum(
     >>> float(frequency[8]), round(float(amplitude[8]), 6)
     (8.0, 1.0)
     """
+    check_rate(fs)
     lines = power_lines(x, fs, nperseg=whole_segment(x) if nperseg is None else nperseg)
     squares = lines * lines.dtype.type(HANN_BANDWIDTH * (1 if rms else 2))
     return line_frequencies(lines.shape[-1], fs), np.asarray(np.sqrt(squares))
@@ -587,6 +596,7 @@ def power_spectral_density(
     >>> round(float(density.sum() * frequency[1]), 6)
     1.0
     """
+    check_rate(fs)
     lines = power_lines(x, fs, nperseg=nperseg)
     frequency = line_frequencies(lines.shape[-1], fs)
     return frequency, np.asarray(lines / lines.dtype.type(frequency[1]))
@@ -642,6 +652,7 @@ def strongest_tone(
     >>> [round(float(value), 4) for value in strongest_tone(tone, 1024.0)]
     [100.3, 3.0]
     """
+    check_rate(fs)
     mean_squares = power_lines(x, fs, nperseg=whole_segment(x) if nperseg is None else nperseg)
     lines = np.asarray(mean_squares, dtype=np.float64)
     frequency = line_frequencies(lines.shape[-1], fs)
@@ -704,5 +715,6 @@ def levels_in_bands(lines: ArrayLike, fs: float, bands: ArrayLike) -> NDArray[np
     >>> levels_in_bands([0.0, 1.0, 1.0, 0.0, 0.0], 8.0, [[0.5, 1.5], [0.5, 2.5]]).round(2).tolist()
     [0.0, 3.01]
     """
+    check_rate(fs)
     power = np.asarray(lines)
     return decibel(power @ band_weights(2 * (power.shape[-1] - 1), fs, bands))

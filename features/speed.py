@@ -12,6 +12,7 @@ from scipy.ndimage import grey_dilation, maximum_filter1d, percentile_filter
 from scipy.special import stdtrit
 
 from .fft import rfft
+from .rate import check_rate
 from .spectrum import hann
 
 Float = NDArray[np.float64]
@@ -165,6 +166,7 @@ def tacholess_speed(
     >>> round(found.mean_hz, 2), found.high_hz - found.low_hz < 0.01
     (24.3, True)
     """
+    check_rate(fs)
     signal = np.asarray(x, dtype=np.float64)
     length = _frame_length(signal, fs, band_hz, frame_s)
     _check_speed_request(signal, fs, band_hz, length, n_harmonics, largest_rate, confidence)
@@ -487,6 +489,7 @@ def phase_from_speed(
     >>> phase_from_speed([0.0, 1.0], [10.0, 20.0], 3, 2.0).round(6).tolist()
     [0.0, 6.25, 15.0]
     """
+    check_rate(fs)
     clock, speed = np.asarray(times, dtype=np.float64), np.asarray(speed_hz, dtype=np.float64)
     _check_speeds(clock, speed)
     samples = np.arange(n_samples) / fs

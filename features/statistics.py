@@ -6,6 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .rate import check_rate
+
 Real = NDArray[np.floating[Any]]
 
 ENTROPY_BINS = 64
@@ -513,8 +515,7 @@ def zero_crossing_rate(x: ArrayLike, fs: float) -> Real:
     >>> float(zero_crossing_rate([1.0, -1.0, 1.0, -1.0], 100.0))
     100.0
     """
-    if not (np.isfinite(fs) and fs > 0):
-        raise ValueError(f"fs = {fs} Hz must be > 0 and finite; give the sample rate")
+    check_rate(fs)
     rate = Amplitude(x).zero_crossings
     return np.asarray(rate * rate.dtype.type(fs))
 

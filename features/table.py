@@ -14,6 +14,7 @@ from . import order
 from .analysis import ACCELERATION, FORCE, STANDARD, Analysis, Settings
 from .catalogue import SETS, Feature, Scope, SetName, smallest_set
 from .needs import NEEDS, Layout, shortcomings, struck
+from .rate import check_rate
 from .statistics import Real
 
 Float = NDArray[np.float64]
@@ -156,6 +157,7 @@ def feature_names(
     >>> feature_names(["acc_x"], 25_600.0, only=["velocity_rms", "acc_x.order_02.level_db"])
     ('acc_x.order_02.level_db', 'acc_x.velocity_rms')
     """
+    check_rate(fs)
     layout = Layout(
         channels=tuple(channel_names),
         quantities=_quantities(quantities, len(channel_names)),
@@ -376,6 +378,7 @@ def feature_row(
     >>> feature_row(wave, 25_600.0, only=["strongest_tone"])[1].round(2).tolist()
     [1000.0, -3.01]
     """
+    check_rate(fs)
     signals = np.atleast_2d(np.asarray(vibration))
     if not np.issubdtype(signals.dtype, np.floating) or signals.dtype == np.float16:
         signals = signals.astype(np.float64)

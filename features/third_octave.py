@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .fft import fast_length
+from .rate import check_rate
 from .spectrum import band_levels, upper_edge, whole_segment
 
 
@@ -123,6 +124,7 @@ def third_octave_levels(
     >>> abs(levels[1]).round(3).tolist()
     0.0
     """
+    check_rate(fs)
     if high is None:
         high = 1000.0 * 10 ** (math.floor(10 * math.log10(upper_edge(fs) / 1122.02)) / 10)
     centres, edges = third_octave_centres(low, high), third_octave_edges(low, high)

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.special import gammainccinv
 
 from . import frf, impact, mimo, modal
+from .rate import check_rate
 from .spectrum import decibel
 
 Float = NDArray[np.float64]
@@ -241,6 +242,7 @@ def excited_spectra(
     >>> excited_spectra(force, [force], 1024.0, nperseg=256)[1]
     '7 windows (Hann, half overlapped)'
     """
+    check_rate(fs)
     if impact.is_impact(force):
         spectra, found = impact.impact_spectra(force, response, fs, least=least, last=last)
         return spectra, found.text
@@ -296,6 +298,7 @@ def measured_transfer(
     >>> found.value[:, 7].real.round(9).tolist(), found.coherence.min().round(9).item()
     ([3.0, -1.0], 1.0)
     """
+    check_rate(fs)
     forces = np.atleast_2d(np.asarray(force))
     responses = np.atleast_2d(np.asarray(response))
     alive = np.flatnonzero(np.ptp(forces, axis=-1) > 0)

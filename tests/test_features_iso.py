@@ -263,7 +263,7 @@ def test_band_of_a_kind(kind, speed, low):
         ),
         (
             lambda: iso.velocity_rms(np.ones(9), np.nan, band=(5, 2)),
-            r"fs = nan Hz must be > 0 .*; low = 5 Hz must be > 0 and < high = 2 Hz",
+            r"fs = nan Hz must be >= 0.001 .*; low = 5 Hz must be > 0 and < high = 2 Hz",
         ),
         (lambda: iso.velocity_rms([], FS), r"n_samples = 0"),
         (lambda: iso.band_rms([1.0], FS, (1, 2), integrations=3), r"integrations = 3 must be 0"),

@@ -84,7 +84,7 @@ FORCE, RESPONSE = records(5, n=1024)
             lambda: multiple_h1(FORCE * np.nan, RESPONSE * np.inf, FS, nperseg=64),
             "force has 2048 non-finite samples.*response has 2048",
         ),
-        (lambda: multiple_h1(FORCE, RESPONSE, 0.0, nperseg=64), "fs = 0.0 Hz must be > 0"),
+        (lambda: multiple_h1(FORCE, RESPONSE, 0.0, nperseg=64), "fs = 0.0 Hz must be >= 0.001"),
         (lambda: multiple_h1(FORCE, RESPONSE, FS, nperseg=64, overlap=1), "overlap = 1 must be"),
         (lambda: multiple_h1(FORCE, RESPONSE, FS, nperseg=2000), "nperseg = 2000 samples must"),
         (lambda: multiple_h1(FORCE, RESPONSE, FS, nperseg=700), "averages = 1 must be > n_forces"),

@@ -1,7 +1,9 @@
 """Splits keep a machine on one side, and are stored without touching anything else."""
 
 import json
+import os
 import pickle
+from dataclasses import replace
 
 import h5py
 import numpy as np
@@ -282,6 +284,27 @@ def test_storing_that_fails_leaves_the_file(path, monkeypatch):
         store_splits(path, [made])
     assert path.read_bytes() == before
     assert list(path.parent.iterdir()) == [path]
+
+
+def test_two_that_store_at_once(path, monkeypatch):
+    """The second copy would be made without the first one's split, and replace it."""
+    data = drawn_of(DataSet(path))
+    one, two = make_split(data, "machine", seed=1), make_split(data, "machine", seed=2)
+    two = replace(two, name="second")
+    copy = split_file.shutil.copy
+
+    def meanwhile(source, target):
+        copy(source, target)
+        with pytest.raises(DataError, match=rf"is being written by process {os.getpid()} on "):
+            store_splits(path, [two])
+
+    monkeypatch.setattr(split_file.shutil, "copy", meanwhile)
+    store_splits(path, [one])
+    monkeypatch.undo()
+    store_splits(path, [two])
+    with DataSet(path) as stored:
+        assert {one.name, "second"} <= set(stored.splits)
+    assert not path.with_name(path.name + ".lock").exists()
 
 
 def test_damaged_sides_are_refused(path):
