@@ -3,7 +3,7 @@
 import difflib
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -47,6 +47,9 @@ class RecipeSource:
         Where the recipe that ``machines_of`` names is looked for first.
     foreign : tuple of str
         Faults: bounds of wear that a recipe of another scene was extended with.
+    inherited : mapping
+        Path of a draw, or name of a confounder, that a recipe of another scene was extended with
+        -> that scene.
     """
 
     table: dict[str, Any]
@@ -54,6 +57,7 @@ class RecipeSource:
     folder: Path
     machines_folder: Path
     foreign: tuple[str, ...] = ()
+    inherited: Mapping[str, str] = field(default_factory=dict)
 
 
 def recipe_names() -> list[str]:
@@ -118,9 +122,11 @@ def read_recipe(name_or_path: str | Path) -> RecipeSource:
     table: dict[str, Any] = {}
     folders = {"scene": Path(), "machines_of": Path()}
     foreign: list[str] = []
+    inherited: dict[str, str] = {}
     for place, own in reversed(chain):
         _refuse_without(own, table, place)
         foreign = _foreign(own, table, foreign)
+        inherited = _inherited(own, table, inherited)
         folders |= {key: place.parent for key in folders if key in own}
         table = merged(table, own)
     text = recipe_text(name_or_path) if len(chain) == 1 else toml_text(table)
@@ -130,6 +136,7 @@ def read_recipe(name_or_path: str | Path) -> RecipeSource:
         folder=folders["scene"],
         machines_folder=folders["machines_of"],
         foreign=tuple(foreign),
+        inherited=inherited,
     )
 
 
@@ -138,12 +145,26 @@ def _foreign(own: Mapping[str, Any], base: Mapping[str, Any], before: list[str])
     scene, other = own.get("scene", base.get("scene")), base.get("scene")
     if other is None or scene == other:
         return before
-    kept = {}
-    for name in ("severity", "held_out"):
-        given = [_told(e, _LISTS[name]) for e in _tables(own.get(name))]
-        anew = {*given, *map(str, own.get("without", []))}
-        kept[name] = [e for e in _tables(base.get(name)) if _told(e, _LISTS[name]) not in anew]
+    kept = {name: _kept(own, base, name) for name in ("severity", "held_out")}
     return foreign_bounds(kept, str(scene), str(other))
+
+
+def _kept(own: Mapping[str, Any], base: Mapping[str, Any], name: str) -> list[Mapping[str, Any]]:
+    """Entries of a list that a recipe takes over as they are."""
+    key = _LISTS[name]
+    anew = {*(_told(e, key) for e in _tables(own.get(name))), *map(str, own.get("without", []))}
+    return [entry for entry in _tables(base.get(name)) if _told(entry, key) not in anew]
+
+
+def _inherited(
+    own: Mapping[str, Any], base: Mapping[str, Any], before: Mapping[str, str]
+) -> dict[str, str]:
+    """Draws that stay those of a scene before, by path or name."""
+    other = base.get("scene")
+    changed = other is not None and own.get("scene", other) != other
+    lists = ("machine", "record", "confounder")
+    kept = [str(_told(e, _LISTS[name])) for name in lists for e in _kept(own, base, name)]
+    return {key: before.get(key, str(other)) for key in kept if changed or key in before}
 
 
 def _tables(value: Any) -> list[Mapping[str, Any]]:

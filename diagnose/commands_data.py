@@ -66,8 +66,9 @@ def recipe_show(name: str, whole: bool) -> None:
 @json_option
 def recipe_check(file: str, as_json: bool) -> None:
     """Check a recipe against its scene; every fault, and warnings of what is hardly meant."""
+    from ..datasets.foreign_draws import draw_doubts
     from ..datasets.recipe import STRATA, limit_faults, load_recipe, sample_records
-    from ..datasets.recipe_file import RecipeError
+    from ..datasets.recipe_file import RecipeError, read_recipe
     from ..sim.assemble import check
     from ..sim.plausibility import scene_doubts
 
@@ -79,7 +80,7 @@ def recipe_check(file: str, as_json: bool) -> None:
         check(sample.scene)
         for doubt in scene_doubts(sample.scene):
             doubts.setdefault(doubt.check, f"record {sample.index}: {doubt.text}")
-    warnings = list(doubts.values())
+    warnings = draw_doubts(checked, read_recipe(file).inherited) + list(doubts.values())
     told = f", {len(warnings)} warning(s)" if warnings else ""
     lines = [f"{checked.name}: no fault{told}", *(f"warning: {text}" for text in warnings)]
     table = {"recipe": checked.name, "faults": [], "warnings": warnings}

@@ -123,6 +123,37 @@ def test_lengths_of_another_scene_are_faults_of_check(tmp_path):
     assert run("check", file).stdout == "mine: no fault\n"
 
 
+def test_numbers_drawn_for_the_parts_of_another_scene_are_warned_of(tmp_path):
+    """Friction of 0.02 to 0.08 is that of the scene before; factors follow this one."""
+    scene_beside(
+        tmp_path, "dry.toml", ("friction = 0.05               # bou", "friction = 0.2 # bou")
+    )
+    file = tmp_path / "mine.toml"
+    own = 'name = "mine"\nextends = "bilge-pump-standard"\nscene = "dry.toml"\n'
+    file.write_text(own)
+    said = run("check", file).stdout.splitlines()
+    assert said[0] == "mine: no fault, 1 warning(s)"
+    assert said[1].startswith(
+        "warning: joint.crankpin.friction: 0.02 to 0.08 (SI) is of the scene bilge-pump, dry.toml "
+        "has 0.2; give it anew"
+    )
+    draw = '[[machine]]\npath = "joint.crankpin.friction"\ndistribution = "factor"\n'
+    for answer in (
+        own + 'without = ["joint.crankpin.friction"]\n',
+        own + draw + "low=0.5\nhigh=1.5\n",
+    ):
+        file.write_text(answer)
+        assert run("check", file).stdout == "mine: no fault\n"
+    # also where the next recipe of the chain names no scene
+    file.write_text(own)
+    (tmp_path / "next.toml").write_text('name = "next"\nextends = "mine.toml"\n')
+    assert "dry.toml has 0.2" in run("check", tmp_path / "next.toml").stdout
+    own = own.replace("-standard", "-faults")
+    file.write_text(own + 'without = ["joint.wristpin.diametral_clearance"]\n')
+    said = run("check", file).stdout
+    assert "warning: confounder leaking_suction_valve: 3e-06 to 5e-05 (SI) is of the scene" in said
+
+
 def test_a_scene_without_limits_is_told_before_anything_is_made(tmp_path):
     text = scene_text("bilge-pump")
     begin = text.index("[wear]")
