@@ -11,6 +11,7 @@ import reprlib
 from collections.abc import Container, Mapping, Sequence
 from contextlib import suppress
 from decimal import Decimal
+from functools import lru_cache
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Generic, Literal, Self, TypeVar
@@ -134,7 +135,6 @@ def to_si(value: Any, dimension: str) -> float:
     >>> to_si("300 rpm", "rotation speed")
     5.0
     """
-    units = UNITS[dimension]
     if isinstance(value, bool) or not isinstance(value, (int, float, str)):
         raise ValueError(f"is not a number or a string with a unit ({_unit_list(dimension)})")
     if not isinstance(value, str):
@@ -142,6 +142,13 @@ def to_si(value: Any, dimension: str) -> float:
             return float(value)
         except OverflowError:  # a whole number of hundreds of digits
             return math.inf if value > 0 else -math.inf
+    return _text_to_si(value, dimension)
+
+
+@lru_cache(maxsize=4096)
+def _text_to_si(value: str, dimension: str) -> float:
+    """Kept, as a recipe validates its scene a hundred times, each draw at its extremes."""
+    units = UNITS[dimension]
     match = _QUANTITY.fullmatch(value)
     if match is None:
         example = f"1.5 {_unit_symbol(dimension)}".rstrip()
