@@ -23,16 +23,15 @@ from ..sim.integrate import Solution
 from ..sim.parts import Scene, SceneError, channels_of
 from ..sim.wear import grade
 from .choice import Choice, choose, with_choice
-from .draws import value_at
 from .lock import holding
 from .pool import WorkersError
 from .recipe import (
-    CONDITIONS,
     LARGEST_SEED,
     MOST_RECORDS,
     Recipe,
     Sample,
     clearances,
+    condition_of,
     load_recipe,
     overrides_text,
     sample_records,
@@ -526,7 +525,7 @@ def save_solution(
         "record_id": "0",
         "seed": seed,
         "status": solution.status.name.lower(),
-        "speed_hz": value_at(scene, CONDITIONS["speed_hz"]),
+        "speed_hz": condition_of(scene, "speed_hz"),
         **severity,
         **_numerics(solution),
     }

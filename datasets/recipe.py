@@ -50,6 +50,7 @@ SEVERITIES = {
     "bearings.*.wear_down": "wear_down_bearing_{}_m",
     "bearings.*.sag": "sag_bearing_{}_m",
     "coupling.parallel_offset": "parallel_offset_coupling_m",
+    "casing.feet.stretch_lost": "stretch_lost_feet_m",
 }
 """Manifest column of every scene value that says how worn a machine is. A new one is one row.
 
@@ -67,6 +68,7 @@ LIMITS = {
     "bearings.*.wear_down": "wear_down",
     "bearings.*.sag": "wear_sag",
     "coupling.parallel_offset": "wear_coupling",
+    "casing.feet.stretch_lost": "wear_feet",
 }
 """Scene table with the wear limits of a severity. One without a row has no grade."""
 
@@ -354,6 +356,20 @@ class Recipe:
         """Seed of the sensor noise of one record."""
         state = self._sequence(seed, _NOISE, index).generate_state(1, np.uint64)
         return int(state[0])
+
+
+def condition_of(scene: Scene, column: str) -> float:
+    """Operating condition of a scene by its manifest column [SI]; the speed at rest is zero.
+
+    Examples
+    --------
+    >>> from wearstate.sim.scene import load_scene
+    >>> condition_of(load_scene("bilge-pump"), "speed_hz")
+    5.0
+    """
+    if column == "speed_hz" and not getattr(scene, "running", True):
+        return 0.0
+    return float(value_at(scene, CONDITIONS[column]))
 
 
 def _conditions(scene: Scene) -> dict[str, str]:
@@ -928,7 +944,7 @@ def _sample(recipe: Recipe, sources: Mapping[str, _Source], index: int, seed: in
         **_severity_labels(recipe, drawn),
         **({} if life is None else life.labels),
         **_confounder_labels(recipe, faults),
-        **{name: value_at(scene, path) for name, path in recipe.conditions.items()},
+        **{name: condition_of(scene, name) for name in recipe.conditions},
     }
     return Sample(index=index, group=group, seed=noise_seed, row=row, drawn=drawn, scene=scene)
 

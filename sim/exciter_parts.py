@@ -87,6 +87,24 @@ class Exciter(Part):
         return self.force > 0
 
 
+class CasingExciter(Exciter):
+    """A shaker or hammer on the casing of a pump, which is known in one direction at each place."""
+
+    place: Annotated[str, Field(min_length=1, max_length=NAME_LONGEST)] = Field(
+        description="of the mode shapes: of a force, or of a sensor that is pushed"
+    )
+    direction: str = Field(default="", description="which way it pushes, for the report")
+
+    @model_validator(mode="after")
+    def _straight(self) -> Self:
+        if self.angle_scatter:
+            raise ValueError(
+                f"angle_scatter = {self.angle_scatter:g} rad must be 0 on a casing, whose modes "
+                "tell one direction at each place; remove it"
+            )
+        return self
+
+
 class PlacedExciter(Exciter):
     """An exciter on a shaft, whose blows scatter along it as well."""
 

@@ -97,6 +97,7 @@ MOST_SENSORS, _MOST_MODES = 64, 1000
 NAME_LONGEST = 64
 _FILTER_SLOWEST = 1.0  # Hz, of mounting and anti-alias filter: below it no signal is left
 _FILTER_STEEPEST = 10  # order; eight is usual
+_DAMPED_MOST = 0.99  # of a mode that swings still
 _DAMPING_LEAST = 1e-3  # glued steel has some 0.01
 
 
@@ -250,6 +251,18 @@ class CasingMode(Part):
     frequency: Frequency = Field(ge=_MODE_SLOWEST, le=_MODE_FASTEST)
     damping_ratio: Ratio = Field(gt=0, lt=1)
     shape: Annotated[dict[str, ModeShape], AfterValidator(FixedTable)] = Field(min_length=1)
+    foot_share: Ratio = Field(
+        default=0.0, ge=0, le=1, description="of its strain energy, in the feet as tightened"
+    )
+
+    def on_feet(self, stiffness_ratio: float) -> tuple[float, float]:
+        """Frequency [Hz] and damping ratio where the feet keep this share of their stiffness.
+
+        By Rayleigh's quotient with the shape as it was: the stiffness of the mode falls by its
+        share in the feet, mass and dashpots stay.
+        """
+        lower = math.sqrt(1 - self.foot_share * (1 - stiffness_ratio))
+        return self.frequency * lower, min(self.damping_ratio / lower, _DAMPED_MOST)
 
 
 class FrfFile(Part):
@@ -269,9 +282,41 @@ class FrfFile(Part):
     folder: str = Field(default="", exclude=True, description="where the file is looked for first")
 
 
+class Feet(Part):
+    """Feet on anchor bolts, whose contact is as stiff as it is pressed.
+
+    The stiffness of rough surfaces in contact is proportional to the load (Greenwood, Williamson
+    1966, doi:10.1098/rspa.1966.0242; Persson 2007, doi:10.1103/PhysRevLett.99.125502), and the load
+    to the stretch that the bolts still have. The contact is in series with the rest of the feet.
+    """
+
+    bolt_stretch: Length = Field(gt=0, le=0.1, description="of the anchor bolts, as tightened")
+    stretch_lost: Length = Field(default=0.0, ge=0, description="of it, by settling and turning")
+    contact_share: Ratio = Field(
+        default=0.2, gt=0, lt=1, description="of the feet's flexibility, in their contact as new"
+    )
+
+    @model_validator(mode="after")
+    def _held(self) -> Self:
+        if self.stretch_lost >= self.bolt_stretch:
+            raise ValueError(
+                f"stretch_lost = {self.stretch_lost:g} m must be < bolt_stretch = "
+                f"{self.bolt_stretch:g} m; a foot without any load rattles, which this model does "
+                "not know"
+            )
+        return self
+
+    @property
+    def stiffness_ratio(self) -> float:
+        """Of the feet, over that as tightened: 0 to 1 [-]."""
+        left = 1 - self.stretch_lost / self.bolt_stretch
+        return 1 / (1 - self.contact_share + self.contact_share / left)
+
+
 class Casing(Part):
     """The pump casing on its mounts: as modes, or as measured frequency response functions."""
 
+    feet: Feet | None = Field(default=None, description="that may work loose; none: tight")
     modes: tuple[CasingMode, ...] = Field(default=(), max_length=_MOST_MODES)
     frf: FrfFile | None = None
 
@@ -282,6 +327,11 @@ class Casing(Part):
             raise ValueError(
                 f"{' and '.join(given) if given else 'neither'} given, must be exactly one of "
                 f"casing.modes and casing.frf; {'remove one' if given else 'add one'}"
+            )
+        if self.feet is not None and not any(mode.foot_share for mode in self.modes):
+            raise ValueError(
+                "feet needs modes of which one has foot_share > 0; what feet do to a measured "
+                "casing is in the measurement"
             )
         return self
 

@@ -134,6 +134,8 @@ def scene_doubts(scene: Scene) -> tuple[Doubt, ...]:
 
 
 def _few_turns(scene: Any) -> Iterator[str]:
+    if not getattr(scene, "running", True):
+        return
     speed = float(scene.drive.speed)
     turns = scene.duration * speed
     if turns < FEWEST_TURNS * (1 - _TURN_ROUNDING):

@@ -21,12 +21,15 @@ from .crank_setup import (
     pin_offsets,
     run_scene,
 )
+from .exciter_parts import exciter_faults
+from .exciters import Push
 from .frf_table import Accelerance, load_accelerance
 from .hydraulics import lift_left
 from .integrate import SimulationError, Solution, Status
 from .ladder import FEWEST_STEPS, MOST_STEPS, joint_faults, knock_limits, limits, pump_step
-from .parts import Accelerometer, Scene, SceneError, channels_of, specific_key
+from .parts import Accelerometer, CasingMode, Scene, SceneError, channels_of, specific_key
 from .pump_parts import CRANK_PLACES, FORCE_PLACES, GUIDE_PLACES, VALVE_PLACES, PumpScene
+from .pump_push import casing_pushes, read_cells, with_pushes
 from .sensor import (
     anti_alias_poles,
     digitise,
@@ -58,13 +61,19 @@ def check_pump(scene: Scene) -> None:
     SceneError
         Every fault at once.
     """
-    steps_per_sample(cast(PumpScene, scene))
-    _measured_casing(cast(PumpScene, scene))
+    pump = cast(PumpScene, scene)
+    if pump.running:
+        steps_per_sample(pump)
+    else:
+        _refuse(pump, _rest_faults(pump))
+    _measured_casing(pump)
 
 
 def simulate_pump(scene: Scene, seed: int, truth: bool, raise_on_failure: bool) -> Solution:
     """Simulate one recording; see :func:`wearstate.sim.assemble.simulate`."""
     pump = cast(PumpScene, scene)
+    if not pump.running:
+        return _at_rest(pump, seed, truth)
     try:
         factor = steps_per_sample(pump)
     except LimitError as error:
@@ -82,20 +91,70 @@ def simulate_pump(scene: Scene, seed: int, truth: bool, raise_on_failure: bool) 
         if raise_on_failure:
             raise SimulationError(status, pump.name)
         return _failed(pump, status, numerics)
-    places, on_casing = casing_forces(pump, run)
+    pushes = plan.pushes(seed)
+    places, on_casing = with_pushes(pump, *casing_forces(pump, run), pushes)
     acceleration, casing_numerics = _housing(pump, places, on_casing, 1 / step, factor)
-    signal, clipped = _measured(pump, acceleration, plan.turned(run), plan, seed)
+    signal, clipped = _measured(acceleration, plan.turned(run), plan, pushes, seed)
     numerics |= casing_numerics
     numerics["clipped_samples"] = clipped
     return Solution(
         signal=signal,
         sample_rate=pump.sample_rate,
         channels=channels_of(pump),
-        truth=_truth(run, plan) if truth else {},
+        truth=_truth(run, plan) | _test_truth(plan, pushes) if truth else {},
         status=status,
         numerics=numerics,
         warnings=_warnings(numerics),
     )
+
+
+def _at_rest(pump: PumpScene, seed: int, truth: bool) -> Solution:
+    """A test of the casing while the crank stands: no force but those of the exciters."""
+    _refuse(pump, _rest_faults(pump))
+    plan = _Plan(pump, FEWEST_STEPS)
+    pushes = plan.pushes(seed)
+    places, forces = with_pushes(pump, (), np.zeros((plan.n_steps, 0)), pushes)
+    rate = pump.sample_rate * plan.factor
+    acceleration, numerics = _housing(pump, places, forces, rate, plan.factor)
+    angle = np.full(plan.n_samples, pump.drive.start_angle)
+    signal, clipped = _measured(acceleration, angle, plan, pushes, seed)
+    numerics |= {"step_s": 1 / rate, "steps": plan.n_steps, "mean_speed_hz": 0.0}
+    numerics |= {"estimated_error": 0.0, "clipped_samples": clipped}
+    return Solution(
+        signal=signal,
+        sample_rate=pump.sample_rate,
+        channels=channels_of(pump),
+        truth=_test_truth(plan, pushes) if truth else {},
+        status=Status.OK,
+        numerics=numerics,
+        warnings=_warnings(numerics),
+    )
+
+
+def _rest_faults(scene: PumpScene) -> list[str]:
+    needed = scene.duration * scene.sample_rate * FEWEST_STEPS * _BYTES_PER_STEP
+    if needed <= _MEMORY:
+        return _pushing_faults(scene)
+    return [
+        f"duration = {scene.duration:g} s at sample_rate = {scene.sample_rate:g} Hz needs "
+        f"{needed / 1e9:.3g} GB, must be <= {_MEMORY / 1e9:g} GB; shorten it or lower the rate",
+        *_pushing_faults(scene),
+    ]
+
+
+def _refuse(scene: PumpScene, faults: list[str]) -> None:
+    if faults:
+        raise SceneError(scene.name, faults)
+
+
+def _pushing_faults(scene: PumpScene) -> list[str]:
+    return [
+        fault
+        for i, part in enumerate(scene.exciters)
+        for fault in exciter_faults(
+            f"exciters.{i}", part, duration=scene.duration, sample_rate=scene.sample_rate
+        )
+    ]
 
 
 def _failed(scene: PumpScene, status: Status, numerics: dict[str, float | int | str]) -> Solution:
@@ -126,6 +185,18 @@ class _Plan:
         self.first_angle = scene.drive.start_angle - 2 * math.pi * speed * before
         self.angle = scene.drive.start_angle + 2 * math.pi * speed * (
             np.arange(self.n_samples) / rate
+        )
+
+    def pushes(self, seed: int) -> tuple[Push, ...]:
+        """Forces of the mounted exciters at all steps."""
+        first, last = self.kept.start * self.factor, self.kept.stop * self.factor
+        return casing_pushes(
+            self.scene,
+            n_steps=self.n_steps,
+            first=first,
+            last=last,
+            factor=self.factor,
+            seed=seed,
         )
 
     def turned(self, run: CrankRun) -> NDArray[np.float64]:
@@ -219,7 +290,7 @@ def _size_fault(scene: PumpScene, steps: float) -> str | None:
 
 def _sampling_faults(scene: PumpScene) -> list[str]:
     revolution = 1 / scene.drive.speed
-    faults = []
+    faults = _pushing_faults(scene)
     if scene.duration < revolution:
         faults.append(
             f"duration = {scene.duration:g} s must be >= one revolution = {revolution:g} s; "
@@ -362,26 +433,33 @@ def _all_places(scene: PumpScene) -> list[str]:
 
 def _modes(scene: PumpScene, places: tuple[str, ...]) -> Modes:
     modes, sensors = scene.casing.modes, scene.accelerometers
-    inputs = [_split(key) for key in places]
+    feet = scene.casing.feet
+    held = [mode.on_feet(1.0 if feet is None else feet.stiffness_ratio) for mode in modes]
     return Modes(
-        frequency=np.array([mode.frequency for mode in modes]),
-        damping_ratio=np.array([mode.damping_ratio for mode in modes]),
-        inputs=np.array([[casing_inputs(mode.shape, *at) for at in inputs] for mode in modes]),
+        frequency=np.array([frequency for frequency, _ in held]),
+        damping_ratio=np.array([ratio for _, ratio in held]),
+        inputs=np.array([[_participation(mode, key) for key in places] for mode in modes]),
         outputs=np.array([[mode.shape[s.name] for s in sensors] for mode in modes]),
     )
+
+
+def _participation(mode: CasingMode, key: str) -> float:
+    """Shape at the key of a force, or at a sensor that is pushed."""
+    return mode.shape[key] if key in mode.shape else casing_inputs(mode.shape, *_split(key))
 
 
 # --- recording
 
 
 def _measured(
-    scene: PumpScene,
     acceleration: NDArray[np.float64],
     angle: NDArray[np.float64],
     plan: _Plan,
+    pushes: tuple[Push, ...],
     seed: int,
 ) -> tuple[NDArray[np.float32], int]:
     """Signal of every channel, and how many samples were clipped."""
+    scene = plan.scene
     rng = np.random.default_rng(seed)
     rows, clipped = [], 0
     for sensor, row in zip(scene.accelerometers, acceleration, strict=True):
@@ -395,7 +473,12 @@ def _measured(
         )
         rows.append(channel)
         clipped += lost
-    if scene.tacho:
+    cells, lost = read_cells(scene, pushes, plan.factor, plan.kept, rng)
+    rows += cells
+    clipped += lost
+    if scene.tacho and not scene.running:
+        rows.append(np.zeros(plan.n_samples, dtype=np.float32))
+    elif scene.tacho:
         turn = 2 * math.pi
         width = scene.tacho.pulse_width / turn
         rows.append(tacho_pulses(angle / turn, pulse_width=width, level=scene.tacho.level))
@@ -518,6 +601,13 @@ def _warnings(numerics: dict[str, float | int | str]) -> tuple[str, ...]:
     if int(numerics.get("clipped_samples", 0)) > 0:
         found.append(f"{numerics['clipped_samples']} samples clipped; widen the sensor's range")
     return tuple(found)
+
+
+def _test_truth(plan: _Plan, pushes: tuple[Push, ...]) -> dict[str, Any]:
+    if not pushes:
+        return {}
+    forces = np.stack([push.along for push in pushes], axis=1)
+    return {"test_force_n": decimate(forces, plan.factor)[plan.kept]}
 
 
 def _truth(run: CrankRun, plan: _Plan) -> dict[str, Any]:

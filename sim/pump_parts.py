@@ -6,7 +6,9 @@ from typing import Any, Literal, Self
 
 from pydantic import Field, model_validator
 
+from .exciter_parts import CasingExciter, force_channel
 from .hydraulic_parts import CylinderPressure
+from .journal_parts import ScarLimits
 from .parts import (
     ANGLE_MOST,
     DAMPING_MOST,
@@ -350,6 +352,10 @@ FORCE_PLACES = (*CRANK_PLACES, *GUIDE_PLACES, *VALVE_PLACES)
 """All places of forces on the casing; with a suffix ``_1``, ``_2``, … those of one throw."""
 
 
+class FootLimits(ScarLimits):
+    """Limits of the stretch that anchor bolts have lost, with their source."""
+
+
 class PumpScene(Scene):
     """A reciprocating pump of one to many equal throws with clearance in its joints."""
 
@@ -367,7 +373,10 @@ class PumpScene(Scene):
     throws: tuple[Throw, ...] = Field(default=(Throw(),), min_length=1, max_length=_MOST_THROWS)
     wear: Wear | None = None
     wear_wristpin: Wear | None = None
+    wear_feet: FootLimits | None = None
     casing: Casing
+    running: bool = Field(default=True, description="false: the crank stands, a test at rest")
+    exciters: tuple[CasingExciter, ...] = Field(default=(), max_length=MOST_SENSORS)
     sensors: tuple[Accelerometer, ...] = Field(min_length=1, max_length=MOST_SENSORS)
 
     @model_validator(mode="before")
@@ -384,8 +393,8 @@ class PumpScene(Scene):
         return single_axis(self.sensors)
 
     def sensor_channels(self) -> tuple[Channel, ...]:
-        """One channel of acceleration for every axis of every accelerometer."""
-        return tuple(
+        """One channel of acceleration for every axis of every accelerometer, then test forces."""
+        accelerations = tuple(
             Channel(
                 name=sensor.name,
                 unit="m/s^2",
@@ -395,6 +404,15 @@ class PumpScene(Scene):
             )
             for sensor in self.accelerometers
         )
+        return accelerations + tuple(
+            force_channel(part, f"casing at {part.place}", part.direction)
+            for part in self.mounted_exciters
+        )
+
+    @property
+    def mounted_exciters(self) -> tuple[CasingExciter, ...]:
+        """Those that push; the others are not there."""
+        return tuple(part for part in self.exciters if part.mounted)
 
     def joints(self, throw: int) -> PumpJoints:
         """Joints of one throw, counted from 0."""
@@ -410,8 +428,10 @@ class PumpScene(Scene):
         checks = (
             (_rod_faults, ("crank", "joint", "rod")),
             (_guide_faults, ("joint", "piston")),
-            (_name_faults, ("sensors", "tacho")),
+            (_name_faults, ("sensors", "exciters", "tacho")),
             (_shape_faults, ("casing", "sensors", "throws")),
+            (_exciter_faults, ("casing", "sensors", "exciters")),
+            (_rest_faults, ("running", "exciters", "fidelity")),
         )
         return [
             fault
@@ -451,8 +471,44 @@ def _rod_faults(crank: Crank, joint: PumpJoints, rod: Rod) -> list[str]:
     ]
 
 
-def _name_faults(sensors: tuple[Accelerometer, ...], tacho: Tacho | None) -> list[str]:
-    return name_faults([sensor.name for sensor in single_axis(sensors)], tacho)
+def _name_faults(
+    sensors: tuple[Accelerometer, ...], exciters: tuple[CasingExciter, ...], tacho: Tacho | None
+) -> list[str]:
+    names = [*(sensor.name for sensor in single_axis(sensors)), *(part.name for part in exciters)]
+    return name_faults(names, tacho)
+
+
+def _exciter_faults(
+    casing: Casing, sensors: tuple[Accelerometer, ...], exciters: tuple[CasingExciter, ...]
+) -> list[str]:
+    """Places of exciters that the casing does not know."""
+    if casing.frf is not None:
+        known = set(FORCE_PLACES)
+    else:
+        known = {key for mode in casing.modes for key in mode.shape}
+        known |= {sensor.name for sensor in single_axis(sensors)}
+    return [
+        f"exciters.{i}.place = '{part.place}' is no place of the casing"
+        f"{nearest(part.place, sorted(known))}"
+        for i, part in enumerate(exciters)
+        if part.place not in known
+    ]
+
+
+def _rest_faults(running: bool, exciters: tuple[CasingExciter, ...], fidelity: str) -> list[str]:
+    """A pump at rest is there to be tested."""
+    faults = []
+    if not running and not any(part.mounted for part in exciters):
+        faults.append(
+            "running = false needs an exciter with force > 0: nothing moves else; set "
+            "exciters.0.force or let it run"
+        )
+    if not running and fidelity == "auto":
+        faults.append(
+            "fidelity = 'auto' must be 'given' with running = false; a casing at rest has no "
+            "rungs to choose"
+        )
+    return faults
 
 
 def _shape_faults(
