@@ -26,7 +26,7 @@ from .commands_data import (
     recipe,
     splits,
 )
-from .commands_machine import align, chart, scene, simulate, stability, verify
+from .commands_machine import align, chart, frf, scene, simulate, stability, verify
 from .commands_wear import demo, evaluate, report, train
 
 # files are written under another name first, which says nothing to the caller
@@ -94,6 +94,7 @@ def cli() -> None:
 for _command in (
     scene,
     simulate,
+    frf,
     align,
     stability,
     chart,

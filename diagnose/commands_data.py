@@ -48,7 +48,8 @@ def recipe_list(as_json: bool) -> None:
     from ..datasets.recipe_file import read_recipe, recipe_names
 
     found = {name: read_recipe(name).table.get("description", "") for name in recipe_names()}
-    emit({"recipes": found}, as_json, "\n".join(f"{n:26} {d}" for n, d in found.items()))
+    width = max(map(len, found))
+    emit({"recipes": found}, as_json, "\n".join(f"{n:{width}}  {d}" for n, d in found.items()))
 
 
 @recipe.command("show")

@@ -140,6 +140,47 @@ def simulate(
 @click.command()
 @click.argument("scene_name", metavar="SCENE")
 @click.option("--set", "pairs", multiple=True, metavar="PATH=VALUE", help="Replace a scene value.")
+@click.option("--low", type=float, help="Lowest frequency [Hz]; --high / 300.")
+@click.option("--high", type=float, help="Highest frequency [Hz]; 0.45 of the rate.")
+@click.option("-o", "--output", type=PATH, help="Table to write (.csv).")
+@click.option("--plot", type=PATH, help="Picture to write (.png, .svg or .pdf).")
+@force_option
+@json_option
+def frf(
+    scene_name: str,
+    pairs: Sequence[str],
+    low: float | None,
+    high: float | None,
+    output: Path | None,
+    plot: Path | None,
+    force: bool,
+    as_json: bool,
+) -> None:
+    """Transfer functions of SCENE: of a pump's casing, or of a running shaft line.
+
+    What a perfect test would measure; the table can be the `casing.frf` of a scene.
+    """
+    from ..sim.scene import load_scene
+    from .transfer import save_csv, save_figure, transfer_of, transfer_table, transfer_text
+
+    check_outputs([scene_name], [(output, (".csv",)), (plot, PICTURE_SUFFIXES)], force)
+    machine = load_scene(scene_name, overrides_of(pairs))
+    found = transfer_of(machine, low, high)
+    if output is not None:
+        save_csv(found, output, force=force)
+    if plot is not None:
+        save_figure(machine, found, plot, force=force)
+    files = [str(path) for path in (output, plot) if path]
+    emit(
+        {**transfer_table(machine, found), "files": files},
+        as_json,
+        "\n".join([transfer_text(machine, found), *files]),
+    )
+
+
+@click.command()
+@click.argument("scene_name", metavar="SCENE")
+@click.option("--set", "pairs", multiple=True, metavar="PATH=VALUE", help="Replace a scene value.")
 @click.option(
     "--condition",
     type=click.Choice(["cold", "hot", "running", "all"]),

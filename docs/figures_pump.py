@@ -19,6 +19,7 @@ from wearstate.sim.crank_setup import pin_offsets, run_scene
 from wearstate.sim.hydraulics import even_phases, flow_ripple
 from wearstate.sim.pump_parts import PumpScene
 from wearstate.sim.scene import load_scene
+from wearstate.sim.transfer import scene_transfer
 from wearstate.sim.wear_rate import joint_wear
 
 STEP = 1 / 51_200  # s
@@ -175,27 +176,17 @@ def modes() -> Figure:
     return figure
 
 
-def accelerance(scene: PumpScene, place: str, sensor: str, f: NDArray[np.float64]) -> NDArray[Any]:
-    """Acceleration per force from the modes, in closed form [m/s²/N]."""
-    w = 2 * np.pi * f
-    total = np.zeros(f.size, dtype=complex)
-    for mode in scene.casing.modes:
-        natural = 2 * np.pi * mode.frequency
-        gain = mode.shape.get(place, 0.0) * mode.shape[sensor]
-        total += -gain * w**2 / (natural**2 - w**2 + 2j * mode.damping_ratio * natural * w)
-    return total
-
-
 def transfer() -> Figure:
     """Accelerance of the casing, magnitude and phase."""
     scene = pump()
     figure, axes = sheet(
         "bilge-pump (simulated): accelerance of the casing", 2, 2, (11, 6.5), sharex=True
     )
-    f = np.geomspace(50, 11_500, 4000)
+    found = scene_transfer(scene, np.geomspace(50, 11_500, 4000))
+    f = found.frequency
     for column, place in enumerate(("bearing_x", "guide_y")):
-        for sensor, colour in zip(("acc_x", "acc_y"), COLOURS, strict=False):
-            h = accelerance(scene, place, sensor, f)
+        for row, (sensor, colour) in enumerate(zip(found.sensors, COLOURS, strict=False)):
+            h = found.values[row, found.places.index(place)]
             axes[0, column].semilogx(f, 20 * np.log10(np.abs(h)), color=colour, lw=1, label=sensor)
             axes[1, column].semilogx(f, np.degrees(np.angle(h)), color=colour, lw=0.9, label=sensor)
         name = f"force at {place.replace('_', ' ')}"

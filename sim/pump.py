@@ -66,7 +66,7 @@ def check_pump(scene: Scene) -> None:
         steps_per_sample(pump)
     else:
         _refuse(pump, _rest_faults(pump))
-    _measured_casing(pump)
+    measured_casing(pump)
 
 
 def simulate_pump(scene: Scene, seed: int, truth: bool, raise_on_failure: bool) -> Solution:
@@ -394,9 +394,9 @@ def _housing(
     factor: int,
 ) -> tuple[NDArray[np.float64], dict[str, float | int | str]]:
     """Acceleration at every accelerometer, and the numerics of a measured casing."""
-    accelerance = _measured_casing(scene, places)
+    accelerance = measured_casing(scene, places)
     if accelerance is None:
-        modes = _modes(scene, places)
+        modes = casing_modes(scene, places)
         return band_limited_acceleration(means, step_rate, factor, modes), {}
     run = table_acceleration(means, step_rate, factor, accelerance)
     return run.acceleration, {
@@ -407,20 +407,40 @@ def _housing(
     }
 
 
-def _measured_casing(scene: PumpScene, places: tuple[str, ...] = ()) -> Accelerance | None:
-    """Accelerance from the scene's file, None where the casing is given as modes."""
+def measured_casing(scene: PumpScene, places: tuple[str, ...] = ()) -> Accelerance | None:
+    """Accelerance from the scene's file, None where the casing is given as modes.
+
+    Parameters
+    ----------
+    scene : PumpScene
+    places : tuple of str
+        Columns wanted; those of :func:`measured_places` by default.
+
+    Raises
+    ------
+    SceneError
+        The file cannot be used.
+    """
     if scene.casing.frf is None:
         return None
     sensors = [sensor.name for sensor in scene.accelerometers]
-    inputs = tuple(_split(key) for key in places or _all_places(scene))
+    inputs = tuple(_split(key) for key in places or measured_places(scene))
     try:
         return load_accelerance(scene.casing.frf, sensors, inputs)
     except SceneError as error:
         raise SceneError(scene.name, error.faults) from None
 
 
-def _all_places(scene: PumpScene) -> list[str]:
-    return [
+def measured_places(scene: PumpScene) -> tuple[str, ...]:
+    """Places where the mechanism pushes on a measured casing, by throw.
+
+    Examples
+    --------
+    >>> from wearstate.sim.scene import load_scene
+    >>> measured_places(load_scene("bilge-pump"))[0]
+    'bearing_x_1'
+    """
+    return tuple(
         f"{place}_{throw + 1}"
         for throw in range(len(scene.throws))
         for place in (
@@ -428,10 +448,27 @@ def _all_places(scene: PumpScene) -> list[str]:
             *(GUIDE_PLACES if _rubs(scene, throw) else ()),
             *(VALVE_PLACES if scene.pressures(throw).rung == "chamber" else ()),
         )
-    ]
+    )
 
 
-def _modes(scene: PumpScene, places: tuple[str, ...]) -> Modes:
+def casing_modes(scene: PumpScene, places: tuple[str, ...]) -> Modes:
+    """Modes of a scene's casing on its feet as they are, at these places and all sensors.
+
+    Parameters
+    ----------
+    scene : PumpScene
+        Whose casing is given as modes.
+    places : tuple of str
+        Keys of mode shapes: of forces, or sensors that are pushed.
+
+    Examples
+    --------
+    >>> from wearstate.sim.scene import load_scene
+    >>> loose = {"casing.feet.bolt_stretch": 2e-4, "casing.feet.stretch_lost": 1e-4}
+    >>> modes = casing_modes(load_scene("bilge-pump", loose), ("bearing_x",))
+    >>> modes.inputs.shape, modes.frequency[0].round(1)
+    ((8, 1), np.float64(133.5))
+    """
     modes, sensors = scene.casing.modes, scene.accelerometers
     feet = scene.casing.feet
     held = [mode.on_feet(1.0 if feet is None else feet.stiffness_ratio) for mode in modes]

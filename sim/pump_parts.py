@@ -481,7 +481,7 @@ def _name_faults(
 def _exciter_faults(
     casing: Casing, sensors: tuple[Accelerometer, ...], exciters: tuple[CasingExciter, ...]
 ) -> list[str]:
-    """Places of exciters that the casing does not know."""
+    """Places of mounted exciters that the casing does not know."""
     if casing.frf is not None:
         known = set(FORCE_PLACES)
     else:
@@ -491,7 +491,7 @@ def _exciter_faults(
         f"exciters.{i}.place = '{part.place}' is no place of the casing"
         f"{nearest(part.place, sorted(known))}"
         for i, part in enumerate(exciters)
-        if part.place not in known
+        if part.mounted and part.place not in known
     ]
 
 

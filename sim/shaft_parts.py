@@ -626,14 +626,15 @@ def _exciter_faults(
 ) -> list[str]:
     housed = [bearing.name for bearing in bearings]
     known = {"housing": housed, "shaft": [*housed, *(disc.name for disc in discs)]}
-    stations = [(f"exciters.{i}", part.station) for i, part in enumerate(exciters)]
+    mounted = [(i, part) for i, part in enumerate(exciters) if part.mounted]
+    stations = [(f"exciters.{i}", part.station) for i, part in mounted]
     return [
         *_outside(sections, ((name, at) for name, at in stations if at is not None)),
         *(
             f"exciters.{i}.place = '{part.place}' is no {'bearing' * (part.part == 'housing')}"
             f"{'bearing and no disc' * (part.part == 'shaft')}; choose one of "
             f"{', '.join(known[part.part])}"
-            for i, part in enumerate(exciters)
+            for i, part in mounted
             if part.place and part.place not in known[part.part]
         ),
     ]

@@ -69,7 +69,12 @@ def exciter_places(scene: ShaftScene) -> tuple[Place, ...]:
     >>> exciter_places(load_scene("shaft-rig", {"exciters.0.force": "20 N"}))
     ((4.0, 'y'),)
     """
-    return tuple(_full(part, _place(scene, part)) for part in scene.mounted_exciters)
+    return tuple(exciter_place(scene, part) for part in scene.mounted_exciters)
+
+
+def exciter_place(scene: ShaftScene, part: ShaftExciter) -> Place:
+    """Where one exciter pushes, mounted or not, as transfer functions name it."""
+    return _full(part, _place(scene, part))
 
 
 def _full(part: ShaftExciter, place: tuple[float | str, str]) -> Place:

@@ -25,11 +25,11 @@ MAY_IMPORT = {
 SIM_FLOORS = [
     {"fidelity"},
     {"assemble"},
-    {"wear_rate"},
+    {"wear_rate", "transfer"},
     {"shaft_change"},
     {"pump", "journal", "shaft_line"},
     {"ladder", "plausibility"},
-    {"tearing"},
+    {"tearing", "pump_push"},
     {"crank_setup", "shaft_push"},
     {"slider_crank", "orbit", "casing", "shaft_film", "shaft_response"},
     {"impedance", "bearing", "film_mass", "contact", "hydraulics", "frf_table"},

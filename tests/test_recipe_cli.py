@@ -41,7 +41,7 @@ def test_every_recipe_is_listed_with_its_description():
     assert all(found.values())
     lines = run("list").stdout.splitlines()
     assert len(lines) == len(found)
-    assert "bilge-pump-small           Crank-pin wear of a bilge pump, for trials" in lines
+    assert "bilge-pump-small                Crank-pin wear of a bilge pump, for trials" in lines
 
 
 def test_a_recipe_is_shown_as_written_or_whole(tmp_path):

@@ -14,9 +14,11 @@ from wearstate.datasets.recipe import (
 )
 from wearstate.datasets.recipe_file import RecipeError, recipe_names
 from wearstate.sim.assemble import simulate
+from wearstate.sim.parts import channels_of
 from wearstate.sim.scene import load_scene
 
 MACHINES = ("bilge-pump", "journal-bearing", "propulsion-shaft")
+TESTS = ("shaft-rig", "propulsion-shaft-test", "bilge-pump-casing")
 N = 2000
 
 BRIEF = {
@@ -47,10 +49,13 @@ def standard(request):
     return recipe, drawn(recipe)
 
 
-@pytest.mark.parametrize("machine", MACHINES)
+@pytest.mark.parametrize("machine", [*MACHINES, *TESTS])
 @pytest.mark.parametrize("kind", ["small", "standard", "shifted", "healthy"])
 def test_every_machine_has_its_recipes(machine, kind):
-    assert load_recipe(f"{machine}-{kind}").scene.name == machine
+    recipe = load_recipe(f"{machine}-{kind}")
+    assert machine.startswith(recipe.scene.name)
+    forces = [channel.name for channel in channels_of(recipe.scene) if channel.quantity == "force"]
+    assert bool(forces) == (machine in TESTS)
 
 
 @pytest.mark.parametrize("name", recipe_names())
@@ -64,7 +69,9 @@ def test_the_first_records_of_every_recipe_simulate(name):
         assert np.ptp(solution.signal[0]) > 0
 
 
-@pytest.mark.parametrize("name", [*(f"{m}-standard" for m in MACHINES), "bilge-pump-faults"])
+@pytest.mark.parametrize(
+    "name", [*(f"{m}-standard" for m in (*MACHINES, *TESTS)), "bilge-pump-faults"]
+)
 def test_sets_that_figures_are_quoted_on_have_a_thousand_machines(name):
     table = load_recipe(name).table
     assert table.records / table.records_per_group >= 1000
@@ -273,6 +280,35 @@ def test_the_other_law_and_films_make_another_signal():
         # not rounding: more than a per cent of the vibration
         change = np.std(signals[0] - signals[1]) / np.std(signals[0])
         assert change > 0.01
+
+
+@pytest.mark.parametrize("machine", TESTS)
+def test_tests_of_the_shifted_sets_are_beyond_the_standard_ones(machine):
+    standard, shifted = (load_recipe(f"{machine}-{kind}") for kind in ("standard", "shifted"))
+    assert shifted.scene.duration == standard.scene.duration / 2  # half the averages
+    there, here = spans(standard), spans(shifted)
+    assert {path for path in there if there[path] != here[path]} >= {SHIFTED_TEST[machine]}
+    bands, [(low, high)] = here[SHIFTED_TEST[machine]], there[SHIFTED_TEST[machine]]
+    assert all(b <= low * (1 + 1e-9) or a >= high * (1 - 1e-9) for a, b in bands)
+
+
+SHIFTED_TEST = {
+    "shaft-rig": "drive.speed",
+    "propulsion-shaft-test": "drive.speed",
+    "bilge-pump-casing": "exciters.0.contact_time",
+}
+"""What of a shifted set lies outside the standard one altogether."""
+
+
+@pytest.mark.parametrize("machine", TESTS)
+def test_healthy_tests_are_of_the_machines_of_the_standard_set(machine):
+    standard, healthy = (load_recipe(f"{machine}-{kind}") for kind in ("standard", "healthy"))
+    pairs = zip(*(sample_records(r, 5, seed=5) for r in (standard, healthy)), strict=True)
+    for worn, new in pairs:
+        assert worn.group == new.group
+        assert all(worn.drawn[axis.path] == new.drawn[axis.path] for axis in standard.machine)
+        assert new.row["grade"] == 0
+        assert new.seed != worn.seed
 
 
 # -- healthy recordings of the same machines
