@@ -2,7 +2,7 @@
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import product
@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 
 from ..features.order import pulse_times
 from ..sim.atomic import OutputError
+from ..sim.parts import nearest
+from ..sim.sensor import Channel
 from .import_plan import Header, Plan, plan_records, read_headers, sparing_tacho, worth_workers
 from .import_rows import MEAN_SPEED, START, FileRows, GroupBy, file_rows
 from .importers import read_window
@@ -92,6 +94,8 @@ def import_recordings(
     group_by: GroupBy | None = None,
     segment: float | None = None,
     overlap: float = 0.0,
+    places: Mapping[str, str] | None = None,
+    directions: Mapping[str, str] | None = None,
     jobs: int = 1,
     force: bool = False,
     progress: Callable[[int, int], None] | None = None,
@@ -123,6 +127,9 @@ def import_recordings(
         left at the end of a file is reported and left out, never padded.
     overlap : float
         Part of a record that the next one repeats, 0 <= overlap < 1.
+    places, directions : mapping of str to str, optional
+        Channel -> where it is and which way it points: of a force cell, the point and the
+        direction of the push.
     jobs : int
         Processes that read, >= 1; the result does not depend on it.
     force : bool
@@ -171,6 +178,7 @@ def import_recordings(
     _refuse_counts(tacho, pulses_per_revolution, jobs)
     headers = read_headers(files, reading.options, tacho, jobs=jobs)
     plan = plan_records(headers, segment, overlap)
+    plan = replace(plan, channels=_placed(plan.channels, places or {}, directions or {}))
     known = labels or Labels(columns={}, constants={})
     table = file_rows(headers, known, limits=limits, group_by=group_by, tacho=tacho)
     writer = DataSetWriter(
@@ -194,6 +202,29 @@ def import_recordings(
         writer.part.unlink(missing_ok=True)  # made anew, not gone on with
         raise
     return _summary(target, plan, known, table)
+
+
+def _placed(
+    channels: tuple[Channel, ...], places: Mapping[str, str], directions: Mapping[str, str]
+) -> tuple[Channel, ...]:
+    """Channels with the places and directions that are told."""
+    names = [channel.name for channel in channels]
+    faults = [
+        f"{what}: no channel {name!r} is imported{nearest(name, names)}"
+        for what, told in (("place", places), ("direction", directions))
+        for name in told
+        if name not in names
+    ]
+    if faults:
+        raise DataError("\n".join(faults))
+    return tuple(
+        replace(
+            channel,
+            place=places.get(channel.name, channel.place),
+            direction=directions.get(channel.name, channel.direction),
+        )
+        for channel in channels
+    )
 
 
 def _refuse_chosen_row(options: SourceOptions) -> None:

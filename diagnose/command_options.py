@@ -207,6 +207,19 @@ def _each_channel(texts: Sequence[str], option: str) -> Any:
     return EachChannel(named, others=others[0] if others else None) if texts else None
 
 
+def told_of_channels(texts: Sequence[str], option: str) -> dict[str, str]:
+    """``channel=text``, once for a channel."""
+    told: dict[str, str] = {}
+    for text in texts:
+        name, _, value = text.partition("=")
+        if not name.strip() or not value.strip() or name in told:
+            raise click.BadParameter(
+                f"'{text}' must read CHANNEL=TEXT, once for a channel", param_hint=option
+            )
+        told[name] = value
+    return told
+
+
 def emit(value: dict[str, Any], as_json: bool, text: str) -> None:
     """Print a result, as JSON or as text."""
     click.echo(json_text({"schema_version": 1, **value}) if as_json else text)

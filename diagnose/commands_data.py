@@ -30,6 +30,7 @@ from .command_options import (
     progress_bar,
     seed_option,
     source_options,
+    told_of_channels,
     worker_count,
 )
 
@@ -255,6 +256,10 @@ class _Segment(click.ParamType):  # type: ignore[type-arg]  # generic from click
 @click.option(
     "--overlap", type=Share(0, 0.99), default=0.0, help="Part of a record the next one repeats."
 )
+@click.option("--place", multiple=True, metavar="CHANNEL=TEXT", help="Where a channel is.")
+@click.option(
+    "--direction", multiple=True, metavar="CHANNEL=TEXT", help="Which way it points or pushes."
+)
 @jobs_option
 @force_option
 @json_option
@@ -293,6 +298,8 @@ def import_files(
             options=declared_source(given),
             labels=labels,
             limits=read_limits(limits, labels.severities) if limits else None,
+            places=told_of_channels(given["place"], "--place"),
+            directions=told_of_channels(given["direction"], "--direction"),
             jobs=worker_count(jobs),
             progress=progress,
             **{name: given[name] for name in _IMPORT_OPTIONS},

@@ -254,3 +254,21 @@ def test_file_names_that_are_no_utf8_are_imported(tmp_path):
     with DataSet(tmp_path / "o.h5") as data:
         assert data.manifest["file"].tolist() == ["a\\xe8.wav", "a\\xe9.wav"]
         assert data.manifest["group"].nunique() == 2
+
+
+def test_a_force_cell_tells_where_and_which_way_it_pushes(wavs, tmp_path):
+    """A measured hammer or shaker test, with all that a transfer function needs."""
+    path = tmp_path / "x.h5"
+    named = ("--channels", "x,force,key", "--unit", "m/s^2", "--unit", "force=N")
+    told = ("--place", "force=shaft at forward", "--direction", "force=vertical, up")
+    run("import", *wavs, "-o", path, *named, *told, "--tacho", "key")
+    with DataSet(path) as data:
+        x, force, _ = data.attributes.channels
+    assert (force.quantity, force.unit) == ("force", "N")
+    assert (force.place, force.direction) == ("shaft at forward", "vertical, up")
+    assert x.place == x.direction == ""
+    again = ("import", *wavs, "-o", tmp_path / "y.h5", *named, "--tacho", "key")
+    error = run(*again, "--place", "forse=a", code=2).stderr
+    assert "no channel 'forse' is imported; did you mean 'force'?" in error
+    error = run(*again, "--direction", "force", code=2).stderr
+    assert "must read CHANNEL=TEXT" in error
