@@ -13,7 +13,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
-from scipy.signal import chirp, find_peaks
+from scipy.signal import find_peaks
 from scipy.special import stdtr, stdtrit
 
 from ..features.frf import (
@@ -28,6 +28,7 @@ from ..features.frf import (
 )
 from ..features.order import order_amplitudes
 from ..sim.calibration import Calibration
+from ..sim.exciters import band_noise, burst_gate, half_sine, sweep_wave
 from ..sim.parts import Scene
 from ..sim.rotor import Rotor
 from ..sim.shaft_line import harmonic_forces, random_forces, shaft_beam, shaft_state
@@ -58,7 +59,6 @@ _CHANCE = 1e-6  # of a peak's coherence without any connection
 _BLOW_SHARE, _SHAKER_SHARE, _CELL_SHARE = 0.2, 0.02, 5e-6  # of a shaft's weight: usual forces
 _TINY = 1e-300  # against the logarithm of zero
 _PROMINENCE_DB = 3.0  # a factor of two in power
-_RISE_SHARE = 0.05  # of a burst, in which it comes and goes
 _COLOURS = ("#1f5a94", "#b3541e")
 _DARK = {"before": "#0c2742", "after": "#4d2209"}
 _SHOWN_DB = 80.0  # of a picture, from the highest peak down
@@ -527,8 +527,7 @@ def _hammer_force(setup: HammerTest, rng: np.random.Generator) -> tuple[Float, N
     clock = np.arange(round((setup.quiet + stretch * setup.blows) * fs)) / fs
     force = np.zeros(clock.size)
     for begin, peak in zip(begins, peaks, strict=True):
-        share = (clock - begin) / setup.contact_time
-        force += np.where((share > 0) & (share < 1), peak * np.sin(np.pi * share), 0.0)
+        force += peak * half_sine(clock - begin, setup.contact_time)
     return force, np.round(begins * fs).astype(np.intp)
 
 
@@ -550,29 +549,20 @@ def _shaker_force(setup: ShakerTest, rng: np.random.Generator) -> tuple[Float, N
     starts = round(setup.quiet * setup.sample_rate) + setup.nperseg * np.arange(setup.bursts)
     force = np.zeros(starts[-1] + setup.nperseg)
     n = round(setup.share * setup.nperseg)
-    gate = np.minimum(1.0, np.minimum(np.arange(n), np.arange(n)[::-1]) / (_RISE_SHARE * n))
-    gate = 0.5 * (1 - np.cos(np.pi * gate))
     for start in starts:
-        burst = gate * _BURSTS[setup.kind](setup, n, rng)
+        burst = burst_gate(n) * _BURSTS[setup.kind](setup, n, rng)
         force[start : start + n] = burst * setup.force / np.sqrt(np.mean(burst**2))
     return force, starts.astype(np.intp)
 
 
 def _random_burst(setup: ShakerTest, n: int, rng: np.random.Generator) -> Float:
-    """Gaussian noise, flat over the band."""
-    lines = np.fft.rfftfreq(n, 1 / setup.sample_rate)
-    normal = rng.standard_normal((2, lines.size))
-    inside = (lines >= 0.8 * setup.low) & (lines <= 1.05 * setup.high)
-    return np.fft.irfft((normal[0] + 1j * normal[1]) * inside, n)
+    """Gaussian noise, flat over a little more than the band."""
+    return band_noise(n, setup.sample_rate, 0.8 * setup.low, 1.05 * setup.high, rng)
 
 
 def _sweep(setup: ShakerTest, n: int, rng: np.random.Generator) -> Float:
-    """From below the band to above it, so that coming and going lie outside."""
     del rng  # the same every time
-    time = np.arange(n) / setup.sample_rate
-    margin = 1.2 * _RISE_SHARE * (setup.high - setup.low)
-    first = max(0.0, setup.low - margin)
-    return np.asarray(chirp(time, first, time[-1], setup.high + margin), dtype=np.float64)
+    return sweep_wave(n, setup.sample_rate, setup.low, setup.high)
 
 
 _BURSTS: dict[str, Callable[[ShakerTest, int, np.random.Generator], Float]] = {
