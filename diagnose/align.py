@@ -38,6 +38,7 @@ from .align_margins import jack_cells, jack_rows, margin_cells, margin_rows
 from .align_tests import LineTest
 from .page import render, short_name
 from .picture import encoded, save_picture
+from .quiet_moves import QuietMoves, quiet_moves
 from .report import save_page
 from .rig import EXPECTED, BeforeAfter, rig_figure, rig_text
 from .sag_report import SagReport, next_texts, sag_figure, sag_rows
@@ -64,6 +65,8 @@ class Alignment:
         In the first condition.
     margin : float
         Share of each limit that was asked for as a distance from it.
+    quiet : QuietMoves or None
+        What the moves do to the vibration, where that was the target.
     """
 
     scene: ShaftScene
@@ -72,6 +75,7 @@ class Alignment:
     calibration: Calibration | None
     jacking: Jacking | None
     margin: float = 0.0
+    quiet: QuietMoves | None = None
 
     @property
     def name(self) -> str:
@@ -127,7 +131,8 @@ def align(
         Look for moves.
     prefer, target : str
     margin : float
-        As of :func:`wearstate.sim.calibration.calibrate`.
+        As of :func:`wearstate.sim.calibration.calibrate`; the target "vibration" is that of
+        :func:`wearstate.diagnose.quiet_moves.quiet_moves`.
     jack : str, optional
         Bearing to jack.
 
@@ -153,9 +158,13 @@ def align(
         )
     line, conditions = _line_of(scene), _conditions_of(scene, condition)
     states = tuple(reactions(line, one) for one in conditions)
-    calibration = None
+    calibration = quiet = None
     if mend:
-        calibration = calibrate(line, conditions, prefer=prefer, target=target, margin=margin)
+        aim = "limits" if target == "vibration" else target
+        calibration = calibrate(line, conditions, prefer=prefer, target=aim, margin=margin)
+    if calibration is not None and target == "vibration":
+        quiet = quiet_moves(scene, calibration, margin=margin)
+        calibration = quiet.calibration
     return Alignment(
         scene=scene,
         line=line,
@@ -163,6 +172,7 @@ def align(
         calibration=calibration,
         jacking=jacking(line, jack, conditions[0]) if jack is not None else None,
         margin=margin,
+        quiet=quiet,
     )
 
 
@@ -195,7 +205,7 @@ def align_table(found: Alignment) -> dict[str, Any]:
     dict
         ``schema_version``, ``scene``, ``verdict``, ``bearings``, ``conditions`` (the line as it
         is set), ``influence_n_per_m``, ``margins``, ``jacks``, ``films`` at three speeds,
-        ``calibration`` and ``jacking``, the last two null where not asked for.
+        ``calibration``, ``vibration`` and ``jacking``, the last three null where not asked for.
     """
     return {
         "schema_version": ALIGN_SCHEMA,
@@ -209,6 +219,7 @@ def align_table(found: Alignment) -> dict[str, Any]:
         "jacks": jack_rows(found.states, found.calibration),
         "films": film_rows(film_states(found.scene, *found.proposed)),
         "calibration": _calibration_table(found.calibration),
+        "vibration": None if found.quiet is None else _quiet_table(found.quiet),
         "jacking": None if found.jacking is None else _jacking_table(found.jacking),
     }
 
@@ -277,6 +288,14 @@ def _calibration_table(found: Calibration | None) -> dict[str, Any] | None:
     }
 
 
+def _quiet_table(found: QuietMoves) -> dict[str, Any]:
+    return {
+        "text": found.text,
+        "before_rms_m_per_s2": found.before.tolist(),
+        "after_rms_m_per_s2": found.after.tolist(),
+    }
+
+
 def _jacking_table(found: Jacking) -> dict[str, Any]:
     return {
         "bearing": found.bearing,
@@ -304,6 +323,8 @@ def align_text(found: Alignment) -> str:
     blocks.append(_influence_text(found))
     if found.calibration is not None:
         blocks.append(_calibration_text(found.calibration, found.margin))
+    if found.quiet is not None:
+        blocks.append(found.quiet.text)
     if found.jacking is not None:
         blocks.append(_jacking_text(found.jacking, found.states[0].condition.name))
     return "\n\n".join(blocks)

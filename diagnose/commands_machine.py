@@ -198,10 +198,11 @@ def frf(
 )
 @click.option(
     "--target",
-    type=click.Choice(["limits", "even"]),
+    type=click.Choice(["limits", "even", "vibration"]),
     default="limits",
     show_default=True,
-    help="limits: least moves that meet them; even: also reactions as even as they allow.",
+    help="limits: least moves that meet them; even: also reactions as even as they allow; "
+    "vibration: also the running line as quiet.",
 )
 @click.option(
     "--margin",
