@@ -62,6 +62,13 @@ _FAIL_ON_HELP = "Exit 3 at a warning, 4 at an alarm, 5 when unfamiliar; alarm: o
     help="Healthy records of DATA's machines: a model that is told how each was when new.",
 )
 @click.option(
+    "--features",
+    multiple=True,
+    metavar="SET|NAMES|FILE",
+    help="Train on this set (standard, core, complete), these names or those in a text file. Of "
+    "several, or of select (all sets), folds choose.",
+)
+@click.option(
     "--budget-ms",
     type=click.FloatRange(0, min_open=True),
     default=None,
@@ -78,6 +85,7 @@ def train(
     held_out: float,
     split: str | None,
     healthy: Path | None,
+    features: Sequence[str],
     budget_ms: float | None,
     seed: int,
     jobs: int | None,
@@ -90,7 +98,8 @@ def train(
     every recording left out in turn.
     """
     from .evaluate import score
-    from .evaluate_text import score_lines
+    from .evaluate_text import features_text, score_lines
+    from .feature_choice import choice_in, choices_of, costs_ms
     from .healthy import references
     from .modelfile import save_model
     from .own import names_classes
@@ -102,13 +111,16 @@ def train(
     shared = source is not click.core.ParameterSource.DEFAULT
     if shared and split:
         raise click.UsageError("--split says what is held out: leave --held-out away")
+    choices = choices_of(features)
     if target is not None and names_classes(data, target):
+        if len(choices) > 1:
+            raise click.UsageError("--features must name one set for a model of named conditions")
         if healthy or budget_ms or shared or split:
             raise click.UsageError(
                 f"--baseline, --budget-ms, --held-out and --split are for a severity; {target} "
                 "names conditions, and every recording is left out in turn"
             )
-        _train_classes(data, output, target, seed, worker_count(jobs), force, as_json)
+        _train_classes(data, output, target, choices[0], seed, worker_count(jobs), force, as_json)
         return
     with progress_bar("features") as progress:
         model, table, test = train_model(
@@ -120,33 +132,50 @@ def train(
             jobs=worker_count(jobs),
             budget_ms=budget_ms,
             baseline=healthy,
+            choices=choices,
             progress=progress,
         )
         reference = None
         if healthy is not None:
             reference, _ = references(
-                table, data, healthy, jobs=worker_count(jobs), progress=progress
+                table,
+                data,
+                healthy,
+                choice=choice_in(model.card),
+                jobs=worker_count(jobs),
+                progress=progress,
             )
     save_model(model, output, force=force)
     result = score(model, table, test, references=reference) if len(test) else {}
     trained = model.card["trained_on"]
     head = f"{output}: trained on {trained['records']} records of {trained['draws']} machine draws"
-    lines = [head, *score_lines(result, model.card)]
+    costs = costs_ms(data, choices)
+    lines = [head, *features_text(model.card, choices, costs), *score_lines(result, model.card)]
     if model.notice:
         lines.append(f"Notice: {model.notice}.")
-    value = {"path": str(output), "trained_on": trained, "held_out": result}
+    chosen = {**model.card["feature_choice"], "ms_per_record": costs}
+    value = {"path": str(output), "trained_on": trained, "features": chosen, "held_out": result}
     emit(value, as_json, "\n".join(lines))
 
 
 def _train_classes(
-    data: Path, output: Path, target: str, seed: int, jobs: int, force: bool, as_json: bool
+    data: Path,
+    output: Path,
+    target: str,
+    choice: Any,
+    seed: int,
+    jobs: int,
+    force: bool,
+    as_json: bool,
 ) -> None:
     """A model of named conditions, judged with whole recordings left out."""
     from .own import classes_text, train_classes
     from .ownfile import save_class_model
 
     with progress_bar("features") as progress:
-        model, result = train_classes(data, target=target, seed=seed, jobs=jobs, progress=progress)
+        model, result = train_classes(
+            data, target=target, choice=choice, seed=seed, jobs=jobs, progress=progress
+        )
     save_class_model(model, output, force=force)
     head = (
         f"{output}: trained on {model.card['records']} records of {result['recordings']} "

@@ -22,6 +22,7 @@ from .conformal import (
     scale_inputs,
     tails,
 )
+from .feature_choice import choice_in
 from .grades import GRADE_NAMES, grades_of
 from .healthy import Baseline, referenced_rows
 from .models import Blend, Linear
@@ -334,7 +335,7 @@ class WearModel:
         return Estimate(verdict="unusable", faults=faults, reasons=reasons, mode=self.mode)
 
     def _row(self, recording: Recording) -> Float:
-        names, values = recording_features(recording)
+        names, values = recording_features(recording, choice_in(self.card))
         if names != self.names:
             raise ModelError(
                 f"the model's {len(self.names)} features are not the program's {len(names)}; "

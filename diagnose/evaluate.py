@@ -14,6 +14,7 @@ from ..datasets.split_file import Sides, usable_sides
 from .baselines import Side, contest, side_of
 from .conformal import grade_limits, grade_set, interval, scale_inputs, tails
 from .estimate import Estimate, WearModel
+from .feature_choice import choice_in
 from .foreign import kitchen
 from .grades import grades_of
 from .healthy import references, refuse_strangers
@@ -121,10 +122,12 @@ def evaluate_model(
     table, rows = judged_rows(model, path, sides=sides, jobs=jobs, progress=progress)
     reference = None
     if healthy is not None:
-        reference, _ = references(table, path, healthy, jobs=jobs, progress=progress)
+        reference, _ = references(
+            table, path, healthy, choice=choice_in(model.card), jobs=jobs, progress=progress
+        )
     home, home_table = (path, table) if trained_on is None else (trained_on, None)
     if home_table is None:
-        home_table = feature_table(home, jobs=jobs, progress=progress)
+        home_table = feature_table(home, choice=choice_in(model.card), jobs=jobs, progress=progress)
     train = trained_rows(model, home_table)
     if trained_on is not None and train.size == 0:
         raise DataError(
@@ -184,7 +187,7 @@ def judged_rows(
     with DataSet(path) as data:
         head = data.attributes
     refuse_other_severity(model, head, path)
-    table = feature_table(path, jobs=jobs, progress=progress)
+    table = feature_table(path, choice=choice_in(model.card), jobs=jobs, progress=progress)
     if sides is not None:
         return table, tested_rows(model, table, sides, draw_identity(head), path)
     return table, unseen_rows(model, table, draw_identity(head), path)

@@ -23,6 +23,7 @@ from .baselines import (
 )
 from .estimate import WearModel
 from .evaluate import Background, judge_rows, refuse_other_severity, score
+from .feature_choice import choice_in
 from .foreign import (
     LEFT_OUT,
     PACKAGES,
@@ -34,7 +35,7 @@ from .foreign import (
 )
 from .healthy import Baseline, references
 from .scores import Figure, figures, plain, resampled, smallest_found
-from .tabulate import FeatureTable, Progress, feature_table, recording_features
+from .tabulate import Choice, FeatureTable, Progress, feature_table, recording_features
 from .train import fit_model
 
 Float = NDArray[np.float64]
@@ -87,6 +88,8 @@ class Case:
         Column that is judged.
     edges, limit : tuple of float, float
         Grade edges and condemning limit [m].
+    choice : Choice
+        Features that the table holds.
     fit : callable
         Rows -> model.
     references : numpy.ndarray [shape=(n_records, n_features)] or None
@@ -105,6 +108,7 @@ class Case:
     severity: str
     edges: tuple[float, ...]
     limit: float
+    choice: Choice
     fit: Fit
     references: Float | None
     seed: int
@@ -206,10 +210,12 @@ def case_of(
             f"{path}: the model is {model.mode}, and healthy recordings are "
             f"{'not ' if healthy is None else ''}given; give --baseline for a referenced model only"
         )
-    table = feature_table(path, jobs=jobs, progress=progress)
+    choice = choice_in(card)
+    ways: dict[str, Any] = {"choice": choice, "jobs": jobs, "progress": progress}
+    table = feature_table(path, **ways)
     reference = None
     if healthy is not None:
-        reference, _ = references(table, path, healthy, jobs=jobs, progress=progress)
+        reference, _ = references(table, path, healthy, **ways)
     train, _ = group_split(table.manifest["group"].to_numpy(), test_fraction=TEST_SHARE, seed=seed)
     cook = kitchen(Path(path), train, seed=seed, quick=quick, cache=cache, progress=progress)
 
@@ -222,6 +228,7 @@ def case_of(
             references=reference,
             seed=seed,
             budget_ms=card["budget_ms"],
+            choice=choice,
             path=path,
         )
 
@@ -232,6 +239,7 @@ def case_of(
         severity=card["severity"],
         edges=tuple(card["grade_edges_m"]),
         limit=card["condemning_limit_m"],
+        choice=choice,
         fit=fit,
         references=reference,
         seed=seed,
@@ -518,7 +526,7 @@ def noisy_table(case: Case, level: float) -> tuple[FeatureTable, dict[str, Float
     ]
     table = FeatureTable(
         names=case.table.names,
-        values=np.array([recording_features(recording)[1] for recording in noisy]),
+        values=np.array([recording_features(recording, case.choice)[1] for recording in noisy]),
         manifest=case.table.manifest.iloc[rows].reset_index(drop=True),
     )
     foreign: dict[str, Float | str] = {
@@ -684,7 +692,7 @@ def _own_ms(case: Case, recordings: Sequence[Recording]) -> float:
     healthy = None if case.references is None else case.references[case.random[1][:1]]
 
     def severity(recording: Recording) -> Float:
-        return case.model.predict(recording_features(recording)[1][None, :], healthy)
+        return case.model.predict(recording_features(recording, case.choice)[1][None, :], healthy)
 
     return _ms(severity, recordings)
 

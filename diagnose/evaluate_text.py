@@ -3,10 +3,46 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from .feature_choice import choice_in, words_of
 from .report import severity_word
 from .scores import LEVEL
+from .tabulate import Choice
 
 _FEW_RECORDS = 30
+
+
+def features_text(
+    card: Mapping[str, Any], choices: Sequence[Choice], costs: Sequence[float]
+) -> list[str]:
+    """Features of a model, what else there was to choose from, and the time of each.
+
+    Parameters
+    ----------
+    card : mapping
+        Of the model.
+    choices : sequence of Choice
+        What it was trained with.
+    costs : sequence of float
+        Time of the features of one recording, of each choice [ms].
+    """
+    mine = choice_in(card)
+    tried = {each["name"]: each for each in card["feature_choice"]["candidates"]}
+    lines = []
+    for choice, cost in zip(choices, costs, strict=True):
+        name = words_of(choice)
+        if not tried:
+            count = len(card["features"])
+            lines.append(f"Features: {name}, {count} values of a recording in {cost:.3g} ms")
+            continue
+        about = tried[name]
+        lines.append(
+            f"{'Features:' if choice == mine else '      not'} {name}, {about['values']} values in "
+            f"{cost:.3g} ms; lines erred by {1e6 * about['line_mae_m']:.3g} um out of fold"
+        )
+    if tried:
+        nested = 1e6 * card["model"]["nested_mae_m"]
+        lines.append(f"  the whole, with the set chosen anew in every fold: {nested:.3g} um")
+    return lines
 
 
 def score_lines(result: Mapping[str, Any], card: Mapping[str, Any]) -> list[str]:

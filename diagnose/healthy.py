@@ -10,8 +10,9 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from ..datasets.record import DataError, DataSet, Recording
+from .feature_choice import choice_in
 from .quality import layout_faults, sample_faults
-from .tabulate import FeatureTable, Progress, feature_table, recording_features
+from .tabulate import USUAL, Choice, FeatureTable, Progress, feature_table, recording_features
 
 Float = NDArray[np.float64]
 
@@ -64,6 +65,7 @@ def references(
     path: str | Path,
     healthy: str | Path,
     *,
+    choice: Choice = USUAL,
     jobs: int = 1,
     progress: Progress | None = None,
 ) -> tuple[Float, int]:
@@ -78,6 +80,8 @@ def references(
     healthy : str or Path
         Data set of healthy records of the same machines: drawn by the same recipe under the same
         seed, or measured and named alike. Equal numbers alone make no machine the same.
+    choice : Choice
+        What the table is made of, or holds a part of.
     jobs : int
         Worker processes for the features.
     progress : callable, optional
@@ -95,12 +99,13 @@ def references(
         As of :func:`refuse_strangers`, or the features are others.
     """
     refuse_strangers(path, healthy)
-    known = feature_table(healthy, jobs=jobs, progress=progress)
-    if known.names != table.names:
+    known = feature_table(healthy, choice=choice, jobs=jobs, progress=progress)
+    if not set(table.names) <= set(known.names):
         raise DataError(
             f"{healthy}: its {len(known.names)} features are not the {len(table.names)} of the "
             "data set; use the same channels and rate"
         )
+    known = known.named(table.names)
     return _means(known.values, _machines_in(healthy), _machines_in(path)), len(known.values)
 
 
@@ -213,7 +218,7 @@ def baseline_of(
         if len(next(iter(faults.values()), ())) > _ENOUGH_FAULTS:
             break  # of a thousand recordings of another layout
         if not found:
-            rows.append(recording_features(recording)[1])
+            rows.append(recording_features(recording, choice_in(card))[1])
     if faults:
         told = [f"{source}: {text} ({_few(names)})" for text, names in faults.items()]
         raise DataError("\n".join(told))

@@ -19,6 +19,7 @@ from .novelty import Familiarity
 from .parts import (
     BlendStructure,
     ChannelCard,
+    FeatureChoice,
     Portion,
     Pulses,
     RateHz,
@@ -306,6 +307,7 @@ class _Card(Strict):
     tacho: str | None
     pulses_per_revolution: Pulses
     features: list[str] = Field(min_length=1)
+    feature_choice: FeatureChoice = FeatureChoice()
     conditions: list[_Condition]
     healthy_features: _Healthy
     mode: Literal["cold", "referenced"]

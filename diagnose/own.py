@@ -20,12 +20,20 @@ from ..datasets.splits import check_no_leak, group_folds
 from .blows import NOISE_SCORE, blow_floors, blow_scores, blow_table, lacks_blows
 from .conformal import COVERAGE, record_weights, weighted_quantile
 from .estimate import UNFAMILIAR_SHARE, ModelError
+from .feature_choice import choice_card, choice_in
 from .models import CANDIDATES, Blend, Folds, fit_blend
 from .novelty import Familiarity, fit_familiarity
 from .quality import layout_faults, sample_faults
 from .report_batch import Item, fault_of
 from .scores import Figure, resampled, share
-from .tabulate import FeatureTable, Progress, feature_table, recording_features
+from .tabulate import (
+    USUAL,
+    Choice,
+    FeatureTable,
+    Progress,
+    feature_table,
+    recording_features,
+)
 
 Float = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -248,7 +256,7 @@ class ClassModel:
         reasons = tuple(fault.text for fault in faults if fault.bars)
         if reasons:
             return Naming(verdict="unusable", reasons=reasons, shares={})
-        names, row = recording_features(recording)
+        names, row = recording_features(recording, choice_in(self.card))
         if names != self.names:
             raise ModelError(
                 f"the model's {len(self.names)} features are not the recording's {len(names)}; "
@@ -332,6 +340,7 @@ def train_classes(
     path: str | Path,
     *,
     target: str,
+    choice: Choice = USUAL,
     seed: int = 0,
     jobs: int = 1,
     progress: Progress | None = None,
@@ -345,6 +354,8 @@ def train_classes(
         split, so that windows of one recording are never on both sides.
     target : str
         Manifest column with the label.
+    choice : Choice
+        Features to train on.
     seed : int
         Of folds, trees and resamples.
     jobs : int
@@ -368,10 +379,11 @@ def train_classes(
     with DataSet(path) as data:
         head, manifest = data.attributes, data.manifest
     _labels_of(manifest, target, path)  # refused before the features are computed
-    table = feature_table(path, jobs=jobs, progress=progress)
+    table = feature_table(path, choice=choice, jobs=jobs, progress=progress)
     labels = _labels_of(table.manifest, target, path)
     blows = blow_table(path, len(labels), jobs=jobs)
     model = fit_classes(table, labels, blows, head, target=target, seed=seed)
+    model.card["feature_choice"] = choice_card(choice)
     return model, score_votes(model.votes, model.classes, seed=seed)
 
 
@@ -546,7 +558,7 @@ def evaluate_classes(
         The label is missing or has no value that the model knows, the features are others, or
         every recording has a part in the training.
     """
-    table = feature_table(path, jobs=jobs, progress=progress)
+    table = feature_table(path, choice=choice_in(model.card), jobs=jobs, progress=progress)
     target = model.card["target"]
     if target not in table.manifest or table.names != model.names:
         raise DataError(

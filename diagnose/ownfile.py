@@ -13,6 +13,7 @@ from .own import ClassModel, Votes
 from .parts import (
     BlendStructure,
     ChannelCard,
+    FeatureChoice,
     Pulses,
     RateHz,
     Strict,
@@ -53,6 +54,7 @@ class _Card(Strict):
     tacho: str | None
     pulses_per_revolution: Pulses
     features: list[str] = Field(min_length=1)
+    feature_choice: FeatureChoice = FeatureChoice()
 
     @model_validator(mode="after")
     def _fits_itself(self) -> Self:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from ..features.catalogue import SetName
 from ..sim.sensor import RATE_LEAST, RATE_MOST
 from .models import Blend, Forest, Linear
 from .novelty import Familiarity
@@ -51,6 +52,22 @@ class BlendStructure(Strict):
         if len(self.names) != len(self.kinds):
             raise ValueError("names and kinds must be as many")
         return self
+
+
+class SetCard(Strict):
+    """One set of features that was looked at."""
+
+    name: str
+    values: int = Field(ge=1)
+    line_mae_m: float = Field(ge=0)
+
+
+class FeatureChoice(Strict):
+    """Features that a model was trained on, and the sets that they were chosen among."""
+
+    set: SetName = "standard"
+    only: list[str] = Field(default=[], max_length=100_000)
+    candidates: list[SetCard] = Field(default=[], max_length=100)
 
 
 class ChannelCard(Strict):

@@ -308,6 +308,8 @@ def _levels(names: Sequence[str], rows: Float) -> Levels:
     from sklearn.linear_model import Ridge
 
     inputs, level = shape_rows(names, rows), level_rows(names, rows)
+    if not level.size or not inputs.size:  # features that hold no level, or nothing that tells it
+        return _plain_levels(inputs, level)
     centre, spread = inputs.mean(axis=0), inputs.std(axis=0)
     spread = np.where(spread > 0, spread, 1.0)
     ridge = Ridge(_LEVEL_PENALTY).fit((inputs - centre) / spread, level)
@@ -316,6 +318,19 @@ def _levels(names: Sequence[str], rows: Float) -> Levels:
         spread=spread,
         weight=np.atleast_2d(ridge.coef_),
         offset=np.atleast_1d(ridge.intercept_),
+        size=np.zeros(level.shape[1]),
+        least=level.min(axis=0),
+    )
+
+
+def _plain_levels(inputs: Float, level: Float) -> Levels:
+    """Mean levels, where no shape tells more."""
+    shapes = inputs.shape[1]
+    return Levels(
+        centre=np.zeros(shapes),
+        spread=np.ones(shapes),
+        weight=np.zeros((level.shape[1], shapes)),
+        offset=level.mean(axis=0),
         size=np.zeros(level.shape[1]),
         least=level.min(axis=0),
     )

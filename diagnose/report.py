@@ -15,6 +15,7 @@ from ..features import iso
 from ..sim.atomic import write_whole
 from .advice import advise, touched_grades
 from .estimate import Estimate, WearModel, input_faults
+from .feature_choice import choice_in, words_of
 from .grades import GRADE_NAMES
 from .healthy import Baseline
 from .signal_view import View
@@ -191,6 +192,7 @@ def model_table(model: WearModel, path: Path | None = None) -> dict[str, Any]:
         "created_by": card["created_by"],
         "origin": card["origin"],
         "mode": card["mode"],
+        "features": words_of(choice_in(card)),
         "chosen": card["model"]["chosen"],
         "nested_mae_m": card["model"]["nested_mae_m"],
         **{

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..datasets.record import DataError, Recording
 from .estimate import WearModel
+from .feature_choice import choice_in
 from .page import short_name
 from .panel import RIGHT_OF_MAP, Panel, log_frequency, panel_figure, stack
 from .picture import encoded
@@ -140,7 +141,7 @@ def moved_panel(
     found = {i: match.groups() for i, match in cells if match is not None}
     if not found:
         return None
-    names, row = recording_features(recording)
+    names, row = recording_features(recording, choice_in(model.card))
     if names != model.names:
         return None
     reference = healthy

@@ -46,6 +46,12 @@ class FeatureTable:
     values: NDArray[np.float64]
     manifest: pd.DataFrame
 
+    def named(self, names: Sequence[str]) -> "FeatureTable":
+        """The table with some of its features."""
+        place = {name: i for i, name in enumerate(self.names)}
+        columns = [place[name] for name in names]
+        return replace(self, names=tuple(names), values=self.values[:, columns])
+
     def frame(self) -> pd.DataFrame:
         """Manifest and features side by side."""
         features = pd.DataFrame(self.values, columns=list(self.names), index=self.manifest.index)
@@ -231,22 +237,12 @@ def absent_in(path: str | Path, choice: Choice) -> dict[str, str]:
         if len(data) == 0:
             raise DataError(f"{path}: 0 records, must be > 0; generate or import some")
         layout = recording_layout(data[0], choice.settings)
-    try:
-        if choice.only is None:
+    if choice.only is None:
+        try:
             return absent_features(layout, choice.feature_set)
-        feature_names(
-            layout.channels,
-            layout.fs,
-            tacho=layout.tacho,
-            pulses_per_revolution=layout.pulses_per_revolution,
-            quantities=layout.quantities,
-            n_samples=layout.n_samples,
-            impact=layout.impact,
-            settings=layout.settings,
-            only=choice.only,
-        )
-    except ValueError as error:
-        raise DataError(f"{path}: {error}") from error
+        except ValueError as error:
+            raise DataError(f"{path}: {error}") from error
+    _names(layout, choice, path)
     return {}
 
 
@@ -371,6 +367,47 @@ def feature_table(
                 progress(len(rows), usable.size)
         manifest = data.manifest.iloc[usable].reset_index(drop=True)
     return FeatureTable(names=names, values=np.array(rows), manifest=manifest)
+
+
+def feature_table_names(path: str | Path, choice: Choice = USUAL) -> tuple[str, ...]:
+    """Names of the columns of a feature table, told by the first usable record.
+
+    Parameters
+    ----------
+    path : str or Path
+        Data set file.
+    choice : Choice
+        Which features.
+
+    Raises
+    ------
+    DataError
+        There is no usable record, or a feature that is named is not to be had.
+    """
+    with DataSet(path) as data:
+        usable = np.flatnonzero((data.manifest["status"] == "ok").to_numpy())
+        if usable.size == 0:
+            raise DataError(f"{path}: 0 usable records, must be > 0; see its column 'status'")
+        layout = recording_layout(data[int(usable[0])], choice.settings)
+    return _names(layout, choice, path)
+
+
+def _names(layout: Layout, choice: Choice, path: str | Path) -> tuple[str, ...]:
+    try:
+        return feature_names(
+            layout.channels,
+            layout.fs,
+            tacho=layout.tacho,
+            pulses_per_revolution=layout.pulses_per_revolution,
+            quantities=layout.quantities,
+            n_samples=layout.n_samples,
+            impact=layout.impact,
+            settings=layout.settings,
+            feature_set=choice.feature_set,
+            only=choice.only,
+        )
+    except ValueError as error:
+        raise DataError(f"{path}: {error}") from error
 
 
 def _batch_features(

@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,14 @@ from ..datasets.split_file import usable_sides
 from ..datasets.splits import check_no_leak, group_folds, group_split
 from .conformal import Calibration, Scale, fit_scale, scale_inputs
 from .estimate import Head, WearModel
+from .feature_choice import (
+    Candidates,
+    Selection,
+    candidates_of,
+    choice_card,
+    select_set,
+    words_of,
+)
 from .grades import grades_of
 from .healthy import referenced_rows, references, refuse_strangers
 from .models import (
@@ -30,8 +39,9 @@ from .models import (
     least_line_error,
 )
 from .novelty import Familiarity, fit_familiarity
+from .physical import physical_rows
 from .quality import Levels, fit_levels
-from .tabulate import FeatureTable, Progress, confounders_in, feature_table
+from .tabulate import USUAL, Choice, FeatureTable, Progress, confounders_in, feature_table
 
 Float = NDArray[np.float64]
 
@@ -52,6 +62,7 @@ def train_model(
     jobs: int = 1,
     budget_ms: float | None = None,
     baseline: str | Path | None = None,
+    choices: Sequence[Choice] = (USUAL,),
     progress: Progress | None = None,
 ) -> tuple[WearModel, FeatureTable, NDArray[np.intp]]:
     """Fit a wear model on a data set's training groups.
@@ -86,7 +97,7 @@ def train_model(
     model : WearModel
         Severity, out-of-fold behaviour, familiarity, other faults, card.
     table : FeatureTable
-        All usable records.
+        All usable records, with the features of the model.
     test : numpy.ndarray
         Rows of `table` that were held out.
 
@@ -103,10 +114,12 @@ def train_model(
     _check_draws(draws, path)
     if baseline is not None:
         refuse_strangers(path, baseline)
-    table = feature_table(path, jobs=jobs, progress=progress)
+    candidates = candidates_of(path, choices)
+    ways: dict[str, Any] = {"choice": candidates.whole, "jobs": jobs, "progress": progress}
+    table = feature_table(path, **ways)
     healthy, count = None, 0
     if baseline is not None:
-        healthy, count = references(table, path, baseline, jobs=jobs, progress=progress)
+        healthy, count = references(table, path, baseline, **ways)
     groups = table.manifest["group"].to_numpy()
     if sides is None:
         train, test = _split(groups, held_out, seed, path)
@@ -124,13 +137,14 @@ def train_model(
         held_out=held_out,
         seed=seed,
         budget_ms=budget_ms,
+        candidates=candidates,
         path=path,
     )
     if sides is not None:
         model.card["trained_on"].update(split=sides.name, split_sha256=sides.sha256)
     if healthy is not None:
         model.card.update(baseline_records=count)
-    return model, table, test
+    return model, table.named(model.names), test
 
 
 def fit_model(
@@ -143,6 +157,8 @@ def fit_model(
     held_out: float = 0.0,
     seed: int = 0,
     budget_ms: float | None = None,
+    choice: Choice = USUAL,
+    candidates: Candidates | None = None,
     path: str | Path = "the data set",
 ) -> WearModel:
     """Fit a wear model on some rows of a feature table.
@@ -158,6 +174,10 @@ def fit_model(
         As of :func:`train_model`; the share held out is for the card only.
     references : numpy.ndarray [shape=(n_records, n_features)], optional
         Healthy row of each record's machine: the model is then referenced.
+    choice : Choice
+        What the table is made of.
+    candidates : Candidates, optional
+        Sets among the columns of the table, of which one is chosen; all of `choice` by default.
     path : str or Path
         Of the data set, for messages.
 
@@ -171,7 +191,10 @@ def fit_model(
         As of :func:`train_model`.
     """
     aim = _aim(head, target, path)
-    lesson = Lesson(
+    if candidates is None:
+        columns = np.arange(len(table.names), dtype=np.intp)
+        candidates = Candidates(choices=(choice,), columns=(columns,), whole=choice)
+    whole = Lesson(
         names=table.names,
         rows=table.values[train],
         baseline=None if references is None else references[train],
@@ -179,12 +202,60 @@ def fit_model(
         groups=table.manifest["group"].to_numpy()[train],
         faults={name: here[train] for name, here in confounders_in(table.manifest).items()},
     )
-    learnt = learn(lesson, seed=seed, budget_ms=budget_ms)
-    card = _card(head, aim, table, train, held_out, seed) | _model_card(learnt, budget_ms)
+    lessons = [whole.part(columns) for columns in candidates.columns]
+    for each in lessons:
+        _refuse_undefined(each, path)
+    selection = _selection(lessons, seed)
+    lesson = lessons[selection.chosen]
+    learnt = learn(lesson, seed=seed, budget_ms=budget_ms, selection=selection, among=lessons)
+    mine = candidates.part(table, selection.chosen)
+    card = _card(head, aim, mine, train, held_out, seed) | _model_card(learnt, budget_ms)
     card["healthy_features"] = _healthy(lesson, grades_of(lesson.severity, aim.edges))
+    card["feature_choice"] = choice_card(candidates.choices[selection.chosen]) | {
+        "candidates": [
+            {"name": words_of(each), "values": len(columns), "line_mae_m": error}
+            for each, columns, error in zip(
+                candidates.choices, candidates.columns, selection.errors, strict=False
+            )
+        ]
+    }
     if references is not None:
         card["mode"] = "referenced"
     return _model(learnt, card)
+
+
+def _selection(lessons: Sequence["Lesson"], seed: int) -> Selection:
+    """Of one set there is nothing to choose."""
+    if len(lessons) == 1:
+        return Selection(chosen=0, errors=(), by_fold=(0,) * _FOLDS)
+    first = lessons[0]
+    _refuse_no_wear(first.severity)
+    folds = group_folds(first.groups, n=_FOLDS, seed=seed)
+    inputs = [lesson.inputs for lesson in lessons]
+    return select_set(inputs, first.severity, first.groups, folds, seed=seed)
+
+
+def _refuse_undefined(lesson: "Lesson", path: str | Path) -> None:
+    """Features that some records leave undefined: the coherence of a single blow."""
+    lost = np.flatnonzero(~np.isfinite(lesson.inputs).all(axis=0)) % len(lesson.names)
+    if lost.size:
+        names = [lesson.names[i] for i in np.unique(lost)]
+        raise DataError(
+            f"{path}: {len(names)} features are undefined in some records, must be 0, as "
+            f"{names[0]}; strike more often, or leave them out: wearstate train --features"
+        )
+    if physical_rows(lesson.names, lesson.rows[:1]).shape[1] == 0:
+        raise DataError(
+            f"{path}: its {len(lesson.names)} features are levels alone, which tell no familiar "
+            "machine from a strange one; add others: wearstate train --features"
+        )
+
+
+def _refuse_no_wear(severity: Float) -> None:
+    if not (severity > 0).all():
+        raise DataError(
+            f"severity = {severity.min():g} m must be > 0 in every record; label them all"
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -300,6 +371,15 @@ class Lesson:
         """What the severity is told from."""
         return self.rows if self.baseline is None else referenced_rows(self.rows, self.baseline)
 
+    def part(self, columns: NDArray[np.intp]) -> "Lesson":
+        """The same records with some of the features."""
+        return replace(
+            self,
+            names=tuple(self.names[i] for i in columns),
+            rows=self.rows[:, columns],
+            baseline=None if self.baseline is None else self.baseline[:, columns],
+        )
+
 
 @dataclass(frozen=True, kw_only=True)
 class Learnt:
@@ -326,7 +406,14 @@ class Learnt:
     heads: tuple[tuple[Head, dict[str, Any]], ...]
 
 
-def learn(lesson: Lesson, *, seed: int = 0, budget_ms: float | None = None) -> Learnt:
+def learn(
+    lesson: Lesson,
+    *,
+    seed: int = 0,
+    budget_ms: float | None = None,
+    selection: Selection | None = None,
+    among: Sequence[Lesson] = (),
+) -> Learnt:
     """Fit everything, by folds of whole groups.
 
     Parameters
@@ -336,6 +423,11 @@ def learn(lesson: Lesson, *, seed: int = 0, budget_ms: float | None = None) -> L
         Of the folds and the trees.
     budget_ms : float, optional
         Of :func:`wearstate.diagnose.models.fit_blend`.
+    selection : Selection, optional
+        How the features were chosen: the estimates of a fold are then those of the set that its
+        training records ask for, so that the calibration knows what the choice costs.
+    among : sequence of Lesson
+        The sets that it was chosen from.
 
     Returns
     -------
@@ -346,15 +438,21 @@ def learn(lesson: Lesson, *, seed: int = 0, budget_ms: float | None = None) -> L
     DataError
         A severity is not positive, or no model is within the budget.
     """
-    if not (lesson.severity > 0).all():
-        raise DataError(
-            f"severity = {lesson.severity.min():g} m must be > 0 in every record; label them all"
-        )
+    _refuse_no_wear(lesson.severity)
     folds = group_folds(lesson.groups, n=_FOLDS, seed=seed)
     try:
         severity = fit_blend(lesson.inputs, lesson.severity, folds, seed=seed, budget_ms=budget_ms)
+        others: dict[int, Fitted] = {}
+        if selection is not None:
+            others = _fits_of_others(selection, among, folds, seed, budget_ms)
     except ValueError as error:
         raise DataError(str(error)) from error
+    if selection is not None:
+        estimate = severity.estimate.copy()
+        for place, (_, left) in zip(selection.by_fold, folds, strict=True):
+            if place in others:
+                estimate[left] = others[place].estimate[left]
+        severity = replace(severity, estimate=estimate)
     reach = 2 * least_line_error(severity.options)  # what lines near the ends overshoot by chance
     # random folds leave out no stretch of severity: the calibration needs no such rule
     blend = knowing_unseen(severity.blend, lesson.severity, reach)
@@ -377,6 +475,19 @@ def learn(lesson: Lesson, *, seed: int = 0, budget_ms: float | None = None) -> L
         levels=fit_levels(lesson.names, lesson.rows, folds),
         heads=_heads(lesson, folds, np.abs(severity.estimate - lesson.severity), seed=seed),
     )
+
+
+def _fits_of_others(
+    selection: Selection, among: Sequence[Lesson], folds: Folds, seed: int, budget_ms: float | None
+) -> dict[int, Fitted]:
+    """Fits on the sets that some fold asks for and all records do not."""
+    places = sorted(set(selection.by_fold) - {selection.chosen})
+    return {
+        place: fit_blend(
+            among[place].inputs, among[place].severity, folds, seed=seed, budget_ms=budget_ms
+        )
+        for place in places
+    }
 
 
 def _out_of_fold_distances(lesson: Lesson, folds: Folds) -> Float:

@@ -1,0 +1,191 @@
+"""Features of a model: named, chosen by folds, kept in its card and used wherever it judges."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from wearstate.datasets.record import Attributes, DataError, DataSet, DataSetWriter
+from wearstate.datasets.splits import group_folds
+from wearstate.diagnose.cli import cli
+from wearstate.diagnose.estimate import ModelError
+from wearstate.diagnose.feature_choice import choice_in, choices_of, select_set
+from wearstate.diagnose.modelfile import load_model, save_model
+from wearstate.diagnose.tabulate import USUAL, Choice, recording_features
+from wearstate.diagnose.train import train_model
+from wearstate.sim.sensor import Channel
+
+FS, N = 2560.0, 10_240
+COLUMN = "sag_support_m"
+LIMIT = 5e-4
+CHANNELS = (
+    Channel(name="force", unit="N", quantity="force"),
+    Channel(name="one", unit="m/s^2", quantity="acceleration"),
+    Channel(name="two", unit="m/s^2", quantity="acceleration"),
+)
+
+
+def pushed(path, *, machines=40, healthy=False, blows=0):
+    """Tests of machines of two masses, whose support softens by its sag; nothing else is alike."""
+    s = 2j * np.pi * np.fft.rfftfreq(N, 1 / FS)
+    head = Attributes(
+        sample_rate=FS, channels=CHANNELS, origin="measured", severities=(COLUMN,),
+        grade_edges=(1e-4, 2e-4, 4e-4), condemning_limit=LIMIT, limit_source="drawing",
+    )  # fmt: skip
+    columns = {COLUMN: "<f8", "group_name": "S8"}
+    with DataSetWriter(path, head, n_records=machines, n_samples=N, columns=columns) as writer:
+        for i in range(machines):
+            machine = np.random.default_rng(i)
+            rng = np.random.default_rng([i, int(healthy)])
+            sag = 1e-6 if healthy else LIMIT * machine.uniform(0.02, 1)
+            soft, ground = 4e6 * machine.uniform(0.97, 1.03, 2)
+            ground *= 1 - 0.5 * sag / LIMIT
+            push = rng.uniform(0.1, 10) * rng.standard_normal(N)
+            if blows:
+                push = 100.0 * np.isin(np.arange(N), np.arange(blows) * 1200 + 500)
+            one, two = (m * s**2 + 60 * s + soft + k for m, k in ((2, 4e6), (3, ground)))
+            motion = np.stack([two, np.full_like(s, soft)]) / (one * two - soft**2) * s**2
+            rows = np.fft.irfft(motion * np.fft.rfft(push), N)
+            rows += 0.05 * rows.std() * rng.standard_normal(rows.shape)
+            row = {"record_id": f"r{i}", "group": i, "status": "ok", "group_name": f"rig{i}"}
+            row |= {COLUMN: sag, "grade": int(np.searchsorted(head.grade_edges, sag))}
+            writer.write(i, np.vstack([push, rows]), row)
+        writer.finish()
+    return path
+
+
+@pytest.fixture(scope="module")
+def data(tmp_path_factory):
+    return pushed(tmp_path_factory.mktemp("tests") / "data.h5")
+
+
+def run(*arguments, code=0):
+    result = CliRunner().invoke(cli, [str(argument) for argument in arguments])
+    assert result.exit_code == code, result.output
+    return result
+
+
+# --- what is said
+
+
+def test_words_name_sets_names_and_files(tmp_path):
+    file = tmp_path / "mine.txt"
+    file.write_text("rms  # of every channel\n\nfrf_profile, speed\n")
+    assert choices_of([]) == (USUAL,)
+    assert choices_of(["complete,standard"]) == (USUAL, Choice(feature_set="complete"))
+    assert [c.feature_set for c in choices_of(["select"])] == ["standard", "core", "complete"]
+    assert choices_of([str(file)]) == (Choice(only=("rms", "frf_profile", "speed")),)
+    assert choices_of(["rms", "core", "rms"]) == (Choice(only=("rms",)), Choice(feature_set="core"))
+    with pytest.raises(DataError, match="must hold sets or names, holds both"):
+        choices_of(["core,rms"])
+    with pytest.raises(DataError, match="names 0 features"):
+        choices_of([" , "])
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("--features", "frf_profil"), "did you mean frf_profile?"),
+        (("--features", "order_levels"), "tacho = none must be there"),
+        (("--features", "standard", "--features", "core,rms"), "holds both"),
+        (("--features", "speed_variation,nonsense"), "feature 'nonsense' is unknown"),
+        (("--features", "rms"), "levels alone"),
+    ],
+)
+def test_what_cannot_be_trained_on_is_refused(data, tmp_path, options, message):
+    result = run("train", data, "-o", tmp_path / "m.wsm", "-j", 1, *options, code=2)
+    assert message in result.stderr
+    assert not (tmp_path / "m.wsm").exists()
+
+
+def test_what_a_single_blow_leaves_undefined_is_refused(tmp_path):
+    path = pushed(tmp_path / "blows.h5", machines=12, blows=1)
+    with pytest.raises(DataError, match=r"undefined in some .* as one\.frf\.coh"):
+        train_model(path, choices=choices_of(["core"]), budget_ms=0.1)
+
+
+# --- what is kept and used
+
+
+def test_a_model_keeps_its_features(data, tmp_path):
+    path = tmp_path / "m.wsm"
+    ways = ("--features", "frf_profile,antiresonances", "--budget-ms", 0.1, "-j", 1)
+    told = json.loads(run("train", data, "-o", path, *ways, "--json").stdout)
+    assert told["features"]["only"] == ["frf_profile", "antiresonances"]
+    assert told["features"]["ms_per_record"][0] > 0
+    model = load_model(path)
+    choice = choice_in(model.card)
+    assert len(model.names) == 2 * (72 + 6)
+    with DataSet(data) as records:
+        recording = records[3]
+    estimate = model.estimate(recording)
+    row = recording_features(recording, choice)[1]
+    assert estimate.severity == pytest.approx(model.predict(row[None])[0])
+    assert abs(estimate.severity - recording.row[COLUMN]) < 0.1 * LIMIT
+    # judged again, in folds of its own, and reported: always on the same features
+    judged = run("evaluate", path, data, "--quick", "--json", "-j", 1)
+    assert json.loads(judged.stdout)["records"] == 10
+    again = run("evaluate", path, data, "--quick", "--retrain", "random", "--json", "-j", 1)
+    assert json.loads(again.stdout)
+    report = run("report", data, "--model", path, "--record", 3, "--json")
+    assert "frf_profile, antiresonances" in report.stdout
+
+
+def test_an_older_model_has_the_standard_set(data, tmp_path):
+    model, table, _ = train_model(data, budget_ms=0.1)
+    assert model.card["feature_choice"] == {"set": "standard", "only": [], "candidates": []}
+    older = {key: value for key, value in model.card.items() if key != "feature_choice"}
+    save_model(replace(model, card=older), tmp_path / "old.wsm")
+    with DataSet(data) as records:
+        assert load_model(tmp_path / "old.wsm").estimate(records[0]).severity is not None
+    other = replace(model, card={**model.card, "feature_choice": {"set": "core", "only": []}})
+    with DataSet(data) as records, pytest.raises(ModelError, match="features are not"):
+        other.estimate(records[0])
+    assert len(table.names) == len(model.names)
+
+
+# --- the choice
+
+
+def test_folds_choose_the_set_that_tells(data):
+    choices = choices_of(["skewness,kurtosis", "frf_profile"])
+    model, table, test = train_model(data, choices=choices, budget_ms=0.1)
+    kept = model.card["feature_choice"]
+    assert kept["only"] == ["frf_profile"]
+    assert set(table.names) == set(model.names)
+    poor, good = (each["line_mae_m"] for each in kept["candidates"])
+    assert good < 0.3 * poor
+    error = np.abs(model.predict(table.values[test]) - table.manifest[COLUMN].to_numpy()[test])
+    assert error.mean() < 0.04 * LIMIT
+    alone, *_ = train_model(data, choices=choices[1:], budget_ms=0.1)
+    assert_same(alone, model)
+
+
+def assert_same(one, other):
+    assert one.names == other.names
+    np.testing.assert_array_equal(one.calibration.estimate, other.calibration.estimate)
+
+
+def test_the_error_of_a_choice_among_nonsense_is_honest():
+    """The best of many sets of noise looks good; judged in folds of its own it is worth nothing."""
+    rng = np.random.default_rng(2)
+    target = np.exp(0.3 * rng.standard_normal(24))
+    sets = [rng.standard_normal((24, 1)) for _ in range(12)]
+    folds = group_folds(np.arange(24), n=5, seed=2)
+    found = select_set(sets, target, np.arange(24), folds, seed=2)
+    constant = np.abs(target - np.median(target)).mean()
+    assert found.errors[found.chosen] <= 1.01 * min(found.errors)
+    assert min(found.errors) < 0.97 * constant
+    assert outer_error(sets, target, folds, found) > constant
+
+
+def outer_error(sets, target, folds, found):
+    from wearstate.diagnose.models import CANDIDATES, fit_blend
+
+    error = np.empty(len(target))
+    for place, (train, test) in zip(found.by_fold, folds, strict=True):
+        inner = group_folds(np.arange(len(train)), n=5, seed=0)
+        fitted = fit_blend(sets[place][train], target[train], inner, candidates=CANDIDATES[:6])
+        error[test] = np.abs(fitted.blend.predict(sets[place][test]) - target[test])
+    return error.mean()
