@@ -104,6 +104,7 @@ def train(
     from .modelfile import save_model
     from .own import names_classes
     from .train import train_model
+    from .transfer_reference import healthy_transfer
 
     inputs = [data] if healthy is None else [data, healthy]
     check_outputs(inputs, [(output, MODEL_SUFFIXES)], force)
@@ -149,7 +150,7 @@ def train(
     result = score(model, table, test, references=reference) if len(test) else {}
     trained = model.card["trained_on"]
     head = f"{output}: trained on {trained['records']} records of {trained['draws']} machine draws"
-    costs = costs_ms(data, choices)
+    costs = costs_ms(data, choices, healthy_transfer(healthy, choices))
     lines = [head, *features_text(model.card, choices, costs), *score_lines(result, model.card)]
     if model.notice:
         lines.append(f"Notice: {model.notice}.")

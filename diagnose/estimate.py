@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..datasets.record import DataError, Recording
+from ..features.transfer import FrfReference
 from .conformal import (
     COVERAGE,
     Calibration,
@@ -37,7 +38,8 @@ from .quality import (
     sample_faults,
     suspicions,
 )
-from .tabulate import recording_features
+from .tabulate import Choice, held_against, recording_features
+from .transfer_reference import told_against
 
 Float = NDArray[np.float64]
 Verdict = Literal["graded", "caution", "unfamiliar", "unusable"]
@@ -320,9 +322,16 @@ class WearModel:
         faults = layout_faults(recording, self.card) or sample_faults(recording)
         if any(fault.bars for fault in faults):
             return self._unusable(faults)
-        row = self._row(recording)
+        known = None if baseline is None else baseline.transfer
+        if known is None and told_against(Choice(only=self.names)):
+            return Estimate(verdict="unusable", reasons=(NO_BASELINE,), mode=self.mode)
+        row = self._row(recording, known)
         look = self._look(row)
-        faults += suspicions(recording, look, self._see, self._speeds()) or quiet_faults(
+
+        def see(mended: Recording) -> Look:
+            return self._look(self._row(mended, known))
+
+        faults += suspicions(recording, look, see, self._speeds()) or quiet_faults(
             recording, self.names, row, self.levels
         )
         if any(fault.bars for fault in faults):
@@ -334,17 +343,15 @@ class WearModel:
         reasons = tuple(fault.text for fault in faults if fault.bars)
         return Estimate(verdict="unusable", faults=faults, reasons=reasons, mode=self.mode)
 
-    def _row(self, recording: Recording) -> Float:
-        names, values = recording_features(recording, choice_in(self.card))
+    def _row(self, recording: Recording, reference: FrfReference | None) -> Float:
+        choice = held_against(choice_in(self.card), reference)
+        names, values = recording_features(recording, choice)
         if names != self.names:
             raise ModelError(
                 f"the model's {len(self.names)} features are not the program's {len(names)}; "
                 "retrain it: wearstate train DATA -o MODEL"
             )
         return values
-
-    def _see(self, recording: Recording) -> Look:
-        return self._look(self._row(recording))
 
     def _look(self, row: Float) -> Look:
         speed = row[self._columns[_SPEED_FEATURE]] if _SPEED_FEATURE in self._columns else None

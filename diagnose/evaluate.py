@@ -28,8 +28,9 @@ from .scores import (
     resampled,
     share,
 )
-from .tabulate import FeatureTable, Progress, confounders_in, feature_table
+from .tabulate import Choice, FeatureTable, Progress, confounders_in, feature_table
 from .train import draw_identity
+from .transfer_reference import healthy_transfer
 
 Float = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -119,7 +120,9 @@ def evaluate_model(
     sides = None if split is None else _sides(path, split)
     if healthy is not None:
         refuse_strangers(path, healthy)
-    table, rows = judged_rows(model, path, sides=sides, jobs=jobs, progress=progress)
+    table, rows = judged_rows(
+        model, path, sides=sides, healthy=healthy, jobs=jobs, progress=progress
+    )
     reference = None
     if healthy is not None:
         reference, _ = references(
@@ -172,6 +175,7 @@ def judged_rows(
     path: str | Path,
     *,
     sides: Sides | None = None,
+    healthy: str | Path | None = None,
     jobs: int = 1,
     progress: Progress | None = None,
 ) -> tuple[FeatureTable, Index]:
@@ -187,7 +191,10 @@ def judged_rows(
     with DataSet(path) as data:
         head = data.attributes
     refuse_other_severity(model, head, path)
-    table = feature_table(path, choice=choice_in(model.card), jobs=jobs, progress=progress)
+    known = healthy_transfer(healthy, [Choice(only=model.names)])
+    table = feature_table(
+        path, choice=choice_in(model.card), healthy=known, jobs=jobs, progress=progress
+    )
     if sides is not None:
         return table, tested_rows(model, table, sides, draw_identity(head), path)
     return table, unseen_rows(model, table, draw_identity(head), path)

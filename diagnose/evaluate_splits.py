@@ -35,8 +35,17 @@ from .foreign import (
 )
 from .healthy import Baseline, references
 from .scores import Figure, figures, plain, resampled, smallest_found
-from .tabulate import Choice, FeatureTable, Progress, feature_table, recording_features
+from .tabulate import (
+    Choice,
+    FeatureTable,
+    Healthy,
+    Progress,
+    feature_table,
+    held_against,
+    recording_features,
+)
 from .train import fit_model
+from .transfer_reference import healthy_transfer
 
 Float = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -90,6 +99,8 @@ class Case:
         Grade edges and condemning limit [m].
     choice : Choice
         Features that the table holds.
+    healthy : Healthy or None
+        What they are told against.
     fit : callable
         Rows -> model.
     references : numpy.ndarray [shape=(n_records, n_features)] or None
@@ -109,6 +120,7 @@ class Case:
     edges: tuple[float, ...]
     limit: float
     choice: Choice
+    healthy: Healthy | None
     fit: Fit
     references: Float | None
     seed: int
@@ -154,6 +166,11 @@ class Case:
     def noisy(self) -> dict[float, tuple[FeatureTable, dict[str, Float | str]]]:
         """Of each level of noise [dB], as :func:`noisy_table`."""
         return {level: noisy_table(self, level) for level in NOISE_DB}
+
+    def row(self, recording: Recording) -> Float:
+        """Features of a recording, as the table holds them."""
+        known = None if self.healthy is None else self.healthy.of(recording.machine)
+        return recording_features(recording, held_against(self.choice, known))[1]
 
     def recordings(self, rows: Index) -> Iterator[Recording]:
         """Recordings of rows of the table, one in memory at a time."""
@@ -212,7 +229,8 @@ def case_of(
         )
     choice = choice_in(card)
     ways: dict[str, Any] = {"choice": choice, "jobs": jobs, "progress": progress}
-    table = feature_table(path, **ways)
+    known = healthy_transfer(healthy, [Choice(only=tuple(card["features"]))])
+    table = feature_table(path, healthy=known, **ways)
     reference = None
     if healthy is not None:
         reference, _ = references(table, path, healthy, **ways)
@@ -240,6 +258,7 @@ def case_of(
         edges=tuple(card["grade_edges_m"]),
         limit=card["condemning_limit_m"],
         choice=choice,
+        healthy=known,
         fit=fit,
         references=reference,
         seed=seed,
@@ -526,7 +545,7 @@ def noisy_table(case: Case, level: float) -> tuple[FeatureTable, dict[str, Float
     ]
     table = FeatureTable(
         names=case.table.names,
-        values=np.array([recording_features(recording, case.choice)[1] for recording in noisy]),
+        values=np.array([case.row(recording) for recording in noisy]),
         manifest=case.table.manifest.iloc[rows].reset_index(drop=True),
     )
     foreign: dict[str, Float | str] = {
@@ -692,7 +711,7 @@ def _own_ms(case: Case, recordings: Sequence[Recording]) -> float:
     healthy = None if case.references is None else case.references[case.random[1][:1]]
 
     def severity(recording: Recording) -> Float:
-        return case.model.predict(recording_features(recording, case.choice)[1][None, :], healthy)
+        return case.model.predict(case.row(recording)[None, :], healthy)
 
     return _ms(severity, recordings)
 

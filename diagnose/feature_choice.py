@@ -13,7 +13,15 @@ from ..datasets.record import DataError, DataSet
 from ..datasets.splits import group_folds
 from ..features.catalogue import SetName
 from .models import CANDIDATES, Folds
-from .tabulate import USUAL, Choice, FeatureTable, feature_table_names, recording_features
+from .tabulate import (
+    USUAL,
+    Choice,
+    FeatureTable,
+    Healthy,
+    feature_table_names,
+    held_against,
+    recording_features,
+)
 
 Float = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -143,7 +151,9 @@ class Candidates:
         return table.named([table.names[i] for i in self.columns[place]])
 
 
-def candidates_of(path: str | Path, choices: Sequence[Choice]) -> Candidates:
+def candidates_of(
+    path: str | Path, choices: Sequence[Choice], healthy: Healthy | None = None
+) -> Candidates:
     """Columns of each candidate, told by the first usable record of a data set.
 
     Parameters
@@ -152,6 +162,8 @@ def candidates_of(path: str | Path, choices: Sequence[Choice]) -> Candidates:
         Data set file.
     choices : sequence of Choice
         One or more.
+    healthy : Healthy, optional
+        As of :func:`wearstate.diagnose.tabulate.feature_table`.
 
     Returns
     -------
@@ -163,7 +175,7 @@ def candidates_of(path: str | Path, choices: Sequence[Choice]) -> Candidates:
         The data set has no usable record, a feature that is named does not exist or is not to be
         had, or two candidates are the same features here.
     """
-    each = [feature_table_names(path, choice) for choice in choices]
+    each = [feature_table_names(path, choice, healthy) for choice in choices]
     if len(set(each)) < len(each):
         twice = next(i for i, names in enumerate(each) if names in each[:i])
         raise DataError(
@@ -175,7 +187,7 @@ def candidates_of(path: str | Path, choices: Sequence[Choice]) -> Candidates:
         return Candidates(choices=tuple(choices), columns=(columns,), whole=choices[0])
     union = tuple(dict.fromkeys(name for names in each for name in names))
     whole = Choice(only=union)
-    place = {name: i for i, name in enumerate(feature_table_names(path, whole))}
+    place = {name: i for i, name in enumerate(feature_table_names(path, whole, healthy))}
     return Candidates(
         choices=tuple(choices),
         columns=tuple(np.array(sorted(place[name] for name in names)) for names in each),
@@ -183,7 +195,9 @@ def candidates_of(path: str | Path, choices: Sequence[Choice]) -> Candidates:
     )
 
 
-def costs_ms(path: str | Path, choices: Sequence[Choice]) -> list[float]:
+def costs_ms(
+    path: str | Path, choices: Sequence[Choice], healthy: Healthy | None = None
+) -> list[float]:
     """Time that the features of one recording take, of each choice [ms].
 
     Parameters
@@ -191,19 +205,22 @@ def costs_ms(path: str | Path, choices: Sequence[Choice]) -> list[float]:
     path : str or Path
         Data set; the least time of its first few usable records is taken, after a first call.
     choices : sequence of Choice
+    healthy : Healthy, optional
+        As of :func:`wearstate.diagnose.tabulate.feature_table`; its own time is not counted.
     """
     with DataSet(path) as data:
         usable = np.flatnonzero((data.manifest["status"] == "ok").to_numpy())[:_TIMED]
         recordings = [data[int(index)] for index in usable]
     found = []
     for choice in choices:
-        recording_features(recordings[0], choice)
         seconds = []
-        for recording in recordings:
+        for recording in recordings[:1] + recordings:
+            known = None if healthy is None else healthy.of(recording.machine)
+            mine = held_against(choice, known)
             start = perf_counter()
-            recording_features(recording, choice)
+            recording_features(recording, mine)
             seconds.append(perf_counter() - start)
-        found.append(1e3 * min(seconds))
+        found.append(1e3 * min(seconds[1:]))
     return found
 
 

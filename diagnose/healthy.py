@@ -10,9 +10,24 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from ..datasets.record import DataError, DataSet, Recording
+from ..features.transfer import FrfReference
 from .feature_choice import choice_in
 from .quality import layout_faults, sample_faults
-from .tabulate import USUAL, Choice, FeatureTable, Progress, feature_table, recording_features
+from .tabulate import (
+    USUAL,
+    Choice,
+    FeatureTable,
+    Progress,
+    feature_table,
+    held_against,
+    recording_features,
+)
+from .transfer_reference import (
+    healthy_transfer,
+    told_against,
+    told_against_modes,
+    transfer_reference,
+)
 
 Float = NDArray[np.float64]
 
@@ -30,11 +45,14 @@ class Baseline:
     recordings : int
     source : str
         File or files, for messages.
+    transfer : FrfReference or None
+        Mean of their transfer functions, where the model is told against them.
     """
 
     features: Float
     recordings: int
     source: str
+    transfer: FrfReference | None = None
 
 
 def referenced_rows(rows: Float, baseline: Float) -> Float:
@@ -99,7 +117,8 @@ def references(
         As of :func:`refuse_strangers`, or the features are others.
     """
     refuse_strangers(path, healthy)
-    known = feature_table(healthy, choice=choice, jobs=jobs, progress=progress)
+    against = healthy_transfer(healthy, [Choice(only=table.names)])
+    known = feature_table(healthy, choice=choice, healthy=against, jobs=jobs, progress=progress)
     if not set(table.names) <= set(known.names):
         raise DataError(
             f"{healthy}: its {len(known.names)} features are not the {len(table.names)} of the "
@@ -190,7 +209,6 @@ def baseline_of(
     Parameters
     ----------
     recordings : iterable of Recording
-        One at a time is held.
     card : mapping
         Of the model.
     source : str
@@ -205,7 +223,7 @@ def baseline_of(
     DataError
         There is no recording, or some lack the model's inputs or are at fault; each fault once.
     """
-    rows: list[Float] = []
+    sound: list[Recording] = []
     faults: dict[str, list[str]] = {}
     for i, recording in enumerate(recordings):
         found = [
@@ -218,18 +236,25 @@ def baseline_of(
         if len(next(iter(faults.values()), ())) > _ENOUGH_FAULTS:
             break  # of a thousand recordings of another layout
         if not found:
-            rows.append(recording_features(recording, choice_in(card))[1])
+            sound.append(recording)
     if faults:
         told = [f"{source}: {text} ({_few(names)})" for text, names in faults.items()]
         raise DataError("\n".join(told))
-    if not rows:
+    if not sound:
         raise DataError(f"{source}: 0 healthy recordings, must be >= 1; record some")
+    named = Choice(only=tuple(card["features"]))
+    reference = None
+    if told_against(named):
+        reference = transfer_reference(sound, modes=told_against_modes(named))
+    choice = held_against(choice_in(card), reference)
+    rows = [recording_features(recording, choice)[1] for recording in sound]
     if {len(row) for row in rows} != {len(card["features"])}:
         raise DataError(
             f"{source}: its {len(rows[0])} features are not the model's {len(card['features'])}; "
             "use recordings with the model's channels and rate"
         )
-    return Baseline(features=np.mean(rows, axis=0), recordings=len(rows), source=source)
+    mean = np.mean(rows, axis=0)
+    return Baseline(features=mean, recordings=len(rows), source=source, transfer=reference)
 
 
 class Baselines:

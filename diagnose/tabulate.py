@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import pandas as pd
@@ -20,7 +20,7 @@ from ..features.catalogue import SetName
 from ..features.envelope import BearingFrequencies, bearing_frequencies
 from ..features.needs import Layout, shortcomings, struck
 from ..features.table import absent_features, feature_names, feature_row
-from ..features.transfer import Transfer
+from ..features.transfer import FrfReference, Transfer
 from ..sim.atomic import replacing
 
 _BATCH = 16  # records a worker reads at a time: 20 MB, and few enough to keep both cores busy
@@ -99,6 +99,20 @@ class Choice:
     feature_set: SetName = "standard"
     only: tuple[str, ...] | None = None
     settings: Settings = STANDARD
+
+
+def held_against(choice: Choice, reference: FrfReference | None) -> Choice:
+    """The same features, told against a healthy reference."""
+    if reference is None:
+        return choice
+    return replace(choice, settings=replace(choice.settings, reference=reference))
+
+
+class Healthy(Protocol):
+    """Transfer functions of machines when they were healthy."""
+
+    def of(self, machine: str) -> FrfReference | None:
+        """Those of a machine; None where there are none."""
 
 
 USUAL = Choice()
@@ -326,6 +340,7 @@ def feature_table(
     path: str | Path,
     *,
     choice: Choice = USUAL,
+    healthy: Healthy | None = None,
     jobs: int = 1,
     progress: Progress | None = None,
 ) -> FeatureTable:
@@ -337,6 +352,8 @@ def feature_table(
         Data set file.
     choice : Choice
         Which features.
+    healthy : Healthy, optional
+        Transfer functions of each machine when it was healthy.
     jobs : int
         Worker processes; the table does not depend on it.
     progress : callable, optional
@@ -359,7 +376,9 @@ def feature_table(
         batches = (usable[i : i + _BATCH] for i in range(0, usable.size, _BATCH))
         rows: list[NDArray[np.float64]] = []
         names: tuple[str, ...] = ()
-        for part, found in in_order(partial(_batch_features, data, choice), batches, jobs=jobs):
+        for part, found in in_order(
+            partial(_batch_features, data, choice, healthy), batches, jobs=jobs
+        ):
             rows += part
             names = names or found
             _same_names(path, names, found)
@@ -369,15 +388,17 @@ def feature_table(
     return FeatureTable(names=names, values=np.array(rows), manifest=manifest)
 
 
-def feature_table_names(path: str | Path, choice: Choice = USUAL) -> tuple[str, ...]:
+def feature_table_names(
+    path: str | Path, choice: Choice = USUAL, healthy: Healthy | None = None
+) -> tuple[str, ...]:
     """Names of the columns of a feature table, told by the first usable record.
 
     Parameters
     ----------
     path : str or Path
         Data set file.
-    choice : Choice
-        Which features.
+    choice, healthy
+        As of :func:`feature_table`.
 
     Raises
     ------
@@ -388,7 +409,9 @@ def feature_table_names(path: str | Path, choice: Choice = USUAL) -> tuple[str, 
         usable = np.flatnonzero((data.manifest["status"] == "ok").to_numpy())
         if usable.size == 0:
             raise DataError(f"{path}: 0 usable records, must be > 0; see its column 'status'")
-        layout = recording_layout(data[int(usable[0])], choice.settings)
+        first = data[int(usable[0])]
+    choice = held_against(choice, None if healthy is None else healthy.of(first.machine))
+    layout = recording_layout(first, choice.settings)
     return _names(layout, choice, path)
 
 
@@ -411,12 +434,14 @@ def _names(layout: Layout, choice: Choice, path: str | Path) -> tuple[str, ...]:
 
 
 def _batch_features(
-    data: DataSet, choice: Choice, indices: NDArray[np.intp]
+    data: DataSet, choice: Choice, healthy: Healthy | None, indices: NDArray[np.intp]
 ) -> tuple[list[NDArray[np.float64]], tuple[str, ...]]:
     rows: list[NDArray[np.float64]] = []
     names: tuple[str, ...] = ()
     for index in indices:
-        found, values = recording_features(data[int(index)], choice)
+        recording = data[int(index)]
+        known = None if healthy is None else healthy.of(recording.machine)
+        found, values = recording_features(recording, held_against(choice, known))
         names = names or found
         _same_names(f"{data.path}[{index}]", names, found)
         rows.append(values)
@@ -442,16 +467,28 @@ def recording_transfer(recording: Recording, settings: Settings = STANDARD) -> T
     DataError
         Several forces are copies of one another.
     """
-    if shortcomings(("force",), recording_layout(recording, settings)):
+    analysis = recording_analysis(recording, settings)
+    if analysis is None:
         return None
-    kinds = tuple(channel.quantity for channel in recording.vibration_channels)
-    analysis = Analysis(
-        recording.vibration, recording.sample_rate, quantities=kinds, settings=settings
-    )
     try:
         return analysis.transfer_functions
     except ValueError as error:
         raise DataError(f"{recording.source or 'recording'}: {error}") from error
+
+
+def recording_analysis(recording: Recording, settings: Settings = STANDARD) -> Analysis | None:
+    """Transforms of a test; None where a recording has no transfer function to tell.
+
+    Parameters
+    ----------
+    recording : Recording
+    settings : Settings
+    """
+    layout = recording_layout(recording, settings)
+    if shortcomings(("force",), layout):
+        return None
+    rate, kinds = recording.sample_rate, layout.quantities
+    return Analysis(recording.vibration, rate, quantities=kinds, settings=settings)
 
 
 def excitation_notes(path: str | Path, settings: Settings = STANDARD) -> dict[str, int]:

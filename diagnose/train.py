@@ -42,6 +42,7 @@ from .novelty import Familiarity, fit_familiarity
 from .physical import physical_rows
 from .quality import Levels, fit_levels
 from .tabulate import USUAL, Choice, FeatureTable, Progress, confounders_in, feature_table
+from .transfer_reference import healthy_transfer
 
 Float = NDArray[np.float64]
 
@@ -114,9 +115,10 @@ def train_model(
     _check_draws(draws, path)
     if baseline is not None:
         refuse_strangers(path, baseline)
-    candidates = candidates_of(path, choices)
+    known = healthy_transfer(baseline, choices)
+    candidates = candidates_of(path, choices, known)
     ways: dict[str, Any] = {"choice": candidates.whole, "jobs": jobs, "progress": progress}
-    table = feature_table(path, **ways)
+    table = feature_table(path, healthy=known, **ways)
     healthy, count = None, 0
     if baseline is not None:
         healthy, count = references(table, path, baseline, **ways)

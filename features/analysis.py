@@ -543,13 +543,21 @@ class Analysis:
         ]
 
     @cached_property
+    def modal_quantity(self) -> modal.Quantity:
+        """What the functions of `modal_paths` are called."""
+        return MODAL_QUANTITIES.get(self._quantities[self.responses[0]], ACCELERANCE)
+
+    @cached_property
     def modes(self) -> modal.Modes | None:
         """Modes of `modal_paths`; None where no pole is stable."""
-        kind = self._quantities[self.responses[0]]
+        return self.modes_of(self.transfer_functions)
+
+    def modes_of(self, found: transfer.Transfer) -> modal.Modes | None:
+        """Modes of functions of the same paths, as the mean of several tests."""
         return transfer.fit_transfer(
-            self.transfer_functions,
+            found,
             self.modal_paths,
-            quantity=MODAL_QUANTITIES.get(kind, ACCELERANCE),
+            quantity=self.modal_quantity,
             n_modes=self.settings.n_modes,
             highest_order=HIGHEST_ORDER,
             most_lines=MOST_LINES,

@@ -2,7 +2,7 @@
 
 import difflib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import combinations
 from typing import get_args
@@ -13,9 +13,11 @@ from numpy.typing import ArrayLike, NDArray
 from . import order
 from .analysis import ACCELERATION, FORCE, STANDARD, Analysis, Settings
 from .catalogue import SETS, Feature, Scope, SetName, smallest_set
+from .modal import Modes
 from .needs import NEEDS, Layout, shortcomings, struck
 from .rate import check_rate
 from .statistics import Real
+from .transfer import FrfReference
 
 Float = NDArray[np.float64]
 
@@ -393,7 +395,7 @@ def feature_row(
         pulses_per_revolution=pulses_per_revolution,
         n_samples=signals.shape[-1],
         impact=struck(signals, kinds),
-        settings=settings,
+        settings=_planned(settings),
     )
     plan = _plan(layout, feature_set, None if only is None else tuple(only))
     pulses = None
@@ -409,6 +411,33 @@ def feature_row(
         settings=settings,
     )
     return plan.names, _values(plan, analysis)
+
+
+def _planned(settings: Settings) -> Settings:
+    """Settings by which names are planned: any reference is as good as another."""
+    known = settings.reference
+    if known is None:
+        return settings
+    return replace(settings, reference=_ANY_MODES if known.modes is not None else _ANY)
+
+
+_LINE = np.ones(1)
+_ANY = FrfReference(_LINE, _LINE[np.newaxis].astype(np.complex128))
+_ANY_MODES = replace(
+    _ANY,
+    modes=Modes(
+        frequency=_LINE,
+        damping_ratio=_LINE,
+        residue=_ANY.value,
+        lower=_ANY.value[0],
+        upper=_ANY.value[0],
+        quantity="receptance",
+        frequency_deviation=_LINE,
+        damping_deviation=_LINE,
+        residue_deviation=_LINE[np.newaxis],
+        fit_error=_LINE,
+    ),
+)
 
 
 def _turns(feature: Feature) -> bool:

@@ -1,6 +1,7 @@
 """Features of a model: named, chosen by folds, kept in its card and used wherever it judges."""
 
 import json
+import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -11,9 +12,11 @@ from wearstate.datasets.splits import group_folds
 from wearstate.diagnose.cli import cli
 from wearstate.diagnose.estimate import ModelError
 from wearstate.diagnose.feature_choice import choice_in, choices_of, select_set
+from wearstate.diagnose.healthy import Baselines
 from wearstate.diagnose.modelfile import load_model, save_model
-from wearstate.diagnose.tabulate import USUAL, Choice, recording_features
+from wearstate.diagnose.tabulate import USUAL, Choice, held_against, recording_features
 from wearstate.diagnose.train import train_model
+from wearstate.diagnose.transfer_reference import HealthyTransfer
 from wearstate.sim.sensor import Channel
 
 FS, N = 2560.0, 10_240
@@ -189,3 +192,65 @@ def outer_error(sets, target, folds, found):
         fitted = fit_blend(sets[place][train], target[train], inner, candidates=CANDIDATES[:6])
         error[test] = np.abs(fitted.blend.predict(sets[place][test]) - target[test])
     return error.mean()
+
+
+# --- against the healthy machine
+
+
+@pytest.fixture(scope="module")
+def new(tmp_path_factory):
+    return pushed(tmp_path_factory.mktemp("new") / "new.h5", healthy=True)
+
+
+def test_a_referenced_model_is_told_against_the_healthy_machine(data, new, tmp_path):
+    path = tmp_path / "m.wsm"
+    ways = ("--baseline", new, "--budget-ms", 0.1, "-j", 1, "--json")
+    run("train", data, "-o", path, "--features", "frf_assurance,frf_profile", *ways)
+    model = load_model(path)
+    assert model.mode == "referenced"
+    assert model.names[-2:] == ("one.frf.assurance", "two.frf.assurance")
+    with DataSet(data) as records:
+        recording = records[3]
+    baseline = Baselines(new, model.card).of(recording)
+    sag = recording.row[COLUMN]
+    assert abs(model.estimate(recording, baseline).severity - sag) < 0.1 * LIMIT
+    # without healthy records there is no verdict, and the judge needs them, too
+    assert model.estimate(recording).unreferenced
+    judged = run("evaluate", path, data, "--quick", "--json", "-j", 1, "--baseline", new)
+    assert json.loads(judged.stdout)["mae_all_m"] < 0.05 * LIMIT
+
+
+def test_modes_are_told_against_those_of_the_healthy_machine(data, new):
+    with DataSet(data) as records:
+        sags = records.manifest[COLUMN].to_numpy()
+        place = int(np.argmin(np.abs(sags - 0.3 * LIMIT)))
+        recording = records[place]
+    known = HealthyTransfer(path=new, modes=True).of(recording.machine)
+    choice = held_against(Choice(only=("mode_changes", "frf_assurance")), known)
+    row = dict(zip(*recording_features(recording, choice), strict=True))
+    machine = np.random.default_rng(place)
+    machine.uniform()
+    soft, ground = 4e6 * machine.uniform(0.97, 1.03, 2)
+
+    def natural(support):
+        stiffness = [[soft + 4e6, -soft], [-soft, soft + support]]
+        return np.sqrt(np.sort(np.linalg.eigvals(np.diag([1 / 2, 1 / 3]) @ stiffness)))
+
+    shift = natural(ground * (1 - 0.5 * sags[place] / LIMIT)) / natural(ground) - 1
+    told = [row[f"frf.mode_{k}.frequency_shift"] for k in (1, 2)]
+    # 9 half-overlapped windows of noise of 5 % on either side
+    np.testing.assert_allclose(told, shift, atol=0.01)
+    assert shift[0] < -0.02
+    assert 0.3 < row["one.frf.assurance"] < 0.98
+    assert all(0.5 < row[f"frf.mode_{k}.mac"] <= 1 for k in (1, 2))
+
+
+def test_a_worker_makes_its_own_references(new):
+    known = HealthyTransfer(path=new, modes=True)
+    first = known.of("machine rig0")
+    sent = pickle.loads(pickle.dumps(known))
+    assert sent == known
+    again = sent.of("machine rig0")
+    np.testing.assert_array_equal(again.value, first.value)
+    assert again.modes.frequency.size >= 2
+    assert known.of("machine rig99") is None
