@@ -51,6 +51,9 @@ def plot_simulation(scene: Scene, solution: Solution, path: Path, *, force: bool
 
 def _draw_pump(figure: Any, scene: Scene, solution: Solution) -> None:
     pump = cast(PumpScene, scene)
+    if not pump.running:
+        _draw_rest(figure, solution)
+        return
     rate = solution.sample_rate
     n = min(solution.signal.shape[1], round(_REVOLUTIONS / pump.drive.speed * rate))
     turns = np.arange(n) / rate * pump.drive.speed + pump.drive.start_angle / (2 * np.pi)
@@ -73,6 +76,27 @@ def _draw_pump(figure: Any, scene: Scene, solution: Solution) -> None:
     _label(panels["force"], "crank revolutions", "pin on rod [kN]", "Crank-pin force")
     _pressures(panels["pressure"], pump, solution, turns)
     _orbit(panels["orbit"], pump, solution.truth["pin_offset_m"][:n])
+
+
+def _draw_rest(figure: Any, solution: Solution) -> None:
+    """A test of the casing at rest: forces and accelerations over time, and their spectra."""
+    rate = solution.sample_rate
+    time = np.arange(solution.signal.shape[1]) / rate
+    panels = figure.subplots(2, 2, sharex="col")
+    rows = (("force", "force [N]", "N²/Hz"), ("acceleration", "acceleration [m/s²]", "(m/s²)²/Hz"))
+    for (quantity, told, density), (wave, spectrum) in zip(rows, panels, strict=True):
+        shown = [
+            (short_name(channel.name), row)
+            for channel, row in zip(solution.channels, solution.signal, strict=True)
+            if channel.quantity == quantity
+        ]
+        for (name, row), colour in zip(shown, COLOURS, strict=False):
+            wave.plot(time, row, lw=0.5, color=colour, label=name)
+            frequency, level = _density(row, rate)
+            spectrum.plot(frequency / 1e3, level, lw=0.6, color=colour, label=name)
+        _label(wave, "time [s]", told, f"{quantity.capitalize()} of the test")
+        _label(spectrum, "frequency [kHz]", f"PSD [dB re 1 {density}]", "Spectrum")
+        spectrum.set_xscale("log")
 
 
 def _pressures(axes: Any, scene: PumpScene, solution: Solution, turns: NDArray[np.float64]) -> None:

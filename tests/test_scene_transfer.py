@@ -7,6 +7,7 @@ import pytest
 from click.testing import CliRunner
 from numpy.testing import assert_allclose, assert_array_equal
 from wearstate.datasets.recipe import load_recipe, sample_records, wear_limits
+from wearstate.datasets.record import DataSet
 from wearstate.diagnose.cli import cli
 from wearstate.features.frf import block_spectra, estimate_frf, find_blows, force_window
 from wearstate.sim.assemble import check, simulate
@@ -142,6 +143,21 @@ def test_the_rocking_mode_of_a_loose_pump_is_found_lower_by_a_test():
         found.append(frf.frequency[band][np.abs(frf.value[1, band]).argmax()])
     # 142 Hz, lower by sqrt(1 - 0.7 (1 - 1 / 1.6)) = 0.859; lines are 2.5 Hz apart
     assert_allclose(found, [142, 122], atol=2.6)
+
+
+def test_a_test_at_rest_is_recorded_and_drawn_by_the_command(tmp_path):
+    made, picture = tmp_path / "t.h5", tmp_path / "t.svg"
+    values = ("running=false", "exciters.0.force=500 N", "exciters.0.repeats=2", "duration=1 s")
+    sets = [text for value in values for text in ("--set", value)]
+    arguments = ["simulate", "bilge-pump", *sets, "-o", str(made), "--plot", str(picture)]
+    done = CliRunner().invoke(cli, arguments)
+    assert done.exit_code == 0, done.output
+    assert "Force of the test" in picture.read_text()
+    with DataSet(made) as data:
+        force = data.attributes.channels[2]
+        assert data.manifest["speed_hz"][0] == 0
+    told = (force.unit, force.quantity, force.place)
+    assert told == ("N", "force", "casing at guide_y")
 
 
 # --- the command
