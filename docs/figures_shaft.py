@@ -15,11 +15,16 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
-from wearstate.diagnose.rig import calibrated_test, rig_figure
+from scipy.signal import find_peaks
+from wearstate.diagnose.next_test import rank_tests, usual_responses
+from wearstate.diagnose.rig import ShakerTest, calibrated_test, rig_figure
+from wearstate.diagnose.sag_model import Prior
 from wearstate.sim.alignment import AlignmentLine, influence, reactions
 from wearstate.sim.calibration import Calibration, calibrate
 from wearstate.sim.rotor import Rotor, campbell
 from wearstate.sim.scene import load_scene
+from wearstate.sim.shaft_change import free_line, line_model, rest, unit_change
+from wearstate.sim.shaft_change import transfer as transfer_of
 from wearstate.sim.shaft_line import (
     ShaftState,
     alignment_conditions,
@@ -340,6 +345,135 @@ def rig() -> Figure:
     return figure
 
 
+ALIGNED = {
+    "shaft-rig": ({"bearings.2.offset": "0 mm"}, "third", 300.0, ("aft", "forward")),
+    "propulsion-shaft": ({}, "intermediate_aft", 200.0, ("stern_aft", "thrust_block")),
+}
+"""Scene -> what makes it straight, the bearing that sags, the band [Hz], where it is pushed."""
+
+SAGS = {"shaft-rig": (0.1, 0.2, 0.3, 0.4, 0.5), "propulsion-shaft": (0.3, 0.6, 1.2, 1.8, 2.4)}
+"""mm; the last two of each leave the bearing without load, or press it up."""
+
+SPEED_SHARES = (0.7, 1.0, 1.3)
+AUDIBLE_DB = 1.0
+
+
+@cache
+def aligned_peaks(name: str, push: str, axis: str) -> tuple[tuple[int, int, float], ...]:
+    """How many peaks of the sagged line fall and rise by alignment, and by how much they fall most.
+
+    In rows of the speeds, the sags of each following each other.
+    """
+    overrides, bearing, high, _ = ALIGNED[name]
+    bench = load_scene(name, overrides)
+    assert isinstance(bench, ShaftScene)
+    base = line_model(bench)
+    sag = -1e-3 * unit_change(len(base.names), base.names.index(bearing), "bore")
+    hertz = np.linspace(8.0, high, 240)
+    seen = [(own, axis, "housing") for own in base.names]
+    found = []
+    for share in SPEED_SHARES:
+        speed = math.tau * share * bench.drive.speed
+        line = free_line(base, hertz, speed=speed, forces=[(push, axis)], responses=seen)
+        film = rest(base, speed)
+        after = _decibels(transfer_of(base, film, line).value[..., 0])
+        for size in SAGS[name]:
+            sagged = base.changed(size * sag)
+            film = rest(sagged, speed, start=film)
+            before = _decibels(transfer_of(sagged, film, line).value[..., 0])
+            changes = [
+                c for k in range(len(seen)) for c in _peak_changes(before[:, k], after[:, k])
+            ]
+            fell, rose = (sum(side * c > AUDIBLE_DB for c in changes) for side in (-1, 1))
+            found.append((fell, rose, min([*changes, 0.0])))
+    return tuple(found)
+
+
+def _decibels(value: Any) -> Any:
+    return 20 * np.log10(np.abs(value))
+
+
+def _peak_changes(before: Any, after: Any) -> list[float]:
+    """Change of each peak of 3 dB to the highest one within a tenth of the 240 lines beside it."""
+    tops, _ = find_peaks(before, prominence=3.0)
+    others, _ = find_peaks(after, prominence=1.0)
+    changes = []
+    for top in tops:
+        near = others[np.abs(others - top) <= max(2, top // 10)]
+        level = after[near].max() if near.size else after[top]
+        changes.append(float(level - before[top]))
+    return changes
+
+
+def contradiction() -> Figure:
+    """Where alignment makes peaks fall: sag, speed, place and direction of the push."""
+    figure, panels = sheet("Peaks that alignment lowers (↓) and raises (↑) by a decibel", 2, 4,
+                           (13, 6.2))  # fmt: skip
+    for row, (name, (_, bearing, _, pushes)) in zip(panels, ALIGNED.items(), strict=True):
+        cases = [(push, axis) for push in pushes for axis in "yz"]
+        for axes, (push, axis) in zip(row, cases, strict=True):
+            cells = aligned_peaks(name, push, axis)
+            shape = len(SPEED_SHARES), len(SAGS[name])
+            fall = np.array([cell[2] for cell in cells]).reshape(shape)
+            image = axes.imshow(fall, cmap="Blues_r", vmin=-9, vmax=0, aspect="auto",
+                                origin="lower")  # fmt: skip
+            for k, (fell, rose, most) in enumerate(cells):
+                place = k % shape[1], k // shape[1]
+                axes.annotate(f"{fell}↓\n{rose}↑", place, ha="center", va="center", fontsize=9,
+                              color="white" if most < -4.5 else "black")  # fmt: skip
+            axes.set_xticks(range(shape[1]), [f"{sag:g}" for sag in SAGS[name]])
+            axes.set_yticks(range(shape[0]), [f"{100 * share:.0f} %" for share in SPEED_SHARES])
+            way = "up" if axis == "y" else "sideways"
+            axes.set_title(f"{name}: push {push} {way}", fontsize=9)
+            axes.set_xlabel(f"sag of {bearing} [mm]")
+        row[0].set_ylabel("speed")
+    figure.colorbar(image, ax=panels, label="largest fall of a peak [dB]", shrink=0.8)
+    return figure
+
+
+BURSTS = (3, 10, 30, 100, 300)
+TOLD = 2 * 1.645
+"""Deviations of a sag that is told at 5 % false alarms in 95 % of the tests."""
+
+
+@cache
+def told_sags(push: str, axis: str, sensors: int, film: float) -> tuple[float, ...]:
+    """Smallest sag of the rig's third bearing that is told, by the bursts of a shaker test [mm].
+
+    Sensors are those of the third bearing alone, or of all; `film` is the films' error.
+    """
+    bench = load_scene("shaft-rig", {"bearings.2.offset": "0 mm"})
+    assert isinstance(bench, ShaftScene)
+    places = [place for place in usual_responses(bench) if sensors > 1 or place[0] == "third"]
+    found = []
+    for bursts in BURSTS:
+        [test] = rank_tests(
+            bench,
+            prior=Prior(film=film),
+            setup=ShakerTest(force=25.0, bursts=bursts),
+            places=[(push, axis)],
+            responses=places,
+        )
+        found.append(1e3 * TOLD * test.deviations[1])
+    return tuple(found)
+
+
+def detectability() -> Figure:
+    """Smallest sag that a shaker test of the rig tells, over its length."""
+    figure, panels = sheet("Smallest sag of the rig's third bearing that is told", 1, 2, (10, 3.8))
+    cases = [("third", "y"), ("forward", "y"), ("aft", "y"), ("aft", "z")]
+    for axes, sensors, title in zip(
+        np.ravel(panels), (4, 1), ("four accelerometers", "one, on the third bearing"), strict=True
+    ):
+        for (push, axis), colour in zip(cases, COLOURS, strict=False):
+            name = f"push {push} {'up' if axis == 'y' else 'sideways'}"
+            axes.loglog(BURSTS, told_sags(push, axis, sensors, 0.03), "o-", color=colour,
+                        label=name)  # fmt: skip
+            axes.loglog(BURSTS, told_sags(push, axis, sensors, 0.01), "--", color=colour, lw=0.8)
+        label(axes, "bursts of 4 s", "sag [mm]", title)
+    return figure
+
+
 FIGURES: dict[str, Callable[[], Figure]] = {
     "shaft-model": model,
     "shaft-influence": influence_lines,
@@ -347,6 +481,8 @@ FIGURES: dict[str, Callable[[], Figure]] = {
     "shaft-transfer": transfer,
     "shaft-campbell": campbell_diagram,
     "shaft-rig": rig,
+    "shaft-contradiction": contradiction,
+    "shaft-detectability": detectability,
 }
 
 

@@ -49,3 +49,29 @@ def test_figures_say_that_they_are_simulated(figures, name, tmp_path):
     assert "(simulated)" in figure.get_suptitle()
     figure.savefig(tmp_path / "figure.png", dpi=40)
     assert (tmp_path / "figure.png").stat().st_size > 5_000
+
+
+def test_peaks_fall_where_the_push_hears_the_films(figures, monkeypatch):
+    """Beside the light bearings of the rig, not at its heavy end, and on the ship hardly."""
+    monkeypatch.setattr(figures, "SPEED_SHARES", (1.0,))
+    forward = figures.aligned_peaks.__wrapped__("shaft-rig", "forward", "y")
+    aft = figures.aligned_peaks.__wrapped__("shaft-rig", "aft", "y")
+    ship = figures.aligned_peaks.__wrapped__("propulsion-shaft", "stern_aft", "y")
+    falls = [cell[2] for cell in forward]
+    assert falls == sorted(falls, reverse=True)  # the more, the larger the sag
+    assert falls[-1] < -6
+    assert forward[2][0] >= 3  # some fall
+    assert forward[2][1] >= 3  # and as many rise
+    assert min(cell[2] for cell in aft) > -3
+    assert min(cell[2] for cell in ship[:3]) > -1  # as long as the bearing carries
+
+
+def test_films_and_sensors_count_for_more_than_averages(figures, monkeypatch):
+    monkeypatch.setattr(figures, "BURSTS", (10, 100))
+    told = figures.told_sags.__wrapped__
+    four = told("third", "y", 4, 0.03)
+    assert 0.07 < four[1] < four[0] < 0.12
+    assert told("third", "y", 4, 0.01)[0] < 0.5 * four[0]
+    one = told("third", "y", 1, 0.03)
+    assert one[0] > 1.5 * four[0]
+    assert one[1] < 0.7 * one[0]
