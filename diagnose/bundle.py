@@ -34,7 +34,7 @@ _LARGEST_ARRAYS = 2**28  # byte, of all arrays unpacked: 1,000 times those of 2,
 _BOUNDS = dict.fromkeys((_SEAL, _CARD, _STRUCTURE), _LARGEST_TABLE) | {_ARRAYS: _LARGEST_ARRAYS}
 _MOST_ARRAYS = 10_000
 _LONGEST_HEADER = 1024  # byte, of an array: numpy's own have 118
-_FEATURES = 1  # to be raised when a feature is computed in another way
+_FEATURES = 2  # to be raised when a feature is computed in another way
 
 
 @dataclass(frozen=True, kw_only=True)

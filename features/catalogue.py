@@ -1,5 +1,6 @@
 """The named catalogue of features: one row each, with its unit, its needs and its reference."""
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
@@ -125,8 +126,15 @@ def _speed(analysis: Analysis) -> Float:
 
 
 def _speed_variation(analysis: Analysis) -> Float:
+    """Scatter of the pulses' intervals over their mean; 0 where single samples could make it."""
     intervals = np.diff(analysis.pulses)
-    return np.asarray(intervals.std() / intervals.mean())
+    found = intervals.std()
+    return np.asarray(found / intervals.mean() if found > UNTOLD_SAMPLES / analysis.fs else 0.0)
+
+
+UNTOLD_SAMPLES = 1 / math.sqrt(6)
+"""Scatter of intervals between edges that are known to one sample [samples]: a sampled logic level
+tells no less, and one whose edges are averaged must not tell more to a model."""
 
 
 def _orbit_labels(*parts: str) -> Callable[[Settings, float], tuple[str, ...]]:
