@@ -7,6 +7,15 @@ from pathlib import Path
 import pytest
 
 
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Campaigns run where they are asked for by ``-m slow``."""
+    if "slow" in config.option.markexpr:
+        return
+    for item in items:
+        if item.get_closest_marker("slow"):
+            item.add_marker(pytest.mark.skip(reason="a campaign of minutes: run it with -m slow"))
+
+
 @pytest.fixture(scope="session")
 def realdata() -> Path:
     """Folder of measured recordings, beside the checkout; tests that need it skip without."""

@@ -39,4 +39,4 @@ wait "$lowest"
 )
 
 # a file a process, so that what its tests share is made once
-"$bin/pytest" -q -n 2 --dist loadfile
+"$bin/pytest" -q -n 2 --dist loadfile --durations 15

@@ -458,9 +458,7 @@ def test_calibrations_keep_their_word():
 
 
 @pytest.mark.slow
-def test_calibrations_keep_their_word_at_length(request):
-    if "slow" not in request.config.option.markexpr:
-        pytest.skip("a campaign of a minute or two: run it with -m slow")
+def test_calibrations_keep_their_word_at_length():
     for seed in range(40, 400):
         check_calibration(seed)
 

@@ -557,9 +557,7 @@ def test_threshold_is_that_of_a_finer_mesh(kind, length_to_diameter, s):
 @pytest.mark.slow
 @pytest.mark.parametrize("length_to_diameter", [0.5, 1.0])
 @pytest.mark.parametrize("kind", BEARINGS)
-def test_threshold_at_every_sommerfeld_number(request, kind, length_to_diameter):
-    if "slow" not in request.config.option.markexpr:
-        pytest.skip("a sweep of half a minute: run it with -m slow")
+def test_threshold_at_every_sommerfeld_number(kind, length_to_diameter):
     numbers = np.geomspace(0.05, 1.0, 40)
     limits = [check_threshold(kind, length_to_diameter, s) for s in numbers]
     assert np.mean([limit.speed_error <= br.WHIRL_TOLERANCE for limit in limits]) > 0.9

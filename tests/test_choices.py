@@ -160,7 +160,5 @@ def test_a_sample_of_the_pairs_runs_or_is_refused_in_words(name):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", scene_names())
-def test_every_pair_runs_or_is_refused_in_words(name, request):
-    if "slow" not in request.config.option.markexpr:
-        pytest.skip("a campaign of some minutes: run it with -m slow")
+def test_every_pair_runs_or_is_refused_in_words(name):
     judge(name, rows_of(name))
