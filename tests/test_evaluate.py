@@ -25,6 +25,7 @@ from wearstate.diagnose.evaluate_figure import evaluation_html, save_evaluation
 from wearstate.diagnose.evaluate_splits import (
     SPLITS,
     case_of,
+    costs,
     evaluate_splits,
     machine_distances,
     noisy_table,
@@ -431,6 +432,12 @@ def test_json_is_strict_and_complete(result):
     assert own["ms_per_record"] > 0
     assert told["cost"][1]["ms_per_record"] > 0
     assert [row["name"] for row in told["cost"] if row["missing"]] == ["tsfel", "minirocket"]
+
+
+def test_the_severity_alone_costs_less_than_the_whole_estimate(case):
+    """Seconds of a busy computer: one of three measurements shows it."""
+    rows = (costs(case) for _ in range(3))
+    assert any(own["ms_per_record"] < whole["ms_per_record"] for own, whole, *_ in rows)
 
 
 @pytest.mark.parametrize("suffix", [".json", ".html"])
