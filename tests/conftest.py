@@ -1,6 +1,7 @@
 """Fixtures shared by all tests."""
 
 import fcntl
+import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -30,10 +31,10 @@ def realdata() -> Path:
 
 
 @pytest.fixture(scope="session")
-def common(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> Path:
+def common(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Folder of all test processes of this run."""
     base = tmp_path_factory.getbasetemp()
-    folder = (base if worker_id == "master" else base.parent) / "common"
+    folder = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "common"
     folder.mkdir(exist_ok=True)
     return folder
 
