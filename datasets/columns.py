@@ -50,6 +50,8 @@ MEANINGS = (
     ("group_name", "identity", "machine, as the labels of a measured file name it"),
     ("file", "identity", "measured file that the record is from"),
     ("start_s", "identity", "where in that file the record begins"),
+    ("view", "identity", "which test of its machine state the record is"),
+    ("state", "identity", "machine state: records of one machine and state can be joined"),
     ("seed", "identity", "of the record's sensor noise"),
     ("done", "identity", "the record is written; true in every finished file"),
     ("status", "identity", "ok, or why the record is not to be used"),

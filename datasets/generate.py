@@ -144,6 +144,7 @@ def generate(
     n: int | None,
     path: str | Path,
     *,
+    view: str = "",
     seed: int = 0,
     jobs: int = 1,
     scheduler: str | None = None,
@@ -164,6 +165,8 @@ def generate(
     path : str or Path
         File to write; ``<path>.part`` until finished. An unfinished file of the same call is
         gone on with.
+    view : str
+        As of :func:`~.recipe.load_recipe`: record `i` of every view is of the same machine state.
     seed : int
         Of the data set, >= 0. Record `i` depends on recipe, seed and `i` alone.
     jobs : int
@@ -219,7 +222,7 @@ def generate(
     ...     generate(recipe, 2, Path(folder) / "data.h5").n_groups
     1
     """
-    plan = recipe if isinstance(recipe, Recipe) else load_recipe(recipe)
+    plan = recipe if isinstance(recipe, Recipe) else load_recipe(recipe, view=view)
     count = plan.table.records if n is None else n
     if jobs < 1:
         raise DataError(f"jobs = {jobs} must be >= 1; give the number of cores")

@@ -16,6 +16,7 @@ from .labels import refusal
 from .record import LARGEST_RECORD, DataError, DataSet, Recording
 from .source_part import Source, SourceOptions
 from .sources import list_sources, open_source
+from .views import JoinedSet, View, joined_recordings
 
 _LOG = logging.getLogger(__name__)
 _PIECE = 2**20  # numbers read at once
@@ -83,6 +84,37 @@ def read_recording(
             row=dict(source.conditions),
             source=file.name,
         )
+
+
+def with_views(
+    recording: Recording, path: str | Path, record: int, views: Sequence[View]
+) -> Recording:
+    """A recording with its views: of data sets by machine and state, of other files as they are.
+
+    Parameters
+    ----------
+    recording : Recording
+        As :func:`read_recording` gives it.
+    path : str or Path
+        Where it is from.
+    record : int
+        Its number, if that is a data set.
+    views : sequence of View
+        Files of the views; those that are no data sets must declare all by themselves.
+
+    Raises
+    ------
+    DataError
+        As of :func:`read_recording`, :class:`~.views.JoinedSet` and
+        :func:`~.views.joined_recordings`.
+    """
+    if not views:
+        return recording
+    files = [Path(path), *(view.path for view in views)]
+    if all(file.suffix.lower() in _DATA_SETS and _is_ours(file) for file in files):
+        with JoinedSet(files[0], tuple(views)) as data:
+            return data[record]
+    return joined_recordings(recording, {view.name: read_recording(view.path) for view in views})
 
 
 def _is_ours(file: Path) -> bool:

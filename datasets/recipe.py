@@ -9,10 +9,10 @@ import json
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
-from typing import Any, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -85,6 +85,9 @@ CONDITIONS = {
 }
 """Manifest column of every operating condition -> its place in the scene."""
 
+VIEW = "view"
+"""Manifest column that names which test of its machine state a record is."""
+
 STRATA = BLOCK
 """Severities of each run of this many records fall in as many equal parts of the range."""
 
@@ -136,6 +139,10 @@ class Confounder(Draw):
         return self
 
 
+ViewName = Annotated[str, Field(pattern="^[a-z][a-z0-9_-]*$", max_length=32)]
+"""Of one of several tests of the same machine states."""
+
+
 class RecipeTable(Part):
     """The tables of a recipe file."""
 
@@ -155,6 +162,10 @@ class RecipeTable(Part):
     )
     fixed: dict[str, Bound | bool] = Field(
         default={}, description="scene values replaced in every record, by dotted path in quotes"
+    )
+    views: dict[ViewName, dict[str, Bound | bool]] = Field(
+        default={},
+        description="other tests of the same machine states: by name, what each sets beside fixed",
     )
     severity: tuple[Severity, ...] = Field(
         min_length=1, description="what wears; the first is graded and trained for"
@@ -263,6 +274,8 @@ class Recipe:
         Level, ``severity``, ``machine`` or ``record`` -> correlation of its draws.
     held_out : tuple of HeldOut
         Regions to test on.
+    view : str
+        Which of the recipe's tests of each machine state; empty of the one that needs no name.
     """
 
     table: RecipeTable
@@ -276,6 +289,7 @@ class Recipe:
     confounders: Mapping[str, tuple[Fault, ...]]
     copulas: Mapping[str, Copula]
     held_out: tuple[HeldOut, ...]
+    view: str = ""
 
     @property
     def name(self) -> str:
@@ -314,6 +328,7 @@ class Recipe:
         presence = [fault.columns[0] for fault in self.faults]
         values = [fault.columns[1] for fault in self.faults]
         return {
+            **({VIEW: f"S{len(self.view)}"} if self.view else {}),
             **dict.fromkeys(self.severity_columns, "<f8"),
             **dict.fromkeys(further, "i1"),
             **dict.fromkeys(presence, "?"),
@@ -353,8 +368,9 @@ class Recipe:
         return np.random.SeedSequence([seed, number_of(name)], spawn_key=(stream, *key))
 
     def noise_seed(self, seed: int, index: int) -> int:
-        """Seed of the sensor noise of one record."""
-        state = self._sequence(seed, _NOISE, index).generate_state(1, np.uint64)
+        """Seed of the sensor noise of one record, another in each view."""
+        view = (number_of(self.view),) if self.view else ()
+        state = self._sequence(seed, _NOISE, index, *view).generate_state(1, np.uint64)
         return int(state[0])
 
 
@@ -376,7 +392,9 @@ def _conditions(scene: Scene) -> dict[str, str]:
     return {name: path for name, path in CONDITIONS.items() if has_value(scene, path)}
 
 
-def load_recipe(name_or_path: str | Path, overrides: Mapping[str, Any] | None = None) -> Recipe:
+def load_recipe(
+    name_or_path: str | Path, overrides: Mapping[str, Any] | None = None, *, view: str = ""
+) -> Recipe:
     """Load a built-in recipe or a TOML file, and check it against its scene.
 
     Parameters
@@ -385,6 +403,9 @@ def load_recipe(name_or_path: str | Path, overrides: Mapping[str, Any] | None = 
         A name of `recipe_names`, or a file.
     overrides : mapping, optional
         Dotted path of the scene -> value; set in every record like the recipe's ``[fixed]``.
+    view : str
+        Which of its ``[views]``, further tests of the same machine states; what the view sets is
+        set like an override, and an override of the same path wins.
 
     Returns
     -------
@@ -395,13 +416,16 @@ def load_recipe(name_or_path: str | Path, overrides: Mapping[str, Any] | None = 
     ------
     RecipeError
         Every fault at once: of the tables, of paths the scene does not have, of bounds the scene
-        refuses, of correlations and held-out regions, of a recipe with other machines.
+        refuses, of correlations and held-out regions, of a recipe with other machines, of a view
+        that it does not have.
 
     Examples
     --------
     >>> recipe = load_recipe("bilge-pump-small", {"duration": "1 s"})
     >>> recipe.table.records, recipe.scene.duration
     (120, 1.0)
+    >>> load_recipe("shaft-rig-small", view="running").scene.exciters[0].mounted
+    False
     """
     source = read_recipe(name_or_path)
     try:
@@ -413,7 +437,17 @@ def load_recipe(name_or_path: str | Path, overrides: Mapping[str, Any] | None = 
         raise RecipeError(str(name_or_path), error.faults) from None
     faults = [*source.foreign, *_machine_faults(table, source.machines_folder)]
     texts = {"text": source.text, "scene_text": scene}
-    return _resolved(table, base, dict(overrides or {}), texts, faults)
+    changes = {**_view_values(table, view), **(overrides or {})}
+    return replace(_resolved(table, base, changes, texts, faults), view=view)
+
+
+def _view_values(table: RecipeTable, view: str) -> Mapping[str, Any]:
+    """What a view sets, by dotted path; nothing of the test that needs no name."""
+    if view and view not in table.views:
+        known = ", ".join(table.views) or "(it has none)"
+        fault = f"view = {view!r} must be one of {known}; choose one, or add a table [views.{view}]"
+        raise RecipeError(table.name, [fault])
+    return table.views[view] if view else {}
 
 
 def _resolved(
@@ -941,6 +975,7 @@ def _sample(recipe: Recipe, sources: Mapping[str, _Source], index: int, seed: in
         "record_id": f"{index:08d}",
         "group": group,
         "seed": noise_seed,
+        **({VIEW: recipe.view} if recipe.view else {}),
         **_severity_labels(recipe, drawn),
         **({} if life is None else life.labels),
         **_confounder_labels(recipe, faults),

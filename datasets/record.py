@@ -88,6 +88,8 @@ class Recording:
         File name, for messages and reports.
     machine : str
         Identity of the machine, as of :func:`~.machines.machine_identities`; empty where unknown.
+    joined : mapping
+        Further tests of the same machine state, by the name of the view.
 
     Raises
     ------
@@ -111,6 +113,7 @@ class Recording:
     row: Mapping[str, Any] = field(default_factory=dict)
     source: str = ""
     machine: str = ""
+    joined: Mapping[str, "Recording"] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         shape = np.shape(self.signal)

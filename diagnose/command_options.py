@@ -58,6 +58,15 @@ seed_option = click.option(
 )
 
 
+join_option = click.option(
+    "--join",
+    "joined",
+    multiple=True,
+    metavar="[VIEW=]FILE",
+    help="Further tests of the same machines and states, to be told from together; repeat it.",
+)
+
+
 def source_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """Options about a measured file, the same for every command that reads one."""
 

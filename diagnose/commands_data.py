@@ -1,7 +1,9 @@
 """Commands about data: recipes, data sets, measured files, splits, audit, features."""
 
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -26,6 +28,7 @@ from .command_options import (
     emit,
     force_option,
     jobs_option,
+    join_option,
     json_option,
     progress_bar,
     seed_option,
@@ -75,6 +78,8 @@ def recipe_check(file: str, as_json: bool) -> None:
     from ..sim.plausibility import scene_doubts
 
     checked = load_recipe(file)
+    for view in checked.table.views:
+        check(load_recipe(file, view=view).scene)
     if faults := limit_faults(checked):
         raise RecipeError(checked.name, faults)
     doubts: dict[str, str] = {}  # each with the first record that has it
@@ -134,6 +139,9 @@ def recipe_preview(
 @click.argument("recipe")
 @_records_option
 @click.option("-o", "--output", type=PATH, required=True, help="Data set to write (.h5).")
+@click.option(
+    "--view", default="", metavar="NAME", help="One of the recipe's further tests of each state."
+)
 @click.option("--truth", is_flag=True, help="Also store forces and orbit.")
 @click.option(
     "--fidelity",
@@ -154,6 +162,7 @@ def generate(
     recipe: str,
     records: int | None,
     output: Path,
+    view: str,
     truth: bool,
     fidelity: Literal["auto", "given"] | None,
     seed: int,
@@ -178,6 +187,7 @@ def generate(
             recipe,
             records,
             output,
+            view=view,
             seed=seed,
             jobs=worker_count(jobs),
             scheduler=scheduler,
@@ -713,6 +723,7 @@ _FEATURE_SETS = ("standard", "core", "complete")  # as wearstate.features.catalo
     help="What models are trained on (default); all but the dearest; everything.",
 )
 @click.option("--only", multiple=True, metavar="NAMES", help="Only these, parted by commas.")
+@join_option
 @click.option("--machine", metavar="KIND", help="Kind of machine, for its ISO zone.")
 @_speed_option
 @_bearing_option
@@ -739,6 +750,7 @@ def features(
     listing: bool,
     feature_set: str | None,
     only: Sequence[str],
+    joined: Sequence[str],
     jobs: int | None,
     force: bool,
     as_json: bool,
@@ -754,12 +766,15 @@ def features(
         raise click.UsageError("give DATA and --output, or --list")
     if only and feature_set:
         raise click.UsageError("give either --set or --only: names are looked for in every set")
+    from ..datasets.views import views_of
     from .tabulate import absent_in, choice_of, excitation_notes, feature_table, save_table
 
-    check_outputs([data], [(output, TABLE_SUFFIXES)], force)
+    views = views_of(joined)
+    sources = [data, *(view.path for view in views)]
+    check_outputs(sources, [(output, TABLE_SUFFIXES)], force)
     names = [name.strip() for part in only for name in part.split(",")]
     wanted: Any = feature_set or _FEATURE_SETS[0]
-    choice = choice_of(wanted, names, **about)
+    choice = replace(choice_of(wanted, names, **about), views=views)
     command = click.get_current_context().command
     absent = {name: as_options(why, command) for name, why in absent_in(data, choice).items()}
     if feature_set and absent:
@@ -769,13 +784,12 @@ def features(
     with progress_bar("features") as progress:
         table = feature_table(data, choice=choice, jobs=worker_count(jobs), progress=progress)
     save_table(table, output, force=force)
+    for text in table.lacking_words:
+        click.echo(f"{text}: its values are empty there", err=True)
     size = {"path": str(output), "records": len(table.values), "features": len(table.names)}
     text = f"{output}: {size['records']} records, {size['features']} features"
-    told = (
-        excitation_notes(data, choice.settings)
-        if any("frf" in name for name in table.names)
-        else {}
-    )
+    tests = sources if any("frf" in name for name in table.names) else []
+    told = dict(sum((Counter(excitation_notes(one, choice.settings)) for one in tests), Counter()))
     for note, count in told.items():
         click.echo(f"{count} records: {note}", err=True)
     emit({**size, "absent": absent, "tests": told}, as_json, text)

@@ -1,6 +1,7 @@
 """Commands about the wear: train, evaluate, report, and the demonstration of it all."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -22,6 +23,7 @@ from .command_options import (
     emit,
     force_option,
     jobs_option,
+    join_option,
     json_option,
     json_text,
     overrides_of,
@@ -74,6 +76,7 @@ _FAIL_ON_HELP = "Exit 3 at a warning, 4 at an alarm, 5 when unfamiliar; alarm: o
     default=None,
     help="Time that a prediction may take, beside its features [ms]; 5 by default.",
 )
+@join_option
 @seed_option
 @jobs_option
 @force_option
@@ -87,6 +90,7 @@ def train(
     healthy: Path | None,
     features: Sequence[str],
     budget_ms: float | None,
+    joined: Sequence[str],
     seed: int,
     jobs: int | None,
     force: bool,
@@ -94,9 +98,11 @@ def train(
 ) -> None:
     """Train a wear model on a labelled data set and judge it on held-out machine draws.
 
-    Where the target names conditions instead of a severity: a model that tells which, judged with
-    every recording left out in turn.
+    With --join: on several tests of each machine state together, the features of each named by
+    its view. Where the target names conditions instead of a severity: a model that tells which,
+    judged with every recording left out in turn.
     """
+    from ..datasets.views import views_of
     from .evaluate import score
     from .evaluate_text import features_text, score_lines
     from .feature_choice import choice_in, choices_of, costs_ms
@@ -106,19 +112,21 @@ def train(
     from .train import train_model
     from .transfer_reference import healthy_transfer
 
-    inputs = [data] if healthy is None else [data, healthy]
+    views = views_of(joined)
+    inputs = [data, *(view.path for view in views), *([healthy] if healthy else [])]
     check_outputs(inputs, [(output, MODEL_SUFFIXES)], force)
     source = click.get_current_context().get_parameter_source("held_out")
     shared = source is not click.core.ParameterSource.DEFAULT
     if shared and split:
         raise click.UsageError("--split says what is held out: leave --held-out away")
-    choices = choices_of(features)
+    choices = tuple(replace(choice, views=views) for choice in choices_of(features))
     if target is not None and names_classes(data, target):
         if len(choices) > 1:
             raise click.UsageError("--features must name one set for a model of named conditions")
-        if healthy or budget_ms or shared or split:
+        if healthy or budget_ms or shared or split or views:
             raise click.UsageError(
-                f"--baseline, --budget-ms, --held-out and --split are for a severity; {target} "
+                f"--baseline, --budget-ms, --held-out, --join and --split are for a severity; "
+                f"{target} "
                 "names conditions, and every recording is left out in turn"
             )
         _train_classes(data, output, target, choices[0], seed, worker_count(jobs), force, as_json)
@@ -151,7 +159,13 @@ def train(
     trained = model.card["trained_on"]
     head = f"{output}: trained on {trained['records']} records of {trained['draws']} machine draws"
     costs = costs_ms(data, choices, healthy_transfer(healthy, choices))
-    lines = [head, *features_text(model.card, choices, costs), *score_lines(result, model.card)]
+    left_out = [f"  left out: {text}" for text in table.lacking_words]
+    lines = [
+        head,
+        *left_out,
+        *features_text(model.card, choices, costs),
+        *score_lines(result, model.card),
+    ]
     if model.notice:
         lines.append(f"Notice: {model.notice}.")
     chosen = {**model.card["feature_choice"], "ms_per_record": costs}
@@ -220,6 +234,7 @@ def _train_classes(
     metavar="NAME|all",
     help="Train and judge anew with this part of DATA held out; may be repeated.",
 )
+@join_option
 @click.option("--trained-on", type=PATH, help="MODEL's training set, for the baselines.")
 @click.option("--baseline", "healthy", type=PATH, help="Healthy records of DATA's machines.")
 @click.option("--quick", is_flag=True, help="Leave out baselines that need packages of others.")
@@ -257,7 +272,7 @@ def evaluate(
     from .bundle import kind_of
     from .ownfile import CLASS_MODEL
 
-    keys = ("split", "retrain", "trained_on", "healthy", "quick", "cache")
+    keys = ("split", "retrain", "joined", "trained_on", "healthy", "quick", "cache")
     named = [key for key in keys if given[key]]
     if across_fidelity:
         if data is not None:
@@ -275,6 +290,8 @@ def evaluate(
             "--retrain trains on DATA, by splits of its own: --trained-on and --split have no "
             "meaning with it"
         )
+    if given["retrain"] and given["joined"]:
+        raise click.UsageError("--retrain knows no joined views: leave --join or --retrain out")
     check_outputs([model_file, data], [(output, _EVALUATION)], force)
     if kind_of(model_file) == CLASS_MODEL:
         if named or output:
@@ -309,6 +326,7 @@ def _judge(
     given: Mapping[str, Any],
 ) -> None:
     """Of a finished model, or by splits; text or JSON, and a file if asked for."""
+    from ..datasets.views import views_of
     from .evaluate import evaluate_model
     from .evaluate_figure import save_evaluation
     from .evaluate_splits import ALL_SPLITS, case_of, evaluate_splits, one_split
@@ -326,6 +344,7 @@ def _judge(
             whole, text = result, splits_text(result)
         else:
             ways |= {"trained_on": given["trained_on"], "split": given["split"]}
+            ways |= {"views": views_of(given["joined"])}
             result = evaluate_model(model, data, **ways)
             whole = one_split(result, model, data, seed)
             text = "\n".join(score_lines(result, model.card))
@@ -370,6 +389,7 @@ def _judge_across(
 @click.argument("source", metavar="RECORDING|FOLDER", type=PATH)
 @click.option("--model", "model_file", type=PATH, required=True)
 @click.option("--baseline", "healthy", type=PATH, help="Healthy recordings of the machine (.h5).")
+@join_option
 @click.option("-o", "--output", type=PATH, help="HTML page to write.")
 @click.option("--machine", metavar="KIND", help="Kind of machine, for its ISO zone.")
 @click.option("--trend", is_flag=True, help="Of many recordings: severity over time, life left.")
@@ -409,13 +429,15 @@ def report(
     recordings, the code of the worst: alarm, warning, bad input, unfamiliar. With times, only the
     latest of a machine counts.
     """
+    from ..datasets.views import views_of
     from .bundle import kind_of
     from .healthy import Baselines
     from .modelfile import load_model
     from .ownfile import CLASS_MODEL
     from .report import known_machine
 
-    inputs = [source, model_file, *([healthy] if healthy else [])]
+    views = views_of(given["joined"])
+    inputs = [source, model_file, *(view.path for view in views), *([healthy] if healthy else [])]
     check_outputs(inputs, [(output, PAGE_SUFFIXES)], force)
     known_machine(machine)
     if kind_of(model_file) == CLASS_MODEL:
@@ -424,6 +446,7 @@ def report(
             "-o": output,
             "--machine": machine,
             "--fail-on": fail_on,
+            "--join": given["joined"],
             "--trend": given["trend"],
             "--dates": given["dates"],
         }
@@ -440,7 +463,11 @@ def report(
     many = _holds_many(source)
     if not many and (given["trend"] or given["dates"]):
         raise click.UsageError("--trend and --dates are for a folder or a data set of many records")
-    told = _Told(source, model_file, model, baselines, output, machine, as_json, force, given)
+    if views and source.is_dir():
+        raise click.UsageError("--join completes a recording or a data set: name one, not a folder")
+    told = _Told(
+        source, model_file, model, baselines, output, machine, as_json, force, given, views
+    )
     verdicts = _report_many(told) if many else _report_one(told)
     raise click.exceptions.Exit(report_exit(verdicts, fail_on))
 
@@ -500,6 +527,7 @@ class _Told(NamedTuple):
     as_json: bool
     force: bool
     given: Mapping[str, Any]
+    views: Sequence[Any]
 
 
 _Verdict = tuple[str, int | None]
@@ -508,7 +536,7 @@ _Verdict = tuple[str, int | None]
 
 def _report_one(told: _Told) -> list[_Verdict]:
     """Report on one recording."""
-    from ..datasets.importers import read_recording
+    from ..datasets.importers import read_recording, with_views
     from .report import report_table, save_page
     from .report_text import report_text
 
@@ -518,6 +546,7 @@ def _report_one(told: _Told) -> list[_Verdict]:
         tacho=told.given["tacho"],
         pulses_per_revolution=told.given["pulses_per_revolution"],
     )
+    recording = with_views(recording, told.source, told.given["record"], told.views)
     baseline = told.baselines.of(recording) if told.baselines else None
     estimate = told.model.estimate(recording, baseline)
     table = report_table(
@@ -558,6 +587,7 @@ def _report_many(told: _Told) -> list[_Verdict]:
             tacho=given["tacho"],
             pulses_per_revolution=given["pulses_per_revolution"],
             leave_out=others,
+            views=told.views,
         ) as items,
         progress_bar("judging") as progress,
     ):

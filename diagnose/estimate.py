@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from typing import Any, Literal
 
@@ -35,7 +35,7 @@ from .quality import (
     Look,
     layout_faults,
     quiet_faults,
-    sample_faults,
+    recording_faults,
     suspicions,
 )
 from .tabulate import Choice, held_against, recording_features
@@ -303,7 +303,8 @@ class WearModel:
         Parameters
         ----------
         recording : Recording
-            Any; one that lacks the model's inputs or is at fault is unusable, with the reasons.
+            Any, with the views that the model reads joined to it; one that lacks the model's inputs
+            or is at fault is unusable, with the reasons.
         baseline : Baseline, optional
             Healthy recordings of the same machine; a referenced model needs them, a cold one only
             tells the evidence against them.
@@ -319,7 +320,7 @@ class WearModel:
         ModelError
             The program's features are not the model's.
         """
-        faults = layout_faults(recording, self.card) or sample_faults(recording)
+        faults = recording_faults(recording, self.card)
         if any(fault.bars for fault in faults):
             return self._unusable(faults)
         known = None if baseline is None else baseline.transfer
@@ -345,7 +346,9 @@ class WearModel:
 
     def _row(self, recording: Recording, reference: FrfReference | None) -> Float:
         choice = held_against(choice_in(self.card), reference)
-        names, values = recording_features(recording, choice)
+        order = self.card.get("views", {})
+        joined = {view: recording.joined[view] for view in order}
+        names, values = recording_features(replace(recording, joined=joined), choice)
         if names != self.names:
             raise ModelError(
                 f"the model's {len(self.names)} features are not the program's {len(names)}; "

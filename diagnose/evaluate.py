@@ -1,7 +1,7 @@
 """How good is a wear model on machines it has not seen, and against what."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..datasets.record import Attributes, DataError, DataSet
 from ..datasets.split_file import Sides, usable_sides
+from ..datasets.views import View
 from .baselines import Side, contest, side_of
 from .conformal import grade_limits, grade_set, interval, scale_inputs, tails
 from .estimate import Estimate, WearModel
@@ -68,6 +69,7 @@ def evaluate_model(
     model: WearModel,
     path: str | Path,
     *,
+    views: Sequence[View] = (),
     trained_on: str | Path | None = None,
     healthy: str | Path | None = None,
     split: str | None = None,
@@ -85,6 +87,9 @@ def evaluate_model(
     path : str or Path
         Labelled data set. Where its machine draws are those of the training set, only the draws
         held out there are used.
+    views : sequence of View
+        Data sets that complete the records, as the model needs them; records that lack one are
+        left out.
     trained_on : str or Path, optional
         The model's training set, for the baselines. Without it they are trained on what `path`
         has of it, or, where it has none, by folds of the judged machines, which flatters them.
@@ -120,8 +125,10 @@ def evaluate_model(
     sides = None if split is None else _sides(path, split)
     if healthy is not None:
         refuse_strangers(path, healthy)
+    if views and trained_on is not None:
+        raise DataError("join and trained_on must not both be given; leave the training set out")
     table, rows = judged_rows(
-        model, path, sides=sides, healthy=healthy, jobs=jobs, progress=progress
+        model, path, views=views, sides=sides, healthy=healthy, jobs=jobs, progress=progress
     )
     reference = None
     if healthy is not None:
@@ -174,6 +181,7 @@ def judged_rows(
     model: WearModel,
     path: str | Path,
     *,
+    views: Sequence[View] = (),
     sides: Sides | None = None,
     healthy: str | Path | None = None,
     jobs: int = 1,
@@ -192,12 +200,30 @@ def judged_rows(
         head = data.attributes
     refuse_other_severity(model, head, path)
     known = healthy_transfer(healthy, [Choice(only=model.names)])
-    table = feature_table(
-        path, choice=choice_in(model.card), healthy=known, jobs=jobs, progress=progress
+    choice = replace(choice_in(model.card), views=_views_of(model, views, path))
+    table = feature_table(path, choice=choice, healthy=known, jobs=jobs, progress=progress)
+    identity = draw_identity(head)
+    rows = (
+        unseen_rows(model, table, identity, path)
+        if sides is None
+        else tested_rows(model, table, sides, identity, path)
     )
-    if sides is not None:
-        return table, tested_rows(model, table, sides, draw_identity(head), path)
-    return table, unseen_rows(model, table, draw_identity(head), path)
+    whole = rows[table.complete[rows]]
+    if whole.size == 0:
+        raise DataError(f"{path}: {'; '.join(table.lacking_words)}, must be 0; join other sets")
+    return table, whole
+
+
+def _views_of(model: WearModel, views: Sequence[View], path: str | Path) -> tuple[View, ...]:
+    """Views in the order of the model; they must be its own."""
+    known = {view.name: view for view in views}
+    wanted = model.card.get("views", {})
+    if set(known) != set(wanted):
+        raise DataError(
+            f"{path}: joined views = {', '.join(known) or 'none'}, the model needs "
+            f"{', '.join(wanted) or 'none'}; give --join NAME=FILE for each of them"
+        )
+    return tuple(known[name] for name in wanted)
 
 
 def unseen_rows(

@@ -9,8 +9,9 @@ from typing import Any, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from ..datasets.record import DataError, DataSet
+from ..datasets.record import DataError
 from ..datasets.splits import group_folds
+from ..datasets.views import JoinedSet
 from ..features.catalogue import SetName
 from .models import CANDIDATES, Folds
 from .tabulate import (
@@ -161,7 +162,7 @@ def candidates_of(
     path : str or Path
         Data set file.
     choices : sequence of Choice
-        One or more.
+        One or more, all of the same views.
     healthy : Healthy, optional
         As of :func:`wearstate.diagnose.tabulate.feature_table`.
 
@@ -186,7 +187,7 @@ def candidates_of(
         columns = np.arange(len(each[0]), dtype=np.intp)
         return Candidates(choices=tuple(choices), columns=(columns,), whole=choices[0])
     union = tuple(dict.fromkeys(name for names in each for name in names))
-    whole = Choice(only=union)
+    whole = Choice(only=union, views=choices[0].views)
     place = {name: i for i, name in enumerate(feature_table_names(path, whole, healthy))}
     return Candidates(
         choices=tuple(choices),
@@ -208,8 +209,9 @@ def costs_ms(
     healthy : Healthy, optional
         As of :func:`wearstate.diagnose.tabulate.feature_table`; its own time is not counted.
     """
-    with DataSet(path) as data:
-        usable = np.flatnonzero((data.manifest["status"] == "ok").to_numpy())[:_TIMED]
+    with JoinedSet(Path(path), choices[0].views) as data:
+        sound = (data.data.manifest["status"] == "ok").to_numpy() & data.complete
+        usable = np.flatnonzero(sound)[:_TIMED]
         recordings = [data[int(index)] for index in usable]
     found = []
     for choice in choices:

@@ -289,6 +289,20 @@ class _Rates(Strict):
     members: dict[str, float]
 
 
+class _ViewCard(Strict):
+    """What the recording of a view must have."""
+
+    channels: list[ChannelCard] = Field(min_length=1)
+    sample_rate_hz: RateHz
+    tacho: str | None
+    pulses_per_revolution: Pulses
+
+    @model_validator(mode="after")
+    def _fits_itself(self) -> Self:
+        check_channels(self.channels, self.tacho)
+        return self
+
+
 class _Card(Strict):
     """What a card must hold, so that nothing that reads it can fail."""
 
@@ -306,6 +320,7 @@ class _Card(Strict):
     channels: list[ChannelCard] = Field(min_length=1)
     tacho: str | None
     pulses_per_revolution: Pulses
+    views: dict[str, _ViewCard] = Field(default_factory=dict)
     features: list[str] = Field(min_length=1)
     feature_choice: FeatureChoice = FeatureChoice()
     conditions: list[_Condition]

@@ -14,6 +14,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from ..datasets.views import MARK
+
 Float = NDArray[np.float64]
 
 LEVELS = ("rms", "peak", "peak_to_peak")
@@ -70,7 +72,7 @@ def columns_of(names: tuple[str, ...]) -> dict[str, Columns]:
     for i, name in enumerate(names):
         owner, _, label = name.partition(".")
         columns = owners.setdefault(owner, Columns())
-        if name in _CONDITIONS:
+        if name.rpartition(MARK)[2] in _CONDITIONS:
             continue
         band = re.fullmatch(_BAND, label)
         cell = re.fullmatch(_CELL, label)
@@ -166,7 +168,7 @@ def coordinates_of(names: Sequence[str]) -> Coordinates:
     """
     row = np.zeros((1, len(names)))
     found = [
-        (owner, "orbit" if owner == "orbit" else kind)
+        (owner, "orbit" if owner.rpartition(MARK)[2] == "orbit" else kind)
         for owner, columns in columns_of(tuple(names)).items()
         for kind, part in _parts(columns, row).items()
         for _ in range(part.shape[1])

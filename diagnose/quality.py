@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..datasets.record import Recording
+from ..datasets.views import MARK
 from ..features.order import pulse_times, shaft_phase
 from ..sim.sensor import Channel
 from .physical import level_channels, level_rows, shape_rows
@@ -74,6 +75,38 @@ class Fault:
 
 
 # --- what the samples and the header show
+
+
+def recording_faults(recording: Recording, card: Mapping[str, Any]) -> tuple[Fault, ...]:
+    """What is wrong with a recording and its views as inputs of a model, all of it.
+
+    Parameters
+    ----------
+    recording : Recording
+    card : mapping
+        Of the model.
+
+    Returns
+    -------
+    tuple of Fault
+        Of layout where that does not fit, else of the samples; a view that is missing is one.
+    """
+    faults = [*(layout_faults(recording, card) or sample_faults(recording))]
+    views = card.get("views", {})
+    for view, layout in views.items():
+        if view not in recording.joined:
+            text = f"view {view} is missing, which the model needs; give --join {view}=FILE"
+            faults.append(Fault(kind="layout", channel="", text=text))
+            continue
+        other = recording.joined[view]
+        found = layout_faults(other, layout) or sample_faults(other)
+        faults += [replace(fault, text=f"view {view}: {fault.text}") for fault in found]
+    strange = sorted(set(recording.joined) - set(views))
+    if strange:
+        known = ", ".join(views) or "none"
+        text = f"views {', '.join(strange)} are joined, the model knows {known}: leave them out"
+        faults.append(Fault(kind="layout", channel="", text=text))
+    return tuple(faults)
 
 
 def layout_faults(recording: Recording, card: Mapping[str, Any]) -> tuple[Fault, ...]:
@@ -422,8 +455,7 @@ def _wrong_unit(recording: Recording, look: Look, see: See) -> tuple[Fault, ...]
     off = {name: db for name, db in look.excess_db.items() if abs(db) >= _OFF_DB}
     for rank in range(_TRIED):
         factors = {name: _near_factors(excess)[rank] for name, excess in off.items()}
-        gain = np.array([factors.get(name, 1.0) for name in recording.names], dtype=np.float32)
-        mended = see(replace(recording, signal=recording.signal * gain[:, None]))
+        mended = see(_amplified(recording, factors))
         nearer = all(abs(mended.excess_db[n]) < _NEARER * abs(db) for n, db in off.items())
         if mended.familiar and nearer:
             return tuple(
@@ -437,6 +469,14 @@ def _wrong_unit(recording: Recording, look: Look, see: See) -> tuple[Fault, ...]
                 for name, factor in factors.items()
             )
     return ()
+
+
+def _amplified(recording: Recording, factors: Mapping[str, float], view: str = "") -> Recording:
+    """A recording and its views with channels multiplied; those of a view go by its name."""
+    names = [f"{view}{MARK}{name}" if view else name for name in recording.names]
+    gain = np.array([factors.get(name, 1.0) for name in names], dtype=np.float32)
+    joined = {name: _amplified(each, factors, name) for name, each in recording.joined.items()}
+    return replace(recording, signal=recording.signal * gain[:, None], joined=joined)
 
 
 def _near_factors(excess_db: float) -> list[float]:
@@ -525,6 +565,8 @@ def quiet_faults(
     """
     found = level_rows(names, row[None, :])[0]
     units = recording.units
+    for view, each in recording.joined.items():
+        units |= {f"{view}{MARK}{name}": unit for name, unit in each.units.items()}
     return tuple(
         Fault(
             kind="dead",

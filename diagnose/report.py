@@ -160,15 +160,17 @@ def _recording_table(recording: Recording, card: Mapping[str, Any]) -> dict[str,
             channel.name: float(row.std())
             for channel, row in zip(recording.vibration_channels, recording.vibration, strict=True)
         },
+        "views": {name: each.source for name, each in recording.joined.items()},
         "fits_model_inputs": not input_faults(recording, card),
     }
 
 
 def _recording_line(recording: Recording) -> str:
     channels = ", ".join(channel.label for channel in recording.channels)
+    views = "".join(f"; {name}: {each.source}" for name, each in recording.joined.items())
     return (
         f"{recording.source}: {recording.origin}, {recording.duration:.3g} s at "
-        f"{recording.sample_rate:g} Hz, {channels}"
+        f"{recording.sample_rate:g} Hz, {channels}{views}"
     )
 
 

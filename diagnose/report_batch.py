@@ -18,6 +18,7 @@ from ..datasets.importers import read_recording
 from ..datasets.machines import GROUP_NAME
 from ..datasets.record import DataError, DataSet, Recording
 from ..datasets.sources import READERS, SourceOptions
+from ..datasets.views import JoinedSet, View
 from .advice import Advice, advise
 from .estimate import Estimate, ModelError, WearModel
 from .grades import GRADE_NAMES, WARNING_GRADE
@@ -185,6 +186,7 @@ def recordings_in(
     tacho: str | None = None,
     pulses_per_revolution: int = 1,
     leave_out: Sequence[Path] = (),
+    views: Sequence[View] = (),
 ) -> Iterator[tuple[Item, ...]]:
     """Recordings of a folder (not of folders in it), or records of a data set.
 
@@ -195,6 +197,8 @@ def recordings_in(
         As of :func:`wearstate.datasets.importers.read_recording`.
     leave_out : sequence of Path
         Files of the folder that are no recordings: dates, baseline.
+    views : sequence of View
+        Data sets that complete the records of a data set.
 
     Yields
     ------
@@ -212,7 +216,7 @@ def recordings_in(
     )
     if not path.is_dir():
         read(path)  # refuses options that contradict what the data set declares
-        with DataSet(path) as data:
+        with JoinedSet(path, tuple(views)) as data:
             yield tuple(_records(path, data))
         return
     spared = {file.resolve() for file in leave_out}
@@ -239,28 +243,28 @@ def _items_of(file: Path, read: Callable[[Path], Recording]) -> list[Item]:
     """Every record of a data set; one item of another file, readable or not."""
     if file.suffix.lower() in _DATA_SETS:
         try:
-            with DataSet(file) as data:  # closed: a process may not open a thousand files
+            with JoinedSet(file) as data:  # closed: a process may not open a thousand files
                 return _records(file, data, close=True)
         except DataError:
             pass  # of another program, or damaged: reading it says which
     return [Item(name=file.name, machine="", path=file, row={}, load=partial(read, file))]
 
 
-def _records(file: Path, data: DataSet, *, close: bool = False) -> list[Item]:
-    several = data.manifest["group"].nunique() > 1
+def _records(file: Path, data: JoinedSet, *, close: bool = False) -> list[Item]:
+    several = data.data.manifest["group"].nunique() > 1
     return [
         Item(
-            name=file.name if len(data) == 1 else f"{file.name}[{i}]",
+            name=file.name if len(data.data) == 1 else f"{file.name}[{i}]",
             machine=str(row.get(GROUP_NAME, row["group"])) if several else "",
             path=file,
             row=row,
             load=partial(_read_record, data, i, close=close),
         )
-        for i, row in enumerate(_manifest_rows(data))
+        for i, row in enumerate(_manifest_rows(data.data))
     ]
 
 
-def _read_record(data: DataSet, index: int, *, close: bool) -> Recording:
+def _read_record(data: JoinedSet, index: int, *, close: bool) -> Recording:
     """One record; a closed data set opens by itself."""
     try:
         return data[index]

@@ -3,7 +3,7 @@
 import math
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ..datasets.csv_cells import safe_frame
 from ..datasets.record import DataError, DataSet, Recording
+from ..datasets.views import MARK, JoinedSet, View
 from ..datasets.workers import in_order
 from ..features.analysis import STANDARD, Analysis, Settings
 from ..features.catalogue import SetName
@@ -40,11 +41,29 @@ class FeatureTable:
         One row per record.
     manifest : pandas.DataFrame
         The same records' labels, conditions and numerics.
+    lacking : dict
+        Name of a view -> records that lack it [shape=(n_records,)]: its values are NaN there.
+        Views that no record lacks are left out.
     """
 
     names: tuple[str, ...]
     values: NDArray[np.float64]
     manifest: pd.DataFrame
+    lacking: dict[str, NDArray[np.bool_]] = field(default_factory=dict)
+
+    @property
+    def complete(self) -> NDArray[np.bool_]:
+        """Records that have every view [shape=(n_records,)]."""
+        lost = [np.zeros(len(self.values), dtype=bool), *self.lacking.values()]
+        return np.asarray(~np.any(lost, axis=0))
+
+    @property
+    def lacking_words(self) -> list[str]:
+        """Views that records lack, as sentences."""
+        return [
+            f"{int(flags.sum())} of {len(flags)} records have no view {name}"
+            for name, flags in self.lacking.items()
+        ]
 
     def named(self, names: Sequence[str]) -> "FeatureTable":
         """The table with some of its features."""
@@ -93,12 +112,30 @@ class Choice:
     Attributes
     ----------
     feature_set, only, settings
-        As of :func:`wearstate.features.table.feature_row`.
+        As of :func:`wearstate.features.table.feature_row`; a name in `only` with a view before it,
+        as ``running:rms``, is of that view alone.
+    views : tuple of View
+        Data sets whose records complete each row.
     """
 
     feature_set: SetName = "standard"
     only: tuple[str, ...] | None = None
     settings: Settings = STANDARD
+    views: tuple[View, ...] = ()
+
+    def part(self, view: str = "") -> "Choice | None":
+        """The choice among the features of one view, or of the record itself; None: none.
+
+        Examples
+        --------
+        >>> Choice(only=("rms", "running:rms", "running:speed")).part("running").only
+        ('rms', 'speed')
+        """
+        if self.only is None:
+            return replace(self, views=())
+        named = [name.rpartition(MARK) for name in self.only]
+        mine = tuple(label for owner, _, label in named if owner == view)
+        return replace(self, only=mine, views=()) if mine else None
 
 
 def held_against(choice: Choice, reference: FrfReference | None) -> Choice:
@@ -250,20 +287,20 @@ def absent_in(path: str | Path, choice: Choice) -> dict[str, str]:
     with DataSet(path) as data:
         if len(data) == 0:
             raise DataError(f"{path}: 0 records, must be > 0; generate or import some")
-        layout = recording_layout(data[0], choice.settings)
-    if choice.only is None:
-        try:
-            return absent_features(layout, choice.feature_set)
-        except ValueError as error:
-            raise DataError(f"{path}: {error}") from error
-    _names(layout, choice, path)
-    return {}
+        first = data[0]
+    if choice.only is not None:
+        feature_table_names(path, choice)
+        return {}
+    try:
+        return absent_features(recording_layout(first, choice.settings), choice.feature_set)
+    except ValueError as error:
+        raise DataError(f"{path}: {error}") from error
 
 
 def recording_features(
     recording: Recording, choice: Choice = USUAL
 ) -> tuple[tuple[str, ...], NDArray[np.float64]]:
-    """Feature row of one recording.
+    """Feature row of one recording and the views joined to it.
 
     Parameters
     ----------
@@ -275,7 +312,8 @@ def recording_features(
     Returns
     -------
     names : tuple of str
-        As :func:`wearstate.features.table.feature_names`.
+        As :func:`wearstate.features.table.feature_names`; those of a view have its name in front:
+        ``running:acc_aft.rms``.
     values : numpy.ndarray [shape=(n_features,)]
         Finite.
 
@@ -284,6 +322,27 @@ def recording_features(
     DataError
         The signal cannot be turned into features; the text says why and what helps.
     """
+    if not recording.joined and choice.part() is choice:
+        return _own_features(recording, choice)
+    names: tuple[str, ...] = ()
+    rows: list[NDArray[np.float64]] = []
+    for view, each in {"": recording, **recording.joined}.items():
+        part = choice.part(view)
+        if part is not None:
+            labels, values = _own_features(each, part)
+            names += _of_view(view, labels)
+            rows.append(values)
+    return names, np.concatenate(rows) if rows else np.empty(0)
+
+
+def _of_view(view: str, labels: tuple[str, ...]) -> tuple[str, ...]:
+    return tuple(f"{view}{MARK}{label}" for label in labels) if view else labels
+
+
+def _own_features(
+    recording: Recording, choice: Choice
+) -> tuple[tuple[str, ...], NDArray[np.float64]]:
+    """Feature row of one recording alone."""
     try:
         return feature_row(
             recording.vibration,
@@ -362,30 +421,40 @@ def feature_table(
     Returns
     -------
     FeatureTable
-        Records in the order of the file; failed ones are left out.
+        Records in the order of the file; failed ones are left out. The columns of a view that a
+        record lacks are NaN.
 
     Raises
     ------
     DataError
-        The file cannot be read, or holds no usable record.
+        The file cannot be read, or holds no usable record; its records and those of a view do not
+        tell which belong together, or none do.
     """
-    with DataSet(path) as data:
-        usable = np.flatnonzero((data.manifest["status"] == "ok").to_numpy())
-        if usable.size == 0:
-            raise DataError(f"{path}: 0 usable records, must be > 0; see its column 'status'")
+    _refuse_strange(choice, path)
+    with JoinedSet(Path(path), choice.views) as data:
+        usable = _usable(data)
+        names = feature_table_names(path, choice, healthy) if data.missing else ()
         batches = (usable[i : i + _BATCH] for i in range(0, usable.size, _BATCH))
         rows: list[NDArray[np.float64]] = []
-        names: tuple[str, ...] = ()
         for part, found in in_order(
-            partial(_batch_features, data, choice, healthy), batches, jobs=jobs
+            partial(_batch_features, data, choice, healthy, names), batches, jobs=jobs
         ):
             rows += part
             names = names or found
             _same_names(path, names, found)
             if progress is not None:
                 progress(len(rows), usable.size)
-        manifest = data.manifest.iloc[usable].reset_index(drop=True)
-    return FeatureTable(names=names, values=np.array(rows), manifest=manifest)
+        manifest = data.data.manifest.iloc[usable].reset_index(drop=True)
+        lacking = {name: data.lacks(name)[usable] for name in data.missing}
+    return FeatureTable(names=names, values=np.array(rows), manifest=manifest, lacking=lacking)
+
+
+def _usable(data: JoinedSet) -> NDArray[np.intp]:
+    """Numbers of the records whose status is ok."""
+    found = np.flatnonzero((data.data.manifest["status"] == "ok").to_numpy())
+    if found.size == 0:
+        raise DataError(f"{data.path}: 0 usable records, must be > 0; see its column 'status'")
+    return found
 
 
 def feature_table_names(
@@ -405,14 +474,38 @@ def feature_table_names(
     DataError
         There is no usable record, or a feature that is named is not to be had.
     """
-    with DataSet(path) as data:
-        usable = np.flatnonzero((data.manifest["status"] == "ok").to_numpy())
-        if usable.size == 0:
-            raise DataError(f"{path}: 0 usable records, must be > 0; see its column 'status'")
-        first = data[int(usable[0])]
+    _refuse_strange(choice, path)
+    with JoinedSet(Path(path), choice.views) as data:
+        usable = _usable(data)
+        whole = usable[data.complete[usable]]
+        if whole.size == 0:
+            raise DataError(
+                f"{path}: 0 of {usable.size} records have all views, {_listed(choice.views)}, must "
+                "be > 0; join others"
+            )
+        first = data[int(whole[0])]
     choice = held_against(choice, None if healthy is None else healthy.of(first.machine))
-    layout = recording_layout(first, choice.settings)
-    return _names(layout, choice, path)
+    names: tuple[str, ...] = ()
+    for view, each in {"": first, **first.joined}.items():
+        part = choice.part(view)
+        if part is not None:
+            names += _of_view(view, _names(recording_layout(each, part.settings), part, path))
+    return names
+
+
+def _refuse_strange(choice: Choice, path: str | Path) -> None:
+    """Features of a view that nobody joined."""
+    known = {"", *(view.name for view in choice.views)}
+    strange = [name for name in choice.only or () if name.rpartition(MARK)[0] not in known]
+    if strange:
+        raise DataError(
+            f"{path}: feature {strange[0]} is of a view that is not joined, must be one of "
+            f"{_listed(choice.views)}; give --join"
+        )
+
+
+def _listed(views: Sequence[View]) -> str:
+    return ", ".join(view.name for view in views) or "(none)"
 
 
 def _names(layout: Layout, choice: Choice, path: str | Path) -> tuple[str, ...]:
@@ -434,7 +527,11 @@ def _names(layout: Layout, choice: Choice, path: str | Path) -> tuple[str, ...]:
 
 
 def _batch_features(
-    data: DataSet, choice: Choice, healthy: Healthy | None, indices: NDArray[np.intp]
+    data: JoinedSet,
+    choice: Choice,
+    healthy: Healthy | None,
+    planned: tuple[str, ...],
+    indices: NDArray[np.intp],
 ) -> tuple[list[NDArray[np.float64]], tuple[str, ...]]:
     rows: list[NDArray[np.float64]] = []
     names: tuple[str, ...] = ()
@@ -442,11 +539,21 @@ def _batch_features(
         recording = data[int(index)]
         known = None if healthy is None else healthy.of(recording.machine)
         found, values = recording_features(recording, held_against(choice, known))
+        if planned and not data.complete[index]:
+            found, values = planned, _placed(found, values, planned)
         names = names or found
         _same_names(f"{data.path}[{index}]", names, found)
         rows.append(values)
     data.close()
     return rows, names
+
+
+def _placed(
+    names: tuple[str, ...], values: NDArray[np.float64], planned: tuple[str, ...]
+) -> NDArray[np.float64]:
+    """A row with NaN for what it lacks."""
+    found = dict(zip(names, values, strict=True))
+    return np.array([found.get(name, np.nan) for name in planned])
 
 
 def recording_transfer(recording: Recording, settings: Settings = STANDARD) -> Transfer | None:

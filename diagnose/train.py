@@ -16,6 +16,7 @@ from ..datasets.recipe import recorded_scene, wear_limits
 from ..datasets.record import Attributes, DataError, DataSet
 from ..datasets.split_file import usable_sides
 from ..datasets.splits import check_no_leak, group_folds, group_split
+from ..datasets.views import MARK, JoinedSet, layout_card
 from .conformal import Calibration, Scale, fit_scale, scale_inputs
 from .estimate import Head, WearModel
 from .feature_choice import (
@@ -90,6 +91,9 @@ def train_model(
         Data set of healthy records of the same machines, by identity (recipe, seed and number, or
         declared name): the model is then referenced, and needs healthy recordings of every machine
         it is asked about.
+    choices : sequence of Choice
+        Sets of features to choose from, all of the same views; records that lack a view are left
+        out.
     progress : callable, optional
         Called with (records done, records).
 
@@ -113,7 +117,10 @@ def train_model(
         sides = None if split is None else usable_sides(data, split)
     _aim(head, target, path)  # refused before the features are computed
     _check_draws(draws, path)
+    views = choices[0].views
     if baseline is not None:
+        if views:
+            raise DataError("join and baseline must not both be given; train cold to join views")
         refuse_strangers(path, baseline)
     known = healthy_transfer(baseline, choices)
     candidates = candidates_of(path, choices, known)
@@ -123,6 +130,7 @@ def train_model(
     if baseline is not None:
         healthy, count = references(table, path, baseline, **ways)
     groups = table.manifest["group"].to_numpy()
+    whole = np.flatnonzero(table.complete)
     if sides is None:
         train, test = _split(groups, held_out, seed, path)
         check_no_leak(groups, train, test)
@@ -130,6 +138,8 @@ def train_model(
         train, test = sides.train, sides.test  # leaks are refused where it was read
         held_out = len(np.unique(groups[test])) / len(np.unique(groups))
         _check_kept(len(np.unique(groups[train])), draws, f"split {sides.name}", path)
+    train, test = np.intersect1d(train, whole), np.intersect1d(test, whole)
+    _check_kept(len(np.unique(groups[train])), draws, "what lacks no view", path)
     model = fit_model(
         table,
         train,
@@ -146,6 +156,8 @@ def train_model(
         model.card["trained_on"].update(split=sides.name, split_sha256=sides.sha256)
     if healthy is not None:
         model.card.update(baseline_records=count)
+    with JoinedSet(Path(path), views) as data:
+        model.card["views"] = {name: layout_card(one) for name, one in data.layouts.items()}
     return model, table.named(model.names), test
 
 
@@ -615,7 +627,7 @@ def _conditions(table: FeatureTable, train: NDArray[np.intp]) -> list[dict[str, 
         {"name": name, "feature": name, "unit": "Hz" if name.endswith("hz") else ""}
         | _range(table.values[train, i])
         for i, name in enumerate(table.names)
-        if name == "shaft.speed_hz" or name.endswith(".rms")
+        if name.rpartition(MARK)[2] == "shaft.speed_hz" or name.endswith(".rms")
     ]
     manifest = table.manifest.iloc[train]
     return columns + [
