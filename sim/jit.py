@@ -3,7 +3,8 @@
 numba keys a cached kernel by its own file only, so a change in a callee of another file would go
 unnoticed. Here the cache folder carries a hash of every source of ``sim`` that a kernel can see.
 What is cut or altered there is compiled anew and replaced; a folder that cannot be written costs
-compiling at every start, and one warning.
+compiling at every start, and one warning. The hash says all of a kernel of ``sim``, so that
+installations of the same sources share what one of them compiled.
 """
 
 import hashlib
@@ -20,6 +21,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
+import numpy as np
 from numba.core import serialize
 
 from .atomic import sealed, unsealed, write_whole
@@ -50,7 +52,7 @@ def cache_folder() -> Path | None:
     The base is ``$WEARSTATE_CACHE``, else ``$XDG_CACHE_HOME/wearstate``, else
     ``~/.cache/wearstate``. Folders of other sources that are older are removed.
     """
-    digest = hashlib.sha256(numba.__version__.encode())
+    digest = hashlib.sha256(f"{numba.__version__} {np.__version__}".encode())
     for source in kernel_sources(Path(__file__).parent):
         digest.update(source.read_bytes())
     try:
@@ -197,6 +199,8 @@ def kernel(function: Function) -> Function:
         return numba.njit(**_OPTIONS)(function)  # type: ignore[no-any-return]
     names = files._impl
     stamp = names.locator.get_source_stamp()
+    if Path(compiled.py_func.__code__.co_filename).parent == Path(__file__).parent:
+        place, stamp = folder / "sim", None
     files._cache_file = _SealedFiles(place, names.filename_base, stamp)
     return compiled  # type: ignore[no-any-return]
 

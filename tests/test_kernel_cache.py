@@ -1,10 +1,13 @@
 """A damaged kernel cache mends itself, with one warning; code that is not whole is never run."""
 
 import os
+import shutil
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
+from wearstate.sim import jit
 
 CODE = "from wearstate.sim.jit import sine_cosine\nprint(sine_cosine(0.5)[0])"
 SINE = "0.479425538604203"
@@ -98,3 +101,21 @@ def test_a_place_that_cannot_be_a_folder_costs_one_warning(tmp_path):
     [warning] = run(tmp_path / "file")
     assert "compiled kernels cannot be kept" in warning
     assert "WEARSTATE_CACHE" in warning
+
+
+def test_installations_of_the_same_sources_share_kernels(filled, tmp_path):
+    """Another folder and another time of the files: nothing is compiled or written again."""
+    package = Path(jit.__file__).parents[1]
+    (tmp_path / "wearstate" / "sim").mkdir(parents=True)
+    for source in (*package.glob("*.py"), *package.glob("sim/*.py")):
+        shutil.copyfile(source, tmp_path / "wearstate" / source.relative_to(package))
+    before = {path: path.stat().st_mtime_ns for path in filled.rglob("*.nb*")}
+    told = f"import sys\nsys.path.insert(0, {str(tmp_path)!r})\n{CODE}"
+    assert (
+        run(
+            filled,
+            f"{told}\nimport wearstate\nassert wearstate.__path__ == [sys.path[0] + '/wearstate']",
+        )
+        == []
+    )
+    assert {path: path.stat().st_mtime_ns for path in filled.rglob("*.nb*")} == before
