@@ -2,8 +2,10 @@
 
 import fcntl
 import os
+import pickle
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import settings
@@ -12,8 +14,21 @@ settings.register_profile("results", deadline=None)  # seconds are the business 
 settings.load_profile("results")
 
 
+DEAR = (
+    "test_same_bytes",
+    "test_evaluate",
+    "test_choices",
+    "test_kill",
+    "test_generate",
+    "test_bearing",
+    "test_cli",
+)
+"""Files of the longest tests: begun first, so that no process is left alone with one of them."""
+
+
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Campaigns run where they are asked for by ``-m slow``."""
+    """Dear files first; campaigns run where they are asked for by ``-m slow``."""
+    items.sort(key=lambda item: DEAR.index(item.path.stem) if item.path.stem in DEAR else len(DEAR))
     if "slow" in config.option.markexpr:
         return
     for item in items:
@@ -58,12 +73,20 @@ def small_set(common: Path) -> Path:
     )
 
 
-@pytest.fixture(scope="session")
-def small_model(common: Path, small_set: Path) -> Path:
-    """Model file trained on `small_set`."""
-    from wearstate.diagnose.modelfile import save_model
+@pytest.fixture(scope="module")
+def small_trained(common: Path, small_set: Path) -> Any:
+    """What `train_model` returns of `small_set`: model, feature table and rows held out."""
     from wearstate.diagnose.train import train_model
 
-    return made_once(
-        common / "model.wsm", lambda path: save_model(train_model(small_set, seed=0)[0], path)
-    )
+    def train(path: Path) -> None:
+        path.write_bytes(pickle.dumps(train_model(small_set, seed=0)))
+
+    return pickle.loads(made_once(common / "trained.pickle", train).read_bytes())
+
+
+@pytest.fixture(scope="module")
+def small_model(common: Path, small_trained: Any) -> Path:
+    """Model file trained on `small_set`."""
+    from wearstate.diagnose.modelfile import save_model
+
+    return made_once(common / "model.wsm", lambda path: save_model(small_trained[0], path))

@@ -4,39 +4,42 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 bin=$(cd "$1" && pwd)
+unset PYTHONDONTWRITEBYTECODE  # every process would compile every module that it imports
 
 "$bin/ruff" check .
 "$bin/ruff" format --check .
-bash tests/types.sh "$bin"
 
-# The wheel, in an environment that has nothing else: a forgotten package or file shows here.
 scratch=$(mktemp -d)
-trap 'rm -rf "$scratch"' EXIT
+trap 'kill $(jobs -p) 2> /dev/null || true; wait; rm -rf "$scratch"' EXIT
+
+ended() {  # NAME PROCESS: what a process in the background said, where it failed
+  wait "$2" || { cat "$scratch/$1.log"; echo "$1 fails"; return 1; }
+}
+bash tests/types.sh "$bin" > "$scratch/types.log" 2>&1 & types=$!
+
+# The wheel, in environments that have nothing else: a forgotten package or file shows here. One has
+# the lowest versions that pyproject.toml allows, the other the newest; each does the whole job.
 "$bin/python" -m build --wheel --outdir "$scratch" . > "$scratch/build.log" 2>&1 \
   || { cat "$scratch/build.log"; exit 1; }
-"$bin/python" -m venv "$scratch/env"
-"$scratch/env/bin/python" -m pip install --quiet --disable-pip-version-check "$scratch"/*.whl
-
-# The whole job with the lowest versions that pyproject.toml allows, beside the same with the newest.
-"$bin/uv" venv --quiet --python "$bin/python" "$scratch/lowest"
-"$bin/uv" pip install --quiet --python "$scratch/lowest/bin/python" --resolution lowest-direct \
-  "$scratch"/*.whl
-job() {
-  "$scratch/$1/bin/wearstate" demo --folder "$scratch/demo-$1" -j 1 > "$scratch/$1.log" 2>&1 \
-    || { cat "$scratch/$1.log"; echo "demo fails with the $2 versions"; return 1; }
+whole_job() {  # NAME RESOLUTION
+  "$bin/uv" venv --quiet --python "$bin/python" "$scratch/$1" \
+    && "$bin/uv" pip install --quiet --python "$scratch/$1/bin/python" --resolution "$2" \
+      "$scratch"/*.whl \
+    && exec "$scratch/$1/bin/wearstate" demo --folder "$scratch/demo-$1" -j 1
 }
-job lowest lowest & lowest=$!
-job env newest
-wait "$lowest"
-
+whole_job lowest lowest-direct > "$scratch/lowest.log" 2>&1 & lowest=$!
+whole_job newest highest > "$scratch/newest.log" 2>&1 & newest=$!
+ended types "$types"
+ended newest "$newest"
 (
   cd "$scratch"
-  env/bin/wearstate --version
-  env/bin/wearstate scene list
-  env/bin/wearstate simulate bilge-pump --set "duration=0.4 s" -o rec.h5
-  env/bin/wearstate info rec.h5
-  env/bin/wearstate verify
+  newest/bin/wearstate --version
+  newest/bin/wearstate scene list
+  newest/bin/wearstate simulate bilge-pump --set "duration=0.4 s" -o rec.h5
+  newest/bin/wearstate info rec.h5
+  newest/bin/wearstate verify
 )
+ended lowest "$lowest"
 
-# a file a process, so that what its tests share is made once
-"$bin/pytest" -q -n 2 --dist loadfile --durations 15
+# a file a process, so that what its tests share is made once; dear files first (tests/conftest.py)
+"$bin/pytest" -q -n 2 --dist loadfile --no-loadscope-reorder --durations 15

@@ -486,7 +486,7 @@ def test_a_large_file_is_imported_with_flat_memory(tmp_path):
     assert peak < 48e6
 
 
-def test_a_simulated_set_comes_back_with_the_same_features(small_set, tmp_path):
+def test_a_simulated_set_comes_back_with_the_same_features(small_set, small_trained, tmp_path):
     from wearstate.diagnose.tabulate import feature_table
     from wearstate.diagnose.train import train_model
 
@@ -510,7 +510,7 @@ def test_a_simulated_set_comes_back_with_the_same_features(small_set, tmp_path):
     assert_array_equal(after.values, before.values)  # a float WAV keeps every bit
     for column in ("group", "grade", CLEARANCE, "signal_crc32"):
         assert_array_equal(after.manifest[column], before.manifest[column])
-    ours, theirs = train_model(small_set)[0], train_model(path)[0]
+    ours, theirs = small_trained[0], train_model(path)[0]
     assert_array_equal(theirs.predict(after.values), ours.predict(before.values))
     assert (theirs.notice, ours.notice != "") == ("", True)  # origin: measured
 

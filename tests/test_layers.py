@@ -67,13 +67,14 @@ HEAVY = {
 """Library -> modules or packages that may import it at module level."""
 
 
+@pytest.fixture(scope="module")
 def sources():
-    for package in PACKAGES:
-        for path in sorted((ROOT / package).glob("*.py")):
-            yield f"{package}.{path.stem}", ast.parse(path.read_text(encoding="utf-8"))
-
-
-SOURCES = dict(sources())
+    """Every file of the library, read: 'package.module' -> its syntax tree."""
+    return {
+        f"{package}.{path.stem}": ast.parse(path.read_text(encoding="utf-8"))
+        for package in PACKAGES
+        for path in sorted((ROOT / package).glob("*.py"))
+    }
 
 
 def targets(name, node):
@@ -147,18 +148,18 @@ def test_the_reader_sees_a_forbidden_import():
     assert violations("datasets.generate", ast.parse("from ..sim.scene import load_scene")) == []
 
 
-@pytest.mark.parametrize("name", SOURCES)
-def test_arrows_point_down(name):
-    assert violations(name, SOURCES[name]) == []
+def test_arrows_point_down(sources):
+    assert {name.split(".")[0] for name in sources} == set(PACKAGES)
+    assert [each for name, tree in sources.items() for each in violations(name, tree)] == []
 
 
-def test_every_file_of_sim_has_a_floor():
-    stems = {name.split(".")[1] for name in SOURCES if name.startswith("sim.")} - {"__init__"}
+def test_every_file_of_sim_has_a_floor(sources):
+    stems = {name.split(".")[1] for name in sources if name.startswith("sim.")} - {"__init__"}
     assert stems <= set().union(*SIM_FLOORS)
 
 
-def test_the_kernel_cache_is_keyed_by_all_that_a_kernel_can_see():
-    sim = {name: tree for name, tree in SOURCES.items() if name.startswith("sim.")}
+def test_the_kernel_cache_is_keyed_by_all_that_a_kernel_can_see(sources):
+    sim = {name: tree for name, tree in sources.items() if name.startswith("sim.")}
     graph = {name: set(filter(ours, imports_of(name, tree))) for name, tree in sim.items()}
     seen, queue = set(), [name for name, targets in graph.items() if "sim.jit" in targets]
     while queue:
@@ -183,21 +184,25 @@ def reaches_itself(name, graph):
     return False
 
 
-def test_no_import_circles():
+def test_no_import_circles(sources):
     assert reaches_itself("a", {"a": {"b"}, "b": {"c"}, "c": {"a"}})
-    graph = {name: set(filter(ours, imports_of(name, tree))) for name, tree in SOURCES.items()}
+    graph = {name: set(filter(ours, imports_of(name, tree))) for name, tree in sources.items()}
     assert [name for name in graph if reaches_itself(name, graph)] == []
 
 
-@pytest.mark.parametrize("name", SOURCES)
-def test_imports_inside_the_library_are_relative(name):
-    absolute = [
-        ast.unparse(node)
-        for node in ast.walk(SOURCES[name])
+def absolute_imports(name, tree):
+    return [
+        f"{name}: {ast.unparse(node)}"
+        for node in ast.walk(tree)
         if (isinstance(node, ast.ImportFrom) and (node.module or "").startswith("wearstate"))
         or (isinstance(node, ast.Import) and any("wearstate" in a.name for a in node.names))
     ]
-    assert absolute == []
+
+
+def test_imports_inside_the_library_are_relative(sources):
+    absolute = ast.parse("def f():\n    import wearstate.sim\nfrom .jit import kernel")
+    assert absolute_imports("sim.scene", absolute) == ["sim.scene: import wearstate.sim"]
+    assert [each for name, tree in sources.items() for each in absolute_imports(name, tree)] == []
 
 
 def heavy_imports(name, tree):
@@ -207,25 +212,24 @@ def heavy_imports(name, tree):
             library = target.split(".")[0]
             allowed = HEAVY.get(library)
             if allowed is not None and not {name, name.split(".")[0]} & allowed:
-                found.append(target)
+                found.append(f"{name} -> {target}")
     return found
 
 
 def test_the_reader_sees_a_heavy_import():
-    assert heavy_imports("sim.scene", ast.parse("import pandas as pd")) == ["pandas"]
+    assert heavy_imports("sim.scene", ast.parse("import pandas as pd")) == ["sim.scene -> pandas"]
     guarded = ast.parse("try:\n    import h5py\nfinally:\n    1")
-    assert heavy_imports("sim.scene", guarded) == ["h5py"]
+    assert heavy_imports("sim.scene", guarded) == ["sim.scene -> h5py"]
     assert heavy_imports("sim.scene", ast.parse("def f():\n    import pandas")) == []
 
 
-@pytest.mark.parametrize("name", SOURCES)
-def test_heavy_libraries_stay_where_they_belong(name):
-    assert heavy_imports(name, SOURCES[name]) == []
+def test_heavy_libraries_stay_where_they_belong(sources):
+    assert [each for name, tree in sources.items() for each in heavy_imports(name, tree)] == []
 
 
-@pytest.mark.parametrize("name", [name for name in SOURCES if name.endswith("__init__")])
-def test_packages_hold_no_code(name):
-    [docstring] = SOURCES[name].body
+@pytest.mark.parametrize("package", PACKAGES)
+def test_packages_hold_no_code(package, sources):
+    [docstring] = sources[f"{package}.__init__"].body
     assert isinstance(docstring, ast.Expr)
     assert isinstance(docstring.value, ast.Constant)
 

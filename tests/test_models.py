@@ -20,8 +20,8 @@ from wearstate.sim.wear import grade
 
 
 @pytest.fixture(scope="module")
-def trained(small_set):
-    return train_model(small_set, seed=0)
+def trained(small_trained):
+    return small_trained
 
 
 # --- grades -------------------------------------------------------------------------------------
