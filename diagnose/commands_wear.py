@@ -392,6 +392,18 @@ def _judge_across(
 @join_option
 @click.option("-o", "--output", type=PATH, help="HTML page to write.")
 @click.option("--machine", metavar="KIND", help="Kind of machine, for its ISO zone.")
+@click.option(
+    "--scene",
+    metavar="SCENE|TOML",
+    help="The machine's nameplate: geometry, load, oil. A data set's own by default.",
+)
+@click.option(
+    "--set",
+    "pairs",
+    multiple=True,
+    metavar="PATH=VALUE",
+    help="Replace a value of the nameplate, as load.static='4 kN +- 5 %'.",
+)
 @click.option("--trend", is_flag=True, help="Of many recordings: severity over time, life left.")
 @click.option(
     "--dates",
@@ -417,6 +429,8 @@ def report(
     healthy: Path | None,
     output: Path | None,
     machine: str | None,
+    scene: str | None,
+    pairs: Sequence[str],
     fail_on: str | None,
     force: bool,
     as_json: bool,
@@ -433,6 +447,7 @@ def report(
     from .bundle import kind_of
     from .healthy import Baselines
     from .modelfile import load_model
+    from .nameplate import nameplate_of
     from .ownfile import CLASS_MODEL
     from .report import known_machine
 
@@ -445,6 +460,8 @@ def report(
             "--baseline": healthy,
             "-o": output,
             "--machine": machine,
+            "--scene": scene,
+            "--set": pairs,
             "--fail-on": fail_on,
             "--join": given["joined"],
             "--trend": given["trend"],
@@ -465,9 +482,10 @@ def report(
         raise click.UsageError("--trend and --dates are for a folder or a data set of many records")
     if views and source.is_dir():
         raise click.UsageError("--join completes a recording or a data set: name one, not a folder")
-    told = _Told(
-        source, model_file, model, baselines, output, machine, as_json, force, given, views
-    )
+    usual = model.card["trained_on"]["scene"]
+    plate = nameplate_of(source, scene, overrides_of(pairs), usual=usual)
+    ways = (output, machine, as_json, force, given, views)
+    told = _Told(source, model_file, model, baselines, plate, *ways)
     verdicts = _report_many(told) if many else _report_one(told)
     raise click.exceptions.Exit(report_exit(verdicts, fail_on))
 
@@ -522,6 +540,7 @@ class _Told(NamedTuple):
     model_file: Path
     model: Any
     baselines: Any
+    plate: Any
     output: Path | None
     machine: str | None
     as_json: bool
@@ -555,6 +574,7 @@ def _report_one(told: _Told) -> list[_Verdict]:
         estimate,
         machine=told.machine,
         baseline=baseline,
+        plate=told.plate,
         files={"recording": told.source, "model": told.model_file},
     )
     if told.output is not None:
@@ -565,7 +585,7 @@ def _report_one(told: _Told) -> list[_Verdict]:
         table["html"] = str(told.output)
     text = report_text(table) + (f"\nPage        {told.output}" if told.output else "")
     click.echo(json_text(table) if told.as_json else text)
-    return [(estimate.verdict, estimate.grade)]
+    return [(table["estimate"]["verdict"], estimate.grade)]
 
 
 def _report_many(told: _Told) -> list[_Verdict]:
@@ -597,6 +617,7 @@ def _report_many(told: _Told) -> list[_Verdict]:
             told.model,
             model_file=told.model_file,
             baselines=told.baselines,
+            plate=told.plate,
             dates=dates,
             growth=given["growth"],
             seed=given["seed"],
@@ -606,7 +627,13 @@ def _report_many(told: _Told) -> list[_Verdict]:
         if told.output is not None:
             from .report_page import batch_html
 
-            page = batch_html(batch, told.model, machine=told.machine, baselines=told.baselines)
+            page = batch_html(
+                batch,
+                told.model,
+                machine=told.machine,
+                baselines=told.baselines,
+                plate=told.plate,
+            )
             save_page(page, told.output, force=told.force)
     if not told.as_json:
         click.echo(batch_text(batch) + (f"\nPage        {told.output}" if told.output else ""))

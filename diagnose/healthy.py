@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ..datasets.record import DataError, DataSet, Recording
 from ..features.transfer import FrfReference
 from .feature_choice import choice_in
+from .probe_means import ProbeMeans, probe_means
 from .quality import layout_faults, sample_faults
 from .tabulate import (
     USUAL,
@@ -47,12 +48,15 @@ class Baseline:
         File or files, for messages.
     transfer : FrfReference or None
         Mean of their transfer functions, where the model is told against them.
+    positions : tuple of ProbeMeans
+        Where the shaft ran in each; empty without proximity probes.
     """
 
     features: Float
     recordings: int
     source: str
     transfer: FrfReference | None = None
+    positions: tuple[ProbeMeans, ...] = ()
 
 
 def referenced_rows(rows: Float, baseline: Float) -> Float:
@@ -254,7 +258,14 @@ def baseline_of(
             "use recordings with the model's channels and rate"
         )
     mean = np.mean(rows, axis=0)
-    return Baseline(features=mean, recordings=len(rows), source=source, transfer=reference)
+    positions = tuple(means for means in map(probe_means, sound) if means.names)
+    return Baseline(
+        features=mean,
+        recordings=len(rows),
+        source=source,
+        transfer=reference,
+        positions=positions,
+    )
 
 
 class Baselines:

@@ -16,8 +16,10 @@ from ..sim.atomic import write_whole
 from .advice import advise, touched_grades
 from .estimate import Estimate, WearModel, input_faults
 from .feature_choice import choice_in, words_of
+from .film_verdict import film_estimate, film_table, with_film
 from .grades import GRADE_NAMES
 from .healthy import Baseline
+from .nameplate import Nameplate
 from .signal_view import View
 from .trend import Outlook
 
@@ -46,6 +48,7 @@ def report_table(
     *,
     machine: str | None = None,
     baseline: Baseline | None = None,
+    plate: Nameplate | None = None,
     outlook: Outlook | None = None,
     files: Mapping[str, Path] | None = None,
 ) -> dict[str, Any]:
@@ -61,6 +64,8 @@ def report_table(
         Kind of machine for its ISO zone, a key of :data:`wearstate.features.iso.KINDS`.
     baseline : Baseline, optional
         That the estimate was given.
+    plate : Nameplate, optional
+        Of the machine, for the estimate by its film equilibrium.
     outlook : Outlook, optional
         Of the machine's trend, for how soon to act.
     files : mapping, optional
@@ -69,7 +74,8 @@ def report_table(
     Returns
     -------
     dict
-        ``schema_version``, ``headline``, ``recording``, ``estimate``, ``grades_text``,
+        ``schema_version``, ``headline``, ``recording``, ``estimate``, ``film`` (what the film
+        equilibrium says, None where it says nothing of this machine), ``grades_text``,
         ``advice``, ``limits``, ``iso``, ``outlook``, ``evidence_summary``, ``evidence``,
         ``baseline_note``, ``notice``, ``provenance``. Lengths in metres, speeds in revolutions
         per second.
@@ -81,11 +87,14 @@ def report_table(
     """
     card = model.card
     quantity = quantity_name(card["severity"])
+    film = film_estimate(recording, card["severity"], plate, baseline)
+    estimate = with_film(estimate, film)
     return {
         "schema_version": REPORT_SCHEMA,
         "headline": headline(estimate),
         "recording": _recording_table(recording, card),
         "estimate": estimate.as_dict(),
+        "film": film_table(film, plate),
         "grades_text": possible_words(estimate, card["grade_edges_m"]),
         "advice": asdict(advise(estimate, quantity, card["grade_edges_m"], outlook)),
         "limits": limits_table(card),

@@ -21,8 +21,11 @@ from ..datasets.sources import READERS, SourceOptions
 from ..datasets.views import JoinedSet, View
 from .advice import Advice, advise
 from .estimate import Estimate, ModelError, WearModel
+from .film_clearance import FilmEstimate
+from .film_verdict import film_estimate, film_table, with_film
 from .grades import GRADE_NAMES, WARNING_GRADE
 from .healthy import Baselines
+from .nameplate import Nameplate
 from .report import NO_REFERENCE, REPORT_SCHEMA, headline, limits_table, model_table, quantity_name
 from .tabulate import Progress
 from .trend import Growth, Outlook, Trend, date_in, fit_trend, hours_of, read_dates
@@ -355,6 +358,7 @@ def judge_all(
     *,
     model_file: Path | None = None,
     baselines: Baselines | None = None,
+    plate: Nameplate | None = None,
     dates: str | None = None,
     growth: Growth = "linear",
     seed: int = 0,
@@ -373,6 +377,8 @@ def judge_all(
         For its hash.
     baselines : Baselines, optional
         Of the machines.
+    plate : Nameplate, optional
+        Of the machines, for the estimate by their film equilibrium.
     dates : str, optional
         As of :func:`times_of`: a trend is wanted.
     growth : {"linear", "log"}
@@ -398,11 +404,11 @@ def judge_all(
     times = (None,) * len(items) if dates is None else times_of(items, dates)
     rows = []
     for number, (item, time) in enumerate(zip(items, times, strict=True)):
-        estimate = _judged(item, model, baselines)
+        estimate, film = _judged(item, model, baselines, plate)
         advice = _advice(estimate, model)
         rows.append(_row(number, item, time, estimate, advice))
         if tell is not None:
-            tell(_line(item, time, estimate, advice))
+            tell(_line(item, time, estimate, advice) | {"film": film_table(film, plate)})
         if progress is not None:
             progress(number + 1, len(items))
     clock = dates is not None and clock_is_operating(dates)
@@ -427,16 +433,20 @@ def judge_all(
     )
 
 
-def _judged(item: Item, model: WearModel, baselines: Baselines | None) -> Estimate:
+def _judged(
+    item: Item, model: WearModel, baselines: Baselines | None, plate: Nameplate | None
+) -> tuple[Estimate, FilmEstimate | None]:
     """A recording that cannot be read is unusable, and does not stop the others."""
     try:
         recording = item.load()
         baseline = None if baselines is None else baselines.of(recording)
-        return model.estimate(recording, baseline)
+        film = film_estimate(recording, model.card["severity"], plate, baseline)
+        return with_film(model.estimate(recording, baseline), film), film
     except ModelError:
         raise  # would be so for each of them
     except (ValueError, OSError) as error:
-        return Estimate(verdict="unusable", reasons=(fault_of(item, error),), mode=model.mode)
+        reasons = (fault_of(item, error),)
+        return Estimate(verdict="unusable", reasons=reasons, mode=model.mode), None
 
 
 def fault_of(item: Item, error: Exception) -> str:

@@ -8,6 +8,7 @@ from ..datasets.record import DataError, Recording
 from .advice import brief_words
 from .estimate import Estimate, WearModel
 from .healthy import Baseline, Baselines
+from .nameplate import Nameplate
 from .page import render
 from .report import (
     feature_words,
@@ -84,6 +85,7 @@ def batch_html(
     *,
     machine: str | None = None,
     baselines: Baselines | None = None,
+    plate: Nameplate | None = None,
 ) -> str:
     """The report on many recordings: counts, trends, a table, and the most urgent in full.
 
@@ -96,6 +98,8 @@ def batch_html(
         As of :func:`wearstate.diagnose.report.report_table`.
     baselines : Baselines, optional
         That the estimates were given.
+    plate : Nameplate, optional
+        Of the machines, as of :func:`wearstate.diagnose.report.report_table`.
 
     Returns
     -------
@@ -117,7 +121,7 @@ def batch_html(
         ],
         untold=[_told(batch, name) for name in order[_MOST_TRENDS:]],
         assumptions=sorted({outlook.assumption for outlook in outlooks}),
-        details=_details(batch, model, machine, baselines),
+        details=_details(batch, model, machine, baselines, plate),
         brief=brief_words,
         bar=lambda row: _bar(row, batch.limits["condemning_limit_m"]),
         short=lambda text: textwrap.shorten(text, _MOST_LETTERS, placeholder=" …"),
@@ -156,7 +160,11 @@ def _bar(row: Row, limit: float) -> str:
 
 
 def _details(
-    batch: Batch, model: WearModel, machine: str | None, baselines: Baselines | None
+    batch: Batch,
+    model: WearModel,
+    machine: str | None,
+    baselines: Baselines | None,
+    plate: Nameplate | None,
 ) -> list[dict[str, Any]]:
     """Tables and pictures of the most urgent graded recordings, read once more."""
     found = []
@@ -169,7 +177,13 @@ def _details(
             continue  # it has gone since
         outlook = batch.outlook_of(row)
         table = report_table(
-            recording, model, estimate, machine=machine, baseline=baseline, outlook=outlook
+            recording,
+            model,
+            estimate,
+            machine=machine,
+            baseline=baseline,
+            plate=plate,
+            outlook=outlook,
         )
         found.append(
             {"table": table, "pictures": _few(table, recording, model, estimate, baseline)}

@@ -41,6 +41,8 @@ def report_text(table: Mapping[str, Any]) -> str:
         ]
         if table["grades_text"]:
             lines.append(("Possible", table["grades_text"]))
+    if table["film"] is not None:
+        lines.append(("Film", f"equilibrium: {table['film']['text']}"))
     lines.append(("Advice", advice["sentence"]))
     if advice["horizon"]:
         lines.append(("How soon", f"{advice['horizon']} ({advice['basis']})"))

@@ -11,6 +11,7 @@ from wearstate.datasets.recipe import clearances, load_recipe, sample_records, w
 from wearstate.datasets.record import DataSet
 from wearstate.diagnose.cli import cli
 from wearstate.diagnose.evaluate import score
+from wearstate.diagnose.modelfile import save_model
 from wearstate.diagnose.plots import plot_simulation
 from wearstate.diagnose.report import report_table
 from wearstate.diagnose.report_page import report_html
@@ -155,6 +156,27 @@ def test_the_command_line_goes_all_the_way(data, tmp_path):
     assert page.stat().st_size > 20_000
     assert "orbit.centreline.x" in features.read_text().splitlines()[0]
     assert "diametral_clearance_bearing" in run("info", data).stdout
+
+
+def test_the_film_equilibrium_stands_beside_the_model(trained, data, tmp_path):
+    """Without a word of a person, as the data set holds its scene; and against a wrong load."""
+    model = tmp_path / "bearing.wsm"
+    save_model(trained[0], model)
+    one = ["report", data, "--record", 4, "--model", model]
+    with DataSet(data) as found:
+        truth = found.manifest[CLEARANCE].iloc[4]
+    table = json.loads(run(*one, "--json").stdout)
+    # probes set to 5 um, sensitivities within 5 %
+    assert table["film"]["severity"] == pytest.approx(truth, rel=0.15)
+    assert table["film"]["low"] < truth < table["film"]["high"]
+    assert "Film        equilibrium: 0." in run(*one).stdout
+    wrong = json.loads(run(*one, "--set", "load.static=0 N", "--json").stdout)
+    assert wrong["film"]["severity"] is None or wrong["estimate"]["verdict"] == "caution"
+    whole = run("report", data, "--model", model, "--json").stdout.splitlines()
+    assert json.loads(whole[4])["film"] == table["film"]
+    page = tmp_path / "all.html"
+    run("report", data, "--model", model, "--scene", "journal-bearing", "-o", page)
+    assert "Film equilibrium:" in page.read_text(encoding="utf-8")
 
 
 def test_a_pump_recording_lacks_what_a_bearing_model_needs(trained, tmp_path):

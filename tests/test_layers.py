@@ -32,6 +32,7 @@ SIM_FLOORS = [
     {"tearing", "pump_push"},
     {"crank_setup", "shaft_push"},
     {"slider_crank", "orbit", "casing", "shaft_film", "shaft_response"},
+    {"rest_curve"},
     {"impedance", "bearing", "film_mass", "contact", "hydraulics", "frf_table"},
     {"calibration", "jacking"},
     {"rotor", "alignment"},

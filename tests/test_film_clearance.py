@@ -1,0 +1,243 @@
+"""The clearance by the static film equilibrium: on places made by the closed form, and on runs."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+from wearstate.datasets.generate import save_solution
+from wearstate.datasets.record import DataError, DataSet
+from wearstate.diagnose.estimate import Estimate
+from wearstate.diagnose.film_clearance import (
+    Doubts,
+    FilmEstimate,
+    JournalRun,
+    film_clearance,
+)
+from wearstate.diagnose.film_verdict import (
+    disagree,
+    film_estimate,
+    film_table,
+    with_film,
+)
+from wearstate.diagnose.healthy import Baseline
+from wearstate.diagnose.nameplate import Nameplate, nameplate_of
+from wearstate.diagnose.probe_means import probe_means
+from wearstate.sim.assemble import simulate
+from wearstate.sim.film import FilmGeometry
+from wearstate.sim.rest_curve import rest_curve
+from wearstate.sim.scene import load_scene
+from wearstate.sim.sensor import Channel
+
+ANGLES = (math.radians(225), math.radians(135))
+CURVE = rest_curve(FilmGeometry(length_to_diameter=0.6), "short")
+AS_NEW = (0.0914e-3, 0.1905e-3)
+CLEARANCE = "diametral_clearance_bearing_m"
+
+
+def placed(clearance, *, load=(6e3, 0.0), force=7e-5, offset=(0.0, 0.0), **changes):
+    """A run of a journal at rest, by the short film."""
+    radial = clearance / 2
+    place = radial * CURVE.position(np.array(load) * radial**2 / force)
+    towards = [place @ (math.cos(a), math.sin(a)) for a in ANGLES]
+    known = {"swing": 1e-6, "load": load, "film_force": force, **changes}
+    return JournalRun(readings=np.add(towards, offset), **known)
+
+
+@pytest.mark.parametrize("clearance", [0.1e-3, 0.2e-3, 0.36e-3])
+@pytest.mark.parametrize("load", [(6e3, 0.0), (1e3, 5e3), (980.0, 0.0)])
+def test_a_place_gives_its_clearance(clearance, load):
+    tight = Doubts(load=1e-4, viscosity=1e-4, offset=1e-8, gain=1e-4)
+    found = film_clearance(placed(clearance, load=load), CURVE, ANGLES, AS_NEW, doubts=tight)
+    # the prior of the clearance is a decade wide, and pulls by some parts in 1e4
+    assert found.severity == pytest.approx(clearance, rel=2e-3)
+    assert found.low < clearance < found.high
+
+
+def test_what_is_less_known_makes_the_interval_wider():
+    run = placed(0.2e-3)
+    usual = film_clearance(run, CURVE, ANGLES, AS_NEW)
+    for name in ("load", "viscosity", "offset", "gain"):
+        doubts = Doubts(**{name: 3 * getattr(Doubts(), name)})
+        wider = film_clearance(run, CURVE, ANGLES, AS_NEW, doubts=doubts)
+        assert wider.high / wider.low > 1.005 * usual.high / usual.low, name
+
+
+def test_an_interval_keeps_its_promise_where_the_told_values_are_off_by_their_doubts():
+    """Of 200 machines 90 % within four standard errors of a share, and no wider than it must be."""
+    rng, doubts, covered = np.random.default_rng(1), Doubts(), []
+    for _ in range(200):
+        clearance = np.exp(rng.uniform(math.log(0.12e-3), math.log(0.36e-3)))
+        load, force = 6e3, 7e-5
+        true = placed(
+            clearance,
+            load=(load * math.exp(doubts.load * rng.standard_normal()), 0.0),
+            force=force * math.exp(doubts.viscosity * rng.standard_normal()),
+            offset=doubts.offset * rng.standard_normal(2),
+        )
+        readings = true.readings * np.exp(doubts.gain * rng.standard_normal(2))
+        told = JournalRun(readings=readings, swing=1e-6, load=(load, 0.0), film_force=force)
+        found = film_clearance(told, CURVE, ANGLES, AS_NEW)
+        if not found.reason:
+            covered.append(found.low <= clearance <= found.high)
+    assert len(covered) > 190
+    assert abs(np.mean(covered) - 0.9) < 4 * math.sqrt(0.9 * 0.1 / len(covered))
+
+
+def test_healthy_recordings_take_an_offset_away():
+    off = (-20e-6, -20e-6)
+    run = placed(0.25e-3, offset=off)
+    healthy = [
+        placed(0.1e-3, offset=off, measured=0.1e-3, load=(load, 0.0)) for load in (5e3, 6e3, 7e3)
+    ]
+    alone = film_clearance(run, CURVE, ANGLES, AS_NEW)
+    told = film_clearance(run, CURVE, ANGLES, AS_NEW, healthy=healthy)
+    assert alone.severity is None or abs(alone.severity - 0.25e-3) > 20e-6
+    assert told.severity == pytest.approx(0.25e-3, rel=0.02)
+    assert told.healthy == 3
+
+
+def test_an_unloaded_journal_tells_nothing():
+    run = JournalRun(readings=np.zeros(2), swing=1e-6, load=(0.0, 0.0), film_force=7e-5)
+    assert "load is 0 N, must be > 0" in film_clearance(run, CURVE, ANGLES, AS_NEW).reason
+    light = placed(0.1e-3, load=(50.0, 0.0))
+    assert "loaded too lightly" in film_clearance(light, CURVE, ANGLES, AS_NEW).reason
+
+
+def test_a_whirl_and_a_contradiction_are_said():
+    whirling = placed(0.2e-3, swing=50e-6)
+    assert "a whirling journal" in film_clearance(whirling, CURVE, ANGLES, AS_NEW).reason
+    turned = placed(0.2e-3, load=(0.0, 6e3))
+    wrong = JournalRun(
+        readings=turned.readings, swing=1e-6, load=(6e3, 0.0), film_force=turned.film_force
+    )
+    assert "no clearance puts the journal" in film_clearance(wrong, CURVE, ANGLES, AS_NEW).reason
+
+
+# --- from a recording
+
+
+SHORT = {"film.rung": "short", "duration": 0.2, "bearing.diametral_clearance": 0.22e-3}
+
+
+def recorded(path, changes, seed=1):
+    scene = load_scene("journal-bearing", {**SHORT, **changes})
+    save_solution(scene, simulate(scene, seed=seed), path, seed=seed)
+    with DataSet(path) as data:
+        return data[0]
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"load.static": 0.0},
+        {"load.static": 0.0, "load.static_across": 5e3},
+        {"bearing.length": 0.084},
+        {"oil.viscosity": 0.06},
+    ],
+)
+def test_every_condition_that_is_told_is_taken_into_account(tmp_path, changes):
+    recording = recorded(tmp_path / "run.h5", changes)
+    plate = nameplate_of(tmp_path / "run.h5", None, {})
+    found = film_estimate(recording, CLEARANCE, plate)
+    # the mean of an orbit is not quite the place of rest
+    assert found.severity == pytest.approx(0.22e-3, rel=0.02)
+    # what a person sets goes before the manifest, and is believed
+    usual = nameplate_of(None, "journal-bearing", {"load.static": 5e3, "oil.viscosity": 0.03})
+    believed = film_estimate(recording, CLEARANCE, usual)
+    assert believed.severity is None or abs(believed.severity / 0.22e-3 - 1) > 0.05
+
+
+def test_a_declared_offset_is_taken_out_and_healthy_recordings_find_one(tmp_path):
+    off = {f"sensors.{i}.offset": -20e-6 for i in range(2)}
+    recording = recorded(tmp_path / "run.h5", off)
+    told = nameplate_of(tmp_path / "run.h5", None, {})
+    assert film_estimate(recording, CLEARANCE, told).severity == pytest.approx(0.22e-3, rel=0.02)
+    plate = nameplate_of(None, "journal-bearing", {"film.rung": "short"})
+    new = [
+        recorded(tmp_path / f"{speed}.h5", {**off, "drive.speed": speed, **NEW})
+        for speed in (45.0, 50.0, 55.0)
+    ]
+    healthy = Baseline(
+        features=np.zeros(1), recordings=3, source="", positions=tuple(map(probe_means, new))
+    )
+    found = film_estimate(recording, CLEARANCE, plate, healthy)
+    assert found.severity == pytest.approx(0.22e-3, rel=0.02)
+    assert found.healthy == 3
+
+
+NEW = {"bearing.diametral_clearance": 0.1e-3}
+
+
+def test_what_bars_an_estimate_is_named(tmp_path):
+    recording = recorded(tmp_path / "run.h5", {})
+    scarred = nameplate_of(
+        None, "journal-bearing", {"bearing.scar_depth": 1e-5, "film.rung": "direct"}
+    )
+    assert "the bore has a scar" in film_estimate(recording, CLEARANCE, scarred).reason
+    plate = Nameplate(scene=load_scene("journal-bearing"))
+    probe = Channel(name="gap", unit="m", quantity="displacement")
+    strange = recording.__class__(
+        signal=recording.signal[:1], sample_rate=5120.0, channels=(probe,), row={"speed_hz": 50.0}
+    )
+    assert "probes gap are none of" in film_estimate(strange, CLEARANCE, plate).reason
+    assert film_estimate(recording, "scar_depth_bearing_m", plate) is None
+    assert film_estimate(recording, CLEARANCE, None) is None
+
+
+# --- the nameplate
+
+
+def test_uncertainties_come_with_the_values():
+    plate = nameplate_of(
+        None,
+        "journal-bearing",
+        {"load.static": "4 kN ± 12 %", "sensors.1.offset": "3 um +- 2 um"},
+    )
+    assert (plate.scene.load.static, plate.scene.sensors[1].offset) == (4000.0, 3e-6)
+    assert plate.doubts == Doubts(load=0.12, offset=2e-6)
+    with pytest.raises(DataError, match="takes no uncertainty"):
+        nameplate_of(None, "journal-bearing", {"bearing.length": "60 mm +- 1 %"})
+    with pytest.raises(DataError, match="in per cent"):
+        nameplate_of(None, "journal-bearing", {"load.static": "4 kN +- 1 kN"})
+
+
+def test_oil_is_as_uncertain_as_its_temperature():
+    warm = nameplate_of(None, "propulsion-shaft", {"oil.temperature": "318.15 K +- 3 K"})
+    hot = load_scene("propulsion-shaft", {"oil.temperature": 321.15}).oil.dynamic_viscosity
+    expected = math.log(warm.scene.oil.dynamic_viscosity / hot)
+    assert warm.doubts.viscosity == pytest.approx(expected, rel=1e-9)
+    assert 0.1 < expected < 0.2
+
+
+def test_the_day_goes_before_the_nameplate_and_a_person_before_the_day():
+    plate = nameplate_of(None, "journal-bearing", {"load.static": 4e3})
+    day = plate.on_the_day({"static_load_n": 6e3, "viscosity_pa_s": 0.05, "thrust_n": 1.0}, 40.0)
+    assert (day.load.static, day.oil.viscosity, day.drive.speed) == (4e3, 0.05, 40.0)
+    assert plate.on_the_day({"viscosity_pa_s": math.nan}, None).oil.viscosity == 0.03
+
+
+def test_nothing_known_is_no_nameplate(tmp_path):
+    assert nameplate_of(tmp_path / "a.wav", None, {}) is None
+
+
+# --- beside the trained model
+
+
+def test_a_disagreement_is_said_first():
+    trained = Estimate(
+        verdict="graded", grade=0, severity=1.5e-4, low=1.4e-4, high=1.6e-4, cautions=("other",)
+    )
+    far = FilmEstimate(severity=2.5e-4, low=2.3e-4, high=2.7e-4)
+    near = FilmEstimate(severity=1.7e-4, low=1.55e-4, high=1.9e-4)
+    untold = FilmEstimate(reason="no load")
+    assert disagree(trained, far)
+    assert not disagree(trained, near)
+    assert not disagree(trained, untold)
+    said = with_film(trained, far)
+    assert said.verdict == "caution"
+    assert said.cautions[0].startswith("film equilibrium and trained model disagree: 0.250 mm")
+    assert said.cautions[1:] == ("other",)
+    assert with_film(trained, near) is trained
+    table = film_table(untold, Nameplate(scene=load_scene("journal-bearing")))
+    assert json.loads(json.dumps(table))["text"] == "not told: no load"
