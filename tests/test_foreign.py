@@ -236,6 +236,24 @@ def test_a_file_of_two_pumps_is_read_like_any_other(tmp_path):
     assert len(rows[0].split(",")) > 500
 
 
+def test_two_independent_mechanisms_agree():
+    """Lagrange's equations here, rigid bodies of Exudyn there."""
+    pytest.importorskip("exudyn")
+    import foreign_exudyn as other
+
+    machine, run = pump.machine_draw(5, 2), replace(nominal(), diametral_clearance=0.3e-3)
+    found = []
+    for simulate in (pump.simulate, other.simulate):
+        forces, angle, settled = simulate(machine, run, NOTHING, duration=0.4)
+        kept = forces[settled:]
+        assert angle[settled] == pytest.approx(run.start_angle)
+        found.append(np.sqrt(np.mean(kept**2, axis=0)))
+    assert found[1][3] == pytest.approx(found[0][3], rel=1e-4)  # as many steps to a transition
+    # knocks are chaotic, and the contact of Exudyn opens later
+    assert found[1][[0, 2]] == pytest.approx(found[0][[0, 2]], rel=0.02)
+    assert found[1][1] == pytest.approx(found[0][1], rel=0.05)
+
+
 def test_judge_counts_what_it_says():
     script = runpy.run_path(str(BENCHMARKS / "foreign.py"))
     from wearstate.diagnose.scores import point_judged

@@ -35,7 +35,8 @@ from wearstate.diagnose.scores import Figure, Judged, resampled, share
 from wearstate.diagnose.train import train_model
 
 PROGRAMS = {
-    "bilge-pump": {"A": "foreign_pump.PUMP_A"},
+    "bilge-pump": {"A": "foreign_pump.PUMP_A", "B": "foreign_exudyn.PUMP_B"},
+    "journal-bearing": {"A": "foreign_ross.JOURNAL"},
 }
 """Machine -> letter -> where its program is."""
 

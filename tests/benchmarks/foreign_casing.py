@@ -91,11 +91,11 @@ def noise(n, rate, machine_seed, rng, *, coloured):
     return level[:, None] * shaped / shaped.std(axis=1, keepdims=True)
 
 
-def tacho(angle, steps, rate):
+def tacho(angle, steps, rate, width=PULSE_WIDTH):
     """Pulses [shape=(n_samples,)] of a crank angle at all steps; a sample is a mean over itself."""
     turns, time = angle / (2 * np.pi), np.arange(len(angle)) / (steps * rate)
     whole = np.arange(np.floor(turns[0]), np.ceil(turns[-1]) + 1)
-    edges = np.interp(np.sort(np.concatenate([whole, whole + PULSE_WIDTH])), turns, time)
+    edges = np.interp(np.sort(np.concatenate([whole, whole + width])), turns, time)
     high = np.cumsum(np.diff(edges, prepend=edges[0]) * (np.arange(len(edges)) % 2))
     borders = (np.arange(len(angle) // steps + 1) - 0.5) / rate
     return LEVEL * rate * np.diff(np.interp(borders, edges, high))
