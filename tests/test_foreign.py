@@ -254,6 +254,50 @@ def test_two_independent_mechanisms_agree():
     assert found[1][1] == pytest.approx(found[0][1], rel=0.05)
 
 
+def test_the_journal_turns_about_the_equilibrium_of_its_film():
+    pytest.importorskip("ross")
+    import foreign_ross as journal
+
+    run = replace(journal.conditions_draw(5, 0), diametral_clearance=0.24e-3)
+    place, stiffness, damping = journal.film(run, thermal=False)
+    # the load pushes along X, the film drives the journal on in the direction of rotation
+    assert 0 < place[1] < place[0] * 2
+    assert 0.3 < np.hypot(*place) / 0.12e-3 < 0.9
+    omega = 2 * np.pi * run.speed_hz
+    amplitude = journal.orbit(stiffness, damping, journal.UNBALANCE, omega)
+    # far stiffer than a free mass, whose amplitude is the unbalance over the mass
+    assert 0.02 < np.abs(amplitude).max() * journal.MASS / journal.UNBALANCE < 2.0
+    free = journal.orbit(0 * stiffness, 0 * damping, journal.UNBALANCE, omega)
+    assert np.abs(free) == pytest.approx(journal.UNBALANCE / journal.MASS)
+
+
+def test_the_nominal_numbers_of_the_journal_are_those_of_its_scene():
+    import foreign_ross as journal
+
+    scene = load_scene("journal-bearing")
+    pairs = [
+        (journal.SPEED, scene.drive.speed),
+        (journal.DIAMETER, scene.bearing.diameter),
+        (journal.LENGTH, scene.bearing.length),
+        (journal.VISCOSITY, scene.oil.viscosity),
+        (journal.MASS, scene.rotor.mass),
+        (journal.UNBALANCE, scene.rotor.unbalance),
+        (journal.GRAVITY, scene.gravity),
+        (journal.STATIC_LOAD, scene.load.static),
+        (journal.RUN_OUT, [part.amplitude for part in scene.rotor.run_out]),
+        (journal.PROBES, [probe.angle for probe in scene.sensors]),
+        (journal.NOISE, scene.sensors[0].noise),
+        (journal.RANGE, scene.sensors[0].range),
+        (2 * np.pi * journal.PULSE_WIDTH, scene.tacho.pulse_width),
+        (journal.SAMPLE_RATE, scene.sample_rate),
+        (journal.DURATION, scene.duration),
+        (journal.AS_NEW, scene.wear.as_new_diametral),
+        (journal.GRADE_EDGES, scene.wear.grade_edges_diametral),
+    ]
+    for own, theirs in pairs:
+        np.testing.assert_allclose(own, theirs, rtol=1e-12)
+
+
 def test_judge_counts_what_it_says():
     script = runpy.run_path(str(BENCHMARKS / "foreign.py"))
     from wearstate.diagnose.scores import point_judged
