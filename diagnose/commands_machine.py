@@ -229,11 +229,14 @@ def frf(
 )
 @click.option("--reactions", type=PATH, help="CSV of measured reactions: bearing, reaction_kn.")
 @click.option(
+    "--jacking", type=PATH, help="CSV of measured jacking curves: bearing, lift_mm, load_kn."
+)
+@click.option(
     "--reactions-in",
     type=click.Choice(["cold", "hot", "running"]),
     default="cold",
     show_default=True,
-    help="Condition in which --reactions were measured.",
+    help="Condition in which --reactions and --jacking were measured.",
 )
 @seed_option
 @click.option("--plot", type=PATH, help="Picture to write (.png, .svg or .pdf).")
@@ -255,6 +258,7 @@ def align(
     test_plot: Path | None,
     tests: Sequence[Path],
     reactions: Path | None,
+    jacking: Path | None,
     reactions_in: str,
     seed: int,
     plot: Path | None,
@@ -265,7 +269,8 @@ def align(
 ) -> None:
     """Bearing loads of the shaft line SCENE, and the moves that bring them within limits.
 
-    With --from-test or --reactions the line is first taken to where these put its bearings.
+    With --from-test, --reactions or --jacking the line is first taken to where these put its
+    bearings.
     """
     from ..sim.scene import load_scene
     from .align import align as judge
@@ -281,10 +286,10 @@ def align(
     if rig_test is not None and not calibrate:
         raise click.UsageError("--test compares before and after the moves: it needs --calibrate")
     outputs = [(plot, PICTURE_SUFFIXES), (output, PAGE_SUFFIXES), (test_plot, PICTURE_SUFFIXES)]
-    inputs = [*tests, *([reactions] if reactions else [])]
+    inputs = [*tests, *(path for path in (reactions, jacking) if path)]
     check_outputs([scene_name, *inputs], outputs, force)
     scene = load_scene(scene_name, overrides_of(pairs))
-    scene, measured = _measured(scene, tests, reactions, reactions_in)
+    scene, measured = _measured(scene, tests, reactions, jacking, reactions_in)
     found = judge(
         scene,
         condition=condition,
@@ -313,14 +318,14 @@ def align(
 
 
 def _measured(
-    scene: Any, tests: Sequence[Path], reactions: Path | None, condition: str
+    scene: Any, tests: Sequence[Path], reactions: Path | None, jacking: Path | None, condition: str
 ) -> tuple[Any, Any]:
     """The scene where its tests put it, and what they say; as it is where there are none."""
-    if not tests and reactions is None:
+    if not tests and reactions is None and jacking is None:
         return scene, None
     from .sag_report import sag_report, sagged
 
-    found = sag_report(scene, tests, reactions, condition=condition)
+    found = sag_report(scene, tests, reactions, curves=jacking, condition=condition)
     return sagged(scene, found.posterior), found
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from ..sim.parts import Scene
 from ..sim.shaft_parts import ShaftScene
 from .align_tests import LineTest, read_reactions, read_tests
+from .jacking_tests import JackedBearing, measured_curves, read_curves
 from .next_test import PlannedTest, candidate_places, rank_tests
 from .page import short_name
 from .sag_model import MeasuredReactions, Prior, SagError
@@ -33,14 +34,23 @@ class SagReport:
     posterior : SagPosterior
     tests : tuple of LineTest
     reactions : MeasuredReactions or None
+        Given as such and told by jacking curves.
     planned : tuple of PlannedTest
         The most telling first.
+    jacked : tuple of JackedBearing
+        Jacking curves.
     """
 
     posterior: SagPosterior
     tests: tuple[LineTest, ...]
     reactions: MeasuredReactions | None
     planned: tuple[PlannedTest, ...]
+    jacked: tuple[JackedBearing, ...] = ()
+
+    @property
+    def sources(self) -> list[str]:
+        """What each test and each jacking curve told, one line each."""
+        return [*(test.text for test in self.tests), *(one.text for one in self.jacked)]
 
     @property
     def headline(self) -> str:
@@ -68,6 +78,7 @@ def sag_report(
     tests: Sequence[Path] = (),
     reactions: Path | None = None,
     *,
+    curves: Path | None = None,
     condition: str = "cold",
 ) -> SagReport:
     """Sags of a line from files of its tests and reactions.
@@ -80,6 +91,8 @@ def sag_report(
         Of :func:`.align_tests.read_tests`.
     reactions : Path, optional
         Of :func:`.align_tests.read_reactions`.
+    curves : Path, optional
+        Of :func:`.jacking_tests.read_curves`, of bearings whose reactions are not given.
     condition : str
         In which these were measured.
 
@@ -101,6 +114,9 @@ def sag_report(
     prior = Prior(gain=_GAIN)
     read = [test for path in tests for test in read_tests(path, scene)]
     jacked = None if reactions is None else read_reactions(reactions, scene, condition=condition)
+    lifted = () if curves is None else read_curves(curves, scene, condition=condition)
+    if lifted:
+        jacked = _together(jacked, measured_curves(lifted, condition))
     posterior = estimate_sags(scene, [test.transfer for test in read], jacked, prior=prior)
     names = posterior.bearings
     done = set() if jacked is None else set(jacked.reactions)
@@ -117,6 +133,24 @@ def sag_report(
         tests=tuple(read),
         reactions=jacked,
         planned=planned,
+        jacked=lifted,
+    )
+
+
+def _together(one: MeasuredReactions | None, other: MeasuredReactions) -> MeasuredReactions:
+    """Reactions of a table and of curves."""
+    if one is None:
+        return other
+    twice = sorted(set(one.reactions) & set(other.reactions))
+    if twice:
+        raise SagError(
+            f"bearings {', '.join(twice)} are in reactions and in jacking, must be in one of them; "
+            "remove them from one"
+        )
+    return MeasuredReactions(
+        reactions={**one.reactions, **other.reactions},
+        deviations={**one.deviations, **other.deviations},
+        condition=one.condition,
     )
 
 
@@ -166,7 +200,8 @@ def sag_table(report: SagReport) -> dict[str, Any]:
             )
         ],
         "covariance_m2": found.covariance.tolist(),
-        "tests": [test.text for test in report.tests],
+        "tests": report.sources,
+        "jacking": [one.as_dict() for one in report.jacked],
         "next": [
             {
                 "text": one.text,
@@ -186,7 +221,7 @@ def sag_text(report: SagReport) -> str:
     found = report.posterior
     lines = [f"sags: {report.headline}"]
     lines += [f"  {' '.join(row)}" for row in _aligned(sag_rows(report))]
-    lines += [f"  {test.text}" for test in report.tests]
+    lines += [f"  {text}" for text in report.sources]
     return "\n".join([*lines, *(f"  {text}" for text in _next_texts(report, found))])
 
 

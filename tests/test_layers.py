@@ -34,7 +34,7 @@ SIM_FLOORS = [
     {"slider_crank", "orbit", "casing", "shaft_film", "shaft_response"},
     {"rest_curve"},
     {"impedance", "bearing", "film_mass", "contact", "hydraulics", "frf_table"},
-    {"calibration", "jacking"},
+    {"calibration", "jacking", "jacking_curve"},
     {"rotor", "alignment"},
     {"film", "film_slopes", "beam"},
     {"film_relax"},
