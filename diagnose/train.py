@@ -117,6 +117,8 @@ def train_model(
         sides = None if split is None else usable_sides(data, split)
     _aim(head, target, path)  # refused before the features are computed
     _check_draws(draws, path)
+    if sides is None:
+        _check_held_out(draws, held_out, path)
     views = choices[0].views
     if baseline is not None:
         if views:
@@ -336,14 +338,17 @@ def _split(
     groups: NDArray[Any], held_out: float, seed: int, path: str | Path
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Training and test rows; enough draws for the folds must be left to train on."""
-    draws = len(np.unique(groups))
+    _check_held_out(len(np.unique(groups)), held_out, path)
+    if held_out == 0:
+        return np.arange(len(groups)), np.arange(0)
+    return group_split(groups, test_fraction=held_out, seed=seed)
+
+
+def _check_held_out(draws: int, held_out: float, path: str | Path) -> None:
     if not 0 <= held_out < 1:
         raise DataError(f"held_out = {held_out} must be >= 0 and < 1; try 0.25")
     kept = draws - max(1, round(held_out * draws)) if held_out > 0 else draws
     _check_kept(kept, draws, f"held_out = {held_out}", path)
-    if held_out == 0:
-        return np.arange(len(groups)), np.arange(0)
-    return group_split(groups, test_fraction=held_out, seed=seed)
 
 
 def _check_kept(kept: int, draws: int, what: str, path: str | Path) -> None:

@@ -10,6 +10,7 @@ import zipfile
 import numpy as np
 import pytest
 from wearstate.datasets.record import Channel, DataError, DataSet, Recording
+from wearstate.diagnose import train as training
 from wearstate.diagnose.estimate import Head, ModelError
 from wearstate.diagnose.evaluate import evaluate_model, score
 from wearstate.diagnose.grades import accuracy_bound, grades_of
@@ -121,9 +122,10 @@ def test_one_rms_alone_does_not_solve_the_task(trained):
     assert told["single_rms"]["accuracy"]["value"] <= 0.70
 
 
-def test_the_training_set_is_judged_on_its_held_out_draws_only(trained, small_set):
-    model, _table, test = trained
+def test_the_training_set_is_judged_on_its_held_out_draws_only(trained, small_set, monkeypatch):
+    model, table, test = trained
     assert evaluate_model(model, small_set)["records"] == len(test)
+    monkeypatch.setattr(training, "feature_table", lambda path, **_: table)  # as it was computed
     everything, *_ = train_model(small_set, held_out=0.0)
     with pytest.raises(DataError, match="has not seen"):
         evaluate_model(everything, small_set)
@@ -601,7 +603,8 @@ def test_the_notice_does_not_hang_on_a_text_in_the_file(trained):
     assert model.notice.startswith("trained on simulation")
 
 
-def test_holding_out_too_much_is_refused(small_set):
+def test_holding_out_too_much_is_refused_before_any_work(small_set, monkeypatch):
+    monkeypatch.setattr(training, "feature_table", None)
     for share in (0.95, float("nan"), -0.1):
         with pytest.raises(DataError, match="held_out"):
             train_model(small_set, held_out=share)
