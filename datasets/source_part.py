@@ -239,6 +239,8 @@ class Part:
         Records of this layout beside each other, this one among them.
     empty : tuple of str
         Channels of NaN alone, which are left out.
+    unread : mapping of str to str
+        Columns of numbers in an unknown notation -> what they hold, and the cure.
     """
 
     name: str
@@ -256,6 +258,7 @@ class Part:
     extras: tuple[str, ...] = ()
     n_records: int = 1
     empty: tuple[str, ...] = ()
+    unread: Mapping[str, str] = field(default_factory=dict)
 
     def row_as_record(self, row: int) -> "Part":
         """One channel as a recording of its own, named like the others.

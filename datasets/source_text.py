@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ..sim.parts import UNITS, nearest
 from .channel_units import known_unit
 from .csv_cells import plain_cell
+from .number_notation import unknown_notation
 from .record import DataError
 from .source_clock import (
     is_stamp,
@@ -216,7 +217,7 @@ def text_contents(path: Path, options: SourceOptions) -> Contents:
 
     Separators, decimal sign, header, units ("acc [g]") and the column of times are found where
     only one reading is possible, and asked for where there are several. Columns that hold words
-    are left out.
+    are left out; numbers in an unknown notation are named, to be refused where they are wanted.
 
     Raises
     ------
@@ -257,9 +258,27 @@ def text_contents(path: Path, options: SourceOptions) -> Contents:
         rate_doubt=doubt,
         rate_note=note,
         extras=() if time is None else (columns[time].name,),
+        unread=_unread(table, columns, time),
     )
     words = [c.name for i, c in enumerate(columns) if i not in dialect.numeric]
     return Contents(parts=(part,), others=tuple(words))
+
+
+def _unread(table: "Table", columns: Sequence["_Column"], time: int | None) -> dict[str, str]:
+    """Columns whose last cells are numbers in a notation that is not read, and what to do."""
+    first = max(0, table.lines.count - _SAMPLE)
+    found = {}
+    for index, column in enumerate(columns):
+        if index in table.dialect.numeric or index == time:
+            continue
+        known = unknown_notation(table.cells(first, table.lines.count, index))
+        if known:
+            cell, kind, cure = known
+            found[column.name] = (
+                f"column {column.name!r} holds {cell!r}, {kind}, which is not read; {cure}, or "
+                "choose channels without it"
+            )
+    return found
 
 
 def _line_records(path: Path, table: "Table", options: SourceOptions) -> Contents:

@@ -193,6 +193,7 @@ def open_records(path: str | Path, options: SourceOptions | None = None) -> tupl
 
 def _opened(file: Path, contents: Contents, given: SourceOptions, record: int) -> Source:
     part = without_empty(_chosen(file, contents, given, record))
+    _refuse_unread(file, part, given)
     return resampled(_settled(file, part, given, contents.close), given.resample_to, given.tacho)
 
 
@@ -235,6 +236,15 @@ def list_sources(path: str | Path, options: SourceOptions | None = None) -> tupl
     except BaseException:
         contents.close()
         raise
+
+
+def _refuse_unread(file: Path, part: Part, options: SourceOptions) -> None:
+    """Numbers must not be left out like words, unless the channels are chosen without them."""
+    wanted = options.channels or (options.like.channels if options.like else ())
+    chosen = {_split(entry)[1] or entry for entry in wanted}
+    told = [text for name, text in part.unread.items() if not wanted or name in chosen]
+    if told:
+        raise DataError("\n".join(f"{file}: {text}" for text in told))
 
 
 def _contents(file: Path, options: SourceOptions) -> Contents:

@@ -37,6 +37,7 @@ ended newest "$newest"
   newest/bin/wearstate scene list
   newest/bin/wearstate simulate bilge-pump --set "duration=0.4 s" -o rec.h5
   newest/bin/wearstate info rec.h5
+  newest/bin/wearstate simulate journal-bearing --set "duration=0.1 s" -o journal.h5
   newest/bin/wearstate verify
 )
 ended lowest "$lowest"
