@@ -9,8 +9,8 @@ have the clearance of a machine as new: they tell the offsets of the probes.
 """
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,12 +25,12 @@ Float = NDArray[np.float64]
 COVERAGE = 0.9
 """Of the interval, as that of the trained models."""
 
-_NORMAL = 1.6449  # standard deviations to either side of the middle 90 %
-_LARGE_OFFSET = 50e-6  # m: what healthy recordings of a measured clearance may correct
-_FLOOR = 0.2e-6  # m: mean of a record of some revolutions, and the curve's own error
+NORMAL = 1.6449  # standard deviations to either side of the middle 90 %
+CORRECTED = 10.0  # times its doubt: an offset that healthy recordings of known wear correct
+FLOOR = 0.2e-6  # m: mean of a record of some revolutions, and the curve's own error
 _MOST_SWING = 0.35  # rms of the orbit over the radial clearance; beyond, it has no place of rest
 _LOOSEST = 0.3  # standard error of the clearance's logarithm, above which nothing is told
-_CONTRADICTED = 2.6  # root mean square of what is left, in standard deviations, per free number
+CONTRADICTED = 2.6  # root mean square of what is left, in standard deviations, per free number
 _WIDEST, _NARROWEST = 10.0, 0.1  # clearance looked for, over that as new
 
 
@@ -47,7 +47,7 @@ class Doubts:
         warmer than the sump by what is known to two or three: 10 %.
     offset : float
         Of the reading of a centred shaft [m]. Gaps are set to some hundredths of a volt, and the
-        middle is found by lifting the shaft: 5 um.
+        middle is found by lifting the shaft: half a per cent of the range, 5 um of 1 mm.
     gain : float
         Of a probe's sensitivity, over it. API 670 allows 5 %, evenly spread: 3 %.
     clearance : float
@@ -63,6 +63,7 @@ class Doubts:
 
 
 USUAL_DOUBTS = Doubts()
+DOUBTS = tuple(each.name for each in fields(Doubts))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,6 +105,9 @@ class FilmEstimate:
         Nominal, of the interval, as far as the stated uncertainties hold.
     healthy : int
         Recordings of the machine as new that it was told against.
+    budget : dict
+        What each doubt is worth: its own part of half the interval [m], by the names of
+        :class:`Doubts`; their squares add up to that of the whole.
     """
 
     reason: str = ""
@@ -112,6 +116,7 @@ class FilmEstimate:
     high: float | None = None
     coverage: float = COVERAGE
     healthy: int = 0
+    budget: dict[str, float] = field(default_factory=dict)
 
 
 def film_clearance(
@@ -147,10 +152,10 @@ def film_clearance(
     -----
     Least squares over all readings, with the logarithms of the clearance now and as new, offset and
     sensitivity of every probe, and of every recording factors of load and viscosity, each held by
-    its uncertainty; half of the variance of these factors is common to all recordings, as an error
-    of the name plate is, the other half is that of the day. The interval is that of the linearised
-    problem. The mean of an orbit departs from the place of rest by about its mean square over the
-    clearance, which is counted as scatter.
+    its uncertainty; half of the variance of these factors, and of the clearance as new, is common
+    to all recordings, as an error of the nameplate is, the other half is that of the day. The
+    interval is that of the linearised problem. The mean of an orbit departs from the place of rest
+    by about its mean square over the clearance, which is counted as scatter.
 
     Laminar and isothermal, a round plain bore. A scar, a groove, a wrong direction of the load or a
     swapped probe put the journal where no clearance explains it: that is said, not fitted.
@@ -216,27 +221,32 @@ class _Problem:
         day = math.sqrt(0.5)
         self.prior = np.concatenate(
             [
-                [math.log(_WIDEST), band],
-                [max(doubts.offset, _LARGE_OFFSET) if known else doubts.offset] * probes,
+                [math.log(_WIDEST)],
+                [day * band] * n,
+                [doubts.offset * (CORRECTED if known else 1)] * probes,
                 [doubts.gain] * probes,
                 np.repeat([day * doubts.load, day * doubts.viscosity], 1 + n),
             ]
         )
+        self.names = [
+            *["", *["clearance"] * n, *["offset"] * probes, *["gain"] * probes],
+            *["load"] * (1 + n),
+            *["viscosity"] * (1 + n),
+        ]
         swing = np.array([run.swing for run in runs])
-        self.scatter = np.hypot(_FLOOR, swing**2 / math.exp(self.middle))
+        self.scatter = np.hypot(FLOOR, swing**2 / math.exp(self.middle))
 
     def predicted(self, free: Float) -> Float:
         """Readings [shape=(n, n_probes)] for deviations from what is told, in their doubts."""
         real = free * self.prior
-        first, n, probes = 2 + 2 * self.probes, self.n, self.probes
-        clearance = np.exp(self.middles + np.repeat([real[0], real[1]], [1, n - 1]))
-        loads, oils = real[first : first + 1 + n], real[first + 1 + n :]
+        probes, n = self.probes, self.n
+        new, offsets, gains, factors = np.split(real[1:], np.cumsum([n, probes, probes]))
+        clearance = np.exp(self.middles + np.concatenate([real[:1], new[0] + new[1:]]))
+        loads, oils = np.split(factors, 2)
         strength = self.film_force * np.exp(oils[0] + oils[1:]) / clearance**2
         load = self.load * np.exp(loads[0] + loads[1:])[:, None] / strength[:, None]
         place = clearance[:, None] * self.curve.position(load)
-        return np.asarray(
-            (place @ self.looks + real[2 : 2 + probes]) * np.exp(real[2 + probes : first])
-        )
+        return np.asarray((place @ self.looks + offsets) * np.exp(gains))
 
     def residuals(self, free: Float) -> Float:
         apart = (self.predicted(free) - self.readings) / self.scatter[:, None]
@@ -247,22 +257,75 @@ class _Problem:
         radius = float(np.hypot(*np.linalg.lstsq(self.looks.T, self.readings[0], rcond=None)[0]))
         guess = max(1.3 * radius, math.exp(self.middle))
         start[0] = (math.log(guess) - self.middle) / self.prior[0]
-        found = least_squares(self.residuals, start, method="lm", xtol=1e-10, ftol=1e-10)
-        inverse = np.linalg.inv(found.jac.T @ found.jac)
+        found = fitted(self.residuals, start, self.readings.size)
         return _Found(
-            log_clearance=self.middle + float(found.x[0] * self.prior[0]),
-            error=float(math.sqrt(inverse[0, 0]) * self.prior[0]),
-            left=math.sqrt(2 * found.cost / max(1, self.readings.size - 1)),
+            log_clearance=self.middle + float(found.values[0] * self.prior[0]),
+            error=float(found.error * self.prior[0]),
+            budget={name: found.worth(self.names, name) * self.prior[0] for name in DOUBTS},
+            left=found.left,
             strength=float(self.film_force[0]),
         )
 
 
 @dataclass(frozen=True, kw_only=True)
+class Fitted:
+    """Least squares of readings and of what is held.
+
+    Attributes
+    ----------
+    values : numpy.ndarray [shape=(n,)]
+        Numbers found.
+    covariance : numpy.ndarray [shape=(n,)]
+        Of the first number with each.
+    left : float
+        Root mean square of the residuals per reading beyond the first, in standard deviations.
+    """
+
+    values: Float
+    covariance: Float
+    left: float
+
+    @property
+    def error(self) -> float:
+        """Standard error of the first number."""
+        return math.sqrt(self.covariance[0])
+
+    def worth(self, names: Sequence[str], name: str) -> float:
+        """Part of that error which is due to what is held under a name.
+
+        The first number moves by its covariance with another where the value at which that one
+        is held moves by its standard deviation.
+        """
+        mine = [part for part, own in zip(self.covariance, names, strict=True) if own == name]
+        return math.hypot(*mine)
+
+
+def fitted(residuals: Callable[[Float], Float], start: Float, n_readings: int) -> Fitted:
+    """Numbers with the least residuals, which are in standard deviations.
+
+    Parameters
+    ----------
+    residuals : callable
+        Numbers -> residuals of readings and of prior knowledge of each.
+    start : numpy.ndarray
+    n_readings : int
+    """
+    found = least_squares(residuals, start, method="lm", xtol=1e-10, ftol=1e-10)
+    inverse = np.linalg.inv(found.jac.T @ found.jac)
+    return Fitted(
+        values=found.x,
+        covariance=inverse[0],
+        left=math.sqrt(2 * found.cost / max(1, n_readings - 1)),
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
 class _Found:
-    """Logarithm of the radial clearance, its standard error, and what is left."""
+    """Logarithm of the radial clearance, its standard error, its parts, and what is left."""
 
     log_clearance: float
     error: float
+    budget: dict[str, float]
     left: float
     strength: float
 
@@ -274,12 +337,13 @@ def _judged(
     reason = _untold(problem, found, run, curve, clearance)
     if reason:
         return FilmEstimate(reason=reason, healthy=healthy)
-    spread = math.exp(_NORMAL * found.error)
+    spread = math.exp(NORMAL * found.error)
     return FilmEstimate(
         severity=2 * clearance,
         low=2 * clearance / spread,
         high=2 * clearance * spread,
         healthy=healthy,
+        budget={name: 2 * clearance * NORMAL * part for name, part in found.budget.items()},
     )
 
 
@@ -288,10 +352,10 @@ def _untold(
 ) -> str:
     """Why a solution is no estimate; empty where it is one."""
     ratio = clearance / math.exp(problem.middle)
-    if found.left > _CONTRADICTED or not _NARROWEST < ratio < _WIDEST:
+    if found.left > CONTRADICTED or not _NARROWEST < ratio < _WIDEST:
         return (
             f"no clearance puts the journal where the probes see it: {found.left:.1f} standard "
-            f"deviations are left, must be <= {_CONTRADICTED:g}; check load, its direction, "
+            f"deviations are left, must be <= {CONTRADICTED:g}; check load, its direction, "
             "viscosity and the probes, or look for a scar of the bore"
         )
     if run.swing > _MOST_SWING * clearance:

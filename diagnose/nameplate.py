@@ -7,7 +7,7 @@ where it has one, how it ran on the day. What a person sets for one recording go
 import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,7 @@ from .film_clearance import Doubts
 
 _OIL = "oil.dynamic_viscosity"
 _SPEED = "drive.speed"
+_MEASURED = ("speed_hz", "start_angle_rad", "unbalance_kg_m")  # by the signals, or no matter here
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -142,7 +143,7 @@ def nameplate_of(
         name = f"scene {usual}, which the model was trained on"
     else:
         return None
-    doubts = _doubts(spreads, found, plain)
+    doubts = replace(_usual_doubts(found), **_doubts(spreads, found, plain))
     return Nameplate(scene=found, told=frozenset(plain), doubts=doubts, source=name)
 
 
@@ -177,7 +178,19 @@ def _parted(values: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, str]]:
     return plain, spreads
 
 
-def _doubts(spreads: Mapping[str, str], scene: Scene, values: Mapping[str, Any]) -> Doubts:
+_OFFSET_SHARE = 0.005  # of a probe's range: how well the reading of a centred shaft is known
+
+
+def _usual_doubts(scene: Any) -> Doubts:
+    """Those of the scene's probes."""
+    probes = [*getattr(scene, "probes", ()), *getattr(scene, "sensors", ())]
+    ranges = [probe.range for probe in probes if hasattr(probe, "offset")]
+    return Doubts(offset=_OFFSET_SHARE * max(ranges)) if ranges else Doubts()
+
+
+def _doubts(
+    spreads: Mapping[str, str], scene: Scene, values: Mapping[str, Any]
+) -> dict[str, float]:
     found: dict[str, float] = {}
     for path, text in spreads.items():
         kind = _kind_of(path)
@@ -187,7 +200,7 @@ def _doubts(spreads: Mapping[str, str], scene: Scene, values: Mapping[str, Any])
                 "offset or gain; leave the +- out"
             )
         found[kind] = max(found.get(kind, 0.0), _spread(path, text, kind, scene))
-    return Doubts(**found)
+    return found
 
 
 def _kind_of(path: str) -> str | None:
@@ -231,10 +244,12 @@ def _warmer(scene: Any, kelvin: float) -> float:
 
 
 def told_conditions(plate: Nameplate, row: Mapping[str, Any]) -> Sequence[str]:
-    """Conditions of the day that were noted or set, by their manifest columns."""
+    """Loads and oil of the day that were noted or set, by their manifest columns."""
     return [
         column
         for column, path in CONDITIONS.items()
+        if column not in _MEASURED
         if path in plate.told
+        or (path == _OIL and any(told.startswith("oil.") for told in plate.told))
         or (isinstance(row.get(column), float | int) and math.isfinite(row[column]))
     ]

@@ -94,7 +94,7 @@ def report_table(
         "headline": headline(estimate),
         "recording": _recording_table(recording, card),
         "estimate": estimate.as_dict(),
-        "film": film_table(film, plate),
+        "film": film_table(film, plate, recording.row),
         "grades_text": possible_words(estimate, card["grade_edges_m"]),
         "advice": asdict(advise(estimate, quantity, card["grade_edges_m"], outlook)),
         "limits": limits_table(card),

@@ -408,7 +408,7 @@ def judge_all(
         advice = _advice(estimate, model)
         rows.append(_row(number, item, time, estimate, advice))
         if tell is not None:
-            tell(_line(item, time, estimate, advice) | {"film": film_table(film, plate)})
+            tell(_line(item, time, estimate, advice) | {"film": film_table(film, plate, item.row)})
         if progress is not None:
             progress(number + 1, len(items))
     clock = dates is not None and clock_is_operating(dates)

@@ -61,6 +61,10 @@ def test_what_is_less_known_makes_the_interval_wider():
         doubts = Doubts(**{name: 3 * getattr(Doubts(), name)})
         wider = film_clearance(run, CURVE, ANGLES, AS_NEW, doubts=doubts)
         assert wider.high / wider.low > 1.005 * usual.high / usual.low, name
+        assert wider.budget[name] > 2 * usual.budget[name], name
+    # squares of the parts add up to that of the whole, but for the readings' own scatter
+    parts = math.hypot(*usual.budget.values())
+    assert parts == pytest.approx((usual.high - usual.low) / 2, rel=0.05)
 
 
 def test_an_interval_keeps_its_promise_where_the_told_values_are_off_by_their_doubts():
@@ -239,5 +243,5 @@ def test_a_disagreement_is_said_first():
     assert said.cautions[0].startswith("film equilibrium and trained model disagree: 0.250 mm")
     assert said.cautions[1:] == ("other",)
     assert with_film(trained, near) is trained
-    table = film_table(untold, Nameplate(scene=load_scene("journal-bearing")))
+    table = film_table(untold, Nameplate(scene=load_scene("journal-bearing")), {})
     assert json.loads(json.dumps(table))["text"] == "not told: no load"

@@ -1,0 +1,86 @@
+"""The wear-down of a shaft's bearing by alignment and films."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.interpolate import CubicSpline
+from wearstate.datasets.generate import save_solution
+from wearstate.datasets.record import DataSet
+from wearstate.diagnose.film_clearance import Doubts
+from wearstate.diagnose.film_verdict import film_estimate
+from wearstate.diagnose.film_wear_down import SinkingRun, film_wear_down, sinking_places
+from wearstate.diagnose.nameplate import nameplate_of
+from wearstate.sim.assemble import simulate
+from wearstate.sim.scene import load_scene
+
+ANGLES = (math.radians(225), math.radians(135))
+LIMIT, AS_NEW = 0.9e-3, 0.03e-3
+WEAR = "wear_down_bearing_1_m"
+
+
+def sunk(wear, *, offset=(0.0, 0.0), measured=None, film=80e-6):
+    """A journal that lies one film above the bottom of its bore, a little to the side."""
+    wears = np.linspace(0, 1.5 * LIMIT, 5)
+    rows = [[-0.35e-3 - w + film, 40e-6, 20e-6, 5e-6, -0.35e-3, 0.0] for w in wears]
+    up, side = -0.35e-3 - wear + film, 40e-6
+    towards = [-(up * math.cos(a) + side * math.sin(a)) for a in ANGLES]
+    return SinkingRun(
+        readings=np.add(towards, offset),
+        places=CubicSpline(wears, np.array(rows)),
+        swing=5e-6,
+        clearance=0.35e-3,
+        measured=measured,
+    )
+
+
+def told(run, **ways):
+    return film_wear_down(run, ANGLES, LIMIT, AS_NEW, Doubts(offset=15e-6), **ways)
+
+
+def test_a_place_gives_its_wear_and_doubts_their_interval():
+    found = told(sunk(0.5e-3))
+    assert found.severity == pytest.approx(0.5e-3, abs=2e-6)
+    # 9 % of 0.35 mm by the makers' tolerance, 15 um of two probes: half of 90 % in all
+    known = math.hypot(0.09 * 0.35e-3, 15e-6, 0.03 * 0.77e-3 / math.sqrt(2))
+    assert (found.high - found.low) / 2 == pytest.approx(1.645 * known, rel=0.1)
+    assert found.budget["clearance"] > found.budget["offset"] > found.budget["viscosity"]
+
+
+def test_healthy_recordings_take_offsets_and_tolerances_away():
+    off = (-150e-6, -120e-6)
+    new = [sunk(w, offset=off, measured=w) for w in (0.03e-3, 0.04e-3, 0.05e-3)]
+    alone = told(sunk(0.5e-3, offset=off))
+    assert alone.severity is None or abs(alone.severity - 0.5e-3) > 0.1e-3
+    found = told(sunk(0.5e-3, offset=off), healthy=new)
+    assert found.severity == pytest.approx(0.5e-3, abs=0.03 * LIMIT)
+    assert found.low < 0.5e-3 < found.high
+
+
+def test_what_no_wear_explains_is_said():
+    turned = sunk(0.5e-3, offset=(300e-6, -300e-6))
+    assert "no wear-down puts the journal" in told(turned).reason
+    assert "--baseline" in told(sunk(2 * LIMIT)).reason
+
+
+def test_the_line_is_solved_for_places(tmp_path):
+    """A recording of the built-in line: its own alignment and films, one nuisance wrong."""
+    changes = {"bearings.0.wear_down": 0.5e-3, "duration": 0.5, "oil.temperature": 318.15}
+    scene = load_scene("propulsion-shaft", changes)
+    path = tmp_path / "line.h5"
+    save_solution(scene, simulate(scene, seed=1), path, seed=1)
+    with DataSet(path) as data:
+        recording = data[0]
+    told_right = film_estimate(recording, WEAR, nameplate_of(path, None, {}))
+    assert told_right.severity == pytest.approx(0.5e-3, abs=0.02 * LIMIT)
+    assert told_right.low < 0.5e-3 < told_right.high
+    # a sag without probes in its bearing cannot be told so
+    assert (
+        "0 probes"
+        in film_estimate(recording, "wear_down_bearing_2_m", nameplate_of(path, None, {})).reason
+    )
+
+
+def test_a_line_that_no_film_carries_says_so():
+    scene = load_scene("propulsion-shaft", {"oil.viscosity_40": 2e-6, "oil.viscosity_100": 2e-6})
+    assert "bearing" in sinking_places(scene, 0, LIMIT)
