@@ -772,7 +772,7 @@ def _measured(report: SagReport) -> dict[str, Any]:
         "plausible": report.posterior.plausible,
         "head": head,
         "rows": rows,
-        "tests": report.sources,
+        "tests": [*report.doubts, *report.sources],
         "next": next_texts(report),
         "image": encoded(sag_figure(report)),
     }

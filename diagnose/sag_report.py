@@ -14,14 +14,16 @@ from .align_tests import LineTest, read_reactions, read_tests
 from .jacking_tests import JackedBearing, measured_curves, read_curves
 from .next_test import PlannedTest, candidate_places, rank_tests
 from .page import short_name
+from .sag_films import estimate_over_films, nearly_unloaded
 from .sag_model import MeasuredReactions, Prior, SagError
-from .sags import SagPosterior, estimate_sags
+from .sags import SagPosterior
 
 CONFIDENCE = 0.9
 """Of the intervals told [-]."""
 
 _GAIN = 0.02 / math.sqrt(3)  # of sensors calibrated before the test, to 2 per cent
 _SHOWN = 3  # tests proposed
+_UNDECIDED = 0.05  # probability of a condition of the films: below it the other is taken as sure
 _WORTH = 0.1  # of the variance: less is not worth a test
 
 
@@ -39,6 +41,8 @@ class SagReport:
         The most telling first.
     jacked : tuple of JackedBearing
         Jacking curves.
+    unloaded : tuple of str
+        Bearings about which two sags may explain the tests.
     """
 
     posterior: SagPosterior
@@ -46,6 +50,25 @@ class SagReport:
     reactions: MeasuredReactions | None
     planned: tuple[PlannedTest, ...]
     jacked: tuple[JackedBearing, ...] = ()
+    unloaded: tuple[str, ...] = ()
+
+    @property
+    def doubts(self) -> list[str]:
+        """What the interval of each bearing does not say, one sentence each."""
+        films = self.posterior.films
+        texts = []
+        if min(films.values(), default=0.0) > _UNDECIDED:
+            shares = ", ".join(f"{name} {share:.0%}" for name, share in films.items())
+            texts.append(
+                f"the films may rupture either way ({shares}): mean and interval are of both"
+            )
+        if self.unloaded:
+            texts.append(
+                f"{', '.join(self.unloaded)} may carry nothing: about that, two sags some "
+                "hundredths of a millimetre apart explain a test; jack it, or test again after "
+                "raising it"
+            )
+        return texts
 
     @property
     def sources(self) -> list[str]:
@@ -117,7 +140,7 @@ def sag_report(
     lifted = () if curves is None else read_curves(curves, scene, condition=condition)
     if lifted:
         jacked = _together(jacked, measured_curves(lifted, condition))
-    posterior = estimate_sags(scene, [test.transfer for test in read], jacked, prior=prior)
+    posterior = estimate_over_films(scene, [test.transfer for test in read], jacked, prior=prior)
     names = posterior.bearings
     done = set() if jacked is None else set(jacked.reactions)
     planned = rank_tests(
@@ -134,6 +157,7 @@ def sag_report(
         reactions=jacked,
         planned=planned,
         jacked=lifted,
+        unloaded=nearly_unloaded(scene, posterior) if read and posterior.plausible else (),
     )
 
 
@@ -199,6 +223,8 @@ def sag_table(report: SagReport) -> dict[str, Any]:
                 strict=True,
             )
         ],
+        "films": found.films,
+        "doubts": report.doubts,
         "covariance_m2": found.covariance.tolist(),
         "tests": report.sources,
         "jacking": [one.as_dict() for one in report.jacked],
@@ -221,7 +247,7 @@ def sag_text(report: SagReport) -> str:
     found = report.posterior
     lines = [f"sags: {report.headline}"]
     lines += [f"  {' '.join(row)}" for row in _aligned(sag_rows(report))]
-    lines += [f"  {text}" for text in report.sources]
+    lines += [f"  {text}" for text in (*report.doubts, *report.sources)]
     return "\n".join([*lines, *(f"  {text}" for text in _next_texts(report, found))])
 
 

@@ -12,7 +12,7 @@ in Structural Dynamics, Kluwer, doi:10.1007/978-94-015-8508-8, for bearings and 
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -75,6 +75,10 @@ class SagPosterior:
     settled : bool
         Whether the mode is less than a standard deviation away; otherwise mean and covariance are
         those of where the search stopped.
+    scale : numpy.ndarray
+        Prior deviation of each unknown.
+    films : dict
+        Probability of each condition of film rupture that was asked; empty where one was taken.
     """
 
     bearings: tuple[str, ...]
@@ -88,6 +92,8 @@ class SagPosterior:
     spread: Vector
     steps: int
     settled: bool
+    scale: Vector
+    films: dict[str, float] = field(default_factory=dict)
 
     @property
     def deviation(self) -> Vector:
@@ -275,4 +281,5 @@ def _posterior(question: Question, mode: _Mode) -> SagPosterior:
         spread=spread,
         steps=mode.steps,
         settled=mode.settled,
+        scale=own.deviations,
     )
