@@ -21,6 +21,7 @@ from .film_clearance import FilmEstimate, JournalRun, film_clearance
 from .film_wear_down import SinkingRun, film_wear_down, sinking_places
 from .healthy import Baseline
 from .nameplate import Nameplate, told_conditions
+from .nameplate_cautions import nameplate_cautions
 from .probe_means import ProbeMeans, probe_means
 
 Float = NDArray[np.float64]
@@ -49,11 +50,14 @@ def film_estimate(
     Returns
     -------
     FilmEstimate or None
-        None where no such estimate exists for this wear or machine, or nothing is known of it.
+        None where no such estimate exists for this wear or machine.
     """
     kind = _NUMBER.sub("_{}_m", severity)
-    way = None if plate is None else _WAYS.get((kind, plate.scene.machine))
-    if way is None or plate is None:
+    if plate is None:
+        told = any(kind == each for each, _ in _WAYS) and probe_means(recording).names
+        return FilmEstimate(reason=_UNKNOWN) if told else None
+    way = _WAYS.get((kind, plate.scene.machine))
+    if way is None:
         return None
     healthy = () if baseline is None else baseline.positions
     return way(probe_means(recording), plate, healthy, severity)
@@ -249,6 +253,30 @@ _NUMBER = re.compile(r"_[0-9]+_m$")
 # --- beside the trained model
 
 
+def beside_film(
+    estimate: Estimate,
+    film: FilmEstimate | None,
+    plate: Nameplate | None,
+    recording: Recording,
+    card: Mapping[str, Any],
+) -> Estimate:
+    """An estimate with what film equilibrium and nameplate have to say against it, first.
+
+    Parameters
+    ----------
+    estimate : Estimate
+    film : FilmEstimate or None
+    plate : Nameplate or None
+    recording : Recording
+    card : mapping
+        Of the model.
+    """
+    said = nameplate_cautions(plate, recording.row, card) if estimate.graded else ()
+    if said:
+        estimate = replace(estimate, verdict="caution", cautions=(*said, *estimate.cautions))
+    return with_film(estimate, film)
+
+
 def with_film(estimate: Estimate, film: FilmEstimate | None) -> Estimate:
     """An estimate that says first where the film equilibrium contradicts it.
 
@@ -278,6 +306,13 @@ def disagree(estimate: Estimate, film: FilmEstimate) -> bool:
     return film_high < low or high < film_low
 
 
+_UNKNOWN = (
+    "load, oil and geometry of the machine are unknown, on which its severity depends as much as "
+    "on the signals; give its scene (--scene SCENE|TOML), or what differs from the trained one "
+    "(--set PATH=VALUE)"
+)
+
+
 def film_table(
     film: FilmEstimate | None, plate: Nameplate | None, row: Mapping[str, Any]
 ) -> dict[str, Any] | None:
@@ -290,8 +325,10 @@ def film_table(
     row : mapping
         What was noted beside the recording.
     """
-    if film is None or plate is None:
+    if film is None:
         return None
+    if plate is None:
+        return {**asdict(film), "nameplate": "", "text": film_words(film)}
     day = told_conditions(plate, row)
     usual = "" if day else "; load and oil as on the nameplate, none were noted on the day"
     return {

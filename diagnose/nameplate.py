@@ -67,11 +67,12 @@ class Nameplate:
         }
         scene = self.scene
         for path, value in noted.items():
-            if path != _SPEED and not self._was_told(path):
+            if path != _SPEED and not self.was_told(path):
                 scene = _replaced(scene, path, value)
         return scene if speed_hz is None else _replaced(scene, _SPEED, speed_hz)
 
-    def _was_told(self, path: str) -> bool:
+    def was_told(self, path: str) -> bool:
+        """Whether a person set this value, or one that it follows from."""
         if path == _OIL:
             return any(told.startswith("oil.") for told in self.told)
         return path in self.told
@@ -249,7 +250,6 @@ def told_conditions(plate: Nameplate, row: Mapping[str, Any]) -> Sequence[str]:
         column
         for column, path in CONDITIONS.items()
         if column not in _MEASURED
-        if path in plate.told
-        or (path == _OIL and any(told.startswith("oil.") for told in plate.told))
+        if plate.was_told(path)
         or (isinstance(row.get(column), float | int) and math.isfinite(row[column]))
     ]

@@ -22,7 +22,7 @@ from ..datasets.views import JoinedSet, View
 from .advice import Advice, advise
 from .estimate import Estimate, ModelError, WearModel
 from .film_clearance import FilmEstimate
-from .film_verdict import film_estimate, film_table, with_film
+from .film_verdict import beside_film, film_estimate, film_table
 from .grades import GRADE_NAMES, WARNING_GRADE
 from .healthy import Baselines
 from .nameplate import Nameplate
@@ -441,7 +441,8 @@ def _judged(
         recording = item.load()
         baseline = None if baselines is None else baselines.of(recording)
         film = film_estimate(recording, model.card["severity"], plate, baseline)
-        return with_film(model.estimate(recording, baseline), film), film
+        estimate = model.estimate(recording, baseline)
+        return beside_film(estimate, film, plate, recording, model.card), film
     except ModelError:
         raise  # would be so for each of them
     except (ValueError, OSError) as error:

@@ -22,6 +22,7 @@ from wearstate.diagnose.film_verdict import (
 )
 from wearstate.diagnose.healthy import Baseline
 from wearstate.diagnose.nameplate import Nameplate, nameplate_of
+from wearstate.diagnose.nameplate_cautions import nameplate_cautions
 from wearstate.diagnose.probe_means import probe_means
 from wearstate.sim.assemble import simulate
 from wearstate.sim.film import FilmGeometry
@@ -186,7 +187,7 @@ def test_what_bars_an_estimate_is_named(tmp_path):
     )
     assert "probes gap are none of" in film_estimate(strange, CLEARANCE, plate).reason
     assert film_estimate(recording, "scar_depth_bearing_m", plate) is None
-    assert film_estimate(recording, CLEARANCE, None) is None
+    assert "--scene" in film_estimate(recording, CLEARANCE, None).reason
 
 
 # --- the nameplate
@@ -223,6 +224,44 @@ def test_the_day_goes_before_the_nameplate_and_a_person_before_the_day():
 
 def test_nothing_known_is_no_nameplate(tmp_path):
     assert nameplate_of(tmp_path / "a.wav", None, {}) is None
+
+
+CARD = {
+    "trained_on": {"scene": "journal-bearing"},
+    "conditions": [
+        {"name": "shaft.speed_hz", "feature": "shaft.speed_hz", "unit": "Hz", "low": 1, "high": 2},
+        {"name": "static_load_n", "feature": "", "unit": "N", "low": 4e3, "high": 6e3},
+        {"name": "viscosity_pa_s", "feature": "", "unit": "Pa s", "low": 0.024, "high": 0.036},
+    ],
+}
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({}, []),
+        ({"load.static": 0.0}, ["static_load_n = 0 N by the nameplate is outside"]),
+        ({"load.static_across": 5e3}, ["load.static_across = 5000 N by the nameplate"]),
+        ({"bearing.length": 0.084}, ["bearing.length = 0.084 m by the nameplate"]),
+        ({"oil.viscosity": 0.06}, ["viscosity_pa_s = 0.06 Pa s by the nameplate is outside"]),
+    ],
+)
+def test_a_nameplate_outside_the_trained_one_is_a_caution(changes, said):
+    plate = nameplate_of(None, "journal-bearing", changes)
+    found = nameplate_cautions(plate, {}, CARD)
+    assert len(found) == len(said)
+    assert all(text.startswith(begin) for text, begin in zip(found, said, strict=True))
+    # what the manifest notes of the day is looked at by the model, unless a person knows better
+    noted = {"static_load_n": 100.0, "viscosity_pa_s": 1.0}
+    assert [t for t in nameplate_cautions(plate, noted, CARD) if "outside" in t] == [
+        t for t in found if "outside" in t
+    ]
+
+
+def test_a_nameplate_of_another_machine_is_a_caution():
+    plate = nameplate_of(None, "bilge-pump", {})
+    assert "is of a reciprocating-pump" in nameplate_cautions(plate, {}, CARD)[0]
+    assert nameplate_cautions(None, {}, CARD) == ()
 
 
 # --- beside the trained model
