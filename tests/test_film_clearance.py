@@ -5,8 +5,10 @@ import math
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from wearstate.datasets.generate import save_solution
 from wearstate.datasets.record import DataError, DataSet
+from wearstate.diagnose.cli import cli
 from wearstate.diagnose.estimate import Estimate
 from wearstate.diagnose.film_clearance import (
     Doubts,
@@ -284,3 +286,20 @@ def test_a_disagreement_is_said_first():
     assert with_film(trained, near) is trained
     table = film_table(untold, Nameplate(scene=load_scene("journal-bearing")), {})
     assert json.loads(json.dumps(table))["text"] == "not told: no load"
+
+
+def test_conditions_in_the_labels_of_an_import_are_those_of_the_day(tmp_path):
+    recording = recorded(tmp_path / "run.h5", {"load.static": 1e3, "oil.viscosity": 0.06})
+    time = np.arange(recording.signal.shape[1]) / recording.sample_rate
+    head = "time [s],probe_1 [m],probe_2 [m],tacho [V]"
+    rows = np.c_[time, recording.signal.T]
+    np.savetxt(tmp_path / "run.csv", rows, "%.9g", ",", header=head, comments="")
+    labels = tmp_path / "labels.csv"
+    labels.write_text("file,static_load_n,viscosity_pa_s\nrun.csv,1000,0.06\n", encoding="utf-8")
+    given = ["import", tmp_path / "run.csv", "--labels", labels, "--tacho", "tacho"]
+    done = CliRunner().invoke(cli, [*map(str, given), "-o", str(tmp_path / "in.h5")])
+    assert done.exit_code == 0, done.output
+    plate = nameplate_of(None, "journal-bearing", {"film.rung": "short"})
+    with DataSet(tmp_path / "in.h5") as data:
+        found = film_estimate(data[0], CLEARANCE, plate)
+    assert found.severity == pytest.approx(0.22e-3, rel=0.03)
