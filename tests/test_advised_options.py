@@ -31,6 +31,7 @@ SPOKEN_BY = {
     "align": {"align"},
     "audit_text": {"splits"},
     "estimate": {"evaluate", "report"},
+    "evaluate": {"evaluate"},
     "evaluate_splits": {"evaluate"},
     "film_clearance": {"report"},
     "film_verdict": {"report"},
@@ -42,6 +43,7 @@ SPOKEN_BY = {
     "own": {"import"},
     "like": {"import", "info", "report"},
     "sources": {"import", "info", "report"},
+    "tabulate": {"evaluate", "features", "report", "train"},
 }
 """File -> commands that say its messages, where these name an option without a command."""
 
