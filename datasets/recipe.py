@@ -34,6 +34,7 @@ from .correlation import Copula, Correlation, copula_of
 from .draws import Axis, Bound, Draw, Range, axes_of, has_value, matches, value_at
 from .held_out import HeldOut, Region, regions_of
 from .life import LIFE_COLUMNS, LifeTable, Lives, Moment, life_faults
+from .options import Alternatives, OptionSet, alternatives_of
 from .recipe_file import RecipeError, beside, merged, read_recipe
 from .sampling import BLOCK, SET, Dimension, Points, Sampling, number_of
 from .wear_bounds import bound_of_limits
@@ -101,7 +102,17 @@ RESERVED = ("none", "combined")
 """Names that no confounder may have: tables use them for records without any and with several."""
 
 # independent random streams of one data set; their numbers decide the records of every recipe
-_MACHINE, _RECORD, _NOISE, _PRESENCE, _CONFOUNDER, _LIFE, _MOMENT = range(7)
+(
+    _MACHINE,
+    _RECORD,
+    _NOISE,
+    _PRESENCE,
+    _CONFOUNDER,
+    _LIFE,
+    _MOMENT,
+    _MACHINE_CHOICE,
+    _RECORD_CHOICE,
+) = range(9)
 
 _SEVERITIES_OF_SET = 1
 """Dimensions of a Sobol sequence kept for severities: the first one is even together with the first
@@ -172,6 +183,7 @@ class RecipeTable(Part):
     )
     machine: tuple[Draw, ...] = Field(default=(), description="drawn once per group")
     record: tuple[Draw, ...] = Field(default=(), description="drawn for every record")
+    choice: tuple[OptionSet, ...] = Field(default=(), description="one of several, by chance")
     confounder: tuple[Confounder, ...] = Field(default=(), description="faults beside the wear")
     correlation: tuple[Correlation, ...] = Field(default=(), description="draws that go together")
     held_out: tuple[Region, ...] = Field(default=(), description="to test on, not to train on")
@@ -268,6 +280,8 @@ class Recipe:
         The first is graded and trained for.
     machine, record : tuple of Range or Vector
         Nuisance and conditions, in the order in which they are drawn.
+    choices : tuple of Alternatives
+        Discrete draws.
     confounders : mapping
         Name of a random stream -> confounders that share it because they exclude each other.
     copulas : mapping
@@ -286,6 +300,7 @@ class Recipe:
     severities: tuple[Wearing, ...]
     machine: tuple[Axis, ...]
     record: tuple[Axis, ...]
+    choices: tuple[Alternatives, ...]
     confounders: Mapping[str, tuple[Fault, ...]]
     copulas: Mapping[str, Copula]
     held_out: tuple[HeldOut, ...]
@@ -331,6 +346,7 @@ class Recipe:
             **({VIEW: f"S{len(self.view)}"} if self.view else {}),
             **dict.fromkeys(self.severity_columns, "<f8"),
             **dict.fromkeys(further, "i1"),
+            **dict.fromkeys([each.column for each in self.choices], "S32"),
             **dict.fromkeys(presence, "?"),
             **dict.fromkeys(values, "<f8"),
             **({} if self.table.life is None else LIFE_COLUMNS),
@@ -364,7 +380,8 @@ class Recipe:
 
     def _sequence(self, seed: int, stream: int, *key: int) -> np.random.SeedSequence:
         # the name keeps two recipes with one seed from drawing the same machines
-        name = self.machine_name if stream == _MACHINE else self.name
+        of_machine = stream in (_MACHINE, _MACHINE_CHOICE)
+        name = self.machine_name if of_machine else self.name
         return np.random.SeedSequence([seed, number_of(name)], spawn_key=(stream, *key))
 
     def noise_seed(self, seed: int, index: int) -> int:
@@ -466,7 +483,9 @@ def _resolved(
     places = _places(in_metres)
     axes = axes_of(places, _with_lists(base), faults)
     faults += _severity_faults(table.severity)
-    faults += _path_clashes([axis.path for found in axes.values() for axis in found])
+    choices = alternatives_of(table.choice, _with_lists(base), faults)
+    paths = [axis.path for found in axes.values() for axis in found]
+    faults += _path_clashes([*paths, *(path for each in choices for path in each.paths)])
     faults += _confounder_faults(table.confounder)
     copulas = copula_of(table.correlation, _levels(places, axes), faults)
     held_out = _held_out(in_metres, axes, base, faults) if len(axes) == len(places) else ()
@@ -481,6 +500,7 @@ def _resolved(
         severities=_wearing(table.severity, _of(axes, "severity"), scene_from_table(base)),
         machine=tuple(_of(axes, "machine")),
         record=tuple(_of(axes, "record")),
+        choices=choices,
         confounders=_fault_sets(table.confounder, axes),
         copulas=copulas,
         held_out=held_out,
@@ -596,7 +616,7 @@ def _machine_faults(table: RecipeTable, folder: Path) -> list[str]:
     return [
         f"machines_of = '{other.name}': {name} must be as it is there; extend that recipe and "
         "leave it"
-        for name in ("scene", "sampling", "machine", "correlation")
+        for name in ("scene", "sampling", "machine", "choice", "correlation")
         if getattr(other, name) != getattr(table, name)
     ]
 
@@ -964,6 +984,8 @@ def _sample(recipe: Recipe, sources: Mapping[str, _Source], index: int, seed: in
     drawn = sources["machine"].values(group)
     drawn |= sources["record"].values(index)
     drawn |= sources["severity"].values(index)
+    taken = _choices(recipe, group, index, seed)
+    drawn |= {path: value for _, values in taken.values() for path, value in values.items()}
     life = _moment(recipe, group, index, seed)
     if life is not None:
         drawn[recipe.severity.path] = life.severity
@@ -977,11 +999,25 @@ def _sample(recipe: Recipe, sources: Mapping[str, _Source], index: int, seed: in
         "seed": noise_seed,
         **({VIEW: recipe.view} if recipe.view else {}),
         **_severity_labels(recipe, drawn),
+        **{column: name for column, (name, _) in taken.items()},
         **({} if life is None else life.labels),
         **_confounder_labels(recipe, faults),
         **{name: condition_of(scene, name) for name in recipe.conditions},
     }
     return Sample(index=index, group=group, seed=noise_seed, row=row, drawn=drawn, scene=scene)
+
+
+def _choices(
+    recipe: Recipe, group: int, index: int, seed: int
+) -> dict[str, tuple[str, dict[str, Any]]]:
+    """Option and scene values of every choice, by its manifest column."""
+    streams = {"machine": (_MACHINE_CHOICE, group), "record": (_RECORD_CHOICE, index)}
+
+    def rng(per: str, *key: int) -> np.random.Generator:
+        stream, number = streams[per]
+        return recipe.rng(seed, stream, number, *key)
+
+    return {each.column: each.take(partial(rng, each.per)) for each in recipe.choices}
 
 
 def _moment(recipe: Recipe, group: int, index: int, seed: int) -> Moment | None:

@@ -21,6 +21,7 @@ _LISTS = {
     "severity": "path",
     "machine": "path",
     "record": "path",
+    "choice": "name",
     "confounder": "name",
     "held_out": "name",
 }
@@ -162,7 +163,7 @@ def _inherited(
     """Draws that stay those of a scene before, by path or name."""
     other = base.get("scene")
     changed = other is not None and own.get("scene", other) != other
-    lists = ("machine", "record", "confounder")
+    lists = ("machine", "record", "choice", "confounder")
     kept = [str(_told(e, _LISTS[name])) for name in lists for e in _kept(own, base, name)]
     return {key: before.get(key, str(other)) for key in kept if changed or key in before}
 

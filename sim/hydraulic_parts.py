@@ -178,9 +178,12 @@ class CylinderPressure(Part):
     """Gauge pressure on the piston face.
 
     ``none``: no pressure. ``constant``: `discharge` all the time. ``two-level``: `suction` and
-    `discharge` by turns, over `rise_angle`. ``heads``: the quasi-static energy balance of the two
-    lines, whose far ends are at `suction` and `discharge`. ``chamber``: a compressible chamber
-    with self-acting valves, `suction` and `discharge` being the pressures before and after them.
+    `discharge` by turns; the rise begins `rise_delay` after the bottom dead centre, when the
+    suction valve has closed, and takes `rise_angle`; the fall at the other dead centre likewise,
+    with numbers of its own, since clearance volume and air expand there. ``heads``: the
+    quasi-static energy balance of the two lines, whose far ends are at `suction` and `discharge`.
+    ``chamber``: a compressible chamber with self-acting valves, `suction` and `discharge` being
+    the pressures before and after them.
     """
 
     rung: Literal["none", "constant", "two-level", "heads", "chamber"] = "two-level"
@@ -190,7 +193,25 @@ class CylinderPressure(Part):
         default=math.radians(3.0),
         ge=math.radians(0.5),
         le=math.radians(90.0),
-        description="crank angle after a dead centre over which the pressure changes level",
+        description="crank angle over which the pressure rises, and falls unless fall_angle says",
+    )
+    rise_delay: Angle = Field(
+        default=0.0,
+        ge=0,
+        le=math.radians(90.0),
+        description="crank angle after the bottom dead centre at which the rise begins",
+    )
+    fall_angle: Angle | None = Field(
+        default=None,
+        ge=math.radians(0.5),
+        le=math.radians(90.0),
+        description="crank angle over which the pressure falls; none: as it rises",
+    )
+    fall_delay: Angle = Field(
+        default=0.0,
+        ge=0,
+        le=math.radians(90.0),
+        description="crank angle after the top dead centre at which the fall begins",
     )
     flow: Literal["exact", "two-harmonic"] = Field(
         default="exact", description="flow of the rung heads"

@@ -96,7 +96,10 @@ _NUMBERS = (
     "speed",
     "suction",
     "discharge",
+    "rise_delay",
     "rise_angle",
+    "fall_delay",
+    "fall_angle",
     "density",
     "suction_head",
     "suction_resistance",
@@ -183,7 +186,10 @@ def hydraulic_parameters(
         "speed": speed,
         "suction": pressure.suction,
         "discharge": pressure.discharge,
+        "rise_delay": pressure.rise_delay,
         "rise_angle": pressure.rise_angle,
+        "fall_delay": pressure.fall_delay,
+        "fall_angle": pressure.rise_angle if pressure.fall_angle is None else pressure.fall_angle,
         "density": liquid.density,
         "dead_volume": pressure.dead_volume or 0.0,
         "bulk_modulus": liquid.bulk_modulus,
@@ -264,7 +270,7 @@ def _valve_values(side: str, valve: Valve | None, liquid: Liquid) -> dict[str, f
 
 
 @kernel
-def two_level_pressure(angle: float, suction: float, discharge: float, rise_angle: float) -> float:
+def two_level_pressure(angle: float, suction: float, discharge: float, h: Any) -> float:
     """Suction level while the piston withdraws, discharge level while it advances [Pa].
 
     Parameters
@@ -273,20 +279,34 @@ def two_level_pressure(angle: float, suction: float, discharge: float, rise_angl
         Crank angle [rad]; the piston withdraws from 0 to pi.
     suction, discharge : float
         Gauge pressures [Pa].
-    rise_angle : float
-        After each dead centre the level changes over this angle [rad], by the cubic with zero
-        slope at both ends: liquid with a little air is compressed, valves close late.
+    h : record of dtype HYDRAULIC
+        Its delays and angles [rad]: after each dead centre the level stays for the delay, then
+        changes over the angle by the cubic with zero slope at both ends.
+
+    Notes
+    -----
+    The delay is what a valve takes to close: its plate follows the flow and is still open at the
+    dead centre, 5 to 15 degrees in plate valves. The angle is what the liquid and its air take to
+    be compressed, ``dV/V = dp/K``; at the other end the dead volume expands, so rise and fall
+    differ [1]_.
+
+    References
+    ----------
+    .. [1] J. E. Miller, The Reciprocating Pump: Theory, Design, and Use, 2nd ed., Krieger 1995,
+       chapters on valves and on volumetric efficiency.
     """
     turn = 2.0 * math.pi
     phase = angle - turn * math.floor(angle / turn)
     if phase < math.pi:
         before, after = discharge, suction
+        u = (phase - h.fall_delay) / h.fall_angle
     else:
         before, after = suction, discharge
-        phase -= math.pi
-    if phase >= rise_angle:
+        u = (phase - math.pi - h.rise_delay) / h.rise_angle
+    if u >= 1.0:
         return after
-    u = phase / rise_angle
+    if u <= 0.0:
+        return before
     return before + (after - before) * u * u * (3.0 - 2.0 * u)
 
 
@@ -307,7 +327,7 @@ def _inflow(angle: float, crank_speed: float, piston_velocity: float, h: Any) ->
 @kernel
 def _head_pressure(angle: float, crank_speed: float, piston_velocity: float, h: Any) -> Any:
     flow, rate, inertia = _inflow(angle, crank_speed, piston_velocity, h)
-    share = two_level_pressure(angle, 0.0, 1.0, h.rise_angle)  # of the discharge side
+    share = two_level_pressure(angle, 0.0, 1.0, h)  # of the discharge side
     speed = flow / h.area
     outlet_speed = flow / h.outlet_area
     loss = flow * abs(flow)
@@ -362,8 +382,8 @@ def line_pressure(angle: float, crank_speed: float, piston_velocity: float, h: A
     ``M = rho (L / A_line + l / A_valve)``. With the exact flow ``Q = -A x'`` the last term is
     handed out as the added mass ``A^2 M``, so no acceleration is needed; with the two-harmonic
     flow ``A r w (sin a + lambda/2 sin 2a)`` it is in the pressure, and the added mass is 0. That
-    flow errs by at most ``0.163 lambda^3`` of ``A r w``. Over `rise_angle` after a dead centre
-    one side passes into the other as in the rung *two-level*.
+    flow errs by at most ``0.163 lambda^3`` of ``A r w``. About a dead centre one side
+    passes into the other as in the rung *two-level*.
 
     Valid while the liquid column holds together: see :func:`lowest_pressure`.
 
@@ -387,7 +407,7 @@ def line_pressure(angle: float, crank_speed: float, piston_velocity: float, h: A
     if h.rung == PRESSURE_CONSTANT:
         return h.discharge, 0.0
     if h.rung == PRESSURE_TWO_LEVEL:
-        return two_level_pressure(angle, h.suction, h.discharge, h.rise_angle), 0.0
+        return two_level_pressure(angle, h.suction, h.discharge, h), 0.0
     if h.rung == PRESSURE_HEADS:
         return _head_pressure(angle, crank_speed, piston_velocity, h)
     return 0.0, 0.0

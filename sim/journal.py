@@ -35,7 +35,7 @@ from .orbit import (
     step_history,
 )
 from .parts import Scene, SceneError, channels_of
-from .sensor import digitise, tacho_pulses
+from .sensor import digitise
 
 Float = NDArray[np.float64]
 Numerics = dict[str, float | int | str]
@@ -465,9 +465,7 @@ def _measured(
         rows.append(row)
         clipped += lost
     if scene.tacho:
-        width = scene.tacho.pulse_width / math.tau
-        turns = plan.angle / math.tau
-        rows.append(tacho_pulses(turns, pulse_width=width, level=scene.tacho.level))
+        rows.append(scene.tacho.channel(plan.angle))
     return np.stack(rows), clipped
 
 

@@ -16,6 +16,8 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Generic, Literal, Self, TypeVar
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import (
     AfterValidator,
     BaseModel,
@@ -27,7 +29,7 @@ from pydantic import (
     model_validator,
 )
 
-from .sensor import SIMULATED_RATE_LEAST, SIMULATED_RATE_MOST, Channel
+from .sensor import SIMULATED_RATE_LEAST, SIMULATED_RATE_MOST, Channel, tacho_pulses
 
 _INCH = 0.0254  # m, exact by definition
 _POUND_FORCE = 4.4482216152605  # N, exact by definition
@@ -399,8 +401,18 @@ class Accelerometer(Part):
         default=1.0, ge=GAIN_LEAST, le=GAIN_MOST, description="true sensitivity over nominal"
     )
     noise: Acceleration = Field(
-        default=0.0, ge=0, le=_ACCELERATION_MOST, description="rms of white noise"
+        default=0.0, ge=0, le=_ACCELERATION_MOST, description="rms of the sensor's own noise"
     )
+    noise_slope: Ratio = Field(
+        default=0.0,
+        ge=0,
+        le=2,
+        description="its power falls as 1 / f to this power: 0 white, 1 pink, 2 red",
+    )
+    mains: Acceleration = Field(
+        default=0.0, ge=0, le=_ACCELERATION_MOST, description="rms of hum, harmonics and all"
+    )
+    mains_frequency: Frequency = Field(default=50.0, ge=15, le=400, description="of the hum")
     range: Acceleration = Field(
         ge=_ACCELERATION_LEAST, le=_ACCELERATION_MOST, description="full scale, plus and minus"
     )
@@ -489,11 +501,22 @@ def single_axis(sensors: Sequence[Accelerometer]) -> tuple[Accelerometer, ...]:
 
 
 class Tacho(Part):
-    """A rectangular pulse per revolution, rising at crank angle zero."""
+    """A rectangular pulse per revolution, rising at shaft angle zero or `late` after it."""
 
     name: str = Field(default="tacho", min_length=1, max_length=NAME_LONGEST)
     pulse_width: Angle = Field(default=math.radians(10.0), gt=0, le=math.pi)
     level: Voltage = Field(default=5.0, ge=_LEVEL_LEAST, le=_LEVEL_MOST)
+    late: Angle = Field(
+        default=0.0, ge=-math.pi, le=math.pi, description="shaft angle at which the pulse rises"
+    )
+
+    def channel(self, angle: NDArray[np.float64]) -> NDArray[np.float32]:
+        """Pulses [V, shape=(n,)] of a shaft at these rising angles [rad, shape=(n,)]."""
+        return tacho_pulses(
+            (angle - self.late) / math.tau,
+            pulse_width=self.pulse_width / math.tau,
+            level=self.level,
+        )
 
 
 class Wear(Part):

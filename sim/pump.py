@@ -32,10 +32,11 @@ from .pump_parts import CRANK_PLACES, FORCE_PLACES, GUIDE_PLACES, VALVE_PLACES, 
 from .pump_push import casing_pushes, read_cells, with_pushes
 from .sensor import (
     anti_alias_poles,
+    coloured_noise,
     digitise,
     low_pass,
+    mains_hum,
     mounting_poles,
-    tacho_pulses,
 )
 from .slider_crank import FORCES, GUIDE, JOINT_COMPLIANT, JOINT_LINK, CrankRun
 from .tearing import lowest_of_run, torn_in_run
@@ -503,7 +504,7 @@ def _measured(
         channel, lost = digitise(
             _front_end(sensor, row, scene.sample_rate)[plan.kept],
             gain=sensor.gain,
-            noise=sensor.noise,
+            noise=_floor(sensor, plan.n_samples, scene.sample_rate, rng),
             full_scale=sensor.range,
             bits=sensor.bits,
             rng=rng,
@@ -516,10 +517,18 @@ def _measured(
     if scene.tacho and not scene.running:
         rows.append(np.zeros(plan.n_samples, dtype=np.float32))
     elif scene.tacho:
-        turn = 2 * math.pi
-        width = scene.tacho.pulse_width / turn
-        rows.append(tacho_pulses(angle / turn, pulse_width=width, level=scene.tacho.level))
+        rows.append(scene.tacho.channel(angle))
     return np.stack(rows), clipped
+
+
+def _floor(
+    sensor: Accelerometer, n: int, fs: float, rng: np.random.Generator
+) -> NDArray[np.float64]:
+    """What the sensor shows of a machine at rest [m/s^2, shape=(n,)]."""
+    noise = coloured_noise(n, fs, rms=sensor.noise, slope=sensor.noise_slope, rng=rng)
+    if sensor.mains > 0:
+        noise += mains_hum(n, fs, rms=sensor.mains, frequency=sensor.mains_frequency, rng=rng)
+    return noise
 
 
 def _front_end(sensor: Accelerometer, row: NDArray[np.float64], fs: float) -> NDArray[np.float64]:

@@ -244,11 +244,99 @@ def padded_spectrum(x: NDArray[np.float64], pad: int) -> tuple[NDArray[np.comple
     return fft.rfft(whole, axis=-1), length
 
 
+def coloured_noise(
+    n: int, fs: float, *, rms: float, slope: float, rng: np.random.Generator
+) -> NDArray[np.float64]:
+    """Gaussian noise whose power density falls as ``1 / f**slope``.
+
+    Parameters
+    ----------
+    n : int
+        Samples.
+    fs : float
+        Sample rate [Hz].
+    rms : float
+        Of the whole band, from one cycle in the record to half the sample rate.
+    slope : float
+        0 white, 1 pink (flicker noise of amplifiers), 2 red.
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    numpy.ndarray [shape=(n,)]
+        In the unit of `rms`; zeros where it is 0.
+
+    Examples
+    --------
+    >>> x = coloured_noise(2**16, 1e3, rms=2.0, slope=1.0, rng=np.random.default_rng(0))
+    >>> power = np.abs(np.fft.rfft(x)) ** 2
+    >>> octaves = [power[2**k : 2**(k + 1)].sum() for k in (12, 13, 14)]  # equal of pink noise
+    >>> bool(np.ptp(octaves) < 0.1 * max(octaves)), round(float(x.std()), 1)
+    (True, 2.0)
+    """
+    if rms == 0:
+        return np.zeros(n)
+    white = rng.standard_normal(n)
+    if slope == 0:
+        return np.asarray(rms * white)
+    frequency = np.fft.rfftfreq(n, 1 / fs)[1:]
+    weight = frequency ** (-slope / 2)
+    weight *= rms / math.sqrt(float(np.mean(weight**2)))
+    return np.asarray(np.fft.irfft(np.fft.rfft(white) * np.append(0.0, weight), n))
+
+
+HUM = ((1, 1.0), (2, 0.3), (3, 0.5), (5, 0.25))
+"""Harmonics of mains hum and their amplitudes over the first: a ground loop beside a rectifier
+(estimate)."""
+
+
+def mains_hum(
+    n: int, fs: float, *, rms: float, frequency: float, rng: np.random.Generator
+) -> NDArray[np.float64]:
+    """Hum of a mains supply, each harmonic of :data:`HUM` at a phase of its own.
+
+    Parameters
+    ----------
+    n : int
+        Samples.
+    fs : float
+        Sample rate [Hz].
+    rms : float
+        Of all harmonics together; those above half the sample rate are left out.
+    frequency : float
+        Of the first one [Hz].
+    rng : numpy.random.Generator
+        Of the phases.
+
+    Returns
+    -------
+    numpy.ndarray [shape=(n,)]
+        In the unit of `rms`.
+
+    Examples
+    --------
+    >>> hum = mains_hum(1000, 1e3, rms=1.0, frequency=50.0, rng=np.random.default_rng(0))
+    >>> round(float(hum.std()), 9), int(np.abs(np.fft.rfft(hum)).argmax())
+    (1.0, 50)
+    """
+    phases = math.tau * rng.random(len(HUM))
+    angle = math.tau * frequency / fs * np.arange(n)
+    scale = rms * math.sqrt(2 / sum(share**2 for _, share in HUM))
+    return np.asarray(
+        scale
+        * sum(
+            share * np.sin(order * angle + phase)
+            for (order, share), phase in zip(HUM, phases, strict=True)
+            if order * frequency < fs / 2
+        )
+    )
+
+
 def digitise(
     acceleration: NDArray[np.float64],
     *,
     gain: float,
-    noise: float,
+    noise: float | NDArray[np.float64],
     full_scale: float,
     bits: int,
     rng: np.random.Generator,
@@ -261,8 +349,8 @@ def digitise(
         True acceleration of the housing [m/s^2], already band-limited.
     gain : float
         True sensitivity over the nominal one.
-    noise : float
-        rms of white Gaussian noise [m/s^2], added before the converter.
+    noise : float or numpy.ndarray [shape=(n_samples,)]
+        rms of white Gaussian noise, or the noise itself [m/s^2], added before the converter.
     full_scale : float
         The converter saturates at plus and minus this [m/s^2].
     bits : int
@@ -284,7 +372,9 @@ def digitise(
     (array([ 0., 20.], dtype=float32), 1)
     """
     signal = gain * acceleration
-    if noise > 0:
+    if isinstance(noise, np.ndarray):
+        signal = signal + noise
+    elif noise > 0:
         signal = signal + noise * rng.standard_normal(signal.shape)
     step = 2 * full_scale / 2**bits
     clipped = int(np.count_nonzero(np.abs(signal) > full_scale))

@@ -23,7 +23,7 @@ from .integrate import Recorder, SimulationError, Solution, Status
 from .ladder import element_faults
 from .parts import Scene, SceneError, channels_of
 from .rotor import Rotor, Support
-from .sensor import digitise, tacho_pulses
+from .sensor import digitise
 from .shaft_film import BeamFilm, FilmBearing, ShaftFilmStatus, beam_film
 from .shaft_parts import (
     Coupling,
@@ -1199,8 +1199,7 @@ def _measured(
         rows.append(row)
         clipped += lost
     if scene.tacho:
-        width = scene.tacho.pulse_width / math.tau
-        rows.append(tacho_pulses(angle / math.tau, pulse_width=width, level=scene.tacho.level))
+        rows.append(scene.tacho.channel(angle))
     return np.stack(rows), clipped
 
 

@@ -97,8 +97,9 @@ def test_simple_rungs(angle):
     levels = {"suction": -3e4, "discharge": 3e5, "rise_angle": 0.1}
     assert hy.line_pressure(angle, SPEED, 1.0, record(rung="none", **levels)) == (0.0, 0.0)
     assert hy.line_pressure(angle, SPEED, 1.0, record(rung="constant", **levels)) == (3e5, 0.0)
-    expected = hy.two_level_pressure(angle, -3e4, 3e5, 0.1)
-    assert hy.line_pressure(angle, SPEED, 1.0, record(rung="two-level", **levels)) == (
+    h = record(rung="two-level", **levels)
+    expected = hy.two_level_pressure(angle, -3e4, 3e5, h)
+    assert hy.line_pressure(angle, SPEED, 1.0, h) == (
         expected,
         0.0,
     )
@@ -191,7 +192,7 @@ def test_heads_without_losses_at_low_speed_are_the_two_levels():
     for angle in np.linspace(0, TURN, 50):
         p, mass = hy.line_pressure(angle, SPEED, 1e-6, h)
         assert mass == 0.0
-        expected = hy.two_level_pressure(angle, -1e4, 2e5, math.radians(3.0))
+        expected = hy.two_level_pressure(angle, -1e4, 2e5, h)
         assert_allclose(p, expected, rtol=0, atol=1e-8)  # rho u^2 = 1e-9 Pa
 
 
@@ -715,7 +716,8 @@ def test_quick_valves_and_rigid_liquid_approach_the_two_levels():
         last = slice(-10_000, None)
         stroke = angle[last] % math.pi
         away = (stroke > 0.25) & (stroke < 3.0)
-        levels = np.array([hy.two_level_pressure(a, -3e4, 3e5, 0.01) for a in angle[last]])
+        sharp = record(rung="two-level", rise_angle=0.01)
+        levels = np.array([hy.two_level_pressure(a, -3e4, 3e5, sharp) for a in angle[last]])
         errors.append(np.abs(states[last, 0] - levels)[away].mean())
     # what is left is what opens the valves
     assert_allclose(errors, [2e3, 1e3, 0.5e3], rtol=0.05)

@@ -91,7 +91,7 @@ NARROWER = (
 def test_limits_follow_the_scene_of_a_recipe_that_extends_another(tmp_path):
     scene_beside(tmp_path, "narrow.toml", *NARROWER)
     file = tmp_path / "mine.toml"
-    text = 'name = "mine"\nextends = "bilge-pump-standard"\nscene = "narrow.toml"\n'
+    text = 'name = "mine"\nextends = "bilge-pump-narrow"\nscene = "narrow.toml"\n'
     file.write_text(text)
     found = load_recipe(file)
     assert_allclose(found.severity.bands, [[5e-5, 1.5 * 2.5e-4]])
@@ -105,7 +105,7 @@ def test_limits_follow_the_scene_of_a_recipe_that_extends_another(tmp_path):
 def test_lengths_of_another_scene_are_faults_of_check(tmp_path):
     scene_beside(tmp_path, "narrow.toml", *NARROWER)
     (tmp_path / "first.toml").write_text(
-        'name = "first"\nextends = "bilge-pump-standard"\n[[severity]]\n'
+        'name = "first"\nextends = "bilge-pump-narrow"\n[[severity]]\n'
         'path = "joint.crankpin.diametral_clearance"\nlow = "as new"\nhigh = "0.4 mm"\n'
         f'[[held_out]]\nname = "beyond_limit"\nbounds.{CLEARANCE} = {{ low = "0.31 mm" }}\n'
     )
@@ -129,7 +129,7 @@ def test_numbers_drawn_for_the_parts_of_another_scene_are_warned_of(tmp_path):
         tmp_path, "dry.toml", ("friction = 0.05               # bou", "friction = 0.2 # bou")
     )
     file = tmp_path / "mine.toml"
-    own = 'name = "mine"\nextends = "bilge-pump-standard"\nscene = "dry.toml"\n'
+    own = 'name = "mine"\nextends = "bilge-pump-narrow"\nscene = "dry.toml"\n'
     file.write_text(own)
     said = run("check", file).stdout.splitlines()
     assert said[0] == "mine: no fault, 1 warning(s)"
@@ -148,7 +148,7 @@ def test_numbers_drawn_for_the_parts_of_another_scene_are_warned_of(tmp_path):
     file.write_text(own)
     (tmp_path / "next.toml").write_text('name = "next"\nextends = "mine.toml"\n')
     assert "dry.toml has 0.2" in run("check", tmp_path / "next.toml").stdout
-    own = own.replace("-standard", "-faults")
+    own = own.replace("-narrow", "-faults")
     file.write_text(own + 'without = ["joint.wristpin.diametral_clearance"]\n')
     said = run("check", file).stdout
     assert "warning: confounder leaking_suction_valve: 3e-06 to 5e-05 (SI) is of the scene" in said

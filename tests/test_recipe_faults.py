@@ -82,7 +82,7 @@ def second(monkeypatch):
     monkeypatch.setitem(recipes.SEVERITIES, SECOND, "second_severity_m")
 
 
-def written(tmp_path, text, name="mine", base="bilge-pump-small"):
+def written(tmp_path, text, name="mine", base="bilge-pump-narrow"):
     file = tmp_path / f"{name}.toml"
     file.write_text(f'name = "{name}"\nextends = "{base}"\n{text}')
     return file
@@ -177,7 +177,7 @@ def test_a_further_severity_moves_no_other_draw(tmp_path, second):
 
 
 def test_the_first_severity_of_a_list_is_the_primary_one(tmp_path, second):
-    text = recipe_text("bilge-pump-standard").replace("[severity]", WORN + "\n[[severity]]")
+    text = recipe_text("bilge-pump-narrow").replace("[severity]", WORN + "\n[[severity]]")
     file = tmp_path / "mine.toml"
     file.write_text(text)
     recipe = load_recipe(file)
@@ -434,15 +434,15 @@ def test_confounders_at_fault(tmp_path, text, fault):
 GOLDEN = {
     "bilge-pump-small": (
         12188568256729861054,
-        [0.0002720256758630729, 1.0177175419870763, 1.1145393852219077],
+        [0.0002720256758630729, 1.024804558781907, 1.1145393852219077],
     ),
-    "bilge-pump-standard": (
-        11361987407968808928,
-        [0.0003388261383166816, 1.0067628625314682, 2.156353259397224],
+    "bilge-pump-narrow": (
+        17378824282752705755,
+        [9.387656215832088e-05, 1.045485269697383, 1.7063958976213054],
     ),
     "bilge-pump-shifted": (
         3241098451762532397,
-        [5.5407954217035906e-05, 1.043138877907768, 0.4967394894564585],
+        [5.5407954217035906e-05, 0.9970511688571424, 0.4967394894564585],
     ),
 }
 """Record 5 of seed 7: golden numbers, so that no data set changes unseen."""
@@ -460,11 +460,12 @@ def test_the_draws_do_not_change_unseen(name):
 def test_extending_draws_what_the_whole_text_draws(tmp_path):
     """The nuisance written out in full, under the same name: the same records."""
     whole = tmp_path / "whole.toml"
-    text = recipe_text("bilge-pump-standard").replace("bilge-pump-standard", "bilge-pump-small")
+    text = recipe_text("journal-bearing-standard")
+    text = text.replace("journal-bearing-standard", "journal-bearing-small")
     whole.write_text(text)
     for one, other in zip(
         sample_records(load_recipe(whole), 20, seed=3),
-        sample_records(load_recipe("bilge-pump-small"), 20, seed=3),
+        sample_records(load_recipe("journal-bearing-small"), 20, seed=3),
         strict=True,
     ):
         assert (one.drawn, one.row, one.scene) == (other.drawn, other.row, other.scene)
@@ -512,7 +513,7 @@ def test_what_is_left_out_is_gone_and_may_come_back_at_the_end():
 def test_what_is_left_out_must_have_been_there(tmp_path):
     recipe = load_recipe(written(tmp_path, 'without = ["joint.crankpin.friction"]'))
     assert "joint.crankpin.friction" not in [axis.path for axis in recipe.machine]
-    assert len(recipe.machine) == len(load_recipe("bilge-pump-small").machine) - 1
+    assert len(recipe.machine) == len(load_recipe("bilge-pump-narrow").machine) - 1
     fault = "without: 'joint.crankpin.frictio' is no path and no name of the recipe extended"
     text = 'without = ["joint.crankpin.frictio", "drive.speed"]'
     assert faults_of(written(tmp_path, text))[0].startswith(fault)
@@ -541,7 +542,7 @@ def test_the_text_of_an_extended_recipe_is_whole_and_draws_the_same(tmp_path):
 
 
 def test_a_recipe_that_extends_nothing_keeps_its_text():
-    assert load_recipe("bilge-pump-standard").text == recipe_text("bilge-pump-standard")
+    assert load_recipe("bilge-pump-narrow").text == recipe_text("bilge-pump-narrow")
 
 
 def test_a_chain_of_files_is_followed_and_the_scene_found_beside_its_own(tmp_path):
@@ -549,7 +550,7 @@ def test_a_chain_of_files_is_followed_and_the_scene_found_beside_its_own(tmp_pat
     far.mkdir()
     near.mkdir()
     pump_file(far, {"drive.speed": "4 Hz"})
-    standard = recipe_text("bilge-pump-standard")
+    standard = recipe_text("bilge-pump-narrow")
     (far / "base.toml").write_text(
         standard.replace('scene = "bilge-pump"', 'scene = "pump.toml"').replace("2000", "7")
     )
@@ -566,7 +567,7 @@ def test_circles_and_long_chains_are_refused(tmp_path):
         "extends: a -> b -> c -> a must not come back; write the draws out in one of them"
     ]
     for i in range(LONGEST_CHAIN - 1):
-        parent = f"r{i - 1}.toml" if i else "bilge-pump-standard"
+        parent = f"r{i - 1}.toml" if i else "bilge-pump-narrow"
         (tmp_path / f"r{i}.toml").write_text(f'name = "r{i}"\nextends = "{parent}"\n')
     assert load_recipe(tmp_path / f"r{LONGEST_CHAIN - 2}.toml").table.records == 2000
     last = written(tmp_path, "", base=f"r{LONGEST_CHAIN - 2}.toml")
@@ -578,7 +579,7 @@ def test_circles_and_long_chains_are_refused(tmp_path):
     [
         ("3", "extends = 3 must be the name of a recipe"),
         ('""', "extends = '' must be the name of a recipe"),
-        ('"bilge-pump-standart"', "did you mean 'bilge-pump-standard'?"),
+        ('"bilge-pump-narow"', "did you mean 'bilge-pump-narrow'?"),
     ],
 )
 def test_what_is_extended_must_be_there(tmp_path, extends, fault):
@@ -590,7 +591,7 @@ def test_what_is_extended_must_be_there(tmp_path, extends, fault):
 def test_a_name_is_never_taken_over(tmp_path):
     """It decides the seeds: two recipes of one name would draw the same machines."""
     file = tmp_path / "m.toml"
-    file.write_text('extends = "bilge-pump-standard"\n')
+    file.write_text('extends = "bilge-pump-narrow"\n')
     assert faults_of(file) == ["name is missing; add it"]
 
 

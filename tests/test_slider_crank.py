@@ -15,8 +15,10 @@ from wearstate.diagnose.verify import rebound
 from wearstate.sim import crank_setup as cs
 from wearstate.sim import slider_crank as sc
 from wearstate.sim.analytic import ideal_crank, kelvin_voigt_restitution
+from wearstate.sim.assemble import simulate
 from wearstate.sim.contact import RELEASE_AT_ZERO_FORCE, RELEASE_AT_ZERO_PENETRATION
-from wearstate.sim.hydraulics import two_level_pressure
+from wearstate.sim.hydraulic_parts import CylinderPressure
+from wearstate.sim.hydraulics import hydraulic_parameters, two_level_pressure
 from wearstate.sim.jit import sine_cosine
 from wearstate.sim.scene import load_scene
 
@@ -70,12 +72,18 @@ def crank_by_newton_euler(scene, angle, piston_force):
     }
 
 
+def levels_of(pressure):
+    """Kernel record of a pressure whose piston does not matter."""
+    return hydraulic_parameters(pressure, area=1.0, crank_radius=1.0, rod_length=5.0, speed=1.0)[0]
+
+
 def pushes(scene, angle):
     """Force of a two-level pressure on the piston, positive towards the crank [N]."""
     p, area = scene.pressure, math.pi / 4 * scene.piston.diameter**2
+    h = levels_of(p)
     return np.array(
         [
-            area * two_level_pressure(a, p.suction, p.discharge, p.rise_angle)
+            area * two_level_pressure(a, p.suction, p.discharge, h)
             if p.rung == "two-level"
             else 0.0
             for a in angle
@@ -124,21 +132,32 @@ def test_drive_does_no_work_over_a_revolution_without_pressure(scene):
     assert abs(moment.mean()) < 1e-13 * abs(moment).max()
 
 
-@pytest.mark.parametrize("rise", ["0.5 deg", "6 deg", "60 deg"])
-def test_drive_does_the_work_of_the_pressure(rise):
-    scene = load_scene("bilge-pump", {"pressure.rise_angle": rise})
-    ramp, area = scene.pressure.rise_angle, math.pi / 4 * scene.piston.diameter**2
+@pytest.mark.parametrize(
+    ("rise", "fall"),
+    [
+        ((0, 0.5), (0, 0.5)),
+        ((0, 6), (0, 6)),
+        ((0, 60), (0, 60)),
+        ((9, 2), (7, 1)),  # what the valves of the rung chamber do
+        ((80, 90), (3, 20)),
+    ],
+)
+def test_drive_does_the_work_of_the_pressure(rise, fall):
+    ramps = dict(zip(("rise_delay", "rise_angle"), rise, strict=True))
+    ramps |= dict(zip(("fall_delay", "fall_angle"), fall, strict=True))
+    scene = load_scene("bilge-pump", {f"pressure.{k}": f"{v} deg" for k, v in ramps.items()})
+    area = math.pi / 4 * scene.piston.diameter**2
     span = scene.pressure.discharge - scene.pressure.suction
     radius, length = scene.crank.radius, scene.rod.length
 
     def position(a):
         return radius * math.cos(a) + math.sqrt(length**2 - (radius * math.sin(a)) ** 2)
 
-    def late(dead_centre):
+    def late(dead_centre, delay, ramp):
         """Volume over area that passes while the pressure is still at the old level."""
         change, _ = quad(
             lambda a: (
-                abs(position(dead_centre + a) - position(dead_centre))
+                abs(position(dead_centre + delay + a) - position(dead_centre))
                 * (6 / ramp * (a / ramp) * (1 - a / ramp))  # slope of the smooth step
             ),
             0.0,
@@ -147,14 +166,16 @@ def test_drive_does_the_work_of_the_pressure(rise):
         )
         return change
 
+    rise, fall = np.radians(rise), np.radians(fall)
     # Indicator diagram: the full rectangle less what each dead centre loses to its ramp.
-    work = area * span * (2 * radius - late(0.0) - late(math.pi))
+    work = area * span * (2 * radius - late(0.0, *fall) - late(math.pi, *rise))
 
     def moment(a):
         return float(cs.ideal_motion(scene, np.array([a])).crank_moment[0])
 
-    pieces = [0.0, ramp, math.pi, math.pi + ramp, 2 * math.pi]
-    done = sum(quad(moment, a, b, epsrel=1e-11, limit=200)[0] for a, b in pairwise(pieces))
+    pieces = [0.0, fall[0], fall.sum(), math.pi, math.pi + rise[0], math.pi + rise.sum()]
+    ends = pairwise([*pieces, 2 * math.pi])
+    done = sum(quad(moment, a, b, epsrel=1e-11, limit=200)[0] for a, b in ends if a < b)
     assert_allclose(done, work, rtol=1e-9)  # quadrature
     assert 0 < work < area * span * 2 * radius
 
@@ -205,13 +226,40 @@ def test_ideal_run_records_the_ideal_forces_in_mid_step():
 
 
 def test_pressure_levels_and_ramps():
+    h = levels_of(CylinderPressure(rise_delay=0.2, rise_angle=0.1, fall_delay=0.3, fall_angle=0.4))
     down, up = 0.5 * math.pi, 1.5 * math.pi
-    assert two_level_pressure(down, -2.0, 7.0, 0.1) == -2.0
-    assert two_level_pressure(up, -2.0, 7.0, 0.1) == 7.0
-    assert two_level_pressure(up - 40 * math.pi, -2.0, 7.0, 0.1) == 7.0
+    assert two_level_pressure(down, -2.0, 7.0, h) == -2.0
+    assert two_level_pressure(up, -2.0, 7.0, h) == 7.0
+    assert two_level_pressure(up - 40 * math.pi, -2.0, 7.0, h) == 7.0
+    # the old level stays for the delay
+    assert two_level_pressure(0.299, -2.0, 7.0, h) == 7.0
+    assert two_level_pressure(math.pi + 0.199, -2.0, 7.0, h) == -2.0
     # half-way up a symmetric ramp is the mean of the levels
-    assert_allclose(two_level_pressure(0.05, -2.0, 7.0, 0.1), 2.5, rtol=1e-12)
-    assert_allclose(two_level_pressure(math.pi + 0.05, -2.0, 7.0, 0.1), 2.5, rtol=1e-12)
+    assert_allclose(two_level_pressure(0.5, -2.0, 7.0, h), 2.5, rtol=1e-12)
+    assert_allclose(two_level_pressure(math.pi + 0.25, -2.0, 7.0, h), 2.5, rtol=1e-12)
+    # one angle stands for both where only one is given
+    both = levels_of(CylinderPressure(rise_angle=0.1))
+    assert_allclose(two_level_pressure(0.05, -2.0, 7.0, both), 2.5, rtol=1e-12)
+
+
+@pytest.mark.parametrize("rpm", [255, 345])
+def test_delays_are_those_of_the_valves(rpm):
+    """Valves and liquid of the rung chamber reverse the pressure as late as the delays say."""
+    speed = {"drive.speed": f"{rpm} rpm", "duration": "1.2 s", "joint.crankpin.rung": "ideal"}
+    run = simulate(load_scene("bilge-pump", {**speed, "pressure.rung": "chamber"}), seed=0, truth=True)
+    angle, found = run.truth["state_alpha"], run.truth["cylinder_pressure_pa"]
+    about = ((angle + 0.1) % math.pi < 0.4) & (angle > angle[0] + 4 * math.pi)
+
+    def error(**numbers):
+        h = levels_of(CylinderPressure(**{k: math.radians(v) for k, v in numbers.items()}))
+        here = [two_level_pressure(a, -0.03e6, 0.3e6, h) for a in angle[about]]
+        return np.abs(found[about] - here).mean()
+
+    closing = {"rise_delay": 0.024 * rpm, "fall_delay": 0.0245 * rpm}  # a fixed time, 4 ms
+    late = error(**closing, rise_angle=4, fall_angle=1)
+    # what is left is the pressure that opens the valves; 300 rpm has 7.4 and 8.4 degrees
+    assert late < 0.25 * error(rise_angle=6)
+
 
 
 # --- one impact

@@ -384,7 +384,7 @@ def test_splits_that_are_asked_for_wrongly(path, arguments, message):
 
 
 def test_what_a_recipe_declares(tmp_path):
-    recipe = load_recipe("bilge-pump-standard", {"duration": "0.25 s"})
+    recipe = load_recipe("bilge-pump-narrow", {"duration": "0.25 s"})
     assert recipe.held_out
     with DataSet(write_set(tmp_path / "s.h5", recipe=recipe, n=200)) as data:
         made, manifest = default_splits(drawn_of(data)), data.manifest
