@@ -170,7 +170,5 @@ def _resolved(
 
 def _values(option: Option, base: Mapping[str, Any]) -> dict[str, Any]:
     return {
-        path: value
-        for pattern, value in option.values.items()
-        for path in matches(base, pattern)
+        path: value for pattern, value in option.values.items() for path in matches(base, pattern)
     }

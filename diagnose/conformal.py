@@ -19,6 +19,7 @@ Float = NDArray[np.float64]
 COVERAGE = 0.9
 """Nominal coverage of interval and set."""
 
+_LEAST_APART = 1e-2  # disagreement below which parts agree
 _LEAST_SCALE = 1e-6  # relative error below which errors are no more told apart
 _PENALTY = 1.0  # of the scale's slopes, for standardised inputs: a few records decide nothing
 
@@ -52,7 +53,7 @@ class Scale:
         return np.asarray(np.exp(standard @ self.weight + self.offset))
 
 
-def scale_inputs(estimate: ArrayLike, distance: ArrayLike) -> Float:
+def scale_inputs(estimate: ArrayLike, distance: ArrayLike, disagreement: ArrayLike) -> Float:
     """What the expected size of an error is told from.
 
     Parameters
@@ -61,20 +62,23 @@ def scale_inputs(estimate: ArrayLike, distance: ArrayLike) -> Float:
         Of the severity [m], > 0.
     distance : array_like [shape=(n,)]
         From the cloud of familiar recordings [-].
+    disagreement : array_like [shape=(n,)]
+        Of the parts of the blend, as a logarithm.
 
     Returns
     -------
-    numpy.ndarray [shape=(n, 3)]
-        Log estimate and its square, log distance.
+    numpy.ndarray [shape=(n, 4)]
+        Log estimate and its square, log distance, log disagreement.
 
     Examples
     --------
-    >>> scale_inputs([1.0], [1.0]).tolist()
-    [[0.0, 0.0, 0.0]]
+    >>> scale_inputs([1.0], [1.0], [1.0]).tolist()
+    [[0.0, 0.0, 0.0, 0.0]]
     """
     log = np.log(np.asarray(estimate, dtype=float))
     far = np.log(np.maximum(np.asarray(distance, dtype=float), _LEAST_SCALE))
-    return np.column_stack([log, log**2, far])
+    apart = np.log(np.maximum(np.asarray(disagreement, dtype=float), _LEAST_APART))
+    return np.column_stack([log, log**2, far, apart])
 
 
 def fit_scale(inputs: Float, log_error: Float) -> Scale:

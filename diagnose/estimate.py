@@ -28,7 +28,7 @@ from .grades import GRADE_NAMES, grades_of
 from .healthy import Baseline, referenced_rows
 from .models import Blend, Linear
 from .novelty import Familiarity, free_distance, novelty_p_value
-from .physical import level_channels
+from .physical import level_channels, levelled_rows
 from .quality import (
     Fault,
     Levels,
@@ -360,12 +360,18 @@ class WearModel:
         speed = row[self._columns[_SPEED_FEATURE]] if _SPEED_FEATURE in self._columns else None
         apart = self.familiarity.by_kind(self.names, row[None, :])[0]
         return Look(
-            distance=float(apart.mean()),
+            distance=float(self.familiarity.distance(self.names, self._levelled(row))[0]),
             limit=self.distance_limit,
             free_distance=free_distance(self.names, apart),
             excess_db=self._excess(row),
             speed_hz=None if speed is None else float(speed),
         )
+
+    def _levelled(self, row: Float) -> Float:
+        """The row with levels that a sensitivity must have put there taken away [shape=(1, n)]."""
+        excess = self.levels.excess(self.names, row[None, :])
+        wrong = np.abs(excess) > _OFF_LEVEL * np.asarray(self.levels.size)
+        return levelled_rows(self.names, row[None, :], np.where(wrong, excess, 0.0))
 
     def _excess(self, row: Float) -> dict[str, float]:
         """Level of each channel above the expected one [dB]."""
@@ -426,13 +432,15 @@ class WearModel:
         if known["p_value"] <= self.p_limit:
             reason = _strangeness(look.distance, self.calibration.distance)
             return Estimate(verdict="unfamiliar", reasons=(reason,), **known)
-        severity = float(self.predict(row[None, :], baseline)[0])
+        inputs = self._inputs(row[None, :], baseline)
+        severity = float(self.severity.predict(inputs)[0])
         findings = self._findings(row)
         cautions = (
             *(fault.text for fault in faults),
-            *self._range_cautions(severity, self._inputs(row[None, :], baseline)),
+            *self._range_cautions(severity, inputs),
             *self._condition_cautions(row, conditions),
             *self._level_cautions(look),
+            *self._disagreement_cautions(inputs),
             *self._finding_cautions(findings),
         )
         return Estimate(
@@ -441,13 +449,14 @@ class WearModel:
             confounders=findings,
             evidence=self._evidence(row, baseline),
             **known,
-            **self._grading(severity, look.distance),
+            **self._grading(severity, look.distance, inputs),
         )
 
-    def _grading(self, severity: float, distance: float) -> dict[str, Any]:
+    def _grading(self, severity: float, distance: float, inputs: Float) -> dict[str, Any]:
         """Grade, set, probabilities and interval of an estimate."""
         edges = self.card["grade_edges_m"]
-        scale = float(self.scale.predict(scale_inputs([severity], [distance]))[0])
+        apart = self.severity.disagreement(inputs)
+        scale = float(self.scale.predict(scale_inputs([severity], [distance], apart))[0])
         low, high = interval(severity, scale, self._tails)
         grade = int(grades_of(severity, edges))
         share = grade_probabilities(severity, scale, self.calibration, edges)
@@ -496,6 +505,16 @@ class WearModel:
                 f"{low:.4g} to {high:.4g} {condition['unit']}: extrapolating"
             )
         return cautions
+
+    def _disagreement_cautions(self, inputs: Float) -> list[str]:
+        """Lines and trees learnt the same; where they part, one of them knows nothing."""
+        apart, usual = float(self.severity.disagreement(inputs)[0]), self.severity.tube
+        if apart <= usual:
+            return []
+        return [
+            f"straight lines and trees of the model differ by a factor of {math.exp(apart):.3g}, "
+            f"on familiar machines by {math.exp(usual):.3g} at most: this one is unlike them"
+        ]
 
     def _level_cautions(self, look: Look) -> list[str]:
         return [

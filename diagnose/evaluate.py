@@ -13,7 +13,7 @@ from ..datasets.record import Attributes, DataError, DataSet
 from ..datasets.split_file import Sides, usable_sides
 from ..datasets.views import View
 from .baselines import Side, contest, side_of
-from .conformal import grade_limits, grade_set, interval, scale_inputs, tails
+from .conformal import grade_limits, grade_set, interval, tails
 from .estimate import Estimate, WearModel
 from .feature_choice import choice_in
 from .foreign import kitchen
@@ -365,7 +365,7 @@ def score(
         "accuracy_bound": bound_of(judged, edges),
         "nominal_coverage": float(np.mean(given)) if given else None,
         "confusion": confusion(true[mine], judged.grade[mine], len(edges) + 1),
-        "reliability": reliability(model, table, rows, judged, draws),
+        "reliability": reliability(model, judged, draws),
         "familiarity": p_value_shares(estimates, draws),
         "baselines": contest(train, test, judged, edges, limit, draws, seed=seed),
         "by_confounder": by_confounder(
@@ -432,9 +432,7 @@ def _numbers(values: Iterable[float | None]) -> Float:
     return np.array([np.nan if value is None else value for value in values])
 
 
-def reliability(
-    model: WearModel, table: FeatureTable, rows: Index, judged: Judged, draws: Resamples
-) -> list[dict[str, Any]]:
+def reliability(model: WearModel, judged: Judged, draws: Resamples) -> list[dict[str, Any]]:
     """Coverage of intervals and sets against the nominal one, over the graded records.
 
     Returns
@@ -445,8 +443,8 @@ def reliability(
     edges = model.card["grade_edges_m"]
     true = grades_of(judged.truth, edges)
     mine = np.flatnonzero(judged.graded)
-    distance = model.familiarity.distance(model.names, table.values[rows[mine]])
-    scale = model.scale.predict(scale_inputs(judged.found[mine], distance))
+    given = tails(model.calibration)  # what the intervals at hand were made with
+    scale = np.log(judged.high[mine] / judged.low[mine]) / (given.low + given.high)
     found = []
     for nominal in LEVELS:
         ends = tails(model.calibration, nominal)

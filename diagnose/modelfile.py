@@ -193,7 +193,7 @@ def _check_structure(model: WearModel, path: str | Path) -> None:
         "witness": linear_fits(model.witness, inputs),
         "scale": _scale_fits(model.scale),
         "calibration": _calibration_fits(model.calibration),
-        "familiarity": familiarity_fits(model.familiarity, physical.shape[1]),
+        "familiarity": familiarity_fits(model.familiarity, physical.shape[1], n),
         "levels": _levels_fit(model.levels, len(level_channels(names)), shapes.shape[1]),
         "numbers": numbers_fit(_arrays_of(model)),
     }
@@ -203,7 +203,7 @@ def _check_structure(model: WearModel, path: str | Path) -> None:
 
 
 def _scale_fits(scale: Scale) -> bool:
-    n = scale_inputs([1.0], [1.0]).shape[1]
+    n = scale_inputs([1.0], [1.0], [1.0]).shape[1]
     return (
         shapes_of(scale.centre, scale.spread, scale.weight) == {(n,)}
         and isinstance(scale.offset, float)

@@ -5,7 +5,7 @@ model file holds numbers only, and a prediction needs no library but numpy.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from itertools import accumulate, pairwise
 from typing import Any
 
@@ -19,6 +19,8 @@ Folds = Sequence[tuple[Index, Index]]
 _TREES = 100
 _LEAST_WEIGHT = 0.02  # of a blend: a part that says less is left out, and its time saved
 _TIE = 0.01  # of the error: a blend that is no better than this is not worth its time
+_SLACK = 0.1  # of a feature's range: as far beyond it a line may go on
+_USUAL = 0.99  # share of held-out records whose parts are no farther apart than the tube
 _FAR = 2.0  # estimates end this factor beyond the trained severities
 
 
@@ -33,6 +35,8 @@ class Linear:
     ----------
     centre, spread, weight : numpy.ndarray [shape=(n_features,)]
         ``offset + sum(weight * (feature - centre) / spread)`` is the target, or its logarithm.
+    low, high : numpy.ndarray [shape=(n_features,)]
+        Features beyond are set to these: a line goes on for ever, and what it learnt does not.
     offset : float
         At the centre.
     log : bool
@@ -42,12 +46,16 @@ class Linear:
     centre: Float
     spread: Float
     weight: Float
+    low: Float
+    high: Float
     offset: float
     log: bool
 
     def predict(self, rows: Float) -> Float:
         """Target [shape=(n,)] of feature rows [shape=(n, n_features)]."""
-        value = (rows - self.centre) / self.spread @ self.weight + self.offset
+        value = (
+            np.clip(rows, self.low, self.high) - self.centre
+        ) / self.spread @ self.weight + self.offset
         return _back(np.asarray(value), self.log)
 
 
@@ -118,14 +126,16 @@ class Blend:
     low, high : float
         Estimates outside are set to the bound: a factor of two beyond what was trained, where an
         estimate is a bound anyway.
-    unseen : numpy.ndarray [shape=(n_stretches, 2)]
-        Targets from and to which no training record had any: where the lines among the parts
-        point there, they stand alone, as trees know only what they have seen.
+    tube : float
+        Lines may point this far from the trees, as a logarithm; farther, they are set to it: what
+        99 of 100 held-out records keep to. 0 where all parts are of one kind.
 
     Examples
     --------
     >>> one = np.ones(1)
-    >>> flat = Linear(centre=0 * one, spread=one, weight=one, offset=2.0, log=False)
+    >>> flat = Linear(
+    ...     centre=0 * one, spread=one, weight=one, low=0 * one, high=9 * one, offset=2.0, log=False
+    ... )
     >>> Blend(names=("a",), parts=(flat,), weights=np.ones(1), low=0.0, high=9.0).predict(
     ...     np.array([[1.0], [50.0]])
     ... ).tolist()
@@ -137,48 +147,52 @@ class Blend:
     weights: Float
     low: float
     high: float
-    unseen: Float = field(default_factory=lambda: np.empty((0, 2)))
+    tube: float = 0.0
 
     def predict(self, rows: Float) -> Float:
         """Target [shape=(n,)] of feature rows [shape=(n, n_features)]."""
+        lines, trees = self._sides(rows)
+        share = float(self.weights @ self._straight)
+        if 0 < share < 1:
+            lines = trees * np.exp(np.clip(np.log(lines / trees), -self.tube, self.tube))
+        return np.clip(share * lines + (1 - share) * trees, self.low, self.high)
+
+    def disagreement(self, rows: Float) -> Float:
+        """How far lines and trees are apart, as a logarithm [shape=(n,)]; 0 of one kind alone."""
+        lines, trees = self._sides(rows)
+        return np.abs(np.log(lines / trees))
+
+    def _sides(self, rows: Float) -> tuple[Float, Float]:
         found = np.stack([part.predict(rows) for part in self.parts], axis=1)
-        value = found @ self.weights
-        lines = self.weights * [isinstance(part, Linear) for part in self.parts]
-        if len(self.unseen) and lines.any():
-            line = np.clip(found @ lines / lines.sum(), self.low, self.high)
-            first, last = self.unseen.T
-            value = np.where(((first < line[:, None]) & (line[:, None] < last)).any(1), line, value)
-        return np.clip(value, self.low, self.high)
+        return sides(np.clip(found, self.low, self.high), self.weights, self._straight)
+
+    @property
+    def _straight(self) -> Float:
+        return np.array([isinstance(part, Linear) for part in self.parts], dtype=np.float64)
 
 
-def knowing_unseen(blend: Blend, target: Float, reach: float) -> Blend:
-    """A blend that leaves to its lines what no training record had.
+def sides(found: Float, weights: Float, straight: Float) -> tuple[Float, Float]:
+    """Estimates of the lines and of the trees; where one kind is missing, those of the other.
 
     Parameters
     ----------
-    blend : Blend
-    target : numpy.ndarray [shape=(n,)]
-        Of the training records.
-    reach : float
-        A line that points no farther than this from a training record points at something seen:
-        twice its own mean error, in the unit of the target.
+    found : numpy.ndarray [shape=(n, n_parts)]
+    weights, straight : numpy.ndarray [shape=(n_parts,)]
+        One where a part is a line.
 
     Returns
     -------
-    Blend
+    lines, trees : numpy.ndarray [shape=(n,)]
 
     Examples
     --------
-    >>> one = np.ones(1)
-    >>> flat = Linear(centre=0 * one, spread=one, weight=one, offset=0.0, log=False)
-    >>> blend = Blend(names=("a",), parts=(flat,), weights=one, low=0.5, high=9.0)
-    >>> knowing_unseen(blend, np.array([1.0, 1.1, 4.0]), 0.2).unseen.round(1).tolist()
-    [[0.5, 0.8], [1.3, 3.8], [4.2, 9.0]]
+    >>> lines, trees = sides(np.array([[1.0, 2.0, 4.0]]), np.full(3, 1 / 3), np.array([1, 0, 0]))
+    >>> lines.tolist(), trees.round(9).tolist()
+    ([1.0], [3.0])
     """
-    known = np.unique(target)
-    first = np.append(blend.low, known + reach)
-    last = np.append(known - reach, blend.high)
-    return replace(blend, unseen=np.column_stack([first, last])[first < last])
+    own = [weights * straight, weights * (1 - straight)]
+    lines, trees = (each if each.any() else weights for each in own)
+    return found @ lines / lines.sum(), found @ trees / trees.sum()
 
 
 # --- candidates
@@ -195,6 +209,8 @@ def _ridge(penalty: float, *, log: bool) -> Callable[[Float, Float, int], Part]:
             centre=scaler.mean_,
             spread=scaler.scale_,  # one where a feature is constant
             weight=np.asarray(ridge.coef_, dtype=float),
+            low=rows.min(axis=0) - _SLACK * np.ptp(rows, axis=0),
+            high=rows.max(axis=0) + _SLACK * np.ptp(rows, axis=0),
             offset=float(ridge.intercept_),
             log=log,
         )
@@ -375,6 +391,8 @@ class Fitted:
         Fitted on all records.
     estimate : numpy.ndarray [shape=(n,)]
         Estimates of every record by parts, weights and choice that its group had no part in.
+    disagreement : numpy.ndarray [shape=(n,)]
+        Of the blend's parts, on groups they had no part in; see :meth:`Blend.disagreement`.
     options : tuple of Option
         All that was looked at, within the budget or not.
     chosen : str
@@ -383,6 +401,7 @@ class Fitted:
 
     blend: Blend
     estimate: Float
+    disagreement: Float
     options: tuple[Option, ...]
     chosen: str
 
@@ -485,11 +504,6 @@ def fit_line(rows: Float, target: Float, options: Sequence[Option], *, seed: int
     return part
 
 
-def least_line_error(options: Sequence[Option]) -> float:
-    """Error of the best straight line, of the target or of its logarithm [unit of the target]."""
-    return min(option.error for option in options if option.name in _line_names())
-
-
 def _out_of_fold(
     candidate: Candidate, rows: Float, target: Float, folds: Folds, seed: int
 ) -> Float:
@@ -524,20 +538,30 @@ def _chosen(
     )
     kept = np.flatnonzero(weights).tolist()
     members = [usable[i] for i in kept]
+    straight = np.array([item.name in _line_names() for item in members], dtype=np.float64)
+    lines, trees = sides(table[:, kept], weights[kept], straight)
+    apart = np.abs(np.log(lines / trees))
     blend = Blend(
         names=tuple(item.name for item in members),
         parts=tuple(item.fit(rows, target, seed) for item in members),
         weights=weights[kept],
         low=bounds[0],
         high=bounds[1],
+        tube=float(np.quantile(apart, _USUAL)),
     )
-    return Fitted(blend=blend, estimate=estimate, options=_front(options), chosen=best.name)
+    return Fitted(
+        blend=blend,
+        estimate=estimate,
+        disagreement=apart,
+        options=_front(options),
+        chosen=best.name,
+    )
 
 
 def _with_a_line(
     usable: Sequence[Candidate], options: Sequence[Option], best: Option, weights: Float
 ) -> Float:
-    """Weights of all usable candidates; the best line is kept, as trees know only what they saw."""
+    """Weights of all usable candidates; the best line is kept, to be held against the trees."""
     everyone = np.zeros(len(usable))
     everyone[list(best.members)] = weights
     lines = [o for o in options if len(o.members) == 1 and o.name in _line_names()]

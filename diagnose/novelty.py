@@ -39,6 +39,11 @@ class Familiarity:
         Mean of each machine draw in these.
     groups : numpy.ndarray [shape=(n_machines,)]
         Numbers of these draws.
+    low, high : numpy.ndarray [shape=(n_features,)]
+        Least and largest value of each feature in training.
+    weight : float
+        Distance that stands for all features outside that range: a machine may be near in all
+        coordinates and still show cells of its map that no training machine ever did.
     """
 
     centre: Float
@@ -46,6 +51,13 @@ class Familiarity:
     whiten: Float
     machines: Float
     groups: NDArray[np.intp]
+    low: Float
+    high: Float
+    weight: float
+
+    def outside(self, rows: Float) -> Float:
+        """Share of the features outside what was trained on [shape=(n_recordings,)]."""
+        return np.asarray(((rows < self.low) | (rows > self.high)).mean(axis=1))
 
     def distance(self, names: Sequence[str], rows: Float) -> Float:
         """Distance of recordings from the cloud: about 1 for a training recording.
@@ -60,9 +72,11 @@ class Familiarity:
         -------
         numpy.ndarray [shape=(n_recordings,)]
             Mean over the kinds of coordinates of the root mean square in each, every coordinate in
-            the spread it has once the others of its kind are known (Mahalanobis).
+            the spread it has once the others of its kind are known (Mahalanobis); or the weighted
+            share of features outside the trained range, where that is more.
         """
-        return np.asarray(self.by_kind(names, rows).mean(axis=1))
+        near = self.by_kind(names, rows).mean(axis=1)
+        return np.asarray(np.maximum(near, self.weight * self.outside(rows)))
 
     def by_kind(self, names: Sequence[str], rows: Float) -> Float:
         """Distance of recordings in each kind of coordinates, of :func:`kinds_of`.
@@ -138,7 +152,9 @@ def _standardised(values: Float, centre: Float, spread: Float) -> Float:
     return np.asarray(np.clip((values - centre) / spread, -_CLIP, _CLIP))
 
 
-def fit_familiarity(names: Sequence[str], rows: Float, groups: NDArray[np.intp]) -> Familiarity:
+def fit_familiarity(
+    names: Sequence[str], rows: Float, groups: NDArray[np.intp], *, weight: float = 0.0
+) -> Familiarity:
     """Learn the cloud of training recordings.
 
     Parameters
@@ -149,6 +165,8 @@ def fit_familiarity(names: Sequence[str], rows: Float, groups: NDArray[np.intp])
         At least three recordings.
     groups : numpy.ndarray [shape=(n_recordings,)]
         Machine draw of each.
+    weight : float
+        Of the share of features outside the trained range; 0: it does not count.
 
     Returns
     -------
@@ -190,6 +208,9 @@ def fit_familiarity(names: Sequence[str], rows: Float, groups: NDArray[np.intp])
         whiten=whiten,
         machines=means / np.bincount(place)[:, None],
         groups=machines.astype(np.intp),
+        low=rows.min(axis=0),
+        high=rows.max(axis=0),
+        weight=weight,
     )
 
 

@@ -158,7 +158,7 @@ def _check(model: ClassModel, path: str | Path) -> None:
         and all(blend_fits(blend, n) for blend in model.blends),
         "votes": _votes_fit(model.votes, len(model.classes)),
         "familiarity": len(model.familiarity) == len(model.classes)
-        and all(familiarity_fits(cloud, physical.shape[1]) for cloud in model.familiarity),
+        and all(familiarity_fits(cloud, physical.shape[1], n) for cloud in model.familiarity),
         "numbers": numbers_fit(_arrays_of(model)),
     }
     bad = [name for name, good in fits.items() if not good]

@@ -46,6 +46,7 @@ class BlendStructure(Strict):
     kinds: list[Literal["linear", "forest"]] = Field(min_length=1, max_length=100)
     low: float
     high: float
+    tube: float = Field(ge=0)
 
     @model_validator(mode="after")
     def _pairs(self) -> Self:
@@ -105,12 +106,13 @@ def blend_structure(blend: Blend) -> dict[str, Any]:
         "kinds": [kinds[type(part)] for part in blend.parts],
         "low": blend.low,
         "high": blend.high,
+        "tube": blend.tube,
     }
 
 
 def blend_arrays(blend: Blend, place: str) -> dict[str, Any]:
     """Every number of a blend by a dotted name under `place`."""
-    found: dict[str, Any] = {f"{place}.weights": blend.weights, f"{place}.unseen": blend.unseen}
+    found: dict[str, Any] = {f"{place}.weights": blend.weights}
     for i, part in enumerate(blend.parts):
         found |= part_arrays(part, f"{place}.{i}")
     return found
@@ -136,7 +138,7 @@ def blend_of(structure: BlendStructure, arrays: Mapping[str, NDArray[Any]], plac
         weights=_number_array(arrays[f"{place}.weights"], "weights"),
         low=structure.low,
         high=structure.high,
-        unseen=_number_array(arrays[f"{place}.unseen"], "unseen"),
+        tube=structure.tube,
     )
 
 
@@ -221,8 +223,6 @@ def blend_fits(blend: Blend, n: int) -> bool:
         and bool((weights > 0).all())
         and abs(float(weights.sum()) - 1) < _ROUNDING
         and blend.low < blend.high
-        and np.ndim(blend.unseen) == 2
-        and np.shape(blend.unseen)[1] == 2
         and all(
             linear_fits(part, n) if isinstance(part, Linear) else _forest_fits(part, n)
             for part in blend.parts
@@ -241,7 +241,8 @@ def spreads_fit(values: NDArray[np.float64]) -> bool:
 def linear_fits(part: Linear, n: int) -> bool:
     """Whether a line can be asked about rows of n features."""
     return (
-        shapes_of(part.centre, part.spread, part.weight) == {(n,)}
+        shapes_of(part.centre, part.spread, part.weight, part.low, part.high) == {(n,)}
+        and bool((part.low <= part.high).all())
         and isinstance(part.offset, float)
         and isinstance(part.log, bool)
         and spreads_fit(part.spread)
@@ -283,10 +284,13 @@ def _within(index: NDArray[np.intp], n: int) -> bool:
     return bool((index >= 0).all() and (index < n).all())
 
 
-def familiarity_fits(cloud: Familiarity, n: int) -> bool:
-    """Whether a cloud has n coordinates."""
+def familiarity_fits(cloud: Familiarity, n: int, n_features: int) -> bool:
+    """Whether a cloud has n coordinates, and a range for each of n_features."""
     return (
         shapes_of(cloud.centre, cloud.spread) == {(n,)}
+        and shapes_of(cloud.low, cloud.high) == {(n_features,)}
+        and isinstance(cloud.weight, float)
+        and cloud.weight >= 0
         and np.shape(cloud.whiten) == (n, n)
         and np.ndim(cloud.groups) == 1
         and np.size(cloud.groups) > 0

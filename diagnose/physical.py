@@ -304,6 +304,34 @@ def level_rows(names: Sequence[str], rows: Float) -> Float:
     return np.asarray(20 * np.log10(np.maximum(rows[:, first], _SILENCE)))
 
 
+def levelled_rows(names: Sequence[str], rows: Float, excess_db: Float) -> Float:
+    """Feature rows as they would be at other levels of the channels.
+
+    Parameters
+    ----------
+    names, rows
+        As of :func:`physical_rows`.
+    excess_db : numpy.ndarray [shape=(n, n_channels)]
+        To take away from each channel of :func:`level_channels` [dB].
+
+    Returns
+    -------
+    numpy.ndarray [shape=(n, n_features)]
+
+    Examples
+    --------
+    >>> names = ["a.rms", "a.band_50_100.level_db", "a.kurtosis"]
+    >>> levelled_rows(names, np.array([[10.0, 3.0, 2.0]]), np.array([[20.0]])).tolist()
+    [[1.0, -17.0, 2.0]]
+    """
+    levelled = rows.copy()
+    owners = [columns for columns in columns_of(tuple(names)).values() if columns.level]
+    for columns, excess in zip(owners, excess_db.T, strict=True):
+        levelled[:, columns.level] *= 10 ** (-excess[:, None] / 20)
+        levelled[:, [*columns.bands, *columns.orders, *columns.cells]] -= excess[:, None]
+    return levelled
+
+
 def level_channels(names: Sequence[str]) -> tuple[str, ...]:
     """Channels of :func:`level_rows`, in its order."""
     return tuple(owner for owner, columns in columns_of(tuple(names)).items() if columns.level)

@@ -36,8 +36,6 @@ from .models import (
     Linear,
     fit_blend,
     fit_line,
-    knowing_unseen,
-    least_line_error,
 )
 from .novelty import Familiarity, fit_familiarity
 from .physical import physical_rows
@@ -50,6 +48,7 @@ Float = NDArray[np.float64]
 _FOLDS = 5
 _FEWEST_GROUPS = 10  # two a fold, so that a fold's error is no accident
 _FEWEST_FAULTS = 20  # records with and without a fault, for an error rate to within a tenth
+_RARE = 0.99  # of the records: as far, or with as many features out of range, as 1 in 100 is
 _PRESENT = 0.5  # a fault that is likelier there than not
 _LOGISTIC_C = 10.0  # weak: one slope on hundreds of records
 
@@ -472,12 +471,8 @@ def learn(
             if place in others:
                 estimate[left] = others[place].estimate[left]
         severity = replace(severity, estimate=estimate)
-    reach = 2 * least_line_error(severity.options)  # what lines near the ends overshoot by chance
-    # random folds leave out no stretch of severity: the calibration needs no such rule
-    blend = knowing_unseen(severity.blend, lesson.severity, reach)
-    severity = replace(severity, blend=blend)
-    distance = _out_of_fold_distances(lesson, folds)
-    inputs = scale_inputs(severity.estimate, distance)
+    distance, weight = _out_of_fold_distances(lesson, folds)
+    inputs = scale_inputs(severity.estimate, distance, severity.disagreement)
     scale = fit_scale(inputs, np.log(lesson.severity / severity.estimate))
     return Learnt(
         severity=severity,
@@ -490,7 +485,7 @@ def learn(
             distance=distance,
             group=lesson.groups,
         ),
-        familiarity=fit_familiarity(lesson.names, lesson.rows, lesson.groups),
+        familiarity=fit_familiarity(lesson.names, lesson.rows, lesson.groups, weight=weight),
         levels=fit_levels(lesson.names, lesson.rows, folds),
         heads=_heads(lesson, folds, np.abs(severity.estimate - lesson.severity), seed=seed),
     )
@@ -509,13 +504,20 @@ def _fits_of_others(
     }
 
 
-def _out_of_fold_distances(lesson: Lesson, folds: Folds) -> Float:
-    """Novelty distances of records from clouds that their machine draw had no part in."""
-    distance = np.empty(len(lesson.rows))
+def _out_of_fold_distances(lesson: Lesson, folds: Folds) -> tuple[Float, float]:
+    """Novelty distances of records from clouds that their machine draw had no part in.
+
+    And the weight of the share outside the ranges, which makes its rare values as far as those of
+    the distance itself: of both together no more are refused than of one.
+    """
+    apart, outside = np.empty((2, len(lesson.rows)))
     for train, test in folds:
         cloud = fit_familiarity(lesson.names, lesson.rows[train], lesson.groups[train])
-        distance[test] = cloud.distance(lesson.names, lesson.rows[test])
-    return distance
+        apart[test] = cloud.distance(lesson.names, lesson.rows[test])
+        outside[test] = cloud.outside(lesson.rows[test])
+    rare = max(float(np.quantile(outside, _RARE)), 1 / len(lesson.names))
+    weight = float(np.quantile(apart, _RARE)) / rare
+    return np.maximum(apart, weight * outside), weight
 
 
 def _heads(

@@ -125,12 +125,9 @@ def forest(**changes):
         depth=changes.get("depth", 2),
         offset=0.0,
         log=False,
-        **{name: value for name, value in given.items() if name not in ("depth", "unseen")},
+        **{name: value for name, value in given.items() if name != "depth"},
     )
-    unseen = np.zeros(changes.get("unseen", (1, 2)))
-    return Blend(
-        names=("trees",), parts=(tree,), weights=np.ones(1), low=0.0, high=1.0, unseen=unseen
-    )
+    return Blend(names=("trees",), parts=(tree,), weights=np.ones(1), low=0.0, high=1.0)
 
 
 @pytest.mark.parametrize(
@@ -147,9 +144,6 @@ def forest(**changes):
         ({"root": [0, 0]}, False),
         ({"depth": 1}, False),  # ends before the leaves
         ({"depth": 10**9}, False),  # ends never
-        ({"unseen": (0, 2)}, True),
-        ({"unseen": (2,)}, False),
-        ({"unseen": (1, 3)}, False),
     ],
 )
 def test_trees_that_lead_nowhere_are_seen(changes, fits):

@@ -231,7 +231,8 @@ def test_a_condition_outside_the_trained_range_is_named(trained, small_set):
 def with_a_fault(model, *, slope, mae_with_m):
     """The model with a head that says the same of every recording, present for a slope above 0."""
     n = len(model.names)
-    flat = Linear(centre=np.zeros(n), spread=np.ones(n), weight=np.zeros(n), offset=1.0, log=False)
+    none, one = np.zeros(n), np.ones(n)
+    flat = Linear(centre=none, spread=one, weight=none, low=none, high=one, offset=1.0, log=False)
     blend = Blend(names=("flat",), parts=(flat,), weights=np.ones(1), low=0.5, high=4.0)
     head = Head(name="stuck_valve", blend=blend, slope=slope, offset=0.0, threshold=0.5)
     rates = {"name": "stuck_valve", "share": 0.1, "detection_rate": 0.9, "false_alarm_rate": 0.1}

@@ -31,7 +31,10 @@ low = 0.5
 high = 2.0
 [[choice.option]]
 name = "lossy"
-values = { "joint.crankpin.law" = "exact", "joint.crankpin.damping" = 0.0, "joint.crankpin.restitution" = 0.3 }
+[choice.option.values]
+"joint.crankpin.law" = "exact"
+"joint.crankpin.damping" = 0.0
+"joint.crankpin.restitution" = 0.3
 [[choice.option.draw]]
 path = "joint.crankpin.restitution"
 distribution = "uniform"

@@ -1,5 +1,6 @@
 """The candidates, their flattened trees, and the choice among them."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -11,8 +12,6 @@ from wearstate.diagnose.models import (
     Linear,
     blend_weights,
     fit_blend,
-    knowing_unseen,
-    least_line_error,
 )
 
 ROWS = {candidate.name: candidate for candidate in CANDIDATES}
@@ -107,7 +106,8 @@ def test_the_front_has_no_option_that_is_dearer_and_no_better(task):
 def constant(value, cost):
     def fit(_rows, target, _seed):
         zero = np.zeros(_rows.shape[1])
-        return Linear(centre=zero, spread=zero + 1, weight=zero, offset=value, log=False)
+        ends = {"low": zero - 9, "high": zero + 9}
+        return Linear(centre=zero, spread=zero + 1, weight=zero, **ends, offset=value, log=False)
 
     return Candidate(name=f"constant {value:g}", cost_ms=cost, fit=fit)
 
@@ -138,49 +138,70 @@ def test_an_out_of_fold_estimate_does_not_know_its_target(task):
 def test_estimates_end_where_nothing_was_trained(task):
     rows, target, groups = task
     blend = fit_blend(rows, target, group_folds(groups, n=5), candidates=CANDIDATES[:1]).blend
-    low, high = blend.predict(np.array([-100 * np.ones(20), 100 * np.ones(20)]))
-    assert (low, high) == (target.min() / 2, target.max() * 2)
+    ends = np.array([-100 * np.ones(20), 100 * np.ones(20)])
+    low, high = blend.predict(ends)
+    assert (blend.low, blend.high) == (target.min() / 2, target.max() * 2)
+    assert blend.low <= min(low, high) < max(low, high) <= blend.high
+    assert np.array_equal(blend.predict(1e6 * ends), [low, high])
+    narrow = replace(blend, low=min(low, high) + 1e-9, high=max(low, high) - 1e-9)
+    assert sorted(narrow.predict(ends)) == [narrow.low, narrow.high]
 
 
-def unseen_task(keep):
-    """A straight target of one of five features, records of some of its range left to learn from.
+def blended(rows, target):
+    """A line and trees of 900 records, blended."""
+    folds = group_folds(np.arange(len(target)), n=5, seed=0)
+    kinds = [candidate for candidate in CANDIDATES if candidate.name in ("plain ridge 3", "trees")]
+    return fit_blend(rows, target, folds, candidates=kinds)
 
-    The level doubles over the range; noise of 0.01 blurs what trees and lines can tell.
-    """
+
+@pytest.fixture(scope="module")
+def straight():
+    """A target that follows the first of five features, with a step in the second: no kind of part
+    tells both as well as the blend; noise of 0.01 blurs it."""
     rng = np.random.default_rng(5)
-    target = rng.uniform(1, 2, 900)
+    slope = rng.uniform(1, 2, 900)
     rows = rng.standard_normal((900, 5))
-    rows[:, 0] = target + 0.01 * rng.standard_normal(900)
-    learn = keep(target)
-    folds = group_folds(np.arange(learn.sum()), n=5, seed=0)
-    trees = [candidate for candidate in CANDIDATES if candidate.name in ("plain ridge 3", "trees")]
-    fitted = fit_blend(rows[learn], target[learn], folds, candidates=trees)
-    reach = 2 * least_line_error(fitted.options)
-    return fitted.blend, knowing_unseen(fitted.blend, target[learn], reach), rows, target
+    rows[:, 0] = slope + 0.01 * rng.standard_normal(900)
+    target = slope + 0.1 * (rows[:, 1] > 0.5)
+    return rows, target, blended(rows, target)
 
 
-@pytest.mark.parametrize(
-    ("keep", "asked"),
-    [
-        (lambda y: y < 1.5, lambda y: y > 1.6),
-        (lambda y: (y < 1.4) | (y > 1.6), lambda y: (y > 1.45) & (y < 1.55)),
-    ],
-    ids=["beyond", "between"],
-)
-def test_where_no_severity_was_seen_the_line_stands_alone(keep, asked):
-    blend, knowing, rows, target = unseen_task(keep)
-    trees = blend.parts[blend.names.index("trees")]
-    there = asked(target)
-    line = blend.parts[blend.names.index("plain ridge 3")]
-    # the least of records asked lies farther from those known than a line errs by
-    np.testing.assert_allclose(knowing.predict(rows[there]), line.predict(rows[there]), rtol=1e-12)
-    error, of_trees = (
-        np.abs(part.predict(rows[there]) - target[there]).mean() for part in (knowing, trees)
-    )
-    assert error < 0.02  # twice the mean of the noise
-    assert of_trees > 2 * error
-    known = keep(target) & (target > 1.05) & (np.abs(target - 1.5) > 0.15)
-    np.testing.assert_array_equal(knowing.predict(rows[known]), blend.predict(rows[known]))
+def test_a_line_ends_a_little_beyond_what_it_saw(straight):
+    rows, _, fitted = straight
+    line = fitted.blend.parts[fitted.blend.names.index("plain ridge 3")]
+    far = np.tile(rows.mean(axis=0), (3, 1))
+    far[:, 0] = [2.0, 3.0, 1e6]
+    near, end, runaway = line.predict(far)
+    # a tenth of the feature's range beyond it
+    assert end == runaway == pytest.approx(near + 0.1 * np.ptp(rows[:, 0]), abs=0.03)
+
+
+def test_lines_that_part_from_the_trees_are_held_at_the_tube(straight):
+    rows, _, fitted = straight
+    blend = fitted.blend
+    lines, trees = (blend.parts[blend.names.index(name)] for name in ("plain ridge 3", "trees"))
+    share = blend.weights[blend.names.index("plain ridge 3")]
+    assert 0 < blend.tube < 0.1  # ten times the noise at most
+    # a contradiction that no training record held: what tells the wear says 1, the rest is far out
+    odd = np.full((1, 5), 3.5)
+    odd[0, 0] = rows[:, 0].min() - 1.0
+    apart = float(blend.disagreement(odd)[0])
+    assert apart > blend.tube
+    held = trees.predict(odd) * np.exp(-blend.tube)
+    assert lines.predict(odd) < held
+    expected = share * held + (1 - share) * trees.predict(odd)
+    np.testing.assert_allclose(blend.predict(odd), expected, rtol=1e-12)
+    # where they agree the blend is the weighted mean
+    usual = blend.disagreement(rows) < blend.tube
+    assert usual.mean() > 0.95
+    found = np.stack([part.predict(rows[usual]) for part in blend.parts], axis=1)
+    np.testing.assert_allclose(blend.predict(rows[usual]), found @ blend.weights, rtol=1e-9)
+
+
+def test_disagreement_is_that_of_groups_without_a_part(straight):
+    rows, _, fitted = straight
+    assert np.quantile(fitted.disagreement, 0.99) == pytest.approx(fitted.blend.tube)
+    assert not np.allclose(fitted.disagreement, fitted.blend.disagreement(rows), rtol=0.1)
 
 
 def test_a_line_is_kept_beside_trees_that_are_better(task):

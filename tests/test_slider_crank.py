@@ -246,7 +246,9 @@ def test_pressure_levels_and_ramps():
 def test_delays_are_those_of_the_valves(rpm):
     """Valves and liquid of the rung chamber reverse the pressure as late as the delays say."""
     speed = {"drive.speed": f"{rpm} rpm", "duration": "1.2 s", "joint.crankpin.rung": "ideal"}
-    run = simulate(load_scene("bilge-pump", {**speed, "pressure.rung": "chamber"}), seed=0, truth=True)
+    run = simulate(
+        load_scene("bilge-pump", {**speed, "pressure.rung": "chamber"}), seed=0, truth=True
+    )
     angle, found = run.truth["state_alpha"], run.truth["cylinder_pressure_pa"]
     about = ((angle + 0.1) % math.pi < 0.4) & (angle > angle[0] + 4 * math.pi)
 
@@ -259,7 +261,6 @@ def test_delays_are_those_of_the_valves(rpm):
     late = error(**closing, rise_angle=4, fall_angle=1)
     # what is left is the pressure that opens the valves; 300 rpm has 7.4 and 8.4 degrees
     assert late < 0.25 * error(rise_angle=6)
-
 
 
 # --- one impact
