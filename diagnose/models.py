@@ -20,6 +20,7 @@ _TREES = 100
 _LEAST_WEIGHT = 0.02  # of a blend: a part that says less is left out, and its time saved
 _TIE = 0.01  # of the error: a blend that is no better than this is not worth its time
 _SLACK = 0.1  # of a feature's range: as far beyond it a line may go on
+_ENDLESS = 1e6  # spreads of a feature: no bound, and still a number that a file may hold
 _USUAL = 0.99  # share of held-out records whose parts are no farther apart than the tube
 _FAR = 2.0  # estimates end this factor beyond the trained severities
 
@@ -495,13 +496,15 @@ def fit_line(rows: Float, target: Float, options: Sequence[Option], *, seed: int
     Returns
     -------
     Linear
-        Of the logarithm of the target: it can be told at any size.
+        Of the logarithm of the target, and without bounds to its features: a witness that points
+        beyond what was trained, which an estimate may not.
     """
     lines = {candidate.name: candidate for candidate in CANDIDATES[:_LINES]}
     best = min((o for o in options if o.name in lines), key=lambda option: option.error)
     part = lines[best.name].fit(rows, target, seed)
     assert isinstance(part, Linear)
-    return part
+    room = _ENDLESS * part.spread
+    return replace(part, low=part.centre - room, high=part.centre + room)
 
 
 def _out_of_fold(
