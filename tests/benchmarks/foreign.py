@@ -67,10 +67,10 @@ def trained(given: argparse.Namespace) -> Iterator[Case]:
     """Models trained on the library's own records: cold, and referenced where asked for."""
     home, new = (
         own_records(given, f"{given.machine}-{kind}", records)
-        for kind, records in (("standard", given.train), ("healthy", given.train * 3 // 2))
+        for kind, records in ((given.kind, given.train), ("healthy", given.train * 3 // 2))
     )
     for name, healthy in (("cold", None), ("referenced", new))[: 1 + (given.baseline > 0)]:
-        path = given.folder / f"{given.machine}-{name}-{given.train}.wsm"
+        path = given.folder / f"{given.machine}-{given.kind}-{name}-{given.train}.wsm"
         if not path.exists():
             save_model(train_model(home, baseline=healthy, jobs=given.jobs)[0], path)
         yield Case(name=name, model=load_model(path), home=(home, healthy))
@@ -79,7 +79,7 @@ def trained(given: argparse.Namespace) -> Iterator[Case]:
 def own_records(given: argparse.Namespace, recipe: str, records: int) -> Path:
     """The library's own data set, generated unless it is there."""
     path = given.folder / f"{recipe}-{records}.h5"
-    needed = recipe.endswith("standard") or given.baseline
+    needed = recipe.endswith(given.kind) or given.baseline
     if needed and not path.exists():
         generate(recipe, records, path, seed=given.seed, jobs=given.jobs)
     return path
@@ -241,6 +241,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=11)
     parser.add_argument("--model", action="append", help="in place of those trained here")
     parser.add_argument("--train", type=int, default=300, help="records to train on")
+    parser.add_argument("--kind", default="standard", help="recipe to train on: or narrow, cold")
     parser.add_argument("--baseline", type=int, default=0, help="healthy records of each machine")
     parser.add_argument("--peel", action="store_true")
     parser.add_argument("--only", nargs="*", help="differences that are on")
