@@ -532,7 +532,7 @@ def test_a_single_severity_meets_a_list():
 
 
 def test_the_text_of_an_extended_recipe_is_whole_and_draws_the_same(tmp_path):
-    recipe = load_recipe(written(tmp_path, LOUD, base="bilge-pump-shifted"))
+    recipe = load_recipe(written(tmp_path, LOUD, base="bilge-pump-faults"))
     copy = tmp_path / "copy.toml"
     copy.write_text(recipe.text)
     again = load_recipe(copy)

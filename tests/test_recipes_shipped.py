@@ -378,8 +378,8 @@ def test_machines_of_a_file_beside(tmp_path):
 def test_an_added_severity_or_confounder_leaves_the_machines(tmp_path):
     """What recordings of a reference stand for: they need not have the faults of the set."""
     fault = (
-        '[[confounder]]\nname = "loud"\nprobability = 1\npath = "sensors.0.noise"\n'
-        'distribution = "uniform"\nlow = 1.0\nhigh = 2.0\n'
+        '[[confounder]]\nname = "loud"\nprobability = 1\npath = "crank.unbalance"\n'
+        'distribution = "uniform"\nlow = 0.1\nhigh = 0.2\n'
     )
     mine = load_text(tmp_path, healthy_text(more=fault))
     one = next(sample_records(mine, seed=2))
