@@ -307,7 +307,8 @@ def two_level_pressure(angle: float, suction: float, discharge: float, h: Any) -
         return after
     if u <= 0.0:
         return before
-    return before + (after - before) * u * u * (3.0 - 2.0 * u)
+    level: float = before + (after - before) * u * u * (3.0 - 2.0 * u)
+    return level
 
 
 @kernel
