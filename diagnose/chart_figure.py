@@ -96,6 +96,7 @@ def _draw_points(axes: Any, chart: Chart) -> None:
     if chart.accuracy is not None:
         axes.set_yscale("log")
         axes.set_ylim(bottom=_FLOOR / 2)
+        axes.set_ylim(top=_HEADROOM * axes.get_ylim()[1])
     _plain_numbers(axes.xaxis)
     _plain_numbers(axes.yaxis)
     axes.grid(alpha=0.3, which="both")
@@ -128,6 +129,7 @@ def _number(axes: Any, front: list[Point]) -> None:
         )
 
 
+_HEADROOM = 2.0  # of the error axis: the highest number stays inside the frame
 _NEAR = (0.03, 0.08)  # of the panel's width and height: two numbers would touch
 
 

@@ -4,6 +4,7 @@ import csv
 import itertools
 import json
 import math
+import re
 
 import numpy as np
 import pytest
@@ -21,7 +22,7 @@ from wearstate.diagnose.chart import (
     scene_chart,
     timed_again,
 )
-from wearstate.diagnose.chart_figure import SUFFIXES, chart_figure, save_chart
+from wearstate.diagnose.chart_figure import SUFFIXES, chart_figure, chart_html, save_chart
 from wearstate.diagnose.cli import cli
 from wearstate.sim.fidelity import Candidate, Convergence, Difference, Study
 from wearstate.sim.scene import load_scene
@@ -237,6 +238,26 @@ def test_points_of_the_picture_have_names(chart, tmp_path):
     assert "a link is in tension" in page
     assert "<script" not in page
     assert "src=" not in page  # nothing is fetched
+
+
+def test_every_value_of_the_page_tells_what_it_is_on_a_phone(chart):
+    """Where rows are stacked the head is gone: each value but the name has its own."""
+    page = chart_html(chart)
+    table = page[page.index('<table class="stack">') : page.index("</table>")]
+    rows = re.findall(r"<tr[^>]*>(.*?)</tr>", table, flags=re.DOTALL)[1:]
+    assert len(rows) == len(chart.points)
+    for row, point in zip(rows, chart.points, strict=True):
+        name, *values = re.findall(r"<td[^>]*>", row)
+        assert f"{name}{point.name}<" in row
+        assert len(values) == 6
+        assert all("data-label=" in value for value in values)
+    assert "</div><figcaption>" in page  # which says on a phone that the picture goes on
+
+
+def test_the_highest_number_of_the_front_has_room_below_the_frame(chart):
+    """A number takes 18 points above its mark: a tenth of a decade less and it meets the frame."""
+    highest = max(100 * point.error for point in chart.front)
+    assert chart_figure(chart).axes[0].get_ylim()[1] > 2 * highest  # 5 % of the decades: 1.7
 
 
 def test_csv_has_a_row_for_every_quantity(chart, tmp_path):

@@ -55,7 +55,7 @@ def test_every_value_of_a_table_of_bearings_tells_what_it_is(tmp_path):
     tables = re.findall(r"<table.*?</table>", text, flags=re.DOTALL)
     assert len(tables) == 8  # three conditions, before and after, margins, jacks, films, influence
     for table in tables:
-        assert table.startswith('<table class="stack">')
+        assert re.match('<table class="stack( many)?">', table)
         for row in re.findall(r"<tr>(.*?)</tr>", table, flags=re.DOTALL)[1:]:
             cells = re.findall(r"<td[^>]*>", row)
             assert len(cells) > 1
@@ -78,3 +78,15 @@ def test_what_cannot_wait_is_before_what_is_worse():
     assert [row.name for row in rows] == ["a", "b", "d", "c", "e"]
     same = [dataclasses.replace(worse, name="f", severity=s) for s in (4e-4, 6e-4)]
     assert sorted(same, key=lambda row: row.urgency)[0].severity == 6e-4
+
+
+def test_the_films_table_may_wrap_its_pairs(tmp_path):
+    """Unwrapped, nine columns of "as set → after" are wider than the page and are cut off."""
+    page = tmp_path / "page.html"
+    assert CliRunner().invoke(cli, ["align", "shaft-rig", "-o", str(page)]).exit_code == 0
+    text = page.read_text()
+    films = text[text.index("Oil films by speed") :]
+    assert re.search(r"<table[^>]*>", films)[0] == '<table class="stack many">'
+    general, many = (text.index(rule) for rule in ("td { white-space: nowrap", ".many td,"))
+    assert many > general  # the later rule wins
+    assert "white-space: normal" in text[many : text.index("}", many)]
