@@ -66,7 +66,11 @@ FEWEST_FRAMES, MANY_FRAMES = 64, 256
 one of noise, below the latter a third is that of every tenth line, half of none."""
 
 LONE_SHARE_OF_FEW = 1 / 2
-"""`LONE_SHARE` between the two [-]."""
+"""`LONE_SHARE` below the latter [-]."""
+
+FEWEST_POOLED = 31
+"""Frames from which it looks for lone events at all [-], below `FEWEST_FRAMES` over neighbouring
+lines together; the default frames leave at least so many."""
 
 MOST_LONE = 3
 """Lone events left out of a band [-]; with more, they come back."""
@@ -83,6 +87,7 @@ SHOWN_HZ = 500.0
 _PARTS = 16  # of a record, in which lone events are looked for
 _LONE_PARTS = 2  # neighbours: an event may lie on the edge of two
 _FEWEST_NEIGHBOURS = 8  # lines; the median of fewer is no background
+_POOLED_LINES = 9  # neighbours in spectral kurtosis, a third of whose noise is shared
 _LINE_SILENCE = 1e-12  # of the power of all lines; below it is rounding
 _INDEPENDENCE = 0.703  # samples a flanked band holds per independent fourth moment, times its width
 _CHUNK = 32_768  # complex samples transformed at a time, half a megabyte
@@ -629,8 +634,9 @@ def spectral_kurtosis(x: ArrayLike, fs: float, *, nperseg: int | None = None) ->
     scatter otherwise, are left out.
 
     Lone events are left out by the rule of `kurtogram`, line by line, where there are 256 frames or
-    more, and from 64 on where they have half of a line's ``<|X|^4>``; K then counts the frames that
-    are left. Of noise, one line in a hundred loses some.
+    more, and from 64 on where they have half of a line's ``<|X|^4>``; from 31 on, where they have
+    half of it in the mean of nine neighbouring lines. K then counts the frames that are left.
+    Of noise, one line in a hundred loses some.
 
     References
     ----------
@@ -654,10 +660,10 @@ def spectral_kurtosis(x: ArrayLike, fs: float, *, nperseg: int | None = None) ->
             f"nperseg = {length} samples must be even, >= 16 and <= 2/5 of n_samples = "
             f"{signal.shape[-1]}; choose another"
         )
-    begins = _begins(n_frames, _PARTS if n_frames >= FEWEST_FRAMES else 1)
+    begins = _begins(n_frames, _PARTS if n_frames >= FEWEST_POOLED else 1)
     parts = _moments(signal, length, n_frames, begins)
     share = LONE_SHARE if n_frames >= MANY_FRAMES else LONE_SHARE_OF_FEW
-    kept = _without_lone(parts[1], share)
+    kept = _without_lone(parts[1] if n_frames >= FEWEST_FRAMES else _pooled(parts[1]), share)
     second, fourth = ((part * kept).sum(axis=-1) for part in parts)
     n_left = kept @ np.diff([*begins, n_frames])
     silence = _LINE_SILENCE * parts[0].sum(axis=(-1, -2))[..., np.newaxis]
@@ -666,6 +672,20 @@ def spectral_kurtosis(x: ArrayLike, fs: float, *, nperseg: int | None = None) ->
     inner = slice(2, length // 2 - 1)
     frequency = np.arange(length // 2 + 1)[inner] * (fs / length)
     return frequency, kurtosis[..., inner].astype(signal.dtype)
+
+
+def _pooled(fourth: Float) -> Float:
+    """Share of each part in the fourth moment, mean of a line and its neighbours.
+
+    Of few frames one line of noise has its largest in a single one; an event has it in all lines
+    of its neighbourhood.
+    """
+    total = fourth.sum(axis=-1, keepdims=True)
+    share = np.divide(fourth, total, out=np.zeros_like(fourth), where=total > 0)
+    width = min(_POOLED_LINES, share.shape[-2] // 2 * 2 - 1)
+    ends = [(0, 0)] * (share.ndim - 2) + [(width // 2, width // 2), (0, 0)]
+    padded = np.pad(share, ends, mode="reflect")
+    return np.asarray(sliding_window_view(padded, width, axis=-2).mean(axis=-1))
 
 
 def _begins(n: int, n_parts: int) -> NDArray[np.intp]:

@@ -14,6 +14,7 @@ from wearstate.features.envelope import (
     Kurtogram,
     _begins,
     _moments,
+    _pooled,
     _without_lone,
     baseband,
     bearing_frequencies,
@@ -405,6 +406,25 @@ def test_a_lone_spike_is_left_out_of_a_short_record():
     noise = 0.2 * np.random.default_rng(0).standard_normal(16_384)
     _, found = spectral_kurtosis(noise + spikes(5000, n=16_384), 25_600.0)
     assert found.max() < 1.0  # 127 frames: 0.18 and 4 to 5 times that
+
+
+@pytest.mark.parametrize("n", [1024, 4096, 8192])  # 31, 31 and 63 frames
+def test_a_lone_spike_is_left_out_of_fewer_than_64_frames(n):
+    noise = 0.2 * np.random.default_rng(0).standard_normal(n)
+    _, found = spectral_kurtosis(noise + spikes(n // 3, n=n), 25_600.0)
+    assert found.max() < 2.5  # noise: 0.4, and 4 to 5 times that; with the spike 10 and more
+
+
+def test_noise_of_few_frames_loses_none():
+    wave = np.random.default_rng(4).standard_normal((40, 4096))
+    fourth = _moments(wave, 256, 31, _begins(31, 16))[1]
+    assert np.mean(_without_lone(_pooled(fourth), LONE_SHARE_OF_FEW).min(axis=-1) == 0) < 0.005
+
+
+def test_blows_in_few_frames_are_kept():
+    wave = blows(80.0, 3000.0)
+    short, pooled = spectral_kurtosis(wave[:2048], 25_600.0)  # 31 frames, 6 blows
+    assert short[np.argmax(pooled)] == pytest.approx(3000, abs=800)  # four lines
 
 
 def test_spectral_kurtosis_of_silence_is_that_of_a_steady_tone():
