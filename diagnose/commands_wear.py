@@ -659,6 +659,91 @@ def report_exit(verdicts: Sequence[_Verdict], fail_on: str | None) -> int:
 
 
 @click.command()
+@click.argument("model_file", metavar="MODEL", type=PATH)
+@click.option("--recipe", metavar="RECIPE", help="Draws the machines; the model's own by default.")
+@click.option(
+    "-n",
+    "--machines",
+    type=click.IntRange(1, 300),
+    default=12,
+    show_default=True,
+    help="Simulated for every row.",
+)
+@click.option(
+    "--budget",
+    type=click.FloatRange(0, min_open=True),
+    help="Seconds after which no further row is begun; repeat the command to go on.",
+)
+@click.option(
+    "--background",
+    type=PATH,
+    help="Recording of the surroundings, added at three levels; its unit does not matter.",
+)
+@click.option("-o", "--output", type=PATH, help="HTML page to write.")
+@seed_option
+@force_option
+@json_option
+def blindspots(
+    model_file: Path,
+    recipe: str | None,
+    machines: int,
+    budget: float | None,
+    background: Path | None,
+    output: Path | None,
+    seed: int,
+    force: bool,
+    as_json: bool,
+) -> None:
+    """What MODEL takes for granted: its error where one thing differs from its recipe.
+
+    The same simulated machines, which it was not trained on, are judged again with each value that
+    the recipe holds fixed shifted, each drawn one beyond its range, and the signal disturbed. The
+    worst is first: the largest error without a caution. With -o, finished rows are kept beside the
+    page until all are done.
+    """
+    from .blindspot_signals import signal_rows
+    from .blindspots import Kept, file_hash, find_blind_spots, recipe_of, run_key
+    from .blindspots_text import blind_spots_table, blind_spots_text
+    from .bundle import kind_of
+    from .modelfile import load_model
+    from .ownfile import CLASS_MODEL
+    from .report import save_page
+
+    part = None if output is None else output.with_suffix(".part.json")
+    going_on = part is not None and part.exists() and not force
+    inputs = [model_file, *([background] if background else [])]
+    check_outputs(inputs, [(output, PAGE_SUFFIXES)], force or going_on)
+    if kind_of(model_file) == CLASS_MODEL:
+        raise click.UsageError(f"{model_file} names conditions, no wear; name a wear model")
+    model = load_model(model_file)
+    plan = recipe_of(model, recipe)
+    if part is not None and force:
+        part.unlink(missing_ok=True)
+    heard = file_hash(background) if background else ""
+    kept = Kept(part, run_key(file_hash(model_file), plan, machines, seed, heard))
+    with progress_bar("rows") as progress:
+        found = find_blind_spots(
+            model,
+            plan,
+            machines=machines,
+            seed=seed,
+            budget=budget,
+            signals=signal_rows(background),
+            kept=kept,
+            progress=progress,
+        )
+    table = blind_spots_table(found, model.card)
+    if output is not None:
+        from .blindspots_page import blind_spots_html
+
+        page = blind_spots_html(table, notice=model.notice)
+        save_page(page, output, force=force or going_on)
+        if part is not None and not found.left:
+            part.unlink(missing_ok=True)
+    emit(table, as_json, blind_spots_text(table))
+
+
+@click.command()
 @click.option(
     "--folder",
     type=PathType(path_type=Path, file_okay=False),
