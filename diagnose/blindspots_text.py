@@ -113,9 +113,9 @@ def blind_spots_text(table: Table) -> str:
         if row["faults"] and not row["machines"]
     ]
     if table["left"]:
-        names = dict.fromkeys(key.partition(": ")[2].partition(" ")[0] for key in table["left"])
+        paths = dict.fromkeys(key.partition(": ")[2].partition(" ")[0] for key in table["left"])
         lines.append(
-            f"Left for want of time: {len(table['left'])} rows, of {', '.join(names)}; with -o the "
+            f"Left for want of time: {len(table['left'])} rows, of {', '.join(paths)}; with -o the "
             "same command goes on with them"
         )
     return "\n".join(lines)

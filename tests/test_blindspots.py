@@ -395,29 +395,63 @@ def run(*arguments):
     return CliRunner().invoke(cli, ["blindspots", *map(str, arguments)])
 
 
-def test_the_command_goes_on_where_time_ended(small_model, tmp_path):
+@pytest.fixture
+def stub(tmp_path, monkeypatch):
+    """A model file that is none: loading it gives the stand-in."""
+    told = SimpleNamespace(card=CARD, estimate=loudness, notice="trained on simulation")
+    monkeypatch.setattr("wearstate.diagnose.bundle.kind_of", lambda path: "wear")
+    monkeypatch.setattr("wearstate.diagnose.modelfile.load_model", lambda path: told)
+    path = tmp_path / "model.wsm"
+    path.write_bytes(b"stub")
+    return path
+
+
+def test_the_command_goes_on_where_time_ended(stub, tmp_path):
     page, part = tmp_path / "page.html", tmp_path / "page.part.json"
-    first = run(small_model, "-n", 1, "--budget", 0.001, "-o", page, "--json")
+    ways = (stub, "-n", 1, "--budget", 0.001, "-o", page)
+    first = run(*ways, "--json")
     assert first.exit_code == 0, first.output
     table = json.loads(first.stdout)
     assert (table["machines"], table["rows"]) == (1, [])
-    assert page.exists()
-    assert part.exists()
-    assert "held fixed" in page.read_text() or "Left for want of time" in page.read_text()
+    assert "fixed: pressure.rise_delay = 6 deg" in table["left"]
+    assert "Left for want of time" in page.read_text()
+    before = part.read_bytes()
 
-    again = run(small_model, "-n", 1, "--budget", 0.001, "-o", page, "--json")
+    again = run(*ways, "--json")
     assert json.loads(again.stdout) == table
-    other = run(small_model, "-n", 2, "--budget", 0.001, "-o", page)
+    assert part.read_bytes() == before
+    other = run(*ways, "-n", 2)
     assert other.exit_code == 2
     assert "--force" in other.stderr
-    anew = run(small_model, "-n", 2, "--budget", 0.001, "-o", page, "--force")
+    anew = run(*ways, "-n", 2, "--force")
     assert anew.exit_code == 0
-    assert "As trained it errs by" in anew.stdout
+    assert "(2 simulated machines of bilge-pump-narrow)" in anew.stdout
 
 
-def test_the_command_refuses_what_does_not_fit(small_model, tmp_path):
-    wrong = run(small_model, "--recipe", "journal-bearing-small", "-o", tmp_path / "a.html")
+def test_a_finished_run_leaves_no_rows_behind(stub, tmp_path, monkeypatch):
+    monkeypatch.setattr(blindspots, "scene_rows", lambda recipe: shifts_of("rod.mass", 1.2))
+    page = tmp_path / "page.html"
+    assert run(stub, "-n", 1, "-o", page).exit_code == 0
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["model.wsm", "page.html"]
+    assert "rod.mass" in page.read_text()
+    once_more = run(stub, "-n", 1, "-o", page)
+    assert once_more.exit_code == 2
+    assert "exists" in once_more.stderr
+
+
+def test_the_command_refuses_what_does_not_fit(stub, tmp_path):
+    wrong = run(stub, "--recipe", "journal-bearing-small", "-o", tmp_path / "a.html")
     assert wrong.exit_code == 2
     assert "another severity" in wrong.stderr
-    assert run(small_model, "-o", tmp_path / "a.txt").exit_code == 2
-    assert list(tmp_path.iterdir()) == []
+    assert run(stub, "-o", tmp_path / "a.txt").exit_code == 2
+    assert [path.name for path in tmp_path.iterdir()] == ["model.wsm"]
+
+
+def test_a_trained_model_is_judged(small_model):
+    done = run(small_model, "-n", 1, "--budget", 0.001, "--json")
+    assert done.exit_code == 0, done.output
+    table = json.loads(done.stdout)
+    assert table["recipe"] == "bilge-pump-small"
+    [said] = table["baseline"]["said"]
+    assert said["verdict"] in ("graded", "caution")
+    assert abs(said["found"] - said["truth"]) < 0.5 * LIMIT
