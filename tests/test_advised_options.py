@@ -30,6 +30,7 @@ SPOKEN_BY = {
     "advice": {"report"},
     "align": {"align"},
     "audit_text": {"splits"},
+    "blindspots": {"blindspots"},
     "estimate": {"evaluate", "report"},
     "evaluate": {"evaluate"},
     "evaluate_splits": {"evaluate"},
