@@ -168,6 +168,8 @@ def _gained(recording: Recording) -> Recording:
 
 def _mounted(recording: Recording) -> Recording:
     """Accelerometers alone: a proximity probe has no mounted resonance."""
+    if not any(channel.quantity == "acceleration" for channel in recording.channels):
+        raise DataError("no channel is an acceleration; nothing resonates on its mount")
     poles = mounting_poles(MOUNT_HZ, MOUNT_DAMPING)
     signal = recording.signal.astype(float)
     for i, channel in enumerate(recording.channels):
