@@ -203,6 +203,9 @@ class WearModel:
         Size of the error to expect.
     calibration : Calibration
         Behaviour on machines that had no part in the fit.
+    shifted : Calibration
+        The same with the resonances of each machine elsewhere: what a verdict with caution may
+        count on.
     familiarity : Familiarity
         The cloud of the training recordings.
     levels : Levels
@@ -217,6 +220,7 @@ class WearModel:
     witness: Linear
     scale: Scale
     calibration: Calibration
+    shifted: Calibration
     familiarity: Familiarity
     levels: Levels
     heads: tuple[Head, ...] = ()
@@ -251,12 +255,11 @@ class WearModel:
         return float(np.nextafter(far[rank], math.inf)) if rank < len(far) else 0.0
 
     @cached_property
-    def _tails(self) -> Tails:
-        return tails(self.calibration)
-
-    @cached_property
-    def _grade_limits(self) -> Float:
-        return grade_limits(self.calibration, self.card["grade_edges_m"])
+    def _known(self) -> tuple[tuple[Calibration, Tails, Float], ...]:
+        """Calibration, tails and limits of the grades: without caution, and with one."""
+        edges = self.card["grade_edges_m"]
+        both = (self.calibration, self.shifted)
+        return tuple((each, tails(each), grade_limits(each, edges)) for each in both)
 
     @cached_property
     def _columns(self) -> dict[str, int]:
@@ -449,26 +452,29 @@ class WearModel:
             confounders=findings,
             evidence=self._evidence(row, baseline),
             **known,
-            **self._grading(severity, look.distance, inputs),
+            **self._grading(severity, look.distance, inputs, cautious=bool(cautions)),
         )
 
-    def _grading(self, severity: float, distance: float, inputs: Float) -> dict[str, Any]:
+    def _grading(
+        self, severity: float, distance: float, inputs: Float, *, cautious: bool
+    ) -> dict[str, Any]:
         """Grade, set, probabilities and interval of an estimate."""
         edges = self.card["grade_edges_m"]
+        known, ends, limits = self._known[cautious]
         apart = self.severity.disagreement(inputs)
         scale = float(self.scale.predict(scale_inputs([severity], [distance], apart))[0])
-        low, high = interval(severity, scale, self._tails)
+        low, high = interval(severity, scale, ends)
         grade = int(grades_of(severity, edges))
-        share = grade_probabilities(severity, scale, self.calibration, edges)
+        share = grade_probabilities(severity, scale, known, edges)
         return {
             "grade": grade,
             "grade_name": GRADE_NAMES[grade],
-            "possible_grades": grade_set(severity, scale, self._grade_limits, edges),
+            "possible_grades": grade_set(severity, scale, limits, edges),
             "grade_probabilities": tuple(share.tolist()),
             "severity": severity,
             "low": low,
             "high": high,
-            "coverage": self._tails.coverage,
+            "coverage": ends.coverage,
         }
 
     def _nearest(self, row: Float) -> str:

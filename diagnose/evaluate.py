@@ -433,7 +433,7 @@ def _numbers(values: Iterable[float | None]) -> Float:
 
 
 def reliability(model: WearModel, judged: Judged, draws: Resamples) -> list[dict[str, Any]]:
-    """Coverage of intervals and sets against the nominal one, over the graded records.
+    """Coverage of intervals and sets against the nominal one, over records graded without caution.
 
     Returns
     -------
@@ -442,7 +442,8 @@ def reliability(model: WearModel, judged: Judged, draws: Resamples) -> list[dict
     """
     edges = model.card["grade_edges_m"]
     true = grades_of(judged.truth, edges)
-    mine = np.flatnonzero(judged.graded)
+    plain = judged.graded & ~judged.cautious
+    mine = np.flatnonzero(plain)
     given = tails(model.calibration)  # what the intervals at hand were made with
     scale = np.log(judged.high[mine] / judged.low[mine]) / (given.low + given.high)
     found = []
@@ -454,7 +455,7 @@ def reliability(model: WearModel, judged: Judged, draws: Resamples) -> list[dict
             low, high = interval(judged.found[row], size, ends)
             held[0, row] = low <= judged.truth[row] <= high
             held[1, row] = true[row] in grade_set(judged.found[row], size, limits, edges)
-        shares = [share(each, judged.graded, draws) for each in held]
+        shares = [share(each, plain, draws) for each in held]
         found.append({"nominal": nominal, "interval": shares[0], "set": shares[1]})
     return found
 

@@ -105,6 +105,7 @@ _ARRAY_PARTS: dict[str, Any] = {
     "witness": Linear,
     "scale": Scale,
     "calibration": Calibration,
+    "shifted": Calibration,
     "familiarity": Familiarity,
     "levels": Levels,
 }
@@ -193,6 +194,7 @@ def _check_structure(model: WearModel, path: str | Path) -> None:
         "witness": linear_fits(model.witness, inputs),
         "scale": _scale_fits(model.scale),
         "calibration": _calibration_fits(model.calibration),
+        "shifted": _calibration_fits(model.shifted),
         "familiarity": familiarity_fits(model.familiarity, physical.shape[1], n),
         "levels": _levels_fit(model.levels, len(level_channels(names)), shapes.shape[1]),
         "numbers": numbers_fit(_arrays_of(model)),

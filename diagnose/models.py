@@ -154,9 +154,7 @@ class Blend:
         """Target [shape=(n,)] of feature rows [shape=(n, n_features)]."""
         lines, trees = self._sides(rows)
         share = float(self.weights @ self._straight)
-        if 0 < share < 1:
-            lines = trees * np.exp(np.clip(np.log(lines / trees), -self.tube, self.tube))
-        return np.clip(share * lines + (1 - share) * trees, self.low, self.high)
+        return np.clip(together(lines, trees, share, self.tube), self.low, self.high)
 
     def disagreement(self, rows: Float) -> Float:
         """How far lines and trees are apart, as a logarithm [shape=(n,)]; 0 of one kind alone."""
@@ -172,18 +170,25 @@ class Blend:
         return np.array([isinstance(part, Linear) for part in self.parts], dtype=np.float64)
 
 
+def together(lines: Float, trees: Float, share: float, tube: float) -> Float:
+    """Mean of lines, of this share, and trees; lines are held within the tube round the trees."""
+    if 0 < share < 1:
+        lines = trees * np.exp(np.clip(np.log(lines / trees), -tube, tube))
+    return np.asarray(share * lines + (1 - share) * trees)
+
+
 def sides(found: Float, weights: Float, straight: Float) -> tuple[Float, Float]:
     """Estimates of the lines and of the trees; where one kind is missing, those of the other.
 
     Parameters
     ----------
-    found : numpy.ndarray [shape=(n, n_parts)]
+    found : numpy.ndarray [shape=(…, n, n_parts)]
     weights, straight : numpy.ndarray [shape=(n_parts,)]
         One where a part is a line.
 
     Returns
     -------
-    lines, trees : numpy.ndarray [shape=(n,)]
+    lines, trees : numpy.ndarray [shape=(…, n)]
 
     Examples
     --------
@@ -394,6 +399,8 @@ class Fitted:
         Estimates of every record by parts, weights and choice that its group had no part in.
     disagreement : numpy.ndarray [shape=(n,)]
         Of the blend's parts, on groups they had no part in; see :meth:`Blend.disagreement`.
+    shifted_estimate, shifted_disagreement : numpy.ndarray [shape=(n,)]
+        The same of the records on other machines, by the weights of the blend.
     options : tuple of Option
         All that was looked at, within the budget or not.
     chosen : str
@@ -403,6 +410,8 @@ class Fitted:
     blend: Blend
     estimate: Float
     disagreement: Float
+    shifted_estimate: Float
+    shifted_disagreement: Float
     options: tuple[Option, ...]
     chosen: str
 
@@ -420,6 +429,7 @@ def fit_blend(
     seed: int = 0,
     budget_ms: float | None = None,
     candidates: Sequence[Candidate] = CANDIDATES,
+    shifted: Float | None = None,
 ) -> Fitted:
     """Fit every affordable candidate and keep the best of them, or a blend.
 
@@ -436,6 +446,8 @@ def fit_blend(
         Time that one prediction may take [ms]; :data:`BUDGET_MS` unless given.
     candidates : sequence of Candidate
         From fast to strong.
+    shifted : numpy.ndarray [shape=(n, n_features)], optional
+        The same records on other machines than those trained on; as they are unless given.
 
     Returns
     -------
@@ -477,10 +489,10 @@ def fit_blend(
             f"budget_ms = {limit:g} ms must be >= {cheapest:g} ms, the cheapest model; raise it"
         )
     bounds = (float(target.min()) / _FAR, float(target.max()) * _FAR)
-    table = np.column_stack(
-        [np.clip(_out_of_fold(item, rows, target, folds, seed), *bounds) for item in usable]
-    )
-    return _chosen(usable, table, rows, target, folds, seed=seed, limit=limit, bounds=bounds)
+    asked = (rows, rows if shifted is None else shifted)
+    both = [_out_of_fold(item, rows, asked, target, folds, seed) for item in usable]
+    tables = np.clip(np.stack(both, axis=2), *bounds)
+    return _chosen(usable, tables, rows, target, folds, seed=seed, limit=limit, bounds=bounds)
 
 
 def fit_line(rows: Float, target: Float, options: Sequence[Option], *, seed: int = 0) -> Linear:
@@ -508,17 +520,24 @@ def fit_line(rows: Float, target: Float, options: Sequence[Option], *, seed: int
 
 
 def _out_of_fold(
-    candidate: Candidate, rows: Float, target: Float, folds: Folds, seed: int
+    candidate: Candidate,
+    rows: Float,
+    asked: tuple[Float, Float],
+    target: Float,
+    folds: Folds,
+    seed: int,
 ) -> Float:
-    estimate = np.empty(len(target))
+    """Estimates of every record as it is and shifted [shape=(2, n)]."""
+    estimate = np.empty((2, len(target)))
     for train, test in folds:
-        estimate[test] = candidate.fit(rows[train], target[train], seed).predict(rows[test])
+        part = candidate.fit(rows[train], target[train], seed)
+        estimate[:, test] = [part.predict(each[test]) for each in asked]
     return estimate
 
 
 def _chosen(
     usable: Sequence[Candidate],
-    table: Float,
+    tables: Float,
     rows: Float,
     target: Float,
     folds: Folds,
@@ -527,6 +546,7 @@ def _chosen(
     limit: float,
     bounds: tuple[float, float],
 ) -> Fitted:
+    table = tables[0]
     names = _option_members(usable)
     crossed = {name: _crossed(table[:, m], target, folds) for name, m in names.items()}
     everyone = np.arange(len(target))
@@ -542,20 +562,24 @@ def _chosen(
     kept = np.flatnonzero(weights).tolist()
     members = [usable[i] for i in kept]
     straight = np.array([item.name in _line_names() for item in members], dtype=np.float64)
-    lines, trees = sides(table[:, kept], weights[kept], straight)
-    apart = np.abs(np.log(lines / trees))
+    lines, trees = sides(tables[:, :, kept], weights[kept], straight)
+    apart, strange = np.abs(np.log(lines / trees))
+    tube = float(np.quantile(apart, _USUAL))
     blend = Blend(
         names=tuple(item.name for item in members),
         parts=tuple(item.fit(rows, target, seed) for item in members),
         weights=weights[kept],
         low=bounds[0],
         high=bounds[1],
-        tube=float(np.quantile(apart, _USUAL)),
+        tube=tube,
     )
+    held = together(lines[1], trees[1], float(weights[kept] @ straight), tube)
     return Fitted(
         blend=blend,
         estimate=estimate,
         disagreement=apart,
+        shifted_estimate=held,
+        shifted_disagreement=strange,
         options=_front(options),
         chosen=best.name,
     )

@@ -18,9 +18,11 @@ from .physical import coordinates_of, moved_rows, physical_rows
 
 Float = NDArray[np.float64]
 
+REACH = 1.2
+"""Another machine of the kind has its resonances within this factor of the known ones."""
+
 _LEAST_SPREAD = 1e-6  # of the largest: a feature that never moves says nothing
 _CLIP = 10.0  # standard deviations: one wild feature must not stand for a strange recording
-_REACH = 1.2  # another machine of the kind has its resonances within this factor of the known ones
 _FREE = ("profile", "orders", "spiky", "orbit", "other")  # kinds that know of no hertz
 
 
@@ -218,7 +220,7 @@ def _tolerance(names: Sequence[str], rows: Float, values: Float) -> Float:
     """Covariance of what moving the spectra does, each by a factor uniform within the reach."""
     moves = [
         physical_rows(names, moved_rows(names, rows, factor)) - values
-        for factor in (1 / _REACH, _REACH)
+        for factor in (1 / REACH, REACH)
     ]
     owner = coordinates_of(names).owner
     alone = owner[:, None] == owner  # every place has resonances of its own

@@ -177,15 +177,19 @@ def coordinates_of(names: Sequence[str]) -> Coordinates:
     return Coordinates(owner=owner, kind=kind)
 
 
-def moved_rows(names: Sequence[str], rows: Float, factor: float) -> Float:
+def moved_rows(
+    names: Sequence[str], rows: Float, factor: float | Float, *, cells: bool = False
+) -> Float:
     """Feature rows of machines whose spectra stand at other frequencies.
 
     Parameters
     ----------
     names, rows
         As of :func:`physical_rows`.
-    factor : float
-        Of all frequencies.
+    factor : float or numpy.ndarray [shape=(n,)]
+        Of all frequencies, of each row.
+    cells : bool
+        Whether the spectra at each crank angle move as well.
 
     Returns
     -------
@@ -200,18 +204,33 @@ def moved_rows(names: Sequence[str], rows: Float, factor: float) -> Float:
     [[0.0, 0.0, 6.0]]
     """
     moved = rows.copy()
+    steps = np.log(np.broadcast_to(factor, len(rows)))
     for columns in columns_of(tuple(names)).values():
-        if not columns.bands:
-            continue
-        middle = np.log(columns.edges).mean(axis=1)
-        place = np.interp(middle - np.log(factor), middle, np.arange(len(middle)))
-        below = np.minimum(place.astype(np.intp), max(len(middle) - 2, 0))
-        above = np.minimum(below + 1, len(middle) - 1)
-        levels = rows[:, columns.bands]
-        moved[:, columns.bands] = levels[:, below] + (place - below) * (
-            levels[:, above] - levels[:, below]
-        )
+        if columns.bands:
+            moved[:, columns.bands] = _moved(rows[:, columns.bands], columns.edges, steps)
+        if cells and columns.cells:
+            bands = len(columns.cells) // columns.angles
+            edges = [_edges_of(names[i]) for i in columns.cells[:bands]]
+            spectra = rows[:, columns.cells].reshape(len(rows) * columns.angles, bands)
+            turned = _moved(spectra, edges, np.repeat(steps, columns.angles))
+            moved[:, columns.cells] = turned.reshape(len(rows), -1)
     return moved
+
+
+def _moved(levels: Float, edges: Sequence[tuple[float, float]], steps: Float) -> Float:
+    """Spectra [shape=(n, n_bands)] moved by steps of the log frequency [shape=(n,)]."""
+    middle = np.log(edges).mean(axis=1)
+    place = np.interp(middle - steps[:, None], middle, np.arange(len(middle)))
+    below = np.minimum(place.astype(np.intp), max(len(middle) - 2, 0))
+    above = np.minimum(below + 1, len(middle) - 1)
+    first = np.take_along_axis(levels, below, axis=1)
+    return np.asarray(first + (place - below) * (np.take_along_axis(levels, above, axis=1) - first))
+
+
+def _edges_of(name: str) -> tuple[float, float]:
+    found = re.search(_BAND, name)
+    assert found is not None  # a cell's name ends in that of a band
+    return float(found[1]), float(found[2])
 
 
 def _parts(columns: Columns, rows: Float) -> dict[str, Float]:

@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
@@ -37,8 +38,8 @@ from .models import (
     fit_blend,
     fit_line,
 )
-from .novelty import Familiarity, fit_familiarity
-from .physical import physical_rows
+from .novelty import REACH, Familiarity, fit_familiarity
+from .physical import moved_rows, physical_rows
 from .quality import Levels, fit_levels
 from .tabulate import USUAL, Choice, FeatureTable, Progress, confounders_in, feature_table
 from .transfer_reference import healthy_transfer
@@ -389,6 +390,21 @@ class Lesson:
         """What the severity is told from."""
         return self.rows if self.baseline is None else referenced_rows(self.rows, self.baseline)
 
+    def moved(self, seed: int) -> "Lesson":
+        """The same records of machines whose resonances stand anywhere within the reach.
+
+        Each machine has its own factor, which its healthy rows share.
+        """
+        machines, place = np.unique(self.groups, return_inverse=True)
+        steps = np.random.default_rng(seed).uniform(-1, 1, len(machines))[place]
+        factor = np.exp(steps * math.log(REACH))
+
+        def there(rows: Float) -> Float:
+            return moved_rows(self.names, rows, factor, cells=True)
+
+        healthy = None if self.baseline is None else there(self.baseline)
+        return replace(self, rows=there(self.rows), baseline=healthy)
+
     def part(self, columns: NDArray[np.intp]) -> "Lesson":
         """The same records with some of the features."""
         return replace(
@@ -408,7 +424,8 @@ class Learnt:
     severity : Fitted
     witness : Linear
     scale : Scale
-    calibration : Calibration
+    calibration, shifted : Calibration
+        On machines like the trained ones, and on such whose resonances stand elsewhere.
     familiarity : Familiarity
     levels : Levels
     heads : tuple of (Head, dict)
@@ -419,6 +436,7 @@ class Learnt:
     witness: Linear
     scale: Scale
     calibration: Calibration
+    shifted: Calibration
     familiarity: Familiarity
     levels: Levels
     heads: tuple[tuple[Head, dict[str, Any]], ...]
@@ -459,7 +477,15 @@ def learn(
     _refuse_no_wear(lesson.severity)
     folds = group_folds(lesson.groups, n=_FOLDS, seed=seed)
     try:
-        severity = fit_blend(lesson.inputs, lesson.severity, folds, seed=seed, budget_ms=budget_ms)
+        other = lesson.moved(seed)
+        severity = fit_blend(
+            lesson.inputs,
+            lesson.severity,
+            folds,
+            seed=seed,
+            budget_ms=budget_ms,
+            shifted=other.inputs,
+        )
         others: dict[int, Fitted] = {}
         if selection is not None:
             others = _fits_of_others(selection, among, folds, seed, budget_ms)
@@ -471,8 +497,9 @@ def learn(
             if place in others:
                 estimate[left] = others[place].estimate[left]
         severity = replace(severity, estimate=estimate)
-    distance, weight = _out_of_fold_distances(lesson, folds)
+    (distance, far), weight = _out_of_fold_distances(lesson, other, folds)
     inputs = scale_inputs(severity.estimate, distance, severity.disagreement)
+    strange = scale_inputs(severity.shifted_estimate, far, severity.shifted_disagreement)
     scale = fit_scale(inputs, np.log(lesson.severity / severity.estimate))
     return Learnt(
         severity=severity,
@@ -483,6 +510,13 @@ def learn(
             truth=lesson.severity,
             scale=scale.predict(inputs),
             distance=distance,
+            group=lesson.groups,
+        ),
+        shifted=Calibration(
+            estimate=severity.shifted_estimate,
+            truth=lesson.severity,
+            scale=scale.predict(strange),
+            distance=far,
             group=lesson.groups,
         ),
         familiarity=fit_familiarity(lesson.names, lesson.rows, lesson.groups, weight=weight),
@@ -504,19 +538,20 @@ def _fits_of_others(
     }
 
 
-def _out_of_fold_distances(lesson: Lesson, folds: Folds) -> tuple[Float, float]:
-    """Novelty distances of records from clouds that their machine draw had no part in.
+def _out_of_fold_distances(lesson: Lesson, other: Lesson, folds: Folds) -> tuple[Float, float]:
+    """Novelty distances of records, as they are and moved, from clouds without their machine draw.
 
     And the weight of the share outside the ranges, which makes its rare values as far as those of
     the distance itself: of both together no more are refused than of one.
     """
-    apart, outside = np.empty((2, len(lesson.rows)))
+    apart, outside = np.empty((2, 2, len(lesson.rows)))
     for train, test in folds:
         cloud = fit_familiarity(lesson.names, lesson.rows[train], lesson.groups[train])
-        apart[test] = cloud.distance(lesson.names, lesson.rows[test])
-        outside[test] = cloud.outside(lesson.rows[test])
-    rare = max(float(np.quantile(outside, _RARE)), 1 / len(lesson.names))
-    weight = float(np.quantile(apart, _RARE)) / rare
+        for i, each in enumerate((lesson, other)):
+            apart[i, test] = cloud.distance(lesson.names, each.rows[test])
+            outside[i, test] = cloud.outside(each.rows[test])
+    rare = max(float(np.quantile(outside[0], _RARE)), 1 / len(lesson.names))
+    weight = float(np.quantile(apart[0], _RARE)) / rare
     return np.maximum(apart, weight * outside), weight
 
 
@@ -567,6 +602,7 @@ def _model(learnt: Learnt, card: dict[str, Any]) -> WearModel:
         witness=learnt.witness,
         scale=learnt.scale,
         calibration=learnt.calibration,
+        shifted=learnt.shifted,
         familiarity=learnt.familiarity,
         levels=learnt.levels,
         heads=tuple(head for head, _ in learnt.heads),
