@@ -98,11 +98,11 @@ def test_intervals_follow_the_expected_size_of_the_error():
         estimate = np.exp(rng.uniform(np.log(0.3), np.log(3), 300))
         error = 0.1 * estimate * rng.standard_normal(300)
         distance = np.exp(0.2 * rng.standard_normal(300))
-        inputs = scale_inputs(estimate, distance)
+        inputs = scale_inputs(estimate, distance, np.full(300, 0.1))
         scale = fit_scale(inputs, error)
         found = tails(known(error, estimate=estimate, scale=scale.predict(inputs)))
         for place, told in covered.items():
-            size = float(scale.predict(scale_inputs([place], [1.0]))[0])
+            size = float(scale.predict(scale_inputs([place], [1.0], [0.1]))[0])
             low, high = interval(place, size, found)
             told.append(low <= place * np.exp(0.1 * place * rng.standard_normal()) <= high)
     for told in covered.values():
@@ -111,14 +111,16 @@ def test_intervals_follow_the_expected_size_of_the_error():
         assert np.mean(told) == pytest.approx(0.9, abs=0.052)
 
 
-def test_the_farther_from_the_familiar_the_wider():
+def test_the_farther_from_the_familiar_and_the_more_parts_differ_the_wider():
     rng = np.random.default_rng(3)
     distance = np.exp(0.3 * rng.standard_normal(3000))
-    inputs = scale_inputs(np.exp(rng.standard_normal(3000)), distance)
-    scale = fit_scale(inputs, 0.1 * distance**2 * rng.standard_normal(3000))
-    near, far = scale.predict(scale_inputs([1.0, 1.0], [1.0, 1.5]))
+    apart = np.exp(0.3 * rng.standard_normal(3000)) / 10
+    inputs = scale_inputs(np.exp(rng.standard_normal(3000)), distance, apart)
+    scale = fit_scale(inputs, apart * distance**2 * rng.standard_normal(3000))
+    near, far, torn = scale.predict(scale_inputs(np.ones(3), [1.0, 1.5, 1.0], [0.1, 0.1, 0.15]))
     # the slope of 3,000 log sizes of spread 1.1 over a spread of 0.3 is known to 0.07
     assert np.log(far / near) == pytest.approx(2 * np.log(1.5), abs=4 * 0.07 * np.log(1.5))
+    assert np.log(torn / near) == pytest.approx(np.log(1.5), abs=4 * 0.07 * np.log(1.5))
 
 
 EDGES = [1.0, 2.0, 3.0]
