@@ -1,6 +1,6 @@
 """What does a strange casing cost, and what does a healthy reference of the same pump give back?
 
-Trains on pumps of ``bilge-pump-standard``, whose casings scatter by 3 per cent, judges pumps whose
+Trains on pumps of ``bilge-pump-standard``, whose casings scatter by 6 per cent, judges pumps whose
 casing frequencies lie up to 20 per cent off, cold and referenced to three healthy records each.
 Run as ``python tests/benchmarks/casing_shift.py FOLDER [-n 400]``; what FOLDER holds is used again.
 """

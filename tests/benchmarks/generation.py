@@ -2,7 +2,7 @@
 
     python tests/benchmarks/generation.py [--seconds 20] [--records 20000] [--folder DIR]
 
-Simulates `bilge-pump-standard` (three channels at 25.6 kHz) in one process and in two workers,
+Simulates `bilge-pump-narrow` (three channels at 25.6 kHz) in one process and in two workers,
 without their start: signal made and written in a second, what it costs in processor time (which a
 busy machine changes less), and the writer's share. Then the memory of every process at 100 records,
 and at `--records` short ones of `journal-bearing-small`, small enough to make so many; then random
@@ -28,7 +28,7 @@ from wearstate.datasets.recipe import Recipe, load_recipe, sample_records
 from wearstate.datasets.record import DataSet, DataSetWriter
 from wearstate.datasets.workers import in_order
 
-RECIPE, SHORT = "bilge-pump-standard", "journal-bearing-small"
+RECIPE, SHORT = "bilge-pump-narrow", "journal-bearing-small"
 
 LEAST_RATE = 50.0
 """Seconds of three-channel signal made in a second, with two processes."""
