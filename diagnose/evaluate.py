@@ -13,7 +13,7 @@ from ..datasets.record import Attributes, DataError, DataSet
 from ..datasets.split_file import Sides, usable_sides
 from ..datasets.views import View
 from .baselines import Side, contest, side_of
-from .conformal import grade_limits, grade_set, interval, tails
+from .conformal import Calibration, grade_limits, grade_set, interval, tails
 from .estimate import Estimate, WearModel
 from .feature_choice import choice_in
 from .foreign import kitchen
@@ -21,6 +21,7 @@ from .grades import grades_of
 from .healthy import references, refuse_strangers
 from .scores import (
     Judged,
+    Mask,
     Resamples,
     bound_of,
     confusion,
@@ -433,31 +434,36 @@ def _numbers(values: Iterable[float | None]) -> Float:
 
 
 def reliability(model: WearModel, judged: Judged, draws: Resamples) -> list[dict[str, Any]]:
-    """Coverage of intervals and sets against the nominal one, over records graded without caution.
+    """Coverage of intervals and sets against the nominal one, over the graded records.
 
     Returns
     -------
     list of dict
         ``nominal``, and ``interval`` and ``set``: shares that hold the truth.
     """
-    edges = model.card["grade_edges_m"]
-    true = grades_of(judged.truth, edges)
-    plain = judged.graded & ~judged.cautious
-    mine = np.flatnonzero(plain)
-    given = tails(model.calibration)  # what the intervals at hand were made with
-    scale = np.log(judged.high[mine] / judged.low[mine]) / (given.low + given.high)
     found = []
     for nominal in LEVELS:
-        ends = tails(model.calibration, nominal)
-        limits = grade_limits(model.calibration, edges, nominal)
-        held = np.zeros((2, len(true)))
-        for row, size in zip(mine, scale, strict=True):
-            low, high = interval(judged.found[row], size, ends)
-            held[0, row] = low <= judged.truth[row] <= high
-            held[1, row] = true[row] in grade_set(judged.found[row], size, limits, edges)
-        shares = [share(each, plain, draws) for each in held]
+        held = _held(model.calibration, judged, ~judged.cautious, model, nominal)
+        held |= _held(model.shifted, judged, judged.cautious, model, nominal)
+        shares = [share(each.astype(np.float64), judged.graded, draws) for each in held]
         found.append({"nominal": nominal, "interval": shares[0], "set": shares[1]})
     return found
+
+
+def _held(known: Calibration, judged: Judged, here: Mask, model: WearModel, nominal: float) -> Mask:
+    """Whether interval and set hold the truth, of graded records here [shape=(2, n)]."""
+    edges = model.card["grade_edges_m"]
+    held = np.zeros((2, len(judged.truth)), dtype=bool)
+    given, ends = tails(known), tails(known, nominal)
+    limits = grade_limits(known, edges, nominal)
+    for row in np.flatnonzero(judged.graded & here):
+        # what the interval at hand was made with tells the size of the error expected
+        size = float(np.log(judged.high[row] / judged.low[row]) / (given.low + given.high))
+        low, high = interval(judged.found[row], size, ends)
+        true = int(grades_of(judged.truth[row], edges))
+        held[0, row] = low <= judged.truth[row] <= high
+        held[1, row] = true in grade_set(judged.found[row], size, limits, edges)
+    return held
 
 
 def p_value_shares(estimates: Sequence[Estimate], draws: Resamples) -> list[dict[str, Any]]:
