@@ -65,6 +65,7 @@ MEANINGS = (
     ("sag_(.+)_m", "label", "how far the foundation has sunk: {0}"),
     ("parallel_offset_(.+)_m", "label", "parallel offset of the shafts: {0}"),
     ("stretch_lost_(.+)_m", "label", "stretch that the anchor bolts have lost: {0}"),
+    ("choice_(.+)", "numerics", "option of the recipe that the machine or record took: {0}"),
     ("confounder_(.+)", "label", "whether this fault beside the wear is present: {0}"),
     ("(.+)_value", "label", "scene value of that fault [SI], 0 where it is absent: {0}"),
     ("operating_hours", "label", "of the machine, at the record"),

@@ -183,6 +183,7 @@ def sagged(scene: ShaftScene, found: SagPosterior) -> ShaftScene:
 
     Examples
     --------
+    >>> from wearstate.diagnose.sags import estimate_sags
     >>> from wearstate.sim.scene import load_scene
     >>> rig = load_scene("shaft-rig")
     >>> jacks = MeasuredReactions(reactions={"second": 200.0}, deviations={"second": 5.0})
