@@ -549,7 +549,7 @@ def test_the_benchmark_fails_on_a_miss():
         {"name": "minirocket", "missing": "not here", "ms_per_record": None},
     ]
     misses = script["misses"]
-    assert misses({"splits": [good], "shifted": ahead, "cost": cost}, "narrow-pump") == []
+    assert misses({"splits": [good], "shifted": ahead, "cost": cost}, "pump") == []
     bad = {
         **good,
         "mae_share_of_limit": 0.041,
@@ -557,15 +557,13 @@ def test_the_benchmark_fails_on_a_miss():
         "accuracy_far": 0.94,
         "missed_fault": 0.003,
     }
-    assert len(misses({"splits": [bad]}, "narrow-pump")) == 4
+    assert len(misses({"splits": [bad]}, "pump")) == 4
     worse = {"value": 0.02, "low": 0.01, "high": 0.03}
     behind = {**good, "baselines": {"single_rms": {**ran, "difference_all": worse}}}
-    assert len(misses({"splits": [behind]}, "narrow-pump")) == 1
+    assert len(misses({"splits": [behind]}, "pump")) == 1
     # no worse is not enough beyond the trained range
-    assert (
-        len(misses({"splits": [good], "shifted": {**good, "unfamiliar": 0.21}}, "narrow-pump")) == 2
-    )
+    assert len(misses({"splits": [good], "shifted": {**good, "unfamiliar": 0.21}}, "pump")) == 2
     slow = [{**cost[0], "ms_per_record": 11.0}, *cost[1:]]
-    assert len(misses({"splits": [good], "cost": slow}, "narrow-pump")) == 1
+    assert len(misses({"splits": [good], "cost": slow}, "pump")) == 1
     nothing = {**good, "mae_share_of_limit": None}
-    assert "unfamiliar" in misses({"splits": [nothing]}, "narrow-pump")[0]
+    assert "unfamiliar" in misses({"splits": [nothing]}, "pump")[0]
