@@ -157,14 +157,16 @@ class _Machines:
         if not solution.status.ok:
             return solution.status.text
         tacho = getattr(scene, "tacho", None)
-        speed = {} if tacho else {"speed_hz": condition_of(scene, "speed_hz")}
+        noted = {name: condition_of(scene, name) for name in self.model.noted}
+        if not tacho:
+            noted["speed_hz"] = condition_of(scene, "speed_hz")
         return Recording(
             signal=solution.signal,
             sample_rate=solution.sample_rate,
             channels=solution.channels,
             tacho=tacho.name if tacho else None,
             origin="simulated",
-            row=speed,
+            row=noted,
         )
 
     def judged(self, recording: Recording, sample: Sample) -> Said:

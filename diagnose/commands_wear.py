@@ -556,6 +556,7 @@ _Verdict = tuple[str, int | None]
 def _report_one(told: _Told) -> list[_Verdict]:
     """Report on one recording."""
     from ..datasets.importers import read_recording, with_views
+    from .nameplate_cautions import known_beside
     from .report import report_table, save_page
     from .report_text import report_text
 
@@ -567,7 +568,8 @@ def _report_one(told: _Told) -> list[_Verdict]:
     )
     recording = with_views(recording, told.source, told.given["record"], told.views)
     baseline = told.baselines.of(recording) if told.baselines else None
-    estimate = told.model.estimate(recording, baseline)
+    beside = known_beside(told.plate, recording, told.model.card, baseline)
+    estimate = told.model.estimate(recording, baseline, **beside)
     table = report_table(
         recording,
         told.model,

@@ -1,7 +1,7 @@
 """The wear model: what it says of a recording."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from typing import Any, Literal
@@ -11,22 +11,11 @@ from numpy.typing import NDArray
 
 from ..datasets.record import DataError, Recording
 from ..features.transfer import FrfReference
-from .conformal import (
-    COVERAGE,
-    Calibration,
-    Scale,
-    Tails,
-    grade_limits,
-    grade_probabilities,
-    grade_set,
-    interval,
-    scale_inputs,
-    tails,
-)
+from .conformal import COVERAGE
 from .feature_choice import choice_in
-from .grades import GRADE_NAMES, grades_of
 from .healthy import Baseline, referenced_rows
-from .models import Blend, Linear
+from .models import Blend
+from .noted import NOTED, noted_names, noted_values
 from .novelty import Familiarity, free_distance, novelty_p_value
 from .physical import level_channels, levelled_rows
 from .quality import (
@@ -38,6 +27,7 @@ from .quality import (
     recording_faults,
     suspicions,
 )
+from .severity import Estimator
 from .tabulate import Choice, held_against, recording_features
 from .transfer_reference import told_against
 
@@ -128,6 +118,8 @@ class Estimate:
         Conditions outside the trained range, faults that bar no verdict.
     mode : {"cold", "referenced"}
         Whether healthy recordings of the same machine were used.
+    noted : tuple of str
+        Conditions noted beside the recording that the estimate is made with.
     p_value : float or None
         Of the hypothesis that the recording is of the trained kind; None where it could not even
         be turned into the model's features.
@@ -159,6 +151,7 @@ class Estimate:
     reasons: tuple[str, ...] = ()
     cautions: tuple[str, ...] = ()
     mode: Mode = "cold"
+    noted: tuple[str, ...] = ()
     p_value: float | None = None
     p_limit: float | None = None
     nearest: str = ""
@@ -194,18 +187,11 @@ class WearModel:
 
     Attributes
     ----------
-    severity : Blend
-        Features to severity [m].
-    witness : Linear
-        The best straight line among the candidates: it goes on beyond the trained severities,
-        where trees stay at the last they have seen.
-    scale : Scale
-        Size of the error to expect.
-    calibration : Calibration
-        Behaviour on machines that had no part in the fit.
-    shifted : Calibration
-        The same with the resonances of each machine elsewhere: what a verdict with caution may
-        count on.
+    blind : Estimator
+        Features to severity.
+    informed : Estimator or None
+        Features and the conditions noted beside the recording to severity: used where all of them
+        are known. None where the conditions tell no more than the features do.
     familiarity : Familiarity
         The cloud of the training recordings.
     levels : Levels
@@ -216,11 +202,8 @@ class WearModel:
         What it was trained on, its inputs, limits and ranges.
     """
 
-    severity: Blend
-    witness: Linear
-    scale: Scale
-    calibration: Calibration
-    shifted: Calibration
+    blind: Estimator
+    informed: Estimator | None = None
     familiarity: Familiarity
     levels: Levels
     heads: tuple[Head, ...] = ()
@@ -244,22 +227,20 @@ class WearModel:
     @cached_property
     def p_limit(self) -> float:
         """A recording with this p-value or a smaller one is called unfamiliar."""
-        return max(UNFAMILIAR_SHARE, 1 / (len(self.calibration.distance) + 1))
+        return max(UNFAMILIAR_SHARE, 1 / (len(self.blind.calibration.distance) + 1))
 
     @cached_property
     def distance_limit(self) -> float:
         """Distance at which the p-value falls to its limit."""
-        far = np.sort(self.calibration.distance)[::-1]
+        far = np.sort(self.blind.calibration.distance)[::-1]
         # that many calibration recordings lie at least as far
         rank = math.floor(self.p_limit * (len(far) + 1) + 1e-9) - 1
         return float(np.nextafter(far[rank], math.inf)) if rank < len(far) else 0.0
 
     @cached_property
-    def _known(self) -> tuple[tuple[Calibration, Tails, Float], ...]:
-        """Calibration, tails and limits of the grades: without caution, and with one."""
-        edges = self.card["grade_edges_m"]
-        both = (self.calibration, self.shifted)
-        return tuple((each, tails(each), grade_limits(each, edges)) for each in both)
+    def noted(self) -> tuple[str, ...]:
+        """Conditions that the informed estimate needs; none where there is no such estimate."""
+        return () if self.informed is None else noted_names(self.card)
 
     @cached_property
     def _columns(self) -> dict[str, int]:
@@ -271,7 +252,12 @@ class WearModel:
         known = self.card["healthy_features"]
         return np.array(known["mean"]), np.array(known["spread"])
 
-    def predict(self, rows: Float, baseline: Float | None = None) -> Float:
+    def predict(
+        self,
+        rows: Float,
+        baseline: Float | None = None,
+        conditions: Sequence[Mapping[str, Any]] | None = None,
+    ) -> Float:
         """Severity of many recordings, without a word on how far it can be trusted.
 
         Parameters
@@ -280,6 +266,8 @@ class WearModel:
             In the order of ``card["features"]``.
         baseline : numpy.ndarray [shape=(n, n_features)] or [shape=(n_features,)], optional
             Healthy rows of the same machines, of a referenced model.
+        conditions : sequence of mapping, optional
+            What was noted beside each recording, by the names of the card.
 
         Returns
         -------
@@ -291,7 +279,31 @@ class WearModel:
         DataError
             The model is referenced and there is no baseline.
         """
-        return self.severity.predict(self._inputs(rows, baseline))
+        inputs = self._inputs(rows, baseline)
+        found = self.blind.severity.predict(inputs)
+        if self.informed is None or conditions is None:
+            return found
+        noted = noted_values(self.noted, conditions)
+        known = np.isfinite(noted).all(axis=1)
+        if known.any():
+            both = np.hstack([inputs[known], noted[known]])
+            found[known] = self.informed.severity.predict(both)
+        return found
+
+    def informed_of(self, conditions: Mapping[str, Any]) -> bool:
+        """Whether the conditions suffice for the informed estimate."""
+        if self.informed is None:
+            return False
+        return bool(np.isfinite(noted_values(self.noted, [conditions])).all())
+
+    def _asked(
+        self, row: Float, baseline: Float | None, conditions: Mapping[str, Any]
+    ) -> tuple[Estimator, Float]:
+        """Who is to tell the severity of a recording, and from which inputs [shape=(1, n)]."""
+        inputs = self._inputs(row[None, :], baseline)
+        if self.informed is None or not self.informed_of(conditions):
+            return self.blind, inputs
+        return self.informed, np.hstack([inputs, noted_values(self.noted, [conditions])])
 
     def _inputs(self, rows: Float, baseline: Float | None) -> Float:
         if self.mode == "cold":
@@ -300,7 +312,13 @@ class WearModel:
             raise DataError(NO_BASELINE)
         return referenced_rows(rows, baseline)
 
-    def estimate(self, recording: Recording, baseline: Baseline | None = None) -> Estimate:
+    def estimate(
+        self,
+        recording: Recording,
+        baseline: Baseline | None = None,
+        conditions: Mapping[str, Any] | None = None,
+        told: tuple[str, ...] = (),
+    ) -> Estimate:
         """Estimate the wear of the machine in a recording.
 
         Parameters
@@ -311,6 +329,11 @@ class WearModel:
         baseline : Baseline, optional
             Healthy recordings of the same machine; a referenced model needs them, a cold one only
             tells the evidence against them.
+        conditions : mapping, optional
+            What is known of the day by the names of the card [SI units]; unless given, what was
+            noted beside the recording.
+        told : tuple of str
+            Cautions from what is known beside the signals.
 
         Returns
         -------
@@ -341,7 +364,8 @@ class WearModel:
         if any(fault.bars for fault in faults):
             return self._unusable(faults)
         features = None if baseline is None else baseline.features
-        return self._judge(row, look, features, recording.row, faults)
+        noted = recording.row if conditions is None else conditions
+        return self._judge(row, look, features, noted, faults, told)
 
     def _unusable(self, faults: tuple[Fault, ...]) -> Estimate:
         reasons = tuple(fault.text for fault in faults if fault.bars)
@@ -422,60 +446,43 @@ class WearModel:
         baseline: Float | None,
         conditions: Mapping[str, Any],
         faults: tuple[Fault, ...],
+        told: tuple[str, ...] = (),
     ) -> Estimate:
         if self.mode == "referenced" and baseline is None:
             return Estimate(verdict="unusable", reasons=(NO_BASELINE,), mode=self.mode)
         known: dict[str, Any] = {
             "faults": faults,
             "mode": self.mode,
-            "p_value": novelty_p_value(look.distance, self.calibration.distance),
+            "p_value": novelty_p_value(look.distance, self.blind.calibration.distance),
             "p_limit": self.p_limit,
             "nearest": self._nearest(row),
         }
         if known["p_value"] <= self.p_limit:
-            reason = _strangeness(look.distance, self.calibration.distance)
+            reason = _strangeness(look.distance, self.blind.calibration.distance)
             return Estimate(verdict="unfamiliar", reasons=(reason,), **known)
-        inputs = self._inputs(row[None, :], baseline)
-        severity = float(self.severity.predict(inputs)[0])
+        asked, inputs = self._asked(row, baseline, conditions)
         findings = self._findings(row)
         cautions = (
+            *told,
             *(fault.text for fault in faults),
-            *self._range_cautions(severity, inputs),
+            *self._missing_cautions(conditions),
+            *self._range_cautions(asked, inputs),
             *self._condition_cautions(row, conditions),
             *self._level_cautions(look),
-            *self._disagreement_cautions(inputs),
+            *_disagreement_cautions(asked, inputs),
             *self._finding_cautions(findings),
         )
         return Estimate(
             verdict="caution" if cautions else "graded",
+            noted=() if asked is self.blind else self.noted,
             cautions=cautions,
             confounders=findings,
             evidence=self._evidence(row, baseline),
             **known,
-            **self._grading(severity, look.distance, inputs, cautious=bool(cautions)),
+            **asked.grading(
+                inputs, look.distance, self.card["grade_edges_m"], cautious=bool(cautions)
+            ),
         )
-
-    def _grading(
-        self, severity: float, distance: float, inputs: Float, *, cautious: bool
-    ) -> dict[str, Any]:
-        """Grade, set, probabilities and interval of an estimate."""
-        edges = self.card["grade_edges_m"]
-        known, ends, limits = self._known[cautious]
-        apart = self.severity.disagreement(inputs)
-        scale = float(self.scale.predict(scale_inputs([severity], [distance], apart))[0])
-        low, high = interval(severity, scale, ends)
-        grade = int(grades_of(severity, edges))
-        share = grade_probabilities(severity, scale, known, edges)
-        return {
-            "grade": grade,
-            "grade_name": GRADE_NAMES[grade],
-            "possible_grades": grade_set(severity, scale, limits, edges),
-            "grade_probabilities": tuple(share.tolist()),
-            "severity": severity,
-            "low": low,
-            "high": high,
-            "coverage": ends.coverage,
-        }
 
     def _nearest(self, row: Float) -> str:
         group, distance = self.familiarity.nearest(self.names, row)
@@ -483,10 +490,26 @@ class WearModel:
         kind = trained["recipe"] or trained["scene"] or "the training set"
         return f"machine {group} of {kind}, {distance:.2g} away"
 
-    def _range_cautions(self, severity: float, inputs: Float) -> list[str]:
+    def _missing_cautions(self, conditions: Mapping[str, Any]) -> list[str]:
+        """What a person could add, and what it is worth."""
+        if self.informed is None or self.informed_of(conditions):
+            return []
+        noted = noted_values(self.noted, [conditions])[0]
+        missing = [name for name, value in zip(self.noted, noted, strict=True) if np.isnan(value)]
+        settings = " ".join(f"--set {NOTED[name].setting}" for name in missing)
+        limit = self.card["condemning_limit_m"]
+        without, told = (100 * each.error / limit for each in (self.blind, self.informed))
+        return [
+            f"{', '.join(missing)} {'is' if len(missing) == 1 else 'are'} not known: with "
+            f"{'it' if len(missing) == 1 else 'them'} estimates of unseen machines erred by "
+            f"{told:.2g} % of the limit, without by {without:.2g} %; give {settings}"
+        ]
+
+    def _range_cautions(self, asked: Estimator, inputs: Float) -> list[str]:
         """Beyond the trained severities an estimate is a bound, and a poor one."""
         low, high = self.card["severity_range_m"]
-        straight = float(self.witness.predict(inputs)[0])
+        severity = float(asked.severity.predict(inputs)[0])
+        straight = float(asked.witness.predict(inputs)[0])
         outside = [value for value in (severity, straight) if not low <= value <= high]
         if not outside:
             return []
@@ -511,16 +534,6 @@ class WearModel:
                 f"{low:.4g} to {high:.4g} {condition['unit']}: extrapolating"
             )
         return cautions
-
-    def _disagreement_cautions(self, inputs: Float) -> list[str]:
-        """Lines and trees learnt the same; where they part, one of them knows nothing."""
-        apart, usual = float(self.severity.disagreement(inputs)[0]), self.severity.tube
-        if apart <= usual:
-            return []
-        return [
-            f"straight lines and trees of the model differ by a factor of {math.exp(apart):.3g}, "
-            f"on familiar machines by {math.exp(usual):.3g} at most: this one is unlike them"
-        ]
 
     def _level_cautions(self, look: Look) -> list[str]:
         return [
@@ -575,6 +588,17 @@ NO_BASELINE = (
     "--baseline healthy.h5, or use a model that was trained cold"
 )
 """Reason of a verdict that lacks nothing but the reference."""
+
+
+def _disagreement_cautions(asked: Estimator, inputs: Float) -> list[str]:
+    """Lines and trees learnt the same; where they part, one of them knows nothing."""
+    apart, usual = float(asked.severity.disagreement(inputs)[0]), asked.severity.tube
+    if apart <= usual:
+        return []
+    return [
+        f"straight lines and trees of the model differ by a factor of {math.exp(apart):.3g}, "
+        f"on familiar machines by {math.exp(usual):.3g} at most: this one is unlike them"
+    ]
 
 
 def _strangeness(distance: float, calibration: Float) -> str:

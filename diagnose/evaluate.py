@@ -19,6 +19,7 @@ from .feature_choice import choice_in
 from .foreign import kitchen
 from .grades import grades_of
 from .healthy import references, refuse_strangers
+from .noted import notes_of
 from .scores import (
     Judged,
     Mask,
@@ -366,7 +367,7 @@ def score(
         "accuracy_bound": bound_of(judged, edges),
         "nominal_coverage": float(np.mean(given)) if given else None,
         "confusion": confusion(true[mine], judged.grade[mine], len(edges) + 1),
-        "reliability": reliability(model, judged, draws),
+        "reliability": reliability(model, judged, estimates, draws),
         "familiarity": p_value_shares(estimates, draws),
         "baselines": contest(train, test, judged, edges, limit, draws, seed=seed),
         "by_confounder": by_confounder(
@@ -401,11 +402,12 @@ def judge_rows(
     card = model.card
     manifest = table.manifest.iloc[rows]
     healthy = None if references is None else references[rows]
+    notes = notes_of(manifest)
     estimates = [
         model.judge(row, None if healthy is None else healthy[i], conditions=noted)
-        for i, (row, noted) in enumerate(zip(table.values[rows], _notes(manifest), strict=True))
+        for i, (row, noted) in enumerate(zip(table.values[rows], notes, strict=True))
     ]
-    found = model.predict(table.values[rows], healthy)
+    found = model.predict(table.values[rows], healthy, notes)
     n_grades = len(card["grade_edges_m"]) + 1
     judged = Judged(
         groups=manifest["group"].to_numpy(),
@@ -423,17 +425,13 @@ def judge_rows(
     return judged, estimates
 
 
-def _notes(manifest: pd.DataFrame) -> list[dict[str, Any]]:
-    """Manifest values of each record by name."""
-    rows = manifest.to_dict("records")
-    return [{str(name): value for name, value in row.items()} for row in rows]
-
-
 def _numbers(values: Iterable[float | None]) -> Float:
     return np.array([np.nan if value is None else value for value in values])
 
 
-def reliability(model: WearModel, judged: Judged, draws: Resamples) -> list[dict[str, Any]]:
+def reliability(
+    model: WearModel, judged: Judged, estimates: Sequence[Estimate], draws: Resamples
+) -> list[dict[str, Any]]:
     """Coverage of intervals and sets against the nominal one, over the graded records.
 
     Returns
@@ -442,9 +440,16 @@ def reliability(model: WearModel, judged: Judged, draws: Resamples) -> list[dict
         ``nominal``, and ``interval`` and ``set``: shares that hold the truth.
     """
     found = []
+    informed = np.array([bool(each.noted) for each in estimates])
+    asked = [(model.blind, ~informed)]
+    if model.informed is not None:
+        asked.append((model.informed, informed))
     for nominal in LEVELS:
-        held = _held(model.calibration, judged, ~judged.cautious, model, nominal)
-        held |= _held(model.shifted, judged, judged.cautious, model, nominal)
+        held = np.zeros((2, len(judged.truth)), dtype=bool)
+        for estimator, here in asked:
+            for cautious, those in ((False, ~judged.cautious), (True, judged.cautious)):
+                known = estimator.known(cautious=cautious)
+                held |= _held(known, judged, here & those, model, nominal)
         shares = [share(each.astype(np.float64), judged.graded, draws) for each in held]
         found.append({"nominal": nominal, "interval": shares[0], "set": shares[1]})
     return found

@@ -34,6 +34,7 @@ from .foreign import (
     recordings_of,
 )
 from .healthy import Baseline, references
+from .noted import notes_of
 from .scores import Figure, figures, plain, resampled, smallest_found
 from .tabulate import (
     Choice,
@@ -649,7 +650,9 @@ def detectability(case: Case, *, noise: bool = True) -> list[dict[str, Any]]:
 
 
 def _estimates(case: Case, table: FeatureTable, rows: Index, references: Float | None) -> Float:
-    return case.model.predict(table.values[rows], None if references is None else references[rows])
+    notes = notes_of(table.manifest.iloc[rows])
+    healthy = None if references is None else references[rows]
+    return case.model.predict(table.values[rows], healthy, notes)
 
 
 def _floors_by_speed(case: Case, test: Index, truth: Float, found: Float) -> list[dict[str, Any]]:
@@ -711,7 +714,7 @@ def _own_ms(case: Case, recordings: Sequence[Recording]) -> float:
     healthy = None if case.references is None else case.references[case.random[1][:1]]
 
     def severity(recording: Recording) -> Float:
-        return case.model.predict(case.row(recording)[None, :], healthy)
+        return case.model.predict(case.row(recording)[None, :], healthy, [recording.row])
 
     return _ms(severity, recordings)
 

@@ -21,7 +21,6 @@ from .film_clearance import FilmEstimate, JournalRun, film_clearance
 from .film_wear_down import SinkingRun, film_wear_down, sinking_places
 from .healthy import Baseline
 from .nameplate import Nameplate, told_conditions
-from .nameplate_cautions import nameplate_cautions
 from .probe_means import ProbeMeans, probe_means
 
 Float = NDArray[np.float64]
@@ -251,30 +250,6 @@ _NUMBER = re.compile(r"_[0-9]+_m$")
 
 
 # --- beside the trained model
-
-
-def beside_film(
-    estimate: Estimate,
-    film: FilmEstimate | None,
-    plate: Nameplate | None,
-    recording: Recording,
-    card: Mapping[str, Any],
-) -> Estimate:
-    """An estimate with what film equilibrium and nameplate have to say against it, first.
-
-    Parameters
-    ----------
-    estimate : Estimate
-    film : FilmEstimate or None
-    plate : Nameplate or None
-    recording : Recording
-    card : mapping
-        Of the model.
-    """
-    said = nameplate_cautions(plate, recording.row, card) if estimate.graded else ()
-    if said:
-        estimate = replace(estimate, verdict="caution", cautions=(*said, *estimate.cautions))
-    return with_film(estimate, film)
 
 
 def with_film(estimate: Estimate, film: FilmEstimate | None) -> Estimate:

@@ -15,6 +15,7 @@ from .conformal import Calibration, Scale, scale_inputs
 from .estimate import Head, ModelError, WearModel
 from .grades import GRADE_NAMES
 from .models import Linear
+from .noted import NOTED, noted_names
 from .novelty import Familiarity
 from .parts import (
     BlendStructure,
@@ -40,6 +41,7 @@ from .parts import (
 )
 from .physical import level_channels, physical_rows, shape_rows
 from .quality import Levels
+from .severity import Estimator
 
 _KIND = "wear model"
 
@@ -101,15 +103,16 @@ def load_model(path: str | Path) -> WearModel:
     return model
 
 
-_ARRAY_PARTS: dict[str, Any] = {
+_ARRAY_PARTS: dict[str, Any] = {"familiarity": Familiarity, "levels": Levels}
+"""Parts of a model that are plain arrays and numbers."""
+
+_ESTIMATOR_PARTS: dict[str, Any] = {
     "witness": Linear,
     "scale": Scale,
     "calibration": Calibration,
     "shifted": Calibration,
-    "familiarity": Familiarity,
-    "levels": Levels,
 }
-"""Parts of a model that are plain arrays and numbers."""
+"""The same of an estimator."""
 
 
 class _HeadStructure(Strict):
@@ -123,13 +126,15 @@ class _HeadStructure(Strict):
 class _Structure(Strict):
     """Which parts a model has; their numbers are in the arrays."""
 
-    severity: BlendStructure
+    blind: BlendStructure
+    informed: BlendStructure | None
     heads: list[_HeadStructure] = Field(max_length=100)
 
 
 def _structure_of(model: WearModel) -> dict[str, Any]:
     return {
-        "severity": blend_structure(model.severity),
+        "blind": blend_structure(model.blind.severity),
+        "informed": None if model.informed is None else blend_structure(model.informed.severity),
         "heads": [
             {
                 "name": head.name,
@@ -148,19 +153,39 @@ def _arrays_of(model: WearModel) -> dict[str, NDArray[Any]]:
     found: dict[str, Any] = {}
     for part in _ARRAY_PARTS:
         found |= part_arrays(getattr(model, part), part)
-    blends = {"severity": model.severity} | {
-        f"heads.{i}": head.blend for i, head in enumerate(model.heads)
-    }
-    for place, blend in blends.items():
-        found |= blend_arrays(blend, place)
+    for place, estimator in _estimators(model).items():
+        found |= blend_arrays(estimator.severity, f"{place}.severity")
+        for part in _ESTIMATOR_PARTS:
+            found |= part_arrays(getattr(estimator, part), f"{place}.{part}")
+    for i, head in enumerate(model.heads):
+        found |= blend_arrays(head.blend, f"heads.{i}")
     return {name: np.asarray(value) for name, value in found.items()}
+
+
+def _estimators(model: WearModel) -> dict[str, Estimator]:
+    """Those that a model has, by their place."""
+    both = {"blind": model.blind, "informed": model.informed}
+    return {place: each for place, each in both.items() if each is not None}
+
+
+def _estimator_of(
+    structure: BlendStructure, arrays: Mapping[str, NDArray[Any]], place: str
+) -> Estimator:
+    parts = {
+        part: kind(**part_of(arrays, f"{place}.{part}", kind))
+        for part, kind in _ESTIMATOR_PARTS.items()
+    }
+    return Estimator(severity=blend_of(structure, arrays, f"{place}.severity"), **parts)
 
 
 def _model_of(
     structure: _Structure, arrays: Mapping[str, NDArray[Any]], card: dict[str, Any]
 ) -> WearModel:
     model = WearModel(
-        severity=blend_of(structure.severity, arrays, "severity"),
+        blind=_estimator_of(structure.blind, arrays, "blind"),
+        informed=None
+        if structure.informed is None
+        else _estimator_of(structure.informed, arrays, "informed"),
         heads=tuple(
             Head(
                 name=head.name,
@@ -182,19 +207,18 @@ def _check_structure(model: WearModel, path: str | Path) -> None:
     """Shapes that fit each other, so that a forged file fails here and not in a prediction."""
     n = len(model.card.get("features", []))
     inputs = 2 * n if model.mode == "referenced" else n
+    more = len(noted_names(model.card))
     names = model.names
     try:
         physical, shapes = (f(names, np.zeros((1, n))) for f in (physical_rows, shape_rows))
     except ValueError as error:  # a crank-angle map with holes
         raise ModelError(f"{path}: features do not fit each other ({error}); retrain it") from error
     fits = {
-        "severity": blend_fits(model.severity, inputs) and model.severity.low > 0,
+        "blind": _estimator_fits(model.blind, inputs),
+        "informed": model.informed is None
+        or (more > 0 and _estimator_fits(model.informed, inputs + more)),
         "heads": all(blend_fits(head.blend, n) for head in model.heads)
         and [h.name for h in model.heads] == [c["name"] for c in model.card["confounders"]],
-        "witness": linear_fits(model.witness, inputs),
-        "scale": _scale_fits(model.scale),
-        "calibration": _calibration_fits(model.calibration),
-        "shifted": _calibration_fits(model.shifted),
         "familiarity": familiarity_fits(model.familiarity, physical.shape[1], n),
         "levels": _levels_fit(model.levels, len(level_channels(names)), shapes.shape[1]),
         "numbers": numbers_fit(_arrays_of(model)),
@@ -202,6 +226,17 @@ def _check_structure(model: WearModel, path: str | Path) -> None:
     bad = [name for name, good in fits.items() if not good]
     if bad:
         raise ModelError(f"{path}: {', '.join(bad)} do not fit {n} features; retrain it")
+
+
+def _estimator_fits(estimator: Estimator, n: int) -> bool:
+    return (
+        blend_fits(estimator.severity, n)
+        and estimator.severity.low > 0
+        and linear_fits(estimator.witness, n)
+        and _scale_fits(estimator.scale)
+        and _calibration_fits(estimator.calibration)
+        and _calibration_fits(estimator.shifted)
+    )
 
 
 def _scale_fits(scale: Scale) -> bool:
@@ -278,6 +313,7 @@ class _Chosen(Strict):
     chosen: str
     members: dict[str, float]
     nested_mae_m: float
+    informed_mae_m: float | None = None
     candidates: list[_Tried]
 
 
@@ -348,6 +384,8 @@ class _Card(Strict):
                 raise ValueError(f"{name} = {low:g} to {high:g} must rise")
         if not {c.feature for c in self.conditions} <= {"", *self.features}:
             raise ValueError("conditions must name features")
+        if not {c.name for c in self.conditions if not c.feature} <= set(NOTED):
+            raise ValueError(f"conditions that are noted must be of {', '.join(NOTED)}")
         check_channels(self.channels, self.tacho)
         return self
 

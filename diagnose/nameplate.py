@@ -11,12 +11,14 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from ..datasets.recipe import CONDITIONS, recorded_scene
+from ..datasets.draws import has_value
+from ..datasets.recipe import CONDITIONS, condition_of, recorded_scene
 from ..datasets.record import Attributes, DataError, DataSet
 from ..sim.journal_parts import Oil
 from ..sim.parts import Scene, SceneError, to_si
 from ..sim.scene import load_scene, override, scene_from_table, scene_names, scene_table, scene_text
 from .film_clearance import Doubts
+from .noted import NOTED
 
 _OIL = "oil.dynamic_viscosity"
 _SPEED = "drive.speed"
@@ -37,12 +39,15 @@ class Nameplate:
         How well all that is known.
     source : str
         Where it is from, for the report.
+    assumed : bool
+        Nobody gave a scene: what no one told is that of the machine a model was trained on.
     """
 
     scene: Scene
     told: frozenset[str] = field(default_factory=frozenset)
     doubts: Doubts = field(default_factory=Doubts)
     source: str = ""
+    assumed: bool = False
 
     def on_the_day(self, row: Mapping[str, Any], speed_hz: float | None) -> Scene:
         """The scene with a recording's conditions.
@@ -70,6 +75,34 @@ class Nameplate:
             if path != _SPEED and not self.was_told(path):
                 scene = _replaced(scene, path, value)
         return scene if speed_hz is None else _replaced(scene, _SPEED, speed_hz)
+
+    def conditions(self, row: Mapping[str, Any]) -> dict[str, Any]:
+        """What is known of a recording's day: what a person told, what was noted, what is usual.
+
+        Parameters
+        ----------
+        row : mapping
+            What was noted beside the recording.
+
+        Returns
+        -------
+        dict
+            The row, with every column of :data:`~.noted.NOTED` that the scene has a value for.
+
+        Examples
+        --------
+        >>> plate = Nameplate(scene=load_scene("journal-bearing"))
+        >>> plate.conditions({"static_load_n": 4000.0})["static_load_n"]
+        4000.0
+        """
+        day = self.on_the_day(row, None)
+        known = {
+            column: condition_of(day, column)
+            for column in NOTED
+            if has_value(day, CONDITIONS[column])
+            if not self.assumed or self.was_told(CONDITIONS[column])
+        }
+        return {**row, **known}
 
     def was_told(self, path: str) -> bool:
         """Whether a person set this value, or one that it follows from."""
@@ -144,8 +177,23 @@ def nameplate_of(
         name = f"scene {usual}, which the model was trained on"
     else:
         return None
+    assumed = scene is None and head is None
     doubts = replace(_usual_doubts(found), **_doubts(spreads, found, plain))
-    return Nameplate(scene=found, told=frozenset(plain), doubts=doubts, source=name)
+    return Nameplate(
+        scene=found, told=frozenset(plain), doubts=doubts, source=name, assumed=assumed
+    )
+
+
+def day_of(plate: Nameplate | None, row: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Conditions of a recording's day, as far as they are known beside its signals.
+
+    Parameters
+    ----------
+    plate : Nameplate or None
+    row : mapping
+        What was noted beside the recording.
+    """
+    return row if plate is None else plate.conditions(row)
 
 
 def _head_of(source: Path) -> Attributes | None:

@@ -1,16 +1,23 @@
 """Where a nameplate is not what a model was trained on: nothing in the signals need show it."""
 
-import math
 from collections.abc import Mapping
 from typing import Any
 
-from ..datasets.recipe import CONDITIONS, condition_of
-from ..sim.parts import Scene
+from ..datasets.record import Recording
 from ..sim.scene import load_scene, scene_names
-from .nameplate import Nameplate
+from .healthy import Baseline
+from .nameplate import Nameplate, day_of
 
 _SAME = 0.02  # over the trained value: nameplates are rounded
 _BUILT: dict[str, tuple[tuple[str, str], ...]] = {
+    "reciprocating-pump": (
+        ("crank.radius", "m"),
+        ("rod.length", "m"),
+        ("piston.diameter", "m"),
+        ("piston.mass", "kg"),
+        ("rod.mass", "kg"),
+    ),
+    "propulsion-shaft": (("propeller.blades", ""),),
     "journal-bearing": (
         ("bearing.diameter", "m"),
         ("bearing.length", "m"),
@@ -19,6 +26,52 @@ _BUILT: dict[str, tuple[tuple[str, str], ...]] = {
     ),
 }
 """Machine -> what of its nameplate recipes leave as it is, with units."""
+
+
+def known_beside(
+    plate: Nameplate | None,
+    recording: Recording,
+    card: Mapping[str, Any],
+    baseline: Baseline | None = None,
+) -> dict[str, Any]:
+    """What a model should be told of a recording beside its signals.
+
+    Parameters
+    ----------
+    plate : Nameplate or None
+    recording : Recording
+    card : mapping
+        Of the model.
+    baseline : Baseline, optional
+        Healthy recordings of the same machine.
+
+    Returns
+    -------
+    dict
+        ``conditions`` and ``told`` of :meth:`~.estimate.WearModel.estimate`.
+    """
+    told = nameplate_cautions(plate, recording.row, card)
+    return {
+        "conditions": day_of(plate, recording.row),
+        "told": (*told, *_gap_cautions(plate, recording, baseline)),
+    }
+
+
+def _gap_cautions(
+    plate: Nameplate | None, recording: Recording, baseline: Baseline | None
+) -> list[str]:
+    """Where a shaft runs is read from gap voltages, whose zero nobody knows by itself."""
+    if baseline is not None or not any(
+        channel.quantity == "displacement" for channel in recording.vibration_channels
+    ):
+        return []
+    if plate is not None and any(path.endswith((".offset", ".gap")) for path in plate.told):
+        return []
+    return [
+        "no healthy recording of this machine tells the offsets of its probes, which are taken to "
+        "be as small as where the model was trained, and its estimate leans on them: give "
+        "--baseline HEALTHY, or what is known: --set 'sensors.0.offset=0 um +- 5 um'"
+    ]
 
 
 def nameplate_cautions(
@@ -30,46 +83,19 @@ def nameplate_cautions(
     ----------
     plate : Nameplate or None
     row : mapping
-        What was noted beside the recording; conditions in it are judged by the model itself.
+        What was noted beside the recording.
     card : mapping
         Of the model.
 
     Returns
     -------
     tuple of str
-        Of each condition or size outside what the model was trained on.
+        Of each size that is not that of the machine that the model was trained on.
     """
     if plate is None:
         return ()
     day = plate.on_the_day(row, None)
-    return (*_outside(day, plate, row, card), *_otherwise_built(day, card["trained_on"]["scene"]))
-
-
-def _outside(
-    day: Scene, plate: Nameplate, row: Mapping[str, Any], card: Mapping[str, Any]
-) -> list[str]:
-    found = []
-    for condition in card["conditions"]:
-        name, unit = condition["name"], condition["unit"]
-        if condition["feature"] or name not in CONDITIONS or _noted(name, plate, row):
-            continue
-        try:
-            value = condition_of(day, name)
-        except (AttributeError, IndexError, KeyError, TypeError):
-            continue  # the scene is of another machine
-        if not condition["low"] <= value <= condition["high"]:
-            found.append(
-                f"{name} = {value:.4g} {unit} by the nameplate is outside the trained range "
-                f"{condition['low']:.4g} to {condition['high']:.4g} {unit}: extrapolating"
-            )
-    return found
-
-
-def _noted(name: str, plate: Nameplate, row: Mapping[str, Any]) -> bool:
-    """Whether the manifest's own value holds: the model looks at it itself."""
-    value = row.get(name)
-    there = isinstance(value, float | int) and math.isfinite(value)
-    return there and not plate.was_told(CONDITIONS[name])
+    return tuple(_otherwise_built(day, card["trained_on"]["scene"]))
 
 
 def _otherwise_built(day: Any, trained: str) -> list[str]:

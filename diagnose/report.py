@@ -16,7 +16,7 @@ from ..sim.atomic import write_whole
 from .advice import advise, touched_grades
 from .estimate import Estimate, WearModel, input_faults
 from .feature_choice import choice_in, words_of
-from .film_verdict import beside_film, film_estimate, film_table
+from .film_verdict import film_estimate, film_table, with_film
 from .grades import GRADE_NAMES
 from .healthy import Baseline
 from .nameplate import Nameplate
@@ -88,7 +88,7 @@ def report_table(
     card = model.card
     quantity = quantity_name(card["severity"])
     film = film_estimate(recording, card["severity"], plate, baseline)
-    estimate = beside_film(estimate, film, plate, recording, card)
+    estimate = with_film(estimate, film)
     return {
         "schema_version": REPORT_SCHEMA,
         "headline": headline(estimate),

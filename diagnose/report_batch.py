@@ -22,10 +22,11 @@ from ..datasets.views import JoinedSet, View
 from .advice import Advice, advise
 from .estimate import Estimate, ModelError, WearModel
 from .film_clearance import FilmEstimate
-from .film_verdict import beside_film, film_estimate, film_table
+from .film_verdict import film_estimate, film_table, with_film
 from .grades import GRADE_NAMES, WARNING_GRADE
 from .healthy import Baselines
 from .nameplate import Nameplate
+from .nameplate_cautions import known_beside
 from .report import NO_REFERENCE, REPORT_SCHEMA, headline, limits_table, model_table, quantity_name
 from .tabulate import Progress
 from .trend import Growth, Outlook, Trend, date_in, fit_trend, hours_of, read_dates
@@ -441,8 +442,9 @@ def _judged(
         recording = item.load()
         baseline = None if baselines is None else baselines.of(recording)
         film = film_estimate(recording, model.card["severity"], plate, baseline)
-        estimate = model.estimate(recording, baseline)
-        return beside_film(estimate, film, plate, recording, model.card), film
+        beside = known_beside(plate, recording, model.card, baseline)
+        estimate = model.estimate(recording, baseline, **beside)
+        return with_film(estimate, film), film
     except ModelError:
         raise  # would be so for each of them
     except (ValueError, OSError) as error:

@@ -9,6 +9,7 @@ from .advice import brief_words
 from .estimate import Estimate, WearModel
 from .healthy import Baseline, Baselines
 from .nameplate import Nameplate
+from .nameplate_cautions import known_beside
 from .page import render
 from .report import (
     feature_words,
@@ -172,7 +173,8 @@ def _details(
         try:
             recording = batch.items[row.number].load()
             baseline = None if baselines is None else baselines.of(recording)
-            estimate = model.estimate(recording, baseline)
+            beside = known_beside(plate, recording, model.card, baseline)
+            estimate = model.estimate(recording, baseline, **beside)
         except DataError:
             continue  # it has gone since
         outlook = batch.outlook_of(row)

@@ -3,12 +3,13 @@
 import hashlib
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from .. import __version__
@@ -18,7 +19,7 @@ from ..datasets.record import Attributes, DataError, DataSet
 from ..datasets.split_file import usable_sides
 from ..datasets.splits import check_no_leak, group_folds, group_split
 from ..datasets.views import MARK, JoinedSet, layout_card
-from .conformal import Calibration, Scale, fit_scale, scale_inputs
+from .conformal import Calibration, fit_scale, scale_inputs
 from .estimate import Head, WearModel
 from .feature_choice import (
     Candidates,
@@ -32,15 +33,18 @@ from .grades import grades_of
 from .healthy import referenced_rows, references, refuse_strangers
 from .models import (
     BUDGET_MS,
+    CANDIDATES,
+    WITNESSES,
     Fitted,
     Folds,
-    Linear,
     fit_blend,
     fit_line,
 )
+from .noted import NOTED, doubted, noted_values, notes_of
 from .novelty import REACH, Familiarity, fit_familiarity
 from .physical import moved_rows, physical_rows
 from .quality import Levels, fit_levels
+from .severity import Estimator
 from .tabulate import USUAL, Choice, FeatureTable, Progress, confounders_in, feature_table
 from .transfer_reference import healthy_transfer
 
@@ -50,6 +54,7 @@ _FOLDS = 5
 _FEWEST_GROUPS = 10  # two a fold, so that a fold's error is no accident
 _FEWEST_FAULTS = 20  # records with and without a fault, for an error rate to within a tenth
 _RARE = 0.99  # of the records: as far, or with as many features out of range, as 1 in 100 is
+_WORTH = 0.1  # of the error: conditions that bring less are not worth a person's asking
 _PRESENT = 0.5  # a fault that is likelier there than not
 _LOGISTIC_C = 10.0  # weak: one slope on hundreds of records
 
@@ -72,8 +77,8 @@ def train_model(
     Parameters
     ----------
     path : str or Path
-        Labelled data set. Of its manifest, only the target, the groups and the labels of other
-        faults decide the fit: conditions are no inputs.
+        Labelled data set. Of its manifest, the target, the groups, the labels of other faults and
+        the conditions of :data:`~.noted.NOTED` decide the fit.
     target : str, optional
         Severity column to train for; the first one of the data set unless given.
     held_out : float
@@ -210,7 +215,10 @@ def fit_model(
     if candidates is None:
         columns = np.arange(len(table.names), dtype=np.intp)
         candidates = Candidates(choices=(choice,), columns=(columns,), whole=choice)
+    noted = table.manifest.iloc[train]
     whole = Lesson(
+        conditions=tuple(c["name"] for c in _noted(noted)),
+        notes=notes_of(noted),
         names=table.names,
         rows=table.values[train],
         baseline=None if references is None else references[train],
@@ -374,6 +382,10 @@ class Lesson:
         [m], > 0.
     groups : numpy.ndarray [shape=(n,)]
         Machine draw of each record.
+    conditions : tuple of str
+        Noted conditions that vary.
+    notes : sequence of mapping
+        What was noted beside each record; of no matter without conditions.
     faults : dict
         Name -> presence [shape=(n,)] of each fault beside the wear.
     """
@@ -383,6 +395,8 @@ class Lesson:
     baseline: Float | None
     severity: Float
     groups: NDArray[np.intp]
+    conditions: tuple[str, ...] = ()
+    notes: Sequence[Mapping[str, Any]] = ()
     faults: dict[str, NDArray[np.bool_]] = field(default_factory=dict)
 
     @property
@@ -422,10 +436,11 @@ class Learnt:
     Attributes
     ----------
     severity : Fitted
-    witness : Linear
-    scale : Scale
-    calibration, shifted : Calibration
-        On machines like the trained ones, and on such whose resonances stand elsewhere.
+        By the features alone.
+    blind : Estimator
+        The same, with its uncertainty.
+    informed : Estimator or None
+        By the features and the noted conditions; None where these tell no more.
     familiarity : Familiarity
     levels : Levels
     heads : tuple of (Head, dict)
@@ -433,10 +448,8 @@ class Learnt:
     """
 
     severity: Fitted
-    witness: Linear
-    scale: Scale
-    calibration: Calibration
-    shifted: Calibration
+    blind: Estimator
+    informed: Estimator | None
     familiarity: Familiarity
     levels: Levels
     heads: tuple[tuple[Head, dict[str, Any]], ...]
@@ -498,31 +511,70 @@ def learn(
                 estimate[left] = others[place].estimate[left]
         severity = replace(severity, estimate=estimate)
     (distance, far), weight = _out_of_fold_distances(lesson, other, folds)
-    inputs = scale_inputs(severity.estimate, distance, severity.disagreement)
-    strange = scale_inputs(severity.shifted_estimate, far, severity.shifted_disagreement)
-    scale = fit_scale(inputs, np.log(lesson.severity / severity.estimate))
+    apart = distance, far
     return Learnt(
         severity=severity,
-        witness=fit_line(lesson.inputs, lesson.severity, severity.options, seed=seed),
-        scale=scale,
-        calibration=Calibration(
-            estimate=severity.estimate,
-            truth=lesson.severity,
-            scale=scale.predict(inputs),
-            distance=distance,
-            group=lesson.groups,
-        ),
-        shifted=Calibration(
-            estimate=severity.shifted_estimate,
-            truth=lesson.severity,
-            scale=scale.predict(strange),
-            distance=far,
-            group=lesson.groups,
-        ),
+        blind=_estimator(lesson, lesson.inputs, severity, apart, seed),
+        informed=_informed(lesson, other, severity, folds, apart, seed),
         familiarity=fit_familiarity(lesson.names, lesson.rows, lesson.groups, weight=weight),
         levels=fit_levels(lesson.names, lesson.rows, folds),
         heads=_heads(lesson, folds, np.abs(severity.estimate - lesson.severity), seed=seed),
     )
+
+
+def _estimator(
+    lesson: Lesson, inputs: Float, fitted: Fitted, apart: tuple[Float, Float], seed: int
+) -> Estimator:
+    """A fit with its uncertainty, from how it did on machines that it had not seen."""
+    distance, far = apart
+    sizes = scale_inputs(fitted.estimate, distance, fitted.disagreement)
+    strange = scale_inputs(fitted.shifted_estimate, far, fitted.shifted_disagreement)
+    scale = fit_scale(sizes, np.log(lesson.severity / fitted.estimate))
+
+    def calibration(estimate: Float, sizes: Float, distance: Float) -> Calibration:
+        return Calibration(
+            estimate=estimate,
+            truth=lesson.severity,
+            scale=scale.predict(sizes),
+            distance=distance,
+            group=lesson.groups,
+        )
+
+    return Estimator(
+        severity=fitted.blend,
+        witness=fit_line(inputs, lesson.severity, fitted.options, seed=seed),
+        scale=scale,
+        calibration=calibration(fitted.estimate, sizes, distance),
+        shifted=calibration(fitted.shifted_estimate, strange, far),
+    )
+
+
+def _informed(
+    lesson: Lesson,
+    other: Lesson,
+    blind: Fitted,
+    folds: Folds,
+    apart: tuple[Float, Float],
+    seed: int,
+) -> Estimator | None:
+    """The kinds of parts that do well without the conditions, fitted again with them.
+
+    They are as uncertain as people know them. None where they are not worth the asking.
+    """
+    if not lesson.conditions:
+        return None
+    noted = noted_values(lesson.conditions, lesson.notes)
+    if not np.isfinite(noted).all():
+        return None
+    noted = doubted(lesson.conditions, noted, seed)
+    inputs, moved = (np.hstack([each.inputs, noted]) for each in (lesson, other))
+    kept = {*blind.blend.names, *WITNESSES}
+    kinds = [each for each in CANDIDATES if each.name in kept]
+    fitted = fit_blend(inputs, lesson.severity, folds, seed=seed, candidates=kinds, shifted=moved)
+    errors = [np.abs(each.estimate - lesson.severity).mean() for each in (fitted, blind)]
+    if errors[0] > (1 - _WORTH) * errors[1]:
+        return None
+    return _estimator(lesson, inputs, fitted, apart, seed)
 
 
 def _fits_of_others(
@@ -598,11 +650,8 @@ def _head(
 
 def _model(learnt: Learnt, card: dict[str, Any]) -> WearModel:
     return WearModel(
-        severity=learnt.severity.blend,
-        witness=learnt.witness,
-        scale=learnt.scale,
-        calibration=learnt.calibration,
-        shifted=learnt.shifted,
+        blind=learnt.blind,
+        informed=learnt.informed,
         familiarity=learnt.familiarity,
         levels=learnt.levels,
         heads=tuple(head for head, _ in learnt.heads),
@@ -672,23 +721,17 @@ def _conditions(table: FeatureTable, train: NDArray[np.intp]) -> list[dict[str, 
         for i, name in enumerate(table.names)
         if name.rpartition(MARK)[2] == "shaft.speed_hz" or name.endswith(".rms")
     ]
-    manifest = table.manifest.iloc[train]
-    return columns + [
-        {"name": name, "feature": "", "unit": unit} | _range(manifest[name].to_numpy(dtype=float))
-        for name, unit in _NOTED.items()
-        if name in manifest and manifest[name].nunique() > 1
+    return columns + _noted(table.manifest.iloc[train])
+
+
+def _noted(manifest: pd.DataFrame) -> list[dict[str, Any]]:
+    """Conditions that vary and that no vibration tells, with their ranges."""
+    return [
+        {"name": name, "feature": "", "unit": noted.unit}
+        | _range(manifest[name].to_numpy(dtype=float))
+        for name, noted in NOTED.items()
+        if name in manifest and np.ptp(manifest[name].to_numpy(dtype=float)) > 0
     ]
-
-
-_NOTED = {
-    "discharge_pressure_pa": "Pa",
-    "suction_pressure_pa": "Pa",
-    "static_load_n": "N",
-    "viscosity_pa_s": "Pa s",
-    "hull_deflection_m": "m",
-    "thrust_n": "N",
-}
-"""Operating conditions that no vibration tells, by their manifest columns, with their units."""
 
 
 def _range(values: Float) -> dict[str, float]:
@@ -703,7 +746,8 @@ def _model_card(learnt: Learnt, budget_ms: float | None) -> dict[str, Any]:
         "model": {
             "chosen": severity.chosen,
             "members": severity.members,
-            "nested_mae_m": float(np.abs(severity.estimate - learnt.calibration.truth).mean()),
+            "nested_mae_m": learnt.blind.error,
+            "informed_mae_m": None if learnt.informed is None else learnt.informed.error,
             "candidates": [
                 {
                     "name": option.name,

@@ -228,9 +228,7 @@ def code(rng: np.random.Generator, mine: Members, _other: Members) -> bytes:
         node = {"__class__": "system", "__module__": "posix", "__loader__": "FunctionNode"}
         return packed(sealed({**mine, "schema.json": json.dumps(node).encode()}))
     structure = json.loads(mine["structure.json"])
-    structure["severity"]["kinds"][0] = str(
-        rng.choice(["os.system", "__import__", "Forest", "eval"])
-    )
+    structure["blind"]["kinds"][0] = str(rng.choice(["os.system", "__import__", "Forest", "eval"]))
     return packed(sealed({**mine, "structure.json": json.dumps(structure).encode()}))
 
 
@@ -257,7 +255,7 @@ def bomb(rng: np.random.Generator, mine: Members, _other: Members) -> bytes:
         if rng.integers(2):
             head = b"-" * 60_000 + head
         data = b"\x93NUMPY\x01\x00" + struct.pack("<H", len(head)) + head + bytes(64)
-        inner = packed({**unzipped(mine["arrays.npz"]), "witness.weight.npy": data})
+        inner = packed({**unzipped(mine["arrays.npz"]), "blind.witness.weight.npy": data})
         return packed(sealed({**mine, "arrays.npz": inner}))
     if way == 6:  # a zip inside, of many times its size
         inner = packed({**unzipped(mine["arrays.npz"]), "more.npy": bytes(2**28)})

@@ -42,5 +42,7 @@ ended newest "$newest"
 )
 ended lowest "$lowest"
 
+# every process has a core already: threads would only wait for each other
+export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 # a file a process, so that what its tests share is made once; dear files first (tests/conftest.py)
 "$bin/pytest" -q -n 2 --dist loadfile --no-loadscope-reorder --durations 15

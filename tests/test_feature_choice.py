@@ -167,7 +167,7 @@ def test_folds_choose_the_set_that_tells(data):
 
 def assert_same(one, other):
     assert one.names == other.names
-    np.testing.assert_array_equal(one.calibration.estimate, other.calibration.estimate)
+    np.testing.assert_array_equal(one.blind.calibration.estimate, other.blind.calibration.estimate)
 
 
 def test_a_fold_knows_nothing_of_what_it_leaves_out():

@@ -23,8 +23,8 @@ from wearstate.diagnose.film_verdict import (
     with_film,
 )
 from wearstate.diagnose.healthy import Baseline
-from wearstate.diagnose.nameplate import Nameplate, nameplate_of
-from wearstate.diagnose.nameplate_cautions import nameplate_cautions
+from wearstate.diagnose.nameplate import Nameplate, day_of, nameplate_of
+from wearstate.diagnose.nameplate_cautions import known_beside, nameplate_cautions
 from wearstate.diagnose.probe_means import probe_means
 from wearstate.sim.assemble import simulate
 from wearstate.sim.film import FilmGeometry
@@ -242,10 +242,8 @@ CARD = {
     ("changes", "said"),
     [
         ({}, []),
-        ({"load.static": 0.0}, ["static_load_n = 0 N by the nameplate is outside"]),
         ({"load.static_across": 5e3}, ["load.static_across = 5000 N by the nameplate"]),
         ({"bearing.length": 0.084}, ["bearing.length = 0.084 m by the nameplate"]),
-        ({"oil.viscosity": 0.06}, ["viscosity_pa_s = 0.06 Pa s by the nameplate is outside"]),
     ],
 )
 def test_a_nameplate_outside_the_trained_one_is_a_caution(changes, said):
@@ -253,11 +251,25 @@ def test_a_nameplate_outside_the_trained_one_is_a_caution(changes, said):
     found = nameplate_cautions(plate, {}, CARD)
     assert len(found) == len(said)
     assert all(text.startswith(begin) for text, begin in zip(found, said, strict=True))
-    # what the manifest notes of the day is looked at by the model, unless a person knows better
+
+
+def test_the_day_is_what_a_person_told_then_what_was_noted_then_the_nameplate():
+    plate = nameplate_of(None, "journal-bearing", {"oil.viscosity": 0.06})
     noted = {"static_load_n": 100.0, "viscosity_pa_s": 1.0}
-    assert [t for t in nameplate_cautions(plate, noted, CARD) if "outside" in t] == [
-        t for t in found if "outside" in t
-    ]
+    day = day_of(plate, noted)
+    assert (day["static_load_n"], day["viscosity_pa_s"]) == (100.0, 0.06)
+    assert day_of(plate, {})["static_load_n"] == load_scene("journal-bearing").load.static
+    assert day_of(None, noted) == noted
+    # without a scene only what a person told is known
+    assumed = nameplate_of(None, None, {"oil.viscosity": 0.06}, usual="journal-bearing")
+    assert day_of(assumed, {}) == {"viscosity_pa_s": 0.06}
+
+
+def test_probes_without_healthy_recordings_are_a_caution(tmp_path):
+    recording = recorded(tmp_path / "a.h5", {})
+    assert "offsets of its probes" in known_beside(None, recording, CARD)["told"][0]
+    told = nameplate_of(None, "journal-bearing", {"sensors.0.offset": "0 um +- 5 um"})
+    assert known_beside(told, recording, CARD)["told"] == ()
 
 
 def test_a_nameplate_of_another_machine_is_a_caution():

@@ -63,7 +63,7 @@ def test_severity_cannot_be_learnt_from_the_identity_of_a_machine():
     rows = np.hstack([np.ones((120, 1)), np.eye(40)[groups]])
     known = learn(
         Lesson(names=names, rows=rows, baseline=None, severity=severity, groups=groups)
-    ).calibration
+    ).blind.calibration
     assert np.std(np.log(known.truth / known.estimate)) > 0.9 * np.std(np.log(severity))
 
 
@@ -319,12 +319,12 @@ def test_a_model_of_another_version_is_refused_with_the_cure(trained, tmp_path):
         seal = json.loads(bundle.read("seal.json"))
     changes = {"seal.json": json.dumps({**seal, "schema_version": 99}).encode()}
     rewritten(tmp_path / "good.wsm", tmp_path / "other.wsm", changes)
-    with pytest.raises(ModelError, match=r"schema_version = 99 must be 2; retrain it"):
+    with pytest.raises(ModelError, match=r"schema_version = 99 must be 3; retrain it"):
         load_model(tmp_path / "other.wsm")
     with zipfile.ZipFile(tmp_path / "fewer.wsm", "w") as bundle:  # as version 1, of fewer members
         bundle.writestr("seal.json", json.dumps({**seal, "schema_version": 1}))
         bundle.writestr("card.json", "{}")
-    with pytest.raises(ModelError, match=r"schema_version = 1 must be 2; retrain it"):
+    with pytest.raises(ModelError, match=r"schema_version = 1 must be 3; retrain it"):
         load_model(tmp_path / "fewer.wsm")
     for damaged in (b"[1]", b"{", b"9" * 9_000_000):
         with zipfile.ZipFile(tmp_path / "bad.wsm", "w", zipfile.ZIP_DEFLATED) as bundle:
@@ -346,30 +346,30 @@ def both(trained):
         low=1e-5,
         high=1e-3,
     )
-    return dataclasses.replace(model, severity=blend)
+    return dataclasses.replace(model, blind=dataclasses.replace(model.blind, severity=blend))
 
 
 @pytest.mark.parametrize(
     ("name", "forgery"),
     [
-        ("severity.weights", np.array([-1.0, 2.0])),
-        ("severity.0.weight", np.ones(3)),
-        ("severity.0.weight", np.float64(1.0)),
-        ("severity.0.spread", None),
-        ("severity.0.offset", np.ones(2)),
-        ("severity.1.left", np.array([7])),
-        ("severity.1.root", np.array([-1])),
-        ("severity.1.root", np.array([10**9])),
-        ("severity.1.depth", np.int64(10**9)),
-        ("severity.2.root", np.array([0])),
-        ("witness.weight", np.ones(3)),
-        ("scale.weight", np.ones(7)),
+        ("blind.severity.weights", np.array([-1.0, 2.0])),
+        ("blind.severity.0.weight", np.ones(3)),
+        ("blind.severity.0.weight", np.float64(1.0)),
+        ("blind.severity.0.spread", None),
+        ("blind.severity.0.offset", np.ones(2)),
+        ("blind.severity.1.left", np.array([7])),
+        ("blind.severity.1.root", np.array([-1])),
+        ("blind.severity.1.root", np.array([10**9])),
+        ("blind.severity.1.depth", np.int64(10**9)),
+        ("blind.severity.2.root", np.array([0])),
+        ("blind.witness.weight", np.ones(3)),
+        ("blind.scale.weight", np.ones(7)),
         ("familiarity.whiten", np.zeros((4, 4))),
         ("levels.offset", np.zeros(9)),
-        ("calibration.truth", np.array([np.nan])),
-        ("calibration.scale", np.array([-1.0])),
-        ("calibration.group", np.array([0.5])),
-        ("calibration.distance", np.array(["text"], dtype=object)),
+        ("blind.calibration.truth", np.array([np.nan])),
+        ("blind.calibration.scale", np.array([-1.0])),
+        ("blind.calibration.group", np.array([0.5])),
+        ("blind.calibration.distance", np.array(["text"], dtype=object)),
     ],
 )
 def test_a_forged_model_with_a_right_checksum_is_refused(both, tmp_path, name, forgery):
@@ -614,10 +614,12 @@ def test_holding_out_too_much_is_refused_before_any_work(small_set, monkeypatch)
 def test_within_one_grade_and_accuracy_are_those_of_the_confusion(trained):
     """Estimates four times too large: many grades are off by two."""
     model, table, test = trained
-    part = next(part for part in model.severity.parts if part.log)
+    part = next(part for part in model.blind.severity.parts if part.log)
     fourfold = dataclasses.replace(part, offset=part.offset + float(np.log(4)))
     severity = Blend(names=("fourfold",), parts=(fourfold,), weights=np.ones(1), low=1e-6, high=1.0)
-    wrong = dataclasses.replace(model, severity=severity)
+    wrong = dataclasses.replace(
+        model, blind=dataclasses.replace(model.blind, severity=severity), informed=None
+    )
     result = score(wrong, table, test)
     counts = np.array(result["confusion"])
     near = sum(counts[i, j] for i in range(4) for j in range(4) if abs(i - j) <= 1)

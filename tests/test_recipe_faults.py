@@ -460,8 +460,8 @@ def test_the_draws_do_not_change_unseen(name):
 def test_extending_draws_what_the_whole_text_draws(tmp_path):
     """The nuisance written out in full, under the same name: the same records."""
     whole = tmp_path / "whole.toml"
-    text = recipe_text("journal-bearing-standard")
-    text = text.replace("journal-bearing-standard", "journal-bearing-small")
+    text = recipe_text("journal-bearing-narrow")
+    text = text.replace("journal-bearing-narrow", "journal-bearing-small")
     whole.write_text(text)
     for one, other in zip(
         sample_records(load_recipe(whole), 20, seed=3),

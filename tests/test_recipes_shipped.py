@@ -105,6 +105,25 @@ NUISANCE = {
         "pressure.discharge": (0.8, 1.2),
     },
     "journal-bearing-standard": {
+        "oil.viscosity": (0.4, 2.5),
+        "rotor.unbalance": (0.5, 2.0),
+        "rotor.run_out.2.amplitude": (0.3, 2.0),
+        "sensors.0.noise": (0.5, 2.0),
+        "sensors.1.gain": (0.95, 1.05),
+        "drive.speed": (0.85, 1.15),
+        "load.static": (0.4, 1.6),
+    },
+    "propulsion-shaft-standard": {
+        "discs.4.unbalance": (0.5, 2.0),
+        "bearings.4.housing.damping_side": (0.6, 1.4),
+        "run_out.0.amplitude": (0.3, 2.0),
+        "probes.0.noise": (0.5, 2.0),
+        "sensors.4.gain": (0.95, 1.05),
+        "drive.speed": (0.85, 1.15),
+        "propeller.thrust": (0.0, 1.3),
+        "oil.temperature": (298.15 / 313.15, 333.15 / 313.15),
+    },
+    "journal-bearing-narrow": {
         "oil.viscosity": (0.8, 1.2),
         "rotor.unbalance": (0.5, 2.0),
         "rotor.run_out.2.amplitude": (0.3, 2.0),
@@ -113,7 +132,7 @@ NUISANCE = {
         "drive.speed": (0.85, 1.15),
         "load.static": (0.8, 1.2),
     },
-    "propulsion-shaft-standard": {
+    "propulsion-shaft-narrow": {
         "discs.4.unbalance": (0.5, 2.0),
         "bearings.4.housing.damping_side": (0.6, 1.4),
         "run_out.0.amplitude": (0.3, 2.0),

@@ -48,11 +48,12 @@ def figures_of(task, seed, budget_ms=None):
         severity=task.severity[train],
         groups=task.groups[train],
     )
-    found = learn(lesson, seed=seed, budget_ms=budget_ms)
+    learnt = learn(lesson, seed=seed, budget_ms=budget_ms)
+    found = learnt.blind
     rows, truth = task.rows[test], task.severity[test]
-    estimate = found.severity.blend.predict(rows)
-    distance = found.familiarity.distance(task.names, rows)
-    scale = found.scale.predict(scale_inputs(estimate, distance))
+    estimate, apart = found.severity.predict(rows), found.severity.disagreement(rows)
+    distance = learnt.familiarity.distance(task.names, rows)
+    scale = found.scale.predict(scale_inputs(estimate, distance, apart))
     ends, limits = tails(found.calibration), grade_limits(found.calibration, task.edges)
     pairs = list(zip(estimate.tolist(), scale.tolist(), strict=True))
     low, high = np.array([interval(*pair, ends) for pair in pairs]).T

@@ -1,0 +1,115 @@
+"""Operating conditions that no vibration tells, noted beside a recording: inputs of a model."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+Float = NDArray[np.float64]
+
+_LEAST = 1e-9  # in SI units, of a condition whose logarithm is taken
+
+
+@dataclass(frozen=True, kw_only=True)
+class Noted:
+    """A condition that can be noted.
+
+    Attributes
+    ----------
+    unit : str
+    doubt : float
+        Standard uncertainty of what people note: over the value, or over the trained range where
+        the value may be 0 or negative.
+    log : bool
+        It acts by its ratio: its logarithm is the input.
+    setting : str
+        How a person gives it.
+    """
+
+    unit: str
+    doubt: float
+    log: bool
+    setting: str
+
+
+NOTED = {
+    "discharge_pressure_pa": Noted(
+        unit="Pa", doubt=0.02, log=True, setting='pressure.discharge="3 bar"'
+    ),
+    "suction_pressure_pa": Noted(
+        unit="Pa", doubt=0.05, log=False, setting='pressure.suction="-0.3 bar"'
+    ),
+    "static_load_n": Noted(unit="N", doubt=0.03, log=True, setting='load.static="2 kN"'),
+    "viscosity_pa_s": Noted(unit="Pa s", doubt=0.05, log=True, setting='oil.viscosity="30 mPa s"'),
+    "hull_deflection_m": Noted(unit="m", doubt=0.05, log=False, setting='hull.deflection="0.2 mm"'),
+    "thrust_n": Noted(unit="N", doubt=0.05, log=False, setting='propeller.thrust="700 kN"'),
+}
+"""Manifest column -> what it is. Gauges of pressure are read to 2 %, a viscosity from the oil's
+temperature is known to a kelvin, thrust from the shaft's torque."""
+
+
+def noted_names(card: Mapping[str, Any]) -> tuple[str, ...]:
+    """Conditions that varied where a model was trained and that its signals do not tell."""
+    return tuple(c["name"] for c in card["conditions"] if not c["feature"])
+
+
+def noted_values(names: Sequence[str], rows: Sequence[Mapping[str, Any]]) -> Float:
+    """Conditions as inputs of a model.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Keys of :data:`NOTED`.
+    rows : sequence of mapping
+        What was noted beside each recording, in SI units.
+
+    Returns
+    -------
+    numpy.ndarray [shape=(n_rows, n_names)]
+        NaN where nothing was noted.
+
+    Examples
+    --------
+    >>> noted_values(["hull_deflection_m", "viscosity_pa_s"], [{"viscosity_pa_s": 1.0}])
+    array([[nan,  0.]])
+    """
+    values = np.array([[_number(row.get(name)) for name in names] for row in rows], dtype=float)
+    values = values.reshape(len(rows), len(names))
+    for column, name in enumerate(names):
+        if NOTED[name].log:
+            values[:, column] = np.log(np.maximum(values[:, column], _LEAST))
+    return values
+
+
+def _number(value: Any) -> float:
+    return float(value) if isinstance(value, float | int) else np.nan
+
+
+def doubted(names: Sequence[str], values: Float, seed: int) -> Float:
+    """Conditions as people would have noted them: each off by what it is known to.
+
+    Parameters
+    ----------
+    names : sequence of str
+    values : numpy.ndarray [shape=(n, n_names)]
+        Of :func:`noted_values`.
+    seed : int
+
+    Returns
+    -------
+    numpy.ndarray [shape=(n, n_names)]
+    """
+    doubts = [
+        NOTED[name].doubt * (1.0 if NOTED[name].log else np.ptp(values[:, i]))
+        for i, name in enumerate(names)
+    ]
+    return np.asarray(values + np.random.default_rng(seed).normal(0, 1, values.shape) * doubts)
+
+
+def notes_of(manifest: pd.DataFrame) -> list[dict[str, Any]]:
+    """Manifest values of each record by name."""
+    rows = manifest.to_dict("records")
+    return [{str(name): value for name, value in row.items()} for row in rows]

@@ -1,0 +1,115 @@
+"""Conditions noted beside a recording as inputs of a model."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from wearstate.diagnose.bundle import load_bundle
+from wearstate.diagnose.estimate import ModelError
+from wearstate.diagnose.modelfile import load_model, save_model
+from wearstate.diagnose.noted import NOTED, doubted, noted_values
+from wearstate.diagnose.train import Lesson, learn
+
+NAMES = tuple(f"acc_x.order_{i}.level_db" for i in range(1, 9))
+N = 120
+
+
+def lesson(conditions, effect, seed=0):
+    """Severities told by a level and by the viscosity, of two records a machine."""
+    rng = np.random.default_rng(seed)
+    severity = np.exp(rng.uniform(np.log(1e-4), np.log(4e-4), N))
+    viscosity = np.exp(rng.uniform(np.log(0.01), np.log(0.04), N))
+    rows = rng.normal(0, 1, (N, len(NAMES)))
+    rows[:, 0] = 10 * (np.log(severity / 2e-4) + effect * np.log(viscosity / 0.02))
+    rows[:, 0] += rng.normal(0, 1, N)  # a tenth of the severity
+    return Lesson(
+        names=NAMES,
+        rows=rows,
+        baseline=None,
+        severity=severity,
+        groups=np.repeat(np.arange(N // 2), 2),
+        conditions=conditions,
+        notes=[{"viscosity_pa_s": float(value)} for value in viscosity],
+    )
+
+
+@pytest.fixture(scope="module")
+def learnt():
+    return learn(lesson(("viscosity_pa_s",), effect=1.0))
+
+
+def test_a_condition_that_tells_makes_an_informed_estimate(learnt):
+    assert learnt.informed.error < 0.5 * learnt.blind.error
+    # it was learnt from notes that are off by their doubt
+    assert learnt.informed.error > 0.3 * NOTED["viscosity_pa_s"].doubt * 2e-4
+
+
+def test_a_condition_that_tells_nothing_is_not_asked_for():
+    assert learn(lesson(("viscosity_pa_s",), effect=0.0)).informed is None
+    assert learn(lesson((), effect=1.0)).informed is None
+
+
+def test_notes_become_inputs():
+    rows = [{"viscosity_pa_s": np.e, "hull_deflection_m": -1e-3}, {"thrust_n": 1.0}, {}]
+    found = noted_values(["viscosity_pa_s", "hull_deflection_m"], rows)
+    np.testing.assert_allclose(found, [[1.0, -1e-3], [np.nan, np.nan], [np.nan, np.nan]])
+    assert noted_values([], rows).shape == (3, 0)
+
+
+def test_doubts_are_those_of_the_table():
+    names = ["viscosity_pa_s", "hull_deflection_m"]
+    values = np.column_stack([np.zeros(4000), np.linspace(-1, 1, 4000)])
+    off = (doubted(names, values, seed=1) - values).std(axis=0)
+    np.testing.assert_allclose(off, [0.05, 0.05 * 2], rtol=0.05)
+
+
+@pytest.fixture(scope="module")
+def model(small_trained):
+    """The small pump model, as if its straight line leant on the viscosity too."""
+    trained, table, _ = small_trained
+    noted = {"name": "viscosity_pa_s", "feature": "", "unit": "Pa s", "low": 0.01, "high": 0.04}
+    kept = [c for c in trained.card["conditions"] if c["feature"]]
+    card = {**trained.card, "conditions": [*kept, noted]}
+    line = trained.blind.witness
+    more = {"centre": -4.0, "spread": 1.0, "weight": 0.5, "low": -5.0, "high": -3.0}
+    line = replace(line, **{key: np.append(getattr(line, key), end) for key, end in more.items()})
+    blend = replace(
+        trained.blind.severity, names=("line",), parts=(line,), weights=np.ones(1), tube=0.0
+    )
+    informed = replace(trained.blind, severity=blend, witness=line)
+    return replace(trained, informed=informed, card=card), table
+
+
+def test_what_is_not_known_is_a_caution_with_its_worth(model):
+    asked, table = model
+    row = table.values[0]
+    blind = asked.judge(row)
+    assert blind.verdict == "caution"
+    assert blind.noted == ()
+    assert "viscosity_pa_s is not known: with it estimates" in blind.cautions[0]
+    assert '--set oil.viscosity="30 mPa s"' in blind.cautions[0]
+    told = asked.judge(row, conditions={"viscosity_pa_s": 0.02})
+    assert told.noted == ("viscosity_pa_s",)
+    assert not any("not known" in text for text in told.cautions)
+    assert told.severity != blind.severity
+    notes = [{}, {"viscosity_pa_s": 0.02}]
+    both = asked.predict(np.stack([row, row]), conditions=notes)
+    np.testing.assert_allclose(both, [blind.severity, told.severity], rtol=1e-12)
+
+
+def test_an_informed_model_comes_back_from_its_file(model, tmp_path):
+    asked, table = model
+    save_model(asked, tmp_path / "a.wsm")
+    again = load_model(tmp_path / "a.wsm")
+    note = {"viscosity_pa_s": 0.03}
+    assert again.judge(table.values[0], conditions=note) == asked.judge(
+        table.values[0], conditions=note
+    )
+    assert load_bundle(tmp_path / "a.wsm", "wear model").structure["informed"] is not None
+
+
+def test_an_informed_part_without_its_conditions_is_refused(model, tmp_path):
+    asked, _ = model
+    kept = [c for c in asked.card["conditions"] if c["feature"]]
+    with pytest.raises(ModelError, match="informed do not fit"):
+        save_model(replace(asked, card={**asked.card, "conditions": kept}), tmp_path / "a.wsm")
