@@ -106,6 +106,7 @@ def signal_rows(background: Path | None = None) -> list[SignalRow]:
             name="start", shift="first revolution missing", why="cut by hand", apply=_without_first
         )
     )
+    rows.append(_plain("conditions", "not noted", "nobody wrote them down", _unnoted))
     if background is not None:
         sound = _sound(background)
         rows += [
@@ -204,6 +205,11 @@ def _late(degrees: float) -> Callable[[Recording, float, np.random.Generator], R
         return replace(recording, signal=signal)
 
     return apply
+
+
+def _unnoted(recording: Recording) -> Recording:
+    speed = recording.row.get("speed_hz")
+    return replace(recording, row={} if speed is None else {"speed_hz": speed})
 
 
 def _without_first(recording: Recording, speed: float, _rng: np.random.Generator) -> Recording:

@@ -26,6 +26,7 @@ from .blindspot_rows import SceneRow, scene_rows
 from .blindspot_scores import Row, Said, row_of, said_of
 from .blindspot_signals import SignalRow, signal_rows
 from .estimate import Estimate
+from .nameplate_cautions import known_beside
 
 OWN_SEEDS = 2**62
 """Added to the seed: data sets are made with small ones, so that no machine was trained on."""
@@ -42,7 +43,17 @@ class Model(Protocol):
     def card(self) -> Mapping[str, Any]:
         """What it was trained on."""
 
-    def estimate(self, recording: Recording) -> Estimate:
+    @property
+    def noted(self) -> tuple[str, ...]:
+        """Conditions that it takes as inputs."""
+
+    def estimate(
+        self,
+        recording: Recording,
+        baseline: None = None,
+        conditions: Mapping[str, Any] | None = None,
+        told: tuple[str, ...] = (),
+    ) -> Estimate:
         """What it says of a recording."""
 
 
@@ -171,7 +182,7 @@ class _Machines:
 
     def judged(self, recording: Recording, sample: Sample) -> Said:
         """What the model says of a recording of a machine."""
-        estimate = self.model.estimate(recording)
+        estimate = self.model.estimate(recording, **known_beside(None, recording, self.model.card))
         return said_of(estimate, sample.group, float(sample.row[self.column]))
 
 

@@ -109,6 +109,29 @@ def doubted(names: Sequence[str], values: Float, seed: int) -> Float:
     return np.asarray(values + np.random.default_rng(seed).normal(0, 1, values.shape) * doubts)
 
 
+def strayed(names: Sequence[str], values: Float, seed: int, reach: float) -> Float:
+    """Conditions of machines for which they mean something else: another oil, a load elsewhere.
+
+    Parameters
+    ----------
+    names : sequence of str
+    values : numpy.ndarray [shape=(n, n_names)]
+        Of :func:`noted_values`.
+    seed : int
+    reach : float
+        Each is off by a factor of up to this; where it may be 0, by as large a share of its range.
+
+    Returns
+    -------
+    numpy.ndarray [shape=(n, n_names)]
+    """
+    ends = [
+        np.log(reach) if NOTED[name].log else (reach - 1) * np.ptp(values[:, i])
+        for i, name in enumerate(names)
+    ]
+    return np.asarray(values + np.random.default_rng(seed).uniform(-1, 1, values.shape) * ends)
+
+
 def notes_of(manifest: pd.DataFrame) -> list[dict[str, Any]]:
     """Manifest values of each record by name."""
     rows = manifest.to_dict("records")

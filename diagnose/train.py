@@ -40,7 +40,7 @@ from .models import (
     fit_blend,
     fit_line,
 )
-from .noted import NOTED, doubted, noted_values, notes_of
+from .noted import NOTED, doubted, noted_values, notes_of, strayed
 from .novelty import REACH, Familiarity, fit_familiarity
 from .physical import moved_rows, physical_rows
 from .quality import Levels, fit_levels
@@ -567,7 +567,8 @@ def _informed(
     if not np.isfinite(noted).all():
         return None
     noted = doubted(lesson.conditions, noted, seed)
-    inputs, moved = (np.hstack([each.inputs, noted]) for each in (lesson, other))
+    inputs = np.hstack([lesson.inputs, noted])
+    moved = np.hstack([other.inputs, strayed(lesson.conditions, noted, seed, REACH)])
     kept = {*blind.blend.names, *WITNESSES}
     kinds = [each for each in CANDIDATES if each.name in kept]
     fitted = fit_blend(inputs, lesson.severity, folds, seed=seed, candidates=kinds, shifted=moved)

@@ -38,13 +38,13 @@ CARD = {
 }
 
 
-def loudness(recording):
+def loudness(recording, baseline=None, conditions=None, told=()):
     """Stands for a model: the louder, the more worn."""
     found = 1e-5 * float(recording.signal[0].std())
     return Estimate(verdict="graded", severity=found, low=found / 2, high=2 * found, grade=0)
 
 
-MODEL = SimpleNamespace(card=CARD, estimate=loudness)
+MODEL = SimpleNamespace(card=CARD, noted=(), estimate=loudness)
 
 
 def shifts_of(path, *amounts):
@@ -361,7 +361,7 @@ def test_page_text_and_json():
 
 
 def card(**changes):
-    return SimpleNamespace(card={**CARD, **changes}, estimate=loudness)
+    return SimpleNamespace(card={**CARD, **changes}, noted=(), estimate=loudness)
 
 
 @pytest.mark.parametrize(
@@ -399,7 +399,7 @@ def run(*arguments):
 @pytest.fixture
 def stub(tmp_path, monkeypatch):
     """A model file that is none: loading it gives the stand-in."""
-    told = SimpleNamespace(card=CARD, estimate=loudness, notice="trained on simulation")
+    told = SimpleNamespace(card=CARD, noted=(), estimate=loudness, notice="trained on simulation")
     monkeypatch.setattr("wearstate.diagnose.bundle.kind_of", lambda path: "wear")
     monkeypatch.setattr("wearstate.diagnose.modelfile.load_model", lambda path: told)
     path = tmp_path / "model.wsm"
@@ -456,3 +456,14 @@ def test_a_trained_model_is_judged(small_model):
     [said] = table["baseline"]["said"]
     assert said["verdict"] in ("graded", "caution")
     assert abs(said["found"] - said["truth"]) < 0.5 * LIMIT
+
+
+def test_conditions_can_be_left_out():
+    row = next(row for row in signal_rows() if row.name == "conditions")
+    recording = Recording(
+        signal=np.zeros((1, 8)),
+        sample_rate=8.0,
+        channels=(Channel(name="a", unit="m/s^2", quantity="acceleration"),),
+        row={"viscosity_pa_s": 0.03, "speed_hz": 5.0},
+    )
+    assert row.apply(recording, 5.0, np.random.default_rng(0)).row == {"speed_hz": 5.0}

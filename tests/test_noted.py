@@ -7,7 +7,7 @@ import pytest
 from wearstate.diagnose.bundle import load_bundle
 from wearstate.diagnose.estimate import ModelError
 from wearstate.diagnose.modelfile import load_model, save_model
-from wearstate.diagnose.noted import NOTED, doubted, noted_values
+from wearstate.diagnose.noted import NOTED, doubted, noted_values, strayed
 from wearstate.diagnose.train import Lesson, learn
 
 NAMES = tuple(f"acc_x.order_{i}.level_db" for i in range(1, 9))
@@ -61,6 +61,13 @@ def test_doubts_are_those_of_the_table():
     values = np.column_stack([np.zeros(4000), np.linspace(-1, 1, 4000)])
     off = (doubted(names, values, seed=1) - values).std(axis=0)
     np.testing.assert_allclose(off, [0.05, 0.05 * 2], rtol=0.05)
+
+
+def test_strays_reach_a_fifth():
+    names = ["viscosity_pa_s", "hull_deflection_m"]
+    values = np.column_stack([np.zeros(4000), np.linspace(-1, 1, 4000)])
+    off = np.abs(strayed(names, values, seed=1, reach=1.2) - values).max(axis=0)
+    np.testing.assert_allclose(off, [np.log(1.2), 0.2 * 2], rtol=0.01)
 
 
 @pytest.fixture(scope="module")
