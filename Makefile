@@ -20,7 +20,7 @@ lint: $(STAMP)
 types: $(STAMP)
 	bash tests/types.sh $(BIN)
 
-$(STAMP): pyproject.toml
+$(STAMP): pyproject.toml setup.py
 	@$(PYTHON) -c 'import sys; v = sys.version_info; \
 	  sys.exit(None if v >= (3, 11) else f"Python {v[0]}.{v[1]} must be >= 3.11; call make PYTHON=python3.11")'
 	test -x $(BIN)/python || $(PYTHON) -m venv .venv

@@ -7,6 +7,7 @@ compiling at every start, and one warning. The hash says all of a kernel of ``si
 installations of the same sources share what one of them compiled.
 """
 
+import ast
 import hashlib
 import logging
 import math
@@ -36,7 +37,9 @@ _OPTIONS: dict[str, Any] = {
     "_nrt": False,
 }
 
-_IMPORT = re.compile(r"^from \.(\w+) import", re.MULTILINE)  # tests/test_layers.py holds us to it
+# Statements, then parsed by themselves: whole files would cost every start a quarter of a second.
+# tests/test_layers.py holds what is found here against the syntax trees of whole files.
+_IMPORT = re.compile(r"^[ \t]*(from \.+[\w.]* import (?:\([^)]*\)|.*))", re.MULTILINE)
 
 _dumps: Any = serialize.dumps  # as numba packs: also what only its own unpickler knows
 
@@ -85,9 +88,10 @@ def _warn_damaged(folder: Path) -> None:
 
 
 def kernel_sources(folder: Path) -> list[Path]:
-    """Files of a flat package that hold kernels, and all that they import from it, sorted.
+    """Files of a package that hold kernels, in it or below, and all that they import from it.
 
-    A kernel takes its callees and constants from there; other files may change freely.
+    A kernel takes its callees and constants from there; other files may change freely. Sorted by
+    name below `folder`, so that the order is the same wherever the package lies.
 
     Examples
     --------
@@ -95,18 +99,35 @@ def kernel_sources(folder: Path) -> list[Path]:
     >>> {"jit", "contact"} <= names, "assemble" in names
     (True, False)
     """
-    imports = {
-        path: [folder / f"{name}.py" for name in _IMPORT.findall(path.read_text(encoding="utf-8"))]
-        for path in folder.glob("*.py")
-    }
+    imports = {path: _imported_from(folder, path) for path in folder.rglob("*.py")}
     this = folder / Path(__file__).name
-    found, ahead = set(), [path for path, names in imports.items() if this in names]
+    found, ahead = set(), [path for path, targets in imports.items() if this in targets]
     while ahead:
         path = ahead.pop()
         if path not in found:
             found.add(path)
-            ahead.extend(imports.get(path, []))
-    return sorted(found)
+            ahead.extend(imports[path])
+    return sorted(found, key=lambda path: path.relative_to(folder).parts)
+
+
+def _imported_from(folder: Path, path: Path) -> list[Path]:
+    """Files in or below `folder` that the relative imports of one file name."""
+    text = path.read_text(encoding="utf-8")
+    statements = ast.parse("\n".join(_IMPORT.findall(text))).body
+    return [
+        file
+        for statement in statements
+        if isinstance(statement, ast.ImportFrom)
+        for file in _named_files(statement, path)
+        if folder in file.parents and file.is_file()
+    ]
+
+
+def _named_files(statement: ast.ImportFrom, path: Path) -> list[Path]:
+    """Files that one relative import may mean: a module, or modules of a package."""
+    base = path.parents[statement.level - 1].joinpath(*(statement.module or "").split("."))
+    modules = [base / alias.name for alias in statement.names]
+    return [each.parent / f"{each.name}.py" for each in (base, *modules)]
 
 
 def _base_folder() -> Path:
@@ -199,8 +220,9 @@ def kernel(function: Function) -> Function:
         return numba.njit(**_OPTIONS)(function)  # type: ignore[no-any-return]
     names = files._impl
     stamp = names.locator.get_source_stamp()
-    if Path(compiled.py_func.__code__.co_filename).parent == Path(__file__).parent:
-        place, stamp = folder / "sim", None
+    source, here = Path(compiled.py_func.__code__.co_filename), Path(__file__).parent
+    if source.is_relative_to(here):
+        place, stamp = folder / "sim" / source.relative_to(here).parent, None
     files._cache_file = _SealedFiles(place, names.filename_base, stamp)
     return compiled  # type: ignore[no-any-return]
 

@@ -119,9 +119,11 @@ def test_a_place_that_cannot_be_a_folder_costs_one_warning(tmp_path):
 def test_installations_of_the_same_sources_share_kernels(filled, tmp_path):
     """Another folder and another time of the files: nothing is compiled or written again."""
     package = Path(jit.__file__).parents[1]
-    (tmp_path / "wearstate" / "sim").mkdir(parents=True)
-    for source in (*package.glob("*.py"), *package.glob("sim/*.py")):
-        shutil.copyfile(source, tmp_path / "wearstate" / source.relative_to(package))
+    (tmp_path / "wearstate").mkdir()
+    for source in (*package.glob("*.py"), *package.glob("sim/**/*.py")):
+        copy = tmp_path / "wearstate" / source.relative_to(package)
+        copy.parent.mkdir(exist_ok=True)
+        shutil.copyfile(source, copy)
     before = {path: path.stat().st_mtime_ns for path in filled.rglob("*.nb*")}
     told = f"import sys\nsys.path.insert(0, {str(tmp_path)!r})\n{CODE}"
     assert (
@@ -132,3 +134,55 @@ def test_installations_of_the_same_sources_share_kernels(filled, tmp_path):
         == []
     )
     assert {path: path.stat().st_mtime_ns for path in filled.rglob("*.nb*")} == before
+
+
+NESTED = {
+    "jit.py": "",
+    "constants.py": "LIMIT = 1.0",
+    "units.py": "SCALE = 1.0",
+    "unseen.py": "from .film.direct import pressure",
+    "film/__init__.py": "",
+    "film/direct.py": "from ..jit import kernel\nfrom . import (\n    mesh,\n)",
+    "film/mesh.py": "from ..constants import LIMIT",
+    "film/closed/__init__.py": "",
+    "film/closed/short.py": "def late():\n    from ... import jit\n    from ..mesh import x, y",
+    "contact.py": "from .jit import kernel\nfrom .units import (\n    SCALE as S,\n)",
+}
+
+
+def test_kernels_of_subfolders_are_seen(tmp_path):
+    for name, text in NESTED.items():
+        path = tmp_path / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+    found = [path.relative_to(tmp_path).as_posix() for path in jit.kernel_sources(tmp_path)]
+    assert found == [
+        "constants.py",
+        "contact.py",
+        "film/closed/short.py",
+        "film/direct.py",
+        "film/mesh.py",
+        "jit.py",
+        "units.py",
+    ]
+
+
+def test_kernels_of_one_name_in_two_folders_are_kept_apart(tmp_path):
+    """The same function in the same line of two files `law.py` of different folders."""
+    package = Path(jit.__file__).parents[1]
+    copy = tmp_path / "wearstate"
+    shutil.copytree(package / "sim", copy / "sim", ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copyfile(package / "__init__.py", copy / "__init__.py")
+    for room, factor in (("one", 2.0), ("two", 3.0)):
+        (copy / "sim" / room).mkdir()
+        (copy / "sim" / room / "__init__.py").touch()
+        (copy / "sim" / room / "law.py").write_text(
+            f"from ..jit import kernel\n\n@kernel\ndef law(x):\n    return {factor} * x\n"
+        )
+    told = f"import sys\nsys.path.insert(0, {str(tmp_path)!r})\n{CODE}\n"
+    asked = "from wearstate.sim.one import law as a\nfrom wearstate.sim.two import law as b\n"
+    for _ in range(2):  # compiled, then read back
+        process = start(tmp_path / "cache", f"{told}{asked}print(a.law(1.0), b.law(1.0))")
+        out, err = process.communicate(timeout=300)
+        assert (out.split()[1:], err) == (["2.0", "3.0"], "")
+    assert len(list((tmp_path / "cache").glob("kernels-*/sim/*/law.law*.nbi"))) == 2
