@@ -43,6 +43,7 @@ SPOKEN_BY = {
     "report_batch.html": {"report"},
     "own": {"import"},
     "like": {"import", "info", "report"},
+    "nameplate_cautions": {"report"},
     "sources": {"import", "info", "report"},
     "tabulate": {"evaluate", "features", "report", "train"},
 }
