@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from ..features import frf, transfer
 from ..features.analysis import FORCE
 from ..features.spectrum import decibel
+from ..features.table import FEWEST_SAMPLES
 from .page import short_name
 from .panel import (
     COLOURS,
@@ -17,6 +18,7 @@ from .panel import (
     Panel,
     first_rows,
     name_inside,
+    refuse_short,
     stack,
 )
 from .signal_view import Trace, View, number
@@ -37,6 +39,7 @@ def frf_panel(view: View) -> Panel:
     responses, others = first_rows([trace for trace in view.motions if trace.name != force.name])
     if not responses:
         raise LackError("needs a response beside the force; record one")
+    refuse_short(view, FEWEST_SAMPLES)
     rows = np.stack([trace.values for trace in responses])
     spectra, words = _averaged(force.values, rows, view.rate, view.exponential)
     # zero frequency holds the drift of the sensors, the last lines the anti-alias filter

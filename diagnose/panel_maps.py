@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..features.analysis import STANDARD
-from ..features.order import crank_angle_map
+from ..features.needs import crank_map_fault
+from ..features.order import crank_angle_map, default_window
 from ..features.resample import AngleSignal, angular_resample, order_map
 from ..features.spectrum import decibel, default_nperseg, line_frequencies, power_lines
 from ..features.table import FEWEST_SAMPLES
@@ -206,6 +207,9 @@ def angle_panel(view: View) -> Panel:
     traces, others = first_rows(view.casing)
     if not traces:
         raise LackError("needs a channel on a casing, that is no proximity probe; record one")
+    if fault := crank_map_fault(view.rate):
+        raise LackError(f"cannot be computed: {fault}")
+    refuse_short(view, default_window(view.rate)[0])
     edges = STANDARD.map_edges(view.rate)
     maps = [
         _Map(

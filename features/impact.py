@@ -18,6 +18,9 @@ MOST_STRUCK = 0.05
 """Largest share of a hammer's samples that reach the trigger level [-]: of a random force a third
 do, of a burst that lasts a fifth of its block, a fifteenth."""
 
+MOST_OF_ONE = 0.2
+"""The same where they are one blow, that ends in the record: a short record of a soft tip [-]."""
+
 LARGEST_PULL = 0.5
 """Largest force against the blows, in largest blows [-]: filters ring back by a fifth or so."""
 
@@ -130,8 +133,8 @@ def is_impact(force: ArrayLike) -> bool:
     Returns
     -------
     bool
-        True where at most `MOST_STRUCK` of the samples reach a tenth of the largest, and the
-        largest one the other way is at most `LARGEST_PULL` of it.
+        True where at most `MOST_STRUCK` of the samples reach a tenth of the largest, of a single
+        blow `MOST_OF_ONE`, and the largest one the other way is at most `LARGEST_PULL` of it.
 
     Examples
     --------
@@ -142,8 +145,14 @@ def is_impact(force: ArrayLike) -> bool:
     top = float(pulse.max(initial=0.0))
     if top <= 0:
         return False
-    struck = float(np.mean(pulse >= frf.TRIGGER_SHARE * top))
-    return struck <= MOST_STRUCK and -float(pulse.min()) <= LARGEST_PULL * top
+    struck = pulse >= frf.TRIGGER_SHARE * top
+    most = MOST_OF_ONE if _is_one(struck) else MOST_STRUCK
+    return float(np.mean(struck)) <= most and -float(pulse.min()) <= LARGEST_PULL * top
+
+
+def _is_one(struck: NDArray[np.bool_]) -> bool:
+    """Whether the samples follow each other and the last is not among them."""
+    return not struck[-1] and np.count_nonzero(np.diff(struck.astype(np.int8)) < 0) == 1
 
 
 def find_impacts(

@@ -129,8 +129,31 @@ def _mark(layout: Layout) -> str:
 def _casing(layout: Layout) -> str:
     if set(layout.quantities) == {DISPLACEMENT}:
         return "channels other than displacement = 0 must be >= 1; an orbit has no knocks"
-    # A slow rate, as of a shaft line, shows orders; what knocks there is no map's worth of bands.
-    return _bands_fault(layout.settings.map_edges, layout.fs)
+    return crank_map_fault(layout.fs, layout.settings)
+
+
+def crank_map_fault(fs: float, settings: Settings = STANDARD) -> str:
+    """Why a sample rate has no room for the bands of the crank-angle map.
+
+    A slow rate, as of a shaft line, shows orders; what knocks there is no map's worth of bands.
+
+    Parameters
+    ----------
+    fs : float
+        Sample rate [Hz].
+    settings : Settings
+
+    Returns
+    -------
+    str
+        Value, bound and cure; empty where there is room.
+
+    Examples
+    --------
+    >>> crank_map_fault(25_600.0), crank_map_fault(1280.0).split(": ")[0]
+    ('', 'fs = 1280 Hz is too low')
+    """
+    return _bands_fault(settings.map_edges, fs)
 
 
 def _spectrum_bands(layout: Layout) -> str:

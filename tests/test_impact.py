@@ -49,6 +49,26 @@ def test_what_is_a_hammer_and_what_is_not():
         assert not impact.is_impact(other)
 
 
+@pytest.mark.parametrize(("samples", "hammer"), [(40, True), (99, True), (150, False)])
+def test_one_blow_may_take_a_fifth_of_its_record(samples, hammer):
+    """A soft tip in a record that was cut short; what does not end in it is no blow."""
+    blow = np.zeros(500)
+    blow[20 : 20 + samples] = np.sin(np.pi * np.arange(samples) / samples) + 0.1
+    assert impact.is_impact(blow) is hammer
+    assert impact.is_impact(blow + 0.01 * np.random.default_rng(0).standard_normal(500)) is hammer
+    assert not impact.is_impact(np.arange(500) >= 500 - samples if samples > 40 else np.ones(9))
+    assert not impact.is_impact(np.concatenate([blow, blow, blow]))
+
+
+def test_a_blow_that_is_a_sixteenth_of_its_record_is_analysed_as_a_blow():
+    """As of a random force the record would be too short for any transfer function."""
+    half_sine = np.sin(np.pi * np.arange(1, 25) / 25)
+    struck, answer = (np.convolve(half_sine, each)[:400] for each in record([0]))
+    found = row(np.stack([struck, answer]), exponential=0.05)
+    assert np.isnan(found["ch_1.frf.coherence"])
+    assert all(np.isfinite(value) for name, value in found.items() if ".frf.band" in name)
+
+
 def test_blocks_of_several_blows():
     found = impact.find_impacts(record([1, 2000, 4000, 6000])[0], FS)
     assert found.blows.starts.tolist() == [0, 1996, 3996, 5996]  # the first without its pretrigger

@@ -437,6 +437,7 @@ def test_pairs_of_probes_by_their_place():
         ("envelope", {"probe": 4096}, "no proximity probe"),
         ("frf", {"acc": 4096}, "needs a force channel, has 0 in N"),
         ("frf", {"force": 4096}, "needs a response"),
+        ("frf", {"force": 60, "acc": 60}, "needs >= 64 samples, has 60; record longer"),
         ("orbit", {"acc": 4096, "probe": 4096}, "needs 2 displacement channels, has 1"),
         ("waveform", {"tacho": 4096}, "needs a channel beside the tacho"),
     ],
@@ -448,6 +449,13 @@ def test_a_kind_that_is_not_supported_says_what_is_missing(kind, rows, says):
     with pytest.raises(DataError, match=says) as caught:
         make_panel(view(**signals), kind)
     assert str(caught.value).startswith(f"here.h5[0]: {kind} ")
+
+
+def test_a_window_longer_than_the_recording_is_refused():
+    t = clock(0.1, 51200.0)
+    seen = view(51200.0, acc=np.sin(t[:400]), tacho=pulses(400 * t[:400]))
+    with pytest.raises(DataError, match="angle needs >= 512 samples, has 400; record longer"):
+        make_panel(seen, "angle")
 
 
 def test_few_revolutions_are_refused():
@@ -535,9 +543,10 @@ def test_a_dead_sensor_is_drawn_as_silence(value):
     t = clock(4)
     dead = np.full(t.size, value)
     made = plot_recording(view(acc=dead, probe_1=dead, probe_2=dead, tacho=pulses(10 * t)))
-    # 4096 Hz are too few for the bands of the crank-angle map
+    # 4096 Hz are too few for the bands of the crank-angle map, and no command chooses those
     assert set(made.drawn) == set(KINDS) - {"frf", "angle"}
-    assert "n_bands = 20" in made.left_out["angle"]
+    assert "n_bands = 20 must be <= " in made.left_out["angle"]
+    assert made.left_out["angle"].endswith("; sample faster")
     density = line(axes_of(view(acc=dead), "spectrum")[0], "acc")[1]
     assert np.all(density == -200)
 
