@@ -100,7 +100,7 @@ def _draw_rest(figure: Any, solution: Solution) -> None:
 
 
 def _pressures(axes: Any, scene: PumpScene, solution: Solution, turns: NDArray[np.float64]) -> None:
-    """Cylinder pressure of every throw."""
+    """Cylinder pressure of every throw, and what sensors make of it."""
     area = np.pi / 4 * scene.piston.diameter**2
     for throw in range(len(scene.throws)):
         suffix = f"_{throw + 1}" if throw else ""
@@ -108,6 +108,10 @@ def _pressures(axes: Any, scene: PumpScene, solution: Solution, turns: NDArray[n
         colour = COLOURS[throw % len(COLOURS)]
         if area > 0:
             axes.plot(turns, force / area / 1e6, lw=0.8, color=colour, label=f"{throw + 1}")
+    for channel, row in zip(solution.channels, solution.signal, strict=True):
+        if channel.quantity == "pressure":
+            told = {"label": short_name(channel.name), "color": "black", "ls": ":"}
+            axes.plot(turns, row[: turns.size] / 1e6, lw=0.9, **told)
     _label(axes, "crank revolutions", "gauge pressure [MPa]", "Cylinder pressure")
 
 

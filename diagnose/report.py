@@ -37,8 +37,14 @@ NO_REFERENCE = "Healthy reference missing"
 
 _CHANCE = 0.05  # that the farthest feature of a healthy machine lies beyond
 _SURE = 0.9  # confidence in the boundaries of a zone, below which they are to be confirmed
-_SHOWN = {"m": ("µm", 1e6), "m/s": ("mm/s", 1e3), "m/s^2": ("m/s²", 1.0)}  # unit -> for people
-_SIZES = ("rms", "peak", "peak_to_peak")  # features in the unit of their channel
+_SHOWN = {  # unit -> for people
+    "m": ("µm", 1e6),
+    "m/s": ("mm/s", 1e3),
+    "m/s^2": ("m/s²", 1.0),
+    "Pa": ("kPa", 1e-3),
+}
+_LEVELS = ("suction", "discharge", "suction_ripple", "discharge_ripple")
+_SIZES = ("rms", "peak", "peak_to_peak", *_LEVELS)  # features in the unit of their channel
 
 
 def report_table(
@@ -350,6 +356,8 @@ def feature_words(name: str) -> str:
     'acc_y, kurtosis'
     >>> feature_words("orbit.order_0.5.major_db")
     'orbit, order 0.5, major'
+    >>> feature_words("pressure.rise_width_deg")
+    'pressure, rise width'
     """
     owner, *parts = re.split(r"\.(?![0-9])", name)  # an order may be 0.5
     words = [owner]
@@ -359,7 +367,7 @@ def feature_words(name: str) -> str:
             unit = "°" if span[1] == "angle" else " Hz"
             words.append(f"{int(span[2])} to {int(span[3])}{unit}")
         else:
-            bare = re.sub(r"_(db|hz)$", "", part).replace("_", " ")
+            bare = re.sub(r"_(db|hz|deg)$", "", part).replace("_", " ")
             words.append(re.sub(r"^order 0*(?=\d)", "order ", bare))
     return ", ".join(words)
 
@@ -384,6 +392,8 @@ def evidence_words(
     '6.0 dB stronger: 2.0 times the amplitude'
     >>> evidence_words("acc_x.rms", 12.0, 6.0, {"acc_x": "m/s^2"})
     '12 m/s² instead of 6'
+    >>> evidence_words("p.discharge", 3.5e5, 3.1e5, {"p": "Pa"})
+    '350 kPa instead of 310'
     """
     owner, last = name.split(".", 1)[0], name.rsplit(".", 1)[-1]
     if last == "level_db":
@@ -392,7 +402,7 @@ def evidence_words(
         return f"{abs(value - healthy):.1f} dB {side}: {_times(ratio)} times the amplitude"
     if last.endswith("_db"):
         return f"{value:.1f} dB instead of {healthy:.1f}"
-    unit, factor = "Hz" if last.endswith("_hz") else "", 1.0
+    unit, factor = {"hz": "Hz", "deg": "°"}.get(last.rpartition("_")[2], ""), 1.0
     if last in _SIZES:
         unit = (units or {}).get(owner, "")
         unit, factor = _SHOWN.get(unit, (unit, 1.0))

@@ -19,8 +19,13 @@ from ..sim.sensor import Channel
 
 Float = NDArray[np.float64]
 
-_SHOWN = {"m": ("µm", 1e6), "m/s": ("mm/s", 1e3), "m/s^2": ("m/s²", 1.0)}
-"""SI unit -> unit in which vibration is spoken of, and factor to it."""
+_SHOWN = {
+    "m": ("µm", 1e6),
+    "m/s": ("mm/s", 1e3),
+    "m/s^2": ("m/s²", 1.0),
+    "Pa": ("kPa", 1e-3),
+}
+"""SI unit -> unit in which a signal is spoken of, and factor to it."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -383,16 +383,22 @@ def recording_layout(recording: Recording, settings: Settings = STANDARD) -> Lay
         For :func:`wearstate.features.table.absent_features`.
     """
     quantities = tuple(channel.quantity for channel in recording.vibration_channels)
-    return Layout(
+    layout = Layout(
         channels=recording.vibration_names,
         quantities=quantities,
         fs=recording.sample_rate,
         tacho=recording.tacho is not None,
         pulses_per_revolution=recording.pulses_per_revolution,
         n_samples=recording.signal.shape[-1],
-        impact=struck(recording.vibration, quantities),
         settings=_about(recording, settings),
     )
+    return replace(layout, impact=struck(_vibration(recording, layout), layout.kinds))
+
+
+def _vibration(recording: Recording, layout: Layout) -> NDArray[np.float32]:
+    """All channels but tacho and cylinder pressures [shape=(n_vibrations, n_samples)]."""
+    aside = layout.cylinders
+    return recording.vibration[~aside] if aside.any() else recording.vibration
 
 
 def feature_table(
@@ -594,8 +600,8 @@ def recording_analysis(recording: Recording, settings: Settings = STANDARD) -> A
     layout = recording_layout(recording, settings)
     if shortcomings(("force",), layout):
         return None
-    rate, kinds = recording.sample_rate, layout.quantities
-    return Analysis(recording.vibration, rate, quantities=kinds, settings=settings)
+    rate, kinds = recording.sample_rate, layout.kinds
+    return Analysis(_vibration(recording, layout), rate, quantities=kinds, settings=settings)
 
 
 def excitation_notes(path: str | Path, settings: Settings = STANDARD) -> dict[str, int]:

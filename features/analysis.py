@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import cepstrum, envelope, frf, iso, modal, orbit, order, resample, spectrum, transfer
+from . import pressure as cylinder
 from .fft import fast_length, irfft, rfft
 from .impact import WIDEST_LINES_HZ
 from .statistics import Amplitude, Real
@@ -18,7 +19,9 @@ Float = NDArray[np.float64]
 Band = tuple[float, float]
 
 ACCELERATION, DISPLACEMENT, FORCE = "acceleration", "displacement", "force"
-"""Quantities that decide what a channel is good for: severity, an orbit, a transfer function."""
+PRESSURE = "pressure"
+"""Quantities that decide what a channel is good for: severity, an orbit, a transfer function, the
+conditions in a cylinder."""
 
 FAULTS = ("outer", "inner", "roller", "cage")
 """Parts of a rolling bearing that a fault line is looked for of."""
@@ -237,6 +240,8 @@ class Analysis:
         Rows of the two proximity probes of an orbit, see :mod:`wearstate.features.orbit`.
     quantities : tuple of str, optional
         Quantity of every channel; all ``acceleration`` by default.
+    pressures : ndarray, shape (n_pressures, n_samples), optional
+        Of cylinders [Pa], beside the vibration.
     settings : Settings
         Bands, bins and orders.
 
@@ -257,8 +262,10 @@ class Analysis:
         pulses_per_revolution: int = 1,
         probes: tuple[int, int] | None = None,
         quantities: tuple[str, ...] | None = None,
+        pressures: Real | None = None,
         settings: Settings = STANDARD,
     ) -> None:
+        self._pressures = pressures
         self.amplitude = Amplitude(vibration)
         self._readings = vibration
         self._probes = probes
@@ -423,6 +430,14 @@ class Analysis:
     def profile(self) -> Float:
         """Broadband energy over the angle [(unit of x)^2, shape=(n_channels, angle_bins)]."""
         return np.asarray(self.angle_map.sum(axis=-1))
+
+    # --- cylinder
+
+    @cached_property
+    def transitions(self) -> list[cylinder.Transitions]:
+        """Levels and transitions of each cylinder pressure."""
+        rows = () if self._pressures is None else self._pressures
+        return [cylinder.transitions(cylinder.mean_revolution(row, self.phase)) for row in rows]
 
     # --- orbit
 

@@ -24,7 +24,7 @@ from .spectrum import decibel, levels_in_bands
 from .statistics import Real
 
 Float = NDArray[np.float64]
-Scope = Literal["channel", "housing", "path", "pair", "shaft", "orbit", "frf"]
+Scope = Literal["channel", "housing", "path", "pair", "shaft", "orbit", "frf", "cylinder"]
 SetName = Literal["standard", "core", "complete"]
 
 
@@ -42,9 +42,10 @@ class Feature:
         What it cannot be had without, keys of `needs.NEEDS`; nothing but a vibration by default.
     uses : tuple of str
         What else it takes into account where it is there; ``tacho`` alone has a meaning.
-    scope : {"channel", "housing", "path", "pair", "shaft", "orbit", "frf"}
+    scope : {"channel", "housing", "path", "pair", "shaft", "orbit", "frf", "cylinder"}
         Whether it exists once per channel, per acceleration, per path from a force to a channel
-        that is none, per pair of channels, per record, per orbit, or per test.
+        that is none, per pair of channels, per record, per orbit, per test, or per cylinder
+        pressure.
     labels : callable
         ``labels(settings, fs)`` names its values within one of these.
     function : callable
@@ -637,6 +638,45 @@ ORBIT_CATALOGUE: tuple[Feature, ...] = (
 """Features of a pair of proximity probes at right angles, after those of `CATALOGUE`."""
 
 
+def _of_cylinders(*parts: str) -> Callable[[Analysis], Float]:
+    """Parts of the transitions of each cylinder pressure."""
+    return lambda a: np.array([[getattr(row, part) for part in parts] for row in a.transitions])
+
+
+_PUMP = "Miller, The Reciprocating Pump, 2nd ed. (1995)"
+
+CYLINDER_CATALOGUE: tuple[Feature, ...] = (
+    Feature(
+        name="pressure_levels",
+        unit="x",
+        needs=("tacho", "mark", "cylinder"),
+        scope="cylinder",
+        labels=_named("suction", "discharge"),
+        function=_of_cylinders("suction", "discharge"),
+        reference="pressure.transitions",
+    ),
+    Feature(
+        name="pressure_ripple",
+        unit="x",
+        needs=("tacho", "mark", "cylinder"),
+        scope="cylinder",
+        labels=_named("suction_ripple", "discharge_ripple"),
+        function=_of_cylinders("suction_ripple", "discharge_ripple"),
+        reference="pressure.transitions",
+    ),
+    Feature(
+        name="pressure_transitions",
+        unit="deg",
+        needs=("tacho", "mark", "cylinder"),
+        scope="cylinder",
+        labels=_named("rise_deg", "rise_width_deg", "fall_deg", "fall_width_deg"),
+        function=_of_cylinders("rise", "rise_width", "fall", "fall_width"),
+        reference=f"pressure.transitions; {_PUMP}",
+    ),
+)
+"""Features of a cylinder pressure beside a vibration, after those of a test."""
+
+
 _RANDOM_DATA = "Bendat, Piersol, Random Data, 4th ed. (2010), chapter 9"
 
 TEST_CATALOGUE: tuple[Feature, ...] = (
@@ -992,7 +1032,7 @@ COMPLETE_ROWS: tuple[Feature, ...] = (
 """What `complete` has beside `core`: what costs most."""
 
 
-_STANDARD = (*CATALOGUE, *ORBIT_CATALOGUE, *TEST_CATALOGUE)
+_STANDARD = (*CATALOGUE, *ORBIT_CATALOGUE, *TEST_CATALOGUE, *CYLINDER_CATALOGUE)
 
 SETS: Mapping[SetName, tuple[Feature, ...]] = MappingProxyType(
     {

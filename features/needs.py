@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import compress, pairwise
 from types import MappingProxyType
 
 import numpy as np
@@ -15,6 +15,7 @@ from .analysis import (
     DISPLACEMENT,
     FEWEST_FRF_LINES,
     FORCE,
+    PRESSURE,
     STANDARD,
     Settings,
     least_samples,
@@ -29,7 +30,7 @@ class Layout:
     Parameters
     ----------
     channels : tuple of str
-        Names of the vibration channels.
+        Names of the channels but the tacho.
     quantities : tuple of str
         Quantity of each.
     fs : float
@@ -49,6 +50,9 @@ class Layout:
     --------
     >>> Layout(channels=("a",), quantities=("acceleration",), fs=1000.0).probes is None
     True
+    >>> kinds = ("acceleration", "pressure")
+    >>> Layout(channels=("a", "p"), quantities=kinds, fs=1000.0, tacho=True).pressures
+    ('p',)
     """
 
     channels: tuple[str, ...]
@@ -59,6 +63,31 @@ class Layout:
     n_samples: int | None = None
     impact: bool = False
     settings: Settings = STANDARD
+
+    @property
+    def cylinders(self) -> NDArray[np.bool_]:
+        """Which channels are pressures of cylinders, read over the crank angle.
+
+        All pressures, if a tacho with one pulse a revolution and another quantity are there; none
+        otherwise: then they are signals like any other.
+        """
+        found = np.array([kind == PRESSURE for kind in self.quantities], dtype=np.bool_)
+        return found & (self.tacho and self.pulses_per_revolution == 1 and not found.all())
+
+    @property
+    def pressures(self) -> tuple[str, ...]:
+        """Names of the cylinder pressures."""
+        return tuple(compress(self.channels, self.cylinders))
+
+    @property
+    def vibrations(self) -> tuple[str, ...]:
+        """Names of all other channels, the rows of an analysis."""
+        return tuple(compress(self.channels, ~self.cylinders))
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """Quantity of each of `vibrations`."""
+        return tuple(compress(self.quantities, ~self.cylinders))
 
     @property
     def duration(self) -> float:
@@ -72,8 +101,8 @@ class Layout:
         return (rows[0], rows[1]) if len(rows) == 2 else None
 
     def rows_of(self, quantity: str) -> tuple[int, ...]:
-        """Channels of a quantity."""
-        return tuple(i for i, kind in enumerate(self.quantities) if kind == quantity)
+        """Rows of a quantity among `vibrations`."""
+        return tuple(i for i, kind in enumerate(self.kinds) if kind == quantity)
 
 
 def struck(signals: NDArray[np.floating], quantities: Sequence[str]) -> bool:
@@ -127,7 +156,7 @@ def _mark(layout: Layout) -> str:
 
 
 def _casing(layout: Layout) -> str:
-    if set(layout.quantities) == {DISPLACEMENT}:
+    if set(layout.kinds) == {DISPLACEMENT}:
         return "channels other than displacement = 0 must be >= 1; an orbit has no knocks"
     return crank_map_fault(layout.fs, layout.settings)
 
@@ -193,11 +222,17 @@ def _probes(layout: Layout) -> str:
     )
 
 
+def _cylinder(layout: Layout) -> str:
+    if layout.pressures:
+        return ""
+    return f"cylinder pressures = 0 must be >= 1 beside a vibration; {_declared('Pa')}"
+
+
 def _force(layout: Layout) -> str:
     count = len(layout.rows_of(FORCE))
     if count == 0:
         return f"force channels = 0 must be >= 1; {_declared('N')}"
-    if len(layout.channels) == count:
+    if len(layout.vibrations) == count:
         return "responses = 0 must be >= 1; record one beside the force"
     try:
         low, high = layout.settings.frf_band(layout.fs)
@@ -343,6 +378,7 @@ NEEDS: Mapping[str, Need] = MappingProxyType(
         "envelope": Need(text="band of eight lines", fault=_envelope),
         "frames": Need(text="256 samples", fault=_samples(256)),
         "cycles": Need(text="768 samples", fault=_samples(768)),
+        "cylinder": Need(text="pressure channel beside a vibration", fault=_cylinder),
         "force": Need(text="force channel", fault=_force),
         "frf bands": Need(text="rate for its bands", fault=_frf_bands),
         "profile": Need(text="rate for its narrow bands", fault=_profile),

@@ -143,7 +143,7 @@ def feature_names(
     -------
     tuple of str
         ``channel.label``, ``first_over_second.label``, ``shaft.label``, ``orbit.label``,
-        ``frf.label``, and of several forces ``response_per_force.label``.
+        ``frf.label``, and of several forces ``response_per_force.label``; pressures come last.
 
     Raises
     ------
@@ -246,7 +246,7 @@ def _names_of(row: Feature, layout: Layout) -> tuple[str, ...]:
 
 def _owners(scope: Scope, layout: Layout) -> tuple[str, ...]:
     """What a feature exists once per."""
-    channels = layout.channels
+    channels = layout.vibrations
     forces = [channels[i] for i in layout.rows_of(FORCE)]
     responses = [name for name in channels if name not in forces]
     owners: Mapping[Scope, tuple[str, ...]] = {
@@ -258,6 +258,7 @@ def _owners(scope: Scope, layout: Layout) -> tuple[str, ...]:
             for force in forces
         ),
         "pair": tuple(f"{a}_over_{b}" for a, b in combinations(channels, 2)),
+        "cylinder": layout.pressures,
     }
     return owners.get(scope, (scope,))
 
@@ -334,7 +335,8 @@ def feature_row(
     quantities : sequence of str, optional
         Quantity of every channel; all ``acceleration`` by default. With exactly two of
         ``displacement`` the features of their orbit are added, with one or more of ``force`` those
-        of the transfer functions from them.
+        of the transfer functions from them. One of ``pressure`` beside another quantity, with a
+        tacho of one pulse, is that of a cylinder: it has features of its own and no others.
     settings : Settings
         Bands, bins and orders; the kind of machine, the geometry of a bearing.
     feature_set : {"standard", "core", "complete"}
@@ -386,17 +388,18 @@ def feature_row(
         signals = signals.astype(np.float64)
     channels = _channel_names(channel_names, len(signals))
     _check_vibration(signals, channels)
-    kinds = _quantities(quantities, len(signals))
     layout = Layout(
         channels=channels,
-        quantities=kinds,
+        quantities=_quantities(quantities, len(signals)),
         fs=float(fs),
         tacho=tacho is not None,
         pulses_per_revolution=pulses_per_revolution,
         n_samples=signals.shape[-1],
-        impact=struck(signals, kinds),
         settings=_planned(settings),
     )
+    aside = layout.cylinders
+    pressures, signals = signals[aside], signals[~aside] if aside.any() else signals
+    layout = replace(layout, impact=struck(signals, layout.kinds))
     plan = _plan(layout, feature_set, None if only is None else tuple(only))
     pulses = None
     if tacho is not None and any(_turns(feature) for feature in plan.features):
@@ -407,7 +410,8 @@ def feature_row(
         pulses=pulses,
         pulses_per_revolution=pulses_per_revolution,
         probes=layout.probes,
-        quantities=layout.quantities,
+        quantities=layout.kinds,
+        pressures=pressures,
         settings=settings,
     )
     return plan.names, _values(plan, analysis)

@@ -1,27 +1,32 @@
 """The parts of a scene that make the pressure in a pump cylinder: liquid, lines and valves."""
 
 import math
-from typing import Literal, Self
+from typing import Any, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from .parts import (
     DAMPING_MOST,
+    GAIN_LEAST,
+    GAIN_MOST,
     HEAVIEST,
     LIGHTEST,
     LONGEST,
+    NAME_LONGEST,
     PRESSURE_MOST,
     STIFFEST,
     Angle,
     Area,
     Damping,
     Density,
+    Frequency,
     Length,
     Mass,
     Part,
     Pressure,
     Ratio,
     Stiffness,
+    Time,
     Volume,
 )
 
@@ -37,6 +42,9 @@ _VOLUME_LEAST, _VOLUME_MOST = 1e-9, 1e3  # m^3
 _LEVEL_MOST = 1e4  # m
 _MOST_VALVES = 100
 _CONTACT_FASTEST = 1e6  # rad/s, a ball of a gram on hard steel has half of it
+_SENSOR_SLOWEST, _SENSOR_FASTEST = 1.0, 1e6  # Hz: below it no stroke is left, above it is no line
+_SENSOR_LEAST = 1.0  # Pa, a microphone's range
+_DAMPING_LEAST, _DAMPING_RATIO_MOST = 1e-3, 0.99  # of a line that swings still
 
 
 class Liquid(Part):
@@ -174,6 +182,66 @@ class Valve(Part):
         ]
 
 
+class PressureSensor(Part):
+    """A pressure transmitter at the cylinder, with its connecting line and its converter.
+
+    It reads gauge pressure from absolute vacuum, -101,325 Pa, to the upper end of its range.
+
+    Notes
+    -----
+    A line full of liquid swings on the compliance C of what it leads to, with the inertance
+    ``rho L / A``: ``f = sqrt(A / (rho L C)) / (2 pi)`` [1]_. Usual numbers: a flush membrane has
+    none; 0.3 m of 4 mm tube up to a membrane quarter-wave rings at 1.2 kHz, and with a bubble of
+    0.05 cm^3 left in it (``C = V / (1.4 p)``) at some 60 Hz. It lags by ``zeta / (pi f)``, and a
+    transmitter's own time constant adds to it.
+
+    References
+    ----------
+    .. [1] E. O. Doebelin, Measurement Systems, 5th ed., McGraw-Hill 2004, section 6.6, dynamic
+       effects of volumes and connecting tubing.
+    """
+
+    name: str = Field(default="pressure", min_length=1, max_length=NAME_LONGEST - 3)
+    place: str = Field(default="cylinder", description="where it sits, for the report")
+    range: Pressure = Field(
+        ge=_SENSOR_LEAST, le=PRESSURE_MOST, description="upper end of its range, gauge"
+    )
+    gain: Ratio = Field(
+        default=1.0, ge=GAIN_LEAST, le=GAIN_MOST, description="true sensitivity over nominal"
+    )
+    offset: Pressure = Field(
+        default=0.0, ge=-PRESSURE_MOST, le=PRESSURE_MOST, description="reading of the atmosphere"
+    )
+    noise: Pressure = Field(default=0.0, ge=0, le=PRESSURE_MOST, description="rms of white noise")
+    bits: int = Field(default=24, ge=8, le=32)
+    lag: Time | None = Field(
+        default=None,
+        ge=1 / (math.tau * _SENSOR_FASTEST),
+        le=1 / (math.tau * _SENSOR_SLOWEST),
+        description="time constant of the transmitter, first order; none: at once",
+    )
+    line_resonance: Frequency | None = Field(
+        default=None,
+        ge=_SENSOR_SLOWEST,
+        le=_SENSOR_FASTEST,
+        description="of the liquid in the connecting line; none: a flush membrane",
+    )
+    line_damping: Ratio | None = Field(
+        default=None, ge=_DAMPING_LEAST, le=_DAMPING_RATIO_MOST, description="ratio to the critical"
+    )
+
+    @model_validator(mode="after")
+    def _line_whole(self) -> Self:
+        given = (self.line_resonance is not None, self.line_damping is not None)
+        if given[0] != given[1]:
+            lone, other = ("resonance", "damping") if given[0] else ("damping", "resonance")
+            raise ValueError(
+                f"line_{lone} = {getattr(self, f'line_{lone}'):g} needs line_{other} beside it; "
+                "add it or remove both"
+            )
+        return self
+
+
 class CylinderPressure(Part):
     """Gauge pressure on the piston face.
 
@@ -227,6 +295,17 @@ class CylinderPressure(Part):
         le=_VOLUME_MOST,
         description="of the chamber with the piston at its top dead centre",
     )
+    sensor: PressureSensor | None = Field(
+        default=None, description="records the pressure in the cylinder; none: nobody does"
+    )
+
+    @model_serializer(mode="wrap")
+    def _without_absent_sensor(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Scenes without a sensor are written as they were before there were any."""
+        table: dict[str, Any] = handler(self)
+        if self.sensor is None:
+            table.pop("sensor", None)
+        return table
 
     @model_validator(mode="after")
     def _fit_for_the_rung(self) -> Self:

@@ -29,6 +29,7 @@ from .integrate import SimulationError, Solution, Status
 from .ladder import FEWEST_STEPS, MOST_STEPS, joint_faults, knock_limits, limits, pump_step
 from .parts import Accelerometer, CasingMode, Scene, SceneError, channels_of, specific_key
 from .pump_parts import CRANK_PLACES, FORCE_PLACES, GUIDE_PLACES, VALVE_PLACES, PumpScene
+from .pump_pressure import pressures_at_rest, read_pressures
 from .pump_push import casing_pushes, read_cells, with_pushes
 from .sensor import (
     anti_alias_poles,
@@ -95,7 +96,7 @@ def simulate_pump(scene: Scene, seed: int, truth: bool, raise_on_failure: bool) 
     pushes = plan.pushes(seed)
     places, on_casing = with_pushes(pump, *casing_forces(pump, run), pushes)
     acceleration, casing_numerics = _housing(pump, places, on_casing, 1 / step, factor)
-    signal, clipped = _measured(acceleration, plan.turned(run), plan, pushes, seed)
+    signal, clipped = _measured(acceleration, plan.turned(run), plan, pushes, seed, run)
     numerics |= casing_numerics
     numerics["clipped_samples"] = clipped
     return Solution(
@@ -118,7 +119,7 @@ def _at_rest(pump: PumpScene, seed: int, truth: bool) -> Solution:
     rate = pump.sample_rate * plan.factor
     acceleration, numerics = _housing(pump, places, forces, rate, plan.factor)
     angle = np.full(plan.n_samples, pump.drive.start_angle)
-    signal, clipped = _measured(acceleration, angle, plan, pushes, seed)
+    signal, clipped = _measured(acceleration, angle, plan, pushes, seed, None)
     numerics |= {"step_s": 1 / rate, "steps": plan.n_steps, "mean_speed_hz": 0.0}
     numerics |= {"estimated_error": 0.0, "clipped_samples": clipped}
     return Solution(
@@ -495,8 +496,9 @@ def _measured(
     plan: _Plan,
     pushes: tuple[Push, ...],
     seed: int,
+    run: CrankRun | None,
 ) -> tuple[NDArray[np.float32], int]:
-    """Signal of every channel, and how many samples were clipped."""
+    """Signal of every channel, and how many samples were clipped; no run where the crank stands."""
     scene = plan.scene
     rng = np.random.default_rng(seed)
     rows, clipped = [], 0
@@ -513,6 +515,12 @@ def _measured(
         clipped += lost
     cells, lost = read_cells(scene, pushes, plan.factor, plan.kept, rng)
     rows += cells
+    clipped += lost
+    if run is None:
+        pressures, lost = pressures_at_rest(scene, plan.n_samples, rng)
+    else:
+        pressures, lost = read_pressures(scene, run, plan.factor, plan.kept, rng)
+    rows += pressures
     clipped += lost
     if scene.tacho and not scene.running:
         rows.append(np.zeros(plan.n_samples, dtype=np.float32))

@@ -7,7 +7,7 @@ from typing import Any, Literal, Self
 from pydantic import Field, model_validator
 
 from .exciter_parts import CasingExciter, force_channel
-from .hydraulic_parts import CylinderPressure
+from .hydraulic_parts import CylinderPressure, PressureSensor
 from .journal_parts import ScarLimits
 from .parts import (
     ANGLE_MOST,
@@ -393,7 +393,7 @@ class PumpScene(Scene):
         return single_axis(self.sensors)
 
     def sensor_channels(self) -> tuple[Channel, ...]:
-        """One channel of acceleration for every axis of every accelerometer, then test forces."""
+        """Acceleration of every axis of every accelerometer, then test forces, then pressures."""
         accelerations = tuple(
             Channel(
                 name=sensor.name,
@@ -404,10 +404,15 @@ class PumpScene(Scene):
             )
             for sensor in self.accelerometers
         )
-        return accelerations + tuple(
+        forces = tuple(
             force_channel(part, f"casing at {part.place}", part.direction)
             for part in self.mounted_exciters
         )
+        pressures = tuple(
+            Channel(name=sensor.name, unit="Pa", quantity="pressure", place=sensor.place)
+            for _, sensor in self.pressure_sensors
+        )
+        return accelerations + forces + pressures
 
     @property
     def mounted_exciters(self) -> tuple[CasingExciter, ...]:
@@ -422,13 +427,21 @@ class PumpScene(Scene):
         """Pressure on the piston of one throw, counted from 0."""
         return self.throws[throw].pressure or self.pressure
 
+    @property
+    def pressure_sensors(self) -> tuple[tuple[int, PressureSensor], ...]:
+        """Throw, counted from 0, and sensor of every cylinder that has one.
+
+        Where there are several throws, the number of its throw, from 1, follows each name.
+        """
+        return _pressure_sensors(self.pressure, self.throws)
+
     @classmethod
     def cross_faults(cls, parts: Mapping[str, Any]) -> list[str]:
         """Faults between parts, of those parts that are there."""
         checks = (
             (_rod_faults, ("crank", "joint", "rod")),
             (_guide_faults, ("joint", "piston")),
-            (_name_faults, ("sensors", "exciters", "tacho")),
+            (_name_faults, ("sensors", "exciters", "tacho", "pressure", "throws")),
             (_shape_faults, ("casing", "sensors", "throws")),
             (_exciter_faults, ("casing", "sensors", "exciters")),
             (_rest_faults, ("running", "exciters", "fidelity")),
@@ -471,11 +484,29 @@ def _rod_faults(crank: Crank, joint: PumpJoints, rod: Rod) -> list[str]:
     ]
 
 
+def _pressure_sensors(
+    pressure: CylinderPressure, throws: tuple[Throw, ...]
+) -> tuple[tuple[int, PressureSensor], ...]:
+    found = []
+    for i, throw in enumerate(throws):
+        sensor = (throw.pressure or pressure).sensor
+        if sensor is not None and len(throws) > 1:
+            sensor = sensor.model_copy(update={"name": f"{sensor.name}_{i + 1}"})
+        if sensor is not None:
+            found.append((i, sensor))
+    return tuple(found)
+
+
 def _name_faults(
-    sensors: tuple[Accelerometer, ...], exciters: tuple[CasingExciter, ...], tacho: Tacho | None
+    sensors: tuple[Accelerometer, ...],
+    exciters: tuple[CasingExciter, ...],
+    tacho: Tacho | None,
+    pressure: CylinderPressure,
+    throws: tuple[Throw, ...],
 ) -> list[str]:
+    pressures = (sensor.name for _, sensor in _pressure_sensors(pressure, throws))
     names = [*(sensor.name for sensor in single_axis(sensors)), *(part.name for part in exciters)]
-    return name_faults(names, tacho)
+    return name_faults([*names, *pressures], tacho)
 
 
 def _exciter_faults(

@@ -28,7 +28,7 @@ SIM_FLOORS = [
     {"shaft_change"},
     {"pump", "journal", "shaft_line"},
     {"ladder", "plausibility"},
-    {"tearing", "pump_push"},
+    {"tearing", "pump_push", "pump_pressure"},
     {"crank_setup", "shaft_push"},
     {"slider_crank", "orbit", "casing", "shaft_film", "shaft_response"},
     {"rest_curve"},
