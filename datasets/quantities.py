@@ -14,10 +14,11 @@ from numpy.typing import NDArray
 from ..features.orbit import filtered_orbits
 from ..features.order import order_amplitudes
 from ..features.spectrum import band_edges, band_levels, decibel
-from ..sim.fidelity import Quantities, Quantity, Resolution, resolve, resolved_scene
+from ..sim.fidelity import Resolution, resolve, resolved_scene
 from ..sim.integrate import Solution
 from ..sim.journal_parts import JournalScene
 from ..sim.parts import Scene
+from ..sim.pilot import Quantities, Quantity
 from ..sim.shaft_parts import ShaftScene
 
 Float = NDArray[np.float64]
@@ -103,9 +104,12 @@ def _bands(solution: Solution) -> dict[str, Quantity]:
     if not rows:
         return {}
     fs = solution.sample_rate
-    edges = band_edges(fs, n_bands=_BANDS, low=min(50.0, fs / 20))
-    powers = 10 ** (band_levels(np.stack(rows), fs, edges) / 10)
+    powers = 10 ** (band_levels(np.stack(rows), fs, _edges(fs)) / 10)
     return {f"band_{i + 1}": level(power) for i, power in enumerate(powers.sum(axis=0))}
+
+
+def _edges(fs: float) -> Float:
+    return band_edges(fs, n_bands=_BANDS, low=min(50.0, fs / 20))
 
 
 def journal_quantities(solution: Solution, scene: Scene) -> dict[str, Quantity]:
@@ -204,6 +208,77 @@ QUANTITIES: dict[str, Quantities] = {
     "propulsion-shaft": shaft_quantities,
 }
 """Quantities of interest of every machine. A new machine is one row."""
+
+
+_WORDS: dict[str, tuple[str, str]] = {
+    "pin_rms": ("crank pin force, rms", "N"),
+    "pin_peak": ("crank pin force, mean peak", "N"),
+    "guide_rms": ("guide force, rms", "N"),
+    "pressure_rms": ("pressure force on the piston, rms", "N"),
+    "centre_x": ("mean position x", "m"),
+    "centre_y": ("mean position y", "m"),
+    "orbit_rms": ("orbit, rms radius", "m"),
+    "orbit_largest": ("orbit, largest radius", "m"),
+    "film_least": ("thinnest film", "m"),
+    "force_rms": ("film force, rms", "N"),
+    "force_peak": ("film force, peak", "N"),
+    "axis_major": ("orbit at the speed, major half axis", "m"),
+    "axis_minor": ("orbit at the speed, minor half axis", "m"),
+    "resonance_hz": ("first resonance", "Hz"),
+    "least_damping": ("least damping ratio", "-"),
+    "reaction": ("reaction in", "N"),
+    "up": ("journal height in", "m"),
+    "side": ("journal side position in", "m"),
+    "orbit": ("orbit, rms radius in", "m"),
+}
+"""Quantity, without the throw or the bearing -> words and unit."""
+
+
+def quantity_label(name: str, scene: Scene) -> tuple[str, str]:
+    """A quantity of interest in words, and its unit.
+
+    Parameters
+    ----------
+    name : str
+        As of :data:`QUANTITIES`.
+    scene : Scene
+        That it is of: it has the edges of the bands.
+
+    Returns
+    -------
+    tuple of str
+        An unknown name stands for itself.
+
+    Examples
+    --------
+    >>> from wearstate.sim.scene import load_scene
+    >>> quantity_label("band_3", load_scene("bilge-pump"))
+    ('vibration 306 to 758 Hz', 'dB')
+    >>> quantity_label("pin_rms_2", load_scene("triplex-pump"))
+    ('crank pin force, rms, throw 2', 'N')
+    """
+    stem, _, last = name.rpartition("_")
+    if stem in ("band", "order"):
+        text = _band_words(int(last), scene.sample_rate) if stem == "band" else f"at order {last}"
+        return f"vibration {text}", "dB"
+    if name in _WORDS:
+        return _WORDS[name]
+    if stem in _WORDS and last.isdecimal():
+        words, unit = _WORDS[stem]
+        return f"{words}, throw {last}", unit
+    kind, _, bearing = name.partition("_")
+    words, unit = _WORDS.get(kind, ("", ""))
+    return (f"{words} {bearing}", unit) if words else (name, "")
+
+
+def _band_words(number: int, fs: float) -> str:
+    low, high = _edges(fs)[number - 1 : number + 1]
+    if high < _KILO:
+        return f"{low:.0f} to {high:.0f} Hz"
+    return f"{low / _KILO:.2g} to {high / _KILO:.2g} kHz"
+
+
+_KILO = 1000.0  # Hz
 
 
 def resolved(scene: Scene) -> tuple[Scene, Resolution | None]:

@@ -17,9 +17,9 @@ from ..datasets.generate import generate
 from ..datasets.recipe import Recipe, load_recipe
 from ..datasets.record import DataError
 from ..datasets.splits import group_folds
-from ..sim.fidelity import Difference
 from ..sim.ladder import Effect, admissible, cost_of, effects_of, with_values
 from ..sim.parts import Scene, nearest
+from ..sim.pilot import Difference
 from .models import CANDIDATES, fit_blend
 from .tabulate import FeatureTable, feature_table
 

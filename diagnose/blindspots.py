@@ -8,7 +8,7 @@ import hashlib
 import json
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Any, Protocol
@@ -20,12 +20,12 @@ from ..datasets.recipe import Recipe, Sample, condition_of, load_recipe, sample_
 from ..datasets.recipe_file import recipe_names
 from ..datasets.record import DataError, Recording
 from ..sim.assemble import simulate
-from ..sim.atomic import write_whole
 from ..sim.parts import Scene, SceneError, channels_of
 from .blindspot_rows import SceneRow, scene_rows
 from .blindspot_scores import Row, Said, row_of, said_of
 from .blindspot_signals import SignalRow, signal_rows
 from .estimate import Estimate
+from .kept import Kept
 from .nameplate_cautions import known_beside
 
 OWN_SEEDS = 2**62
@@ -252,48 +252,28 @@ def _tasks(scenes: Sequence[SceneRow], signals: Sequence[SignalRow]) -> list[_Ta
     return tasks
 
 
-@dataclass
-class Kept:
+def kept_rows(path: Path | None, key: str) -> Kept[Row]:
     """Finished rows in a file beside the output.
 
-    Attributes
+    Parameters
     ----------
     path : Path or None
         None keeps nothing.
     key : str
-        What the rows depend on.
-    rows : dict
-        Finished ones by key.
+        Of :func:`run_key`.
+
+    Raises
+    ------
+    DataError
+        The file is damaged, or of another run.
     """
-
-    path: Path | None
-    key: str
-    rows: dict[str, Row] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        """Read what an earlier run left."""
-        if self.path is None or not self.path.exists():
-            return
-        try:
-            stored = json.loads(self.path.read_bytes())
-            same = stored["key"] == self.key
-            rows = [row_of(each) for each in stored["rows"]] if same else []
-        except (ValueError, KeyError, TypeError) as error:
-            raise DataError(f"{self.path} is damaged ({error}); delete it") from None
-        if not same:
-            raise DataError(
-                f"{self.path} is of another model, recipe, number of machines, seed or version; "
-                "delete it, or use --force"
-            )
-        self.rows = {row.key: row for row in rows}
-
-    def add(self, row: Row) -> None:
-        """Keep one more, in the file as well."""
-        self.rows[row.key] = row
-        if self.path is None:
-            return
-        table = {"key": self.key, "rows": [each.as_dict() for each in self.rows.values()]}
-        write_whole(self.path, json.dumps(table).encode(), force=True)
+    return Kept(
+        path,
+        key,
+        table_of=Row.as_dict,
+        piece_of=row_of,
+        depends="another model, recipe, number of machines, seed or version",
+    )
 
 
 def file_hash(path: Path) -> str:
@@ -318,7 +298,7 @@ def find_blind_spots(
     budget: float | None = None,
     scenes: Sequence[SceneRow] | None = None,
     signals: Sequence[SignalRow] | None = None,
-    kept: Kept | None = None,
+    kept: Kept[Row] | None = None,
     progress: Progress | None = None,
 ) -> BlindSpots:
     """Judge a model on the same machines, with one thing shifted at a time.
@@ -351,7 +331,7 @@ def find_blind_spots(
         No machine could be simulated as trained.
     """
     end = None if budget is None else time.monotonic() + budget
-    store = kept or Kept(None, "")
+    store = kept_rows(None, "") if kept is None else kept
     samples = _samples(recipe, machines, seed)
     fleet = _Machines(recipe=recipe, model=model, samples=samples, seed=seed)
     tasks = _tasks(
@@ -360,20 +340,20 @@ def find_blind_spots(
     )
     for done, task in enumerate(tasks, start=1):
         late = end is not None and time.monotonic() >= end and task is not tasks[0]
-        if task.row.key not in store.rows and not late:
-            store.add(_made(task, fleet))
+        if task.row.key not in store and not late:
+            store[task.row.key] = _made(task, fleet)
         if progress is not None:
             progress(done, len(tasks))
     baseline, *others = tasks
-    if not store.rows[baseline.row.key].said:
-        fault = next(iter(store.rows[baseline.row.key].faults), "")
+    if not store[baseline.row.key].said:
+        fault = next(iter(store[baseline.row.key].faults), "")
         raise DataError(f"{recipe.name}: 0 of {machines} machines can be simulated ({fault})")
     keys = [task.row.key for task in others]
     return BlindSpots(
         recipe=recipe.name,
-        baseline=store.rows[baseline.row.key],
-        rows=tuple(store.rows[key] for key in keys if key in store.rows),
-        left=tuple(key for key in keys if key not in store.rows),
+        baseline=store[baseline.row.key],
+        rows=tuple(store[key] for key in keys if key in store),
+        left=tuple(key for key in keys if key not in store),
     )
 
 

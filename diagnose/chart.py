@@ -1,31 +1,26 @@
 """Speed against accuracy: what every choice costs, and how wrong it is.
 
-One chart serves the rungs and steps of a scene (wall time of a simulated second against the error
-of its quantities of interest) and the diagnosis of a data set (time of a recording against the
-error on unseen machines). Pictures and pages of it are in :mod:`.chart_figure`.
+One chart serves the rungs and steps of a scene (:mod:`.chart_scene`: wall time of a simulated
+second against the error of its quantities of interest) and the diagnosis of a data set
+(:mod:`.chart_models`: time of a recording against the error on unseen machines). Pictures and pages
+of it are in :mod:`.chart_figure`.
 """
 
 import math
-import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
 from ..datasets.csv_cells import safe_cell
-from ..datasets.quantities import QUANTITIES
-from ..sim.assemble import simulate
 from ..sim.atomic import replacing
-from ..sim.fidelity import Candidate, Convergence, Difference, Study, study
-from ..sim.ladder import with_values
-from ..sim.parts import Scene
+from ..sim.pilot import Difference
+from ..sim.study import Convergence
 
 Progress = Callable[[int, int], None]
 Clock = Callable[[], float]
 
-_RUNS = 3  # of a point that is timed; the least counts, for others only add to it
 _GAIN = 0.95  # of an error: the most of it that a slower point on the front may have
-_TIMING_SHARE = 0.25  # of a budget, on top of it, for timing again what is on the front
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,7 +30,7 @@ class Point:
     Attributes
     ----------
     name : str
-        What it has other than the reference.
+        What it has other than the scene as written.
     rungs : mapping of str to str
         All of the choice, effect by effect.
     seconds : float
@@ -53,6 +48,11 @@ class Point:
         No other point is both faster and more accurate.
     counts : str
         Quantity by which it is judged; the one with the largest error where none is named.
+    question : str
+        That it belongs to, where a chart answers several; errors are against the reference of that
+        question.
+    here : bool
+        The scene as it is written.
     """
 
     name: str
@@ -64,6 +64,8 @@ class Point:
     starts: int = 1
     on_front: bool = False
     counts: str = ""
+    question: str = ""
+    here: bool = False
 
     @property
     def worst(self) -> str:
@@ -82,6 +84,80 @@ class Point:
         """Of that error [-]; NaN where it cannot be told."""
         found = self.errors[self.worst].standard_error if self.errors else math.nan
         return found if math.isfinite(found) else math.nan
+
+
+@dataclass(frozen=True, kw_only=True)
+class Choice:
+    """What to take, for one question.
+
+    Attributes
+    ----------
+    question : str
+        As of :class:`Point`.
+    name : str
+        Of the point.
+    status : str
+        ``resolved``, ``so far``, ``unresolvable`` or ``not converged``.
+    error, standard_error, promised : float
+        Of the worst quantity, and the sum of both of the worst quantity by it [-].
+    starts : int
+        That the error is the mean of.
+    seconds : float
+        Of a simulated second [s].
+    changes : mapping of str to object
+        Dotted path -> value, of what the scene as written must change.
+    block, options : str
+        The same as TOML to paste, and as options of a command.
+    reference : str
+        What the error is taken against, in words.
+    sentence : str
+        The conclusion.
+    keeps : bool
+        Nothing is to be changed.
+    """
+
+    question: str
+    name: str
+    status: str
+    error: float
+    standard_error: float
+    promised: float
+    starts: int
+    seconds: float
+    changes: Mapping[str, Any]
+    block: str
+    options: str
+    reference: str
+    sentence: str
+    keeps: bool
+
+
+@dataclass(frozen=True, kw_only=True)
+class RungCost:
+    """What one rung of the scene as written costs: its error against the best of its effect.
+
+    Attributes
+    ----------
+    effect, written, best : str
+        Effect in words, names of the rungs.
+    error, standard_error : float
+        Of the worst quantity [-].
+    worst : str
+        That quantity in words.
+    starts : int
+        That the error is the mean of.
+    text : str
+        All of it in one line.
+    """
+
+    effect: str
+    written: str
+    best: str
+    error: float
+    standard_error: float
+    worst: str
+    starts: int
+    text: str
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -111,6 +187,16 @@ class Chart:
         What did not run, and why.
     note : str
         How it was measured.
+    conclusion : tuple of str
+        The finding in a few sentences, of a scene.
+    choices : tuple of Choice
+        What to take, question by question, of a scene.
+    raises : tuple of RungCost
+        What each rung of the scene as written costs.
+    labels : mapping of str to str
+        Quantity -> words and unit; a quantity that has none stands for itself.
+    measured, planned : int
+        Points measured, of those of interest; 0 of 0 where nothing was left out.
     """
 
     name: str
@@ -127,6 +213,30 @@ class Chart:
     refused: tuple[str, ...] = ()
     pruned: tuple[str, ...] = ()
     note: str = ""
+    conclusion: tuple[str, ...] = ()
+    choices: tuple[Choice, ...] = ()
+    raises: tuple[RungCost, ...] = ()
+    labels: Mapping[str, str] = field(default_factory=dict)
+    measured: int = 0
+    planned: int = 0
+
+    @property
+    def questions(self) -> tuple[str, ...]:
+        """Of its points, in their order."""
+        return tuple(dict.fromkeys(point.question for point in self.points))
+
+    @property
+    def unfinished(self) -> bool:
+        """Something was left out for want of time."""
+        return self.status == "out of budget"
+
+    def of(self, question: str) -> tuple[Point, ...]:
+        """Points of a question."""
+        return tuple(point for point in self.points if point.question == question)
+
+    def label(self, quantity: str) -> str:
+        """A quantity in words."""
+        return self.labels.get(quantity, quantity)
 
     @property
     def front(self) -> tuple[Point, ...]:
@@ -199,205 +309,6 @@ def front_of(places: Sequence[tuple[float, float]]) -> list[bool]:
     return found
 
 
-# --- a scene
-
-
-def scene_chart(
-    scene: Scene,
-    *,
-    accuracy: float | None = None,
-    budget: float | None = None,
-    clock: Clock = time.perf_counter,
-    progress: Progress | None = None,
-) -> Chart:
-    """Measure every combination of rungs and steps of a scene that matters.
-
-    Parameters
-    ----------
-    scene : Scene
-        Its own fidelity plays no part; what it pins stays as written.
-    accuracy : float, optional
-        Error that every quantity of interest may carry; the scene's own by default.
-    budget : float, optional
-        Seconds after which no further combination is begun.
-    clock : callable
-        Seconds.
-    progress : callable, optional
-        Called with (combinations done, combinations in all).
-
-    Returns
-    -------
-    Chart
-
-    Raises
-    ------
-    SceneError
-        The reference cannot be run.
-    ValueError
-        The accuracy is out of bounds.
-
-    Notes
-    -----
-    Errors are those of :func:`wearstate.sim.fidelity.study`, against the highest admissible rung
-    of every effect. What is on the front is timed again, so that the least of several runs counts.
-    """
-    found = study(
-        scene,
-        QUANTITIES[scene.machine],
-        accuracy=accuracy,
-        budget=budget,
-        clock=clock,
-        progress=progress,
-    )
-    spare = math.inf if budget is None else _TIMING_SHARE * budget
-    return chart_of(scene, found, timed_again(scene, found, clock, spare))
-
-
-def timed_again(
-    scene: Scene, found: Study, clock: Clock, spare: float = math.inf
-) -> dict[int, float]:
-    """Least seconds of a run of every candidate; those on the front run some times more.
-
-    Parameters
-    ----------
-    scene : Scene
-    found : Study
-        Timed.
-    clock : callable
-        Seconds.
-    spare : float
-        Seconds of `clock` after which no further run is begun.
-
-    Returns
-    -------
-    dict of int to float
-        Number of the candidate in the study -> seconds.
-    """
-    seconds = {i: each.seconds for i, each in enumerate(found.candidates)}
-    chosen = front_of([(each.seconds, each.error) for each in found.candidates])
-    end = clock() + spare
-    for i in (i for i, front in enumerate(chosen) if front):
-        for _ in range(_RUNS):
-            if clock() >= end:
-                return seconds
-            seconds[i] = min(seconds[i], _time_of(scene, found.candidates[i], clock))
-    return seconds
-
-
-def _time_of(scene: Scene, candidate: Candidate, clock: Clock) -> float:
-    chosen = with_values(scene, {**candidate.values, "fidelity": "given"})
-    begin = clock()
-    simulate(chosen, seed=0, truth=True, raise_on_failure=False)
-    return clock() - begin
-
-
-def chart_of(scene: Scene, found: Study, seconds: Mapping[int, float]) -> Chart:
-    """Chart of a study.
-
-    Parameters
-    ----------
-    scene : Scene
-    found : Study
-    seconds : mapping of int to float
-        Number of the candidate -> least seconds of a run.
-
-    Returns
-    -------
-    Chart
-    """
-    rates = [seconds[i] / scene.duration for i in range(len(found.candidates))]
-    front = front_of(
-        [(rate, each.error) for rate, each in zip(rates, found.candidates, strict=True)]
-    )
-    best = dict(found.reference.rungs)
-    points = tuple(
-        Point(
-            name=difference_name(each.rungs, best),
-            rungs=each.rungs,
-            seconds=rate,
-            errors=each.differences,
-            verdict="reference" if dict(each.rungs) == best else each.verdict,
-            reason=each.reason,
-            starts=each.starts,
-            on_front=on_front,
-        )
-        for each, rate, on_front in zip(found.candidates, rates, front, strict=True)
-    )
-    points = tuple(sorted(points, key=lambda p: (not math.isfinite(p.seconds), p.seconds)))
-    winner, status, verdict = _finding(points, found)
-    return Chart(
-        name=scene.name,
-        title=f"{scene.name} (simulated): speed against accuracy",
-        cost_label="wall time of a simulated second [s/s]",
-        error_label="largest error of a quantity of interest [%]",
-        accuracy=found.accuracy,
-        points=points,
-        reference=REFERENCE,
-        status=status,
-        winner=winner,
-        verdict=verdict,
-        convergence=found.convergence,
-        refused=found.refused,
-        pruned=found.pruned,
-        note=f"{scene.duration:g} s a run, with its settling; the least of several runs",
-    )
-
-
-REFERENCE = "reference"
-"""Name of the point with the highest admissible rung of every effect."""
-
-
-def difference_name(rungs: Mapping[str, str], best: Mapping[str, str]) -> str:
-    """What a combination has other than the reference, in words.
-
-    Examples
-    --------
-    >>> difference_name({"film": "map", "mesh": "x1"}, {"film": "direct", "mesh": "x1"})
-    'film map'
-    """
-    parts = [f"{effect} {rung}" for effect, rung in rungs.items() if rung != best.get(effect)]
-    return ", ".join(parts) or REFERENCE
-
-
-def _finding(points: Sequence[Point], found: Study) -> tuple[str, str, str]:
-    """Winner, status and sentence."""
-    open_ends = [
-        each
-        for each in found.convergence
-        if not each.converged or remaining_error(each) > found.accuracy
-    ]
-    if open_ends:
-        text = "; ".join(f"{e.effect} moves {e.quantity} by {_steps(e)}" for e in open_ends)
-        return "", "not converged", f"no winner: the reference does not converge, {text}"
-    good = [p for p in points if p.verdict in ("within", "reference") and math.isfinite(p.seconds)]
-    if not good:
-        return "", "out of budget", "no winner: nothing ran within the budget"
-    winner = good[0]
-    doubted = [p for p in points if p.verdict == "doubtful" and p.seconds < winner.seconds]
-    if doubted and found.status != "out of budget":  # where more starts might have told
-        return (
-            "",
-            "unresolvable",
-            f"unresolvable at {100 * found.accuracy:.3g} %: {doubted[0].name} is faster than "
-            f"all that is within, but {doubted[0].reason} over {doubted[0].starts} starts; ask for "
-            "less accuracy or a longer duration",
-        )
-    slowest = next(p for p in points if p.verdict == "reference")
-    status = "out of budget" if found.status == "out of budget" else "resolved"
-    late = ", of what the budget left time for" if status == "out of budget" else ""
-    return (
-        winner.name,
-        status,
-        f"within {100 * found.accuracy:.3g} % the fastest{late}: {winner.name}, "
-        f"{winner.error:.2%} off, {slowest.seconds / winner.seconds:.3g} times as fast as the "
-        "reference",
-    )
-
-
-def _steps(each: Convergence) -> str:
-    return " then ".join(f"{abs(step):.2%}" for step in each.steps)
-
-
 # --- showing
 
 
@@ -439,6 +350,14 @@ def chart_table(chart: Chart) -> dict[str, Any]:
         ],
         "refused": list(chart.refused),
         "pruned": list(chart.pruned),
+        "conclusion": list(chart.conclusion),
+        "recommendations": [
+            {**asdict(each), "changes": dict(each.changes)} for each in chart.choices
+        ],
+        "rungs_as_written": [asdict(each) for each in chart.raises],
+        "quantities": dict(chart.labels),
+        "measured_points": chart.measured,
+        "planned_points": chart.planned,
     }
 
 
@@ -453,6 +372,8 @@ def _point_table(point: Point) -> dict[str, Any]:
         "reason": point.reason,
         "starts": point.starts,
         "on_front": point.on_front,
+        "question": point.question,
+        "here": point.here,
         "errors": {
             name: {"mean": each.mean, "standard_error": each.standard_error}
             for name, each in point.errors.items()
@@ -460,7 +381,17 @@ def _point_table(point: Point) -> dict[str, Any]:
     }
 
 
-CSV_HEAD = ("point", "on_front", "verdict", "seconds", "quantity", "error", "standard_error")
+CSV_HEAD = (
+    "question",
+    "point",
+    "here",
+    "on_front",
+    "verdict",
+    "seconds",
+    "quantity",
+    "error",
+    "standard_error",
+)
 
 
 def chart_rows(chart: Chart) -> list[tuple[Any, ...]]:
@@ -477,7 +408,14 @@ def chart_rows(chart: Chart) -> list[tuple[Any, ...]]:
     """
     rows: list[tuple[Any, ...]] = []
     for point in chart.points:
-        head = (point.name, int(point.on_front), point.verdict, point.seconds)
+        head = (
+            point.question,
+            point.name,
+            int(point.here),
+            int(point.on_front),
+            point.verdict,
+            point.seconds,
+        )
         rows += [(*head, name, d.mean, d.standard_error) for name, d in point.errors.items()]
         if not point.errors:
             rows.append((*head, "", math.nan, math.nan))
@@ -495,31 +433,54 @@ def chart_text(chart: Chart) -> str:
     -------
     str
     """
-    lines = [chart.title, chart.verdict, ""]
-    lines += [f"{chart.cost_label:>40}  {'error':>9}  on the front"]
-    lines += [
-        f"{point.seconds:40.4g}  {point.error:9.3%}  {point.name}"
-        + (f" ({point.worst})" if point.error > 0 else "")
-        for point in chart.front
-    ]
+    lines = [chart.title, "", *(chart.conclusion or (chart.verdict,))]
+    for choice in (each for each in chart.choices if each.block):
+        lines += ["", f"{choice.question}: paste into the scene, or {choice.options}", choice.block]
+    if chart.raises:
+        lines += ["", "each rung of your scene by itself"]
+        lines += [f"  {each.text}" for each in chart.raises]
+    for question in chart.questions:
+        lines += ["", *_question_lines(chart, question)]
     if chart.convergence:
-        lines += ["", "convergence of the reference"]
-        lines += [f"  {convergence_text(each)}" for each in chart.convergence]
-    dropped = [f"{p.name}: {p.reason}" for p in chart.points if p.verdict in _UNUSABLE]
+        lines += ["", "convergence of the references"]
+        lines += [f"  {convergence_text(each, chart.labels)}" for each in chart.convergence]
+    unusable = ("invalid",) if chart.unfinished else ("invalid", "doubtful")
+    dropped = [f"{p.name}: {p.reason}" for p in chart.points if p.verdict in unusable]
     for title, texts in (
         ("not valid, or not to be told", dropped),
         ("refused", chart.refused),
         ("pruned", chart.pruned),
     ):
         lines += ["", title, *(f"  {text}" for text in texts)] if texts else []
+    if chart.unfinished and chart.planned:
+        lines += ["", f"so far: {chart.measured} of {chart.planned} combinations measured"]
     return "\n".join([*lines, "", f"measured: {chart.note}"])
 
 
-_UNUSABLE = ("invalid", "doubtful")
+def _question_lines(chart: Chart, question: str) -> list[str]:
+    """Points that a person chooses among: where one stands, what to take, the front."""
+    wanted = {choice.name for choice in chart.choices if choice.question == question}
+    shown = [p for p in chart.of(question) if p.here or p.on_front or p.name in wanted]
+    head = [f"{question or chart.cost_label}", f"{'seconds':>10}  {'error':>8}  choice"]
+    return head + [
+        f"{point.seconds:10.3g}  {_share(point.error):>8}  {point.name}"
+        + (f" ({chart.label(point.worst)})" if point.error > 0 and point.errors else "")
+        for point in shown
+    ]
 
 
-def convergence_text(each: Convergence) -> str:
+def _share(value: float) -> str:
+    return f"{value:.2%}" if math.isfinite(value) else "-"
+
+
+def convergence_text(each: Convergence, labels: Mapping[str, str] | None = None) -> str:
     """How the reference converges with one effect, in one line.
+
+    Parameters
+    ----------
+    each : Convergence
+    labels : mapping of str to str, optional
+        Quantity -> words.
 
     Examples
     --------
@@ -529,10 +490,15 @@ def convergence_text(each: Convergence) -> str:
     """
     order = f"order {each.order:.2f}" if math.isfinite(each.order) else "no order to be told"
     word = "" if each.converged else "; NOT CONVERGED"
+    label = (labels or {}).get(each.quantity, each.quantity)
     return (
-        f"{each.effect} {', '.join(each.levels)}: {each.quantity} moves by {_steps(each)}, "
+        f"{each.effect} {', '.join(each.levels)}: {label} moves by {_steps(each)}, "
         f"{order}, {remaining_error(each):.2%} left{word}"
     )
+
+
+def _steps(each: Convergence) -> str:
+    return " then ".join(f"{abs(step):.2%}" for step in each.steps)
 
 
 def save_rows(chart: Chart, path: Path, *, force: bool = True) -> None:

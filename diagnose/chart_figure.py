@@ -1,4 +1,4 @@
-"""Pictures and pages of a chart: the front, the convergence of the reference, every quantity."""
+"""Pictures and pages of a chart: where one stands, what to take, the front, every quantity."""
 
 import json
 import math
@@ -11,21 +11,21 @@ from xml.sax.saxutils import escape
 
 import numpy as np
 
-from ..sim.fidelity import Convergence
-from .chart import Chart, Point, chart_table, convergence_text, remaining_error, save_rows
+from .chart import Chart, Choice, Point, chart_table, convergence_text, save_rows
+from .chart_words import percent
 from .page import render, visible
 from .picture import picture_bytes, save_picture
 from .report import save_page
 
 _FRONT, _OTHER, _DOUBTFUL, _LIMIT = "#1f5a94", "#9aa3ab", "#e07b39", "#b3261e"
-_WINNER = "#3a923a"
+_WINNER, _SO_FAR, _HERE = "#3a923a", "#e07b39", "#111111"
 _FLOOR = 1e-3  # %, the least error that is drawn; the reference sits on it
 _MOST_ROWS = 12  # of the front, in the table of quantities
 _WIDE = 46  # characters of a name on one line
 
 
 def chart_figure(chart: Chart) -> Any:
-    """Figure of a chart: points with the front, convergence, errors by quantity.
+    """Figure of a chart: a panel of points for each question, errors by quantity.
 
     Parameters
     ----------
@@ -38,18 +38,23 @@ def chart_figure(chart: Chart) -> Any:
     """
     from matplotlib.figure import Figure
 
-    rows = min(len(chart.front), _MOST_ROWS)
-    figure = Figure(figsize=(13, 6.7 + 0.38 * rows + 1.2), layout="constrained")
-    figure.suptitle(f"{chart.title}\n{_wrapped(chart.verdict, 130)}", fontsize=11)
-    ratios = (5.5, 0.38 * rows + 1.2)
-    right = "levels" if chart.convergence else "points"
-    mosaic: Any = [["points", "points", right], ["quantities"] * 3]
-    panels = figure.subplot_mosaic(mosaic, height_ratios=ratios)
-    _draw_points(panels["points"], chart)
-    if chart.convergence:
-        _draw_convergence(panels["levels"], chart)
+    rows = len(_table_points(chart))
+    high = _PER_ROW * rows + _LABELS
+    figure = Figure(figsize=(13, _POINTS + high), layout="constrained")
+    figure.suptitle(f"{chart.title}\n{_wrapped(chart.verdict, 150)}", fontsize=11)
+    questions = chart.questions or ("",)
+    names = [f"points {i}" for i in range(len(questions))]
+    mosaic: Any = [names, ["quantities"] * len(names)]
+    panels = figure.subplot_mosaic(mosaic, height_ratios=(_POINTS - 1, high))
+    for name in names[1:]:
+        panels[name].sharey(panels[names[0]])
+    for name, question in zip(names, questions, strict=True):
+        _draw_points(panels[name], chart, question)
     _draw_quantities(figure, panels["quantities"], chart)
     return figure
+
+
+_POINTS, _PER_ROW, _LABELS = 6.2, 0.38, 1.9  # inches: panels, a row of the table, its words
 
 
 def _wrapped(text: str, width: int) -> str:
@@ -61,9 +66,10 @@ def _shown(point: Point) -> float:
     return max(100 * point.error, _FLOOR)
 
 
-def _draw_points(axes: Any, chart: Chart) -> None:
-    finite = [p for p in chart.points if math.isfinite(p.error) and math.isfinite(p.seconds)]
-    front = [p for p in finite if p.on_front]
+def _draw_points(axes: Any, chart: Chart, question: str) -> None:
+    points = chart.of(question)
+    finite = [p for p in points if math.isfinite(p.error) and math.isfinite(p.seconds)]
+    front = sorted((p for p in finite if p.on_front), key=lambda p: p.seconds)
     axes.step(
         [p.seconds for p in front],
         [_shown(p) for p in front],
@@ -74,7 +80,7 @@ def _draw_points(axes: Any, chart: Chart) -> None:
         zorder=1,
     )
     for number, point in enumerate(chart.points):
-        if point in finite:
+        if any(point is each for each in finite):
             _draw_point(axes, point, number)
     if chart.accuracy is not None:
         axes.axhline(100 * chart.accuracy, color=_LIMIT, lw=1, ls="--", label="accuracy asked")
@@ -86,22 +92,71 @@ def _draw_points(axes: Any, chart: Chart) -> None:
             zorder=0,
             label="the reference's own error",
         )
-    for point in (p for p in finite if p.name == chart.winner):
-        place = (point.seconds, _shown(point))
-        axes.plot(*place, "o", ms=15, mfc="none", mew=2, color=_WINNER, label=_fastest(chart))
     for label, style in _KINDS.items():
         if any(_kind(p) == label for p in finite):
             axes.plot([], [], ls="none", label=label, **style)
+    _mark_choice(axes, chart, question, finite)
+    _mark_here(axes, finite)
     axes.set(xscale="log", xlabel=chart.cost_label, ylabel=chart.error_label)
+    if question:
+        axes.set_title(question, fontsize=10)
     if chart.accuracy is not None:
         axes.set_yscale("log")
-        axes.set_ylim(bottom=_FLOOR / 2)
-        axes.set_ylim(top=_HEADROOM * axes.get_ylim()[1])
+        axes.set_ylim(_FLOOR / 2, _HEADROOM * _highest(chart))
     _plain_numbers(axes.xaxis)
     _plain_numbers(axes.yaxis)
     axes.grid(alpha=0.3, which="both")
     _number(axes, front)
     _legend_below(axes, ncols=3)
+
+
+def _mark_choice(axes: Any, chart: Chart, question: str, finite: list[Point]) -> None:
+    """Ring round what to take: green where that is final."""
+    choice = _choice_of(chart, question)
+    name = chart.winner if choice is None else choice.name
+    final = choice is None or choice.status == "resolved"
+    if choice is not None and choice.status == "not converged":
+        return
+    for point in (p for p in finite if p.name == name):
+        style = {"color": _WINNER, "ls": "-"} if final else {"color": _SO_FAR, "ls": ":"}
+        label = _fastest(chart) if final else "may be enough, not certain"
+        axes.scatter(
+            point.seconds,
+            _shown(point),
+            s=260,
+            facecolors="none",
+            edgecolors=style["color"],
+            linestyles=style["ls"],
+            linewidths=2.2,
+            label=label,
+            zorder=3,
+        )
+
+
+def _choice_of(chart: Chart, question: str) -> Choice | None:
+    return next((each for each in chart.choices if each.question == question), None)
+
+
+def _mark_here(axes: Any, finite: list[Point]) -> None:
+    for point in (p for p in finite if p.here):
+        place = (point.seconds, _shown(point))
+        axes.plot(*place, "*", ms=16, mfc="#ffd23f", mec=_HERE, label="your scene", zorder=5)
+        right = axes.transAxes.inverted().transform(axes.transData.transform(place))[0] > _RIGHT
+        axes.annotate(
+            "your scene",
+            place,
+            xytext=(-10 if right else 10, -12),
+            textcoords="offset points",
+            ha="right" if right else "left",
+            va="top",
+            fontsize=9,
+            weight="bold",
+            color=_HERE,
+            zorder=5,
+        )
+
+
+_RIGHT = 0.7  # of the panel: further right words stand left of their mark
 
 
 def _number(axes: Any, front: list[Point]) -> None:
@@ -129,7 +184,13 @@ def _number(axes: Any, front: list[Point]) -> None:
         )
 
 
-_HEADROOM = 2.0  # of the error axis: the highest number stays inside the frame
+def _highest(chart: Chart) -> float:
+    """Largest error that is drawn, or the accuracy asked [%]."""
+    errors = [_shown(p) for p in chart.points if math.isfinite(p.error)]
+    return max([*errors, 100 * (chart.accuracy or 0.0), _FLOOR])
+
+
+_HEADROOM = 2.5  # of the error axis: the highest number stays inside the frame
 _NEAR = (0.03, 0.08)  # of the panel's width and height: two numbers would touch
 
 
@@ -143,7 +204,7 @@ def _legend_below(axes: Any, ncols: int) -> None:
 def _fastest(chart: Chart) -> str:
     if chart.accuracy is None:
         return "fastest within the standard error of the best"
-    return "fastest within the accuracy"
+    return "cheapest within the accuracy"
 
 
 def _plain_numbers(axis: Any) -> None:
@@ -184,38 +245,14 @@ def _draw_point(axes: Any, point: Point, number: int) -> None:
     mark.set_gid(f"point-{number}")
 
 
-def _draw_convergence(axes: Any, chart: Chart) -> None:
-    """Changes of the reference from level to level, and what Richardson leaves."""
-    for colour, each in enumerate(chart.convergence):
-        sizes = [max(100 * abs(step), _FLOOR / 10) for step in each.steps]
-        rest = max(100 * remaining_error(each), _FLOOR / 10)
-        places = range(1, len(sizes) + 1)
-        axes.plot(places, sizes, "o-", color=f"C{colour}", lw=1.2, label=_convergence_label(each))
-        axes.plot(len(sizes) + 1, rest, "x", color=f"C{colour}", ms=7)
-    n_steps = max(len(each.steps) for each in chart.convergence)
-    labels = ["coarse\nto middle", "middle\nto fine", "left after\nRichardson"]
-    axes.set_xticks(range(1, n_steps + 2), labels[: n_steps + 1])
-    axes.set_yscale("log")
-    _plain_numbers(axes.yaxis)
-    axes.set_xlim(0.7, n_steps + 1.3)
-    axes.set_ylabel("change of the quantity that moves most [%]")
-    axes.set_title("Convergence of the reference", fontsize=10)
-    if chart.accuracy is not None:
-        axes.axhline(100 * chart.accuracy / 3, color=_LIMIT, lw=1, ls=":", label="accuracy / 3")
-    axes.grid(alpha=0.3, which="both")
-    _legend_below(axes, ncols=1)
-
-
-def _convergence_label(each: Convergence) -> str:
-    order = f"order {each.order:.1f}" if math.isfinite(each.order) else "order not told"
-    return f"{each.effect} ({each.quantity}): {order}{'' if each.converged else ', NOT CONVERGED'}"
-
-
 def _draw_quantities(figure: Any, axes: Any, chart: Chart) -> None:
     """Errors of every quantity for the points of the front, as a table of colours."""
     from matplotlib.colors import LogNorm
 
     points = _table_points(chart)
+    if not points:
+        axes.set_axis_off()
+        return
     names = list(dict.fromkeys(name for _, point in points for name in point.errors))
     if not names:
         axes.set_axis_off()
@@ -240,10 +277,12 @@ def _draw_quantities(figure: Any, axes: Any, chart: Chart) -> None:
             fontsize=6.5,
             color="white" if dark else "black",
         )
-    axes.set_xticks(range(len(names)), names, rotation=35, ha="right", fontsize=7)
-    labels = [f"{number} {_wrapped(point.name, _WIDE)}" for number, point in points]
+    words = [chart.label(name) for name in names]
+    axes.set_xticks(range(len(names)), words, rotation=35, ha="right", fontsize=7)
+    labels = [_wrapped(label, _WIDE) for label, _ in points]
     axes.set_yticks(range(len(points)), labels, fontsize=7)
-    axes.set_title(f"Error of every quantity on the front [{_unit(chart)}]", fontsize=10)
+    what = "" if chart.choices else " on the front"
+    axes.set_title(f"Error of every quantity{what} [{_unit(chart)}]", fontsize=10)
     figure.colorbar(shown, ax=axes, pad=0.01).ax.tick_params(labelsize=7)
 
 
@@ -259,10 +298,17 @@ def _unit(chart: Chart) -> str:
     return "%" if chart.accuracy is not None else "% of the limit"
 
 
-def _table_points(chart: Chart) -> list[tuple[int, Point]]:
-    """Numbered points of the front; of many the most accurate."""
-    numbered = list(enumerate(chart.front, start=1))
-    return numbered[-_MOST_ROWS:]
+def _table_points(chart: Chart) -> list[tuple[str, Point]]:
+    """Rows of the table: where one stands and what to take; else the front, its most accurate."""
+    if not chart.choices:
+        numbered = [(f"{i} {p.name}", p) for i, p in enumerate(chart.front, start=1)]
+        return numbered[-_MOST_ROWS:]
+    rows = []
+    for choice in chart.choices:
+        for point in (p for p in chart.of(choice.question) if p.errors):
+            if point.here or point.name == choice.name:
+                rows.append((f"{choice.question}: {point.name}", point))
+    return rows
 
 
 def _percent(value: float) -> str:
@@ -285,16 +331,15 @@ def chart_svg(chart: Chart) -> str:
     str
     """
     text = picture_bytes(chart_figure(chart), ".svg").decode()
-    return _PLACE.sub(lambda found: found[0] + _pointer(chart.points[int(found[1])]), text)
+    return _PLACE.sub(lambda found: found[0] + _pointer(chart, chart.points[int(found[1])]), text)
 
 
 _PLACE = re.compile(r'<g id="point-(\d+)">')
 
 
-def _pointer(point: Point) -> str:
-    words = (
-        f"{point.name}: {point.seconds:.3g} s, error {point.error:.2%} ({point.worst or 'none'})"
-    )
+def _pointer(chart: Chart, point: Point) -> str:
+    worst = chart.label(point.worst) or "none"
+    words = f"{point.name}: {point.seconds:.3g} s, error {point.error:.2%} ({worst})"
     return f"<title>{escape(visible(words))}</title>"
 
 
@@ -310,15 +355,32 @@ def chart_html(chart: Chart) -> str:
     str
     """
     svg = chart_svg(chart)
-    numbers = {id(point): number for number, point in enumerate(chart.front, start=1)}
     return render(
         "chart.html.j2",
         chart=chart,
         svg=svg[svg.index("<svg") :],
-        rows=[(numbers.get(id(point), ""), point) for point in chart.points],
-        convergence=[convergence_text(each) for each in chart.convergence],
+        tables=[(question, _rows(chart, question)) for question in chart.questions],
+        quantities=_quantity_rows(chart),
+        convergence=[convergence_text(each, chart.labels) for each in chart.convergence],
         finite=math.isfinite,
+        percent=percent,
     )
+
+
+def _rows(chart: Chart, question: str) -> list[tuple[int | str, Point, bool]]:
+    """Number on the front, point, whether it is what to take."""
+    points, choice = chart.of(question), _choice_of(chart, question)
+    front = sorted((p for p in points if p.on_front), key=lambda p: p.seconds)
+    numbers: dict[int, int | str] = {id(point): i for i, point in enumerate(front, start=1)}
+    wanted = choice.name if choice else None
+    return [(numbers.get(id(point), ""), point, point.name == wanted) for point in points]
+
+
+def _quantity_rows(chart: Chart) -> list[tuple[str, list[Any]]]:
+    """Of the scene as written: quantity in words, its difference for each question."""
+    own = [next((p for p in chart.of(q) if p.here), None) for q in chart.questions]
+    shown = [point for point in own if point is not None]
+    return [(words, [p.errors.get(name) for p in shown]) for name, words in chart.labels.items()]
 
 
 def save_chart(chart: Chart, path: Path, *, force: bool = True) -> None:

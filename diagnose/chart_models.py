@@ -14,7 +14,7 @@ from ..datasets.record import DataError, DataSet, Recording
 from ..datasets.splits import group_folds
 from ..features.needs import Layout
 from ..features.table import absent_features, catalogue, feature_names, feature_row
-from ..sim.fidelity import Difference
+from ..sim.pilot import Difference
 from .chart import Chart, Clock, Point, front_of
 from .grades import GRADE_NAMES, grades_of
 from .tabulate import FeatureTable, Progress, feature_table, recording_layout

@@ -336,6 +336,35 @@ def progress_bar(what: str) -> Iterator[Callable[[int, int], None] | None]:
         yield update
 
 
+@contextmanager
+def time_bar() -> Iterator[Callable[[str, float, float], None] | None]:
+    """Bar on stderr where a person watches: what is done now, and the seconds left.
+
+    Gives a function of what is done, seconds gone by, and seconds that are left.
+    """
+    if not sys.stderr.isatty():
+        yield None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn
+
+    left = TextColumn("about {task.fields[left]:.0f} s left")
+    columns = (BarColumn(), left, TextColumn("{task.description}"))
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("starting", total=1.0, left=0.0)
+
+        def update(what: str, gone: float, remaining: float) -> None:
+            bar.update(
+                task,
+                description=what,
+                completed=gone,
+                total=max(gone + remaining, 1e-3),
+                left=remaining,
+            )
+
+        yield update
+
+
 def overrides_of(pairs: Sequence[str]) -> dict[str, Any]:
     """``path=value`` pairs; a value that reads as a number is one."""
     values: dict[str, Any] = {}

@@ -404,9 +404,17 @@ def stability(
     "--budget",
     type=Share(1.0, 1e6),
     default=None,
-    help="Seconds after which nothing further is begun.",
+    help="Seconds; 90 of a scene, of a data set none. The same command with -o goes on.",
 )
-@click.option("-o", "--output", type=PATH, help="Chart (.svg, .png, .pdf, .html, .json, .csv).")
+@click.option("-o", "--output", type=PATH, help="Chart (.html, .svg, .png, .pdf, .json, .csv).")
+@click.option("--apply", "applied", type=PATH, help="Scene to write (.toml): what is recommended.")
+@click.option(
+    "--choice",
+    type=click.Choice(["kept", "raised"]),
+    default="kept",
+    show_default=True,
+    help="Of --apply: with the rungs of the scene kept, or with rungs that may change.",
+)
 @seed_option
 @jobs_option
 @force_option
@@ -417,38 +425,79 @@ def chart(
     accuracy: float | None,
     budget: float | None,
     output: Path | None,
+    applied: Path | None,
+    choice: str,
     seed: int,
     jobs: int | None,
     force: bool,
     as_json: bool,
 ) -> None:
-    """Speed against accuracy: of the rungs and steps of SCENE, or the diagnosis on DATA (.h5)."""
-    from .chart import chart_table, chart_text, scene_chart
+    """How much model SCENE needs: its own error, and what would be enough; or diagnosis on DATA.
 
-    check_outputs([subject], [(output, CHART_SUFFIXES)], force)
+    Of a scene: the error of its rungs and steps as they are written, the cheapest numerics that do
+    where its rungs stay, and the cheapest rungs where they may change. Cheap information comes
+    first, and a budget or Ctrl-C ends it with what is known by then; with -o the same command goes
+    on from there. Of a data set (.h5): features and models, cost against error.
+    """
     of_data = subject.endswith(DATA_SUFFIXES)
-    if of_data and (pairs or accuracy is not None):
-        raise click.UsageError("--set and --accuracy are for a scene, not for a data set")
+    if of_data and (pairs or accuracy is not None or applied):
+        raise click.UsageError("--set, --accuracy and --apply are for a scene, not for a data set")
     if seed and not of_data:
         raise click.UsageError("--seed is of the models on a data set; a scene's chart draws none")
+    if of_data:
+        found = _data_chart(subject, budget, output, seed, jobs, force)
+        _emit_chart(found, [output], as_json)
+        return
+    from .chart_commands import scene_chart_command
+
+    found, interrupted = scene_chart_command(
+        subject,
+        overrides_of(pairs),
+        accuracy=accuracy,
+        budget=_CHART_BUDGET if budget is None else budget,
+        output=output,
+        applied=applied,
+        choice=choice,
+        jobs=worker_count(jobs),
+        force=force,
+    )
+    _emit_chart(found, [output, applied], as_json)
+    if interrupted:
+        going_on = "; the same command goes on from there" if output else ""
+        click.echo(f"interrupted: what was measured is shown{going_on}", err=True)
+        raise click.exceptions.Exit(EXIT_FAILED)
+
+
+_CHART_BUDGET = 90.0  # s of a scene
+
+
+def _data_chart(
+    subject: str,
+    budget: float | None,
+    output: Path | None,
+    seed: int,
+    jobs: int | None,
+    force: bool,
+) -> Any:
+    from .chart_figure import save_chart
+    from .chart_models import model_chart
+
+    check_outputs([subject], [(output, CHART_SUFFIXES)], force)
     with progress_bar("measuring") as progress:
-        if of_data:
-            from .chart_models import model_chart
-
-            found = model_chart(
-                subject, seed=seed, budget=budget, jobs=worker_count(jobs), progress=progress
-            )
-        else:
-            from ..sim.scene import load_scene
-
-            machine = load_scene(subject, overrides_of(pairs))
-            found = scene_chart(machine, accuracy=accuracy, budget=budget, progress=progress)
+        found = model_chart(
+            subject, seed=seed, budget=budget, jobs=worker_count(jobs), progress=progress
+        )
     if output is not None:
-        from .chart_figure import save_chart
-
         save_chart(found, output, force=force)
-    files = [str(output)] if output is not None else []
-    emit({**chart_table(found), "files": files}, as_json, "\n".join([chart_text(found), *files]))
+    return found
+
+
+def _emit_chart(found: Any, files: Sequence[Path | None], as_json: bool) -> None:
+    from .chart import chart_table, chart_text
+
+    written = [str(path) for path in files if path is not None]
+    text = "\n".join([chart_text(found), *written])
+    emit({**chart_table(found), "files": written}, as_json, text)
 
 
 @click.command()

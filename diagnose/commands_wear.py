@@ -704,14 +704,15 @@ def blindspots(
     page until all are done.
     """
     from .blindspot_signals import signal_rows
-    from .blindspots import Kept, file_hash, find_blind_spots, recipe_of, run_key
+    from .blindspots import file_hash, find_blind_spots, kept_rows, recipe_of, run_key
     from .blindspots_text import blind_spots_table, blind_spots_text
     from .bundle import kind_of
+    from .kept import part_file
     from .modelfile import load_model
     from .ownfile import CLASS_MODEL
     from .report import save_page
 
-    part = None if output is None else output.with_suffix(".part.json")
+    part = part_file(output)
     going_on = part is not None and part.exists() and not force
     inputs = [model_file, *([background] if background else [])]
     check_outputs(inputs, [(output, PAGE_SUFFIXES)], force or going_on)
@@ -722,7 +723,7 @@ def blindspots(
     if part is not None and force:
         part.unlink(missing_ok=True)
     heard = file_hash(background) if background else ""
-    kept = Kept(part, run_key(file_hash(model_file), plan, machines, seed, heard))
+    kept = kept_rows(part, run_key(file_hash(model_file), plan, machines, seed, heard))
     with progress_bar("rows") as progress:
         found = find_blind_spots(
             model,
@@ -740,8 +741,8 @@ def blindspots(
 
         page = blind_spots_html(table, notice=model.notice)
         save_page(page, output, force=force or going_on)
-        if part is not None and not found.left:
-            part.unlink(missing_ok=True)
+        if not found.left:
+            kept.drop()
     emit(table, as_json, blind_spots_text(table))
 
 

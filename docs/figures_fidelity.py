@@ -11,14 +11,18 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from wearstate.diagnose.chart import Chart, chart_text, scene_chart
+from wearstate.diagnose.chart import Chart, chart_text
 from wearstate.diagnose.chart_figure import save_chart
+from wearstate.diagnose.chart_scene import scene_chart
 from wearstate.diagnose.stability import save_figure
 from wearstate.diagnose.stability_maps import atlas
 from wearstate.sim.scene import load_scene, scene_names
 
 BUDGET = 300.0
 """Seconds of a chart; what it leaves no time for is said in the picture."""
+
+JOBS = 2
+"""Worker processes of a chart; its errors do not depend on them."""
 
 SHORTER: dict[str, dict[str, Any]] = {
     "bilge-pump": {"duration": "0.8 s"},  # four revolutions
@@ -36,10 +40,10 @@ COARSER: dict[str, dict[str, Any]] = {
 """Scenes whose knocks scatter too much for their own accuracy in that time."""
 
 
-def chart(name: str, budget: float | None = BUDGET) -> Chart:
+def chart(name: str, budget: float | None = BUDGET, jobs: int = JOBS) -> Chart:
     """Chart of a scene, with its rungs as written where they are pinned."""
     changes = SHORTER.get(name, {}) | COARSER.get(name, {})
-    return scene_chart(load_scene(name, changes), budget=budget)
+    return scene_chart(load_scene(name, changes), budget=budget, jobs=jobs)
 
 
 def main(names: Sequence[str], folder: Path) -> None:

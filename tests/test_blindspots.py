@@ -15,7 +15,7 @@ from wearstate.diagnose.blindspot_rows import scene_rows
 from wearstate.diagnose.blindspot_scores import Row, Said, ranked, row_figures
 from wearstate.diagnose.blindspot_signals import signal_rows
 from wearstate.diagnose.blindspot_table import SCENE_SHIFTS, Shift
-from wearstate.diagnose.blindspots import Kept, find_blind_spots, recipe_of
+from wearstate.diagnose.blindspots import find_blind_spots, kept_rows, recipe_of
 from wearstate.diagnose.blindspots_page import blind_spots_html
 from wearstate.diagnose.blindspots_text import blind_spots_table, blind_spots_text
 from wearstate.diagnose.cli import cli
@@ -258,7 +258,7 @@ def test_a_run_is_gone_on_with(found, tmp_path, monkeypatch):
     rows = shifts_of("piston.mass", 1.0, 1.25)
     ways = {"machines": 2, "scenes": rows, "signals": gains()}
     path = tmp_path / "page.part.json"
-    first = find_blind_spots(MODEL, PUMP, **ways, budget=1e-9, kept=Kept(path, "key"))
+    first = find_blind_spots(MODEL, PUMP, **ways, budget=1e-9, kept=kept_rows(path, "key"))
     assert (first.rows, len(first.left)) == ((), 3)
     assert first.baseline == found.baseline
     table = blind_spots_table(first, CARD)
@@ -267,22 +267,22 @@ def test_a_run_is_gone_on_with(found, tmp_path, monkeypatch):
 
     steps = []
     say = lambda done, total: steps.append((done, total))  # noqa: E731
-    again = find_blind_spots(MODEL, PUMP, **ways, kept=Kept(path, "key"), progress=say)
+    again = find_blind_spots(MODEL, PUMP, **ways, kept=kept_rows(path, "key"), progress=say)
     assert again == found
     assert steps == [(1, 4), (2, 4), (3, 4), (4, 4)]
 
     monkeypatch.setattr(blindspots, "simulate", None)
-    assert find_blind_spots(MODEL, PUMP, **ways, kept=Kept(path, "key")) == found
+    assert find_blind_spots(MODEL, PUMP, **ways, kept=kept_rows(path, "key")) == found
 
 
 def test_rows_of_another_run_are_refused(tmp_path):
     path = tmp_path / "page.part.json"
     path.write_text('{"key": "other", "rows": []}')
     with pytest.raises(DataError, match=r"another model.*delete it, or use --force"):
-        Kept(path, "key")
+        kept_rows(path, "key")
     path.write_text('{"key": "key"}')
     with pytest.raises(DataError, match=r"damaged.*delete it"):
-        Kept(path, "key")
+        kept_rows(path, "key")
 
 
 # --- figures --------------------------------------------------------------------------------------

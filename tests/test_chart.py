@@ -5,40 +5,46 @@ import itertools
 import json
 import math
 import re
+import tomllib
+from dataclasses import replace
 
-import numpy as np
 import pytest
 from click.testing import CliRunner
 from hypothesis import given
 from hypothesis import strategies as st
+from wearstate.datasets.quantities import QUANTITIES
 from wearstate.diagnose.chart import (
     CSV_HEAD,
-    REFERENCE,
-    chart_of,
     chart_table,
     chart_text,
     front_of,
     remaining_error,
-    scene_chart,
-    timed_again,
 )
 from wearstate.diagnose.chart_figure import SUFFIXES, chart_figure, chart_html, save_chart
+from wearstate.diagnose.chart_scene import KEPT, RAISED, chart_of, scene_chart
+from wearstate.diagnose.chart_words import HERE
 from wearstate.diagnose.cli import cli
-from wearstate.sim.fidelity import Candidate, Convergence, Difference, Study
+from wearstate.sim.ladder import with_values
+from wearstate.sim.pilot import Candidate, Difference, Pilot, differences
 from wearstate.sim.scene import load_scene
+from wearstate.sim.study import Answer, Convergence, Raise, Study
 
 FILM = {"film": "direct", "mesh": "x1/2"}
+WRITTEN = {"film": "map", "mesh": "x1"}
+VALUES = {"direct": 72, "x1/2": (144, 33), "x1": (72, 17), "x2": (36, 9)}
 
 
 def candidate(seconds, error, verdict="within", reason="", **rungs):
-    """A candidate of a film whose worst quantity is `peak`."""
+    """A candidate of a film whose worst quantity is the peak force."""
     found = {
-        "rms": Difference(mean=error / 4, standard_error=1e-5),
-        "peak": Difference(mean=-error, standard_error=1e-4),
+        "force_rms": Difference(mean=error / 4, standard_error=1e-5),
+        "force_peak": Difference(mean=-error, standard_error=1e-4),
     }
+    names = {**FILM, **rungs}
+    mesh = dict(zip(("film.n_theta", "film.n_z"), VALUES[names["mesh"]], strict=True))
     return Candidate(
-        rungs={**FILM, **rungs},
-        values={"film.rung": {**FILM, **rungs}["film"]},
+        rungs=names,
+        values={"film.rung": names["film"], **mesh},
         cost=seconds,
         differences={} if verdict == "invalid" else found,
         starts=8,
@@ -52,7 +58,7 @@ def convergence(steps=(0.004, 0.001), order=2.0, converged=True):
     return Convergence(
         effect="mesh",
         levels=("x2", "x1", "x1/2"),
-        quantity="peak",
+        quantity="force_peak",
         steps=steps,
         order=order,
         remaining=abs(steps[-1]) / 3,
@@ -61,33 +67,55 @@ def convergence(steps=(0.004, 0.001), order=2.0, converged=True):
 
 
 REFERENCE_POINT = candidate(4.0, 0.0)
-SHORT = candidate(0.01, 0.3, "beyond", "peak is off by 30.00%", film="short")
-MAP = candidate(0.02, 0.001, film="map")
+SHORT = candidate(0.01, 0.3, "beyond", "force_peak is off by 30.00%", film="short", mesh="x1")
+HERE_POINT = candidate(0.02, 0.001, film="map", mesh="x1")
 COARSE = candidate(2.0, 0.01, mesh="x1")
 TORN = candidate(0.005, 0.0, "invalid", "a link is in tension", film="link")
+COARSE_MAP = candidate(0.015, 0.012, film="map", mesh="x2")
 
 
-def study_of(*candidates, level=None, status="resolved"):
+def answer_of(*candidates, level=None, status="resolved", written=HERE_POINT, reference=None):
+    reference = reference or REFERENCE_POINT
+    shown = sorted((*candidates, reference), key=lambda c: c.cost)
+    chosen = next(c for c in shown if c.verdict == "within")
+    changes = {} if chosen is written else dict(chosen.values)
+    return Answer(
+        reference=reference,
+        written=written,
+        chosen=chosen,
+        status=status,
+        candidates=tuple(shown),
+        convergence=(level or convergence(),),
+        changes=changes,
+    )
+
+
+def study_of(*candidates, level=None, status="resolved", raises=()):
+    fine = candidate(0.1, 0.0, film="map", mesh="x1/2")
+    so_far = "so far" if status == "out of budget" else status
     return Study(
         accuracy=0.02,
-        reference=REFERENCE_POINT,
-        candidates=(*candidates, REFERENCE_POINT),
-        convergence=(level or convergence(),),
+        written=WRITTEN,
+        kept=answer_of(HERE_POINT, COARSE_MAP, reference=fine, status=so_far),
+        raised=answer_of(HERE_POINT, *candidates, level=level, status=so_far),
+        raises=raises,
         refused=("film = finite: knows no feed",),
         pruned=("mesh = x4: a cheaper one errs no more",),
+        measured=5,
+        planned=9 if status == "out of budget" else 5,
         status=status,
     )
 
 
 def chart_from(*candidates, **options):
-    found = study_of(*candidates, **options)
-    scene = load_scene("journal-bearing", {"duration": "0.5 s"})
-    return chart_of(scene, found, {i: c.seconds for i, c in enumerate(found.candidates)})
+    return chart_of(
+        load_scene("journal-bearing", {"duration": "0.5 s"}), study_of(*candidates, **options)
+    )
 
 
 @pytest.fixture
 def chart():
-    return chart_from(SHORT, MAP, COARSE, TORN)
+    return chart_from(SHORT, COARSE, TORN)
 
 
 # -- the front
@@ -112,29 +140,79 @@ def test_nothing_beats_the_front_and_the_front_beats_the_rest(found):
 
 def test_points_are_rates_with_their_worst_quantity(chart):
     # half a second of recording: rates are twice the seconds
-    assert {p.name: p.seconds for p in chart.points if p.errors} == {
+    assert {p.name: p.seconds for p in chart.of(RAISED) if p.errors} == {
+        HERE: 0.04,
         "film short": 0.02,
-        "film map": 0.04,
-        "mesh x1": 4.0,
-        REFERENCE: 8.0,
+        "film direct": 4.0,
+        "film direct, mesh 144 x 33": 8.0,
     }
-    assert [p.name for p in chart.front] == ["film short", "film map", REFERENCE]
-    assert {p.worst for p in chart.points if p.error > 0 and p.errors} == {"peak"}
-    assert chart.front[0].error == 0.3
+    assert {p.worst for p in chart.points if p.error > 0 and p.errors} == {"force_peak"}
 
 
-# -- who wins
+# -- where one stands, and what to take
 
 
-def test_the_fastest_within_wins(chart):
-    assert (chart.winner, chart.status) == ("film map", "resolved")
-    assert "within 2 % the fastest: film map, 0.10% off, 200 times as fast" in chart.verdict
+def test_the_scene_as_written_is_first_in_every_question(chart):
+    assert chart.questions == (KEPT, RAISED)
+    for question in chart.questions:
+        first, *others = chart.of(question)
+        assert (first.name, first.here) == (HERE, True)
+        assert not any(point.here for point in others)
+        seconds = [point.seconds for point in others]
+        assert seconds == sorted(seconds)
 
 
-def test_nothing_but_the_reference_within(chart):
-    alone = chart_from(SHORT)
-    assert alone.winner == REFERENCE
-    assert "1 times as fast" in alone.verdict
+def test_three_sentences_say_where_one_stands_and_what_to_take(chart):
+    here, kept, raised = chart.conclusion
+    assert here.startswith("Your scene as written is within 2 % of the best rungs: 0.1 % off in")
+    assert "film force, peak" in here
+    assert "With your rungs kept: take mesh 36 x 9 (1.2 % off in film force, peak" in kept
+    assert "1.3 times as fast as your scene" in kept
+    assert "If rungs may change: change nothing (0.1 % off in film force, peak)." in raised
+
+
+def test_a_rung_of_the_scene_is_charged_in_words_and_hertz():
+    pump = load_scene("bilge-pump", {"duration": "0.4 s"})
+    found = study_of()
+    cost = Candidate(
+        rungs={},
+        values={},
+        cost=1.0,
+        differences={"band_3": Difference(mean=-0.64, standard_error=0.02)},
+        verdict="beyond",
+    )
+    raises = (Raise(effect="pressure", written="two-level", best="chamber", candidate=cost),)
+    chart = chart_of(pump, replace(found, raises=raises))
+    [row] = chart.raises
+    assert row.text == (
+        "your pressure rung (two-level, not chamber) is 64 % +- 2 % off in vibration 306 to 758 Hz"
+    )
+    assert "Rung by rung: pressure two-level instead of chamber 64 %." in chart.conclusion[0]
+    assert row.text in chart_text(chart)
+    assert "306 to 758 Hz" in chart_html(chart)
+
+
+def test_what_to_take_comes_as_toml_and_as_options(chart):
+    kept, raised = chart.choices
+    assert kept.changes == {"film.rung": "map", "film.n_theta": 36, "film.n_z": 9}
+    values = tomllib.loads(kept.block)
+    assert values == {"film": {"rung": "map", "n_theta": 36, "n_z": 9}}
+    assert kept.options == "--set film.rung=map --set film.n_theta=36 --set film.n_z=9"
+    assert (raised.keeps, raised.block) == (True, "")
+    for shown in (chart_text(chart), chart_html(chart), json.dumps(chart_table(chart))):
+        assert "n_theta = 36" in shown
+
+
+def test_an_unfinished_search_calls_nothing_final():
+    chart = chart_from(SHORT, status="out of budget")
+    assert (chart.winner, chart.status) == ("", "out of budget")
+    for choice in chart.choices:
+        assert "so far this is enough: 5 of 9 combinations measured" in choice.sentence
+    page = chart_html(chart)
+    assert "so far 5 of 9 combinations are measured. The same command goes on" in page
+    ring = "cheapest within the accuracy"
+    assert ring not in page
+    assert ring in chart_html(chart_from(SHORT))
 
 
 @pytest.mark.parametrize(
@@ -145,11 +223,23 @@ def test_nothing_but_the_reference_within(chart):
         convergence(steps=(0.021, 0.02), order=0.07),
     ],
 )
-def test_no_winner_where_the_reference_does_not_converge(level):
-    chart = chart_from(SHORT, MAP, level=level)
-    assert (chart.winner, chart.status) == ("", "not converged")
-    assert chart.verdict.startswith("no winner: the reference does not converge, mesh moves peak")
+def test_nothing_is_recommended_where_the_reference_does_not_converge(level):
+    chart = chart_from(SHORT, level=level)
+    assert chart.winner == ""
+    assert chart.choices[-1].status == "not converged"
+    assert (
+        "nothing can be recommended: the reference itself still moves with the mesh"
+        in (chart.conclusion[-1])
+    )
     assert chart_table(chart)["winner"] is None
+
+
+def test_doubt_about_something_cheaper_is_said():
+    doubt = candidate(0.015, 0.02, "doubtful", "peak is off by 2.00%", film="finite", mesh="x1")
+    chart = chart_from(SHORT, doubt, status="unresolvable")
+    assert chart.winner == ""
+    told = "not told from the reference for scatter: film finite (2 % off in film force, peak over"
+    assert told in chart.conclusion[-1]
 
 
 def test_an_order_near_none_is_not_extrapolated_from():
@@ -159,60 +249,18 @@ def test_an_order_near_none_is_not_extrapolated_from():
     assert remaining_error(flat) == pytest.approx(0.001 / (math.sqrt(2) - 1))
 
 
-def test_doubt_about_something_faster_is_unresolvable():
-    doubt = candidate(0.015, 0.02, "doubtful", "peak is off by 2.00%", film="finite")
-    chart = chart_from(SHORT, MAP, doubt)
-    assert (chart.winner, chart.status) == ("", "unresolvable")
-    assert "film finite is faster than all that is within, but peak is off" in chart.verdict
-
-
-def test_doubt_about_something_slower_is_none():
-    doubt = candidate(3.0, 0.02, "doubtful", "peak is off by 2.00%", mesh="x4")
-    assert chart_from(SHORT, MAP, doubt).winner == "film map"
-
-
-def test_what_the_budget_left_out_is_said():
-    chart = chart_from(MAP, status="out of budget")
-    assert chart.status == "out of budget"
-    assert "of what the budget left time for: film map" in chart.verdict
-
-
-# -- timing
-
-
-def test_the_front_is_timed_again_and_the_least_counts(monkeypatch):
-    from wearstate.diagnose import chart as module
-
-    now, runs = [0.0], []
-
-    def simulate(scene, **options):
-        runs.append((scene.film.rung, options["truth"]))
-        now[0] += (5.0, 0.015, 0.5)[(len(runs) - 1) % 3]
-
-    monkeypatch.setattr(module, "simulate", simulate)
-    scene = load_scene("journal-bearing", {"fidelity": "auto"})
-    found = study_of(MAP, COARSE)
-    seconds = timed_again(scene, found, lambda: now[0])
-    assert runs == [("map", True)] * 3 + [("direct", True)] * 3  # the coarse mesh is beaten
-    assert seconds == pytest.approx({0: 0.015, 1: COARSE.seconds, 2: 0.015})
-    runs.clear()
-    assert timed_again(scene, found, lambda: now[0], spare=1.0)[0] == 0.02
-    assert len(runs) == 1  # the first took five seconds
-
-
 # -- showing
 
 
 def test_text_and_json_tell_the_same(chart):
     table = json.loads(json.dumps(chart_table(chart)))
     text = chart_text(chart)
-    assert table["front"] == ["film short", "film map", REFERENCE]
-    assert table["winner"] == "film map"
+    assert table["conclusion"] == list(chart.conclusion)
     assert table["convergence"][0]["observed_order"] == 2.0
     for words in (
-        chart.verdict,
-        "mesh x2, x1, x1/2: peak moves by 0.40% then 0.10%, order 2.00, 0.03% left",
-        "film link: a link is in tension",
+        *chart.conclusion,
+        "mesh x2, x1, x1/2: film force, peak [N] moves by 0.40% then 0.10%, order 2.00, 0.03% left",
+        "film link, mesh 144 x 33: a link is in tension",
         "mesh = x4: a cheaper one errs no more",
         "film = finite: knows no feed",
     ):
@@ -232,9 +280,10 @@ def test_points_of_the_picture_have_names(chart, tmp_path):
     save_chart(chart, tmp_path / "chart.html")
     svg = (tmp_path / "chart.svg").read_text()
     page = (tmp_path / "chart.html").read_text()
-    assert svg.count("<title>") == 4  # the invalid one has no place
-    assert "<title>film map: 0.04 s, error 0.10% (peak)</title>" in svg
-    assert "<title>film map: 0.04 s, error 0.10% (peak)</title>" in page
+    assert svg.count("<title>") == len(chart.points) - 1  # the invalid one has no place
+    title = f"<title>{HERE}: 0.04 s, error 0.10% (film force, peak [N])</title>"
+    assert title in svg
+    assert title in page
     assert "a link is in tension" in page
     assert "<script" not in page
     assert "src=" not in page  # nothing is fetched
@@ -243,14 +292,14 @@ def test_points_of_the_picture_have_names(chart, tmp_path):
 def test_every_value_of_the_page_tells_what_it_is_on_a_phone(chart):
     """Where rows are stacked the head is gone: each value but the name has its own."""
     page = chart_html(chart)
-    table = page[page.index('<table class="stack">') : page.index("</table>")]
-    rows = re.findall(r"<tr[^>]*>(.*?)</tr>", table, flags=re.DOTALL)[1:]
-    assert len(rows) == len(chart.points)
-    for row, point in zip(rows, chart.points, strict=True):
-        name, *values = re.findall(r"<td[^>]*>", row)
-        assert f"{name}{point.name}<" in row
-        assert len(values) == 6
-        assert all("data-label=" in value for value in values)
+    tables = re.findall(r"<table.*?</table>", page, flags=re.DOTALL)
+    assert len(tables) == 1 + len(chart.questions)
+    for table in tables:
+        for row in re.findall(r"<tr[^>]*>(.*?)</tr>", table, flags=re.DOTALL):
+            _, *values = re.findall(r"<td[^>]*>", row) or [""]
+            assert all("data-label=" in value for value in values)
+    for words in ("Rung", "Reference", "Unresolvable"):
+        assert f"<dt>{words}</dt>" in page
     assert "</div><figcaption>" in page  # which says on a phone that the picture goes on
 
 
@@ -265,73 +314,165 @@ def test_csv_has_a_row_for_every_quantity(chart, tmp_path):
     with (tmp_path / "chart.csv").open(newline="") as handle:
         rows = list(csv.DictReader(handle))
     assert tuple(rows[0]) == CSV_HEAD
-    assert len(rows) == 4 * 2 + 1
-    [peak] = [r for r in rows if r["point"] == "film map" and r["quantity"] == "peak"]
+    assert len(rows) == 3 * 2 + 4 * 2 + 1  # of two questions; one point is not valid
+    [peak] = [
+        r
+        for r in rows
+        if r["here"] == "1" and r["quantity"] == "force_peak" and r["question"] == RAISED
+    ]
     assert (float(peak["error"]), float(peak["seconds"]), peak["on_front"]) == (-0.001, 0.04, "1")
 
 
 def test_the_picture_says_simulated_and_numbers_its_front(chart):
     figure = chart_figure(chart)
     assert "(simulated)" in figure.get_suptitle()
-    texts = {text.get_text() for axes in figure.axes for text in axes.texts}
-    assert {"1", "2", "3"} <= texts
+    texts = [text.get_text() for axes in figure.axes for text in axes.texts]
+    assert {"1", "2", "3"} <= set(texts)
+    assert texts.count("your scene") == 2  # once a question
     [x, y] = [axes.get_scale() for axes in (figure.axes[0].xaxis, figure.axes[0].yaxis)]
     assert (x, y) == ("log", "log")
 
 
 def test_numbers_of_near_points_and_the_legend_do_not_touch():
     near = candidate(3.9, 1e-5, tolerance="x2")  # beside the reference, which takes 4 s
-    figure = chart_figure(chart_from(SHORT, near, COARSE))
+    found = study_of(SHORT, near, COARSE)
+    figure = chart_figure(chart_of(load_scene("journal-bearing"), replace_written(found, near)))
     figure.draw_without_rendering()
-    axes = figure.axes[0]
-    boxes = [text.get_window_extent() for text in axes.texts]
+    axes = figure.axes[1]
+    boxes = [t.get_window_extent() for t in axes.texts if t.get_text().isdecimal()]
     assert len(boxes) == 4
     assert not [pair for pair in itertools.combinations(boxes, 2) if pair[0].overlaps(pair[1])]
     assert not axes.get_legend().get_window_extent().overlaps(axes.get_window_extent())
 
 
+def replace_written(found, *_others):
+    """The same study, every effect of its candidates known as written."""
+    return replace(found, written={**found.written, "tolerance": "x1"})
+
+
 # -- real scenes
 
 
-def test_a_journal_needs_its_map_only():
-    size = {"duration": "0.1 s", "film.n_theta": 24, "film.n_z": 5}
-    scene = load_scene("journal-bearing", {**size, "pinned": ["tolerance"]})
-    seen = []
-    chart = scene_chart(scene, accuracy=0.05, progress=lambda *pair: seen.append(pair))
-    by_name = {point.name: point for point in chart.points}
+SMALL = {"duration": "0.1 s", "film.n_theta": 24, "film.n_z": 5}
+
+
+@pytest.fixture(scope="module")
+def journal():
+    """A real scene, its chart whole."""
+    scene = load_scene("journal-bearing", {**SMALL, "pinned": ["tolerance"]})
+    return scene, scene_chart(scene, accuracy=0.05)
+
+
+def test_a_journal_needs_its_map_only(journal):
+    _, chart = journal
+    by_name = {point.name: point for point in chart.of(RAISED)}
     # Ocvirk at L/D 2/3 is off by tens of per cent; the map by the error of its table, 4e-4 C
-    assert by_name[REFERENCE].error == 0
+    assert by_name["film direct, mesh 48 x 9"].error == 0
     assert min(p.error for n, p in by_name.items() if "film short" in n) > 0.02
-    assert "film map" in by_name
-    assert by_name["film map"].error < 1e-3
-    assert "film map" in chart.winner
-    assert seen[-1][0] == seen[-1][1]
+    assert by_name["mesh 48 x 9"].error < 1e-3
     assert chart.status == "resolved"
     # a map is interpolated, a direct film solved at every step
-    assert by_name["film map"].seconds < by_name[REFERENCE].seconds / 3
+    assert by_name[HERE].seconds < by_name["film direct, mesh 48 x 9"].seconds / 3
+    assert [choice.keeps for choice in chart.choices] == [True, True]
 
 
-def test_the_command_writes_and_prints(tmp_path):
-    path = tmp_path / "chart.csv"
-    sizes = ("film.n_theta=24", "film.n_z=5", "duration=0.05", "numerics.tolerance=1e-4")
-    pairs = [word for size in sizes for word in ("--set", size)]
-    done = CliRunner().invoke(
-        cli, ["chart", "journal-bearing", *pairs, "--accuracy", "0.1", "--json", "-o", str(path)]
-    )
+def test_the_promise_is_kept_on_fresh_starts(tmp_path):
+    """What is applied loads by `scene check`, and errs as promised on 32 starts not seen."""
+    path, page = tmp_path / "mine.toml", tmp_path / "chart.json"
+    done = run_chart("journal-unbalance", {**QUICK, "film.rung": "direct"}, "--accuracy", "0.05",
+                     "--apply", str(path), "--choice", "raised", "-o", str(page))  # fmt: skip
     assert done.exit_code == 0, done.output
-    table = json.loads(done.stdout)
-    assert table["schema_version"] == 1
-    assert table["accuracy"] == 0.1
-    assert table["files"] == [str(path)]
-    assert path.read_text().startswith("point,on_front")
-    assert np.isfinite([p["seconds"] for p in table["points"] if p["error"] is not None]).all()
+    assert CliRunner().invoke(cli, ["scene", "check", str(path)]).exit_code == 0
+    [raised] = [
+        c for c in json.loads(page.read_text())["recommendations"] if c["question"] == RAISED
+    ]
+    assert raised["changes"]
+    scene = load_scene(path)
+    best = with_values(scene, {**FINEST, "film.rung": "direct"})
+    quantities = QUANTITIES[scene.machine]
+    own, other = (
+        [run.quantities for run in Pilot(each, quantities, seed=9).outcomes({}, 32)]
+        for each in (scene, best)
+    )
+    for each in differences(own, other).values():
+        assert each.error - 2 * each.standard_error <= 0.05
+        assert each.error <= raised["promised"] + 2 * each.standard_error + 1e-3
+
+
+QUICK = {
+    "film.n_theta": 24, "film.n_z": 9, "sample_rate": 5120, "duration": 0.06,
+    "settling_revolutions": 3, "numerics.tolerance": 1e-4,
+}  # fmt: skip
+FINEST = {"film.n_theta": 48, "film.n_z": 17, "numerics.tolerance": 1e-4 / 16}
+
+
+def run_chart(name, sizes, *arguments):
+    pairs = [word for path, value in sizes.items() for word in ("--set", f"{path}={value}")]
+    return CliRunner().invoke(cli, ["chart", name, *pairs, "-j", "1", *arguments])
+
+
+def test_an_interrupted_chart_goes_on_to_the_same_page(tmp_path, monkeypatch):
+    """Ctrl-C in the middle: an answer, exit code 1, and the same command ends as if nothing was."""
+    ticks = itertools.count()
+    monkeypatch.setattr(
+        "wearstate.diagnose.chart_scene.time.perf_counter", lambda: 1e-9 * next(ticks)
+    )
+    sizes = {**SMALL, "numerics.tolerance": 1e-4, "pinned": "", "duration": 0.05}
+    sizes.pop("pinned")
+    whole, page = tmp_path / "whole.csv", tmp_path / "page.csv"
+    assert run_chart("journal-bearing", sizes, "-o", str(whole)).exit_code == 0
+    assert list(tmp_path.iterdir()) == [whole]  # nothing is left beside it
+
+    made = Pilot._run
+    calls = itertools.count()
+
+    def stopped(self, values, start):
+        if next(calls) == 12:
+            raise KeyboardInterrupt
+        return made(self, values, start)
+
+    monkeypatch.setattr(Pilot, "_run", stopped)
+    done = run_chart("journal-bearing", sizes, "-o", str(page))
+    assert done.exit_code == 1
+    assert "the same command goes on from there" in done.stderr
+    assert "Your scene as written is" in done.stdout
+    assert page.with_suffix(".part.json").exists()
+    again = run_chart("journal-bearing", sizes, "-o", str(page))
+    assert again.exit_code == 0, again.output
+    assert not page.with_suffix(".part.json").exists()
+    assert next(calls) > 12
+    assert without_seconds(page) == without_seconds(whole)
+
+
+def without_seconds(path):
+    with path.open(newline="") as handle:
+        rows = list(csv.DictReader(handle))
+    return [{k: v for k, v in row.items() if k not in ("seconds", "on_front")} for row in rows]
+
+
+def test_errors_do_not_depend_on_the_number_of_workers(tmp_path):
+    sizes = {**SMALL, "duration": 0.05, "numerics.tolerance": 1e-4}
+    pages = [tmp_path / f"{jobs}.csv" for jobs in (1, 2)]
+    for jobs, path in zip((1, 2), pages, strict=True):
+        done = run_chart("journal-bearing", sizes, "-j", str(jobs), "-o", str(path))
+        assert done.exit_code == 0, done.output
+    assert without_seconds(pages[0]) == without_seconds(pages[1])
+
+
+def test_runs_of_another_scene_are_refused(tmp_path):
+    path = tmp_path / "chart.html"
+    path.with_suffix(".part.json").write_text('{"key": "other", "pieces": {}}')
+    done = run_chart("journal-bearing", SMALL, "-o", str(path))
+    assert done.exit_code == 2
+    assert "another scene or version; delete it, or use --force" in done.stderr
 
 
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
         (["journal-bearing", "-o", "x.txt"], "suffix '.txt' must be one of .svg"),
-        (["data.h5", "--accuracy", "0.1"], "--set and --accuracy are for a scene"),
+        (["data.h5", "--accuracy", "0.1"], "--set, --accuracy and --apply are for a scene"),
+        (["journal-bearing", "--apply", "x.json"], "suffix '.json' must be one of .toml"),
         (["journal-baring"], "journal-bearing"),
         (["journal-bearing", "--budget", "nan"], "must be >= 1"),
     ],

@@ -7,27 +7,21 @@ import pytest
 from numpy.testing import assert_allclose
 from wearstate.datasets.quantities import QUANTITIES, resolved, with_estimate
 from wearstate.sim.assemble import recorder, simulate
-from wearstate.sim.fidelity import (
-    Bench,
-    Difference,
-    Outcome,
-    differences,
-    resolve,
-    resolved_scene,
-    study,
-)
+from wearstate.sim.fidelity import resolve, resolved_scene
 from wearstate.sim.integrate import SimulationError
 from wearstate.sim.ladder import cost_of, effects_of, with_values
 from wearstate.sim.parts import SceneError
+from wearstate.sim.pilot import Difference, Outcome, Pilot, differences
 from wearstate.sim.scene import load_scene, scene_names
 from wearstate.sim.shaft_line import shaft_state
 from wearstate.sim.shaft_response import receptance
+from wearstate.sim.study import Search, study
 
 ACCURACIES = (0.01, 0.02, 0.05, 0.10)
 CONVERGENCE_ORDER = 2.0
 
 
-class KnownBench(Bench):
+class KnownPilot(Pilot):
     """A pump whose quantities have known errors: so much a rung, and a step to the second power."""
 
     def __init__(self, errors, *, scatter=0.0, step_error=0.0, faults=(), seed=0):
@@ -56,8 +50,8 @@ def _outcome(error, fault):
     return Outcome({} if fault else {"one": (100 * (1 + error), "relative", 0.0)}, fault)
 
 
-def chosen(bench, accuracy, **options):
-    return resolve(bench.scene, bench.quantities, accuracy, bench=bench, **options)
+def chosen(pilot, accuracy, **options):
+    return resolve(pilot.scene, pilot.quantities, accuracy, pilot=pilot, **options)
 
 
 IDEAL_WRIST = ("joint.wristpin.rung", "ideal")
@@ -67,13 +61,15 @@ IDEAL_CRANK = ("joint.crankpin.rung", "ideal")
 LINK_CRANK = ("joint.crankpin.rung", "link")
 CONSTANT_SPEED = ("drive.rung", "constant-speed")
 HEADS = ("pressure.rung", "heads")
+CONSTANT = ("pressure.rung", "constant")
+NONE = ("pressure.rung", "none")
 
 
 # --- the choice
 
 
 def test_without_errors_the_cheapest_of_everything_is_taken():
-    found = chosen(KnownBench({}), 0.02)
+    found = chosen(KnownPilot({}), 0.02)
     assert found.status == "resolved"
     assert found.rungs == {
         "crankpin": "ideal",
@@ -91,8 +87,8 @@ def test_without_errors_the_cheapest_of_everything_is_taken():
     [(0.10, "ideal"), (0.05, "ideal"), (0.02, "link"), (0.005, "compliant")],
 )
 def test_a_rung_is_taken_where_its_error_is_within_the_accuracy(accuracy, wristpin):
-    bench = KnownBench({IDEAL_WRIST: 0.03, LINK_WRIST: 0.01})
-    found = chosen(bench, accuracy)
+    pilot = KnownPilot({IDEAL_WRIST: 0.03, LINK_WRIST: 0.01})
+    found = chosen(pilot, accuracy)
     assert found.rungs["wristpin"] == wristpin
     expected = {"ideal": 0.03, "link": 0.01, "compliant": 0.0}[wristpin]
     assert_allclose(found.estimated_error, expected, atol=1e-12)  # rounding of 1 + error
@@ -100,14 +96,14 @@ def test_a_rung_is_taken_where_its_error_is_within_the_accuracy(accuracy, wristp
 
 def test_errors_that_add_up_beyond_the_accuracy_are_not_taken_together():
     alone = {IDEAL_WRIST: 0.015, LINK_WRIST: 0.015, IDEAL_GUIDE: 0.015}
-    found = chosen(KnownBench(alone), 0.02)
+    found = chosen(KnownPilot(alone), 0.02)
     assert (found.rungs["wristpin"], found.rungs["guide"]) in [
         ("ideal", "compliant"),
         ("compliant", "ideal"),
     ]
     # errors of opposite sign do not add up
     alone[IDEAL_GUIDE] = -0.015
-    both = chosen(KnownBench(alone), 0.02)
+    both = chosen(KnownPilot(alone), 0.02)
     assert (both.rungs["wristpin"], both.rungs["guide"]) == ("ideal", "ideal")
 
 
@@ -119,10 +115,10 @@ def test_the_cheapest_that_will_do_is_found_as_by_brute_force():
         errors = dict(zip(paths, rng.uniform(0, 0.03, len(paths)), strict=True))
         errors[IDEAL_WRIST] += errors[LINK_WRIST]
         errors |= {IDEAL_CRANK: 1.0, LINK_CRANK: 0.9, ("pressure.rung", "two-level"): 0.5}
-        bench = KnownBench(errors)
+        pilot = KnownPilot(errors)
         # knocks tear its columns unless their flow feels none
-        bench.scene = with_values(bench.scene, {"pressure.flow": "two-harmonic"})
-        found = chosen(bench, 0.03)
+        pilot.scene = with_values(pilot.scene, {"pressure.flow": "two-harmonic"})
+        found = chosen(pilot, 0.03)
         best = math.inf
         for wrist in ("ideal", "link", "compliant"):
             for guide in ("ideal", "compliant"):
@@ -138,13 +134,13 @@ def test_the_cheapest_that_will_do_is_found_as_by_brute_force():
                         }
                         error = sum(errors.get(pair, 0.0) for pair in values.items())
                         if error <= 0.03:
-                            best = min(best, cost_of(with_values(bench.scene, values)))
+                            best = min(best, cost_of(with_values(pilot.scene, values)))
         assert found.cost <= best * (1 + 1e-12)
 
 
 def test_a_rung_out_of_its_validity_is_never_taken():
-    bench = KnownBench({}, faults=[LINK_CRANK, LINK_WRIST])
-    found = chosen(bench, 0.10)
+    pilot = KnownPilot({}, faults=[LINK_CRANK, LINK_WRIST])
+    found = chosen(pilot, 0.10)
     assert found.rungs["crankpin"] != "link"
     assert found.rungs["wristpin"] != "link"
     assert any("out of its validity" in reason for reason in found.reasons)
@@ -152,17 +148,17 @@ def test_a_rung_out_of_its_validity_is_never_taken():
 
 def test_a_reference_that_cannot_be_run_is_refused_with_a_cure():
     with pytest.raises(SceneError, match=r"reference .* out of its validity; pin the effect"):
-        chosen(KnownBench({}, faults=[("drive.rung", "motor")]), 0.02)
+        chosen(KnownPilot({}, faults=[("drive.rung", "motor")]), 0.02)
 
 
 def test_pinned_effects_stay_as_they_are_written():
-    found = chosen(KnownBench({}), 0.02, pinned=["crankpin", "pressure"])
+    found = chosen(KnownPilot({}), 0.02, pinned=["crankpin", "pressure"])
     assert set(found.rungs) == {"wristpin", "guide", "drive", "step"}
     scene = resolved_scene(load_scene("bilge-pump"), found)
     assert scene.joint.crankpin.rung == "compliant"
     assert scene.pressure.rung == "two-level"
     with pytest.raises(SceneError, match="did you mean 'pressure'"):
-        chosen(KnownBench({}), 0.02, pinned=["presure"])
+        chosen(KnownPilot({}), 0.02, pinned=["presure"])
 
 
 # --- scatter
@@ -170,31 +166,31 @@ def test_pinned_effects_stay_as_they_are_written():
 
 def test_scatter_below_the_accuracy_is_averaged_away():
     # A standard error of scatter sqrt(2 / n): 0.01 needs n >= 2 (0.01 / (0.02 / 3))^2 = 4.5.
-    found = chosen(KnownBench({IDEAL_CRANK: 0.3, LINK_CRANK: 0.2}, scatter=0.01), 0.02, starts=64)
+    found = chosen(KnownPilot({IDEAL_CRANK: 0.3, LINK_CRANK: 0.2}, scatter=0.01), 0.02, starts=64)
     assert found.status == "resolved"
     assert found.rungs["crankpin"] == "compliant"
     assert found.cost < found.cost_of_reference / 2
 
 
 def test_scatter_that_cannot_be_averaged_away_is_called_unresolvable_and_falls_up():
-    bench = KnownBench({IDEAL_CRANK: 9.0, LINK_CRANK: 9.0}, scatter=0.5)
-    found = chosen(bench, 0.02)
+    pilot = KnownPilot({IDEAL_CRANK: 9.0, LINK_CRANK: 9.0}, scatter=0.5)
+    found = chosen(pilot, 0.02)
     assert found.status == "unresolvable"
     assert found.cost == found.cost_of_reference
     assert found.rungs["crankpin"] == "compliant"
     # hopeless cases are seen early, not after all starts of all rungs
-    assert bench.runs < 32 * 6
+    assert pilot.runs < 32 * 6
 
 
 def test_the_accuracy_is_kept_in_most_of_many_noisy_trials():
     """The step errs by 0.015 (factor 4) against an accuracy of 0.012: mostly seen as too coarse."""
     kept = 0
     for seed in range(40):
-        bench = KnownBench(
+        pilot = KnownPilot(
             {IDEAL_CRANK: 1.0, LINK_CRANK: 1.0}, scatter=0.005, step_error=0.001, seed=seed
         )
         others = ["wristpin", "guide", "pressure", "drive"]
-        found = chosen(bench, 0.012, starts=64, pinned=others)
+        found = chosen(pilot, 0.012, starts=64, pinned=others)
         error = {"x2": 0.035, "x1": 0.015, "x1/2": 0.003, "x1/4": 0.0}[found.rungs["step"]]
         kept += error <= 0.012
     # 93 per cent are asked of real scenes; this one is nearer to the edge than most
@@ -234,9 +230,9 @@ def test_differences_are_taken_start_by_start():
 
 
 def test_a_study_shows_the_order_of_convergence_and_what_is_left():
-    bench = KnownBench({IDEAL_WRIST: 0.03}, step_error=1e-4)
+    pilot = KnownPilot({IDEAL_WRIST: 0.03}, step_error=1e-4)
     kept = ["crankpin", "guide", "pressure", "drive"]
-    found = study(bench.scene, bench.quantities, accuracy=0.02, pinned=kept, bench=bench)
+    found = study(pilot.scene, pilot.quantities, accuracy=0.02, pinned=kept, pilot=pilot)
     [convergence] = found.convergence
     assert convergence.levels == ("x1", "x1/2", "x1/4")
     assert_allclose(convergence.order, CONVERGENCE_ORDER, rtol=1e-3)  # of values near 100
@@ -249,14 +245,14 @@ def test_a_study_shows_the_order_of_convergence_and_what_is_left():
 
 
 def test_a_reference_that_does_not_converge_is_said_to():
-    class Wild(KnownBench):
+    class Wild(KnownPilot):
         def _run(self, values, start):
             wide = values["numerics.step"] / self.finest
             return _outcome({6: 0.1, 4: 0.1, 2: 0.11, 1: 0.3}[round(wide)], "")
 
     kept = ["crankpin", "guide", "pressure", "drive", "wristpin"]
-    bench = Wild({})
-    found = study(bench.scene, bench.quantities, accuracy=0.02, pinned=kept, bench=bench)
+    pilot = Wild({})
+    found = study(pilot.scene, pilot.quantities, accuracy=0.02, pinned=kept, pilot=pilot)
     assert not found.convergence[0].converged
     assert found.status == "not converged"
 
@@ -273,14 +269,14 @@ def test_a_reference_that_does_not_converge_is_said_to():
 def test_convergence_is_what_is_left_and_not_the_last_change(order, left, converged):
     """Error of a level w times as wide as the finest: left w^order; 2 % asked, so a third is."""
 
-    class Known(KnownBench):
+    class Known(KnownPilot):
         def _run(self, values, start):
             wide = values["numerics.step"] / self.finest
             return Outcome({"one": (left * wide**order, "absolute", 1.0)}, "")
 
     kept = ["crankpin", "guide", "pressure", "drive", "wristpin"]
-    bench = Known({})
-    found = study(bench.scene, bench.quantities, accuracy=0.02, pinned=kept, bench=bench)
+    pilot = Known({})
+    found = study(pilot.scene, pilot.quantities, accuracy=0.02, pinned=kept, pilot=pilot)
     [convergence] = found.convergence
     assert convergence.converged == converged
     assert (found.status == "not converged") == (not converged)
@@ -291,7 +287,7 @@ def test_convergence_is_what_is_left_and_not_the_last_change(order, left, conver
 def test_scatter_of_few_starts_is_no_lack_of_convergence(seed):
     """The coarsest level is seen to be wrong on few starts; the finer two differ by scatter."""
 
-    class Knocking(KnownBench):
+    class Knocking(KnownPilot):
         def _run(self, values, start):
             coarse = round(values["numerics.step"] / self.finest) >= CONVERGENCE_ORDER**2
             rng = np.random.default_rng([start, seed, round(1e9 * values["numerics.step"])])
@@ -299,8 +295,8 @@ def test_scatter_of_few_starts_is_no_lack_of_convergence(seed):
             return Outcome({f"band_{i}": (x, "relative", 0.0) for i, x in enumerate(sizes)}, "")
 
     kept = ["crankpin", "guide", "pressure", "drive", "wristpin"]
-    bench = Knocking({})
-    found = study(bench.scene, bench.quantities, accuracy=0.02, pinned=kept, bench=bench)
+    pilot = Knocking({})
+    found = study(pilot.scene, pilot.quantities, accuracy=0.02, pinned=kept, pilot=pilot)
     [convergence] = found.convergence
     assert convergence.converged
     assert abs(convergence.steps[-1]) < 0.03  # of two starts half of the seeds have more
@@ -321,18 +317,18 @@ def test_a_cheap_scene_is_averaged_over_more_starts():
     errors = {IDEAL_CRANK: 9.0, LINK_CRANK: 9.0}
     statuses = {}
     for duration in ("4.8 s", "0.4 s"):
-        bench = KnownBench(errors, scatter=scatter)
-        bench.scene = load_scene("bilge-pump", {"duration": duration})
-        found = chosen(bench, 0.02, pinned=["wristpin", "guide", "pressure", "drive"])
+        pilot = KnownPilot(errors, scatter=scatter)
+        pilot.scene = load_scene("bilge-pump", {"duration": duration})
+        found = chosen(pilot, 0.02, pinned=["wristpin", "guide", "pressure", "drive"])
         statuses[duration] = found.status
-        assert chosen(bench, 0.02, starts=32).status == "unresolvable"
+        assert chosen(pilot, 0.02, starts=32).status == "unresolvable"
     assert statuses == {"4.8 s": "unresolvable", "0.4 s": "resolved"}
 
 
 def test_few_starts_at_one_end_of_a_scatter_are_no_error():
     """The first four lie close together and far off; the others show that they were the same."""
 
-    class TwoEnds(KnownBench):
+    class TwoEnds(KnownPilot):
         def _run(self, values, start):
             fine = math.isclose(values["numerics.step"], self.finest)
             end = 0.045 if start // 4 % 2 == 0 else -0.045
@@ -343,64 +339,152 @@ def test_few_starts_at_one_end_of_a_scatter_are_no_error():
     assert (found.status, found.rungs["step"]) == ("resolved", "x2")
 
 
+def late_after(runs):
+    """No time is left after so many looks at the time."""
+    ticks = iter(range(10_000_000))
+    return lambda _expected: next(ticks) >= runs
+
+
 def test_a_budget_ends_a_study():
-    ticks = iter(range(10_000))
-    bench = KnownBench({IDEAL_WRIST: 0.03})
-    found = study(
-        bench.scene,
-        bench.quantities,
-        accuracy=0.02,
-        bench=bench,
-        budget=3.0,
-        clock=lambda: float(next(ticks)),
-    )
+    pilot = KnownPilot({IDEAL_WRIST: 0.03})
+    found = study(pilot.scene, pilot.quantities, accuracy=0.02, pilot=pilot, late=late_after(3))
     assert found.status == "out of budget"
+    assert found.kept.status == "so far"
+    assert found.measured < found.planned
 
 
 def test_a_budget_that_cuts_the_averaging_is_not_called_scatter():
     """Told with 512 starts; in time for a few the rung is not unresolvable, only not told yet."""
     statuses = {}
-    for budget in (None, 20.0):
-        ticks = iter(range(10_000_000))
-        bench = KnownBench({}, scatter=0.05)
-        bench.scene = load_scene("bilge-pump", {"duration": "0.4 s"})
+    for runs in (None, 20):
+        pilot = KnownPilot({}, scatter=0.05)
+        pilot.scene = load_scene("bilge-pump", {"duration": "0.4 s"})
         kept = ["crankpin", "wristpin", "guide", "pressure", "drive"]
-        clock = None if budget is None else lambda ticks=ticks: float(next(ticks))
+        late = None if runs is None else late_after(runs)
         found = study(
-            bench.scene,
-            bench.quantities,
-            accuracy=0.02,
-            pinned=kept,
-            bench=bench,
-            budget=budget,
-            clock=clock,
+            pilot.scene, pilot.quantities, accuracy=0.02, pinned=kept, pilot=pilot, late=late
         )
-        statuses[budget] = found.status
+        statuses[runs] = found.status, found.kept.status
         assert all(each.converged for each in found.convergence)
-        untold = "convergence over step: out of budget" in found.pruned  # not from a few starts
-        assert untold == (not found.convergence) == (budget is not None)
-    assert statuses == {None: "resolved", 20.0: "out of budget"}
+        assert (not found.convergence) == (runs is not None)  # not from a few starts
+    assert statuses == {None: ("resolved", "resolved"), 20: ("out of budget", "so far")}
+
+
+# --- where the scene as written stands
+
+
+TWO_LEVEL = ("pressure.rung", "two-level")
+
+
+def test_the_cheapest_information_comes_first():
+    """Numerics of the scene as written, then one rung at a time, then the best rungs."""
+    told = []
+    pilot = KnownPilot({TWO_LEVEL: 0.6, IDEAL_WRIST: 0.3, IDEAL_GUIDE: 0.001})
+    search = Search(pilot.scene, pilot.quantities, accuracy=0.02, pilot=pilot, tell=told.append)
+    search.measure()
+    first = list(dict.fromkeys(told))
+    assert first[:2] == ["the scene as written", "numerics of the scene as written"]
+    singles = [i for i, what in enumerate(first) if what.startswith("what the rung of")]
+    assert singles == list(range(2, 2 + len(singles)))
+    assert first[2 + len(singles)] == "the scene as written against the best rungs"
+
+
+def test_each_rung_as_written_is_charged_what_it_costs_by_itself():
+    pilot = KnownPilot({TWO_LEVEL: 0.6, IDEAL_WRIST: 0.3, IDEAL_GUIDE: 0.001}, step_error=0.0001)
+    found = study(pilot.scene, pilot.quantities, accuracy=0.02, pilot=pilot)
+    costs = {each.effect: each.candidate.error for each in found.raises}
+    assert set(costs) == {"wristpin", "guide", "pressure", "drive"}  # the crank pin has the best
+    # of a quantity of 100 (1 + error), the other errors being in it: 0.3 / 1.6 and so on
+    assert_allclose(costs["pressure"], 0.6 / 1.3, rtol=0.01)
+    assert_allclose(costs["wristpin"], 0.3 / 1.6, rtol=0.01)
+    assert_allclose(costs["drive"], 0.0, atol=1e-9)
+    assert_allclose(found.raised.written.error, 0.9, rtol=0.01)
+    assert found.written["pressure"] == "two-level"
+
+
+def test_rungs_are_kept_or_may_change():
+    """Kept: no error but the step's. Free: what errs goes up, what does not stays or goes down."""
+    pilot = KnownPilot({TWO_LEVEL: 0.6, IDEAL_WRIST: 0.3, LINK_WRIST: 0.1, IDEAL_CRANK: 0.2,
+                        LINK_CRANK: 0.2, CONSTANT: 0.7, NONE: 0.8}, step_error=0.004)  # fmt: skip
+    found = study(pilot.scene, pilot.quantities, accuracy=0.02, pilot=pilot)
+    assert found.kept.status == found.raised.status == "resolved"
+    rungs = dict(found.kept.chosen.rungs)
+    step = rungs.pop("step")
+    assert rungs == {n: r for n, r in found.written.items() if n != "step"}
+    assert step == "x1/2"  # 0.004 of the finest, four times of twice, 16 times of four
+    assert set(found.kept.changes) == {"numerics.step"}
+    assert found.raised.chosen.rungs == {
+        "crankpin": "compliant",
+        "wristpin": "compliant",
+        "guide": "ideal",
+        "pressure": "chamber",
+        "drive": "constant-speed",
+        "step": "x1/2",
+    }
+    changed = with_values(pilot.scene, found.raised.changes)
+    assert changed == with_values(pilot.scene, found.raised.chosen.values)
+
+
+def test_a_choice_is_that_of_auto():
+    errors = {TWO_LEVEL: 0.6, CONSTANT: 0.7, NONE: 0.8, IDEAL_WRIST: 0.015, LINK_WRIST: 0.01,
+              IDEAL_CRANK: 0.2, LINK_CRANK: 0.2}  # fmt: skip
+    for accuracy in (0.05, 0.012):
+        pilots = [KnownPilot(errors, step_error=0.001) for _ in range(3)]
+        own = study(pilots[0].scene, pilots[0].quantities, accuracy=accuracy, pilot=pilots[0])
+        assert own.raised.chosen.rungs == chosen(pilots[1], accuracy).rungs
+        physical = [n for n in own.written if n != "step"]
+        kept = chosen(pilots[2], accuracy, pinned=physical)
+        assert own.kept.chosen.rungs["step"] == kept.rungs["step"]
+
+
+@pytest.mark.parametrize("runs", [0, 1, 5, 20, 60, 150])
+def test_at_any_budget_there_is_an_answer_that_is_not_called_final(runs):
+    pilot = KnownPilot({TWO_LEVEL: 0.6, IDEAL_WRIST: 0.3}, scatter=0.01)
+    found = study(pilot.scene, pilot.quantities, accuracy=0.02, pilot=pilot, late=late_after(runs))
+    assert found.kept.written is not None
+    assert found.kept.status in ("so far", "resolved")
+    assert found.raised is None or found.raised.status == "so far"
+    assert found.status == "out of budget"
+
+
+def test_a_search_goes_on_from_the_runs_that_are_kept():
+    """Interrupted in the middle and taken up again: the same study, and no run made twice."""
+    scene = load_scene("journal-bearing", {**SMALL_JOURNAL, "duration": "0.05 s"})
+    whole_runs, runs = {}, {}
+    quantities = QUANTITIES[scene.machine]
+
+    def once(kept, late=None):
+        pilot = Pilot(scene, quantities, kept=kept)
+        return study(scene, quantities, accuracy=0.05, pilot=pilot, late=late), pilot.runs
+
+    whole, needed = once(whole_runs)
+    part, first = once(runs, late_after(7))
+    assert part.status == "out of budget"
+    again, second = once(runs)
+    assert again == whole  # NaN seconds: no clock, the same object
+    assert first + second == needed
+    assert runs == whole_runs
 
 
 # --- real machines
 
 
 def known_starts(scene, *, clock=None):
-    """What a bench hands on of ten starts: signals, as quantities."""
+    """What a pilot hands on of ten starts: signals, as quantities."""
     kept = []
-    bench = Bench(scene, lambda run, _: kept.append(run.signal) or {}, seed=3, clock=clock)
-    bench.outcomes({}, 10)
-    return bench, kept
+    pilot = Pilot(scene, lambda run, _: kept.append(run.signal) or {}, seed=3, clock=clock)
+    pilot.outcomes({}, 10)
+    return pilot, kept
 
 
 @pytest.mark.parametrize("name", ["shaft-rig", "journal-half-sine", "bilge-pump"])
-def test_starts_of_a_bench_are_recordings_of_their_own(name):
+def test_starts_of_a_pilot_are_recordings_of_their_own(name):
     """What starts share is done once, timed or not; the recordings are those of `simulate`."""
     scene = load_scene(name, {"duration": "0.3 s"})
     _, shared = known_starts(scene)
     timed, with_clock = known_starts(scene, clock=iter(range(100)).__next__)
-    assert timed.seconds({}) == 1  # two looks at the clock a start, of the first eight
-    assert next(timed.clock.__self__) == 16
+    assert timed.seconds({}) == 1  # three looks at the clock a start, of the first three
+    assert next(timed.clock.__self__) == 9
     for start, (one, other) in enumerate(zip(shared, with_clock, strict=True)):
         number = start + 3 * 65_537
         turn = math.tau * (number * (math.sqrt(5) - 1) / 2 % 1.0)
@@ -437,8 +521,8 @@ def test_motions_that_are_damped_alike_do_not_make_the_resonance_jump():
 def test_a_line_that_fails_fails_from_every_start():
     line = load_scene("shaft-rig", {"duration": "0.3 s", "oil.viscosity": 1e-5})
     assert not simulate(line, seed=0, raise_on_failure=False).status.ok
-    bench = Bench(line, QUANTITIES[line.machine])
-    [outcome] = bench.outcomes({}, 3)  # no more is tried
+    pilot = Pilot(line, QUANTITIES[line.machine])
+    [outcome] = pilot.outcomes({}, 3)  # no more is tried
     assert outcome.fault
     with pytest.raises(SimulationError):
         recorder(line)(line, 0, False, True)
@@ -458,12 +542,12 @@ def test_auto_keeps_the_accuracy_of_a_journal_on_fresh_starts(accuracy):
     """One of the trials of tests/benchmarks/auto_trials.py, on a coarse mesh."""
     scene = load_scene("journal-unbalance", SMALL_JOURNAL)
     quantities = QUANTITIES[scene.machine]
-    bench = Bench(scene, quantities)
-    found = resolve(scene, quantities, accuracy, bench=bench, starts=16)
+    pilot = Pilot(scene, quantities)
+    found = resolve(scene, quantities, accuracy, pilot=pilot, starts=16)
     assert found.status in ("resolved", "reference")
     reference = {e.name: e.rungs[-1] for e in effects_of(scene)}
     values = {path: value for rung in reference.values() for path, value in rung.values.items()}
-    fresh = Bench(scene, quantities, seed=1)
+    fresh = Pilot(scene, quantities, seed=1)
     own, other = (
         [outcome.quantities for outcome in fresh.outcomes(v, 8)] for v in (found.values, values)
     )

@@ -22,7 +22,9 @@ MAY_IMPORT = {
 """Package -> packages below it. sim and features know nothing of each other."""
 
 SIM_FLOORS = [
+    {"study"},
     {"fidelity"},
+    {"pilot"},
     {"assemble"},
     {"wear_rate", "transfer"},
     {"shaft_change"},

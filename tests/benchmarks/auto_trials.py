@@ -21,9 +21,10 @@ from pathlib import Path
 import numpy as np
 from wearstate.datasets.quantities import QUANTITIES
 from wearstate.sim.assemble import simulate
-from wearstate.sim.fidelity import Bench, affordable_starts, differences, resolve
+from wearstate.sim.fidelity import affordable_starts, resolve
 from wearstate.sim.ladder import admissible, cost_of, effects_of, with_values
 from wearstate.sim.parts import SceneError
+from wearstate.sim.pilot import Pilot, differences
 from wearstate.sim.scene import load_scene, scene_names
 
 ACCURACIES = (0.10, 0.05, 0.02, 0.01)
@@ -94,9 +95,9 @@ def starts_of(name, scene):
     return 1 << math.floor(math.log2(starts * written.duration / scene.duration))
 
 
-def apart(bench, values, reference, starts):
+def apart(pilot, values, reference, starts):
     """Differences of the means over starts; None if a run is not valid."""
-    own, other = (bench.outcomes(v, starts) for v in (values, reference))
+    own, other = (pilot.outcomes(v, starts) for v in (values, reference))
     if any(outcome.fault for outcome in (*own, *other)):
         return None
     return differences([o.quantities for o in own], [o.quantities for o in other])
@@ -115,10 +116,10 @@ def off(found, starts, accuracy):
     return any(d.error - doubt * d.standard_error > accuracy for d in found.values())
 
 
-def would_do(bench, values, reference, accuracy):
+def would_do(pilot, values, reference, accuracy):
     """Whether a combination keeps the accuracy, on as many starts as tell."""
     for starts in BRUTE_STARTS:
-        found = apart(bench, values, reference, starts)
+        found = apart(pilot, values, reference, starts)
         if off(found, starts, accuracy):
             return False
         if max(d.standard_error for d in found.values()) <= STILL * accuracy:
@@ -129,7 +130,7 @@ def would_do(bench, values, reference, accuracy):
 # --- one trial
 
 
-def verdict(bench, fresh, values, reference, accuracy):
+def verdict(pilot, fresh, values, reference, accuracy):
     """How well a choice does on fresh starts: of as many as tell, 64 at the most.
 
     ``kept`` is false where a quantity is off by more than the accuracy and twice its own standard
@@ -138,7 +139,7 @@ def verdict(bench, fresh, values, reference, accuracy):
     scatter within two bounds rather than about a mean, and the first four may well lie near the
     same one.
     """
-    pilot = apart(bench, values, reference, 2)
+    pilot = apart(pilot, values, reference, 2)
     still = max(each.standard_error for each in pilot.values()) <= STILL * accuracy
     for starts in ((1,) if still else ()) + FRESH_STARTS:
         found = apart(fresh, values, reference, starts)
@@ -164,7 +165,7 @@ def verdict(bench, fresh, values, reference, accuracy):
     }
 
 
-def cheaper_that_does(scene, bench, reference, accuracy, below):
+def cheaper_that_does(scene, pilot, reference, accuracy, below):
     """Least cost under a bound of all combinations within the accuracy; None if there is none.
 
     Every combination is run, but for those that hold a rung which alone errs `CLEARLY` too much.
@@ -179,7 +180,7 @@ def cheaper_that_does(scene, bench, reference, accuracy, below):
                 if each.numerical
                 or rung is rungs[-1]
                 or not off(
-                    apart(bench, {**reference, **rung.values}, reference, 2), 2, CLEARLY * accuracy
+                    apart(pilot, {**reference, **rung.values}, reference, 2), 2, CLEARLY * accuracy
                 )
             ]
         )
@@ -191,7 +192,7 @@ def cheaper_that_does(scene, bench, reference, accuracy, below):
     for cost, i in priced:
         if cost >= below:
             return None
-        if would_do(bench, combinations[i], reference, accuracy):
+        if would_do(pilot, combinations[i], reference, accuracy):
             return cost
     return None
 
@@ -210,13 +211,13 @@ def trial(name, seed, accuracies=ACCURACIES, *, brute=True, timed=False):
     """One row for each accuracy: what was chosen, its error on fresh starts, its cost."""
     scene = drawn(name, seed)
     quantities, starts = QUANTITIES[scene.machine], starts_of(name, scene)
-    bench, fresh = (Bench(scene, quantities, seed=2 * seed + k) for k in range(2))
+    pilot, fresh = (Pilot(scene, quantities, seed=2 * seed + k) for k in range(2))
     reference = reference_values(scene)
     slowest = seconds_of(scene, reference) if timed else math.nan
     rows = []
     for accuracy in accuracies:
         try:
-            found = resolve(scene, quantities, accuracy, starts=starts, bench=bench)
+            found = resolve(scene, quantities, accuracy, starts=starts, pilot=pilot)
         except SceneError as error:  # a draw that the best rungs cannot run is no trial
             return {"scene": name, "seed": seed, "refused": error.faults[0]}
         row = {
@@ -230,15 +231,15 @@ def trial(name, seed, accuracies=ACCURACIES, *, brute=True, timed=False):
         if found.values == reference:
             row |= {"kept": True, "strictly": True, "error": 0.0, "worst": "", "scatter": 0.0}
         elif promised:
-            row |= verdict(bench, fresh, found.values, reference, accuracy)
+            row |= verdict(pilot, fresh, found.values, reference, accuracy)
         if brute and promised:
             limit = found.cost / DEAREST
-            best = cheaper_that_does(scene, bench, reference, accuracy, limit)
+            best = cheaper_that_does(scene, pilot, reference, accuracy, limit)
             row["dear"] = DEAREST if best is None else found.cost / best
         if timed:
             row["faster"] = slowest / seconds_of(scene, found.values)
         rows.append(row)
-    return {"scene": name, "seed": seed, "rows": rows, "runs": bench.runs + fresh.runs}
+    return {"scene": name, "seed": seed, "rows": rows, "runs": pilot.runs + fresh.runs}
 
 
 # --- many
