@@ -360,9 +360,11 @@ def _tested(
 @click.option(
     "--budget",
     type=Share(min=1.0, max=86_400.0),
-    help="Seconds; what it leaves no time for is drawn as not run. None by default.",
+    help="Seconds, none by default: the scene's own methods first, the rest is drawn as not run.",
 )
-@click.option("-o", "--output", type=PATH, help="Picture to write (.png, .svg or .pdf).")
+@click.option(
+    "-o", "--output", type=PATH, help="Page or picture to write (.html, .png, .svg or .pdf)."
+)
 @force_option
 @json_option
 def stability(
@@ -375,18 +377,24 @@ def stability(
     force: bool,
     as_json: bool,
 ) -> None:
-    """Where each method fails on SCENE: stable, wrong or unstable, by its method or physically."""
-    from ..sim.scene import load_scene
-    from .stability import save_figure, stability_table, stability_text
-    from .stability_maps import atlas
+    """Where each method fails on SCENE, and how far the scene is from that.
 
-    check_outputs([scene_name], [(output, PICTURE_SUFFIXES)], force)
+    Accurate, inaccurate or unstable, with a numerical or a physical cause; the scene is marked in
+    every map.
+    """
+    from ..sim.scene import load_scene
+    from .stability_atlas import atlas
+    from .stability_text import stability_table, stability_text
+
+    check_outputs([scene_name], [(output, (*PAGE_SUFFIXES, *PICTURE_SUFFIXES))], force)
     machine = load_scene(scene_name, overrides_of(pairs))
     with progress_bar("running cells") as progress:
         maps = atlas(machine, name=map_name, budget=budget, size=size, progress=progress)
     files = [str(output)] if output is not None else []
     if output is not None:
-        save_figure(machine, maps, output, force=force)
+        from .stability_page import save_atlas
+
+        save_atlas(machine, maps, output, force=force)
     text = "\n".join([stability_text(machine, maps), *files])
     emit({**stability_table(machine, maps), "files": files}, as_json, text)
 

@@ -1,25 +1,21 @@
-"""Where each method fails on a scene: maps of stable, wrong and unstable, theory over them.
+"""Where each method fails on a scene: accurate, inaccurate or unstable, theory over it.
 
 A map is a plane of two quantities and a panel for every method. A cell says how one run of one
-method ended there; failed runs are kept, with their word. What another step or mesh removes is the
-method's doing, what it does not remove is the machine's: the two never share a colour. The maps
-themselves are in :mod:`.stability_maps`.
+method ended there; failed runs are kept, with their word. What another step or mesh removes has a
+numerical cause, what it does not remove a physical one: the two never share a colour. The scene
+itself is a cell of every map: its row and column are run first. The maps themselves are in
+:mod:`.stability_maps`, the distance from the scene to the next failure in :mod:`.stability_edges`.
 """
 
+import math
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from itertools import product
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-
-from ..sim.parts import Scene
-from .page import short_name
-from .picture import save_picture
 
 _COARSEST = 4  # every fourth cell first: a run that is cut short has seen all of the plane
 
@@ -29,7 +25,7 @@ class Verdict(IntEnum):
 
     NOT_RUN = 0
     ACCURATE = 1
-    WRONG = 2
+    INACCURATE = 2
     UNSTABLE = 3
     NOT_CONVERGED = 4
     REFUSED = 5
@@ -44,35 +40,24 @@ class Verdict(IntEnum):
         return _TEXT[self]
 
     @property
-    def physical(self) -> bool:
-        """Whether the machine does it, not the method: a finer step or mesh would show it too."""
-        return self >= Verdict.LOST
+    def cause(self) -> str:
+        """``numerical``: a finer step or mesh removes it; ``physical``: the machine does it."""
+        if self >= Verdict.LOST:
+            return "physical"
+        return "numerical" if self >= Verdict.INACCURATE else ""
 
 
 _TEXT = {
     Verdict.NOT_RUN: "not run (budget)",
-    Verdict.ACCURATE: "stable and accurate",
-    Verdict.WRONG: "stable but wrong",
-    Verdict.UNSTABLE: "unstable by its method",
-    Verdict.NOT_CONVERGED: "not converged",
-    Verdict.REFUSED: "refused by a guard",
-    Verdict.LOST: "contact lost (physical)",
-    Verdict.CHAOTIC: "chaotic (physical)",
-    Verdict.WHIRL: "whirls (physical)",
-    Verdict.FAILS: "fails at any step or mesh (physical)",
-}
-
-_COLOUR = {
-    Verdict.NOT_RUN: "#ffffff",
-    Verdict.ACCURATE: "#4f9d5d",
-    Verdict.WRONG: "#f2c14e",
-    Verdict.UNSTABLE: "#b3261e",
-    Verdict.NOT_CONVERGED: "#e07b39",
-    Verdict.REFUSED: "#9aa3ab",
-    Verdict.LOST: "#9cc9e3",
-    Verdict.CHAOTIC: "#5b8fc7",
-    Verdict.WHIRL: "#7a4fa0",
-    Verdict.FAILS: "#3c3457",
+    Verdict.ACCURATE: "accurate",
+    Verdict.INACCURATE: "inaccurate (numerical cause)",
+    Verdict.UNSTABLE: "unstable (numerical cause)",
+    Verdict.NOT_CONVERGED: "not converged (numerical cause)",
+    Verdict.REFUSED: "refused by a check (numerical cause)",
+    Verdict.LOST: "contact lost (physical cause)",
+    Verdict.CHAOTIC: "chaotic (physical cause)",
+    Verdict.WHIRL: "whirl (physical cause)",
+    Verdict.FAILS: "fails at any step or mesh (physical cause)",
 }
 
 
@@ -88,17 +73,64 @@ class Axis:
         Rising.
     log : bool
         Even ratios rather than even steps.
+    even : bool
+        Even whole numbers only, as nodes round a bore are.
     """
 
     name: str
     unit: str
     values: tuple[float, ...]
     log: bool = True
+    even: bool = False
 
     @property
     def label(self) -> str:
         """With its unit."""
         return f"{self.name} [{self.unit}]" if self.unit else self.name
+
+    @property
+    def quantity(self) -> str:
+        """Its name without what explains it.
+
+        Examples
+        --------
+        >>> Axis(name="gap left, 1 - eccentricity ratio", unit="", values=(0.1, 0.5)).quantity
+        'gap left'
+        """
+        return self.name.partition(",")[0].partition(" (")[0]
+
+    def written(self, value: float) -> str:
+        """A value with its unit, and a prefix where the number would be unwieldy.
+
+        Examples
+        --------
+        >>> Axis(name="step", unit="s", values=(1.0, 2.0)).written(1.953e-5)
+        '19.5 us'
+        """
+        for factor, prefix in _PREFIXES:
+            if self.unit in _PREFIXED and factor <= abs(value) < 1000 * factor:
+                return f"{value / factor:.3g} {prefix}{self.unit}"
+        return f"{value:.3g} {self.unit}".rstrip()
+
+    def through(self, value: float | None) -> "Axis":
+        """The same axis with a value > 0 on it: the nearest inside gives way, the ends stay.
+
+        Examples
+        --------
+        >>> Axis(name="step", unit="s", values=(1.0, 2.0, 4.0)).through(2.2).values
+        (1.0, 2.2, 4.0)
+        >>> Axis(name="step", unit="s", values=(1.0, 2.0, 4.0)).through(9.0).values
+        (1.0, 2.0, 4.0, 9.0)
+        """
+        if value is None or not math.isfinite(value):
+            return self
+        way = math.log if self.log else float
+        inner = [k for k, other in enumerate(self.values) if abs(other / value - 1) < _SAME] or (
+            range(1, len(self.values) - 1) if self.values[0] < value < self.values[-1] else []
+        )
+        gone = min(inner, key=lambda k: abs(way(self.values[k]) - way(value)), default=None)
+        others = [other for k, other in enumerate(self.values) if k != gone]
+        return replace(self, values=tuple(sorted([*others, value])))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -118,11 +150,35 @@ class Curve:
     y: tuple[float, ...]
 
 
+_SAME = 1e-9  # of a value: two that differ by less are one
+_PREFIXES = ((1e-9, "n"), (1e-6, "u"), (1e-3, "m"), (1.0, ""), (1e3, "k"), (1e6, "M"), (1e9, "G"))
+_PREFIXED = {"s", "m", "N", "N/m", "Pa s"}
+
 Cell = tuple[Verdict, str]
 """Verdict and a word on it: a status, an error."""
 
 Judge = Callable[[float, float], Cell]
 """``(x, y) -> cell``: one run of one method."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Own:
+    """The scene itself in a map.
+
+    Attributes
+    ----------
+    method : str
+        Panel of what it is computed with, as written.
+    x, y : float or None
+        Of the axes; None where the scene has no such quantity.
+    note : str
+        Where the panel is not quite its method: what is different.
+    """
+
+    method: str
+    x: float | None
+    y: float | None
+    note: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -139,6 +195,10 @@ class Plan:
         Theory for a method; under "" for all.
     note : str
         What the colours are judged by.
+    own : Own, optional
+        Where the scene lies; its values are on the axes.
+    aside : bool
+        Of methods that the scene is not computed with: it waits for the other maps.
     """
 
     name: str
@@ -148,6 +208,66 @@ class Plan:
     judges: Mapping[str, Judge]
     curves: Mapping[str, Sequence[Curve]] = field(default_factory=dict)
     note: str = ""
+    own: Own | None = None
+    aside: bool = False
+
+    def theory(self, method: str) -> list[Curve]:
+        """Curves over the panel of a method."""
+        return [*self.curves.get("", ()), *self.curves.get(method, ())]
+
+    @property
+    def cell(self) -> tuple[int, int] | None:
+        """Row and column of the scene; None where it is not on both axes."""
+        if self.own is None or self.own.x is None or self.own.y is None:
+            return None
+        return self.y.values.index(self.own.y), self.x.values.index(self.own.x)
+
+    @property
+    def cross(self) -> list[tuple[int, int]]:
+        """Cells of the scene's row and column, from the scene outwards."""
+        if self.own is None:
+            return []
+        cells = []
+        if self.own.y in self.y.values:
+            row = self.y.values.index(self.own.y)
+            cells += [(row, j) for j in range(len(self.x.values))]
+        if self.own.x in self.x.values:
+            column = self.x.values.index(self.own.x)
+            cells += [(i, column) for i in range(len(self.y.values))]
+        if self.cell is None:
+            return cells
+        i, j = self.cell
+        return sorted(dict.fromkeys(cells), key=lambda c: abs(c[0] - i) + abs(c[1] - j))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Edge:
+    """Where the scene's own method changes its verdict, going one way along one axis.
+
+    Attributes
+    ----------
+    axis : str
+        "x" or "y".
+    rising : bool
+        Which way.
+    inside, outside : float
+        Last value with a verdict as good as the scene's (where the scene itself is bad: as bad),
+        first one with another; `outside` is NaN where none was seen.
+    verdict : Verdict
+        At `outside`; NOT_RUN where none was seen.
+    word : str
+        At `outside`.
+    whole : bool
+        Whether all was run on the way, to the end of the axis where no change was seen.
+    """
+
+    axis: str
+    rising: bool
+    inside: float
+    outside: float = math.nan
+    verdict: Verdict = Verdict.NOT_RUN
+    word: str = ""
+    whole: bool = True
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -161,11 +281,20 @@ class StabilityMap:
         Codes of :class:`Verdict` for every method.
     words : dict of str to list of list of str
         Of the same cells.
+    edges : tuple of Edge
+        Of the scene's own method, from the scene.
     """
 
     plan: Plan
     verdicts: dict[str, NDArray[np.int64]]
     words: dict[str, list[list[str]]]
+    edges: tuple[Edge, ...] = ()
+
+    @property
+    def methods(self) -> list[str]:
+        """Panels, that of the scene's own method first."""
+        own = self.plan.own.method if self.plan.own else None
+        return sorted(self.verdicts, key=lambda name: name != own)
 
     @property
     def whole(self) -> bool:
@@ -205,8 +334,10 @@ def measure(
     progress: Callable[[int, int], None] | None = None,
     *,
     begun: StabilityMap | None = None,
+    methods: Sequence[str] | None = None,
+    cells: Sequence[tuple[int, int]] | None = None,
 ) -> StabilityMap:
-    """Run every cell of a map, the coarse picture first.
+    """Run the cells of a map: row and column of the scene, then the plane, coarse before fine.
 
     Parameters
     ----------
@@ -217,19 +348,21 @@ def measure(
         ``(done, all)``.
     begun : StabilityMap, optional
         Of the same plan, cut short by a budget: only what it left is run.
+    methods : sequence of str, optional
+        Panels that are run; all by default.
+    cells : sequence of tuple of int, optional
+        Row and column of those that are run; all by default.
 
     Returns
     -------
     StabilityMap
     """
+    found = begun or unmeasured(plan)
+    verdicts = {name: codes.copy() for name, codes in found.verdicts.items()}
+    words = {name: [list(row) for row in rows] for name, rows in found.words.items()}
     shape = len(plan.y.values), len(plan.x.values)
-    if begun is None:
-        verdicts = {name: np.zeros(shape, np.int64) for name in plan.judges}
-        words = {name: [[""] * shape[1] for _ in range(shape[0])] for name in plan.judges}
-    else:
-        verdicts = {name: codes.copy() for name, codes in begun.verdicts.items()}
-        words = {name: [list(row) for row in rows] for name, rows in begun.words.items()}
-    order = [(i, j, name) for i, j in coarse_first(shape) for name in plan.judges]
+    wanted = dict.fromkeys([*plan.cross, *coarse_first(shape)] if cells is None else cells)
+    order = [(i, j, name) for i, j in wanted for name in methods or found.methods]
     for done, (i, j, name) in enumerate(order, start=1):
         if verdicts[name][i, j] != Verdict.NOT_RUN:
             continue
@@ -239,7 +372,17 @@ def measure(
         verdicts[name][i, j], words[name][i][j] = verdict, word
         if progress is not None:
             progress(done, len(order))
-    return StabilityMap(plan=plan, verdicts=verdicts, words=words)
+    return replace(found, verdicts=verdicts, words=words)
+
+
+def unmeasured(plan: Plan) -> StabilityMap:
+    """A map of which no cell is run."""
+    n_y, n_x = len(plan.y.values), len(plan.x.values)
+    return StabilityMap(
+        plan=plan,
+        verdicts={name: np.zeros((n_y, n_x), np.int64) for name in plan.judges},
+        words={name: [[""] * n_x for _ in range(n_y)] for name in plan.judges},
+    )
 
 
 def coarse_first(shape: tuple[int, int]) -> Iterator[tuple[int, int]]:
@@ -287,204 +430,3 @@ def edge(
     known = hit.any(axis=1) & (first > 0)
     values = np.asarray(x, float)
     return np.where(known, np.sqrt(values[np.maximum(first - 1, 0)] * values[first]), np.nan)
-
-
-# --- showing
-
-
-def stability_table(scene: Scene, maps: Sequence[StabilityMap]) -> dict[str, Any]:
-    """Maps as plain values.
-
-    Parameters
-    ----------
-    scene : Scene
-    maps : sequence of StabilityMap
-
-    Returns
-    -------
-    dict
-        Axes, verdicts by name, words of the cells that are not simply accurate, theory.
-    """
-    return {"scene": scene.name, "maps": [_table(each) for each in maps]}
-
-
-def _table(found: StabilityMap) -> dict[str, Any]:
-    plan = found.plan
-    return {
-        "name": plan.name,
-        "title": plan.title,
-        "judged_by": plan.note,
-        "axes": {
-            key: {"name": axis.name, "unit": axis.unit, "values": list(axis.values)}
-            for key, axis in (("x", plan.x), ("y", plan.y))
-        },
-        "methods": [
-            {
-                "name": name,
-                "verdicts": [[Verdict(code).name.lower() for code in row] for row in codes],
-                "words": found.words[name],
-                "shares": {v.name.lower(): share for v, share in found.share(name).items()},
-                "theory": [
-                    {"name": curve.name, "x": list(curve.x), "y": list(curve.y)}
-                    for curve in _curves(plan, name)
-                ],
-            }
-            for name, codes in found.verdicts.items()
-        ],
-    }
-
-
-def _curves(plan: Plan, method: str) -> list[Curve]:
-    return [*plan.curves.get("", ()), *plan.curves.get(method, ())]
-
-
-def stability_text(scene: Scene, maps: Sequence[StabilityMap]) -> str:
-    """Shares of every region, a line a method.
-
-    Parameters
-    ----------
-    scene : Scene
-    maps : sequence of StabilityMap
-
-    Returns
-    -------
-    str
-    """
-    lines = [f"{scene.name} (simulated): where its methods fail"]
-    for found in maps:
-        plan = found.plan
-        lines += ["", f"{plan.name}: {plan.title}", f"  {plan.x.label} against {plan.y.label}"]
-        lines += [f"  judged by {plan.note}"] if plan.note else []
-        for method in found.verdicts:
-            shares = ", ".join(f"{v.text} {s:.0%}" for v, s in found.share(method).items())
-            lines.append(f"  {method:24} {shares}")
-            lines += [f"    {count} x {word}" for word, count in _reasons(found, method)]
-    return "\n".join(lines)
-
-
-def _reasons(found: StabilityMap, method: str) -> list[tuple[str, int]]:
-    """Statuses behind the cells that failed, the most frequent first."""
-    failed = (Verdict.REFUSED, Verdict.FAILS, Verdict.UNSTABLE, Verdict.NOT_CONVERGED)
-    codes = found.verdicts[method]
-    words = [
-        word.partition(":")[0]
-        for row, line in zip(codes, found.words[method], strict=True)
-        for code, word in zip(row, line, strict=True)
-        if code in failed and word
-    ]
-    counts = {word: words.count(word) for word in sorted(set(words))}
-    return sorted(counts.items(), key=lambda item: -item[1])[:_MOST_REASONS]
-
-
-_MOST_REASONS = 4
-
-
-def save_figure(
-    scene: Scene, maps: Sequence[StabilityMap], path: Path, *, force: bool = True
-) -> None:
-    """Draw maps on one sheet, a row of panels each.
-
-    Parameters
-    ----------
-    scene : Scene
-    maps : sequence of StabilityMap
-    path : Path
-        ``.png``, ``.svg`` or ``.pdf``.
-
-    Raises
-    ------
-    DataError
-        Another suffix.
-    """
-    save_picture(atlas_figure(scene, maps), path, force=force)
-
-
-def atlas_figure(scene: Scene, maps: Sequence[StabilityMap]) -> Any:
-    """Figure of maps: regions as colours, theory as lines, a legend for both.
-
-    Parameters
-    ----------
-    scene : Scene
-    maps : sequence of StabilityMap
-        At least one.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-    """
-    from matplotlib.figure import Figure
-
-    widest = max(len(found.verdicts) for found in maps)
-    figure = Figure(figsize=(max(7.5, 3.0 * widest + 1.0), 4.3 * len(maps)), layout="constrained")
-    rows = figure.subfigures(len(maps), 1, squeeze=False)[:, 0]
-    for row, found in zip(rows, maps, strict=True):
-        _draw(row, scene, found)
-    return figure
-
-
-def _draw(sheet: Any, scene: Scene, found: StabilityMap) -> None:
-    plan = found.plan
-    sheet.suptitle(f"{short_name(scene.name, 60)} (simulated): {plan.title}", fontsize=11)
-    panels = sheet.subplots(1, len(found.verdicts), squeeze=False, sharex=True, sharey=True)[0]
-    lines: dict[str, Any] = {}
-    for panel, (method, codes) in zip(panels, found.verdicts.items(), strict=True):
-        _draw_panel(panel, plan, codes)
-        panel.set_title(method, fontsize=9)
-        panel.set_xlabel(plan.x.label, fontsize=9)
-        for number, curve in enumerate(_curves(plan, method)):
-            (line,) = panel.plot(curve.x, curve.y, **_LINES[number % len(_LINES)])
-            lines.setdefault(curve.name, line)
-    panels[0].set_ylabel(plan.y.label, fontsize=9)
-    _legend(sheet, found, lines)
-
-
-_LINES: tuple[dict[str, Any], ...] = (
-    {"color": "black", "lw": 1.8},
-    {"color": "black", "lw": 1.4, "ls": "--"},
-    {"color": "black", "lw": 1.2, "ls": ":"},
-)
-
-
-_DECADES = 300
-"""Range of an axis, end over end, below which 1, 2 and 5 are marked in each decade."""
-
-
-def _draw_panel(panel: Any, plan: Plan, codes: NDArray[np.int64]) -> None:
-    from matplotlib.colors import BoundaryNorm, ListedColormap
-    from matplotlib.ticker import LogLocator, NullFormatter
-
-    colours = ListedColormap([_COLOUR[verdict] for verdict in Verdict])
-    norm = BoundaryNorm(np.arange(len(Verdict) + 1) - 0.5, len(Verdict))
-    x, y = _bounds(plan.x), _bounds(plan.y)
-    panel.pcolormesh(x, y, codes, cmap=colours, norm=norm, edgecolors="white", linewidth=0.3)
-    for axis, scale in ((plan.x, panel.set_xscale), (plan.y, panel.set_yscale)):
-        scale("log" if axis.log else "linear")
-    panel.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
-    for axis, ticks in ((plan.x, panel.xaxis), (plan.y, panel.yaxis)):
-        if not axis.log:
-            continue
-        ticks.set_minor_formatter(NullFormatter())  # decades say enough, where there are several
-        if axis.values[-1] < _DECADES * axis.values[0]:
-            ticks.set_major_locator(LogLocator(subs=(1, 2, 5)))
-            ticks.set_major_formatter("{x:g}")
-    panel.tick_params(labelsize=8)
-
-
-def _bounds(axis: Axis) -> NDArray[np.float64]:
-    """Edges of the cells about the values of an axis."""
-    values = np.log(axis.values) if axis.log else np.asarray(axis.values)
-    middle = 0.5 * (values[1:] + values[:-1])
-    edges = np.concatenate([[2 * values[0] - middle[0]], middle, [2 * values[-1] - middle[-1]]])
-    return np.asarray(np.exp(edges) if axis.log else edges)
-
-
-def _legend(sheet: Any, found: StabilityMap, lines: Mapping[str, Any]) -> None:
-    from matplotlib.patches import Patch
-
-    seen = sorted({int(code) for codes in found.verdicts.values() for code in np.unique(codes)})
-    patches = [
-        Patch(facecolor=_COLOUR[Verdict(code)], edgecolor="grey", label=Verdict(code).text)
-        for code in seen
-    ]
-    handles, labels = [*patches, *lines.values()], [*(p.get_label() for p in patches), *lines]
-    sheet.legend(handles, labels, loc="outside lower center", ncols=4, fontsize=8, frameon=False)

@@ -5,7 +5,6 @@ one row of :data:`MAPS`.
 """
 
 import math
-import time
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from typing import Any, NamedTuple, cast
@@ -15,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..sim.analytic import kelvin_voigt_restitution
 from ..sim.assemble import simulate
-from ..sim.bearing import BearingError, BearingStatus, equilibrium, whirl
+from ..sim.bearing import BearingError, BearingStatus, equilibrium, sommerfeld_number, whirl
 from ..sim.crank_setup import (
     LARGEST_STEP_PER_CONTACT_TIME,
     contact_rate,
@@ -41,24 +40,16 @@ from ..sim.film_relax import PAPER_RELAXATION
 from ..sim.integrate import Solution, Status
 from ..sim.journal import film_geometry, journal_film, journal_scale
 from ..sim.journal_parts import JournalScene, Oil
+from ..sim.ladder import JOURNAL_STEP
 from ..sim.orbit import Film, OrbitRun, OrbitStatus, film_force, load, run_orbit
-from ..sim.parts import Scene, SceneError, nearest
+from ..sim.parts import Scene, SceneError
+from ..sim.pump import steps_per_sample
 from ..sim.pump_parts import PumpScene
-from ..sim.shaft_line import film_bearings
 from ..sim.shaft_parts import ShaftScene
 from ..sim.slider_crank import JOINT_COMPLIANT
 from ..sim.steppers import STEPPERS, Stepper, bounce, decays
-from .stability import (
-    Axis,
-    Budget,
-    Cell,
-    Curve,
-    Judge,
-    Plan,
-    StabilityMap,
-    Verdict,
-    measure,
-)
+from .stability import Axis, Cell, Curve, Judge, Own, Plan, Verdict
+from .stability_own import journal_weight, orbit_step, own_film, plain_film
 
 Array = NDArray[np.float64]
 Maker = Callable[[Scene, int | None], Plan | str]
@@ -100,7 +91,6 @@ class _Contact(NamedTuple):
     mass: float
     stiffness: float
     damping: float
-    linear: bool
 
 
 def contact_oscillator(scene: PumpScene) -> _Contact | None:
@@ -137,7 +127,6 @@ def contact_oscillator(scene: PumpScene) -> _Contact | None:
                 mass=1 / joint_mobility(scene, 0, number),
                 stiffness=tangent_stiffness(record, loads[number]),
                 damping=max(float(record["damping"]), loss),
-                linear=part.elasticity == "linear",
             )
         )
     return max(found, key=lambda each: each.stiffness / each.mass, default=None)
@@ -185,20 +174,18 @@ def step_stiffness(scene: Scene, size: int | None = None) -> Plan | str:
         return "no joint is compliant; set joint.crankpin.rung = 'compliant'"
     n = size or 13
     rate = math.sqrt(contact.stiffness / contact.mass)
-    x = Axis(name="step", unit="s", values=_spread(0.02 / rate, 20 / rate, n))
+    step = 1 / (pump.sample_rate * steps_per_sample(pump))
+    guard = LARGEST_STEP_PER_CONTACT_TIME / contact_rate(pump) / step
+    x = Axis(name="step", unit="s", values=_spread(0.02 / rate, 20 / rate, n)).through(step)
     y = Axis(
         name="contact stiffness",
         unit="N/m",
         values=_spread(contact.stiffness / 100, contact.stiffness * 100, n),
-    )
+    ).through(contact.stiffness)
     judges = {s.name: _stepper_judge(s, contact, x, y, scene.accuracy) for s in STEPPERS}
     curves = {s.name: _stepper_curve(s, contact, y) for s in STEPPERS}
-    if contact.linear:
-        judges["mechanism, cut at contacts"] = _mechanism_judge(pump, contact.joint)
-        curves["mechanism, cut at contacts"] = [
-            *curves["runge-kutta 4"],
-            _guard_curve(pump, contact.joint, y),
-        ]
+    judges[_MECHANISM] = _mechanism_judge(pump, contact)
+    curves[_MECHANISM] = [*curves["runge-kutta 4"], _guard_curve(pump, contact, y)]
     return Plan(
         name="step-stiffness",
         title=f"contact of the {contact.joint}, step by stiffness, damping as it is",
@@ -208,7 +195,16 @@ def step_stiffness(scene: Scene, size: int | None = None) -> Plan | str:
         curves=curves,
         note="growth of the pressed contact; speed after an impact, over that before, within "
         f"{scene.accuracy:.2g}; the mechanism: rms of the joint's force",
+        own=Own(
+            method=_MECHANISM,
+            x=step,
+            y=contact.stiffness,
+            note=f"A check lets a scene take at most {guard:.2g} times this step.",
+        ),
     )
+
+
+_MECHANISM = "mechanism, cut at contacts"
 
 
 def _stepper_curve(stepper: Stepper, contact: _Contact, y: Axis) -> list[Curve]:
@@ -227,15 +223,31 @@ def _column(points: list[tuple[float, float]], column: int) -> tuple[float, ...]
     return tuple(point[column] for point in points)
 
 
-def _guard_curve(scene: PumpScene, joint: str, y: Axis) -> Curve:
+def _guard_curve(scene: PumpScene, contact: _Contact, y: Axis) -> Curve:
     longest = [
-        LARGEST_STEP_PER_CONTACT_TIME / contact_rate(_stiff(scene, joint, k)) for k in y.values
+        LARGEST_STEP_PER_CONTACT_TIME / contact_rate(_stiff(scene, contact, k)) for k in y.values
     ]
     return Curve(name="guard: longest step let pass", x=tuple(longest), y=y.values)
 
 
-def _stiff(scene: PumpScene, joint: str, stiffness: float) -> PumpScene:
-    return cast(PumpScene, changed(scene, {f"joint.{joint}.stiffness": stiffness}))
+def _stiff(scene: PumpScene, contact: _Contact, stiffness: float) -> PumpScene:
+    """A scene whose joint has another tangent stiffness under its largest load.
+
+    That of Hertz's law goes with the power 2/3 of its constant, that of the conformal one nearly
+    with its modulus.
+    """
+    path = f"joint.{contact.joint}"
+    part = getattr(scene.joint, contact.joint)
+    name, power = _STIFFENED[part.elasticity]
+    value = getattr(part, name) * (stiffness / contact.stiffness) ** power
+    return cast(PumpScene, changed(scene, {f"{path}.{name}": value}))
+
+
+_STIFFENED = {
+    "linear": ("stiffness", 1.0),
+    "hertz": ("hertz_stiffness", 1.5),
+    "conformal": ("effective_modulus", 1.0),
+}
 
 
 def _stepper_judge(stepper: Stepper, contact: _Contact, x: Axis, y: Axis, accuracy: float) -> Judge:
@@ -264,31 +276,31 @@ def _stepper_cell(stable: bool, off: float, accuracy: float) -> Cell:
         return Verdict.UNSTABLE, "grows"
     if math.isnan(off):
         return Verdict.NOT_CONVERGED, "no next point"
-    verdict = Verdict.ACCURATE if off <= accuracy else Verdict.WRONG
+    verdict = Verdict.ACCURATE if off <= accuracy else Verdict.INACCURATE
     return verdict, f"restitution off by {off:.3g}"
 
 
-def _mechanism_judge(scene: PumpScene, joint: str) -> Judge:
+def _mechanism_judge(scene: PumpScene, contact: _Contact) -> Judge:
     """The whole mechanism without its guard, against a quarter of the longest step let pass."""
 
     @cache
     def reference(stiffness: float) -> Array:
-        stiff = _stiff(scene, joint, stiffness)
+        stiff = _stiff(scene, contact, stiffness)
         longest = LARGEST_STEP_PER_CONTACT_TIME / contact_rate(stiff)
-        return _joint_rms(stiff, joint, longest / _FINER)
+        return _joint_rms(stiff, contact.joint, longest / _FINER)
 
     def judge(step: float, stiffness: float) -> Cell:
         right = reference(stiffness)
         if not np.all(np.isfinite(right)):
             return Verdict.FAILS, "no finer step runs either"
-        found = _joint_rms(_stiff(scene, joint, stiffness), joint, step)
+        found = _joint_rms(_stiff(scene, contact, stiffness), contact.joint, step)
         if not np.all(found < _BOUNDLESS * right.max()):  # also where it is not finite
             return Verdict.UNSTABLE, "force without bound"
         off, mean = abs(found.mean() / right.mean() - 1), right.mean()
         # impacts are chaotic: what the starts scatter by is no error
         scatter = 3 * math.hypot(found.std(ddof=1), right.std(ddof=1)) / math.sqrt(len(_STARTS))
         fine = off <= max(scene.accuracy, scatter / mean)
-        return (Verdict.ACCURATE if fine else Verdict.WRONG), f"rms force off by {off:.2g}"
+        return (Verdict.ACCURATE if fine else Verdict.INACCURATE), f"rms force off by {off:.2g}"
 
     return judge
 
@@ -332,17 +344,23 @@ def clearance_speed(scene: Scene, size: int | None = None) -> Plan | str:
     pump = cast(PumpScene, scene)
     if pump.joint.crankpin.rung != "compliant":
         return "the crank pin is not compliant; set joint.crankpin.rung = 'compliant'"
-    n, gap = size or 9, 2 * pump.joint.crankpin.clearance_radial
+    n, gap = size or 9, pump.joint.crankpin.clearance_diametral
+    if gap == 0:
+        return "the crank pin has no clearance; set joint.crankpin.diametral_clearance"
+    method = f"step of the scene, and a {_FINER}th"
     return Plan(
         name="clearance-speed",
         title="crank-pin clearance by speed, the scene otherwise as it is",
         x=Axis(
             name="speed", unit="Hz", values=_spread(pump.drive.speed / 4, 4 * pump.drive.speed, n)
+        ).through(pump.drive.speed),
+        y=Axis(name="diametral clearance", unit="m", values=_spread(gap / 30, gap * 10, n)).through(
+            gap
         ),
-        y=Axis(name="diametral clearance", unit="m", values=_spread(gap / 30, gap * 10, n)),
-        judges={f"step of the scene, and a {_FINER}th": lambda x, y: _pump_cell(pump, x, y)},
+        judges={method: lambda x, y: _pump_cell(pump, x, y)},
         note=f"status and contact, repeated at a {_FINER}th of the step; chaos: a clearance larger "
         "by 1e-9 parts the orbits by a thousandth of it",
+        own=Own(method=method, x=pump.drive.speed, y=gap),
     )
 
 
@@ -366,7 +384,7 @@ def _pump_cell(scene: PumpScene, speed: float, clearance: float) -> Cell:
     if not first.status.ok:
         return _told_apart(first.status, again.status)
     if not again.status.ok:
-        return Verdict.WRONG, f"a finer step ends with {again.status.name.lower()}"
+        return Verdict.INACCURATE, f"a finer step ends with {again.status.name.lower()}"
     if _parts(here, first, clearance) and _parts(finer, again, clearance):
         return Verdict.CHAOTIC, f"in flight for {_flight(first, clearance):.1%} of the time"
     lost = _flight(first, clearance)
@@ -374,7 +392,7 @@ def _pump_cell(scene: PumpScene, speed: float, clearance: float) -> Cell:
         return Verdict.LOST, f"in flight for {lost:.1%} of the time"
     off = abs(_pin_rms(first) / _pin_rms(again) - 1)
     return (
-        Verdict.ACCURATE if off <= scene.accuracy else Verdict.WRONG
+        Verdict.ACCURATE if off <= scene.accuracy else Verdict.INACCURATE
     ), f"rms force off by {off:.2g}"
 
 
@@ -426,9 +444,9 @@ def step_squeeze(scene: Scene, size: int | None = None) -> Plan | str:
     """
     journal = cast(JournalScene, scene)
     case = _orbit_case(journal)
-    n = size or 13
-    x = Axis(name="step", unit="rad", values=_spread(1e-5, 1.0, n))
-    y = Axis(name="gap left, 1 - eccentricity ratio", unit="", values=_spread(0.01, 0.95, n))
+    n, step, gap = size or 13, orbit_step(journal), own_film(journal).gap
+    x = Axis(name="step", unit="rad", values=_spread(1e-5, 1.0, n)).through(step)
+    y = Axis(name=_GAP, unit="", values=_spread(0.01, 0.95, n)).through(gap)
     by_name = {stepper.name: stepper for stepper in STEPPERS}
     euler, runge = by_name["semi-implicit euler"], by_name["runge-kutta 4"]
     limits = {
@@ -445,7 +463,9 @@ def step_squeeze(scene: Scene, size: int | None = None) -> Plan | str:
             "rk4, no guard": _bare_judge(case, runge, scene.accuracy),
             "euler": _guarded_judge(case, "euler", scene.accuracy),
             "rk4": _guarded_judge(case, "rk4", scene.accuracy),
-            "adaptive": _guarded_judge(case, "adaptive", scene.accuracy),
+            "adaptive": _guarded_judge(
+                case, "adaptive", scene.accuracy, journal.numerics.tolerance
+            ),
         },
         curves={
             **{f"{name}, no guard": [curve] for name, curve in limits.items()},
@@ -453,7 +473,18 @@ def step_squeeze(scene: Scene, size: int | None = None) -> Plan | str:
         },
         note="a displacement of a thousandth of the gap, followed within "
         f"{scene.accuracy:.2g} of it",
+        own=Own(
+            method=journal.numerics.integrator,
+            x=step,
+            y=gap,
+            note="The step is the longest that it may take."
+            if journal.numerics.integrator == "adaptive"
+            else "",
+        ),
     )
+
+
+_GAP = "gap left, 1 - eccentricity ratio"
 
 
 class _OrbitCase(NamedTuple):
@@ -582,7 +613,9 @@ def _bare_judge(case: _OrbitCase, stepper: Stepper, accuracy: float) -> Judge:
     return judge
 
 
-def _guarded_judge(case: _OrbitCase, integrator: str, accuracy: float) -> Judge:
+def _guarded_judge(
+    case: _OrbitCase, integrator: str, accuracy: float, tolerance: float = 1e-5
+) -> Judge:
     """An integrator as a recording uses it."""
 
     def judge(step: float, gap: float) -> Cell:
@@ -594,6 +627,7 @@ def _guarded_judge(case: _OrbitCase, integrator: str, accuracy: float) -> Judge:
             start=(1 - gap + _AWAY * gap, 0.0),
             integrator=integrator,
             step=step,
+            tolerance=tolerance,
         )
         if run.status is OrbitStatus.STEP:
             return Verdict.REFUSED, f"step: {run.status.text}"
@@ -617,7 +651,7 @@ def _orbit_cell(
     size = np.hypot(*(reference.position - [1 - gap, 0.0]).T).max()
     if not away < 2 * size:  # two motions that both stay within the displacement part by no more
         return Verdict.UNSTABLE, "grows"
-    verdict = Verdict.ACCURATE if away <= accuracy * size else Verdict.WRONG
+    verdict = Verdict.ACCURATE if away <= accuracy * size else Verdict.INACCURATE
     return verdict, f"off by {away / size:.2g} of the displacement"
 
 
@@ -640,28 +674,39 @@ def speed_load(scene: Scene, size: int | None = None) -> Plan | str:
         Or why there is none.
     """
     journal = cast(JournalScene, scene)
-    n, weight = size or 11, journal.rotor.mass * journal.gravity + journal.load.static
+    n, weight = size or 11, journal_weight(journal)
     if not weight > 0:
         return "nothing rests on the journal; set load.static, in newtons"
     x = Axis(
         name="speed", unit="Hz", values=_spread(journal.drive.speed / 4, 8 * journal.drive.speed, n)
-    )
-    y = Axis(name="load", unit="N", values=_spread(weight / 30, weight * 10, n))
-    settings = {"adaptive": ("adaptive", 0.02), "rk4, step 0.02": ("rk4", 0.02)}
-    settings |= {"euler, step 0.02": ("euler", 0.02), "euler, step 0.2": ("euler", 0.2)}
+    ).through(journal.drive.speed)
+    y = Axis(name="load", unit="N", values=_spread(weight / 30, weight * 10, n)).through(weight)
+    numerics = journal.numerics
+    own = f"{numerics.integrator}, as written"
+    settings: dict[str, tuple[str, float, float]] = {
+        own: (numerics.integrator, orbit_step(journal), numerics.tolerance)
+    }
+    settings |= {name: setting for name, setting in _SETTINGS.items() if setting != settings[own]}
     return Plan(
         name="speed-load",
         title=f"whirl over speed and load, film '{journal.film.rung}'",
         x=x,
         y=y,
-        judges={
-            name: _whirl_judge(journal, integrator, step)
-            for name, (integrator, step) in settings.items()
-        },
+        judges={name: _whirl_judge(journal, *setting) for name, setting in settings.items()},
         curves={"": [threshold_curve(journal, x, y)]},
         note="a displacement of a hundredth of the gap dies out or grows; the adaptive integrator "
         "at a hundredth of its tolerance decides what is right",
+        own=Own(method=own, x=journal.drive.speed, y=weight),
     )
+
+
+_SETTINGS = {
+    "adaptive": ("adaptive", JOURNAL_STEP, 1e-5),
+    "rk4, step 0.02": ("rk4", 0.02, 1e-5),
+    "euler, step 0.02": ("euler", 0.02, 1e-5),
+    "euler, step 0.2": ("euler", 0.2, 1e-5),
+}
+"""Integrator, longest step [rad] and tolerance of the panels beside that of the scene."""
 
 
 def at_load(scene: JournalScene, speed: float, weight: float) -> JournalScene:
@@ -724,17 +769,21 @@ def _margin(scene: JournalScene, weight: float, speed: float) -> float:
     return math.log(scale.force / weight / limit) if math.isfinite(limit) else -math.inf
 
 
-def _whirl_judge(scene: JournalScene, integrator: str, step: float) -> Judge:
+def _whirl_judge(
+    scene: JournalScene, integrator: str, step: float, tolerance: float = 1e-5
+) -> Judge:
     def judge(speed: float, weight: float) -> Cell:
         true, word = whirls(scene, speed, weight)
         if true is None:
             return Verdict.FAILS, word
-        told, word = whirls(scene, speed, weight, integrator=integrator, step=step, tolerance=1e-5)
+        told, word = whirls(
+            scene, speed, weight, integrator=integrator, step=step, tolerance=tolerance
+        )
         if told is None:
             status = word.partition(":")[0]
             return (Verdict.REFUSED if status == "step" else Verdict.UNSTABLE), word
         if told != true:
-            return Verdict.WRONG, f"says that it {'grows' if told else 'dies out'}"
+            return Verdict.INACCURATE, f"says that it {'grows' if told else 'dies out'}"
         return (Verdict.WHIRL if true else Verdict.ACCURATE), word
 
     return judge
@@ -808,18 +857,9 @@ def whirls(
 # --- films
 
 
-def _film_geometry(scene: Scene) -> FilmGeometry:
-    """Of the bearing, or of the aftmost one of a line; a plain bore."""
-    if isinstance(scene, ShaftScene):
-        found = film_bearings(scene)[0].worn.geometry
-    else:
-        found = film_geometry(cast(JournalScene, scene))
-    return FilmGeometry(
-        length_to_diameter=found.length_to_diameter,
-        n_theta=found.n_theta,
-        n_z=found.n_z,
-        condition=found.condition,
-    )
+def _film_method(scene: Scene) -> str:
+    """Panel of the solver of a scene's film: maps are drawn from direct solves."""
+    return "short" if isinstance(scene, JournalScene) and scene.film.rung == "short" else "direct"
 
 
 def _meshed(geometry: FilmGeometry, n_theta: int, n_z: int | None = None) -> FilmGeometry:
@@ -852,8 +892,8 @@ def eccentricity_mesh(scene: Scene, size: int | None = None) -> Plan | str:
     Plan or str
         Or why there is none.
     """
-    geometry = _film_geometry(scene)
-    n = size or 10
+    geometry = plain_film(scene)
+    n, own = size or 10, own_film(scene)
     nodes = sorted({2 * round(value / 2) for value in np.geomspace(12, 216, n)})
     gaps = _spread(0.004, 0.9, n)
 
@@ -873,8 +913,8 @@ def eccentricity_mesh(scene: Scene, size: int | None = None) -> Plan | str:
     return Plan(
         name="eccentricity-mesh",
         title=f"solvers of the film, L/D {geometry.length_to_diameter:.2g}, eccentricity by mesh",
-        x=Axis(name="nodes round the circle", unit="", values=tuple(float(v) for v in nodes)),
-        y=Axis(name="gap left, 1 - eccentricity ratio", unit="", values=gaps),
+        x=_nodes(nodes).through(geometry.n_theta),
+        y=Axis(name=_GAP, unit="", values=gaps).through(own.gap),
         judges={
             "direct": judge_of(solve_direct),
             f"over-relaxed, {PAPER_RELAXATION}": judge_of(_relaxed),
@@ -885,6 +925,17 @@ def eccentricity_mesh(scene: Scene, size: int | None = None) -> Plan | str:
         curves={"": [_cells_curve(gaps)]},
         note=f"force within {scene.accuracy:.2g} of a direct solve on {_FINE[0]} x {_FINE[1]} "
         "nodes",
+        own=Own(method=_film_method(scene), x=float(geometry.n_theta), y=own.gap, note=own.note),
+        aside=isinstance(scene, ShaftScene),
+    )
+
+
+def _nodes(values: Sequence[int]) -> Axis:
+    return Axis(
+        name="mesh, nodes round the circle",
+        unit="",
+        values=tuple(float(v) for v in values),
+        even=True,
     )
 
 
@@ -913,7 +964,7 @@ def _film_cell(found: FilmSolution, reference: FilmSolution, accuracy: float) ->
         verdict = _FILM_VERDICT.get(found.status, Verdict.NOT_CONVERGED)
         return verdict, f"{found.status.name.lower()}: {found.status.value}"
     off = float(np.hypot(*(found.force - reference.force)) / np.hypot(*reference.force))
-    return (Verdict.ACCURATE if off <= accuracy else Verdict.WRONG), f"force off by {off:.2g}"
+    return (Verdict.ACCURATE if off <= accuracy else Verdict.INACCURATE), f"force off by {off:.2g}"
 
 
 def relaxation_mesh(scene: Scene, size: int | None = None) -> Plan | str:
@@ -931,7 +982,7 @@ def relaxation_mesh(scene: Scene, size: int | None = None) -> Plan | str:
     Plan or str
         Or why there is none.
     """
-    geometry = _film_geometry(scene)
+    geometry = plain_film(scene)
     n = size or 16
     factors = tuple(float(value) for value in np.linspace(0.9, 2.4, n))
     nodes = sorted({2 * round(value / 2) for value in np.geomspace(16, 128, max(4, n // 2))})
@@ -950,6 +1001,9 @@ def relaxation_mesh(scene: Scene, size: int | None = None) -> Plan | str:
 
         return judge
 
+    eccentricities = (0.2, 0.6, 0.9)
+    own = 1 - (own_film(scene).gap or 0.4)
+    nearest = min(eccentricities, key=lambda e: abs(e - own))
     lines = [
         ("limit in theory: 2", 2.0),
         (f"the paper's factor: {PAPER_RELAXATION}", PAPER_RELAXATION),
@@ -958,10 +1012,17 @@ def relaxation_mesh(scene: Scene, size: int | None = None) -> Plan | str:
         name="relaxation-mesh",
         title=f"projected over-relaxation, L/D {geometry.length_to_diameter:.2g}, factor by mesh",
         x=Axis(name="relaxation factor", unit="", values=factors, log=False),
-        y=Axis(name="nodes round the circle", unit="", values=tuple(float(v) for v in nodes)),
-        judges={f"eccentricity {e:g}": judge_of(e) for e in (0.2, 0.6, 0.9)},
+        y=_nodes(nodes).through(geometry.n_theta),
+        judges={f"eccentricity {e:g}": judge_of(e) for e in eccentricities},
         curves={"": [Curve(name=name, x=(at, at), y=(1.0, 1000.0)) for name, at in lines]},
         note=f"force within 0.01 of a direct solve on the same mesh, within {_SWEEPS} sweeps",
+        own=Own(
+            method=f"eccentricity {nearest:g}",
+            x=None,
+            y=float(geometry.n_theta),
+            note="No scene relaxes its film: this is the source paper's method.",
+        ),
+        aside=True,
     )
 
 
@@ -980,7 +1041,7 @@ def length_load(scene: Scene, size: int | None = None) -> Plan | str:
     Plan or str
         Or why there is none.
     """
-    geometry = _film_geometry(scene)
+    geometry, own = plain_film(scene), own_film(scene)
     n = size or 10
 
     @cache
@@ -1006,18 +1067,27 @@ def length_load(scene: Scene, size: int | None = None) -> Plan | str:
     return Plan(
         name="length-load",
         title=f"rungs of the film on {geometry.n_theta} x {geometry.n_z} nodes, load by length",
-        x=Axis(name="L/D", unit="", values=_spread(0.1, 6.0, n)),
+        x=Axis(name="L/D", unit="", values=_spread(0.1, 6.0, n)).through(
+            geometry.length_to_diameter
+        ),
         y=Axis(
             name="Sommerfeld number (light load: large)", unit="", values=_spread(0.003, 10.0, n)
-        ),
+        ).through(own.sommerfeld),
         judges={rung: judge_of(rung) for rung in ("short", "finite", "long", "direct")},
         note=f"least film within {scene.accuracy:.2g} of a direct solve on 216 x 33 nodes",
+        own=Own(
+            method=_film_method(scene),
+            x=geometry.length_to_diameter,
+            y=own.sommerfeld,
+            note=own.note,
+        ),
+        aside=isinstance(scene, ShaftScene),
     )
 
 
 def _per_sommerfeld(number: float) -> tuple[float, float]:
-    """Load over ``eta omega R^3 L / C^2``; the number itself counts on ``eta N L D (R / C)^2``."""
-    return 1 / (math.pi * number), 0.0
+    """Load over ``eta omega R^3 L / C^2``."""
+    return sommerfeld_number(number), 0.0
 
 
 def _rest_cell(found: Any, reference: Any, accuracy: float) -> Cell:
@@ -1030,7 +1100,9 @@ def _rest_cell(found: Any, reference: Any, accuracy: float) -> Cell:
     if not status.ok:
         return Verdict.NOT_CONVERGED, word
     off = abs((1 - found.eccentricity_ratio) / (1 - reference.eccentricity_ratio) - 1)
-    return (Verdict.ACCURATE if off <= accuracy else Verdict.WRONG), f"least film off by {off:.2g}"
+    return (
+        Verdict.ACCURATE if off <= accuracy else Verdict.INACCURATE
+    ), f"least film off by {off:.2g}"
 
 
 # --- shaft line
@@ -1061,6 +1133,7 @@ def speed_viscosity(scene: Scene, size: int | None = None) -> Plan | str:
     """
     shaft = cast(ShaftScene, scene)
     n, viscosity = size or 11, shaft.oil.dynamic_viscosity
+    meshes = dict.fromkeys([(shaft.film.n_theta, shaft.film.n_z), (24, 7)])
     return Plan(
         name="speed-viscosity",
         title=f"the line on its films, '{shaft.film.rung}', viscosity by speed",
@@ -1068,14 +1141,21 @@ def speed_viscosity(scene: Scene, size: int | None = None) -> Plan | str:
             name="speed",
             unit="Hz",
             values=_spread(shaft.drive.speed / 30, 10 * shaft.drive.speed, n),
+        ).through(shaft.drive.speed),
+        y=Axis(
+            name="viscosity", unit="Pa s", values=_spread(viscosity / 30, viscosity * 10, n)
+        ).through(viscosity),
+        judges={_mesh_name(*mesh): _line_judge(shaft, *mesh) for mesh in meshes},
+        note="status, and least film against a mesh of twice the nodes in both directions; a "
+        "failure is physical where twice the nodes round the bore fail too",
+        own=Own(
+            method=_mesh_name(shaft.film.n_theta, shaft.film.n_z), x=shaft.drive.speed, y=viscosity
         ),
-        y=Axis(name="viscosity", unit="Pa s", values=_spread(viscosity / 30, viscosity * 10, n)),
-        judges={
-            f"{n_theta} x {n_z} nodes": _line_judge(shaft, n_theta, n_z)
-            for n_theta, n_z in dict.fromkeys([(24, 7), (shaft.film.n_theta, shaft.film.n_z)])
-        },
-        note="status, and least film against a mesh of twice the nodes in both directions",
     )
+
+
+def _mesh_name(n_theta: int, n_z: int) -> str:
+    return f"{n_theta} x {n_z} nodes"
 
 
 def _line_at(
@@ -1097,16 +1177,18 @@ def _line_judge(scene: ShaftScene, n_theta: int, n_z: int) -> Judge:
         word = f"{found.status.name.lower()}: {found.status.text}"
         if found.status in _LINE_METHOD:
             return _LINE_METHOD[found.status], word
-        finer = _run(_line_at(scene, speed, viscosity, (2 * n_theta, 2 * n_z - 1)))
+        # a failed search has refined its meshes along the length by itself: round the bore is left
+        along = 2 * n_z - 1 if found.status.ok else n_z
+        finer = _run(_line_at(scene, speed, viscosity, (2 * n_theta, along)))
         if not found.status.ok:
             if finer.status.ok:
-                return Verdict.WRONG, f"a finer mesh removes {word}"
+                return Verdict.INACCURATE, f"a finer mesh removes {word}"
             return _LINE_PHYSICAL.get(found.status, Verdict.FAILS), word
         if not finer.status.ok:
-            return Verdict.WRONG, f"a finer mesh ends with {finer.status.name.lower()}"
+            return Verdict.INACCURATE, f"a finer mesh ends with {finer.status.name.lower()}"
         off = abs(float(found.numerics["min_film_m"]) / float(finer.numerics["min_film_m"]) - 1)
         fine = off <= scene.accuracy
-        return (Verdict.ACCURATE if fine else Verdict.WRONG), f"least film off by {off:.2g}"
+        return (Verdict.ACCURATE if fine else Verdict.INACCURATE), f"least film off by {off:.2g}"
 
     return judge
 
@@ -1123,64 +1205,3 @@ MAPS: dict[str, dict[str, Maker]] = {
     "propulsion-shaft": {"speed-viscosity": speed_viscosity, **_FILMS},
 }
 """Machine -> its maps. A new one is one row."""
-
-
-def atlas(
-    scene: Scene,
-    *,
-    name: str | None = None,
-    budget: float | None = None,
-    size: int | None = None,
-    progress: Callable[[int, int], None] | None = None,
-) -> tuple[StabilityMap, ...]:
-    """All maps of a scene, or one of them.
-
-    Parameters
-    ----------
-    scene : Scene
-    name : str, optional
-        Of a map of this machine.
-    budget : float, optional
-        Seconds in all; every map gets an even share of what is left, and those that it cuts short
-        go on with what the others leave.
-    size : int, optional
-        Cells along either axis; each map has its own.
-    progress : callable, optional
-        ``(done, all)`` of the map that runs.
-
-    Returns
-    -------
-    tuple of StabilityMap
-
-    Raises
-    ------
-    SceneError
-        The machine has no such map, or the scene nothing to draw in it.
-    """
-    makers = MAPS[scene.machine]
-    if name is not None and name not in makers:
-        raise SceneError(
-            scene.name, [f"map = '{name}' is unknown for a {scene.machine}{nearest(name, makers)}"]
-        )
-    plans = _plans(scene, [name] if name is not None else list(makers), size)
-    end = None if budget is None else time.monotonic() + budget
-    found: dict[str, StabilityMap] = {}
-    for _ in range(2):
-        waiting = [p for p in plans if p.name not in found or not found[p.name].whole]
-        for place, plan in enumerate(waiting):
-            share = None if end is None else (end - time.monotonic()) / (len(waiting) - place)
-            begun = found.get(plan.name)
-            found[plan.name] = measure(plan, Budget(share), progress, begun=begun)
-    return tuple(found.values())
-
-
-def _plans(scene: Scene, names: Sequence[str], size: int | None) -> list[Plan]:
-    """Those that the scene has something to draw in; of one alone, its refusal is an error."""
-    plans = []
-    for name in names:
-        plan = MAPS[scene.machine][name](scene, size)
-        if isinstance(plan, Plan):
-            plans.append(plan)
-        elif len(names) == 1:
-            raise SceneError(scene.name, [f"map = '{name}': {plan}"])
-    return plans

@@ -14,8 +14,8 @@ from typing import Any
 from wearstate.diagnose.chart import Chart, chart_text
 from wearstate.diagnose.chart_figure import save_chart
 from wearstate.diagnose.chart_scene import scene_chart
-from wearstate.diagnose.stability import save_figure
-from wearstate.diagnose.stability_maps import atlas
+from wearstate.diagnose.stability_atlas import atlas
+from wearstate.diagnose.stability_figure import save_figure
 from wearstate.sim.scene import load_scene, scene_names
 
 BUDGET = 300.0

@@ -27,7 +27,8 @@ info one.h5 --plot sheet.png
 info one.h5 --plot sheet.pdf
 align shaft-rig -o line.html --plot line.svg
 align shaft-rig --plot line.pdf
-stability journal-bearing --map solvers --size 3 -o atlas.svg
+stability journal-bearing --map relaxation-mesh --size 3 -o atlas.svg
+stability journal-bearing --map relaxation-mesh --size 3 -o atlas.html
 train data.h5 -o model.wsm
 report one.h5 --model model.wsm -o report.html
 report data.h5 --model model.wsm -o batch.html

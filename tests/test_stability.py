@@ -10,7 +10,7 @@ import pytest
 from click.testing import CliRunner
 from numpy.testing import assert_allclose
 from wearstate.datasets.record import DataError
-from wearstate.diagnose import stability, stability_maps
+from wearstate.diagnose import stability, stability_atlas
 from wearstate.diagnose.cli import cli
 from wearstate.diagnose.stability import (
     Axis,
@@ -19,12 +19,12 @@ from wearstate.diagnose.stability import (
     Verdict,
     edge,
     measure,
-    save_figure,
 )
+from wearstate.diagnose.stability_atlas import atlas
+from wearstate.diagnose.stability_figure import save_figure
 from wearstate.diagnose.stability_maps import (
     MAPS,
     _orbit_case,
-    atlas,
     contact_oscillator,
     contact_restitution,
     growth,
@@ -232,11 +232,11 @@ def tiny(judge, x=(1.0, 2.0, 4.0), y=(1.0, 2.0)):
 
 def test_a_map_keeps_verdicts_and_words_in_their_cells():
     found = measure(
-        tiny(lambda x, y: (Verdict.UNSTABLE if x * y > 3 else Verdict.WRONG, f"{x * y}"))
+        tiny(lambda x, y: (Verdict.UNSTABLE if x * y > 3 else Verdict.INACCURATE, f"{x * y}"))
     )
     assert found.verdicts["method"].tolist() == [[2, 2, 3], [2, 3, 3]]
     assert found.words["method"] == [["1.0", "2.0", "4.0"], ["2.0", "4.0", "8.0"]]
-    assert found.share("method") == {Verdict.WRONG: 0.5, Verdict.UNSTABLE: 0.5}
+    assert found.share("method") == {Verdict.INACCURATE: 0.5, Verdict.UNSTABLE: 0.5}
     assert_allclose(edge(found.verdicts["method"], (1.0, 2.0, 4.0)), [math.sqrt(8), math.sqrt(2)])
 
 
@@ -284,7 +284,7 @@ def test_a_map_goes_on_with_what_the_others_leave_of_a_budget(monkeypatch):
     quick = replace(tiny(judge_of(0.1)), name="quick")
     makers = {"slow": lambda *_: slow, "quick": lambda *_: quick}
     monkeypatch.setitem(MAPS, scene.machine, makers)
-    for module in (stability, stability_maps):
+    for module in (stability, stability_atlas):
         monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: now[0]))
     maps = atlas(scene, budget=14.0)  # the slow one takes 12 s, its even share is 7
     assert [found.plan.name for found in maps] == ["slow", "quick"]
@@ -335,7 +335,7 @@ def test_a_line_whirls_at_any_mesh():
     maker = MAPS["propulsion-shaft"]["speed-viscosity"]
     for judge in maker(load_scene("propulsion-shaft"), 3).judges.values():
         assert judge(60.0, 0.08)[0] is Verdict.WHIRL
-        assert not judge(5.0, 0.08)[0].physical
+        assert judge(5.0, 0.08)[0].cause != "physical"
 
 
 # --- command
@@ -351,7 +351,7 @@ def test_command_writes_picture_text_and_json(tmp_path):
     picture = tmp_path / "map.png"
     result = run("bilge-pump", "--map", "step-stiffness", "--size", 3, "-o", picture)
     assert picture.stat().st_size > 10_000
-    assert "unstable by its method" in result.stdout
+    assert "unstable (numerical cause)" in result.stdout
     table = json.loads(
         run("journal-whirl", "--map", "relaxation-mesh", "--size", 3, "--json").stdout
     )
