@@ -75,7 +75,7 @@ def signal_rows(background: Path | None = None) -> list[SignalRow]:
     Examples
     --------
     >>> sorted({row.name for row in signal_rows()})[:3]
-    ['anti-alias filter', 'converter', 'gain']
+    ['anti-alias filter', 'conditions', 'converter']
     """
     rows = [
         SignalRow(name=f"{name} noise", shift=f"{db} dB", why=why, apply=_noisy(make, db))

@@ -108,6 +108,8 @@ def _otherwise_built(day: Any, trained: str) -> list[str]:
     found = []
     for path, unit in _BUILT.get(day.machine, ()):
         mine, theirs = _value(day, path), _value(usual, path)
+        if mine is None or theirs is None:
+            continue  # a rig has no propeller
         scale = max(abs(theirs), _LEAST_FORCE if unit == "N" else 0.0)
         if abs(mine - theirs) > _SAME * scale:
             found.append(
@@ -120,7 +122,8 @@ def _otherwise_built(day: Any, trained: str) -> list[str]:
 _LEAST_FORCE = 1e3  # N: a component that the trained scene has none of is told from 20 N on
 
 
-def _value(scene: Any, path: str) -> float:
+def _value(scene: Any, path: str) -> float | None:
+    """None where the scene has no such part."""
     for name in path.split("."):
-        scene = getattr(scene, name)
-    return float(scene)
+        scene = getattr(scene, name, None)
+    return None if scene is None else float(scene)

@@ -21,6 +21,7 @@ from .analysis import (
     least_samples,
 )
 from .impact import is_impact
+from .rate import check_rate
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -177,11 +178,17 @@ def crank_map_fault(fs: float, settings: Settings = STANDARD) -> str:
     str
         Value, bound and cure; empty where there is room.
 
+    Raises
+    ------
+    ValueError
+        The sample rate is none that is believed.
+
     Examples
     --------
     >>> crank_map_fault(25_600.0), crank_map_fault(1280.0).split(": ")[0]
     ('', 'fs = 1280 Hz is too low')
     """
+    check_rate(fs)
     return _bands_fault(settings.map_edges, fs)
 
 

@@ -177,7 +177,7 @@ def test_damaged_and_forged_models_do_no_harm(small_model, tmp_path):
     script = forge()
     members = script.unpacked(small_model)
     arrays = stored_arrays(members)
-    arrays["witness.offset"] = arrays["witness.offset"] * 1.01
+    arrays["blind.witness.offset"] = arrays["blind.witness.offset"] * 1.01
     other = tmp_path / "other.wsm"
     other.write_bytes(script.with_arrays(members, arrays))
     found = script.run((small_model, other), FILES)

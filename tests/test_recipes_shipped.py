@@ -1,5 +1,7 @@
 """The recipes that come with the package: what each must hold, so that figures mean something."""
 
+from operator import attrgetter
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -251,10 +253,11 @@ def spans(recipe):
 
 
 SHIFTED_LOAD = {
-    "bilge-pump": "pressure.discharge",
-    "journal-bearing": "load.static",
-    "propulsion-shaft": "propeller.thrust",
+    "bilge-pump": ("pressure.discharge", [(0.6, 0.8), (1.2, 1.4)]),
+    "journal-bearing": ("load.static", [(0.25, 0.4), (1.6, 1.9)]),
+    "propulsion-shaft": ("propeller.thrust", [(1.3, 1.5)]),  # none at all is in the standard set
 }
+"""Path, and bands over the scene's own value."""
 
 
 @pytest.mark.parametrize("machine", MACHINES)
@@ -263,9 +266,11 @@ def test_the_shifted_set_is_beyond_the_standard_one(machine):
     there, here = spans(standard), spans(shifted)
     own = standard.scene.drive.speed
     assert_allclose(here["drive.speed"], [(0.7 * own, 1.3 * own)])
-    load = SHIFTED_LOAD[machine]
-    (low, high) = there[load][0]
-    assert_allclose(here[load], [(0.6 * low / 0.8, low), (high, 1.4 * high / 1.2)])
+    load, bands = SHIFTED_LOAD[machine]
+    [(low, high)] = there[load]
+    as_written = attrgetter(load)(standard.scene)
+    assert_allclose(here[load], np.array(bands) * as_written)
+    assert all(top <= low * (1 + 1e-9) or bottom >= high * (1 - 1e-9) for bottom, top in here[load])
     severities = [wearing.axis for wearing in standard.severities]
     assert [wearing.axis for wearing in shifted.severities] == severities
     assert not shifted.held_out
