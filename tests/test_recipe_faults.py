@@ -5,6 +5,7 @@ import math
 import re
 import shutil
 import tomllib
+from operator import attrgetter
 
 import h5py
 import numpy as np
@@ -722,10 +723,10 @@ def test_labels_are_no_inputs(labelled, trained, tmp_path):
     assert {k: v for k, v in other.card.items() if k not in own} == {
         k: v for k, v in model.card.items() if k not in own
     }
-    for part in ("scale", "calibration", "familiarity", "levels"):
-        for field in dataclasses.fields(getattr(model, part)):
-            value = getattr(getattr(model, part), field.name)
-            assert_array_equal(getattr(getattr(other, part), field.name), value)
+    for part in ("blind.scale", "blind.calibration", "familiarity", "levels"):
+        mine, theirs = attrgetter(part)(model), attrgetter(part)(other)
+        for field in dataclasses.fields(mine):
+            assert_array_equal(getattr(theirs, field.name), getattr(mine, field.name))
     assert_array_equal(other.predict(table.values), model.predict(table.values))
 
 
