@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..datasets.generate import generate
-from ..datasets.recipe import Recipe, load_recipe
+from ..datasets.recipe import load_recipe, wear_limits
 from ..datasets.record import DataError
 from ..datasets.splits import group_folds
 from ..sim.ladder import Effect, admissible, cost_of, effects_of, with_values
@@ -130,31 +130,123 @@ def across_fidelity(
     RecipeError
         The recipe is at fault.
     """
-    plain = load_recipe(name, overrides)
-    chosen = _effects(plain.scene, effects)
-    best = {effect.name: admissible(effect, plain.scene)[-1].name for effect in chosen}
-    table, limit = _made(plain, chosen, best, name, overrides, n, folder, seed, jobs, say)
-    assert table is not None
-    court = _Court(table, limit, plain.severity_columns[0], seed)
-    losses = []
-    for effect in chosen:
-        for rung in admissible(effect, plain.scene)[:-1]:
-            rungs = {**best, effect.name: rung.name}
-            cost = _cost(plain.scene, chosen, rungs) / _cost(plain.scene, chosen, best)
-            try:
-                other, _ = _made(plain, chosen, rungs, name, overrides, n, folder, seed, jobs, say)
-            except DataError as error:
-                losses.append(_no_loss(effect.name, rung.name, cost, str(error)))
-                continue
-            losses.append(court.loss(effect.name, rung.name, cost, other))
-    return Across(
-        recipe=plain.name,
-        best=best,
-        error=court.mean(court.own),
-        losses=tuple(losses),
-        records=len(table.values),
-        draws=len(np.unique(court.draws)),
+    sets = RungSets(
+        name, n, folder, effects=effects, overrides=overrides, seed=seed, jobs=jobs, say=say
     )
+    judge = sets.judge()
+    losses = [
+        loss_of(sets, judge, effect.name, rung.name, {**sets.best, effect.name: rung.name})
+        for effect in sets.effects
+        for rung in admissible(effect, sets.plain.scene)[:-1]
+    ]
+    return Across(
+        recipe=sets.plain.name,
+        best=sets.best,
+        error=judge.mean(judge.own),
+        losses=tuple(losses),
+        records=len(judge.best.values),
+        draws=len(np.unique(judge.draws)),
+    )
+
+
+class RungSets:
+    """Data sets of one recipe on other rungs, the same machines in each, and their features.
+
+    Parameters
+    ----------
+    name, n, folder, effects, overrides, seed, jobs, say
+        As of :func:`across_fidelity`.
+
+    Attributes
+    ----------
+    plain : Recipe
+        As it is written.
+    effects : list of Effect
+        Those whose rungs are compared.
+    best, written : dict of str to str
+        Effect -> its best rung, and the one of the recipe's scene.
+    """
+
+    def __init__(
+        self,
+        name: str | Path,
+        n: int,
+        folder: Path,
+        *,
+        effects: Sequence[str] = (),
+        overrides: Mapping[str, Any] | None = None,
+        seed: int = 0,
+        jobs: int = 1,
+        say: Callable[[str], None] | None = None,
+    ) -> None:
+        self.name, self.n, self.folder, self.seed, self.jobs = name, n, folder, seed, jobs
+        self.overrides, self.say = dict(overrides or {}), say
+        self.plain = load_recipe(name, self.overrides)
+        self.effects = _effects(self.plain.scene, effects)
+        scene = self.plain.scene
+        self._tables: dict[tuple[str, ...], FeatureTable] = {}
+        self.best = {each.name: admissible(each, scene)[-1].name for each in self.effects}
+        self.written = {each.name: each.current(scene) for each in self.effects}
+
+    def values(self, rungs: Mapping[str, str]) -> dict[str, Any]:
+        """Dotted path of the scene -> value of these rungs."""
+        return {
+            path: value
+            for effect in self.effects
+            for path, value in effect.rung(rungs[effect.name]).values.items()
+        }
+
+    def cost(self, rungs: Mapping[str, str]) -> float:
+        """Tabulated, of one record [s]."""
+        return cost_of(with_values(self.plain.scene, self.values(rungs)))
+
+    def table(self, rungs: Mapping[str, str]) -> FeatureTable:
+        """Features of the data set on these rungs, which is made where it is not there."""
+        key = tuple(rungs[effect.name] for effect in self.effects)
+        if key not in self._tables:
+            self._tables[key] = self._made(rungs)
+        return self._tables[key]
+
+    def _made(self, rungs: Mapping[str, str]) -> FeatureTable:
+        words = "-".join(f"{effect}_{rung}" for effect, rung in rungs.items()).replace("/", "o")
+        path = self.folder / f"{self.plain.name}-{words}-{self.n}-{self.seed}.h5"
+        if self.say is not None:
+            self.say(", ".join(f"{effect} {rung}" for effect, rung in rungs.items()))
+        if not path.exists():
+            recipe = load_recipe(self.name, {**self.overrides, **self.values(rungs)})
+            generate(recipe, self.n, path, seed=self.seed, jobs=self.jobs, fidelity="given")
+        return feature_table(path, jobs=self.jobs)
+
+    def judge(self) -> "PairedJudge":
+        """Of what is trained on other rungs: the best ones."""
+        column = self.plain.severity_columns[0]
+        limits = wear_limits(self.plain.scene, column)
+        if limits is None:
+            raise DataError(f"{self.plain.name}: {column} has no condemning limit in the scene")
+        return PairedJudge(self.table(self.best), limits.condemning, column, self.seed)
+
+
+def loss_of(
+    sets: RungSets, judge: "PairedJudge", effect: str, rung: str, rungs: Mapping[str, str]
+) -> Loss:
+    """What training on these rungs costs; without a figure where they cannot be simulated.
+
+    Parameters
+    ----------
+    sets : RungSets
+    judge : PairedJudge
+        Its own.
+    effect, rung : str
+        Names of the loss.
+    rungs : mapping of str to str
+        Effect -> rung.
+    """
+    cost = sets.cost(rungs) / sets.cost(sets.best)
+    try:
+        table = sets.table(rungs)
+    except DataError as error:
+        return _no_loss(effect, rung, cost, str(error))
+    return judge.loss(effect, rung, cost, table)
 
 
 def _effects(scene: Scene, wanted: Sequence[str]) -> list[Effect]:
@@ -177,48 +269,7 @@ def _effects(scene: Scene, wanted: Sequence[str]) -> list[Effect]:
     return found
 
 
-def _values(effects: Sequence[Effect], rungs: Mapping[str, str]) -> dict[str, Any]:
-    return {
-        path: value
-        for effect in effects
-        for path, value in effect.rung(rungs[effect.name]).values.items()
-    }
-
-
-def _cost(scene: Scene, effects: Sequence[Effect], rungs: Mapping[str, str]) -> float:
-    return cost_of(with_values(scene, _values(effects, rungs)))
-
-
-def _made(
-    plain: Recipe,
-    effects: Sequence[Effect],
-    rungs: Mapping[str, str],
-    name: str | Path,
-    overrides: Mapping[str, Any] | None,
-    n: int,
-    folder: Path,
-    seed: int,
-    jobs: int,
-    say: Callable[[str], None] | None,
-) -> tuple[FeatureTable, float]:
-    """Features of the data set on these rungs, and its condemning limit."""
-    from ..datasets.record import DataSet
-
-    words = "-".join(f"{effect}_{rung}" for effect, rung in rungs.items()).replace("/", "o")
-    path = folder / f"{plain.name}-{words}-{n}-{seed}.h5"
-    if say is not None:
-        say(", ".join(f"{effect} {rung}" for effect, rung in rungs.items()))
-    if not path.exists():
-        recipe = load_recipe(name, {**(overrides or {}), **_values(effects, rungs)})
-        generate(recipe, n, path, seed=seed, jobs=jobs, fidelity="given")
-    with DataSet(path) as data:
-        limit = data.attributes.condemning_limit
-    if not math.isfinite(limit):
-        raise DataError(f"{plain.name}: condemning_limit = {limit} m must be given; label the set")
-    return feature_table(path, jobs=jobs), limit
-
-
-class _Court:
+class PairedJudge:
     """Errors on the best rungs, by folds of whole machine draws."""
 
     def __init__(self, best: FeatureTable, limit: float, column: str, seed: int) -> None:

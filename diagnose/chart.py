@@ -197,6 +197,8 @@ class Chart:
         Quantity -> words and unit; a quantity that has none stands for itself.
     measured, planned : int
         Points measured, of those of interest; 0 of 0 where nothing was left out.
+    subject : str
+        ``scene``, or ``recipe`` where the errors are those of the verdict.
     """
 
     name: str
@@ -219,6 +221,7 @@ class Chart:
     labels: Mapping[str, str] = field(default_factory=dict)
     measured: int = 0
     planned: int = 0
+    subject: str = "scene"
 
     @property
     def questions(self) -> tuple[str, ...]:
@@ -435,7 +438,11 @@ def chart_text(chart: Chart) -> str:
     """
     lines = [chart.title, "", *(chart.conclusion or (chart.verdict,))]
     for choice in (each for each in chart.choices if each.block):
-        lines += ["", f"{choice.question}: paste into the scene, or {choice.options}", choice.block]
+        lines += [
+            "",
+            f"{choice.question}: paste into the {chart.subject}, or {choice.options}",
+            choice.block,
+        ]
     if chart.raises:
         lines += ["", "each rung of your scene by itself"]
         lines += [f"  {each.text}" for each in chart.raises]

@@ -1,16 +1,24 @@
-"""The command `chart` of a scene: measures, goes on, writes."""
+"""The command `chart` of a scene, and of a recipe: measures, goes on, writes."""
 
+import os
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
+import click
+
+from ..datasets.recipe_file import recipe_names, toml_text
+from ..sim.atomic import write_whole
 from ..sim.parts import Scene, SceneError
 from ..sim.scene import load_scene
 from ..sim.study import Search
+from .across import RungSets
 from .chart import Chart
 from .chart_scene import KEPT, RAISED, chart_of, kept_runs, measure, scene_search
+from .chart_verdict import verdict_chart
 from .command_options import CHART_SUFFIXES, check_outputs, time_bar
 from .kept import part_file
 from .scene_edit import apply_changes
@@ -85,6 +93,82 @@ def scene_chart_command(
     if applied is not None:
         _apply(subject, scene, given, found, choice, applied, force or going_on)
     return found, interrupted
+
+
+def verdict_chart_command(
+    subject: str,
+    given: Mapping[str, Any],
+    *,
+    accuracy: float,
+    records: int,
+    effects: Sequence[str],
+    folder: Path | None,
+    output: Path | None,
+    applied: Path | None,
+    seed: int,
+    jobs: int,
+    force: bool,
+) -> Chart:
+    """Measure what the rungs of a recipe are worth to the verdict, write what is asked for.
+
+    Parameters
+    ----------
+    subject : str
+        Built-in recipe, or file.
+    given : mapping of str to object
+        Values of its scene.
+    accuracy : float
+        Rise of the error over the condemning limit.
+    records : int
+        On every choice of rungs.
+    effects : sequence of str
+        Only these.
+    folder : Path or None
+        Keeps the data sets; they vanish without.
+    output, applied : Path or None
+        Chart; recipe with what is recommended.
+    seed, jobs : int
+    force : bool
+        Replace existing files.
+
+    Returns
+    -------
+    Chart
+    """
+    check_outputs([subject], [(output, CHART_SUFFIXES), (applied, SCENE_SUFFIXES)], force)
+    if folder is not None:
+        folder.mkdir(parents=True, exist_ok=True)
+    with TemporaryDirectory() as passing:
+        sets = RungSets(
+            subject,
+            records,
+            folder or Path(passing),
+            effects=effects,
+            overrides=given,
+            seed=seed,
+            jobs=jobs,
+            say=lambda text: click.echo(text, err=True),
+        )
+        found = verdict_chart(sets, accuracy)
+    if output is not None:
+        from .chart_figure import save_chart
+
+        save_chart(found, output, force=force)
+    if applied is not None:
+        [chosen] = found.choices
+        table = {
+            "name": f"{found.name}-for-the-verdict",
+            "extends": _seen_from(applied, subject),
+            "fixed": {**given, **chosen.changes},
+        }
+        text = f"# wearstate chart {subject}: {chosen.sentence}\n\n{toml_text(table)}"
+        write_whole(applied, text.encode(), force=force)
+    return found
+
+
+def _seen_from(applied: Path, recipe: str) -> str:
+    """A recipe as another file names it."""
+    return recipe if recipe in recipe_names() else os.path.relpath(recipe, applied.parent)
 
 
 def _apply(

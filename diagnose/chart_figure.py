@@ -96,7 +96,7 @@ def _draw_points(axes: Any, chart: Chart, question: str) -> None:
         if any(_kind(p) == label for p in finite):
             axes.plot([], [], ls="none", label=label, **style)
     _mark_choice(axes, chart, question, finite)
-    _mark_here(axes, finite)
+    _mark_here(axes, finite, chart.subject)
     axes.set(xscale="log", xlabel=chart.cost_label, ylabel=chart.error_label)
     if question:
         axes.set_title(question, fontsize=10)
@@ -137,13 +137,13 @@ def _choice_of(chart: Chart, question: str) -> Choice | None:
     return next((each for each in chart.choices if each.question == question), None)
 
 
-def _mark_here(axes: Any, finite: list[Point]) -> None:
+def _mark_here(axes: Any, finite: list[Point], subject: str) -> None:
     for point in (p for p in finite if p.here):
         place = (point.seconds, _shown(point))
-        axes.plot(*place, "*", ms=16, mfc="#ffd23f", mec=_HERE, label="your scene", zorder=5)
+        axes.plot(*place, "*", ms=16, mfc="#ffd23f", mec=_HERE, label=f"your {subject}", zorder=5)
         right = axes.transAxes.inverted().transform(axes.transData.transform(place))[0] > _RIGHT
         axes.annotate(
-            "your scene",
+            f"your {subject}",
             place,
             xytext=(-10 if right else 10, -12),
             textcoords="offset points",

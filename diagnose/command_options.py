@@ -39,6 +39,26 @@ class Share(click.FloatRange):
         return number
 
 
+class Accuracy(Share):
+    """A share, of every quantity of a scene; or ``verdict=2%``, of the error of a wear estimate."""
+
+    name = "accuracy"
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> Any:
+        """As of :class:`click.ParamType`: (of the verdict, share)."""
+        if isinstance(value, tuple):
+            return value
+        text = str(value).strip()
+        of_verdict = text.startswith("verdict=")
+        number = text.removeprefix("verdict=")
+        if number.endswith("%"):
+            try:
+                number = repr(float(number[:-1]) / 100)
+            except ValueError:
+                self.fail(f"{value} is no share; try 0.02, 2% or verdict=2%", param, ctx)
+        return of_verdict, super().convert(number, param, ctx)
+
+
 PATH = PathType(path_type=Path)
 MOST_RECORDS = 10**8  # as wearstate.datasets.recipe, which is too heavy to import for --help
 LARGEST_SEED = 2**63 - 1

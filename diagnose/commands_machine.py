@@ -15,6 +15,7 @@ from .command_options import (
     PAGE_SUFFIXES,
     PATH,
     PICTURE_SUFFIXES,
+    Accuracy,
     Share,
     check_outputs,
     emit,
@@ -400,14 +401,24 @@ def stability(
 
 
 @click.command()
-@click.argument("subject", metavar="SCENE|DATA")
+@click.argument("subject", metavar="SCENE|DATA|RECIPE")
 @click.option("--set", "pairs", multiple=True, metavar="PATH=VALUE", help="Replace a scene value.")
 @click.option(
     "--accuracy",
-    type=Share(1e-6, 0.5),
+    type=Accuracy(1e-6, 0.5),
     default=None,
-    help="Error that every quantity may carry; the scene's own by default.",
+    help="Error that every quantity may carry; the scene's own by default. Of a recipe: "
+    "verdict=2%, rise of the error of the wear estimate, in % of the limit.",
 )
+@click.option(
+    "-n",
+    "--records",
+    type=click.IntRange(20, 10_000),
+    default=None,
+    help="Of a recipe: records on every choice of rungs; 120 by default.",
+)
+@click.option("--effect", "effects", multiple=True, help="Of a recipe: only this one.")
+@click.option("--folder", type=PATH, help="Of a recipe: keep its data sets, and go on from them.")
 @click.option(
     "--budget",
     type=Share(1.0, 1e6),
@@ -415,7 +426,9 @@ def stability(
     help="Seconds; 90 of a scene, of a data set none. The same command with -o goes on.",
 )
 @click.option("-o", "--output", type=PATH, help="Chart (.html, .svg, .png, .pdf, .json, .csv).")
-@click.option("--apply", "applied", type=PATH, help="Scene to write (.toml): what is recommended.")
+@click.option(
+    "--apply", "applied", type=PATH, help="Scene or recipe to write (.toml): what is recommended."
+)
 @click.option(
     "--choice",
     type=click.Choice(["kept", "raised"]),
@@ -430,7 +443,10 @@ def stability(
 def chart(
     subject: str,
     pairs: Sequence[str],
-    accuracy: float | None,
+    accuracy: tuple[bool, float] | None,
+    records: int | None,
+    effects: Sequence[str],
+    folder: Path | None,
     budget: float | None,
     output: Path | None,
     applied: Path | None,
@@ -445,9 +461,34 @@ def chart(
     Of a scene: the error of its rungs and steps as they are written, the cheapest numerics that do
     where its rungs stay, and the cheapest rungs where they may change. Cheap information comes
     first, and a budget or Ctrl-C ends it with what is known by then; with -o the same command goes
-    on from there. Of a data set (.h5): features and models, cost against error.
+    on from there. Of a data set (.h5): features and models, cost against error. Of a recipe, with
+    --accuracy verdict=2%: which rungs may be cheaper while training on them keeps the verdict.
     """
     of_data = subject.endswith(DATA_SUFFIXES)
+    of_verdict, share = accuracy if accuracy is not None else (False, None)
+    if of_verdict and not of_data:
+        if budget is not None or choice != "kept":
+            raise click.UsageError("--budget and --choice are for a scene, not for a recipe")
+        from .chart_commands import verdict_chart_command
+
+        assert share is not None
+        found = verdict_chart_command(
+            subject,
+            overrides_of(pairs),
+            accuracy=share,
+            records=records or _VERDICT_RECORDS,
+            effects=effects,
+            folder=folder,
+            output=output,
+            applied=applied,
+            seed=seed,
+            jobs=worker_count(jobs),
+            force=force,
+        )
+        _emit_chart(found, [output, applied], as_json)
+        return
+    if records is not None or effects or folder is not None:
+        raise click.UsageError("-n, --effect and --folder need --accuracy verdict=SHARE")
     if of_data and (pairs or accuracy is not None or applied):
         raise click.UsageError("--set, --accuracy and --apply are for a scene, not for a data set")
     if seed and not of_data:
@@ -461,7 +502,7 @@ def chart(
     found, interrupted = scene_chart_command(
         subject,
         overrides_of(pairs),
-        accuracy=accuracy,
+        accuracy=share,
         budget=_CHART_BUDGET if budget is None else budget,
         output=output,
         applied=applied,
@@ -477,6 +518,7 @@ def chart(
 
 
 _CHART_BUDGET = 90.0  # s of a scene
+_VERDICT_RECORDS = 120  # on every choice of rungs of a recipe
 
 
 def _data_chart(

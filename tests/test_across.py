@@ -41,44 +41,44 @@ def table(shift, *, noise=0.02, n=80, drop=()):
 
 
 @pytest.fixture
-def court():
-    return module._Court(table(0.0), LIMIT, COLUMN, 0)
+def judge():
+    return module.PairedJudge(table(0.0), LIMIT, COLUMN, 0)
 
 
-def test_the_same_model_loses_nothing(court):
-    loss = court.loss("film", "map", 0.1, table(0.0))
+def test_the_same_model_loses_nothing(judge):
+    loss = judge.loss("film", "map", 0.1, table(0.0))
     assert loss.loss.mean == 0
     assert loss.p_value == 1
-    assert loss.error == court.mean(court.own)
+    assert loss.error == judge.mean(judge.own)
 
 
-def test_a_shifted_model_loses_what_the_shift_is_worth(court):
-    loss = court.loss("film", "map", 0.1, table(0.3))
+def test_a_shifted_model_loses_what_the_shift_is_worth(judge):
+    loss = judge.loss("film", "map", 0.1, table(0.3))
     # scaled to one spread, the three features share the estimate evenly; one carries the shift
-    folds = group_folds(court.draws, n=5, seed=0)
-    model = fit_blend(table(0.3).values, court.truth, folds, candidates=CANDIDATES[:3]).blend
+    folds = group_folds(judge.draws, n=5, seed=0)
+    model = fit_blend(table(0.3).values, judge.truth, folds, candidates=CANDIDATES[:3]).blend
     found = np.log(model.predict(table(0.0).values))
-    offset = float(found.mean() - np.log(court.truth).mean())
+    offset = float(found.mean() - np.log(judge.truth).mean())
     assert_allclose(offset, -0.3 / 3, rtol=0.2)  # their noise: a weak penalty shares less evenly
-    expected = abs(math.expm1(offset)) * court.truth.mean() / LIMIT
+    expected = abs(math.expm1(offset)) * judge.truth.mean() / LIMIT
     # what ridge takes off both ends of the range adds a tenth of it
     assert_allclose(loss.error.mean, expected, rtol=0.15)
     assert loss.loss.mean > 0.5 * loss.error.mean
     assert loss.p_value < 1e-3
 
 
-def test_records_that_one_model_cannot_make_are_trained_on_by_neither(court):
-    dropped = court.loss("film", "map", 0.1, table(0.0, drop=range(0, 20)))
+def test_records_that_one_model_cannot_make_are_trained_on_by_neither(judge):
+    dropped = judge.loss("film", "map", 0.1, table(0.0, drop=range(0, 20)))
     assert dropped.records == 60
     assert dropped.loss.mean == 0
-    few = court.loss("film", "map", 0.1, table(0.0, drop=range(8, 80)))
+    few = judge.loss("film", "map", 0.1, table(0.0, drop=range(8, 80)))
     assert few.reason == "4 machine draws could be simulated"
     assert math.isnan(few.loss.mean)
 
 
 def test_too_few_draws_are_refused():
     with pytest.raises(DataError, match="9 machine draws, must be >= 10"):
-        module._Court(table(0.0, n=18), LIMIT, COLUMN, 0)
+        module.PairedJudge(table(0.0, n=18), LIMIT, COLUMN, 0)
 
 
 # -- the paired test

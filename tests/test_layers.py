@@ -54,6 +54,7 @@ HEAVY = {
     "matplotlib": set(),  # inside functions only
     "click": {
         "diagnose.cli",
+        "diagnose.chart_commands",
         "diagnose.command_options",
         "diagnose.commands_machine",
         "diagnose.commands_data",
