@@ -55,7 +55,8 @@ def cache_folder() -> Path | None:
     The base is ``$WEARSTATE_CACHE``, else ``$XDG_CACHE_HOME/wearstate``, else
     ``~/.cache/wearstate``. Folders of other sources that are older are removed.
     """
-    digest = hashlib.sha256(f"{numba.__version__} {np.__version__}".encode())
+    # kept code names its modules: a copy that is imported by another name has a folder of its own
+    digest = hashlib.sha256(f"{numba.__version__} {np.__version__} {__package__}".encode())
     for source in kernel_sources(Path(__file__).parent):
         digest.update(source.read_bytes())
     try:

@@ -186,3 +186,16 @@ def test_kernels_of_one_name_in_two_folders_are_kept_apart(tmp_path):
         out, err = process.communicate(timeout=300)
         assert (out.split()[1:], err) == (["2.0", "3.0"], "")
     assert len(list((tmp_path / "cache").glob("kernels-*/sim/*/law.law*.nbi"))) == 2
+
+
+def test_a_copy_that_is_imported_by_another_name_does_not_spoil_the_cache(tmp_path):
+    """Kept code names its modules, which the installation `wearstate` does not have."""
+    package = Path(jit.__file__).parents[1]
+    copy = tmp_path / "renamed"
+    shutil.copytree(package / "sim", copy / "sim", ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copyfile(package / "__init__.py", copy / "__init__.py")
+    renamed = CODE.replace("wearstate.", "renamed.")
+    told = f"import sys\nsys.path.insert(0, {str(tmp_path)!r})\n{renamed}\n"
+    assert run(tmp_path / "cache", told) == []
+    assert run(tmp_path / "cache") == []
+    assert len(files(tmp_path / "cache", ".nbi")) == 2
