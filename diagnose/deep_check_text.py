@@ -10,6 +10,7 @@ from ..sim.deep_rows import Figure, Quantity
 _MARKS = {True: "usual", False: "UNUSUAL"}
 _INDENT = "    "
 _WIDTH = 100
+_NOTHING = 1e-9  # rounding of a sum that is zero
 
 
 def deep_check_text(name: str, found: DeepCheck) -> str:
@@ -34,18 +35,21 @@ def deep_check_text(name: str, found: DeepCheck) -> str:
         lines += ["", "unusual, and what helps:"]
         lines += [_cure(figure) for figure in unusual]
     if found.failure:
-        lines += ["", f"the simulated trial of {found.turns:.3g} revolutions fails: {found.failure}"]
+        lines += [
+            "",
+            f"the simulated trial of {found.turns:.3g} revolutions fails: {found.failure}",
+        ]
     lines += [f"warning: {text}" for text in found.warnings]
     return "\n".join(lines)
 
 
 def _verdict(name: str, found: DeepCheck) -> str:
     odd, all_of_them = len(found.unusual), len(found.figures)
-    if found.failure:
-        return f"{name}: cannot be simulated; {odd} of {all_of_them} figures are unusual"
-    if odd:
-        return f"{name}: no fault; {odd} of {all_of_them} figures are unusual"
-    return f"{name}: no fault; all {all_of_them} figures are usual"
+    begin = "the simulated trial fails" if found.failure else "no fault"
+    if not odd:
+        return f"{name}: {begin}; all {all_of_them} figures are usual"
+    verb = "is" if odd == 1 else "are"
+    return f"{name}: {begin}; {odd} of {all_of_them} figures {verb} unusual"
 
 
 def _row(figure: Figure) -> list[str]:
@@ -93,6 +97,8 @@ def number(value: float) -> str:
     >>> [number(value) for value in (0.0004, 0.7812, 12345.0, 3e7)]
     ['0.0004', '0.781', '12300', '3e+07']
     """
+    if abs(value) < _NOTHING:
+        return "0"
     if 1000 <= abs(value) < 1e6:
         return f"{float(f'{value:.3g}'):.0f}"
     return f"{value:.3g}"

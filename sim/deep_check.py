@@ -71,7 +71,8 @@ def deep_check(scene: Scene) -> DeepCheck:
     facts = gather(scene)
     rows = figures(table, facts)
     told = {row.quantity.doubt for row in rows if not row.usual}
-    doubts: list[Doubt] = [doubt for doubt in scene_doubts(scene) if doubt.check not in told]
+    all_doubts: tuple[Doubt, ...] = (*scene_doubts(scene), *facts.trial.doubts)
+    doubts = [doubt for doubt in all_doubts if doubt.check not in told]
     status = facts.trial.solution.status
     return DeepCheck(
         figures=rows,

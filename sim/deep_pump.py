@@ -176,9 +176,7 @@ def _compliant(scene: PumpScene) -> Iterator[tuple[str, float, float, Any]]:
 
 
 def _sunk(facts: PumpFacts) -> dict[str, float]:
-    return {
-        name: depth / part.clearance_radial for name, depth, _, part in _compliant(facts.scene)
-    }
+    return {name: depth / part.clearance_radial for name, depth, _, part in _compliant(facts.scene)}
 
 
 def _overlap(facts: PumpFacts) -> dict[str, float]:
@@ -420,8 +418,8 @@ PUMP_ROWS = (
         least=1e-3,
         most=2.0,
         reason="under the load without clearance; from 4 on the gap makes no difference",
-        low="lower the joint's stiffness: oil film, bush and web in series give 0.1 to 5 GN/m",
-        high="raise the joint's stiffness (0.1 to 5 GN/m), or set its rung to 'ideal'",
+        low="lower the joint's stiffness: oil film, bush and web in series give 100 to 5000 MN/m",
+        high="raise the joint's stiffness (100 to 5000 MN/m), or set its rung to 'ideal'",
     ),
     Quantity(
         name="penetration over pin radius",
@@ -429,7 +427,7 @@ PUMP_ROWS = (
         measure=_overlap,
         most=0.01,
         reason="the contact laws end at 0.1",
-        high="raise the joint's stiffness (0.1 to 5 GN/m)",
+        high="raise the joint's stiffness (100 to 5000 MN/m)",
     ),
     Quantity(
         name="impacts per revolution",

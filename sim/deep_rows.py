@@ -10,11 +10,20 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from .assemble import simulate
 from .integrate import Solution
 from .ladder import cost_of, with_values
 from .parts import Scene, channels_of
-from .plausibility import FEWEST_TURNS, scene_doubts
+from .plausibility import (
+    FEWEST_TURNS,
+    LEAST_LEVEL,
+    Doubt,
+    scene_doubts,
+    sensor_limits,
+    solution_doubts,
+)
 
 _BYTES = 4  # of a sample: float32
 _ROUNDING = 1e-6  # of a bound that a value stands on
@@ -38,7 +47,8 @@ class Quantity:
     low, high : str
         Cure of a value below and above.
     doubt : str
-        Row of ``plausibility.SCENE_CHECKS`` that asks the same; "" where none does.
+        Row of ``plausibility.SCENE_CHECKS`` or ``RECORD_CHECKS`` that asks the same; "" where none
+        does.
     """
 
     name: str
@@ -129,12 +139,15 @@ class Trial:
     solution : Solution
         With its truth where the machine turns; signals of zeros where the run failed.
     warnings : tuple of str
-        Of the run; without those about the scene, which the scene itself has or has not.
+        Of the run; without doubts.
+    doubts : tuple of Doubt
+        About its recording; those about the scene are not of the trial.
     """
 
     scene: Scene
     solution: Solution
     warnings: tuple[str, ...]
+    doubts: tuple[Doubt, ...]
 
     @property
     def ok(self) -> bool:
@@ -165,27 +178,29 @@ def trial(scene: Scene, *, turns: float, seconds: float, truth: bool = True) -> 
     duration = max(1.01 / speed, full * min(1.0, seconds / dear))
     short = with_values(scene, {"duration": duration, "fidelity": "given"})
     solution = simulate(short, seed=0, truth=truth, raise_on_failure=False)
-    of_scene = {doubt.text for doubt in scene_doubts(short)}
-    told = tuple(text for text in solution.warnings if text not in of_scene)
-    return Trial(scene=short, solution=solution, warnings=told)
+    of_scene = scene_doubts(short)
+    doubts = solution_doubts(short, solution)[len(of_scene) :] if solution.status.ok else ()
+    known = {doubt.text for doubt in (*of_scene, *doubts)}
+    told = tuple(text for text in solution.warnings if text not in known)
+    return Trial(scene=short, solution=solution, warnings=told, doubts=doubts)
 
 
 def over_range(run: Trial) -> dict[str, float]:
-    """Largest reading of every sensor over its range in a trial."""
-    scene: Any = run.scene
-    parts = (*getattr(scene, "accelerometers", scene.sensors), *getattr(scene, "probes", ()))
+    """Largest deviation from its mean over the range of every sensor in a trial."""
     if not run.ok:
         return {}
-    ranges = {part.name: part.range for part in parts}
+    ranges, _ = sensor_limits(run.scene)
     rows = zip(run.solution.channels, run.solution.signal, strict=True)
     return {
-        channel.name: float(abs(row).max()) / ranges[channel.name]
+        channel.name: float(np.abs(row - row.mean()).max()) / ranges[channel.name]
         for channel, row in rows
         if channel.name in ranges
     }
 
 
-def taylor_share(speed: float, radius: float, gap: float, viscosity: float, density: float) -> float:
+def taylor_share(
+    speed: float, radius: float, gap: float, viscosity: float, density: float
+) -> float:
     """Reynolds number of a film over that of its first instability.
 
     Parameters
@@ -268,11 +283,12 @@ RECORDING = (
         name="sensor reading over range",
         unit="",
         measure=lambda facts: over_range(facts.trial),
-        least=1e-3,
+        least=LEAST_LEVEL,
         most=0.95,
         reason="a range is chosen to be used, and not to clip",
         low="lower the sensor's range, or look for what should excite the machine",
         high="raise the sensor's range, or look for what shakes it so much",
+        doubt="faint",
     ),
     Quantity(
         name="processor time per recording",
