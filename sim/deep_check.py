@@ -1,4 +1,4 @@
-"""Deep check of any scene: every figure of its machine beside what is usual, a short run included."""
+"""Deep check of any scene: every figure of its machine beside what is usual, a short run too."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

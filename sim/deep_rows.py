@@ -1,6 +1,6 @@
 """Figures of a scene beside what is usual: the rows of a deep check, and what all machines share.
 
-A quantity is one row: how it is found, in which range machines have it, why, and what to do outside.
+A quantity is one row: how it is found, in which range machines have it, why, and the cure outside.
 "Usual" is a practitioner's range, wider than any design rule, and no bound of validity: those are
 checked before, by :func:`wearstate.sim.assemble.check`.
 """

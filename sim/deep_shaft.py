@@ -189,7 +189,7 @@ def _span(facts: ShaftFacts) -> dict[str, float]:
 
 
 def seated_modes(scene: ShaftScene) -> NDArray[np.float64]:
-    """Natural frequencies of the shaft at rest on its housings' stiffness, as class rules take them.
+    """Natural frequencies of the shaft at rest on its housings' stiffness, as in class rules.
 
     Films are left out: they are stiffer than most housings, and the slow motions that they add at
     half the speed are no modes of the shaft.

@@ -176,7 +176,13 @@ BROKEN = {
     ),
     "stroke given as radius and rpm as rev/s": (
         MUD_PUMP,
-        [("crank.radius", "254 mm"), ("rod.length", "1400 mm"), ("rod.centre_of_mass", "900 mm"), ("pressure.rung", "none"), ("drive.speed", "6 Hz")],
+        [
+            ("crank.radius", "254 mm"),
+            ("rod.length", "1400 mm"),
+            ("rod.centre_of_mass", "900 mm"),
+            ("pressure.rung", "none"),
+            ("drive.speed", "6 Hz"),
+        ],
         "mean piston speed",
         [("drive.speed", "1.9 Hz")],
     ),
