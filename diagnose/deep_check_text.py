@@ -65,7 +65,8 @@ def _row(figure: Figure) -> list[str]:
 def _cure(figure: Figure) -> str:
     place, value = figure.worst
     quantity = figure.quantity
-    where = f" ({place})" if place else ""
+    also = f"; also {', '.join(figure.others)}" if figure.others else ""
+    where = f" ({place}{also})" if place else ""
     unit = f" {quantity.unit}" if quantity.unit else ""
     text = (
         f"{quantity.name}{where} = {number(value)}{unit}, usual {usual_range(quantity)}: "

@@ -1,6 +1,6 @@
 """Deep check of any scene: every figure of its machine beside what is usual, a short run too."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -70,13 +70,18 @@ def deep_check(scene: Scene) -> DeepCheck:
     gather, table = _TABLES[scene.machine]
     facts = gather(scene)
     rows = figures(table, facts)
-    told = {row.quantity.doubt for row in rows if not row.usual}
+    told = {row.quantity.doubt for row in rows if row.quantity.doubt and not row.usual}
     all_doubts: tuple[Doubt, ...] = (*scene_doubts(scene), *facts.trial.doubts)
     doubts = [doubt for doubt in all_doubts if doubt.check not in told]
     status = facts.trial.solution.status
     return DeepCheck(
         figures=rows,
         failure="" if status.ok else f"{status.name.lower()}: {status.text}",
-        warnings=(*(doubt.text for doubt in doubts), *facts.trial.warnings),
+        warnings=(*(doubt.text for doubt in doubts), *_untold(facts.trial.warnings, told)),
         turns=facts.trial.scene.duration * facts.trial.scene.drive.speed,
     )
+
+
+def _untold(warnings: Sequence[str], told: Collection[str]) -> list[str]:
+    """Warnings of a run that no unusual figure tells already."""
+    return [text for text in warnings if not any(words in text for words in told)]

@@ -354,6 +354,7 @@ PUMP_ROWS = (
         most=0.01,
         reason="a pump that cavitates does not last",
         high="raise pressure.suction, shorten or widen pressure.suction_line, or lower drive.speed",
+        doubt="the suction cavitates",
     ),
     Quantity(
         name="crank pin, projected pressure",
@@ -456,6 +457,7 @@ PUMP_ROWS = (
         most=0.0,
         reason="the rung 'link' never loses contact",
         high="set the joint's rung to 'compliant'",
+        doubt="link is in tension",
     ),
     Quantity(
         name="casing mass over moving mass",

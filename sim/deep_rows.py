@@ -47,8 +47,8 @@ class Quantity:
     low, high : str
         Cure of a value below and above.
     doubt : str
-        Row of ``plausibility.SCENE_CHECKS`` or ``RECORD_CHECKS`` that asks the same; "" where none
-        does.
+        Row of ``plausibility.SCENE_CHECKS`` or ``RECORD_CHECKS`` that asks the same, or words of
+        the run's warning that tells the same; "" where none does.
     """
 
     name: str
@@ -85,6 +85,13 @@ class Figure:
     def usual(self) -> bool:
         """Whether all values are."""
         return self._excess(self.worst[1]) <= _ROUNDING
+
+    @property
+    def others(self) -> tuple[str, ...]:
+        """Further places outside of what is usual."""
+        first = self.worst[0]
+        odd = (place for place, value in self.values.items() if self._excess(value) > _ROUNDING)
+        return tuple(place for place in odd if place != first)
 
     @property
     def cure(self) -> str:

@@ -332,6 +332,7 @@ SHAFT_ROWS = (
         least=0.1,
         reason="no bearing below a fifth of its share (class rules); 0 is unloaded",
         low="raise that bearing's offset or lower its neighbours': wearstate align says how far",
+        doubt="less than 5% of the mean",
     ),
     Quantity(
         name="projected pressure",
@@ -402,6 +403,7 @@ SHAFT_ROWS = (
         least=0.2,
         reason="below a fifth the edge is what runs",
         low="turn the bore towards the shaft (slope), or shorten the bearing",
+        doubt="runs on its edge",
     ),
     Quantity(
         name="Reynolds over critical number",
@@ -470,6 +472,7 @@ SHAFT_ROWS = (
         reason="the response is linear about the state of rest, good to 0.3",
         low="give discs their unbalance (kg m), or the propeller its blade_rate",
         high="lower unbalance, blade_rate or turbulence",
+        doubt="of its least film",
     ),
     Quantity(
         name="balance grade",

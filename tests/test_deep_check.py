@@ -274,3 +274,10 @@ def test_a_doubt_that_a_figure_tells_is_not_told_again():
     short = found("bilge-pump", ("duration", "1.2 s"))
     assert [figure.quantity.name for figure in short.unusual] == ["revolutions recorded"]
     assert short.warnings == ()
+
+
+def test_a_warning_of_the_run_that_a_figure_tells_is_not_told_again():
+    low = found(LINE, ("bearings.1.offset", "-2.5 mm"))
+    assert low.warnings == ()
+    edge = next(f for f in low.unusual if f.quantity.name == "film at the edge over middle")
+    assert edge.others == ("forward",)
