@@ -147,7 +147,7 @@ def _few_turns(scene: Any) -> Iterator[str]:
 
 def _light_casing(pump: PumpScene) -> Iterator[str]:
     moving = len(pump.throws) * (pump.piston.mass + pump.rod.mass)
-    masses = [(index, _modal_mass(mode)) for index, mode in enumerate(pump.casing.modes)]
+    masses = [(index, modal_mass(mode)) for index, mode in enumerate(pump.casing.modes)]
     light = [(index, mass) for index, mass in masses if mass < LEAST_MASS_RATIO * moving]
     if light:
         index, mass = min(light, key=lambda each: each[1])
@@ -159,16 +159,42 @@ def _light_casing(pump: PumpScene) -> Iterator[str]:
         )
 
 
-def _modal_mass(mode: CasingMode) -> float:
+def modal_mass(mode: CasingMode) -> float:
     """Mass felt at the liveliest place of a mode [kg]."""
     largest = max(abs(value) for value in mode.shape.values())
     return 1 / largest**2 if largest > 0 else math.inf
 
 
 def _soft_casing(pump: PumpScene) -> Iterator[str]:
-    if not pump.casing.modes:
-        return
-    force = _largest_force(pump)
+    found = largest_deflection(pump)
+    if found is not None and found[2] > MOST_DEFLECTION:
+        place, sensor, most = found
+        yield (
+            f"casing.modes: {largest_force(pump):.3g} N at {place} move {sensor} by "
+            f"{1e3 * most:.3g} mm, usual are < {1e3 * MOST_DEFLECTION / 10:g} mm; raise the "
+            "frequencies of the modes, or lower their shapes"
+        )
+
+
+def largest_deflection(pump: PumpScene) -> tuple[str, str, float] | None:
+    """Largest static deflection of a sensor under the largest steady force at a place.
+
+    Parameters
+    ----------
+    pump : PumpScene
+
+    Returns
+    -------
+    tuple of str, str, float, or None
+        Place of the force, sensor, and how far it moves [m]; None of a casing without modes.
+
+    Examples
+    --------
+    >>> from wearstate.sim.scene import load_scene
+    >>> place, sensor, most = largest_deflection(load_scene("bilge-pump"))
+    >>> place, sensor, round(1e6 * most)
+    ('guide_y', 'acc_y', 60)
+    """
     sensors = [sensor.name for sensor in pump.accelerometers]
     places = {key for mode in pump.casing.modes for key in mode.shape} - set(sensors)
     compliance = {
@@ -177,14 +203,9 @@ def _soft_casing(pump: PumpScene) -> Iterator[str]:
         for sensor in sensors
     }
     if not compliance:
-        return
+        return None
     (place, sensor), most = max(compliance.items(), key=lambda each: (each[1], each[0]))
-    if most * force > MOST_DEFLECTION:
-        yield (
-            f"casing.modes: {force:.3g} N at {place} move {sensor} by {1e3 * most * force:.3g} mm, "
-            f"usual are < {1e3 * MOST_DEFLECTION / 10:g} mm; raise the frequencies of the modes, "
-            "or lower their shapes"
-        )
+    return place, sensor, most * largest_force(pump)
 
 
 def _compliance(modes: Sequence[CasingMode], place: str, sensor: str) -> float:
@@ -195,7 +216,7 @@ def _compliance(modes: Sequence[CasingMode], place: str, sensor: str) -> float:
     )
 
 
-def _largest_force(pump: PumpScene) -> float:
+def largest_force(pump: PumpScene) -> float:
     """Of liquid and piston of one throw, as they reach the casing [N]."""
     area = math.pi / 4 * pump.piston.diameter**2
     pressure = max(abs(pump.pressure.suction), abs(pump.pressure.discharge))

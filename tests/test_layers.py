@@ -24,7 +24,9 @@ MAY_IMPORT = {
 SIM_FLOORS = [
     {"study"},
     {"fidelity"},
-    {"pilot"},
+    {"pilot", "deep_check"},
+    {"deep_pump", "deep_journal", "deep_shaft"},
+    {"deep_rows"},
     {"assemble"},
     {"wear_rate", "transfer"},
     {"shaft_change"},
