@@ -156,14 +156,17 @@ def _numbers(pairs: Iterable[tuple[float | None, float]]) -> Any:
 def ranked(rows: Sequence[Row], limit: float) -> list[Row]:
     """Rows by the error of what is graded without caution, worst first.
 
-    Rows of which nothing is graded so follow: there the model warns of itself. Rows that no
-    machine could be simulated for come last.
+    Rows of which nothing is graded so follow, by the error of all that is graded: there the model
+    warns of itself. Rows that no machine could be simulated for come last.
     """
 
     def place(row: Row) -> tuple[int, float]:
         if not row.said:
             return 2, 0.0
-        error = row_figures(row, limit)["clear_error"].value
-        return (1, 0.0) if math.isnan(error) else (0, -error)
+        figures = row_figures(row, limit)
+        clear, every = figures["clear_error"].value, figures["error"].value
+        if math.isnan(clear):
+            return 1, math.inf if math.isnan(every) else -every
+        return 0, -clear
 
     return sorted(rows, key=place)

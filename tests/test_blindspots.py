@@ -327,11 +327,13 @@ def test_figures_of_a_row():
 
 
 def test_the_worst_without_a_caution_is_first():
-    warned = told("warned", 0.9, verdict="caution")
+    warned = told("warned", 0.8, verdict="caution")
+    worse = told("worse", 0.9, verdict="caution")
     nothing = replace(REFUSED, name="nothing", said=(), faults=("no",))
-    rows = [nothing, REFUSED, told("small", 0.01), warned, told("large", 0.3), told("some", -0.1)]
+    rows = [nothing, REFUSED, told("small", 0.01), warned, worse, told("large", 0.3)]
+    rows.append(told("some", -0.1))
     order = [row.name for row in ranked(rows, LIMIT)]
-    assert order == ["large", "some", "small", "strange", "warned", "nothing"]
+    assert order == ["large", "some", "small", "worse", "warned", "strange", "nothing"]
 
 
 def spots(*rows):
