@@ -55,6 +55,7 @@ HEAVY = {
     "click": {
         "diagnose.cli",
         "diagnose.command_options",
+        "diagnose.command_sweep",
         "diagnose.commands_machine",
         "diagnose.commands_data",
         "diagnose.commands_wear",
