@@ -117,10 +117,9 @@ def sweep(
     except KeyboardInterrupt:
         interrupted = True
     found = sweep_of(plan, kept)
-    if found.finished:
-        if all(run.fault for run in found.outcomes.values()):
-            kept.drop()
-            raise SweepError([f"no run succeeded: {fault}" for fault in found.faults])
+    if found.finished and all(run.fault for run in found.outcomes.values()):
+        kept.drop()
+        raise SweepError([f"no run succeeded: {fault}" for fault in found.faults])
     if output is not None and found.outcomes:
         save_sweep(found, output, force=force or going_on)
         if found.finished:

@@ -111,7 +111,10 @@ def _journal(truth: Truths) -> Iterator[tuple[str, str]]:
     if "attitude_angle" in truth:
         place += f", attitude angle {_of(truth, 'attitude_angle')}"
     yield "journal", place
-    yield "orbit", f"{_of(truth, 'orbit_rms')} rms, {_of(truth, 'orbit_largest')} at most from there"
+    yield (
+        "orbit",
+        f"{_of(truth, 'orbit_rms')} rms, {_of(truth, 'orbit_largest')} at most from there",
+    )
     pressure = f"; peak pressure {_of(truth, 'pressure_peak')}" if "pressure_peak" in truth else ""
     yield "film", f"thinnest {_of(truth, 'film_least')}{pressure}"
 

@@ -184,7 +184,9 @@ def sweep_plan(
     except SweepError as error:
         faults += error.faults
     if len(scenes) * starts > MOST_RUNS:
-        faults.append(f"{len(scenes)} points x {starts} starts must be <= {MOST_RUNS}; ask for less")
+        faults.append(
+            f"{len(scenes)} points x {starts} starts must be <= {MOST_RUNS}; ask for less"
+        )
     if faults:
         raise SweepError(faults)
     return Plan(
@@ -348,7 +350,9 @@ def measure(
     missing = [run for run in runs if _name(*run) not in kept]
     done = len(runs) - len(missing)
     try:
-        with closing(in_order(made, _tasks(plan, missing), jobs=min(jobs, len(missing) or 1))) as found:
+        with closing(
+            in_order(made, _tasks(plan, missing), jobs=min(jobs, len(missing) or 1))
+        ) as found:
             for run, outcome in zip(missing, found, strict=True):
                 kept[_name(*run)] = outcome
                 done += 1

@@ -151,7 +151,9 @@ def _read(path: str, text: str, points: int) -> tuple[list[float], list[str]]:
     entries = [_ENTRY.fullmatch(entry.strip()) for entry in text.split(",")]
     bad = [raw for raw, entry in zip(text.split(","), entries, strict=True) if entry is None]
     if bad:
-        raise SweepError([f"{path}: {', '.join(map(repr, bad))} must be a number; a unit may follow"])
+        raise SweepError(
+            [f"{path}: {', '.join(map(repr, bad))} must be a number; a unit may follow"]
+        )
     told_units = [entry for entry in entries if entry is not None]
     return [float(e[1]) for e in told_units], [e[2].strip() for e in told_units]
 

@@ -126,8 +126,12 @@ def _draw_changes(axes: Any, sweep: Sweep, rows: list[Row]) -> None:
         for place, value in zip(places, shown, strict=True):
             if np.isfinite(value):
                 axes.annotate(
-                    short_name(name, 24), (place, value), xytext=(4, 3),
-                    textcoords="offset points", fontsize=7, color=colormaps["tab10"](i),
+                    short_name(name, 24),
+                    (place, value),
+                    xytext=(4, 3),
+                    textcoords="offset points",
+                    fontsize=7,
+                    color=colormaps["tab10"](i),
                 )
                 break
     if single:
@@ -209,7 +213,9 @@ def save_sweep(sweep: Sweep, path: Path, *, force: bool = True) -> None:
     if path.suffix == ".csv":
         save_csv(sweep, path, force=force)
     elif path.suffix == ".json":
-        save_page(json.dumps(json.loads(json_text(sweep_table(sweep))), indent=1), path, force=force)
+        save_page(
+            json.dumps(json.loads(json_text(sweep_table(sweep))), indent=1), path, force=force
+        )
     elif path.suffix in (".html", ".htm"):
         save_page(sweep_html(sweep), path, force=force)
     else:

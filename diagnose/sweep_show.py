@@ -77,13 +77,21 @@ def _feature_rows(solution: Solution) -> Iterator[tuple[str, str, Shown]]:
         except ValueError:  # this recording cannot have it
             continue
         for name in names:
-            unit = units.get(name.partition(".")[0], "") if row["unit"] == "x" else row["unit"]
-            plain_unit = "" if unit == "-" else unit
-            yield (
-                row["name"],
-                name,
-                Shown(name=name, words="", unit=plain_unit, seen=True, feature=True),
-            )
+            unit = _unit(row["unit"], units.get(name.partition(".")[0], ""))
+            yield row["name"], name, Shown(name=name, words="", unit=unit, seen=True, feature=True)
+
+
+def _unit(told: str, channel: str) -> str:
+    """Unit of a row of the catalogue, on a channel.
+
+    Examples
+    --------
+    >>> _unit("x", "m/s^2"), _unit("dB re 1 x^2", "m/s^2"), _unit("-", "m")
+    ('m/s^2', 'dB', '')
+    """
+    if told.startswith("dB"):
+        return "dB"
+    return {"x": channel, "-": ""}.get(told, told)
 
 
 def truths_shown(truths: Mapping[str, Truth]) -> dict[str, Shown]:
@@ -131,7 +139,8 @@ def choose(
             forms.setdefault(form, []).append(each)
     found: dict[str, Shown] = {}
     faults = []
-    for pattern in patterns or (*_usual(known), "*.rms"):
+    levels = [name for row, name, _ in rows if row == "rms"]
+    for pattern in patterns or (*_usual(known), *levels):
         hits = [each for form in _matching(pattern, forms) for each in forms[form]]
         found |= {each.name: each for each in hits}
         if not hits:

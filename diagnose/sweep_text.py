@@ -68,7 +68,9 @@ def conclusion(sweep: Sweep) -> tuple[str, ...]:
     begin = axis.text(axis.numbers[0], 4)
     if not best:
         cure = "give --starts 2 or more" if sweep.plan.starts < 2 else "more runs must succeed"
-        return (f"{what}: no smallest change is known, as there is no scatter to judge by; {cure}.",)
+        return (
+            f"{what}: no smallest change is known, as there is no scatter to judge by; {cure}.",
+        )
     told = sorted((r for r in best if r.detection.told), key=lambda row: row.detection.change)
     lost = [row for row in best if not row.detection.told]
     if not told:
@@ -79,7 +81,7 @@ def conclusion(sweep: Sweep) -> tuple[str, ...]:
     verb = "shows first" if first.setting else "shows"
     lines = [
         f"{what} {verb}{where}, in {first.shown.label}: a change of "
-        f"{change_words(sweep, first)} from {begin} is told by one recording."
+        f"{change_words(sweep, first)} from {begin} is told by one recording{_coarse(sweep, first)}."
     ]
     if rest:
         shown = rest if len(rest) <= _NAMED else [*rest[: _NAMED - 1], rest[-1]]
@@ -94,7 +96,24 @@ def conclusion(sweep: Sweep) -> tuple[str, ...]:
         places = ", ".join(setting_words(sweep, r.setting, short=True) for r in lost)
         far = axis.text(axis.numbers[-1], 4)
         lines.append(f"At {places} nothing shown tells a change up to {far}.")
+    unjudged = [s for s in sweep.settings if s not in {row.setting for row in best}]
+    if unjudged:
+        places = ", ".join(setting_words(sweep, setting, short=True) for setting in unjudged)
+        lines.append(f"At {places} too few runs have values to tell.")
     return tuple(lines)
+
+
+def _coarse(sweep: Sweep, row: Row) -> str:
+    """Warning that the first step of the axis is much wider than the change in it."""
+    axis = sweep.plan.axes[-1]
+    step = abs(axis.values[1] - axis.values[0])
+    if not _AT_ONCE * step < row.detection.change < _WITHIN * step:
+        return ""
+    wide = axis.text(step / abs(axis.scale), 2)
+    return f" (interpolated in a first step of {wide}: sweep smaller steps to be sure)"
+
+
+_WITHIN = 0.25  # of the first step
 
 
 def basis(sweep: Sweep) -> str:
@@ -113,8 +132,8 @@ def basis(sweep: Sweep) -> str:
         f"Simulated: {plan.name}, {axes}; {len(plan.scenes)} points x {plan.starts} starts, which "
         f"differ in start angle, sensor noise and random forces; recordings{length}. Told: one "
         f"recording stands out against the mean of the {plan.starts} at the first value, at "
-        f"{plain(100 - 100 * plan.confidence, 2)} % false alarms (two-sided), {level} % found, each "
-        "quantity by itself; Student's t, scatter pooled over the last axis, monotone "
+        f"{plain(100 - 100 * plan.confidence, 2)} % false alarms (two-sided), {level} % found, "
+        "each quantity by itself; Student's t, scatter pooled over the last axis, monotone "
         "interpolation. Scatter between starts is that of one and the same machine: between "
         "machines it is larger."
     )
@@ -199,9 +218,7 @@ def sweep_table(sweep: Sweep) -> dict[str, Any]:
         "confidence": plan.confidence,
         "starts": plan.starts,
         "runs": {"done": len(sweep.outcomes), "planned": len(plan.runs)},
-        "axes": [
-            {"path": a.path, "unit": a.si_unit, "values": list(a.values)} for a in plan.axes
-        ],
+        "axes": [{"path": a.path, "unit": a.si_unit, "values": list(a.values)} for a in plan.axes],
         "quantities": [
             {"name": s.name, "unit": s.unit, "meaning": s.words, "seen_by_sensors": s.seen}
             for s in plan.shown
