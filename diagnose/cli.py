@@ -15,6 +15,7 @@ import click
 
 from .. import __version__
 from .command_options import EXIT_BAD_INPUT, EXIT_FAILED, as_options
+from .command_sweep import sweep
 from .commands_data import (
     audit,
     export,
@@ -98,6 +99,7 @@ for _command in (
     align,
     stability,
     chart,
+    sweep,
     verify,
     recipe,
     generate,

@@ -124,10 +124,11 @@ def simulate(
     from ..datasets.quantities import resolved, with_estimate
     from ..sim.assemble import simulate as run
     from ..sim.scene import load_scene
+    from .simulate_text import simulation_summary, summary_lines
 
     check_outputs([scene_name], [(output, DATA_SUFFIXES), (plot, PICTURE_SUFFIXES)], force)
     machine, resolution = resolved(load_scene(scene_name, overrides_of(pairs)))
-    solution = run(machine, seed=seed, truth=truth or plot is not None)
+    solution = run(machine, seed=seed, truth=True)
     if resolution is not None:
         solution = with_estimate(solution, resolution)
         click.echo(f"fidelity: {resolution.text}", err=True)
@@ -144,19 +145,22 @@ def simulate(
     ]
     rms = {channel.name: value for channel, value in vibration}
     shown = ", ".join(f"{channel.name} {value:.3g} {channel.unit}" for channel, value in vibration)
+    head = f"{machine.name} (simulated): {shown} rms about the mean"
     files = [str(path) for path in (output, plot) if path]
+    summary = simulation_summary(machine, solution)
     for warning in solution.warnings:
         click.echo(f"warning: {warning}", err=True)
     emit(
         {
             "scene": machine.name,
             "rms": rms,
+            "summary": summary,
             "numerics": solution.numerics,
             "warnings": list(solution.warnings),
             "files": files,
         },
         as_json,
-        "\n".join([f"{machine.name} (simulated): {shown} rms about the mean", *files]),
+        "\n".join([head, *files, *summary_lines(machine, summary)]),
     )
 
 

@@ -881,6 +881,20 @@ def _find_field(model: type[BaseModel], location: tuple[Any, ...]) -> tuple[Any,
     return owner, field
 
 
+def si_unit(model: type[BaseModel], path: str) -> str:
+    """SI unit of a number of a scene at a dotted path; empty where it has none.
+
+    Examples
+    --------
+    >>> from wearstate.sim.pump_parts import PumpScene
+    >>> si_unit(PumpScene, "joint.crankpin.diametral_clearance"), si_unit(PumpScene, "drive.speed")
+    ('m', 'rev/s')
+    """
+    location = tuple(int(key) if key.isdecimal() else key for key in path.split("."))
+    dimension = _dimension_of(_find_field(model, location)[1])
+    return "" if dimension is None else _unit_symbol(dimension)
+
+
 def _model_inside(annotation: Any) -> type[BaseModel] | None:
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return annotation

@@ -58,6 +58,7 @@ HEAVY = {
         "diagnose.cli",
         "diagnose.chart_commands",
         "diagnose.command_options",
+        "diagnose.command_sweep",
         "diagnose.commands_machine",
         "diagnose.commands_data",
         "diagnose.commands_wear",

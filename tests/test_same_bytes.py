@@ -29,6 +29,7 @@ align shaft-rig -o line.html --plot line.svg
 align shaft-rig --plot line.pdf
 stability journal-bearing --map relaxation-mesh --size 3 -o atlas.svg
 stability journal-bearing --map relaxation-mesh --size 3 -o atlas.html
+sweep bilge-pump --set duration=0.45 --over drive.speed=5,6 --starts 2 -j 1 -o sweep.html
 train data.h5 -o model.wsm
 report one.h5 --model model.wsm -o report.html
 report data.h5 --model model.wsm -o batch.html
