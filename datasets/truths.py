@@ -146,7 +146,7 @@ def _journal(solution: Solution, scene: Scene) -> Iterator[tuple[str, Truth]]:
         yield "pressure_peak", Truth(peak, "Pa", "film pressure, peak")
 
 
-def _shaft(solution: Solution, scene: Scene) -> Iterator[tuple[str, Truth]]:
+def _shaft(solution: Solution, _scene: Scene) -> Iterator[tuple[str, Truth]]:
     total = float(solution.truth["film_force_n"].mean(axis=0)[:, 0].sum())
     yield "reaction_sum", Truth(total, "N", "sum of the vertical reactions")
 

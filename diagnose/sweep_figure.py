@@ -28,7 +28,7 @@ from .sweep_text import (
 SUFFIXES = (".html", ".htm", ".json", ".csv", ".png", ".svg", ".pdf")
 """Of what a sweep is written as."""
 
-_MOST_PANELS = 9
+_MOST_PANELS = 8  # and that of the smallest changes
 _MOST_LINES = 6  # quantities in the panel of smallest changes
 _COLUMNS = 3
 
@@ -103,7 +103,7 @@ def _draw_quantity(axes: Any, sweep: Sweep, rows: list[Row]) -> None:
     aside = "" if shown.seen else " *"
     axes.set_title(short_name(shown.name, 40) + aside, fontsize=10)
     unit = f" [{shown.unit}]" if shown.unit else ""
-    axes.set_ylabel(f"{short_name(shown.words or 'feature', 44)}{unit}", fontsize=8)
+    axes.set_ylabel(f"{short_name(shown.words, 44)}{unit}".strip(), fontsize=8)
     axes.set_xlabel(f"{axis.words} [{axis.unit or axis.si_unit or '-'}]", fontsize=9)
     axes.tick_params(labelsize=8)
     axes.grid(alpha=0.3)
@@ -111,29 +111,16 @@ def _draw_quantity(axes: Any, sweep: Sweep, rows: list[Row]) -> None:
 
 def _draw_changes(axes: Any, sweep: Sweep, rows: list[Row]) -> None:
     """Smallest change that is told, over the settings."""
-    from matplotlib import colormaps
-
     settings, axis = sweep.settings, sweep.plan.axes[-1]
     single = len(sweep.plan.axes) == 2
     places = list(sweep.plan.axes[0].numbers) if single else list(range(len(settings)))
     judged = [row for row in rows if row.shown.seen] or rows
     names = [n for n in _panel_names(sweep, judged) if any(r.shown.name == n for r in judged)]
-    for i, name in enumerate(names[:_MOST_LINES]):
+    for name in names[:_MOST_LINES]:
         own = {row.setting: row.detection.change for row in judged if row.shown.name == name}
         values = np.array([own[setting] for setting in settings]) / abs(axis.scale)
         shown = np.where(np.isfinite(values), values, np.nan)
-        axes.plot(places, shown, "o-", ms=5, lw=1.3, color=colormaps["tab10"](i))
-        for place, value in zip(places, shown, strict=True):
-            if np.isfinite(value):
-                axes.annotate(
-                    short_name(name, 24),
-                    (place, value),
-                    xytext=(4, 3),
-                    textcoords="offset points",
-                    fontsize=7,
-                    color=colormaps["tab10"](i),
-                )
-                break
+        axes.plot(places, shown, "o-", ms=5, lw=1.3, label=short_name(name, 24))
     if single:
         first = sweep.plan.axes[0]
         axes.set_xlabel(f"{first.words} [{first.unit or first.si_unit or '-'}]", fontsize=9)
@@ -142,7 +129,8 @@ def _draw_changes(axes: Any, sweep: Sweep, rows: list[Row]) -> None:
         axes.set_xticks(places, words, rotation=30, ha="right", fontsize=7)
     axes.set_title("smallest change that is told", fontsize=10)
     axes.set_ylabel(f"{axis.words} [{axis.unit or axis.si_unit or '-'}]", fontsize=8)
-    axes.set_ylim(bottom=0)
+    axes.set_yscale("log")
+    axes.legend(fontsize=7, framealpha=0.6)
     axes.tick_params(labelsize=8)
     axes.grid(alpha=0.3)
 

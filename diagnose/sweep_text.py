@@ -81,7 +81,8 @@ def conclusion(sweep: Sweep) -> tuple[str, ...]:
     verb = "shows first" if first.setting else "shows"
     lines = [
         f"{what} {verb}{where}, in {first.shown.label}: a change of "
-        f"{change_words(sweep, first)} from {begin} is told by one recording{_coarse(sweep, first)}."
+        f"{change_words(sweep, first)} from {begin} is told by one recording"
+        f"{_coarse(sweep, first)}."
     ]
     if rest:
         shown = rest if len(rest) <= _NAMED else [*rest[: _NAMED - 1], rest[-1]]
