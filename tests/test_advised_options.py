@@ -23,7 +23,13 @@ COMMAND = re.compile(r"\bwearstate ((?:[a-z]+ )?[a-z]+)")
 FOREIGN = {"--nthreads"}  # of `dask worker`
 NAMED = {"import": "import", "train": "train", "retrain": "train", "generate": "generate"}
 """Word before an option -> command that it tells to run."""
-OWN_RULE = {"commands_data.py", "commands_machine.py", "commands_wear.py", "command_options.py"}
+OWN_RULE = {
+    "command_sweep.py",
+    "commands_data.py",
+    "commands_machine.py",
+    "commands_wear.py",
+    "command_options.py",
+}
 """Files that hold many commands or declare options: see the test of usage errors."""
 SPOKEN_BY = {
     "across": {"evaluate"},
@@ -49,6 +55,9 @@ SPOKEN_BY = {
     "nameplate_cautions": {"report"},
     "sources": {"import", "info", "report"},
     "tabulate": {"evaluate", "features", "report", "train"},
+    "sweep_axes": {"sweep"},
+    "sweep_show": {"sweep"},
+    "sweep_text": {"sweep"},
 }
 """File -> commands that say its messages, where these name an option without a command."""
 
