@@ -193,7 +193,7 @@ def largest_deflection(pump: PumpScene) -> tuple[str, str, float] | None:
     >>> from wearstate.sim.scene import load_scene
     >>> place, sensor, most = largest_deflection(load_scene("bilge-pump"))
     >>> place, sensor, round(1e6 * most)
-    ('guide_y', 'acc_y', 60)
+    ('guide_y', 'acc_y', 61)
     """
     sensors = [sensor.name for sensor in pump.accelerometers]
     places = {key for mode in pump.casing.modes for key in mode.shape} - set(sensors)
