@@ -1,6 +1,5 @@
 """Pictures and pages of a chart: where one stands, what to take, the front, every quantity."""
 
-import json
 import math
 import re
 import textwrap
@@ -15,6 +14,7 @@ from .chart import Chart, Choice, Point, chart_table, convergence_text, save_row
 from .chart_words import percent
 from .page import render, visible
 from .picture import picture_bytes, save_picture
+from .plain_json import json_text
 from .report import save_page
 
 _FRONT, _OTHER, _DOUBTFUL, _LIMIT = "#1f5a94", "#9aa3ab", "#e07b39", "#b3261e"
@@ -408,16 +408,7 @@ def save_chart(chart: Chart, path: Path, *, force: bool = True) -> None:
 
 
 def _json(chart: Chart) -> str:
-    return json.dumps(_strict(chart_table(chart)), indent=1, allow_nan=False)
-
-
-def _strict(value: Any) -> Any:
-    """What is not finite as null."""
-    if isinstance(value, dict):
-        return {key: _strict(inner) for key, inner in value.items()}
-    if isinstance(value, list):
-        return [_strict(inner) for inner in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+    return json_text(chart_table(chart), indent=1)
 
 
 _PAGES: dict[str, Callable[[Chart], str]] = {

@@ -3,7 +3,6 @@
 Heavy imports stay inside the functions, so that ``--help`` answers at once.
 """
 
-import json
 import math
 import re
 import sys
@@ -14,6 +13,8 @@ from pathlib import Path
 from typing import Any
 
 import click
+
+from .plain_json import json_text
 
 EXIT_FAILED, EXIT_BAD_INPUT, EXIT_WARNING, EXIT_ALARM, EXIT_UNFAMILIAR = 1, 2, 3, 4, 5
 
@@ -252,22 +253,6 @@ def told_of_channels(texts: Sequence[str], option: str) -> dict[str, str]:
 def emit(value: dict[str, Any], as_json: bool, text: str) -> None:
     """Print a result, as JSON or as text."""
     click.echo(json_text({"schema_version": 1, **value}) if as_json else text)
-
-
-def json_text(value: Mapping[str, Any]) -> str:
-    """Strict JSON: what is not finite is null, what has no JSON form is a defect."""
-    return json.dumps(_plain(value), allow_nan=False)
-
-
-def _plain(value: Any) -> Any:
-    """Python's own types, from numpy's and from tuples; null for a number that is not finite."""
-    if isinstance(value, Mapping):
-        return {str(key): _plain(inner) for key, inner in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_plain(inner) for inner in value]
-    if hasattr(value, "tolist"):  # of numpy
-        return _plain(value.tolist())
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def worker_count(jobs: int | None) -> int:

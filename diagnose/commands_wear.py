@@ -25,13 +25,13 @@ from .command_options import (
     jobs_option,
     join_option,
     json_option,
-    json_text,
     overrides_of,
     progress_bar,
     seed_option,
     source_options,
     worker_count,
 )
+from .plain_json import json_text
 
 _FAIL_ON_HELP = "Exit 3 at a warning, 4 at an alarm, 5 when unfamiliar; alarm: only 4 and 5."
 

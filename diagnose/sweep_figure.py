@@ -1,15 +1,14 @@
 """Picture and page of a sweep."""
 
-import json
 import math
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from .command_options import json_text
 from .page import render, short_name
 from .picture import encoded, save_picture
+from .plain_json import json_text
 from .report import save_page
 from .si_text import si_text
 from .sweep import Row, Sweep
@@ -201,9 +200,7 @@ def save_sweep(sweep: Sweep, path: Path, *, force: bool = True) -> None:
     if path.suffix == ".csv":
         save_csv(sweep, path, force=force)
     elif path.suffix == ".json":
-        save_page(
-            json.dumps(json.loads(json_text(sweep_table(sweep))), indent=1), path, force=force
-        )
+        save_page(json_text(sweep_table(sweep), indent=1), path, force=force)
     elif path.suffix in (".html", ".htm"):
         save_page(sweep_html(sweep), path, force=force)
     else:

@@ -13,7 +13,7 @@ from wearstate.datasets.recipe_file import recipe_text
 from wearstate.datasets.record import DataError, DataSet
 from wearstate.diagnose import demo
 from wearstate.diagnose.cli import cli
-from wearstate.diagnose.command_options import json_text
+from wearstate.diagnose.plain_json import json_text
 
 
 def run(*arguments, code=0):
