@@ -18,16 +18,16 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 _PUBLIC = {
-    "Scene": ".sim.scene",
-    "load_scene": ".sim.scene",
-    "simulate": ".sim.assemble",
-    "feature_row": ".features.table",
-    "DataSet": ".datasets.record",
-    "generate": ".datasets.generate",
-    "read_recording": ".datasets.importers",
-    "import_recordings": ".datasets.import_set",
-    "SourceOptions": ".datasets.sources",
-    "load_model": ".diagnose.modelfile",
+    "Scene": ".sim.scene.load",
+    "load_scene": ".sim.scene.load",
+    "simulate": ".sim.machine.simulate",
+    "feature_row": ".features.catalogue.row",
+    "DataSet": ".datasets.file.record",
+    "generate": ".datasets.generation.generate",
+    "read_recording": ".datasets.measured.recording",
+    "import_recordings": ".datasets.measured.data_set",
+    "SourceOptions": ".datasets.readers.open",
+    "load_model": ".diagnose.wear_model.file",
 }
 
 __all__ = ["__version__", *_PUBLIC]

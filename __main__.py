@@ -5,6 +5,6 @@ import sys
 if not sys.flags.safe_path:
     del sys.path[0]  # the current folder, put first by -m: no file there may be run for a module
 
-from .diagnose.cli import main
+from .diagnose.command_line.cli import main
 
 main()

@@ -11,12 +11,12 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from wearstate.diagnose.chart import Chart, chart_text
-from wearstate.diagnose.chart_figure import save_chart
-from wearstate.diagnose.chart_scene import scene_chart
-from wearstate.diagnose.stability_atlas import atlas
-from wearstate.diagnose.stability_figure import save_figure
-from wearstate.sim.scene import load_scene, scene_names
+from wearstate.diagnose.charts.chart import Chart, chart_text
+from wearstate.diagnose.charts.figure import save_chart
+from wearstate.diagnose.charts.of_scene import scene_chart
+from wearstate.diagnose.stability.atlas import atlas
+from wearstate.diagnose.stability.figure import save_figure
+from wearstate.sim.scene.load import load_scene, scene_names
 
 BUDGET = 300.0
 """Seconds of a chart; what it leaves no time for is said in the picture."""

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
-from wearstate.sim.assemble import simulate
-from wearstate.sim.bearing import equilibrium
-from wearstate.sim.film import (
+from wearstate.sim.film.bearing import equilibrium
+from wearstate.sim.film.impedance_map import impedance_map, map_force
+from wearstate.sim.film.solve import (
     FILM_RUNGS,
     FilmGeometry,
     FilmState,
@@ -22,10 +22,10 @@ from wearstate.sim.film import (
     film_gap,
     solve_direct,
 )
-from wearstate.sim.impedance import impedance_map, map_force
-from wearstate.sim.integrate import Solution
-from wearstate.sim.journal_parts import JournalScene
-from wearstate.sim.scene import load_scene
+from wearstate.sim.machine.simulate import simulate
+from wearstate.sim.output.solution import Solution
+from wearstate.sim.scene.journal import JournalScene
+from wearstate.sim.scene.load import load_scene
 
 COLOURS = ("#1f5a94", "#b3541e", "#4f7d3a", "#7a4fa0", "#8a8a8a", "#c2a000")
 CASES = {

@@ -13,14 +13,14 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
-from wearstate.datasets.recipe import load_recipe, sample_records
-from wearstate.sim.assemble import simulate
-from wearstate.sim.crank_setup import pin_offsets, run_scene
-from wearstate.sim.hydraulics import even_phases, flow_ripple
-from wearstate.sim.pump_parts import PumpScene
-from wearstate.sim.scene import load_scene
-from wearstate.sim.transfer import scene_transfer
-from wearstate.sim.wear_rate import joint_wear
+from wearstate.datasets.recipe.recipe import load_recipe, sample_records
+from wearstate.sim.machine.simulate import simulate
+from wearstate.sim.machine.transfer import scene_transfer
+from wearstate.sim.pump.hydraulics import even_phases, flow_ripple
+from wearstate.sim.pump.setup import pin_offsets, run_scene
+from wearstate.sim.scene.load import load_scene
+from wearstate.sim.scene.pump import PumpScene
+from wearstate.sim.wear.rate import joint_wear
 
 STEP = 1 / 51_200  # s
 SETTLING = 2  # revolutions

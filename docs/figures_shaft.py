@@ -16,23 +16,23 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from scipy.signal import find_peaks
-from wearstate.diagnose.next_test import rank_tests, usual_responses
-from wearstate.diagnose.rig import ShakerTest, calibrated_test, rig_figure
-from wearstate.diagnose.sag_model import Prior
-from wearstate.sim.alignment import AlignmentLine, influence, reactions
-from wearstate.sim.calibration import Calibration, calibrate
-from wearstate.sim.rotor import Rotor, campbell
-from wearstate.sim.scene import load_scene
-from wearstate.sim.shaft_change import free_line, line_model, rest, unit_change
-from wearstate.sim.shaft_change import transfer as transfer_of
-from wearstate.sim.shaft_line import (
+from wearstate.diagnose.shaft_tests.next_test import rank_tests, usual_responses
+from wearstate.diagnose.shaft_tests.rig_test import ShakerTest, calibrated_test, rig_figure
+from wearstate.diagnose.shaft_tests.sag_model import Prior
+from wearstate.sim.alignment.alignment import AlignmentLine, influence, reactions
+from wearstate.sim.alignment.calibration import Calibration, calibrate
+from wearstate.sim.beam.rotor import Rotor, campbell
+from wearstate.sim.scene.load import load_scene
+from wearstate.sim.scene.shaft import ShaftScene
+from wearstate.sim.shaft.changed import free_line, line_model, rest, unit_change
+from wearstate.sim.shaft.changed import transfer as transfer_of
+from wearstate.sim.shaft.recording import (
     ShaftState,
     alignment_conditions,
     alignment_line,
     shaft_state,
 )
-from wearstate.sim.shaft_parts import ShaftScene
-from wearstate.sim.shaft_response import accelerance
+from wearstate.sim.shaft.response import accelerance
 
 COLOURS = ("#1f5a94", "#b3541e", "#4f7d3a", "#7a4fa0", "#8a8a8a", "#c2a000")
 MISALIGNED = {"bearings.2.offset": "-1.0 mm", "bearings.3.offset": "1.4 mm"}

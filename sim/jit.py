@@ -97,7 +97,7 @@ def kernel_sources(folder: Path) -> list[Path]:
     Examples
     --------
     >>> names = {path.stem for path in kernel_sources(Path(__file__).parent)}
-    >>> {"jit", "contact"} <= names, "assemble" in names
+    >>> {"jit", "law"} <= names, "simulate" in names
     (True, False)
     """
     imports = {path: _imported_from(folder, path) for path in folder.rglob("*.py")}

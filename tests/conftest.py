@@ -66,7 +66,7 @@ def made_once(path: Path, make: Callable[[Path], object]) -> Path:
 @pytest.fixture(scope="session")
 def small_set(common: Path) -> Path:
     """Data set of the recipe bilge-pump-small: 120 simulated records of 60 machine draws."""
-    from wearstate.datasets.generate import generate
+    from wearstate.datasets.generation.generate import generate
 
     return made_once(
         common / "small.h5", lambda path: generate("bilge-pump-small", None, path, seed=0, jobs=2)
@@ -76,7 +76,7 @@ def small_set(common: Path) -> Path:
 @pytest.fixture(scope="module")
 def small_trained(common: Path, small_set: Path) -> Any:
     """What `train_model` returns of `small_set`: model, feature table and rows held out."""
-    from wearstate.diagnose.train import train_model
+    from wearstate.diagnose.wear_model.train import train_model
 
     def train(path: Path) -> None:
         path.write_bytes(pickle.dumps(train_model(small_set, seed=0)))
@@ -87,6 +87,6 @@ def small_trained(common: Path, small_set: Path) -> Any:
 @pytest.fixture(scope="module")
 def small_model(common: Path, small_trained: Any) -> Path:
     """Model file trained on `small_set`."""
-    from wearstate.diagnose.modelfile import save_model
+    from wearstate.diagnose.wear_model.file import save_model
 
     return made_once(common / "model.wsm", lambda path: save_model(small_trained[0], path))

@@ -337,7 +337,7 @@ def forged(number_: int, seed: int, intact: tuple[Path, Path]) -> tuple[str, byt
 
 def child(model: str) -> None:
     """Read the files named on stdin; answer with one line each."""
-    from wearstate.diagnose.modelfile import load_model
+    from wearstate.diagnose.wear_model.file import load_model
 
     row = np.array(load_model(model).card["healthy_features"]["mean"])
     wanted = answer(load_model(model), row)
@@ -360,8 +360,8 @@ def child(model: str) -> None:
 
 
 def verdict(path: Path, row: Any, wanted: str) -> str:
-    from wearstate.diagnose.estimate import ModelError
-    from wearstate.diagnose.modelfile import load_model
+    from wearstate.diagnose.wear_model.estimate import ModelError
+    from wearstate.diagnose.wear_model.file import load_model
 
     try:
         model = load_model(path)

@@ -62,8 +62,8 @@ def _option(key: str, value: object) -> tuple[str, str]:
 
 def data_set(path: Path) -> bytes:
     """A data set with everything that one can hold."""
-    from wearstate.datasets.record import Attributes, DataSetWriter
-    from wearstate.sim.sensor import Channel
+    from wearstate.datasets.file.record import Attributes, DataSetWriter
+    from wearstate.sim.output.sensor import Channel
 
     head = Attributes(
         sample_rate=1000.0,
@@ -105,11 +105,11 @@ def other_kinds(folder: Path, model: Path | None) -> dict[str, list[Kind]]:
         "data-flips": [whole],
         "scene": [
             Kind(".toml", path.read_bytes(), (("scene", "check", "FILE"),))
-            for path in sorted((ROOT / "sim" / "scenes").glob("*.toml"))
+            for path in sorted((ROOT / "sim" / "scene" / "built_in").glob("*.toml"))
         ],
         "recipe": [
             Kind(".toml", path.read_bytes(), (("recipe", "check", "FILE"),))
-            for path in sorted((ROOT / "datasets" / "recipes").glob("*small.toml"))
+            for path in sorted((ROOT / "datasets" / "recipe" / "built_in").glob("*small.toml"))
         ],
         "table": [
             Kind(
@@ -147,23 +147,23 @@ def damaged(kind: str, whole: bytes, seed: int, number: int) -> bytes:
 def warm_up() -> None:
     """Import and load what commands do inside: forks start from a process that has it all."""
     for name in (
-        "datasets.audit",
-        "datasets.check",
-        "datasets.export",
-        "datasets.import_set",
-        "datasets.recipe",
-        "datasets.splits",
-        "diagnose.cli",
-        "diagnose.info",
-        "diagnose.modelfile",
-        "diagnose.report",
-        "diagnose.report_batch",
-        "diagnose.tabulate",
-        "diagnose.train",
+        "datasets.audit.audit",
+        "datasets.audit.integrity",
+        "datasets.convert.export",
+        "datasets.measured.data_set",
+        "datasets.recipe.recipe",
+        "datasets.split.rules",
+        "diagnose.command_line.cli",
+        "diagnose.inspect.info",
+        "diagnose.wear_model.file",
+        "diagnose.report.verdict",
+        "diagnose.report.batch",
+        "diagnose.feature_rows.feature_table",
+        "diagnose.wear_model.train",
     ):
         importlib.import_module(f"wearstate.{name}")
     from click.testing import CliRunner
-    from wearstate.diagnose.cli import cli
+    from wearstate.diagnose.command_line.cli import cli
 
     for scene in ("bilge-pump", "journal-bearing", "propulsion-shaft"):  # kernels of each machine
         CliRunner().invoke(cli, ["scene", "check", scene], catch_exceptions=False)
@@ -195,7 +195,7 @@ def _become(command: list[str], log: Path) -> None:
     sys.stdout, sys.stderr = (_strict(descriptor) for descriptor in (1, 2))
     code = 70
     try:
-        from wearstate.diagnose.cli import main
+        from wearstate.diagnose.command_line.cli import main
 
         main(command)
     except SystemExit as error:

@@ -38,9 +38,10 @@ from typing import Any
 
 import h5py
 import numpy as np
-from wearstate.datasets import generate, record
-from wearstate.diagnose import cli
-from wearstate.sim.sensor import Channel
+from wearstate.datasets.file import record
+from wearstate.datasets.generation import generate
+from wearstate.diagnose.command_line import cli
+from wearstate.sim.output.sensor import Channel
 
 RECIPE = """
 name = "kill-trials"

@@ -10,13 +10,18 @@ import pandas as pd
 import pytest
 from click.testing import CliRunner
 from numpy.testing import assert_allclose
-from wearstate.datasets.record import DataError
-from wearstate.datasets.splits import group_folds
-from wearstate.diagnose import across as module
-from wearstate.diagnose.across import across_fidelity, across_table, across_text, sign_flip_test
-from wearstate.diagnose.cli import cli
-from wearstate.diagnose.models import CANDIDATES, fit_blend
-from wearstate.diagnose.tabulate import FeatureTable
+from wearstate.datasets.file.record import DataError
+from wearstate.datasets.split.rules import group_folds
+from wearstate.diagnose.charts import across as module
+from wearstate.diagnose.charts.across import (
+    across_fidelity,
+    across_table,
+    across_text,
+    sign_flip_test,
+)
+from wearstate.diagnose.command_line.cli import cli
+from wearstate.diagnose.feature_rows.feature_table import FeatureTable
+from wearstate.diagnose.learning.regressions import CANDIDATES, fit_blend
 
 LIMIT = 1e-4
 COLUMN = "diametral_clearance_bearing_m"
@@ -136,7 +141,7 @@ def test_the_map_costs_the_verdict_nothing(found):
 
 
 def test_records_of_one_number_are_one_machine(found):
-    from wearstate.datasets.record import DataSet
+    from wearstate.datasets.file.record import DataSet
 
     folder, _ = found
     paths = sorted(folder.glob("*.h5"))

@@ -3,7 +3,7 @@
 import dataclasses
 
 import pytest
-from wearstate.diagnose.advice import (
+from wearstate.diagnose.report.advice import (
     _RULES,
     _WORDS,
     FROM_TREND,
@@ -13,8 +13,8 @@ from wearstate.diagnose.advice import (
     touched_grades,
     work_words,
 )
-from wearstate.diagnose.estimate import NO_BASELINE, Estimate
-from wearstate.diagnose.trend import Outlook
+from wearstate.diagnose.report.trend import Outlook
+from wearstate.diagnose.wear_model.estimate import NO_BASELINE, Estimate
 
 PIN = "diametral clearance, crankpin"
 EDGES = (1e-4, 2e-4, 3e-4)

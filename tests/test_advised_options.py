@@ -9,14 +9,14 @@ from pathlib import Path
 import click
 import pytest
 import wearstate
-from wearstate.diagnose.cli import cli
-from wearstate.diagnose.command_options import as_options
-from wearstate.features.analysis import Settings
-from wearstate.features.needs import NEEDS, Layout
+from wearstate.diagnose.command_line.cli import cli
+from wearstate.diagnose.command_line.command_options import as_options
+from wearstate.features.catalogue.analysis import Settings
+from wearstate.features.catalogue.needs import NEEDS, Layout
 
 ROOT = Path(wearstate.__file__).parent
 SOURCES = [
-    p for part in ("sim", "features", "datasets", "diagnose") for p in ROOT.glob(f"{part}/*")
+    p for part in ("sim", "features", "datasets", "diagnose") for p in ROOT.glob(f"{part}/**/*.py")
 ]
 OPTION = re.compile(r"(?<![\w-])--[a-z][a-z-]*")
 COMMAND = re.compile(r"\bwearstate ((?:[a-z]+ )?[a-z]+)")
@@ -32,32 +32,32 @@ OWN_RULE = {
 }
 """Files that hold many commands or declare options: see the test of usage errors."""
 SPOKEN_BY = {
-    "across": {"evaluate"},
-    "advice": {"report"},
-    "align": {"align"},
-    "audit_text": {"splits"},
-    "blindspots": {"blindspots"},
-    "chart_commands": {"chart"},
-    "estimate": {"evaluate", "report"},
-    "evaluate": {"evaluate"},
-    "evaluate_splits": {"evaluate"},
-    "film_clearance": {"report"},
-    "film_verdict": {"report"},
-    "film_wear_down": {"report"},
-    "impact": {"features", "info"},
-    "kept": {"blindspots", "chart"},
-    "quality": {"report"},
-    "report": {"report"},
-    "report_batch.html": {"report"},
-    "scene_edit": {"chart", "simulate"},
-    "own": {"import"},
-    "like": {"import", "info", "report"},
-    "nameplate_cautions": {"report"},
-    "sources": {"import", "info", "report"},
-    "tabulate": {"evaluate", "features", "report", "train"},
-    "sweep_axes": {"sweep"},
-    "sweep_show": {"sweep"},
-    "sweep_text": {"sweep"},
+    "charts/across": {"evaluate"},
+    "report/advice": {"report"},
+    "alignment/page": {"align"},
+    "inspect/audit_text": {"splits"},
+    "blindspots/blindspots": {"blindspots"},
+    "command_line/chart_commands": {"chart"},
+    "wear_model/estimate": {"evaluate", "report"},
+    "evaluation/evaluate": {"evaluate"},
+    "evaluation/splits": {"evaluate"},
+    "film_clearance/clearance": {"report"},
+    "report/film": {"report"},
+    "film_clearance/wear_down": {"report"},
+    "response/impact": {"features", "info"},
+    "pages/kept": {"blindspots", "chart"},
+    "feature_rows/quality": {"report"},
+    "report/verdict": {"report"},
+    "templates/report_batch.html": {"report"},
+    "charts/scene_edit": {"chart", "simulate"},
+    "class_model/train": {"import"},
+    "wear_model/like": {"import", "info", "report"},
+    "nameplate/cautions": {"report"},
+    "readers/open": {"import", "info", "report"},
+    "feature_rows/feature_table": {"evaluate", "features", "report", "train"},
+    "sweep/axes": {"sweep"},
+    "sweep/show": {"sweep"},
+    "sweep/text": {"sweep"},
 }
 """File -> commands that say its messages, where these name an option without a command."""
 
@@ -109,7 +109,9 @@ def strings(path):
 @cache
 def messages():
     """Every text that names an option or a command: file, line, text."""
-    files = [p for p in SOURCES if p.suffix == ".py"] + sorted(ROOT.glob("diagnose/templates/*.j2"))
+    files = [p for p in SOURCES if p.suffix == ".py"] + sorted(
+        ROOT.glob("diagnose/pages/templates/*.j2")
+    )
     return [
         (path, line, text)
         for path in files
@@ -128,8 +130,12 @@ def readers(path, text, place):
     for word in reversed(re.findall(r"[a-z]+", before)):
         if word in NAMED:
             return {NAMED[word]}
-    name = path.name.removesuffix(".j2").removesuffix(".py")
-    return SPOKEN_BY.get(name, set())
+    return SPOKEN_BY.get(spot(path), set())
+
+
+def spot(path):
+    """Room and file, without the endings: file names are unique within a room only."""
+    return f"{path.parent.name}/{path.name.removesuffix('.j2').removesuffix('.py')}"
 
 
 def command_in(words):
@@ -175,19 +181,20 @@ def test_the_walk_finds_what_it_should():
 
 
 def test_a_file_whose_messages_name_bare_options_says_who_reads_them():
-    known = {name.removesuffix(".py") for name in OWN_RULE} | {"cli", *SPOKEN_BY}
+    known = {f"command_line/{name.removesuffix('.py')}" for name in OWN_RULE}
+    known |= {"command_line/cli", *SPOKEN_BY}
     bare = {
-        path.name.removesuffix(".j2").removesuffix(".py")
+        spot(path)
         for path, _, text in messages()
         for found in OPTION.finditer(text)
         if not readers(path, text, found.start()) and found.group() not in FOREIGN
     }
-    assert bare - known - {"export"} == set()  # the export writes whole command lines
+    assert bare - known - {"convert/export"} == set()  # the export writes whole command lines
 
 
 def test_the_usage_errors_of_a_command_name_its_own_options():
     wrong = []
-    for path in ROOT.glob("diagnose/commands_*.py"):
+    for path in ROOT.glob("diagnose/command_line/commands_*.py"):
         tree = ast.parse(path.read_text(encoding="utf-8"))
         for function in tree.body:
             if not isinstance(function, ast.FunctionDef):

@@ -6,8 +6,7 @@ import math
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from wearstate.diagnose.align import align, align_html, align_table
-from wearstate.diagnose.align_films import (
+from wearstate.diagnose.alignment.films import (
     FILM_HEAD,
     film_cells,
     film_rows,
@@ -16,12 +15,13 @@ from wearstate.diagnose.align_films import (
     resting,
     transfer_figure,
 )
-from wearstate.diagnose.align_films import _pressure_unit as pressure_unit
-from wearstate.diagnose.align_margins import jack_rows, margin_of, margin_rows
-from wearstate.diagnose.cli import cli
-from wearstate.sim.alignment import Check, check, reactions
-from wearstate.sim.scene import load_scene
-from wearstate.sim.shaft_line import shaft_state
+from wearstate.diagnose.alignment.films import _pressure_unit as pressure_unit
+from wearstate.diagnose.alignment.margins import jack_rows, margin_of, margin_rows
+from wearstate.diagnose.alignment.page import align, align_html, align_table
+from wearstate.diagnose.command_line.cli import cli
+from wearstate.sim.alignment.alignment import Check, check, reactions
+from wearstate.sim.scene.load import load_scene
+from wearstate.sim.shaft.recording import shaft_state
 
 MOVES = {"third": 0.25e-3}
 

@@ -7,15 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from wearstate.datasets.record import DataError, Recording
-from wearstate.diagnose.align_tests import line_tests, read_reactions
-from wearstate.diagnose.cli import cli
-from wearstate.diagnose.sag_report import sag_report, sag_text
-from wearstate.sim.alignment import reactions
-from wearstate.sim.assemble import simulate
-from wearstate.sim.scene import load_scene
-from wearstate.sim.shaft_change import free_line, line_model, rest, transfer
-from wearstate.sim.shaft_line import alignment_conditions, alignment_line
+from wearstate.datasets.file.record import DataError, Recording
+from wearstate.diagnose.command_line.cli import cli
+from wearstate.diagnose.shaft_tests.measured_tests import line_tests, read_reactions
+from wearstate.diagnose.shaft_tests.sag_report import sag_report, sag_text
+from wearstate.sim.alignment.alignment import reactions
+from wearstate.sim.machine.simulate import simulate
+from wearstate.sim.scene.load import load_scene
+from wearstate.sim.shaft.changed import free_line, line_model, rest, transfer
+from wearstate.sim.shaft.recording import alignment_conditions, alignment_line
 
 STRAIGHT = {"bearings.2.offset": "0 mm"}
 SAG = 0.15e-3

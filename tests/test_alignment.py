@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
-from wearstate.sim.alignment import (
+from wearstate.sim.alignment.alignment import (
     AS_SET,
     AlignmentError,
     AlignmentLine,
@@ -21,9 +21,9 @@ from wearstate.sim.alignment import (
     seat_stations,
     span_loads,
 )
-from wearstate.sim.beam import Disc, PointLoad, Section, assemble_beam
-from wearstate.sim.calibration import CalibrationStatus, calibrate
-from wearstate.sim.jacking import gap_and_sag, jacking
+from wearstate.sim.alignment.calibration import CalibrationStatus, calibrate
+from wearstate.sim.alignment.jacking import gap_and_sag, jacking
+from wearstate.sim.beam.beam import Disc, PointLoad, Section, assemble_beam
 
 STEEL = {"young": 2.1e11, "shear_modulus": 8.1e10, "density": 7850.0}
 

@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from wearstate.sim.assemble import check, simulate
-from wearstate.sim.crank_setup import contact_frequency
-from wearstate.sim.integrate import SimulationError, Status
-from wearstate.sim.parts import SceneError, channels_of
-from wearstate.sim.pump import steps_per_sample
-from wearstate.sim.scene import load_scene
+from wearstate.sim.machine.simulate import check, simulate
+from wearstate.sim.output.solution import SimulationError, Status
+from wearstate.sim.pump.recording import steps_per_sample
+from wearstate.sim.pump.setup import contact_frequency
+from wearstate.sim.scene.load import load_scene
+from wearstate.sim.scene.parts import SceneError, channels_of
 
 SHORT = {"duration": "0.4 s"}  # two revolutions
 RATE = 25_600.0
@@ -233,7 +233,7 @@ def unchecked(changes):
 def test_failure_is_a_status(monkeypatch, changes, status):
     scene = unchecked(changes)
     # the check sees them coming: here the solver must
-    monkeypatch.setattr("wearstate.sim.pump.limits", lambda scene: [])
+    monkeypatch.setattr("wearstate.sim.pump.recording.limits", lambda scene: [])
     with pytest.raises(SimulationError, match=f"bilge-pump: {status.name.lower()}: ") as caught:
         simulate(scene, seed=1)
     assert caught.value.status is status

@@ -8,9 +8,9 @@ import sys
 from pathlib import Path
 
 import pytest
-from wearstate.datasets import lock
-from wearstate.datasets.lock import holding
-from wearstate.datasets.record import DataError
+from wearstate.datasets.file import lock
+from wearstate.datasets.file.lock import holding
+from wearstate.datasets.file.record import DataError
 from wearstate.sim import atomic
 from wearstate.sim.atomic import OutputError, fresh_name, replacing, sealed, unsealed, write_whole
 
@@ -160,7 +160,7 @@ def test_the_package_imports_nothing_of_ours():
 HOLDER = """
 import sys, time
 from pathlib import Path
-from wearstate.datasets import lock
+from wearstate.datasets.file import lock
 if sys.argv[2] == "without":
     lock.fcntl = None
 with lock.holding(Path(sys.argv[1])):

@@ -11,19 +11,19 @@ from click.testing import CliRunner
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
-from wearstate.datasets.audit import CHECKS, Audit, audit, table_findings
-from wearstate.datasets.audit_columns import close_pairs, resolution
-from wearstate.datasets.audit_label import neighbour_accuracy
-from wearstate.datasets.audit_records import ANCHORS, anchors, copies, sketch
-from wearstate.datasets.audit_rows import _rank, copied_rows
-from wearstate.datasets.audit_table import Roles, Table, coded, read_table
-from wearstate.datasets.generate import generate
-from wearstate.datasets.machines import machine_origin
-from wearstate.datasets.recipe import load_recipe
-from wearstate.datasets.record import Attributes, DataError, DataSet, DataSetWriter
-from wearstate.diagnose.audit_text import audit_text
-from wearstate.diagnose.cli import cli
-from wearstate.sim.sensor import Channel
+from wearstate.datasets.audit.audit import CHECKS, Audit, audit, table_findings
+from wearstate.datasets.audit.columns import close_pairs, resolution
+from wearstate.datasets.audit.label import neighbour_accuracy
+from wearstate.datasets.audit.records import ANCHORS, anchors, copies, sketch
+from wearstate.datasets.audit.rows import _rank, copied_rows
+from wearstate.datasets.audit.table import Roles, Table, coded, read_table
+from wearstate.datasets.file.machines import machine_origin
+from wearstate.datasets.file.record import Attributes, DataError, DataSet, DataSetWriter
+from wearstate.datasets.generation.generate import generate
+from wearstate.datasets.recipe.recipe import load_recipe
+from wearstate.diagnose.command_line.cli import cli
+from wearstate.diagnose.inspect.audit_text import audit_text
+from wearstate.sim.output.sensor import Channel
 
 NUISANCE = 3
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from wearstate.features.balance import correction_masses, influence_coefficients
+from wearstate.features.rotation.balancing import correction_masses, influence_coefficients
 
 
 def phasor(text):

@@ -7,14 +7,20 @@ import numpy as np
 import pandas as pd
 import pytest
 from numpy.testing import assert_allclose
-from wearstate.datasets.record import Channel, Recording
-from wearstate.diagnose import baselines, foreign
-from wearstate.diagnose.baselines import BASELINES, FOLDS, Side, choose, contest, side_of
-from wearstate.diagnose.foreign import LEFT_OUT, PACKAGES, foreign_transform, kitchen
-from wearstate.diagnose.grades import grades_of
-from wearstate.diagnose.models import CANDIDATES
-from wearstate.diagnose.scores import point_judged, resampled
-from wearstate.diagnose.tabulate import FeatureTable
+from wearstate.datasets.file.record import Channel, Recording
+from wearstate.diagnose.evaluation import baselines
+from wearstate.diagnose.evaluation import foreign_features as foreign
+from wearstate.diagnose.evaluation.baselines import BASELINES, FOLDS, Side, choose, contest, side_of
+from wearstate.diagnose.evaluation.foreign_features import (
+    LEFT_OUT,
+    PACKAGES,
+    foreign_transform,
+    kitchen,
+)
+from wearstate.diagnose.feature_rows.feature_table import FeatureTable
+from wearstate.diagnose.learning.grades import grades_of
+from wearstate.diagnose.learning.regressions import CANDIDATES
+from wearstate.diagnose.learning.scores import point_judged, resampled
 
 EDGES = [1e-4, 2e-4, 3e-4]
 LIMIT = 3e-4

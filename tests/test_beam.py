@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy import linalg
-from wearstate.sim import beam as bm
-from wearstate.sim.beam import Disc, DistributedLoad, PointLoad, Section, assemble_beam
+from wearstate.sim.beam import beam as bm
+from wearstate.sim.beam.beam import Disc, DistributedLoad, PointLoad, Section, assemble_beam
 
 PI = math.pi
 STEEL = {"young": 2.11e11, "shear_modulus": 8.12e10, "density": 7810.0}

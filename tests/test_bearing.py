@@ -7,8 +7,8 @@ import re
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from wearstate.sim import bearing as br
-from wearstate.sim.film import FilmGeometry, Groove, dufrane_scar
+from wearstate.sim.film import bearing as br
+from wearstate.sim.film.solve import FilmGeometry, Groove, dufrane_scar
 
 PI = math.pi
 

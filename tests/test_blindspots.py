@@ -8,21 +8,21 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from wearstate.datasets.recipe import load_recipe, sample_records
-from wearstate.datasets.record import DataError, Recording
-from wearstate.diagnose import blindspots
-from wearstate.diagnose.blindspot_rows import scene_rows
-from wearstate.diagnose.blindspot_scores import Row, Said, ranked, row_figures
-from wearstate.diagnose.blindspot_signals import signal_rows
-from wearstate.diagnose.blindspot_table import SCENE_SHIFTS, Shift
-from wearstate.diagnose.blindspots import find_blind_spots, kept_rows, recipe_of
-from wearstate.diagnose.blindspots_page import blind_spots_html
-from wearstate.diagnose.blindspots_text import blind_spots_table, blind_spots_text
-from wearstate.diagnose.cli import cli
-from wearstate.diagnose.estimate import Estimate
-from wearstate.features.order import pulse_times
-from wearstate.sim.parts import SceneError, channels_of
-from wearstate.sim.sensor import Channel, tacho_pulses
+from wearstate.datasets.file.record import DataError, Recording
+from wearstate.datasets.recipe.recipe import load_recipe, sample_records
+from wearstate.diagnose.blindspots import blindspots
+from wearstate.diagnose.blindspots.blindspots import find_blind_spots, kept_rows, recipe_of
+from wearstate.diagnose.blindspots.page import blind_spots_html
+from wearstate.diagnose.blindspots.rows import scene_rows
+from wearstate.diagnose.blindspots.scores import Row, Said, ranked, row_figures
+from wearstate.diagnose.blindspots.shifts import SCENE_SHIFTS, Shift
+from wearstate.diagnose.blindspots.signals import signal_rows
+from wearstate.diagnose.blindspots.text import blind_spots_table, blind_spots_text
+from wearstate.diagnose.command_line.cli import cli
+from wearstate.diagnose.wear_model.estimate import Estimate
+from wearstate.features.rotation.order import pulse_times
+from wearstate.sim.output.sensor import Channel, tacho_pulses
+from wearstate.sim.scene.parts import SceneError, channels_of
 
 PUMP = load_recipe("bilge-pump-narrow", {"duration": "0.4 s"})
 LIMIT = 3.1e-4
@@ -402,8 +402,8 @@ def run(*arguments):
 def stub(tmp_path, monkeypatch):
     """A model file that is none: loading it gives the stand-in."""
     told = SimpleNamespace(card=CARD, noted=(), estimate=loudness, notice="trained on simulation")
-    monkeypatch.setattr("wearstate.diagnose.bundle.kind_of", lambda path: "wear")
-    monkeypatch.setattr("wearstate.diagnose.modelfile.load_model", lambda path: told)
+    monkeypatch.setattr("wearstate.diagnose.wear_model.bundle.kind_of", lambda path: "wear")
+    monkeypatch.setattr("wearstate.diagnose.wear_model.file.load_model", lambda path: told)
     path = tmp_path / "model.wsm"
     path.write_bytes(b"stub")
     return path

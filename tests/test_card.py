@@ -10,10 +10,11 @@ import h5py
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from wearstate.datasets.generate import generate
-from wearstate.datasets.recipe import load_recipe
-from wearstate.datasets.record import Attributes, DataError, DataSet, DataSetWriter
-from wearstate.diagnose.card import (
+from wearstate.datasets.file.record import Attributes, DataError, DataSet, DataSetWriter
+from wearstate.datasets.generation.generate import generate
+from wearstate.datasets.recipe.recipe import load_recipe
+from wearstate.diagnose.command_line.cli import cli
+from wearstate.diagnose.inspect.card import (
     Code,
     Picture,
     Table,
@@ -23,8 +24,7 @@ from wearstate.diagnose.card import (
     snippets,
     write_card,
 )
-from wearstate.diagnose.cli import cli
-from wearstate.sim.sensor import Channel
+from wearstate.sim.output.sensor import Channel
 
 N = 24
 CLEARANCE = "diametral_clearance_bearing_m"

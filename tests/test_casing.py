@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy import signal
-from wearstate.sim.casing import (
+from wearstate.sim.pump.casing import (
     PASS_BAND,
     Modes,
     band_limited_acceleration,
@@ -17,9 +17,9 @@ from wearstate.sim.casing import (
     exact_oscillator,
     housing_acceleration,
 )
-from wearstate.sim.parts import SceneError
-from wearstate.sim.pump_parts import FORCE_PLACES
-from wearstate.sim.scene import load_scene
+from wearstate.sim.scene.load import load_scene
+from wearstate.sim.scene.parts import SceneError
+from wearstate.sim.scene.pump import FORCE_PLACES
 
 FS = 25_600.0
 FACTORS = [1, 2, 3, 5, 8]

@@ -12,22 +12,22 @@ import pytest
 from click.testing import CliRunner
 from hypothesis import given
 from hypothesis import strategies as st
-from wearstate.datasets.quantities import QUANTITIES
-from wearstate.diagnose.chart import (
+from wearstate.datasets.generation.quantities import QUANTITIES
+from wearstate.diagnose.charts.chart import (
     CSV_HEAD,
     chart_table,
     chart_text,
     front_of,
     remaining_error,
 )
-from wearstate.diagnose.chart_figure import SUFFIXES, chart_figure, chart_html, save_chart
-from wearstate.diagnose.chart_scene import KEPT, RAISED, chart_of, scene_chart
-from wearstate.diagnose.chart_words import HERE
-from wearstate.diagnose.cli import cli
-from wearstate.sim.ladder import with_values
-from wearstate.sim.pilot import Candidate, Difference, Pilot, differences
-from wearstate.sim.scene import load_scene
-from wearstate.sim.study import Answer, Convergence, Raise, Study
+from wearstate.diagnose.charts.figure import SUFFIXES, chart_figure, chart_html, save_chart
+from wearstate.diagnose.charts.of_scene import KEPT, RAISED, chart_of, scene_chart
+from wearstate.diagnose.charts.words import HERE
+from wearstate.diagnose.command_line.cli import cli
+from wearstate.sim.fidelity.ladder import with_values
+from wearstate.sim.fidelity.pilot import Candidate, Difference, Pilot, differences
+from wearstate.sim.fidelity.study import Answer, Convergence, Raise, Study
+from wearstate.sim.scene.load import load_scene
 
 FILM = {"film": "direct", "mesh": "x1/2"}
 WRITTEN = {"film": "map", "mesh": "x1"}
@@ -415,7 +415,7 @@ def test_an_interrupted_chart_goes_on_to_the_same_page(tmp_path, monkeypatch):
     """Ctrl-C in the middle: an answer, exit code 1, and the same command ends as if nothing was."""
     ticks = itertools.count()
     monkeypatch.setattr(
-        "wearstate.diagnose.chart_scene.time.perf_counter", lambda: 1e-9 * next(ticks)
+        "wearstate.diagnose.charts.of_scene.time.perf_counter", lambda: 1e-9 * next(ticks)
     )
     sizes = {**SMALL, "numerics.tolerance": 1e-4, "pinned": "", "duration": 0.05}
     sizes.pop("pinned")

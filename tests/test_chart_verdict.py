@@ -5,12 +5,12 @@ import tomllib
 
 import pytest
 from click.testing import CliRunner
-from wearstate.datasets.recipe import load_recipe
-from wearstate.diagnose import chart_verdict as module
-from wearstate.diagnose.across import Loss
-from wearstate.diagnose.chart_verdict import LOSS, verdict_chart
-from wearstate.diagnose.cli import cli
-from wearstate.sim.pilot import Difference
+from wearstate.datasets.recipe.recipe import load_recipe
+from wearstate.diagnose.charts import verdict as module
+from wearstate.diagnose.charts.across import Loss
+from wearstate.diagnose.charts.verdict import LOSS, verdict_chart
+from wearstate.diagnose.command_line.cli import cli
+from wearstate.sim.fidelity.pilot import Difference
 
 SMALL = ("--set", "duration=0.1", "--set", "film.n_theta=24", "--set", "film.n_z=5")
 
@@ -122,7 +122,7 @@ def test_usage(arguments, message):
 
 
 def test_an_accuracy_in_per_cent_is_that_of_a_scene(monkeypatch):
-    from wearstate.diagnose import chart_commands
+    from wearstate.diagnose.command_line import chart_commands
 
     seen = {}
     monkeypatch.setattr(

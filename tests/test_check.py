@@ -10,12 +10,9 @@ import h5py
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from wearstate.datasets.check import check_set, checked_table, checked_text
-from wearstate.datasets.columns import MEANINGS, describe_columns
-from wearstate.datasets.generate import NUMERICS, generate
-from wearstate.datasets.recipe import load_recipe
-from wearstate.datasets.recipe_file import recipe_names
-from wearstate.datasets.record import (
+from wearstate.datasets.audit.integrity import check_set, checked_table, checked_text
+from wearstate.datasets.file.columns import MEANINGS, describe_columns
+from wearstate.datasets.file.record import (
     HASHES,
     Attributes,
     DataError,
@@ -24,8 +21,11 @@ from wearstate.datasets.record import (
     manifest_hash,
     signal_checksum,
 )
-from wearstate.diagnose.cli import cli
-from wearstate.sim.sensor import Channel
+from wearstate.datasets.generation.generate import NUMERICS, generate
+from wearstate.datasets.recipe.recipe import load_recipe
+from wearstate.datasets.recipe.text import recipe_names
+from wearstate.diagnose.command_line.cli import cli
+from wearstate.sim.output.sensor import Channel
 
 N = 8
 
@@ -244,7 +244,7 @@ def test_a_signal_written_twice_is_found(copy):
 
 
 def test_equal_checksums_of_other_signals_are_no_duplicate(copy, monkeypatch):
-    monkeypatch.setattr("wearstate.datasets.check.signal_checksum", lambda _: 7)
+    monkeypatch.setattr("wearstate.datasets.audit.integrity.signal_checksum", lambda _: 7)
     relabel(copy, set_to("signal_crc32", slice(None), 7))
     assert check_set(copy).sound
 

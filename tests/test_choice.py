@@ -3,16 +3,16 @@
 import h5py
 import pytest
 from click.testing import CliRunner
-from wearstate.datasets import choice as module
-from wearstate.datasets import generate as generation
-from wearstate.datasets.choice import Choice, choose, pinned_by, with_choice
-from wearstate.datasets.generate import generate
-from wearstate.datasets.recipe import load_recipe, recorded_scene, sample_records
-from wearstate.datasets.recipe_file import recipe_names
-from wearstate.datasets.record import DataError, DataSet
-from wearstate.diagnose.cli import cli
-from wearstate.sim.fidelity import Resolution
-from wearstate.sim.ladder import effects_of
+from wearstate.datasets.file.record import DataError, DataSet
+from wearstate.datasets.generation import fidelity_choice as module
+from wearstate.datasets.generation import generate as generation
+from wearstate.datasets.generation.fidelity_choice import Choice, choose, pinned_by, with_choice
+from wearstate.datasets.generation.generate import generate
+from wearstate.datasets.recipe.recipe import load_recipe, recorded_scene, sample_records
+from wearstate.datasets.recipe.text import recipe_names
+from wearstate.diagnose.command_line.cli import cli
+from wearstate.sim.fidelity.choose import Resolution
+from wearstate.sim.fidelity.ladder import effects_of
 
 SMALL = {
     "duration": "0.05 s",

@@ -9,10 +9,10 @@ from random import Random
 
 import pytest
 from pydantic import BaseModel
-from wearstate.sim.assemble import check, simulate
-from wearstate.sim.integrate import SimulationError
-from wearstate.sim.parts import SceneError
-from wearstate.sim.scene import load_scene, scene_names
+from wearstate.sim.machine.simulate import check, simulate
+from wearstate.sim.output.solution import SimulationError
+from wearstate.sim.scene.load import load_scene, scene_names
+from wearstate.sim.scene.parts import SceneError
 
 SHORT = {
     "bilge-pump": {"duration": "0.21 s", "settling_revolutions": 1},

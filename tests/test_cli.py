@@ -9,11 +9,11 @@ import h5py
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from wearstate.datasets.recipe_file import recipe_text
-from wearstate.datasets.record import DataError, DataSet
-from wearstate.diagnose import demo
-from wearstate.diagnose.cli import cli
-from wearstate.diagnose.plain_json import json_text
+from wearstate.datasets.file.record import DataError, DataSet
+from wearstate.datasets.recipe.text import recipe_text
+from wearstate.diagnose.command_line import demo
+from wearstate.diagnose.command_line.cli import cli
+from wearstate.diagnose.pages.plain_json import json_text
 
 
 def run(*arguments, code=0):
@@ -50,7 +50,7 @@ def test_module_and_script_are_the_same_program():
 
 def test_help_imports_nothing_heavy():
     code = (
-        "import sys\nfrom wearstate.diagnose.cli import cli\n"
+        "import sys\nfrom wearstate.diagnose.command_line.cli import cli\n"
         "heavy = {'numpy', 'scipy', 'numba', 'pandas', 'sklearn', 'matplotlib', 'h5py'}\n"
         "heavy |= {'pydantic', 'rich', 'joblib'}\n"
         "print(sorted(heavy & set(sys.modules)))"
@@ -315,7 +315,7 @@ def test_a_failed_simulation_leaves_nothing(tmp_path, monkeypatch):
     def fail(*_, **__):
         raise OSError(28, "No space left on device", str(tmp_path / "x.h5.part"))
 
-    monkeypatch.setattr("wearstate.datasets.record.DataSetWriter.write", fail)
+    monkeypatch.setattr("wearstate.datasets.file.record.DataSetWriter.write", fail)
     error = refused("simulate", "bilge-pump", "-o", tmp_path / "x.h5", says=["No space", "x.h5'"])
     assert ".part" not in error
     assert list(tmp_path.iterdir()) == []
@@ -334,7 +334,7 @@ def test_a_reader_that_stops_ends_the_program_quietly():
 
 
 def test_no_more_workers_than_four_a_core():
-    from wearstate.datasets import workers
+    from wearstate.datasets.workers import local as workers
 
     assert workers.cores() >= 1
     with pytest.MonkeyPatch.context() as patch:
@@ -446,8 +446,8 @@ def test_a_caution_stands_beside_the_verdict_of_the_page(tmp_path, small_model):
 
 def test_the_bounds_of_the_options_are_those_of_the_library():
     """The command line repeats two numbers, because importing them would slow its help."""
-    from wearstate.datasets import recipe
-    from wearstate.diagnose import command_options as module
+    from wearstate.datasets.recipe import recipe
+    from wearstate.diagnose.command_line import command_options as module
 
     assert module.MOST_RECORDS == recipe.MOST_RECORDS
     assert module.LARGEST_SEED == recipe.LARGEST_SEED
@@ -456,10 +456,10 @@ def test_the_bounds_of_the_options_are_those_of_the_library():
 @pytest.mark.parametrize(
     ("function", "arguments"),
     [
-        ("chart_models.model_chart", ("chart", "x.h5", "-j", 1)),
-        ("rig.calibrated_test", ("align", "propulsion-shaft", "--test", "hammer")),
-        ("train.train_model", ("train", "SET", "-o", "m.wsm", "-j", 1)),
-        ("demo.run_demo", ("demo", "-j", 1)),
+        ("charts.of_models.model_chart", ("chart", "x.h5", "-j", 1)),
+        ("shaft_tests.rig_test.calibrated_test", ("align", "propulsion-shaft", "--test", "hammer")),
+        ("wear_model.train.train_model", ("train", "SET", "-o", "m.wsm", "-j", 1)),
+        ("command_line.demo.run_demo", ("demo", "-j", 1)),
     ],
 )
 def test_seed_reaches_whatever_draws(function, arguments, small_set, tmp_path, monkeypatch):

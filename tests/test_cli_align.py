@@ -4,11 +4,11 @@ import json
 
 import pytest
 from click.testing import CliRunner
-from wearstate.diagnose.align import align, align_figure, align_text
-from wearstate.diagnose.cli import cli
-from wearstate.sim.alignment import reactions
-from wearstate.sim.scene import load_scene
-from wearstate.sim.shaft_line import alignment_conditions, alignment_line
+from wearstate.diagnose.alignment.page import align, align_figure, align_text
+from wearstate.diagnose.command_line.cli import cli
+from wearstate.sim.alignment.alignment import reactions
+from wearstate.sim.scene.load import load_scene
+from wearstate.sim.shaft.recording import alignment_conditions, alignment_line
 
 SCENE = "propulsion-shaft"
 SAGGED = ("--set", "bearings.2.sag=1.6 mm")  # the intermediate bearing lifts, and chocks mend it

@@ -8,12 +8,12 @@ import pandas as pd
 import pytest
 from click.testing import CliRunner
 from numpy.testing import assert_allclose
-from wearstate.datasets.record import DataSet
-from wearstate.diagnose.cli import cli
-from wearstate.diagnose.commands_data import _FEATURE_SETS
-from wearstate.diagnose.tabulate import choice_of, feature_table
-from wearstate.features import iso
-from wearstate.features.catalogue import SETS, SetName
+from wearstate.datasets.file.record import DataSet
+from wearstate.diagnose.command_line.cli import cli
+from wearstate.diagnose.command_line.commands_data import _FEATURE_SETS
+from wearstate.diagnose.feature_rows.feature_table import choice_of, feature_table
+from wearstate.features.catalogue.catalogue import SETS, SetName
+from wearstate.features.signal import iso
 
 
 def run(*arguments, code=0):

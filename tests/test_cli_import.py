@@ -8,10 +8,10 @@ import pytest
 from click.testing import CliRunner
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.io import wavfile
-from wearstate.datasets.record import DataSet
-from wearstate.diagnose.cli import cli
-from wearstate.diagnose.command_options import as_options
-from wearstate.sim.parts import STANDARD_GRAVITY
+from wearstate.datasets.file.record import DataSet
+from wearstate.diagnose.command_line.cli import cli
+from wearstate.diagnose.command_line.command_options import as_options
+from wearstate.sim.scene.parts import STANDARD_GRAVITY
 
 RAMP = np.arange(400.0)
 

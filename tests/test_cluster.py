@@ -12,13 +12,13 @@ from contextlib import contextmanager
 import h5py
 import pytest
 from click.testing import CliRunner
-from wearstate.datasets import cluster
-from wearstate.datasets.generate import generate
-from wearstate.datasets.pool import WorkersError
-from wearstate.datasets.recipe import load_recipe
-from wearstate.datasets.record import DataError
-from wearstate.datasets.workers import in_order
-from wearstate.diagnose.cli import cli
+from wearstate.datasets.file.record import DataError
+from wearstate.datasets.generation.generate import generate
+from wearstate.datasets.recipe.recipe import load_recipe
+from wearstate.datasets.workers import cluster
+from wearstate.datasets.workers.local import in_order
+from wearstate.datasets.workers.pool import WorkersError
+from wearstate.diagnose.command_line.cli import cli
 
 pytest.importorskip("distributed")
 cloudpickle = pytest.importorskip("cloudpickle")
@@ -175,13 +175,13 @@ def test_what_the_function_raises_is_raised(pair):
 
 def test_a_refusal_there_must_be_one_here(pair, recipe, tmp_path, monkeypatch):
     """A worker may lack a file of the scene, and would make rows of failures of it."""
-    monkeypatch.setattr("wearstate.datasets.generate._simulated", refused_unless_here)
+    monkeypatch.setattr("wearstate.datasets.generation.generate._simulated", refused_unless_here)
     with pytest.raises(WorkersError, match=r"record 0 is refused by a worker \(no such file\) and"):
         generate(recipe, 2, tmp_path / "data.h5", scheduler=pair.address)
 
 
 def refused_unless_here(sample, *, truth, error):
-    from wearstate.datasets.generate import _Outcome, _silence
+    from wearstate.datasets.generation.generate import _Outcome, _silence
 
     lacking = None if os.getpid() == HERE else sample
     fault = "no such file" if lacking else ""

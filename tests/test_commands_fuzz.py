@@ -40,6 +40,7 @@ def test_a_crash_and_a_hang_are_seen(tmp_path, monkeypatch):
     monkeypatch.setattr(fuzz, "LONGEST", 0.5)
     for code, end in (("os.kill(os.getpid(), 9)", -9), ("time.sleep(60)", None)):
         monkeypatch.setattr(
-            "wearstate.diagnose.cli.main", lambda words, code=code: exec(f"import os, time; {code}")
+            "wearstate.diagnose.command_line.cli.main",
+            lambda words, code=code: exec(f"import os, time; {code}"),
         )
         assert fuzz.run_forked([], log)[0] == end

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from wearstate.diagnose.conformal import (
+from wearstate.diagnose.learning.conformal import (
     Calibration,
     fit_scale,
     grade_limits,
@@ -18,7 +18,7 @@ from wearstate.diagnose.conformal import (
     tails,
     weighted_quantile,
 )
-from wearstate.diagnose.grades import grades_of
+from wearstate.diagnose.learning.grades import grades_of
 
 
 def known(log_error, *, estimate=None, scale=None, group=None):

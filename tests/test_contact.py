@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy.integrate import quad, solve_ivp
-from wearstate.diagnose.verify import LITERATURE_FOLDER, drop
-from wearstate.sim import contact as c
-from wearstate.sim.analytic import (
+from wearstate.diagnose.literature.verify import LITERATURE_FOLDER, drop
+from wearstate.sim.contact import law as c
+from wearstate.sim.contact.closed_forms import (
     conformal_stiffness,
     effective_modulus,
     hertz_sphere_stiffness,

@@ -2,8 +2,8 @@
 
 import pandas as pd
 import pytest
-from wearstate.datasets.csv_cells import plain_cell, safe_cell, safe_frame
-from wearstate.datasets.source_text import split_cells
+from wearstate.datasets.file.csv_cells import plain_cell, safe_cell, safe_frame
+from wearstate.datasets.readers.text import split_cells
 
 
 @pytest.mark.parametrize("first", list("=+-@\t\r\n"))

@@ -43,7 +43,7 @@ def test_a_trap_is_sprung_where_the_folder_is_on_the_path(tmp_path):
 def test_workers_and_what_is_started_beside_them(tmp_path):
     """Where the folder is not on the path of the parent, as with the script and ``-m``."""
     set_traps(tmp_path, package=True)
-    code = "from wearstate.datasets.workers import in_order\n"
+    code = "from wearstate.datasets.workers.local import in_order\n"
     code += "assert list(in_order(abs, [-1, 2, -3], jobs=2)) == [1, 2, 3]"
     run(tmp_path, sys.executable, "-c", f"import sys; sys.path.remove(''); exec({code!r})")
 

@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from wearstate.diagnose.cli import cli
-from wearstate.diagnose.deep_check_text import deep_check_text, number, usual_range
-from wearstate.sim.deep_check import deep_check
-from wearstate.sim.deep_pump import closing_speeds
-from wearstate.sim.deep_rows import Figure, Quantity
-from wearstate.sim.journal import film_geometry
-from wearstate.sim.scene import load_scene, scene_names
+from wearstate.diagnose.command_line.cli import cli
+from wearstate.diagnose.inspect.deep_check_text import deep_check_text, number, usual_range
+from wearstate.sim.deep_check.check import deep_check
+from wearstate.sim.deep_check.pump import closing_speeds
+from wearstate.sim.deep_check.rows import Figure, Quantity
+from wearstate.sim.journal.recording import film_geometry
+from wearstate.sim.scene.load import load_scene, scene_names
 
 OWN = Path(__file__).parent / "own_scenes"
 MUD_PUMP, JOURNAL, LINE = (

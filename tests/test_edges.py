@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from wearstate.features.edges import is_logic_level, smoothest
-from wearstate.features.order import pulse_times, shaft_phase
-from wearstate.features.table import feature_row
-from wearstate.sim.assemble import simulate
-from wearstate.sim.scene import load_scene
-from wearstate.sim.sensor import tacho_pulses
+from wearstate.features.catalogue.row import feature_row
+from wearstate.features.rotation.edges import is_logic_level, smoothest
+from wearstate.features.rotation.order import pulse_times, shaft_phase
+from wearstate.sim.machine.simulate import simulate
+from wearstate.sim.output.sensor import tacho_pulses
+from wearstate.sim.scene.load import load_scene
 
 WIDTH = 1 / 36
 LOUD = (

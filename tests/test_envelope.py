@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
-from wearstate.features.envelope import (
+from wearstate.features.signal.envelope import (
     LONE_SHARE,
     LONE_SHARE_OF_FEW,
     MANY_FRAMES,

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from wearstate.datasets.importers import read_recording
-from wearstate.features.envelope import (
+from wearstate.datasets.measured.recording import read_recording
+from wearstate.features.signal.envelope import (
     bearing_frequencies,
     coherence_threshold,
     cyclic_coherence,

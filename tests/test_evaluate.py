@@ -12,17 +12,21 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from numpy.testing import assert_allclose
-from wearstate.datasets.record import Channel, DataError, DataSet, Recording
-from wearstate.datasets.split_file import Split, drawn_of, store_splits, usable_sides
-from wearstate.datasets.splits import check_no_leak
-from wearstate.diagnose import evaluate as judging
-from wearstate.diagnose import evaluate_splits as module
-from wearstate.diagnose import train as training
-from wearstate.diagnose.cli import cli
-from wearstate.diagnose.estimate import Estimate
-from wearstate.diagnose.evaluate import P_LEVELS, evaluate_model, judge_rows, p_value_shares, score
-from wearstate.diagnose.evaluate_figure import evaluation_html, save_evaluation
-from wearstate.diagnose.evaluate_splits import (
+from wearstate.datasets.file.record import Channel, DataError, DataSet, Recording
+from wearstate.datasets.split.rules import check_no_leak
+from wearstate.datasets.split.stored import Split, drawn_of, store_splits, usable_sides
+from wearstate.diagnose.command_line.cli import cli
+from wearstate.diagnose.evaluation import evaluate as judging
+from wearstate.diagnose.evaluation import splits as module
+from wearstate.diagnose.evaluation.evaluate import (
+    P_LEVELS,
+    evaluate_model,
+    judge_rows,
+    p_value_shares,
+    score,
+)
+from wearstate.diagnose.evaluation.figure import evaluation_html, save_evaluation
+from wearstate.diagnose.evaluation.splits import (
     SPLITS,
     case_of,
     costs,
@@ -32,10 +36,12 @@ from wearstate.diagnose.evaluate_splits import (
     one_split,
     with_noise,
 )
-from wearstate.diagnose.evaluate_text import score_lines, splits_text
-from wearstate.diagnose.modelfile import load_model, save_model
-from wearstate.diagnose.scores import resampled
-from wearstate.diagnose.train import train_model
+from wearstate.diagnose.evaluation.text import score_lines, splits_text
+from wearstate.diagnose.learning.scores import resampled
+from wearstate.diagnose.wear_model import train as training
+from wearstate.diagnose.wear_model.estimate import Estimate
+from wearstate.diagnose.wear_model.file import load_model, save_model
+from wearstate.diagnose.wear_model.train import train_model
 
 NAMES = ("random", "speed", "severity-beyond", "noise")  # of others, the rows are looked at
 CHEAP_MS = 0.05  # ridges only: the protocol is tested, not the model

@@ -6,23 +6,23 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.stats import kstest
-from wearstate.features.frf import (
+from wearstate.features.response.frf import (
     block_spectra,
     estimate_frf,
     find_blows,
     force_window,
     welch_spectra,
 )
-from wearstate.features.mimo import multiple_h1
-from wearstate.sim.assemble import check, simulate
-from wearstate.sim.exciter_parts import Exciter, PlacedExciter
-from wearstate.sim.exciters import exciter_push, stepped_frequencies
-from wearstate.sim.integrate import SimulationError, Status
-from wearstate.sim.parts import SceneError, channels_of
-from wearstate.sim.scene import load_scene
-from wearstate.sim.shaft_line import peak_motion, reduced_rotor, shaft_state
-from wearstate.sim.shaft_push import exciter_places
-from wearstate.sim.shaft_response import Harmonic, accelerance, harmonic_response
+from wearstate.features.response.mimo import multiple_h1
+from wearstate.sim.excitation.forces import exciter_push, stepped_frequencies
+from wearstate.sim.machine.simulate import check, simulate
+from wearstate.sim.output.solution import SimulationError, Status
+from wearstate.sim.scene.exciters import Exciter, PlacedExciter
+from wearstate.sim.scene.load import load_scene
+from wearstate.sim.scene.parts import SceneError, channels_of
+from wearstate.sim.shaft.push import exciter_places
+from wearstate.sim.shaft.recording import peak_motion, reduced_rotor, shaft_state
+from wearstate.sim.shaft.response import Harmonic, accelerance, harmonic_response
 
 FS = 1024.0
 STILL = {

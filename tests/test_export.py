@@ -16,16 +16,16 @@ import pytest
 from click.testing import CliRunner
 from numpy.testing import assert_array_equal
 from scipy.io import wavfile
-from wearstate.datasets import export
-from wearstate.datasets.check import check_set
-from wearstate.datasets.export import ABOUT, FORMATS, LABELS, export_set
-from wearstate.datasets.generate import generate
-from wearstate.datasets.labels import RESERVED
-from wearstate.datasets.recipe import load_recipe
-from wearstate.datasets.record import Attributes, DataError, DataSet, DataSetWriter
-from wearstate.diagnose.cli import cli
-from wearstate.diagnose.tabulate import recording_features
-from wearstate.sim.sensor import Channel
+from wearstate.datasets.audit.integrity import check_set
+from wearstate.datasets.convert import export
+from wearstate.datasets.convert.export import ABOUT, FORMATS, LABELS, export_set
+from wearstate.datasets.file.record import Attributes, DataError, DataSet, DataSetWriter
+from wearstate.datasets.generation.generate import generate
+from wearstate.datasets.measured.labels import RESERVED
+from wearstate.datasets.recipe.recipe import load_recipe
+from wearstate.diagnose.command_line.cli import cli
+from wearstate.diagnose.feature_rows.feature_table import recording_features
+from wearstate.sim.output.sensor import Channel
 
 N = 6
 
@@ -312,7 +312,7 @@ def test_nothing_is_left_of_an_export_that_fails(mixed, tmp_path, name):
 def test_a_killed_export_leaves_no_output(pump, tmp_path):
     code = (
         "import os, sys\n"
-        "from wearstate.datasets.export import export_set\n"
+        "from wearstate.datasets.convert.export import export_set\n"
         "export_set(sys.argv[1], sys.argv[2], kind='csv', progress=lambda i, n: os._exit(9))\n"
     )
     target = tmp_path / "out"

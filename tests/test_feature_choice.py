@@ -7,17 +7,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from wearstate.datasets.record import Attributes, DataError, DataSet, DataSetWriter
-from wearstate.datasets.splits import group_folds
-from wearstate.diagnose.cli import cli
-from wearstate.diagnose.estimate import ModelError
-from wearstate.diagnose.feature_choice import choice_in, choices_of, select_set
-from wearstate.diagnose.healthy import Baselines
-from wearstate.diagnose.modelfile import load_model, save_model
-from wearstate.diagnose.tabulate import USUAL, Choice, held_against, recording_features
-from wearstate.diagnose.train import train_model
-from wearstate.diagnose.transfer_reference import HealthyTransfer
-from wearstate.sim.sensor import Channel
+from wearstate.datasets.file.record import Attributes, DataError, DataSet, DataSetWriter
+from wearstate.datasets.split.rules import group_folds
+from wearstate.diagnose.command_line.cli import cli
+from wearstate.diagnose.feature_rows.feature_choice import choice_in, choices_of, select_set
+from wearstate.diagnose.feature_rows.feature_table import (
+    USUAL,
+    Choice,
+    held_against,
+    recording_features,
+)
+from wearstate.diagnose.feature_rows.healthy import Baselines
+from wearstate.diagnose.feature_rows.transfer_reference import HealthyTransfer
+from wearstate.diagnose.wear_model.estimate import ModelError
+from wearstate.diagnose.wear_model.file import load_model, save_model
+from wearstate.diagnose.wear_model.train import train_model
+from wearstate.sim.output.sensor import Channel
 
 FS, N = 2560.0, 10_240
 COLUMN = "sag_support_m"

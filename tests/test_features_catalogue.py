@@ -5,28 +5,25 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from wearstate.datasets.importers import read_recording
-from wearstate.features import (
-    analysis as shared,
-)
-from wearstate.features import (
-    catalogue,
+from wearstate.datasets.measured.recording import read_recording
+from wearstate.features.catalogue import analysis as shared
+from wearstate.features.catalogue import catalogue, needs
+from wearstate.features.catalogue import row as table
+from wearstate.features.response import modal
+from wearstate.features.response.transfer import FrfReference
+from wearstate.features.rotation import angle_resample as resample
+from wearstate.features.rotation import order
+from wearstate.features.rotation import tacholess_speed as speed
+from wearstate.features.signal import (
     cepstrum,
     envelope,
     fft,
     iso,
-    modal,
-    needs,
-    order,
-    resample,
     spectral_shape,
     spectrum,
-    speed,
     statistics,
-    table,
     third_octave,
 )
-from wearstate.features.transfer import FrfReference
 
 FS = 25_600.0
 N = 25_600

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
-from wearstate.features.cepstrum import cepstrum, cepstrum_of_lines, harmonic_spacing
+from wearstate.features.signal.cepstrum import cepstrum, cepstrum_of_lines, harmonic_spacing
 
 FS = 16_000.0
 

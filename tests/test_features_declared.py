@@ -4,15 +4,17 @@ import numpy as np
 import pandas as pd
 import pytest
 from click.testing import CliRunner
-from wearstate.datasets.record import Attributes, DataSet, DataSetWriter
-from wearstate.diagnose.cli import cli
-from wearstate.diagnose.info import plot_file
-from wearstate.diagnose.panel_envelope import envelope_panel
-from wearstate.diagnose.signal_view import View
-from wearstate.diagnose.tabulate import choice_of, feature_table
-from wearstate.features import needs, order, table
-from wearstate.features.envelope import bearing_frequencies
-from wearstate.sim.sensor import Channel
+from wearstate.datasets.file.record import Attributes, DataSet, DataSetWriter
+from wearstate.diagnose.command_line.cli import cli
+from wearstate.diagnose.feature_rows.feature_table import choice_of, feature_table
+from wearstate.diagnose.inspect.info import plot_file
+from wearstate.diagnose.pictures.envelope import envelope_panel
+from wearstate.diagnose.pictures.view import View
+from wearstate.features.catalogue import needs
+from wearstate.features.catalogue import row as table
+from wearstate.features.rotation import order
+from wearstate.features.signal.envelope import bearing_frequencies
+from wearstate.sim.output.sensor import Channel
 
 BEARING = (8, 20.0, 120.0)
 

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
-from wearstate.features import fft
+from wearstate.features.signal import fft
 
 KINDS = ("rfft", "irfft", "fft", "ifft")
 ENGINES = ("scipy", "fftw")
@@ -169,7 +169,7 @@ def test_the_number_of_plans_is_bounded():
 
 HASH = """
 import hashlib, numpy as np
-from wearstate.features import fft
+from wearstate.features.signal import fft
 x = np.random.default_rng(0).standard_normal((3, 2400)).astype(np.float32)
 assert fft.engine_in_force("rfft", 2400, 3, "float32") == {engine!r}
 print(hashlib.sha256(fft.rfft(x).tobytes()).hexdigest())
@@ -203,7 +203,7 @@ def test_processes_agree_to_the_last_bit_whatever_else_they_planned(tmp_path):
 def test_plans_are_estimates_unless_measured_ones_are_asked_for(tmp_path):
     # A timed plan may be the estimated one by chance, so the bits alone would not tell.
     code = (
-        "from wearstate.features import fft\n"
+        "from wearstate.features.signal import fft\n"
         "print(fft._PLANS.of('rfft', 2048, False).execute.__self__.flags)"
     )
     assert "'FFTW_ESTIMATE'" in in_a_process(code, tmp_path)
@@ -222,7 +222,7 @@ def test_without_pyfftw_scipy_serves(tmp_path):
 
 SMALL = """
 import numpy as np, sys
-from wearstate.features import fft
+from wearstate.features.signal import fft
 known = fft._recall(fft.fftw_library())
 x = np.random.default_rng(0).standard_normal(2048).astype(np.float32)
 error = np.abs(fft.rfft(x) - fft.transform("rfft", x, engine="scipy")).max()

@@ -7,8 +7,8 @@ import scipy.stats
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
-from wearstate.features import frf
-from wearstate.features.spectrum import hann
+from wearstate.features.response import frf
+from wearstate.features.signal.spectrum import hann
 
 FS = 4096.0
 N = 4096

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy import signal
-from wearstate.features import operational, spectrum
-from wearstate.features.table import feature_row
+from wearstate.features.catalogue.row import feature_row
+from wearstate.features.response import operational
+from wearstate.features.signal import spectrum
 
 FS = 2048.0
 EDGES = np.array([50.0, 100.0, 200.0, 400.0, 800.0])

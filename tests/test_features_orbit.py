@@ -7,8 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
-from wearstate.features import analysis as shared
-from wearstate.features import catalogue, orbit, order, table
+from wearstate.features.catalogue import analysis as shared
+from wearstate.features.catalogue import catalogue
+from wearstate.features.catalogue import row as table
+from wearstate.features.rotation import orbit, order
 
 FS = 5120.0
 SPEED = 50.0

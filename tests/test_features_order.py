@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from wearstate.features import order, spectrum
+from wearstate.features.rotation import order
+from wearstate.features.signal import spectrum
 
 FS = 25_600.0
 

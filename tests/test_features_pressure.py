@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.optimize import brentq
-from wearstate.features import needs, table
-from wearstate.features.pressure import mean_revolution, transitions
-from wearstate.sim.assemble import simulate
-from wearstate.sim.hydraulic_parts import CylinderPressure
-from wearstate.sim.hydraulics import hydraulic_parameters, two_level_pressure
-from wearstate.sim.scene import load_scene
-from wearstate.sim.sensor import low_pass, mounting_poles
+from wearstate.features.catalogue import needs
+from wearstate.features.catalogue import row as table
+from wearstate.features.rotation.pressure import mean_revolution, transitions
+from wearstate.sim.machine.simulate import simulate
+from wearstate.sim.output.sensor import low_pass, mounting_poles
+from wearstate.sim.pump.hydraulics import hydraulic_parameters, two_level_pressure
+from wearstate.sim.scene.load import load_scene
+from wearstate.sim.scene.pump_hydraulics import CylinderPressure
 
 FS, SPEED = 25_600.0, 4.9  # a speed that does not repeat after whole samples
 SUCTION, DISCHARGE = -0.3e5, 3e5

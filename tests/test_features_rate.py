@@ -7,9 +7,9 @@ import pkgutil
 import numpy as np
 import pytest
 import wearstate.features
-from wearstate.features.analysis import Settings
-from wearstate.features.rate import RATE_LEAST, RATE_MOST
-from wearstate.sim import sensor
+from wearstate.features.catalogue.analysis import Settings
+from wearstate.features.signal.rate import RATE_LEAST, RATE_MOST
+from wearstate.sim.output import sensor
 
 FS, N = 4096.0, 16384
 _RNG = np.random.default_rng(0)
@@ -69,8 +69,8 @@ OTHER = {
 
 def functions():
     found = {}
-    for module in pkgutil.iter_modules(wearstate.features.__path__):
-        content = importlib.import_module(f"wearstate.features.{module.name}")
+    for module in pkgutil.walk_packages(wearstate.features.__path__, "wearstate.features."):
+        content = importlib.import_module(module.name)
         for name, item in vars(content).items():
             own = inspect.isfunction(item) and item.__module__ == content.__name__
             if own and not name.startswith("_") and "fs" in inspect.signature(item).parameters:

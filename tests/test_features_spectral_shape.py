@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.special import digamma
-from wearstate.features import spectral_shape as shape
-from wearstate.features.spectrum import power_lines
+from wearstate.features.signal import spectral_shape as shape
+from wearstate.features.signal.spectrum import power_lines
 
 FS = 4096.0
 N = 4096  # lines of 1 Hz from one segment

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy import signal
-from wearstate.features import spectrum, third_octave
+from wearstate.features.signal import spectrum, third_octave
 
 FS = 25_600.0
 

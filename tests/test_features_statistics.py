@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.special import gamma
-from wearstate.features import statistics
-from wearstate.features.fft import rfft
+from wearstate.features.signal import statistics
+from wearstate.features.signal.fft import rfft
 
 RATIOS = ("crest_factor", "shape_factor", "impulse_factor", "kurtosis", "skewness")
 SIZES = ("rms", "peak", "peak_to_peak")

@@ -5,8 +5,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
-from wearstate.features import analysis as shared
-from wearstate.features import catalogue, order, spectrum, statistics, table
+from wearstate.features.catalogue import analysis as shared
+from wearstate.features.catalogue import catalogue
+from wearstate.features.catalogue import row as table
+from wearstate.features.rotation import order
+from wearstate.features.signal import spectrum, statistics
 
 FS = 25_600.0
 N = 30_720

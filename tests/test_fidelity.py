@@ -5,18 +5,19 @@ import math
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from wearstate.datasets.quantities import QUANTITIES, resolved, with_estimate
-from wearstate.sim import pilot as pilot_runs
-from wearstate.sim.assemble import recorder, simulate
-from wearstate.sim.fidelity import resolve, resolved_scene
-from wearstate.sim.integrate import SimulationError
-from wearstate.sim.ladder import cost_of, effects_of, with_values
-from wearstate.sim.parts import SceneError
-from wearstate.sim.pilot import Difference, Outcome, Pilot, differences
-from wearstate.sim.scene import load_scene, scene_names
-from wearstate.sim.shaft_line import shaft_state
-from wearstate.sim.shaft_response import receptance
-from wearstate.sim.study import Search, study
+from wearstate.datasets.generation.quantities import QUANTITIES, resolved, with_estimate
+from wearstate.sim.fidelity import pilot as pilot_runs
+from wearstate.sim.fidelity.choose import resolve, resolved_scene
+from wearstate.sim.fidelity.cost import cost_of
+from wearstate.sim.fidelity.ladder import effects_of, with_values
+from wearstate.sim.fidelity.pilot import Difference, Outcome, Pilot, differences
+from wearstate.sim.fidelity.study import Search, study
+from wearstate.sim.machine.simulate import recorder, simulate
+from wearstate.sim.output.solution import SimulationError
+from wearstate.sim.scene.load import load_scene, scene_names
+from wearstate.sim.scene.parts import SceneError
+from wearstate.sim.shaft.recording import shaft_state
+from wearstate.sim.shaft.response import receptance
 
 ACCURACIES = (0.01, 0.02, 0.05, 0.10)
 CONVERGENCE_ORDER = 2.0

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 import wearstate
-from wearstate.sim.scene import load_scene, scene_names
+from wearstate.sim.scene.load import load_scene, scene_names
 
 DOCS = Path(wearstate.__file__).parent / "docs"
 

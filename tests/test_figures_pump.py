@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import wearstate
 from numpy.testing import assert_allclose
-from wearstate.sim.transfer import scene_transfer
+from wearstate.sim.machine.transfer import scene_transfer
 
 SCRIPT = Path(wearstate.__file__).parent / "docs" / "figures_pump.py"
 

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from scipy.io import wavfile
-from wearstate.datasets.record import DataSet
+from wearstate.datasets.file.record import DataSet
 
 sys.path.insert(0, str(Path(__file__).parent))
 import fuzz_commands as fuzz

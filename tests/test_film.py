@@ -11,8 +11,11 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import quad
 from scipy.optimize import nnls
-from wearstate.sim.analytic import ocvirk_film, sommerfeld_film
-from wearstate.sim.film import (
+from wearstate.sim.contact.closed_forms import ocvirk_film, sommerfeld_film
+from wearstate.sim.film.direct import WARM, direct_force, direct_tilted_force
+from wearstate.sim.film.line import line_force
+from wearstate.sim.film.short import short_force
+from wearstate.sim.film.solve import (
     FILM_RUNGS,
     FilmGeometry,
     FilmState,
@@ -28,10 +31,7 @@ from wearstate.sim.film import (
     solve_relaxed,
     solve_short,
 )
-from wearstate.sim.film_direct import WARM, direct_force, direct_tilted_force
-from wearstate.sim.film_line import line_force
-from wearstate.sim.film_short import short_force
-from wearstate.sim.viscosity import vogel_viscosity, walther_viscosity
+from wearstate.sim.scene.oil_viscosity import vogel_viscosity, walther_viscosity
 
 FINE = {"n_theta": 144, "n_z": 33}
 HALF = FilmState(x=0.5, y=0.0)

@@ -6,31 +6,26 @@ import math
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from wearstate.datasets.generate import save_solution
-from wearstate.datasets.record import DataError, DataSet
-from wearstate.diagnose.cli import cli
-from wearstate.diagnose.estimate import Estimate
-from wearstate.diagnose.film_clearance import (
+from wearstate.datasets.file.record import DataError, DataSet
+from wearstate.datasets.generation.generate import save_solution
+from wearstate.diagnose.command_line.cli import cli
+from wearstate.diagnose.feature_rows.healthy import Baseline
+from wearstate.diagnose.feature_rows.probe_means import probe_means
+from wearstate.diagnose.film_clearance.clearance import (
     Doubts,
     FilmEstimate,
     JournalRun,
     film_clearance,
 )
-from wearstate.diagnose.film_verdict import (
-    disagree,
-    film_estimate,
-    film_table,
-    with_film,
-)
-from wearstate.diagnose.healthy import Baseline
-from wearstate.diagnose.nameplate import Nameplate, day_of, nameplate_of
-from wearstate.diagnose.nameplate_cautions import known_beside, nameplate_cautions
-from wearstate.diagnose.probe_means import probe_means
-from wearstate.sim.assemble import simulate
-from wearstate.sim.film import FilmGeometry
-from wearstate.sim.rest_curve import rest_curve
-from wearstate.sim.scene import load_scene
-from wearstate.sim.sensor import Channel
+from wearstate.diagnose.nameplate.cautions import known_beside, nameplate_cautions
+from wearstate.diagnose.nameplate.nameplate import Nameplate, day_of, nameplate_of
+from wearstate.diagnose.report.film import disagree, film_estimate, film_table, with_film
+from wearstate.diagnose.wear_model.estimate import Estimate
+from wearstate.sim.film.rest_curve import rest_curve
+from wearstate.sim.film.solve import FilmGeometry
+from wearstate.sim.machine.simulate import simulate
+from wearstate.sim.output.sensor import Channel
+from wearstate.sim.scene.load import load_scene
 
 ANGLES = (math.radians(225), math.radians(135))
 CURVE = rest_curve(FilmGeometry(length_to_diameter=0.6), "short")

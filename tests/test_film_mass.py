@@ -11,21 +11,21 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import quad
 from scipy.optimize import brentq
-from wearstate.sim import film_mass
-from wearstate.sim.film import (
+from wearstate.sim.film import mass_conserving as film_mass
+from wearstate.sim.film.mass_conserving import (
+    mass_conserving,
+    mass_step,
+    oil_in_gap,
+    oil_intake,
+    oil_volume,
+)
+from wearstate.sim.film.solve import (
     FilmGeometry,
     FilmState,
     FilmStatus,
     Groove,
     groove_nodes,
     solve_direct,
-)
-from wearstate.sim.film_mass import (
-    mass_conserving,
-    mass_step,
-    oil_in_gap,
-    oil_intake,
-    oil_volume,
 )
 
 # The stored field: open code of S. Pfeil, demonstration of the finite volume Elrod solver

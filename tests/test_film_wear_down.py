@@ -5,14 +5,14 @@ import math
 import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
-from wearstate.datasets.generate import save_solution
-from wearstate.datasets.record import DataSet
-from wearstate.diagnose.film_clearance import Doubts
-from wearstate.diagnose.film_verdict import film_estimate
-from wearstate.diagnose.film_wear_down import SinkingRun, film_wear_down, sinking_places
-from wearstate.diagnose.nameplate import nameplate_of
-from wearstate.sim.assemble import simulate
-from wearstate.sim.scene import load_scene
+from wearstate.datasets.file.record import DataSet
+from wearstate.datasets.generation.generate import save_solution
+from wearstate.diagnose.film_clearance.clearance import Doubts
+from wearstate.diagnose.film_clearance.wear_down import SinkingRun, film_wear_down, sinking_places
+from wearstate.diagnose.nameplate.nameplate import nameplate_of
+from wearstate.diagnose.report.film import film_estimate
+from wearstate.sim.machine.simulate import simulate
+from wearstate.sim.scene.load import load_scene
 
 ANGLES = (math.radians(225), math.radians(135))
 LIMIT, AS_NEW = 0.9e-3, 0.03e-3

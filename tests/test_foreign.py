@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from wearstate.datasets.record import DataSet
-from wearstate.diagnose.cli import cli
-from wearstate.sim.scene import load_scene
+from wearstate.datasets.file.record import DataSet
+from wearstate.diagnose.command_line.cli import cli
+from wearstate.sim.scene.load import load_scene
 
 BENCHMARKS = Path(__file__).parent / "benchmarks"
 sys.path.insert(0, str(BENCHMARKS))  # its files import one another by name
@@ -300,7 +300,7 @@ def test_the_nominal_numbers_of_the_journal_are_those_of_its_scene():
 
 def test_judge_counts_what_it_says():
     script = runpy.run_path(str(BENCHMARKS / "foreign.py"))
-    from wearstate.diagnose.scores import point_judged
+    from wearstate.diagnose.learning.scores import point_judged
 
     truth = np.array([1e-4, 2e-4, 4e-4, 4e-4])
     found = point_judged(

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from wearstate.datasets.record import DataSet
-from wearstate.sim.scene import load_scene
-from wearstate.sim.shaft_line import harmonic_forces, reduced_rotor, shaft_state
-from wearstate.sim.shaft_response import harmonic_response
+from wearstate.datasets.file.record import DataSet
+from wearstate.sim.scene.load import load_scene
+from wearstate.sim.shaft.recording import harmonic_forces, reduced_rotor, shaft_state
+from wearstate.sim.shaft.response import harmonic_response
 
 BENCHMARKS = Path(__file__).parent / "benchmarks"
 sys.path.insert(0, str(BENCHMARKS))  # its files import one another by name

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from wearstate.features import modal
+from wearstate.features.response import modal
 
 BEAM_PEAKS = [52, 142, 279, 460, 687, 959]
 """Lines of the peaks of the three points together [Hz]."""

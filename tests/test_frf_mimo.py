@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from wearstate.features import frf
-from wearstate.features.mimo import multiple_h1
+from wearstate.features.response import frf
+from wearstate.features.response.mimo import multiple_h1
 
 FS = 1024.0
 GAINS = np.array([[2.0, -1.0], [0.5, 3.0]])

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
-from wearstate.features import frf, modal
+from wearstate.features.response import frf, modal
 
 QUANTITIES = tuple(modal.DERIVATIVES)
 

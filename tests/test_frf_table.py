@@ -8,22 +8,22 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
-from wearstate.sim.assemble import check, simulate
-from wearstate.sim.casing import (
+from wearstate.sim.machine.simulate import check, simulate
+from wearstate.sim.pump.casing import (
     Modes,
     band_limited_acceleration,
     edge_samples,
     table_acceleration,
 )
-from wearstate.sim.frf_table import (
+from wearstate.sim.pump.casing_frf import (
     FEWEST_LINES,
     Accelerance,
     find_file,
     load_accelerance,
     read_frf_table,
 )
-from wearstate.sim.parts import FrfFile, SceneError, beside
-from wearstate.sim.scene import load_scene, scene_from_table, scene_table, scene_text
+from wearstate.sim.scene.load import load_scene, scene_from_table, scene_table, scene_text
+from wearstate.sim.scene.parts import FrfFile, SceneError, beside
 
 FS = 25_600.0
 FACTOR = 2

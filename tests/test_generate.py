@@ -14,9 +14,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.stats import rankdata
-from wearstate.datasets import generate as generation
-from wearstate.datasets.generate import Stopped, generate, save_solution
-from wearstate.datasets.recipe import (
+from wearstate.datasets.file.record import DataError, DataSet, DataSetWriter, LostError, WriteError
+from wearstate.datasets.generation import generate as generation
+from wearstate.datasets.generation.generate import Stopped, generate, save_solution
+from wearstate.datasets.recipe.recipe import (
     LARGEST_SEED,
     MOST_RECORDS,
     STRATA,
@@ -24,14 +25,13 @@ from wearstate.datasets.recipe import (
     sample_records,
     wear_limits,
 )
-from wearstate.datasets.recipe_file import RecipeError, recipe_names
-from wearstate.datasets.record import DataError, DataSet, DataSetWriter, LostError, WriteError
-from wearstate.datasets.splits import group_split
-from wearstate.datasets.workers import in_order
-from wearstate.sim.assemble import simulate
+from wearstate.datasets.recipe.text import RecipeError, recipe_names
+from wearstate.datasets.split.rules import group_split
+from wearstate.datasets.workers.local import in_order
 from wearstate.sim.atomic import OutputError
-from wearstate.sim.parts import SceneError
-from wearstate.sim.scene import load_scene
+from wearstate.sim.machine.simulate import simulate
+from wearstate.sim.scene.load import load_scene
+from wearstate.sim.scene.parts import SceneError
 
 SHORT = {"duration": "0.25 s", "settling_revolutions": 1}
 """One revolution and a bit of the slowest machine: about 20 ms to simulate."""
@@ -170,8 +170,8 @@ def read_terminal(terminal):
 
 KILLED = """
 import os, signal, sys
-from wearstate.datasets.generate import generate
-from wearstate.datasets.recipe import load_recipe
+from wearstate.datasets.generation.generate import generate
+from wearstate.datasets.recipe.recipe import load_recipe
 recipe = load_recipe("bilge-pump-small", {overrides})
 kill = lambda done, total: os.kill(os.getpid(), signal.SIGKILL) if done == 4 else None
 generate(recipe, {n}, sys.argv[1], seed=5, progress=kill, jobs=int(sys.argv[2]))
@@ -255,9 +255,9 @@ def test_an_output_that_appears_is_not_replaced(short, reference, tmp_path):
 RIVAL = """
 import sys, time
 from pathlib import Path
-from wearstate.datasets.generate import generate
-from wearstate.datasets.recipe import load_recipe
-from wearstate.datasets.record import DataError
+from wearstate.datasets.generation.generate import generate
+from wearstate.datasets.recipe.recipe import load_recipe
+from wearstate.datasets.file.record import DataError
 
 folder, me, other, rounds = Path(sys.argv[1]), sys.argv[2], sys.argv[3], int(sys.argv[4])
 recipe = load_recipe("bilge-pump-small", {overrides!r})

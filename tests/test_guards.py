@@ -9,11 +9,11 @@ import re
 
 import numpy as np
 import pytest
-from wearstate.sim.assemble import simulate
-from wearstate.sim.crank_setup import contact_rate, joint_loads
-from wearstate.sim.film import FilmGeometry, FilmState, FilmStatus, solve_relaxed
-from wearstate.sim.parts import SceneError
-from wearstate.sim.scene import load_scene
+from wearstate.sim.film.solve import FilmGeometry, FilmState, FilmStatus, solve_relaxed
+from wearstate.sim.machine.simulate import simulate
+from wearstate.sim.pump.setup import contact_rate, joint_loads
+from wearstate.sim.scene.load import load_scene
+from wearstate.sim.scene.parts import SceneError
 
 PUMP = {"duration": "0.4 s", "settling_revolutions": 1}
 CHAMBER = {**PUMP, "pressure.rung": "chamber"}

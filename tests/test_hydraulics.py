@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, minimize_scalar
-from wearstate.sim import hydraulics as hy
-from wearstate.sim.analytic import kelvin_voigt_restitution
-from wearstate.sim.hydraulic_parts import CylinderPressure, Line, Liquid, Valve
+from wearstate.sim.contact.closed_forms import kelvin_voigt_restitution
 from wearstate.sim.jit import kernel
-from wearstate.sim.parts import STANDARD_GRAVITY, SceneError, validate_table
+from wearstate.sim.pump import hydraulics as hy
+from wearstate.sim.scene.parts import STANDARD_GRAVITY, SceneError, validate_table
+from wearstate.sim.scene.pump_hydraulics import CylinderPressure, Line, Liquid, Valve
 
 # The built-in bilge pump
 RADIUS, ROD, SPEED = 0.05, 0.25, 2 * math.pi * 5

@@ -5,10 +5,12 @@ import pandas as pd
 import pytest
 from click.testing import CliRunner
 from numpy.testing import assert_allclose
-from wearstate.datasets.record import Attributes, DataSetWriter
-from wearstate.diagnose.cli import cli
-from wearstate.features import analysis, frf, impact, table
-from wearstate.sim.sensor import Channel
+from wearstate.datasets.file.record import Attributes, DataSetWriter
+from wearstate.diagnose.command_line.cli import cli
+from wearstate.features.catalogue import analysis
+from wearstate.features.catalogue import row as table
+from wearstate.features.response import frf, impact
+from wearstate.sim.output.sensor import Channel
 
 FS, N = 2048.0, 8192
 POLES = ((100.0, 0.002), (300.0, 0.001))

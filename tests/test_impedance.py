@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
-from wearstate.sim import impedance as im
-from wearstate.sim.film import FilmGeometry, Groove, direct_film
-from wearstate.sim.film_direct import direct_force
-from wearstate.sim.film_short import short_force
-from wearstate.sim.impedance import impedance_map, map_force, map_peak, map_scales
+from wearstate.sim.film import impedance_map as im
+from wearstate.sim.film.direct import direct_force
+from wearstate.sim.film.impedance_map import impedance_map, map_force, map_peak, map_scales
+from wearstate.sim.film.short import short_force
+from wearstate.sim.film.solve import FilmGeometry, Groove, direct_film
 
 TURN = 2 * math.pi
 SEED_CASE = FilmGeometry(length_to_diameter=2 / 3)

@@ -11,12 +11,14 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.io import savemat, wavfile
-from wearstate.datasets import import_plan, import_set, labels
-from wearstate.datasets.import_set import NO_PULSES, import_recordings
-from wearstate.datasets.labels import read_labels, read_limits
-from wearstate.datasets.record import DataError, DataSet
-from wearstate.datasets.sources import SourceOptions
-from wearstate.sim.parts import STANDARD_GRAVITY
+from wearstate.datasets.file.record import DataError, DataSet
+from wearstate.datasets.measured import data_set as import_set
+from wearstate.datasets.measured import labels
+from wearstate.datasets.measured import plan as import_plan
+from wearstate.datasets.measured.data_set import NO_PULSES, import_recordings
+from wearstate.datasets.measured.labels import read_labels, read_limits
+from wearstate.datasets.readers.open import SourceOptions
+from wearstate.sim.scene.parts import STANDARD_GRAVITY
 
 RATE = 100
 NAMES = ("acc", "key")
@@ -487,8 +489,8 @@ def test_a_large_file_is_imported_with_flat_memory(tmp_path):
 
 
 def test_a_simulated_set_comes_back_with_the_same_features(small_set, small_trained, tmp_path):
-    from wearstate.diagnose.tabulate import feature_table
-    from wearstate.diagnose.train import train_model
+    from wearstate.diagnose.feature_rows.feature_table import feature_table
+    from wearstate.diagnose.wear_model.train import train_model
 
     options = SourceOptions(channels=("acc_x", "acc_y", "tacho"), unit="m/s^2")
     with DataSet(small_set) as data:
@@ -516,7 +518,7 @@ def test_a_simulated_set_comes_back_with_the_same_features(small_set, small_trai
 
 
 def test_text_files_come_back_with_the_same_features(small_set, tmp_path):
-    from wearstate.diagnose.tabulate import recording_features
+    from wearstate.diagnose.feature_rows.feature_table import recording_features
 
     with DataSet(small_set) as data:
         items = [data[i] for i in range(2)]
@@ -539,8 +541,8 @@ def test_text_files_come_back_with_the_same_features(small_set, tmp_path):
 
 
 def test_measured_bearings_become_a_data_set(realdata, tmp_path):
-    from wearstate.diagnose.tabulate import feature_table
-    from wearstate.diagnose.train import train_model
+    from wearstate.diagnose.feature_rows.feature_table import feature_table
+    from wearstate.diagnose.wear_model.train import train_model
 
     folder = realdata / "mfpt_bearing_CC-BY-NC-SA-4.0"
     files = sorted(folder.glob("*_vload_*.mat"))

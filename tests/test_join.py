@@ -6,14 +6,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from wearstate.datasets.generate import generate
-from wearstate.datasets.recipe import load_recipe
-from wearstate.datasets.record import DataError, DataSet
-from wearstate.datasets.views import JoinedSet, View, views_of
-from wearstate.diagnose.cli import cli
-from wearstate.diagnose.evaluate import evaluate_model
-from wearstate.diagnose.modelfile import load_model
-from wearstate.diagnose.tabulate import Choice, feature_table
+from wearstate.datasets.file.record import DataError, DataSet
+from wearstate.datasets.file.views import JoinedSet, View, views_of
+from wearstate.datasets.generation.generate import generate
+from wearstate.datasets.recipe.recipe import load_recipe
+from wearstate.diagnose.command_line.cli import cli
+from wearstate.diagnose.evaluation.evaluate import evaluate_model
+from wearstate.diagnose.feature_rows.feature_table import Choice, feature_table
+from wearstate.diagnose.wear_model.file import load_model
 
 RECORDS = 16
 

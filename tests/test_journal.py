@@ -6,12 +6,12 @@ import re
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from wearstate.sim.assemble import check, simulate
-from wearstate.sim.integrate import SimulationError, Status
-from wearstate.sim.journal import film_geometry, journal_scale
-from wearstate.sim.journal_parts import JournalScene
-from wearstate.sim.parts import SceneError, channels_of
-from wearstate.sim.scene import load_scene, override, scene_from_table, scene_table, scene_text
+from wearstate.sim.journal.recording import film_geometry, journal_scale
+from wearstate.sim.machine.simulate import check, simulate
+from wearstate.sim.output.solution import SimulationError, Status
+from wearstate.sim.scene.journal import JournalScene
+from wearstate.sim.scene.load import load_scene, override, scene_from_table, scene_table, scene_text
+from wearstate.sim.scene.parts import SceneError, channels_of
 
 PAPER = ("journal-step", "journal-rectangular-pulse", "journal-half-sine")
 STEP_TIME = 0.16  # s, tau = 16 pi at 3000 rpm

@@ -122,7 +122,7 @@ def test_installations_of_the_same_sources_share_kernels(filled, tmp_path):
     (tmp_path / "wearstate").mkdir()
     for source in (*package.glob("*.py"), *package.glob("sim/**/*.py")):
         copy = tmp_path / "wearstate" / source.relative_to(package)
-        copy.parent.mkdir(exist_ok=True)
+        copy.parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(source, copy)
     before = {path: path.stat().st_mtime_ns for path in filled.rglob("*.nb*")}
     told = f"import sys\nsys.path.insert(0, {str(tmp_path)!r})\n{CODE}"

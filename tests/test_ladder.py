@@ -6,27 +6,18 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from wearstate.sim.assemble import simulate
-from wearstate.sim.casing import edge_samples
-from wearstate.sim.journal import journal_film, squeeze_rate
-from wearstate.sim.ladder import (
-    LADDERS,
-    admissible,
-    cost_of,
-    effects_of,
-    element_faults,
-    element_lengths,
-    journal_calls,
-    orbit_faults,
-    pump_step,
-    pump_steps,
-    shaft_states,
-    with_values,
-)
-from wearstate.sim.orbit import load, run_orbit, short_film
-from wearstate.sim.parts import EFFECTS, SceneError
-from wearstate.sim.scene import load_scene, scene_names
-from wearstate.sim.shaft_line import reduced_rotor, shaft_beam, shaft_state
+from wearstate.sim.fidelity.cost import cost_of, journal_calls, shaft_states
+from wearstate.sim.fidelity.ladder import LADDERS, admissible, effects_of, with_values
+from wearstate.sim.journal.orbit import load, run_orbit, short_film
+from wearstate.sim.journal.recording import journal_film, squeeze_rate
+from wearstate.sim.journal.validity import orbit_faults
+from wearstate.sim.machine.simulate import simulate
+from wearstate.sim.pump.casing import edge_samples
+from wearstate.sim.pump.validity import pump_step, pump_steps
+from wearstate.sim.scene.load import load_scene, scene_names
+from wearstate.sim.scene.parts import EFFECTS, SceneError
+from wearstate.sim.shaft.elements import element_faults, element_lengths
+from wearstate.sim.shaft.recording import reduced_rotor, shaft_beam, shaft_state
 
 PUMPS = ("bilge-pump", "slider-crank-benchmark", "triplex-pump")
 JOURNALS = tuple(name for name in scene_names() if name.startswith("journal"))

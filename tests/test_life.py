@@ -11,15 +11,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_equal
 from scipy.integrate import simpson
-from wearstate.datasets.generate import generate
-from wearstate.datasets.life import LIFE_COLUMNS
-from wearstate.datasets.recipe import load_recipe, sample_records
-from wearstate.datasets.recipe_file import RecipeError, recipe_text
-from wearstate.datasets.record import DataSet
-from wearstate.sim.scene import load_scene
-from wearstate.sim.wear import grade
-from wearstate.sim.wear_life import Maintenance, RunningIn, WearLaw, life_history
-from wearstate.sim.wear_rate import joint_wear
+from wearstate.datasets.file.record import DataSet
+from wearstate.datasets.generation.generate import generate
+from wearstate.datasets.recipe.life import LIFE_COLUMNS
+from wearstate.datasets.recipe.recipe import load_recipe, sample_records
+from wearstate.datasets.recipe.text import RecipeError, recipe_text
+from wearstate.sim.scene.load import load_scene
+from wearstate.sim.wear.archard import grade
+from wearstate.sim.wear.life import Maintenance, RunningIn, WearLaw, life_history
+from wearstate.sim.wear.rate import joint_wear
 
 HOUR = 3600.0
 GAIN = 200.0  # m of play per m^3

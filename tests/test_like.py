@@ -5,8 +5,8 @@ import json
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from wearstate.datasets.record import DataSet
-from wearstate.diagnose.cli import cli
+from wearstate.datasets.file.record import DataSet
+from wearstate.diagnose.command_line.cli import cli
 
 SIGNAL = np.random.default_rng(3).standard_normal((3, 4000))
 SIGNAL[2] = np.arange(4000) % 50 < 5

@@ -13,8 +13,8 @@ import numpy as np
 import pandas as pd
 import pytest
 from numpy.testing import assert_array_equal
-from wearstate.datasets import record
-from wearstate.datasets.record import (
+from wearstate.datasets.file import record
+from wearstate.datasets.file.record import (
     Attributes,
     DataError,
     DataSet,
@@ -22,9 +22,9 @@ from wearstate.datasets.record import (
     attributes_hash,
     manifest_hash,
 )
-from wearstate.datasets.splits import group_split
-from wearstate.diagnose.tabulate import feature_table
-from wearstate.sim.sensor import Channel
+from wearstate.datasets.split.rules import group_split
+from wearstate.diagnose.feature_rows.feature_table import feature_table
+from wearstate.sim.output.sensor import Channel
 
 N, N_SAMPLES = 12, 2048
 CHANNELS = (
@@ -234,7 +234,7 @@ import sys
 import numpy as np
 import torch
 from torch.utils.data import DataLoader
-from wearstate.datasets.record import DataSet
+from wearstate.datasets.file.record import DataSet
 
 
 def batch(items):

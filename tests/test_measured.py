@@ -5,12 +5,12 @@ import json
 import numpy as np
 import pytest
 from scipy.signal import resample_poly
-from wearstate.datasets.importers import read_recording
-from wearstate.datasets.record import Channel, Recording
-from wearstate.diagnose.commands_wear import report_exit
-from wearstate.diagnose.modelfile import load_model
-from wearstate.sim.parts import STANDARD_GRAVITY
-from wearstate.sim.sensor import tacho_pulses
+from wearstate.datasets.file.record import Channel, Recording
+from wearstate.datasets.measured.recording import read_recording
+from wearstate.diagnose.command_line.commands_wear import report_exit
+from wearstate.diagnose.wear_model.file import load_model
+from wearstate.sim.output.sensor import tacho_pulses
+from wearstate.sim.scene.parts import STANDARD_GRAVITY
 
 FILES = [
     *(f"InnerRaceFault_vload_{n}.mat" for n in (1, 3, 5, 7)),
@@ -45,7 +45,7 @@ def test_sample_rate_length_and_unit(mfpt, name):
 def test_as_it_is_the_report_cannot_judge_it_and_says_what_it_lacks(mfpt, small_model, name):
     """One channel, no tacho, another rate: nothing of the machine can be said."""
     from click.testing import CliRunner
-    from wearstate.diagnose.cli import cli
+    from wearstate.diagnose.command_line.cli import cli
 
     arguments = ["report", str(mfpt / name), "--model", str(small_model), "--json"]
     done = CliRunner().invoke(cli, arguments)

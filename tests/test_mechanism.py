@@ -6,11 +6,11 @@ import math
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from wearstate.diagnose.verify import impact
-from wearstate.sim import crank_setup as cs
-from wearstate.sim import slider_crank as sc
-from wearstate.sim.contact import CONTACT, ELASTIC_HERTZ, LAW_HYSTERESIS, hysteresis
-from wearstate.sim.scene import load_scene
+from wearstate.diagnose.literature.verify import impact
+from wearstate.sim.contact.law import CONTACT, ELASTIC_HERTZ, LAW_HYSTERESIS, hysteresis
+from wearstate.sim.pump import setup as cs
+from wearstate.sim.pump import slider_crank as sc
+from wearstate.sim.scene.load import load_scene
 
 IDEAL, LINK, COMPLIANT = "ideal", "link", "compliant"
 COMBINATIONS = list(

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from numpy.testing import assert_array_equal
-from wearstate.datasets.import_set import import_recordings
-from wearstate.datasets.labels import Labels, read_labels
-from wearstate.datasets.merge import merge_sets
-from wearstate.datasets.record import DataError, DataSet
-from wearstate.datasets.source_part import SourceOptions
-from wearstate.diagnose.cli import cli
+from wearstate.datasets.convert.merge import merge_sets
+from wearstate.datasets.file.record import DataError, DataSet
+from wearstate.datasets.measured.data_set import import_recordings
+from wearstate.datasets.measured.labels import Labels, read_labels
+from wearstate.datasets.source.part import SourceOptions
+from wearstate.diagnose.command_line.cli import cli
 
 
 def made(folder, name, seeds, *, fs=100.0, labels=None, unit="g"):

@@ -8,12 +8,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from wearstate.diagnose import bundle as bundle_module
-from wearstate.diagnose.bundle import Bundle, feature_version, load_bundle, save_bundle
-from wearstate.diagnose.estimate import ModelError
-from wearstate.diagnose.modelfile import load_model, save_model
-from wearstate.diagnose.models import Blend, Forest
-from wearstate.diagnose.parts import blend_fits
+from wearstate.diagnose.learning.regressions import Blend, Forest
+from wearstate.diagnose.wear_model import bundle as bundle_module
+from wearstate.diagnose.wear_model.arrays import blend_fits
+from wearstate.diagnose.wear_model.bundle import Bundle, feature_version, load_bundle, save_bundle
+from wearstate.diagnose.wear_model.estimate import ModelError
+from wearstate.diagnose.wear_model.file import load_model, save_model
 
 FILES = 60  # four of every kind; the campaign is a script
 

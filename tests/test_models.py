@@ -9,15 +9,15 @@ import zipfile
 
 import numpy as np
 import pytest
-from wearstate.datasets.record import Channel, DataError, DataSet, Recording
-from wearstate.diagnose import train as training
-from wearstate.diagnose.estimate import Head, ModelError
-from wearstate.diagnose.evaluate import evaluate_model, score
-from wearstate.diagnose.grades import accuracy_bound, grades_of
-from wearstate.diagnose.modelfile import load_model, save_model
-from wearstate.diagnose.models import CANDIDATES, Blend, Linear
-from wearstate.diagnose.train import Lesson, learn, train_model
-from wearstate.sim.wear import grade
+from wearstate.datasets.file.record import Channel, DataError, DataSet, Recording
+from wearstate.diagnose.evaluation.evaluate import evaluate_model, score
+from wearstate.diagnose.learning.grades import accuracy_bound, grades_of
+from wearstate.diagnose.learning.regressions import CANDIDATES, Blend, Linear
+from wearstate.diagnose.wear_model import train as training
+from wearstate.diagnose.wear_model.estimate import Head, ModelError
+from wearstate.diagnose.wear_model.file import load_model, save_model
+from wearstate.diagnose.wear_model.train import Lesson, learn, train_model
+from wearstate.sim.wear.archard import grade
 
 
 @pytest.fixture(scope="module")
@@ -132,8 +132,8 @@ def test_the_training_set_is_judged_on_its_held_out_draws_only(trained, small_se
 
 
 def test_too_few_machines_are_refused(tmp_path):
-    from wearstate.datasets.generate import generate
-    from wearstate.datasets.recipe import load_recipe
+    from wearstate.datasets.generation.generate import generate
+    from wearstate.datasets.recipe.recipe import load_recipe
 
     generate(load_recipe("bilge-pump-small", {"duration": "0.3 s"}), 4, tmp_path / "few.h5")
     with pytest.raises(DataError, match="2 machine draws, must be >= 10"):
@@ -416,7 +416,7 @@ def test_every_flipped_or_missing_byte_is_noticed_or_harmless(trained, tmp_path)
 
 def test_units_are_compared_channel_by_channel():
     """A force in m/s^2 and an acceleration in N: both units are the model's, neither is right."""
-    from wearstate.diagnose.estimate import input_faults
+    from wearstate.diagnose.wear_model.estimate import input_faults
 
     units = {"acc": "m/s^2", "push": "N"}
     card = {
@@ -438,7 +438,7 @@ def test_units_are_compared_channel_by_channel():
 
 def test_unknown_channel_unit_reads_well():
     channel = Channel(name="a", unit="", quantity="acceleration")
-    from wearstate.diagnose.estimate import input_faults
+    from wearstate.diagnose.wear_model.estimate import input_faults
 
     card = {
         "channels": [{"name": "a", "unit": "m/s^2"}],
@@ -465,8 +465,8 @@ def test_unknown_channel_unit_reads_well():
 )
 def test_a_copied_recipe_is_no_new_machine(trained, tmp_path, change):
     """The draws come from the recipe's name and the seed; its text may change as it likes."""
-    from wearstate.datasets.generate import generate
-    from wearstate.datasets.recipe_file import recipe_text
+    from wearstate.datasets.generation.generate import generate
+    from wearstate.datasets.recipe.text import recipe_text
 
     text = recipe_text("bilge-pump-small")
     assert change[0] in text
@@ -486,7 +486,7 @@ def test_a_copied_recipe_is_no_new_machine(trained, tmp_path, change):
 
 def test_a_training_signal_under_another_name_is_noticed(trained, small_set, tmp_path):
     """The same bytes in a set of no recipe: the checksum tells."""
-    from wearstate.datasets.record import DataSetWriter
+    from wearstate.datasets.file.record import DataSetWriter
 
     with DataSet(small_set) as data:
         head = dataclasses.replace(data.attributes, recipe="")
@@ -522,9 +522,9 @@ def test_a_training_signal_under_another_name_is_noticed(trained, small_set, tmp
 def test_beyond_the_trained_severities_the_estimate_is_called_a_bound(
     trained, tmp_path, clearance, says
 ):
-    from wearstate.datasets.generate import save_solution
-    from wearstate.sim.assemble import simulate
-    from wearstate.sim.scene import load_scene
+    from wearstate.datasets.generation.generate import save_solution
+    from wearstate.sim.machine.simulate import simulate
+    from wearstate.sim.scene.load import load_scene
 
     scene = load_scene("bilge-pump", {"joint.crankpin.diametral_clearance": clearance})
     save_solution(scene, simulate(scene, seed=1), tmp_path / "x.h5", seed=1)

@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from wearstate.diagnose.bundle import load_bundle
-from wearstate.diagnose.estimate import ModelError
-from wearstate.diagnose.modelfile import load_model, save_model
-from wearstate.diagnose.noted import NOTED, doubted, noted_values, strayed
-from wearstate.diagnose.train import Lesson, learn
+from wearstate.diagnose.feature_rows.noted import NOTED, doubted, noted_values, strayed
+from wearstate.diagnose.wear_model.bundle import load_bundle
+from wearstate.diagnose.wear_model.estimate import ModelError
+from wearstate.diagnose.wear_model.file import load_model, save_model
+from wearstate.diagnose.wear_model.train import Lesson, learn
 
 NAMES = tuple(f"acc_x.order_{i}.level_db" for i in range(1, 9))
 N = 120

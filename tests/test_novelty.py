@@ -5,9 +5,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from wearstate.datasets.record import DataSet
-from wearstate.diagnose.novelty import fit_familiarity, free_distance, novelty_p_value
-from wearstate.diagnose.physical import (
+from wearstate.datasets.file.record import DataSet
+from wearstate.diagnose.feature_rows.feature_table import recording_features
+from wearstate.diagnose.feature_rows.physical import (
     columns_of,
     coordinates_of,
     level_rows,
@@ -15,8 +15,8 @@ from wearstate.diagnose.physical import (
     physical_rows,
     shape_rows,
 )
-from wearstate.diagnose.tabulate import recording_features
-from wearstate.features.table import feature_names, feature_row
+from wearstate.diagnose.wear_model.novelty import fit_familiarity, free_distance, novelty_p_value
+from wearstate.features.catalogue.row import feature_names, feature_row
 
 NAMES = tuple(f"a.shape_{i}" for i in range(40))
 """Features that the physical space takes as they are."""
@@ -285,8 +285,8 @@ def test_p_value_of_familiar_recordings_is_uniform():
 
 def test_another_machine_made_to_match_is_refused(small_model, small_set, tmp_path):
     """A sample of tests/benchmarks/strangers.py: journals in the rate and channels of the pump."""
-    from wearstate.datasets.generate import generate
-    from wearstate.diagnose.modelfile import load_model
+    from wearstate.datasets.generation.generate import generate
+    from wearstate.diagnose.wear_model.file import load_model
 
     script = runpy.run_path(str(Path(__file__).parent / "benchmarks" / "strangers.py"))
     journals = tmp_path / "journals.h5"

@@ -7,12 +7,12 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
-from wearstate.sim.contact import CONTACT, LAW_HYSTERESIS, hysteresis
-from wearstate.sim.film import FilmGeometry, direct_film
-from wearstate.sim.film_direct import direct_force
-from wearstate.sim.film_short import short_force
-from wearstate.sim.impedance import impedance_map
-from wearstate.sim.orbit import (
+from wearstate.sim.contact.law import CONTACT, LAW_HYSTERESIS, hysteresis
+from wearstate.sim.film.direct import direct_force
+from wearstate.sim.film.impedance_map import impedance_map
+from wearstate.sim.film.short import short_force
+from wearstate.sim.film.solve import FilmGeometry, direct_film
+from wearstate.sim.journal.orbit import (
     INTEGRATORS,
     OrbitStatus,
     Wall,

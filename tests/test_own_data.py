@@ -10,16 +10,13 @@ from tempfile import TemporaryDirectory
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from wearstate.datasets.import_set import import_recordings
-from wearstate.datasets.labels import read_labels
-from wearstate.datasets.record import DataError, DataSet
-from wearstate.datasets.sources import SourceOptions, open_source
-from wearstate.datasets.splits import group_folds
-from wearstate.diagnose.blows import NOISE_SCORE, blow_scores
-from wearstate.diagnose.cli import cli
-from wearstate.diagnose.estimate import ModelError
-from wearstate.diagnose.modelfile import load_model
-from wearstate.diagnose.own import (
+from wearstate.datasets.file.record import DataError, DataSet
+from wearstate.datasets.measured.data_set import import_recordings
+from wearstate.datasets.measured.labels import read_labels
+from wearstate.datasets.readers.open import SourceOptions, open_source
+from wearstate.datasets.split.rules import group_folds
+from wearstate.diagnose.class_model.file import load_class_model, save_class_model
+from wearstate.diagnose.class_model.train import (
     Votes,
     _clouds,
     _left_out_distances,
@@ -29,8 +26,11 @@ from wearstate.diagnose.own import (
     set_of,
     train_classes,
 )
-from wearstate.diagnose.ownfile import load_class_model, save_class_model
-from wearstate.diagnose.tabulate import feature_table, recording_features
+from wearstate.diagnose.command_line.cli import cli
+from wearstate.diagnose.feature_rows.blows import NOISE_SCORE, blow_scores
+from wearstate.diagnose.feature_rows.feature_table import feature_table, recording_features
+from wearstate.diagnose.wear_model.estimate import ModelError
+from wearstate.diagnose.wear_model.file import load_model
 
 RATE = 4000.0
 

@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from matplotlib.text import Text
-from wearstate.diagnose import evaluate_figure, report_figures
-from wearstate.diagnose.cli import cli
-from wearstate.diagnose.report_batch import Row
-from wearstate.diagnose.trend import fit_trend
+from wearstate.diagnose.command_line.cli import cli
+from wearstate.diagnose.evaluation import figure as evaluate_figure
+from wearstate.diagnose.report import figures as report_figures
+from wearstate.diagnose.report.batch import Row
+from wearstate.diagnose.report.trend import fit_trend
 
 PHONE_PX = 358  # of 390 the margins of the page take 32
 LEAST_PX = 8

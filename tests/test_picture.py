@@ -9,18 +9,18 @@ import pytest
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.text import Text
-from wearstate.datasets.record import Channel, Recording
-from wearstate.diagnose.align import align, align_figure, align_html
-from wearstate.diagnose.page import render, short_name, visible
-from wearstate.diagnose.picture import FORMATS, encoded, picture_bytes, save_picture
-from wearstate.diagnose.plots import plot_simulation
-from wearstate.diagnose.report_figures import trend_picture
-from wearstate.diagnose.signal_plots import AUTO, KINDS, plot_recording
-from wearstate.diagnose.signal_view import View
-from wearstate.diagnose.trend import fit_trend
-from wearstate.sim.integrate import Solution, Status
-from wearstate.sim.scene import load_scene
-from wearstate.sim.sensor import Channel as SensorChannel
+from wearstate.datasets.file.record import Channel, Recording
+from wearstate.diagnose.alignment.page import align, align_figure, align_html
+from wearstate.diagnose.pages.page import render, short_name, visible
+from wearstate.diagnose.pages.picture import FORMATS, encoded, picture_bytes, save_picture
+from wearstate.diagnose.pictures.kinds import AUTO, KINDS, plot_recording
+from wearstate.diagnose.pictures.simulation import plot_simulation
+from wearstate.diagnose.pictures.view import View
+from wearstate.diagnose.report.figures import trend_picture
+from wearstate.diagnose.report.trend import fit_trend
+from wearstate.sim.output.sensor import Channel as SensorChannel
+from wearstate.sim.output.solution import Solution, Status
+from wearstate.sim.scene.load import load_scene
 
 HOSTILE = {
     "dollar": "p$_x^{2$",

@@ -6,15 +6,17 @@ import re
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from wearstate.datasets.check import check_set
-from wearstate.datasets.generate import save_solution
-from wearstate.datasets.plausible import recording_doubts, scene_in
-from wearstate.datasets.recipe import load_recipe, sample_records
-from wearstate.datasets.recipe_file import recipe_names
-from wearstate.datasets.record import DataSet, Recording
-from wearstate.diagnose.cli import cli
-from wearstate.sim.assemble import simulate
-from wearstate.sim.plausibility import (
+from wearstate.datasets.audit.integrity import check_set
+from wearstate.datasets.audit.plausibility import recording_doubts, scene_in
+from wearstate.datasets.file.record import DataSet, Recording
+from wearstate.datasets.generation.generate import save_solution
+from wearstate.datasets.recipe.recipe import load_recipe, sample_records
+from wearstate.datasets.recipe.text import recipe_names
+from wearstate.diagnose.command_line.cli import cli
+from wearstate.sim.machine.simulate import simulate
+from wearstate.sim.output.sensor import Channel
+from wearstate.sim.scene.load import load_scene, scene_names
+from wearstate.sim.scene.plausibility import (
     FEWEST_TURNS,
     MOST_VELOCITY,
     RECORD_CHECKS,
@@ -24,8 +26,6 @@ from wearstate.sim.plausibility import (
     scene_doubts,
     solution_doubts,
 )
-from wearstate.sim.scene import load_scene, scene_names
-from wearstate.sim.sensor import Channel
 
 RATE = 1024.0
 ACC = Channel(name="acc", unit="m/s^2", quantity="acceleration")

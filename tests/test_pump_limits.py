@@ -5,10 +5,10 @@ import re
 
 import numpy as np
 import pytest
-from wearstate.sim.assemble import check, simulate
-from wearstate.sim.integrate import SimulationError, Status
-from wearstate.sim.parts import SceneError
-from wearstate.sim.scene import load_scene
+from wearstate.sim.machine.simulate import check, simulate
+from wearstate.sim.output.solution import SimulationError, Status
+from wearstate.sim.scene.load import load_scene
+from wearstate.sim.scene.parts import SceneError
 
 SHORT = {"duration": "0.4 s", "settling_revolutions": 1}
 CHAMBER = {

@@ -5,15 +5,15 @@ import math
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from wearstate.datasets.channel_units import parse_unit
-from wearstate.datasets.record import Recording
-from wearstate.diagnose.signal_view import View
-from wearstate.diagnose.tabulate import recording_features, recording_layout
-from wearstate.sim.assemble import simulate
-from wearstate.sim.hydraulic_parts import PressureSensor
-from wearstate.sim.parts import SceneError
-from wearstate.sim.pump_pressure import read_pressure
-from wearstate.sim.scene import load_scene
+from wearstate.datasets.file.record import Recording
+from wearstate.datasets.source.channel_units import parse_unit
+from wearstate.diagnose.feature_rows.feature_table import recording_features, recording_layout
+from wearstate.diagnose.pictures.view import View
+from wearstate.sim.machine.simulate import simulate
+from wearstate.sim.pump.pressure_sensors import read_pressure
+from wearstate.sim.scene.load import load_scene
+from wearstate.sim.scene.parts import SceneError
+from wearstate.sim.scene.pump_hydraulics import PressureSensor
 
 SENSOR = {"pressure.sensor.range": "10 bar"}
 BRIEF = {"duration": "0.6 s", "settling_revolutions": 1}

@@ -7,9 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from wearstate.datasets.record import Channel, DataSet, Recording
-from wearstate.diagnose.modelfile import load_model
-from wearstate.diagnose.quality import (
+from wearstate.datasets.file.record import Channel, DataSet, Recording
+from wearstate.diagnose.feature_rows.quality import (
     Levels,
     Look,
     fit_levels,
@@ -18,6 +17,7 @@ from wearstate.diagnose.quality import (
     sample_faults,
     suspicions,
 )
+from wearstate.diagnose.wear_model.file import load_model
 
 CAMPAIGN = runpy.run_path(str(Path(__file__).parent / "benchmarks" / "quality_faults.py"))
 PLANTED = CAMPAIGN["PLANTED"]

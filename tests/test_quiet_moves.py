@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-from wearstate.diagnose.align import align, align_table, align_text
-from wearstate.diagnose.quiet_moves import quiet_moves, running_line, running_rms
-from wearstate.sim.alignment import AlignmentError, check
-from wearstate.sim.calibration import calibrate
-from wearstate.sim.scene import load_scene
-from wearstate.sim.shaft_line import alignment_conditions, alignment_line, shaft_recorder
-from wearstate.sim.shaft_parts import AlignmentLimits
+from wearstate.diagnose.alignment.page import align, align_table, align_text
+from wearstate.diagnose.alignment.quiet_moves import quiet_moves, running_line, running_rms
+from wearstate.sim.alignment.alignment import AlignmentError, check
+from wearstate.sim.alignment.calibration import calibrate
+from wearstate.sim.scene.load import load_scene
+from wearstate.sim.scene.shaft import AlignmentLimits
+from wearstate.sim.shaft.recording import alignment_conditions, alignment_line, shaft_recorder
 
 
 def calibrated(scene, **asked):

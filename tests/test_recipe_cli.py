@@ -6,8 +6,8 @@ import re
 import pytest
 from click.testing import CliRunner
 from numpy.testing import assert_allclose
-from wearstate.datasets.generate import generate
-from wearstate.datasets.recipe import (
+from wearstate.datasets.generation.generate import generate
+from wearstate.datasets.recipe.recipe import (
     load_recipe,
     overrides_text,
     recorded_recipe,
@@ -15,12 +15,12 @@ from wearstate.datasets.recipe import (
     sample_records,
     wear_limits,
 )
-from wearstate.datasets.recipe_file import recipe_names, recipe_text
-from wearstate.diagnose.cli import cli
-from wearstate.diagnose.recipe_text import MOST_DRAWN, preview, preview_text
-from wearstate.sim.assemble import check
-from wearstate.sim.ladder import cost_of
-from wearstate.sim.scene import scene_text
+from wearstate.datasets.recipe.text import recipe_names, recipe_text
+from wearstate.diagnose.command_line.cli import cli
+from wearstate.diagnose.inspect.recipe_preview import MOST_DRAWN, preview, preview_text
+from wearstate.sim.fidelity.cost import cost_of
+from wearstate.sim.machine.simulate import check
+from wearstate.sim.scene.load import scene_text
 
 CLEARANCE = "diametral_clearance_crankpin_m"
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.stats import kstest, spearmanr
-from wearstate.datasets import recipe as recipes
-from wearstate.datasets.correlation import pearson
-from wearstate.datasets.recipe import load_recipe, sample_records
-from wearstate.datasets.recipe_file import RecipeError
+from wearstate.datasets.recipe import recipe as recipes
+from wearstate.datasets.recipe.correlation import pearson
+from wearstate.datasets.recipe.recipe import load_recipe, sample_records
+from wearstate.datasets.recipe.text import RecipeError
 
 BASE = """
 name = "together"

@@ -15,24 +15,24 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 from scipy.stats import rankdata
-from wearstate.datasets import recipe as recipes
-from wearstate.datasets.generate import generate
-from wearstate.datasets.recipe import STRATA, load_recipe, sample_records
-from wearstate.datasets.recipe_file import (
+from wearstate.datasets.file.record import DataError, DataSet
+from wearstate.datasets.generation.generate import generate
+from wearstate.datasets.recipe import recipe as recipes
+from wearstate.datasets.recipe.recipe import STRATA, load_recipe, sample_records
+from wearstate.datasets.recipe.text import (
     LONGEST_CHAIN,
     RecipeError,
     merged,
     recipe_text,
     toml_text,
 )
-from wearstate.datasets.record import DataError, DataSet
-from wearstate.diagnose.evaluate import by_confounder, evaluate_model, score
-from wearstate.diagnose.evaluate_text import confounder_lines
-from wearstate.diagnose.info import describe, description_text
-from wearstate.diagnose.tabulate import confounders_in
-from wearstate.diagnose.train import train_model
-from wearstate.sim.integrate import Status
-from wearstate.sim.scene import load_scene, override, scene_table, scene_text
+from wearstate.diagnose.evaluation.evaluate import by_confounder, evaluate_model, score
+from wearstate.diagnose.evaluation.text import confounder_lines
+from wearstate.diagnose.feature_rows.feature_table import confounders_in
+from wearstate.diagnose.inspect.info import describe, description_text
+from wearstate.diagnose.wear_model.train import train_model
+from wearstate.sim.output.solution import Status
+from wearstate.sim.scene.load import load_scene, override, scene_table, scene_text
 
 CRANKPIN = "joint.crankpin.diametral_clearance"
 SECOND = "rod.centre_of_mass"

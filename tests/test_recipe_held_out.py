@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 import pytest
-from wearstate.datasets.held_out import DIMENSIONS
-from wearstate.datasets.recipe import (
+from wearstate.datasets.recipe.held_out import DIMENSIONS
+from wearstate.datasets.recipe.recipe import (
     CONDITIONS,
     SEVERITIES,
     load_recipe,
@@ -13,8 +13,8 @@ from wearstate.datasets.recipe import (
     recorded_recipe,
     sample_records,
 )
-from wearstate.datasets.recipe_file import RecipeError
-from wearstate.sim.parts import UNITS
+from wearstate.datasets.recipe.text import RecipeError
+from wearstate.sim.scene.parts import UNITS
 
 SPEED = (42.5, 57.5)  # Hz, drawn by the recipe below
 

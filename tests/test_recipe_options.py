@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from wearstate.datasets.generate import generate
-from wearstate.datasets.recipe import load_recipe, sample_records
-from wearstate.datasets.recipe_file import RecipeError
-from wearstate.datasets.record import DataSet
+from wearstate.datasets.file.record import DataSet
+from wearstate.datasets.generation.generate import generate
+from wearstate.datasets.recipe.recipe import load_recipe, sample_records
+from wearstate.datasets.recipe.text import RecipeError
 
 RECIPE = """
 name = "mine"

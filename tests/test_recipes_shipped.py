@@ -6,18 +6,18 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.stats import norm, rankdata
-from wearstate.datasets import recipe as recipes
-from wearstate.datasets.draws import value_at
-from wearstate.datasets.recipe import (
+from wearstate.datasets.recipe import recipe as recipes
+from wearstate.datasets.recipe.draws import value_at
+from wearstate.datasets.recipe.recipe import (
     load_recipe,
     overrides_text,
     recorded_recipe,
     sample_records,
 )
-from wearstate.datasets.recipe_file import RecipeError, recipe_names
-from wearstate.sim.assemble import simulate
-from wearstate.sim.parts import channels_of
-from wearstate.sim.scene import load_scene
+from wearstate.datasets.recipe.text import RecipeError, recipe_names
+from wearstate.sim.machine.simulate import simulate
+from wearstate.sim.scene.load import load_scene
+from wearstate.sim.scene.parts import channels_of
 
 MACHINES = ("bilge-pump", "journal-bearing", "propulsion-shaft")
 TESTS = ("shaft-rig", "propulsion-shaft-test", "bilge-pump-casing")

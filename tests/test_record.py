@@ -14,10 +14,10 @@ import h5py
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
-from wearstate.datasets import hdf5_values, record
-from wearstate.datasets.hdf5_values import is_plain
-from wearstate.datasets.record import Attributes, DataError, DataSet, DataSetWriter, Recording
-from wearstate.sim.sensor import Channel
+from wearstate.datasets.file import hdf5_values, record
+from wearstate.datasets.file.hdf5_values import is_plain
+from wearstate.datasets.file.record import Attributes, DataError, DataSet, DataSetWriter, Recording
+from wearstate.sim.output.sensor import Channel
 
 N_RECORDS, N_SAMPLES = 3, 40
 CHANNELS = (

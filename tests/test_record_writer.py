@@ -8,9 +8,9 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from wearstate.datasets import record
-from wearstate.datasets.record import Attributes, DataError, DataSet, DataSetWriter, WriteError
-from wearstate.sim.sensor import Channel
+from wearstate.datasets.file import record
+from wearstate.datasets.file.record import Attributes, DataError, DataSet, DataSetWriter, WriteError
+from wearstate.sim.output.sensor import Channel
 
 HEAD = Attributes(
     sample_rate=100.0,
@@ -162,8 +162,8 @@ LIMITED = """
 import resource, sys
 from pathlib import Path
 import numpy as np
-from wearstate.datasets.record import Attributes, DataSetWriter, WriteError
-from wearstate.sim.sensor import Channel
+from wearstate.datasets.file.record import Attributes, DataSetWriter, WriteError
+from wearstate.sim.output.sensor import Channel
 channel = Channel(name="acc", unit="m/s^2", quantity="acceleration")
 head = Attributes(sample_rate=100.0, channels=(channel,), origin="simulated")
 size = Path(sys.argv[1] + ".part").stat().st_size

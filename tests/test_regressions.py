@@ -5,8 +5,8 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from wearstate.datasets.splits import group_folds
-from wearstate.diagnose.models import (
+from wearstate.datasets.split.rules import group_folds
+from wearstate.diagnose.learning.regressions import (
     CANDIDATES,
     Candidate,
     Linear,

@@ -10,26 +10,26 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from wearstate.datasets.record import Attributes, DataError, DataSet, DataSetWriter, Recording
-from wearstate.diagnose.cli import cli
-from wearstate.diagnose.commands_wear import report_exit
-from wearstate.diagnose.estimate import Estimate, Finding
-from wearstate.diagnose.healthy import Baseline, Baselines
-from wearstate.diagnose.modelfile import load_model, save_model
-from wearstate.diagnose.quality import Fault
-from wearstate.diagnose.report import (
+from wearstate.datasets.file.record import Attributes, DataError, DataSet, DataSetWriter, Recording
+from wearstate.diagnose.command_line.cli import cli
+from wearstate.diagnose.command_line.commands_wear import report_exit
+from wearstate.diagnose.feature_rows.healthy import Baseline, Baselines
+from wearstate.diagnose.feature_rows.quality import Fault
+from wearstate.diagnose.report.batch import judge_all, recordings_in, times_of
+from wearstate.diagnose.report.figures import moved_panel, report_pictures
+from wearstate.diagnose.report.page import batch_html, report_html
+from wearstate.diagnose.report.text import batch_text, report_text
+from wearstate.diagnose.report.verdict import (
     evidence_words,
     iso_table,
     millimetres,
     report_table,
     zone_words,
 )
-from wearstate.diagnose.report_batch import judge_all, recordings_in, times_of
-from wearstate.diagnose.report_figures import moved_panel, report_pictures
-from wearstate.diagnose.report_page import batch_html, report_html
-from wearstate.diagnose.report_text import batch_text, report_text
-from wearstate.diagnose.train import train_model
-from wearstate.sim.sensor import Channel
+from wearstate.diagnose.wear_model.estimate import Estimate, Finding
+from wearstate.diagnose.wear_model.file import load_model, save_model
+from wearstate.diagnose.wear_model.train import train_model
+from wearstate.sim.output.sensor import Channel
 
 FS = 10240.0
 SPEED = 8.0  # Hz
@@ -296,7 +296,7 @@ def test_where_there_is_no_zone_it_says_why():
 
 def test_the_map_of_what_moved_is_level_against_healthy(model):
     """Against a baseline of its own features nothing has moved."""
-    from wearstate.diagnose.tabulate import recording_features
+    from wearstate.diagnose.feature_rows.feature_table import recording_features
 
     found = recording_of(4e-4)
     own = recording_features(found)[1]
@@ -481,9 +481,9 @@ def test_measured_machines_go_by_the_names_that_they_were_imported_with(referenc
 
 def test_faults_of_a_baseline_are_told_once(referenced, tmp_path):
     from scipy.io import wavfile
-    from wearstate.datasets.importers import read_recording
-    from wearstate.datasets.sources import SourceOptions
-    from wearstate.diagnose.healthy import baseline_of
+    from wearstate.datasets.measured.recording import read_recording
+    from wearstate.datasets.readers.open import SourceOptions
+    from wearstate.diagnose.feature_rows.healthy import baseline_of
 
     model = load_model(referenced[0])
     wavfile.write(tmp_path / "x.wav", 8000, np.zeros(9000, dtype=np.float32))
@@ -719,7 +719,7 @@ def test_a_report_without_a_page_loads_neither_trainers_nor_pictures(tmp_path, m
     """A cold report of 3 s has no room for it."""
     data = written(tmp_path / "one.h5", [2.5e-4])
     code = (
-        "import sys\nfrom wearstate.diagnose.cli import main\n"
+        "import sys\nfrom wearstate.diagnose.command_line.cli import main\n"
         f"try: main(['report', {str(data)!r}, '--model', {str(model_file)!r}])\n"
         "except SystemExit: pass\n"
         "print('heavy:', *{'sklearn', 'matplotlib'} & set(sys.modules))"

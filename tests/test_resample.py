@@ -5,8 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
-from wearstate.features import order, resample
-from wearstate.features.resample import AngleSignal
+from wearstate.features.rotation import angle_resample as resample
+from wearstate.features.rotation import order
+from wearstate.features.rotation.angle_resample import AngleSignal
 
 FS = 5120.0
 ERROR = resample.INTERPOLATION_ERROR

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from wearstate.datasets import resampled_tacho
-from wearstate.datasets.import_set import import_recordings
-from wearstate.datasets.importers import read_recording
-from wearstate.datasets.record import DataError, DataSet
-from wearstate.datasets.sources import SourceOptions, open_source
-from wearstate.features.order import pulse_times
+from wearstate.datasets.file.record import DataError, DataSet
+from wearstate.datasets.measured.data_set import import_recordings
+from wearstate.datasets.measured.recording import read_recording
+from wearstate.datasets.readers.open import SourceOptions, open_source
+from wearstate.datasets.source import resampled_tacho
+from wearstate.features.rotation.order import pulse_times
 
 FS = 4000.0
 

@@ -4,9 +4,9 @@ import math
 
 import numpy as np
 import pytest
-from wearstate.sim.bearing import equilibrium, short_attitude, short_eccentricity
-from wearstate.sim.film import FilmGeometry, Groove
-from wearstate.sim.rest_curve import rest_curve
+from wearstate.sim.film.bearing import equilibrium, short_attitude, short_eccentricity
+from wearstate.sim.film.rest_curve import rest_curve
+from wearstate.sim.film.solve import FilmGeometry, Groove
 
 SHORT = FilmGeometry(length_to_diameter=0.6)
 

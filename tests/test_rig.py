@@ -9,15 +9,15 @@ import scipy.signal
 import scipy.stats
 from click.testing import CliRunner
 from numpy.testing import assert_allclose, assert_array_equal
-from wearstate.diagnose import rig
-from wearstate.diagnose.cli import cli
-from wearstate.features.frf import Frf
-from wearstate.sim.beam import Disc, Section, assemble_beam
-from wearstate.sim.calibration import calibrate
-from wearstate.sim.rotor import Rotor, Support, natural_frequencies
-from wearstate.sim.scene import load_scene
-from wearstate.sim.shaft_line import alignment_conditions, alignment_line
-from wearstate.sim.shaft_response import Broadband, Harmonic
+from wearstate.diagnose.command_line.cli import cli
+from wearstate.diagnose.shaft_tests import rig_test as rig
+from wearstate.features.response.frf import Frf
+from wearstate.sim.alignment.calibration import calibrate
+from wearstate.sim.beam.beam import Disc, Section, assemble_beam
+from wearstate.sim.beam.rotor import Rotor, Support, natural_frequencies
+from wearstate.sim.scene.load import load_scene
+from wearstate.sim.shaft.recording import alignment_conditions, alignment_line
+from wearstate.sim.shaft.response import Broadband, Harmonic
 
 RATE = 1024.0
 SPEED = 2 * np.pi * 12.0

@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy import linalg
-from wearstate.sim import rotor as rt
-from wearstate.sim.beam import Disc, Section, assemble_beam
-from wearstate.sim.rotor import Rotor, Support, Unbalance, campbell, critical_speeds, modes
+from wearstate.sim.beam import rotor as rt
+from wearstate.sim.beam.beam import Disc, Section, assemble_beam
+from wearstate.sim.beam.rotor import Rotor, Support, Unbalance, campbell, critical_speeds, modes
 
 PI = math.pi
 STEEL = {"young": 211e9, "shear_modulus": 81.2e9, "density": 7810.0}

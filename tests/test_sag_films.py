@@ -2,14 +2,14 @@
 
 import numpy as np
 import pytest
-from wearstate.diagnose.sag_films import estimate_over_films, mixed, nearly_unloaded
-from wearstate.diagnose.sag_model import MeasuredReactions, MeasuredTransfer, Prior
-from wearstate.diagnose.sag_report import SagReport
-from wearstate.diagnose.sags import SagPosterior, estimate_sags
-from wearstate.sim.alignment import reactions
-from wearstate.sim.scene import load_scene
-from wearstate.sim.shaft_change import free_line, line_model, rest, transfer
-from wearstate.sim.shaft_line import alignment_conditions, alignment_line
+from wearstate.diagnose.shaft_tests.sag_films import estimate_over_films, mixed, nearly_unloaded
+from wearstate.diagnose.shaft_tests.sag_model import MeasuredReactions, MeasuredTransfer, Prior
+from wearstate.diagnose.shaft_tests.sag_report import SagReport
+from wearstate.diagnose.shaft_tests.sags import SagPosterior, estimate_sags
+from wearstate.sim.alignment.alignment import reactions
+from wearstate.sim.scene.load import load_scene
+from wearstate.sim.shaft.changed import free_line, line_model, rest, transfer
+from wearstate.sim.shaft.recording import alignment_conditions, alignment_line
 
 PRIOR = Prior(sag=0.2e-3)
 SAGS = np.array([0.05e-3, 0.12e-3])

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.stats import binom
-from wearstate.diagnose.next_test import (
+from wearstate.diagnose.shaft_tests.next_test import (
     candidate_places,
     force_density,
     rank_tests,
@@ -14,8 +14,8 @@ from wearstate.diagnose.next_test import (
     transfer_covariance,
     usual_responses,
 )
-from wearstate.diagnose.rig import HammerTest, ShakerTest, run_test, scene_plant
-from wearstate.diagnose.sag_model import (
+from wearstate.diagnose.shaft_tests.rig_test import HammerTest, ShakerTest, run_test, scene_plant
+from wearstate.diagnose.shaft_tests.sag_model import (
     MeasuredReactions,
     MeasuredTransfer,
     Prior,
@@ -26,11 +26,11 @@ from wearstate.diagnose.sag_model import (
     trial_at,
     unknowns_of,
 )
-from wearstate.diagnose.sags import estimate_sags
-from wearstate.sim.alignment import influence, reactions
-from wearstate.sim.scene import load_scene
-from wearstate.sim.shaft_change import free_line, line_model, part_of, rest, transfer
-from wearstate.sim.shaft_line import alignment_conditions, alignment_line
+from wearstate.diagnose.shaft_tests.sags import estimate_sags
+from wearstate.sim.alignment.alignment import influence, reactions
+from wearstate.sim.scene.load import load_scene
+from wearstate.sim.shaft.changed import free_line, line_model, part_of, rest, transfer
+from wearstate.sim.shaft.recording import alignment_conditions, alignment_line
 
 CONFIDENCE = 0.9
 

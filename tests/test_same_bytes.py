@@ -41,7 +41,7 @@ evaluate model.wsm data.h5 -o judged.svg
 
 RUN = """
 import shlex, sys
-from wearstate.diagnose.cli import cli
+from wearstate.diagnose.command_line.cli import cli
 for line in sys.stdin.read().strip().splitlines():
     try:
         cli.main(shlex.split(line), standalone_mode=False)

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 from scipy.stats import kstest, qmc
-from wearstate.datasets import sampling
-from wearstate.datasets.sampling import BLOCK, SET, Dimension, Points
+from wearstate.datasets.recipe import sampling
+from wearstate.datasets.recipe.sampling import BLOCK, SET, Dimension, Points
 
 METHODS = ("sobol", "latin-hypercube", "random")
 EVEN = METHODS[:2]

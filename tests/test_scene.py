@@ -13,11 +13,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from pydantic import ValidationError
-from wearstate.sim.analytic import kelvin_voigt_restitution
-from wearstate.sim.assemble import simulate
-from wearstate.sim.crank_setup import contact_frequency, ideal_motion
-from wearstate.sim.parts import MOST_FAULTS, UNITS, FixedTable, SceneError, to_si
-from wearstate.sim.scene import (
+from wearstate.sim.contact.closed_forms import kelvin_voigt_restitution
+from wearstate.sim.machine.simulate import simulate
+from wearstate.sim.pump.setup import contact_frequency, ideal_motion
+from wearstate.sim.scene.load import (
     SCENE_FOLDER,
     load_scene,
     scene_from_table,
@@ -25,6 +24,7 @@ from wearstate.sim.scene import (
     scene_table,
     scene_text,
 )
+from wearstate.sim.scene.parts import MOST_FAULTS, UNITS, FixedTable, SceneError, to_si
 
 EVERY_UNIT = [(dimension, unit) for dimension, units in UNITS.items() for unit in units]
 CRANKPIN = "joint.crankpin"

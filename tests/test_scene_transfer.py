@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from numpy.testing import assert_allclose, assert_array_equal
-from wearstate.datasets.recipe import load_recipe, sample_records, wear_limits
-from wearstate.datasets.record import DataSet
-from wearstate.diagnose.cli import cli
-from wearstate.features.frf import block_spectra, estimate_frf, find_blows, force_window
-from wearstate.sim.assemble import check, simulate
-from wearstate.sim.parts import Feet, SceneError
-from wearstate.sim.pump import casing_modes
-from wearstate.sim.scene import load_scene, scene_text
-from wearstate.sim.transfer import scene_transfer
+from wearstate.datasets.file.record import DataSet
+from wearstate.datasets.recipe.recipe import load_recipe, sample_records, wear_limits
+from wearstate.diagnose.command_line.cli import cli
+from wearstate.features.response.frf import block_spectra, estimate_frf, find_blows, force_window
+from wearstate.sim.machine.simulate import check, simulate
+from wearstate.sim.machine.transfer import scene_transfer
+from wearstate.sim.pump.recording import casing_modes
+from wearstate.sim.scene.load import load_scene, scene_text
+from wearstate.sim.scene.parts import Feet, SceneError
 
 FS = 25_600.0
 TESTED = {

@@ -6,8 +6,8 @@ import math
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from wearstate.diagnose.grades import grades_of
-from wearstate.diagnose.scores import (
+from wearstate.diagnose.learning.grades import grades_of
+from wearstate.diagnose.learning.scores import (
     FIGURES,
     Figure,
     Judged,

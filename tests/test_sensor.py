@@ -5,10 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
-from wearstate.sim.assemble import simulate
-from wearstate.sim.parts import SceneError, channels_of
-from wearstate.sim.scene import load_scene, override, scene_from_table, scene_table, scene_text
-from wearstate.sim.sensor import (
+from wearstate.sim.machine.simulate import simulate
+from wearstate.sim.output.sensor import (
     anti_alias_poles,
     digitise,
     low_pass,
@@ -16,6 +14,8 @@ from wearstate.sim.sensor import (
     mounting_poles,
     tacho_pulses,
 )
+from wearstate.sim.scene.load import load_scene, override, scene_from_table, scene_table, scene_text
+from wearstate.sim.scene.parts import SceneError, channels_of
 
 
 def clean(x, **changes):

@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from wearstate.sim import shaft_change
-from wearstate.sim.scene import load_scene
-from wearstate.sim.shaft_change import (
+from wearstate.sim.scene.load import load_scene
+from wearstate.sim.shaft import changed as shaft_change
+from wearstate.sim.shaft.changed import (
     QUANTITIES,
     coefficient_slopes,
     free_line,
@@ -18,9 +18,9 @@ from wearstate.sim.shaft_change import (
     transfer_slopes,
     unit_change,
 )
-from wearstate.sim.shaft_film import coefficient_gradients, journal_shifts
-from wearstate.sim.shaft_line import shaft_state
-from wearstate.sim.shaft_response import accelerance
+from wearstate.sim.shaft.on_oil_films import coefficient_gradients, journal_shifts
+from wearstate.sim.shaft.recording import shaft_state
+from wearstate.sim.shaft.response import accelerance
 
 SPEED = 2 * math.pi * 10
 HERTZ = np.array([12.0, 33.0, 70.0, 145.0, 320.0])

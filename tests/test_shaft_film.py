@@ -8,11 +8,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
-from wearstate.sim.beam import Disc, PointLoad, Section, assemble_beam
-from wearstate.sim.bearing import JournalBearing, coefficients, operate
-from wearstate.sim.film import FilmGeometry, Groove, dufrane_scar
-from wearstate.sim.rotor import Rotor, modes
-from wearstate.sim.shaft_film import (
+from wearstate.sim.beam.beam import Disc, PointLoad, Section, assemble_beam
+from wearstate.sim.beam.rotor import Rotor, modes
+from wearstate.sim.film.bearing import JournalBearing, coefficients, operate
+from wearstate.sim.film.solve import FilmGeometry, Groove, dufrane_scar
+from wearstate.sim.shaft.on_oil_films import (
     FilmBearing,
     ShaftFilmError,
     ShaftFilmStatus,

@@ -5,12 +5,13 @@ import math
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from wearstate.sim.alignment import influence, reactions
-from wearstate.sim.assemble import check, simulate
-from wearstate.sim.integrate import SimulationError, Status
-from wearstate.sim.parts import SceneError, channels_of
-from wearstate.sim.scene import load_scene
-from wearstate.sim.shaft_line import (
+from wearstate.sim.alignment.alignment import influence, reactions
+from wearstate.sim.machine.simulate import check, simulate
+from wearstate.sim.output.solution import SimulationError, Status
+from wearstate.sim.scene.load import load_scene
+from wearstate.sim.scene.parts import SceneError, channels_of
+from wearstate.sim.scene.shaft import Coupling, Turbulence
+from wearstate.sim.shaft.recording import (
     alignment_conditions,
     alignment_line,
     coupling_forces,
@@ -25,8 +26,7 @@ from wearstate.sim.shaft_line import (
     shaft_state,
     turbulence_density,
 )
-from wearstate.sim.shaft_parts import Coupling, Turbulence
-from wearstate.sim.shaft_response import receptance
+from wearstate.sim.shaft.response import receptance
 
 QUIET = {
     "propeller.blade_rate": [],

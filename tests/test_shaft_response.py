@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy import sparse
-from wearstate.sim import shaft_response as sr
-from wearstate.sim.beam import Disc, Section, assemble_beam
-from wearstate.sim.rotor import Rotor, Support, Unbalance, modes, unbalance_response
+from wearstate.sim.beam.beam import Disc, Section, assemble_beam
+from wearstate.sim.beam.rotor import Rotor, Support, Unbalance, modes, unbalance_response
+from wearstate.sim.shaft import response as sr
 
 STEEL = {"young": 2.06e11, "shear_modulus": 7.92e10, "density": 7850.0}
 FILM = {

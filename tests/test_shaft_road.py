@@ -6,19 +6,19 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from numpy.testing import assert_array_equal
-from wearstate.datasets.generate import generate, save_solution
-from wearstate.datasets.recipe import clearances, load_recipe, sample_records, wear_limits
-from wearstate.datasets.record import DataSet
-from wearstate.diagnose.cli import cli
-from wearstate.diagnose.evaluate import score
-from wearstate.diagnose.plots import plot_simulation
-from wearstate.diagnose.report import report_table
-from wearstate.diagnose.report_page import report_html
-from wearstate.diagnose.report_text import report_text
-from wearstate.diagnose.tabulate import recording_features
-from wearstate.diagnose.train import train_model
-from wearstate.sim.assemble import simulate
-from wearstate.sim.scene import load_scene
+from wearstate.datasets.file.record import DataSet
+from wearstate.datasets.generation.generate import generate, save_solution
+from wearstate.datasets.recipe.recipe import clearances, load_recipe, sample_records, wear_limits
+from wearstate.diagnose.command_line.cli import cli
+from wearstate.diagnose.evaluation.evaluate import score
+from wearstate.diagnose.feature_rows.feature_table import recording_features
+from wearstate.diagnose.pictures.simulation import plot_simulation
+from wearstate.diagnose.report.page import report_html
+from wearstate.diagnose.report.text import report_text
+from wearstate.diagnose.report.verdict import report_table
+from wearstate.diagnose.wear_model.train import train_model
+from wearstate.sim.machine.simulate import simulate
+from wearstate.sim.scene.load import load_scene
 
 N = 120
 WEAR = "wear_down_bearing_1_m"

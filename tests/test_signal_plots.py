@@ -6,13 +6,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy.signal import lfilter
-from wearstate.datasets.record import DataError, Recording
-from wearstate.diagnose.panel import panel_figure
-from wearstate.diagnose.picture import save_picture
-from wearstate.diagnose.signal_plots import AUTO, KINDS, make_panel, plot_recording
-from wearstate.diagnose.signal_view import View, thinned
-from wearstate.features.envelope import bearing_frequencies
-from wearstate.sim.sensor import Channel
+from wearstate.datasets.file.record import DataError, Recording
+from wearstate.diagnose.pages.picture import save_picture
+from wearstate.diagnose.pictures.kinds import AUTO, KINDS, make_panel, plot_recording
+from wearstate.diagnose.pictures.panel import panel_figure
+from wearstate.diagnose.pictures.view import View, thinned
+from wearstate.features.signal.envelope import bearing_frequencies
+from wearstate.sim.output.sensor import Channel
 
 UNITS = {"acceleration": "m/s^2", "displacement": "m", "force": "N", "tacho": "V"}
 FS = 4096.0

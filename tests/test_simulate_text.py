@@ -5,8 +5,8 @@ import math
 
 import pytest
 from click.testing import CliRunner
-from wearstate.diagnose.cli import cli
-from wearstate.diagnose.si_text import si_text
+from wearstate.diagnose.command_line.cli import cli
+from wearstate.diagnose.pages.si_text import si_text
 
 
 def simulated(*arguments):
@@ -68,8 +68,8 @@ def test_the_reactions_of_a_shaft_sum_to_its_weight():
     names = [n for n in summary["truth"] if n.startswith("reaction_") and n != "reaction_sum"]
     total = value(summary, "reaction_sum")
     assert sum(value(summary, name) for name in names) == pytest.approx(total)
-    from wearstate.sim.scene import load_scene
-    from wearstate.sim.shaft_line import running_beam
+    from wearstate.sim.scene.load import load_scene
+    from wearstate.sim.shaft.recording import running_beam
 
     weight = running_beam(load_scene("shaft-rig")).downward_load
     assert total == pytest.approx(weight, rel=0.02)  # means of whole and a part of a revolution

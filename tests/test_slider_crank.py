@@ -11,16 +11,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy.integrate import quad
-from wearstate.diagnose.verify import rebound
-from wearstate.sim import crank_setup as cs
-from wearstate.sim import slider_crank as sc
-from wearstate.sim.analytic import ideal_crank, kelvin_voigt_restitution
-from wearstate.sim.assemble import simulate
-from wearstate.sim.contact import RELEASE_AT_ZERO_FORCE, RELEASE_AT_ZERO_PENETRATION
-from wearstate.sim.hydraulic_parts import CylinderPressure
-from wearstate.sim.hydraulics import hydraulic_parameters, two_level_pressure
+from wearstate.diagnose.literature.verify import rebound
+from wearstate.sim.contact.closed_forms import ideal_crank, kelvin_voigt_restitution
+from wearstate.sim.contact.law import RELEASE_AT_ZERO_FORCE, RELEASE_AT_ZERO_PENETRATION
 from wearstate.sim.jit import sine_cosine
-from wearstate.sim.scene import load_scene
+from wearstate.sim.machine.simulate import simulate
+from wearstate.sim.pump import setup as cs
+from wearstate.sim.pump import slider_crank as sc
+from wearstate.sim.pump.hydraulics import hydraulic_parameters, two_level_pressure
+from wearstate.sim.scene.load import load_scene
+from wearstate.sim.scene.pump_hydraulics import CylinderPressure
 
 REVOLUTION = np.linspace(0.0, 2 * np.pi, 721)
 PUMP = load_scene("bilge-pump")

@@ -3,8 +3,8 @@
 from datetime import datetime, timedelta
 
 import pytest
-from wearstate.datasets.record import DataError
-from wearstate.datasets.sources import SourceOptions, open_source
+from wearstate.datasets.file.record import DataError
+from wearstate.datasets.readers.open import SourceOptions, open_source
 
 START = datetime(2024, 5, 1, 23, 59, 59, 900000)
 """A tenth of a second before midnight: a recording of 0.2 s passes it."""

@@ -14,13 +14,22 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.io import loadmat, savemat, wavfile
-from wearstate.datasets import hdf5_values, source_flat, source_mat5, source_text, source_time
-from wearstate.datasets.channel_units import DIMENSIONS, known_units, parse_sensitivity, parse_unit
-from wearstate.datasets.record import Attributes, DataError, DataSetWriter
-from wearstate.datasets.source_part import LARGEST_INFLATED
-from wearstate.datasets.sources import READERS, SourceOptions, list_sources, open_source
-from wearstate.sim.parts import STANDARD_GRAVITY
-from wearstate.sim.sensor import Channel
+from wearstate.datasets.file import hdf5_values
+from wearstate.datasets.file.record import Attributes, DataError, DataSetWriter
+from wearstate.datasets.readers import flat as source_flat
+from wearstate.datasets.readers import mat5 as source_mat5
+from wearstate.datasets.readers import text as source_text
+from wearstate.datasets.readers.open import READERS, SourceOptions, list_sources, open_source
+from wearstate.datasets.source import time_column as source_time
+from wearstate.datasets.source.channel_units import (
+    DIMENSIONS,
+    known_units,
+    parse_sensitivity,
+    parse_unit,
+)
+from wearstate.datasets.source.part import LARGEST_INFLATED
+from wearstate.sim.output.sensor import Channel
+from wearstate.sim.scene.parts import STANDARD_GRAVITY
 
 _SPEC = importlib.util.spec_from_file_location(
     "fuzz_readers", Path(__file__).with_name("fuzz_readers.py")

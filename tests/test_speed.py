@@ -5,8 +5,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
-from wearstate.features import resample
-from wearstate.features.speed import SpeedEstimate, phase_from_speed, tacholess_speed
+from wearstate.features.rotation import angle_resample as resample
+from wearstate.features.rotation.tacholess_speed import (
+    SpeedEstimate,
+    phase_from_speed,
+    tacholess_speed,
+)
 
 FS = 2560.0
 RICH = {k: 1 / k for k in range(1, 11)}

@@ -12,11 +12,19 @@ from click.testing import CliRunner
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
-from wearstate.datasets import split_file
-from wearstate.datasets.generate import generate
-from wearstate.datasets.recipe import load_recipe, overrides_text, sample_records
-from wearstate.datasets.record import Attributes, DataError, DataSet, DataSetWriter
-from wearstate.datasets.split_file import (
+from wearstate.datasets.file.record import Attributes, DataError, DataSet, DataSetWriter
+from wearstate.datasets.generation.generate import generate
+from wearstate.datasets.recipe.recipe import load_recipe, overrides_text, sample_records
+from wearstate.datasets.split import stored as split_file
+from wearstate.datasets.split.rules import (
+    check_no_leak,
+    condition_split,
+    group_folds,
+    group_split,
+    region_split,
+    time_split,
+)
+from wearstate.datasets.split.stored import (
     KINDS,
     Drawn,
     Split,
@@ -28,17 +36,9 @@ from wearstate.datasets.split_file import (
     store_splits,
     usable_sides,
 )
-from wearstate.datasets.splits import (
-    check_no_leak,
-    condition_split,
-    group_folds,
-    group_split,
-    region_split,
-    time_split,
-)
-from wearstate.diagnose.cli import cli
-from wearstate.diagnose.commands_data import _SPLITS
-from wearstate.sim.sensor import Channel
+from wearstate.diagnose.command_line.cli import cli
+from wearstate.diagnose.command_line.commands_data import _SPLITS
+from wearstate.sim.output.sensor import Channel
 
 MANY = st.lists(st.integers(-3, 9), min_size=2, max_size=60).filter(lambda g: len(set(g)) > 1)
 

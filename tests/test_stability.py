@@ -9,20 +9,13 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from numpy.testing import assert_allclose
-from wearstate.datasets.record import DataError
-from wearstate.diagnose import stability, stability_atlas
-from wearstate.diagnose.cli import cli
-from wearstate.diagnose.stability import (
-    Axis,
-    Budget,
-    Plan,
-    Verdict,
-    edge,
-    measure,
-)
-from wearstate.diagnose.stability_atlas import atlas
-from wearstate.diagnose.stability_figure import save_figure
-from wearstate.diagnose.stability_maps import (
+from wearstate.datasets.file.record import DataError
+from wearstate.diagnose.command_line.cli import cli
+from wearstate.diagnose.stability import atlas as stability_atlas
+from wearstate.diagnose.stability import method_map as stability
+from wearstate.diagnose.stability.atlas import atlas
+from wearstate.diagnose.stability.figure import save_figure
+from wearstate.diagnose.stability.maps import (
     MAPS,
     _orbit_case,
     contact_oscillator,
@@ -35,13 +28,20 @@ from wearstate.diagnose.stability_maps import (
     threshold_speed,
     whirls,
 )
-from wearstate.sim.analytic import kelvin_voigt_restitution
-from wearstate.sim.bearing import BearingStatus, equilibrium
-from wearstate.sim.crank_setup import contact_frequency, joint_mobility
-from wearstate.sim.film import FilmGeometry, FilmState, FilmStatus, solve_relaxed
-from wearstate.sim.parts import SceneError
-from wearstate.sim.scene import load_scene
-from wearstate.sim.steppers import STEPPERS, bounce, decays, measured_limit, runge_kutta_limit
+from wearstate.diagnose.stability.method_map import Axis, Budget, Plan, Verdict, edge, measure
+from wearstate.diagnose.stability.steppers import (
+    STEPPERS,
+    bounce,
+    decays,
+    measured_limit,
+    runge_kutta_limit,
+)
+from wearstate.sim.contact.closed_forms import kelvin_voigt_restitution
+from wearstate.sim.film.bearing import BearingStatus, equilibrium
+from wearstate.sim.film.solve import FilmGeometry, FilmState, FilmStatus, solve_relaxed
+from wearstate.sim.pump.setup import contact_frequency, joint_mobility
+from wearstate.sim.scene.load import load_scene
+from wearstate.sim.scene.parts import SceneError
 
 BY_NAME = {stepper.name: stepper for stepper in STEPPERS}
 FIVE_PER_CENT = 0.05  # what a measured limit may be off by from theory
@@ -325,7 +325,7 @@ def test_the_pump_loses_contact_by_its_clearance_and_not_by_its_step(monkeypatch
     )
     judge = next(iter(MAPS["reciprocating-pump"]["clearance-speed"](soft, 3).judges.values()))
     assert judge(5.0, 5e-3)[0] is Verdict.REFUSED  # the check sees it coming
-    monkeypatch.setattr("wearstate.sim.pump.limits", lambda scene: [])
+    monkeypatch.setattr("wearstate.sim.pump.recording.limits", lambda scene: [])
     verdict, word = judge(5.0, 5e-3)
     assert verdict is Verdict.FAILS  # at a quarter of the step as well
     assert word.startswith("overlap")

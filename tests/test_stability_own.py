@@ -13,19 +13,28 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from numpy.testing import assert_allclose
-from wearstate.diagnose import stability, stability_atlas
-from wearstate.diagnose.cli import cli
-from wearstate.diagnose.stability import Axis, Budget, Own, Plan, Verdict, measure, unmeasured
-from wearstate.diagnose.stability_atlas import atlas
-from wearstate.diagnose.stability_edges import conclusion, with_edges
-from wearstate.diagnose.stability_figure import COLOUR, SYMBOL, atlas_figure
-from wearstate.diagnose.stability_maps import MAPS, contact_oscillator
-from wearstate.diagnose.stability_own import own_film
-from wearstate.diagnose.stability_page import atlas_html
-from wearstate.diagnose.stability_text import stability_table
-from wearstate.sim.assemble import simulate
-from wearstate.sim.pump import steps_per_sample
-from wearstate.sim.scene import load_scene
+from wearstate.diagnose.command_line.cli import cli
+from wearstate.diagnose.stability import atlas as stability_atlas
+from wearstate.diagnose.stability import method_map as stability
+from wearstate.diagnose.stability.atlas import atlas
+from wearstate.diagnose.stability.edges import conclusion, with_edges
+from wearstate.diagnose.stability.figure import COLOUR, SYMBOL, atlas_figure
+from wearstate.diagnose.stability.maps import MAPS, contact_oscillator
+from wearstate.diagnose.stability.method_map import (
+    Axis,
+    Budget,
+    Own,
+    Plan,
+    Verdict,
+    measure,
+    unmeasured,
+)
+from wearstate.diagnose.stability.own_point import own_film
+from wearstate.diagnose.stability.page import atlas_html
+from wearstate.diagnose.stability.text import stability_table
+from wearstate.sim.machine.simulate import simulate
+from wearstate.sim.pump.recording import steps_per_sample
+from wearstate.sim.scene.load import load_scene
 
 DECADE = (0.1, 0.3, 1.0, 3.0, 10.0)
 

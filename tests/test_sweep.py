@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from scipy.stats import t as student
-from wearstate.diagnose import sweep as sweep_module
-from wearstate.diagnose.cli import cli
-from wearstate.diagnose.sweep import kept_runs, measure, sweep_of, sweep_plan
-from wearstate.diagnose.sweep_axes import SweepError, parse_axis
-from wearstate.diagnose.sweep_detect import detect
-from wearstate.diagnose.sweep_text import conclusion, sweep_table
-from wearstate.sim.pilot import Outcome
+from wearstate.diagnose.command_line.cli import cli
+from wearstate.diagnose.sweep import sweep as sweep_module
+from wearstate.diagnose.sweep.axes import SweepError, parse_axis
+from wearstate.diagnose.sweep.detect import detect
+from wearstate.diagnose.sweep.sweep import kept_runs, measure, sweep_of, sweep_plan
+from wearstate.diagnose.sweep.text import conclusion, sweep_table
+from wearstate.sim.fidelity.pilot import Outcome
 
 CLEARANCE = "joint.crankpin.diametral_clearance"
 OVER = ("drive.speed=300..400rpm/2", f"{CLEARANCE}=.1,.3mm")

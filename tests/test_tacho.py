@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
-from wearstate.features import order, tacho
+from wearstate.features.rotation import order
+from wearstate.features.rotation import tacho_faults as tacho
 
 
 def ramp_pulses(n=60, start=10.0, rise=2.0):

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from wearstate.features import frf, impact, modal, transfer
-from wearstate.features.analysis import Analysis, Settings
-from wearstate.features.table import feature_row
+from wearstate.features.catalogue.analysis import Analysis, Settings
+from wearstate.features.catalogue.row import feature_row
+from wearstate.features.response import frf, impact, modal, transfer
 
 FS = 2560.0
 N = 60 * 2560

@@ -12,10 +12,10 @@ from sklearn.model_selection import GridSearchCV
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 from sklearn.utils import get_tags
-from wearstate.diagnose.transformer import SignalFeatures
-from wearstate.features import envelope
-from wearstate.features.analysis import Settings
-from wearstate.features.table import feature_row
+from wearstate.diagnose.feature_rows.transformer import SignalFeatures
+from wearstate.features.catalogue.analysis import Settings
+from wearstate.features.catalogue.row import feature_row
+from wearstate.features.signal import envelope
 
 FS = 8192.0
 N = 8192

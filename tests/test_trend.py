@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.stats import theilslopes
-from wearstate.datasets.record import DataError
-from wearstate.diagnose.trend import (
+from wearstate.datasets.file.record import DataError
+from wearstate.diagnose.report.trend import (
     FEWEST_POINTS,
     LONGEST_REACH,
     _theil_sen,
@@ -269,7 +269,7 @@ def test_the_picture_has_dates_where_dates_were_given():
     from datetime import UTC, datetime
 
     from matplotlib.figure import Figure
-    from wearstate.diagnose.report_figures import _draw_trend
+    from wearstate.diagnose.report.figures import _draw_trend
 
     start = datetime(2024, 3, 14, tzinfo=UTC).timestamp() / 3600
     hours = start + 24 * 9.0 * np.arange(10)

@@ -5,9 +5,9 @@ import math
 
 import pytest
 from numpy.testing import assert_allclose
-from wearstate.diagnose import verify
-from wearstate.sim.analytic import kelvin_voigt_restitution
-from wearstate.sim.contact import RELEASE_AT_ZERO_FORCE
+from wearstate.diagnose.literature import verify
+from wearstate.sim.contact.closed_forms import kelvin_voigt_restitution
+from wearstate.sim.contact.law import RELEASE_AT_ZERO_FORCE
 
 
 def test_every_check_passes():

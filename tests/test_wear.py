@@ -7,13 +7,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
-from wearstate.sim.bearing import JournalBearing, operate
-from wearstate.sim.crank_setup import ideal_motion
-from wearstate.sim.film import dufrane_scar
-from wearstate.sim.journal import film_geometry
-from wearstate.sim.parts import SceneError
-from wearstate.sim.scene import load_scene
-from wearstate.sim.wear import (
+from wearstate.sim.film.bearing import JournalBearing, operate
+from wearstate.sim.film.solve import dufrane_scar
+from wearstate.sim.journal.recording import film_geometry
+from wearstate.sim.pump.setup import ideal_motion
+from wearstate.sim.scene.load import load_scene
+from wearstate.sim.scene.parts import SceneError
+from wearstate.sim.wear.archard import (
     dufrane_depth,
     dufrane_volume,
     scar_shape,
@@ -21,7 +21,7 @@ from wearstate.sim.wear import (
     wear_volume,
     widening,
 )
-from wearstate.sim.wear_rate import joint_wear, turning_wear
+from wearstate.sim.wear.rate import joint_wear, turning_wear
 
 RADIUS, WIDTH = 0.03, 0.05
 TURN = np.linspace(0, 2 * np.pi, 360, endpoint=False)

@@ -9,9 +9,9 @@ import time
 import cloudpickle
 import numpy as np
 import pytest
-from wearstate.datasets import workers
-from wearstate.datasets.pool import WorkersError
-from wearstate.datasets.workers import in_order
+from wearstate.datasets.workers import local as workers
+from wearstate.datasets.workers.local import in_order
+from wearstate.datasets.workers.pool import WorkersError
 
 cloudpickle.register_pickle_by_value(sys.modules[__name__])  # workers cannot import this file
 
@@ -140,8 +140,8 @@ def test_a_worker_that_grows_is_replaced_without_a_word(tmp_path):
 def test_a_worker_whose_parent_was_gone_before_it_settled_ends():
     """Its parent is then already another process, which lives."""
     script = (
-        "import os, time; from wearstate.datasets import workers; workers.PARENT_CHECK = 0.1; "
-        "workers._settle(os.getppid() + 10**6); time.sleep(60)"
+        "import os, time; from wearstate.datasets.workers import local; local.PARENT_CHECK = 0.1; "
+        "local._settle(os.getppid() + 10**6); time.sleep(60)"
     )
     run = subprocess.run([sys.executable, "-P", "-c", script], check=False, timeout=180)
     assert run.returncode == 1

@@ -8,10 +8,10 @@ Run as ``python tests/benchmarks/casing_shift.py FOLDER [-n 400]``; what FOLDER 
 import argparse
 from pathlib import Path
 
-from wearstate.datasets.generate import generate
-from wearstate.datasets.recipe import load_recipe
-from wearstate.diagnose.evaluate import evaluate_model
-from wearstate.diagnose.train import train_model
+from wearstate.datasets.generation.generate import generate
+from wearstate.datasets.recipe.recipe import load_recipe
+from wearstate.diagnose.evaluation.evaluate import evaluate_model
+from wearstate.diagnose.wear_model.train import train_model
 
 SHIFTED = """
 name = "casing-shifted"

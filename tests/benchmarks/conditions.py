@@ -19,13 +19,13 @@ from tempfile import TemporaryDirectory
 from time import perf_counter
 
 import numpy as np
-from wearstate.datasets.generate import generate
-from wearstate.datasets.recipe import load_recipe
-from wearstate.datasets.record import DataSet
-from wearstate.diagnose.film_verdict import film_estimate
-from wearstate.diagnose.healthy import Baseline
-from wearstate.diagnose.nameplate import nameplate_of
-from wearstate.diagnose.probe_means import probe_means
+from wearstate.datasets.file.record import DataSet
+from wearstate.datasets.generation.generate import generate
+from wearstate.datasets.recipe.recipe import load_recipe
+from wearstate.diagnose.feature_rows.healthy import Baseline
+from wearstate.diagnose.feature_rows.probe_means import probe_means
+from wearstate.diagnose.nameplate.nameplate import nameplate_of
+from wearstate.diagnose.report.film import film_estimate
 
 SEED = 5
 

@@ -11,13 +11,19 @@ import argparse
 from dataclasses import dataclass
 
 import numpy as np
-from wearstate.datasets.record import DataSet
-from wearstate.datasets.splits import group_split
-from wearstate.diagnose.conformal import grade_limits, grade_set, interval, scale_inputs, tails
-from wearstate.diagnose.grades import grades_of
-from wearstate.diagnose.novelty import novelty_p_value
-from wearstate.diagnose.tabulate import feature_table
-from wearstate.diagnose.train import Lesson, learn
+from wearstate.datasets.file.record import DataSet
+from wearstate.datasets.split.rules import group_split
+from wearstate.diagnose.feature_rows.feature_table import feature_table
+from wearstate.diagnose.learning.conformal import (
+    grade_limits,
+    grade_set,
+    interval,
+    scale_inputs,
+    tails,
+)
+from wearstate.diagnose.learning.grades import grades_of
+from wearstate.diagnose.wear_model.novelty import novelty_p_value
+from wearstate.diagnose.wear_model.train import Lesson, learn
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,9 +9,9 @@ the number of starts is doubled until their standard error is a third of what is
 from functools import cache
 
 import numpy as np
-from wearstate.features.spectrum import band_edges, band_levels
-from wearstate.sim.assemble import simulate
-from wearstate.sim.scene import load_scene
+from wearstate.features.signal.spectrum import band_edges, band_levels
+from wearstate.sim.machine.simulate import simulate
+from wearstate.sim.scene.load import load_scene
 
 LEVEL_TOLERANCE = 0.2  # dB, a change of 2.3 %
 PEAK_TOLERANCE = 0.02

@@ -15,19 +15,19 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from wearstate.datasets.generate import generate
-from wearstate.diagnose.evaluate import evaluate_model
-from wearstate.diagnose.evaluate_figure import save_evaluation
-from wearstate.diagnose.evaluate_splits import (
+from wearstate.datasets.generation.generate import generate
+from wearstate.diagnose.evaluation.evaluate import evaluate_model
+from wearstate.diagnose.evaluation.figure import save_evaluation
+from wearstate.diagnose.evaluation.splits import (
     ALL_SPLITS,
     OWN,
     case_of,
     evaluate_splits,
     one_split,
 )
-from wearstate.diagnose.evaluate_text import best_baseline, splits_text
-from wearstate.diagnose.scores import Figure, verdict_of
-from wearstate.diagnose.train import train_model
+from wearstate.diagnose.evaluation.text import best_baseline, splits_text
+from wearstate.diagnose.learning.scores import Figure, verdict_of
+from wearstate.diagnose.wear_model.train import train_model
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -25,15 +25,15 @@ from typing import Any
 
 import numpy as np
 from foreign_records import Program, write_records
-from wearstate.datasets.generate import generate
-from wearstate.datasets.record import DataSet
-from wearstate.diagnose.estimate import Estimate, WearModel
-from wearstate.diagnose.evaluate import judge_rows, judged_rows
-from wearstate.diagnose.feature_choice import choice_in
-from wearstate.diagnose.healthy import Baselines, references
-from wearstate.diagnose.modelfile import load_model, save_model
-from wearstate.diagnose.scores import Figure, Judged, resampled, share
-from wearstate.diagnose.train import train_model
+from wearstate.datasets.file.record import DataSet
+from wearstate.datasets.generation.generate import generate
+from wearstate.diagnose.evaluation.evaluate import judge_rows, judged_rows
+from wearstate.diagnose.feature_rows.feature_choice import choice_in
+from wearstate.diagnose.feature_rows.healthy import Baselines, references
+from wearstate.diagnose.learning.scores import Figure, Judged, resampled, share
+from wearstate.diagnose.wear_model.estimate import Estimate, WearModel
+from wearstate.diagnose.wear_model.file import load_model, save_model
+from wearstate.diagnose.wear_model.train import train_model
 
 PROGRAMS = {
     "bilge-pump": {"A": "foreign_pump.PUMP_A", "B": "foreign_exudyn.PUMP_B"},

@@ -74,7 +74,7 @@ from foreign_records import Job, Program
 from foreign_ross_line import NoBalanceError, Rest, balance, beam, coupling_spring, pedestals
 from scipy import fft
 from scipy.linalg import solve_banded
-from wearstate.datasets.record import Channel
+from wearstate.datasets.file.record import Channel
 
 DIFFERENCES = (
     *("grooves", "scar", "thermal", "bores", "coupling"),

@@ -23,10 +23,10 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from wearstate.datasets import generate as generation
-from wearstate.datasets.recipe import Recipe, load_recipe, sample_records
-from wearstate.datasets.record import DataSet, DataSetWriter
-from wearstate.datasets.workers import in_order
+from wearstate.datasets.file.record import DataSet, DataSetWriter
+from wearstate.datasets.generation import generate as generation
+from wearstate.datasets.recipe.recipe import Recipe, load_recipe, sample_records
+from wearstate.datasets.workers.local import in_order
 
 RECIPE, SHORT = "bilge-pump-narrow", "journal-bearing-small"
 

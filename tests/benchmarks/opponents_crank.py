@@ -18,10 +18,10 @@ from pathlib import Path
 import numpy as np
 from numba import njit
 from scipy.integrate import odeint, solve_ivp
-from wearstate.sim import crank_setup
-from wearstate.sim.contact import RELEASE_AT_ZERO_FORCE, RELEASE_AT_ZERO_PENETRATION
-from wearstate.sim.scene import load_scene
-from wearstate.sim.slider_crank import CRANKPIN, run_mechanism
+from wearstate.sim.contact.law import RELEASE_AT_ZERO_FORCE, RELEASE_AT_ZERO_PENETRATION
+from wearstate.sim.pump import setup as crank_setup
+from wearstate.sim.pump.slider_crank import CRANKPIN, run_mechanism
+from wearstate.sim.scene.load import load_scene
 
 SAMPLES_PER_REVOLUTION = 256  # three a contact period; every fixed step divides it
 HORIZONS = (0.25, 0.5)  # revolutions

@@ -13,9 +13,9 @@ from fractions import Fraction
 
 import numpy as np
 from scipy.signal import resample_poly
-from wearstate.datasets.record import DataSet
-from wearstate.diagnose.modelfile import load_model
-from wearstate.diagnose.train import train_model
+from wearstate.datasets.file.record import DataSet
+from wearstate.diagnose.wear_model.file import load_model
+from wearstate.diagnose.wear_model.train import train_model
 
 
 def changed(recording, name, change):
@@ -100,7 +100,7 @@ def silent_tacho(recording, rng):
 
 def lossy_tacho(recording, _rng):
     """Every third pulse is missing."""
-    from wearstate.features.order import pulse_times
+    from wearstate.features.rotation.order import pulse_times
 
     row = recording.tacho_signal.copy()
     pulses = (pulse_times(row, recording.sample_rate) * recording.sample_rate).astype(int)

@@ -12,9 +12,9 @@ import time
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from wearstate.diagnose.modelfile import load_model
-from wearstate.diagnose.report_batch import judge_all, recordings_in
-from wearstate.diagnose.report_page import batch_html
+from wearstate.diagnose.report.batch import judge_all, recordings_in
+from wearstate.diagnose.report.page import batch_html
+from wearstate.diagnose.wear_model.file import load_model
 
 COLD_S, EACH_MS, GROWTH_MB = 3.0, 50.0, 50.0
 WARM = 20  # recordings, before time and memory are taken

@@ -19,10 +19,10 @@ from pathlib import Path
 
 import numpy as np
 from scipy.signal import resample_poly
-from wearstate.datasets.importers import read_recording
-from wearstate.datasets.record import DataError, DataSet
-from wearstate.diagnose.modelfile import load_model
-from wearstate.sim.sensor import tacho_pulses
+from wearstate.datasets.file.record import DataError, DataSet
+from wearstate.datasets.measured.recording import read_recording
+from wearstate.diagnose.wear_model.file import load_model
+from wearstate.sim.output.sensor import tacho_pulses
 
 MEASURED_SPEED_HZ = 25.0  # of every MFPT recording
 PULSE_WIDTH = 1 / 36  # of a revolution

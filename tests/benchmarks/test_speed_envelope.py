@@ -4,7 +4,7 @@ import time
 
 import numpy as np
 import pytest
-from wearstate.features.envelope import (
+from wearstate.features.signal.envelope import (
     cyclic_coherence,
     envelope_spectrum,
     fault_line,

@@ -9,11 +9,11 @@ from functools import partial
 
 import numpy as np
 import pytest
-from wearstate.features.analysis import Settings
-from wearstate.features.envelope import bearing_frequencies
-from wearstate.features.table import feature_row
-from wearstate.sim.assemble import simulate
-from wearstate.sim.scene import load_scene
+from wearstate.features.catalogue.analysis import Settings
+from wearstate.features.catalogue.row import feature_row
+from wearstate.features.signal.envelope import bearing_frequencies
+from wearstate.sim.machine.simulate import simulate
+from wearstate.sim.scene.load import load_scene
 
 FS = 25_600.0
 BEARING = bearing_frequencies(9, 0.3126, 1.537)

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from wearstate.features import fft, iso, spectral_shape, spectrum, statistics, third_octave
-from wearstate.features.cepstrum import harmonic_spacing
+from wearstate.features.signal import fft, iso, spectral_shape, spectrum, statistics, third_octave
+from wearstate.features.signal.cepstrum import harmonic_spacing
 
 FS = 25_600.0
 

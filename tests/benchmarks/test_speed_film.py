@@ -10,9 +10,9 @@ import time
 
 import numpy as np
 import pytest
-from wearstate.sim.film import FilmGeometry, FilmState, direct_film, mesh_error
-from wearstate.sim.film_direct import ITERATIONS, STATUS, WARM, DirectFilm, direct_force, residual
-from wearstate.sim.film_relax import PAPER_RELAXATION, relaxed_force
+from wearstate.sim.film.direct import ITERATIONS, STATUS, WARM, DirectFilm, direct_force, residual
+from wearstate.sim.film.over_relaxed import PAPER_RELAXATION, relaxed_force
+from wearstate.sim.film.solve import FilmGeometry, FilmState, direct_film, mesh_error
 from wearstate.sim.jit import kernel
 
 CALLS = 50

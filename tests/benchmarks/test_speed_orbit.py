@@ -13,11 +13,11 @@ import time
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from wearstate.sim.film import FilmGeometry, direct_film
-from wearstate.sim.film_relax import PAPER_RELAXATION, relaxed_force
-from wearstate.sim.impedance import impedance_map
+from wearstate.sim.film.impedance_map import impedance_map
+from wearstate.sim.film.over_relaxed import PAPER_RELAXATION, relaxed_force
+from wearstate.sim.film.solve import FilmGeometry, direct_film
 from wearstate.sim.jit import kernel
-from wearstate.sim.orbit import load, map_film, run_orbit, solved_film, step_history
+from wearstate.sim.journal.orbit import load, map_film, run_orbit, solved_film, step_history
 
 ALPHA, WEIGHT, JUMP = 0.83537, 0.3972, 16 * math.pi
 STEP, STEPS, TOLERANCE = 0.02, 7000, 1e-5

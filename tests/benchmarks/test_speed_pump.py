@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy import signal
-from wearstate.sim.assemble import simulate
-from wearstate.sim.casing import decimate, decimation_filter, edge_samples
-from wearstate.sim.integrate import Status
-from wearstate.sim.scene import load_scene
+from wearstate.sim.machine.simulate import simulate
+from wearstate.sim.output.solution import Status
+from wearstate.sim.pump.casing import decimate, decimation_filter, edge_samples
+from wearstate.sim.scene.load import load_scene
 
 
 def test_speed_of_the_low_pass_against_scipy(benchmark):

@@ -26,13 +26,13 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from threadpoolctl import threadpool_limits
-from wearstate.sim.alignment import AlignmentLine, Seat, influence, reactions
-from wearstate.sim.assemble import recorder, simulate
-from wearstate.sim.beam import Disc, Section, assemble_beam
-from wearstate.sim.ladder import admissible, effects_of, with_values
-from wearstate.sim.rotor import Rotor, Support
-from wearstate.sim.scene import load_scene
-from wearstate.sim.shaft_response import (
+from wearstate.sim.alignment.alignment import AlignmentLine, Seat, influence, reactions
+from wearstate.sim.beam.beam import Disc, Section, assemble_beam
+from wearstate.sim.beam.rotor import Rotor, Support
+from wearstate.sim.fidelity.ladder import admissible, effects_of, with_values
+from wearstate.sim.machine.simulate import recorder, simulate
+from wearstate.sim.scene.load import load_scene
+from wearstate.sim.shaft.response import (
     Broadband,
     Harmonic,
     free_basis,

@@ -1,0 +1,586 @@
+"""Whether a data set file is what it says: every hash, range, group and duplicate.
+
+A fault is a thing that makes a label or a signal wrong. A note is what a user ought to know.
+"""
+
+import math
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...sim.wear.archard import grade
+from ..file.record import DataError, DataSet, signal_checksum
+from ..recipe.draws import Range
+from ..recipe.recipe import Recipe, recorded_recipe
+from ..split.rules import check_no_leak
+from .plausibility import doubts_of, scene_in
+
+Flags = NDArray[np.bool_]
+
+_ROUNDING = 1e-9  # of bounds that were converted from other units
+
+
+@dataclass(frozen=True, kw_only=True)
+class Finding:
+    """One thing found.
+
+    Attributes
+    ----------
+    severity : {"fault", "note"}
+        Whether it makes the file unsound.
+    check : str
+        What was looked at.
+    text : str
+        What is wrong, and the cure.
+    records : tuple of int
+        Where; empty if it is about the file.
+    """
+
+    severity: Literal["fault", "note"]
+    check: str
+    text: str
+    records: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Checked:
+    """What came of checking a file.
+
+    Attributes
+    ----------
+    path : Path
+        The file.
+    n_records, n_failed : int
+        Records in it, and those whose status is not ``ok``; 0 where it could not be opened.
+    n_bytes : int
+        Of signal that was read.
+    findings : tuple of Finding
+        Faults first.
+    """
+
+    path: Path
+    n_records: int
+    n_failed: int
+    n_bytes: int
+    findings: tuple[Finding, ...]
+
+    @property
+    def sound(self) -> bool:
+        """No fault was found."""
+        return all(finding.severity != "fault" for finding in self.findings)
+
+
+def check_set(path: str | Path, *, progress: Callable[[int, int], None] | None = None) -> Checked:
+    """Check a data set file, every record of it.
+
+    Parameters
+    ----------
+    path : str or Path
+        A finished file.
+    progress : callable, optional
+        Called with (records read, records in all).
+
+    Returns
+    -------
+    Checked
+
+    Raises
+    ------
+    DataError
+        There is no such file.
+
+    Notes
+    -----
+    Memory holds the manifest and one record. A file that cannot be opened has that as its only
+    finding. Hidden quantities (``truth``) have no checksum and are not looked at.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from wearstate.datasets.generation.generate import generate
+    >>> from wearstate.datasets.recipe.recipe import load_recipe
+    >>> recipe = load_recipe("journal-bearing-small", {"duration": "0.05 s"})
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     made = generate(recipe, 2, Path(folder) / "data.h5")
+    ...     check_set(made.path).sound
+    True
+    """
+    place = Path(path).absolute()
+    if not place.is_file():
+        raise DataError(f"{place} is no file; check the path")
+    try:
+        data = DataSet(place)
+    except DataError as error:
+        texts = [text.removeprefix(f"{place}: ") for text in str(error).split("\n")]
+        found = tuple(Finding(severity="fault", check="file", text=text) for text in texts)
+        return Checked(path=place, n_records=0, n_failed=0, n_bytes=0, findings=found)
+    with data:
+        signals = _read_signals(data, progress)
+        seen = _Seen(data, signals)
+        findings = [finding for check in _CHECKS for finding in check(seen)]
+    return Checked(
+        path=place,
+        n_records=len(data),
+        n_failed=int(np.count_nonzero(~seen.ok)),
+        n_bytes=signals.n_bytes,
+        findings=tuple(sorted(findings, key=lambda finding: finding.severity)),
+    )
+
+
+# --- what is looked at --------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Signals:
+    """What the signals showed [shape=(n_records,)]."""
+
+    damaged: Flags
+    infinite: Flags
+    zero: Flags
+    constant: Flags
+    n_bytes: int
+    doubts: Mapping[str, Sequence[tuple[int, str]]]  # check -> records and what is told of each
+
+
+def _read_signals(data: DataSet, progress: Callable[[int, int], None] | None) -> _Signals:
+    """Look at every signal once, in the order of the file."""
+    n = len(data)
+    flags = np.zeros((4, n), dtype=bool)
+    doubts: dict[str, list[tuple[int, str]]] = {}
+    scene, speeds = scene_in(data.attributes), _speeds(data.rows)
+    n_bytes = 0
+    checksums = data.rows["signal_crc32"]
+    for index in range(n):
+        try:
+            signal = data.stored_signal(index)
+        except DataError:
+            flags[0, index] = True
+        else:
+            flags[:, index] = _signal_flags(signal, int(checksums[index]))
+            n_bytes += signal.nbytes
+            if not flags[:2, index].any() and data.rows["status"][index] == b"ok":
+                for doubt in doubts_of(signal, data.attributes, scene, speeds[index]):
+                    doubts.setdefault(doubt.check, []).append((index, doubt.text))
+        if progress is not None:
+            progress(index + 1, n)
+    damaged, infinite, zero, constant = flags
+    return _Signals(
+        damaged=damaged,
+        infinite=infinite,
+        zero=zero,
+        constant=constant,
+        n_bytes=n_bytes,
+        doubts=doubts,
+    )
+
+
+def _speeds(rows: NDArray[np.void]) -> NDArray[np.float64]:
+    """Speed of every record by the manifest, its mean before the one set [Hz]; NaN without."""
+    found = np.full(len(rows), math.nan)
+    for name in _SPEEDS:  # the last one has the last word
+        if name in (rows.dtype.names or ()):
+            told = np.asarray(rows[name], dtype=float)
+            known = np.isfinite(told) & (told > 0)
+            found[known] = told[known]
+    return found
+
+
+def _signal_flags(signal: NDArray[np.float32], checksum: int) -> tuple[bool, bool, bool, bool]:
+    low, high = signal.min(axis=1), signal.max(axis=1)  # not finite where a sample is not
+    still = low == high
+    return (
+        signal_checksum(signal) != checksum,
+        not bool(np.isfinite(low).all() and np.isfinite(high).all()),
+        bool(still.all() and not low.any()),
+        bool(still.any()),
+    )
+
+
+class _Seen:
+    """A file with what its signals showed and what its recipe says."""
+
+    def __init__(self, data: DataSet, signals: _Signals) -> None:
+        self.data = data
+        self.head = data.attributes
+        self.signals = signals
+        self.rows = data.rows
+        self.columns = data.rows.dtype.names or ()
+        self.ok: Flags = data.rows["status"] == b"ok"
+        self.simulated = self.head.origin == "simulated"
+
+    @cached_property
+    def recipe(self) -> Recipe | str:
+        """The recipe, or why the texts in the file give none; empty where there is no text."""
+        if not self.head.recipe:
+            return ""
+        try:
+            return recorded_recipe(self.head.scene, self.head.recipe, self.head.overrides)
+        except ValueError as error:
+            return " ".join(str(error).split())
+
+    def numbers(self, name: str) -> NDArray[np.float64]:
+        """A column as floats."""
+        return np.asarray(self.rows[name], dtype=float)
+
+
+def _at(flags: Any) -> tuple[int, ...]:
+    return tuple(np.flatnonzero(flags).tolist())
+
+
+def _fault(check: str, text: str, flags: Any) -> Iterator[Finding]:
+    """A fault of the flagged records, if there are any."""
+    if np.any(flags):
+        yield Finding(severity="fault", check=check, text=text, records=_at(flags))
+
+
+def _note(check: str, text: str, flags: Any) -> Iterator[Finding]:
+    if np.any(flags):
+        yield Finding(severity="note", check=check, text=text, records=_at(flags))
+
+
+# --- checks -------------------------------------------------------------------------------------
+
+
+def _check_hashes(seen: _Seen) -> Iterator[Finding]:
+    if seen.data.unhashed:
+        text = (
+            f"the file has no {' and no '.join(seen.data.unhashed)}, so that altered labels are "
+            "not found; it was made before there were such: export it to .h5 to add them"
+        )
+        yield Finding(severity="note", check="hash", text=text)
+
+
+def _check_signals(seen: _Seen) -> Iterator[Finding]:
+    signals = seen.signals
+    yield from _fault(
+        "checksum",
+        "signal does not fit its checksum; take an intact copy",
+        signals.damaged,
+    )
+    intact = ~signals.damaged
+    yield from _fault(
+        "signal", "has samples that are not finite; generate anew", signals.infinite & intact
+    )
+    silent = signals.zero & intact & seen.ok
+    yield from _fault("signal", "is zero throughout while its status is ok; generate anew", silent)
+    yield from _note(
+        "signal",
+        "has a channel that never changes; look at the sensor",
+        signals.constant & intact & seen.ok & ~silent,
+    )
+
+
+def _check_equal_signals(seen: _Seen) -> Iterator[Finding]:
+    """Records that are the same, byte for byte, whatever their labels."""
+    usable = seen.ok & ~seen.signals.damaged & ~seen.signals.zero
+    first: dict[int, list[int]] = {}
+    equal = np.zeros(len(usable), dtype=bool)
+    apart = False
+    groups = seen.rows["group"]
+    checksums = seen.rows["signal_crc32"].tolist()
+    for index in np.flatnonzero(usable).tolist():
+        others = first.setdefault(checksums[index], [])
+        # of 100,000 records two have the same checksum by chance: look at them
+        twin = next((other for other in others if _same_signal(seen.data, other, index)), None)
+        if twin is None:
+            others.append(index)
+        else:
+            equal[[twin, index]] = True
+            apart |= bool(groups[twin] != groups[index])
+    where = "also across groups, which leaks into every split; " if apart else ""
+    yield from _fault("duplicate", f"signal is that of another record; {where}keep one", equal)
+
+
+def _same_signal(data: DataSet, one: int, other: int) -> bool:
+    return np.array_equal(data.stored_signal(one), data.stored_signal(other))
+
+
+def _check_identities(seen: _Seen) -> Iterator[Finding]:
+    for name in ("record_id", "seed"):
+        if name == "seed" and not seen.simulated:
+            continue  # a measured record has none
+        values, inverse, counts = np.unique(
+            seen.rows[name], return_inverse=True, return_counts=True
+        )
+        del values
+        yield from _fault(
+            "duplicate",
+            f"{name} is that of another record, must be its own; generate or import anew",
+            counts[inverse] > 1,
+        )
+
+
+def _check_status(seen: _Seen) -> Iterator[Finding]:
+    failed = Counter(
+        status.decode(errors="replace") for status in seen.rows["status"][~seen.ok].tolist()
+    )
+    if failed:
+        kinds = ", ".join(f"{count} {status}" for status, count in failed.most_common())
+        severity: Literal["fault", "note"] = "note" if seen.ok.any() else "fault"
+        text = f"not to be used, by their status: {kinds}"
+        yield Finding(severity=severity, check="status", text=text, records=_at(~seen.ok))
+
+
+def _check_numbers(seen: _Seen) -> Iterator[Finding]:
+    """Finite, known where they must be, and of the right sign."""
+    for name in seen.columns:
+        if seen.rows.dtype[name].kind != "f":
+            continue
+        values = seen.numbers(name)
+        yield from _fault(
+            "number", f"{name} is infinite; generate or import anew", np.isinf(values)
+        )
+        if name in _must_be_known(seen):
+            text = f"{name} is not a number, must be known; generate anew"
+            yield from _fault("number", text, np.isnan(values) & seen.ok)
+    for name in [name for name in seen.head.severities if name in seen.columns]:
+        yield from _fault("number", f"{name} must be >= 0; mend the label", seen.rows[name] < 0)
+    for name in [name for name in _SPEEDS if name in seen.columns]:
+        wrong = seen.ok & (seen.rows[name] <= 0)
+        yield from _fault("number", f"{name} must be > 0; mend the label", wrong)
+
+
+_SPEEDS = ("speed_hz", "mean_speed_hz")
+
+
+def _must_be_known(seen: _Seen) -> frozenset[str]:
+    """Columns in which a simulated record has no gap; of a measured one anything may be unknown."""
+    if not seen.simulated:
+        return frozenset()
+    drawn = frozenset(seen.recipe.columns) if isinstance(seen.recipe, Recipe) else frozenset()
+    return (drawn | frozenset(seen.head.severities)) - _MAY_END
+
+
+_MAY_END = frozenset({"remaining_life_h"})  # unknown where maintenance keeps it from its end
+
+
+def _check_grades(seen: _Seen) -> Iterator[Finding]:
+    grades = np.asarray(seen.rows["grade"], dtype=int)
+    yield from _fault(
+        "grade", "grade must be -1 to 3; mend the label", (grades < -1) | (grades > 3)
+    )
+    edges = seen.head.grade_edges
+    if not edges or not seen.head.severities:
+        return
+    name = seen.head.severities[0]
+    values = seen.numbers(name)
+    known = np.isfinite(values) & (values >= 0)
+    wanted = np.array([grade(v, edges) if k else -1 for v, k in zip(values, known, strict=True)])
+    shown = ", ".join(f"{edge:g}" for edge in edges)
+    text = f"grade must be what {name} and the limits {shown} m make it; mend the label"
+    yield from _fault("grade", text, known & (grades != wanted))
+
+
+def _check_recipe(seen: _Seen) -> Iterator[Finding]:
+    """Every drawn value within what its recipe says."""
+    recipe = seen.recipe
+    if isinstance(recipe, str):
+        if recipe:
+            text = f"ranges and groups are not checked against the recipe in the file: {recipe}"
+            yield Finding(severity="note", check="range", text=text)
+        return
+    for column, bands in _bands(recipe).items():
+        if column in seen.columns:
+            values = seen.numbers(column)
+            outside = np.isfinite(values) & ~_within(values, bands)
+            text = f"{column} must be within {_bands_text(bands)} of the recipe; generate anew"
+            yield from _fault("range", text, outside)
+    yield from _check_confounders(seen, recipe)
+    yield from _check_groups(seen, recipe)
+
+
+Bands = Sequence[tuple[float, float]]
+
+
+def _bands(recipe: Recipe) -> dict[str, Bands]:
+    """Manifest column -> ranges that it was drawn from."""
+    found: dict[str, Bands] = {wear.column: wear.axis.bands for wear in recipe.severities}
+    columns = {path: column for column, path in recipe.conditions.items()}
+    for axis in (*recipe.machine, *recipe.record):
+        if isinstance(axis, Range) and axis.path in columns:
+            found[columns[axis.path]] = axis.bands
+    return found
+
+
+def _within(values: NDArray[np.float64], bands: Bands) -> Flags:
+    inside = np.zeros(values.shape, dtype=bool)
+    for low, high in bands:
+        room = _ROUNDING * max(abs(low), abs(high))
+        inside |= (values >= low - room) & (values <= high + room)
+    return inside
+
+
+def _bands_text(bands: Bands) -> str:
+    return " or ".join(f"{low:.6g} to {high:.6g}" for low, high in bands)
+
+
+def _check_confounders(seen: _Seen, recipe: Recipe) -> Iterator[Finding]:
+    """Value of a fault in its range where it is present, 0 where it is absent."""
+    for fault in recipe.faults:
+        presence, value = fault.columns
+        if not {presence, value} <= set(seen.columns):
+            continue
+        present = np.asarray(seen.rows[presence], dtype=bool)
+        values = seen.numbers(value)
+        bands = [band for axis in fault.axes for band in axis.bands]
+        wrong = np.where(present, ~_within(values, bands), values != 0)
+        text = (
+            f"{value} must be within {_bands_text(bands)} where {presence}, else 0; generate anew"
+        )
+        yield from _fault("range", text, wrong)
+
+
+def _check_groups(seen: _Seen, recipe: Recipe) -> Iterator[Finding]:
+    """What is drawn per machine is the same in all records of a machine."""
+    most = recipe.table.records_per_group
+    groups, inverse, counts = np.unique(seen.rows["group"], return_inverse=True, return_counts=True)
+    text = f"group has more than the {most} record(s) that the recipe says; generate anew"
+    yield from _fault("group", text, counts[inverse] > most)
+    for name in _machine_columns(recipe) & set(seen.columns):
+        values = seen.numbers(name)
+        first = np.full(len(groups), math.nan)
+        first[inverse[::-1]] = values[::-1]  # the first record of each group is written last
+        text = f"{name} is drawn per machine, must be one in a group; generate anew"
+        differs = np.isfinite(values) & (values != first[inverse])
+        yield from _fault("group", text, np.isin(inverse, inverse[differs]))
+
+
+def _check_lives(seen: _Seen) -> Iterator[Finding]:
+    """Records of a machine in the order in which it aged."""
+    if _HOURS in seen.columns:
+        hours, groups = seen.numbers(_HOURS), seen.rows["group"]
+        back = (groups[1:] == groups[:-1]) & (hours[1:] < hours[:-1])
+        text = f"{_HOURS} must not fall from record to record of a group; generate anew"
+        yield from _fault("group", text, np.append(False, back))
+
+
+_HOURS = "operating_hours"
+
+
+def _machine_columns(recipe: Recipe) -> set[str]:
+    paths = {axis.path for axis in recipe.machine}
+    conditions = {column for column, path in recipe.conditions.items() if path in paths}
+    per_machine = [fault for fault in recipe.faults if fault.table.per == "machine"]
+    return conditions | {column for fault in per_machine for column in fault.columns}
+
+
+def _check_splits(seen: _Seen) -> Iterator[Finding]:
+    """Every split of the file: a side for every record, and machines apart where it says so."""
+    try:
+        for name, about in seen.data.splits.items():
+            train, test = seen.data.split(name)
+            if about.get("machines_apart"):
+                check_no_leak(seen.rows["group"], train, test)
+    except DataError as error:
+        text = str(error).removeprefix(f"{seen.data.path}: ")
+        yield Finding(severity="fault", check="split", text=text)
+
+
+def _check_clipped(seen: _Seen) -> Iterator[Finding]:
+    if "clipped_samples" in seen.columns:
+        text = "holds samples at the end of the converter's range, as a real sensor would"
+        yield from _note("clipped", text, seen.rows["clipped_samples"] > 0)
+
+
+def _check_plausible(seen: _Seen) -> Iterator[Finding]:
+    """Records that are whole, and hardly meant; one that never changes has a note of its own."""
+    for check, found in seen.signals.doubts.items():
+        if check != "still":
+            records, texts = zip(*found, strict=True)
+            where = f"{check}, such as record {records[0]}" if len(found) > 1 else check
+            text = f"{where}: {texts[0]}"
+            yield Finding(severity="note", check="plausible", text=text, records=records)
+
+
+_CHECKS: tuple[Callable[[_Seen], Iterator[Finding]], ...] = (
+    _check_hashes,
+    _check_signals,
+    _check_equal_signals,
+    _check_identities,
+    _check_status,
+    _check_numbers,
+    _check_grades,
+    _check_recipe,
+    _check_lives,
+    _check_splits,
+    _check_clipped,
+    _check_plausible,
+)
+"""Every check; a new one is one function and one row."""
+
+
+# --- words --------------------------------------------------------------------------------------
+
+_SHOWN = 5  # records of a finding in a line
+_MOST_RECORDS = 1000  # of a finding in JSON
+
+
+def checked_table(checked: Checked) -> dict[str, Any]:
+    """What was found, ready for JSON.
+
+    Returns
+    -------
+    dict
+        ``path``, ``sound``, counts, and ``findings``, each with ``count`` and the first 1,000 of
+        its ``records``.
+    """
+    return {
+        "path": str(checked.path),
+        "sound": checked.sound,
+        "records": checked.n_records,
+        "failed": checked.n_failed,
+        "signal_bytes": checked.n_bytes,
+        "findings": [
+            {
+                "severity": finding.severity,
+                "check": finding.check,
+                "text": finding.text,
+                "count": len(finding.records),
+                "records": list(finding.records[:_MOST_RECORDS]),
+            }
+            for finding in checked.findings
+        ],
+    }
+
+
+def checked_text(table: Mapping[str, Any]) -> str:
+    """What was found, for people: the verdict, then a line for every finding.
+
+    Parameters
+    ----------
+    table : mapping
+        From :func:`checked_table`.
+
+    Examples
+    --------
+    >>> finding = {"severity": "fault", "check": "checksum", "text": "damaged", "count": 1}
+    >>> table = {"path": "a.h5", "records": 3, "failed": 0, "signal_bytes": 2e6, "sound": False}
+    >>> print(checked_text({**table, "findings": [{**finding, "records": [2]}]}))
+    a.h5: NOT SOUND: 1 fault(s), 0 note(s) in 3 records (0 failed), 2.0 MB of signal
+    fault  checksum   record 2: damaged
+    """
+    findings = table["findings"]
+    faults = sum(finding["severity"] == "fault" for finding in findings)
+    verdict = "sound" if table["sound"] else "NOT SOUND"
+    head = (
+        f"{table['path']}: {verdict}: {faults} fault(s), {len(findings) - faults} note(s) in "
+        f"{table['records']} records ({table['failed']} failed), "
+        f"{table['signal_bytes'] / 1e6:.1f} MB of signal"
+    )
+    return "\n".join([head, *(_finding_line(finding) for finding in findings)])
+
+
+def _finding_line(finding: Mapping[str, Any]) -> str:
+    where = ""
+    if finding["count"]:
+        more = finding["count"] - _SHOWN
+        shown = ", ".join(map(str, finding["records"][:_SHOWN]))
+        where = f"record{'s' if finding['count'] > 1 else ''} {shown}"
+        where += f" and {more} more: " if more > 0 else ": "
+    return f"{finding['severity']:5}  {finding['check']:9}  {where}{finding['text']}"

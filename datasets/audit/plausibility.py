@@ -1,0 +1,128 @@
+"""What of a record is hardly meant: the checks of :mod:`.plausibility`, for files."""
+
+import json
+import math
+
+from ...features.rotation.order import pulse_times
+from ...sim.scene.load import scene_from_table
+from ...sim.scene.parts import Scene
+from ...sim.scene.plausibility import (
+    Doubt,
+    Seen,
+    Signal,
+    record_doubts,
+    scene_doubts,
+    sensor_limits,
+)
+from ..file.record import Attributes, Recording
+from ..recipe.recipe import recorded_scene
+
+
+def scene_in(head: Attributes) -> Scene | None:
+    """Scene of a file, before anything was drawn; None where it holds none.
+
+    Examples
+    --------
+    >>> from wearstate.sim.output.sensor import Channel
+    >>> channel = Channel(name="acc", unit="m/s^2", quantity="acceleration")
+    >>> scene_in(Attributes(sample_rate=1e3, channels=(channel,), origin="measured")) is None
+    True
+    """
+    if not head.scene:
+        return None
+    try:
+        if head.scene.startswith("{"):  # one recording, its scene as it was run
+            return scene_from_table(json.loads(head.scene))
+        return recorded_scene(head.scene, head.recipe, head.overrides)
+    except ValueError:  # of another version; the check of the recipe tells
+        return None
+
+
+def doubts_of(
+    signal: Signal, head: Attributes | Recording, scene: Scene | None, speed_hz: float
+) -> tuple[Doubt, ...]:
+    """What of one record is hardly meant.
+
+    Parameters
+    ----------
+    signal : numpy.ndarray [shape=(n_channels, n_samples)]
+        Finite.
+    head : Attributes or Recording
+        Names its rate, channels and tacho.
+    scene : Scene or None
+        Whose sensors it was recorded with.
+    speed_hz : float
+        Of the shaft by the manifest; NaN where unknown, then it is counted by the tacho.
+
+    Returns
+    -------
+    tuple of Doubt
+    """
+    full_scale, noise = sensor_limits(scene) if scene is not None else ({}, {})
+    turns = speed_hz * signal.shape[1] / head.sample_rate
+    if not math.isfinite(turns) or turns <= 0:
+        turns = _counted_turns(signal, head)
+    return record_doubts(
+        Seen(
+            signal=signal,
+            sample_rate=head.sample_rate,
+            channels=head.channels,
+            tacho=head.tacho,
+            turns=turns,
+            full_scale=full_scale,
+            noise=noise,
+        )
+    )
+
+
+def _tacho_row(head: Attributes | Recording) -> int:
+    return [channel.name for channel in head.channels].index(str(head.tacho))
+
+
+def _counted_turns(signal: Signal, head: Attributes | Recording) -> float:
+    """Revolutions by the tacho; NaN without one, or where it has too few pulses to say."""
+    if head.tacho is None:
+        return math.nan
+    try:
+        pulses = pulse_times(signal[_tacho_row(head)], head.sample_rate)
+    except ValueError:  # no swing: told elsewhere
+        return math.nan
+    speed = (len(pulses) - 1) / head.pulses_per_revolution / float(pulses[-1] - pulses[0])
+    return float(speed * signal.shape[1] / head.sample_rate)
+
+
+def recording_doubts(
+    recording: Recording, scene: Scene | None = None, *, scene_too: bool = False
+) -> tuple[Doubt, ...]:
+    """What of a recording is hardly meant.
+
+    Parameters
+    ----------
+    recording : Recording
+    scene : Scene, optional
+        Whose sensors it was recorded with.
+    scene_too : bool
+        The scene is the one that was run, nothing drawn: doubts about it are of the recording too.
+
+    Returns
+    -------
+    tuple of Doubt
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from wearstate.sim.output.sensor import Channel
+    >>> channel = Channel(name="acc", unit="m/s^2", quantity="acceleration")
+    >>> short = Recording(
+    ...     signal=np.sin(np.arange(100.0))[None], sample_rate=100.0, channels=(channel,),
+    ...     row={"speed_hz": 6.0},
+    ... )
+    >>> [doubt.check for doubt in recording_doubts(short)]
+    ['few revolutions']
+    """
+    speed = recording.declared_speed_hz
+    found = doubts_of(recording.signal, recording, scene, math.nan if speed is None else speed)
+    if scene is None or not scene_too:
+        return found
+    told = {doubt.check for doubt in found}
+    return (*found, *(doubt for doubt in scene_doubts(scene) if doubt.check not in told))

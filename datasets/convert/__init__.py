@@ -1,0 +1,4 @@
+"""Whole data sets turned into others: merged, or exported to other formats.
+
+It may import ``sim.atomic``, ``datasets.file``, ``datasets.source``, ``datasets.measured``.
+"""

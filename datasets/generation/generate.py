@@ -1,0 +1,568 @@
+"""A recipe goes in, a labelled data set file comes out.
+
+Workers simulate, this process alone writes. A killed run is resumed by the same call.
+"""
+
+import signal
+import threading
+from collections import Counter
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from types import FrameType
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...sim.atomic import OutputError
+from ...sim.machine.simulate import simulate
+from ...sim.output.solution import Solution
+from ...sim.scene.parts import Scene, SceneError, channels_of
+from ...sim.wear.archard import grade
+from ..file.lock import holding
+from ..file.record import (
+    Attributes,
+    DataError,
+    DataSetWriter,
+    LostError,
+    WriteError,
+    refuse_output,
+    unfinished_attributes,
+)
+from ..recipe.recipe import (
+    LARGEST_SEED,
+    MOST_RECORDS,
+    Recipe,
+    Sample,
+    clearances,
+    condition_of,
+    load_recipe,
+    overrides_text,
+    sample_records,
+    wear_limits,
+)
+from ..recipe.text import RecipeError
+from ..split.stored import Drawn, default_splits, split_names
+from ..workers.local import in_order
+from ..workers.pool import WorkersError
+from .fidelity_choice import Choice, choose, with_choice
+
+NUMERICS = {
+    "rung_joint": "S16",
+    "rung_wristpin": "S16",
+    "rung_guide": "S16",
+    "rung_pressure": "S16",
+    "rung_drive": "S16",
+    "rung_film": "S16",
+    "contact_law": "S24",
+    "frf_sha256": "S64",
+    "mean_speed_hz": "<f8",
+    "step_s": "<f8",
+    "steps": "<i8",
+    "step_per_contact_time": "<f8",
+    "contact_changes": "<i8",
+    "cuts_refused": "<i8",
+    "peak_normal_force_n": "<f8",
+    "min_film_m": "<f8",
+    "peak_eccentricity": "<f8",
+    "least_reaction_n": "<f8",
+    "motion_share": "<f8",
+    "cavitating_share": "<f8",
+    "lift_left": "<f8",
+    "tension_share": "<f8",
+    "floored_share": "<f8",
+    "residual": "<f8",
+    "estimated_error": "<f8",
+    "stability_margin": "<f8",
+    "least_damping_ratio": "<f8",
+    "least_damped_hz": "<f8",
+    "clipped_samples": "<i8",
+}
+"""Manifest columns taken from a solution; -1, NaN or empty where it does not give them."""
+
+REFUSED = "refused"
+"""Status of a record whose drawn scene the simulation does not accept."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Summary:
+    """What a run of `generate` made.
+
+    Attributes
+    ----------
+    path : Path
+        The file.
+    n_records, n_groups : int
+        Records and machines in it.
+    n_resumed : int
+        Records that an earlier, interrupted run had written.
+    grades : dict of int to int
+        Records of each grade; -1 unknown.
+    failures : dict of str to int
+        Records of each status other than ``ok``; their signal is zero.
+    first_failures : tuple of str
+        Text of the first few failures of this run.
+    n_clipped : int
+        Records with saturated samples.
+    fidelity : Choice or None
+        Rungs that were chosen for the whole set, with what they save; None where they are as
+        written.
+    """
+
+    path: Path
+    n_records: int
+    n_groups: int
+    n_resumed: int
+    grades: dict[int, int]
+    failures: dict[str, int]
+    first_failures: tuple[str, ...]
+    n_clipped: int
+    fidelity: Choice | None = None
+
+
+@dataclass(frozen=True)
+class _Outcome:
+    """What a worker sends back: arrays and plain values only."""
+
+    index: int
+    signal: NDArray[np.float32]
+    row: dict[str, Any]
+    truth: dict[str, NDArray[np.float32]]
+    fault: str
+    refused: Sample | None = None
+
+
+class Stopped(KeyboardInterrupt):
+    """A run was stopped by hand; says what is kept and how to go on."""
+
+
+def generate(
+    recipe: str | Path | Recipe,
+    n: int | None,
+    path: str | Path,
+    *,
+    view: str = "",
+    seed: int = 0,
+    jobs: int = 1,
+    scheduler: str | None = None,
+    force: bool = False,
+    truth: bool = False,
+    fidelity: Literal["auto", "given"] | None = None,
+    progress: Callable[[int, int], None] | None = None,
+    say: Callable[[str], None] | None = None,
+) -> Summary:
+    """Simulate a labelled data set into a file.
+
+    Parameters
+    ----------
+    recipe : str, Path or Recipe
+        Built-in name, file, or a loaded recipe.
+    n : int or None
+        Records; None for the recipe's own number.
+    path : str or Path
+        File to write; ``<path>.part`` until finished. An unfinished file of the same call is
+        gone on with.
+    view : str
+        As of :func:`~.recipe.recipe.load_recipe`: record `i` of every view is of the same machine
+        state.
+    seed : int
+        Of the data set, >= 0. Record `i` depends on recipe, seed and `i` alone.
+    jobs : int
+        Processes that simulate, >= 1; no more are started than there are records. Signal and
+        manifest are the same for any number.
+    scheduler : str, optional
+        Address of a Dask scheduler, ``tcp://HOST:PORT``, whose workers simulate instead of `jobs`
+        processes here; the same bytes again, on processors of one kind.
+    force : bool
+        Replace an existing file and start an unfinished one anew.
+    truth : bool
+        Store the hidden quantities of each record.
+    fidelity : {"auto", "given"}, optional
+        Least rungs that the scene's accuracy needs, or those that are written; as the recipe says
+        by default, else as its scene does. Chosen once, and stored before the first record.
+    progress : callable, optional
+        Called with (records done, records in all) after each.
+    say : callable, optional
+        Called with a line about each pilot of the choice, and about workers.
+
+    Returns
+    -------
+    Summary
+        Counts of records, grades and failures.
+
+    Raises
+    ------
+    RecipeError
+        The recipe is at fault; nothing is written.
+    DataError
+        The file exists, another run is writing it, an unfinished one is of another run, `jobs` is
+        below one, there is no room, `scheduler` cannot be used, or every record failed (the file
+        stays, to be looked at).
+    WorkersError, WriteError
+        Workers or scheduler were lost, or the disk is full or failing. What is written stays in
+        the unfinished file, and the same call goes on with it.
+    LostError
+        The unfinished file was deleted, moved or replaced; nothing is kept.
+    OutputError
+        A file of that name appeared meanwhile; the finished one keeps the unfinished one's name.
+    Stopped
+        A KeyboardInterrupt came; as above.
+
+    Notes
+    -----
+    A record whose simulation fails keeps its row, with its status and a signal of zeros.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> recipe = load_recipe("bilge-pump-small", {"duration": "0.25 s"})
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     generate(recipe, 2, Path(folder) / "data.h5").n_groups
+    1
+    """
+    plan = recipe if isinstance(recipe, Recipe) else load_recipe(recipe, view=view)
+    count = plan.table.records if n is None else n
+    if jobs < 1:
+        raise DataError(f"jobs = {jobs} must be >= 1; give the number of cores")
+    _refuse_bounds(plan, count, seed)
+    if scheduler is not None:
+        from ..workers.cluster import refuse_scheduler
+
+        refuse_scheduler(scheduler)
+    output = Path(path).absolute()
+    refuse_output(output, force)
+    with holding(output, say):
+        choice = _chosen(plan, path, fidelity=fidelity, seed=seed, force=force, say=say)
+        plan = with_choice(plan, choice)
+        tally = _Tally(count, choice)
+        error = None if choice is None else choice.estimated_error
+        work = partial(_simulated, truth=truth, error=error)
+        with (
+            _writer(
+                plan, count, path, seed=seed, force=force, truth=truth, choice=choice
+            ) as writer,
+            _going_on(writer),
+        ):
+            tally.n_resumed = int(np.count_nonzero(writer.done))
+            samples = sample_records(plan, count, seed=seed, skip=writer.done.copy())
+            jobs = min(jobs, max(1, count - tally.n_resumed))
+            found = in_order(
+                work, samples, jobs=jobs, scheduler=scheduler, say=say, watch=writer.refuse_lost
+            )
+            with closing(found) as outcomes, _listening() as asked:
+                for outcome in outcomes:
+                    if scheduler is not None and outcome.refused is not None:
+                        _refuse_refusal(outcome, work)
+                    writer.write(outcome.index, outcome.signal, outcome.row, outcome.truth)
+                    tally.note(outcome)
+                    if progress is not None:
+                        progress(int(np.count_nonzero(writer.done)), count)
+                    if asked.is_set():
+                        raise KeyboardInterrupt
+            rows = writer.manifest()
+            _write_splits(writer, rows, plan, seed)
+            writer.finish()
+        return tally.summary(writer.path, rows)
+
+
+@contextmanager
+def _listening() -> Iterator[threading.Event]:
+    """Keep a Ctrl-C in mind: one that arrives in a callback, of HDF5 or a finaliser, is lost."""
+    asked = threading.Event()
+
+    def hear(number: int, frame: FrameType | None) -> None:
+        asked.set()
+        signal.default_int_handler(number, frame)
+
+    ours = threading.current_thread() is threading.main_thread()
+    if not ours or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+        yield asked
+        return
+    signal.signal(signal.SIGINT, hear)
+    try:
+        yield asked
+    finally:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+@contextmanager
+def _going_on(writer: DataSetWriter) -> Iterator[None]:
+    """Tell with whatever stops a run what is kept, and how to go on."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        raise Stopped(f"stopped; {_kept(writer)}") from None
+    except LostError:  # says itself that nothing is kept
+        raise
+    except (WorkersError, WriteError) as error:
+        raise type(error)(f"{error}; {_kept(writer)}") from error
+    except DataError:
+        writer.close()
+        if not writer.done.any():  # workers that cannot be used: nothing has begun
+            writer.part.unlink(missing_ok=True)
+        raise
+
+
+def _kept(writer: DataSetWriter) -> str:
+    try:
+        writer.refuse_lost()
+    except LostError as error:
+        return str(error)
+    kept = np.count_nonzero(writer.done)
+    return (
+        f"{kept} of {len(writer.done)} records are kept in {writer.part.name}: repeat the command "
+        "to go on"
+    )
+
+
+def _refuse_refusal(outcome: _Outcome, work: Callable[[Sample], _Outcome]) -> None:
+    """A worker elsewhere may only lack a file that the scene names: ask again here."""
+    if outcome.refused is not None and work(outcome.refused).refused is None:
+        raise WorkersError(
+            f"record {outcome.index} is refused by a worker ({outcome.fault}) and simulated here; "
+            "give the workers the files that the scene names, under the same path"
+        )
+
+
+def _chosen(
+    plan: Recipe,
+    path: str | Path,
+    *,
+    fidelity: str | None,
+    seed: int,
+    force: bool,
+    say: Callable[[str], None] | None,
+) -> Choice | None:
+    """The choice that an unfinished file already holds, or a new one; None for rungs as written."""
+    refuse_output(Path(path).absolute(), force)
+    wanted = fidelity or plan.table.fidelity or plan.scene.fidelity
+    if wanted == "given":
+        return None
+    begun = None if force else unfinished_attributes(path)
+    if begun is None:
+        return choose(plan, seed=seed, say=say)
+    if not begun.fidelity:
+        raise DataError(
+            f"{path}.part: fidelity = 'given', must be 'auto' to go on with it; repeat the command "
+            "that began it, or use force to start anew"
+        )
+    return Choice.load(begun.fidelity)
+
+
+def _refuse_bounds(plan: Recipe, count: int, seed: int) -> None:
+    faults = []
+    if not 1 <= count <= MOST_RECORDS:
+        faults.append(f"n = {count} must be >= 1 and <= {MOST_RECORDS}; choose a number between")
+    if not 0 <= seed <= LARGEST_SEED:
+        faults.append(f"seed = {seed} must be >= 0 and <= {LARGEST_SEED}; choose another")
+    if faults:
+        raise RecipeError(plan.name, faults)
+
+
+def _writer(
+    plan: Recipe,
+    count: int,
+    path: str | Path,
+    *,
+    seed: int,
+    force: bool,
+    truth: bool,
+    choice: Choice | None,
+) -> DataSetWriter:
+    return DataSetWriter(
+        path,
+        _attributes(plan, seed, truth, choice),
+        n_records=count,
+        n_samples=round(plan.scene.duration * plan.scene.sample_rate),
+        columns={**plan.columns, **NUMERICS},
+        splits=split_names(plan),
+        force=force,
+    )
+
+
+def _write_splits(writer: DataSetWriter, rows: NDArray[np.void], plan: Recipe, seed: int) -> None:
+    severity = plan.severity_columns[0]
+    drawn = Drawn(columns=rows, severity=severity, recipe=plan, seed=seed)
+    if not drawn.usable.size:
+        return
+    for name, split in default_splits(drawn).items():
+        writer.write_split(name, split.sides(len(rows)), split.attribute())
+
+
+def _attributes(plan: Recipe, seed: int, truth: bool, choice: Choice | None) -> Attributes:
+    scene = plan.scene
+    return Attributes(
+        sample_rate=scene.sample_rate,
+        channels=channels_of(scene),
+        origin="simulated",
+        tacho=scene.tacho.name if scene.tacho else None,
+        severities=plan.severity_columns,
+        recipe=plan.text,
+        scene=plan.scene_text,
+        overrides=overrides_text(plan),
+        fidelity="" if choice is None else choice.dump(),
+        seed=seed,
+        truth=truth,
+        **_limits(scene, plan.severity_columns[0]),
+    )
+
+
+def _limits(scene: Scene, severity: str) -> dict[str, Any]:
+    wear = wear_limits(scene, severity)
+    if wear is None:
+        return {}
+    return {
+        "grade_edges": wear.grade_edges,
+        "condemning_limit": wear.condemning,
+        "limit_source": wear.source,
+    }
+
+
+def _simulated(sample: Sample, *, truth: bool, error: float | None) -> _Outcome:
+    """Simulate one record; runs in a worker. An error measured on pilots replaces its own guess."""
+    try:
+        solution = simulate(sample.scene, seed=sample.seed, truth=truth, raise_on_failure=False)
+    except SceneError as error:
+        return _refused(sample, str(error))
+    status = solution.status
+    row = {**sample.row, "status": status.name.lower(), **_numerics(solution)}
+    return _Outcome(
+        index=sample.index,
+        signal=solution.signal,
+        row=row if error is None else {**row, "estimated_error": error},
+        truth={name: array.astype(np.float32) for name, array in solution.truth.items()},
+        fault="" if status.ok else status.text,
+    )
+
+
+def _refused(sample: Sample, text: str) -> _Outcome:
+    return _Outcome(
+        index=sample.index,
+        signal=_silence(sample.scene),
+        row={**sample.row, "status": REFUSED},
+        truth={},
+        fault=text,
+        refused=sample,
+    )
+
+
+def _silence(scene: Scene) -> NDArray[np.float32]:
+    n_samples = round(scene.duration * scene.sample_rate)
+    return np.zeros((len(channels_of(scene)), n_samples), dtype=np.float32)
+
+
+def _numerics(solution: Solution) -> dict[str, Any]:
+    return {name: value for name, value in solution.numerics.items() if name in NUMERICS}
+
+
+class _Tally:
+    """Counts of a run."""
+
+    def __init__(self, count: int, choice: Choice | None) -> None:
+        self.count, self.choice = count, choice
+        self.n_resumed = 0
+        self.faults: list[str] = []
+
+    def note(self, outcome: _Outcome) -> None:
+        if outcome.fault and len(self.faults) < 3:
+            self.faults.append(f"record {outcome.index}: {outcome.fault}")
+
+    def summary(self, path: Path, rows: NDArray[np.void]) -> Summary:
+        status = Counter(name.decode() for name in rows["status"].tolist())
+        del status["ok"]
+        if status.total() == self.count:
+            raise DataError(
+                f"{path}: 0 of {self.count} records are simulated, must be >= 1; "
+                f"{self.faults[0] if self.faults else 'see the status column'}"
+            )
+        return Summary(
+            path=path,
+            n_records=self.count,
+            n_groups=len(np.unique(rows["group"])),
+            n_resumed=self.n_resumed,
+            grades=dict(sorted(Counter(rows["grade"].tolist()).items())),
+            failures=dict(status),
+            first_failures=tuple(self.faults),
+            n_clipped=int(np.count_nonzero(rows["clipped_samples"] > 0)),
+            fidelity=self.choice,
+        )
+
+
+def save_solution(
+    scene: Scene,
+    solution: Solution,
+    path: str | Path,
+    *,
+    seed: int,
+    force: bool = False,
+    truth: bool = False,
+) -> None:
+    """Write one simulated recording as a data set of one record.
+
+    Parameters
+    ----------
+    scene : Scene
+        What was simulated.
+    solution : Solution
+        Its result.
+    path : str or Path
+        File to write.
+    seed : int
+        Of the simulation, for the record.
+    force : bool
+        Replace an existing file.
+    truth : bool
+        Also store the hidden quantities that the solution holds.
+
+    Raises
+    ------
+    DataError
+        The file exists, or cannot be written.
+    """
+    severity = clearances(scene)
+    primary = next(iter(severity), "")
+    limits = _limits(scene, primary)
+    row = {
+        "record_id": "0",
+        "seed": seed,
+        "status": solution.status.name.lower(),
+        "speed_hz": condition_of(scene, "speed_hz"),
+        **severity,
+        **_numerics(solution),
+    }
+    if limits:
+        row["grade"] = grade(severity[primary], limits["grade_edges"])
+    head = Attributes(
+        sample_rate=solution.sample_rate,
+        channels=solution.channels,
+        origin="simulated",
+        tacho=scene.tacho.name if scene.tacho else None,
+        severities=tuple(severity),
+        scene=scene.model_dump_json(),
+        seed=seed,
+        truth=truth,
+        **limits,
+    )
+    columns = {**dict.fromkeys((*severity, "speed_hz"), "<f8"), **NUMERICS}
+    n_samples = solution.signal.shape[1]
+    writer = DataSetWriter(
+        path,
+        head,
+        n_records=1,
+        n_samples=n_samples,
+        columns=columns,
+        force=force,
+        resumable=False,
+    )
+    try:
+        with writer:
+            writer.write(0, solution.signal, row, solution.truth if truth else None)
+            writer.finish()
+    except OutputError:
+        raise  # the recording is whole, and its text says where
+    except BaseException:
+        writer.part.unlink(missing_ok=True)  # a single recording is made anew, not gone on with
+        raise

@@ -1,0 +1,424 @@
+"""Which pieces of which files become the records of a data set: all must be of one kind."""
+
+import os
+from collections import Counter
+from collections.abc import Hashable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+
+from ...sim.output.sensor import Channel
+from ...sim.scene.parts import nearest
+from ..file.record import LARGEST_RECORD, DataError
+from ..readers.flat import numbered
+from ..readers.open import open_source
+from ..source.part import Source, SourceOptions
+from ..workers.local import in_order
+from .labels import listed, refusal
+
+RATE_TOLERANCE = 1e-5
+"""Relative difference of sample rates that count as one: rates from a printed column of times
+differ by their last digit. It moves a spectrum by a tenth of a line in 10,000 lines."""
+
+_WORTH_WORKERS = 2**26  # byte of files; below it workers take longer to start than to read
+
+
+class EachChannel(Mapping[str, str]):
+    """A declaration by name of channel, and one for the others.
+
+    Parameters
+    ----------
+    named : mapping
+        Channel -> declaration.
+    others : str, optional
+        For every channel not in `named`.
+    but : str, optional
+        A channel that `others` is not about.
+
+    Examples
+    --------
+    >>> unit = EachChannel({"x": "g"}, others="mm/s", but="tacho")
+    >>> unit["x"], unit.get("y"), unit.get("tacho"), list(unit)
+    ('g', 'mm/s', None, ['x'])
+    """
+
+    def __init__(
+        self, named: Mapping[str, str], *, others: str | None = None, but: str | None = None
+    ) -> None:
+        self.named = dict(named)
+        self.others = others
+        self.but = but
+
+    def __getitem__(self, name: str) -> str:
+        if name in self.named:
+            return self.named[name]
+        if self.others is None or name == self.but:
+            raise KeyError(name)
+        return self.others
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.named)
+
+    def __len__(self) -> int:
+        return len(self.named)
+
+
+def sparing_tacho(options: SourceOptions, tacho: str | None) -> SourceOptions:
+    """The same options, with the tacho, which unit and sensitivity of all channels leave out.
+
+    Parameters
+    ----------
+    options : SourceOptions
+    tacho : str, optional
+        Name of the tacho channel.
+    """
+    return replace(
+        options,
+        tacho=tacho,
+        unit=_sparing(options.unit, tacho),
+        sensitivity=_sparing(options.sensitivity, tacho),
+    )
+
+
+def _sparing(
+    given: str | Mapping[str, str] | None, tacho: str | None
+) -> str | Mapping[str, str] | None:
+    if isinstance(given, str):
+        return EachChannel({}, others=given, but=tacho)
+    if isinstance(given, EachChannel):
+        return EachChannel(given.named, others=given.others, but=tacho)
+    return given
+
+
+def channels_of_source(source: Source, tacho: str | None) -> tuple[Channel, ...]:
+    """Channels of a source as a data set has them.
+
+    A tacho needs no unit, since only its edges count: without one it has "-".
+
+    Raises
+    ------
+    DataError
+        Rate or a unit is declared by nobody, or there is no such tacho; all faults at once.
+    """
+    names = [channel.name for channel in source.channels]
+    spared = f"channel '{tacho}': "
+    faults = [text for text in source.undeclared if tacho is None or not text.startswith(spared)]
+    if tacho is not None and tacho not in names:
+        faults.append(f"has no channel {tacho!r} to be the tacho{nearest(tacho, names)}")
+    if faults:
+        raise DataError("\n".join(f"{source.path}: {fault}" for fault in faults))
+    return tuple(
+        Channel(
+            name=channel.name,
+            unit=channel.unit or "-",
+            quantity="tacho" if channel.name == tacho else str(channel.quantity),
+            unit_in_file=channel.unit_in_file,
+        )
+        for channel in source.channels
+    )
+
+
+# --- files --------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, kw_only=True)
+class Header:
+    """What a file holds, without its samples.
+
+    Attributes
+    ----------
+    path : Path
+        Absolute.
+    name : str
+        As messages and the manifest name it: its path below the folder that all files share.
+    channels : tuple of Channel
+        As the data set has them.
+    sample_rate : float
+        [Hz]
+    n_samples : int
+        Per channel.
+    conditions : mapping
+        Manifest columns that the file declares, in SI.
+    named : bool
+        File or caller name the channels.
+    n_records : int
+        Rows that are records of their own, each of `n_samples`.
+    empty : tuple of str
+        Channels of NaN alone, which are left out.
+    """
+
+    path: Path
+    name: str
+    channels: tuple[Channel, ...]
+    sample_rate: float
+    n_samples: int
+    conditions: Mapping[str, float]
+    named: bool = True
+    n_records: int = 1
+    empty: tuple[str, ...] = ()
+
+    @property
+    def duration(self) -> float:
+        """Length [s]."""
+        return self.n_samples / self.sample_rate
+
+    @property
+    def length(self) -> str:
+        """Length for people."""
+        return f"{self.duration:.6g} s ({self.n_samples} samples)"
+
+
+def read_headers(
+    files: Sequence[str | Path], options: SourceOptions, tacho: str | None, *, jobs: int = 1
+) -> tuple[Header, ...]:
+    """Look into every file; sorted by name, whatever order they come in.
+
+    Raises
+    ------
+    DataError
+        A file is given twice, cannot be read, or lacks rate, unit or tacho; all at once.
+    """
+    paths = [Path(os.path.abspath(file)) for file in files]
+    _refuse_twice(paths)
+    names = _names(paths)
+    order = sorted(range(len(paths)), key=lambda i: (Path(names[i]).parts, names[i]))
+    items = [(paths[i], names[i]) for i in order]
+    look = partial(_header, options, tacho)
+    found = list(in_order(look, items, jobs=worth_workers(paths, jobs)))
+    faults = [fault for fault in found if isinstance(fault, str)]
+    if faults:
+        raise refusal([line for fault in faults for line in fault.split("\n")])
+    return tuple(header for header in found if isinstance(header, Header))
+
+
+def worth_workers(paths: Sequence[Path], jobs: int) -> int:
+    """Worker processes that reading these files is worth; the result does not depend on them."""
+    size = sum(path.stat().st_size for path in paths if path.is_file())
+    return min(jobs, len(paths)) if size > _WORTH_WORKERS else 1
+
+
+def _refuse_twice(paths: Sequence[Path]) -> None:
+    if not paths:
+        raise DataError("0 files, must be >= 1; name those to import")
+    counts = Counter(os.path.realpath(path) for path in paths)
+    twice = [path for path, count in counts.items() if count > 1]
+    if twice:
+        raise DataError(
+            f"{len(twice)} file(s) are given twice, must be once: {listed(twice)}; remove them"
+        )
+
+
+def _names(paths: Sequence[Path]) -> list[str]:
+    """Path of each file below the folder that all share; bytes that are no UTF-8 as numbers."""
+    base = os.path.commonpath([path.parent for path in paths])
+    names = [path.relative_to(base).as_posix() for path in paths]
+    return [os.fsencode(name).decode(errors="backslashreplace") for name in names]
+
+
+def _header(options: SourceOptions, tacho: str | None, item: tuple[Path, str]) -> Header | str:
+    """Header of a file, or what is wrong with it; runs in a worker."""
+    path, name = item
+    if path.is_dir():
+        return f"{path} is a folder, must be a file; name the files in it"
+    try:
+        with open_source(path, options) as source:
+            channels = channels_of_source(source, tacho)
+            return Header(
+                path=path,
+                name=name,
+                channels=channels,
+                sample_rate=float(source.sample_rate or 0.0),
+                n_samples=source.n_samples,
+                n_records=source.n_records,
+                empty=source.empty,
+                conditions=dict(source.conditions),
+                named=source.named or tacho is not None,
+            )
+    except DataError as error:
+        return str(error)
+
+
+# --- one kind -----------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plan:
+    """Records to make of files.
+
+    Attributes
+    ----------
+    headers : tuple of Header
+        Files, sorted by name.
+    channels : tuple of Channel
+        Of every record.
+    sample_rate : float
+        [Hz]
+    n_samples : int
+        Of every record.
+    starts : tuple of range
+        First sample of every record, by file; the same in each of its rows that are records.
+    """
+
+    headers: tuple[Header, ...]
+    channels: tuple[Channel, ...]
+    sample_rate: float
+    n_samples: int
+    starts: tuple[range, ...]
+
+    @property
+    def n_records(self) -> int:
+        """Records of all files."""
+        pairs = zip(self.headers, self.starts, strict=True)
+        return sum(header.n_records * len(starts) for header, starts in pairs)
+
+    @property
+    def left_over(self) -> tuple[float, ...]:
+        """Time at the end of each file that fills no record [s]."""
+        return tuple(
+            header.n_records * (header.n_samples - starts[-1] - self.n_samples) / self.sample_rate
+            for header, starts in zip(self.headers, self.starts, strict=True)
+        )
+
+
+def plan_records(headers: Sequence[Header], segment: float | None, overlap: float) -> Plan:
+    """Cut files into records of one length.
+
+    Parameters
+    ----------
+    headers : sequence of Header
+        Sorted.
+    segment : float or None
+        Length of a record [s]; None for whole files, which must then be of one length.
+    overlap : float
+        Part of a record that the next one repeats, 0 <= overlap < 1.
+
+    Raises
+    ------
+    DataError
+        Files differ in rate, channels or length, are shorter than a segment, or a record is
+        larger than any believed; all at once.
+    """
+    faults = _bound_faults(segment, overlap)
+    if faults:
+        raise refusal(faults)
+    headers = _numbered_alike(headers)
+    faults = [*_rate_faults(headers), *_channel_faults(headers)]
+    n_samples = headers[0].n_samples
+    if segment is not None:
+        n_samples = max(1, round(segment * headers[0].sample_rate))
+    faults += _length_faults(headers, n_samples, segment)
+    size = 4 * n_samples * len(headers[0].channels)
+    if size > LARGEST_RECORD:
+        faults.append(
+            f"a record of {n_samples} samples has {size} byte, must be <= {LARGEST_RECORD}; cut "
+            "the files into shorter ones with segment"
+        )
+    if faults:
+        raise refusal(faults)
+    step = max(1, round(n_samples * (1 - overlap)))
+    return Plan(
+        headers=tuple(headers),
+        channels=_common_channels(headers),
+        sample_rate=headers[0].sample_rate,
+        n_samples=n_samples,
+        starts=tuple(range(0, header.n_samples - n_samples + 1, step) for header in headers),
+    )
+
+
+def _bound_faults(segment: float | None, overlap: float) -> list[str]:
+    faults = []
+    if segment is not None and not 0 < segment < float("inf"):
+        faults.append(f"segment = {segment} s must be > 0 and finite; give the length of a record")
+    if not 0 <= overlap < 1:
+        faults.append(f"overlap = {overlap} must be >= 0 and < 1; give a part of the segment")
+    if segment is None and overlap > 0:
+        faults.append(f"overlap = {overlap} needs a segment; give its length, or leave it out")
+    return faults
+
+
+def _rate_faults(headers: Sequence[Header]) -> list[str]:
+    first = headers[0].sample_rate
+    if all(abs(header.sample_rate / first - 1) <= RATE_TOLERANCE for header in headers):
+        return []
+    kinds = _kinds({header.name: f"{header.sample_rate:.10g} Hz" for header in headers})
+    return [
+        f"all files must have the same sample rate: {kinds}; import each rate by itself, or "
+        "resample_to one of them"
+    ]
+
+
+def _channel_faults(headers: Sequence[Header]) -> list[str]:
+    alike = {header.name: _signature(header) for header in headers}
+    if len(set(alike.values())) == 1:
+        return []
+    words = {
+        header.name: ", ".join(f"{c.name} [{c.unit}]" for c in header.channels)
+        for header in headers
+    }
+    return [
+        f"all files must have the same channels: {_kinds(words)}; choose those that all have "
+        "with channels, as new=old to rename; where the files name none, name them all there"
+    ]
+
+
+def _numbered_alike(headers: Sequence[Header]) -> Sequence[Header]:
+    """The same names for channels that no file names: its own stem is not what they have alike."""
+    names = {tuple(channel.name for channel in header.channels) for header in headers}
+    counts = {len(header.channels) for header in headers}
+    if any(header.named for header in headers) or len(names) == 1 or len(counts) > 1:
+        return headers
+    common = [part.name for part in numbered("channel", counts.pop())]
+    return [
+        replace(
+            header,
+            channels=tuple(
+                replace(channel, name=name)
+                for channel, name in zip(header.channels, common, strict=True)
+            ),
+        )
+        for header in headers
+    ]
+
+
+def _signature(header: Header) -> tuple[tuple[str, str, str], ...]:
+    return tuple((channel.name, channel.unit, channel.quantity) for channel in header.channels)
+
+
+def _length_faults(headers: Sequence[Header], n_samples: int, segment: float | None) -> list[str]:
+    if segment is not None:
+        short = [header for header in headers if header.n_samples < n_samples]
+        if not short:
+            return []
+        least = min(short, key=lambda header: header.n_samples)
+        return [
+            f"{len(short)} of {len(headers)} files are shorter than the segment of {segment:g} s "
+            f"({n_samples} samples), must be as long: {listed([h.name for h in short])}, the "
+            f"shortest {least.name} with {least.length}; shorten the segment or leave them out"
+        ]
+    least = min(headers, key=lambda header: header.n_samples)
+    most = max(headers, key=lambda header: header.n_samples)
+    if least.n_samples == most.n_samples:
+        return []
+    return [
+        f"whole files must have the same length: shortest {least.name} with {least.length}, "
+        f"longest {most.name} with {most.length}; cut them with segment"
+    ]
+
+
+def _kinds(values: Mapping[str, Hashable]) -> str:
+    """Who has what, the most common first."""
+    counts = Counter(values.values())
+    return "; ".join(
+        f"{value} in {listed([name for name, own in values.items() if own == value])}"
+        for value, _ in counts.most_common()
+    )
+
+
+def _common_channels(headers: Sequence[Header]) -> tuple[Channel, ...]:
+    """Channels of the first file; a unit in the file only where all files agree on it."""
+    return tuple(
+        channel
+        if len({header.channels[i].unit_in_file for header in headers}) == 1
+        else replace(channel, unit_in_file="")
+        for i, channel in enumerate(headers[0].channels)
+    )

@@ -1,0 +1,256 @@
+"""One measured recording from a file, and what files hold."""
+
+import logging
+from collections.abc import Sequence
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from ..file.hdf5_values import HDF5_FAULTS
+from ..file.record import LARGEST_RECORD, DataError, DataSet, Recording
+from ..file.views import JoinedSet, View, joined_recordings
+from ..readers.open import list_sources, open_source
+from ..source.part import Source, SourceOptions
+from .labels import refusal
+from .plan import channels_of_source, sparing_tacho
+
+_LOG = logging.getLogger(__name__)
+_PIECE = 2**20  # numbers read at once
+_DATA_SETS = (".h5", ".hdf5")
+
+
+def read_recording(
+    path: str | Path,
+    options: SourceOptions | None = None,
+    *,
+    tacho: str | None = None,
+    pulses_per_revolution: int = 1,
+) -> Recording:
+    """Read one recording from a file.
+
+    Parameters
+    ----------
+    path : str or Path
+        A data set of this program, or any format that :func:`~.readers.open.open_source` reads.
+    options : SourceOptions, optional
+        What the file does not declare; ``record`` chooses one of a data set. Units are declared
+        or refused, never guessed.
+    tacho : str, optional
+        Name of the tacho channel; a data set knows its own.
+    pulses_per_revolution : int
+        Of the tacho.
+
+    Returns
+    -------
+    Recording
+        In SI units.
+
+    Raises
+    ------
+    DataError
+        The file is missing, truncated, damaged or of a format not known; nobody declares its
+        sample rate or a unit; what it declares contradicts the caller; it is too long.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from scipy.io import savemat
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     file = Path(folder) / "pump.mat"
+    ...     savemat(file, {"x": np.ones(16)})
+    ...     item = read_recording(file, SourceOptions(fs=1000.0, unit="g"))
+    ...     item.signal[0, 0]
+    np.float32(9.80665)
+    """
+    file, given = Path(path), options or SourceOptions()
+    if file.suffix.lower() in _DATA_SETS and given.dtype is None and _is_ours(file):
+        return _of_data_set(file, given, tacho)
+    with open_source(file, sparing_tacho(given, tacho)) as source:
+        channels = channels_of_source(source, tacho)
+        if source.empty:
+            _LOG.warning("%s: left out, nothing but NaN: %s", source.path, ", ".join(source.empty))
+        _refuse_long(source)
+        return Recording(
+            signal=read_window(source, 0, source.n_samples),
+            sample_rate=float(source.sample_rate or 0.0),
+            channels=channels,
+            tacho=tacho,
+            pulses_per_revolution=pulses_per_revolution,
+            origin="measured",
+            row=dict(source.conditions),
+            source=file.name,
+        )
+
+
+def with_views(
+    recording: Recording, path: str | Path, record: int, views: Sequence[View]
+) -> Recording:
+    """A recording with its views: of data sets by machine and state, of other files as they are.
+
+    Parameters
+    ----------
+    recording : Recording
+        As :func:`read_recording` gives it.
+    path : str or Path
+        Where it is from.
+    record : int
+        Its number, if that is a data set.
+    views : sequence of View
+        Files of the views; those that are no data sets must declare all by themselves.
+
+    Raises
+    ------
+    DataError
+        As of :func:`read_recording`, :class:`~.file.views.JoinedSet` and
+        :func:`~.file.views.joined_recordings`.
+    """
+    if not views:
+        return recording
+    files = [Path(path), *(view.path for view in views)]
+    if all(file.suffix.lower() in _DATA_SETS and _is_ours(file) for file in files):
+        with JoinedSet(files[0], tuple(views)) as data:
+            return data[record]
+    return joined_recordings(recording, {view.name: read_recording(view.path) for view in views})
+
+
+def _is_ours(file: Path) -> bool:
+    """Whether an HDF5 file says that it is a data set; also where it cannot be read at all."""
+    try:
+        with h5py.File(file, "r") as handle:
+            return bool({"created_by", "schema_version"} & set(handle.attrs))
+    except HDF5_FAULTS:
+        return True  # the reader of data sets has words for it
+
+
+def _of_data_set(file: Path, options: SourceOptions, tacho: str | None) -> Recording:
+    default = SourceOptions()
+    wrong = [
+        field.name
+        for field in fields(SourceOptions)
+        if field.name not in ("record", "fs")
+        and getattr(options, field.name) != getattr(default, field.name)
+    ]
+    with DataSet(file) as data:
+        head = data.attributes
+        faults = [f"{', '.join(wrong)} must not be given; it declares its own"] if wrong else []
+        if options.fs not in (None, head.sample_rate):
+            faults.append(f"fs = {options.fs:.10g} Hz must be {head.sample_rate:.10g} Hz; leave it")
+        if tacho not in (None, head.tacho):
+            faults.append(f"tacho = {tacho!r} must be {head.tacho!r}, as declared; leave it out")
+        if not 0 <= options.record < len(data):
+            faults.append(
+                f"record = {options.record} must be >= 0 and < {len(data)}; choose another"
+            )
+        if faults:
+            raise DataError("\n".join(f"{file}: {fault}" for fault in faults))
+        return data[options.record]
+
+
+def _refuse_long(source: Source) -> None:
+    size = 4 * len(source.channels) * source.n_samples
+    if size > LARGEST_RECORD:
+        raise DataError(
+            f"{source.path}: its {len(source.channels)} x {source.n_samples} samples have {size} "
+            f"byte, must be <= {LARGEST_RECORD}; cut it: wearstate import --segment"
+        )
+
+
+def read_window(source: Source, start: int, n_samples: int) -> NDArray[np.float32]:
+    """Read some samples of all channels, in pieces, so that only their float32 is held.
+
+    Parameters
+    ----------
+    source : Source
+    start, n_samples : int
+        First sample and how many, within the source.
+
+    Returns
+    -------
+    numpy.ndarray [shape=(n_channels, n_samples)]
+        In the units of the source.
+
+    Raises
+    ------
+    DataError
+        A sample is not finite or beyond single precision, or the file is damaged there.
+    """
+    window = np.empty((len(source.channels), n_samples), dtype=np.float32)
+    step = max(1, _PIECE // len(source.channels))
+    for first in range(0, n_samples, step):
+        last = min(first + step, n_samples)
+        with np.errstate(over="ignore"):  # becomes inf, refused below
+            window[:, first:last] = source.read(start + first, start + last)
+    if not np.isfinite(window).all():
+        row, at = np.argwhere(~np.isfinite(window))[0].tolist()
+        raise DataError(
+            f"{source.path}: channel '{source.channels[row].name}' is beyond 3.4e38 at index "
+            f"{start + at}, must fit single precision; check its unit"
+        )
+    return window
+
+
+def list_contents(
+    files: Sequence[str | Path], options: SourceOptions | None = None
+) -> list[dict[str, Any]]:
+    """What files hold, ready for JSON: nothing is read of their signals.
+
+    Parameters
+    ----------
+    files : sequence of str or Path
+    options : SourceOptions, optional
+        Layout and declarations; of what is chosen (variable, channels) nothing is used.
+
+    Returns
+    -------
+    list of dict
+        A file after the other: ``file``, ``recordings`` (each with ``variable``, ``channels``,
+        ``sample_rate_hz``, ``samples``, ``duration_s``, ``conditions``, ``undeclared``).
+
+    Raises
+    ------
+    DataError
+        Files cannot be read; all at once.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     np.save(Path(folder) / "x.npy", np.ones((2, 9)))
+    ...     [found] = list_contents([Path(folder) / "x.npy"], SourceOptions(fs=9.0))
+    >>> [(part["samples"], part["duration_s"]) for part in found["recordings"]]
+    [(9, 1.0)]
+    """
+    found, faults = [], []
+    for file in files:
+        try:
+            parts = list_sources(file, options)
+        except DataError as error:
+            faults += str(error).split("\n")
+            continue
+        found.append({"file": str(file), "recordings": [_described(part) for part in parts]})
+        for part in parts:
+            part.close()
+    if faults:
+        raise refusal(faults)
+    return found
+
+
+def _described(source: Source) -> dict[str, Any]:
+    rate = source.sample_rate
+    return {
+        "variable": source.part,
+        "channels": [
+            {"name": c.name, "unit": c.unit, "quantity": c.quantity, "unit_in_file": c.unit_in_file}
+            for c in source.channels
+        ],
+        "sample_rate_hz": rate,
+        "samples": source.n_samples,
+        "records": source.n_records,
+        "duration_s": None if rate is None else source.n_samples / rate,
+        "conditions": dict(source.conditions),
+        "undeclared": list(source.undeclared),
+    }

@@ -1,0 +1,4 @@
+"""One reader per file format, and one way to open them all.
+
+It may import ``sim.output``, ``sim.scene``, ``datasets.file``, ``datasets.source``.
+"""

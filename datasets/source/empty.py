@@ -1,0 +1,64 @@
+"""Channels that hold nothing but NaN: inputs that were not connected."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from .part import Part
+
+_PIECE = 2**16  # samples of a channel looked at in one read
+
+
+def without_empty(part: Part) -> Part:
+    """The part without its channels of NaN alone, which it names; all of them if none is left.
+
+    Parameters
+    ----------
+    part : Part
+        A single sample is read of most channels, all samples of those that begin and end with NaN.
+
+    Examples
+    --------
+    >>> from .part import PartChannel
+    >>> rows = np.array([[1.0, np.nan], [np.nan, np.nan]])
+    >>> names = (PartChannel(name="a"), PartChannel(name="b"))
+    >>> part = Part(
+    ...     name="x",
+    ...     about="",
+    ...     channels=names,
+    ...     named=True,
+    ...     n_samples=2,
+    ...     fetch=lambda start, stop, wanted: rows[list(wanted), start:stop],
+    ... )
+    >>> kept = without_empty(part)
+    >>> [channel.name for channel in kept.channels], kept.empty
+    (['a'], ('b',))
+    """
+    count = len(part.channels)
+    if part.n_samples < 1 or count < 2:
+        return part
+    suspects = tuple(range(count))
+    for at in (0, part.n_samples - 1):
+        suspects = _still_empty(part, at, at + 1, suspects)
+    for start in range(0, part.n_samples, _PIECE):
+        suspects = _still_empty(part, start, min(start + _PIECE, part.n_samples), suspects)
+    kept = [row for row in range(count) if row not in suspects]
+    if not suspects or not kept:
+        return part
+    fetch = part.fetch
+    return replace(
+        part,
+        channels=tuple(part.channels[row] for row in kept),
+        fetch=lambda start, stop, rows: fetch(start, stop, tuple(kept[row] for row in rows)),
+        empty=tuple(part.channels[row].name for row in suspects),
+    )
+
+
+def _still_empty(part: Part, start: int, stop: int, rows: tuple[int, ...]) -> tuple[int, ...]:
+    """Those of some channels that are NaN throughout."""
+    if not rows:
+        return ()
+    numbers = part.fetch(start, stop, rows)
+    if numbers.dtype.kind != "f":
+        return ()
+    return tuple(row for row, own in zip(rows, numbers, strict=True) if np.isnan(own).all())

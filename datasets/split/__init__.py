@@ -1,0 +1,4 @@
+"""Train and test splits: their rules, and splits stored in a file.
+
+It may import ``sim.atomic``, ``datasets.file``, ``datasets.recipe``.
+"""

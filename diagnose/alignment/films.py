@@ -1,0 +1,380 @@
+"""What an alignment does to the oil films of its bearings: stiffness, tilt, pressure, by speed.
+
+References
+----------
+Zhang, Suo (2020), Research on the influence of shafting alignment condition on transverse vibration
+transmission characteristics, Ship Science and Technology 42(6), 65-70,
+doi:10.3404/j.issn.1672-7649.2020.06.013, section 2.1 and figure 5.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...sim.film.bearing import JournalBearing
+from ...sim.scene.shaft import ShaftScene
+from ...sim.shaft.changed import free_line, line_model, rest, transfer
+from ...sim.shaft.on_oil_films import BeamFilm, ShaftFilmError
+from ...sim.shaft.response import Place
+from ..pages.page import short_name
+from ..shaft_tests.measured_tests import LineTest
+from ..shaft_tests.rig_test import turned_scene
+
+Vector = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+SPEEDS = (0.75, 1.0, 1.25)
+"""Of the scene's speed, at which films are shown [-]."""
+
+_SHOWN_PANELS = 6  # bearings of a picture
+_BAND, _LINES = (5.0, 400.0), 400  # of transfer functions that nobody measured [Hz]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FilmState:
+    """The films of a line as it is set, or after moves, at one speed.
+
+    Attributes
+    ----------
+    after : bool
+        Whether the moves are made.
+    speed_hz : float
+    film : BeamFilm or None
+        None where the line does not rest on its films.
+    """
+
+    after: bool
+    speed_hz: float
+    film: BeamFilm | None
+
+
+def film_states(
+    scene: ShaftScene,
+    moves: Mapping[str, float] | None = None,
+    turns: Mapping[str, float] | None = None,
+    *,
+    speeds: Sequence[float] = SPEEDS,
+) -> tuple[FilmState, ...]:
+    """Films of a line before and after moves, at several speeds.
+
+    Parameters
+    ----------
+    scene : ShaftScene
+    moves, turns : mapping of str to float, optional
+        Bearing -> by how much it rises [m], and its bore turns [rad]; nothing moves by default.
+    speeds : sequence of float
+        Over the scene's [-].
+
+    Returns
+    -------
+    tuple of FilmState
+        As set at all speeds, then after the moves, where there are any.
+
+    Examples
+    --------
+    >>> from wearstate.sim.scene.load import load_scene
+    >>> states = film_states(load_scene("shaft-rig"), {"third": 1e-4}, speeds=(1.0,))
+    >>> [state.after for state in states]
+    [False, True]
+    """
+    shifted = any((moves or {}).values()) or any((turns or {}).values())
+    kinds: list[tuple[bool, ShaftScene]] = [(False, scene)]
+    if shifted:
+        kinds.append((True, moved_scene(scene, moves or {}, turns or {})))
+    found = []
+    for after, one in kinds:
+        model, start = line_model(one), None
+        for share in speeds:
+            speed = share * scene.drive.speed
+            try:
+                start = rest(model, math.tau * speed, start=start)
+            except ShaftFilmError:
+                start = None
+            found.append(FilmState(after=after, speed_hz=speed, film=start))
+    return tuple(found)
+
+
+def moved_scene(
+    scene: ShaftScene, moves: Mapping[str, float], turns: Mapping[str, float]
+) -> ShaftScene:
+    """The scene with its bearings moved and its bores turned.
+
+    Examples
+    --------
+    >>> from wearstate.sim.scene.load import load_scene
+    >>> round(moved_scene(load_scene("shaft-rig"), {"third": 1e-4}, {}).bearings[2].offset, 9)
+    -0.00015
+    """
+    turned = turned_scene(scene, turns)
+    bearings = tuple(
+        bearing.model_copy(update={"offset": bearing.offset + moves.get(bearing.name, 0.0)})
+        for bearing in turned.bearings
+    )
+    return turned.model_copy(update={"bearings": bearings})
+
+
+def film_rows(states: Sequence[FilmState]) -> list[dict[str, Any]]:
+    """One row for each bearing, speed and alignment, in SI, ready for JSON."""
+    return [
+        {
+            "bearing": bearing.name,
+            "after": state.after,
+            "speed_hz": state.speed_hz,
+            "load_n": float(np.hypot(*film.reactions[i])),
+            "tilt_up_rad": float(film.slopes[i, 0]),
+            "tilt_side_rad": float(film.slopes[i, 1]),
+            "eccentricity": float(film.eccentricity_ratios[i]),
+            "least_film_m": float(film.least_film[i]),
+            "peak_pressure_pa": float(film.peak_pressure[i]),
+            "stiffness_up_n_per_m": float(film.stiffness[i, 0, 0]),
+            "stiffness_side_n_per_m": float(film.stiffness[i, 1, 1]),
+            "damping_up_ns_per_m": float(film.damping[i, 0, 0]),
+            "damping_side_ns_per_m": float(film.damping[i, 1, 1]),
+        }
+        for state in states
+        if (film := state.film) is not None
+        for i, bearing in enumerate(film.bearings)
+    ]
+
+
+FILM_HEAD = (
+    ("bearing", ""),
+    ("speed", "1/min"),
+    ("load", "kN"),
+    ("tilt up", "mm/m"),
+    ("tilt side", "mm/m"),
+    ("least film", "µm"),
+    ("stiffness up", "kN/mm"),
+    ("stiffness side", "kN/mm"),
+    ("damping up", "kN s/m"),
+)
+"""Names and units of the columns of :func:`film_cells`."""
+
+_CELLS = (
+    ("load_n", 1e-3, ".3g"),
+    ("tilt_up_rad", 1e3, ".3f"),
+    ("tilt_side_rad", 1e3, ".3f"),
+    ("least_film_m", 1e6, ".1f"),
+    ("stiffness_up_n_per_m", 1e-6, ".3g"),
+    ("stiffness_side_n_per_m", 1e-6, ".3g"),
+    ("damping_up_ns_per_m", 1e-3, ".4g"),
+)
+
+
+def film_cells(states: Sequence[FilmState]) -> list[tuple[str, ...]]:
+    """Rows of a table for people: before the moves -> after them.
+
+    Examples
+    --------
+    >>> from wearstate.sim.scene.load import load_scene
+    >>> [row, *_] = film_cells(film_states(load_scene("shaft-rig"), speeds=(1.0,)))
+    >>> row[:3]
+    ('aft', '600', '0.611')
+    """
+    rows = film_rows(states)
+    later = {(row["bearing"], row["speed_hz"]): row for row in rows if row["after"]}
+    cells = []
+    for row in rows:
+        if row["after"]:
+            continue
+        other = later.get((row["bearing"], row["speed_hz"]))
+        texts = [_change(row, other, *cell) for cell in _CELLS]
+        cells.append((row["bearing"], f"{60 * row['speed_hz']:.0f}", *texts))
+    order = list(dict.fromkeys(row[0] for row in cells))
+    return sorted(cells, key=lambda row: (order.index(row[0]), float(row[1])))
+
+
+def _change(
+    row: Mapping[str, Any], other: Mapping[str, Any] | None, key: str, factor: float, form: str
+) -> str:
+    before = f"{factor * row[key]:{form}}"
+    if other is None:
+        return before
+    return f"{before} → {factor * other[key]:{form}}"
+
+
+def resting(states: Sequence[FilmState]) -> list[str]:
+    """A sentence for each state in which the line does not rest on its films."""
+    return [
+        f"{'after the moves' if state.after else 'as set'}, {60 * state.speed_hz:.0f} 1/min: the "
+        "line finds no rest on its films"
+        for state in states
+        if state.film is None
+    ]
+
+
+def pressure_figure(states: Sequence[FilmState]) -> Any:
+    """Film pressure over every bearing's unrolled bore, as set and after the moves.
+
+    Parameters
+    ----------
+    states : sequence of FilmState
+        The two nearest to the scene's speed are drawn.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        A column a bearing; the bottom of the bore in the middle of each panel.
+    """
+    from matplotlib.figure import Figure
+
+    rows = [state for state in _at_one_speed(states) if state.film is not None]
+    films = [state.film for state in rows if state.film is not None]
+    count = min(len(films[0].bearings) if films else 1, _SHOWN_PANELS)
+    figure = Figure(figsize=(1 + 2.4 * count, 0.8 + 2.2 * max(len(rows), 1)), layout="constrained")
+    panels = figure.subplots(max(len(rows), 1), count, squeeze=False, sharey=True)
+    highest = [max(float(film.peak_pressure[i]) for film in films) for i in range(count)]
+    for line, state, film in zip(panels, rows, films, strict=True):
+        for i, axes in enumerate(line):
+            image = _draw_pressure(axes, film, i, highest[i])
+            title = short_name(film.bearings[i].name, 18)
+            axes.set_title(f"{title}, {'after' if state.after else 'as set'}", fontsize=9)
+            if line is panels[-1]:
+                figure.colorbar(image, ax=panels[:, i], label="MPa", location="bottom")
+        line[0].set_ylabel("angle from the bottom [deg]")
+    speed = f" at {60 * rows[0].speed_hz:.0f} 1/min" if rows else ""
+    figure.suptitle(f"Oil film pressure (computed){speed}")
+    return figure
+
+
+def _at_one_speed(states: Sequence[FilmState]) -> list[FilmState]:
+    """Those of the middle speed."""
+    speeds = sorted({state.speed_hz for state in states})
+    middle = speeds[len(speeds) // 2]
+    return [state for state in states if state.speed_hz == middle]
+
+
+def _draw_pressure(axes: Any, film: BeamFilm, i: int, highest: float) -> Any:
+    """Pressure over length and angle; the film's angle counts from below, with the rotation."""
+    pressure = np.asarray(film.films[i].pressure)
+    unit = _pressure_unit(film.bearings[i].worn, film.speed)
+    shifted = np.roll(pressure, pressure.shape[0] // 2, axis=0) * unit / 1e6
+    half = 1e3 * film.bearings[i].bearing.length / 2
+    image = axes.imshow(
+        shifted, origin="lower", aspect="auto", extent=(-half, half, -180, 180), cmap="viridis",
+        vmin=0.0, vmax=max(highest / 1e6, 1e-12),
+    )  # fmt: skip
+    axes.set(xlabel="along [mm]", yticks=[-180, -90, 0, 90, 180])
+    return image
+
+
+def _pressure_unit(bearing: JournalBearing, speed: float) -> float:
+    return bearing.force_unit(speed) / (bearing.diameter / 2 * bearing.length)
+
+
+# --- transfer functions before and after
+
+
+def transfer_figure(
+    scene: ShaftScene,
+    moves: Mapping[str, float] | None = None,
+    turns: Mapping[str, float] | None = None,
+    *,
+    measured: LineTest | None = None,
+    push: Place | None = None,
+) -> Any:
+    """Accelerances of the housings: measured, of the line as set, and after the moves.
+
+    Parameters
+    ----------
+    scene : ShaftScene
+        The line as set, or as found by its tests.
+    moves, turns : mapping of str to float, optional
+        Proposed.
+    measured : LineTest, optional
+        Where it pushes, its responses and its lines are drawn.
+    push : place, optional
+        Where the force acts without a measured test; by default the aftmost journal, up.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        A column a response: level over coherence, or level alone where nothing is measured.
+
+    Raises
+    ------
+    ShaftFilmError
+        The line does not rest on its films as it is set.
+    """
+    from matplotlib.figure import Figure
+
+    plan = _plan(scene, measured, push)
+    curves = _curves(scene, moves or {}, turns or {}, plan)
+    across = min(len(plan.responses), _SHOWN_PANELS)
+    rows = 1 if measured is None else 2
+    figure = Figure(figsize=(1 + 3.2 * across, 3.4 + 1.4 * (rows - 1)), layout="constrained")
+    ratios = [3, 1][:rows]
+    panels = figure.subplots(
+        rows, across, squeeze=False, sharex=True, sharey="row", height_ratios=ratios
+    )
+    for k in range(across):
+        level = panels[0, k]
+        if measured is not None:
+            value = measured.transfer.value[:, k]
+            level.plot(
+                plan.frequencies, _level(value), ".", ms=2.5, color="#7a828b", label="measured"
+            )
+            panels[1, k].plot(plan.frequencies, measured.coherence[:, k], color="#7a828b", lw=0.8)
+            panels[1, k].set(ylim=(0, 1.02), xlabel="frequency [Hz]")
+        for label, colour, curve in curves:
+            level.plot(plan.frequencies, _level(curve[:, k]), color=colour, lw=0.9, label=label)
+        level.set_title(_response_name(plan.responses[k]), fontsize=9)
+        for axes in panels[:, k]:
+            axes.grid(alpha=0.3)
+    panels[0, 0].set_ylabel("accelerance [dB re 1 (m/s²)/N]")
+    panels[-1, 0].set_xlabel("frequency [Hz]")
+    if measured is not None:
+        panels[1, 0].set_ylabel("coherence")
+    panels[0, -1].legend(fontsize=8)
+    figure.suptitle(f"Transfer functions, pushing {_response_name(plan.force)}")
+    return figure
+
+
+class _Plan(NamedTuple):
+    frequencies: Vector
+    speed: float
+    force: Place
+    responses: tuple[Place, ...]
+
+
+def _plan(scene: ShaftScene, measured: LineTest | None, push: Place | None) -> _Plan:
+    if measured is not None:
+        own = measured.transfer
+        return _Plan(own.frequencies, own.speed, own.force, own.responses)
+    force = push or (scene.bearings[0].name, "y")
+    responses: tuple[Place, ...] = tuple((b.name, "y", "housing") for b in scene.bearings)
+    hertz = np.linspace(*_BAND, _LINES)
+    return _Plan(hertz, math.tau * scene.drive.speed, force, responses)
+
+
+def _curves(
+    scene: ShaftScene, moves: Mapping[str, float], turns: Mapping[str, float], plan: _Plan
+) -> list[tuple[str, str, Complex]]:
+    """Label, colour and accelerances of the line as set and, if anything moves, after."""
+    first = line_model(scene)
+    line = free_line(
+        first, plan.frequencies, speed=plan.speed, forces=[plan.force], responses=plan.responses
+    )
+    kinds = [("model, as set", "#1f5a94", first)]
+    if any(moves.values()) or any(turns.values()):
+        other = line_model(moved_scene(scene, moves, turns))
+        kinds.append(("model, after the moves", "#b3541e", other))
+    return [
+        (label, colour, transfer(model, rest(model, plan.speed), line).value[..., 0])
+        for label, colour, model in kinds
+    ]
+
+
+def _level(value: Complex) -> Vector:
+    return np.asarray(20 * np.log10(np.abs(value) + 1e-300))
+
+
+def _response_name(place: Place) -> str:
+    assert isinstance(place, tuple)
+    where, axis, *part = place
+    what = f"{where:g} m" if isinstance(where, float) else short_name(str(where), 18)
+    return f"{'housing of ' if part else ''}{what} {'up' if axis == 'y' else 'sideways'}"

@@ -1,0 +1,6 @@
+"""What a wear model takes for granted: the same machines with one thing shifted.
+
+It may import ``sim.output``, ``sim.scene``, ``sim.machine``, ``datasets.file``,
+``datasets.source``, ``datasets.recipe``, ``datasets.measured``, ``diagnose.pages``,
+``diagnose.learning``, ``diagnose.wear_model``, ``diagnose.nameplate``.
+"""

@@ -1,0 +1,91 @@
+"""A list of blind spots as a page and a picture."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from ..pages.page import render, short_name
+from ..pages.picture import encoded
+from ..pages.words import quantity_name
+from .text import Table, conclusion, percent, with_ends
+
+_COLOURS = {"as trained": "#9aa3ab", "fixed": "#b3261e", "drawn": "#1f5a94", "sensor": "#3a923a"}
+_WORDS = {
+    "fixed": "held fixed by the recipe",
+    "drawn": "drawn, beyond its range",
+    "sensor": "sensor and converter",
+}
+_WIDTH, _PER_ROW, _MARGIN = 6.4, 0.22, 1.0  # inches
+_MOST = 25  # rows of the picture
+
+
+def blind_spots_html(table: Table, *, notice: str = "") -> str:
+    """A list of blind spots as one self-contained page: no script, no link, a picture inside.
+
+    Parameters
+    ----------
+    table : dict
+        Of :func:`~.blindspots.text.blind_spots_table`.
+    notice : str
+        Of the model, where it was trained on simulation.
+
+    Returns
+    -------
+    str
+        HTML.
+    """
+    told = [row for row in table["rows"] if row["machines"]]
+    return render(
+        "blindspots.html.j2",
+        table=table,
+        told=[table["baseline"], *told],
+        untold=[row for row in table["rows"] if not row["machines"]],
+        words={"as trained": "as trained", **_WORDS},
+        conclusion=conclusion(table),
+        quantity=quantity_name(table["severity"]),
+        notice=notice,
+        percent=percent,
+        with_ends=with_ends,
+        picture=encoded(blind_spots_figure(table)),
+    )
+
+
+def blind_spots_figure(table: Table) -> Any:
+    """Error without a caution of the worst rows, beside the one as trained.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    from matplotlib.figure import Figure
+
+    rows = [row for row in table["rows"] if row["clear_error"]["value"] is not None][:_MOST]
+    figure = Figure(figsize=(_WIDTH, _MARGIN + _PER_ROW * max(len(rows), 4)), layout="constrained")
+    axes = figure.add_subplot()
+    usual = table["baseline"]["clear_error"]["value"]
+    if usual is not None:
+        axes.axvline(100 * usual, color=_COLOURS["as trained"], ls="--", label="as trained")
+    for kind, word in _WORDS.items():
+        _draw(axes, [(i, row) for i, row in enumerate(rows) if row["kind"] == kind], kind, word)
+    names = [short_name(f"{row['name']} {row['shift']}", 56) for row in rows]
+    axes.set_yticks(range(len(rows)), names, fontsize=7)
+    axes.set_ylim(max(len(rows), 1) - 0.5, -0.5)
+    axes.set_xlim(left=0)
+    axes.set_xlabel("error without a caution [% of the condemning limit]", fontsize=8)
+    axes.grid(axis="x", alpha=0.3)
+    axes.legend(fontsize=7, loc="lower right")
+    return figure
+
+
+def _draw(axes: Any, rows: Sequence[tuple[int, Table]], kind: str, word: str) -> None:
+    if not rows:
+        return
+    figures = [row["clear_error"] for _, row in rows]
+    values = [100 * each["value"] for each in figures]
+    ends = [
+        # a quantile of the resamples may lie on the wrong side by rounding
+        [max(value - 100 * each["low"], 0.0) for value, each in zip(values, figures, strict=True)],
+        [max(100 * each["high"] - value, 0.0) for value, each in zip(values, figures, strict=True)],
+    ]
+    places = [place for place, _ in rows]
+    style = {"ls": "none", "marker": "o", "capsize": 3, "ms": 4, "lw": 1}
+    axes.errorbar(values, places, xerr=ends, color=_COLOURS[kind], label=word, **style)

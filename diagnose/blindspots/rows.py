@@ -1,0 +1,305 @@
+"""Rows of a list of blind spots: what of a recipe's scene is shifted, and by how much.
+
+A value that the recipe draws is moved beyond its range, by a factor of 1.3 where it is drawn by its
+logarithm, else by 30 % of the range; one that it holds fixed by the table's amount. Severities, and
+angles drawn all round, are left alone.
+"""
+
+import math
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import chain
+from typing import Any, Literal
+
+from ...datasets.recipe.draws import Axis, Vector, has_value, matches, value_at
+from ...datasets.recipe.options import Alternatives, Taken
+from ...datasets.recipe.recipe import Recipe, Sample
+from ...sim.scene.load import override, scene_from_table
+from ...sim.scene.parts import Scene, SceneError
+from .shifts import SCENE_SHIFTS, Shift
+
+BEYOND = 1.3
+"""Of the edge of a range drawn by its logarithm; of others 30 % of the range is added."""
+
+_ALL_ROUND = 0.999 * math.tau
+
+Kind = Literal["as trained", "fixed", "drawn", "sensor"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class SceneRow:
+    """One value of the scene, shifted on every machine.
+
+    Attributes
+    ----------
+    name : str
+        Dotted path, ``*`` for every list entry.
+    shift : str
+        In words.
+    kind : {"fixed", "drawn"}
+        Whether the recipe holds it fixed or draws it.
+    why : str
+        How such a difference comes about; empty where nobody said.
+    changes : callable
+        Machine's scene -> new values by dotted path.
+    option : optional
+        Option of the recipe that draws the value: every machine is given it.
+    """
+
+    name: str
+    shift: str
+    kind: Kind
+    why: str
+    changes: Callable[[Scene], Mapping[str, Any]]
+
+    option: "_Option | None" = None
+
+    def applied(self, recipe: Recipe, sample: Sample) -> Scene:
+        """Scene of a machine with this one thing shifted.
+
+        Raises
+        ------
+        SceneError
+            The machine lacks the value, or its scene refuses it.
+        """
+        drawn = sample.drawn if self.option is None else self.option.taken_by(sample)
+        machine = scene_from_table(override(recipe.base, drawn))
+        changes = self.changes(machine)
+        if not changes:
+            fault = f"{self.name} has no value on this machine; there is nothing to shift"
+            raise SceneError(machine.name, [fault])
+        return scene_from_table(override(recipe.base, {**drawn, **changes}))
+
+
+@dataclass(frozen=True)
+class _Option:
+    """One option of a recipe's choice, put on every machine."""
+
+    choice: Alternatives
+    option: Taken
+
+    def taken_by(self, sample: Sample) -> dict[str, Any]:
+        """Draws of a machine that has this option: its own where it has, else the middle."""
+        if sample.row[self.choice.column] == self.option.name:
+            return sample.drawn
+        others = {p: v for p, v in sample.drawn.items() if p not in self.choice.paths}
+        middle = {axis.path: axis.value([0.5] * len(axis.entries)) for axis in self.option.axes}
+        return {**others, **self.option.values, **middle}
+
+
+def scene_rows(recipe: Recipe, shifts: Sequence[Shift] | None = None) -> list[SceneRow]:
+    """Every row of a recipe's scene, what it holds fixed first.
+
+    Parameters
+    ----------
+    recipe : Recipe
+    shifts : sequence of Shift, optional
+        Those of the machine by :data:`~.blindspots.shifts.SCENE_SHIFTS` by default.
+
+    Returns
+    -------
+    list of SceneRow
+
+    Examples
+    --------
+    >>> from wearstate.datasets.recipe.recipe import load_recipe
+    >>> rows = scene_rows(load_recipe("bilge-pump-narrow"))
+    >>> [(row.kind, row.shift) for row in rows if row.name == "pressure.rise_delay"]
+    [('fixed', '= 6 deg'), ('fixed', '= 12 deg')]
+    """
+    table = SCENE_SHIFTS.get(recipe.scene.machine, ()) if shifts is None else shifts
+    drawn = _drawn(recipe)
+    names = {each.path for each in drawn}
+    worn = {_pattern(wearing.axis.path) for wearing in recipe.severities}
+    known = list(chain.from_iterable(_expanded(shift, recipe) for shift in table))
+    fixed = [
+        row
+        for shift in known
+        if shift.path not in worn | names
+        for row in _fixed_rows(shift, recipe)
+    ]
+    told = {shift.path: shift for shift in known}
+    beyond = [
+        row
+        for each in drawn
+        if each.path not in worn
+        for row in _beyond_rows(each, told.get(each.path))
+    ]
+    return [*fixed, *beyond]
+
+
+def _pattern(path: str) -> str:
+    return re.sub(r"(?<=\.)[0-9]+(?=\.|$)", "*", path)
+
+
+@dataclass(frozen=True)
+class _Drawn:
+    """All that a recipe draws at one path with ``*``, everywhere or where an option is taken."""
+
+    path: str
+    axes: tuple[Axis, ...]
+    option: _Option | None = None
+
+
+def _drawn(recipe: Recipe) -> list[_Drawn]:
+    options = [_Option(each, option) for each in recipe.choices for option in each.options]
+    parts = [
+        _by_pattern((*recipe.machine, *recipe.record), None),
+        *(_by_pattern(each.option.axes, each) for each in options),
+    ]
+    return list(chain.from_iterable(parts))
+
+
+def _by_pattern(axes: Sequence[Axis], option: _Option | None) -> list[_Drawn]:
+    found: dict[str, list[Axis]] = {}
+    for axis in axes:
+        found.setdefault(_pattern(axis.path), []).append(axis)
+    return [_Drawn(path, tuple(each), option) for path, each in found.items()]
+
+
+def _expanded(shift: Shift, recipe: Recipe) -> Iterator[Shift]:
+    """The row as it is where the scene has its path, and under every throw that has it."""
+    for prefix in ("", "throws.*."):
+        path = prefix + shift.path
+        if _paths(path, recipe.scene, recipe.base):
+            beside = {prefix + key: value for key, value in shift.beside.items()}
+            amounts, why = shift.amounts, shift.why
+            yield Shift(path=path, kind=shift.kind, amounts=amounts, why=why, beside=beside)
+
+
+def _paths(pattern: str, scene: Scene, table: Mapping[str, Any]) -> list[str]:
+    """Paths of a pattern that a scene has something at."""
+    try:
+        found = matches(table, pattern)
+    except SceneError:
+        return []
+    return [path for path in found if has_value(scene, path)]
+
+
+# --- fixed values ---------------------------------------------------------------------------------
+
+
+def _fixed_rows(shift: Shift, recipe: Recipe) -> Iterator[SceneRow]:
+    taken = _taken(shift.path, recipe)
+    for amount in shift.amounts:
+        if shift.kind == "set" and amount in taken:
+            continue
+        yield SceneRow(
+            name=shift.path,
+            shift=_words(shift, amount),
+            kind="fixed",
+            why=shift.why,
+            changes=_changer(shift, amount, recipe),
+        )
+
+
+def _taken(path: str, recipe: Recipe) -> set[Any]:
+    """Values that a path takes without any shift: the scene's own and those of options."""
+    options = [option.values for each in recipe.choices for option in each.options]
+    values = {v for each in options for p, v in each.items() if _pattern(p) == path}
+    values |= {value_at(recipe.scene, p) for p in _paths(path, recipe.scene, recipe.base)}
+    return values
+
+
+def _words(shift: Shift, amount: Any) -> str:
+    sign = {"factor": "x ", "add": "", "set": "= "}[shift.kind]
+    if not isinstance(amount, (int, float)):
+        return f"{sign}{amount}"
+    return f"{amount:+.3g} [SI]" if shift.kind == "add" else f"{sign}{amount:g}"
+
+
+def _changer(shift: Shift, amount: Any, recipe: Recipe) -> Callable[[Scene], Mapping[str, Any]]:
+    def changes(scene: Scene) -> Mapping[str, Any]:
+        found = {}
+        for path in _paths(shift.path, scene, recipe.base):
+            value = value_at(scene, path)
+            if shift.kind == "set":
+                found[path] = amount
+            elif value is not None and not (shift.kind == "factor" and value == 0):
+                found[path] = value * amount if shift.kind == "factor" else value + amount
+        beside = {
+            path: value
+            for pattern, value in shift.beside.items()
+            for path in matches(recipe.base, pattern)
+        }
+        return {**beside, **found} if found else {}
+
+    return changes
+
+
+# --- drawn values ---------------------------------------------------------------------------------
+
+
+def _beyond_rows(drawn: _Drawn, told: Shift | None) -> Iterator[SceneRow]:
+    axes = drawn.axes
+    if any(_all_round(axis) for axis in axes):
+        return
+    for side in _sides(axes[0]):
+        ends = {axis.path: _beyond(axis, side) for axis in axes}
+        where = f", with {drawn.option.option.name}" if drawn.option else ""
+        yield SceneRow(
+            name=drawn.path,
+            shift=f"{side}, {_shown(axes, ends, side)}{where}",
+            kind="drawn",
+            why=told.why if told else "beyond the range that the recipe draws from",
+            changes=_mover(ends),
+            option=drawn.option,
+        )
+
+
+def _sides(axis: Axis) -> tuple[str, ...]:
+    """Sides of a range; one that begins at zero goes on upwards alone."""
+    if isinstance(axis, Vector):
+        return ("outward",)
+    return ("above",) if axis.extremes()[0] == 0 else ("below", "above")
+
+
+def _all_round(axis: Axis) -> bool:
+    if isinstance(axis, Vector) or not re.search(r"(angle|phase)$", axis.path):
+        return False
+    low, high = axis.extremes()
+    return high - low >= _ALL_ROUND
+
+
+_Move = Callable[[Any], Any]
+
+
+def _beyond(axis: Axis, side: str) -> _Move:
+    """From the machine's own value to the one beyond the range."""
+    if isinstance(axis, Vector):
+        centre = axis.base
+        return lambda own: {
+            key: value + BEYOND * (own[key] - value) for key, value in centre.items()
+        }
+    value = _edge(axis.extremes(), side, logarithmic=axis.kind.scale is math.log)
+    return lambda _own: value
+
+
+def _edge(ends: tuple[float, float], side: str, *, logarithmic: bool) -> float:
+    """Value beyond a range; a bound above zero is not crossed into negative numbers."""
+    low, high = ends
+    step = (BEYOND - 1) * (high - low)
+    if logarithmic:
+        return low / BEYOND if side == "below" else high * BEYOND
+    if side == "below":
+        return low - step if low - step > 0 or low <= 0 else low / BEYOND
+    return high + step if high + step < 0 or high >= 0 else high / BEYOND
+
+
+def _shown(axes: Sequence[Axis], ends: Mapping[str, _Move], side: str) -> str:
+    if isinstance(axes[0], Vector):
+        return f"{BEYOND:g} x as far from the scene's own"
+    values = {ends[axis.path](None) for axis in axes}
+    if len(values) == 1:
+        return f"= {next(iter(values)):.3g} [SI]"
+    edge = axes[0].extremes()[0 if side == "below" else 1]
+    ratio = ends[axes[0].path](None) / edge if edge else math.nan
+    return f"{ratio:.3g} x the edge" if math.isfinite(ratio) else "30 % of the range"
+
+
+def _mover(ends: Mapping[str, _Move]) -> Callable[[Scene], Mapping[str, Any]]:
+    def changes(scene: Scene) -> Mapping[str, Any]:
+        return {path: move(value_at(scene, path)) for path, move in ends.items()}
+
+    return changes

@@ -1,0 +1,121 @@
+"""A list of blind spots as a table for JSON and as text."""
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from ..learning.scores import Figure
+from .blindspots import BlindSpots
+from .scores import FIGURES, Row, ranked, row_figures
+
+Table = dict[str, Any]
+
+FEW = 20
+"""Machines below which intervals over machines are too narrow."""
+
+
+def blind_spots_table(found: BlindSpots, card: Mapping[str, Any]) -> Table:
+    """A list of blind spots, ready for JSON.
+
+    Parameters
+    ----------
+    found : BlindSpots
+    card : mapping
+        Of the model.
+
+    Returns
+    -------
+    dict
+        ``recipe``, ``severity``, ``condemning_limit_m``, ``machines``; ``baseline`` and ``rows``,
+        the worst first, each with name, shift, kind, why, machines, figures (value, low, high; None
+        where no machine tells), what was said of every machine, and the faults of those that could
+        not be simulated; ``left`` names rows that time did not suffice for.
+    """
+    limit = float(card["condemning_limit_m"])
+    return {
+        "recipe": found.recipe,
+        "severity": card["severity"],
+        "condemning_limit_m": limit,
+        "machines": len(found.baseline.said),
+        "baseline": _row_table(found.baseline, limit),
+        "rows": [_row_table(row, limit) for row in ranked(found.rows, limit)],
+        "left": list(found.left),
+    }
+
+
+def _row_table(row: Row, limit: float) -> Table:
+    figures = row_figures(row, limit)
+    stored = row.as_dict()
+    return {
+        **{name: stored[name] for name in ("name", "shift", "kind", "why")},
+        "machines": len(row.said),
+        **{name: _plain(figures[name]) for name, _ in FIGURES},
+        "said": list(stored["said"]),
+        "faults": list(row.faults),
+    }
+
+
+def _plain(figure: Figure) -> dict[str, float | None]:
+    ends = {"value": figure.value, "low": figure.low, "high": figure.high}
+    return {name: None if math.isnan(end) else end for name, end in ends.items()}
+
+
+def conclusion(table: Table) -> list[str]:
+    """What the list says, in a sentence or two."""
+    usual = table["baseline"]["clear_error"]["value"]
+    told = [row for row in table["rows"] if row["clear_error"]["value"] is not None]
+    shown = f"As trained it errs by {percent(usual)} % of the condemning limit without a caution"
+    lines = [f"{shown} ({table['machines']} simulated machines of {table['recipe']})."]
+    if told:
+        worst = told[0]
+        lines.append(
+            f"Worst without a caution: {worst['name']} {worst['shift']}, "
+            f"{percent(worst['clear_error']['value'])} %."
+        )
+    if table["machines"] < FEW:
+        lines.append(f"Below {FEW} machines the intervals are too narrow: give more with -n.")
+    return lines
+
+
+def percent(value: float | None) -> str:
+    """A share in per cent, as text."""
+    return "none" if value is None else f"{100 * value:.1f}"
+
+
+def with_ends(figure: Mapping[str, float | None]) -> str:
+    """A share in per cent with its interval."""
+    if figure["low"] is None or figure["high"] is None:
+        return percent(figure["value"])
+    return f"{percent(figure['value'])} ({percent(figure['low'])} to {percent(figure['high'])})"
+
+
+_HEAD = ("no caution", "all graded", "bias", "covered", "refused", "cautioned", "machines")
+
+
+def blind_spots_text(table: Table) -> str:
+    """The list for a terminal: per cent of the condemning limit, or of the machines."""
+    rows = [table["baseline"], *(row for row in table["rows"] if row["machines"])]
+    names = [f"{row['name']} {row['shift']}".strip() for row in rows]
+    wide = max(map(len, names))
+    head = f"{'':{wide}}  {_HEAD[0]:>22}" + "".join(f"{word:>11}" for word in _HEAD[1:])
+    lines = [*conclusion(table), "", head]
+    for name, row in zip(names, rows, strict=True):
+        first = f"{with_ends(row['clear_error']):>22}"
+        others = "".join(f"{percent(row[key]['value']):>11}" for key, _ in FIGURES[1:])
+        lines.append(f"{name:{wide}}  {first}{others}{row['machines']:>11}")
+    lines += [
+        "",
+        "Error, bias: % of the condemning limit, 95 % interval over machines; the rest: % of them.",
+    ]
+    lines += [
+        f"Not simulated: {row['name']} {row['shift']}: {row['faults'][0]}"
+        for row in table["rows"]
+        if row["faults"] and not row["machines"]
+    ]
+    if table["left"]:
+        paths = dict.fromkeys(key.partition(": ")[2].partition(" ")[0] for key in table["left"])
+        lines.append(
+            f"Left for want of time: {len(table['left'])} rows, of {', '.join(paths)}; with -o the "
+            "same command goes on with them"
+        )
+    return "\n".join(lines)

@@ -1,0 +1,6 @@
+"""Speed against accuracy: of a scene's rungs, and of features and models.
+
+It may import ``sim.atomic``, ``sim.scene``, ``sim.fidelity``, ``features.catalogue``,
+``datasets.file``, ``datasets.workers``, ``datasets.recipe``, ``datasets.split``,
+``datasets.generation``, ``diagnose.pages``, ``diagnose.learning``, ``diagnose.feature_rows``.
+"""

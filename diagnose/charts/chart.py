@@ -1,0 +1,521 @@
+"""Speed against accuracy: what every choice costs, and how wrong it is.
+
+One chart serves the rungs and steps of a scene (:mod:`.charts.of_scene`: wall time of a simulated
+second against the error of its quantities of interest) and the diagnosis of a data set
+(:mod:`.charts.of_models`: time of a recording against the error on unseen machines). Pictures and
+pages of it are in :mod:`.charts.figure`.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+from ...datasets.file.csv_cells import safe_cell
+from ...sim.atomic import replacing
+from ...sim.fidelity.pilot import Difference
+from ...sim.fidelity.study import Convergence
+
+Progress = Callable[[int, int], None]
+Clock = Callable[[], float]
+
+_GAIN = 0.95  # of an error: the most of it that a slower point on the front may have
+
+
+@dataclass(frozen=True, kw_only=True)
+class Point:
+    """One choice.
+
+    Attributes
+    ----------
+    name : str
+        What it has other than the scene as written.
+    rungs : mapping of str to str
+        All of the choice, effect by effect.
+    seconds : float
+        Least of the measured times, of one simulated second or one recording [s]; NaN where it
+        never ran.
+    errors : mapping of str to Difference
+        Of every quantity [-]; empty where it is not valid.
+    verdict : str
+        ``within``, ``beyond``, ``doubtful`` or ``invalid``; ``reference``.
+    reason : str
+        Why it is not within.
+    starts : int
+        That the errors are means of.
+    on_front : bool
+        No other point is both faster and more accurate.
+    counts : str
+        Quantity by which it is judged; the one with the largest error where none is named.
+    question : str
+        That it belongs to, where a chart answers several; errors are against the reference of that
+        question.
+    here : bool
+        The scene as it is written.
+    """
+
+    name: str
+    rungs: Mapping[str, str]
+    seconds: float
+    errors: Mapping[str, Difference] = field(default_factory=dict)
+    verdict: str = "within"
+    reason: str = ""
+    starts: int = 1
+    on_front: bool = False
+    counts: str = ""
+    question: str = ""
+    here: bool = False
+
+    @property
+    def worst(self) -> str:
+        """Quantity by which the point is judged; empty where there is none."""
+        if self.counts:
+            return self.counts
+        return max(self.errors, key=lambda name: self.errors[name].error, default="")
+
+    @property
+    def error(self) -> float:
+        """Of that quantity [-]; infinite where it is not valid."""
+        return self.errors[self.worst].error if self.errors else math.inf
+
+    @property
+    def standard_error(self) -> float:
+        """Of that error [-]; NaN where it cannot be told."""
+        found = self.errors[self.worst].standard_error if self.errors else math.nan
+        return found if math.isfinite(found) else math.nan
+
+
+@dataclass(frozen=True, kw_only=True)
+class Choice:
+    """What to take, for one question.
+
+    Attributes
+    ----------
+    question : str
+        As of :class:`Point`.
+    name : str
+        Of the point.
+    status : str
+        ``resolved``, ``so far``, ``unresolvable`` or ``not converged``.
+    error, standard_error, promised : float
+        Of the worst quantity, and the sum of both of the worst quantity by it [-].
+    starts : int
+        That the error is the mean of.
+    seconds : float
+        Of a simulated second [s].
+    changes : mapping of str to object
+        Dotted path -> value, of what the scene as written must change.
+    block, options : str
+        The same as TOML to paste, and as options of a command.
+    reference : str
+        What the error is taken against, in words.
+    sentence : str
+        The conclusion.
+    keeps : bool
+        Nothing is to be changed.
+    """
+
+    question: str
+    name: str
+    status: str
+    error: float
+    standard_error: float
+    promised: float
+    starts: int
+    seconds: float
+    changes: Mapping[str, Any]
+    block: str
+    options: str
+    reference: str
+    sentence: str
+    keeps: bool
+
+
+@dataclass(frozen=True, kw_only=True)
+class RungCost:
+    """What one rung of the scene as written costs: its error against the best of its effect.
+
+    Attributes
+    ----------
+    effect, written, best : str
+        Effect in words, names of the rungs.
+    error, standard_error : float
+        Of the worst quantity [-].
+    worst : str
+        That quantity in words.
+    starts : int
+        That the error is the mean of.
+    text : str
+        All of it in one line.
+    """
+
+    effect: str
+    written: str
+    best: str
+    error: float
+    standard_error: float
+    worst: str
+    starts: int
+    text: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Chart:
+    """Every choice that ran, with the front.
+
+    Attributes
+    ----------
+    name, title : str
+    cost_label, error_label : str
+        Of the axes, with units.
+    accuracy : float or None
+        Asked; None where only the front counts.
+    points : tuple of Point
+        Fastest first.
+    reference : str
+        Name of the point that errors are taken against; empty where truth is known.
+    status : str
+        ``resolved``, ``unresolvable``, ``not converged`` or ``out of budget``.
+    winner : str
+        Name of the fastest point within the accuracy; empty where none may be named.
+    verdict : str
+        The finding in one sentence.
+    convergence : tuple of Convergence
+        Of the reference.
+    refused, pruned : tuple of str
+        What did not run, and why.
+    note : str
+        How it was measured.
+    conclusion : tuple of str
+        The finding in a few sentences, of a scene.
+    choices : tuple of Choice
+        What to take, question by question, of a scene.
+    raises : tuple of RungCost
+        What each rung of the scene as written costs.
+    labels : mapping of str to str
+        Quantity -> words and unit; a quantity that has none stands for itself.
+    measured, planned : int
+        Points measured, of those of interest; 0 of 0 where nothing was left out.
+    subject : str
+        ``scene``, or ``recipe`` where the errors are those of the verdict.
+    """
+
+    name: str
+    title: str
+    cost_label: str
+    error_label: str
+    accuracy: float | None
+    points: tuple[Point, ...]
+    reference: str
+    status: str
+    winner: str
+    verdict: str
+    convergence: tuple[Convergence, ...] = ()
+    refused: tuple[str, ...] = ()
+    pruned: tuple[str, ...] = ()
+    note: str = ""
+    conclusion: tuple[str, ...] = ()
+    choices: tuple[Choice, ...] = ()
+    raises: tuple[RungCost, ...] = ()
+    labels: Mapping[str, str] = field(default_factory=dict)
+    measured: int = 0
+    planned: int = 0
+    subject: str = "scene"
+
+    @property
+    def questions(self) -> tuple[str, ...]:
+        """Of its points, in their order."""
+        return tuple(dict.fromkeys(point.question for point in self.points))
+
+    @property
+    def unfinished(self) -> bool:
+        """Something was left out for want of time."""
+        return self.status == "out of budget"
+
+    def of(self, question: str) -> tuple[Point, ...]:
+        """Points of a question."""
+        return tuple(point for point in self.points if point.question == question)
+
+    def label(self, quantity: str) -> str:
+        """A quantity in words."""
+        return self.labels.get(quantity, quantity)
+
+    @property
+    def front(self) -> tuple[Point, ...]:
+        """Points that no other is both faster and more accurate than, fastest first."""
+        return tuple(point for point in self.points if point.on_front)
+
+    @property
+    def remaining(self) -> float:
+        """Error that the reference itself is left with [-]: below it no error is known."""
+        return max(map(remaining_error, self.convergence), default=0.0)
+
+
+def remaining_error(each: Convergence) -> float:
+    """Error that Richardson leaves in the reference [-], an order below a half not believed.
+
+    Parameters
+    ----------
+    each : Convergence
+
+    Returns
+    -------
+    float
+        The last change where no order can be told.
+
+    References
+    ----------
+    Roache, "Quantification of uncertainty in computational fluid dynamics", Annual Review of Fluid
+    Mechanics 29 (1997) 123-160, doi:10.1146/annurev.fluid.29.1.123: an extrapolation from orders
+    far from theory says nothing.
+
+    Examples
+    --------
+    >>> changes = dict(effect="mesh", levels=("x2", "x1", "x1/2"), quantity="rms", converged=True)
+    >>> slow = Convergence(**changes, steps=(0.011, 0.01), order=0.14, remaining=0.098)
+    >>> round(remaining_error(slow), 4)
+    0.0241
+    """
+    if not math.isfinite(each.order):
+        return each.remaining
+    return abs(each.steps[-1]) / (2 ** max(each.order, _LEAST_ORDER) - 1)
+
+
+_LEAST_ORDER = 0.5
+
+
+def front_of(places: Sequence[tuple[float, float]]) -> list[bool]:
+    """Which of some (cost, error) pairs no other beats in one without losing in the other.
+
+    Parameters
+    ----------
+    places : sequence of (float, float)
+        A pair that is not finite is on no front.
+
+    Returns
+    -------
+    list of bool
+        In the order given; of equal pairs the first. Slower for less than a twentieth of the error
+        is no gain: times scatter more.
+
+    Examples
+    --------
+    >>> front_of([(1.0, 0.5), (2.0, 0.1), (3.0, 0.2), (0.5, float("inf")), (2.1, 0.0999)])
+    [True, True, False, False, False]
+    """
+    finite = [i for i, place in enumerate(places) if all(map(math.isfinite, place))]
+    found, least = [False] * len(places), math.inf
+    for i in sorted(finite, key=places.__getitem__):
+        if places[i][1] < _GAIN * least:
+            found[i], least = True, places[i][1]
+    return found
+
+
+# --- showing
+
+
+def chart_table(chart: Chart) -> dict[str, Any]:
+    """A chart as plain values.
+
+    Parameters
+    ----------
+    chart : Chart
+
+    Returns
+    -------
+    dict
+        ``verdict``, ``winner`` (None without one), ``status``, ``points`` fastest first, names of
+        the ``front``, ``convergence``, and what did not run.
+    """
+    return {
+        "name": chart.name,
+        "verdict": chart.verdict,
+        "status": chart.status,
+        "winner": chart.winner or None,
+        "accuracy": chart.accuracy,
+        "axes": {"cost": chart.cost_label, "error": chart.error_label},
+        "measured": chart.note,
+        "front": [point.name for point in chart.front],
+        "points": [_point_table(point) for point in chart.points],
+        "reference_error": chart.remaining,
+        "convergence": [
+            {
+                "effect": each.effect,
+                "levels": list(each.levels),
+                "quantity": each.quantity,
+                "changes": list(each.steps),
+                "observed_order": each.order,
+                "remaining_error": remaining_error(each),
+                "converged": each.converged,
+            }
+            for each in chart.convergence
+        ],
+        "refused": list(chart.refused),
+        "pruned": list(chart.pruned),
+        "conclusion": list(chart.conclusion),
+        "recommendations": [
+            {**asdict(each), "changes": dict(each.changes)} for each in chart.choices
+        ],
+        "rungs_as_written": [asdict(each) for each in chart.raises],
+        "quantities": dict(chart.labels),
+        "measured_points": chart.measured,
+        "planned_points": chart.planned,
+    }
+
+
+def _point_table(point: Point) -> dict[str, Any]:
+    return {
+        "name": point.name,
+        "rungs": dict(point.rungs),
+        "seconds": point.seconds,
+        "error": point.error,
+        "worst": point.worst,
+        "verdict": point.verdict,
+        "reason": point.reason,
+        "starts": point.starts,
+        "on_front": point.on_front,
+        "question": point.question,
+        "here": point.here,
+        "errors": {
+            name: {"mean": each.mean, "standard_error": each.standard_error}
+            for name, each in point.errors.items()
+        },
+    }
+
+
+CSV_HEAD = (
+    "question",
+    "point",
+    "here",
+    "on_front",
+    "verdict",
+    "seconds",
+    "quantity",
+    "error",
+    "standard_error",
+)
+
+
+def chart_rows(chart: Chart) -> list[tuple[Any, ...]]:
+    """A chart as rows of :data:`CSV_HEAD`, one for every quantity of every point.
+
+    Parameters
+    ----------
+    chart : Chart
+
+    Returns
+    -------
+    list of tuple
+        Of a point that is not valid one row without quantity.
+    """
+    rows: list[tuple[Any, ...]] = []
+    for point in chart.points:
+        head = (
+            point.question,
+            point.name,
+            int(point.here),
+            int(point.on_front),
+            point.verdict,
+            point.seconds,
+        )
+        rows += [(*head, name, d.mean, d.standard_error) for name, d in point.errors.items()]
+        if not point.errors:
+            rows.append((*head, "", math.nan, math.nan))
+    return rows
+
+
+def chart_text(chart: Chart) -> str:
+    """A chart as lines for a terminal: verdict, front, convergence, what did not run.
+
+    Parameters
+    ----------
+    chart : Chart
+
+    Returns
+    -------
+    str
+    """
+    lines = [chart.title, "", *(chart.conclusion or (chart.verdict,))]
+    for choice in (each for each in chart.choices if each.block):
+        lines += [
+            "",
+            f"{choice.question}: paste into the {chart.subject}, or {choice.options}",
+            choice.block,
+        ]
+    if chart.raises:
+        lines += ["", "each rung of your scene by itself"]
+        lines += [f"  {each.text}" for each in chart.raises]
+    for question in chart.questions:
+        lines += ["", *_question_lines(chart, question)]
+    if chart.convergence:
+        lines += ["", "convergence of the references"]
+        lines += [f"  {convergence_text(each, chart.labels)}" for each in chart.convergence]
+    unusable = ("invalid",) if chart.unfinished else ("invalid", "doubtful")
+    dropped = [f"{p.name}: {p.reason}" for p in chart.points if p.verdict in unusable]
+    for title, texts in (
+        ("not valid, or not to be told", dropped),
+        ("refused", chart.refused),
+        ("pruned", chart.pruned),
+    ):
+        lines += ["", title, *(f"  {text}" for text in texts)] if texts else []
+    if chart.unfinished and chart.planned:
+        lines += ["", f"so far: {chart.measured} of {chart.planned} combinations measured"]
+    return "\n".join([*lines, "", f"measured: {chart.note}"])
+
+
+def _question_lines(chart: Chart, question: str) -> list[str]:
+    """Points that a person chooses among: where one stands, what to take, the front."""
+    wanted = {choice.name for choice in chart.choices if choice.question == question}
+    shown = [p for p in chart.of(question) if p.here or p.on_front or p.name in wanted]
+    head = [f"{question or chart.cost_label}", f"{'seconds':>10}  {'error':>8}  choice"]
+    return head + [
+        f"{point.seconds:10.3g}  {_share(point.error):>8}  {point.name}"
+        + (f" ({chart.label(point.worst)})" if point.error > 0 and point.errors else "")
+        for point in shown
+    ]
+
+
+def _share(value: float) -> str:
+    return f"{value:.2%}" if math.isfinite(value) else "-"
+
+
+def convergence_text(each: Convergence, labels: Mapping[str, str] | None = None) -> str:
+    """How the reference converges with one effect, in one line.
+
+    Parameters
+    ----------
+    each : Convergence
+    labels : mapping of str to str, optional
+        Quantity -> words.
+
+    Examples
+    --------
+    >>> convergence_text(Convergence(effect="step", levels=("x2", "x1", "x1/2"), quantity="peak",
+    ...     steps=(0.04, 0.01), order=2.0, remaining=0.0033, converged=True))
+    'step x2, x1, x1/2: peak moves by 4.00% then 1.00%, order 2.00, 0.33% left'
+    """
+    order = f"order {each.order:.2f}" if math.isfinite(each.order) else "no order to be told"
+    word = "" if each.converged else "; NOT CONVERGED"
+    label = (labels or {}).get(each.quantity, each.quantity)
+    return (
+        f"{each.effect} {', '.join(each.levels)}: {label} moves by {_steps(each)}, "
+        f"{order}, {remaining_error(each):.2%} left{word}"
+    )
+
+
+def _steps(each: Convergence) -> str:
+    return " then ".join(f"{abs(step):.2%}" for step in each.steps)
+
+
+def save_rows(chart: Chart, path: Path, *, force: bool = True) -> None:
+    """Write :func:`chart_rows` as CSV, whole or not at all."""
+    import csv
+
+    with (
+        replacing(path, force=force) as fresh,
+        fresh.open("w", newline="", encoding="utf-8") as handle,
+    ):
+        writer = csv.writer(handle)
+        writer.writerow(CSV_HEAD)
+        writer.writerows([safe_cell(cell) for cell in row] for row in chart_rows(chart))

@@ -1,0 +1,420 @@
+"""Pictures and pages of a chart: where one stands, what to take, the front, every quantity."""
+
+import math
+import re
+import textwrap
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+from xml.sax.saxutils import escape
+
+import numpy as np
+
+from ..pages.page import render, save_page, visible
+from ..pages.picture import picture_bytes, save_picture
+from ..pages.plain_json import json_text
+from .chart import Chart, Choice, Point, chart_table, convergence_text, save_rows
+from .words import percent
+
+_FRONT, _OTHER, _DOUBTFUL, _LIMIT = "#1f5a94", "#9aa3ab", "#e07b39", "#b3261e"
+_WINNER, _SO_FAR, _HERE = "#3a923a", "#e07b39", "#111111"
+_FLOOR = 1e-3  # %, the least error that is drawn; the reference sits on it
+_MOST_ROWS = 12  # of the front, in the table of quantities
+_WIDE = 46  # characters of a name on one line
+
+
+def chart_figure(chart: Chart) -> Any:
+    """Figure of a chart: a panel of points for each question, errors by quantity.
+
+    Parameters
+    ----------
+    chart : Chart
+        With one finite point at least.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    from matplotlib.figure import Figure
+
+    rows = len(_table_points(chart))
+    high = _PER_ROW * rows + _LABELS
+    figure = Figure(figsize=(13, _POINTS + high), layout="constrained")
+    figure.suptitle(f"{chart.title}\n{_wrapped(chart.verdict, 150)}", fontsize=11)
+    questions = chart.questions or ("",)
+    names = [f"points {i}" for i in range(len(questions))]
+    mosaic: Any = [names, ["quantities"] * len(names)]
+    panels = figure.subplot_mosaic(mosaic, height_ratios=(_POINTS - 1, high))
+    for name in names[1:]:
+        panels[name].sharey(panels[names[0]])
+    for name, question in zip(names, questions, strict=True):
+        _draw_points(panels[name], chart, question)
+    _draw_quantities(figure, panels["quantities"], chart)
+    return figure
+
+
+_POINTS, _PER_ROW, _LABELS = 6.2, 0.38, 1.9  # inches: panels, a row of the table, its words
+
+
+def _wrapped(text: str, width: int) -> str:
+    return "\n".join(textwrap.wrap(text, width))
+
+
+def _shown(point: Point) -> float:
+    """Error in per cent, not below the floor."""
+    return max(100 * point.error, _FLOOR)
+
+
+def _draw_points(axes: Any, chart: Chart, question: str) -> None:
+    points = chart.of(question)
+    finite = [p for p in points if math.isfinite(p.error) and math.isfinite(p.seconds)]
+    front = sorted((p for p in finite if p.on_front), key=lambda p: p.seconds)
+    axes.step(
+        [p.seconds for p in front],
+        [_shown(p) for p in front],
+        where="post",
+        color=_FRONT,
+        lw=1.2,
+        label="front",
+        zorder=1,
+    )
+    for number, point in enumerate(chart.points):
+        if any(point is each for each in finite):
+            _draw_point(axes, point, number)
+    if chart.accuracy is not None:
+        axes.axhline(100 * chart.accuracy, color=_LIMIT, lw=1, ls="--", label="accuracy asked")
+    if chart.remaining > 0:
+        axes.axhspan(
+            _FLOOR / 2,
+            max(100 * chart.remaining, _FLOOR / 2),
+            color="#dfe3e8",
+            zorder=0,
+            label="the reference's own error",
+        )
+    for label, style in _KINDS.items():
+        if any(_kind(p) == label for p in finite):
+            axes.plot([], [], ls="none", label=label, **style)
+    _mark_choice(axes, chart, question, finite)
+    _mark_here(axes, finite, chart.subject)
+    axes.set(xscale="log", xlabel=chart.cost_label, ylabel=chart.error_label)
+    if question:
+        axes.set_title(question, fontsize=10)
+    if chart.accuracy is not None:
+        axes.set_yscale("log")
+        axes.set_ylim(_FLOOR / 2, _HEADROOM * _highest(chart))
+    _plain_numbers(axes.xaxis)
+    _plain_numbers(axes.yaxis)
+    axes.grid(alpha=0.3, which="both")
+    _number(axes, front)
+    _legend_below(axes, ncols=3)
+
+
+def _mark_choice(axes: Any, chart: Chart, question: str, finite: list[Point]) -> None:
+    """Ring round what to take: green where that is final."""
+    choice = _choice_of(chart, question)
+    name = chart.winner if choice is None else choice.name
+    final = choice is None or choice.status == "resolved"
+    if choice is not None and choice.status == "not converged":
+        return
+    for point in (p for p in finite if p.name == name):
+        style = {"color": _WINNER, "ls": "-"} if final else {"color": _SO_FAR, "ls": ":"}
+        label = _fastest(chart) if final else "may be enough, not certain"
+        axes.scatter(
+            point.seconds,
+            _shown(point),
+            s=260,
+            facecolors="none",
+            edgecolors=style["color"],
+            linestyles=style["ls"],
+            linewidths=2.2,
+            label=label,
+            zorder=3,
+        )
+
+
+def _choice_of(chart: Chart, question: str) -> Choice | None:
+    return next((each for each in chart.choices if each.question == question), None)
+
+
+def _mark_here(axes: Any, finite: list[Point], subject: str) -> None:
+    for point in (p for p in finite if p.here):
+        place = (point.seconds, _shown(point))
+        axes.plot(*place, "*", ms=16, mfc="#ffd23f", mec=_HERE, label=f"your {subject}", zorder=5)
+        right = axes.transAxes.inverted().transform(axes.transData.transform(place))[0] > _RIGHT
+        axes.annotate(
+            f"your {subject}",
+            place,
+            xytext=(-10 if right else 10, -12),
+            textcoords="offset points",
+            ha="right" if right else "left",
+            va="top",
+            fontsize=9,
+            weight="bold",
+            color=_HERE,
+            zorder=5,
+        )
+
+
+_RIGHT = 0.7  # of the panel: further right words stand left of their mark
+
+
+def _number(axes: Any, front: list[Point]) -> None:
+    """Numbers above the points of the front, below where the one before is too near."""
+    from matplotlib.patheffects import withStroke
+
+    to_panel = axes.transData + axes.transAxes.inverted()
+    before, below = np.array([-1.0, -1.0]), True
+    for number, point in enumerate(front, start=1):
+        place = (point.seconds, _shown(point))
+        here = to_panel.transform(place)
+        below = bool(np.all(np.abs(here - before) < _NEAR)) and not below
+        before = here
+        axes.annotate(
+            str(number),
+            place,
+            xytext=(6, -6 if below else 6),
+            textcoords="offset points",
+            va="top" if below else "bottom",
+            fontsize=9,
+            weight="bold",
+            color=_FRONT,
+            path_effects=[withStroke(linewidth=2, foreground="white")],
+            zorder=4,
+        )
+
+
+def _highest(chart: Chart) -> float:
+    """Largest error that is drawn, or the accuracy asked [%]."""
+    errors = [_shown(p) for p in chart.points if math.isfinite(p.error)]
+    return max([*errors, 100 * (chart.accuracy or 0.0), _FLOOR])
+
+
+_HEADROOM = 2.5  # of the error axis: the highest number stays inside the frame
+_NEAR = (0.03, 0.08)  # of the panel's width and height: two numbers would touch
+
+
+def _legend_below(axes: Any, ncols: int) -> None:
+    """Where no point can lie under it."""
+    axes.legend(
+        fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=ncols, frameon=False
+    )
+
+
+def _fastest(chart: Chart) -> str:
+    if chart.accuracy is None:
+        return "fastest within the standard error of the best"
+    return "cheapest within the accuracy"
+
+
+def _plain_numbers(axis: Any) -> None:
+    """0.01 rather than a power of ten, at few places."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    if axis.get_scale() != "log":
+        return
+    low, high = axis.get_view_interval()
+    narrow = high < _NARROW * low
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if narrow else (1.0,)))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())
+
+
+_NARROW = 200.0  # of an axis, last over first: so few decades need numbers between
+
+_KINDS: dict[str, dict[str, Any]] = {
+    "on the front": {"marker": "o", "ms": 8, "color": _FRONT},
+    "beaten": {"marker": "o", "ms": 5, "color": _OTHER},
+    "scatter too large to tell": {"marker": "s", "ms": 6, "mfc": "none", "color": _DOUBTFUL},
+}
+
+
+def _kind(point: Point) -> str:
+    if point.verdict == "doubtful":
+        return "scatter too large to tell"
+    return "on the front" if point.on_front else "beaten"
+
+
+def _draw_point(axes: Any, point: Point, number: int) -> None:
+    """One point with its standard error, under an id that the page gives a name to."""
+    error = 100 * point.standard_error
+    if math.isfinite(error) and error > 0:
+        low = max(_shown(point) - error, _FLOOR)
+        axes.vlines(point.seconds, low, _shown(point) + error, color=_OTHER, lw=0.8, zorder=1)
+    (mark,) = axes.plot(point.seconds, _shown(point), ls="none", zorder=3, **_KINDS[_kind(point)])
+    mark.set_gid(f"point-{number}")
+
+
+def _draw_quantities(figure: Any, axes: Any, chart: Chart) -> None:
+    """Errors of every quantity for the points of the front, as a table of colours."""
+    from matplotlib.colors import LogNorm
+
+    points = _table_points(chart)
+    if not points:
+        axes.set_axis_off()
+        return
+    names = list(dict.fromkeys(name for _, point in points for name in point.errors))
+    if not names:
+        axes.set_axis_off()
+        return
+    values = np.array(
+        [[100 * p.errors[n].error if n in p.errors else np.nan for n in names] for _, p in points]
+    )
+    shown = axes.imshow(
+        np.maximum(values, _FLOOR),
+        aspect="auto",
+        cmap="YlOrRd",
+        norm=LogNorm(vmin=_palest(chart, values), vmax=max(100.0, float(np.nanmax(values)))),
+    )
+    for (row, column), value in np.ndenumerate(values):
+        dark = value > _DARK
+        axes.text(
+            column,
+            row,
+            _percent(value),
+            ha="center",
+            va="center",
+            fontsize=6.5,
+            color="white" if dark else "black",
+        )
+    words = [chart.label(name) for name in names]
+    axes.set_xticks(range(len(names)), words, rotation=35, ha="right", fontsize=7)
+    labels = [_wrapped(label, _WIDE) for label, _ in points]
+    axes.set_yticks(range(len(points)), labels, fontsize=7)
+    what = "" if chart.choices else " on the front"
+    axes.set_title(f"Error of every quantity{what} [{_unit(chart)}]", fontsize=10)
+    figure.colorbar(shown, ax=axes, pad=0.01).ax.tick_params(labelsize=7)
+
+
+def _palest(chart: Chart, values: Any) -> float:
+    """Of an accuracy that is asked all decades below it; else from what there is."""
+    return 10 * _FLOOR if chart.accuracy is not None else max(_FLOOR, float(np.nanmin(values)) / 2)
+
+
+_DARK = 20.0  # %, above it a cell is dark
+
+
+def _unit(chart: Chart) -> str:
+    return "%" if chart.accuracy is not None else "% of the limit"
+
+
+def _table_points(chart: Chart) -> list[tuple[str, Point]]:
+    """Rows of the table: where one stands and what to take; else the front, its most accurate."""
+    if not chart.choices:
+        numbered = [(f"{i} {p.name}", p) for i, p in enumerate(chart.front, start=1)]
+        return numbered[-_MOST_ROWS:]
+    rows = []
+    for choice in chart.choices:
+        for point in (p for p in chart.of(choice.question) if p.errors):
+            if point.here or point.name == choice.name:
+                rows.append((f"{choice.question}: {point.name}", point))
+    return rows
+
+
+def _percent(value: float) -> str:
+    if not math.isfinite(value):
+        return ""
+    if value >= 100:
+        return f"{value:.0f}"
+    return "0" if value < _FLOOR else f"{value:.1g}" if value < 10 * _FLOOR else f"{value:.2g}"
+
+
+def chart_svg(chart: Chart) -> str:
+    """The figure as SVG whose points tell their names under the pointer.
+
+    Parameters
+    ----------
+    chart : Chart
+
+    Returns
+    -------
+    str
+    """
+    text = picture_bytes(chart_figure(chart), ".svg").decode()
+    return _PLACE.sub(lambda found: found[0] + _pointer(chart, chart.points[int(found[1])]), text)
+
+
+_PLACE = re.compile(r'<g id="point-(\d+)">')
+
+
+def _pointer(chart: Chart, point: Point) -> str:
+    worst = chart.label(point.worst) or "none"
+    words = f"{point.name}: {point.seconds:.3g} s, error {point.error:.2%} ({worst})"
+    return f"<title>{escape(visible(words))}</title>"
+
+
+def chart_html(chart: Chart) -> str:
+    """One self-contained page: verdict, picture with named points, tables.
+
+    Parameters
+    ----------
+    chart : Chart
+
+    Returns
+    -------
+    str
+    """
+    svg = chart_svg(chart)
+    return render(
+        "chart.html.j2",
+        chart=chart,
+        svg=svg[svg.index("<svg") :],
+        tables=[(question, _rows(chart, question)) for question in chart.questions],
+        quantities=_quantity_rows(chart),
+        convergence=[convergence_text(each, chart.labels) for each in chart.convergence],
+        finite=math.isfinite,
+        percent=percent,
+    )
+
+
+def _rows(chart: Chart, question: str) -> list[tuple[int | str, Point, bool]]:
+    """Number on the front, point, whether it is what to take."""
+    points, choice = chart.of(question), _choice_of(chart, question)
+    front = sorted((p for p in points if p.on_front), key=lambda p: p.seconds)
+    numbers: dict[int, int | str] = {id(point): i for i, point in enumerate(front, start=1)}
+    wanted = choice.name if choice else None
+    return [(numbers.get(id(point), ""), point, point.name == wanted) for point in points]
+
+
+def _quantity_rows(chart: Chart) -> list[tuple[str, list[Any]]]:
+    """Of the scene as written: quantity in words, its difference for each question."""
+    own = [next((p for p in chart.of(q) if p.here), None) for q in chart.questions]
+    shown = [point for point in own if point is not None]
+    return [(words, [p.errors.get(name) for p in shown]) for name, words in chart.labels.items()]
+
+
+def save_chart(chart: Chart, path: Path, *, force: bool = True) -> None:
+    """Write a chart in the form that the suffix asks for, whole or not at all.
+
+    Parameters
+    ----------
+    chart : Chart
+    path : Path
+        One of :data:`SUFFIXES`.
+    force : bool
+        Replace an existing file.
+
+    Raises
+    ------
+    KeyError
+        Another suffix.
+    """
+    if path.suffix == ".csv":
+        save_rows(chart, path, force=force)
+    elif path.suffix in (".png", ".pdf"):
+        save_picture(chart_figure(chart), path, force=force)
+    else:
+        save_page(_PAGES[path.suffix](chart), path, force=force)
+
+
+def _json(chart: Chart) -> str:
+    return json_text(chart_table(chart), indent=1)
+
+
+_PAGES: dict[str, Callable[[Chart], str]] = {
+    ".svg": chart_svg,
+    ".html": chart_html,
+    ".json": _json,
+}
+
+SUFFIXES = (".svg", ".png", ".pdf", ".html", ".json", ".csv")
+"""Forms in which a chart can be written."""

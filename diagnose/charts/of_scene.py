@@ -1,0 +1,387 @@
+"""Chart of a scene: where it stands, and what would be enough, with and without other rungs."""
+
+import hashlib
+import json
+import math
+import time
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from threadpoolctl import threadpool_limits
+
+from ... import __version__
+from ...datasets.generation.quantities import QUANTITIES, quantity_label
+from ...datasets.workers.local import in_order
+from ...sim.fidelity.choose import estimated_error
+from ...sim.fidelity.pilot import Candidate, Outcome, Pilot
+from ...sim.fidelity.study import Answer, Search, Study
+from ...sim.scene.parts import Scene
+from ..pages.kept import Kept
+from .chart import Chart, Choice, Clock, Point, RungCost, front_of, remaining_error
+from .scene_edit import block_of, options_of
+from .words import (
+    HERE,
+    combination_words,
+    effect_words,
+    error_words,
+    faster_words,
+    percent,
+    raise_words,
+    rung_words,
+)
+
+KEPT, RAISED = "your rungs kept", "rungs may change"
+"""The two questions: only numerics may change; rungs as well."""
+
+_PAUSE = 2.0  # s between two writings of the runs that are kept
+_WORST = 3  # rungs that the conclusion names
+_SLACK = 0.9  # of the budget: what runs may take, the rest is for the page
+
+
+def kept_runs(path: Path | None, scene: Scene) -> Kept[Outcome]:
+    """Runs of a scene in a file beside the output.
+
+    Parameters
+    ----------
+    path : Path or None
+        None keeps nothing.
+    scene : Scene
+
+    Raises
+    ------
+    DataError
+        The file is damaged, or of another scene or version.
+    """
+    table = json.dumps(scene.model_dump(mode="json"), sort_keys=True)
+    return Kept(
+        path,
+        hashlib.sha256(f"{__version__} {table}".encode()).hexdigest(),
+        table_of=lambda run: [dict(run.quantities), run.fault, run.seconds],
+        piece_of=_outcome_of,
+        depends="another scene or version",
+        pause=_PAUSE,
+    )
+
+
+def _outcome_of(table: Any) -> Outcome:
+    quantities, fault, seconds = table
+    return Outcome({name: tuple(each) for name, each in quantities.items()}, fault, seconds)
+
+
+def scene_search(
+    scene: Scene,
+    *,
+    accuracy: float | None = None,
+    jobs: int = 1,
+    clock: Clock = time.perf_counter,
+    kept: Kept[Outcome] | None = None,
+    tell: Callable[[str], None] | None = None,
+) -> Search:
+    """Search over the rungs of a scene, nothing measured yet.
+
+    Parameters
+    ----------
+    scene : Scene
+        Its own fidelity plays no part; what it pins stays as written.
+    accuracy : float, optional
+        Error that every quantity of interest may carry; the scene's own by default.
+    jobs : int
+        Worker processes; the errors do not depend on it.
+    clock : callable
+        Seconds; importable by name where there are workers.
+    kept : Kept, optional
+        Runs of an earlier search; new ones are added.
+    tell : callable, optional
+        Called with what is measured next.
+
+    Raises
+    ------
+    SceneError
+        A pinned name is no effect.
+    ValueError
+        The accuracy is out of bounds.
+    """
+    pilot = Pilot(
+        scene,
+        QUANTITIES[scene.machine],
+        clock=clock,
+        kept=kept,
+        spread=partial(in_order, jobs=jobs),
+        at_once=jobs,
+    )
+    return Search(scene, QUANTITIES[scene.machine], accuracy=accuracy, pilot=pilot, tell=tell)
+
+
+def measure(
+    search: Search, *, budget: float | None = None, clock: Clock = time.perf_counter
+) -> None:
+    """Let a search measure, for so many seconds at most.
+
+    Parameters
+    ----------
+    search : Search
+    budget : float, optional
+        Seconds; the first answer is measured in any case.
+    clock : callable
+        Seconds.
+    """
+    end = math.inf if budget is None else clock() + _SLACK * budget
+    with threadpool_limits(1):  # as in a worker: the same sums in the same order
+        search.measure(lambda expected: clock() + expected > end)
+
+
+def scene_chart(
+    scene: Scene,
+    *,
+    accuracy: float | None = None,
+    budget: float | None = None,
+    jobs: int = 1,
+    clock: Clock = time.perf_counter,
+) -> Chart:
+    """Measure where a scene stands, and what would be enough.
+
+    Parameters
+    ----------
+    scene, accuracy, jobs, clock
+        As :func:`scene_search`.
+    budget : float, optional
+        As :func:`measure`.
+
+    Returns
+    -------
+    Chart
+
+    Raises
+    ------
+    SceneError
+        The scene as written cannot be run with the finest numerics.
+    ValueError
+        The accuracy is out of bounds.
+    """
+    search = scene_search(scene, accuracy=accuracy, jobs=jobs, clock=clock)
+    measure(search, budget=budget, clock=clock)
+    return chart_of(scene, search.found())
+
+
+def chart_of(scene: Scene, found: Study) -> Chart:
+    """Chart of a study.
+
+    Parameters
+    ----------
+    scene : Scene
+    found : Study
+
+    Returns
+    -------
+    Chart
+    """
+    answers = {KEPT: found.kept, **({RAISED: found.raised} if found.raised else {})}
+    points = tuple(p for name, a in answers.items() for p in _points(scene, found, a, name))
+    choices = tuple(_choice(scene, found, a, name) for name, a in answers.items())
+    final = [c for c in choices if c.status == "resolved"]
+    conclusion = (_here(scene, found), *(c.sentence for c in choices))
+    return Chart(
+        name=scene.name,
+        title=f"{scene.name} (simulated): how much model does this scene need?",
+        cost_label="wall time of a simulated second [s/s]",
+        error_label="largest error of a quantity of interest [%]",
+        accuracy=found.accuracy,
+        points=points,
+        reference=REFERENCE,
+        status=found.status,
+        winner=final[-1].name if len(final) == len(choices) else "",
+        verdict=" ".join(conclusion),
+        conclusion=conclusion,
+        choices=choices,
+        raises=tuple(_rung_costs(scene, found)),
+        labels=_labels(scene, points),
+        convergence=tuple(dict.fromkeys(e for a in answers.values() for e in a.convergence)),
+        refused=found.refused,
+        pruned=found.pruned,
+        measured=found.measured,
+        planned=found.planned,
+        note=f"{scene.duration:g} s a run, with its settling; the least time of several runs",
+    )
+
+
+REFERENCE = "reference"
+"""Name of the point with the best rungs that a question admits, and the finest numerics."""
+
+
+def _points(scene: Scene, found: Study, answer: Answer, question: str) -> Iterator[Point]:
+    """The scene as written first, then the cheapest first."""
+    rates = [each.seconds / scene.duration for each in answer.candidates]
+    places = [(rate, c.error) for rate, c in zip(rates, answer.candidates, strict=True)]
+    rows = list(zip(answer.candidates, rates, front_of(places), strict=True))
+    rows.sort(key=lambda row: dict(row[0].rungs) != dict(found.written))
+    for each, rate, on_front in rows:
+        best = dict(each.rungs) == dict(answer.reference.rungs)
+        here = dict(each.rungs) == dict(found.written)
+        name = combination_words(each, found.written)
+        yield Point(
+            name=name,
+            rungs=each.rungs,
+            seconds=rate,
+            errors=each.differences,
+            verdict="reference" if best else each.verdict,
+            reason=_reason(each, scene),
+            starts=each.starts,
+            on_front=on_front,
+            question=question,
+            here=here,
+        )
+
+
+def _reason(each: Candidate, scene: Scene) -> str:
+    """Why a candidate is not within, in words."""
+    if each.verdict in ("beyond", "doubtful"):
+        return error_words(each, scene)
+    return each.reason
+
+
+def _here(scene: Scene, found: Study) -> str:
+    """Where the scene as written stands."""
+    whole = found.whole
+    own = whole.written
+    if own is None or (found.raised is None and found.raises):
+        own, against = found.kept.written, "its own finest numerics"
+    else:
+        against = "the best rungs" if found.raised else "its finest numerics"
+    if own is None:
+        return "Your scene as written has not been measured."
+    within = own.verdict == "within"
+    word = (
+        "within"
+        if within
+        else "not within"
+        if own.verdict == "beyond"
+        else "not yet told to be within"
+    )
+    text = f"Your scene as written is {word} {percent(found.accuracy)} of {against}: "
+    text += error_words(own, scene)
+    costly = sorted(found.raises, key=lambda each: -each.candidate.error)
+    named = [e for e in costly if found.accuracy < e.candidate.error < math.inf][:_WORST]
+    if named:
+        parts = [
+            f"{effect_words(e.effect)} {e.written} instead of {e.best} {percent(e.candidate.error)}"
+            for e in named
+        ]
+        text += f". Rung by rung: {', '.join(parts)}"
+    return f"{text}."
+
+
+def _choice(scene: Scene, found: Study, answer: Answer, question: str) -> Choice:
+    """What to take for a question, with its certainty."""
+    chosen = answer.chosen
+    name = combination_words(chosen, found.written)
+    own = math.nan if answer.written is None else answer.written.seconds
+    same_changes = not answer.changes
+    status = _status(found, answer)
+    return Choice(
+        question=question,
+        name=name,
+        status=status,
+        error=chosen.error,
+        standard_error=chosen.standard_error,
+        promised=estimated_error(chosen),
+        starts=chosen.starts,
+        seconds=chosen.seconds / scene.duration,
+        changes=answer.changes,
+        block=_commented(scene, found, answer),
+        options=options_of(answer.changes),
+        reference=_reference_words(answer),
+        sentence=_sentence(scene, found, answer, question, status, own),
+        keeps=same_changes,
+    )
+
+
+def _status(found: Study, answer: Answer) -> str:
+    if any(
+        not each.converged or remaining_error(each) > found.accuracy for each in answer.convergence
+    ):
+        return "not converged"
+    return answer.status
+
+
+def _reference_words(answer: Answer) -> str:
+    rungs = answer.reference
+    return ", ".join(rung_words(e, r, rungs.values) for e, r in rungs.rungs.items())
+
+
+_OPENING = {KEPT: "With your rungs kept", RAISED: "If rungs may change"}
+
+
+def _sentence(
+    scene: Scene, found: Study, answer: Answer, question: str, status: str, own: float
+) -> str:
+    """Conclusion about a question."""
+    opening, chosen = _OPENING[question], answer.chosen
+    asked = percent(found.accuracy)
+    if status == "not converged":
+        worst = max(answer.convergence, key=remaining_error)
+        label = quantity_label(worst.quantity, scene)[0]
+        return (
+            f"{opening}, nothing can be recommended: the reference itself still moves with the "
+            f"{worst.effect}, by {percent(abs(worst.steps[-1]))} in {label} at the finest level."
+        )
+    name = combination_words(chosen, found.written)
+    what = "change nothing" if name == HERE else f"take {name}"
+    errs = error_words(chosen, scene)
+    if dict(chosen.rungs) == dict(answer.reference.rungs):
+        errs = f"nothing cheaper {'looks' if status == 'so far' else 'is'} within {asked}"
+    faster = "" if name == HERE else f", {faster_words(chosen.seconds, own)}"
+    certain = _certainty(scene, found, answer, status)
+    return f"{opening}: {what} ({errs}{faster}){certain}."
+
+
+def _certainty(scene: Scene, found: Study, answer: Answer, status: str) -> str:
+    doubted = answer.doubted
+    if status == "so far":
+        sure = answer.chosen.verdict != "doubtful"
+        word = "is enough" if sure else "looks enough, not certain yet"
+        return f"; so far this {word}: {found.measured} of {found.planned} combinations measured"
+    if status == "unresolvable" and doubted:
+        name = combination_words(doubted[0], found.written)
+        return (
+            f"; cheaper, but not told from the reference for scatter: {name} "
+            f"({error_words(doubted[0], scene)} over {doubted[0].starts} starts); a longer "
+            "duration or less accuracy would tell"
+        )
+    return ""
+
+
+def _commented(scene: Scene, found: Study, answer: Answer) -> str:
+    """Block to paste, with what it is above it."""
+    if not answer.changes:
+        return ""
+    name = combination_words(answer.chosen, found.written)
+    return f"# {scene.name}: {name}; {error_words(answer.chosen, scene)} (simulated)\n" + block_of(
+        answer.changes
+    )
+
+
+def _rung_costs(scene: Scene, found: Study) -> Iterator[RungCost]:
+    for each in found.raises:
+        candidate = each.candidate
+        worst = max(candidate.differences, key=lambda n: candidate.differences[n].error, default="")
+        yield RungCost(
+            effect=effect_words(each.effect),
+            written=each.written,
+            best=each.best,
+            error=candidate.error,
+            standard_error=candidate.standard_error,
+            worst=quantity_label(worst, scene)[0] if worst else "",
+            starts=candidate.starts,
+            text=raise_words(each, scene),
+        )
+
+
+def _labels(scene: Scene, points: tuple[Point, ...]) -> Mapping[str, str]:
+    names = dict.fromkeys(name for point in points for name in point.errors)
+    return {name: _with_unit(*quantity_label(name, scene)) for name in names}
+
+
+def _with_unit(words: str, unit: str) -> str:
+    return f"{words} [{unit}]" if unit else words

@@ -1,0 +1,200 @@
+"""Values written into the TOML text of a scene: as a block to paste, or into a file."""
+
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from ...datasets.recipe.draws import value_at
+from ...datasets.recipe.text import toml_text
+from ...sim.atomic import write_whole
+from ...sim.fidelity.ladder import with_values
+from ...sim.scene.load import scene_from_table, scene_table, scene_text
+from ...sim.scene.parts import Scene, SceneError, beside
+
+_HEADER = re.compile(r"\s*(\[{1,2})\s*([^\[\]#]+?)\s*\]{1,2}\s*(#.*)?$")
+_VALUE = r"(\"[^\"]*\"|'[^']*'|[^#]*?)"  # of one line
+
+
+def block_of(changes: Mapping[str, Any]) -> str:
+    """Values by dotted path as TOML tables.
+
+    Parameters
+    ----------
+    changes : mapping of str to object
+        Dotted path -> number or text; entries of lists by their number.
+
+    Returns
+    -------
+    str
+        Values in lists of tables, which no table can be added to, as lines of comment.
+
+    Examples
+    --------
+    >>> print(block_of({"pressure.rung": "chamber", "numerics.step": 1e-5}))
+    [pressure]
+    rung = "chamber"
+    <BLANKLINE>
+    [numerics]
+    step = 1e-05
+    """
+    tables: dict[str, dict[str, Any]] = {}
+    for path, value in changes.items():
+        table, _, key = path.rpartition(".")
+        tables.setdefault(table, {})[key] = value
+    blocks = [
+        toml_text(values) if not table else f"[{table}]\n{toml_text(values)}"
+        for table, values in sorted(tables.items(), key=lambda row: bool(row[0]))
+        if not re.search(r"\.\d+(\.|$)", table)
+    ]
+    listed = [
+        f"# {path}: {line}"
+        for path, value in changes.items()
+        if re.search(r"\.\d+\.", path)
+        for line in [toml_text({path.rpartition(".")[2]: value}).strip()]
+    ]
+    return "\n".join([*blocks, *listed]).rstrip()
+
+
+def options_of(changes: Mapping[str, Any]) -> str:
+    """The same as options of the command line.
+
+    Examples
+    --------
+    >>> options_of({"pressure.rung": "chamber", "numerics.step": 1e-5})
+    '--set pressure.rung=chamber --set numerics.step=1e-05'
+    """
+    return " ".join(f"--set {path}={value}" for path, value in changes.items())
+
+
+def with_changes(text: str, changes: Mapping[str, Any]) -> str:
+    r"""Text of a scene with values replaced or added; the rest, comments too, stays.
+
+    Parameters
+    ----------
+    text : str
+        TOML.
+    changes : mapping of str to object
+        Dotted path -> number or text.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> print(with_changes("[a]\nrung = 'x'  # why", {"a.rung": "y", "b.step": 2.0}))
+    [a]
+    rung = "y"  # was 'x'
+    <BLANKLINE>
+    [b]
+    step = 2.0
+    """
+    lines = text.rstrip("\n").split("\n")
+    for path, value in changes.items():
+        _put(lines, path.split("."), value)
+    return "\n".join(lines) + ("\n" if text.endswith("\n") else "")
+
+
+def _put(lines: list[str], path: Sequence[str], value: Any) -> None:
+    """Replace the value where it stands, else add it to its table, else add the table."""
+    places = _sections(lines)
+    for split in range(len(path) - 1, -1, -1):
+        for first, last in places.get(tuple(path[:split]), []):
+            key = r"\s*\.\s*".join(map(re.escape, path[split:]))
+            for i in range(first, last):
+                found = re.match(rf"(\s*{key}\s*=\s*){_VALUE}\s*(#.*)?$", lines[i])
+                if found:
+                    new = toml_text({"x": value}).partition("= ")[2].strip()
+                    lines[i] = f"{found[1]}{new}  # was {found[2].strip()}"
+                    return
+    line = toml_text({path[-1]: value}).strip()
+    own = places.get(tuple(path[:-1]))
+    if own is not None:
+        lines.insert(own[0][0], line)
+    else:
+        lines += ["", f"[{'.'.join(path[:-1])}]", line]
+
+
+def _sections(lines: Sequence[str]) -> dict[tuple[str, ...], list[tuple[int, int]]]:
+    """Lines of every table by its path: from the one below its header to the next header."""
+    found: dict[tuple[str, ...], list[tuple[int, int]]] = {}
+    counts: dict[tuple[str, ...], int] = {}
+    begin, path = 0, ()  # type: int, tuple[str, ...]
+    for i, line in enumerate(lines):
+        header = _HEADER.match(line)
+        if header is None or "=" in line.partition("#")[0]:
+            continue
+        found.setdefault(path, []).append((begin, i))
+        begin, path = i + 1, _numbered(header, counts)
+    found.setdefault(path, []).append((begin, len(lines)))
+    return found
+
+
+def _numbered(header: re.Match[str], counts: dict[tuple[str, ...], int]) -> tuple[str, ...]:
+    """Path of a header, with the numbers of the entries of lists of tables."""
+    path: tuple[str, ...] = ()
+    keys = [key.strip().strip("\"'") for key in header[2].split(".")]
+    for depth, key in enumerate(keys, start=1):
+        path = (*path, key)
+        if header[1] == "[[" and depth == len(keys):
+            counts[path] = counts.get(path, -1) + 1
+        if path in counts:
+            path = (*path, str(counts[path]))
+    return path
+
+
+def apply_changes(
+    source: str,
+    scene: Scene,
+    given: Mapping[str, Any],
+    changes: Mapping[str, Any],
+    path: Path,
+    *,
+    note: str = "",
+    force: bool = True,
+) -> None:
+    """Write the text of a scene with values replaced, whole or not at all.
+
+    Parameters
+    ----------
+    source : str
+        Built-in name, or file.
+    scene : Scene
+        As loaded from it, with `given` in it.
+    given : mapping of str to object
+        Values that were given beside the file.
+    changes : mapping of str to object
+        Values to write; rungs stay as they are then.
+    path : Path
+        TOML file.
+    note : str
+        Written at its top.
+    force : bool
+        Replace an existing file.
+
+    Raises
+    ------
+    SceneError
+        The text cannot be changed line by line.
+    """
+    wanted = {**changes, **({"fidelity": "given"} if scene.fidelity != "given" else {})}
+    text = with_changes(scene_text(source), {**given, **wanted})
+    if note:
+        text = f"# {note}\n{text}"
+    target = with_values(scene, wanted)
+    try:
+        found = scene_from_table(beside(scene_table(text, str(path)), path.parent))
+        same = all(_same(found, target, each) for each in (*given, *wanted))
+    except SceneError as error:
+        raise SceneError(
+            str(path), [f"{fault}; write it by hand" for fault in error.faults]
+        ) from None
+    if not same:
+        fault = f"the text of {source} cannot be changed line by line; write it by hand: "
+        raise SceneError(str(path), [fault + options_of(wanted)])
+    write_whole(path, text.encode(), force=force)
+
+
+def _same(one: Scene, other: Scene, path: str) -> bool:
+    return bool(value_at(one, path) == value_at(other, path))

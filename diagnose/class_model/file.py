@@ -1,0 +1,180 @@
+"""The file of a model of named conditions: what is in it, and whether its parts fit each other."""
+
+from pathlib import Path
+from typing import Any, Literal, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from ..feature_rows.physical import physical_rows
+from ..wear_model.arrays import (
+    BlendStructure,
+    ChannelCard,
+    FeatureChoice,
+    Pulses,
+    RateHz,
+    Strict,
+    blend_arrays,
+    blend_fits,
+    blend_of,
+    blend_structure,
+    check_channels,
+    familiarity_fits,
+    numbers_fit,
+    part_arrays,
+    part_of,
+    refuse_more,
+    shapes_of,
+)
+from ..wear_model.bundle import Bundle, checked, load_bundle, save_bundle
+from ..wear_model.estimate import ModelError
+from ..wear_model.novelty import Familiarity
+from .train import ClassModel, Votes
+
+CLASS_MODEL = "class model"
+"""Word of such a file for its kind."""
+
+_ROUNDING = 1e-9
+
+
+class _Structure(Strict):
+    blends: list[BlendStructure] = Field(min_length=2, max_length=100)
+
+
+class _Card(Strict):
+    created_by: str
+    origin: Literal["simulated", "measured"]
+    target: str
+    classes: list[str] = Field(min_length=2, max_length=100)
+    records: int = Field(ge=1)
+    split_seed: int
+    training_signals: list[int]
+    sample_rate_hz: RateHz
+    channels: list[ChannelCard] = Field(min_length=1)
+    tacho: str | None
+    pulses_per_revolution: Pulses
+    features: list[str] = Field(min_length=1)
+    feature_choice: FeatureChoice = FeatureChoice()
+
+    @model_validator(mode="after")
+    def _fits_itself(self) -> Self:
+        if self.classes != sorted(set(self.classes)):
+            raise ValueError("classes must be different, in alphabetical order")
+        check_channels(self.channels, self.tacho)
+        return self
+
+
+def save_class_model(model: ClassModel, path: str | Path, *, force: bool = False) -> None:
+    """Write a model of named conditions; the same model gives the same bytes.
+
+    Parameters
+    ----------
+    model : ClassModel
+    path : str or Path
+        Usually ``*.wsm``.
+    force : bool
+        Replace an existing file.
+
+    Raises
+    ------
+    DataError
+        The file exists, or its folder does not.
+    ModelError
+        The model could not be read again.
+    """
+    _check(model, path)
+    structure = {"blends": [blend_structure(blend) for blend in model.blends]}
+    bundle = Bundle(
+        kind=CLASS_MODEL, card=model.card, structure=structure, arrays=_arrays_of(model)
+    )
+    save_bundle(bundle, path, force=force)
+
+
+def load_class_model(path: str | Path) -> ClassModel:
+    """Read a model of named conditions; nothing in the file is executed.
+
+    Parameters
+    ----------
+    path : str or Path
+        File of :func:`save_class_model`.
+
+    Returns
+    -------
+    ClassModel
+
+    Raises
+    ------
+    ModelError
+        No such file, another kind of model, damaged, changed, of another version of the format or
+        of the features, or forged so that its parts do not fit each other.
+    """
+    bundle = load_bundle(path, CLASS_MODEL)
+    checked(_Card, bundle.card, path, "card.json")
+    structure = checked(_Structure, bundle.structure, path, "structure.json")
+    try:
+        model = _model_of(structure, bundle)
+    except (KeyError, TypeError, ValueError) as error:
+        raise ModelError(f"{path}: arrays.npz cannot be read ({error}); retrain it") from error
+    _check(model, path)
+    return model
+
+
+def _arrays_of(model: ClassModel) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for i, blend in enumerate(model.blends):
+        found |= blend_arrays(blend, f"blends.{i}")
+    for i, cloud in enumerate(model.familiarity):
+        found |= part_arrays(cloud, f"familiarity.{i}")
+    found |= part_arrays(model.votes, "votes")
+    return {name: np.asarray(value) for name, value in found.items()}
+
+
+def _model_of(structure: _Structure, bundle: Bundle) -> ClassModel:
+    arrays = bundle.arrays
+    model = ClassModel(
+        blends=tuple(
+            blend_of(one, arrays, f"blends.{i}") for i, one in enumerate(structure.blends)
+        ),
+        votes=Votes(**part_of(arrays, "votes", Votes)),
+        familiarity=tuple(
+            Familiarity(**part_of(arrays, f"familiarity.{i}", Familiarity))
+            for i in range(len(structure.blends))
+        ),
+        card=bundle.card,
+    )
+    refuse_more(arrays, _arrays_of(model))
+    return model
+
+
+def _check(model: ClassModel, path: str | Path) -> None:
+    """Shapes that fit each other, so that a forged file fails here and not in a prediction."""
+    n = len(model.names)
+    try:
+        physical = physical_rows(model.names, np.zeros((1, n)))
+    except ValueError as error:
+        raise ModelError(f"{path}: features do not fit each other ({error}); retrain it") from error
+    fits = {
+        "blends": len(model.blends) == len(model.classes)
+        and all(blend_fits(blend, n) for blend in model.blends),
+        "votes": _votes_fit(model.votes, len(model.classes)),
+        "familiarity": len(model.familiarity) == len(model.classes)
+        and all(familiarity_fits(cloud, physical.shape[1], n) for cloud in model.familiarity),
+        "numbers": numbers_fit(_arrays_of(model)),
+    }
+    bad = [name for name, good in fits.items() if not good]
+    if bad:
+        raise ModelError(f"{path}: {', '.join(bad)} do not fit {n} features; retrain it")
+
+
+def _votes_fit(votes: Votes, classes: int) -> bool:
+    n = np.size(votes.label)
+    return (
+        shapes_of(votes.label, votes.group, votes.distance) == {(n,)}
+        and n > 0
+        and votes.shares.shape == (n, classes)
+        and bool((votes.shares >= 0).all())
+        and bool((np.abs(votes.shares.sum(axis=1) - 1) < _ROUNDING).all())
+        and votes.blows.ndim == 2
+        and len(votes.blows) == n
+        and bool(((votes.label >= 0) & (votes.label < classes)).all())
+    )

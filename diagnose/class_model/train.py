@@ -1,0 +1,827 @@
+"""Recordings of your own that carry names of conditions: a model that tells which.
+
+There is no clearance in metres here and no grade: a recording is of one of the labelled classes,
+with a set of those that cannot be excluded, or of none that is known.
+"""
+
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ... import __version__
+from ...datasets.file.record import Attributes, DataError, DataSet, Recording
+from ...datasets.split.rules import check_no_leak, group_folds
+from ..feature_rows.blows import NOISE_SCORE, blow_floors, blow_scores, blow_table, lacks_blows
+from ..feature_rows.feature_choice import choice_card, choice_in
+from ..feature_rows.feature_table import (
+    USUAL,
+    Choice,
+    FeatureTable,
+    Progress,
+    feature_table,
+    recording_features,
+)
+from ..feature_rows.quality import layout_faults, sample_faults
+from ..learning.conformal import COVERAGE, record_weights, weighted_quantile
+from ..learning.regressions import CANDIDATES, Blend, Folds, fit_blend
+from ..learning.scores import Figure, resampled, share
+from ..report.batch import Item, fault_of
+from ..wear_model.estimate import UNFAMILIAR_SHARE, ModelError
+from ..wear_model.novelty import Familiarity, fit_familiarity
+
+Float = NDArray[np.float64]
+Index = NDArray[np.intp]
+
+_FEWEST = 3  # recordings of a class that is judged: one out, two to learn from
+_MOST_CLASSES = 20
+_MOST_FOLDS = 10  # of whole recordings; each by itself up to so many
+_FEWEST_TO_KNOW = 10  # recordings of the training; with fewer, most strangers pass for known
+_USED = ("plain ridge", "trees")  # candidates that a handful of recordings can carry
+
+
+@dataclass(frozen=True, kw_only=True)
+class Naming:
+    """What a model of classes says of one recording.
+
+    Attributes
+    ----------
+    verdict : {"named", "unfamiliar", "unusable"}
+        Unfamiliar: like none of the trained recordings. Unusable: the recording is at fault.
+    reasons : tuple of str
+        Why there is no name; empty where there is one.
+    name : str
+        The likeliest class; empty without one.
+    possible : tuple of str
+        Classes that cannot be excluded, in the order of the model; never empty where named.
+    shares : dict
+        Class -> share of the votes, sum 1.
+    p_value : float or None
+        Of the hypothesis that the recording is of a trained class.
+    p_limit : float or None
+        At or below it a recording is called unfamiliar.
+    """
+
+    verdict: Literal["named", "unfamiliar", "unusable"]
+    reasons: tuple[str, ...] = ()
+    name: str = ""
+    possible: tuple[str, ...] = ()
+    shares: Mapping[str, float]
+    p_value: float | None = None
+    p_limit: float | None = None
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        return asdict(self)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Votes:
+    """Votes on the training records, of models that their recording had no part in.
+
+    Attributes
+    ----------
+    shares : numpy.ndarray [shape=(n_records, n_classes)]
+        Rows of sum 1.
+    label : numpy.ndarray [shape=(n_records,)]
+        Number of the class that is labelled.
+    group : numpy.ndarray [shape=(n_records,)]
+        Recording, or machine, of each record.
+    distance : numpy.ndarray [shape=(n_records,)]
+        From the nearest of the classes' clouds, those of the other recordings.
+    blows : numpy.ndarray [shape=(n_records, n_channels)]
+        Score of the blows in each channel; without columns where records are too short for it.
+    """
+
+    shares: Float
+    label: Index
+    group: Index
+    distance: Float
+    blows: Float
+
+    @cached_property
+    def groups_of(self) -> tuple[int, ...]:
+        """Recordings of each class."""
+        return tuple(
+            len(np.unique(self.group[self.label == c])) for c in range(self.shares.shape[1])
+        )
+
+    @cached_property
+    def p_limit(self) -> float:
+        """A recording with this p-value or a smaller one is called unfamiliar."""
+        return max(UNFAMILIAR_SHARE, 1 / (len(np.unique(self.group)) + 1))
+
+    def p_value(self, distance: float) -> float:
+        """Conformal p-value of "this recording is of a trained class", recordings as the units.
+
+        Windows of one recording are no cases of their own: together they count as one, by the
+        share of them that lies as far.
+
+        Examples
+        --------
+        >>> label = np.zeros(4, dtype=int)
+        >>> votes = Votes(
+        ...     shares=np.ones((4, 1)),
+        ...     label=label,
+        ...     group=np.array([0, 0, 0, 1]),
+        ...     distance=np.array([1.0, 1.0, 1.0, 3.0]),
+        ...     blows=np.zeros((4, 1)),
+        ... )
+        >>> round(votes.p_value(2.0), 3), round(votes.p_value(4.0), 3)
+        (0.667, 0.333)
+        """
+        groups, place = np.unique(self.group, return_inverse=True)
+        farther = np.bincount(place, weights=self.distance >= distance)
+        return float((1 + (farther / np.bincount(place)).sum()) / (len(groups) + 1))
+
+    @cached_property
+    def coverages(self) -> tuple[float, ...]:
+        """Coverage that the sets promise for each class: less where recordings are few.
+
+        With m recordings of a class no method promises more than ``m / (m + 1)`` and excludes
+        anything; a class of too few to be judged is never excluded.
+        """
+        return tuple(min(COVERAGE, m / (m + 1)) if m >= _FEWEST else 1.0 for m in self.groups_of)
+
+    @cached_property
+    def limits(self) -> Float:
+        """Least share with which each class is kept in a set [shape=(n_classes,)]."""
+        return np.array([self._limit(c) for c in range(self.shares.shape[1])])
+
+    @cached_property
+    def blow_floors(self) -> Float:
+        """Least score of the blows in each class's recordings [shape=(n_classes, n_channels)]."""
+        mine = [self.label == c for c in range(self.shares.shape[1])]
+        return np.stack([blow_floors(self.blows[here], self.group[here]) for here in mine])
+
+    def lacking(self, blows: Float) -> tuple[int, ...]:
+        """Classes whose every recording has blows, where a recording of these scores has none."""
+        return tuple(c for c, floors in enumerate(self.blow_floors) if lacks_blows(blows, floors))
+
+    def strange(self, shares: Float, distance: float, blows: Float) -> bool:
+        """Whether a recording is of none of the classes: too far, or without their blows."""
+        kept = set_of(shares, self.limits)
+        return self.p_value(distance) <= self.p_limit or set(kept) <= set(self.lacking(blows))
+
+    def _limit(self, c: int) -> float:
+        if self.groups_of[c] < _FEWEST:
+            return 0.0
+        mine = self.label == c
+        lack = 1 - self.shares[mine, c]
+        found = weighted_quantile(lack, record_weights(self.group[mine]), self.coverages[c])
+        return max(1 - found, 0.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ClassModel:
+    """A trained model of named conditions.
+
+    Attributes
+    ----------
+    blends : tuple of Blend
+        One a class: features to 1 (another) … 2 (this one).
+    votes : Votes
+        On the training records.
+    familiarity : tuple of Familiarity
+        The cloud of the training recordings of each class: between two classes lies neither. Of a
+        class of too few recordings, that of all.
+    card : dict
+        What it was trained on, its inputs and classes.
+    """
+
+    blends: tuple[Blend, ...]
+    votes: Votes
+    familiarity: tuple[Familiarity, ...]
+    card: dict[str, Any]
+
+    @property
+    def classes(self) -> tuple[str, ...]:
+        """Names of the classes, in alphabetical order."""
+        return tuple(self.card["classes"])
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Names of the features of a row."""
+        return tuple(self.card["features"])
+
+    @property
+    def notice(self) -> str:
+        """What must be said beside every result."""
+        few = [
+            f"{name}: {count} recording(s), can be neither judged nor excluded"
+            for name, count in zip(self.classes, self.votes.groups_of, strict=True)
+            if count < _FEWEST
+        ]
+        recordings = len(np.unique(self.votes.group))
+        if recordings < _FEWEST_TO_KNOW:
+            few.append(
+                f"trained on {recordings} recordings, must be >= {_FEWEST_TO_KNOW} to know "
+                "strangers: a condition of none of its classes may well be named as one of them"
+            )
+        return "; ".join(few)
+
+    def distance(self, rows: Float) -> Float:
+        """From the nearest class [shape=(n,)] of feature rows [shape=(n, n_features)]."""
+        return _nearest_distance(self.familiarity, self.names, rows)
+
+    def predict(self, rows: Float) -> Float:
+        """Shares [shape=(n, n_classes)] of feature rows [shape=(n, n_features)]."""
+        return _shares(np.stack([blend.predict(rows) for blend in self.blends], axis=1))
+
+    def estimate(self, recording: Recording) -> Naming:
+        """Tell the condition in a recording.
+
+        Parameters
+        ----------
+        recording : Recording
+            Any; one that lacks the model's inputs or is at fault is unusable, with the reasons.
+
+        Returns
+        -------
+        Naming
+
+        Raises
+        ------
+        DataError
+            The signal cannot be turned into features.
+        ModelError
+            The program's features are not the model's.
+        """
+        faults = layout_faults(recording, self.card) or sample_faults(recording)
+        reasons = tuple(fault.text for fault in faults if fault.bars)
+        if reasons:
+            return Naming(verdict="unusable", reasons=reasons, shares={})
+        names, row = recording_features(recording, choice_in(self.card))
+        if names != self.names:
+            raise ModelError(
+                f"the model's {len(self.names)} features are not the recording's {len(names)}; "
+                "use recordings like those it was trained on, or retrain it"
+            )
+        return self.judge(row, blow_scores(recording))
+
+    def judge(self, row: Float, blows: Float) -> Naming:
+        """Tell the condition from features and blows.
+
+        Parameters
+        ----------
+        row : numpy.ndarray [shape=(n_features,)]
+        blows : numpy.ndarray [shape=(n_channels,)]
+            Of :func:`wearstate.diagnose.feature_rows.blows.blow_scores`.
+
+        Returns
+        -------
+        Naming
+        """
+        shares = self.predict(row[None, :])[0]
+        told = {name: float(value) for name, value in zip(self.classes, shares, strict=True)}
+        distance = float(self.distance(row[None, :])[0])
+        p_value, p_limit = self.votes.p_value(distance), self.votes.p_limit
+        judged: dict[str, Any] = {"shares": told, "p_value": p_value, "p_limit": p_limit}
+        if p_value <= p_limit:
+            reason = (
+                f"unlike the recordings of every class (p = {p_value:.2g}, unfamiliar at "
+                f"{p_limit:.2g} or less): {distance:.3g} from the nearest, of the trained ones the "
+                f"farthest {self.votes.distance.max():.3g}"
+            )
+            return Naming(verdict="unfamiliar", reasons=(reason,), **judged)
+        kept = set_of(shares, self.votes.limits)
+        if set(kept) <= set(self.votes.lacking(blows)):
+            return Naming(verdict="unfamiliar", reasons=(self._no_blows(kept, blows),), **judged)
+        return Naming(
+            verdict="named",
+            name=self.classes[int(shares.argmax())],
+            possible=tuple(self.classes[c] for c in kept),
+            **judged,
+        )
+
+    def _no_blows(self, kept: Sequence[int], blows: Float) -> str:
+        """Why a recording is of none of these classes."""
+        floors = self.votes.blow_floors[list(kept)]
+        return (
+            f"without the blows of every recording of {', '.join(self.classes[c] for c in kept)}: "
+            f"score {blows.max():.2g}, noise has up to {NOISE_SCORE:g}, they have "
+            f"{floors[floors > NOISE_SCORE].min():.2g} or more"
+        )
+
+
+def set_of(shares: Float, limits: Float) -> tuple[int, ...]:
+    """Classes that cannot be excluded, the likeliest always among them.
+
+    Parameters
+    ----------
+    shares, limits : numpy.ndarray [shape=(n_classes,)]
+
+    Examples
+    --------
+    >>> set_of(np.array([0.7, 0.2, 0.1]), np.array([0.8, 0.15, 0.15]))
+    (0, 1)
+    """
+    kept = {int(shares.argmax()), *np.flatnonzero(shares >= limits).tolist()}
+    return tuple(sorted(kept))
+
+
+def _shares(values: Float) -> Float:
+    """Votes of 1 (no) to 2 (yes) as shares of sum 1; all alike where nobody votes."""
+    votes = np.clip(values - 1, 0, 1)
+    total = votes.sum(axis=1, keepdims=True)
+    even = np.full_like(votes, 1 / votes.shape[1])
+    return np.asarray(np.where(total > 0, votes / np.where(total > 0, total, 1), even))
+
+
+# --- training
+
+
+def train_classes(
+    path: str | Path,
+    *,
+    target: str,
+    choice: Choice = USUAL,
+    seed: int = 0,
+    jobs: int = 1,
+    progress: Progress | None = None,
+) -> tuple[ClassModel, dict[str, Any]]:
+    """Fit a model of named conditions, and judge it with whole recordings left out.
+
+    Parameters
+    ----------
+    path : str or Path
+        Data set with a label of texts; its groups (files, unless others were named) decide every
+        split, so that windows of one recording are never on both sides.
+    target : str
+        Manifest column with the label.
+    choice : Choice
+        Features to train on.
+    seed : int
+        Of folds, trees and resamples.
+    jobs : int
+        Worker processes for the features.
+    progress : callable, optional
+        Called with (records done, records).
+
+    Returns
+    -------
+    model : ClassModel
+        Fitted on all recordings.
+    result : dict
+        As :func:`score_votes`, every recording judged by a fit that it had no part in.
+
+    Raises
+    ------
+    DataError
+        No such label, a label that differs within a recording, fewer than two classes of enough
+        recordings.
+    """
+    with DataSet(path) as data:
+        head, manifest = data.attributes, data.manifest
+    _labels_of(manifest, target, path)  # refused before the features are computed
+    table = feature_table(path, choice=choice, jobs=jobs, progress=progress)
+    labels = _labels_of(table.manifest, target, path)
+    blows = blow_table(path, len(labels), jobs=jobs)
+    model = fit_classes(table, labels, blows, head, target=target, seed=seed)
+    model.card["feature_choice"] = choice_card(choice)
+    return model, score_votes(model.votes, model.classes, seed=seed)
+
+
+def _labels_of(manifest: Any, target: str, path: str | Path) -> NDArray[np.str_]:
+    """Label of each record as text, refused where it cannot be learnt."""
+    if target not in manifest:
+        raise DataError(
+            f"{path}: target = {target!r} must be one of its columns {', '.join(manifest)}; label "
+            f"the recordings when importing them: --label {target}=… or --labels TABLE"
+        )
+    column = manifest[target].to_numpy()
+    if column.dtype.kind == "f":
+        raise DataError(
+            f"{path}: {target} is a column of fractions, must be one of names; train for a "
+            "severity, or label the recordings by names"
+        )
+    labels = np.asarray(column, dtype=str)
+    groups = manifest["group"].to_numpy()
+    found = {c: len(np.unique(groups[labels == c])) for c in np.unique(labels).tolist()}
+    faults = _class_faults(found, target) + [
+        f"group {group} has {target} = {', '.join(several)}, must have one; group by file"
+        for group in np.unique(groups).tolist()
+        if len(several := np.unique(labels[groups == group]).tolist()) > 1
+    ]
+    if faults:
+        raise DataError("\n".join(f"{path}: {fault}" for fault in faults))
+    return labels
+
+
+def _class_faults(found: Mapping[str, int], target: str) -> list[str]:
+    counts = ", ".join(f"{count} of {name}" for name, count in list(found.items())[:_MOST_CLASSES])
+    enough = sum(count >= _FEWEST for count in found.values())
+    if len(found) > _MOST_CLASSES:
+        return [f"{target} has {len(found)} values, must have <= {_MOST_CLASSES}; name classes"]
+    if enough < 2:
+        return [
+            f"{target}: {enough} classes of >= {_FEWEST} recordings ({counts}), must be >= 2; "
+            "record more"
+        ]
+    return []
+
+
+def fit_classes(
+    table: FeatureTable,
+    labels: NDArray[np.str_],
+    blows: Float,
+    head: Attributes,
+    *,
+    target: str,
+    seed: int = 0,
+) -> ClassModel:
+    """Fit a model of named conditions on a feature table.
+
+    Parameters
+    ----------
+    table : FeatureTable
+    labels : numpy.ndarray [shape=(n_records,)]
+        Of each record.
+    blows : numpy.ndarray [shape=(n_records, n_channels)]
+        Of :func:`wearstate.diagnose.feature_rows.blows.blow_table`.
+    head : Attributes
+        Of the data set.
+    target, seed
+        As of :func:`train_classes`.
+
+    Returns
+    -------
+    ClassModel
+    """
+    classes, truth = np.unique(labels, return_inverse=True)
+    groups = table.manifest["group"].to_numpy()
+    folds = group_folds(groups, n=min(_MOST_FOLDS, len(np.unique(groups))), seed=seed)
+    for train, test in folds:
+        check_no_leak(groups, train, test)
+    usable = [item for item in CANDIDATES if item.name.startswith(_USED)]
+    fitted = [
+        fit_blend(table.values, 1.0 + (truth == c), folds, seed=seed, candidates=usable)
+        for c in range(len(classes))
+    ]
+    return ClassModel(
+        blends=tuple(part.blend for part in fitted),
+        votes=Votes(
+            shares=_shares(np.stack([part.estimate for part in fitted], axis=1)),
+            label=truth.astype(np.intp),
+            group=groups.astype(np.intp),
+            distance=_left_out_distances(table, truth, groups, folds),
+            blows=blows,
+        ),
+        familiarity=_clouds(table, truth, groups, np.arange(len(groups))),
+        card=_card(head, table, classes.tolist(), target, seed),
+    )
+
+
+def _left_out_distances(table: FeatureTable, truth: Index, groups: Index, folds: Folds) -> Float:
+    """Of each record, from clouds that its recording had no part in."""
+    distance = np.empty(len(groups))
+    for train, test in folds:
+        clouds = _clouds(table, truth, groups, train)
+        distance[test] = _nearest_distance(clouds, table.names, table.values[test])
+    return distance
+
+
+def _clouds(
+    table: FeatureTable, truth: Index, groups: Index, rows: Index
+) -> tuple[Familiarity, ...]:
+    """Cloud of each class by some rows; by all of them where a class has too few recordings."""
+    clouds = []
+    for c in np.unique(truth):
+        few = len(np.unique(groups[truth == c])) < _FEWEST
+        here = rows if few else rows[truth[rows] == c]
+        clouds.append(fit_familiarity(table.names, table.values[here], groups[here]))
+    return tuple(clouds)
+
+
+def _nearest_distance(clouds: Sequence[Familiarity], names: Sequence[str], rows: Float) -> Float:
+    return np.asarray(np.min([cloud.distance(names, rows) for cloud in clouds], axis=0))
+
+
+def _card(
+    head: Attributes, table: FeatureTable, classes: list[str], target: str, seed: int
+) -> dict[str, Any]:
+    manifest = table.manifest
+    return {
+        "created_by": f"wearstate {__version__}",
+        "origin": head.origin,
+        "target": target,
+        "classes": classes,
+        "records": len(manifest),
+        "split_seed": seed,
+        "training_signals": sorted({int(crc) for crc in manifest["signal_crc32"]}),
+        "sample_rate_hz": head.sample_rate,
+        "channels": [asdict(channel) for channel in head.channels],
+        "tacho": head.tacho,
+        "pulses_per_revolution": head.pulses_per_revolution,
+        "features": list(table.names),
+    }
+
+
+# --- judging
+
+
+def evaluate_classes(
+    model: ClassModel,
+    path: str | Path,
+    *,
+    seed: int = 0,
+    jobs: int = 1,
+    progress: Progress | None = None,
+) -> dict[str, Any]:
+    """Judge a model on recordings that it has not seen.
+
+    Parameters
+    ----------
+    model : ClassModel
+    path : str or Path
+        Data set with the model's label.
+    seed : int
+        Of the resamples.
+    jobs : int
+        Worker processes for the features.
+    progress : callable, optional
+        Called with (records done, records).
+
+    Returns
+    -------
+    dict
+        As :func:`score_votes`.
+
+    Raises
+    ------
+    DataError
+        The label is missing or has no value that the model knows, the features are others, or
+        every recording has a part in the training.
+    """
+    table = feature_table(path, choice=choice_in(model.card), jobs=jobs, progress=progress)
+    target = model.card["target"]
+    if target not in table.manifest or table.names != model.names:
+        raise DataError(
+            f"{path}: must have the label {target} and the model's {len(model.names)} features, "
+            f"has {len(table.names)}; import recordings like those of the training"
+        )
+    labels = table.manifest[target].to_numpy().astype(str)
+    groups = table.manifest["group"].to_numpy()
+    seen = table.manifest["signal_crc32"].isin(model.card["training_signals"]).to_numpy()
+    rows = np.flatnonzero(~np.isin(groups, groups[seen]) & np.isin(labels, model.classes))
+    if rows.size == 0:
+        raise DataError(
+            f"{path}: 0 recordings of {', '.join(model.classes)} that the model has not seen, must "
+            "be > 0; train tells how it fares on recordings left out"
+        )
+    votes = Votes(
+        shares=model.predict(table.values[rows]),
+        label=np.searchsorted(model.classes, labels[rows]).astype(np.intp),
+        group=groups[rows],
+        distance=model.distance(table.values[rows]),
+        blows=blow_table(path, len(labels), jobs=jobs)[rows],
+    )
+    return score_votes(votes, model.classes, trained=model.votes, seed=seed)
+
+
+def score_votes(
+    votes: Votes,
+    classes: tuple[str, ...],
+    *,
+    trained: Votes | None = None,
+    seed: int = 0,
+) -> dict[str, Any]:
+    """Errors and coverage of votes on unseen recordings.
+
+    Parameters
+    ----------
+    votes : Votes
+    classes : tuple of str
+    trained : Votes, optional
+        Of the training, by which sets and strangers are told; for each recording those of the
+        others unless given.
+    seed : int
+        Of the resamples.
+
+    Returns
+    -------
+    dict
+        Ready for JSON: ``records``, ``recordings``, ``judged`` (classes with enough recordings),
+        ``accuracy``, ``coverage`` of the sets and ``mean_set_size`` over records of the judged
+        classes, ``called_unfamiliar``, the share of them that is refused as of none of the classes,
+        under ``intervals`` their 95 % intervals over recordings; ``recordings_right`` of
+        ``recordings_judged`` by majority of their records with the exact 95 % interval
+        ``recordings_interval``; ``confusion`` (true class by row, of all records),
+        ``nominal_coverage`` by class, ``majority`` (share of the largest class).
+    """
+    enough = np.array(votes.groups_of) >= (_FEWEST if trained is None else 1)
+    judged = enough[votes.label]
+    found = votes.shares.argmax(axis=1)
+    kept, strange = _told(votes, trained)
+    draws = resampled(votes.group[judged], seed=seed)
+    ones = np.ones(int(judged.sum()))
+    inside = kept[np.arange(len(found)), votes.label]
+    figures = {
+        "accuracy": share((found == votes.label)[judged], ones, draws),
+        "coverage": share(inside[judged], ones, draws),
+        "mean_set_size": share(kept[judged].sum(axis=1), ones, draws),
+        "called_unfamiliar": share(strange[judged], ones, draws),
+    }
+    right, of = _recordings_right(votes, judged)
+    matrix = np.zeros((len(classes), len(classes)), dtype=int)
+    np.add.at(matrix, (votes.label, found), 1)
+    return {
+        "records": len(found),
+        "recordings": len(np.unique(votes.group)),
+        "judged": [name for name, here in zip(classes, enough, strict=True) if here],
+        **{name: figure.value for name, figure in figures.items()},
+        "intervals": {name: _ends(figure) for name, figure in figures.items()},
+        "recordings_right": right,
+        "recordings_judged": of,
+        "recordings_interval": _exact_interval(right, of),
+        "classes": list(classes),
+        "confusion": matrix.tolist(),
+        "nominal_coverage": dict(zip(classes, votes.coverages, strict=True)),
+        "majority": float(np.bincount(votes.label[judged]).max() / max(int(judged.sum()), 1)),
+    }
+
+
+def _ends(figure: Figure) -> list[float]:
+    return [figure.low, figure.high]
+
+
+def _told(votes: Votes, trained: Votes | None) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Sets [shape=(n_records, n_classes)] and strangers [shape=(n_records,)].
+
+    Without votes of a training, a recording is told by those of the others.
+    """
+    kept = np.zeros(votes.shares.shape, dtype=bool)
+    strange = np.zeros(len(kept), dtype=bool)
+    for group in np.unique(votes.group):
+        mine = votes.group == group
+        by = _without(votes, mine) if trained is None else trained
+        for i in np.flatnonzero(mine):
+            kept[i, list(set_of(votes.shares[i], by.limits))] = True
+            strange[i] = by.strange(votes.shares[i], votes.distance[i], votes.blows[i])
+    return kept, strange
+
+
+def _without(votes: Votes, mine: NDArray[np.bool_]) -> Votes:
+    return Votes(
+        shares=votes.shares[~mine],
+        label=votes.label[~mine],
+        group=votes.group[~mine],
+        distance=votes.distance[~mine],
+        blows=votes.blows[~mine],
+    )
+
+
+def _recordings_right(votes: Votes, judged: NDArray[np.bool_]) -> tuple[int, int]:
+    """Recordings whose mean votes name their class, of how many."""
+    groups = np.unique(votes.group[judged])
+    means = np.array([votes.shares[votes.group == g].mean(axis=0) for g in groups])
+    truth = np.array([votes.label[votes.group == g][0] for g in groups])
+    return int((means.argmax(axis=1) == truth).sum()), len(groups)
+
+
+def _exact_interval(right: int, of: int, level: float = 0.95) -> list[float]:
+    """Clopper-Pearson interval of a share.
+
+    Examples
+    --------
+    >>> [round(end, 3) for end in _exact_interval(8, 8)]
+    [0.631, 1.0]
+    """
+    from scipy.stats import binomtest
+
+    told = binomtest(right, of).proportion_ci(level)
+    return [float(told.low), float(told.high)]
+
+
+# --- words
+
+
+def names_classes(path: str | Path, target: str) -> bool:
+    """Whether a column of a data set names classes: it is there, and of texts or whole numbers.
+
+    Raises
+    ------
+    DataError
+        The file cannot be read.
+    """
+    with DataSet(path) as data:
+        column = data.manifest.get(target)
+        return (
+            column is not None
+            and target not in data.attributes.severities
+            and (column.to_numpy().dtype.kind != "f")
+        )
+
+
+def classes_text(result: Mapping[str, Any]) -> list[str]:
+    """A judgement as lines for a terminal.
+
+    Parameters
+    ----------
+    result : mapping
+        Of :func:`score_votes`.
+
+    Returns
+    -------
+    list of str
+    """
+    right, of = result["recordings_right"], result["recordings_judged"]
+    low, high = (100 * end for end in result["recordings_interval"])
+    promised = ", ".join(f"{v:.2f} {name}" for name, v in result["nominal_coverage"].items())
+    lines = [
+        f"Judged on recordings that the fit had no part in: {right} of {of} named rightly "
+        f"(95 % interval {low:.0f} to {high:.0f} %)",
+        f"  record accuracy  {_between(result, 'accuracy')}; the largest class alone is "
+        f"{result['majority']:.2f}",
+        f"  set coverage     {_between(result, 'coverage')} (promised {promised})",
+        f"  set size         {_between(result, 'mean_set_size')}",
+        f"  refused          {_between(result, 'called_unfamiliar')} of them, as unfamiliar",
+        "  named            " + " ".join(f"{name:>10}" for name in result["classes"]),
+    ]
+    for name, row in zip(result["classes"], result["confusion"], strict=True):
+        judged = "" if name in result["judged"] else "  (too few recordings to judge)"
+        lines.append(f"    {name:15}" + " ".join(f"{count:10d}" for count in row) + judged)
+    return [*lines, "  brackets         95 % intervals over recordings"]
+
+
+def _between(result: Mapping[str, Any], name: str) -> str:
+    low, high = result["intervals"][name]
+    return f"{result[name]:.2f} [{low:.2f}, {high:.2f}]"
+
+
+def name_all(items: Sequence[Item], model: ClassModel) -> Iterator[tuple[str, Naming]]:
+    """Name the condition in recordings one after the other.
+
+    Parameters
+    ----------
+    items : sequence of Item
+    model : ClassModel
+
+    Yields
+    ------
+    (str, Naming)
+        Of each recording; one that cannot be read is unusable.
+
+    Raises
+    ------
+    ModelError
+        The program's features are not the model's.
+    """
+    for item in items:
+        try:
+            naming = model.estimate(item.load())
+        except ModelError:
+            raise  # would be so for each of them
+        except (ValueError, OSError) as error:
+            naming = Naming(verdict="unusable", reasons=(fault_of(item, error),), shares={})
+        yield item.name, naming
+
+
+def namings_summary(namings: Sequence[Naming]) -> str:
+    """How many recordings there are, and what was found in them.
+
+    Parameters
+    ----------
+    namings : sequence of Naming
+
+    Examples
+    --------
+    >>> strange = Naming(verdict="unfamiliar", shares={})
+    >>> namings_summary([strange, strange])
+    'no condition is named, 2 recordings: 2 unfamiliar'
+    """
+    words = Counter(naming.name or naming.verdict for naming in namings)
+    told = ", ".join(f"{count} {word}" for word, count in words.most_common())
+    none = "" if any(naming.name for naming in namings) else "no condition is named, "
+    return f"{none}{len(namings)} recordings: {told}"
+
+
+def naming_text(naming: Naming) -> str:
+    """What a model says of one recording, in lines.
+
+    Parameters
+    ----------
+    naming : Naming
+
+    Examples
+    --------
+    >>> told = Naming(verdict="named", name="a", possible=("a", "b"), shares={"a": 0.8, "b": 0.2})
+    >>> print(naming_text(told))
+    a; cannot be excluded: a, b
+      votes  a 0.80, b 0.20
+    """
+    if naming.verdict != "named":
+        return f"{naming.verdict}: {'; '.join(naming.reasons)}"
+    votes = ", ".join(f"{name} {share:.2f}" for name, share in naming.shares.items())
+    known = ""
+    if naming.p_value is not None and naming.p_limit is not None:
+        known = (
+            f"\n  familiar: p = {naming.p_value:.2g} (unfamiliar at {naming.p_limit:.2g} or less)"
+        )
+    possible = ", ".join(naming.possible)
+    return f"{naming.name}; cannot be excluded: {possible}\n  votes  {votes}{known}"

@@ -1,0 +1,212 @@
+"""The command `chart` of a scene, and of a recipe: measures, goes on, writes."""
+
+import os
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import click
+
+from ...datasets.recipe.text import recipe_names, toml_text
+from ...sim.atomic import write_whole
+from ...sim.fidelity.study import Search
+from ...sim.scene.load import load_scene
+from ...sim.scene.parts import Scene, SceneError
+from ..charts.across import RungSets
+from ..charts.chart import Chart
+from ..charts.of_scene import KEPT, RAISED, chart_of, kept_runs, measure, scene_search
+from ..charts.scene_edit import apply_changes
+from ..charts.verdict import verdict_chart
+from ..pages.kept import part_file
+from .command_options import CHART_SUFFIXES, check_outputs, time_bar
+
+SCENE_SUFFIXES = (".toml",)
+
+_QUESTIONS = {"kept": KEPT, "raised": RAISED}
+
+
+def scene_chart_command(
+    subject: str,
+    given: Mapping[str, Any],
+    *,
+    accuracy: float | None,
+    budget: float,
+    output: Path | None,
+    applied: Path | None,
+    choice: str,
+    jobs: int,
+    force: bool,
+) -> tuple[Chart, bool]:
+    """Measure a scene, write what is asked for.
+
+    Parameters
+    ----------
+    subject : str
+        Built-in scene, or file.
+    given : mapping of str to object
+        Values that replace its own.
+    accuracy : float or None
+        The scene's own where None.
+    budget : float
+        [s]
+    output, applied : Path or None
+        Chart; scene with what is recommended.
+    choice : str
+        ``kept`` or ``raised``: which recommendation is applied.
+    jobs : int
+    force : bool
+        Replace existing files, and begin anew.
+
+    Returns
+    -------
+    chart : Chart
+    interrupted : bool
+        By the user: what had been measured is in it.
+    """
+    part = part_file(output)
+    going_on = part is not None and part.exists() and not force
+    outputs = [(output, CHART_SUFFIXES), (applied, SCENE_SUFFIXES)]
+    check_outputs([subject], outputs, force or going_on)
+    scene = load_scene(subject, given)
+    if part is not None and force:
+        part.unlink(missing_ok=True)
+    kept = kept_runs(part, scene)
+    search = scene_search(scene, accuracy=accuracy, jobs=jobs, kept=kept)
+    interrupted = False
+    try:
+        with _watched(search, jobs, budget):
+            measure(search, budget=budget)
+    except KeyboardInterrupt:
+        interrupted = True
+    finally:
+        kept.save()
+    found = chart_of(scene, search.found())
+    if output is not None:
+        from ..charts.figure import save_chart
+
+        save_chart(found, output, force=force or going_on)
+        if not found.unfinished:
+            kept.drop()
+    if applied is not None:
+        _apply(subject, scene, given, found, choice, applied, force or going_on)
+    return found, interrupted
+
+
+def verdict_chart_command(
+    subject: str,
+    given: Mapping[str, Any],
+    *,
+    accuracy: float,
+    records: int,
+    effects: Sequence[str],
+    folder: Path | None,
+    output: Path | None,
+    applied: Path | None,
+    seed: int,
+    jobs: int,
+    force: bool,
+) -> Chart:
+    """Measure what the rungs of a recipe are worth to the verdict, write what is asked for.
+
+    Parameters
+    ----------
+    subject : str
+        Built-in recipe, or file.
+    given : mapping of str to object
+        Values of its scene.
+    accuracy : float
+        Rise of the error over the condemning limit.
+    records : int
+        On every choice of rungs.
+    effects : sequence of str
+        Only these.
+    folder : Path or None
+        Keeps the data sets; they vanish without.
+    output, applied : Path or None
+        Chart; recipe with what is recommended.
+    seed, jobs : int
+    force : bool
+        Replace existing files.
+
+    Returns
+    -------
+    Chart
+    """
+    check_outputs([subject], [(output, CHART_SUFFIXES), (applied, SCENE_SUFFIXES)], force)
+    if folder is not None:
+        folder.mkdir(parents=True, exist_ok=True)
+    with TemporaryDirectory() as passing:
+        sets = RungSets(
+            subject,
+            records,
+            folder or Path(passing),
+            effects=effects,
+            overrides=given,
+            seed=seed,
+            jobs=jobs,
+            say=lambda text: click.echo(text, err=True),
+        )
+        found = verdict_chart(sets, accuracy)
+    if output is not None:
+        from ..charts.figure import save_chart
+
+        save_chart(found, output, force=force)
+    if applied is not None:
+        [chosen] = found.choices
+        table = {
+            "name": f"{found.name}-for-the-verdict",
+            "extends": _seen_from(applied, subject),
+            "fixed": {**given, **chosen.changes},
+        }
+        text = f"# wearstate chart {subject}: {chosen.sentence}\n\n{toml_text(table)}"
+        write_whole(applied, text.encode(), force=force)
+    return found
+
+
+def _seen_from(applied: Path, recipe: str) -> str:
+    """A recipe as another file names it."""
+    return recipe if recipe in recipe_names() else os.path.relpath(recipe, applied.parent)
+
+
+def _apply(
+    subject: str,
+    scene: Scene,
+    given: Mapping[str, Any],
+    found: Chart,
+    choice: str,
+    path: Path,
+    force: bool,
+) -> None:
+    chosen = next((c for c in found.choices if c.question == _QUESTIONS[choice]), None)
+    if chosen is None or chosen.status == "not converged":
+        why = "is none" if chosen is None else "has a reference that does not converge"
+        fault = f"recommendation '{choice}' {why}; give more --budget, or write the scene by hand"
+        raise SceneError(scene.name, [fault])
+    note = f"wearstate chart {scene.name}, {chosen.question}: {chosen.sentence}"
+    apply_changes(subject, scene, given, chosen.changes, path, note=note, force=force)
+
+
+@contextmanager
+def _watched(search: Search, jobs: int, budget: float) -> Iterator[None]:
+    """A bar with what is measured and the time left, where a person watches."""
+    with time_bar() as show:
+        if show is not None:
+            search.tell = _teller(search, jobs, budget, show)
+        yield
+
+
+def _teller(
+    search: Search, jobs: int, budget: float, show: Callable[[str, float, float], None]
+) -> Callable[[str], None]:
+    begin = time.perf_counter()
+
+    def tell(what: str) -> None:
+        gone = time.perf_counter() - begin
+        left = max(budget - gone, 0.0)
+        told, known = search.progress()
+        show(f"{what} ({told} of {known})", gone, min(left, search.remaining() / jobs))
+
+    return tell

@@ -1,0 +1,414 @@
+"""What the commands of the command line share: options, outputs, progress, JSON.
+
+Heavy imports stay inside the functions, so that ``--help`` answers at once.
+"""
+
+import math
+import re
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from functools import wraps
+from pathlib import Path
+from typing import Any
+
+import click
+
+from ..pages.plain_json import json_text
+
+EXIT_FAILED, EXIT_BAD_INPUT, EXIT_WARNING, EXIT_ALARM, EXIT_UNFAMILIAR = 1, 2, 3, 4, 5
+
+
+class PathType(click.Path):
+    """A path that is not empty: an empty one is a shell variable gone wrong."""
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> Any:
+        """As of :class:`click.ParamType`."""
+        if str(value).strip() == "":
+            self.fail("is empty, must be a path; name one", param, ctx)
+        return super().convert(value, param, ctx)
+
+
+class Share(click.FloatRange):
+    """A number in a range; not-a-number is in none."""
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> Any:
+        """As of :class:`click.ParamType`."""
+        number = super().convert(value, param, ctx)
+        if math.isnan(number):
+            self.fail(f"{value} must be >= {self.min:g} and <= {self.max:g}; try 0.25", param, ctx)
+        return number
+
+
+class Accuracy(Share):
+    """A share, of every quantity of a scene; or ``verdict=2%``, of the error of a wear estimate."""
+
+    name = "accuracy"
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> Any:
+        """As of :class:`click.ParamType`: (of the verdict, share)."""
+        if isinstance(value, tuple):
+            return value
+        text = str(value).strip()
+        of_verdict = text.startswith("verdict=")
+        number = text.removeprefix("verdict=")
+        if number.endswith("%"):
+            try:
+                number = repr(float(number[:-1]) / 100)
+            except ValueError:
+                self.fail(f"{value} is no share; try 0.02, 2% or verdict=2%", param, ctx)
+        return of_verdict, super().convert(number, param, ctx)
+
+
+PATH = PathType(path_type=Path)
+MOST_RECORDS = 10**8  # as wearstate.datasets.recipe.recipe, which is too heavy to import for --help
+LARGEST_SEED = 2**63 - 1
+json_option = click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout.")
+force_option = click.option("--force", is_flag=True, help="Replace an existing output.")
+
+jobs_option = click.option(
+    "-j",
+    "--jobs",
+    type=click.IntRange(1),
+    default=None,
+    help="Worker processes; all cores by default. The result does not depend on it.",
+)
+
+seed_option = click.option(
+    "--seed", type=click.IntRange(0, LARGEST_SEED), default=0, show_default=True
+)
+
+
+join_option = click.option(
+    "--join",
+    "joined",
+    multiple=True,
+    metavar="[VIEW=]FILE",
+    help="Further tests of the same machines and states, to be told from together; repeat it.",
+)
+
+
+def source_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Options about a measured file, the same for every command that reads one."""
+
+    @wraps(command)
+    def with_profile(*args: Any, like: Path | None = None, **given: Any) -> Any:
+        return command(*args, **_filled(like, given))
+
+    found: Callable[..., Any] = with_profile
+    for option in reversed(_SOURCE_OPTIONS):
+        found = option(found)
+    return found
+
+
+def _filled(like: Path | None, given: dict[str, Any]) -> dict[str, Any]:
+    """Options about a file with what a profile says; what the caller says stands."""
+    if like is None:
+        return {**given, "like": None}
+    from ..wear_model.like import read_profile
+
+    profile, tacho, pulses = read_profile(like)
+    told = dict(given)
+    if told["tacho"] is None:
+        told["tacho"] = tacho
+    asked = click.get_current_context().get_parameter_source("pulses_per_revolution")
+    if asked is click.core.ParameterSource.DEFAULT and told["tacho"] is not None:
+        told["pulses_per_revolution"] = pulses
+    return {**told, "like": profile}
+
+
+_SOURCE_OPTIONS = (
+    click.option(
+        "--like",
+        type=PATH,
+        metavar="MODEL|JSON",
+        help="Channels, units, rate and tacho as of a model, or of what `info --json` printed.",
+    ),
+    click.option("--fs", type=float, help="Sample rate [Hz], where the file has none."),
+    click.option(
+        "--unit",
+        multiple=True,
+        metavar="[CHANNEL=]UNIT",
+        help="Unit of a channel, or of all others, where the file declares none.",
+    ),
+    click.option(
+        "--sensitivity",
+        multiple=True,
+        metavar="[CHANNEL=]TEXT",
+        help="Of the sensor on a channel in volts: '100 mV/g'.",
+    ),
+    click.option(
+        "--full-scale",
+        multiple=True,
+        metavar="[CHANNEL=]TEXT",
+        help="What the largest integer of a WAV file is worth: '10 V'.",
+    ),
+    click.option(
+        "--channels",
+        multiple=True,
+        metavar="NAME,…",
+        help="Channels wanted, in order, NEW=OLD to rename; where the file names none, all names.",
+    ),
+    click.option(
+        "--variable", multiple=True, help="Array, data set or group, where the file holds several."
+    ),
+    click.option("--tacho", help="Name of the tacho channel."),
+    click.option(
+        "--pulses-per-revolution",
+        type=click.IntRange(1),
+        default=1,
+        show_default=True,
+        help="Of the tacho.",
+    ),
+    click.option("--record", type=click.IntRange(0), default=0, help="Of several, counted from 0."),
+    click.option(
+        "--rows",
+        type=click.Choice(["records"]),
+        help="Every row of an array or a text file is a record of one channel.",
+    ),
+    click.option("--delimiter", help="Of a text file: ',', ';', tab, space."),
+    click.option("--decimal", type=click.Choice([".", ","]), help="Of a text file."),
+    click.option(
+        "--header", type=click.IntRange(0), help="Lines above the numbers of a text file."
+    ),
+    click.option("--time-column", help="Name or number (from 1) of the times; 0: there is none."),
+    click.option("--dtype", help="Of headerless binary: '<int16', '>float32'."),
+    click.option("--n-channels", type=click.IntRange(1), help="Of headerless binary."),
+    click.option(
+        "--offset", type=click.IntRange(0), default=0, help="Bytes to skip in headerless binary."
+    ),
+    click.option(
+        "--order",
+        type=click.Choice(["interleaved", "blocks"]),
+        help="Of binary and arrays: sample by sample, or channel by channel.",
+    ),
+    click.option(
+        "--partial", is_flag=True, help="Of a WAV, TDMS or binary file cut short: what is there."
+    ),
+    click.option(
+        "--resample-to", type=float, metavar="HZ", help="Bring measured files to this rate."
+    ),
+)
+
+
+def declared_source(given: Mapping[str, Any]) -> Any:
+    """Options about a measured file, as the library takes them."""
+    from ...datasets.readers.open import SourceOptions
+
+    column = given["time_column"]
+    return SourceOptions(
+        variable=given["variable"] or None,
+        channels=tuple(name for text in given["channels"] for name in text.split(",")),
+        unit=_each_channel(given["unit"], "--unit"),
+        sensitivity=_each_channel(given["sensitivity"], "--sensitivity"),
+        full_scale=_each_channel(given["full_scale"], "--full-scale"),
+        time_column=int(column) if column is not None and column.isdecimal() else column,
+        **{name: given[name] for name in _PLAIN_OPTIONS},
+    )
+
+
+_PLAIN_OPTIONS = (
+    *("fs", "record", "rows", "delimiter", "decimal", "header"),
+    *("dtype", "n_channels", "offset", "order", "resample_to", "partial", "like"),
+)
+
+
+def _each_channel(texts: Sequence[str], option: str) -> Any:
+    """``channel=value`` for one channel, ``value`` for the others; None without any."""
+    from ...datasets.measured.plan import EachChannel
+
+    named: dict[str, str] = {}
+    others: list[str] = []
+    for text in texts:
+        name, sign, value = text.rpartition("=")
+        if not value.strip() or (sign and not name) or name in named:
+            raise click.BadParameter(
+                f"'{text}' must read [CHANNEL=]VALUE, once for a channel", param_hint=option
+            )
+        if sign:
+            named[name] = value
+        else:
+            others.append(value)
+    if len(others) > 1:
+        raise click.BadParameter(
+            f"{', '.join(map(repr, others))} cannot all be for every channel; write CHANNEL=VALUE",
+            param_hint=option,
+        )
+    return EachChannel(named, others=others[0] if others else None) if texts else None
+
+
+def told_of_channels(texts: Sequence[str], option: str) -> dict[str, str]:
+    """``channel=text``, once for a channel."""
+    told: dict[str, str] = {}
+    for text in texts:
+        name, _, value = text.partition("=")
+        if not name.strip() or not value.strip() or name in told:
+            raise click.BadParameter(
+                f"'{text}' must read CHANNEL=TEXT, once for a channel", param_hint=option
+            )
+        told[name] = value
+    return told
+
+
+def emit(value: dict[str, Any], as_json: bool, text: str) -> None:
+    """Print a result, as JSON or as text."""
+    click.echo(json_text({"schema_version": 1, **value}) if as_json else text)
+
+
+def worker_count(jobs: int | None) -> int:
+    """Worker processes asked for, or as many as there are cores."""
+    from ...datasets.workers.local import cores
+
+    return jobs or cores()
+
+
+DATA_SUFFIXES, MODEL_SUFFIXES, PAGE_SUFFIXES = (".h5", ".hdf5"), (".wsm",), (".html", ".htm")
+CHART_SUFFIXES = (".svg", ".png", ".pdf", ".html", ".json", ".csv")
+PICTURE_SUFFIXES, TABLE_SUFFIXES = (".png", ".svg", ".pdf"), (".parquet", ".csv", ".h5")
+_Output = tuple[Path | None, tuple[str, ...]]
+"""A file to write, None where it was not asked for, and the suffixes it may have."""
+
+
+def check_outputs(inputs: Sequence[Path | str], outputs: Sequence[_Output], force: bool) -> None:
+    """Refuse outputs that cannot or must not be written, before any work.
+
+    Raises
+    ------
+    DataError
+        An output has the wrong suffix, is a folder or in none, exists and `force` is not given,
+        or is the same file as an input or another output: that one `force` does not override.
+    """
+    from ...datasets.file.record import DataError
+
+    wanted = [(path, suffixes) for path, suffixes in outputs if path is not None]
+    paths = [path for path, _ in wanted]
+    faults = [fault for path, suffixes in wanted for fault in _name_faults(path, suffixes)]
+    faults += [
+        f"{path} is also an input, must be another file; choose another name"
+        for path in paths
+        if any(_same_file(path, Path(source)) for source in inputs)
+    ]
+    faults += [
+        f"{path} is given for two outputs, must be one; choose another name"
+        for number, path in enumerate(paths)
+        if any(_same_file(path, other) for other in paths[:number])
+    ]
+    if not faults and not force:
+        faults = [
+            f"{path} exists; choose another name or use --force to replace it"
+            for path in paths
+            if path.exists()
+        ]
+    if faults:
+        raise DataError("\n".join(faults))
+
+
+def _name_faults(path: Path, suffixes: tuple[str, ...]) -> list[str]:
+    if path.is_dir():
+        return [f"{path} is a folder; name a file in it"]
+    if path.suffix not in suffixes:
+        return [f"{path}: suffix {path.suffix!r} must be one of {', '.join(suffixes)}; rename it"]
+    if not path.parent.is_dir():
+        return [f"{path.parent} is no folder; create it"]
+    return []
+
+
+def _same_file(one: Path, other: Path) -> bool:
+    if one.exists() and other.exists():
+        return one.samefile(other)  # also by another link
+    return one.resolve() == other.resolve()
+
+
+@contextmanager
+def progress_bar(what: str) -> Iterator[Callable[[int, int], None] | None]:
+    """Progress bar on stderr where a person watches; nothing elsewhere."""
+    if not sys.stderr.isatty():
+        yield None
+        return
+    from rich.console import Console
+    from rich.progress import MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (*Progress.get_default_columns()[:2], MofNCompleteColumn(), TimeRemainingColumn())
+    rate = TextColumn("{task.fields[rate]}")
+    with Progress(*columns, rate, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task(what, total=None, rate="")
+
+        def update(done: int, total: int) -> None:
+            speed = bar.tasks[task].speed  # of the last half minute
+            text = f"{speed:.3g}/s" if speed else ""
+            bar.update(task, completed=done, total=total, rate=text)
+
+        yield update
+
+
+@contextmanager
+def time_bar() -> Iterator[Callable[[str, float, float], None] | None]:
+    """Bar on stderr where a person watches: what is done now, and the seconds left.
+
+    Gives a function of what is done, seconds gone by, and seconds that are left.
+    """
+    if not sys.stderr.isatty():
+        yield None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn
+
+    left = TextColumn("about {task.fields[left]:.0f} s left")
+    columns = (BarColumn(), left, TextColumn("{task.description}"))
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("starting", total=1.0, left=0.0)
+
+        def update(what: str, gone: float, remaining: float) -> None:
+            bar.update(
+                task,
+                description=what,
+                completed=gone,
+                total=max(gone + remaining, 1e-3),
+                left=remaining,
+            )
+
+        yield update
+
+
+def overrides_of(pairs: Sequence[str]) -> dict[str, Any]:
+    """``path=value`` pairs; a value that reads as a number is one."""
+    values: dict[str, Any] = {}
+    for pair in pairs:
+        path, sign, text = pair.partition("=")
+        if not sign or not path:
+            raise click.BadParameter(f"'{pair}' must read PATH=VALUE", param_hint="--set")
+        values[path.strip()] = _number_or_text(text.strip())
+    return values
+
+
+NUMBER = re.compile(r"[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?")
+
+
+def _number_or_text(text: str) -> Any:
+    """Python would also read ``1_0`` and ``nan`` as numbers; a person has mistyped them."""
+    if not NUMBER.fullmatch(text):
+        return text
+    whole = re.fullmatch("[-+]?[0-9]{1,18}", text)
+    return int(text) if whole else float(text)
+
+
+def as_options(text: str, command: click.Command | None) -> str:
+    """The library speaks of arguments, here they are options: ``fs = 0`` is ``--fs = 0``."""
+    for param in command.params if command else ():
+        option = next((name for name in param.opts if name.startswith("--")), "")
+        word = option.removeprefix("--").replace("-", "_")
+        for name in {word, param.name, *_OTHER_NAMES.get(option, ())} if option else ():
+            text = _with_option(text, str(name), option)
+    return text
+
+
+_OTHER_NAMES = {"--speed-band": ("band_hz",)}
+"""What functions below the command call the value of an option."""
+
+
+def _with_option(text: str, word: str, option: str) -> str:
+    if "_" in word:
+        return re.sub(rf"(?<![\w'-]){word}(?![\w'])", option, text)
+    # may be a plain word elsewhere
+    place = rf"(?m)((?:^|: |\b(?:give|with|use) )){word}(?= = | must | to | and | if |[;,)]|$)"
+    return re.sub(rf"(; ){word}(?= = )", rf"\1{option}", re.sub(place, rf"\1{option}", text))

@@ -1,0 +1,133 @@
+"""The command `sweep`: numbers of a scene varied, and what of that can be seen."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import click
+
+from .command_options import (
+    CHART_SUFFIXES,
+    EXIT_FAILED,
+    PATH,
+    Share,
+    check_outputs,
+    emit,
+    force_option,
+    jobs_option,
+    json_option,
+    overrides_of,
+    progress_bar,
+    seed_option,
+    worker_count,
+)
+
+_SUFFIXES = (*CHART_SUFFIXES, ".htm")
+
+
+@click.command()
+@click.argument("scene_name", metavar="SCENE")
+@click.option(
+    "--over",
+    multiple=True,
+    required=True,
+    metavar="PATH=VALUES",
+    help="A..B, A..B/N or A,B,C with a unit at the end; repeat it, the change looked for last.",
+)
+@click.option("--set", "pairs", multiple=True, metavar="PATH=VALUE", help="Replace a scene value.")
+@click.option(
+    "--show",
+    multiple=True,
+    metavar="NAME,…",
+    help="Features, or what the simulator knows; * and ? as in a shell.",
+)
+@click.option(
+    "--points",
+    type=click.IntRange(2, 1000),
+    default=5,
+    show_default=True,
+    help="Of a range that does not say how many.",
+)
+@click.option(
+    "--starts",
+    type=click.IntRange(1, 1000),
+    default=5,
+    show_default=True,
+    help="Recordings at each point: other start angle, noise and random forces.",
+)
+@click.option(
+    "--confidence",
+    type=Share(0.5, 0.9999),
+    default=0.95,
+    show_default=True,
+    help="Of telling a change, and of not telling one where there is none.",
+)
+@click.option(
+    "-o", "--output", type=PATH, help="Page, table or picture (.html, .csv, .json, .png, .svg)."
+)
+@seed_option
+@jobs_option
+@force_option
+@json_option
+def sweep(
+    scene_name: str,
+    over: Sequence[str],
+    pairs: Sequence[str],
+    show: Sequence[str],
+    points: int,
+    starts: int,
+    confidence: float,
+    output: Path | None,
+    seed: int,
+    jobs: int | None,
+    force: bool,
+    as_json: bool,
+) -> None:
+    """Vary numbers of SCENE: what shows a change, from which size on, and where first.
+
+    The last --over is the change that is looked for, such as a clearance; those before it are
+    conditions, such as the speed. With -o, runs are kept beside the output until all are done:
+    after Ctrl-C the same command goes on. The CSV has one row for each point and start, SI.
+    """
+    from ..pages.kept import part_file
+    from ..sweep.axes import SweepError
+    from ..sweep.figure import save_sweep
+    from ..sweep.sweep import kept_runs, measure, sweep_of, sweep_plan
+    from ..sweep.text import sweep_table, sweep_text
+
+    part = part_file(output)
+    going_on = part is not None and part.exists() and not force
+    check_outputs([scene_name], [(output, _SUFFIXES)], force or going_on)
+    plan = sweep_plan(
+        scene_name,
+        over,
+        given=overrides_of(pairs),
+        show=[name for text in show for name in text.split(",") if name.strip()],
+        points=points,
+        starts=starts,
+        seed=seed,
+        confidence=confidence,
+    )
+    if part is not None and force:
+        part.unlink(missing_ok=True)
+    kept = kept_runs(part, plan)
+    interrupted = False
+    try:
+        with progress_bar("simulating") as progress:
+            measure(plan, kept, jobs=worker_count(jobs), progress=progress)
+    except KeyboardInterrupt:
+        interrupted = True
+    found = sweep_of(plan, kept)
+    if found.finished and all(run.fault for run in found.outcomes.values()):
+        kept.drop()
+        raise SweepError([f"no run succeeded: {fault}" for fault in found.faults])
+    if output is not None and found.outcomes:
+        save_sweep(found, output, force=force or going_on)
+        if found.finished:
+            kept.drop()
+    files = [str(output)] if output is not None and found.outcomes else []
+    text = "\n".join([sweep_text(found), *files])
+    emit({**sweep_table(found), "files": files}, as_json, text)
+    if interrupted:
+        on = "; the same command goes on from there" if output else ""
+        click.echo(f"interrupted: what was simulated is shown{on}", err=True)
+        raise click.exceptions.Exit(EXIT_FAILED)

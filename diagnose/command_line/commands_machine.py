@@ -1,0 +1,604 @@
+"""Commands about one machine: scenes, simulation, alignment, stability, charts, literature."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import click
+
+from .command_options import (
+    CHART_SUFFIXES,
+    DATA_SUFFIXES,
+    EXIT_ALARM,
+    EXIT_BAD_INPUT,
+    EXIT_FAILED,
+    EXIT_WARNING,
+    PAGE_SUFFIXES,
+    PATH,
+    PICTURE_SUFFIXES,
+    Accuracy,
+    Share,
+    check_outputs,
+    emit,
+    force_option,
+    jobs_option,
+    json_option,
+    overrides_of,
+    progress_bar,
+    seed_option,
+    worker_count,
+)
+
+_ALIGN_FAIL_ON_HELP = (
+    "Exit 3 where a limit is not met, 4 where a bearing lifts or no moves help; alarm: only 4."
+)
+
+
+@click.group()
+def scene() -> None:
+    """The machines: list, show, check."""
+
+
+@scene.command("list")
+@json_option
+def scene_list(as_json: bool) -> None:
+    """Names and descriptions of the built-in scenes."""
+    from ...sim.scene.load import load_scene, scene_names
+
+    scenes = {name: load_scene(name).description for name in scene_names()}
+    emit({"scenes": scenes}, as_json, "\n".join(f"{n:24} {d}" for n, d in scenes.items()))
+
+
+@scene.command("show")
+@click.argument("name")
+def scene_show(name: str) -> None:
+    """TOML text of a scene: copy it, change it, check it."""
+    from ...sim.scene.load import scene_table, scene_text
+    from ...sim.scene.parts import SceneError
+
+    text = scene_text(name)
+    if not isinstance(scene_table(text, name).get("machine"), str):
+        raise SceneError(name, ["machine is missing, must be a text; this file is no scene"])
+    click.echo(text, nl=False)
+
+
+@scene.command("check")
+@click.argument("file", metavar="SCENE")
+@click.option("--set", "pairs", multiple=True, metavar="PATH=VALUE", help="Replace a scene value.")
+@click.option("--deep", is_flag=True, help="Every figure beside what is usual; runs it shortly.")
+@json_option
+def scene_check(file: str, pairs: Sequence[str], deep: bool, as_json: bool) -> None:
+    """Check a scene; every fault at once, and warnings of what is hardly meant.
+
+    --deep: a table of the machine's figures (natural frequencies, forces, films, contacts, cost),
+    each beside what is usual, with a cure where it is not. Exit 2 for faults, with --deep also
+    where a short simulated run fails; what is merely unusual is no fault.
+    """
+    from ...sim.machine.simulate import check
+    from ...sim.scene.load import load_scene
+    from ...sim.scene.plausibility import scene_doubts
+
+    checked = load_scene(file, overrides_of(pairs))
+    check(checked)
+    if deep:
+        _deep_check(checked, as_json)
+        return
+    warnings = [doubt.text for doubt in scene_doubts(checked)]
+    told = f", {len(warnings)} warning(s)" if warnings else ""
+    lines = [f"{checked.name}: no fault{told}", *(f"warning: {text}" for text in warnings)]
+    emit({"scene": checked.name, "faults": [], "warnings": warnings}, as_json, "\n".join(lines))
+
+
+def _deep_check(checked: Any, as_json: bool) -> None:
+    from ...sim.deep_check.check import deep_check
+    from ..inspect.deep_check_text import deep_check_table, deep_check_text
+
+    found = deep_check(checked)
+    faults = [found.failure] if found.failure else []
+    told = {"scene": checked.name, "faults": faults, "warnings": list(found.warnings)}
+    emit({**told, **deep_check_table(found)}, as_json, deep_check_text(checked.name, found))
+    raise click.exceptions.Exit(EXIT_BAD_INPUT if faults else 0)
+
+
+@click.command()
+@click.argument("scene_name", metavar="SCENE")
+@click.option("--set", "pairs", multiple=True, metavar="PATH=VALUE", help="Replace a scene value.")
+@click.option("-o", "--output", type=PATH, help="Recording to write (.h5).")
+@click.option("--plot", type=PATH, help="Picture to write (.png, .svg or .pdf).")
+@click.option("--truth", is_flag=True, help="Also store forces and orbit.")
+@seed_option
+@force_option
+@json_option
+def simulate(
+    scene_name: str,
+    pairs: Sequence[str],
+    output: Path | None,
+    plot: Path | None,
+    truth: bool,
+    seed: int,
+    force: bool,
+    as_json: bool,
+) -> None:
+    """Simulate one recording of SCENE (a built-in name or a TOML file)."""
+    from ...datasets.generation.generate import save_solution
+    from ...datasets.generation.quantities import resolved, with_estimate
+    from ...sim.machine.simulate import simulate as run
+    from ...sim.scene.load import load_scene
+    from ..inspect.simulate_text import simulation_summary, summary_lines
+
+    check_outputs([scene_name], [(output, DATA_SUFFIXES), (plot, PICTURE_SUFFIXES)], force)
+    machine, resolution = resolved(load_scene(scene_name, overrides_of(pairs)))
+    solution = run(machine, seed=seed, truth=True)
+    if resolution is not None:
+        solution = with_estimate(solution, resolution)
+        click.echo(f"fidelity: {resolution.text}", err=True)
+    if output is not None:
+        save_solution(machine, solution, output, seed=seed, force=force, truth=truth)
+    if plot is not None:
+        from ..pictures.simulation import plot_simulation
+
+        plot_simulation(machine, solution, plot, force=force)
+    vibration = [
+        (channel, float(row.std()))
+        for channel, row in zip(solution.channels, solution.signal, strict=True)
+        if channel.quantity != "tacho"
+    ]
+    rms = {channel.name: value for channel, value in vibration}
+    shown = ", ".join(f"{channel.name} {value:.3g} {channel.unit}" for channel, value in vibration)
+    head = f"{machine.name} (simulated): {shown} rms about the mean"
+    files = [str(path) for path in (output, plot) if path]
+    summary = simulation_summary(machine, solution)
+    for warning in solution.warnings:
+        click.echo(f"warning: {warning}", err=True)
+    emit(
+        {
+            "scene": machine.name,
+            "rms": rms,
+            "summary": summary,
+            "numerics": solution.numerics,
+            "warnings": list(solution.warnings),
+            "files": files,
+        },
+        as_json,
+        "\n".join([head, *files, *summary_lines(machine, summary)]),
+    )
+
+
+@click.command()
+@click.argument("scene_name", metavar="SCENE")
+@click.option("--set", "pairs", multiple=True, metavar="PATH=VALUE", help="Replace a scene value.")
+@click.option("--low", type=float, help="Lowest frequency [Hz]; --high / 300.")
+@click.option("--high", type=float, help="Highest frequency [Hz]; 0.45 of the rate.")
+@click.option("-o", "--output", type=PATH, help="Table to write (.csv).")
+@click.option("--plot", type=PATH, help="Picture to write (.png, .svg or .pdf).")
+@force_option
+@json_option
+def frf(
+    scene_name: str,
+    pairs: Sequence[str],
+    low: float | None,
+    high: float | None,
+    output: Path | None,
+    plot: Path | None,
+    force: bool,
+    as_json: bool,
+) -> None:
+    """Transfer functions of SCENE: of a pump's casing, or of a running shaft line.
+
+    What a perfect test would measure; the table can be the `casing.frf` of a scene.
+    """
+    from ...sim.scene.load import load_scene
+    from ..pictures.scene_transfer import (
+        save_csv,
+        save_figure,
+        transfer_of,
+        transfer_table,
+        transfer_text,
+    )
+
+    check_outputs([scene_name], [(output, (".csv",)), (plot, PICTURE_SUFFIXES)], force)
+    machine = load_scene(scene_name, overrides_of(pairs))
+    found = transfer_of(machine, low, high)
+    if output is not None:
+        save_csv(found, output, force=force)
+    if plot is not None:
+        save_figure(machine, found, plot, force=force)
+    files = [str(path) for path in (output, plot) if path]
+    emit(
+        {**transfer_table(machine, found), "files": files},
+        as_json,
+        "\n".join([transfer_text(machine, found), *files]),
+    )
+
+
+@click.command()
+@click.argument("scene_name", metavar="SCENE")
+@click.option("--set", "pairs", multiple=True, metavar="PATH=VALUE", help="Replace a scene value.")
+@click.option(
+    "--condition",
+    type=click.Choice(["cold", "hot", "running", "all"]),
+    default="all",
+    show_default=True,
+    help="In which the limits must hold.",
+)
+@click.option("--calibrate/--no-calibrate", default=True, show_default=True, help="Look for moves.")
+@click.option(
+    "--prefer",
+    type=click.Choice(["least", "fewest"]),
+    default="least",
+    show_default=True,
+    help="Least sum of moves, or fewest bearings moved.",
+)
+@click.option(
+    "--target",
+    type=click.Choice(["limits", "even", "vibration"]),
+    default="limits",
+    show_default=True,
+    help="limits: least moves that meet them; even: also reactions as even as they allow; "
+    "vibration: also the running line as quiet.",
+)
+@click.option(
+    "--margin",
+    type=Share(0.0, 0.9),
+    default=0.0,
+    show_default=True,
+    help="Keep this share of each limit away from it.",
+)
+@click.option("--jack", metavar="BEARING", help="Jacking test beside this bearing.")
+@click.option(
+    "--test",
+    "rig_test",
+    type=click.Choice(["hammer", "shaker"]),
+    help="Simulated test of the running shaft before and after the moves.",
+)
+@click.option("--push", metavar="BEARING", help="Where --test pushes the shaft up; aftmost.")
+@click.option("--test-plot", type=PATH, help="Picture of --test to write.")
+@click.option(
+    "--from-test",
+    "tests",
+    type=PATH,
+    multiple=True,
+    help="Data set of measured tests of the line, with force channels: its sags.",
+)
+@click.option("--reactions", type=PATH, help="CSV of measured reactions: bearing, reaction_kn.")
+@click.option(
+    "--jacking", type=PATH, help="CSV of measured jacking curves: bearing, lift_mm, load_kn."
+)
+@click.option(
+    "--reactions-in",
+    type=click.Choice(["cold", "hot", "running"]),
+    default="cold",
+    show_default=True,
+    help="Condition in which --reactions and --jacking were measured.",
+)
+@seed_option
+@click.option("--plot", type=PATH, help="Picture to write (.png, .svg or .pdf).")
+@click.option("-o", "--output", type=PATH, help="HTML page to write.")
+@click.option("--fail-on", type=click.Choice(["warning", "alarm"]), help=_ALIGN_FAIL_ON_HELP)
+@force_option
+@json_option
+def align(
+    scene_name: str,
+    pairs: Sequence[str],
+    condition: str,
+    calibrate: bool,
+    prefer: str,
+    target: str,
+    margin: float,
+    jack: str | None,
+    rig_test: str | None,
+    push: str | None,
+    test_plot: Path | None,
+    tests: Sequence[Path],
+    reactions: Path | None,
+    jacking: Path | None,
+    reactions_in: str,
+    seed: int,
+    plot: Path | None,
+    output: Path | None,
+    fail_on: str | None,
+    force: bool,
+    as_json: bool,
+) -> None:
+    """Bearing loads of the shaft line SCENE, and the moves that bring them within limits.
+
+    With --from-test, --reactions or --jacking the line is first taken to where these put its
+    bearings.
+    """
+    from ...sim.scene.load import load_scene
+    from ..alignment.page import align as judge
+    from ..alignment.page import align_table, align_text, save_figure, save_html
+    from ..shaft_tests.sag_report import sag_table, sag_text
+
+    if rig_test is None and (push or test_plot or seed):
+        raise click.UsageError("--push, --test-plot and --seed need --test")
+    if not calibrate and (margin or target != "limits" or prefer != "least"):
+        raise click.UsageError(
+            "--margin, --target and --prefer are of the moves: leave out --no-calibrate"
+        )
+    if rig_test is not None and not calibrate:
+        raise click.UsageError("--test compares before and after the moves: it needs --calibrate")
+    outputs = [(plot, PICTURE_SUFFIXES), (output, PAGE_SUFFIXES), (test_plot, PICTURE_SUFFIXES)]
+    inputs = [*tests, *(path for path in (reactions, jacking) if path)]
+    check_outputs([scene_name, *inputs], outputs, force)
+    scene = load_scene(scene_name, overrides_of(pairs))
+    scene, measured = _measured(scene, tests, reactions, jacking, reactions_in)
+    found = judge(
+        scene,
+        condition=condition,
+        mend=calibrate,
+        prefer=prefer,
+        target=target,
+        margin=margin,
+        jack=jack,
+    )
+    result, tested, words = _tested(
+        scene, found.calibration, rig_test, push, test_plot, seed, force
+    )
+    if plot is not None:
+        save_figure(found, plot, force=force)
+    if output is not None:
+        note = "" if result else "".join(words)
+        save_html(found, output, result, measured=measured, note=note, force=force)
+    files = [str(path) for path, _ in outputs if path and path.exists()]
+    said = [] if measured is None else [sag_text(measured), ""]
+    text = "\n".join([*said, align_text(found), *words, *files])
+    sags = None if measured is None else sag_table(measured)
+    emit({**align_table(found), "sags": sags, "test": tested, "files": files}, as_json, text)
+    levels = {"warning": EXIT_WARNING, "alarm": EXIT_ALARM}
+    code = levels.get(found.verdict, 0) if fail_on else 0
+    raise click.exceptions.Exit(0 if fail_on == "alarm" and code == EXIT_WARNING else code)
+
+
+def _measured(
+    scene: Any, tests: Sequence[Path], reactions: Path | None, jacking: Path | None, condition: str
+) -> tuple[Any, Any]:
+    """The scene where its tests put it, and what they say; as it is where there are none."""
+    if not tests and reactions is None and jacking is None:
+        return scene, None
+    from ..shaft_tests.sag_report import sag_report, sagged
+
+    found = sag_report(scene, tests, reactions, curves=jacking, condition=condition)
+    return sagged(scene, found.posterior), found
+
+
+def _tested(
+    scene: Any,
+    calibration: Any,
+    kind: str | None,
+    push: str | None,
+    picture: Path | None,
+    seed: int,
+    force: bool,
+) -> tuple[Any, dict[str, Any] | None, list[str]]:
+    """Result, table and text of the simulated test of the moves, if one was asked for."""
+    if kind is None:
+        return None, None, []
+    from ..pages.picture import save_picture
+    from ..shaft_tests.rig_test import calibrated_test, rig_figure, rig_table, rig_text
+
+    result = calibrated_test(scene, calibration, kind, push=push, seed=seed)
+    if result is None:
+        return None, None, ["", "no test: nothing moves, so nothing changes"]
+    if picture is not None:
+        save_picture(rig_figure(result), picture, force=force)
+    return result, rig_table(result), ["", rig_text(result)]
+
+
+@click.command()
+@click.argument("scene_name", metavar="SCENE")
+@click.option("--set", "pairs", multiple=True, metavar="PATH=VALUE", help="Replace a scene value.")
+@click.option("--map", "map_name", help="One map only; all that the machine has by default.")
+@click.option("--size", type=click.IntRange(3, 60), help="Cells along either axis.")
+@click.option(
+    "--budget",
+    type=Share(min=1.0, max=86_400.0),
+    help="Seconds, none by default: the scene's own methods first, the rest is drawn as not run.",
+)
+@click.option(
+    "-o", "--output", type=PATH, help="Page or picture to write (.html, .png, .svg or .pdf)."
+)
+@force_option
+@json_option
+def stability(
+    scene_name: str,
+    pairs: Sequence[str],
+    map_name: str | None,
+    size: int | None,
+    budget: float | None,
+    output: Path | None,
+    force: bool,
+    as_json: bool,
+) -> None:
+    """Where each method fails on SCENE, and how far the scene is from that.
+
+    Accurate, inaccurate or unstable, with a numerical or a physical cause; the scene is marked in
+    every map.
+    """
+    from ...sim.scene.load import load_scene
+    from ..stability.atlas import atlas
+    from ..stability.text import stability_table, stability_text
+
+    check_outputs([scene_name], [(output, (*PAGE_SUFFIXES, *PICTURE_SUFFIXES))], force)
+    machine = load_scene(scene_name, overrides_of(pairs))
+    with progress_bar("running cells") as progress:
+        maps = atlas(machine, name=map_name, budget=budget, size=size, progress=progress)
+    files = [str(output)] if output is not None else []
+    if output is not None:
+        from ..stability.page import save_atlas
+
+        save_atlas(machine, maps, output, force=force)
+    text = "\n".join([stability_text(machine, maps), *files])
+    emit({**stability_table(machine, maps), "files": files}, as_json, text)
+
+
+@click.command()
+@click.argument("subject", metavar="SCENE|DATA|RECIPE")
+@click.option("--set", "pairs", multiple=True, metavar="PATH=VALUE", help="Replace a scene value.")
+@click.option(
+    "--accuracy",
+    type=Accuracy(1e-6, 0.5),
+    default=None,
+    help="Error that every quantity may carry; the scene's own by default. Of a recipe: "
+    "verdict=2%, rise of the error of the wear estimate, in % of the limit.",
+)
+@click.option(
+    "-n",
+    "--records",
+    type=click.IntRange(20, 10_000),
+    default=None,
+    help="Of a recipe: records on every choice of rungs; 120 by default.",
+)
+@click.option("--effect", "effects", multiple=True, help="Of a recipe: only this one.")
+@click.option("--folder", type=PATH, help="Of a recipe: keep its data sets, and go on from them.")
+@click.option(
+    "--budget",
+    type=Share(1.0, 1e6),
+    default=None,
+    help="Seconds; 90 of a scene, of a data set none. The same command with -o goes on.",
+)
+@click.option("-o", "--output", type=PATH, help="Chart (.html, .svg, .png, .pdf, .json, .csv).")
+@click.option(
+    "--apply", "applied", type=PATH, help="Scene or recipe to write (.toml): what is recommended."
+)
+@click.option(
+    "--choice",
+    type=click.Choice(["kept", "raised"]),
+    default="kept",
+    show_default=True,
+    help="Of --apply: with the rungs of the scene kept, or with rungs that may change.",
+)
+@seed_option
+@jobs_option
+@force_option
+@json_option
+def chart(
+    subject: str,
+    pairs: Sequence[str],
+    accuracy: tuple[bool, float] | None,
+    records: int | None,
+    effects: Sequence[str],
+    folder: Path | None,
+    budget: float | None,
+    output: Path | None,
+    applied: Path | None,
+    choice: str,
+    seed: int,
+    jobs: int | None,
+    force: bool,
+    as_json: bool,
+) -> None:
+    """How much model SCENE needs: its own error, and what would be enough; or diagnosis on DATA.
+
+    Of a scene: the error of its rungs and steps as they are written, the cheapest numerics that do
+    where its rungs stay, and the cheapest rungs where they may change. Cheap information comes
+    first, and a budget or Ctrl-C ends it with what is known by then; with -o the same command goes
+    on from there. Of a data set (.h5): features and models, cost against error. Of a recipe, with
+    --accuracy verdict=2%: which rungs may be cheaper while training on them keeps the verdict.
+    """
+    of_data = subject.endswith(DATA_SUFFIXES)
+    of_verdict, share = accuracy if accuracy is not None else (False, None)
+    if of_verdict and not of_data:
+        if budget is not None or choice != "kept":
+            raise click.UsageError("--budget and --choice are for a scene, not for a recipe")
+        from .chart_commands import verdict_chart_command
+
+        assert share is not None
+        found = verdict_chart_command(
+            subject,
+            overrides_of(pairs),
+            accuracy=share,
+            records=records or _VERDICT_RECORDS,
+            effects=effects,
+            folder=folder,
+            output=output,
+            applied=applied,
+            seed=seed,
+            jobs=worker_count(jobs),
+            force=force,
+        )
+        _emit_chart(found, [output, applied], as_json)
+        return
+    if records is not None or effects or folder is not None:
+        raise click.UsageError("-n, --effect and --folder need --accuracy verdict=SHARE")
+    if of_data and (pairs or accuracy is not None or applied):
+        raise click.UsageError("--set, --accuracy and --apply are for a scene, not for a data set")
+    if seed and not of_data:
+        raise click.UsageError("--seed is of the models on a data set; a scene's chart draws none")
+    if of_data:
+        found = _data_chart(subject, budget, output, seed, jobs, force)
+        _emit_chart(found, [output], as_json)
+        return
+    from .chart_commands import scene_chart_command
+
+    found, interrupted = scene_chart_command(
+        subject,
+        overrides_of(pairs),
+        accuracy=share,
+        budget=_CHART_BUDGET if budget is None else budget,
+        output=output,
+        applied=applied,
+        choice=choice,
+        jobs=worker_count(jobs),
+        force=force,
+    )
+    _emit_chart(found, [output, applied], as_json)
+    if interrupted:
+        going_on = "; the same command goes on from there" if output else ""
+        click.echo(f"interrupted: what was measured is shown{going_on}", err=True)
+        raise click.exceptions.Exit(EXIT_FAILED)
+
+
+_CHART_BUDGET = 90.0  # s of a scene
+_VERDICT_RECORDS = 120  # on every choice of rungs of a recipe
+
+
+def _data_chart(
+    subject: str,
+    budget: float | None,
+    output: Path | None,
+    seed: int,
+    jobs: int | None,
+    force: bool,
+) -> Any:
+    from ..charts.figure import save_chart
+    from ..charts.of_models import model_chart
+
+    check_outputs([subject], [(output, CHART_SUFFIXES)], force)
+    with progress_bar("measuring") as progress:
+        found = model_chart(
+            subject, seed=seed, budget=budget, jobs=worker_count(jobs), progress=progress
+        )
+    if output is not None:
+        save_chart(found, output, force=force)
+    return found
+
+
+def _emit_chart(found: Any, files: Sequence[Path | None], as_json: bool) -> None:
+    from ..charts.chart import chart_table, chart_text
+
+    written = [str(path) for path in files if path is not None]
+    text = "\n".join([chart_text(found), *written])
+    emit({**chart_table(found), "files": written}, as_json, text)
+
+
+@click.command()
+@json_option
+def verify(as_json: bool) -> None:
+    """Every literature check: expected, obtained, tolerance, source. Exit 1 if one fails."""
+    from dataclasses import asdict
+
+    from ..literature.verify import run_checks
+
+    results = run_checks()
+    failed = sum(not result.passed for result in results)
+    lines = [f"{'check':44} {'expected':>14} {'obtained':>14} {'tolerance':>10}  source"]
+    lines += [
+        f"{r.name:44} {r.expected:14.8g} {r.obtained:14.8g} {r.tolerance:10.2g}  "
+        f"{'' if r.passed else 'FAILED '}[{r.trust}] {r.source}"
+        for r in results
+    ]
+    lines.append(f"{len(results) - failed} passed, {failed} failed")
+    checks = [{**asdict(r), "passed": r.passed} for r in results]
+    emit({"checks": checks, "failed": failed}, as_json, "\n".join(lines))
+    raise click.exceptions.Exit(EXIT_FAILED if failed else 0)

@@ -1,0 +1,338 @@
+"""Figures of an evaluation as text for a terminal."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from ..feature_rows.feature_choice import choice_in, words_of
+from ..feature_rows.feature_table import Choice
+from ..learning.scores import LEVEL
+from ..pages.words import severity_word
+
+_FEW_RECORDS = 30
+
+
+def features_text(
+    card: Mapping[str, Any], choices: Sequence[Choice], costs: Sequence[float]
+) -> list[str]:
+    """Features of a model, what else there was to choose from, and the time of each.
+
+    Parameters
+    ----------
+    card : mapping
+        Of the model.
+    choices : sequence of Choice
+        What it was trained with.
+    costs : sequence of float
+        Time of the features of one recording, of each choice [ms].
+    """
+    mine = choice_in(card)
+    tried = {each["name"]: each for each in card["feature_choice"]["candidates"]}
+    lines = []
+    for choice, cost in zip(choices, costs, strict=True):
+        name = words_of(choice)
+        if not tried:
+            count = len(card["features"])
+            lines.append(f"Features: {name}, {count} values of a recording in {cost:.3g} ms")
+            continue
+        about = tried[name]
+        lines.append(
+            f"{'Features:' if choice == mine else '      not'} {name}, {about['values']} values in "
+            f"{cost:.3g} ms; lines erred by {1e6 * about['line_mae_m']:.3g} um out of fold"
+        )
+    if tried:
+        nested = 1e6 * card["model"]["nested_mae_m"]
+        lines.append(f"  the whole, with the set chosen anew in every fold: {nested:.3g} um")
+    return lines
+
+
+def score_lines(result: Mapping[str, Any], card: Mapping[str, Any]) -> list[str]:
+    """A judgement as lines for a terminal.
+
+    Parameters
+    ----------
+    result : mapping
+        Of :func:`wearstate.diagnose.evaluation.evaluate.score`; may be empty.
+    card : mapping
+        Of the model.
+
+    Returns
+    -------
+    list of str
+    """
+    if not result:
+        return ["not judged: no machine draw was held out"]
+    lines = [
+        f"Judged on {result['records']} records of {result['draws']} unseen machine draws "
+        f"({100 * result['unfamiliar']:.1f} % called unfamiliar, {100 * result['caution']:.1f} % "
+        "graded with caution)"
+    ]
+    if result["records"] < _FEW_RECORDS:
+        lines.append("  so few records tell little: every figure below may be far off")
+    if result["mae_m"] is None:
+        return [*lines, "  none is familiar: no figure can be given for this machine"]
+    return [
+        *lines,
+        f"  {severity_word(card['severity'])} error".ljust(20)
+        + f"{1e6 * result['mae_m']:.1f} um mean, "
+        f"{_percent(result, 'mae_share_of_limit')} of the condemning limit "
+        f"{1e3 * card['condemning_limit_m']:.3g} mm "
+        f"({1e6 * result['mae_all_m']:.1f} um with the unfamiliar)",
+        f"  interval coverage {_number(result, 'coverage')} (nominal "
+        f"{result['nominal_coverage']:.2f}), mean width "
+        f"{100 * result['mean_interval_share']:.1f} % of the limit",
+        f"  set coverage      {_number(result, 'set_coverage')}, "
+        f"{result['mean_set_size']:.2f} grades in a set on average",
+        f"  grade accuracy    {_number(result, 'accuracy')}; an error of that size allows about "
+        f"{result['accuracy_bound']:.3f}",
+        f"  within one grade  {result['within_one_grade']:.4f}; quadratic kappa "
+        f"{_plain(result['kappa'])}",
+        f"  false alarms      {_rate(result, 'false_alarm')} of as-new called grade 2 or 3",
+        f"  missed faults     {_rate(result, 'missed_fault')} of condemned called grade 0 or 1",
+        f"  brackets          {100 * LEVEL:.0f} % intervals over machines",
+        *baseline_lines(result["baselines"]),
+        *confounder_lines(result["by_confounder"]),
+    ]
+
+
+def _plain(value: float | None) -> str:
+    return "none" if value is None else f"{value:.3f}"
+
+
+def _number(result: Mapping[str, Any], name: str) -> str:
+    low, high = result["intervals"][name]
+    return _bracketed(result[name], low, high, 1.0, 3)
+
+
+def _percent(result: Mapping[str, Any], name: str) -> str:
+    low, high = result["intervals"][name]
+    return _bracketed(result[name], low, high, 100.0, 1) + " %"
+
+
+def _rate(result: Mapping[str, Any], name: str) -> str:
+    if result[name] is None:
+        return "none to be found: no such machine"
+    return _percent(result, name)
+
+
+def _bracketed(
+    value: float | None, low: float | None, high: float | None, times: float, digits: int
+) -> str:
+    if value is None or low is None or high is None:
+        return "none"
+    return f"{times * value:.{digits}f} [{times * low:.{digits}f}, {times * high:.{digits}f}]"
+
+
+def baseline_lines(rows: Mapping[str, Mapping[str, Any]]) -> list[str]:
+    """Baselines beside a model, as lines for a terminal.
+
+    Parameters
+    ----------
+    rows : mapping
+        Of :func:`wearstate.diagnose.evaluation.baselines.contest`, as JSON has it.
+
+    Examples
+    --------
+    >>> print(*baseline_lines({"tsfel": {"missing": "not here"}}), sep=chr(10))
+      baseline      error [% of limit]  accuracy  ours minus it [% of limit]
+      tsfel         not here
+    """
+    head = f"  {'baseline':12}  error [% of limit]  accuracy  ours minus it [% of limit]"
+    return [head, *(_baseline_line(name, row) for name, row in rows.items())]
+
+
+def _baseline_line(name: str, row: Mapping[str, Any]) -> str:
+    line = f"  {name.replace('_', ' '):12}  "
+    if row["missing"]:
+        return line + str(row["missing"])
+    value = row["mae_share_of_limit"]["value"]
+    if value is None:
+        return line + "none: no record was graded"
+    apart = row["difference"]
+    note = "  (trained on the judged set)" if row["flattered"] else ""
+    return (
+        f"{line}{100 * value:18.1f}  {row['accuracy']['value']:8.3f}  "
+        f"{_bracketed(apart['value'], apart['low'], apart['high'], 100.0, 1)}{note}"
+    )
+
+
+def splits_text(result: Mapping[str, Any]) -> str:
+    """A whole evaluation as text: one line a split, what lies behind it below.
+
+    Parameters
+    ----------
+    result : mapping
+        Of :func:`wearstate.diagnose.evaluation.splits.evaluate_splits`.
+    """
+    origin = "simulated" if result["origin"] == "simulated" else "measured"
+    head = (
+        f"{result['data']}: {result['records']} {origin} records of {result['draws']} machines; "
+        f"{severity_word(result['severity'])}, condemned at "
+        f"{1e3 * result['condemning_limit_m']:.3g} mm"
+    )
+    lines = [head, "", *_table(_SPLIT_HEAD, [_split_row(split) for split in result["splits"]])]
+    lines += ["error, baseline: mean error in % of the condemning limit with 95 % intervals over"]
+    lines += ["machines; bound: accuracy that such an error allows; best baseline and difference"]
+    lines += ["(ours minus it) over all records, the refused ones too"]
+    if "learning_curve" in result:
+        lines += ["", *_table(_CURVE_HEAD, [_curve_row(row) for row in result["learning_curve"]])]
+    if "detectability" in result:
+        lines += ["", *_table(_FLOOR_HEAD, [_floor_row(row) for row in result["detectability"]])]
+    if "cost" in result:
+        lines += ["", *_table(_COST_HEAD, [_cost_row(row) for row in result["cost"]])]
+    return "\n".join(lines)
+
+
+def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
+    # a row that ends early says why, and widens no column
+    full = [head, *(row for row in rows if len(row) == len(head))]
+    widths = [max(len(row[i]) for row in full) for i in range(len(head))]
+    return [
+        "  ".join(
+            cell.ljust(width) for cell, width in zip(row, widths[: len(row)], strict=True)
+        ).rstrip()
+        for row in [head, *rows]
+    ]
+
+
+_SPLIT_HEAD = (
+    "split",
+    "records",
+    "error",
+    "accuracy",
+    "bound",
+    "kappa",
+    "coverage",
+    "set size",
+    "false alarm",
+    "missed",
+    "refused",
+    "best baseline",
+    "difference",
+)
+
+
+def _split_row(split: Mapping[str, Any]) -> list[str]:
+    name = str(split["name"])
+    if split["missing"]:
+        return [name, f"not made: {split['missing']}"]
+    best = best_baseline(split)
+    apart = None if best is None else split["baselines"][best]["difference_all"]
+    return [
+        name,
+        str(split["records"]),
+        _spread(split, "mae_share_of_limit", 100.0, 1),
+        _plain(split["accuracy"]),
+        _plain(split["accuracy_bound"]),
+        _plain(split["kappa"]),
+        _plain(split["coverage"]),
+        "none" if split["mean_set_size"] is None else f"{split['mean_set_size']:.2f}",
+        _share(split["false_alarm"]),
+        _share(split["missed_fault"]),
+        _share(split["unfamiliar"]),
+        "none" if best is None else _best_words(best, split["baselines"][best]),
+        "none"
+        if apart is None
+        else _bracketed(apart["value"], apart["low"], apart["high"], 100.0, 1),
+    ]
+
+
+def _spread(split: Mapping[str, Any], name: str, times: float, digits: int) -> str:
+    low, high = split["intervals"][name]
+    return _bracketed(split[name], low, high, times, digits)
+
+
+def _share(value: float | None) -> str:
+    return "none" if value is None else f"{100 * value:.1f} %"
+
+
+def _best_words(name: str, row: Mapping[str, Any]) -> str:
+    return f"{name.replace('_', ' ')} {100 * row['mae_all_share_of_limit']['value']:.1f}"
+
+
+def best_baseline(split: Mapping[str, Any]) -> str | None:
+    """Name of the baseline with the least mean error over all records; None where none ran.
+
+    Examples
+    --------
+    >>> ran = {"missing": "", "mae_all_share_of_limit": {"value": 0.1}}
+    >>> best_baseline({"baselines": {"tsfel": {"missing": "not installed"}, "majority": ran}})
+    'majority'
+    """
+    errors = {
+        name: row["mae_all_share_of_limit"]["value"]
+        for name, row in split["baselines"].items()
+        if not row["missing"]
+    }
+    return min(errors, key=lambda name: float(errors[name])) if errors else None
+
+
+_CURVE_HEAD = ("machines trained on", "error [% of limit]", "accuracy", "refused")
+
+
+def _curve_row(row: Mapping[str, Any]) -> list[str]:
+    error = row["mae_share_of_limit"]
+    return [
+        str(row["machines"]),
+        _bracketed(error["value"], error["low"], error["high"], 100.0, 1),
+        _plain(row["accuracy"]["value"]),
+        _share(row["unfamiliar"]["value"]),
+    ]
+
+
+_FLOOR_HEAD = ("smallest wear found", "records", "healthy below [um]", "found [um]", "% of limit")
+
+
+def _floor_row(row: Mapping[str, Any]) -> list[str]:
+    found, part = row["smallest_m"], row["smallest_share_of_limit"]
+    return [
+        str(row["condition"]),
+        str(row["records"]),
+        f"{1e6 * row['healthy_below_m']:.0f}",
+        "none so often" if found["value"] is None else _open_ended(found, 1e6, 0),
+        "none so often" if part["value"] is None else _open_ended(part, 100.0, 1),
+    ]
+
+
+def _open_ended(figure: Mapping[str, Any], times: float, digits: int) -> str:
+    """A figure whose upper end may be beyond all that was judged."""
+    high = "beyond" if figure["high"] is None else f"{times * figure['high']:.{digits}f}"
+    low = "beyond" if figure["low"] is None else f"{times * figure['low']:.{digits}f}"
+    return f"{times * figure['value']:.{digits}f} [{low}, {high}]"
+
+
+_COST_HEAD = ("method", "ms per recording")
+
+
+def _cost_row(row: Mapping[str, Any]) -> list[str]:
+    value = row["ms_per_record"]
+    return [str(row["name"]), row["missing"] if value is None else f"{value:.1f}"]
+
+
+def confounder_lines(rows: Mapping[str, Mapping[str, Any]]) -> list[str]:
+    """Errors by confounder as lines for a terminal; none where there are no confounders.
+
+    Parameters
+    ----------
+    rows : mapping
+        From :func:`by_confounder`.
+
+    Examples
+    --------
+    >>> row = {"records": 8, "unfamiliar": 0.25, "mae_m": 2e-5, "coverage": 1.0}
+    >>> print(*confounder_lines({"none": row}), sep=chr(10))
+      confounder  records  unfamiliar  mean error  coverage
+      none              8      25.0 %     20.0 um     1.000
+    """
+    if not rows:
+        return []
+    width = max(len(name) for name in (*rows, "confounder"))
+    head = f"  {'confounder':{width}}  records  unfamiliar  mean error  coverage"
+    return [head, *(_part_line(name, row, width) for name, row in rows.items())]
+
+
+def _part_line(name: str, row: Mapping[str, Any], width: int) -> str:
+    share = 100 * row["unfamiliar"]
+    line = f"  {name.replace('_', ' '):{width}}  {row['records']:7}  {share:8.1f} %"
+    if row["mae_m"] is None:
+        return f"{line}  none is familiar"
+    return f"{line}  {1e6 * row['mae_m']:7.1f} um  {row['coverage']:8.3f}"

@@ -1,0 +1,143 @@
+"""Blows in a recording: a class whose every recording has some is not that of one without.
+
+A damaged bearing strikes; a sound one hisses. What noise does is known without any training, so
+that a handful of recordings is enough to tell that a recording lacks what a class always has, where
+a distance in the space of features would ask for many.
+"""
+
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...datasets.file.record import Recording
+from ...features.catalogue.row import absent_features
+from .feature_table import Choice, absent_in, feature_table, recording_features, recording_layout
+
+Float = NDArray[np.float64]
+
+NOISE_SCORE: Final = 7.0
+"""Score of a kurtogram that noise reaches in one record of a hundred [-]."""
+
+FEWEST_SHOWING: Final = 3
+"""Recordings of a class by which it can be said always to have blows."""
+
+_FEATURE = "kurtogram"
+_ROW = Choice(only=(_FEATURE,))
+_WEAK_SHARE = 0.05  # windows of a recording that may be weaker: a window can fall between blows
+
+
+def blow_scores(recording: Recording) -> Float:
+    """Score of the blows in every channel of a recording.
+
+    Parameters
+    ----------
+    recording : Recording
+
+    Returns
+    -------
+    numpy.ndarray [shape=(n_channels,)]
+        :attr:`wearstate.features.signal.envelope.Kurtogram.score` [-]; empty where the recording is
+        too short for it.
+
+    Raises
+    ------
+    DataError
+        The signal cannot be turned into features.
+    """
+    if _FEATURE in absent_features(recording_layout(recording), "complete"):
+        return np.empty(0)
+    return _scores_in(*recording_features(recording, _ROW))
+
+
+def blow_table(path: str | Path, n_records: int, *, jobs: int = 1) -> Float:
+    """:func:`blow_scores` of every usable record of a data set.
+
+    Parameters
+    ----------
+    path : str or Path
+        Data set file.
+    n_records : int
+        Usable ones in it.
+    jobs : int
+        Worker processes; the result does not depend on it.
+
+    Returns
+    -------
+    numpy.ndarray [shape=(n_records, n_channels)]
+        Without columns where the records are too short.
+
+    Raises
+    ------
+    DataError
+        As :func:`wearstate.diagnose.feature_rows.feature_table.feature_table`.
+    """
+    if _FEATURE in absent_in(path, Choice(feature_set="complete")):
+        return np.empty((n_records, 0))
+    table = feature_table(path, choice=_ROW, jobs=jobs)
+    return _scores_in(table.names, table.values)
+
+
+def _scores_in(names: tuple[str, ...], values: Float) -> Float:
+    return values[..., [name.endswith(".kurtogram.score") for name in names]]
+
+
+def blow_floors(scores: Float, groups: NDArray[np.intp]) -> Float:
+    """Least score that the recordings of one class have.
+
+    Parameters
+    ----------
+    scores : numpy.ndarray [shape=(n_records, n_channels)]
+        Of the records of the class.
+    groups : numpy.ndarray [shape=(n_records,)]
+        Recording of each.
+
+    Returns
+    -------
+    numpy.ndarray [shape=(n_channels,)]
+        Of the weakest recording, one in twenty of its records left out; 0 of fewer than three
+        recordings, of which nothing can be said to be always so.
+
+    Examples
+    --------
+    >>> blow_floors(np.array([[30.0], [50.0], [40.0]]), np.arange(3)).tolist()
+    [30.0]
+    >>> blow_floors(np.array([[30.0], [50.0], [40.0]]), np.array([0, 1, 1])).tolist()
+    [0.0]
+    """
+    names = np.unique(groups)
+    if len(names) < FEWEST_SHOWING:
+        return np.zeros(scores.shape[1])
+    weakest = [
+        np.quantile(scores[groups == one], _WEAK_SHARE, axis=0, method="lower") for one in names
+    ]
+    return np.asarray(np.min(weakest, axis=0), dtype=np.float64)
+
+
+def lacks_blows(scores: Float, floors: Float) -> bool:
+    """Whether a recording has no blow where every recording of a class has some.
+
+    Parameters
+    ----------
+    scores : numpy.ndarray [shape=(n_channels,)]
+        Of the recording; empty where they are not known.
+    floors : numpy.ndarray [shape=(n_channels,)]
+        Of the class, of :func:`blow_floors`.
+
+    Returns
+    -------
+    bool
+        The class has blows above those of noise in some channels, and the recording none in any of
+        these.
+
+    Examples
+    --------
+    >>> floors = np.array([30.0, 2.0])
+    >>> [lacks_blows(np.array(row), floors) for row in ([4.0, 9.0], [8.0, 1.0], [])]
+    [True, False, False]
+    """
+    shown = floors > NOISE_SCORE
+    if scores.size == 0 or not shown.any():
+        return False
+    return bool((scores[shown] <= NOISE_SCORE).all())

@@ -1,0 +1,312 @@
+"""Which features a model is trained on: told in words, chosen by folds, kept in its card."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from time import perf_counter
+from typing import Any, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...datasets.file.record import DataError
+from ...datasets.file.views import JoinedSet
+from ...datasets.split.rules import group_folds
+from ...features.catalogue.catalogue import SetName
+from ..learning.regressions import CANDIDATES, Folds
+from .feature_table import (
+    USUAL,
+    Choice,
+    FeatureTable,
+    Healthy,
+    feature_table_names,
+    held_against,
+    recording_features,
+)
+
+Float = NDArray[np.float64]
+Index = NDArray[np.intp]
+
+SELECT = "select"
+"""Word for a choice among all sets."""
+
+_SETS: tuple[SetName, ...] = get_args(SetName)
+_LINES = tuple(each for each in CANDIDATES if each.cost_ms < 0.1)
+_TIE = 0.01  # of the error: a later set that is no better than this is not worth its time
+_TIMED = 3  # records whose features are timed
+
+
+def choices_of(words: Sequence[str]) -> tuple[Choice, ...]:
+    """Candidates for the features of a model, from what a command line says.
+
+    Parameters
+    ----------
+    words : sequence of str
+        Each a set, several sets parted by commas, ``select`` for all sets, names of features or
+        values parted by commas, or a text file of such names; `#` begins a comment in it.
+
+    Returns
+    -------
+    tuple of Choice
+        In the order told; the set that models are usually trained on where nothing is.
+
+    Raises
+    ------
+    DataError
+        A word mixes sets and names, or names nothing.
+
+    Examples
+    --------
+    >>> [choice.feature_set for choice in choices_of(["standard,core"])]
+    ['standard', 'core']
+    >>> choices_of(["frf_profile, speed"])[0].only
+    ('frf_profile', 'speed')
+    """
+    found = [choice for word in words for choice in _choices(word)]
+    return tuple(dict.fromkeys(found)) or (USUAL,)
+
+
+def _choices(word: str) -> list[Choice]:
+    names = _names_in(word)
+    sets = [name for name in names if name in _SETS]
+    if names == [SELECT]:
+        sets = list(_SETS)
+    elif sets and len(sets) < len(names):
+        raise DataError(
+            f"features = {word!r} must hold sets or names, holds both; give each by an "
+            "option of its own, to choose among them"
+        )
+    if not names:
+        raise DataError(f"features = {word!r} names 0 features, must name >= 1; name some")
+    if sets:
+        return [Choice(feature_set=name) for name in _SETS if name in sets]
+    return [Choice(only=tuple(dict.fromkeys(names)))]
+
+
+def _names_in(word: str) -> list[str]:
+    """Names parted by commas, or those in the lines of a file."""
+    file = Path(word)
+    text = word
+    if file.suffix and file.is_file():
+        text = ",".join(line.partition("#")[0] for line in file.read_text("utf-8").splitlines())
+    return [name for name in (part.strip() for part in text.split(",")) if name]
+
+
+def words_of(choice: Choice) -> str:
+    """A choice as a person tells it.
+
+    Examples
+    --------
+    >>> words_of(Choice(feature_set="core")), words_of(Choice(only=("rms", "speed")))
+    ('core', 'rms, speed')
+    """
+    return choice.feature_set if choice.only is None else ", ".join(choice.only)
+
+
+def choice_in(card: Mapping[str, Any]) -> Choice:
+    """The features that a model was trained on.
+
+    Parameters
+    ----------
+    card : mapping
+        Of the model; without a word about it, of the standard set.
+
+    Examples
+    --------
+    >>> choice_in({"feature_choice": {"set": "core", "only": []}}).feature_set
+    'core'
+    """
+    kept = card.get("feature_choice")
+    if kept is None:
+        return USUAL
+    return Choice(feature_set=kept["set"], only=tuple(kept["only"]) or None)
+
+
+def choice_card(choice: Choice) -> dict[str, Any]:
+    """What a card keeps of a choice."""
+    return {"set": choice.feature_set, "only": list(choice.only or ())}
+
+
+# --- candidates of one data set
+
+
+@dataclass(frozen=True, kw_only=True)
+class Candidates:
+    """Sets of features to choose from, as columns of one table.
+
+    Attributes
+    ----------
+    choices : tuple of Choice
+    columns : tuple of numpy.ndarray
+        Of each, in the table of all.
+    whole : Choice
+        What the table of all is made of.
+    """
+
+    choices: tuple[Choice, ...]
+    columns: tuple[Index, ...]
+    whole: Choice
+
+    def part(self, table: FeatureTable, place: int) -> FeatureTable:
+        """A table of one candidate's columns alone."""
+        return table.named([table.names[i] for i in self.columns[place]])
+
+
+def candidates_of(
+    path: str | Path, choices: Sequence[Choice], healthy: Healthy | None = None
+) -> Candidates:
+    """Columns of each candidate, told by the first usable record of a data set.
+
+    Parameters
+    ----------
+    path : str or Path
+        Data set file.
+    choices : sequence of Choice
+        One or more, all of the same views.
+    healthy : Healthy, optional
+        As of :func:`wearstate.diagnose.feature_rows.feature_table.feature_table`.
+
+    Returns
+    -------
+    Candidates
+
+    Raises
+    ------
+    DataError
+        The data set has no usable record, a feature that is named does not exist or is not to be
+        had, or two candidates are the same features here.
+    """
+    each = [feature_table_names(path, choice, healthy) for choice in choices]
+    if len(set(each)) < len(each):
+        twice = next(i for i, names in enumerate(each) if names in each[:i])
+        raise DataError(
+            f"{path}: {words_of(choices[twice])} has the same {len(each[twice])} features as "
+            f"{words_of(choices[each.index(each[twice])])} here, must have others; leave it out"
+        )
+    if len(each) == 1:
+        columns = np.arange(len(each[0]), dtype=np.intp)
+        return Candidates(choices=tuple(choices), columns=(columns,), whole=choices[0])
+    union = tuple(dict.fromkeys(name for names in each for name in names))
+    whole = Choice(only=union, views=choices[0].views)
+    place = {name: i for i, name in enumerate(feature_table_names(path, whole, healthy))}
+    return Candidates(
+        choices=tuple(choices),
+        columns=tuple(np.array(sorted(place[name] for name in names)) for names in each),
+        whole=whole,
+    )
+
+
+def costs_ms(
+    path: str | Path, choices: Sequence[Choice], healthy: Healthy | None = None
+) -> list[float]:
+    """Time that the features of one recording take, of each choice [ms].
+
+    Parameters
+    ----------
+    path : str or Path
+        Data set; the least time of its first few usable records is taken, after a first call.
+    choices : sequence of Choice
+    healthy : Healthy, optional
+        As of :func:`wearstate.diagnose.feature_rows.feature_table.feature_table`; its own time is
+        not counted.
+    """
+    with JoinedSet(Path(path), choices[0].views) as data:
+        sound = (data.data.manifest["status"] == "ok").to_numpy() & data.complete
+        usable = np.flatnonzero(sound)[:_TIMED]
+        recordings = [data[int(index)] for index in usable]
+    found = []
+    for choice in choices:
+        seconds = []
+        for recording in recordings[:1] + recordings:
+            known = None if healthy is None else healthy.of(recording.machine)
+            mine = held_against(choice, known)
+            start = perf_counter()
+            recording_features(recording, mine)
+            seconds.append(perf_counter() - start)
+        found.append(1e3 * min(seconds[1:]))
+    return found
+
+
+@dataclass(frozen=True, kw_only=True)
+class Selection:
+    """Which set the records ask for, by folds of whole machines.
+
+    Attributes
+    ----------
+    chosen : int
+        Place of the set, by all records.
+    errors : tuple of float
+        Mean absolute error of straight lines on each set, out of fold [unit of the target].
+    by_fold : tuple of int
+        Place of the set that the training records of each outer fold ask for.
+    """
+
+    chosen: int
+    errors: tuple[float, ...]
+    by_fold: tuple[int, ...]
+
+
+def select_set(
+    inputs: Sequence[Float],
+    target: Float,
+    groups: NDArray[Any],
+    folds: Folds,
+    *,
+    seed: int = 0,
+) -> Selection:
+    """Choose one of several sets of features, and what each outer fold would have chosen.
+
+    Parameters
+    ----------
+    inputs : sequence of numpy.ndarray, each [shape=(n, n_features)]
+        Rows of each set, the cheapest first.
+    target : numpy.ndarray [shape=(n,)]
+        > 0.
+    groups : numpy.ndarray [shape=(n,)]
+        Machine of each record.
+    folds : sequence of (numpy.ndarray, numpy.ndarray)
+        Outer folds.
+    seed : int
+        Of the inner folds.
+
+    Returns
+    -------
+    Selection
+
+    Notes
+    -----
+    For an outer fold the choice is made by inner folds of its training records alone, so that the
+    error of the chosen set on what the fold leaves out is that of unseen machines, choice included.
+    Lines alone are tried: they take a hundredth of the time of the trees. The choice is the first
+    set within one per cent of the least error.
+
+    Examples
+    --------
+    >>> rng = np.random.default_rng(0)
+    >>> good, idle = rng.standard_normal((2, 60, 2))
+    >>> groups = np.arange(60)
+    >>> folds = group_folds(groups, n=3, seed=0)
+    >>> select_set([idle, good], np.exp(good[:, 0]), groups, folds).by_fold
+    (1, 1, 1)
+    """
+    errors = [_line_error(rows, target, folds) for rows in inputs]
+    by_fold = []
+    for train, _ in folds:
+        inner = group_folds(groups[train], n=len(folds), seed=seed)
+        by_fold.append(_first([_line_error(rows[train], target[train], inner) for rows in inputs]))
+    return Selection(chosen=_first(errors), errors=tuple(errors), by_fold=tuple(by_fold))
+
+
+def _line_error(rows: Float, target: Float, folds: Folds) -> float:
+    """Least mean absolute error of a straight line, out of fold."""
+    errors = np.zeros(len(_LINES))
+    for train, test in folds:
+        for i, line in enumerate(_LINES):
+            found = line.fit(rows[train], target[train], 0).predict(rows[test])
+            errors[i] += np.abs(np.clip(found, 0.0, 2 * target.max()) - target[test]).sum()
+    return float(errors.min() / len(target))
+
+
+def _first(errors: Sequence[float]) -> int:
+    least = min(errors)
+    return next(i for i, error in enumerate(errors) if error <= least * (1 + _TIE))

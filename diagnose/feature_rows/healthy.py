@@ -1,0 +1,347 @@
+"""Healthy recordings of the machine in question: the reference that the trade works with."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from ...datasets.file.record import DataError, DataSet, Recording
+from ...features.response.transfer import FrfReference
+from .feature_choice import choice_in
+from .feature_table import (
+    USUAL,
+    Choice,
+    FeatureTable,
+    Progress,
+    feature_table,
+    held_against,
+    recording_features,
+)
+from .probe_means import ProbeMeans, probe_means
+from .quality import layout_faults, sample_faults
+from .transfer_reference import (
+    healthy_transfer,
+    told_against,
+    told_against_modes,
+    transfer_reference,
+)
+
+Float = NDArray[np.float64]
+
+_ENOUGH_FAULTS = 5  # recordings with the same fault that need not be looked beyond
+
+
+@dataclass(frozen=True, kw_only=True)
+class Baseline:
+    """Healthy recordings of the machine in question.
+
+    Attributes
+    ----------
+    features : numpy.ndarray [shape=(n_features,)]
+        Mean of their feature rows.
+    recordings : int
+    source : str
+        File or files, for messages.
+    transfer : FrfReference or None
+        Mean of their transfer functions, where the model is told against them.
+    positions : tuple of ProbeMeans
+        Where the shaft ran in each; empty without proximity probes.
+    """
+
+    features: Float
+    recordings: int
+    source: str
+    transfer: FrfReference | None = None
+    positions: tuple[ProbeMeans, ...] = ()
+
+
+def referenced_rows(rows: Float, baseline: Float) -> Float:
+    """Feature rows as a referenced model takes them.
+
+    Parameters
+    ----------
+    rows : numpy.ndarray [shape=(n, n_features)]
+    baseline : numpy.ndarray [shape=(n, n_features)] or [shape=(n_features,)]
+        Healthy rows of the same machines.
+
+    Returns
+    -------
+    numpy.ndarray [shape=(n, 2 n_features)]
+        What changed since the machine was healthy (levels are logarithms: their ratio), and the
+        rows as they are.
+
+    Examples
+    --------
+    >>> referenced_rows(np.array([[3.0, 5.0]]), np.array([1.0, 5.0]))
+    array([[2., 0., 3., 5.]])
+    """
+    return np.hstack([rows - baseline, rows])
+
+
+def references(
+    table: FeatureTable,
+    path: str | Path,
+    healthy: str | Path,
+    *,
+    choice: Choice = USUAL,
+    jobs: int = 1,
+    progress: Progress | None = None,
+) -> tuple[Float, int]:
+    """Mean healthy row of the machine of each record, paired by what tells the machine.
+
+    Parameters
+    ----------
+    table : FeatureTable
+        Records in question.
+    path : str or Path
+        Their data set.
+    healthy : str or Path
+        Data set of healthy records of the same machines: drawn by the same recipe under the same
+        seed, or measured and named alike. Equal numbers alone make no machine the same.
+    choice : Choice
+        What the table is made of, or holds a part of.
+    jobs : int
+        Worker processes for the features.
+    progress : callable, optional
+        Called with (records done, records).
+
+    Returns
+    -------
+    rows : numpy.ndarray [shape=(n_records, n_features)]
+    records : int
+        Healthy records in all.
+
+    Raises
+    ------
+    DataError
+        As of :func:`refuse_strangers`, or the features are others.
+    """
+    refuse_strangers(path, healthy)
+    against = healthy_transfer(healthy, [Choice(only=table.names)])
+    known = feature_table(healthy, choice=choice, healthy=against, jobs=jobs, progress=progress)
+    if not set(table.names) <= set(known.names):
+        raise DataError(
+            f"{healthy}: its {len(known.names)} features are not the {len(table.names)} of the "
+            "data set; use the same channels and rate"
+        )
+    known = known.named(table.names)
+    return _means(known.values, _machines_in(healthy), _machines_in(path)), len(known.values)
+
+
+def refuse_strangers(path: str | Path, healthy: str | Path) -> None:
+    """Refuse a healthy set that is not known to be of the machines of another set.
+
+    Parameters
+    ----------
+    path, healthy : str or Path
+        As of :func:`references`.
+
+    Raises
+    ------
+    DataError
+        A set does not tell its machines, machines have no healthy record, or records of the
+        healthy set are of worn machines; all at once.
+    """
+    wanted, machines = _machines_in(path), _machines_in(healthy)
+    sets = ((path, wanted, healthy), (healthy, machines, path))
+    faults = [_unknown_words(own, names, other) for own, names, other in sets if "" in names]
+    missing = [] if faults else sorted(set(wanted.tolist()) - set(machines.tolist()))
+    if missing:
+        faults.append(
+            f"{healthy}: {len(missing)} machines of {path} have no healthy record, must be 0: "
+            f"{_few(missing)}; it has {_few(sorted(set(machines.tolist())))}; {_SAME_MACHINES}"
+        )
+    with DataSet(healthy) as data:
+        faults += _worn_words(healthy, data.manifest[data.manifest["status"] == "ok"])
+    if faults:
+        raise DataError("\n".join(faults))
+
+
+_SAME_MACHINES = (
+    "generate it with the same seed from a recipe whose machines_of names the other's recipe, or "
+    "import both with the same names of machines in the label group"
+)
+
+
+def _machines_in(path: str | Path) -> NDArray[np.str_]:
+    """Machine of each usable record, as the rows of its feature table."""
+    with DataSet(path) as data:
+        usable = (data.manifest["status"] == "ok").to_numpy()
+        return np.array(data.machines, dtype=str)[usable]
+
+
+def _unknown_words(path: str | Path, machines: NDArray[np.str_], other: str | Path) -> str:
+    return (
+        f"{path}: {int((machines == '').sum())} of {len(machines)} records do not tell their "
+        f"machine, must be 0 to pair them with those of {other} (numbers and file names are no "
+        "machines); import with the label group, or --group-by folder"
+    )
+
+
+def _worn_words(path: str | Path, rows: pd.DataFrame) -> list[str]:
+    worn = int((rows["grade"] > 0).sum())
+    if not worn:
+        return []
+    return [
+        f"{path}: {worn} of {len(rows)} recordings have a grade above 0, must be of a healthy "
+        "machine; leave them out"
+    ]
+
+
+def _means(values: Float, machines: NDArray[np.str_], wanted: NDArray[np.str_]) -> Float:
+    """Mean row of each wanted machine."""
+    names, place = np.unique(machines, return_inverse=True)
+    means = np.zeros((len(names), values.shape[1]))
+    np.add.at(means, place, values)
+    means /= np.bincount(place)[:, None]
+    return np.asarray(means[np.searchsorted(names, wanted)])
+
+
+def _few(numbers: Sequence[object]) -> str:
+    return ", ".join(str(n) for n in numbers[:5]) + (", …" if len(numbers) > 5 else "")
+
+
+def baseline_of(
+    recordings: Iterable[Recording], card: Mapping[str, Any], source: str = "baseline"
+) -> Baseline:
+    """Healthy recordings of one machine, as a model takes them.
+
+    Parameters
+    ----------
+    recordings : iterable of Recording
+    card : mapping
+        Of the model.
+    source : str
+        Where they are from, for messages.
+
+    Returns
+    -------
+    Baseline
+
+    Raises
+    ------
+    DataError
+        There is no recording, or some lack the model's inputs or are at fault; each fault once.
+    """
+    sound: list[Recording] = []
+    faults: dict[str, list[str]] = {}
+    for i, recording in enumerate(recordings):
+        found = [
+            fault.text
+            for fault in (layout_faults(recording, card) or sample_faults(recording))
+            if fault.bars
+        ]
+        for text in found:
+            faults.setdefault(text, []).append(recording.source or str(i))
+        if len(next(iter(faults.values()), ())) > _ENOUGH_FAULTS:
+            break  # of a thousand recordings of another layout
+        if not found:
+            sound.append(recording)
+    if faults:
+        told = [f"{source}: {text} ({_few(names)})" for text, names in faults.items()]
+        raise DataError("\n".join(told))
+    if not sound:
+        raise DataError(f"{source}: 0 healthy recordings, must be >= 1; record some")
+    named = Choice(only=tuple(card["features"]))
+    reference = None
+    if told_against(named):
+        reference = transfer_reference(sound, modes=told_against_modes(named))
+    choice = held_against(choice_in(card), reference)
+    rows = [recording_features(recording, choice)[1] for recording in sound]
+    if {len(row) for row in rows} != {len(card["features"])}:
+        raise DataError(
+            f"{source}: its {len(rows[0])} features are not the model's {len(card['features'])}; "
+            "use recordings with the model's channels and rate"
+        )
+    mean = np.mean(rows, axis=0)
+    positions = tuple(means for means in map(probe_means, sound) if means.names)
+    return Baseline(
+        features=mean,
+        recordings=len(rows),
+        source=source,
+        transfer=reference,
+        positions=positions,
+    )
+
+
+class Baselines:
+    """Healthy recordings in a data set: of the machine in question, or of several by identity.
+
+    Parameters
+    ----------
+    path : str or Path
+        Data set. Machines go by :attr:`wearstate.datasets.file.record.DataSet.machines`, never by
+        number; a set of one machine, or of files without names, is taken to be of the machine of
+        a recording that does not tell its own.
+    card : mapping
+        Of the model.
+
+    Raises
+    ------
+    DataError
+        It is no data set, cannot be read, or a recording in it is not healthy.
+    """
+
+    def __init__(self, path: str | Path, card: Mapping[str, Any]) -> None:
+        if Path(path).suffix.lower() not in (".h5", ".hdf5"):
+            raise DataError(
+                f"baseline = {path} must be a data set (.h5); make one of the healthy recordings: "
+                "wearstate import FILES -o healthy.h5"
+            )
+        self.source = str(path)
+        self._path, self._card = Path(path), card
+        with DataSet(path) as data:
+            usable = (data.manifest["status"] == "ok").to_numpy()
+            self._records = np.flatnonzero(usable)
+            self._machines = np.array(data.machines, dtype=str)[usable]
+            worn = _worn_words(path, data.manifest[usable])
+        if worn:
+            raise DataError(worn[0])
+        self._found: dict[str, Baseline] = {}
+
+    def of(self, recording: Recording) -> Baseline:
+        """That of the machine of a recording; read when it is first asked for.
+
+        Parameters
+        ----------
+        recording : Recording
+            In question.
+
+        Returns
+        -------
+        Baseline
+
+        Raises
+        ------
+        DataError
+            It is not known to be of a machine in the set; as of :func:`baseline_of`.
+        """
+        machine = recording.machine
+        self._refuse_stranger(machine, recording.source or "the recording")
+        if machine not in self._found:
+            records = self._records[self._machines == machine] if machine else self._records
+            with DataSet(self._path) as data:
+                healthy = (data[int(i)] for i in records)
+                self._found[machine] = baseline_of(healthy, self._card, self.source)
+        return self._found[machine]
+
+    def _refuse_stranger(self, machine: str, name: str) -> None:
+        known = sorted(set(self._machines.tolist()))
+        if machine in known or len(known) == 0:
+            return  # without any, reading tells
+        here = _few([one or "a machine without a name" for one in known])
+        if machine:
+            raise DataError(
+                f"{self.source} has healthy recordings of {here}, must have some of {machine}, "
+                f"which {name} is of; {_SAME_MACHINES}"
+            )
+        if len(known) > 1:
+            raise DataError(
+                f"{self.source} has healthy recordings of {len(known)} machines ({here}), must "
+                f"have those of one: {name} does not tell its machine; give a data set of its "
+                "recordings only"
+            )

@@ -1,0 +1,72 @@
+"""Where the shaft runs in a recording: mean readings of its proximity probes, and its speed."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...datasets.file.record import Recording
+from ...features.rotation.order import pulse_times
+
+Float = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ProbeMeans:
+    """What a static equilibrium is told from.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Of the channels of displacement, in the recording's order.
+    means, swings : numpy.ndarray [shape=(n_probes,)]
+        Mean reading and rms about it [m].
+    speed_hz : float or None
+        Of the shaft: by the tacho, else as noted.
+    row : mapping
+        What was noted beside the recording.
+    """
+
+    names: tuple[str, ...]
+    means: Float
+    swings: Float
+    speed_hz: float | None
+    row: Mapping[str, Any]
+
+
+def probe_means(recording: Recording) -> ProbeMeans:
+    """Mean readings in a recording; without probes there are none.
+
+    Examples
+    --------
+    >>> from ...datasets.file.record import Channel
+    >>> probe = Channel(name="probe_1", unit="m", quantity="displacement")
+    >>> still = Recording(signal=np.full((1, 8), 1e-5), sample_rate=8.0, channels=(probe,))
+    >>> found = probe_means(still)
+    >>> found.names, float(found.means[0].round(9)), found.speed_hz
+    (('probe_1',), 1e-05, None)
+    """
+    channels = recording.vibration_channels
+    rows = [i for i, channel in enumerate(channels) if channel.quantity == "displacement"]
+    readings = recording.vibration[rows].astype(np.float64)
+    return ProbeMeans(
+        names=tuple(channels[i].name for i in rows),
+        means=readings.mean(axis=-1),
+        swings=readings.std(axis=-1),
+        speed_hz=_speed(recording),
+        row=recording.row,
+    )
+
+
+def _speed(recording: Recording) -> float | None:
+    tacho = recording.tacho_signal
+    if tacho is None:
+        return recording.declared_speed_hz
+    try:
+        pulses = pulse_times(tacho, recording.sample_rate)
+    except ValueError:
+        return None
+    turns = (len(pulses) - 1) / recording.pulses_per_revolution
+    return float(turns / (pulses[-1] - pulses[0]))

@@ -1,0 +1,580 @@
+"""What is wrong with a recording before anything is said of the machine.
+
+Faults that the samples show (saturated, dead, a tacho without pulses), and those that show in how
+a model sees the recording: a wrong unit, swapped channels, a wrong sample rate. Of the latter each
+suspicion is tried: the recording is mended as suspected, and must then look familiar.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from itertools import combinations
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...datasets.file.record import Recording
+from ...datasets.file.views import MARK
+from ...features.rotation.order import pulse_times, shaft_phase
+from ...sim.output.sensor import Channel
+from .physical import level_channels, level_rows, shape_rows
+
+Float = NDArray[np.float64]
+Kind = Literal["saturated", "dead", "swapped", "unit", "rate", "tacho", "layout"]
+
+FACTORS = (9.80665, 1000.0)
+"""Ratios of units that are mixed up: g for m/s^2, and milli or micro for the next unit."""
+
+RATES = (2.0, 2.56, 4.0, 5.12, 10.0)
+"""Ratios of sample rates that are mixed up: decimation, and rate for bandwidth."""
+
+RATE_TOLERANCE = 1e-3
+"""Of the sample rate that a model needs [-]: band edges move as much."""
+
+_FEWEST_AT_END = 4  # samples that equal the extreme: chance makes one or two
+_END_SHARE = 0.02  # of the swing, next to the extreme
+_PILE = 4  # a tone has at most 1 / (sqrt(2) - 1) = 2.4 times as many at its last code as before it
+_MOST_CLIPPED = 0.1
+"""Share of saturated samples beyond which no verdict is given. They moved estimates of journals by
+0.9 % of the limit (4 % at most) at this share, by 3 % (21 %) at 0.15, by 15 % (91 %) at 0.3."""
+
+_TRIED = 2  # factors of units
+_NEARER = (
+    0.5  # of the excess: one of 11 dB is no factor of 20 dB, though 9 dB the other way is less
+)
+_QUIET = 1 / 30  # of the least level ever trained: wear and speed do not make a channel so quiet
+_OFF_DB = 10.0  # half-way to 9.81 [dB]
+_SPEED_MARGIN = 0.05  # of the trained speeds
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fault:
+    """One thing wrong with a recording.
+
+    Attributes
+    ----------
+    kind : str
+        ``saturated``, ``dead``, ``swapped``, ``unit``, ``rate``, ``tacho`` or ``layout``.
+    channel : str
+        Where; empty for the whole recording.
+    text : str
+        Quantity, value, bound and cure.
+    bars : bool
+        No verdict is given with it.
+    factor : float or None
+        Of a unit: what the samples must be multiplied by. Of a rate: true over stated one.
+    """
+
+    kind: Kind
+    channel: str
+    text: str
+    bars: bool = True
+    factor: float | None = None
+
+
+# --- what the samples and the header show
+
+
+def recording_faults(recording: Recording, card: Mapping[str, Any]) -> tuple[Fault, ...]:
+    """What is wrong with a recording and its views as inputs of a model, all of it.
+
+    Parameters
+    ----------
+    recording : Recording
+    card : mapping
+        Of the model.
+
+    Returns
+    -------
+    tuple of Fault
+        Of layout where that does not fit, else of the samples; a view that is missing is one.
+    """
+    faults = [*(layout_faults(recording, card) or sample_faults(recording))]
+    views = card.get("views", {})
+    for view, layout in views.items():
+        if view not in recording.joined:
+            text = f"view {view} is missing, which the model needs; give --join {view}=FILE"
+            faults.append(Fault(kind="layout", channel="", text=text))
+            continue
+        other = recording.joined[view]
+        found = layout_faults(other, layout) or sample_faults(other)
+        faults += [replace(fault, text=f"view {view}: {fault.text}") for fault in found]
+    strange = sorted(set(recording.joined) - set(views))
+    if strange:
+        known = ", ".join(views) or "none"
+        text = f"views {', '.join(strange)} are joined, the model knows {known}: leave them out"
+        faults.append(Fault(kind="layout", channel="", text=text))
+    return tuple(faults)
+
+
+def layout_faults(recording: Recording, card: Mapping[str, Any]) -> tuple[Fault, ...]:
+    """What a recording lacks of a model's inputs; empty where it fits.
+
+    Parameters
+    ----------
+    recording : Recording
+    card : mapping
+        Of the model: ``channels``, ``tacho``, ``pulses_per_revolution``, ``sample_rate_hz``.
+
+    Returns
+    -------
+    tuple of Fault
+        All of them.
+    """
+    return (
+        *_channel_faults(recording.vibration_channels, card),
+        *_tacho_layout_faults(recording, card),
+        *_rate_faults(recording.sample_rate, card["sample_rate_hz"]),
+    )
+
+
+def _channel_faults(found: Sequence[Channel], card: Mapping[str, Any]) -> list[Fault]:
+    wanted = [c for c in card["channels"] if c["name"] != card["tacho"]]
+    units = {c["name"]: c["unit"] for c in wanted}
+    names = ", ".join(c["name"] for c in wanted)
+    faults = []
+    if len(found) != len(wanted):
+        text = f"it has {len(found)} vibration channel(s), the model needs {len(wanted)}: {names}"
+        text += _mapping([c.name for c in found], [c["name"] for c in wanted])
+        faults.append(Fault(kind="layout", channel="", text=text))
+    elif [c.name for c in found] != [c["name"] for c in wanted]:
+        here = ", ".join(c.name for c in found)
+        text = f"its channels are {here}, the model needs {names}, in this order"
+        text += _mapping([c.name for c in found], [c["name"] for c in wanted])
+        faults.append(Fault(kind="layout", channel="", text=text))
+    for c in found:
+        # under a name that the model does not know, any unit of the model's may be right
+        unit = units.get(c.name, c.unit if c.unit in units.values() else next(iter(units.values())))
+        if c.unit != unit:
+            text = f"channel {c.name} is in {c.unit or 'an unknown unit'}, the model needs {unit}"
+            faults.append(Fault(kind="unit", channel=c.name, text=text))
+    return faults
+
+
+def _mapping(found: Sequence[str], wanted: Sequence[str]) -> str:
+    """What is missing, and how channels of other names can stand for it.
+
+    Examples
+    --------
+    >>> _mapping(["ch1", "ch2", "z"], ["x", "y", "z"])
+    '; missing x, y: if ch1, ch2 are these, give --channels x=ch1,y=ch2,z'
+    >>> _mapping(["x"], ["x", "y"])
+    '; missing y'
+    """
+    missing = [name for name in wanted if name not in found]
+    spare = [name for name in found if name not in wanted]
+    if not missing:
+        return f": give --channels {','.join(wanted)}"
+    told = f"; missing {', '.join(missing)}"
+    if len(spare) < len(missing):
+        return told
+    stand = dict(zip(missing, spare, strict=False))
+    names = ",".join(f"{name}={stand[name]}" if name in stand else name for name in wanted)
+    return f"{told}: if {', '.join(stand.values())} are these, give --channels {names}"
+
+
+def _tacho_layout_faults(recording: Recording, card: Mapping[str, Any]) -> list[Fault]:
+    if (recording.tacho is None) != (card["tacho"] is None):
+        needs = "it has no tacho, the model needs one; record one, or name its channel"
+        text = needs if card["tacho"] else "it has a tacho, the model was trained without"
+        return [Fault(kind="tacho" if card["tacho"] else "layout", channel="", text=text)]
+    if recording.pulses_per_revolution != card["pulses_per_revolution"]:
+        text = (
+            f"its tacho gives {recording.pulses_per_revolution} pulses per revolution, the model "
+            f"needs {card['pulses_per_revolution']}"
+        )
+        return [Fault(kind="layout", channel=recording.tacho or "", text=text)]
+    return []
+
+
+def _rate_faults(found: float, wanted: float) -> list[Fault]:
+    if abs(found / wanted - 1) <= RATE_TOLERANCE:
+        return []
+    text = f"it is sampled at {found:g} Hz, the model needs {wanted:g} Hz: resample"
+    return [Fault(kind="rate", channel="", text=text)]
+
+
+def sample_faults(recording: Recording) -> tuple[Fault, ...]:
+    """Faults that the samples alone show: flat tops, silence, a tacho that does not pulse.
+
+    Parameters
+    ----------
+    recording : Recording
+
+    Returns
+    -------
+    tuple of Fault
+        All of them. A saturated channel bars a verdict from a tenth of its samples on, the others
+        do in any case.
+
+    Notes
+    -----
+    A channel is saturated where four samples or more equal its extreme, and more than four times
+    as many as equal any other value within two per cent of the swing beside it: samples of a fine
+    converter hardly ever agree, of a coarse one they agree everywhere. A square wave, and a tone of
+    five bits with no other code so near, look the same as saturation.
+
+    Examples
+    --------
+    >>> wave = np.sin(np.arange(1000.0))
+    >>> channel = Channel(name="acc", unit="m/s^2", quantity="acceleration")
+    >>> recording = Recording(signal=wave[np.newaxis], sample_rate=10.0, channels=(channel,))
+    >>> sample_faults(recording)
+    ()
+    >>> sample_faults(replace(recording, signal=recording.signal.clip(-0.8, 0.8)))[0].kind
+    'saturated'
+    """
+    faults: list[Fault] = []
+    for channel, row in zip(recording.vibration_channels, recording.vibration, strict=True):
+        faults += _channel_sample_faults(channel.name, channel.unit, row)
+    return (*faults, *_tacho_faults(recording))
+
+
+def _channel_sample_faults(name: str, unit: str, row: NDArray[np.float32]) -> list[Fault]:
+    low, high = float(row.min()), float(row.max())
+    if low == high:
+        text = f"channel {name} is {low:g} {unit} throughout: it is dead; check sensor and cable"
+        return [Fault(kind="dead", channel=name, text=text)]
+    ends = {end: count for end in (low, high) if (count := _piled(row, end, high - low))}
+    if not ends:
+        return []
+    text = (
+        f"channel {name} is at exactly {' and '.join(f'{end:g}' for end in ends)} {unit} "
+        f"{' and '.join(str(n) for n in ends.values())} times, more often than just beside it: "
+        "it is saturated; raise the range"
+    )
+    bars = sum(ends.values()) > _MOST_CLIPPED * row.size
+    return [Fault(kind="saturated", channel=name, text=text, bars=bars)]
+
+
+def _piled(row: NDArray[np.float32], end: float, swing: float) -> int:
+    """Samples at an extreme, where they are too many for an end that nothing cut off; else 0."""
+    apart = np.abs(row - end)
+    at = int(np.count_nonzero(apart == 0))
+    beside = row[(apart > 0) & (apart <= _END_SHARE * swing)]
+    alike = int(np.unique(beside, return_counts=True)[1].max(initial=0))
+    return at if at >= _FEWEST_AT_END and at > _PILE * alike else 0
+
+
+def _tacho_faults(recording: Recording) -> list[Fault]:
+    tacho = recording.tacho_signal
+    if tacho is None:
+        return []
+    try:
+        pulses = pulse_times(tacho, recording.sample_rate)
+        shaft_phase(
+            pulses,
+            tacho.size,
+            recording.sample_rate,
+            pulses_per_revolution=recording.pulses_per_revolution,
+        )
+    except ValueError as error:
+        text = f"tacho {recording.tacho}: {error}"
+        return [Fault(kind="tacho", channel=str(recording.tacho), text=text)]
+    turns = (len(pulses) - 1) / recording.pulses_per_revolution
+    if turns >= 1:
+        return []
+    text = f"tacho {recording.tacho} gives {turns:.2g} revolutions, must be >= 1; record longer"
+    return [Fault(kind="tacho", channel=str(recording.tacho), text=text)]
+
+
+# --- the level that is to be expected
+
+
+@dataclass(frozen=True, kw_only=True)
+class Levels:
+    """Level of each channel as the shape of its signal and the speed let expect it.
+
+    Attributes
+    ----------
+    centre, spread : numpy.ndarray [shape=(n_shapes,)]
+        Of the coordinates of :func:`wearstate.diagnose.feature_rows.physical.shape_rows`.
+    weight : numpy.ndarray [shape=(n_channels, n_shapes)]
+        [dB]
+    offset : numpy.ndarray [shape=(n_channels,)]
+        [dB re 1 x]
+    size : numpy.ndarray [shape=(n_channels,)]
+        Standard deviation of what is left, on machines that had no part in the fit [dB].
+    least : numpy.ndarray [shape=(n_channels,)]
+        Lowest level of the training recordings [dB re 1 x].
+    """
+
+    centre: Float
+    spread: Float
+    weight: Float
+    offset: Float
+    size: Float
+    least: Float
+
+    def excess(self, names: Sequence[str], rows: Float) -> Float:
+        """Level above the expected one [dB, shape=(n, n_channels)]."""
+        standard = np.clip((shape_rows(names, rows) - self.centre) / self.spread, -3.0, 3.0)
+        return level_rows(names, rows) - (standard @ self.weight.T + self.offset)
+
+
+def fit_levels(
+    names: Sequence[str], rows: Float, folds: Sequence[tuple[NDArray[np.intp], NDArray[np.intp]]]
+) -> Levels:
+    """Learn the levels of training recordings.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Of the features.
+    rows : numpy.ndarray [shape=(n, n_features)]
+    folds : sequence of (numpy.ndarray, numpy.ndarray)
+        Records to fit on and to judge on.
+
+    Returns
+    -------
+    Levels
+    """
+    size = np.zeros((len(rows), len(level_channels(names))))
+    for train, test in folds:
+        size[test] = _levels(names, rows[train]).excess(names, rows[test])
+    return replace(_levels(names, rows), size=np.sqrt((size**2).mean(axis=0)))
+
+
+def _levels(names: Sequence[str], rows: Float) -> Levels:
+    from sklearn.linear_model import Ridge
+
+    inputs, level = shape_rows(names, rows), level_rows(names, rows)
+    if not level.size or not inputs.size:  # features that hold no level, or nothing that tells it
+        return _plain_levels(inputs, level)
+    centre, spread = inputs.mean(axis=0), inputs.std(axis=0)
+    spread = np.where(spread > 0, spread, 1.0)
+    ridge = Ridge(_LEVEL_PENALTY).fit((inputs - centre) / spread, level)
+    return Levels(
+        centre=centre,
+        spread=spread,
+        weight=np.atleast_2d(ridge.coef_),
+        offset=np.atleast_1d(ridge.intercept_),
+        size=np.zeros(level.shape[1]),
+        least=level.min(axis=0),
+    )
+
+
+def _plain_levels(inputs: Float, level: Float) -> Levels:
+    """Mean levels, where no shape tells more."""
+    shapes = inputs.shape[1]
+    return Levels(
+        centre=np.zeros(shapes),
+        spread=np.ones(shapes),
+        weight=np.zeros((level.shape[1], shapes)),
+        offset=level.mean(axis=0),
+        size=np.zeros(level.shape[1]),
+        least=level.min(axis=0),
+    )
+
+
+_LEVEL_PENALTY = 30.0  # of a ridge on about a hundred standardised coordinates
+
+
+# --- what shows only in how the recording looks
+
+
+@dataclass(frozen=True, kw_only=True)
+class Look:
+    """How a recording strikes a model.
+
+    Attributes
+    ----------
+    distance, limit : float
+        From the familiar, and where the unfamiliar begins.
+    free_distance : float
+        By what hangs on no sample rate; NaN where there is nothing.
+    excess_db : mapping
+        Level above the expected one [dB] of each channel.
+    speed_hz : float or None
+        From the tacho.
+    """
+
+    distance: float
+    limit: float
+    free_distance: float
+    excess_db: Mapping[str, float]
+    speed_hz: float | None
+
+    @property
+    def familiar(self) -> bool:
+        """Nearer than the limit, with the levels to be expected."""
+        return self.distance < self.limit and self.level
+
+    @property
+    def level(self) -> bool:
+        """Every channel has about the level to be expected."""
+        return all(abs(excess) < _OFF_DB for excess in self.excess_db.values())
+
+
+See = Callable[[Recording], Look]
+
+
+def suspicions(
+    recording: Recording, look: Look, see: See, speeds: tuple[float, float] | None
+) -> tuple[Fault, ...]:
+    """Faults that explain why a recording looks strange, each tried out.
+
+    Parameters
+    ----------
+    recording : Recording
+        With the model's inputs.
+    look : Look
+        How it looks as it is.
+    see : callable
+        How a mended recording looks.
+    speeds : tuple of float, optional
+        Trained range [Hz].
+
+    Returns
+    -------
+    tuple of Fault
+        The first explanation that makes the recording familiar, in the order unit (where a level
+        is off), channels (where the shape is strange), rate (where shape or speed is); empty where
+        none does or nothing is strange.
+    """
+    paced = speeds is None or look.speed_hz is None or _within(look.speed_hz, speeds)
+    near = look.distance < look.limit
+    found: tuple[Fault, ...] = ()
+    if not look.level:
+        found = _wrong_unit(recording, look, see)
+    if not found and not near:
+        found = _swapped(recording, see)
+    if not found and not (near and paced) and speeds is not None:
+        found = _wrong_rate(recording, look, see, speeds)
+    return found
+
+
+def _within(speed: float, speeds: tuple[float, float]) -> bool:
+    low, high = speeds
+    return low * (1 - _SPEED_MARGIN) <= speed <= high * (1 + _SPEED_MARGIN)
+
+
+def _wrong_unit(recording: Recording, look: Look, see: See) -> tuple[Fault, ...]:
+    off = {name: db for name, db in look.excess_db.items() if abs(db) >= _OFF_DB}
+    for rank in range(_TRIED):
+        factors = {name: _near_factors(excess)[rank] for name, excess in off.items()}
+        mended = see(_amplified(recording, factors))
+        nearer = all(abs(mended.excess_db[n]) < _NEARER * abs(db) for n, db in off.items())
+        if mended.familiar and nearer:
+            return tuple(
+                Fault(
+                    kind="unit",
+                    channel=name,
+                    text=f"channel {name} is {off[name]:+.0f} dB off what its shape lets expect; "
+                    f"{_times(factor)} it is familiar: its unit is wrong, check it",
+                    factor=factor,
+                )
+                for name, factor in factors.items()
+            )
+    return ()
+
+
+def _amplified(recording: Recording, factors: Mapping[str, float], view: str = "") -> Recording:
+    """A recording and its views with channels multiplied; those of a view go by its name."""
+    names = [f"{view}{MARK}{name}" if view else name for name in recording.names]
+    gain = np.array([factors.get(name, 1.0) for name in names], dtype=np.float32)
+    joined = {name: _amplified(each, factors, name) for name, each in recording.joined.items()}
+    return replace(recording, signal=recording.signal * gain[:, None], joined=joined)
+
+
+def _near_factors(excess_db: float) -> list[float]:
+    """Factors in the order in which they bring a level near the one to be expected.
+
+    The nearest need not be the one: what is too quiet for the decibels of the features has another
+    shape. Mending will tell.
+    """
+    known = [value for factor in FACTORS for value in (factor, 1 / factor)]
+    return sorted(known, key=lambda factor: abs(excess_db + 20 * math.log10(factor)))
+
+
+def _times(factor: float) -> str:
+    return f"multiplied by {factor:.4g}" if factor > 1 else f"divided by {1 / factor:.4g}"
+
+
+def _swapped(recording: Recording, see: See) -> tuple[Fault, ...]:
+    channels = [c for c in recording.channels if c.name != recording.tacho]
+    for a, b in combinations(channels, 2):
+        if a.quantity != b.quantity or a.unit != b.unit:
+            continue
+        first, second = recording.names.index(a.name), recording.names.index(b.name)
+        order = np.arange(len(recording.names))
+        order[[first, second]] = second, first
+        mended = see(replace(recording, signal=recording.signal[order]))
+        if mended.familiar:
+            text = f"channels {a.name} and {b.name} look swapped; swap their cables or names"
+            return (Fault(kind="swapped", channel=f"{a.name}, {b.name}", text=text),)
+    return ()
+
+
+def _wrong_rate(
+    recording: Recording, look: Look, see: See, speeds: tuple[float, float]
+) -> tuple[Fault, ...]:
+    if look.speed_hz is None:
+        return ()
+    for ratio in (*RATES, *(1 / rate for rate in RATES)):
+        if not _within(look.speed_hz * ratio, speeds):
+            continue
+        mended = see(_resampled(recording, ratio))
+        # true samples that are slower than stated hold no high bands to compare
+        lacking = ratio < 1 and mended.free_distance < mended.limit
+        if mended.familiar or lacking:
+            stated = recording.sample_rate
+            text = (
+                f"speed and spectrum fit a sample rate of {stated * ratio:g} Hz, {ratio:.3g} times "
+                f"the stated {stated:g} Hz; correct the rate, or, if it is right, run the machine "
+                f"within {speeds[0]:.4g} to {speeds[1]:.4g} Hz"
+            )
+            return (Fault(kind="rate", channel="", text=text, factor=ratio),)
+    return ()
+
+
+def _resampled(recording: Recording, ratio: float) -> Recording:
+    """The recording as it is if its samples were taken `ratio` times as fast as stated."""
+    from scipy.signal import resample_poly
+
+    part = Fraction(ratio).limit_denominator(100)
+    signal = resample_poly(
+        recording.signal, part.denominator, part.numerator, axis=1, padtype="line"
+    )
+    if recording.tacho is not None:  # a filter would ring at its edges
+        row = recording.names.index(recording.tacho)
+        place = np.arange(signal.shape[1]) * ratio
+        old = np.arange(recording.signal.shape[1])
+        signal[row] = np.interp(place, old, recording.signal[row])
+    return replace(recording, signal=signal)
+
+
+def quiet_faults(
+    recording: Recording, names: Sequence[str], row: Float, levels: Levels
+) -> tuple[Fault, ...]:
+    """Channels so quiet that nothing but noise can be on them.
+
+    Parameters
+    ----------
+    recording : Recording
+    names : sequence of str
+        Of the features.
+    row : numpy.ndarray [shape=(n_features,)]
+    levels : Levels
+
+    Returns
+    -------
+    tuple of Fault
+    """
+    found = level_rows(names, row[None, :])[0]
+    units = recording.units
+    for view, each in recording.joined.items():
+        units |= {f"{view}{MARK}{name}": unit for name, unit in each.units.items()}
+    return tuple(
+        Fault(
+            kind="dead",
+            channel=channel,
+            text=f"channel {channel} has an rms of {10 ** (level / 20):.3g} {units[channel]}, must "
+            f"be >= {10 ** (least / 20) * _QUIET:.3g} {units[channel]}: it is dead; check sensor "
+            "and cable",
+        )
+        for channel, level, least in zip(level_channels(names), found, levels.least, strict=True)
+        if level < least + 20 * np.log10(_QUIET)
+    )

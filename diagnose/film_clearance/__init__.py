@@ -1,0 +1,4 @@
+"""Clearance and wear-down of bearings from where the journal runs: the film inverted.
+
+It may import ``sim.scene``, ``sim.film``, ``sim.shaft``.
+"""

@@ -1,0 +1,378 @@
+"""The clearance of a journal bearing from where its journal runs: film equilibrium, inverted.
+
+A loaded journal lies on its film where the film carries the load: under the same load it sinks the
+deeper the wider the bearing. Speed, load, viscosity and the bearing's size given, the mean readings
+of two probes tell the clearance, with no training at all. What is not known exactly is estimated
+along with it, held by how well it is known: the readings of a centred shaft, the probes'
+sensitivities, load and viscosity. Healthy recordings of the same machine share these numbers, and
+have the clearance of a machine as new: they tell the offsets of the probes.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, fields
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+if TYPE_CHECKING:
+    from ...sim.film.rest_curve import RestCurve
+
+Float = NDArray[np.float64]
+
+COVERAGE = 0.9
+"""Of the interval, as that of the trained models."""
+
+NORMAL = 1.6449  # standard deviations to either side of the middle 90 %
+CORRECTED = 10.0  # times its doubt: an offset that healthy recordings of known wear correct
+FLOOR = 0.2e-6  # m: mean of a record of some revolutions, and the curve's own error
+_MOST_SWING = 0.35  # rms of the orbit over the radial clearance; beyond, it has no place of rest
+_LOOSEST = 0.3  # standard error of the clearance's logarithm, above which nothing is told
+CONTRADICTED = 2.6  # root mean square of what is left, in standard deviations, per free number
+_WIDEST, _NARROWEST = 10.0, 0.1  # clearance looked for, over that as new
+
+
+@dataclass(frozen=True, kw_only=True)
+class Doubts:
+    """Standard uncertainties of what an estimate is told.
+
+    Attributes
+    ----------
+    load : float
+        Of each component, over the load. Belts are set by a gauge, a rotor is weighed: 5 %.
+    viscosity : float
+        Over the viscosity. Oil loses 4 to 5 % a kelvin near 45 degrees Celsius, and the film is
+        warmer than the sump by what is known to two or three: 10 %.
+    offset : float
+        Of the reading of a centred shaft [m]. Gaps are set to some hundredths of a volt, and the
+        middle is found by lifting the shaft: half a per cent of the range, 5 um of 1 mm.
+    gain : float
+        Of a probe's sensitivity, over it. API 670 allows 5 %, evenly spread: 3 %.
+    clearance : float
+        Of a diametral clearance that was measured [m]. Lead wire and plastic strips are read to
+        some hundredths of a millimetre: 5 um.
+    """
+
+    load: float = 0.05
+    viscosity: float = 0.10
+    offset: float = 5e-6
+    gain: float = 0.03
+    clearance: float = 5e-6
+
+
+USUAL_DOUBTS = Doubts()
+DOUBTS = tuple(each.name for each in fields(Doubts))
+
+
+@dataclass(frozen=True, kw_only=True)
+class JournalRun:
+    """One recording, as the film sees it.
+
+    Attributes
+    ----------
+    readings : numpy.ndarray [shape=(n_probes,)]
+        Mean motion towards each probe, zero for a centred shaft [m].
+    swing : float
+        rms of the motion about it [m].
+    load : tuple of float
+        On the journal along X and Y, weight included [N].
+    film_force : float
+        ``eta omega R^3 L`` [N m^2], the film's force times the square of the clearance.
+    measured : float or None
+        Diametral clearance that was measured when it was recorded, of healthy recordings [m].
+    """
+
+    readings: Float
+    swing: float
+    load: tuple[float, float]
+    film_force: float
+    measured: float | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class FilmEstimate:
+    """What the film equilibrium says of a recording.
+
+    Attributes
+    ----------
+    reason : str
+        Why nothing can be told; empty where there is an estimate.
+    severity, low, high : float or None
+        Diametral clearance, or wear, and its interval [m].
+    coverage : float
+        Nominal, of the interval, as far as the stated uncertainties hold.
+    healthy : int
+        Recordings of the machine as new that it was told against.
+    budget : dict
+        What each doubt is worth: its own part of half the interval [m], by the names of
+        :class:`Doubts`; their squares add up to that of the whole.
+    """
+
+    reason: str = ""
+    severity: float | None = None
+    low: float | None = None
+    high: float | None = None
+    coverage: float = COVERAGE
+    healthy: int = 0
+    budget: dict[str, float] = field(default_factory=dict)
+
+
+def film_clearance(
+    run: JournalRun,
+    curve: "RestCurve",
+    angles: Sequence[float],
+    as_new: tuple[float, float],
+    *,
+    healthy: Sequence[JournalRun] = (),
+    doubts: Doubts = USUAL_DOUBTS,
+) -> FilmEstimate:
+    """Diametral clearance that puts the journal where it was measured.
+
+    Parameters
+    ----------
+    run : JournalRun
+    curve : RestCurve
+        Of the bearing's film.
+    angles : sequence of float
+        Of the probes, from X in the direction of rotation [rad].
+    as_new : tuple of float
+        Least and largest diametral clearance of a healthy bearing of this kind [m].
+    healthy : sequence of JournalRun
+        Of the same machine, with the clearance that was measured, else one within `as_new`.
+    doubts : Doubts
+        How well it is known what is told.
+
+    Returns
+    -------
+    FilmEstimate
+
+    Notes
+    -----
+    Least squares over all readings, with the logarithms of the clearance now and as new, offset and
+    sensitivity of every probe, and of every recording factors of load and viscosity, each held by
+    its uncertainty; half of the variance of these factors, and of the clearance as new, is common
+    to all recordings, as an error of the nameplate is, the other half is that of the day. The
+    interval is that of the linearised problem. The mean of an orbit departs from the place of rest
+    by about its mean square over the clearance, which is counted as scatter.
+
+    Laminar and isothermal, a round plain bore. A scar, a groove, a wrong direction of the load or a
+    swapped probe put the journal where no clearance explains it: that is said, not fitted.
+
+    Examples
+    --------
+    >>> from wearstate.sim.film.solve import FilmGeometry
+    >>> from wearstate.sim.film.rest_curve import rest_curve
+    >>> curve = rest_curve(FilmGeometry(length_to_diameter=0.6), "short")
+    >>> film_force, load, clearance = 7e-5, 6e3, 90e-6
+    >>> place = clearance * curve.position([load * clearance**2 / film_force, 0.0])
+    >>> towards = np.array([place @ (math.cos(a), math.sin(a)) for a in (3.93, 2.36)])
+    >>> run = JournalRun(readings=towards, swing=2e-6, load=(load, 0.0), film_force=film_force)
+    >>> found = film_clearance(run, curve, (3.93, 2.36), (0.09e-3, 0.19e-3))
+    >>> round(found.severity * 1e3, 2), found.low < found.severity < found.high
+    (0.18, True)
+    """
+    runs = [run, *healthy]
+    reason = _unloaded(runs)
+    if reason:
+        return FilmEstimate(reason=reason)
+    problem = _Problem(runs, curve, np.asarray(angles), as_new, doubts)
+    found = problem.solve()
+    return _judged(problem, found, run, curve, len(healthy))
+
+
+def _unloaded(runs: Sequence[JournalRun]) -> str:
+    least = min(math.hypot(*each.load) for each in runs)
+    if least > 0:
+        return ""
+    return (
+        "the static load is 0 N, must be > 0: an unloaded journal runs in the middle of any "
+        "clearance"
+    )
+
+
+class _Problem:
+    """Readings and prior knowledge as residuals in standard deviations."""
+
+    def __init__(
+        self,
+        runs: Sequence[JournalRun],
+        curve: "RestCurve",
+        angles: Float,
+        as_new: tuple[float, float],
+        doubts: Doubts,
+    ) -> None:
+        n, probes = len(runs), len(angles)
+        self.curve, self.n, self.probes = curve, n, probes
+        self.readings = np.array([run.readings for run in runs])
+        self.load = np.array([run.load for run in runs])
+        self.film_force = np.array([run.film_force for run in runs])
+        self.looks = np.stack([np.cos(angles), np.sin(angles)])
+        low, high = np.log(as_new) - math.log(2)
+        self.middle = (low + high) / 2
+        measured = [run.measured for run in runs[1:] if run.measured is not None]
+        known = len(measured) == n - 1 > 0
+        self.middles = np.array(
+            [self.middle, *(math.log(c / 2) for c in measured)] if known else [self.middle] * n
+        )
+        band = doubts.clearance / max(measured) if known else (high - low) / math.sqrt(12)
+        # a machine that is asked about may have any clearance: its prior says next to nothing
+        day = math.sqrt(0.5)
+        self.prior = np.concatenate(
+            [
+                [math.log(_WIDEST)],
+                [day * band] * n,
+                [doubts.offset * (CORRECTED if known else 1)] * probes,
+                [doubts.gain] * probes,
+                np.repeat([day * doubts.load, day * doubts.viscosity], 1 + n),
+            ]
+        )
+        self.names = [
+            *["", *["clearance"] * n, *["offset"] * probes, *["gain"] * probes],
+            *["load"] * (1 + n),
+            *["viscosity"] * (1 + n),
+        ]
+        swing = np.array([run.swing for run in runs])
+        self.scatter = np.hypot(FLOOR, swing**2 / math.exp(self.middle))
+
+    def predicted(self, free: Float) -> Float:
+        """Readings [shape=(n, n_probes)] for deviations from what is told, in their doubts."""
+        real = free * self.prior
+        probes, n = self.probes, self.n
+        new, offsets, gains, factors = np.split(real[1:], np.cumsum([n, probes, probes]))
+        clearance = np.exp(self.middles + np.concatenate([real[:1], new[0] + new[1:]]))
+        loads, oils = np.split(factors, 2)
+        strength = self.film_force * np.exp(oils[0] + oils[1:]) / clearance**2
+        load = self.load * np.exp(loads[0] + loads[1:])[:, None] / strength[:, None]
+        place = clearance[:, None] * self.curve.position(load)
+        return np.asarray((place @ self.looks + offsets) * np.exp(gains))
+
+    def residuals(self, free: Float) -> Float:
+        apart = (self.predicted(free) - self.readings) / self.scatter[:, None]
+        return np.concatenate([apart.ravel(), free])
+
+    def solve(self) -> "_Found":
+        start = np.zeros(len(self.prior))
+        radius = float(np.hypot(*np.linalg.lstsq(self.looks.T, self.readings[0], rcond=None)[0]))
+        guess = max(1.3 * radius, math.exp(self.middle))
+        start[0] = (math.log(guess) - self.middle) / self.prior[0]
+        found = fitted(self.residuals, start, self.readings.size)
+        return _Found(
+            log_clearance=self.middle + float(found.values[0] * self.prior[0]),
+            error=float(found.error * self.prior[0]),
+            budget={name: found.worth(self.names, name) * self.prior[0] for name in DOUBTS},
+            left=found.left,
+            strength=float(self.film_force[0]),
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fitted:
+    """Least squares of readings and of what is held.
+
+    Attributes
+    ----------
+    values : numpy.ndarray [shape=(n,)]
+        Numbers found.
+    covariance : numpy.ndarray [shape=(n,)]
+        Of the first number with each.
+    left : float
+        Root mean square of the residuals per reading beyond the first, in standard deviations.
+    """
+
+    values: Float
+    covariance: Float
+    left: float
+
+    @property
+    def error(self) -> float:
+        """Standard error of the first number."""
+        return math.sqrt(self.covariance[0])
+
+    def worth(self, names: Sequence[str], name: str) -> float:
+        """Part of that error which is due to what is held under a name.
+
+        The first number moves by its covariance with another where the value at which that one
+        is held moves by its standard deviation.
+        """
+        mine = [part for part, own in zip(self.covariance, names, strict=True) if own == name]
+        return math.hypot(*mine)
+
+
+def fitted(residuals: Callable[[Float], Float], start: Float, n_readings: int) -> Fitted:
+    """Numbers with the least residuals, which are in standard deviations.
+
+    Parameters
+    ----------
+    residuals : callable
+        Numbers -> residuals of readings and of prior knowledge of each.
+    start : numpy.ndarray
+    n_readings : int
+    """
+    found = least_squares(residuals, start, method="lm", xtol=1e-10, ftol=1e-10)
+    inverse = np.linalg.inv(found.jac.T @ found.jac)
+    return Fitted(
+        values=found.x,
+        covariance=inverse[0],
+        left=math.sqrt(2 * found.cost / max(1, n_readings - 1)),
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Found:
+    """Logarithm of the radial clearance, its standard error, its parts, and what is left."""
+
+    log_clearance: float
+    error: float
+    budget: dict[str, float]
+    left: float
+    strength: float
+
+
+def _judged(
+    problem: _Problem, found: _Found, run: JournalRun, curve: "RestCurve", healthy: int
+) -> FilmEstimate:
+    clearance = math.exp(found.log_clearance)
+    reason = _untold(problem, found, run, curve, clearance)
+    if reason:
+        return FilmEstimate(reason=reason, healthy=healthy)
+    spread = math.exp(NORMAL * found.error)
+    return FilmEstimate(
+        severity=2 * clearance,
+        low=2 * clearance / spread,
+        high=2 * clearance * spread,
+        healthy=healthy,
+        budget={name: 2 * clearance * NORMAL * part for name, part in found.budget.items()},
+    )
+
+
+def _untold(
+    problem: _Problem, found: _Found, run: JournalRun, curve: "RestCurve", clearance: float
+) -> str:
+    """Why a solution is no estimate; empty where it is one."""
+    ratio = clearance / math.exp(problem.middle)
+    if found.left > CONTRADICTED or not _NARROWEST < ratio < _WIDEST:
+        return (
+            f"no clearance puts the journal where the probes see it: {found.left:.1f} standard "
+            f"deviations are left, must be <= {CONTRADICTED:g}; check load, its direction, "
+            "viscosity and the probes, or look for a scar of the bore"
+        )
+    if run.swing > _MOST_SWING * clearance:
+        return (
+            f"the orbit's rms is {run.swing / clearance:.2f} of the radial clearance, must be <= "
+            f"{_MOST_SWING:g}: a whirling journal has no place of rest"
+        )
+    load = math.hypot(*run.load) * clearance**2 / found.strength
+    if load > curve.most_load:
+        return (
+            f"the film would be thinner than 3 % of the clearance (load {load:.3g} of its unit, "
+            f"must be <= {curve.most_load:.3g}): check load, viscosity and speed"
+        )
+    if found.error > _LOOSEST:
+        return (
+            f"its standard error would be {100 * found.error:.0f} %, must be <= "
+            f"{100 * _LOOSEST:.0f} %: the journal is loaded too lightly for probes known so "
+            "well; give healthy recordings of the machine (--baseline)"
+        )
+    return ""

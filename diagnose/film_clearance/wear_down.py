@@ -1,0 +1,251 @@
+"""The wear-down of a shaft's bearing from where its journal runs: alignment and films, inverted.
+
+A worn bearing lets its journal sink; how deep it lies hangs on the film under it, too, and on what
+the line loads it with. Beam and films are solved together for some wear-downs, each with a little
+more viscosity and a little more clearance: that gives the readings of the probes as functions of
+what is not known exactly, and least squares as those of a single journal do the rest.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from .clearance import CONTRADICTED, CORRECTED, DOUBTS, FLOOR, NORMAL, Doubts, FilmEstimate, fitted
+
+if TYPE_CHECKING:
+    from ...sim.scene.shaft import ShaftScene
+
+Float = NDArray[np.float64]
+
+_SHARES = (0.0, 0.25, 0.6, 1.0, 1.5)  # of the condemning wear-down, where the line is solved
+_HEALTHY = (0.0, 0.1, 0.25)  # the same for a healthy bearing
+_CHANGE = 0.05  # of viscosity and clearance, for their slopes
+_BUILT = 0.09  # of a clearance as new: makers' tolerance 15 %, evenly spread
+_LOOSEST = 0.3  # standard error over the condemning wear-down, above which nothing is told
+_BEYOND = 1.5  # of the condemning wear-down: the line was not solved farther
+
+
+@dataclass(frozen=True, kw_only=True)
+class SinkingRun:
+    """One recording of a journal in a bearing that wears down.
+
+    Attributes
+    ----------
+    readings : numpy.ndarray [shape=(n_probes,)]
+        Mean motion towards each probe, zero in the middle of the bore as new [m].
+    places : CubicSpline
+        Wear-down [m] -> height and side of the journal [m], their slopes by the logarithm of the
+        viscosity, and by that of the clearance as new.
+    swing : float
+        rms of the motion about the mean [m].
+    clearance : float
+        Radial, as new [m].
+    measured : float or None
+        Wear-down that was measured when it was recorded, of healthy recordings [m].
+    """
+
+    readings: Float
+    places: CubicSpline
+    swing: float
+    clearance: float
+    measured: float | None = None
+
+
+def sinking_places(
+    scene: "ShaftScene", bearing: int, limit: float, *, healthy: bool = False
+) -> CubicSpline | str:
+    """Where a journal lies, by the wear-down of its bearing.
+
+    Parameters
+    ----------
+    scene : ShaftScene
+        With the conditions of the day.
+    bearing : int
+        Its number, from aft.
+    limit : float
+        Condemning wear-down [m].
+    healthy : bool
+        Of a bearing with little wear only.
+
+    Returns
+    -------
+    CubicSpline or str
+        As :class:`SinkingRun` has it; or why the line has no balance.
+    """
+    from ...sim.shaft.on_oil_films import ShaftFilmError
+
+    shares = _HEALTHY if healthy else _SHARES
+    wears = [share * limit for share in shares]
+    try:
+        plain, thick, wide = (
+            np.array([_place(changed, bearing, wear) for wear in wears])
+            for changed in (scene, _thicker(scene), _wider(scene, bearing))
+        )
+    except ShaftFilmError as error:
+        return str(error)
+    step = math.log1p(_CHANGE)
+    columns = [plain, (thick - plain) / step, (wide - plain) / step]
+    return CubicSpline(wears, np.hstack(columns))
+
+
+def _place(scene: "ShaftScene", bearing: int, wear: float) -> Float:
+    """Height and side over the middle of the bore as new [m]."""
+    from ...sim.shaft.on_oil_films import beam_film
+    from ...sim.shaft.recording import film_bearings, running_beam
+
+    worn = _with_bearing(scene, bearing, {"wear_down": wear})
+    found = beam_film(
+        running_beam(worn),
+        film_bearings(worn),
+        math.tau * worn.drive.speed,
+        rung=worn.film.rung,
+        pedestals=[(b.housing.stiffness_up, b.housing.stiffness_side) for b in worn.bearings],
+    )
+    up, side = found.positions[bearing]
+    return np.array([up - wear / 2, side])
+
+
+def _with_bearing(scene: Any, bearing: int, changes: Mapping[str, float]) -> Any:
+    bearings = list(scene.bearings)
+    bearings[bearing] = bearings[bearing].model_copy(update=dict(changes))
+    return scene.model_copy(update={"bearings": tuple(bearings)})
+
+
+def _thicker(scene: Any) -> Any:
+    from ...sim.scene.journal import Oil
+
+    oil = Oil(viscosity=scene.oil.dynamic_viscosity * (1 + _CHANGE))
+    return scene.model_copy(update={"oil": oil})
+
+
+def _wider(scene: Any, bearing: int) -> Any:
+    built = scene.bearings[bearing].diametral_clearance
+    return _with_bearing(scene, bearing, {"diametral_clearance": built * (1 + _CHANGE)})
+
+
+def film_wear_down(
+    run: SinkingRun,
+    angles: Sequence[float],
+    limit: float,
+    as_new: float,
+    doubts: Doubts,
+    *,
+    healthy: Sequence[SinkingRun] = (),
+) -> FilmEstimate:
+    """Wear-down that puts the journal where it was measured.
+
+    Parameters
+    ----------
+    run : SinkingRun
+    angles : sequence of float
+        Of the probes, from straight down in the direction of rotation [rad].
+    limit, as_new : float
+        Condemning wear-down, and that after running in [m].
+    doubts : Doubts
+    healthy : sequence of SinkingRun
+        Of the same machine: with the wear-down that was measured, else that of a new bearing.
+
+    Returns
+    -------
+    FilmEstimate
+
+    Notes
+    -----
+    As :func:`.film_clearance.clearance.film_clearance`, linear in viscosity and clearance. Loads
+    are those of the nameplate and of the day's thrust and hull; sags of other bearings are not
+    looked for.
+    """
+    problem = _Problem([run, *healthy], np.asarray(angles), limit, as_new, doubts)
+    start = np.zeros(len(problem.prior))
+    found = fitted(problem.residuals, start, problem.readings.size)
+    wear = problem.middles[0] + float(found.values[0] * problem.prior[0])
+    error = found.error * problem.prior[0]
+    if found.left > CONTRADICTED:
+        return FilmEstimate(
+            healthy=len(healthy),
+            reason=f"no wear-down puts the journal where the probes see it: {found.left:.1f} "
+            f"standard deviations are left, must be <= {CONTRADICTED:g}; check thrust, hull, oil "
+            "and the probes",
+        )
+    if error > _LOOSEST * limit or wear > _BEYOND * limit:
+        return FilmEstimate(
+            healthy=len(healthy),
+            reason=f"the wear-down would be {1e3 * wear:.2f} mm with a standard error of "
+            f"{1e3 * error:.2f} mm, must be <= {1e3 * _BEYOND * limit:.2f} and "
+            f"{1e3 * _LOOSEST * limit:.2f} mm; give healthy recordings of the machine (--baseline)",
+        )
+    return FilmEstimate(
+        severity=max(wear, 0.0),
+        low=max(wear - NORMAL * error, 0.0),
+        high=max(wear + NORMAL * error, 0.0),
+        healthy=len(healthy),
+        budget={
+            name: NORMAL * problem.prior[0] * found.worth(problem.names, name)
+            for name in DOUBTS
+            if name != "load"  # of a line: by its masses, thrust and hull
+        },
+    )
+
+
+class _Problem:
+    """Readings and prior knowledge as residuals in standard deviations."""
+
+    def __init__(
+        self,
+        runs: Sequence[SinkingRun],
+        angles: Float,
+        limit: float,
+        as_new: float,
+        doubts: Doubts,
+    ) -> None:
+        n, probes = len(runs), len(angles)
+        self.runs, self.n, self.probes = runs, n, probes
+        self.readings = np.array([run.readings for run in runs])
+        # height and side are those of the shaft line, the probes look from straight down
+        self.looks = -np.stack([np.cos(angles), np.sin(angles)])
+        measured = [run.measured for run in runs[1:] if run.measured is not None]
+        known = len(measured) == n - 1 > 0
+        self.middles = np.array([limit / 2, *(measured if known else [as_new] * (n - 1))])
+        offset = doubts.offset * (CORRECTED if n > 1 else 1)
+        day = math.sqrt(
+            0.5
+        )  # half of the variance of wear as new and of the oil is that of the day
+        new = day * (doubts.clearance if known else as_new)
+        self.prior = np.array(
+            [
+                2 * limit,
+                _BUILT,
+                *[offset] * probes,
+                *[doubts.gain] * probes,
+                *[new] * n,
+                *[day * doubts.viscosity] * (1 + n),
+            ]
+        )
+        self.names = [
+            *["", "clearance", *["offset"] * probes, *["gain"] * probes],
+            *["clearance"] * n,
+            *["viscosity"] * (1 + n),
+        ]
+        self.scatter = np.array([math.hypot(FLOOR, run.swing**2 / run.clearance) for run in runs])
+
+    def predicted(self, free: Float) -> Float:
+        """Readings [shape=(n, n_probes)] for deviations from what is told, in their doubts."""
+        real = free * self.prior
+        wide, rest = real[1], real[2:]
+        probes, n = self.probes, self.n
+        offsets, gains, new, oils = np.split(rest, np.cumsum([probes, probes, n]))
+        wear = self.middles + np.concatenate([real[:1], new[0] + new[1:]])
+        found = np.array([run.places(w) for run, w in zip(self.runs, wear, strict=True)])
+        oil = (oils[0] + oils[1:])[:, None]
+        place = found[:, :2] + found[:, 2:4] * oil + found[:, 4:] * wide
+        return np.asarray((place @ self.looks + offsets) * np.exp(gains))
+
+    def residuals(self, free: Float) -> Float:
+        """Of readings, then of what is held, in standard deviations."""
+        apart = (self.predicted(free) - self.readings) / self.scatter[:, None]
+        return np.concatenate([apart.ravel(), free])

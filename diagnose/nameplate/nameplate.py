@@ -1,0 +1,312 @@
+"""What is known of a machine beside its signals: its scene, the day's conditions, their doubts.
+
+The scene says how the machine is built and how it usually runs; the manifest row of a recording,
+where it has one, how it ran on the day. What a person sets for one recording goes before both.
+"""
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from ...datasets.file.record import Attributes, DataError, DataSet
+from ...datasets.recipe.draws import has_value
+from ...datasets.recipe.recipe import CONDITIONS, condition_of, recorded_scene
+from ...sim.scene.journal import Oil
+from ...sim.scene.load import (
+    load_scene,
+    override,
+    scene_from_table,
+    scene_names,
+    scene_table,
+    scene_text,
+)
+from ...sim.scene.parts import Scene, SceneError, to_si
+from ..feature_rows.noted import NOTED
+from ..film_clearance.clearance import Doubts
+
+_OIL = "oil.dynamic_viscosity"
+_SPEED = "drive.speed"
+_MEASURED = ("speed_hz", "start_angle_rad", "unbalance_kg_m")  # by the signals, or no matter here
+
+
+@dataclass(frozen=True, kw_only=True)
+class Nameplate:
+    """A machine as it is known beside its signals.
+
+    Attributes
+    ----------
+    scene : Scene
+        Geometry, load, oil.
+    told : frozenset of str
+        Dotted paths that a person set: these go before what a manifest notes.
+    doubts : Doubts
+        How well all that is known.
+    source : str
+        Where it is from, for the report.
+    assumed : bool
+        Nobody gave a scene: what no one told is that of the machine a model was trained on.
+    """
+
+    scene: Scene
+    told: frozenset[str] = field(default_factory=frozenset)
+    doubts: Doubts = field(default_factory=Doubts)
+    source: str = ""
+    assumed: bool = False
+
+    def on_the_day(self, row: Mapping[str, Any], speed_hz: float | None) -> Scene:
+        """The scene with a recording's conditions.
+
+        Parameters
+        ----------
+        row : mapping
+            Manifest values; columns of :data:`wearstate.datasets.recipe.recipe.CONDITIONS` are
+            read.
+        speed_hz : float or None
+            As measured [Hz].
+
+        Examples
+        --------
+        >>> plate = Nameplate(scene=load_scene("journal-bearing"))
+        >>> plate.on_the_day({"static_load_n": 4000.0}, 48.0).load.static
+        4000.0
+        """
+        noted = {
+            path: float(row[column])
+            for column, path in CONDITIONS.items()
+            if isinstance(row.get(column), float | int) and math.isfinite(row[column])
+        }
+        scene = self.scene
+        for path, value in noted.items():
+            if path != _SPEED and not self.was_told(path):
+                scene = _replaced(scene, path, value)
+        return scene if speed_hz is None else _replaced(scene, _SPEED, speed_hz)
+
+    def conditions(self, row: Mapping[str, Any]) -> dict[str, Any]:
+        """What is known of a recording's day: what a person told, what was noted, what is usual.
+
+        Parameters
+        ----------
+        row : mapping
+            What was noted beside the recording.
+
+        Returns
+        -------
+        dict
+            The row, with every column of :data:`~.feature_rows.noted.NOTED` that the scene has a
+            value for.
+
+        Examples
+        --------
+        >>> plate = Nameplate(scene=load_scene("journal-bearing"))
+        >>> plate.conditions({"static_load_n": 4000.0})["static_load_n"]
+        4000.0
+        """
+        day = self.on_the_day(row, None)
+        known = {
+            column: condition_of(day, column)
+            for column in NOTED
+            if has_value(day, CONDITIONS[column])
+            if not self.assumed or self.was_told(CONDITIONS[column])
+        }
+        return {**row, **known}
+
+    def was_told(self, path: str) -> bool:
+        """Whether a person set this value, or one that it follows from."""
+        if path == _OIL:
+            return any(told.startswith("oil.") for told in self.told)
+        return path in self.told
+
+
+def _replaced(scene: Any, path: str, value: float) -> Any:
+    """A scene with one value in another place; what the scene does not have stays absent."""
+    if path == _OIL:
+        return scene.model_copy(update={"oil": Oil(viscosity=value)})
+    name, _, rest = path.partition(".")
+    inner = getattr(scene, name, None)
+    if inner is None:
+        return scene
+    return scene.model_copy(update={name: _replaced(inner, rest, value) if rest else value})
+
+
+def nameplate_of(
+    source: Path | None,
+    scene: str | None,
+    values: Mapping[str, Any],
+    *,
+    usual: str = "",
+) -> Nameplate | None:
+    """Nameplate of the machine in a recording.
+
+    Parameters
+    ----------
+    source : Path, optional
+        The recording: a data set may hold its scene.
+    scene : str, optional
+        A built-in scene or a file, that goes before the one of the data set.
+    values : mapping
+        Dotted path -> value that replaces the scene's, a text with ``+-`` and its standard
+        uncertainty in per cent or in its own unit, where it is not the usual one.
+    usual : str
+        Scene that a model was trained on: taken where values are set and no scene is known.
+
+    Returns
+    -------
+    Nameplate or None
+        None where nothing is known.
+
+    Raises
+    ------
+    SceneError
+        It is no scene, or does not take a value.
+    DataError
+        An uncertainty is none.
+
+    Examples
+    --------
+    >>> plate = nameplate_of(None, "journal-bearing", {"oil.viscosity": "28 mPa s +- 20 %"})
+    >>> plate.scene.oil.viscosity, plate.doubts.viscosity
+    (0.028, 0.2)
+    """
+    plain, spreads = _parted(values)
+    head = None if scene is not None or source is None else _head_of(source)
+    if scene is not None:
+        found, name = load_scene(scene, plain), scene
+    elif head is not None:
+        try:
+            found, name = _scene_in(head, plain), str(source)
+        except SceneError:
+            if plain:
+                raise
+            return None  # a file of another version: nothing was asked of it
+    elif plain and usual in scene_names():
+        found = scene_from_table(override(scene_table(scene_text(usual)), plain))
+        name = f"scene {usual}, which the model was trained on"
+    else:
+        return None
+    assumed = scene is None and head is None
+    doubts = replace(_usual_doubts(found), **_doubts(spreads, found, plain))
+    return Nameplate(
+        scene=found, told=frozenset(plain), doubts=doubts, source=name, assumed=assumed
+    )
+
+
+def day_of(plate: Nameplate | None, row: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Conditions of a recording's day, as far as they are known beside its signals.
+
+    Parameters
+    ----------
+    plate : Nameplate or None
+    row : mapping
+        What was noted beside the recording.
+    """
+    return row if plate is None else plate.conditions(row)
+
+
+def _head_of(source: Path) -> Attributes | None:
+    """Attributes of a data set that a scene was written in."""
+    if source.suffix.lower() not in (".h5", ".hdf5"):
+        return None
+    try:
+        with DataSet(source) as data:
+            return data.attributes if data.attributes.scene else None
+    except DataError:
+        return None  # of another program: it has no scene
+
+
+def _scene_in(head: Attributes, values: Mapping[str, Any]) -> Scene:
+    """Scene of a data set of a recipe (TOML), or of one recording (JSON), with values replaced."""
+    if head.scene.lstrip().startswith("{"):
+        return scene_from_table(override(json.loads(head.scene), values))
+    overrides = {**json.loads(head.overrides or "{}"), **values}
+    return recorded_scene(head.scene, head.recipe, json.dumps(overrides))
+
+
+def _parted(values: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, str]]:
+    """Values, and what stands behind their ``+-``."""
+    plain: dict[str, Any] = {}
+    spreads: dict[str, str] = {}
+    for path, value in values.items():
+        text, sign, spread = str(value).replace("±", "+-").partition("+-")
+        plain[path] = text.strip() if sign else value
+        if sign:
+            spreads[path] = spread.strip()
+    return plain, spreads
+
+
+_OFFSET_SHARE = 0.005  # of a probe's range: how well the reading of a centred shaft is known
+
+
+def _usual_doubts(scene: Any) -> Doubts:
+    """Those of the scene's probes."""
+    probes = [*getattr(scene, "probes", ()), *getattr(scene, "sensors", ())]
+    ranges = [probe.range for probe in probes if hasattr(probe, "offset")]
+    return Doubts(offset=_OFFSET_SHARE * max(ranges)) if ranges else Doubts()
+
+
+def _doubts(
+    spreads: Mapping[str, str], scene: Scene, values: Mapping[str, Any]
+) -> dict[str, float]:
+    found: dict[str, float] = {}
+    for path, text in spreads.items():
+        kind = _kind_of(path)
+        if kind is None:
+            raise DataError(
+                f"{path} = {values[path]} takes no uncertainty, must be of load, oil, or a probe's "
+                "offset or gain; leave the +- out"
+            )
+        found[kind] = max(found.get(kind, 0.0), _spread(path, text, kind, scene))
+    return found
+
+
+def _kind_of(path: str) -> str | None:
+    """The doubt that a value's uncertainty is."""
+    table, *_, name = path.split(".")
+    if table == "load":
+        return "load"
+    if table == "oil":
+        return "viscosity"
+    return name if table in ("sensors", "probes") and name in ("offset", "gain") else None
+
+
+def _spread(path: str, text: str, kind: str, scene: Scene) -> float:
+    """As :class:`Doubts` has it: over the value, or of an offset in metres."""
+    if text.endswith("%") and kind != "offset":
+        share = _number(path, text[:-1]) / 100
+    elif kind == "offset":
+        share = to_si(text, "length")
+    elif path == "oil.temperature":
+        share = _warmer(scene, _number(path, text.removesuffix("K")))
+    else:
+        raise DataError(f"{path}: uncertainty '{text}' must be in per cent; write '+- 10 %'")
+    if not 0 < share < 1:
+        raise DataError(f"{path}: uncertainty '{text}' must be > 0 and < 100 %; correct it")
+    return share
+
+
+def _number(path: str, text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise DataError(f"{path}: uncertainty '{text}' must be a number; correct it") from None
+
+
+def _warmer(scene: Any, kelvin: float) -> float:
+    """By how much the viscosity falls."""
+    oil: Oil = scene.oil
+    assert oil.temperature is not None  # a scene that was given a temperature has one
+    warm = oil.model_copy(update={"temperature": oil.temperature + kelvin})
+    return abs(math.log(warm.dynamic_viscosity / oil.dynamic_viscosity))
+
+
+def told_conditions(plate: Nameplate, row: Mapping[str, Any]) -> Sequence[str]:
+    """Loads and oil of the day that were noted or set, by their manifest columns."""
+    return [
+        column
+        for column, path in CONDITIONS.items()
+        if column not in _MEASURED
+        if plate.was_told(path)
+        or (isinstance(row.get(column), float | int) and math.isfinite(row[column]))
+    ]

@@ -1,0 +1,578 @@
+"""The verdict on many recordings: a folder, or every record of a data set, and their trends.
+
+One recording is in memory at a time; of the others a row is kept. One that cannot be read becomes a
+row with its fault.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ... import __version__
+from ...datasets.file.machines import GROUP_NAME
+from ...datasets.file.record import DataError, DataSet, Recording
+from ...datasets.file.views import JoinedSet, View
+from ...datasets.measured.recording import read_recording
+from ...datasets.readers.open import READERS, SourceOptions
+from ..feature_rows.feature_table import Progress
+from ..feature_rows.healthy import Baselines
+from ..film_clearance.clearance import FilmEstimate
+from ..learning.grades import GRADE_NAMES, WARNING_GRADE
+from ..nameplate.cautions import known_beside
+from ..nameplate.nameplate import Nameplate
+from ..pages.words import quantity_name
+from ..wear_model.estimate import Estimate, ModelError, WearModel
+from .advice import Advice, advise
+from .film import film_estimate, film_table, with_film
+from .trend import Growth, Outlook, Trend, date_in, fit_trend, hours_of, read_dates
+from .verdict import NO_REFERENCE, REPORT_SCHEMA, headline, limits_table, model_table
+
+HOURS = "operating_hours"
+"""Manifest column and condition that times recordings unless told otherwise."""
+
+_DATA_SETS = (".h5", ".hdf5")
+_NO_RECORDINGS = (".txt",)  # read when named, but in a folder usually notes
+
+
+@dataclass(frozen=True, kw_only=True)
+class Item:
+    """A recording that has not been read yet.
+
+    Attributes
+    ----------
+    name : str
+        File, and number in it.
+    machine : str
+        Which machine it is of; empty where all are of one.
+    path : Path
+    row : mapping
+        What its data set knows of it.
+    load : callable
+        Reads it; raises DataError.
+    """
+
+    name: str
+    machine: str
+    path: Path
+    row: Mapping[str, Any]
+    load: Callable[[], Recording]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Row:
+    """What the table says of one recording.
+
+    Attributes
+    ----------
+    number : int
+        Among the items.
+    name, machine : str
+    time_h : float or None
+        Operating hours, or hours of the calendar since 1970 [h].
+    headline : str
+    verdict : str
+    grade : int or None
+    severity, low, high : float or None
+        [m]
+    possible_grades : tuple of int
+    action, advice, horizon : str
+        What to do and how soon.
+    days : float or None
+        The same as a number [d].
+    note : str
+        The first reason or caution.
+    current : bool
+        It tells how the machine is now: with times, the latest of its machine only, else each.
+    """
+
+    number: int
+    name: str
+    machine: str
+    time_h: float | None
+    headline: str
+    verdict: str
+    grade: int | None
+    severity: float | None
+    low: float | None
+    high: float | None
+    possible_grades: tuple[int, ...]
+    action: str
+    advice: str
+    horizon: str
+    days: float | None
+    note: str
+    current: bool = True
+
+    @property
+    def urgency(self) -> tuple[bool, int, float, float]:
+        """For sorting: what must be acted on, what could not be judged, what is fine, what was.
+
+        Of what must be acted on the soonest first, of equals the most worn.
+        """
+        past = not self.current
+        if past:
+            return (past, 0, 0.0, -(self.time_h or 0.0))
+        if self.grade is None:
+            return (past, 1 if self.verdict == "unusable" else 2, 0.0, 0.0)
+        group = 0 if self.grade >= WARNING_GRADE else 3
+        return (past, group, self.days or 0.0, -(self.severity or 0.0))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Batch:
+    """The verdicts on many recordings.
+
+    Attributes
+    ----------
+    source : str
+        Folder or file.
+    rows : tuple of Row
+        The most urgent first.
+    items : tuple of Item
+        By the number of their row.
+    trends : dict
+        Machine -> Trend.
+    limits, provenance : dict
+        As of :func:`wearstate.diagnose.report.verdict.report_table`.
+    notice : str
+    """
+
+    source: str
+    rows: tuple[Row, ...]
+    items: tuple[Item, ...]
+    trends: dict[str, Trend]
+    limits: dict[str, Any]
+    provenance: dict[str, Any]
+    notice: str
+
+    @property
+    def current(self) -> tuple[Row, ...]:
+        """Rows that tell how the machines are now; the worst first."""
+        return tuple(row for row in self.rows if row.current)
+
+    def outlook_of(self, row: Row) -> Outlook | None:
+        """What the trend says of the machine, where the row is its latest recording."""
+        trend = self.trends.get(row.machine)
+        return trend.outlook if trend and row.current and row.time_h is not None else None
+
+    def counts(self) -> dict[str, int]:
+        """Current recordings of each grade from the worst, and those without."""
+        words = [(grade, GRADE_NAMES[grade]) for grade in reversed(range(len(GRADE_NAMES)))]
+        found = {name: sum(row.grade == grade for row in self.current) for grade, name in words}
+        alone = sum(row.headline == NO_REFERENCE for row in self.current)
+        for verdict in ("unusable", "unfamiliar"):
+            found[verdict] = sum(row.verdict == verdict for row in self.current)
+        found["unusable"] -= alone
+        return found | {"without healthy reference": alone}
+
+    def summary(self) -> str:
+        """How many there are, and how the current ones are."""
+        told = ", ".join(f"{count} {name}" for name, count in self.counts().items() if count)
+        past = len(self.rows) - len(self.current)
+        whole = f"{len(self.rows)} recordings"
+        if all(row.grade is None for row in self.current):
+            whole = f"no grade is given, {whole}"
+        return f"{whole}, the latest {len(self.current)}: {told}" if past else f"{whole}: {told}"
+
+
+# --- which recordings
+
+
+@contextmanager
+def recordings_in(
+    path: Path,
+    options: SourceOptions | None = None,
+    *,
+    tacho: str | None = None,
+    pulses_per_revolution: int = 1,
+    leave_out: Sequence[Path] = (),
+    views: Sequence[View] = (),
+) -> Iterator[tuple[Item, ...]]:
+    """Recordings of a folder (not of folders in it), or records of a data set.
+
+    Parameters
+    ----------
+    path : Path
+    options, tacho, pulses_per_revolution
+        As of :func:`wearstate.datasets.measured.recording.read_recording`.
+    leave_out : sequence of Path
+        Files of the folder that are no recordings: dates, baseline.
+    views : sequence of View
+        Data sets that complete the records of a data set.
+
+    Yields
+    ------
+    tuple of Item
+        In the order of their names; a data set stays open as long as the context.
+
+    Raises
+    ------
+    DataError
+        The folder has no recordings, or the data set cannot be read or declares something else
+        than the caller.
+    """
+    read = partial(
+        read_recording, options=options, tacho=tacho, pulses_per_revolution=pulses_per_revolution
+    )
+    if not path.is_dir():
+        read(path)  # refuses options that contradict what the data set declares
+        with JoinedSet(path, tuple(views)) as data:
+            yield tuple(_records(path, data))
+        return
+    spared = {file.resolve() for file in leave_out}
+    files = [file for file in _recording_files(path) if file.resolve() not in spared]
+    items = tuple(item for file in files for item in _items_of(file, read))
+    if not items:
+        known = ", ".join(sorted(set(READERS) - set(_NO_RECORDINGS)))
+        raise DataError(f"{path} holds 0 recordings, must hold >= 1; put in {known}")
+    yield items
+
+
+def _recording_files(folder: Path) -> list[Path]:
+    return sorted(
+        file
+        for file in folder.iterdir()
+        if file.is_file()
+        and not file.name.startswith(".")
+        and file.suffix.lower() in READERS
+        and file.suffix.lower() not in _NO_RECORDINGS
+    )
+
+
+def _items_of(file: Path, read: Callable[[Path], Recording]) -> list[Item]:
+    """Every record of a data set; one item of another file, readable or not."""
+    if file.suffix.lower() in _DATA_SETS:
+        try:
+            with JoinedSet(file) as data:  # closed: a process may not open a thousand files
+                return _records(file, data, close=True)
+        except DataError:
+            pass  # of another program, or damaged: reading it says which
+    return [Item(name=file.name, machine="", path=file, row={}, load=partial(read, file))]
+
+
+def _records(file: Path, data: JoinedSet, *, close: bool = False) -> list[Item]:
+    several = data.data.manifest["group"].nunique() > 1
+    return [
+        Item(
+            name=file.name if len(data.data) == 1 else f"{file.name}[{i}]",
+            machine=str(row.get(GROUP_NAME, row["group"])) if several else "",
+            path=file,
+            row=row,
+            load=partial(_read_record, data, i, close=close),
+        )
+        for i, row in enumerate(_manifest_rows(data.data))
+    ]
+
+
+def _read_record(data: JoinedSet, index: int, *, close: bool) -> Recording:
+    """One record; a closed data set opens by itself."""
+    try:
+        return data[index]
+    finally:
+        if close:
+            data.close()
+
+
+def _manifest_rows(data: DataSet) -> Iterator[dict[str, Any]]:
+    for row in data.manifest.to_dict("records"):
+        yield {str(key): value for key, value in row.items()}
+
+
+def record_count(path: Path) -> int:
+    """Records of a data set; 1 of any other file, readable or not."""
+    if path.suffix.lower() not in _DATA_SETS:
+        return 1
+    try:
+        with DataSet(path) as data:
+            return len(data)
+    except DataError:
+        return 1
+
+
+# --- when they were made
+
+
+def times_of(items: Sequence[Item], dates: str) -> tuple[float | None, ...]:
+    """Time of each recording.
+
+    Parameters
+    ----------
+    items : sequence of Item
+    dates : str
+        ``names`` (dates in the file names), ``mtime`` (of the files), a CSV file with columns
+        ``file,date`` or ``file,hours``, or a column of the data set that counts hours.
+
+    Returns
+    -------
+    tuple of (float or None)
+        [h]; None where a recording has none.
+
+    Raises
+    ------
+    DataError
+        Not one of them, or no recording has a time.
+    """
+    if dates == "names":
+        moments = [date_in(item.name) for item in items]
+        found = [None if moment is None else hours_of(moment) for moment in moments]
+    elif dates == "mtime":
+        found = [item.path.stat().st_mtime / 3600 for item in items]
+    elif Path(dates).suffix.lower() == ".csv":
+        table = read_dates(Path(dates))
+        found = [table.get(item.name, table.get(item.path.name)) for item in items]
+    else:
+        found = [_hours_in(item.row, dates) for item in items]
+    if all(time is None for time in found):
+        raise DataError(
+            f"dates = {dates!r} gives a time to 0 of {len(items)} recordings, must give >= 1; use "
+            f"names, mtime, a CSV file with columns file,date, or a column such as {HOURS}"
+        )
+    return tuple(found)
+
+
+def _hours_in(row: Mapping[str, Any], column: str) -> float | None:
+    value = row.get(column)
+    return float(value) if isinstance(value, (int, float)) and value == value else None
+
+
+def clock_is_operating(dates: str) -> bool:
+    """Whether times count operating hours; dates are of the calendar."""
+    if dates in ("names", "mtime"):
+        return False
+    if Path(dates).suffix.lower() != ".csv":
+        return True
+    with Path(dates).open(encoding="utf-8-sig") as handle:
+        return "hours" in handle.readline().lower()
+
+
+# --- the verdicts
+
+
+def judge_all(
+    source: Path,
+    items: Sequence[Item],
+    model: WearModel,
+    *,
+    model_file: Path | None = None,
+    baselines: Baselines | None = None,
+    plate: Nameplate | None = None,
+    dates: str | None = None,
+    growth: Growth = "linear",
+    seed: int = 0,
+    tell: Callable[[dict[str, Any]], None] | None = None,
+    progress: Progress | None = None,
+) -> Batch:
+    """Judge recordings one after the other.
+
+    Parameters
+    ----------
+    source : Path
+        Where they are from.
+    items : sequence of Item
+    model : WearModel
+    model_file : Path, optional
+        For its hash.
+    baselines : Baselines, optional
+        Of the machines.
+    plate : Nameplate, optional
+        Of the machines, for the estimate by their film equilibrium.
+    dates : str, optional
+        As of :func:`times_of`: a trend is wanted.
+    growth : {"linear", "log"}
+        Of the wear, for the trend.
+    seed : int
+        Of the trend's band.
+    tell : callable, optional
+        Given a table of each recording as soon as it is judged, then one of each trend.
+    progress : callable, optional
+        Called with (recordings done, recordings).
+
+    Returns
+    -------
+    Batch
+
+    Raises
+    ------
+    ModelError
+        The program's features are not the model's.
+    DataError
+        No recording has a time, though a trend is wanted.
+    """
+    times = (None,) * len(items) if dates is None else times_of(items, dates)
+    rows = []
+    for number, (item, time) in enumerate(zip(items, times, strict=True)):
+        estimate, film = _judged(item, model, baselines, plate)
+        advice = _advice(estimate, model)
+        rows.append(_row(number, item, time, estimate, advice))
+        if tell is not None:
+            tell(_line(item, time, estimate, advice) | {"film": film_table(film, plate, item.row)})
+        if progress is not None:
+            progress(number + 1, len(items))
+    clock = dates is not None and clock_is_operating(dates)
+    trends = {} if dates is None else _trends(rows, model, growth, clock, seed)
+    if tell is not None:
+        for machine, trend in trends.items():
+            tell(trend_table(machine, trend))
+    rows = _with_past(rows)
+    rows = [_hastened(row, trends.get(row.machine), model) for row in rows]
+    return Batch(
+        source=source.name or str(source),
+        rows=tuple(sorted(rows, key=lambda row: row.urgency)),
+        items=tuple(items),
+        trends=trends,
+        limits=limits_table(model.card),
+        provenance={
+            "program": f"wearstate {__version__}",
+            "model": model_table(model, model_file),
+            "baseline": None if baselines is None else baselines.source,
+        },
+        notice=model.notice,
+    )
+
+
+def _judged(
+    item: Item, model: WearModel, baselines: Baselines | None, plate: Nameplate | None
+) -> tuple[Estimate, FilmEstimate | None]:
+    """A recording that cannot be read is unusable, and does not stop the others."""
+    try:
+        recording = item.load()
+        baseline = None if baselines is None else baselines.of(recording)
+        film = film_estimate(recording, model.card["severity"], plate, baseline)
+        beside = known_beside(plate, recording, model.card, baseline)
+        estimate = model.estimate(recording, baseline, **beside)
+        return with_film(estimate, film), film
+    except ModelError:
+        raise  # would be so for each of them
+    except (ValueError, OSError) as error:
+        reasons = (fault_of(item, error),)
+        return Estimate(verdict="unusable", reasons=reasons, mode=model.mode), None
+
+
+def fault_of(item: Item, error: Exception) -> str:
+    """Why a recording could not be read."""
+    return str(error).replace(f"{item.path}: ", "", 1)  # the row has its name
+
+
+def _row(number: int, item: Item, time: float | None, estimate: Estimate, advice: Advice) -> Row:
+    notes = (*estimate.reasons, *estimate.cautions)
+    present = [f"{f.name.replace('_', ' ')} present" for f in estimate.confounders if f.present]
+    return Row(
+        number=number,
+        name=item.name,
+        machine=item.machine,
+        time_h=time,
+        headline=headline(estimate).split(":")[0] if estimate.grade is None else _grade(estimate),
+        verdict=estimate.verdict,
+        grade=estimate.grade,
+        severity=estimate.severity,
+        low=estimate.low,
+        high=estimate.high,
+        possible_grades=estimate.possible_grades,
+        action=advice.action,
+        advice=advice.sentence,
+        horizon=advice.horizon,
+        days=advice.days,
+        note="; ".join([*present, *notes[:1]]),
+    )
+
+
+def _grade(estimate: Estimate) -> str:
+    sign = "?" if estimate.verdict == "caution" else ""
+    return f"{estimate.grade} {estimate.grade_name}{sign}"
+
+
+def _line(item: Item, time: float | None, estimate: Estimate, advice: Advice) -> dict[str, Any]:
+    return {
+        "schema_version": REPORT_SCHEMA,
+        "kind": "recording",
+        "name": item.name,
+        "machine": item.machine,
+        "time_h": time,
+        "headline": headline(estimate),
+        "estimate": estimate.as_dict(),
+        "advice": asdict(advice),
+    }
+
+
+def trend_table(machine: str, trend: Trend) -> dict[str, Any]:
+    """A trend for JSON."""
+    return {
+        "schema_version": REPORT_SCHEMA,
+        "kind": "trend",
+        "machine": machine,
+        "recordings": len(trend.time_h),
+        "maintenance_before": [trend.time_h[i] for i in trend.starts[1:]],
+        "outlook": None if trend.outlook is None else asdict(trend.outlook),
+        "reason": trend.reason,
+    }
+
+
+def _trends(
+    rows: Sequence[Row], model: WearModel, growth: Growth, operating: bool, seed: int
+) -> dict[str, Trend]:
+    """Of every machine that has a graded recording with a time."""
+    usable: dict[str, list[tuple[float, ...]]] = {}
+    for row in rows:
+        point = (row.time_h, row.severity, row.low, row.high)
+        known = tuple(value for value in point if value is not None)
+        if len(known) == len(point):
+            usable.setdefault(row.machine, []).append(known)
+    return {
+        machine: fit_trend(
+            *np.transpose(points),
+            limit=model.card["condemning_limit_m"],
+            clock="operating" if operating else "calendar",
+            growth=growth,
+            seed=seed,
+        )
+        for machine, points in usable.items()
+    }
+
+
+def _with_past(rows: Sequence[Row]) -> list[Row]:
+    """Rows of which those before a machine's latest are past; one without a time is not."""
+    latest: dict[str, float] = {}
+    for row in rows:
+        if row.time_h is not None:
+            latest[row.machine] = max(row.time_h, latest.get(row.machine, row.time_h))
+    return [
+        replace(row, current=row.time_h is None or row.time_h == latest[row.machine])
+        for row in rows
+    ]
+
+
+def _hastened(row: Row, trend: Trend | None, model: WearModel) -> Row:
+    """The latest recording of a machine, advised by its trend; others as they are."""
+    usable = row.current and row.time_h is not None and row.grade is not None
+    if not usable or trend is None or trend.outlook is None:
+        return row
+    found = Estimate(
+        verdict="caution" if row.verdict == "caution" else "graded",
+        grade=row.grade,
+        possible_grades=row.possible_grades,
+        low=row.low,
+        high=row.high,
+    )
+    advice = _advice(found, model, trend.outlook)
+    return replace(
+        row,
+        action=advice.action,
+        advice=advice.sentence,
+        horizon=advice.horizon,
+        days=advice.days,
+    )
+
+
+def _advice(estimate: Estimate, model: WearModel, outlook: Outlook | None = None) -> Advice:
+    card = model.card
+    return advise(estimate, quantity_name(card["severity"]), card["grade_edges_m"], outlook)
+
+
+def machine_heading(machine: str) -> str:
+    """A machine in words."""
+    return f"machine {machine}" if machine else "the machine"

@@ -1,0 +1,345 @@
+"""The film equilibrium beside a trained model: its estimate of a recording, and whether they agree.
+
+What the equilibrium needs is no training but the machine's nameplate and the conditions of the day.
+Where both estimates are there and contradict each other, that is the first thing to be said: one of
+them is told something wrong, or the machine is not what either takes it for.
+"""
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, replace
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...datasets.file.record import Recording
+from ...sim.scene.journal import JournalScene, ProximityProbe
+from ...sim.scene.shaft import ShaftScene
+from ..feature_rows.healthy import Baseline
+from ..feature_rows.probe_means import ProbeMeans, probe_means
+from ..film_clearance.clearance import FilmEstimate, JournalRun, film_clearance
+from ..film_clearance.wear_down import SinkingRun, film_wear_down, sinking_places
+from ..nameplate.nameplate import Nameplate, told_conditions
+from ..wear_model.estimate import Estimate
+
+Float = NDArray[np.float64]
+
+_TURN = 2 * np.pi
+
+
+def film_estimate(
+    recording: Recording,
+    severity: str,
+    plate: Nameplate | None,
+    baseline: Baseline | None = None,
+) -> FilmEstimate | None:
+    """Severity of a machine from where its shaft runs.
+
+    Parameters
+    ----------
+    recording : Recording
+    severity : str
+        Column of the wear that is asked for.
+    plate : Nameplate or None
+        What is known beside the signals.
+    baseline : Baseline, optional
+        Healthy recordings of the same machine: they tell the offsets of the probes.
+
+    Returns
+    -------
+    FilmEstimate or None
+        None where no such estimate exists for this wear or machine.
+    """
+    kind = _NUMBER.sub("_{}_m", severity)
+    if plate is None:
+        told = any(kind == each for each, _ in _WAYS) and probe_means(recording).names
+        return FilmEstimate(reason=_UNKNOWN) if told else None
+    way = _WAYS.get((kind, plate.scene.machine))
+    if way is None:
+        return None
+    healthy = () if baseline is None else baseline.positions
+    return way(probe_means(recording), plate, healthy, severity)
+
+
+def _journal(
+    means: ProbeMeans, plate: Nameplate, healthy: Sequence[ProbeMeans], severity: str
+) -> FilmEstimate:
+    from ...sim.film.rest_curve import rest_curve
+    from ...sim.journal.recording import (
+        film_geometry,  # compiled code: a second that others need not wait
+    )
+
+    scene = cast(JournalScene, plate.scene)
+    reason = journal_fault(scene, means)
+    if reason:
+        return FilmEstimate(reason=reason)
+    usable = [each for each in healthy if not journal_fault(scene, each)]
+    wear = scene.wear
+    built = scene.bearing.clearance_diametral
+    as_new = (wear.as_new, wear.grade_edges[0]) if wear else (built / _BUILT, built * _BUILT)
+    return film_clearance(
+        _run(means, plate, severity),
+        rest_curve(film_geometry(scene), "short" if scene.film.rung == "short" else "direct"),
+        [_probe(scene.sensors, name).angle for name in means.names],
+        as_new,
+        healthy=[_run(each, plate, severity, healthy=True) for each in usable],
+        doubts=plate.doubts,
+    )
+
+
+_BUILT = 1.3  # makers' tolerances of a clearance, where no limits say what as new is
+
+
+def _shaft(
+    means: ProbeMeans, plate: Nameplate, healthy: Sequence[ProbeMeans], severity: str
+) -> FilmEstimate:
+    """Wear-down of the bearing that the severity names, counted from 1."""
+    scene = cast(ShaftScene, plate.scene)
+    number = int(severity.removesuffix("_m").rpartition("_")[2]) - 1
+    limits = scene.wear_down
+    if limits is None or number >= len(scene.bearings):
+        return FilmEstimate(reason="the nameplate has no such bearing, or no limits of wear-down")
+    mine = _of_bearing(means, scene, scene.bearings[number].name)
+    reason = _missing(mine)
+    if reason:
+        return FilmEstimate(reason=reason)
+    others = [_of_bearing(each, scene, scene.bearings[number].name) for each in healthy]
+    run = _sinking_run(mine, plate, number, limits.condemning, severity)
+    if isinstance(run, str):
+        return FilmEstimate(reason=run)
+    new = [
+        _sinking_run(each, plate, number, limits.condemning, severity, healthy=True)
+        for each in others
+        if not _missing(each)
+    ]
+    return film_wear_down(
+        run,
+        [_probe(scene.probes, name).angle for name in mine.names],
+        limits.condemning,
+        limits.as_new,
+        plate.doubts,
+        healthy=[each for each in new if not isinstance(each, str)],
+    )
+
+
+def _of_bearing(means: ProbeMeans, scene: ShaftScene, bearing: str) -> ProbeMeans:
+    """Means of the probes in one bearing."""
+    known = {probe.name for probe in scene.probes if probe.bearing == bearing}
+    rows = [i for i, name in enumerate(means.names) if name in known]
+    return replace(
+        means,
+        names=tuple(means.names[i] for i in rows),
+        means=means.means[rows],
+        swings=means.swings[rows],
+    )
+
+
+def _sinking_run(
+    means: ProbeMeans,
+    plate: Nameplate,
+    number: int,
+    limit: float,
+    severity: str,
+    *,
+    healthy: bool = False,
+) -> SinkingRun | str:
+    scene = cast(ShaftScene, plate.on_the_day(means.row, means.speed_hz))
+    places = sinking_places(scene, number, limit, healthy=healthy)
+    if isinstance(places, str):
+        return places
+    readings, swing = _readings(means, scene.probes)
+    return SinkingRun(
+        readings=readings,
+        places=places,
+        swing=swing,
+        clearance=scene.bearings[number].diametral_clearance / 2,
+        measured=_measured(means, severity, healthy),
+    )
+
+
+def journal_fault(scene: JournalScene, means: ProbeMeans) -> str:
+    """Why the place of a journal tells nothing of its clearance; empty where it does."""
+    shaped = [
+        name
+        for name, there in (
+            ("a scar", scene.bearing.scar_depth > 0),
+            ("grooves", scene.bearing.grooves),
+        )
+        if there
+    ]
+    if shaped:
+        return (
+            f"the bore has {' and '.join(shaped)}, must be round and plain: the place of the "
+            "journal then tells of its shape as much as of its clearance"
+        )
+    known = {probe.name for probe in scene.sensors}
+    strange = [name for name in means.names if name not in known]
+    if strange:
+        return (
+            f"probes {', '.join(strange)} are none of the nameplate's {', '.join(sorted(known))}, "
+            "whose angles it gives; rename them, or give the scene with --scene"
+        )
+    return _missing(means)
+
+
+def _missing(means: ProbeMeans) -> str:
+    """What a recording lacks; empty where it has all."""
+    if len(means.names) < _FEWEST_PROBES:
+        return (
+            f"{len(means.names)} probes of the nameplate are in the recording, must be >= "
+            f"{_FEWEST_PROBES}: the place of a journal is two numbers"
+        )
+    if means.speed_hz is None:
+        return "the speed is unknown: add a tacho, or note speed_hz"
+    return ""
+
+
+_FEWEST_PROBES = 2
+
+
+def _probe(probes: Sequence[ProximityProbe], name: str) -> ProximityProbe:
+    return next(probe for probe in probes if probe.name == name)
+
+
+def _readings(means: ProbeMeans, probes: Sequence[ProximityProbe]) -> tuple[Float, float]:
+    """Mean readings without the nameplate's own offsets and gains, and rms of the motion [m]."""
+    mine = [_probe(probes, name) for name in means.names]
+    gains = np.array([probe.gain for probe in mine])
+    readings = means.means / gains - np.array([probe.offset for probe in mine])
+    # of the motion across the axis, however many probes see it
+    swing = float(np.hypot.reduce(means.swings / gains) * np.sqrt(2 / len(mine)))
+    return readings, swing
+
+
+def _measured(means: ProbeMeans, severity: str, healthy: bool) -> float | None:
+    """Wear that was measured, where a recording is of a healthy machine and says so."""
+    value = float(means.row.get(severity, np.nan)) if healthy else np.nan
+    return value if value > 0 else None
+
+
+def _run(
+    means: ProbeMeans, plate: Nameplate, severity: str, *, healthy: bool = False
+) -> JournalRun:
+    """A recording as the film sees it."""
+    scene = cast(JournalScene, plate.on_the_day(means.row, means.speed_hz))
+    readings, swing = _readings(means, scene.sensors)
+    bearing, viscosity = scene.bearing, scene.oil.dynamic_viscosity
+    return JournalRun(
+        readings=readings,
+        swing=swing,
+        load=(
+            scene.rotor.mass * scene.gravity + scene.load.static,
+            scene.load.static_across,
+        ),
+        film_force=viscosity
+        * (_TURN * scene.drive.speed)
+        * (bearing.diameter / 2) ** 3
+        * bearing.length,
+        measured=_measured(means, severity, healthy),
+    )
+
+
+_Way = Callable[[ProbeMeans, Nameplate, Sequence[ProbeMeans], str], FilmEstimate]
+
+_WAYS: dict[tuple[str, str], _Way] = {
+    ("diametral_clearance_bearing_m", "journal-bearing"): _journal,
+    ("wear_down_bearing_{}_m", "propulsion-shaft"): _shaft,
+}
+"""Severity and machine -> how it is told from the place of the shaft. A new one is one row."""
+
+_NUMBER = re.compile(r"_[0-9]+_m$")
+
+
+# --- beside the trained model
+
+
+def with_film(estimate: Estimate, film: FilmEstimate | None) -> Estimate:
+    """An estimate that says first where the film equilibrium contradicts it.
+
+    Examples
+    --------
+    >>> trained = Estimate(verdict="graded", grade=2, severity=2.4e-4, low=2.2e-4, high=2.6e-4)
+    >>> film = FilmEstimate(severity=1.5e-4, low=1.4e-4, high=1.6e-4)
+    >>> with_film(trained, film).cautions[0][:46]
+    'film equilibrium and trained model disagree: 0'
+    """
+    if film is None or not disagree(estimate, film):
+        return estimate
+    said = (
+        f"film equilibrium and trained model disagree: {_length(asdict(film))} against "
+        f"{_length(estimate.as_dict())}; check load, viscosity and offsets that were told, the "
+        "probes, and whether the machine is one of the model's kind"
+    )
+    return replace(estimate, verdict="caution", cautions=(said, *estimate.cautions))
+
+
+def disagree(estimate: Estimate, film: FilmEstimate) -> bool:
+    """Whether two estimates have intervals that do not touch."""
+    ends = (estimate.low, estimate.high, film.low, film.high)
+    if any(end is None for end in ends):
+        return False
+    low, high, film_low, film_high = cast(tuple[float, float, float, float], ends)
+    return film_high < low or high < film_low
+
+
+_UNKNOWN = (
+    "load, oil and geometry of the machine are unknown, on which its severity depends as much as "
+    "on the signals; give its scene (--scene SCENE|TOML), or what differs from the trained one "
+    "(--set PATH=VALUE)"
+)
+
+
+def film_table(
+    film: FilmEstimate | None, plate: Nameplate | None, row: Mapping[str, Any]
+) -> dict[str, Any] | None:
+    """For JSON and pages; None where there is no such estimate.
+
+    Parameters
+    ----------
+    film : FilmEstimate or None
+    plate : Nameplate or None
+    row : mapping
+        What was noted beside the recording.
+    """
+    if film is None:
+        return None
+    if plate is None:
+        return {**asdict(film), "nameplate": "", "text": film_words(film)}
+    day = told_conditions(plate, row)
+    usual = "" if day else "; load and oil as on the nameplate, none were noted on the day"
+    return {
+        **asdict(film),
+        "nameplate": plate.source,
+        "conditions_of_the_day": list(day),
+        "uncertainty": asdict(plate.doubts),
+        "text": film_words(film) + (usual if film.severity is not None else ""),
+    }
+
+
+def film_words(film: FilmEstimate) -> str:
+    """The estimate in a clause.
+
+    Examples
+    --------
+    >>> found = FilmEstimate(severity=2.1e-4, low=1.9e-4, high=2.3e-4, budget={"load": 1e-5})
+    >>> film_words(found).split("; ")[0]
+    '0.210 mm (0.190 to 0.230, 90 %), without training'
+    >>> film_words(found).split("; ")[1:]
+    ['no healthy recordings', 'largest doubt: load, worth 0.010 mm']
+    """
+    if film.severity is None:
+        return f"not told: {film.reason}"
+    healthy = (
+        f"against {film.healthy} healthy recordings" if film.healthy else "no healthy recordings"
+    )
+    worst = max(film.budget, key=lambda name: film.budget[name], default="")
+    doubt = f"; largest doubt: {worst}, worth {1e3 * film.budget[worst]:.3f} mm" if worst else ""
+    return f"{_length(asdict(film))}, without training; {healthy}{doubt}"
+
+
+def _length(found: Mapping[str, Any]) -> str:
+    return (
+        f"{1e3 * found['severity']:.3f} mm ({1e3 * found['low']:.3f} to {1e3 * found['high']:.3f}, "
+        f"{100 * found['coverage']:.0f} %)"
+    )

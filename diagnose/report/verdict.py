@@ -1,0 +1,534 @@
+"""The verdict on one recording, as a table: what the page, the terminal and JSON are made of."""
+
+import hashlib
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from statistics import NormalDist
+from typing import Any
+
+from ... import __version__
+from ...datasets.file.record import DataError, Recording
+from ...features.signal import iso
+from ..feature_rows.feature_choice import choice_in, words_of
+from ..feature_rows.healthy import Baseline
+from ..learning.grades import GRADE_NAMES
+from ..nameplate.nameplate import Nameplate
+from ..pages.words import quantity_name
+from ..pictures.view import View
+from ..wear_model.estimate import Estimate, WearModel, input_faults
+from .advice import advise, touched_grades
+from .film import film_estimate, film_table, with_film
+from .trend import Outlook
+
+REPORT_SCHEMA = 2
+
+LARGEST_HASHED = 2**28
+"""Files above this size [byte] are told by the hash of their samples alone: reading on would take
+longer than the report."""
+
+MAP_CELL = re.compile(r"(.+)\.angle_(\d+)_(\d+)\.band_(\d+)_(\d+)\.level_db")
+"""Name of a level in a bin of the crank angle and a band of frequency."""
+
+NO_REFERENCE = "Healthy reference missing"
+"""Headline of a sound recording whose model needs healthy recordings of the machine."""
+
+_CHANCE = 0.05  # that the farthest feature of a healthy machine lies beyond
+_SURE = 0.9  # confidence in the boundaries of a zone, below which they are to be confirmed
+_SHOWN = {  # unit -> for people
+    "m": ("µm", 1e6),
+    "m/s": ("mm/s", 1e3),
+    "m/s^2": ("m/s²", 1.0),
+    "Pa": ("kPa", 1e-3),
+}
+_LEVELS = ("suction", "discharge", "suction_ripple", "discharge_ripple")
+_SIZES = ("rms", "peak", "peak_to_peak", *_LEVELS)  # features in the unit of their channel
+
+
+def report_table(
+    recording: Recording,
+    model: WearModel,
+    estimate: Estimate,
+    *,
+    machine: str | None = None,
+    baseline: Baseline | None = None,
+    plate: Nameplate | None = None,
+    outlook: Outlook | None = None,
+    files: Mapping[str, Path] | None = None,
+) -> dict[str, Any]:
+    """Everything the report says, ready for JSON.
+
+    Parameters
+    ----------
+    recording : Recording
+    model : WearModel
+    estimate : Estimate
+        Of the model on the recording.
+    machine : str, optional
+        Kind of machine for its ISO zone, a key of :data:`wearstate.features.signal.iso.KINDS`.
+    baseline : Baseline, optional
+        That the estimate was given.
+    plate : Nameplate, optional
+        Of the machine, for the estimate by its film equilibrium.
+    outlook : Outlook, optional
+        Of the machine's trend, for how soon to act.
+    files : mapping, optional
+        ``recording``, ``model``: files whose hashes are wanted.
+
+    Returns
+    -------
+    dict
+        ``schema_version``, ``headline``, ``recording``, ``estimate``, ``film`` (what the film
+        equilibrium says, None where it says nothing of this machine), ``grades_text``,
+        ``advice``, ``limits``, ``iso``, ``outlook``, ``evidence_summary``, ``evidence``,
+        ``baseline_note``, ``notice``, ``provenance``. Lengths in metres, speeds in revolutions
+        per second.
+
+    Raises
+    ------
+    DataError
+        There is no such kind of machine.
+    """
+    card = model.card
+    quantity = quantity_name(card["severity"])
+    film = film_estimate(recording, card["severity"], plate, baseline)
+    estimate = with_film(estimate, film)
+    return {
+        "schema_version": REPORT_SCHEMA,
+        "headline": headline(estimate),
+        "recording": _recording_table(recording, card),
+        "estimate": estimate.as_dict(),
+        "film": film_table(film, plate, recording.row),
+        "grades_text": possible_words(estimate, card["grade_edges_m"]),
+        "advice": asdict(advise(estimate, quantity, card["grade_edges_m"], outlook)),
+        "limits": limits_table(card),
+        "iso": iso_table(recording, machine),
+        "outlook": None if outlook is None else asdict(outlook),
+        "evidence_summary": _quiet_words(estimate, len(model.names))
+        or evidence_summary([item[:3] for item in estimate.evidence]),
+        "evidence": [
+            {"feature": name, "value": value, "healthy": healthy, "moved": moved}
+            | {"words": evidence_words(name, value, healthy, recording.units)}
+            for name, value, healthy, moved in estimate.evidence
+        ],
+        "baseline_note": baseline_note(model, baseline),
+        "notice": model.notice,
+        "provenance": {
+            "program": f"wearstate {__version__}",
+            "recording": {
+                "samples_sha256": hashlib.sha256(recording.signal.tobytes()).hexdigest(),
+                "file_sha256": _file_hash((files or {}).get("recording")),
+            },
+            "model": model_table(model, (files or {}).get("model")),
+            "baseline": None
+            if baseline is None
+            else {"source": baseline.source, "recordings": baseline.recordings},
+        },
+    }
+
+
+def baseline_note(model: WearModel, baseline: Baseline | None) -> str:
+    """What healthy recordings of the machine did to the estimate; empty where they are its base."""
+    if model.mode == "referenced":
+        return ""
+    if baseline is None:
+        return (
+            "no healthy recording of this machine was used: the reference is the model's as-new "
+            "machines"
+        )
+    return (
+        "the model was trained cold: the baseline is what the evidence is told against, the "
+        "estimate does not use it; for that, train with --baseline"
+    )
+
+
+def headline(estimate: Estimate) -> str:
+    """The verdict in one line.
+
+    Examples
+    --------
+    >>> headline(Estimate(verdict="graded", grade=1, grade_name="worn", possible_grades=(1,)))
+    'Grade 1 of 3: worn'
+    """
+    if estimate.verdict == "unfamiliar":
+        return "Unfamiliar: no grade is given"
+    if estimate.unreferenced:
+        return f"{NO_REFERENCE}: no grade is given"
+    if estimate.verdict == "unusable":
+        return "Unusable recording: no grade is given"
+    words = f"Grade {estimate.grade} of {len(GRADE_NAMES) - 1}: {estimate.grade_name}"
+    return f"{words}, with caution" if estimate.verdict == "caution" else words
+
+
+def _recording_table(recording: Recording, card: Mapping[str, Any]) -> dict[str, Any]:
+    return {
+        "source": recording.source,
+        "origin": recording.origin,
+        "channels": [asdict(channel) for channel in recording.channels],
+        "label": _recording_line(recording),
+        "tacho": recording.tacho,
+        "sample_rate_hz": recording.sample_rate,
+        "duration_s": recording.duration,
+        "rms": {
+            channel.name: float(row.std())
+            for channel, row in zip(recording.vibration_channels, recording.vibration, strict=True)
+        },
+        "views": {name: each.source for name, each in recording.joined.items()},
+        "fits_model_inputs": not input_faults(recording, card),
+    }
+
+
+def _recording_line(recording: Recording) -> str:
+    channels = ", ".join(channel.label for channel in recording.channels)
+    views = "".join(f"; {name}: {each.source}" for name, each in recording.joined.items())
+    return (
+        f"{recording.source}: {recording.origin}, {recording.duration:.3g} s at "
+        f"{recording.sample_rate:g} Hz, {channels}{views}"
+    )
+
+
+def limits_table(card: Mapping[str, Any]) -> dict[str, Any]:
+    """Limits of a model's severity, with their source."""
+    return {
+        "severity": card["severity"],
+        "quantity": quantity_name(card["severity"]),
+        "grade_edges_m": card["grade_edges_m"],
+        "grade_names": list(GRADE_NAMES),
+        "condemning_limit_m": card["condemning_limit_m"],
+        "source": card["limit_source"],
+    }
+
+
+def model_table(model: WearModel, path: Path | None = None) -> dict[str, Any]:
+    """Where a model is from, and how it was judged when it was made."""
+    card, trained = model.card, model.card["trained_on"]
+    return {
+        "file_sha256": _file_hash(path),
+        "created_by": card["created_by"],
+        "origin": card["origin"],
+        "mode": card["mode"],
+        "features": words_of(choice_in(card)),
+        "chosen": card["model"]["chosen"],
+        "nested_mae_m": card["model"]["nested_mae_m"],
+        **{
+            key: trained[key]
+            for key in ("scene", "recipe", "records", "draws", "draw_identity", "split_seed")
+        },
+    }
+
+
+def _file_hash(path: Path | None) -> str | None:
+    """SHA-256 of a file, as ``sha256sum`` gives it; None where it is too large."""
+    if path is None or path.stat().st_size > LARGEST_HASHED:
+        return None
+    with path.open("rb") as handle:
+        return hashlib.file_digest(handle, "sha256").hexdigest()
+
+
+# --- the zone of its vibration
+
+
+def known_machine(machine: str | None) -> None:
+    """Refuse a kind of machine that there is not, before any work.
+
+    Raises
+    ------
+    DataError
+        It is none of :data:`wearstate.features.signal.iso.KINDS`.
+    """
+    try:
+        iso.machine_kind(machine or next(iter(iso.KINDS)))
+    except ValueError as error:
+        raise DataError(str(error).replace("kind = ", "machine = ", 1)) from error
+
+
+def iso_table(recording: Recording, machine: str | None) -> dict[str, Any]:
+    """Vibration severity and its zone, or why there is none.
+
+    Parameters
+    ----------
+    recording : Recording
+    machine : str, optional
+        Key of :data:`wearstate.features.signal.iso.KINDS`; no signal tells it.
+
+    Returns
+    -------
+    dict
+        ``machine``, ``standard``, ``band_hz``, ``channels`` (name, place, velocity [m/s], zone),
+        ``zone`` (the worst), ``note`` (what to think of it, or why there is none).
+
+    Raises
+    ------
+    DataError
+        There is no such kind.
+    """
+    table: dict[str, Any] = {
+        "machine": machine,
+        "standard": None,
+        "band_hz": None,
+        "channels": [],
+        "zone": None,
+        "note": "",
+    }
+    if machine is None:
+        table["note"] = "the kind of machine is not given, and no signal tells it: --machine KIND"
+        return table
+    known_machine(machine)
+    kind = iso.machine_kind(machine)
+    table["standard"] = kind.standard
+    housings = [c.quantity == "acceleration" for c in recording.vibration_channels]
+    if not any(housings):
+        table["note"] = (
+            "the zones are of the velocity of housings, and the recording has no channel of "
+            "acceleration"
+        )
+        return table
+    try:
+        band = iso.iso_band(machine, View(recording=recording).speed)
+        velocity = iso.velocity_rms(recording.vibration[housings], recording.sample_rate, band=band)
+    except ValueError as error:
+        table["note"] = str(error)
+        return table
+    zones = iso.zone(velocity, machine)
+    channels = [c for c, kept in zip(recording.vibration_channels, housings, strict=True) if kept]
+    table["band_hz"] = list(band)
+    table["channels"] = [
+        {
+            "name": channel.name,
+            "place": channel.place,
+            "velocity_m_s": float(value),
+            "zone": iso.ZONES[i],
+        }
+        for channel, value, i in zip(channels, velocity, zones, strict=True)
+    ]
+    table["zone"] = iso.ZONES[int(zones.max())]
+    table["note"] = _zone_note(kind)
+    return table
+
+
+def _zone_note(kind: iso.MachineKind) -> str:
+    note = f"{kind.machine}; the zone is of the whole machine's vibration, not of one joint's wear"
+    if kind.confidence < _SURE:
+        note += "; confirm the boundaries in the standard before a contract hangs on them"
+    return note
+
+
+# --- words
+
+
+def feature_words(name: str) -> str:
+    """Feature name for people.
+
+    Examples
+    --------
+    >>> feature_words("acc_x.angle_040_050.band_4350_5250.level_db")
+    'acc_x, 40 to 50°, 4350 to 5250 Hz, level'
+    >>> feature_words("acc_y.kurtosis")
+    'acc_y, kurtosis'
+    >>> feature_words("orbit.order_0.5.major_db")
+    'orbit, order 0.5, major'
+    >>> feature_words("pressure.rise_width_deg")
+    'pressure, rise width'
+    """
+    owner, *parts = re.split(r"\.(?![0-9])", name)  # an order may be 0.5
+    words = [owner]
+    for part in parts:
+        span = re.fullmatch(r"(angle|band)_(\d+)_(\d+)", part)
+        if span:
+            unit = "°" if span[1] == "angle" else " Hz"
+            words.append(f"{int(span[2])} to {int(span[3])}{unit}")
+        else:
+            bare = re.sub(r"_(db|hz|deg)$", "", part).replace("_", " ")
+            words.append(re.sub(r"^order 0*(?=\d)", "order ", bare))
+    return ", ".join(words)
+
+
+def evidence_words(
+    name: str, value: float, healthy: float, units: Mapping[str, str] | None = None
+) -> str:
+    """How a feature moved, with its unit.
+
+    Parameters
+    ----------
+    name : str
+        Of the feature.
+    value, healthy : float
+        Here, and of the healthy reference.
+    units : mapping, optional
+        Unit of each channel.
+
+    Examples
+    --------
+    >>> evidence_words("acc_x.order_02.level_db", -8.0, -14.0)
+    '6.0 dB stronger: 2.0 times the amplitude'
+    >>> evidence_words("acc_x.rms", 12.0, 6.0, {"acc_x": "m/s^2"})
+    '12 m/s² instead of 6'
+    >>> evidence_words("p.discharge", 3.5e5, 3.1e5, {"p": "Pa"})
+    '350 kPa instead of 310'
+    """
+    owner, last = name.split(".", 1)[0], name.rsplit(".", 1)[-1]
+    if last == "level_db":
+        side = "stronger" if value > healthy else "weaker"
+        ratio = 10 ** ((value - healthy) / 20)
+        return f"{abs(value - healthy):.1f} dB {side}: {_times(ratio)} times the amplitude"
+    if last.endswith("_db"):
+        return f"{value:.1f} dB instead of {healthy:.1f}"
+    unit, factor = {"hz": "Hz", "deg": "°"}.get(last.rpartition("_")[2], ""), 1.0
+    if last in _SIZES:
+        unit = (units or {}).get(owner, "")
+        unit, factor = _SHOWN.get(unit, (unit, 1.0))
+    here = f"{factor * value:.3g} {unit}".rstrip()
+    return f"{here} instead of {factor * healthy:.3g}"
+
+
+def _quiet_words(estimate: Estimate, n_features: int) -> str:
+    """That nothing stands out, where the farthest of many features lies as far by chance."""
+    farthest = max((abs(moved) for *_, moved in estimate.evidence), default=math.inf)
+    chance = NormalDist().inv_cdf(1 - _CHANCE / (2 * n_features))
+    if farthest > chance:
+        return ""
+    return (
+        f"nothing stands out: of {n_features} features of a healthy machine the farthest can lie "
+        f"{chance:.1f} standard deviations off by chance, here it is {farthest:.1f}"
+    )
+
+
+def evidence_summary(evidence: Sequence[tuple[str, float, float]]) -> str:
+    """Where most of the evidence lies, if it is levels over crank angle and frequency.
+
+    Parameters
+    ----------
+    evidence : sequence of (str, float, float)
+        Feature, its value, the healthy one.
+
+    Returns
+    -------
+    str
+        Of each channel the span of its cells, the larger number first; empty where the evidence is
+        something else.
+
+    Examples
+    --------
+    >>> evidence_summary([("acc_x.angle_040_050.band_4350_5250.level_db", -8.0, -14.0),
+    ...                   ("acc_x.angle_060_070.band_350_450.level_db", -8.0, -18.0)])
+    'acc_x: stronger by 6 to 10 dB between 40 and 70°, 350 and 5250 Hz'
+    >>> evidence_summary([("acc.angle_350_360.band_350_450.level_db", 6.0, 0.0),
+    ...                   ("acc.angle_000_010.band_350_450.level_db", 6.0, 0.0)])
+    'acc: stronger by 6 dB between 350 and 10°, 350 and 450 Hz'
+    """
+    cells: dict[tuple[str, str], list[tuple[list[int], float]]] = {}
+    for name, value, healthy in evidence:
+        match = MAP_CELL.fullmatch(name)
+        if match is not None:
+            side = "stronger" if value > healthy else "weaker"
+            place = [int(number) for number in match.groups()[1:]]
+            cells.setdefault((match[1], side), []).append((place, abs(value - healthy)))
+    found = sorted(cells.items(), key=lambda item: -len(item[1]))
+    return "; ".join(_span_words(*key, of) for key, of in found if len(of) > 1)
+
+
+def _span_words(channel: str, side: str, cells: Sequence[tuple[list[int], float]]) -> str:
+    left, right, low, high = zip(*(place for place, _ in cells), strict=True)
+    least, most = (f"{size(change for _, change in cells):.0f}" for size in (min, max))
+    by = least if least == most else f"{least} to {most}"
+    begin, end = _arc(left, right)
+    return f"{channel}: {side} by {by} dB between {begin} and {end}°, {min(low)} and {max(high)} Hz"
+
+
+def _arc(left: Sequence[int], right: Sequence[int]) -> tuple[int, int]:
+    """Ends of the shortest arc that holds all bins, which may lie on both sides of 0 degrees."""
+    begins = sorted(set(left))
+    ends = {
+        begin: max(r for b, r in zip(left, right, strict=True) if b == begin) for begin in begins
+    }
+    gaps = [
+        ((after - ends[before]) % 360, after, ends[before])
+        for before, after in zip(begins, begins[1:] + begins[:1], strict=True)
+    ]
+    _, begin, end = max(gaps)
+    return begin, end
+
+
+def _times(ratio: float) -> str:
+    return f"{ratio:.1f}" if ratio < 10 else f"{ratio:.0f}"
+
+
+def millimetres(estimate: Mapping[str, Any]) -> str:
+    """Severity with its interval [mm]."""
+    return (
+        f"{1e3 * estimate['severity']:.3f} mm ({1e3 * estimate['low']:.3f} to "
+        f"{1e3 * estimate['high']:.3f}, {100 * estimate['coverage']:.0f} %)"
+    )
+
+
+def grades_words(grades: tuple[int, ...] | list[int]) -> str:
+    """Possible grades by number and name.
+
+    Examples
+    --------
+    >>> grades_words((0, 1, 2))
+    '0 (as new), 1 (worn) or 2 (plan renewal)'
+    """
+    *first, last = [f"{grade} ({GRADE_NAMES[grade]})" for grade in grades]
+    return f"{', '.join(first)} or {last}" if first else last
+
+
+def possible_words(estimate: Estimate, edges: Sequence[float]) -> str:
+    """Which grades cannot be excluded, and what to think where the interval says otherwise.
+
+    Parameters
+    ----------
+    estimate : Estimate
+    edges : sequence of float
+        Where grades 1, 2, … begin [m].
+
+    Returns
+    -------
+    str
+        Empty where only one is possible and the interval stays within it.
+
+    Examples
+    --------
+    >>> found = Estimate(verdict="graded", grade=2, possible_grades=(2,), low=2.4e-4, high=3.1e-4)
+    >>> possible_words(found, (1e-4, 2e-4, 3e-4))
+    'grade 2 (plan renewal); the interval, calibrated by itself, also reaches 3 (condemned)'
+    """
+    possible = estimate.possible_grades
+    beyond = [g for g in touched_grades(estimate, edges) if g not in possible]
+    if not beyond:
+        return f"grade {grades_words(possible)}" if len(possible) > 1 else ""
+    also = " and ".join(grades_words([grade]) for grade in beyond)
+    return (
+        f"grade {grades_words(possible)}; the interval, calibrated by itself, also reaches {also}"
+    )
+
+
+def finding_words(finding: Mapping[str, Any]) -> str:
+    """A fault beside the wear, with how far its finding can be trusted.
+
+    Examples
+    --------
+    >>> rates = {"detection_rate": 0.88, "false_alarm_rate": 0.02}
+    >>> finding_words({"name": "cavitation", "present": True, "probability": 0.93, **rates})
+    'cavitation: present (93 %; of 100 such faults 88 are found, of 100 without 2 are called so)'
+    """
+    state = "present" if finding["present"] else "not found"
+    return (
+        f"{finding['name'].replace('_', ' ')}: {state} ({100 * finding['probability']:.0f} %; of "
+        f"100 such faults {100 * finding['detection_rate']:.0f} are found, of 100 without "
+        f"{100 * finding['false_alarm_rate']:.0f} are called so)"
+    )
+
+
+def zone_words(table: Mapping[str, Any]) -> str:
+    """The zone in a sentence, or why there is none."""
+    if table["zone"] is None:
+        return f"not given: {table['note']}"
+    worst = max(table["channels"], key=lambda channel: (channel["zone"], channel["velocity_m_s"]))
+    low, high = table["band_hz"]
+    return (
+        f"{table['zone']} ({table['standard']}): {worst['name']} "
+        f"{1e3 * worst['velocity_m_s']:.2g} mm/s rms, {low:g} to {high:g} Hz; {table['note']}"
+    )

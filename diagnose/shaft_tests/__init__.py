@@ -1,0 +1,5 @@
+"""Tests of a shaft line: rig test, jacking, transfer functions; sags; the next test to do.
+
+It may import ``sim.output``, ``sim.scene``, ``sim.excitation``, ``sim.beam``, ``sim.alignment``,
+``sim.shaft``, ``features.response``, ``features.rotation``, ``datasets.file``, ``diagnose.pages``.
+"""

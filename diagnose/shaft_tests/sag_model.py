@@ -1,0 +1,523 @@
+"""A shaft line with all that is not known of it, asked what a test of it would show.
+
+The unknowns are the sags and what else is not known of a line: housings, oil, the films' own
+coefficients, the gains of the sensors. Each has a normal prior. Measured transfer functions and
+reactions are compared with the model's in units of their noise, with slopes by every unknown.
+
+A line that rises or tilts as a whole lies as before. Sags are therefore against the line through
+two bearings, the first and the last unless others are named.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...features.response.frf import Frf
+from ...sim.alignment.alignment import AlignmentLine, Condition, influence, reactions
+from ...sim.scene.shaft import ShaftScene
+from ...sim.shaft.changed import (
+    FreeLine,
+    LineModel,
+    coefficient_slopes,
+    free_line,
+    line_model,
+    no_change,
+    part_of,
+    rest,
+    transfer,
+    transfer_slopes,
+    unit_change,
+)
+from ...sim.shaft.on_oil_films import BeamFilm, ShaftFilmError
+from ...sim.shaft.recording import alignment_conditions, alignment_line
+from ...sim.shaft.response import Place
+
+Vector = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+_FILM_ENTRIES = 16
+
+
+class SagError(ValueError):
+    """Data or a prior from which no sag can be told."""
+
+
+# --- what is measured
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class MeasuredTransfer:
+    """Transfer functions of one test.
+
+    Attributes
+    ----------
+    frequencies : numpy.ndarray [shape=(n_lines,)]
+        > 0 [Hz].
+    value : numpy.ndarray [shape=(n_lines, n_resp)]
+        Accelerance, complex [(m/s^2)/N].
+    covariance : numpy.ndarray [shape=(n_lines, n_resp, n_resp)]
+        Of its noise, Hermitian: the mean of ``e e^H`` for circular complex errors e.
+    speed : float
+        Of the shaft in the test, > 0 [rad/s].
+    force : place
+        Where the test force acts.
+    responses : tuple of place
+        Where the accelerometers are.
+
+    Raises
+    ------
+    SagError
+        Shapes do not agree, or a number is not finite; all faults at once.
+    """
+
+    frequencies: Vector
+    value: Complex
+    covariance: Complex
+    speed: float
+    force: Place
+    responses: tuple[Place, ...]
+
+    def __post_init__(self) -> None:
+        shape = (self.frequencies.size, len(self.responses))
+        faults = [
+            f"{name} of shape {array.shape} must be {wanted}: lines by responses"
+            for name, array, wanted in (
+                ("value", self.value, shape),
+                ("covariance", self.covariance, (*shape, shape[1])),
+            )
+            if array.shape != wanted
+        ]
+        if not (np.isfinite(self.value).all() and np.isfinite(self.covariance).all()):
+            faults.append("value and covariance must be finite; leave out lines without coherence")
+        if not 0 < self.speed < math.inf:
+            faults.append(f"speed = {self.speed} rad/s must be > 0; without rotation is no film")
+        if faults:
+            raise SagError("\n".join(faults))
+
+
+def transfer_data(
+    frf: Frf,
+    *,
+    speed: float,
+    force: Place,
+    responses: Sequence[Place],
+    most_lines: int = 200,
+    floor: float = 1e-3,
+) -> MeasuredTransfer:
+    """Estimated frequency response functions as data, with the noise that their coherence tells.
+
+    Parameters
+    ----------
+    frf : Frf
+        Accelerances [(m/s^2)/N].
+    speed : float
+        [rad/s]
+    force : place
+    responses : sequence of place
+        One for each channel of the estimate.
+    most_lines : int
+        Lines are left out evenly until so many remain.
+    floor : float
+        Least deviation over the magnitude: nothing is measured better [-].
+
+    Returns
+    -------
+    MeasuredTransfer
+        Of the lines above zero with coherence in every channel; errors of the channels are taken
+        to be independent of each other.
+
+    Raises
+    ------
+    SagError
+        No line has coherence, there is one average only, or channels and responses differ in
+        number.
+
+    Notes
+    -----
+    ``E |e|^2 = |H|^2 (1 - c) / (c (n - 1))`` of H1 with coherence c over n averages.
+
+    References
+    ----------
+    J. S. Bendat, A. G. Piersol, "Random Data", 4th ed., Wiley 2010, chapter 9,
+    doi:10.1002/9781118032428.
+
+    Examples
+    --------
+    >>> one = np.ones((1, 4))
+    >>> frf = Frf(frequency=np.arange(4.0), value=2 * one + 0j, coherence=0.8 * one, radius=one,
+    ...           averages=26.0, estimator="h1", confidence=0.95)
+    >>> test = transfer_data(frf, speed=60.0, force=("aft", "y"),
+    ...                          responses=[("aft", "y", "housing")])
+    >>> test.frequencies.size, round(float(test.covariance[0, 0, 0].real), 6)
+    (3, 0.04)
+    """
+    if frf.value.shape[0] != len(responses):
+        raise SagError(
+            f"responses = {len(responses)} must be as many as the {frf.value.shape[0]} channels"
+        )
+    if not frf.averages > 1:
+        raise SagError(
+            f"averages = {frf.averages:g} must be > 1: without scatter nobody knows how sure a "
+            "transfer function is; use shorter blocks or more blows"
+        )
+    usable = (frf.frequency > 0) & (frf.coherence > 0).all(axis=0)
+    kept = np.flatnonzero(usable & np.isfinite(frf.value).all(axis=0))
+    if not kept.size:
+        raise SagError("lines with coherence = 0 must be >= 1; check force and response channels")
+    kept = kept[np.unique(np.linspace(0, kept.size - 1, min(most_lines, kept.size)).round())
+                .astype(int)]  # fmt: skip
+    value, shared = frf.value[:, kept].T, np.minimum(frf.coherence[:, kept].T, 1.0)
+    share = np.maximum((1 - shared) / (shared * (frf.averages - 1)), floor**2)
+    variance = np.abs(value) ** 2 * share
+    return MeasuredTransfer(
+        frequencies=frf.frequency[kept],
+        value=np.ascontiguousarray(value),
+        covariance=np.einsum("lr,rs->lrs", variance, np.eye(len(responses))).astype(complex),
+        speed=speed,
+        force=force,
+        responses=tuple(responses),
+    )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class MeasuredReactions:
+    """Reactions as jacks told them.
+
+    Attributes
+    ----------
+    reactions : mapping of str to float
+        Bearing -> [N].
+    deviations : mapping of str to float
+        Standard deviation of each, > 0 [N].
+    condition : str
+        Of the scene, in which they were measured.
+    """
+
+    reactions: Mapping[str, float]
+    deviations: Mapping[str, float]
+    condition: str = "cold"
+
+
+# --- what is not known
+
+
+@dataclass(frozen=True, kw_only=True)
+class Prior:
+    """What is known before any test; standard deviations.
+
+    Attributes
+    ----------
+    sag : float or None
+        Of each bearing's sag [m]; by default what takes a mean bearing's load away, see
+        :func:`usual_sag`.
+    datum : tuple of str
+        Two bearings against whose line the others sag; by default the first and the last.
+    housing_stiffness, housing_damping, viscosity, clearance : float
+        Of the natural logarithm [-]: about the relative error. A uniform tolerance of +-a has
+        ``a / sqrt(3)``.
+    film : float
+        Of every coefficient of every film over the film's size [-]: the error of the film's model
+        and of its mesh, see :mod:`wearstate.sim.shaft.on_oil_films`.
+    gain : float
+        Of the logarithm of each response's gain over the force's [-].
+    """
+
+    sag: float | None = None
+    datum: tuple[str, ...] = ()
+    housing_stiffness: float = 0.06 / math.sqrt(3)
+    housing_damping: float = 0.4 / math.sqrt(3)
+    viscosity: float = 0.2 / math.sqrt(3)
+    clearance: float = 0.0
+    film: float = 0.03
+    gain: float = 0.0
+
+
+class Unknowns(NamedTuple):
+    """Deviations of all unknowns and what a unit of each changes; gains, if any, come last."""
+
+    sagging: tuple[int, ...]  # bearings
+    deviations: Vector  # (p + n_gains,)
+    directions: Vector  # (p, n, 42)
+    gains: int
+
+    @property
+    def sags(self) -> slice:
+        """Where the sags are."""
+        return slice(0, len(self.sagging))
+
+    def change(self, values: Vector) -> Vector:
+        """Of the whole line (n, 42)."""
+        p = self.directions.shape[0]
+        return np.asarray(np.tensordot(values[:p], self.directions, axes=1))
+
+
+def usual_sag(line: AlignmentLine) -> float:
+    """Sag at which a bearing of the line loses its load, the mean of its inner bearings.
+
+    Parameters
+    ----------
+    line : AlignmentLine
+
+    Returns
+    -------
+    float
+        [m]
+
+    Examples
+    --------
+    >>> from wearstate.sim.scene.load import load_scene
+    >>> round(1e3 * usual_sag(alignment_line(load_scene("propulsion-shaft"))), 2)
+    1.36
+    """
+    state = reactions(line)
+    own = np.diag(influence(line, state))
+    loads = np.maximum(state.reactions, state.reactions.mean() / 10) / np.maximum(own, 1.0)
+    return float(np.mean(loads[1:-1] if loads.size > 2 else loads))
+
+
+def unknowns_of(scene: ShaftScene, prior: Prior, gains: int = 0) -> Unknowns:
+    """The unknowns of a scene's line under a prior, and of so many responses' gains."""
+    names = [bearing.name for bearing in scene.bearings]
+    n = len(names)
+    datum = prior.datum or (names[0], names[-1])
+    strange = [name for name in datum if name not in names]
+    if strange or len(set(datum)) != 2:
+        raise SagError(
+            f"datum = {', '.join(datum)} must be two bearings of {', '.join(names)}; a line that "
+            "rises or tilts as a whole lies as before"
+        )
+    sagging = tuple(i for i, name in enumerate(names) if name not in datum)
+    if not sagging:
+        raise SagError("bearings = 2 must be >= 3: a shaft on two bearings does not feel a sag")
+    size = usual_sag(alignment_line(scene)) if prior.sag is None else prior.sag
+    rows = [(size, -unit_change(n, i, "bore")) for i in sagging]
+    rows += _nuisances(n, prior)
+    kept = [(deviation, change) for deviation, change in rows if deviation > 0]
+    extra = [prior.gain] * gains if prior.gain > 0 else []
+    return Unknowns(
+        sagging=sagging,
+        deviations=np.array([deviation for deviation, _ in kept] + extra),
+        directions=np.array([change for _, change in kept]),
+        gains=len(extra),
+    )
+
+
+def _nuisances(n: int, prior: Prior) -> list[tuple[float, Vector]]:
+    """Deviation and change of what is not asked for."""
+    oil = no_change(n)
+    for i in range(n):
+        oil = oil + unit_change(n, i, "viscosity")
+    rows = [(prior.viscosity, oil)]
+    for i in range(n):
+        rows.append((prior.clearance, unit_change(n, i, "clearance")))
+        for axis in range(2):
+            rows.append((prior.housing_stiffness, unit_change(n, i, "pedestal", axis)))
+            rows.append((prior.housing_damping, unit_change(n, i, "pedestal_damping", axis)))
+        for entry in range(_FILM_ENTRIES):
+            rows.append((prior.film, unit_change(n, i, "film_stiffness", entry)))
+            rows.append((prior.film, unit_change(n, i, "film_damping", entry)))
+    return rows
+
+
+# --- the question
+
+
+class WhiteTest(NamedTuple):
+    """A measured test, its noise made white."""
+
+    line: FreeLine
+    white: Complex  # (n_lines, n_resp, n_resp), times the errors
+    value: Complex  # measured (n_lines, n_resp)
+    gains: slice  # among the gains
+
+
+class Jacks(NamedTuple):
+    """Measured reactions with the line that bears them."""
+
+    line: AlignmentLine
+    condition: Condition
+    rows: list[int]
+    value: Vector
+    deviation: Vector
+
+
+class Question(NamedTuple):
+    """A line, what is not known of it, and what was measured."""
+
+    model: LineModel
+    unknowns: Unknowns
+    tests: tuple[WhiteTest, ...]
+    jacks: Jacks | None
+    names: tuple[str, ...]
+
+
+def question_of(
+    scene: ShaftScene,
+    transfers: Sequence[MeasuredTransfer],
+    measured: MeasuredReactions | None,
+    prior: Prior,
+) -> Question:
+    """Line, unknowns and data, ready for trials; arguments as of `estimate_sags`."""
+    model = line_model(scene)
+    tests, first = [], 0
+    for test in transfers:
+        last = first + len(test.responses)
+        tests.append(white_test(model, test, slice(first, last)))
+        first = last
+    return Question(
+        model=model,
+        unknowns=unknowns_of(scene, prior, first),
+        tests=tuple(tests),
+        jacks=None if measured is None else _jacks(scene, measured),
+        names=model.names,
+    )
+
+
+def white_test(model: LineModel, test: MeasuredTransfer, gains: slice) -> WhiteTest:
+    """A test with the shaft condensed for it, and its noise made white."""
+    line = free_line(
+        model, test.frequencies, speed=test.speed, forces=[test.force], responses=test.responses
+    )
+    try:
+        factor = np.linalg.cholesky(test.covariance / 2)
+    except np.linalg.LinAlgError:
+        raise SagError(
+            "covariance must be positive definite at every line; average more blocks than there "
+            "are responses, or leave the responses uncorrelated"
+        ) from None
+    white = np.asarray(np.linalg.inv(factor), dtype=np.complex128)
+    return WhiteTest(line, white, test.value, gains)
+
+
+def _jacks(scene: ShaftScene, measured: MeasuredReactions) -> Jacks:
+    line = alignment_line(scene)
+    conditions = alignment_conditions(scene)
+    if measured.condition not in conditions:
+        raise SagError(f"condition = '{measured.condition}' must be one of {', '.join(conditions)}")
+    strange = sorted(set(measured.reactions) - set(line.names))
+    if strange:
+        raise SagError(
+            f"reactions of {', '.join(strange)} must be of bearings: {', '.join(line.names)}"
+        )
+    missing = [n for n in measured.reactions if not measured.deviations.get(n, 0.0) > 0]
+    if missing:
+        raise SagError(f"deviations of {', '.join(missing)} must be given and > 0 N")
+    return Jacks(
+        line=line,
+        condition=conditions[measured.condition],
+        rows=[line.seat(name) for name in measured.reactions],
+        value=np.array(list(measured.reactions.values())),
+        deviation=np.array([measured.deviations[name] for name in measured.reactions]),
+    )
+
+
+# --- a trial
+
+
+class Trial(NamedTuple):
+    """A trial: misfit of all that was measured and of the prior, over its deviation."""
+
+    values: Vector
+    films: dict[float, BeamFilm]  # speed -> balance
+    model: LineModel
+    left: Vector  # (n_data,)
+    cost: float
+
+
+def trial_at(question: Question, values: Vector, start: dict[float, BeamFilm]) -> Trial | None:
+    """The trial, or none where the line does not rest."""
+    change = question.unknowns.change(values)
+    model = question.model.changed(change)
+    films = {}
+    for test in question.tests:
+        speed = test.line.speed
+        if speed not in films:
+            try:
+                films[speed] = rest(model, speed, start=start.get(speed))
+            except ShaftFilmError:
+                return None
+    parts = [
+        whitened(test, test.value - _seen(question, test, model, films, change, values))
+        for test in question.tests
+    ]
+    if question.jacks is not None:
+        parts.append(_jack_misfit(question, values))
+    left = np.concatenate(parts)
+    prior = values / question.unknowns.deviations
+    return Trial(values, films, model, left, float(left @ left + prior @ prior))
+
+
+def _seen(
+    question: Question,
+    test: WhiteTest,
+    model: LineModel,
+    films: dict[float, BeamFilm],
+    change: Vector,
+    values: Vector,
+) -> Complex:
+    found = transfer(model, films[test.line.speed], test.line, change)
+    return np.asarray(found.value[..., 0] * np.exp(_gains(question, test, values)))
+
+
+def _gains(question: Question, test: WhiteTest, values: Vector) -> Vector:
+    """Logarithms of the gains of a test's responses (n_resp,)."""
+    own = question.unknowns
+    if own.gains == 0:
+        return np.zeros(test.value.shape[1])
+    return values[own.directions.shape[0] :][test.gains]
+
+
+def whitened(test: WhiteTest, errors: Complex) -> Vector:
+    """Errors (..., n_lines, n_resp) as real numbers of unit deviation (..., 2 n_lines n_resp)."""
+    white = np.einsum("lab,...lb->...la", test.white, errors)
+    flat = white.reshape(*white.shape[:-2], -1)
+    return np.concatenate([flat.real, flat.imag], axis=-1)
+
+
+def _jack_state(question: Question, values: Vector) -> tuple[AlignmentLine, Vector, Vector]:
+    jacks = question.jacks
+    assert jacks is not None
+    moves = part_of(question.unknowns.change(values), "bore")[:, 0]
+    line = jacks.line.moved(moves)
+    state = reactions(line, jacks.condition)
+    return line, state.reactions, influence(line, state)
+
+
+def _jack_misfit(question: Question, values: Vector) -> Vector:
+    jacks = question.jacks
+    assert jacks is not None
+    found = _jack_state(question, values)[1]
+    return np.asarray((jacks.value - found[jacks.rows]) / jacks.deviation)
+
+
+def slopes_at(question: Question, point: Trial) -> Vector:
+    """Of what the model says over its deviation, by the unknowns (n_data, p)."""
+    own = question.unknowns
+    p = own.directions.shape[0]
+    change = own.change(point.values)
+    films = {
+        speed: coefficient_slopes(point.model, film, own.directions)
+        for speed, film in point.films.items()
+    }
+    parts = []
+    for test in question.tests:
+        speed = test.line.speed
+        found = transfer(point.model, point.films[speed], test.line, change)
+        rows = transfer_slopes(point.model, test.line, found, films[speed], own.directions)
+        gain = np.exp(_gains(question, test, point.values))
+        part = np.zeros((own.deviations.size, 2 * test.value.size))
+        part[:p] = whitened(test, rows[..., 0] * gain)
+        if own.gains:
+            single = np.einsum("lr,rk->klr", found.value[..., 0] * gain, np.eye(gain.size))
+            part[p:][test.gains] = whitened(test, single)
+        parts.append(part)
+    if question.jacks is not None:
+        jacks, rising = question.jacks, part_of(own.directions, "bore")[..., 0]
+        part = np.zeros((own.deviations.size, len(jacks.rows)))
+        part[:p] = (rising @ _jack_state(question, point.values)[2])[:, jacks.rows]
+        parts.append(part / jacks.deviation)
+    return np.concatenate(parts, axis=1).T

@@ -1,0 +1,318 @@
+"""What tests of a shaft line say of its sags, and the test to do next: table, text, picture."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...sim.scene.parts import Scene
+from ...sim.scene.shaft import ShaftScene
+from ..pages.page import short_name
+from .jacking_tests import JackedBearing, measured_curves, read_curves
+from .measured_tests import LineTest, read_reactions, read_tests
+from .next_test import PlannedTest, candidate_places, rank_tests
+from .sag_films import estimate_over_films, nearly_unloaded
+from .sag_model import MeasuredReactions, Prior, SagError
+from .sags import SagPosterior
+
+CONFIDENCE = 0.9
+"""Of the intervals told [-]."""
+
+_GAIN = 0.02 / math.sqrt(3)  # of sensors calibrated before the test, to 2 per cent
+_SHOWN = 3  # tests proposed
+_UNDECIDED = 0.05  # probability of a condition of the films: below it the other is taken as sure
+_WORTH = 0.1  # of the variance: less is not worth a test
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SagReport:
+    """Sags of a line by its tests, and what to test next.
+
+    Attributes
+    ----------
+    posterior : SagPosterior
+    tests : tuple of LineTest
+    reactions : MeasuredReactions or None
+        Given as such and told by jacking curves.
+    planned : tuple of PlannedTest
+        The most telling first.
+    jacked : tuple of JackedBearing
+        Jacking curves.
+    unloaded : tuple of str
+        Bearings about which two sags may explain the tests.
+    """
+
+    posterior: SagPosterior
+    tests: tuple[LineTest, ...]
+    reactions: MeasuredReactions | None
+    planned: tuple[PlannedTest, ...]
+    jacked: tuple[JackedBearing, ...] = ()
+    unloaded: tuple[str, ...] = ()
+
+    @property
+    def doubts(self) -> list[str]:
+        """What the interval of each bearing does not say, one sentence each."""
+        films = self.posterior.films
+        texts = []
+        if min(films.values(), default=0.0) > _UNDECIDED:
+            shares = ", ".join(f"{name} {share:.0%}" for name, share in films.items())
+            texts.append(
+                f"the films may rupture either way ({shares}): mean and interval are of both"
+            )
+        if self.unloaded:
+            texts.append(
+                f"{', '.join(self.unloaded)} may carry nothing: about that, two sags some "
+                "hundredths of a millimetre apart explain a test; jack it, or test again after "
+                "raising it"
+            )
+        return texts
+
+    @property
+    def sources(self) -> list[str]:
+        """What each test and each jacking curve told, one line each."""
+        return [*(test.text for test in self.tests), *(one.text for one in self.jacked)]
+
+    @property
+    def headline(self) -> str:
+        """Which bearings have sagged, in one sentence."""
+        found = self.posterior
+        against = f"against the line through {' and '.join(found.datum)}"
+        if not found.plausible:
+            return (
+                f"the line as described does not explain what was measured (misfit "
+                f"{found.misfit:.2f}, must be about 1): believe no sag; check places, speed, oil "
+                "and housings of the scene"
+            )
+        sure = [
+            name
+            for name, (low, high) in zip(found.bearings, found.interval(CONFIDENCE), strict=True)
+            if low > 0 or high < 0
+        ]
+        if not sure:
+            return f"no bearing is told to have moved {against}"
+        return f"moved, with {CONFIDENCE:.0%} confidence each, {against}: {', '.join(sure)}"
+
+
+def sag_report(
+    scene: Scene,
+    tests: Sequence[Path] = (),
+    reactions: Path | None = None,
+    *,
+    curves: Path | None = None,
+    condition: str = "cold",
+) -> SagReport:
+    """Sags of a line from files of its tests and reactions.
+
+    Parameters
+    ----------
+    scene : Scene
+        The line as it was aligned, of the machine propulsion-shaft.
+    tests : sequence of Path
+        Of :func:`.shaft_tests.measured_tests.read_tests`.
+    reactions : Path, optional
+        Of :func:`.shaft_tests.measured_tests.read_reactions`.
+    curves : Path, optional
+        Of :func:`.shaft_tests.jacking_tests.read_curves`, of bearings whose reactions are not
+        given.
+    condition : str
+        In which these were measured.
+
+    Returns
+    -------
+    SagReport
+        With the gains of sensors and force cells as calibrated to 2 %.
+
+    Raises
+    ------
+    DataError, SagError, ShaftFilmError
+        As of what reads and estimates.
+    """
+    if not isinstance(scene, ShaftScene):
+        raise SagError(
+            f"machine of scene '{scene.name}' = '{scene.machine}' must be 'propulsion-shaft'; "
+            "only a shaft line has sags"
+        )
+    prior = Prior(gain=_GAIN)
+    read = [test for path in tests for test in read_tests(path, scene)]
+    jacked = None if reactions is None else read_reactions(reactions, scene, condition=condition)
+    lifted = () if curves is None else read_curves(curves, scene, condition=condition)
+    if lifted:
+        jacked = _together(jacked, measured_curves(lifted, condition))
+    posterior = estimate_over_films(scene, [test.transfer for test in read], jacked, prior=prior)
+    names = posterior.bearings
+    done = set() if jacked is None else set(jacked.reactions)
+    planned = rank_tests(
+        scene,
+        posterior,
+        prior=prior,
+        places=candidate_places(scene),
+        jacks=[name for name in names if name not in done],
+        condition=condition,
+    )
+    return SagReport(
+        posterior=posterior,
+        tests=tuple(read),
+        reactions=jacked,
+        planned=planned,
+        jacked=lifted,
+        unloaded=nearly_unloaded(scene, posterior) if read and posterior.plausible else (),
+    )
+
+
+def _together(one: MeasuredReactions | None, other: MeasuredReactions) -> MeasuredReactions:
+    """Reactions of a table and of curves."""
+    if one is None:
+        return other
+    twice = sorted(set(one.reactions) & set(other.reactions))
+    if twice:
+        raise SagError(
+            f"bearings {', '.join(twice)} are in reactions and in jacking, must be in one of them; "
+            "remove them from one"
+        )
+    return MeasuredReactions(
+        reactions={**one.reactions, **other.reactions},
+        deviations={**one.deviations, **other.deviations},
+        condition=one.condition,
+    )
+
+
+def sagged(scene: ShaftScene, found: SagPosterior) -> ShaftScene:
+    """The scene with its bearings where the tests put them; as it is where these are implausible.
+
+    Examples
+    --------
+    >>> from wearstate.diagnose.shaft_tests.sags import estimate_sags
+    >>> from wearstate.sim.scene.load import load_scene
+    >>> rig = load_scene("shaft-rig")
+    >>> jacks = MeasuredReactions(reactions={"second": 200.0}, deviations={"second": 5.0})
+    >>> sagged(rig, estimate_sags(rig, measured=jacks)).bearings[1].offset < 0
+    True
+    """
+    if not found.plausible:
+        return scene
+    down = dict(zip(found.bearings, found.mean.tolist(), strict=True))
+    bearings = tuple(
+        bearing.model_copy(update={"offset": bearing.offset - down.get(bearing.name, 0.0)})
+        for bearing in scene.bearings
+    )
+    return scene.model_copy(update={"bearings": bearings})
+
+
+def sag_table(report: SagReport) -> dict[str, Any]:
+    """The same in SI, ready for JSON."""
+    found = report.posterior
+    return {
+        "headline": report.headline,
+        "datum": list(found.datum),
+        "plausible": found.plausible,
+        "misfit": found.misfit,
+        "confidence": CONFIDENCE,
+        "bearings": [
+            {
+                "name": name,
+                "sag_m": float(mean),
+                "deviation_m": float(deviation),
+                "interval_m": [float(low), float(high)],
+            }
+            for name, mean, deviation, (low, high) in zip(
+                found.bearings,
+                found.mean,
+                found.deviation,
+                found.interval(CONFIDENCE),
+                strict=True,
+            )
+        ],
+        "films": found.films,
+        "doubts": report.doubts,
+        "covariance_m2": found.covariance.tolist(),
+        "tests": report.sources,
+        "jacking": [one.as_dict() for one in report.jacked],
+        "next": [
+            {
+                "text": one.text,
+                "push": list(one.push) if isinstance(one.push, tuple) else None,
+                "jack": one.jack or None,
+                "force_n": one.force,
+                "deviations_m": list(one.deviations),
+                "variance_taken": one.gain,
+            }
+            for one in report.planned
+        ],
+    }
+
+
+def sag_text(report: SagReport) -> str:
+    """The same for a terminal, in mm."""
+    found = report.posterior
+    lines = [f"sags: {report.headline}"]
+    lines += [f"  {' '.join(row)}" for row in _aligned(sag_rows(report))]
+    lines += [f"  {text}" for text in (*report.doubts, *report.sources)]
+    return "\n".join([*lines, *(f"  {text}" for text in _next_texts(report, found))])
+
+
+def sag_rows(report: SagReport) -> list[tuple[str, str, str]]:
+    """Bearing, sag and interval [mm], with a head."""
+    found = report.posterior
+    rows = [("bearing", "sag mm", f"{CONFIDENCE:.0%} interval")]
+    for name, mean, (low, high) in zip(
+        found.bearings, 1e3 * found.mean, 1e3 * found.interval(CONFIDENCE), strict=True
+    ):
+        rows.append((name, f"{mean:.3f}", f"{low:.3f} … {high:.3f}"))
+    return rows
+
+
+def _aligned(rows: Sequence[tuple[str, str, str]]) -> list[tuple[str, str, str]]:
+    width = max(len(row[0]) for row in rows)
+    return [(a.ljust(width), b.rjust(8), c.rjust(18)) for a, b, c in rows]
+
+
+def _next_texts(report: SagReport, found: SagPosterior) -> list[str]:
+    return [f"next: {text}" for text in next_texts(report)] if found.plausible else []
+
+
+def next_texts(report: SagReport) -> list[str]:
+    """The tests that tell most, and what they would leave."""
+    texts = []
+    for one in report.planned[:_SHOWN]:
+        left = ", ".join(f"{1e3 * deviation:.3f}" for deviation in one.deviations)
+        unit = f"error {one.force:.3g} N" if one.jack else f"{one.force:.3g} N rms"
+        texts.append(
+            f"{one.text} ({unit}): takes {one.gain:.0%} of the variance, leaves ±{left} mm"
+        )
+    if report.planned and report.planned[0].gain < _WORTH:
+        texts.append("none of them is worth much: measure oil, clearances and housings instead")
+    return texts
+
+
+def sag_figure(report: SagReport) -> Any:
+    """Sag of every bearing with its interval, and what the next tests would leave.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    from matplotlib.figure import Figure
+
+    found = report.posterior
+    figure = Figure(figsize=(10, 3.2), layout="constrained")
+    axes = figure.subplots(1, 2)
+    at = np.arange(len(found.bearings))
+    width = 1e3 * (found.interval(CONFIDENCE)[:, 1] - found.mean)
+    axes[0].errorbar(
+        at, 1e3 * found.mean, yerr=width, fmt="o", color="#1f5a94", capsize=4,
+        label=f"estimate, {CONFIDENCE:.0%} interval",
+    )  # fmt: skip
+    axes[0].axhline(0, color="black", lw=0.6)
+    axes[0].set_xticks(at, [short_name(name, 20) for name in found.bearings])
+    axes[0].set_xlim(-0.5, at.size - 0.5)
+    axes[0].set(ylabel="sag [mm]", title="Sags by the tests")
+    axes[0].legend(fontsize=8)
+    shown = report.planned[:_SHOWN][::-1]
+    axes[1].barh([one.text for one in shown], [100 * one.gain for one in shown], color="#b3541e")
+    axes[1].set(xlim=(0, 100), xlabel="share of the variance taken [%]", title="Test next")
+    for one in axes:
+        one.grid(alpha=0.3)
+    return figure

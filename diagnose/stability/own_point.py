@@ -1,0 +1,118 @@
+"""Where a scene lies in its maps: load, gap left, Sommerfeld number, mesh, step and method."""
+
+import math
+from functools import lru_cache
+from typing import NamedTuple, cast
+
+from ...sim.film.bearing import equilibrium, sommerfeld_number
+from ...sim.film.solve import FilmGeometry
+from ...sim.journal.recording import film_geometry, journal_scale
+from ...sim.journal.validity import JOURNAL_STEP
+from ...sim.scene.journal import JournalScene
+from ...sim.scene.parts import Scene
+from ...sim.scene.shaft import ShaftScene
+from ...sim.shaft.recording import film_bearings, shaft_state
+
+
+class OwnFilm(NamedTuple):
+    """The film of a scene at rest in its running state.
+
+    Attributes
+    ----------
+    gap : float or None
+        Thinnest film of the middle over the radial clearance, 1 - eccentricity ratio; None where
+        no rest is found.
+    sommerfeld : float or None
+        Sommerfeld number; None where nothing rests on the film.
+    note : str
+        How the maps of plain, aligned films differ from that of the scene.
+    """
+
+    gap: float | None
+    sommerfeld: float | None
+    note: str
+
+
+def journal_weight(scene: JournalScene) -> float:
+    """Steady load along X [N]: weight and static load."""
+    return scene.rotor.mass * scene.gravity + scene.load.static
+
+
+def orbit_step(scene: JournalScene) -> float:
+    """Longest step of the orbit's integrator, as written or by default [rad]."""
+    told = scene.numerics.step
+    return JOURNAL_STEP if told is None else math.tau * scene.drive.speed * told
+
+
+def plain_film(scene: Scene) -> FilmGeometry:
+    """Film of the bearing, or of the aftmost one of a line: a plain bore on the scene's mesh."""
+    if isinstance(scene, ShaftScene):
+        found = film_bearings(scene)[0].worn.geometry
+    else:
+        found = film_geometry(cast(JournalScene, scene))
+    return FilmGeometry(
+        length_to_diameter=found.length_to_diameter,
+        n_theta=found.n_theta,
+        n_z=found.n_z,
+        condition=found.condition,
+    )
+
+
+@lru_cache(maxsize=8)
+def own_film(scene: Scene) -> OwnFilm:
+    """Film of a scene at rest.
+
+    Parameters
+    ----------
+    scene : Scene
+        A journal bearing, or a shaft line, of which the aftmost bearing is taken.
+
+    Returns
+    -------
+    OwnFilm
+
+    Examples
+    --------
+    >>> from wearstate.sim.scene.load import load_scene
+    >>> found = own_film(load_scene("journal-step"))
+    >>> round(found.gap, 2)
+    0.68
+    """
+    if isinstance(scene, ShaftScene):
+        return _aftmost(scene)
+    return _single(cast(JournalScene, scene))
+
+
+def _single(scene: JournalScene) -> OwnFilm:
+    scale = journal_scale(scene)
+    unit = scale.alpha * scale.force
+    weight = math.hypot(journal_weight(scene), scene.load.static_across)
+    if weight == 0:
+        return OwnFilm(gap=None, sommerfeld=None, note=_MAPPED[scene.film.rung])
+    rung = "short" if scene.film.rung == "short" else "direct"
+    found = equilibrium(plain_film(scene), (weight / unit, 0.0), rung=rung, raise_on_failure=False)
+    return OwnFilm(
+        gap=1 - found.eccentricity_ratio if found.status.ok else None,
+        sommerfeld=sommerfeld_number(weight / unit),
+        note=_MAPPED[scene.film.rung],
+    )
+
+
+_MAPPED = {
+    "short": "",
+    "map": "The scene's film is a map drawn from this one.",
+    "direct": "",
+}
+
+
+def _aftmost(scene: ShaftScene) -> OwnFilm:
+    film = shaft_state(scene, raise_on_failure=False).film
+    note = "This film is plain and aligned, that of the scene is tilted."
+    if not film.status.ok:
+        return OwnFilm(gap=None, sommerfeld=None, note=note)
+    bearing = film.bearings[0].worn
+    unit = bearing.viscosity * film.speed * bearing.length * (bearing.diameter / 2) ** 3
+    load = math.hypot(*film.reactions[0]) * bearing.clearance**2 / unit
+    return OwnFilm(
+        gap=1 - float(film.eccentricity_ratios[0]), sommerfeld=sommerfeld_number(load), note=note
+    )

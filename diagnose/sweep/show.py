@@ -1,0 +1,197 @@
+"""Quantities that a sweep shows: features of the sensors, and what the simulator alone knows."""
+
+import difflib
+import fnmatch
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+from ...datasets.generation.truths import Truth
+from ...features.catalogue.row import catalogue, feature_names
+from ...sim.output.solution import Solution
+from .axes import SweepError
+
+MOST_SHOWN = 200
+"""Quantities of a sweep."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Shown:
+    """One quantity.
+
+    Attributes
+    ----------
+    name : str
+        Of a value of the feature catalogue, or of
+        :func:`wearstate.datasets.generation.truths.truths_of`.
+    words : str
+        In full, bands with their hertz.
+    unit : str
+    seen : bool
+        Computed from the sensors' signals; what is not is known to the simulator alone.
+    feature : bool
+        Of the catalogue.
+    """
+
+    name: str
+    words: str
+    unit: str
+    seen: bool
+    feature: bool
+
+    @property
+    def label(self) -> str:
+        """Name, with the words where they say more."""
+        return f"{self.name} ({self.words})" if self.words else self.name
+
+
+def features_of(solution: Solution) -> dict[str, Shown]:
+    """Values of the feature catalogue that a recording has, and rows that hold several.
+
+    Parameters
+    ----------
+    solution : Solution
+        Its channels, rate and length count.
+
+    Returns
+    -------
+    dict of str to Shown
+        By name, in the order of the catalogue.
+    """
+    return {name: shown for _, name, shown in _feature_rows(solution)}
+
+
+def _feature_rows(solution: Solution) -> Iterator[tuple[str, str, Shown]]:
+    """Row of the catalogue, name of a value, what is shown of it."""
+    channels = [channel for channel in solution.channels if channel.quantity != "tacho"]
+    units = {channel.name: channel.unit for channel in channels}
+    for row in catalogue("complete"):
+        try:
+            names = feature_names(
+                list(units),
+                solution.sample_rate,
+                tacho=len(channels) < len(solution.channels),
+                quantities=[channel.quantity for channel in channels],
+                n_samples=solution.signal.shape[-1],
+                only=[row["name"]],
+            )
+        except ValueError:  # this recording cannot have it
+            continue
+        for name in names:
+            unit = _unit(row["unit"], units.get(name.partition(".")[0], ""))
+            yield row["name"], name, Shown(name=name, words="", unit=unit, seen=True, feature=True)
+
+
+def _unit(told: str, channel: str) -> str:
+    """Unit of a row of the catalogue, on a channel.
+
+    Examples
+    --------
+    >>> _unit("x", "m/s^2"), _unit("dB re 1 x^2", "m/s^2"), _unit("-", "m")
+    ('m/s^2', 'dB', '')
+    """
+    if told.startswith("dB"):
+        return "dB"
+    return {"x": channel, "-": ""}.get(told, told)
+
+
+def truths_shown(truths: Mapping[str, Truth]) -> dict[str, Shown]:
+    """The same of what is known of a run.
+
+    Parameters
+    ----------
+    truths : mapping of str to Truth
+    """
+    return {
+        name: Shown(name=name, words=each.words, unit=each.unit, seen=each.seen, feature=False)
+        for name, each in truths.items()
+    }
+
+
+def choose(
+    patterns: Sequence[str], solution: Solution, truths: Mapping[str, Truth]
+) -> tuple[Shown, ...]:
+    """Quantities that match any of some patterns, in the order of these.
+
+    Parameters
+    ----------
+    patterns : sequence of str
+        Names with ``*``, ``?`` and ``[…]`` as in a shell. A dot is as good as an underscore, the
+        channel and the ending ``.level_db`` may be left out, zeros before a number too; the name of
+        a row of the catalogue stands for all its values. Empty: levels of the channels, and the
+        quantities of interest of the machine.
+    solution : Solution
+        Of the scene that is swept.
+    truths : mapping of str to Truth
+        Of the same.
+
+    Raises
+    ------
+    SweepError
+        A pattern matches nothing, with what is near; or all match too much.
+    """
+    rows = list(_feature_rows(solution))
+    known = truths_shown(truths)
+    forms: dict[str, list[Shown]] = {}
+    for name, each in known.items():
+        forms.setdefault(_plain(name), []).append(each)
+    for row, name, each in rows:
+        for form in dict.fromkeys((_plain(row), *_forms(name))):
+            forms.setdefault(form, []).append(each)
+    found: dict[str, Shown] = {}
+    faults = []
+    levels = [name for row, name, _ in rows if row == "rms"]
+    for pattern in patterns or (*_usual(known), *levels):
+        hits = [each for form in _matching(pattern, forms) for each in forms[form]]
+        found |= {each.name: each for each in hits}
+        if not hits:
+            faults.append(f"quantity '{pattern}' is unknown{_near(pattern, forms)}")
+    if len(found) > MOST_SHOWN:
+        faults.append(
+            f"{len(found)} quantities are to be shown, must be <= {MOST_SHOWN}; name fewer"
+        )
+    if faults:
+        raise SweepError(faults)
+    return tuple(found.values())
+
+
+def _usual(known: Mapping[str, Shown]) -> list[str]:
+    """Bands, orders, and what is not the wear itself or a guard of the run."""
+    return [name for name, each in known.items() if each.seen or not re.search(_COLUMN, name)]
+
+
+_COLUMN = r"_(m|n|hz|pa|share|ratio|samples|margin)$"  # of a manifest
+
+
+def _forms(name: str) -> Iterator[str]:
+    """Ways to write the name of a value: with or without its channel and ending."""
+    whole = name.removesuffix(".level_db")
+    label = whole.partition(".")[2]
+    for form in (name, whole, label, name.partition(".")[2]):
+        if form:
+            yield _plain(form)
+
+
+def _plain(name: str) -> str:
+    """One way to write a name.
+
+    Examples
+    --------
+    >>> _plain("acc_x.order_02"), _plain("pin.peak")
+    ('acc_x_order_2', 'pin_peak')
+    """
+    return re.sub(r"(?<![0-9.])0+(?=[0-9])", "", name.replace(".", "_"))
+
+
+def _matching(pattern: str, forms: Iterable[str]) -> list[str]:
+    wanted = _plain(pattern.strip())
+    if wanted in forms:
+        return [wanted]
+    return fnmatch.filter(forms, wanted)
+
+
+def _near(pattern: str, forms: Iterable[str]) -> str:
+    near = difflib.get_close_matches(_plain(pattern), list(forms), n=3, cutoff=0.5)
+    if near:
+        return f"; did you mean {' or '.join(map(repr, near))}?"
+    return "; see wearstate features --list, and wearstate simulate --json for what is known"

@@ -1,0 +1,617 @@
+"""The wear model: what it says of a recording."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from functools import cached_property
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...datasets.file.record import DataError, Recording
+from ...features.response.transfer import FrfReference
+from ..feature_rows.feature_choice import choice_in
+from ..feature_rows.feature_table import Choice, held_against, recording_features
+from ..feature_rows.healthy import Baseline, referenced_rows
+from ..feature_rows.noted import NOTED, noted_names, noted_values
+from ..feature_rows.physical import level_channels, levelled_rows
+from ..feature_rows.quality import (
+    Fault,
+    Levels,
+    Look,
+    layout_faults,
+    quiet_faults,
+    recording_faults,
+    suspicions,
+)
+from ..feature_rows.transfer_reference import told_against
+from ..learning.conformal import COVERAGE
+from ..learning.regressions import Blend
+from ..learning.severity import Estimator
+from .novelty import Familiarity, free_distance, novelty_p_value
+
+Float = NDArray[np.float64]
+Verdict = Literal["graded", "caution", "unfamiliar", "unusable"]
+Mode = Literal["cold", "referenced"]
+
+SIMULATION_NOTICE = "trained on simulation; no measured joint of known clearance has confirmed it"
+
+UNFAMILIAR_SHARE = 0.01
+"""Share of familiar recordings that may be called unfamiliar, where the calibration is large
+enough to tell so small a share; else one in its number."""
+
+_OFF_LEVEL = 3.5  # standard deviations of a level that few familiar machines reach
+_MUCH_WORSE = 1.5  # times the error: that of twenty recordings is known to a sixth
+_SPEED_FEATURE = "shaft.speed_hz"
+
+
+class ModelError(ValueError):
+    """A model file cannot be used; names what is wrong and what helps."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Finding:
+    """What a model says of a fault beside the wear.
+
+    Attributes
+    ----------
+    name : str
+        As the data set labels it.
+    probability : float
+        That it is present.
+    present : bool
+        The probability is above the threshold of the model.
+    detection_rate, false_alarm_rate : float
+        Share of present ones found, and of absent ones called present, on machines that had no
+        part in the fit.
+    """
+
+    name: str
+    probability: float
+    present: bool
+    detection_rate: float
+    false_alarm_rate: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Head:
+    """Tells the presence of one fault beside the wear.
+
+    Attributes
+    ----------
+    name : str
+    blend : Blend
+        Features to 1 (absent) … 2 (present).
+    slope, offset : float
+        ``probability = 1 / (1 + exp(-(offset + slope * value)))``
+    threshold : float
+        Probability above which it is called present.
+    """
+
+    name: str
+    blend: Blend
+    slope: float
+    offset: float
+    threshold: float
+
+    def probability(self, rows: Float) -> Float:
+        """Probability [shape=(n,)] of feature rows [shape=(n, n_features)]."""
+        return np.asarray(1 / (1 + np.exp(-(self.offset + self.slope * self.blend.predict(rows)))))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Estimate:
+    """What a model says of one recording.
+
+    Attributes
+    ----------
+    verdict : {"graded", "caution", "unfamiliar", "unusable"}
+        Caution: graded, but read `cautions`. Unfamiliar: no grade, the machine is none of the
+        trained kind. Unusable: no grade, the recording is at fault, or there is
+        no healthy reference for a model that needs one.
+    faults : tuple of Fault
+        Of the data.
+    reasons : tuple of str
+        Why there is no grade; empty where there is one.
+    cautions : tuple of str
+        Conditions outside the trained range, faults that bar no verdict.
+    mode : {"cold", "referenced"}
+        Whether healthy recordings of the same machine were used.
+    noted : tuple of str
+        Conditions noted beside the recording that the estimate is made with.
+    p_value : float or None
+        Of the hypothesis that the recording is of the trained kind; None where it could not even
+        be turned into the model's features.
+    p_limit : float or None
+        At or below it a recording is called unfamiliar.
+    nearest : str
+        The trained machine that is nearest; empty where unusable.
+    grade : int or None
+        0 to 3.
+    grade_name : str
+        In words; empty without a grade.
+    possible_grades : tuple of int
+        Those that cannot be excluded.
+    grade_probabilities : tuple of float
+        Of every grade, sum 1.
+    severity, low, high : float or None
+        Estimate and interval [m].
+    coverage : float
+        Nominal coverage of the interval, and of the set.
+    confounders : tuple of Finding
+        Faults beside the wear that the model knows.
+    evidence : tuple of (str, float, float, float)
+        Feature, its value, the healthy one (of the baseline, or mean of as-new machines), distance
+        in standard deviations of healthy machines; the features that moved the most.
+    """
+
+    verdict: Verdict
+    faults: tuple[Fault, ...] = ()
+    reasons: tuple[str, ...] = ()
+    cautions: tuple[str, ...] = ()
+    mode: Mode = "cold"
+    noted: tuple[str, ...] = ()
+    p_value: float | None = None
+    p_limit: float | None = None
+    nearest: str = ""
+    grade: int | None = None
+    grade_name: str = ""
+    possible_grades: tuple[int, ...] = ()
+    grade_probabilities: tuple[float, ...] = ()
+    severity: float | None = None
+    low: float | None = None
+    high: float | None = None
+    coverage: float = COVERAGE
+    confounders: tuple[Finding, ...] = ()
+    evidence: tuple[tuple[str, float, float, float], ...] = ()
+
+    @property
+    def graded(self) -> bool:
+        """Whether there is a grade, with or without caution."""
+        return self.verdict in ("graded", "caution")
+
+    @property
+    def unreferenced(self) -> bool:
+        """Unusable for want of the healthy reference alone: the recording itself is sound."""
+        return self.reasons == (NO_BASELINE,)
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        return asdict(self)
+
+
+@dataclass(frozen=True, kw_only=True)
+class WearModel:
+    """A trained wear model.
+
+    Attributes
+    ----------
+    blind : Estimator
+        Features to severity.
+    informed : Estimator or None
+        Features and the conditions noted beside the recording to severity: used where all of them
+        are known. None where the conditions tell no more than the features do.
+    familiarity : Familiarity
+        The cloud of the training recordings.
+    levels : Levels
+        Level to expect of each channel.
+    heads : tuple of Head
+        Faults beside the wear.
+    card : dict
+        What it was trained on, its inputs, limits and ranges.
+    """
+
+    blind: Estimator
+    informed: Estimator | None = None
+    familiarity: Familiarity
+    levels: Levels
+    heads: tuple[Head, ...] = ()
+    card: dict[str, Any]
+
+    @property
+    def notice(self) -> str:
+        """What every report of this model must say; from its origin, not from a text in a file."""
+        return SIMULATION_NOTICE if self.card["origin"] == "simulated" else ""
+
+    @property
+    def mode(self) -> Mode:
+        """Whether it needs healthy recordings of the machine."""
+        return "referenced" if self.card["mode"] == "referenced" else "cold"
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Names of the features of a row."""
+        return tuple(self.card["features"])
+
+    @cached_property
+    def p_limit(self) -> float:
+        """A recording with this p-value or a smaller one is called unfamiliar."""
+        return max(UNFAMILIAR_SHARE, 1 / (len(self.blind.calibration.distance) + 1))
+
+    @cached_property
+    def distance_limit(self) -> float:
+        """Distance at which the p-value falls to its limit."""
+        far = np.sort(self.blind.calibration.distance)[::-1]
+        # that many calibration recordings lie at least as far
+        rank = math.floor(self.p_limit * (len(far) + 1) + 1e-9) - 1
+        return float(np.nextafter(far[rank], math.inf)) if rank < len(far) else 0.0
+
+    @cached_property
+    def noted(self) -> tuple[str, ...]:
+        """Conditions that the informed estimate needs; none where there is no such estimate."""
+        return () if self.informed is None else noted_names(self.card)
+
+    @cached_property
+    def _columns(self) -> dict[str, int]:
+        return {name: i for i, name in enumerate(self.names)}
+
+    @cached_property
+    def _healthy(self) -> tuple[Float, Float]:
+        """Mean and spread of healthy features."""
+        known = self.card["healthy_features"]
+        return np.array(known["mean"]), np.array(known["spread"])
+
+    def predict(
+        self,
+        rows: Float,
+        baseline: Float | None = None,
+        conditions: Sequence[Mapping[str, Any]] | None = None,
+    ) -> Float:
+        """Severity of many recordings, without a word on how far it can be trusted.
+
+        Parameters
+        ----------
+        rows : numpy.ndarray [shape=(n, n_features)]
+            In the order of ``card["features"]``.
+        baseline : numpy.ndarray [shape=(n, n_features)] or [shape=(n_features,)], optional
+            Healthy rows of the same machines, of a referenced model.
+        conditions : sequence of mapping, optional
+            What was noted beside each recording, by the names of the card.
+
+        Returns
+        -------
+        numpy.ndarray [shape=(n,)]
+            [m]
+
+        Raises
+        ------
+        DataError
+            The model is referenced and there is no baseline.
+        """
+        inputs = self._inputs(rows, baseline)
+        found = self.blind.severity.predict(inputs)
+        if self.informed is None or conditions is None:
+            return found
+        noted = noted_values(self.noted, conditions)
+        known = np.isfinite(noted).all(axis=1)
+        if known.any():
+            both = np.hstack([inputs[known], noted[known]])
+            found[known] = self.informed.severity.predict(both)
+        return found
+
+    def informed_of(self, conditions: Mapping[str, Any]) -> bool:
+        """Whether the conditions suffice for the informed estimate."""
+        if self.informed is None:
+            return False
+        return bool(np.isfinite(noted_values(self.noted, [conditions])).all())
+
+    def _asked(
+        self, row: Float, baseline: Float | None, conditions: Mapping[str, Any]
+    ) -> tuple[Estimator, Float]:
+        """Who is to tell the severity of a recording, and from which inputs [shape=(1, n)]."""
+        inputs = self._inputs(row[None, :], baseline)
+        if self.informed is None or not self.informed_of(conditions):
+            return self.blind, inputs
+        return self.informed, np.hstack([inputs, noted_values(self.noted, [conditions])])
+
+    def _inputs(self, rows: Float, baseline: Float | None) -> Float:
+        if self.mode == "cold":
+            return rows
+        if baseline is None:
+            raise DataError(NO_BASELINE)
+        return referenced_rows(rows, baseline)
+
+    def estimate(
+        self,
+        recording: Recording,
+        baseline: Baseline | None = None,
+        conditions: Mapping[str, Any] | None = None,
+        told: tuple[str, ...] = (),
+    ) -> Estimate:
+        """Estimate the wear of the machine in a recording.
+
+        Parameters
+        ----------
+        recording : Recording
+            Any, with the views that the model reads joined to it; one that lacks the model's inputs
+            or is at fault is unusable, with the reasons.
+        baseline : Baseline, optional
+            Healthy recordings of the same machine; a referenced model needs them, a cold one only
+            tells the evidence against them.
+        conditions : mapping, optional
+            What is known of the day by the names of the card [SI units]; unless given, what was
+            noted beside the recording.
+        told : tuple of str
+            Cautions from what is known beside the signals.
+
+        Returns
+        -------
+        Estimate
+
+        Raises
+        ------
+        DataError
+            The signal cannot be turned into features.
+        ModelError
+            The program's features are not the model's.
+        """
+        faults = recording_faults(recording, self.card)
+        if any(fault.bars for fault in faults):
+            return self._unusable(faults)
+        known = None if baseline is None else baseline.transfer
+        if known is None and told_against(Choice(only=self.names)):
+            return Estimate(verdict="unusable", reasons=(NO_BASELINE,), mode=self.mode)
+        row = self._row(recording, known)
+        look = self._look(row)
+
+        def see(mended: Recording) -> Look:
+            return self._look(self._row(mended, known))
+
+        faults += suspicions(recording, look, see, self._speeds()) or quiet_faults(
+            recording, self.names, row, self.levels
+        )
+        if any(fault.bars for fault in faults):
+            return self._unusable(faults)
+        features = None if baseline is None else baseline.features
+        noted = recording.row if conditions is None else conditions
+        return self._judge(row, look, features, noted, faults, told)
+
+    def _unusable(self, faults: tuple[Fault, ...]) -> Estimate:
+        reasons = tuple(fault.text for fault in faults if fault.bars)
+        return Estimate(verdict="unusable", faults=faults, reasons=reasons, mode=self.mode)
+
+    def _row(self, recording: Recording, reference: FrfReference | None) -> Float:
+        choice = held_against(choice_in(self.card), reference)
+        order = self.card.get("views", {})
+        joined = {view: recording.joined[view] for view in order}
+        names, values = recording_features(replace(recording, joined=joined), choice)
+        if names != self.names:
+            raise ModelError(
+                f"the model's {len(self.names)} features are not the program's {len(names)}; "
+                "retrain it: wearstate train DATA -o MODEL"
+            )
+        return values
+
+    def _look(self, row: Float) -> Look:
+        speed = row[self._columns[_SPEED_FEATURE]] if _SPEED_FEATURE in self._columns else None
+        apart = self.familiarity.by_kind(self.names, row[None, :])[0]
+        return Look(
+            distance=float(self.familiarity.distance(self.names, self._levelled(row))[0]),
+            limit=self.distance_limit,
+            free_distance=free_distance(self.names, apart),
+            excess_db=self._excess(row),
+            speed_hz=None if speed is None else float(speed),
+        )
+
+    def _levelled(self, row: Float) -> Float:
+        """The row with levels that a sensitivity must have put there taken away [shape=(1, n)]."""
+        excess = self.levels.excess(self.names, row[None, :])
+        wrong = np.abs(excess) > _OFF_LEVEL * np.asarray(self.levels.size)
+        return levelled_rows(self.names, row[None, :], np.where(wrong, excess, 0.0))
+
+    def _excess(self, row: Float) -> dict[str, float]:
+        """Level of each channel above the expected one [dB]."""
+        excess = self.levels.excess(self.names, row[None, :])[0]
+        return dict(zip(level_channels(self.names), excess.tolist(), strict=True))
+
+    def _speeds(self) -> tuple[float, float] | None:
+        """Trained speeds [Hz]."""
+        for condition in self.card["conditions"]:
+            if condition["feature"] == _SPEED_FEATURE:
+                return condition["low"], condition["high"]
+        return None
+
+    def judge(
+        self,
+        row: Float,
+        baseline: Float | None = None,
+        *,
+        conditions: Mapping[str, Any] | None = None,
+        faults: tuple[Fault, ...] = (),
+    ) -> Estimate:
+        """Estimate from a feature row.
+
+        Parameters
+        ----------
+        row : numpy.ndarray [shape=(n_features,)]
+            In the order of ``card["features"]``.
+        baseline : numpy.ndarray [shape=(n_features,)], optional
+            Healthy row of the same machine.
+        conditions : mapping, optional
+            Operating conditions by the names of the card, as far as they were recorded.
+        faults : tuple of Fault
+            Found in the recording; none of them bars a verdict.
+
+        Returns
+        -------
+        Estimate
+        """
+        return self._judge(row, self._look(row), baseline, conditions or {}, faults)
+
+    def _judge(
+        self,
+        row: Float,
+        look: Look,
+        baseline: Float | None,
+        conditions: Mapping[str, Any],
+        faults: tuple[Fault, ...],
+        told: tuple[str, ...] = (),
+    ) -> Estimate:
+        if self.mode == "referenced" and baseline is None:
+            return Estimate(verdict="unusable", reasons=(NO_BASELINE,), mode=self.mode)
+        known: dict[str, Any] = {
+            "faults": faults,
+            "mode": self.mode,
+            "p_value": novelty_p_value(look.distance, self.blind.calibration.distance),
+            "p_limit": self.p_limit,
+            "nearest": self._nearest(row),
+        }
+        if known["p_value"] <= self.p_limit:
+            reason = _strangeness(look.distance, self.blind.calibration.distance)
+            return Estimate(verdict="unfamiliar", reasons=(reason,), **known)
+        asked, inputs = self._asked(row, baseline, conditions)
+        findings = self._findings(row)
+        cautions = (
+            *told,
+            *(fault.text for fault in faults),
+            *self._missing_cautions(conditions),
+            *self._range_cautions(asked, inputs),
+            *self._condition_cautions(row, conditions),
+            *self._level_cautions(look),
+            *_disagreement_cautions(asked, inputs),
+            *self._finding_cautions(findings),
+        )
+        return Estimate(
+            verdict="caution" if cautions else "graded",
+            noted=() if asked is self.blind else self.noted,
+            cautions=cautions,
+            confounders=findings,
+            evidence=self._evidence(row, baseline),
+            **known,
+            **asked.grading(
+                inputs, look.distance, self.card["grade_edges_m"], cautious=bool(cautions)
+            ),
+        )
+
+    def _nearest(self, row: Float) -> str:
+        group, distance = self.familiarity.nearest(self.names, row)
+        trained = self.card["trained_on"]
+        kind = trained["recipe"] or trained["scene"] or "the training set"
+        return f"machine {group} of {kind}, {distance:.2g} away"
+
+    def _missing_cautions(self, conditions: Mapping[str, Any]) -> list[str]:
+        """What a person could add, and what it is worth."""
+        if self.informed is None or self.informed_of(conditions):
+            return []
+        noted = noted_values(self.noted, [conditions])[0]
+        missing = [name for name, value in zip(self.noted, noted, strict=True) if np.isnan(value)]
+        settings = " ".join(f"--set {NOTED[name].setting}" for name in missing)
+        limit = self.card["condemning_limit_m"]
+        without, told = (100 * each.error / limit for each in (self.blind, self.informed))
+        return [
+            f"{', '.join(missing)} {'is' if len(missing) == 1 else 'are'} not known: with "
+            f"{'it' if len(missing) == 1 else 'them'} estimates of unseen machines erred by "
+            f"{told:.2g} % of the limit, without by {without:.2g} %; give {settings}"
+        ]
+
+    def _range_cautions(self, asked: Estimator, inputs: Float) -> list[str]:
+        """Beyond the trained severities an estimate is a bound, and a poor one."""
+        low, high = self.card["severity_range_m"]
+        severity = float(asked.severity.predict(inputs)[0])
+        straight = float(asked.witness.predict(inputs)[0])
+        outside = [value for value in (severity, straight) if not low <= value <= high]
+        if not outside:
+            return []
+        side, edge = ("more", high) if outside[0] > high else ("less", low)
+        what = "the estimate" if outside[0] == severity else "a straight line through the training"
+        return [
+            f"{what}, {1e3 * outside[0]:.3g} mm, is outside the trained range {1e3 * low:.3g} to "
+            f"{1e3 * high:.3g} mm: the wear may well be '{side} than {1e3 * edge:.3g} mm'"
+        ]
+
+    def _condition_cautions(self, row: Float, recorded: Mapping[str, Any]) -> list[str]:
+        """Conditions outside the trained range: from the signal, or as noted beside it."""
+        cautions = []
+        for condition in self.card["conditions"]:
+            name, feature = condition["name"], condition["feature"]
+            value = row[self._columns[feature]] if feature else recorded.get(name)
+            low, high = condition["low"], condition["high"]
+            if value is None or not math.isfinite(value) or low <= value <= high:
+                continue
+            cautions.append(
+                f"{name} = {value:.4g} {condition['unit']} is outside the trained range "
+                f"{low:.4g} to {high:.4g} {condition['unit']}: extrapolating"
+            )
+        return cautions
+
+    def _level_cautions(self, look: Look) -> list[str]:
+        return [
+            f"the level of {channel} is {value:+.1f} dB off what its shape lets expect, must be "
+            f"within {_OFF_LEVEL * size:.1f} dB: check the sensitivity of its sensor"
+            for (channel, value), size in zip(look.excess_db.items(), self.levels.size, strict=True)
+            if abs(value) > _OFF_LEVEL * size
+        ]
+
+    def _finding_cautions(self, findings: tuple[Finding, ...]) -> list[str]:
+        """Faults that the intervals, which are for all machines alike, do not allow for."""
+        cautions = []
+        for finding, rates in zip(findings, self.card["confounders"], strict=True):
+            worse, usual = rates["mae_with_m"], rates["mae_without_m"]
+            if finding.present and worse > _MUCH_WORSE * usual:
+                name = finding.name.replace("_", " ")
+                cautions.append(
+                    f"{name} looks present, and with it estimates erred by {1e3 * worse:.2g} mm "
+                    f"instead of {1e3 * usual:.2g} mm: mend it and record again"
+                )
+        return cautions
+
+    def _findings(self, row: Float) -> tuple[Finding, ...]:
+        findings = []
+        for head, rates in zip(self.heads, self.card["confounders"], strict=True):
+            probability = float(head.probability(row[None, :])[0])
+            findings.append(
+                Finding(
+                    name=head.name,
+                    probability=probability,
+                    present=probability > head.threshold,
+                    detection_rate=rates["detection_rate"],
+                    false_alarm_rate=rates["false_alarm_rate"],
+                )
+            )
+        return tuple(findings)
+
+    def _evidence(
+        self, row: Float, baseline: Float | None, most: int = 12
+    ) -> tuple[tuple[str, float, float, float], ...]:
+        """Features farthest from the healthy ones: the machine's own where they are known."""
+        mean, spread = self._healthy
+        if baseline is not None:
+            mean = baseline
+        moved = np.where(spread > 0, (row - mean) / np.where(spread > 0, spread, 1), 0.0)
+        order = np.argsort(-np.abs(moved))[:most]
+        return tuple((self.names[i], float(row[i]), float(mean[i]), float(moved[i])) for i in order)
+
+
+NO_BASELINE = (
+    "the model was trained with a baseline and needs healthy recordings of this machine: give "
+    "--baseline healthy.h5, or use a model that was trained cold"
+)
+"""Reason of a verdict that lacks nothing but the reference."""
+
+
+def _disagreement_cautions(asked: Estimator, inputs: Float) -> list[str]:
+    """Lines and trees learnt the same; where they part, one of them knows nothing."""
+    apart, usual = float(asked.severity.disagreement(inputs)[0]), asked.severity.tube
+    if apart <= usual:
+        return []
+    return [
+        f"straight lines and trees of the model differ by a factor of {math.exp(apart):.3g}, "
+        f"on familiar machines by {math.exp(usual):.3g} at most: this one is unlike them"
+    ]
+
+
+def _strangeness(distance: float, calibration: Float) -> str:
+    """How far a recording lies from the training recordings, in words."""
+    n, farther = len(calibration), int(np.count_nonzero(calibration >= distance))
+    rank = f"{farther} of {n}" if farther else f"none of {n}"
+    return (
+        f"its features lie {distance:.3g} from the centre of the training recordings; {rank} "
+        f"calibration recordings lie as far (median {np.median(calibration):.3g}, largest "
+        f"{calibration.max():.3g})"
+    )
+
+
+def input_faults(recording: Recording, card: Mapping[str, Any]) -> list[str]:
+    """What a recording lacks of a model's inputs, as sentences; empty where it fits."""
+    return [fault.text for fault in layout_faults(recording, card)]

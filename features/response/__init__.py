@@ -1,0 +1,4 @@
+"""What answers a force: transfer functions, impact tests, modes.
+
+It may import ``features.signal``.
+"""

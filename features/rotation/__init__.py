@@ -1,0 +1,4 @@
+"""What turns: tacho, speed, orders, crank angle, orbit, cylinder pressure, balancing.
+
+It may import ``features.signal``.
+"""

@@ -1,0 +1,431 @@
+"""Normal and friction laws of a clearance joint, compiled.
+
+Laws are scene choices, selected by integer codes in the joint's record of :data:`CONTACT`. All
+act on the *rod* end of a joint: the normal force along the direction from the eye's centre to the
+pin's, the tangential one along the sliding velocity of the pin over the eye.
+
+The hysteresis laws share one form, ``F = F_e(d) (1 + a d' / d'_0)``, with F_e the elastic force, d
+the penetration, d'_0 the speed at first touch and a the hysteresis factor. They differ in how a
+follows from the restitution e that is asked for, and most of them miss it. Whatever the
+elasticity, the mass and the speed (:func:`effective_restitution` says why), a body that is asked
+to return with e returns with
+
+    ======================= ===== ===== ===== ===== =====
+    e                         0.3   0.5   0.7   0.8   0.9
+    ======================= ===== ===== ===== ===== =====
+    ``exact``               0.300 0.500 0.700 0.800 0.900
+    ``carvalho-martins``        - 0.500 0.700 0.800 0.900
+    ``hu-guo``              0.271 0.488 0.697 0.799 0.900
+    ``gonthier``            0.304 0.488 0.670 0.768 0.876
+    ``flores``              0.256 0.470 0.683 0.789 0.894
+    ``zhiying-qishao``      0.327 0.483 0.680 0.787 0.896
+    ``herbert-mcwhannell``  0.520 0.594 0.723 0.807 0.901
+    ``hunt-crossley``       0.581 0.663 0.768 0.833 0.909
+    ``lankarani-nikravesh`` 0.684 0.725 0.796 0.847 0.913
+    ``lee-wang``            0.739 0.799 0.869 0.909 0.952
+    ======================= ===== ===== ===== ===== =====
+
+All of them take the bodies as elastic but for the loss itself: an impact faster than about
+``1e-5 sqrt(E / rho)`` (Love; 5 cm/s for steel) leaves a mark.
+"""
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from ..jit import kernel
+
+LAW_KELVIN_VOIGT = 0
+LAW_HYSTERESIS = 1
+
+ELASTIC_LINEAR = 0
+ELASTIC_HERTZ = 1
+ELASTIC_CONFORMAL = 2
+
+RELEASE_AT_ZERO_FORCE = 0
+RELEASE_AT_ZERO_PENETRATION = 1
+
+FRICTION_SMOOTH = 0
+FRICTION_RAMP = 1
+
+CONTACT = np.dtype(
+    [
+        ("law", np.int64),  # LAW_*
+        ("elasticity", np.int64),  # ELASTIC_*
+        ("stiffness", np.float64),  # K of the elasticity: [N/m], Hertz [N/m^1.5]
+        ("damping", np.float64),  # C of Kelvin-Voigt [N s/m]
+        ("hysteresis", np.float64),  # a of the hysteresis laws
+        ("clearance", np.float64),  # radial [m]
+        ("speed_floor", np.float64),  # least d'_0 of the hysteresis laws, > 0 [m/s]
+        ("release", np.int64),  # RELEASE_*
+        ("friction_law", np.int64),  # FRICTION_*
+        ("friction", np.float64),  # Coulomb's coefficient
+        ("friction_speed", np.float64),  # full friction from about here on, > 0 [m/s]
+        ("friction_dead_speed", np.float64),  # no friction below, FRICTION_RAMP [m/s]
+        ("tangential_damping", np.float64),  # C_t [N s/m]
+    ]
+)
+"""One record per joint; SI, codes as integers."""
+
+_LEAST_CARVALHO_MARTINS = 1 / 3  # validity given with the formula
+_ASYMPTOTE = 0.05  # coth x = 1 to rounding where 1 - L(x) is below it, that is x > 20
+_SERIES_END = 0.1  # below, coth x - 1/x cancels more than the series leaves out (6e-16)
+_NEWTON_STEPS = 50  # both uses settle within 8
+
+
+# --- normal force
+
+
+@kernel
+def elastic_force(penetration: float, contact: Any) -> float:
+    """Force of the elastic contact alone [N]; zero without penetration.
+
+    Linear ``K d``; Hertz ``K d^(3/2)`` (:func:`.contact.closed_forms.hertz_sphere_stiffness`);
+    conformal cylinders ``K d sqrt(d / (2 (c + d)))`` with c the radial clearance
+    (:func:`.contact.closed_forms.conformal_stiffness`), which passes from d^(3/2) to linear as the
+    pin sinks in beyond the clearance.
+
+    References
+    ----------
+    Liu, Zhang, Yang (2007), Mechanism and Machine Theory 42(2), 183-197: the conformal law.
+    """
+    if penetration <= 0.0:
+        return 0.0
+    force: float = contact.stiffness * penetration
+    if contact.elasticity == ELASTIC_HERTZ:
+        force *= math.sqrt(penetration)
+    elif contact.elasticity == ELASTIC_CONFORMAL:
+        force *= math.sqrt(0.5 * penetration / (contact.clearance + penetration))
+    return force
+
+
+@kernel
+def elastic_stiffness(penetration: float, contact: Any) -> float:
+    """Derivative of :func:`elastic_force` by the penetration [N/m]; zero without penetration."""
+    if penetration <= 0.0:
+        return 0.0
+    stiffness: float = contact.stiffness
+    if contact.elasticity == ELASTIC_HERTZ:
+        stiffness *= 1.5 * math.sqrt(penetration)
+    elif contact.elasticity == ELASTIC_CONFORMAL:
+        reach = contact.clearance + penetration
+        stiffness *= math.sqrt(0.5 * penetration / reach) * (1.0 + 0.5 * contact.clearance / reach)
+    return stiffness
+
+
+@kernel
+def normal_force(
+    penetration: float, approach_speed: float, impact_speed: float, contact: Any
+) -> float:
+    """Force of the contact along its normal [N].
+
+    Kelvin-Voigt: ``F_e(d) + C d'``, a spring and a dashpot in parallel (eq. 12 of Xia et al. 2017,
+    the pump paper). The dashpot makes the force jump at first touch and turn negative before the
+    surfaces part, so the sign is kept, and without penetration ``K d + C d'``: the solver finds
+    opening and closing where it changes. `impact_speed` does not matter.
+
+    Hysteresis: ``max(0, F_e(d) (1 + a d' / d'_0))``, continuous at first touch and at release, both
+    at zero penetration. It never pulls; a free impact does not come to the limit, as it leaves
+    slower than ``d'_0 / a``. d'_0 is `impact_speed`, at least the record's `speed_floor`
+    (:func:`floored_restitution` gives the price).
+
+    Parameters
+    ----------
+    penetration : float
+        d [m], negative while the surfaces are apart.
+    approach_speed : float
+        Its rate d' [m/s].
+    impact_speed : float
+        Approach speed at the touch that began this contact [m/s].
+    contact : record of CONTACT
+    """
+    force: float = elastic_force(penetration, contact)
+    if contact.law == LAW_KELVIN_VOIGT:
+        if penetration <= 0.0:
+            force = contact.stiffness * penetration
+        force += contact.damping * approach_speed
+    else:
+        loss = contact.hysteresis * approach_speed / max(impact_speed, contact.speed_floor)
+        force *= max(0.0, 1.0 + loss)
+    return force
+
+
+@kernel
+def kelvin_voigt(
+    penetration: float, approach_speed: float, stiffness: float, damping: float
+) -> float:
+    """Spring and dashpot in parallel: ``F = K d + C d'`` [N].
+
+    The dashpot makes the force jump at first touch and turn negative before the surfaces part;
+    the solver releases the contact where the force reaches zero. Source: eq. 12 of Xia et al.
+    2017, the pump paper.
+    """
+    return stiffness * penetration + damping * approach_speed
+
+
+# --- friction
+
+
+@kernel
+def smooth_sign(speed: float, reference: float) -> float:
+    """Regularised sign ``v / sqrt(v^2 + v_s^2)``: 0.995 at ten times the reference speed."""
+    return speed / math.sqrt(speed * speed + reference * reference)
+
+
+@kernel
+def ramp_sign(speed: float, dead_speed: float, full_speed: float) -> float:
+    """Sign that is zero up to the dead speed and rises in proportion from there to the full one.
+
+    References
+    ----------
+    Ambrosio (2003), Virtual Nonlinear Multibody Systems, NATO Science Series 103, 57-81.
+    """
+    size = abs(speed)
+    if size <= dead_speed:
+        return 0.0
+    share = 1.0
+    if size < full_speed:
+        share = (size - dead_speed) / (full_speed - dead_speed)
+    return share if speed > 0.0 else -share
+
+
+@kernel
+def friction_force(sliding_speed: float, normal_force: float, contact: Any) -> float:
+    """Regularised Coulomb friction plus the pump paper's viscous term ``C_t v`` [N].
+
+    Coulomb's part is ``f N s(v)`` with s the :func:`smooth_sign` at `friction_speed`, or the
+    :func:`ramp_sign` from `friction_dead_speed` to `friction_speed`; a contact that pulls has
+    none. The force has the sign of the sliding velocity, so on the body that slides, where it
+    acts in the opposite sense, it never adds energy. At rest there is no friction: a constant
+    load creeps.
+    """
+    if contact.friction_law == FRICTION_SMOOTH:
+        sign = smooth_sign(sliding_speed, contact.friction_speed)
+    else:
+        sign = ramp_sign(sliding_speed, contact.friction_dead_speed, contact.friction_speed)
+    coulomb = contact.friction * max(0.0, normal_force) * sign
+    force: float = coulomb + contact.tangential_damping * sliding_speed
+    return force
+
+
+@kernel
+def tangential_force(
+    sliding_speed: float,
+    normal_force: float,
+    friction: float,
+    friction_speed: float,
+    tangential_damping: float,
+) -> float:
+    """Regularised Coulomb friction plus the pump paper's viscous term C_t v_t [N]."""
+    return (
+        friction * normal_force * smooth_sign(sliding_speed, friction_speed)
+        + tangential_damping * sliding_speed
+    )
+
+
+# --- restitution of the hysteresis laws
+
+
+def hysteresis(law: str, restitution: float) -> float:
+    """Hysteresis factor by which a law means to give a restitution.
+
+    Parameters
+    ----------
+    law : str
+        One of :data:`HYSTERESIS`.
+    restitution : float
+        Speed of separation over speed of approach that is asked for, 0 < e <= 1;
+        ``carvalho-martins`` holds from 1/3 on.
+
+    Returns
+    -------
+    float
+        a of ``F = F_e(d) (1 + a d' / d'_0)``, >= 0.
+
+    Raises
+    ------
+    ValueError
+        There is no such law, or the restitution is outside its validity.
+
+    Notes
+    -----
+    Only ``exact`` and, within 0.003, ``carvalho-martins`` give what is asked for; the table at the
+    head of this file shows the others. ``hunt-crossley`` stays within 5 % from e = 0.78 on,
+    ``lankarani-nikravesh`` from 0.82. For little damping a must tend to ``3/2 (1 - e)``:
+    ``lee-wang`` tends to half of it, ``gonthier`` to 4/3 and ``flores`` to 16/15 of it.
+
+    References
+    ----------
+    Hunt, Crossley (1975), J. Applied Mechanics 42(2), 440-445, doi:10.1115/1.3423596.
+    Herbert, McWhannell (1977), J. Engineering for Industry 99(3), 513-518.
+    Lee, Wang (1983), J. Mechanisms, Transmissions, and Automation in Design 105(3), 534-540.
+    Lankarani, Nikravesh (1990), J. Mechanical Design 112(3), 369-376, doi:10.1115/1.2912617.
+    Gonthier, McPhee, Lange, Piedboeuf (2004), Multibody System Dynamics 11, 209-233: the
+    approximation in closed form.
+    Zhiying, Qishao (2006), J. Dynamics and Control 4, 294-298.
+    Flores, Machado, Silva, Martins (2011), Multibody System Dynamics 25, 357-375,
+    doi:10.1007/s11044-010-9237-4.
+    Hu, Guo (2015), Multibody System Dynamics 35, 131-151, doi:10.1007/s11044-015-9453-z.
+    Carvalho, Martins (2019), Mechanism and Machine Theory 139, 174-194,
+    doi:10.1016/j.mechmachtheory.2019.03.028.
+
+    Examples
+    --------
+    >>> hysteresis("hunt-crossley", 0.5)
+    0.75
+    >>> round(hysteresis("exact", 0.5), 4)
+    1.4328
+    """
+    if law not in HYSTERESIS:
+        raise ValueError(f"law = '{law}' must be one of {', '.join(HYSTERESIS)}")
+    if not 0 < restitution <= 1:
+        raise ValueError(
+            f"restitution = {restitution} must be in (0, 1]; it is a ratio of speeds, and no "
+            "finite damping of this form stops a body dead"
+        )
+    if law == "carvalho-martins" and restitution < _LEAST_CARVALHO_MARTINS:
+        raise ValueError(
+            f"restitution = {restitution} of carvalho-martins must be >= 1/3; "
+            "choose law = 'exact', which holds for all"
+        )
+    return HYSTERESIS[law](restitution)
+
+
+def effective_restitution(factor: float) -> float:
+    """Coefficient of restitution that a hysteresis factor gives to a free impact.
+
+    Parameters
+    ----------
+    factor : float
+        a of ``F = F_e(d) (1 + a d' / d'_0)``, >= 0 and finite.
+
+    Returns
+    -------
+    float
+        Speed of separation over speed of approach, in (0, 1].
+
+    Raises
+    ------
+    ValueError
+        The factor is negative or not finite.
+
+    Notes
+    -----
+    With ``v = d' / d'_0`` the motion ``m d'_0^2 v dv = -F_e(d) (1 + a v) dd`` separates: the
+    integral of ``v / (1 + a v)`` by v is the elastic energy passed through, over ``m d'_0^2``.
+    Closing (v from 1 to 0) and opening (v from 0 to -e) pass through the same energy, whatever
+    F_e, so it drops out:
+
+        a (1 + e) = ln((1 + a) / (1 - a e)).
+
+    With ``2 x = a (1 + e)`` this becomes ``(1 - e) / (1 + e) = coth x - 1/x``, Langevin's function
+    L: hence ``a = x (1 + L)`` to be solved for x, and ``e = (1 - L) / (1 + L)``. No root finding
+    in e, and no cancellation at either end. Small factors: ``e = 1 - 2 a / 3 + ...``; large ones:
+    ``e = 1 / a``. Nothing else may act on the body during the impact.
+
+    Examples
+    --------
+    >>> round(effective_restitution(hysteresis("hunt-crossley", 0.5)), 4)
+    0.663
+    """
+    if not 0 <= factor < math.inf:
+        raise ValueError(
+            f"factor = {factor} must be >= 0 and finite; hysteresis() gives one from a restitution"
+        )
+    x = factor
+    for _ in range(_NEWTON_STEPS):  # x (1 + L) is convex: after one step from the right only
+        langevin = _langevin(x)
+        slope = (1 - langevin) * (1 + x * (1 + langevin))
+        step = (x * (1 + langevin) - factor) / slope
+        x -= step
+        if abs(step) <= 1e-15 * x:
+            break
+    langevin = _langevin(x)
+    return (1 - langevin) / (1 + langevin)
+
+
+def floored_restitution(factor: float, impact_speed: float, speed_floor: float) -> float:
+    """Coefficient of restitution of an impact under a floor of the impact speed.
+
+    The hysteresis laws divide by the impact speed, which goes to zero where a contact closes
+    gently or is sustained. The floor bounds that: a slower impact feels the factor
+    ``a d'_0 / floor`` and so loses less than it should, in the limit nothing.
+
+    Parameters
+    ----------
+    factor : float
+        a of the law, >= 0.
+    impact_speed, speed_floor : float
+        Approach speed at first touch, and its floor, both > 0 [m/s].
+
+    Returns
+    -------
+    float
+        Speed of separation over speed of approach.
+
+    Raises
+    ------
+    ValueError
+        A speed is not above zero, or the factor is negative or not finite.
+
+    Examples
+    --------
+    >>> a = hysteresis("exact", 0.5)
+    >>> [round(floored_restitution(a, v, 1e-3), 3) for v in (1e-2, 1e-3, 1e-4)]
+    [0.5, 0.5, 0.913]
+    """
+    for name, speed in (("impact_speed", impact_speed), ("speed_floor", speed_floor)):
+        if not speed > 0:
+            raise ValueError(
+                f"{name} = {speed} m/s must be > 0; a touch without speed is no impact"
+            )
+    return effective_restitution(factor * min(1.0, impact_speed / speed_floor))
+
+
+def _exact(restitution: float) -> float:
+    """Factor that gives the restitution: ``a = 2 x / (1 + e)`` with ``L(x) = (1 - e) / (1 + e)``.
+
+    Newton from Cohen's approximation of the inverse of L, which is within 5 % everywhere.
+    """
+    lost = (1 - restitution) / (1 + restitution)
+    kept = 2 * restitution / (1 + restitution)  # 1 - lost, without cancellation
+    if lost == 0:
+        return 0.0
+    x = 1 / kept
+    if kept >= _ASYMPTOTE:
+        x = lost * (3 - lost**2) / (kept * (1 + lost))
+        for _ in range(_NEWTON_STEPS):
+            langevin = _langevin(x)
+            step = (langevin - lost) / (1 - langevin**2 - 2 * langevin / x)
+            x -= step
+            if abs(step) <= 1e-15 * x:
+                break
+    return 2 * x / (1 + restitution)
+
+
+def _langevin(x: float) -> float:
+    """Langevin's function ``coth x - 1/x`` for x >= 0, to rounding."""
+    if x >= _SERIES_END:
+        return 1 / math.tanh(x) - 1 / x
+    z = x * x
+    return x * (1 / 3 - z * (1 / 45 - z * (2 / 945 - z * (1 / 4725 - z * (2 / 93555)))))
+
+
+HYSTERESIS: dict[str, Callable[[float], float]] = {
+    "exact": _exact,
+    "carvalho-martins": lambda e: 1.5 * (1 - e) * (11 - e) / (1 + 9 * e),
+    "hu-guo": lambda e: 1.5 * (1 - e) / e,
+    "gonthier": lambda e: (1 - e * e) / e,
+    "flores": lambda e: 1.6 * (1 - e) / e,
+    "zhiying-qishao": lambda e: 0.75 * (1 - e * e) * math.exp(2 * (1 - e)),
+    "herbert-mcwhannell": lambda e: 6 * (1 - e) / ((2 * e - 1) ** 2 + 3),
+    "hunt-crossley": lambda e: 1.5 * (1 - e),
+    "lankarani-nikravesh": lambda e: 0.75 * (1 - e * e),
+    "lee-wang": lambda e: 0.75 * (1 - e),
+}
+"""Name of a hysteresis law -> its factor by the restitution asked for.
+
+Formulae alone; :func:`hysteresis` checks the range.
+"""

@@ -1,0 +1,318 @@
+"""Figures of a scene beside what is usual: the rows of a deep check, and what all machines share.
+
+A quantity is one row: how it is found, in which range machines have it, why, and the cure outside.
+"Usual" is a practitioner's range, wider than any design rule, and no bound of validity: those are
+checked before, by :func:`wearstate.sim.machine.simulate.check`.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..fidelity.cost import cost_of
+from ..fidelity.ladder import with_values
+from ..machine.simulate import simulate
+from ..output.solution import Solution
+from ..scene.parts import Scene, channels_of
+from ..scene.plausibility import (
+    FEWEST_TURNS,
+    LEAST_LEVEL,
+    Doubt,
+    scene_doubts,
+    sensor_limits,
+    solution_doubts,
+)
+
+_BYTES = 4  # of a sample: float32
+_ROUNDING = 1e-6  # of a bound that a value stands on
+
+
+@dataclass(frozen=True, kw_only=True)
+class Quantity:
+    """One row of a machine's table.
+
+    Attributes
+    ----------
+    name, unit : str
+        As shown; the unit is that of `measure`, for people.
+    measure : callable
+        Facts of a scene -> place -> value. Empty where the scene has no such thing; of several
+        places the one furthest from usual is shown. A machine with one place names it "".
+    least, most : float
+        Usual values; infinite where there is no such end.
+    reason : str
+        Why they are usual, with the source.
+    low, high : str
+        Cure of a value below and above.
+    doubt : str
+        Row of ``plausibility.SCENE_CHECKS`` or ``RECORD_CHECKS`` that asks the same, or words of
+        the run's warning that tells the same; "" where none does.
+    """
+
+    name: str
+    unit: str
+    measure: Callable[[Any], Mapping[str, float]]
+    least: float = -math.inf
+    most: float = math.inf
+    reason: str
+    low: str = ""
+    high: str = ""
+    doubt: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Figure:
+    """A quantity of one scene.
+
+    Attributes
+    ----------
+    quantity : Quantity
+    values : mapping of str to float
+        Place -> value [unit of the quantity], at least one.
+    """
+
+    quantity: Quantity
+    values: Mapping[str, float]
+
+    @property
+    def worst(self) -> tuple[str, float]:
+        """Place and value furthest from usual; inside it that nearest to an end."""
+        return max(self.values.items(), key=lambda each: self._excess(each[1]))
+
+    @property
+    def usual(self) -> bool:
+        """Whether all values are."""
+        return self._excess(self.worst[1]) <= _ROUNDING
+
+    @property
+    def others(self) -> tuple[str, ...]:
+        """Further places outside of what is usual."""
+        first = self.worst[0]
+        odd = (place for place, value in self.values.items() if self._excess(value) > _ROUNDING)
+        return tuple(place for place in odd if place != first)
+
+    @property
+    def cure(self) -> str:
+        """What helps; "" where all is usual."""
+        if self.usual:
+            return ""
+        value = self.worst[1]
+        return self.quantity.low if value < self.quantity.least else self.quantity.high
+
+    def _excess(self, value: float) -> float:
+        """Logarithm of how far a value is beyond the nearer end, negative inside."""
+        low, high = self.quantity.least, self.quantity.most
+        if math.isnan(value):
+            return math.inf
+        below = _ratio(low, value) if low > -math.inf else -math.inf
+        above = _ratio(value, high) if high < math.inf else -math.inf
+        return max(below, above)
+
+
+def _ratio(larger: float, smaller: float) -> float:
+    """Logarithm of one value over another, infinite or its sign where one is not above zero."""
+    if larger > 0 and smaller > 0:
+        return math.log(larger / smaller)
+    return math.copysign(math.inf, larger - smaller) if larger != smaller else 0.0
+
+
+def figures(table: Sequence[Quantity], facts: Any) -> tuple[Figure, ...]:
+    """All rows of a table that a scene has.
+
+    Parameters
+    ----------
+    table : sequence of Quantity
+    facts : object
+        What their `measure` takes.
+
+    Returns
+    -------
+    tuple of Figure
+    """
+    found = ((quantity, quantity.measure(facts)) for quantity in table)
+    return tuple(Figure(quantity=quantity, values=values) for quantity, values in found if values)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Trial:
+    """A short simulated run of a scene.
+
+    Attributes
+    ----------
+    scene : Scene
+        As it was run, its duration changed.
+    solution : Solution
+        With its truth where the machine turns; signals of zeros where the run failed.
+    warnings : tuple of str
+        Of the run; without doubts.
+    doubts : tuple of Doubt
+        About its recording; those about the scene are not of the trial.
+    """
+
+    scene: Scene
+    solution: Solution
+    warnings: tuple[str, ...]
+    doubts: tuple[Doubt, ...]
+
+    @property
+    def ok(self) -> bool:
+        """Whether the run came to its end."""
+        return self.solution.status.ok
+
+
+def trial(scene: Scene, *, turns: float, seconds: float, truth: bool = True) -> Trial:
+    """Run a scene for some revolutions, fewer where they would cost too much.
+
+    Parameters
+    ----------
+    scene : Scene
+    turns : float
+        Revolutions recorded, at most; one at least.
+    seconds : float
+        Tabulated processor time that they may take [s].
+    truth : bool
+        Keep hidden states.
+
+    Returns
+    -------
+    Trial
+    """
+    speed = float(scene.drive.speed)  # type: ignore[attr-defined]
+    full = min(turns / speed, scene.duration)
+    dear = cost_of(with_values(scene, {"duration": full}))
+    duration = max(1.01 / speed, full * min(1.0, seconds / dear))
+    short = with_values(scene, {"duration": duration, "fidelity": "given"})
+    solution = simulate(short, seed=0, truth=truth, raise_on_failure=False)
+    of_scene = scene_doubts(short)
+    doubts = solution_doubts(short, solution)[len(of_scene) :] if solution.status.ok else ()
+    known = {doubt.text for doubt in (*of_scene, *doubts)}
+    told = tuple(text for text in solution.warnings if text not in known)
+    return Trial(scene=short, solution=solution, warnings=told, doubts=doubts)
+
+
+def over_range(run: Trial) -> dict[str, float]:
+    """Largest deviation from its mean over the range of every sensor in a trial."""
+    if not run.ok:
+        return {}
+    ranges, _ = sensor_limits(run.scene)
+    rows = zip(run.solution.channels, run.solution.signal, strict=True)
+    return {
+        channel.name: float(np.abs(row - row.mean()).max()) / ranges[channel.name]
+        for channel, row in rows
+        if channel.name in ranges
+    }
+
+
+def taylor_share(
+    speed: float, radius: float, gap: float, viscosity: float, density: float
+) -> float:
+    """Reynolds number of a film over that of its first instability.
+
+    Parameters
+    ----------
+    speed : float
+        Of the surface [m/s].
+    radius, gap : float
+        Of the journal, and the radial clearance [m].
+    viscosity : float
+        Dynamic [Pa s].
+    density : float
+        [kg/m^3]
+
+    Returns
+    -------
+    float
+        ``rho U C / eta`` over ``41.2 sqrt(R / C)``: laminar below 1.
+
+    References
+    ----------
+    Taylor (1923), Philosophical Transactions A 223, 289-343, doi:10.1098/rsta.1923.0008; the
+    number as in DIN 31652-1.
+
+    Examples
+    --------
+    >>> round(taylor_share(23.56, 0.075, 0.25e-3, 0.0251, 880.0), 2)
+    0.29
+    """
+    return density * speed * gap / viscosity / (41.2 * math.sqrt(radius / gap))
+
+
+OIL_DENSITY = 870.0
+"""Of mineral oil where a scene gives none [kg/m^3]; all are within 5 % of it."""
+
+
+# --- rows that all machines have
+
+
+def _turns(facts: Any) -> dict[str, float]:
+    if not getattr(facts.scene, "running", True):
+        return {}
+    return {"": facts.scene.duration * facts.scene.drive.speed}
+
+
+def _samples(facts: Any) -> dict[str, float]:
+    if not getattr(facts.scene, "running", True):
+        return {}
+    return {"": facts.scene.sample_rate / facts.scene.drive.speed}
+
+
+def _seconds(facts: Any) -> dict[str, float]:
+    return {"": cost_of(facts.scene)}
+
+
+def _megabytes(facts: Any) -> dict[str, float]:
+    scene = facts.scene
+    samples = round(scene.duration * scene.sample_rate)
+    return {"": 1e-6 * _BYTES * samples * len(channels_of(scene))}
+
+
+RECORDING = (
+    Quantity(
+        name="revolutions recorded",
+        unit="",
+        measure=_turns,
+        least=FEWEST_TURNS,
+        reason="orders a twentieth of the speed apart",
+        low="raise duration",
+        doubt="few revolutions",
+    ),
+    Quantity(
+        name="samples per revolution",
+        unit="",
+        measure=_samples,
+        least=20.0,
+        reason="orders up to 8 with the usual 2.56 samples a period",
+        low="raise sample_rate, or check the unit of drive.speed",
+    ),
+    Quantity(
+        name="sensor reading over range",
+        unit="",
+        measure=lambda facts: over_range(facts.trial),
+        least=LEAST_LEVEL,
+        most=0.95,
+        reason="a range is chosen to be used, and not to clip",
+        low="lower the sensor's range, or look for what should excite the machine",
+        high="raise the sensor's range, or look for what shakes it so much",
+        doubt="faint",
+    ),
+    Quantity(
+        name="processor time per recording",
+        unit="s",
+        measure=_seconds,
+        most=60.0,
+        reason="by the table of costs; a data set has thousands of recordings",
+        high="shorten duration, or see wearstate chart for cheaper rungs",
+    ),
+    Quantity(
+        name="size of a recording",
+        unit="MB",
+        measure=_megabytes,
+        most=100.0,
+        reason="a data set has thousands of recordings",
+        high="shorten duration, or lower sample_rate",
+    ),
+)
+"""Rows that every machine's table ends with."""

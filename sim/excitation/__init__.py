@@ -1,0 +1,4 @@
+"""Forces of shakers and hammers.
+
+It may import ``sim.output``, ``sim.scene``.
+"""

@@ -1,0 +1,328 @@
+"""The least model that a scene needs: errors of its rungs measured on a pilot, the cheapest chosen.
+
+Errors are against the highest admissible rung of every effect. Cost is tabulated, not timed, so
+that the choice is the same on every machine.
+"""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import Any, NamedTuple
+
+from ..scene.parts import Scene, SceneError, pinned_faults
+from .cost import cost_of
+from .ladder import Effect, Rung, admissible, effects_of, with_values
+from .pilot import Candidate, Comparison, Pilot, Quantities
+
+STARTS = 32
+"""Most starts that a difference is averaged over, where they are not cheap."""
+
+MOST_STARTS = 512
+"""The same where they are."""
+
+PILOT = 128.0
+"""Tabulated time that the starts of the reference may take all together, beyond STARTS [s]."""
+
+_LEAST_ACCURACY = 1e-6
+_ROOM = 0.5  # of the accuracy: what effects that are held low may use up
+
+
+@dataclass(frozen=True, kw_only=True)
+class Resolution:
+    """The combination that was chosen.
+
+    Attributes
+    ----------
+    values : mapping of str to object
+        Dotted path -> value, of everything that is not pinned.
+    rungs : mapping of str to str
+        Effect -> name of its rung.
+    estimated_error : float
+        Largest mean difference to the reference, and its standard error on top [-].
+    cost, cost_of_reference : float
+        Tabulated [s].
+    status : str
+        ``resolved``; ``unresolvable`` where something cheaper could not be told from the reference
+        for its scatter; ``reference`` where nothing cheaper is good enough.
+    reasons : tuple of str
+        Why each rung below the chosen one was not taken.
+    accuracy : float
+        That was asked.
+    runs : int
+        Simulations that the choice took.
+    """
+
+    values: Mapping[str, Any]
+    rungs: Mapping[str, str]
+    estimated_error: float
+    cost: float
+    cost_of_reference: float
+    status: str
+    reasons: tuple[str, ...]
+    accuracy: float
+    runs: int
+
+    @property
+    def text(self) -> str:
+        """What was chosen, in one line."""
+        chosen = ", ".join(f"{name} {rung}" for name, rung in self.rungs.items())
+        return (
+            f"{self.status} for {self.accuracy:.3g}: {chosen}; error {self.estimated_error:.2%}, "
+            f"cost {self.cost / self.cost_of_reference:.3g} of the best rungs'"
+        )
+
+
+def resolved_scene(scene: Scene, resolution: Resolution) -> Scene:
+    """The scene with what was chosen written into it, its fidelity as given.
+
+    Parameters
+    ----------
+    scene : Scene
+    resolution : Resolution
+        Of :func:`resolve`.
+
+    Returns
+    -------
+    Scene
+    """
+    return with_values(scene, {**resolution.values, "fidelity": "given"})
+
+
+def free_effects(scene: Scene, pinned: Sequence[str]) -> tuple[Effect, ...]:
+    """Effects of a scene but for those pinned.
+
+    Raises
+    ------
+    SceneError
+        A pinned name is no effect.
+    """
+    faults = pinned_faults(scene.machine, pinned)
+    if faults:
+        raise SceneError(scene.name, faults)
+    return tuple(effect for effect in effects_of(scene) if effect.name not in pinned)
+
+
+def checked_accuracy(accuracy: float | None, scene: Scene) -> float:
+    """Accuracy that is asked, the scene's own by default.
+
+    Raises
+    ------
+    ValueError
+        It is not between 1e-6 and 1.
+    """
+    asked = scene.accuracy if accuracy is None else accuracy
+    if not _LEAST_ACCURACY <= asked < 1:
+        raise ValueError(
+            f"accuracy = {asked:g} must be >= {_LEAST_ACCURACY:g} and < 1; choose 0.02"
+        )
+    return asked
+
+
+def resolve(
+    scene: Scene,
+    quantities: Quantities,
+    accuracy: float | None = None,
+    pinned: Sequence[str] = (),
+    *,
+    starts: int | None = None,
+    seed: int = 0,
+    pilot: Pilot | None = None,
+) -> Resolution:
+    """Choose the cheapest rungs and numerics whose error is within the accuracy asked.
+
+    Parameters
+    ----------
+    scene : Scene
+        Its own ``fidelity`` plays no part.
+    quantities : callable
+        Quantities of interest of a run; see :data:`Quantities`.
+    accuracy : float, optional
+        Error that each of them may carry; the scene's own by default.
+    pinned : sequence of str
+        Effects that stay as they are written, besides those that the scene pins.
+    starts : int, optional
+        Most starts that a difference is averaged over; by default 32, and up to 512 of a scene
+        whose reference costs so little that they take no more than 128 s by the tables.
+    seed : int
+        Of the starts.
+    pilot : Pilot, optional
+        Runs already made of the same scene.
+
+    Returns
+    -------
+    Resolution
+        Without any wall time in it: the same on every machine.
+
+    Raises
+    ------
+    SceneError
+        A pinned name is no effect, or the reference itself cannot be run.
+    ValueError
+        The accuracy is not between 1e-6 and 1.
+
+    Notes
+    -----
+    Each effect is lowered first by itself, from the best rung down, until what it adds is beyond
+    the accuracy. Combinations of what is left are tried from the cheapest whose differences add up
+    to less, each against the reference. Whatever cannot be told from it for scatter is not taken:
+    doubts fall up.
+    """
+    asked = checked_accuracy(accuracy, scene)
+    names = {*pinned, *scene.pinned}
+    effects = free_effects(scene, sorted(names))
+    comparison = Comparison(
+        pilot or Pilot(scene, quantities, seed=seed),
+        {effect.name: admissible(effect, scene) for effect in effects},
+        asked,
+        STARTS if starts is None else starts,
+    )
+    refuse_bad_reference(comparison)
+    if starts is None:
+        comparison.starts = affordable_starts(reference_cost(comparison))
+    singles = descent(comparison)
+    chosen = next(
+        (found for found in combinations(comparison, singles) if found.verdict == "within"),
+        comparison.judge(comparison.top),
+    )
+    cost_of_reference = comparison.judge(comparison.top).cost
+    doubted = [c for c in comparison.doubted() if c.cost < chosen.cost]
+    status = "resolved" if chosen.rungs != comparison.judge(comparison.top).rungs else "reference"
+    return Resolution(
+        values=chosen.values,
+        rungs=chosen.rungs,
+        estimated_error=estimated_error(chosen),
+        cost=chosen.cost,
+        cost_of_reference=cost_of_reference,
+        status="unresolvable" if doubted else status,
+        reasons=(*refusals(scene, effects), *_failures(singles)),
+        accuracy=asked,
+        runs=comparison.pilot.runs,
+    )
+
+
+def reference_cost(comparison: Comparison) -> float:
+    """Tabulated cost of a run of the reference [s]."""
+    return cost_of(with_values(comparison.pilot.scene, comparison.values(comparison.top)))
+
+
+def affordable_starts(cost: float) -> int:
+    """Most starts of a reference of that cost [s]: a power of two, as they are doubled.
+
+    Examples
+    --------
+    >>> [affordable_starts(cost) for cost in (0.1, 1.0, 60.0)]
+    [512, 128, 32]
+    """
+    most = min(MOST_STARTS, max(STARTS, PILOT / cost))
+    return 1 << math.floor(math.log2(most))
+
+
+def estimated_error(chosen: Candidate) -> float:
+    """Largest mean difference of a candidate, and its standard error on top [-]."""
+    found = chosen.differences.values()
+    return max((d.error + d.standard_error for d in found if d.error > 0), default=0.0)
+
+
+def refuse_bad_reference(comparison: Comparison) -> None:
+    """Raise SceneError where the reference of a comparison cannot be run."""
+    outcome = comparison.pilot.outcomes(comparison.values(comparison.top), 1)[0]
+    if outcome.fault:
+        rungs = ", ".join(f"{name} = {rung.name}" for name, rung in comparison.top.items())
+        fault = f"the reference ({rungs}) cannot be run: {outcome.fault}; pin the effect at fault"
+        raise SceneError(comparison.pilot.scene.name, [fault])
+
+
+class Single(NamedTuple):
+    """A rung of one effect tried with the others held, and what it adds to their differences."""
+
+    rung: Rung
+    candidate: Candidate
+    added: Mapping[str, float]
+
+
+def descent(comparison: Comparison) -> dict[str, list[Single]]:
+    """For each effect its rungs below the best that may do, and the first that fails.
+
+    What saves most is lowered first and stays low while the others are tried, as far as it costs
+    no more than half of the accuracy: the rest is then cheap to run. A doubtful rung is not gone
+    below: what is coarser still could not be told either.
+    """
+    found: dict[str, list[Single]] = {}
+    held = dict(comparison.top)
+    for name in sorted(comparison.rungs, key=lambda each: _lowest_cost(comparison, each)):
+        found[name] = []
+        before = comparison.judge(held)
+        for rung in reversed(comparison.rungs[name][:-1]):
+            single = comparison.judge({**held, name: rung})
+            added = added_differences(single, before)
+            found[name].append(Single(rung, single, added))
+            if single.verdict == "doubtful" or largest_sum([added]) > comparison.accuracy:
+                break
+        low = [s.rung for s in found[name] if _leaves_room(s.candidate, comparison.accuracy)]
+        held[name] = low[-1] if low else comparison.top[name]
+    return found
+
+
+def _lowest_cost(comparison: Comparison, name: str) -> float:
+    """Cost of the best combination with the cheapest rung of one effect."""
+    scene = comparison.pilot.scene
+    values = (comparison.values({**comparison.top, name: rung}) for rung in comparison.rungs[name])
+    return min(cost_of(with_values(scene, each)) for each in values)
+
+
+def _leaves_room(candidate: Candidate, accuracy: float) -> bool:
+    return candidate.verdict == "within" and candidate.error <= _ROOM * accuracy
+
+
+def added_differences(single: Candidate, before: Candidate) -> dict[str, float]:
+    """Mean differences of a candidate over those of the one that it was lowered from."""
+    if single.verdict == "invalid":
+        return {}
+    return {
+        name: each.mean - before.differences[name].mean for name, each in single.differences.items()
+    }
+
+
+def combinations(
+    comparison: Comparison, singles: Mapping[str, list[Single]]
+) -> Iterator[Candidate]:
+    """Combinations of rungs that may do, cheapest first, judged as they are asked for."""
+    choices = []
+    for name, top in comparison.top.items():
+        good = [s for s in singles[name] if s.candidate.verdict in ("within", "beyond")]
+        choices.append([(name, top, None), *((name, s.rung, s.added) for s in good)])
+    ranked: list[tuple[float, int, dict[str, Rung]]] = []
+    for combination in product(*choices):
+        added = [each for _, _, each in combination if each is not None]
+        if largest_sum(added) <= comparison.accuracy:
+            rungs = {name: rung for name, rung, _ in combination}
+            cost = cost_of(with_values(comparison.pilot.scene, comparison.values(rungs)))
+            ranked.append((cost, len(ranked), rungs))
+    for _, _, rungs in sorted(ranked, key=lambda row: row[:2]):
+        yield comparison.judge(rungs)
+
+
+def largest_sum(added: Sequence[Mapping[str, float]]) -> float:
+    """Largest error of any quantity if differences add up."""
+    names = {name for each in added for name in each}
+    return max((abs(sum(each.get(name, 0.0) for each in added)) for name in names), default=0.0)
+
+
+def refusals(scene: Scene, effects: Sequence[Effect]) -> tuple[str, ...]:
+    """Rungs that a scene does not admit, each with the reason."""
+    return tuple(
+        f"{effect.name} = {rung.name}: {fault}"
+        for effect in effects
+        for rung in effect.rungs
+        if (fault := effect.refusal(scene, rung.name)) is not None
+    )
+
+
+def _failures(singles: Mapping[str, list[Single]]) -> list[str]:
+    return [
+        f"{name} = {single.rung.name}: {single.candidate.verdict}, {single.candidate.reason}"
+        for name, rows in singles.items()
+        for single in rows
+        if single.candidate.verdict != "within"
+    ]

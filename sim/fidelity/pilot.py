@@ -1,0 +1,548 @@
+"""Pilot runs: error of a combination of rungs against a reference, on as few starts as tell.
+
+Errors are those of quantities of interest, which reach this file as a callable from above. Contact
+with clearance is chaotic: differences are means over starts, and a difference below their scatter
+is none. What was measured can be kept and taken up again; runs may be spread over workers. Neither
+changes a result.
+"""
+
+import hashlib
+import json
+import math
+import pickle
+from collections.abc import Callable, Iterable, Mapping, MutableMapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import stdtrit
+
+from ..machine.simulate import recorder, simulate
+from ..output.solution import Recorder, Solution
+from ..scene.parts import Scene, SceneError
+from .cost import cost_of
+from .ladder import VALIDITY, Rung, with_values
+
+Quantity = tuple[float, str, float]
+"""Value, kind ("dB", "relative" or "absolute") and scale: the least size a relative error is taken
+of, the size an absolute one is taken of; of no meaning to a level."""
+
+Quantities = Callable[[Solution, Scene], Mapping[str, Quantity]]
+"""Quantities of interest of a run with its truth, by name."""
+
+Float = NDArray[np.float64]
+
+RESOLVED = 1.0 / 3.0
+"""Of the accuracy asked: standard error that a judgement needs."""
+
+FIRST = 4
+"""Starts that a scattered difference is judged on at the earliest."""
+
+STILL = 0.01
+"""Of the accuracy asked: scatter below it is none."""
+
+TIMED = 3
+"""Starts of a rung that are timed, each of which does all that a recording takes."""
+
+_LEAST_TIMED = 0.3  # s: a run that takes less is repeated until so much has gone by
+_MOST_COLD = 10.0  # s: the first run of a process, which loads its kernels, is repeated up to here
+_SURELY_OFF = 0.99865  # chance of as much, by Student's distribution
+_SURELY_NEAR = 0.99  # as one looks up to seven times
+_TOLD = 1.0 / 6.0  # of the accuracy: a standard error that takes up two fifths of it by itself
+_HOPELESS = 2.0  # a standard error of few starts is itself uncertain by half
+_GOLDEN = 0.6180339887498949  # fractions of a turn: evenly spread for any number of starts
+_LEVEL = math.log(10) / 20  # relative change of an amplitude for a dB
+
+
+@dataclass(frozen=True, kw_only=True)
+class Difference:
+    """Of one quantity between a candidate and the reference.
+
+    Attributes
+    ----------
+    mean : float
+        Over the starts, relative: of a level that of its amplitude, of others as their kind says.
+    standard_error : float
+        Of that mean.
+    """
+
+    mean: float
+    standard_error: float
+
+    @property
+    def error(self) -> float:
+        """Size of the mean difference [-]."""
+        return abs(self.mean)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Candidate:
+    """One combination of rungs.
+
+    Attributes
+    ----------
+    rungs : mapping of str to str
+        Effect -> name of its rung.
+    values : mapping of str to object
+        Dotted path -> value that puts the combination into the scene.
+    cost : float
+        Tabulated, of one run [s].
+    differences : mapping of str to Difference
+        Of every quantity; empty where the combination is not valid.
+    starts : int
+        That the differences are means of.
+    verdict : str
+        ``within``, ``beyond``, ``doubtful`` (scatter too large to tell) or ``invalid``.
+    reason : str
+        Why it is not within.
+    seconds : float
+        Least time of a run that was measured [s]; NaN without a clock.
+    """
+
+    rungs: Mapping[str, str]
+    values: Mapping[str, Any]
+    cost: float
+    differences: Mapping[str, Difference] = field(default_factory=dict)
+    starts: int = 0
+    verdict: str = "within"
+    reason: str = ""
+    seconds: float = math.nan
+
+    @property
+    def error(self) -> float:
+        """Largest of its quantities' errors; infinite where it is not valid."""
+        if not self.differences:
+            return math.inf
+        return max(each.error for each in self.differences.values())
+
+    @property
+    def standard_error(self) -> float:
+        """Largest of its quantities' standard errors."""
+        return max((each.standard_error for each in self.differences.values()), default=math.inf)
+
+
+# --- runs
+
+
+class Outcome(NamedTuple):
+    """Quantities of one run, or why there are none."""
+
+    quantities: Mapping[str, Quantity]
+    fault: str
+    seconds: float = math.nan
+    """Least time of the run, where it was timed [s]."""
+
+
+class OutOfTimeError(Exception):
+    """A run was not begun, as there is no time for it."""
+
+
+class Task(NamedTuple):
+    """One run, for a worker: of a scene with the values of its rungs and its start."""
+
+    scene: Scene
+    values: Mapping[str, Any]
+    quantities: Quantities
+    shared: str
+    """Same for runs that differ in their start alone."""
+    number: int
+    clock: Callable[[], float] | None
+
+
+Spread = Callable[[Callable[[Task], Outcome], Iterable[Task]], Iterable[Outcome]]
+"""Applies a function to tasks and gives the results in order; by workers, say."""
+
+
+def outcome_of(task: Task) -> Outcome:
+    """Make a run.
+
+    Parameters
+    ----------
+    task : Task
+        With a clock the run does all that a recording takes; without, what its like have done
+        before in this process is taken over.
+
+    Returns
+    -------
+    Outcome
+    """
+    seconds = math.nan
+    try:
+        scene = with_values(task.scene, task.values)
+        if task.clock is None:
+            solution = _recorder_of(task.shared, scene)(scene, task.number, True, False)
+        else:
+            solution, seconds = _timed(scene, task.number, task.clock)
+    except SceneError as error:
+        return Outcome({}, error.faults[0])
+    fault = _fault(solution)
+    return Outcome({} if fault else task.quantities(solution, scene), fault, seconds)
+
+
+def _timed(scene: Scene, number: int, clock: Callable[[], float]) -> tuple[Solution, float]:
+    """A run and its least time; one that takes next to nothing is repeated."""
+    least, begin, first = math.inf, clock(), scene.machine not in _warm
+    while True:
+        before = clock()
+        solution = simulate(scene, seed=number, truth=True, raise_on_failure=False)
+        now = clock()
+        _warm.add(scene.machine)
+        least = min(least, now - before)
+        cold = first and now - begin < _MOST_COLD
+        if now - begin >= _LEAST_TIMED and not cold:
+            return solution, least
+        first = False
+
+
+_warm: set[str] = set()  # machines that this process has run: the first loads its kernels
+
+
+_recorders: dict[str, Recorder] = {}
+_MOST_RECORDERS = 64
+
+
+def _recorder_of(shared: str, scene: Scene) -> Recorder:
+    if shared not in _recorders:
+        if len(_recorders) >= _MOST_RECORDERS:
+            _recorders.clear()
+        _recorders[shared] = recorder(scene)
+    return _recorders[shared]
+
+
+class Pilot:
+    """Runs of one scene in any combination of rungs, each start once.
+
+    Parameters
+    ----------
+    scene : Scene
+    quantities : callable
+        Of :data:`Quantities`.
+    seed : int
+        Other starts for another one.
+    clock : callable, optional
+        Seconds; only what is reported as measured depends on it.
+    kept : mapping, optional
+        Outcomes by name: those of an earlier pilot are not run again, new ones are added.
+    spread : callable, optional
+        As :data:`Spread`; one after the other by default. Quantities and clock must then be
+        importable by name.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        quantities: Quantities,
+        *,
+        seed: int = 0,
+        clock: Callable[[], float] | None = None,
+        kept: MutableMapping[str, Outcome] | None = None,
+        spread: Spread = map,
+        at_once: int = 1,
+    ) -> None:
+        self.scene, self.quantities, self.seed, self.clock = scene, quantities, seed, clock
+        self.runs = 0
+        self.late: Callable[[float], bool] = lambda _expected: False
+        self._spread, self.at_once = spread, at_once
+        self._kept: MutableMapping[str, Outcome] = {} if kept is None else kept
+        self._outcomes: dict[str, list[Outcome]] = {}
+        self._own = hashlib.sha256(pickle.dumps(scene)).hexdigest()
+
+    def outcomes(self, values: Mapping[str, Any], starts: int) -> list[Outcome]:
+        """Outcomes of the first so many starts, up to one that fails."""
+        self.fill([values], starts)
+        return self._outcomes[_key(values)][:starts]
+
+    def fill(self, combinations: Sequence[Mapping[str, Any]], starts: int) -> None:
+        """Make what is missing of the first so many starts of some combinations.
+
+        Raises
+        ------
+        OutOfTimeError
+            ``late`` said so before a run; what was made by then is kept.
+        """
+        wanted = [
+            (values, start)
+            for start in range(starts)
+            for values in {_key(values): values for values in combinations}.values()
+        ]
+        while missing := [each for each in wanted if not self._has(*each)]:
+            batch = missing[: self._batch(missing[0][0])]
+            if self.late(self._expected(batch)):
+                raise OutOfTimeError
+            for (values, start), found in zip(batch, self._made(batch), strict=True):
+                self._add(values, start, found)
+
+    def seconds(self, values: Mapping[str, Any]) -> float:
+        """Least time of a run so far [s]; NaN without a clock."""
+        told = [each.seconds for each in self._outcomes.get(_key(values), [])[:TIMED]]
+        return min((each for each in told if math.isfinite(each)), default=math.nan)
+
+    def _has(self, values: Mapping[str, Any], start: int) -> bool:
+        rows = self._outcomes.setdefault(_key(values), [])
+        while len(rows) <= start and not (rows and rows[-1].fault):
+            kept = self._kept.get(f"{_key(values)} {len(rows)}")
+            if kept is None:
+                return False
+            rows.append(kept)
+        return True
+
+    def _add(self, values: Mapping[str, Any], start: int, found: Outcome) -> None:
+        self._kept[f"{_key(values)} {start}"] = found
+        self._has(values, start)
+
+    def _batch(self, values: Mapping[str, Any]) -> int:
+        """Runs that are handed out together: a second's for each worker, and one at least."""
+        seconds = self.seconds(values)
+        each = max(1, int(1.0 / seconds)) if seconds > 0 else 1
+        return self.at_once * min(each, _MOST_AT_ONCE) if self.at_once > 1 else 1
+
+    def _expected(self, batch: Sequence[tuple[Mapping[str, Any], int]]) -> float:
+        """Time that a batch is expected to take [s]; 0 where nothing is known."""
+        told = [self.seconds(values) for values, _ in batch]
+        return sum(each for each in told if math.isfinite(each)) / self.at_once
+
+    def _made(self, batch: Sequence[tuple[Mapping[str, Any], int]]) -> Iterable[Outcome]:
+        if self.at_once == 1:
+            return [self._run(values, start) for values, start in batch]
+        self.runs += len(batch)
+        return self._spread(outcome_of, [self._task(values, start) for values, start in batch])
+
+    def _run(self, values: Mapping[str, Any], start: int) -> Outcome:
+        self.runs += 1
+        return outcome_of(self._task(values, start))
+
+    def _task(self, values: Mapping[str, Any], start: int) -> Task:
+        number = start + self.seed * 65_537
+        turn = math.tau * (number * _GOLDEN % 1.0)
+        return Task(
+            scene=self.scene,
+            values={**values, "drive.start_angle": turn, "fidelity": "given"},
+            quantities=self.quantities,
+            shared=f"{self._own} {_key(values)}",
+            number=number,
+            clock=self.clock if start < TIMED else None,
+        )
+
+
+_MOST_AT_ONCE = 8
+
+
+def _key(values: Mapping[str, Any]) -> str:
+    return json.dumps(values, sort_keys=True)
+
+
+def _fault(solution: Solution) -> str:
+    """Why a run is outside the validity of its rungs; empty where it is not."""
+    if not solution.status.ok:
+        return solution.status.text
+    for name, most in VALIDITY.items():
+        value = float(solution.numerics.get(name, 0.0))
+        if value > most:
+            return f"{name} = {value:.3g} must be <= {most:g}, or a rung is not valid"
+    return ""
+
+
+def differences(
+    candidate: Sequence[Mapping[str, Quantity]], reference: Sequence[Mapping[str, Quantity]]
+) -> dict[str, Difference]:
+    """Mean difference of every quantity of the reference, over runs from the same starts.
+
+    Parameters
+    ----------
+    candidate, reference : sequence of mapping
+        Quantities of each start, in the same order.
+
+    Returns
+    -------
+    dict of str to Difference
+        Infinite where the candidate lacks a quantity. One start alone has no scatter to be told.
+
+    Examples
+    --------
+    >>> one = [{"rms": (2.02, "relative", 0.0)}] * 2
+    >>> other = [{"rms": (2.0, "relative", 0.0)}] * 2
+    >>> round(differences(one, other)["rms"].error, 9)
+    0.01
+    """
+    return {
+        name: _difference(name, candidate, reference)
+        for name in reference[0]
+        if all(name in each for each in reference)
+    }
+
+
+def _difference(
+    name: str,
+    candidate: Sequence[Mapping[str, Quantity]],
+    reference: Sequence[Mapping[str, Quantity]],
+) -> Difference:
+    if not all(name in each for each in candidate):
+        return Difference(mean=math.inf, standard_error=0.0)
+    kind, scale = reference[0][name][1:]
+    own = np.array([each[name][0] for each in candidate])
+    other = np.array([each[name][0] for each in reference])
+    apart = (own - other) * _unit(kind, scale, float(np.mean(other)))
+    if len(apart) < 2:
+        return Difference(mean=float(apart[0]), standard_error=math.inf)
+    spread = float(np.std(apart, ddof=1)) / math.sqrt(len(apart))
+    return Difference(mean=float(np.mean(apart)), standard_error=spread)
+
+
+def _unit(kind: str, scale: float, size: float) -> float:
+    """Factor from a difference to a relative error."""
+    if kind == "dB":
+        return _LEVEL
+    least = max(abs(size), scale) if kind == "relative" else scale
+    return 1.0 / least if least > 0 else 0.0
+
+
+# --- judgement
+
+
+def _judgement(found: Mapping[str, Difference], starts: int, accuracy: float) -> str:
+    """``within``, ``beyond``, or ``more``: further starts are needed to tell."""
+    each = found.values()
+    scatter = max(d.standard_error for d in each)
+    far, near = (float(stdtrit(starts - 1, chance)) for chance in (_SURELY_OFF, _SURELY_NEAR))
+    if any(d.error - far * d.standard_error > accuracy for d in each):
+        return "beyond"
+    enough = starts >= FIRST or scatter <= STILL * accuracy
+    close = all(d.error + near * d.standard_error <= accuracy for d in each)
+    return "within" if close and enough and scatter <= RESOLVED * accuracy else "more"
+
+
+class Comparison:
+    """Judges combinations of rungs against the best of them, with as few starts as tell.
+
+    Parameters
+    ----------
+    pilot : Pilot
+    ladders : mapping of str to sequence of Rung
+        Effect -> rungs that it may take, cheapest first; the reference has the last of each.
+    accuracy : float
+        Error that every quantity may carry.
+    starts : int
+        Most starts that a difference is averaged over.
+    """
+
+    def __init__(
+        self,
+        pilot: Pilot,
+        ladders: Mapping[str, Sequence[Rung]],
+        accuracy: float,
+        starts: int,
+    ) -> None:
+        self.pilot, self.accuracy, self.starts = pilot, accuracy, starts
+        self.rungs = ladders
+        self.top = {name: rungs[-1] for name, rungs in ladders.items() if rungs}
+        self.cap = math.inf  # starts of the time being
+        self._kept: dict[tuple[tuple[str, str], ...], Candidate] = {}
+
+    def values(self, rungs: Mapping[str, Rung]) -> dict[str, Any]:
+        """Values of a combination."""
+        return {path: value for rung in rungs.values() for path, value in rung.values.items()}
+
+    def judge(self, rungs: Mapping[str, Rung]) -> Candidate:
+        """Candidate of a combination, with its verdict: anew where more starts may tell."""
+        known = self.known(rungs)
+        if known is None or self._open(known):
+            self._kept[names(rungs)] = known = self._judged(rungs)
+        return known
+
+    def known(self, rungs: Mapping[str, Rung]) -> Candidate | None:
+        """Candidate of a combination that has been judged."""
+        return self._kept.get(names(rungs))
+
+    def told(self, candidate: Candidate) -> bool:
+        """Whether more starts would change nothing of a verdict, or are too many."""
+        if candidate.verdict != "doubtful" or 2 * candidate.starts > self.starts:
+            return True
+        return self._hopeless(candidate.differences, candidate.starts)
+
+    def settled(self) -> bool:
+        """Whether that holds of everything judged."""
+        return all(self.told(each) for each in self.judged())
+
+    def reference(self) -> Candidate:
+        """The reference against itself: its errors are none."""
+        return self._judged(self.top)
+
+    def judged(self) -> tuple[Candidate, ...]:
+        """Every combination that was judged."""
+        return tuple(self._kept.values())
+
+    def doubted(self) -> list[Candidate]:
+        """Combinations whose scatter stayed too large to tell, not those near the limit itself."""
+        most = _TOLD * self.accuracy
+        return [c for c in self.judged() if c.verdict == "doubtful" and c.standard_error > most]
+
+    def _judged(self, rungs: Mapping[str, Rung]) -> Candidate:
+        values, reference = self.values(rungs), self.values(self.top)
+        starts = 2
+        while True:
+            self.pilot.fill([values, reference], starts)
+            own, other = (self.pilot.outcomes(v, starts) for v in (values, reference))
+            fault = next((o.fault for o in (*own, *other) if o.fault), "")
+            if fault:
+                return self._candidate(rungs, {}, len(own), "invalid", fault)
+            found = differences([o.quantities for o in own], [o.quantities for o in other])
+            verdict = _judgement(found, starts, self.accuracy)
+            if verdict != "more":
+                return self._candidate(rungs, found, starts, verdict, _why(found, verdict))
+            if not self._more(found, starts):
+                return self._candidate(rungs, found, starts, "doubtful", _why(found, "doubtful"))
+            starts *= 2
+
+    def _open(self, known: Candidate) -> bool:
+        """Whether a doubt was only that of few starts, and more are admitted now."""
+        return not self.told(known) and 2 * known.starts <= self.cap
+
+    def _more(self, found: Mapping[str, Difference], starts: int) -> bool:
+        most = min(self.starts, self.cap)
+        return 2 * starts <= most and not self._hopeless(found, starts)
+
+    def _hopeless(self, found: Mapping[str, Difference], starts: int) -> bool:
+        """Scatter that even the most starts would not average away: no need to run them."""
+        scatter = max(each.standard_error for each in found.values())
+        in_the_end = scatter * math.sqrt(starts / self.starts)
+        return starts > FIRST and in_the_end > _HOPELESS * RESOLVED * self.accuracy
+
+    def _candidate(
+        self,
+        rungs: Mapping[str, Rung],
+        found: Mapping[str, Difference],
+        starts: int,
+        verdict: str,
+        reason: str,
+    ) -> Candidate:
+        values = self.values(rungs)
+        try:
+            cost = cost_of(with_values(self.pilot.scene, values))
+        except SceneError:
+            cost = math.inf
+        return Candidate(
+            rungs={name: rung.name for name, rung in rungs.items()},
+            values=values,
+            cost=cost,
+            differences=found,
+            starts=starts,
+            verdict=verdict,
+            reason=reason,
+            seconds=self.pilot.seconds(values),
+        )
+
+
+def names(rungs: Mapping[str, Rung]) -> tuple[tuple[str, str], ...]:
+    """A combination by the names of its rungs, in a fixed order."""
+    return tuple(sorted((name, rung.name) for name, rung in rungs.items()))
+
+
+def _why(found: Mapping[str, Difference], verdict: str) -> str:
+    if verdict == "within":
+        return ""
+    name, worst = max(found.items(), key=lambda item: item[1].error)
+    if verdict == "beyond":
+        return f"{name} is off by {worst.error:.2%}"
+    name, worst = max(found.items(), key=lambda item: item[1].error + item[1].standard_error)
+    return f"{name} is off by {worst.error:.2%} with a standard error of {worst.standard_error:.2%}"

@@ -1,0 +1,717 @@
+"""Error and cost of the rungs of a scene, cheapest information first.
+
+A study asks two questions of a scene as it is written. Which numerics, step, tolerance and mesh,
+are enough where its rungs stay? And which rungs would be? It can be ended at any time: what is
+known by then is told, with how sure it is.
+"""
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise, product
+from typing import Any, cast
+
+from ..journal.validity import journal_step
+from ..pump.validity import pump_step
+from ..scene.journal import JournalScene
+from ..scene.parts import Scene
+from ..scene.pump import PumpScene
+from .choose import (
+    added_differences,
+    affordable_starts,
+    checked_accuracy,
+    combinations,
+    descent,
+    free_effects,
+    largest_sum,
+    reference_cost,
+    refusals,
+    refuse_bad_reference,
+)
+from .cost import cost_of
+from .ladder import STEP_LEVELS, Effect, Rung, admissible, level_name, with_values
+from .pilot import (
+    FIRST,
+    RESOLVED,
+    STILL,
+    Candidate,
+    Comparison,
+    Difference,
+    OutOfTimeError,
+    Pilot,
+    Quantities,
+    differences,
+    names,
+)
+
+_CAPS = (4, 16)  # starts of the first rounds; the last takes as many as the accuracy wants
+_SIGMAS = 3.0  # beyond so many standard errors a difference is one
+_ROUNDING = 1e-9  # of relative changes: signals have single precision, truth has double
+_LEVELS_SHOWN = 3
+_SPARED = 1.5  # a predicted error up to this factor behind the front is run: sums are guesses
+_SHORTLIST = 2  # predicted combinations that are measured before the search goes on
+_SAME = 1e-9  # of two values
+
+
+@dataclass(frozen=True, kw_only=True)
+class Convergence:
+    """How the reference converges with the level of one numerical effect.
+
+    Attributes
+    ----------
+    effect : str
+    levels : tuple of str
+        Coarse to fine, the last is that of the reference.
+    quantity : str
+        The one that moves most.
+    steps : tuple of float
+        Its changes from level to level [-].
+    order : float
+        Observed, base two; NaN where it cannot be told.
+    remaining : float
+        Error left in the reference after Richardson; the last change where there is no order [-].
+    converged : bool
+        What remains is below the accuracy's third, or the last change is below scatter. Changes
+        that shrink slowly leave much.
+    """
+
+    effect: str
+    levels: tuple[str, ...]
+    quantity: str
+    steps: tuple[float, ...]
+    order: float
+    remaining: float
+    converged: bool
+
+
+@dataclass(frozen=True, kw_only=True)
+class Raise:
+    """What one rung of the scene as written costs: its error against the best rung of its effect.
+
+    Attributes
+    ----------
+    effect : str
+    written, best : str
+        Names of the rungs.
+    candidate : Candidate
+        The scene as written, against itself with that one rung raised.
+    """
+
+    effect: str
+    written: str
+    best: str
+    candidate: Candidate
+
+
+@dataclass(frozen=True, kw_only=True)
+class Answer:
+    """The cheapest combination of rungs that is good enough, among those that may be chosen.
+
+    Attributes
+    ----------
+    reference : Candidate
+        The best of them, which all errors are taken against.
+    written : Candidate or None
+        The scene as it is written; None where it has not been measured.
+    chosen : Candidate
+        Cheapest that is within the accuracy, by the tables; the reference where nothing else is.
+        Of a search that was ended before, the cheapest that may be, for all that is known.
+    status : str
+        ``resolved``; ``so far`` where the search was ended before; ``unresolvable`` where
+        something cheaper could not be told from the reference for scatter; ``not converged``.
+    candidates : tuple of Candidate
+        All that were measured, cheapest first.
+    convergence : tuple of Convergence
+        Of the reference, for each numerical effect.
+    changes : mapping of str to object
+        Dotted path -> value that turns the scene as written into the chosen one.
+    """
+
+    reference: Candidate
+    written: Candidate | None
+    chosen: Candidate
+    status: str
+    candidates: tuple[Candidate, ...]
+    convergence: tuple[Convergence, ...]
+    changes: Mapping[str, Any]
+
+    @property
+    def doubted(self) -> tuple[Candidate, ...]:
+        """Cheaper combinations that could not be told from the reference."""
+        cheaper = (c for c in self.candidates if c.cost < self.chosen.cost)
+        return tuple(c for c in cheaper if c.verdict == "doubtful")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Study:
+    """Error and cost of every combination that matters.
+
+    Attributes
+    ----------
+    accuracy : float
+    written : mapping of str to str
+        Effect -> rung of the scene as it is written.
+    kept : Answer
+        Where only numerics may change: against the same rungs with the finest numerics.
+    raised : Answer or None
+        Where rungs may change as well: against the highest admissible rung of every effect. None
+        where no rung may, or the best of them were not measured.
+    raises : tuple of Raise
+        What each rung of the scene as written costs by itself.
+    refused : tuple of str
+        Rungs that the scene does not admit, with the reason.
+    pruned : tuple of str
+        Rungs that another is better and cheaper than.
+    measured, planned : int
+        Combinations measured at all, and all that are known to be of interest.
+    status : str
+        ``resolved``, ``unresolvable``, ``not converged``, or ``out of budget``.
+    """
+
+    accuracy: float
+    written: Mapping[str, str]
+    kept: Answer
+    raised: Answer | None
+    raises: tuple[Raise, ...]
+    refused: tuple[str, ...]
+    pruned: tuple[str, ...]
+    measured: int
+    planned: int
+    status: str
+
+    @property
+    def whole(self) -> Answer:
+        """The answer of widest choice."""
+        return self.raised or self.kept
+
+    @property
+    def reference(self) -> Candidate:
+        """Best rungs that were compared with."""
+        return self.whole.reference
+
+    @property
+    def candidates(self) -> tuple[Candidate, ...]:
+        """Those of the widest choice, cheapest first."""
+        return self.whole.candidates
+
+    @property
+    def convergence(self) -> tuple[Convergence, ...]:
+        """Of the reference of the widest choice."""
+        return self.whole.convergence
+
+    @property
+    def front(self) -> tuple[Candidate, ...]:
+        """Candidates that no cheaper one is better than."""
+        found: list[Candidate] = []
+        for one in sorted(self.candidates, key=lambda c: (c.cost, c.error)):
+            if math.isfinite(one.error) and (not found or one.error < found[-1].error):
+                found.append(one)
+        return tuple(found)
+
+
+# --- the scene as written
+
+
+def written_rung(effect: Effect, scene: Scene) -> Rung:
+    """Rung of an effect that a scene has as it is written.
+
+    Parameters
+    ----------
+    effect : Effect
+        Of this scene.
+    scene : Scene
+
+    Returns
+    -------
+    Rung
+        Of the ladder where it has one of the same values, else one that changes nothing.
+
+    Examples
+    --------
+    >>> from wearstate.sim.fidelity.ladder import effects_of
+    >>> from wearstate.sim.scene.load import load_scene
+    >>> pump = load_scene("bilge-pump")  # writes no step: its contact needs no more than x2
+    >>> [written_rung(effect, pump).name for effect in effects_of(pump)][-3:]
+    ['two-level', 'constant-speed', 'x2']
+    """
+    for rung in effect.rungs:
+        if all(_has(scene, path, value) for path, value in rung.values.items()):
+            return rung
+    return Rung(name=effect.current(scene), assumes="as written")
+
+
+def _has(scene: Scene, path: str, value: Any) -> bool:
+    own = _effective_step(scene) if path == "numerics.step" else _value_at(scene, path)
+    if isinstance(value, float) and own is not None:
+        return math.isclose(own, value, rel_tol=_SAME)
+    return bool(own == value)
+
+
+def _value_at(scene: Scene, path: str) -> Any:
+    node: Any = scene
+    for key in path.split("."):
+        node = node[int(key)] if isinstance(node, tuple) else getattr(node, key, None)
+    return node
+
+
+def _effective_step(scene: Scene) -> float:
+    """Step that a scene runs with, a whole part of a sample [s]."""
+    if isinstance(scene, JournalScene):
+        return journal_step(scene)
+    told = pump_step(cast(PumpScene, scene))
+    return 1 / scene.sample_rate / math.ceil(1 / (scene.sample_rate * told) - _SAME)
+
+
+def _ladder(effect: Effect, scene: Scene) -> tuple[Rung, ...]:
+    """Admissible rungs, the written one among them, cheapest first."""
+    rungs = list(admissible(effect, scene))
+    written = written_rung(effect, scene)
+    if written.name not in [rung.name for rung in rungs]:
+        own = cost_of(scene)
+        dearer = (i for i, r in enumerate(rungs) if cost_of(with_values(scene, r.values)) > own)
+        rungs.insert(next(dearer, len(rungs)), written)
+    return tuple(rungs)
+
+
+# --- the search
+
+
+class Search:
+    """Measures a scene's rungs, cheapest information first, and tells what is known so far.
+
+    Parameters
+    ----------
+    scene : Scene
+    quantities : callable
+        See :data:`wearstate.sim.fidelity.pilot.Quantities`.
+    accuracy : float, optional
+        The scene's own by default; says when scatter is small enough.
+    pinned : sequence of str
+        Effects that stay as they are written, besides those that the scene pins.
+    starts : int, optional
+        Most starts that a difference is averaged over; by default as
+        :func:`wearstate.sim.fidelity.choose.resolve`.
+    pilot : Pilot, optional
+        Runs already made of the same scene.
+    tell : callable, optional
+        Called with what is measured next.
+
+    Raises
+    ------
+    SceneError, ValueError
+        As :func:`wearstate.sim.fidelity.choose.resolve`.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        quantities: Quantities,
+        *,
+        accuracy: float | None = None,
+        pinned: Sequence[str] = (),
+        starts: int | None = None,
+        pilot: Pilot | None = None,
+        tell: Callable[[str], None] | None = None,
+    ) -> None:
+        self.scene, self.accuracy = scene, checked_accuracy(accuracy, scene)
+        self.effects = free_effects(scene, sorted({*pinned, *scene.pinned}))
+        self.pilot = pilot or Pilot(scene, quantities)
+        self.tell = tell or (lambda _what: None)
+        self.numerical = {each.name for each in self.effects if each.numerical}
+        self.written = {each.name: written_rung(each, scene) for each in self.effects}
+        ladders = {each.name: _ladder(each, scene) for each in self.effects}
+        self.kept = self._comparison(
+            {n: r if n in self.numerical else (self.written[n],) for n, r in ladders.items()},
+            starts,
+        )
+        physical = [n for n, r in ladders.items() if n not in self.numerical and len(r) > 1]
+        self.best = self._comparison(ladders, starts) if physical else None
+        self.raises = {
+            n: self._raise(n, ladders, starts) for n in physical if self._low(n, ladders)
+        }
+        self.fault = ""  # of the best rungs
+        self._pruned: list[str] = []
+        self._done: set[int] = set()  # comparisons whose answer is final
+        self._convergence: dict[int, list[Convergence]] = {}
+        self._complete = False
+
+    def _comparison(self, ladders: Mapping[str, Sequence[Rung]], starts: int | None) -> Comparison:
+        found = Comparison(self.pilot, ladders, self.accuracy, starts or 1)
+        if starts is None:
+            found.starts = affordable_starts(reference_cost(found))
+        return found
+
+    def _low(self, name: str, ladders: Mapping[str, Sequence[Rung]]) -> bool:
+        return self.written[name].name != ladders[name][-1].name
+
+    def _raise(
+        self, name: str, ladders: Mapping[str, Sequence[Rung]], starts: int | None
+    ) -> Comparison:
+        """The scene as written against itself with one rung raised, at numerics fit for both."""
+        base = level_name(1.0)
+        rungs = {
+            each: (next((r for r in ladders[each] if r.name == base), own),)
+            if each in self.numerical
+            else (own,)
+            for each, own in self.written.items()
+        }
+        return self._comparison({**rungs, name: (self.written[name], ladders[name][-1])}, starts)
+
+    def measure(self, late: Callable[[float], bool] | None = None) -> None:
+        """Measure until everything is told, or there is no time.
+
+        Parameters
+        ----------
+        late : callable, optional
+            Whether a run of so many seconds must not be begun any more. The scene as written is
+            measured against its own finest numerics in any case.
+
+        Raises
+        ------
+        SceneError
+            The finest numerics of the scene as written cannot be run.
+        KeyboardInterrupt
+            What was measured is kept: :meth:`found` tells it.
+        """
+        self.tell("the scene as written")
+        self.pilot.late = lambda _expected: False
+        at_once, self.pilot.at_once = self.pilot.at_once, 1  # workers take longer to start
+        refuse_bad_reference(self.kept)
+        self.kept.cap = 2
+        self.kept.judge(self.written)
+        self.pilot.at_once = at_once
+        if late is not None:
+            self.pilot.late = late
+        try:
+            for cap in (*_CAPS, math.inf):
+                self._round(cap)
+            self._rest()
+        except OutOfTimeError:
+            return
+        self._complete = True
+
+    def _all(self) -> list[Comparison]:
+        return [self.kept, *self.raises.values(), *([self.best] if self.best else [])]
+
+    def _round(self, cap: float) -> None:
+        for each in self._all():
+            each.cap = cap
+        self.tell("numerics of the scene as written")
+        self._answered(self.kept)
+        for name, each in self.raises.items():
+            self.tell(f"what the rung of {name} costs")
+            each.judge({n: rungs[0] for n, rungs in each.rungs.items()})
+        if self.best is None or self._faulty(self.best):
+            return
+        self.tell("the scene as written against the best rungs")
+        self.best.judge(self.written)
+        for rungs in self._shortlist(self.best):
+            if self.best.judge(rungs).verdict == "within":
+                break
+        if cap > _CAPS[0]:
+            self.tell("combinations of rungs")
+            self._answered(self.best)
+
+    def _faulty(self, best: Comparison) -> bool:
+        found = best.judge(best.top)
+        self.fault = found.reason if found.verdict == "invalid" else ""
+        return bool(self.fault)
+
+    def _answered(self, comparison: Comparison) -> None:
+        """Search a comparison for its cheapest combination that will do."""
+        if id(comparison) in self._done:
+            return
+        comparison.judge(self.written)
+        singles = descent(comparison)
+        for found in combinations(comparison, singles):
+            if found.verdict == "within":
+                break
+        self._convergence[id(comparison)] = list(self._convergences(comparison))
+        if comparison.settled():
+            self._done.add(id(comparison))
+
+    def _shortlist(self, best: Comparison) -> Iterator[dict[str, Rung]]:
+        """Combinations that may do, as single rungs of the scene as written predict."""
+        choices = [self._predicted(best, name) for name in best.rungs]
+        rows: list[tuple[float, int, dict[str, Rung]]] = []
+        for combination in product(*choices):
+            if largest_sum([added for _, added in combination]) <= self.accuracy:
+                rungs = dict(zip(best.rungs, (rung for rung, _ in combination), strict=True))
+                cost = cost_of(with_values(self.scene, best.values(rungs)))
+                rows.append((cost, len(rows), rungs))
+        yield from (rungs for _, _, rungs in sorted(rows, key=lambda row: row[:2])[:_SHORTLIST])
+
+    def _predicted(self, best: Comparison, name: str) -> list[tuple[Rung, dict[str, float]]]:
+        """Rungs of an effect with the differences that each is expected to add."""
+        rows: list[tuple[Rung, dict[str, float]]] = [(best.top[name], {})]
+        if name in self.raises:
+            pair = self.raises[name]
+            own = pair.judge({n: rungs[0] for n, rungs in pair.rungs.items()})
+            if own.differences:
+                rows.append((self.written[name], {n: d.mean for n, d in own.differences.items()}))
+        elif name in self.numerical:
+            singles = [(r, self.kept.known({**self.kept.top, name: r})) for r in best.rungs[name]]
+            rows += [
+                (rung, {n: d.mean for n, d in single.differences.items()})
+                for rung, single in singles
+                if single is not None and single.differences and rung is not best.top[name]
+            ]
+        return rows
+
+    def _rest(self) -> None:
+        """What is on the front beside the answers."""
+        whole = self.kept if self.best is None or self.fault else self.best
+        self.tell("the rest of the front")
+        kept = self._undominated(whole)
+        for rungs in _by_cost(whole, kept):
+            whole.judge(rungs)
+
+    def _undominated(self, comparison: Comparison) -> dict[str, list[Rung]]:
+        """Rungs of each effect that no cheaper one is as good as, by their errors alone."""
+        kept: dict[str, list[Rung]] = {}
+        self._pruned = []
+        for name, rungs in comparison.rungs.items():
+            kept[name] = [comparison.top[name]]
+            ahead = [(r, comparison.judge({**comparison.top, name: r})) for r in rungs[:-1]][::-1]
+            for i, (rung, single) in enumerate(ahead):
+                cheaper = [other for _, other in ahead[i + 1 :] if other.cost <= single.cost]
+                best = min((other.error for other in cheaper), default=math.inf)
+                if single.verdict == "invalid":
+                    self._pruned.append(f"{name} = {rung.name}: {single.reason}")
+                elif best <= single.error:
+                    self._pruned.append(f"{name} = {rung.name}: a cheaper one errs no more")
+                else:
+                    kept[name].append(rung)
+        return kept
+
+    def _convergences(self, comparison: Comparison) -> Iterator[Convergence]:
+        """Of every numerical effect with three levels or more; rungs between two are left out."""
+        levels = {level_name(factor) for factor in STEP_LEVELS}
+        for name in comparison.rungs:
+            rungs = [r for r in comparison.rungs[name] if r.name in levels][-_LEVELS_SHOWN:]
+            if name in self.numerical and len(rungs) == _LEVELS_SHOWN:
+                found = _convergence(comparison, name, rungs)
+                if found is not None:
+                    yield found
+
+    # -- what is known
+
+    def progress(self, *, at_all: bool = False) -> tuple[int, int]:
+        """Combinations told, or measured at all, and all that are known to be of interest."""
+        told, known = 0, 0
+        for each in self._all():
+            singles = [{**each.top, n: r} for n, rungs in each.rungs.items() for r in rungs]
+            singles = singles if id(each) not in self._done else []
+            if each not in self.raises.values():
+                singles.append(self.written)
+            wanted = {names(rungs): each.known(rungs) for rungs in singles}
+            wanted |= {tuple(sorted(c.rungs.items())): c for c in each.judged()}
+            known += len(wanted)
+            told += sum(c is not None and (at_all or each.told(c)) for c in wanted.values())
+        return (known, known) if self._complete else (told, known)
+
+    def remaining(self) -> float:
+        """Seconds of runs that the known combinations still take, by the tables."""
+        return sum(self._remaining(each) for each in self._all() if id(each) not in self._done)
+
+    def _remaining(self, comparison: Comparison) -> float:
+        singles = [{**comparison.top, n: r} for n, rungs in comparison.rungs.items() for r in rungs]
+        most = max((c.starts for c in comparison.judged()), default=_CAPS[0])
+        open_ = [r for r in singles if (c := comparison.known(r)) is None or not comparison.told(c)]
+        return most * sum(cost_of(with_values(self.scene, comparison.values(r))) for r in open_)
+
+    def found(self) -> Study:
+        """What has been measured so far; nothing is run."""
+        raised = None
+        if self.best is not None and not self.fault and self.best.known(self.best.top):
+            raised = self._answer(self.best)
+        kept = self._answer(self.kept)
+        told, known = self.progress(at_all=True)
+        return Study(
+            accuracy=self.accuracy,
+            written={name: rung.name for name, rung in self.written.items()},
+            kept=kept,
+            raised=raised,
+            raises=tuple(self._raises()),
+            refused=tuple(self._refused()),
+            pruned=tuple(self._pruned),
+            measured=told,
+            planned=known,
+            status=self._status(raised or kept),
+        )
+
+    def _refused(self) -> Iterator[str]:
+        yield from refusals(self.scene, self.effects)
+        if self.fault:
+            yield f"the best rungs of every effect together: {self.fault}"
+
+    def _raises(self) -> Iterator[Raise]:
+        for name, pair in self.raises.items():
+            candidate = pair.known({n: rungs[0] for n, rungs in pair.rungs.items()})
+            if candidate is not None:
+                best = pair.top[name].name
+                yield Raise(
+                    effect=name, written=self.written[name].name, best=best, candidate=candidate
+                )
+
+    def _answer(self, comparison: Comparison) -> Answer:
+        judged = [self._with_seconds(c) for c in comparison.judged()]
+        judged.sort(key=lambda c: (c.cost, c.error))
+        top = {name: rung.name for name, rung in comparison.top.items()}
+        reference = next(
+            (c for c in judged if dict(c.rungs) == top),
+            self._with_seconds(comparison.reference()),
+        )
+        status = self._answer_status(comparison)
+        sure = [c for c in judged if c.verdict == "within"]
+        likely = sure if status != "so far" else [c for c in judged if self._likely(c)]
+        chosen = next(iter(likely), reference)
+        doubted = [c for c in comparison.doubted() if c.cost < chosen.cost]
+        own = comparison.known(self.written)
+        return Answer(
+            reference=reference,
+            written=None if own is None else self._with_seconds(own),
+            chosen=chosen,
+            status="unresolvable" if doubted and status == "resolved" else status,
+            candidates=tuple(judged),
+            convergence=tuple(self._convergence.get(id(comparison), ())),
+            changes=self._changes(chosen),
+        )
+
+    def _likely(self, candidate: Candidate) -> bool:
+        """Whether a candidate may be within the accuracy, for all that is known."""
+        if candidate.verdict == "doubtful":
+            return candidate.error <= self.accuracy
+        return candidate.verdict == "within"
+
+    def _answer_status(self, comparison: Comparison) -> str:
+        if not all(each.converged for each in self._convergence.get(id(comparison), ())):
+            return "not converged"
+        if id(comparison) not in self._done:
+            return "so far"
+        return "resolved"
+
+    def _status(self, answer: Answer) -> str:
+        if not self._complete:
+            return "out of budget"
+        if answer.status == "not converged":
+            return "not converged"
+        doubtful = any(each.verdict == "doubtful" for each in answer.candidates)
+        return "unresolvable" if doubtful else "resolved"
+
+    def _changes(self, chosen: Candidate) -> dict[str, Any]:
+        if dict(chosen.rungs) == {name: rung.name for name, rung in self.written.items()}:
+            return {}
+        return {
+            path: value
+            for path, value in chosen.values.items()
+            if _value_at(self.scene, path) != value
+        }
+
+    def _with_seconds(self, candidate: Candidate) -> Candidate:
+        return replace(candidate, seconds=self.pilot.seconds(candidate.values))
+
+
+def study(
+    scene: Scene,
+    quantities: Quantities,
+    *,
+    accuracy: float | None = None,
+    pinned: Sequence[str] = (),
+    starts: int | None = None,
+    late: Callable[[float], bool] | None = None,
+    pilot: Pilot | None = None,
+) -> Study:
+    """Measure error and cost of every combination of rungs that matters.
+
+    Parameters
+    ----------
+    scene, quantities, accuracy, pinned, starts, pilot
+        As :class:`Search`.
+    late : callable, optional
+        As :meth:`Search.measure`.
+
+    Returns
+    -------
+    Study
+
+    Raises
+    ------
+    SceneError, ValueError
+        As :func:`wearstate.sim.fidelity.choose.resolve`.
+    """
+    search = Search(scene, quantities, accuracy=accuracy, pinned=pinned, starts=starts, pilot=pilot)
+    search.measure(late)
+    return search.found()
+
+
+def _by_cost(comparison: Comparison, kept: Mapping[str, list[Rung]]) -> list[dict[str, Rung]]:
+    """Combinations of rungs, cheapest first; those that errors alone put behind others left out."""
+    rows: list[tuple[float, float, int, dict[str, Rung]]] = []
+    for combination in product(*kept.values()):
+        rungs = dict(zip(kept, combination, strict=True))
+        best = comparison.judge(comparison.top)
+        alone = [
+            added_differences(comparison.judge({**comparison.top, name: rung}), best)
+            for name, rung in rungs.items()
+            if rung is not comparison.top[name]
+        ]
+        cost = cost_of(with_values(comparison.pilot.scene, comparison.values(rungs)))
+        rows.append((cost, largest_sum(alone), len(rows), rungs))
+    front, least = [], math.inf
+    for _, error, _, rungs in sorted(rows, key=lambda row: row[:3]):
+        if error < least * _SPARED:
+            front.append(rungs)
+            least = min(least, error)
+    return front
+
+
+# --- convergence
+
+
+def _convergence(comparison: Comparison, name: str, rungs: Sequence[Rung]) -> Convergence | None:
+    """Convergence over the starts that its levels were judged on, or more while they scatter."""
+    judged = [comparison.judge({**comparison.top, name: rung}) for rung in rungs]
+    starts, found = min(c.starts for c in judged[:-1]), None
+    most = min(comparison.starts, comparison.cap)
+    while True:
+        comparison.pilot.fill([c.values for c in judged], starts)
+        runs = [comparison.pilot.outcomes(c.values, starts) for c in judged]
+        if any(outcome.fault for row in runs for outcome in row):
+            return found
+        levels = [[outcome.quantities for outcome in row] for row in runs]
+        first, last = (differences(a, b) for a, b in pairwise(levels))
+        quantity = max(last, key=lambda each: last[each].error)
+        found = _order(
+            name, rungs, quantity, first[quantity].mean, last[quantity], comparison.accuracy
+        )
+        scatter = max(each.standard_error for each in last.values()) / comparison.accuracy
+        if scatter <= (RESOLVED if starts >= FIRST else STILL):
+            return found
+        if 2 * starts > most:  # few scattered starts show nothing
+            return found if 2 * starts > comparison.starts else None
+        starts *= 2
+
+
+def _order(
+    effect: str,
+    rungs: Sequence[Rung],
+    quantity: str,
+    before: float,
+    last: Difference,
+    accuracy: float,
+) -> Convergence:
+    """What the last two changes of a quantity say of the finest level."""
+    silent = last.error <= max(_SIGMAS * last.standard_error, _ROUNDING)
+    order = math.log2(abs(before / last.mean)) if before and last.mean else math.nan
+    told = not silent and math.isfinite(order) and order > 0
+    remaining = last.error / (2**order - 1) if told else last.error
+    return Convergence(
+        effect=effect,
+        levels=tuple(rung.name for rung in rungs),
+        quantity=quantity,
+        steps=(before, last.mean),
+        order=order if told else math.nan,
+        remaining=remaining,
+        converged=silent or remaining <= RESOLVED * accuracy,
+    )

@@ -1,0 +1,127 @@
+"""Where a plain journal comes to rest on its film, over the load: a table of static equilibria.
+
+The load is of ``eta omega R^3 L / C^2``, lengths are over the radial clearance C, as in
+:mod:`.film.bearing`. A plain bore looks the same from all sides, so that one curve serves every
+direction of the load; what is tabulated, the logit of the eccentricity ratio and the attitude
+angle over the logarithm of the load, is nearly straight from the lightest load to the thinnest
+film.
+"""
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import CubicSpline
+
+from .bearing import equilibrium
+from .solve import FilmGeometry
+
+Vector = NDArray[np.float64]
+
+_LEAST_LOAD = 1e-3  # eccentricity ratio 0.001: the film is linear below
+_MOST_ECCENTRICITY = 0.97  # beyond it the usual mesh is too coarse for the thinnest film
+_KNOTS_PER_DECADE = 7  # of the load: position within 0.3 % of the clearance, as its mesh is
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RestCurve:
+    """Static equilibria of a plain bearing.
+
+    Attributes
+    ----------
+    most_load : float
+        End of the table [-]; beyond, and below its begin, it goes on straight.
+    spline : CubicSpline
+        Logarithm of the load -> logit of the eccentricity ratio, attitude angle [rad].
+    """
+
+    most_load: float
+    spline: CubicSpline
+
+    def position(self, load: ArrayLike) -> Vector:
+        """Place of the journal's centre.
+
+        Parameters
+        ----------
+        load : array_like [shape=(..., 2)]
+            On the journal, of ``eta omega R^3 L / C^2``, not zero.
+
+        Returns
+        -------
+        numpy.ndarray [shape=(..., 2)]
+            Over the radial clearance.
+
+        Examples
+        --------
+        >>> curve = rest_curve(FilmGeometry(length_to_diameter=0.6), "short")
+        >>> across = curve.position([0.0, 0.5])
+        >>> bool(np.allclose(curve.position([0.5, 0.0]), [across[1], -across[0]]))
+        True
+        """
+        load = np.asarray(load, dtype=float)
+        place = np.log(np.hypot(load[..., 0], load[..., 1]))
+        within = np.clip(place, self.spline.x[0], self.spline.x[-1])
+        found = self.spline(within) + self.spline(within, 1) * (place - within)[..., None]
+        radius = 1 / (1 + np.exp(-found[..., 0]))
+        angle = np.arctan2(load[..., 1], load[..., 0]) + found[..., 1]
+        return np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=-1)
+
+
+def rest_curve(geometry: FilmGeometry, rung: str = "direct") -> RestCurve:
+    """Curve of a plain bearing, from static equilibria.
+
+    Parameters
+    ----------
+    geometry : FilmGeometry
+        With a round bore and without grooves.
+    rung : str
+        Of :func:`.film.bearing.equilibrium`.
+
+    Returns
+    -------
+    RestCurve
+        Made once for each film.
+
+    Raises
+    ------
+    ValueError
+        The bore is not round or has grooves: its place then hangs on the direction of the load.
+
+    Examples
+    --------
+    >>> from .bearing import equilibrium
+    >>> film = FilmGeometry(length_to_diameter=0.6, n_theta=36, n_z=9)
+    >>> apart = rest_curve(film).position([1.7, 0.0]) - equilibrium(film, [1.7, 0.0]).position
+    >>> bool(abs(apart).max() < 3e-3)
+    True
+    """
+    if geometry.bore is not None or geometry.grooves:
+        raise ValueError(
+            "bore and grooves must be absent: a scar or a groove makes the place of the journal "
+            "hang on the direction of the load; use sim.bearing.equilibrium for one load"
+        )
+    size = (geometry.length_to_diameter, geometry.n_theta, geometry.n_z)
+    return _curve(*size, str(geometry.condition), rung)
+
+
+@lru_cache(maxsize=16)
+def _curve(
+    length_to_diameter: float, n_theta: int, n_z: int, condition: str, rung: str
+) -> RestCurve:
+    film = FilmGeometry(
+        length_to_diameter=length_to_diameter, n_theta=n_theta, n_z=n_z, condition=condition
+    )
+    loads, places = [], []
+    load = _LEAST_LOAD
+    while True:
+        found = equilibrium(film, [load, 0.0], rung=rung, raise_on_failure=False)
+        eccentricity = found.eccentricity_ratio
+        if not found.status.ok or eccentricity > _MOST_ECCENTRICITY:
+            break
+        loads.append(math.log(load))
+        places.append([math.log(eccentricity / (1 - eccentricity)), found.attitude_angle])
+        load *= 10 ** (1 / _KNOTS_PER_DECADE)
+    spline = CubicSpline(np.array(loads), np.array(places))
+    return RestCurve(most_load=math.exp(loads[-1]), spline=spline)

@@ -1,0 +1,53 @@
+"""What an orbit's film and integrator must hold: longest steps, and the width of a short film."""
+
+import math
+from typing import cast
+
+from ..scene.journal import JournalScene
+from ..scene.parts import Scene
+
+JOURNAL_STEP = 0.02
+"""Shaft angle of a step that the scene does not give, the source paper's [rad]."""
+
+
+def journal_step(scene: JournalScene) -> float:
+    """Step of a journal's fixed-step integrator: what is written, a whole part of a sample [s]."""
+    told = scene.numerics.step or JOURNAL_STEP / (math.tau * scene.drive.speed)
+    sample = 1 / scene.sample_rate
+    return sample / math.ceil(sample / told * (1 - 1e-9))
+
+
+_LONGEST_STEP = {"euler": 0.1, "rk4": 0.5}
+"""Of the fixed integrators [rad]: by 0.34 of its step euler shifts the threshold of whirl, and a
+dozen steps a turn are few for any load."""
+
+_LONGEST_SHORT = 1.0  # L/D of a short film: it carries half as much again as the bearing does
+
+
+def orbit_faults(scene: Scene) -> list[str]:
+    """A step of a journal that is stable but too long to be right, a film outside its validity.
+
+    Examples
+    --------
+    >>> from wearstate.sim.scene.load import load_scene
+    >>> orbit_faults(load_scene("journal-step"))
+    []
+    """
+    journal = cast(JournalScene, scene)
+    faults = []
+    speed, told = math.tau * journal.drive.speed, journal.numerics.step
+    longest = _LONGEST_STEP.get(journal.numerics.integrator, math.inf)
+    step = min(told or JOURNAL_STEP / speed, 1 / journal.sample_rate)
+    if step * speed > longest:
+        faults.append(
+            f"numerics.step = {step:g} s must be <= {longest / speed:.3g} s, {longest:g} rad of "
+            "the shaft, for the orbit to be right; shorten it, or set numerics.integrator = "
+            "'adaptive'"
+        )
+    ratio = journal.bearing.length / journal.bearing.diameter
+    if journal.film.rung == "short" and ratio > _LONGEST_SHORT:
+        faults.append(
+            f"film.rung = 'short' of L/D = {ratio:.3g} must be <= {_LONGEST_SHORT:g}, it knows no "
+            "flow round the circle; set film.rung = 'map'"
+        )
+    return faults

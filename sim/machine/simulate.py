@@ -1,0 +1,132 @@
+"""From a scene to a recording: only the physics that the scene needs."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from ..journal.recording import check_journal, simulate_journal
+from ..output.solution import Recorder, Solution
+from ..pump.recording import check_pump, simulate_pump
+from ..scene.parts import Scene, SceneError
+from ..scene.plausibility import solution_doubts
+from ..shaft.recording import check_shaft, shaft_recorder, simulate_shaft
+
+
+def simulate(
+    scene: Scene, *, seed: int, truth: bool = False, raise_on_failure: bool = True
+) -> Solution:
+    """Simulate one recording of a scene.
+
+    Parameters
+    ----------
+    scene : Scene
+        A validated scene, see :func:`wearstate.sim.scene.load.load_scene`.
+    seed : int
+        Seed of the sensor noise; the mechanics are deterministic.
+    truth : bool
+        Also return forces and orbit at the sample instants.
+    raise_on_failure : bool
+        False: a failed run comes back with its status and a signal of zeros.
+
+    Returns
+    -------
+    Solution
+        Signal, channels, status, numerics, and truth where asked for; its warnings include what
+        of scene and signal is hardly meant, see :mod:`.scene.plausibility`. The ``estimated_error``
+        of its numerics is that of rungs and steps: it cannot tell whether the scene is a machine.
+
+    Raises
+    ------
+    SceneError
+        A rung is not valid for the scene, the step is too long for the contact, the recording is
+        shorter than a revolution, or pulses or modes cannot be sampled; or its fidelity is not
+        resolved.
+    SimulationError
+        The run failed and `raise_on_failure` is true.
+
+    Examples
+    --------
+    >>> from wearstate.sim.scene.load import load_scene
+    >>> scene = load_scene("bilge-pump", {"duration": "0.2 s"})
+    >>> simulate(scene, seed=1).signal.shape
+    (3, 5120)
+    """
+    _refuse_unresolved(scene)
+    solution = _SIMULATORS[scene.machine](scene, seed, truth, raise_on_failure)
+    if not solution.status.ok:
+        return solution
+    doubts = tuple(doubt.text for doubt in solution_doubts(scene, solution))
+    return replace(solution, warnings=(*solution.warnings, *doubts))
+
+
+def recorder(scene: Scene) -> Recorder:
+    """What makes recordings of a scene from many starts, doing once what they share.
+
+    Parameters
+    ----------
+    scene : Scene
+
+    Returns
+    -------
+    callable
+        Scene, seed, truth, raise_on_failure, as :func:`simulate`; the scene may differ from this
+        one in its start angle alone. Warnings are those of the run, without doubts about the scene.
+
+    Raises
+    ------
+    SceneError
+        As :func:`simulate`; of a machine whose starts share nothing, only when it is called.
+
+    Examples
+    --------
+    >>> from wearstate.sim.scene.load import load_scene
+    >>> scene = load_scene("propulsion-shaft", {"duration": "0.4 s"})
+    >>> again = recorder(scene)
+    >>> bool((again(scene, 1, False, True).signal == simulate(scene, seed=1).signal).all())
+    True
+    """
+    _refuse_unresolved(scene)
+    share = _RECORDERS.get(scene.machine)
+    return share(scene) if share else _SIMULATORS[scene.machine]
+
+
+def check(scene: Scene) -> None:
+    """Check what only the physics can tell: rungs, step, sampling.
+
+    Raises
+    ------
+    SceneError
+        Every fault at once.
+
+    Examples
+    --------
+    >>> from wearstate.sim.scene.load import load_scene
+    >>> check(load_scene("bilge-pump"))
+    """
+    _CHECKS[scene.machine](scene)
+
+
+def _refuse_unresolved(scene: Scene) -> None:
+    """Which rungs a scene needs is judged by features, which this floor does not know."""
+    if scene.fidelity == "auto":
+        fault = (
+            "fidelity = 'auto' must be resolved before a run; set fidelity = 'given', or call "
+            "wearstate.datasets.generation.quantities.resolved(scene)"
+        )
+        raise SceneError(scene.name, [fault])
+
+
+_SIMULATORS: dict[str, Recorder] = {
+    "reciprocating-pump": simulate_pump,
+    "journal-bearing": simulate_journal,
+    "propulsion-shaft": simulate_shaft,
+}
+"""A new machine is one row."""
+
+_RECORDERS: dict[str, Callable[[Scene], Recorder]] = {"propulsion-shaft": shaft_recorder}
+"""Machines whose starts share something: what a film settles to does not know where it began."""
+
+_CHECKS: dict[str, Callable[[Scene], None]] = {
+    "reciprocating-pump": check_pump,
+    "journal-bearing": check_journal,
+    "propulsion-shaft": check_shaft,
+}

@@ -1,0 +1,4 @@
+"""The reciprocating pump: crank mechanism, liquid, casing, and its recording.
+
+It may import ``sim.jit``, ``sim.output``, ``sim.scene``, ``sim.contact``, ``sim.excitation``.
+"""

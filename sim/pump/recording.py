@@ -1,0 +1,707 @@
+"""A reciprocating pump, from its scene to its recording."""
+
+import math
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..excitation.forces import Push
+from ..output.sensor import (
+    anti_alias_poles,
+    coloured_noise,
+    digitise,
+    low_pass,
+    mains_hum,
+    mounting_poles,
+)
+from ..output.solution import SimulationError, Solution, Status
+from ..scene.exciters import exciter_faults
+from ..scene.parts import Accelerometer, CasingMode, Scene, SceneError, channels_of, specific_key
+from ..scene.pump import CRANK_PLACES, FORCE_PLACES, GUIDE_PLACES, VALVE_PLACES, PumpScene
+from .casing import (
+    Modes,
+    band_limited_acceleration,
+    casing_inputs,
+    decimate,
+    edge_samples,
+    table_acceleration,
+)
+from .casing_frf import Accelerance, load_accelerance
+from .hydraulics import lift_left
+from .pressure_sensors import pressures_at_rest, read_pressures
+from .push import casing_pushes, read_cells, with_pushes
+from .setup import contact_rate, contact_table, joint_rungs, pin_offsets, run_scene
+from .slider_crank import FORCES, GUIDE, JOINT_COMPLIANT, JOINT_LINK, CrankRun
+from .tearing import lowest_of_run, torn_in_run
+from .validity import FEWEST_STEPS, MOST_STEPS, joint_faults, knock_limits, limits, pump_step
+
+_MEMORY = 4e9  # byte, what one run may take: a data set runs one on every core
+_BYTES_PER_STEP = 3 * 10 * 8  # of one throw: forces and chamber as doubles, two passes over them
+
+_LIFT_LEFT = 0.05
+"""Of the stop's lift: a valve that is open by more so long after its stroke does not close."""
+
+_STABLE = 2.785  # step times rate of Runge-Kutta 4, on the negative real axis
+
+_MOSTLY = 0.5  # of all contacts: the floor, not the law, decides what they lose
+
+_LATE = math.radians(60.0)  # after the dead centre; a fast pump's valves close 30 degrees late
+
+
+def check_pump(scene: Scene) -> None:
+    """Check what only the physics can tell: rungs, step, sampling, files.
+
+    Raises
+    ------
+    SceneError
+        Every fault at once.
+    """
+    pump = cast(PumpScene, scene)
+    if pump.running:
+        steps_per_sample(pump)
+    else:
+        _refuse(pump, _rest_faults(pump))
+    measured_casing(pump)
+
+
+def simulate_pump(scene: Scene, seed: int, truth: bool, raise_on_failure: bool) -> Solution:
+    """Simulate one recording; see :func:`wearstate.sim.machine.simulate.simulate`."""
+    pump = cast(PumpScene, scene)
+    if not pump.running:
+        return _at_rest(pump, seed, truth)
+    try:
+        factor = steps_per_sample(pump)
+    except LimitError as error:
+        if raise_on_failure:
+            raise
+        return _failed(pump, error.status, {})
+    step = 1 / (pump.sample_rate * factor)
+    plan = _Plan(pump, factor)
+    run = run_scene(
+        pump, step=step, n_steps=plan.n_steps, start_angle=plan.first_angle, keep_states=truth
+    )
+    status = _judged(pump, run, plan) if run.status.ok else run.status
+    numerics = _numerics(pump, run, plan)
+    if not status.ok:
+        if raise_on_failure:
+            raise SimulationError(status, pump.name)
+        return _failed(pump, status, numerics)
+    pushes = plan.pushes(seed)
+    places, on_casing = with_pushes(pump, *casing_forces(pump, run), pushes)
+    acceleration, casing_numerics = _housing(pump, places, on_casing, 1 / step, factor)
+    signal, clipped = _measured(acceleration, plan.turned(run), plan, pushes, seed, run)
+    numerics |= casing_numerics
+    numerics["clipped_samples"] = clipped
+    return Solution(
+        signal=signal,
+        sample_rate=pump.sample_rate,
+        channels=channels_of(pump),
+        truth=_truth(run, plan) | _test_truth(plan, pushes) if truth else {},
+        status=status,
+        numerics=numerics,
+        warnings=_warnings(numerics),
+    )
+
+
+def _at_rest(pump: PumpScene, seed: int, truth: bool) -> Solution:
+    """A test of the casing while the crank stands: no force but those of the exciters."""
+    _refuse(pump, _rest_faults(pump))
+    plan = _Plan(pump, FEWEST_STEPS)
+    pushes = plan.pushes(seed)
+    places, forces = with_pushes(pump, (), np.zeros((plan.n_steps, 0)), pushes)
+    rate = pump.sample_rate * plan.factor
+    acceleration, numerics = _housing(pump, places, forces, rate, plan.factor)
+    angle = np.full(plan.n_samples, pump.drive.start_angle)
+    signal, clipped = _measured(acceleration, angle, plan, pushes, seed, None)
+    numerics |= {"step_s": 1 / rate, "steps": plan.n_steps, "mean_speed_hz": 0.0}
+    numerics |= {"estimated_error": 0.0, "clipped_samples": clipped}
+    return Solution(
+        signal=signal,
+        sample_rate=pump.sample_rate,
+        channels=channels_of(pump),
+        truth=_test_truth(plan, pushes) if truth else {},
+        status=Status.OK,
+        numerics=numerics,
+        warnings=_warnings(numerics),
+    )
+
+
+def _rest_faults(scene: PumpScene) -> list[str]:
+    needed = scene.duration * scene.sample_rate * FEWEST_STEPS * _BYTES_PER_STEP
+    if needed <= _MEMORY:
+        return _pushing_faults(scene)
+    return [
+        f"duration = {scene.duration:g} s at sample_rate = {scene.sample_rate:g} Hz needs "
+        f"{needed / 1e9:.3g} GB, must be <= {_MEMORY / 1e9:g} GB; shorten it or lower the rate",
+        *_pushing_faults(scene),
+    ]
+
+
+def _refuse(scene: PumpScene, faults: list[str]) -> None:
+    if faults:
+        raise SceneError(scene.name, faults)
+
+
+def _pushing_faults(scene: PumpScene) -> list[str]:
+    return [
+        fault
+        for i, part in enumerate(scene.exciters)
+        for fault in exciter_faults(
+            f"exciters.{i}", part, duration=scene.duration, sample_rate=scene.sample_rate
+        )
+    ]
+
+
+def _failed(scene: PumpScene, status: Status, numerics: dict[str, float | int | str]) -> Solution:
+    n_samples = round(scene.duration * scene.sample_rate)
+    return Solution(
+        signal=np.zeros((len(channels_of(scene)), n_samples), dtype=np.float32),
+        sample_rate=scene.sample_rate,
+        channels=channels_of(scene),
+        status=status,
+        numerics=numerics,
+    )
+
+
+class _Plan:
+    """Which steps are run, and which samples are kept."""
+
+    def __init__(self, scene: PumpScene, factor: int) -> None:
+        rate, speed = scene.sample_rate, scene.drive.speed
+        edge = edge_samples(factor)
+        settling = math.ceil(scene.settling_revolutions / speed * rate) + edge
+        self.scene = scene
+        self.factor = factor
+        self.n_samples = round(scene.duration * rate)
+        self.n_steps = (settling + self.n_samples + edge) * factor
+        self.kept = slice(settling, settling + self.n_samples)
+        # a sample stands for the middle of its first step, see decimate
+        before = (settling * factor + 0.5) / (rate * factor)
+        self.first_angle = scene.drive.start_angle - 2 * math.pi * speed * before
+        self.angle = scene.drive.start_angle + 2 * math.pi * speed * (
+            np.arange(self.n_samples) / rate
+        )
+
+    def pushes(self, seed: int) -> tuple[Push, ...]:
+        """Forces of the mounted exciters at all steps."""
+        first, last = self.kept.start * self.factor, self.kept.stop * self.factor
+        return casing_pushes(
+            self.scene,
+            n_steps=self.n_steps,
+            first=first,
+            last=last,
+            factor=self.factor,
+            seed=seed,
+        )
+
+    def turned(self, run: CrankRun) -> NDArray[np.float64]:
+        """Crank angle at the samples [rad]: exact at constant speed, else as the run made it."""
+        if self.scene.drive.rung == "constant-speed":
+            return self.angle
+        return self.at_samples(run.turns[:, 0])
+
+    def at_samples(self, ends: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Values at the samples from those at the ends of all steps, first axis time.
+
+        A sample stands for the middle of a step: its value is the mean of the step's two ends.
+        """
+        first, step = self.kept.start * self.factor, self.factor
+        last = first + self.n_samples * step
+        return np.asarray(0.5 * (ends[first:last:step] + ends[first + 1 : last + 1 : step]))
+
+
+class LimitError(SceneError):
+    """A scene beyond the limits of its methods; the status says which."""
+
+    def __init__(self, name: str, faults: list[str], status: Status) -> None:
+        self.status = status
+        super().__init__(name, faults)
+
+
+def steps_per_sample(scene: PumpScene) -> int:
+    """Integration steps per sample: what the contact needs, or what the scene asks for.
+
+    Raises
+    ------
+    SceneError
+        All of: an invalid rung, a recording shorter than a revolution or two samples, a pulse
+        shorter than two samples. Or: a step of less than a thousandth of a sample, a run that
+        needs more than 4 GB.
+    LimitError
+        A step too long for the contact, a contact too soft for its law or its clearance, a
+        pressure below that of the vapour, in a trial of two revolutions too; with the status a
+        sweep records.
+    """
+    faults = joint_faults(scene)
+    if faults:
+        raise SceneError(scene.name, [*faults, *_sampling_faults(scene)])
+    faults = _sampling_faults(scene)
+    beyond = limits(scene)
+    step = pump_step(scene)
+    if faults:
+        raise SceneError(scene.name, [*faults, *(fault for _, fault in beyond)])
+    if beyond:
+        raise LimitError(scene.name, [fault for _, fault in beyond], beyond[0][0])
+    wanted = 1 / (scene.sample_rate * step)
+    faults = [fault for fault in (_step_fault(scene, wanted), _size_fault(scene, wanted)) if fault]
+    if faults:
+        raise SceneError(scene.name, faults)
+    beyond = knock_limits(scene)
+    if beyond:
+        raise LimitError(scene.name, [fault for _, fault in beyond], beyond[0][0])
+    return max(FEWEST_STEPS, math.ceil(wanted - 1e-9))
+
+
+def _step_fault(scene: PumpScene, steps: float) -> str | None:
+    if steps - 1e-9 <= MOST_STEPS:  # the bound itself, whatever its rounding
+        return None
+    shortest = 1 / (scene.sample_rate * MOST_STEPS)
+    if scene.numerics.step is not None:
+        return (
+            f"numerics.step = {scene.numerics.step:g} s must be >= {shortest:.3g} s, "
+            f"{MOST_STEPS} steps a sample; lengthen it, or raise sample_rate"
+        )
+    return (
+        f"the contact needs steps of {shortest * MOST_STEPS / steps:.3g} s, must be >= "
+        f"{shortest:.3g} s, {MOST_STEPS} steps a sample; raise sample_rate, lower stiffness and "
+        "damping of the joints, or raise their speed_floor"
+    )
+
+
+def _size_fault(scene: PumpScene, steps: float) -> str | None:
+    """Refuse what would not fit the memory, before any of it is taken."""
+    time = scene.duration + scene.settling_revolutions / scene.drive.speed
+    per_step = _BYTES_PER_STEP * len(scene.throws)
+    needed = time * scene.sample_rate * max(steps, FEWEST_STEPS) * per_step
+    if needed <= _MEMORY:
+        return None
+    return (
+        f"duration = {scene.duration:g} s at sample_rate = {scene.sample_rate:g} Hz with "
+        f"{max(steps, FEWEST_STEPS):.0f} steps a sample needs {needed / 1e9:.3g} GB, must be <= "
+        f"{_MEMORY / 1e9:g} GB; shorten duration or settling_revolutions, lower sample_rate, "
+        "lengthen numerics.step, or raise a joint's speed_floor"
+    )
+
+
+def _sampling_faults(scene: PumpScene) -> list[str]:
+    revolution = 1 / scene.drive.speed
+    faults = _pushing_faults(scene)
+    if scene.duration < revolution:
+        faults.append(
+            f"duration = {scene.duration:g} s must be >= one revolution = {revolution:g} s; "
+            "record longer"
+        )
+    if scene.duration * scene.sample_rate < 2:
+        faults.append(
+            f"duration = {scene.duration:g} s must be >= 2 samples = {2 / scene.sample_rate:g} s; "
+            "raise sample_rate or record longer"
+        )
+    if scene.tacho and scene.tacho.pulse_width / (2 * math.pi) * revolution < 2 / scene.sample_rate:
+        faults.append(
+            f"tacho.pulse_width = {scene.tacho.pulse_width:g} rad must last >= 2 samples; "
+            "widen the pulse or raise sample_rate"
+        )
+    return faults
+
+
+# --- casing
+
+
+def casing_forces(scene: PumpScene, run: CrankRun) -> tuple[tuple[str, ...], NDArray[np.float64]]:
+    """Forces of the mechanism on the casing, summed over the throws that one key stands for.
+
+    Parameters
+    ----------
+    scene : PumpScene
+    run : CrankRun
+        Of the scene.
+
+    Returns
+    -------
+    places : tuple of str
+        Key of every column, as in a mode shape: a place, or that of one throw.
+    forces : numpy.ndarray [shape=(n_steps, n_places)]
+        Means over each step [N]: reactions of bearing and guide, liquid on the cylinder head,
+        valves on their seats, and what the unbalanced crank itself weighs and throws.
+    """
+    keys: dict[str, int] = {}
+    signs = np.zeros((run.forces.shape[1], len(scene.throws) * len(FORCE_PLACES)))
+    for throw in range(len(scene.throws)):
+        for place, (name, sign) in _throw_on_casing(scene, throw).items():
+            column = keys.setdefault(_force_key(scene, place, throw + 1), len(keys))
+            signs[1 + len(FORCES) * throw + FORCES.index(name), column] = sign
+    forces = run.forces @ signs[:, : len(keys)]
+    if scene.crank.unbalance > 0:
+        bearings = [keys[_force_key(scene, place, 1)] for place in ("bearing_x", "bearing_y")]
+        forces[:, bearings] += _crank_throws(scene, run)
+    return tuple(keys), forces
+
+
+def _throw_on_casing(scene: PumpScene, throw: int) -> dict[str, tuple[str, float]]:
+    """Force of the mechanism behind every place of the casing, and its sign there."""
+    reactions = {
+        "bearing_x": ("pin_x", -1.0),
+        "bearing_y": ("pin_y", -1.0),
+        "guide_y": ("guide_y", -1.0),
+        "cylinder_x": ("piston_x", -1.0),
+    }
+    if _rubs(scene, throw):
+        reactions |= {place: (place, -1.0) for place in GUIDE_PLACES}
+    if scene.pressures(throw).rung == "chamber":
+        reactions |= {place: (place, 1.0) for place in VALVE_PLACES}
+    return reactions
+
+
+def _rubs(scene: PumpScene, throw: int) -> bool:
+    return joint_rungs(scene, throw)[GUIDE] == JOINT_COMPLIANT
+
+
+def _crank_throws(scene: PumpScene, run: CrankRun) -> NDArray[np.float64]:
+    """What the unbalance of the crank does to its bearing (x, y), but for its steady weight."""
+    angle = 0.5 * (run.turns[:-1, 0] + run.turns[1:, 0]) + scene.throws[0].phase
+    speed = 0.5 * (run.turns[:-1, 1] + run.turns[1:, 1])
+    spin_up = np.diff(run.turns[:, 1]) / run.step
+    sin, cos = np.sin(angle), np.cos(angle)
+    along = scene.crank.unbalance * (speed**2 * cos + spin_up * sin)
+    across = scene.crank.unbalance * (speed**2 * sin - spin_up * cos)
+    return np.column_stack([along, across])
+
+
+def _force_key(scene: PumpScene, place: str, throw: int) -> str:
+    """Key under which the casing knows a force: that of its throw where there is one."""
+    if scene.casing.frf is not None:
+        return f"{place}_{throw}"
+    keys = {key for mode in scene.casing.modes for key in mode.shape}
+    return specific_key(keys, place, throw) or place
+
+
+def _split(key: str) -> tuple[str, int]:
+    """Place and throw of a key; a place for all throws is that of the first."""
+    place, _, throw = key.rpartition("_")
+    return (key, 1) if key in FORCE_PLACES else (place, int(throw))
+
+
+def _housing(
+    scene: PumpScene,
+    places: tuple[str, ...],
+    means: NDArray[np.float64],
+    step_rate: float,
+    factor: int,
+) -> tuple[NDArray[np.float64], dict[str, float | int | str]]:
+    """Acceleration at every accelerometer, and the numerics of a measured casing."""
+    accelerance = measured_casing(scene, places)
+    if accelerance is None:
+        modes = casing_modes(scene, places)
+        return band_limited_acceleration(means, step_rate, factor, modes), {}
+    run = table_acceleration(means, step_rate, factor, accelerance)
+    return run.acceleration, {
+        "frf_sha256": accelerance.sha256,
+        "frf_top_hz": float(accelerance.frequency[-1]),
+        "frf_late_share": accelerance.late_share(),
+        "frf_force_share_above": run.force_share_above,
+    }
+
+
+def measured_casing(scene: PumpScene, places: tuple[str, ...] = ()) -> Accelerance | None:
+    """Accelerance from the scene's file, None where the casing is given as modes.
+
+    Parameters
+    ----------
+    scene : PumpScene
+    places : tuple of str
+        Columns wanted; those of :func:`measured_places` by default.
+
+    Raises
+    ------
+    SceneError
+        The file cannot be used.
+    """
+    if scene.casing.frf is None:
+        return None
+    sensors = [sensor.name for sensor in scene.accelerometers]
+    inputs = tuple(_split(key) for key in places or measured_places(scene))
+    try:
+        return load_accelerance(scene.casing.frf, sensors, inputs)
+    except SceneError as error:
+        raise SceneError(scene.name, error.faults) from None
+
+
+def measured_places(scene: PumpScene) -> tuple[str, ...]:
+    """Places where the mechanism pushes on a measured casing, by throw.
+
+    Examples
+    --------
+    >>> from wearstate.sim.scene.load import load_scene
+    >>> measured_places(load_scene("bilge-pump"))[0]
+    'bearing_x_1'
+    """
+    return tuple(
+        f"{place}_{throw + 1}"
+        for throw in range(len(scene.throws))
+        for place in (
+            *CRANK_PLACES,
+            *(GUIDE_PLACES if _rubs(scene, throw) else ()),
+            *(VALVE_PLACES if scene.pressures(throw).rung == "chamber" else ()),
+        )
+    )
+
+
+def casing_modes(scene: PumpScene, places: tuple[str, ...]) -> Modes:
+    """Modes of a scene's casing on its feet as they are, at these places and all sensors.
+
+    Parameters
+    ----------
+    scene : PumpScene
+        Whose casing is given as modes.
+    places : tuple of str
+        Keys of mode shapes: of forces, or sensors that are pushed.
+
+    Examples
+    --------
+    >>> from wearstate.sim.scene.load import load_scene
+    >>> loose = {"casing.feet.bolt_stretch": 2e-4, "casing.feet.stretch_lost": 1e-4}
+    >>> modes = casing_modes(load_scene("bilge-pump", loose), ("bearing_x",))
+    >>> modes.inputs.shape, modes.frequency[0].round(1)
+    ((8, 1), np.float64(133.5))
+    """
+    modes, sensors = scene.casing.modes, scene.accelerometers
+    feet = scene.casing.feet
+    held = [mode.on_feet(1.0 if feet is None else feet.stiffness_ratio) for mode in modes]
+    return Modes(
+        frequency=np.array([frequency for frequency, _ in held]),
+        damping_ratio=np.array([ratio for _, ratio in held]),
+        inputs=np.array([[_participation(mode, key) for key in places] for mode in modes]),
+        outputs=np.array([[mode.shape[s.name] for s in sensors] for mode in modes]),
+    )
+
+
+def _participation(mode: CasingMode, key: str) -> float:
+    """Shape at the key of a force, or at a sensor that is pushed."""
+    return mode.shape[key] if key in mode.shape else casing_inputs(mode.shape, *_split(key))
+
+
+# --- recording
+
+
+def _measured(
+    acceleration: NDArray[np.float64],
+    angle: NDArray[np.float64],
+    plan: _Plan,
+    pushes: tuple[Push, ...],
+    seed: int,
+    run: CrankRun | None,
+) -> tuple[NDArray[np.float32], int]:
+    """Signal of every channel, and how many samples were clipped; no run where the crank stands."""
+    scene = plan.scene
+    rng = np.random.default_rng(seed)
+    rows, clipped = [], 0
+    for sensor, row in zip(scene.accelerometers, acceleration, strict=True):
+        channel, lost = digitise(
+            _front_end(sensor, row, scene.sample_rate)[plan.kept],
+            gain=sensor.gain,
+            noise=_floor(sensor, plan.n_samples, scene.sample_rate, rng),
+            full_scale=sensor.range,
+            bits=sensor.bits,
+            rng=rng,
+        )
+        rows.append(channel)
+        clipped += lost
+    cells, lost = read_cells(scene, pushes, plan.factor, plan.kept, rng)
+    rows += cells
+    clipped += lost
+    if run is None:
+        pressures, lost = pressures_at_rest(scene, plan.n_samples, rng)
+    else:
+        pressures, lost = read_pressures(scene, run, plan.factor, plan.kept, rng)
+    rows += pressures
+    clipped += lost
+    if scene.tacho and not scene.running:
+        rows.append(np.zeros(plan.n_samples, dtype=np.float32))
+    elif scene.tacho:
+        rows.append(scene.tacho.channel(angle))
+    return np.stack(rows), clipped
+
+
+def _floor(
+    sensor: Accelerometer, n: int, fs: float, rng: np.random.Generator
+) -> NDArray[np.float64]:
+    """What the sensor shows of a machine at rest [m/s^2, shape=(n,)]."""
+    noise = coloured_noise(n, fs, rms=sensor.noise, slope=sensor.noise_slope, rng=rng)
+    if sensor.mains > 0:
+        noise += mains_hum(n, fs, rms=sensor.mains, frequency=sensor.mains_frequency, rng=rng)
+    return noise
+
+
+def _front_end(sensor: Accelerometer, row: NDArray[np.float64], fs: float) -> NDArray[np.float64]:
+    """Whole run through mounting and anti-alias filter: they have settled when it is recorded."""
+    poles: list[NDArray[np.complex128]] = []
+    if sensor.mounting_resonance is not None and sensor.mounting_damping is not None:
+        poles.append(mounting_poles(sensor.mounting_resonance, sensor.mounting_damping))
+    if sensor.anti_alias != "none" and sensor.anti_alias_cutoff and sensor.anti_alias_order:
+        poles.append(
+            anti_alias_poles(sensor.anti_alias, sensor.anti_alias_cutoff, sensor.anti_alias_order)
+        )
+    return low_pass(row, fs, np.concatenate(poles)) if poles else row
+
+
+def _judged(scene: PumpScene, run: CrankRun, plan: _Plan) -> Status:
+    """A column that tears; a valve that never shuts in time, its spring too soft for the speed."""
+    if torn_in_run(scene, run, plan.kept.start * plan.factor):
+        return Status.VAPOUR
+    return Status.VALVE_OPEN if _lift_left(scene, run, plan) > _LIFT_LEFT else Status.OK
+
+
+def _lift_left(scene: PumpScene, run: CrankRun, plan: _Plan) -> float:
+    """Least lift left in the idle strokes of any free valve, over the stop's: what recurs."""
+    begin = plan.kept.start * plan.factor  # after settling
+    if run.chambers is None or len(run.turns) <= begin:  # a run may fail before
+        return 0.0
+    largest = 0.0
+    for throw in range(len(scene.throws)):
+        if _cavitates(run, throw):
+            continue
+        pressure = scene.pressures(throw)
+        angle = run.turns[begin:, 0] + scene.throws[throw].phase
+        sides = (("suction", pressure.suction_valve, 2), ("discharge", pressure.discharge_valve, 4))
+        for side, valve, column in sides:
+            if valve is None or valve.stuck_lift is not None:
+                continue
+            lift = run.chambers[begin:, throw, column]
+            left = lift_left(angle, lift, side, valve.max_lift, after=_LATE)
+            if left.size:
+                largest = max(largest, float(left.min()))
+    return largest
+
+
+def _cavitates(run: CrankRun, throw: int) -> bool:
+    """Vapour keeps the suction valve open until it is refilled, whatever its spring."""
+    return run.chambers is not None and bool(np.any(run.chambers[:, throw, 1] > 0))
+
+
+def _rung_of(part: Any) -> str:
+    return "ideal" if part is None else str(part.rung)
+
+
+def _numerics(scene: PumpScene, run: CrankRun, plan: _Plan) -> dict[str, float | int | str]:
+    steps = len(run.forces)
+    numerics: dict[str, float | int | str] = {
+        "rung_joint": scene.joint.crankpin.rung,
+        "rung_wristpin": _rung_of(scene.joint.wristpin),
+        "rung_guide": _rung_of(scene.joint.guide),
+        "rung_pressure": scene.pressure.rung,
+        "rung_drive": scene.drive.rung,
+        "contact_law": scene.joint.crankpin.law,
+        "step_s": run.step,
+        "steps": steps,
+        "step_per_contact_time": run.step * contact_rate(scene),
+        "stability_margin": 1 - run.step * contact_rate(scene) / _STABLE,
+        # Runge-Kutta 4 turns the fastest contact too slowly by this share
+        "estimated_error": (run.step * contact_rate(scene)) ** 4 / 120,
+        "contact_changes": run.contact_changes,
+        "cuts_refused": run.cuts_refused,
+        "peak_normal_force_n": run.peak_normal_force,
+        "mean_speed_hz": float(run.turns[:, 1].mean()) / (2 * math.pi),
+    }
+    rungs = [joint_rungs(scene, throw) for throw in range(len(scene.throws))]
+    if any(JOINT_COMPLIANT in row for row in rungs) and _has_hysteresis(scene):
+        closings = max(1, run.contact_changes // 2)
+        numerics["floored_share"] = run.floored_closings / closings
+        numerics["speed_floor_m_s"] = max(
+            float(contact_table(scene, throw)["speed_floor"][:2].min())
+            for throw in range(len(scene.throws))
+        )
+    lowest = lowest_of_run(scene, run, plan.kept.start * plan.factor)
+    if math.isfinite(lowest):
+        numerics["lowest_pressure_pa"] = lowest
+    if any(JOINT_LINK in row for row in rungs):
+        numerics["tension_share"] = run.tension_steps / max(1, steps * len(rungs))
+    if run.chambers is not None:
+        numerics["cavitating_share"] = run.vapour_steps / max(1, steps * len(rungs))
+        numerics["lift_left"] = _lift_left(scene, run, plan)
+    return numerics
+
+
+def _has_hysteresis(scene: PumpScene) -> bool:
+    parts = (scene.joint.crankpin, scene.joint.wristpin, scene.joint.guide)
+    return any(part is not None and part.law != "kelvin-voigt" for part in parts)
+
+
+def _warnings(numerics: dict[str, float | int | str]) -> tuple[str, ...]:
+    """What a user must know of a run that did not fail."""
+    found = []
+    if float(numerics.get("tension_share", 0.0)) > 0:
+        found.append(
+            f"contact would be lost in {float(numerics['tension_share']):.1%} of the steps: a "
+            "massless link is in tension; set the joint's rung to 'compliant'"
+        )
+    if float(numerics.get("cavitating_share", 0.0)) > 0:
+        found.append(
+            f"a cylinder holds vapour in {float(numerics['cavitating_share']):.1%} of the steps: "
+            "the suction cavitates"
+        )
+    if float(numerics.get("floored_share", 0.0)) > _MOSTLY:
+        found.append(
+            f"{float(numerics['floored_share']):.1%} of the contacts closed more slowly than "
+            f"{float(numerics['speed_floor_m_s']):.3g} m/s, the floor of the contact law: they "
+            "were damped less than the law says"
+        )
+    if int(numerics.get("clipped_samples", 0)) > 0:
+        found.append(f"{numerics['clipped_samples']} samples clipped; widen the sensor's range")
+    return tuple(found)
+
+
+def _test_truth(plan: _Plan, pushes: tuple[Push, ...]) -> dict[str, Any]:
+    if not pushes:
+        return {}
+    forces = np.stack([push.along for push in pushes], axis=1)
+    return {"test_force_n": decimate(forces, plan.factor)[plan.kept]}
+
+
+def _truth(run: CrankRun, plan: _Plan) -> dict[str, Any]:
+    """Forces, low-passed as the signal is, and states at the sample instants, per throw."""
+    truth: dict[str, Any] = {"state_alpha": plan.turned(run)}
+    truth["state_alpha_rate"] = plan.at_samples(run.turns[:, 1])
+    throws = range(len(plan.scene.throws))
+    columns = [1 + len(FORCES) * throw + FORCES.index(name) for throw in throws for name in _KEPT]
+    force = decimate(run.forces[:, [0, *columns]], plan.factor)[plan.kept]  # it costs by the column
+    truth["drive_moment_n_m"] = force[:, 0]
+    for throw in throws:
+        suffix = f"_{throw + 1}" if throw else ""
+        own = force[:, 1 + len(_KEPT) * throw :]
+        truth |= {f"{name}{suffix}": value for name, value in _throw_truth(run, plan, throw, own)}
+    return truth
+
+
+_KEPT = ("pin_x", "pin_y", "wrist_x", "wrist_y", "guide_y", "piston_x")
+"""Forces of a throw in the truth."""
+
+
+def _throw_truth(
+    run: CrankRun, plan: _Plan, throw: int, force: NDArray[np.float64]
+) -> list[tuple[str, NDArray[np.float64]]]:
+    assert run.bodies is not None  # truth was asked for
+    bodies = plan.at_samples(run.bodies[:, throw])
+    offsets = pin_offsets(plan.scene, plan.turned(run), bodies, throw)
+    found = [
+        ("pin_force_n", force[:, 0:2]),
+        ("wrist_force_n", force[:, 2:4]),
+        ("guide_force_n", force[:, 4]),
+        ("piston_pressure_force_n", -force[:, 5]),  # positive towards the crank
+        ("pin_offset_m", offsets[:, 0:2]),
+        ("wrist_offset_m", offsets[:, 2:4]),
+        ("state_piston", bodies[:, 3]),
+        ("state_piston_velocity", bodies[:, 9]),
+        ("state_piston_across", bodies[:, 4]),
+        ("state_piston_tilt", bodies[:, 5]),
+        ("state_beta", bodies[:, 2]),
+        ("state_beta_rate", bodies[:, 8]),
+    ]
+    if run.chambers is not None:
+        chamber = plan.at_samples(run.chambers[:, throw])
+        found += [
+            ("cylinder_pressure_pa", chamber[:, 0]),
+            ("suction_lift_m", chamber[:, 2]),
+            ("discharge_lift_m", chamber[:, 4]),
+        ]
+    return found

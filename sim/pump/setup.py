@@ -1,0 +1,738 @@
+"""From a pump scene to the crank mechanism: tables, start, contact rates, and the closed form."""
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..contact.closed_forms import IdealCrank, conformal_stiffness, ideal_crank
+from ..contact.law import (
+    CONTACT,
+    ELASTIC_CONFORMAL,
+    ELASTIC_HERTZ,
+    ELASTIC_LINEAR,
+    FRICTION_RAMP,
+    FRICTION_SMOOTH,
+    LAW_HYSTERESIS,
+    LAW_KELVIN_VOIGT,
+    RELEASE_AT_ZERO_FORCE,
+    RELEASE_AT_ZERO_PENETRATION,
+    elastic_force,
+    elastic_stiffness,
+    hysteresis,
+)
+from ..jit import kernel
+from ..scene.pump import Guide, PumpScene, RevoluteJoint
+from .hydraulics import (
+    HYDRAULIC,
+    PRESSURE_CHAMBER,
+    chamber_start,
+    chamber_substeps,
+    hydraulic_parameters,
+    line_pressure,
+)
+from .slider_crank import (
+    CRANKPIN,
+    GUIDE,
+    JOINT_COMPLIANT,
+    JOINT_IDEAL,
+    JOINT_LINK,
+    THROW,
+    WRISTPIN,
+    CrankRun,
+    Machine,
+    Tables,
+    run_mechanism,
+)
+
+STEP_PER_CONTACT_TIME = 0.3
+"""Default step times the contact's fastest angular frequency: 21 steps a contact period."""
+
+STEP_PER_CONTACT_DECAY = 0.7
+"""Default step times the contact's fastest decay, where damping is beyond critical."""
+
+LARGEST_STEP_PER_CONTACT_TIME = 1.0
+"""A step longer than this over the contact's rate is refused: Runge-Kutta 4 stays stable to 2.8
+but is no longer accurate."""
+
+_BAUMGARTE_PER_RADIAN = 30.0
+"""Decay rate of constraint drift over the crank speed. Not over the step: a rate that grew as the
+step shrinks would feed the stages' own drift back as a force that never shrinks, order 1."""
+
+_BAUMGARTE_PER_STEP = 0.1
+"""Most of that rate times the step, far from RK4's limit of 2.8."""
+
+JOINT_CODES = {"ideal": JOINT_IDEAL, "link": JOINT_LINK, "compliant": JOINT_COMPLIANT}
+"""Rung of a joint in the scene -> code of the kernels, from the cheapest to the best."""
+
+_ANGLES = 360  # of a revolution, for the forces an ideal mechanism would carry
+
+
+def joint_parts(
+    scene: PumpScene, throw: int
+) -> tuple[RevoluteJoint, RevoluteJoint | None, Guide | None]:
+    """Crank pin, wrist pin and guide of a throw, in the order of the contact table."""
+    joint = scene.joints(throw)
+    return joint.crankpin, joint.wristpin, joint.guide
+
+
+def joint_rungs(scene: PumpScene, throw: int) -> tuple[int, int, int]:
+    """Codes of crank pin, wrist pin and guide of a throw; an absent joint is ideal."""
+    first, second, third = (
+        JOINT_IDEAL if part is None else JOINT_CODES[part.rung]
+        for part in joint_parts(scene, throw)
+    )
+    return first, second, third
+
+
+def hydraulics_of(scene: PumpScene, throw: int) -> NDArray[np.void]:
+    """Hydraulics of one throw, one record."""
+    return hydraulic_parameters(
+        scene.pressures(throw),
+        area=piston_area(scene),
+        crank_radius=scene.crank.radius,
+        rod_length=scene.rod.length,
+        speed=2 * math.pi * scene.drive.speed,
+    )
+
+
+def piston_area(scene: PumpScene) -> float:
+    """Area that the liquid pushes on [m^2]."""
+    return math.pi / 4 * scene.piston.diameter**2
+
+
+def _gravity(scene: PumpScene) -> tuple[float, float]:
+    return (
+        scene.gravity * math.sin(scene.stroke_inclination),
+        scene.gravity * math.cos(scene.stroke_inclination),
+    )
+
+
+# --- the closed form
+
+
+def ideal_motion(scene: PumpScene, angle: NDArray[np.float64], throw: int = 0) -> IdealCrank:
+    """Inverse dynamics of a throw without clearance at constant speed.
+
+    Parameters
+    ----------
+    scene : PumpScene
+    angle : numpy.ndarray
+        Crank angle of the first throw [rad].
+    throw : int
+        Counted from 0.
+
+    Returns
+    -------
+    IdealCrank
+        With the pressure of the scene's rung; the rung *chamber*, which has a memory, is stood
+        in for by its two levels.
+    """
+    speed = 2 * math.pi * scene.drive.speed
+    gravity_x, gravity_y = _gravity(scene)
+    own = np.asarray(angle, dtype=float) + scene.throws[throw].phase
+    known: dict[str, Any] = {
+        "speed": speed,
+        "crank_radius": scene.crank.radius,
+        "rod_length": scene.rod.length,
+        "rod_mass": scene.rod.mass,
+        "rod_centre": scene.rod.centre_of_mass,
+        "rod_inertia": scene.rod.inertia,
+        "piston_mass": scene.piston.mass,
+        "gravity_x": gravity_x,
+        "gravity_y": gravity_y,
+    }
+    motion = ideal_crank(own, **known)
+    pressure, added = np.empty(own.size), np.empty(own.size)
+    velocity = np.ravel(motion.piston_velocity)
+    liquid = _without_memory(scene, throw)
+    _line_pressures(np.ravel(own), speed, velocity, liquid, pressure, added)
+    force = piston_area(scene) * pressure + added * np.ravel(motion.piston_acceleration)
+    return ideal_crank(own, piston_force=force.reshape(own.shape), **known)
+
+
+@kernel
+def _line_pressures(
+    angle: Any, speed: float, velocity: Any, liquid: Any, pressure: Any, added: Any
+) -> None:
+    for i in range(angle.size):
+        pressure[i], added[i] = line_pressure(angle[i], speed, velocity[i], liquid[0])
+
+
+def _without_memory(scene: PumpScene, throw: int) -> NDArray[np.void]:
+    pressure = scene.pressures(throw)
+    if pressure.rung == "chamber":
+        pressure = pressure.model_copy(update={"rung": "two-level"})
+    return hydraulic_parameters(
+        pressure,
+        area=piston_area(scene),
+        crank_radius=scene.crank.radius,
+        rod_length=scene.rod.length,
+        speed=2 * math.pi * scene.drive.speed,
+    )
+
+
+def joint_loads(scene: PumpScene, throw: int) -> tuple[float, float, float]:
+    """Largest forces of crank pin, wrist pin and guide over a revolution, without clearance [N]."""
+    motion = ideal_motion(scene, np.linspace(0.0, 2 * math.pi, _ANGLES, endpoint=False), throw)
+    return (
+        float(np.hypot(motion.pin_force_x, motion.pin_force_y).max()),
+        float(np.hypot(motion.wrist_force_x, motion.wrist_force_y).max()),
+        float(np.abs(motion.guide_force).max()),
+    )
+
+
+# --- contacts
+
+
+def contact_record(
+    part: RevoluteJoint | Guide, clearance: float, load: float, mobility: float
+) -> NDArray[np.void]:
+    """Kernel record of one contact.
+
+    Parameters
+    ----------
+    part : RevoluteJoint or Guide
+        Of the scene, not ideal.
+    clearance : float
+        Radial, or on either side of a guide [m].
+    load : float
+        Largest force of the ideal joint [N], which places the floor of the impact speed.
+    mobility : float
+        Largest acceleration of the contact per unit force [1/kg].
+
+    Returns
+    -------
+    numpy.ndarray [shape=(1,), dtype=CONTACT]
+        Where the scene sets no ``speed_floor``, a hysteresis law gets the speed at which the
+        damping of sustained contact under `load`, ``a F / v``, is twice the critical one: slower
+        impacts are swallowed whatever the law says, and without a floor the damping has no bound.
+        The swing of a massless link is damped by half the critical damping under `load`: what a
+        pin loses that slides along its eye to the other side.
+    """
+    record = np.zeros(1, dtype=CONTACT)
+    kelvin_voigt = part.law == "kelvin-voigt"
+    code, stiffness = {
+        "linear": (ELASTIC_LINEAR, part.stiffness),
+        "hertz": (ELASTIC_HERTZ, part.hertz_stiffness),
+        "conformal": (
+            ELASTIC_CONFORMAL,
+            conformal_stiffness(part.effective_modulus or 0.0, part.contact_length or 0.0)
+            if part.elasticity == "conformal"
+            else None,
+        ),
+    }[part.elasticity]
+    values = {
+        "law": LAW_KELVIN_VOIGT if kelvin_voigt else LAW_HYSTERESIS,
+        "elasticity": code,
+        "stiffness": stiffness or 0.0,
+        "damping": part.damping,
+        "hysteresis": 0.0 if kelvin_voigt else hysteresis(part.law, part.restitution or 0.0),
+        "clearance": clearance,
+        "release": RELEASE_AT_ZERO_FORCE if kelvin_voigt else RELEASE_AT_ZERO_PENETRATION,
+        "friction_law": FRICTION_RAMP if part.friction_law == "ramp" else FRICTION_SMOOTH,
+        "friction": part.friction,
+        "friction_speed": part.friction_speed,
+        "friction_dead_speed": part.friction_dead_speed,
+        "tangential_damping": part.tangential_damping,
+        "speed_floor": part.speed_floor or 1.0,
+    }
+    for name, value in values.items():
+        record[name] = value
+    if part.rung == "link":
+        record["damping"] = _LINK_DAMPING * 2 * math.sqrt(load / max(clearance, 1e-12) / mobility)
+    elif not kelvin_voigt and part.speed_floor is None and stiffness:
+        spring = tangent_stiffness(record[0], load)
+        most = _MOST_DAMPING * 2 * math.sqrt(spring / mobility)
+        record["speed_floor"] = max(float(record["hysteresis"][0]) * load / most, 1e-9)
+    return record
+
+
+def penetration_under(contact: Any, force: float) -> float:
+    """Penetration at which the elastic force of a contact record is `force` [m].
+
+    Bisection on the compiled law, so that a further elasticity needs nothing here.
+    """
+    high = 1e-9
+    while elastic_force(high, contact) < force and high < 1.0:
+        high *= 2.0
+    low = 0.0
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        if elastic_force(middle, contact) < force:
+            low = middle
+        else:
+            high = middle
+    return high
+
+
+def tangent_stiffness(contact: Any, force: float) -> float:
+    """Stiffness of a contact record at a given force [N/m]."""
+    return float(elastic_stiffness(penetration_under(contact, force), contact))
+
+
+_MOST_DAMPING = 2.0  # of the critical one, where a hysteresis law would have no bound
+_LINK_DAMPING = 0.5  # of the critical one
+
+_PEAK_OVER_LOAD = 3.0  # what a knock may add to the ideal load, where the elasticity is not linear
+
+
+def _rod_jacobian(scene: PumpScene, beta: float) -> NDArray[np.float64]:
+    """Relative motion of pin and eye at crank pin (x, y), wrist pin (x, y), guide (y, two ends).
+
+    Columns: rod x, y, beta; piston x, y, tilt.
+    """
+    arm, centre = scene.rod.length - scene.rod.centre_of_mass, scene.rod.centre_of_mass
+    s, c = math.sin(beta), math.cos(beta)
+    reach = scene.joint.guide.length / 2 if scene.joint.guide else 0.0
+    return np.array(
+        [
+            [-1.0, 0.0, -arm * s, 0.0, 0.0, 0.0],
+            [0.0, -1.0, -arm * c, 0.0, 0.0, 0.0],
+            [-1.0, 0.0, centre * s, 1.0, 0.0, 0.0],
+            [0.0, -1.0, centre * c, 0.0, 1.0, 0.0],
+            [0.0, 0.0, 0.0, 0.0, 1.0, reach],
+            [0.0, 0.0, 0.0, 0.0, 1.0, -reach],
+        ]
+    )
+
+
+_JOINT_ROWS = (slice(0, 2), slice(2, 4), slice(4, 6))
+
+
+def _compliance(scene: PumpScene, throw: int, beta: float) -> NDArray[np.float64]:
+    """Acceleration of every row of the jacobian per force along every other [1/kg]."""
+    rod, piston = scene.rod, scene.piston
+    rungs = joint_rungs(scene, throw)
+    free = rungs[GUIDE] == JOINT_COMPLIANT
+    inverse = np.diag(
+        [
+            1 / rod.mass,
+            1 / rod.mass,
+            1 / rod.inertia,
+            1 / piston.mass,
+            1 / piston.mass if free else 0.0,
+            1 / piston.inertia if free and piston.inertia else 0.0,
+        ]
+    )
+    jacobian = _rod_jacobian(scene, beta)
+    held = [
+        row
+        for joint in (CRANKPIN, WRISTPIN)
+        if rungs[joint] == JOINT_IDEAL
+        for row in jacobian[_JOINT_ROWS[joint]]
+    ]
+    if held:
+        fixed = np.array(held)
+        through = inverse @ fixed.T
+        inverse = inverse - through @ np.linalg.pinv(fixed @ through) @ through.T
+    return np.asarray(jacobian @ inverse @ jacobian.T)
+
+
+def _betas(scene: PumpScene) -> NDArray[np.float64]:
+    largest = math.asin(min(1.0, scene.crank.radius / scene.rod.length))
+    return np.linspace(0.0, largest, 5)
+
+
+def joint_mobility(scene: PumpScene, throw: int, joint: int) -> float:
+    """Largest acceleration of a joint per unit force in it, over a revolution [1/kg]."""
+    rows = _JOINT_ROWS[joint]
+    return max(
+        float(np.linalg.eigvalsh(_compliance(scene, throw, beta)[rows, rows])[-1])
+        for beta in _betas(scene)
+    )
+
+
+def _largest(scene: PumpScene, throw: int, weights: list[float]) -> float:
+    """Largest eigenvalue of the mechanism on springs (or dampers) in its joints."""
+    root = np.sqrt(np.repeat(weights, 2))
+    return max(
+        float(np.linalg.eigvalsh(root[:, None] * _compliance(scene, throw, beta) * root)[-1])
+        for beta in _betas(scene)
+    )
+
+
+def _springs_and_dampers(scene: PumpScene, throw: int) -> tuple[list[float], list[float]]:
+    """Tangent stiffness and damping of every joint: a link's own stiffness is load over length."""
+    springs, dampers = [], []
+    records = contact_table(scene, throw)
+    loads = joint_loads(scene, throw)
+    rungs = joint_rungs(scene, throw)
+    for joint, (record, load, rung) in enumerate(zip(records, loads, rungs, strict=True)):
+        peak = _PEAK_OVER_LOAD * load
+        if rung == JOINT_COMPLIANT:
+            linear = record["elasticity"] == ELASTIC_LINEAR
+            springs.append(
+                float(record["stiffness"]) if linear else tangent_stiffness(record, peak)
+            )
+            loss = record["hysteresis"] * load / max(record["speed_floor"], 1e-12)
+            dampers.append(float(max(record["damping"], loss)))
+        elif rung == JOINT_LINK and joint != GUIDE:
+            springs.append(load / max(float(record["clearance"]), 1e-12))
+            dampers.append(float(record["damping"]))
+        else:
+            springs.append(0.0)
+            dampers.append(0.0)
+    return springs, dampers
+
+
+def contact_frequency(scene: PumpScene) -> float:
+    """Largest angular frequency of the mechanism on its undamped contact springs [rad/s].
+
+    The mass felt at a joint depends on the direction; its least value over a revolution sets the
+    fastest contact, and so the step. 0 where every joint is ideal.
+    """
+    return max(
+        math.sqrt(_largest(scene, throw, _springs_and_dampers(scene, throw)[0]))
+        for throw in _different_throws(scene)
+    )
+
+
+def contact_rate(scene: PumpScene) -> float:
+    """Fastest rate of the damped contacts [1/s]: largest root of ``s^2 + C/m s + K/m``.
+
+    The contact's angular frequency while it oscillates; beyond critical damping the faster of
+    its two decays, which is what limits an explicit step.
+    """
+    return max(_rate(scene, throw) for throw in _different_throws(scene))
+
+
+def _rate(scene: PumpScene, throw: int) -> float:
+    springs, dampers = _springs_and_dampers(scene, throw)
+    half, square = _largest(scene, throw, dampers) / 2, _largest(scene, throw, springs)
+    return half + math.sqrt(half**2 - square) if half**2 > square else math.sqrt(square)
+
+
+def _different_throws(scene: PumpScene) -> list[int]:
+    """Throws that differ in their joints from those before: equal ones have equal rates."""
+    seen: list[Any] = []
+    found = []
+    for throw in range(len(scene.throws)):
+        key = (scene.joints(throw), scene.pressures(throw))
+        if key not in seen:
+            seen.append(key)
+            found.append(throw)
+    return found
+
+
+def contact_table(scene: PumpScene, throw: int) -> NDArray[np.void]:
+    """Contact records of one throw: crank pin, wrist pin, guide; an ideal joint's is empty.
+
+    Returns
+    -------
+    numpy.ndarray [shape=(3,), dtype=CONTACT]
+    """
+    table = np.zeros(3, dtype=CONTACT)
+    table["friction_speed"] = table["speed_floor"] = 1.0  # an unused record divides by neither
+    loads = joint_loads(scene, throw)
+    for joint, part in enumerate(joint_parts(scene, throw)):
+        if part is None or part.rung == "ideal":
+            continue
+        clearance = part.clearance_radial
+        mobility = joint_mobility(scene, throw, joint)
+        table[joint] = contact_record(part, clearance, loads[joint], mobility)[0]
+    return table
+
+
+# --- tables and start
+
+
+def throw_record(scene: PumpScene, throw: int, step: float) -> NDArray[np.void]:
+    """Kernel record of one throw.
+
+    Returns
+    -------
+    numpy.ndarray [shape=(1,), dtype=THROW]
+    """
+    rod, piston, joint = scene.rod, scene.piston, scene.joints(throw)
+    crankpin, wristpin, guide = joint_rungs(scene, throw)
+    free = guide == JOINT_COMPLIANT
+    liquid = hydraulics_of(scene, throw)[0]
+    breathing = int(liquid["rung"]) == PRESSURE_CHAMBER
+    record = np.zeros(1, dtype=THROW)
+    values = {
+        "phase": scene.throws[throw].phase,
+        "crank_radius": scene.crank.radius,
+        "rod_centre": rod.centre_of_mass,
+        "rod_arm": rod.length - rod.centre_of_mass,
+        "rod_mass": rod.mass,
+        "inverse_rod_mass": 1 / rod.mass,
+        "inverse_rod_inertia": 1 / rod.inertia,
+        "piston_mass": piston.mass,
+        "inverse_piston_across": 1 / piston.mass if free else 0.0,
+        "inverse_piston_tilt": 1 / piston.inertia if free and piston.inertia else 0.0,
+        "piston_area": piston_area(scene),
+        "crankpin_rung": crankpin,
+        "wristpin_rung": wristpin,
+        "guide_rung": guide,
+        "crankpin_radius": joint.crankpin.pin_diameter / 2,
+        "wristpin_radius": joint.wristpin.pin_diameter / 2 if joint.wristpin else 0.0,
+        "guide_half_length": joint.guide.length / 2 if joint.guide else 0.0,
+        "guide_half_height": joint.guide.height / 2 if joint.guide else 1.0,
+        "pressure_rung": liquid["rung"],
+        "substeps": chamber_substeps(liquid, step) if breathing else 1,
+    }
+    for name, value in values.items():
+        record[name] = value
+    return record
+
+
+def tables(scene: PumpScene, step: float) -> Tables:
+    """Everything the mechanism's kernel needs of a scene, at this step [s]."""
+    throws = range(len(scene.throws))
+    gravity_x, gravity_y = _gravity(scene)
+    motor = scene.drive.motor if scene.drive.rung == "motor" else None
+    return Tables(
+        throws=np.concatenate([throw_record(scene, throw, step) for throw in throws]),
+        contacts=np.stack([contact_table(scene, throw) for throw in throws]),
+        liquid=np.concatenate([hydraulics_of(scene, throw) for throw in throws]).astype(HYDRAULIC),
+        machine=Machine(
+            gravity_x=gravity_x,
+            gravity_y=gravity_y,
+            inverse_inertia=1 / motor.inertia if motor else 0.0,
+            static_moment=scene.crank.unbalance,
+            drive_moment=0.0,
+            synchronous_speed=2 * math.pi * motor.synchronous_speed if motor else 0.0,
+            breakdown_moment=motor.breakdown_moment if motor else 0.0,
+            breakdown_slip=motor.breakdown_slip if motor else 0.0,
+            baumgarte=min(
+                _BAUMGARTE_PER_RADIAN * 2 * math.pi * scene.drive.speed, _BAUMGARTE_PER_STEP / step
+            ),
+        ),
+    )
+
+
+def start_state(scene: PumpScene, angle: float, t: Tables) -> NDArray[np.float64]:
+    """State of every throw in which its pins rest in their eyes under the ideal joint's forces.
+
+    Parameters
+    ----------
+    scene : PumpScene
+    angle : float
+        Crank angle [rad].
+    t : Tables
+        Of the scene.
+
+    Returns
+    -------
+    numpy.ndarray [shape=(n_throws, 12)]
+        Columns as ``BODY``, then their rates. Pins and eyes move together.
+    """
+    rows = [_throw_start(scene, angle, throw, t) for throw in range(len(scene.throws))]
+    return np.array(rows)
+
+
+def _rest(contact: Any, rung: int, force: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Where a pin rests from its eye's centre under a force on the rod."""
+    size = float(np.hypot(*force))
+    if rung == JOINT_IDEAL:
+        return np.zeros(2)
+    direction = force / size if size > 0 else np.array([1.0, 0.0])
+    pressed = penetration_under(contact, size) if rung == JOINT_COMPLIANT else 0.0
+    return np.asarray((float(contact["clearance"]) + pressed) * direction)
+
+
+def _throw_start(scene: PumpScene, angle: float, throw: int, t: Tables) -> NDArray[np.float64]:
+    ideal = ideal_motion(scene, np.array([angle]), throw)
+    rungs = joint_rungs(scene, throw)
+    contacts = t.contacts[throw]
+    radius, length, centre = scene.crank.radius, scene.rod.length, scene.rod.centre_of_mass
+    own = angle + scene.throws[throw].phase
+    turn = 2 * math.pi * scene.drive.speed
+    on_pin = np.array([ideal.pin_force_x[0], ideal.pin_force_y[0]])
+    on_wrist = -np.array([ideal.wrist_force_x[0], ideal.wrist_force_y[0]])
+    at_pin = _rest(contacts[CRANKPIN], rungs[CRANKPIN], on_pin)
+    at_wrist = _rest(contacts[WRISTPIN], rungs[WRISTPIN], on_wrist)
+    across = 0.0
+    if rungs[GUIDE] == JOINT_COMPLIANT:  # two corners carry the guide's force
+        force = float(ideal.guide_force[0])
+        pressed = penetration_under(contacts[GUIDE], abs(force) / 2)
+        across = -math.copysign(float(contacts[GUIDE]["clearance"]) + pressed, force)
+    pin = radius * np.array([math.cos(own), math.sin(own)])
+    eye = pin - at_pin
+    # out of reach only where the contact is far too soft: the run then says so by its status
+    sin_b = min(1.0, max(-1.0, (eye[1] - across + at_wrist[1]) / length))
+    beta = math.asin(sin_b)
+    cos_b = math.cos(beta)
+    piston = eye[0] + at_wrist[0] + length * cos_b
+    beta_rate = radius * turn * math.cos(own) / (length * cos_b)
+    piston_rate = -radius * turn * math.sin(own) - length * beta_rate * sin_b
+    small = np.array([piston, across]) - at_wrist
+    return np.array(
+        [
+            small[0] - centre * cos_b,
+            small[1] + centre * sin_b,
+            beta,
+            piston,
+            across,
+            0.0,
+            piston_rate + centre * sin_b * beta_rate,
+            centre * cos_b * beta_rate,
+            beta_rate,
+            piston_rate,
+            0.0,
+            0.0,
+        ]
+    )
+
+
+def start_chambers(t: Tables, bodies: NDArray[np.float64]) -> NDArray[np.float64]:
+    """State of every chamber at the start; zeros where there is none.
+
+    Returns
+    -------
+    numpy.ndarray [shape=(n_throws, 6)]
+    """
+    chambers = np.zeros((len(t.throws), 6))
+    for throw, liquid in enumerate(t.liquid):
+        if liquid["rung"] == PRESSURE_CHAMBER:
+            chambers[throw] = chamber_start(liquid, bodies[throw, 3], bodies[throw, 9])
+    return chambers
+
+
+# --- runs
+
+
+def needs_integration(scene: PumpScene) -> bool:
+    """False where the closed form says all: ideal joints, constant speed, pressure by angle."""
+    ideal = all(
+        rung == JOINT_IDEAL
+        for throw in range(len(scene.throws))
+        for rung in joint_rungs(scene, throw)
+    )
+    breathing = any(scene.pressures(k).rung == "chamber" for k in range(len(scene.throws)))
+    return not ideal or breathing or scene.drive.rung != "constant-speed"
+
+
+def run_scene(
+    scene: PumpScene, *, step: float, n_steps: int, start_angle: float, keep_states: bool = False
+) -> CrankRun:
+    """Run the mechanism of a scene: in closed form where that says all, else step by step.
+
+    Parameters
+    ----------
+    scene : PumpScene
+    step : float
+        [s], at most ``LARGEST_STEP_PER_CONTACT_TIME`` over :func:`contact_rate`.
+    n_steps : int
+        Steps to take.
+    start_angle : float
+        Crank angle at the start [rad].
+    keep_states : bool
+        Keep bodies and chambers at the ends of all steps.
+
+    Returns
+    -------
+    CrankRun
+        Cut off at the step in which it failed where the status is not OK.
+    """
+    if not needs_integration(scene):
+        return _run_ideal(scene, step=step, n_steps=n_steps, start_angle=start_angle)
+    t = tables(scene, step)
+    bodies = start_state(scene, start_angle, t)
+    return run_mechanism(
+        t,
+        angle=start_angle,
+        speed=2 * math.pi * scene.drive.speed,
+        bodies=bodies,
+        chambers=start_chambers(t, bodies),
+        step=step,
+        n_steps=n_steps,
+        keep_states=keep_states,
+    )
+
+
+def _run_ideal(scene: PumpScene, *, step: float, n_steps: int, start_angle: float) -> CrankRun:
+    """The closed form as a run: forces at the middle of each step."""
+    speed = 2 * math.pi * scene.drive.speed
+    angle = start_angle + speed * step * np.arange(n_steps + 1.0)
+    middle = 0.5 * (angle[:-1] + angle[1:])
+    bodies, columns, moment, peak = [], [], np.zeros(n_steps), 0.0
+    for throw in range(len(scene.throws)):
+        motion = ideal_motion(scene, middle, throw)
+        pull = scene.piston.mass * (motion.piston_acceleration + _gravity(scene)[0])
+        nothing = np.zeros(n_steps)
+        columns += [
+            motion.pin_force_x,
+            motion.pin_force_y,
+            -motion.wrist_force_x,
+            -motion.wrist_force_y,
+            nothing,
+            motion.guide_force,
+            pull - motion.wrist_force_x,
+            nothing,
+            nothing,
+        ]
+        moment += motion.crank_moment
+        peak = max(peak, float(np.hypot(motion.pin_force_x, motion.pin_force_y).max()))
+        bodies.append(_ideal_bodies(scene, ideal_motion(scene, angle, throw)))
+    weight_x, weight_y = _gravity(scene)
+    first = middle + scene.throws[0].phase
+    moment -= scene.crank.unbalance * (weight_x * np.sin(first) - weight_y * np.cos(first))
+    return CrankRun(
+        turns=np.column_stack([angle, np.full(n_steps + 1, speed)]),
+        forces=np.column_stack([moment, *columns]),
+        bodies=np.stack(bodies, axis=1),
+        chambers=None,
+        step=step,
+        peak_normal_force=peak,
+    )
+
+
+def _ideal_bodies(scene: PumpScene, motion: IdealCrank) -> NDArray[np.float64]:
+    centre = scene.rod.centre_of_mass
+    sin_b, cos_b = np.sin(motion.beta), np.cos(motion.beta)
+    nothing = np.zeros_like(motion.beta)
+    return np.column_stack(
+        [
+            motion.piston - centre * cos_b,
+            centre * sin_b,
+            motion.beta,
+            motion.piston,
+            nothing,
+            nothing,
+            motion.piston_velocity + centre * sin_b * motion.beta_rate,
+            centre * cos_b * motion.beta_rate,
+            motion.beta_rate,
+            motion.piston_velocity,
+            nothing,
+            nothing,
+        ]
+    )
+
+
+def pin_offsets(
+    scene: PumpScene, angle: NDArray[np.float64], bodies: NDArray[np.float64], throw: int = 0
+) -> NDArray[np.float64]:
+    """Position of the pins' centres from those of their eyes [m].
+
+    Parameters
+    ----------
+    scene : PumpScene
+    angle : numpy.ndarray [shape=(n,)]
+        Of the crank [rad].
+    bodies : numpy.ndarray [shape=(n, 12)]
+        Of the throw, columns as ``BODY``, then their rates.
+    throw : int
+        Counted from 0.
+
+    Returns
+    -------
+    numpy.ndarray [shape=(n, 4)]
+        Crank pin x (along the stroke) and y (across it), wrist pin x and y. The length exceeds
+        the radial clearance by the penetration where there is contact.
+    """
+    x, y, beta, piston, across = bodies[:, :5].T
+    angle = angle + scene.throws[throw].phase
+    centre = scene.rod.centre_of_mass
+    arm = scene.rod.length - centre
+    sin_b, cos_b = np.sin(beta), np.cos(beta)
+    return np.column_stack(
+        [
+            scene.crank.radius * np.cos(angle) - x + arm * cos_b,
+            scene.crank.radius * np.sin(angle) - y - arm * sin_b,
+            piston - x - centre * cos_b,
+            across - y + centre * sin_b,
+        ]
+    )

@@ -1,0 +1,1069 @@
+"""The crank mechanism of one to N throws with clearance in its joints, compiled.
+
+Bodies: the crank (one angle ``a``), and per throw a rod (centre of mass ``x_r, y_r`` and angle
+``b``) and a piston (``x, y`` and tilt ``t``). Axes: x along the stroke from the crank centre to
+the cylinder, y across it. The rod points from the wrist pin to the crank pin along
+``e = (-cos b, sin b)``; ``g = de/db = (sin b, cos b)``.
+
+A joint is one of three things. *Ideal*: two constraint forces. *Link*: one constraint force along
+a massless link as long as the radial clearance, with friction at its ends; the pin never leaves
+its eye, and a link in tension says that it would. *Compliant*: the contact force of a law where
+the pin overlaps its eye, nothing in free flight. An ideal guide holds ``y = t = 0``; a compliant
+one has a clearance on either side and touches the piston at its four corners.
+
+For a pin at ``d`` from the centre of its eye, with direction ``n`` and ``t`` a quarter turn
+further, the force on the rod is ``F_n n + F_t t``, where ``F_t`` follows the sliding velocity
+``v_t = d' . t + r_pin w_pin + r_eye b'`` (the rod turns at ``-b'``), so that friction takes energy
+out: the printed signs of the source paper put it in. Newton's and Euler's equations of each body
+are explicit but for the constraint forces, which solve a linear system of up to four unknowns per
+throw; drift is held by Baumgarte's terms. With a motor the crank's acceleration enters every
+throw's constraints linearly, so that it too comes out in closed form.
+
+Classical Runge-Kutta with a fixed step; a step in which a contact closes or opens is cut there, so
+the order is kept across contact. Forces are recorded as means over the step, that is as exact
+impulses, whatever the contacts did in between. A chamber with valves is stepped after the
+mechanism, which feels its pressure extrapolated from the two steps before (second order).
+
+Sources: Xia, Zhang, Yu, Zhu (2017), Ship Science and Technology 39(1), 51-55; Baumgarte (1972),
+doi:10.1016/0045-7825(72)90018-7.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..contact.law import LAW_KELVIN_VOIGT, RELEASE_AT_ZERO_FORCE, friction_force, normal_force
+from ..jit import kernel, sine_cosine
+from ..output.solution import Status
+from .hydraulics import PRESSURE_CHAMBER, chamber_step, line_pressure
+
+JOINT_IDEAL, JOINT_LINK, JOINT_COMPLIANT = 0, 1, 2
+
+THROW = np.dtype(
+    [
+        ("phase", "f8"),  # crank angle of this throw over that of the crank [rad]
+        ("crank_radius", "f8"),
+        ("rod_centre", "f8"),  # wrist pin to centre of mass [m]
+        ("rod_arm", "f8"),  # centre of mass to crank-pin eye [m]
+        ("rod_mass", "f8"),
+        ("inverse_rod_mass", "f8"),
+        ("inverse_rod_inertia", "f8"),  # about its centre of mass [1/(kg m^2)]
+        ("piston_mass", "f8"),
+        ("inverse_piston_across", "f8"),  # 0 in an ideal guide [1/kg]
+        ("inverse_piston_tilt", "f8"),  # about the wrist pin; 0 in an ideal guide [1/(kg m^2)]
+        ("piston_area", "f8"),
+        ("crankpin_rung", "i8"),
+        ("wristpin_rung", "i8"),
+        ("guide_rung", "i8"),
+        ("crankpin_radius", "f8"),
+        ("wristpin_radius", "f8"),
+        ("guide_half_length", "f8"),
+        ("guide_half_height", "f8"),
+        ("pressure_rung", "i8"),
+        ("substeps", "i8"),  # of the chamber
+    ]
+)
+"""One throw, in SI."""
+
+CRANKPIN, WRISTPIN, GUIDE = 0, 1, 2
+"""Columns of the contact table, one row per throw."""
+
+CONTACTS = 6
+"""Places of contact per throw: crank pin, wrist pin, and the guide's corners, rear and front,
+upper then lower."""
+
+
+class Machine(NamedTuple):
+    """What the throws share, in SI."""
+
+    gravity_x: float
+    gravity_y: float
+    inverse_inertia: float  # of everything that turns; 0 is constant speed
+    static_moment: float  # unbalance of the crank along the first throw [kg m]
+    drive_moment: float  # constant part [N m]
+    synchronous_speed: float  # of the motor, at the crank [rad/s]
+    breakdown_moment: float  # largest moment of the motor [N m]; 0 is none
+    breakdown_slip: float
+    baumgarte: float  # decay rate of constraint drift [1/s]
+
+
+BODY = ("rod_x", "rod_y", "beta", "piston_x", "piston_y", "tilt")
+"""Coordinates of a throw [m, rad]; the state holds these, then their rates."""
+
+PER_THROW = 2 * len(BODY)
+
+FORCES = (
+    "pin_x",
+    "pin_y",
+    "wrist_x",
+    "wrist_y",
+    "guide_x",
+    "guide_y",
+    "piston_x",
+    "suction_valve",
+    "discharge_valve",
+)
+"""Mean forces of a throw over a step [N]: crank pin on rod, wrist pin on rod, guide on piston
+(friction along x, push along y), liquid on piston, each valve on the casing along the stroke.
+Before them stands the drive moment [N m]."""
+
+_PIN, _WRIST, _GUIDE, _FACE, _VALVES = 0, 2, 4, 6, 7  # first columns of FORCES
+
+OVERLAP_LIMIT = 0.1  # of the pin radius: small-penetration contact laws end there
+_MOST_CUTS = 8  # contact changes within one step and throw before the rest is taken as it is
+_NO_CHANGE = 1.0  # margin of a contact that cannot change [N]
+
+
+class Tables(NamedTuple):
+    """Everything that the kernel is told."""
+
+    throws: NDArray[Any]  # (n_throws,) of THROW
+    contacts: NDArray[Any]  # (n_throws, 3) of CONTACT
+    liquid: NDArray[Any]  # (n_throws,) of HYDRAULIC
+    machine: Machine
+
+
+STAGE = np.dtype(
+    [
+        ("y", "f8", PER_THROW),
+        ("rate", "f8", PER_THROW),
+        ("force", "f8", len(FORCES)),
+        ("margin", "f8", CONTACTS),
+        ("approach", "f8", CONTACTS),
+        ("normal", "f8"),  # largest normal force
+        ("overlap", "f8"),  # largest overlap over the pin radius
+        ("link", "f8"),  # least force in a link: negative is tension
+        ("rate_per_turn", "f8", PER_THROW),  # per crank acceleration
+        ("force_per_turn", "f8", len(FORCES)),
+    ]
+)
+"""One throw at one stage of a step."""
+
+HELD = np.dtype(
+    [
+        ("touching", "i8", CONTACTS),  # 0 or 1
+        ("impact", "f8", CONTACTS),  # speed at which each contact closed
+        ("pressure", "f8", 2),  # of the chamber, at both ends of the step
+        ("flow", "f8", 4),  # of the chamber's valves, see chamber_step
+    ]
+)
+"""What one throw remembers from step to step."""
+
+ANGLE, SPEED, ANGLE_RATE, SPEED_RATE, MOMENT = range(5)
+"""Columns of the crank's stages."""
+
+
+class _Work(NamedTuple):
+    """Scratch of the march; nothing is allocated in its loop.
+
+    Rows 0 and 1 are the ends of the step in turn, rows 2 to 4 the stages between them.
+    """
+
+    crank: NDArray[np.float64]  # (5, 5)
+    stage: NDArray[Any]  # (5, n_throws) of STAGE
+    held: NDArray[Any]  # (n_throws,) of HELD
+    moment: NDArray[np.float64]  # (2,): on the crank, and per crank acceleration
+    matrix: NDArray[np.float64]  # (4, 6): constraint equations with two right sides
+    place: NDArray[np.float64]  # (4, 6): joint, direction, tangential share, normal
+
+
+@kernel
+def _crank_offset(
+    b: Any, omega: float, q: Any, sin_a: float, cos_a: float, sin_b: float, cos_b: float
+) -> Any:
+    """Pin from its eye's centre, and how fast."""
+    turn = omega * q.crank_radius
+    swing = b.y[8] * q.rod_arm
+    return (
+        q.crank_radius * cos_a - b.y[0] + q.rod_arm * cos_b,
+        q.crank_radius * sin_a - b.y[1] - q.rod_arm * sin_b,
+        -turn * sin_a - b.y[6] - swing * sin_b,
+        turn * cos_a - b.y[7] - swing * cos_b,
+    )
+
+
+@kernel
+def _wrist_offset(b: Any, q: Any, sin_b: float, cos_b: float) -> Any:
+    """Pin from its eye's centre, and how fast."""
+    swing = b.y[8] * q.rod_centre
+    return (
+        b.y[3] - b.y[0] - q.rod_centre * cos_b,
+        b.y[4] - b.y[1] + q.rod_centre * sin_b,
+        b.y[9] - b.y[6] + swing * sin_b,
+        b.y[10] - b.y[7] + swing * cos_b,
+    )
+
+
+@kernel
+def _polar(d_x: float, d_y: float, v_x: float, v_y: float) -> Any:
+    """Length, its rate, and direction; a centred pin has the stroke's, never NaN."""
+    distance = math.sqrt(d_x * d_x + d_y * d_y)
+    if distance > 0.0:
+        n_x, n_y = d_x / distance, d_y / distance
+    else:
+        n_x, n_y = 1.0, 0.0
+    return distance, v_x * n_x + v_y * n_y, n_x, n_y
+
+
+@kernel
+def _corner(b: Any, q: Any, corner: int, clearance: float) -> Any:
+    """Overlap of a corner with its guide, its rate, and the corner from the wrist pin."""
+    along = q.guide_half_length if corner & 1 else -q.guide_half_length
+    side = 1.0 if corner < 2 else -1.0
+    across = side * q.guide_half_height
+    sin_t, cos_t = sine_cosine(b.y[5])
+    r_x = along * cos_t - across * sin_t
+    r_y = along * sin_t + across * cos_t
+    overlap = side * (b.y[4] + r_y) - q.guide_half_height - clearance
+    return overlap, side * (b.y[10] + b.y[11] * r_x), r_x, r_y, side
+
+
+@kernel
+def _margin(overlap: float, force: float, touching: bool, c: Any) -> Any:
+    """Positive while the contact stays as it is, negative once it should change [N]."""
+    elastic = c.stiffness * overlap
+    if c.law == LAW_KELVIN_VOIGT and c.release == RELEASE_AT_ZERO_FORCE:
+        return force if touching else -min(elastic, force)
+    return elastic if touching else -elastic
+
+
+@kernel
+def _contact_margin(k: int, j: int, w: Any, row: int, t: Any) -> Any:
+    """Margin of one contact alone, for the search of its change."""
+    q, b, omega = t.throws[k], w.stage[row, k], w.crank[row, SPEED]
+    touching, impact = w.held[k].touching[j] != 0, w.held[k].impact[j]
+    if j > WRISTPIN:
+        c = t.contacts[k, GUIDE]
+        overlap, speed, _, _, _ = _corner(b, q, j - GUIDE, c.clearance)
+        return _margin(overlap, normal_force(overlap, speed, impact, c), touching, c)
+    sin_b, cos_b = sine_cosine(b.y[2])
+    c = t.contacts[k, j]
+    if j == CRANKPIN:
+        sin_a, cos_a = sine_cosine(w.crank[row, ANGLE] + q.phase)
+        d_x, d_y, v_x, v_y = _crank_offset(b, omega, q, sin_a, cos_a, sin_b, cos_b)
+    else:
+        d_x, d_y, v_x, v_y = _wrist_offset(b, q, sin_b, cos_b)
+    distance, speed, _, _ = _polar(d_x, d_y, v_x, v_y)
+    overlap = distance - c.clearance
+    return _margin(overlap, normal_force(overlap, speed, impact, c), touching, c)
+
+
+@kernel
+def _link_drag(d_x: float, d_y: float, v_x: float, v_y: float, spin: float, c: Any) -> Any:
+    """Viscous force on the rod along a link's end (x, y), and its share between the surfaces.
+
+    The contact's damping resists the swing of the link, `tangential_damping` the sliding.
+    """
+    _, _, n_x, n_y = _polar(d_x, d_y, v_x, v_y)
+    swing = v_y * n_x - v_x * n_y
+    sliding = c.tangential_damping * (swing + spin)
+    drag = c.damping * swing + sliding
+    return -drag * n_y, drag * n_x, sliding
+
+
+@kernel
+def _pin_joint(
+    joint: int,
+    rung: int,
+    d_x: float,
+    d_y: float,
+    v_x: float,
+    v_y: float,
+    spin: float,
+    b: Any,
+    held: Any,
+    c: Any,
+) -> Any:
+    """Applied force of a pin on the rod (x, y), what of it rubs, what presses, and the overlap.
+
+    `spin` is the sliding velocity that comes from turning alone.
+    """
+    if rung == JOINT_LINK:
+        f_x, f_y, rub = _link_drag(d_x, d_y, v_x, v_y, spin, c)
+        return f_x, f_y, rub, 0.0, 0.0
+    distance, speed, n_x, n_y = _polar(d_x, d_y, v_x, v_y)
+    overlap = distance - c.clearance
+    law = normal_force(overlap, speed, held.impact[joint], c)
+    touching = held.touching[joint] != 0
+    b.margin[joint], b.approach[joint] = _margin(overlap, law, touching, c), speed
+    if not touching:
+        return 0.0, 0.0, 0.0, 0.0, overlap
+    rub = friction_force(v_y * n_x - v_x * n_y + spin, law, c)
+    return law * n_x - rub * n_y, law * n_y + rub * n_x, rub, law, overlap
+
+
+@kernel
+def _guide(q: Any, b: Any, held: Any, c: Any) -> Any:
+    """Force of a guide with clearance on the piston (x, y, turning), peak normal force, overlap."""
+    f_x, f_y, moment, peak, deepest = 0.0, 0.0, 0.0, 0.0, 0.0
+    for corner in range(4):
+        j = GUIDE + corner
+        overlap, speed, r_x, r_y, side = _corner(b, q, corner, c.clearance)
+        law = normal_force(overlap, speed, held.impact[j], c)
+        touching = held.touching[j] != 0
+        b.margin[j], b.approach[j] = _margin(overlap, law, touching, c), speed
+        deepest = max(deepest, overlap)
+        if touching:
+            push = -side * law
+            drag = -friction_force(b.y[9] - b.y[11] * r_y, law, c)
+            f_x += drag
+            f_y += push
+            moment += r_x * push - r_y * drag
+            peak = max(peak, law)
+    return f_x, f_y, moment, peak, deepest
+
+
+@kernel
+def _pressure(k: int, w: Any, row: int, share: float, t: Any) -> Any:
+    """Pressure on the piston, and the mass of the liquid that moves with it."""
+    q, held = t.throws[k], w.held[k]
+    if q.pressure_rung == PRESSURE_CHAMBER:
+        before, after = held.pressure[0], held.pressure[1]
+        return before + share * (after - before), 0.0
+    angle = w.crank[row, ANGLE] + q.phase
+    return line_pressure(angle, w.crank[row, SPEED], w.stage[row, k].y[9], t.liquid[k])
+
+
+@kernel
+def _throw(k: int, w: Any, row: int, share: float, t: Any) -> None:
+    """Rates and forces of one throw at constant crank speed, and per crank acceleration."""
+    q, m, b, held = t.throws[k], t.machine, w.stage[row, k], w.held[k]
+    sin_a, cos_a = sine_cosine(w.crank[row, ANGLE] + q.phase)
+    sin_b, cos_b = sine_cosine(b.y[2])
+    omega, b_rate = w.crank[row, SPEED], b.y[8]
+    pressure, added = _pressure(k, w, row, share, t)
+    # applied forces on rod (x, y, turning with b), piston (x, y, turning with t), and crank
+    rod_x, rod_y, rod_b = -m.gravity_x * q.rod_mass, -m.gravity_y * q.rod_mass, 0.0
+    on_face = -q.piston_area * pressure
+    piston_x, piston_y = on_face - m.gravity_x * q.piston_mass, -m.gravity_y * q.piston_mass
+    piston_t, guide_x, guide_y, crank_moment = 0.0, 0.0, 0.0, 0.0
+    pin_x, pin_y, wrist_x, wrist_y = 0.0, 0.0, 0.0, 0.0
+    peak, overlap_ratio = 0.0, 0.0
+    if q.crankpin_rung != JOINT_IDEAL:
+        c, radius = t.contacts[k, CRANKPIN], q.crankpin_radius
+        eye = radius + c.clearance
+        d_x, d_y, v_x, v_y = _crank_offset(b, omega, q, sin_a, cos_a, sin_b, cos_b)
+        spin = omega * radius + b_rate * eye
+        pin_x, pin_y, rub, peak, overlap = _pin_joint(
+            CRANKPIN, q.crankpin_rung, d_x, d_y, v_x, v_y, spin, b, held, c
+        )
+        rod_x += pin_x
+        rod_y += pin_y
+        rod_b += q.rod_arm * (pin_x * sin_b + pin_y * cos_b) - eye * rub
+        crank_moment -= radius * rub
+        overlap_ratio = overlap / radius
+    if q.wristpin_rung != JOINT_IDEAL:
+        c, radius = t.contacts[k, WRISTPIN], q.wristpin_radius
+        eye = radius + c.clearance
+        d_x, d_y, v_x, v_y = _wrist_offset(b, q, sin_b, cos_b)
+        spin = b.y[11] * radius + b_rate * eye
+        wrist_x, wrist_y, rub, normal, overlap = _pin_joint(
+            WRISTPIN, q.wristpin_rung, d_x, d_y, v_x, v_y, spin, b, held, c
+        )
+        rod_x += wrist_x
+        rod_y += wrist_y
+        rod_b -= q.rod_centre * (wrist_x * sin_b + wrist_y * cos_b) + eye * rub
+        piston_x -= wrist_x
+        piston_y -= wrist_y
+        piston_t -= radius * rub
+        peak, overlap_ratio = max(peak, normal), max(overlap_ratio, overlap / radius)
+    if q.guide_rung == JOINT_COMPLIANT:
+        guide_x, guide_y, moment, normal, overlap = _guide(q, b, held, t.contacts[k, GUIDE])
+        piston_x += guide_x
+        piston_y += guide_y
+        piston_t += moment
+        peak, overlap_ratio = max(peak, normal), max(overlap_ratio, overlap / q.guide_half_height)
+    inv_m, inv_j = q.inverse_rod_mass, q.inverse_rod_inertia
+    inv_px = 1.0 / (q.piston_mass + added)
+    acc_x, acc_y, acc_b = rod_x * inv_m, rod_y * inv_m, rod_b * inv_j
+    pis_x, pis_y = piston_x * inv_px, piston_y * q.inverse_piston_across
+    b.link = 0.0
+    b.rate[11] = piston_t * q.inverse_piston_tilt
+    if q.crankpin_rung == JOINT_COMPLIANT and q.wristpin_rung == JOINT_IDEAL:
+        # two constraints of the wrist pin in closed form: the way a worn crank pin takes
+        d_x, d_y, v_x, v_y = _wrist_offset(b, q, sin_b, cos_b)
+        swing, lag = q.rod_centre * b_rate * b_rate, q.rod_centre * acc_b
+        need_x = pis_x - acc_x + lag * sin_b + swing * cos_b + _held_back(d_x, v_x, m)
+        need_y = pis_y - acc_y + lag * cos_b - swing * sin_b + _held_back(d_y, v_y, m)
+        turning = q.rod_centre * q.rod_centre * inv_j
+        a_xx = inv_m + inv_px + turning * sin_b * sin_b
+        a_yy = inv_m + q.inverse_piston_across + turning * cos_b * cos_b
+        a_xy = turning * sin_b * cos_b
+        inverse = 1.0 / (a_xx * a_yy - a_xy * a_xy)
+        wrist_x = (a_yy * need_x - a_xy * need_y) * inverse
+        wrist_y = (a_xx * need_y - a_xy * need_x) * inverse
+        acc_x += wrist_x * inv_m
+        acc_y += wrist_y * inv_m
+        acc_b -= q.rod_centre * (wrist_x * sin_b + wrist_y * cos_b) * inv_j
+        pis_x -= wrist_x * inv_px
+        pis_y -= wrist_y * q.inverse_piston_across
+    for i in range(6):
+        b.rate[i] = b.y[6 + i]
+    b.rate[6], b.rate[7], b.rate[8] = acc_x, acc_y, acc_b
+    b.rate[9], b.rate[10] = pis_x, pis_y
+    b.force[_PIN], b.force[_PIN + 1] = pin_x, pin_y
+    b.force[_WRIST], b.force[_WRIST + 1] = wrist_x, wrist_y
+    b.normal, b.overlap = peak, overlap_ratio
+    if q.crankpin_rung != JOINT_COMPLIANT or q.wristpin_rung == JOINT_LINK:
+        crank_moment += _constrain(k, w, row, t, sin_a, cos_a, sin_b, cos_b, inv_px)
+    pin_x, pin_y = b.force[_PIN], b.force[_PIN + 1]
+    w.moment[0] += crank_moment + q.crank_radius * (pin_x * sin_a - pin_y * cos_a)
+    b.force[_FACE] = on_face - added * b.rate[9]
+    if q.guide_rung != JOINT_COMPLIANT:  # what holds the piston up
+        guide_y = b.force[_WRIST + 1] + m.gravity_y * q.piston_mass
+    b.force[_GUIDE], b.force[_GUIDE + 1] = guide_x, guide_y
+    if q.crankpin_rung != JOINT_COMPLIANT and m.inverse_inertia > 0.0:
+        b.force_per_turn[_FACE] = -added * b.rate_per_turn[9]
+        if q.guide_rung != JOINT_COMPLIANT:
+            b.force_per_turn[_GUIDE + 1] = b.force_per_turn[_WRIST + 1]
+
+
+@kernel
+def _held_back(distance: float, speed: float, m: Any) -> Any:
+    """Baumgarte's term: acceleration that brings a drifting constraint back."""
+    return m.baumgarte * (2.0 * speed + m.baumgarte * distance)
+
+
+@kernel
+def _equations(
+    joint: int,
+    n: int,
+    side: float,
+    k: int,
+    w: Any,
+    row: int,
+    t: Any,
+    sin_a: float,
+    cos_a: float,
+    sin_b: float,
+    cos_b: float,
+) -> int:
+    """Equations of one joint from number n on: what its constraint forces must accelerate.
+
+    A link's force has friction across it, on one side of the eye in compression (`side` 1), on
+    the other in tension (-1). Returns the number of the next equation.
+    """
+    q, m, b, c = t.throws[k], t.machine, w.stage[row, k], t.contacts[k, joint]
+    omega, b_rate = w.crank[row, SPEED], b.y[8]
+    if joint == CRANKPIN:
+        rung, arm, radius, spin = q.crankpin_rung, q.rod_arm, q.crankpin_radius, omega
+        d_x, d_y, v_x, v_y = _crank_offset(b, omega, q, sin_a, cos_a, sin_b, cos_b)
+        pull = q.crank_radius * omega * omega
+        apart_x, apart_y = -pull * cos_a, -pull * sin_a
+        turn_x, turn_y = -q.crank_radius * sin_a, q.crank_radius * cos_a
+    else:
+        rung, arm, radius, spin = q.wristpin_rung, -q.rod_centre, q.wristpin_radius, b.y[11]
+        d_x, d_y, v_x, v_y = _wrist_offset(b, q, sin_b, cos_b)
+        apart_x, apart_y = b.rate[9], b.rate[10]
+        turn_x, turn_y = 0.0, 0.0
+    apart_x -= b.rate[6] + arm * (b.rate[8] * sin_b + b_rate * b_rate * cos_b)
+    apart_y -= b.rate[7] + arm * (b.rate[8] * cos_b - b_rate * b_rate * sin_b)
+    if rung == JOINT_IDEAL:
+        w.place[n, 0] = w.place[n + 1, 0] = joint
+        w.place[n, 1] = w.place[n, 4] = w.place[n + 1, 2] = w.place[n + 1, 5] = 1.0
+        w.place[n, 2] = w.place[n, 5] = w.place[n + 1, 1] = w.place[n + 1, 4] = 0.0
+        w.place[n, 3] = w.place[n + 1, 3] = 0.0
+        w.matrix[n, 4] = apart_x + _held_back(d_x, v_x, m)
+        w.matrix[n + 1, 4] = apart_y + _held_back(d_y, v_y, m)
+        w.matrix[n, 5], w.matrix[n + 1, 5] = turn_x, turn_y
+        return n + 2
+    distance, speed, n_x, n_y = _polar(d_x, d_y, v_x, v_y)
+    swing = v_y * n_x - v_x * n_y
+    sliding = swing + radius * spin + (radius + c.clearance) * b_rate
+    share = side * (friction_force(sliding, 1.0, c) - c.tangential_damping * sliding)
+    w.place[n, 0], w.place[n, 3] = joint, share
+    w.place[n, 1], w.place[n, 2] = n_x - share * n_y, n_y + share * n_x
+    w.place[n, 4], w.place[n, 5] = n_x, n_y
+    across = swing * swing / distance
+    back = _held_back(distance - c.clearance, speed, m)
+    w.matrix[n, 4] = apart_x * n_x + apart_y * n_y + across + back
+    w.matrix[n, 5] = turn_x * n_x + turn_y * n_y
+    return n + 1
+
+
+@kernel
+def _unit_swing(j: int, k: int, w: Any, t: Any, sin_b: float, cos_b: float) -> Any:
+    """Angular acceleration of the rod per unit of constraint force j."""
+    q, crank = t.throws[k], w.place[j, 0] == CRANKPIN
+    arm = q.rod_arm if crank else -q.rod_centre
+    radius = q.crankpin_radius if crank else q.wristpin_radius
+    eye = radius + t.contacts[k, CRANKPIN if crank else WRISTPIN].clearance
+    along = w.place[j, 1] * sin_b + w.place[j, 2] * cos_b
+    return (arm * along - eye * w.place[j, 3]) * q.inverse_rod_inertia
+
+
+@kernel
+def _mobilities(n: int, k: int, w: Any, t: Any, sin_b: float, cos_b: float, inv_px: float) -> None:
+    """What every unit constraint force does to every equation."""
+    q = t.throws[k]
+    for j in range(n):
+        u_x, u_y = w.place[j, 1], w.place[j, 2]
+        swing = _unit_swing(j, k, w, t, sin_b, cos_b)
+        for i in range(n):
+            reach = q.rod_arm if w.place[i, 0] == CRANKPIN else -q.rod_centre
+            e_x = u_x * q.inverse_rod_mass + reach * swing * sin_b
+            e_y = u_y * q.inverse_rod_mass + reach * swing * cos_b
+            if w.place[j, 0] == WRISTPIN and w.place[i, 0] == WRISTPIN:
+                e_x += u_x * inv_px
+                e_y += u_y * q.inverse_piston_across
+            w.matrix[i, j] = e_x * w.place[i, 4] + e_y * w.place[i, 5]
+
+
+@kernel
+def _add_force(
+    size: float, j: int, k: int, rate: Any, force: Any, w: Any, t: Any, swing: float, inv_px: float
+) -> Any:
+    """Add constraint force j to rates and forces of a throw; its friction's moment on the crank."""
+    q = t.throws[k]
+    f_x, f_y, rub = size * w.place[j, 1], size * w.place[j, 2], size * w.place[j, 3]
+    rate[6] += f_x * q.inverse_rod_mass
+    rate[7] += f_y * q.inverse_rod_mass
+    rate[8] += size * swing
+    if w.place[j, 0] == CRANKPIN:
+        force[_PIN] += f_x
+        force[_PIN + 1] += f_y
+        return -q.crankpin_radius * rub
+    force[_WRIST] += f_x
+    force[_WRIST + 1] += f_y
+    rate[9] -= f_x * inv_px
+    rate[10] -= f_y * q.inverse_piston_across
+    rate[11] -= q.wristpin_radius * rub * q.inverse_piston_tilt
+    return 0.0
+
+
+@kernel
+def _constrain(
+    k: int,
+    w: Any,
+    row: int,
+    t: Any,
+    sin_a: float,
+    cos_a: float,
+    sin_b: float,
+    cos_b: float,
+    inv_px: float,
+) -> Any:
+    """Add the constraint forces of ideal joints and links; their friction's moment on the crank.
+
+    Unknowns are forces along given directions at either end of the rod; the equations ask the
+    relative acceleration of pin and eye to be what keeps them together.
+    """
+    q, m, b = t.throws[k], t.machine, w.stage[row, k]
+    least, at_pin, at_wrist, n = 1.0, 1.0, 1.0, 0
+    for _ in range(4):  # until every link has its friction on the side that its sign asks for
+        n = 0
+        if q.crankpin_rung != JOINT_COMPLIANT:
+            n = _equations(CRANKPIN, n, at_pin, k, w, row, t, sin_a, cos_a, sin_b, cos_b)
+        if q.wristpin_rung != JOINT_COMPLIANT:
+            n = _equations(WRISTPIN, n, at_wrist, k, w, row, t, sin_a, cos_a, sin_b, cos_b)
+        _mobilities(n, k, w, t, sin_b, cos_b, inv_px)
+        _eliminate(w, n)
+        least, was_pin, was_wrist = 1.0, at_pin, at_wrist
+        if q.crankpin_rung == JOINT_LINK:  # the first equation
+            least = min(least, w.matrix[0, 4])
+            at_pin = -1.0 if w.matrix[0, 4] < 0.0 else 1.0
+        if q.wristpin_rung == JOINT_LINK:  # the last one
+            least = min(least, w.matrix[n - 1, 4])
+            at_wrist = -1.0 if w.matrix[n - 1, 4] < 0.0 else 1.0
+        if at_pin == was_pin and at_wrist == was_wrist:
+            break
+    b.link = min(least, 0.0)
+    per_turn = m.inverse_inertia > 0.0 and q.crankpin_rung != JOINT_COMPLIANT
+    if per_turn:
+        for c in range(6, PER_THROW):
+            b.rate_per_turn[c] = 0.0
+        for c in range(_VALVES):
+            b.force_per_turn[c] = 0.0
+    moment, rubbing = 0.0, 0.0
+    for j in range(n):
+        swing = _unit_swing(j, k, w, t, sin_b, cos_b)
+        moment += _add_force(w.matrix[j, 4], j, k, b.rate, b.force, w, t, swing, inv_px)
+        if per_turn:
+            more = w.matrix[j, 5]
+            rubbing += _add_force(
+                more, j, k, b.rate_per_turn, b.force_per_turn, w, t, swing, inv_px
+            )
+    if per_turn:
+        along, across = b.force_per_turn[_PIN], b.force_per_turn[_PIN + 1]
+        w.moment[1] += rubbing + q.crank_radius * (along * sin_a - across * cos_a)
+    return moment
+
+
+@kernel
+def _eliminate(w: Any, n: int) -> None:
+    """Gauss elimination in place; the solutions replace columns 4 and 5."""
+    for i in range(n):
+        inverse = 1.0 / w.matrix[i, i]
+        for r in range(i + 1, n):
+            factor = w.matrix[r, i] * inverse
+            for column in range(i + 1, n):
+                w.matrix[r, column] -= factor * w.matrix[i, column]
+            w.matrix[r, 4] -= factor * w.matrix[i, 4]
+            w.matrix[r, 5] -= factor * w.matrix[i, 5]
+    for i in range(n - 1, -1, -1):
+        for column in range(i + 1, n):
+            w.matrix[i, 4] -= w.matrix[i, column] * w.matrix[column, 4]
+            w.matrix[i, 5] -= w.matrix[i, column] * w.matrix[column, 5]
+        w.matrix[i, 4] /= w.matrix[i, i]
+        w.matrix[i, 5] /= w.matrix[i, i]
+
+
+@kernel
+def motor_moment(speed: float, m: Any) -> Any:
+    """Moment of the drive at a crank speed [N m]: constant part plus Kloss's curve.
+
+    ``2 M_b / (s / s_b + s_b / s)`` with the slip s of an asynchronous motor, breakdown moment M_b
+    at the slip s_b. Source: Kloss (1929); Boldea and Nasar, The Induction Machine Handbook.
+    """
+    if m.breakdown_moment == 0.0:
+        return m.drive_moment
+    slip = 1.0 - speed / m.synchronous_speed
+    both = slip * slip + m.breakdown_slip * m.breakdown_slip
+    return m.drive_moment + 2.0 * m.breakdown_moment * slip * m.breakdown_slip / both
+
+
+@kernel
+def _derivative(w: Any, row: int, share: float, t: Any) -> None:
+    """Rates, forces and margins at the state of a row; `share` of the step has passed."""
+    m = t.machine
+    w.moment[0] = w.moment[1] = 0.0
+    for k in range(t.throws.shape[0]):
+        _throw(k, w, row, share, t)
+    w.crank[row, ANGLE_RATE], w.crank[row, SPEED_RATE] = w.crank[row, SPEED], 0.0
+    load = w.moment[0]
+    if m.static_moment != 0.0:
+        sin_a, cos_a = sine_cosine(w.crank[row, ANGLE] + t.throws[0].phase)
+        load += m.static_moment * (m.gravity_x * sin_a - m.gravity_y * cos_a)
+    w.crank[row, MOMENT] = -load
+    if m.inverse_inertia == 0.0:
+        return
+    drive = motor_moment(w.crank[row, SPEED], m)
+    turning = m.inverse_inertia * (drive + load) / (1.0 - m.inverse_inertia * w.moment[1])
+    w.crank[row, SPEED_RATE] = turning
+    w.crank[row, MOMENT] = drive
+    for k in range(t.throws.shape[0]):
+        if t.throws[k].crankpin_rung == JOINT_COMPLIANT:
+            continue
+        b = w.stage[row, k]
+        for c in range(6, 12):
+            b.rate[c] += turning * b.rate_per_turn[c]
+        for c in range(_VALVES):
+            b.force[c] += turning * b.force_per_turn[c]
+
+
+@kernel
+def _hermite(
+    before: float, rate_before: float, after: float, rate_after: float, h: float, s: float
+) -> float:
+    """Cubic through both ends of a step, a fraction s into it."""
+    r = 1.0 - s
+    return r * r * ((1.0 + 2.0 * s) * before + s * h * rate_before) + s * s * (
+        (1.0 + 2.0 * r) * after - r * h * rate_after
+    )
+
+
+@kernel
+def _interpolate(k: int, w: Any, i: int, h: float, s: float) -> None:
+    """State of crank and one throw a fraction s into the step from row i, into row 2."""
+    y, z = w.crank, 1 - i
+    for c in range(2):
+        y[2, c] = _hermite(y[i, c], y[i, 2 + c], y[z, c], y[z, 2 + c], h, s)
+    here, before, after = w.stage[2, k], w.stage[i, k], w.stage[z, k]
+    for c in range(PER_THROW):
+        here.y[c] = _hermite(before.y[c], before.rate[c], after.y[c], after.rate[c], h, s)
+
+
+@kernel
+def _locate_change(k: int, j: int, w: Any, i: int, h: float, t: Any) -> Any:
+    """Fraction of the step at which one contact changes: Illinois on the dense output."""
+    low, high = 0.0, 1.0
+    f_low, f_high = w.stage[i, k].margin[j], w.stage[1 - i, k].margin[j]
+    share = 0.5
+    while f_low <= 0.0:  # changed just now, at rounding: it must hold before it changes again
+        if share < 1e-4:
+            return 0.0  # it never holds: it asks for the change at once
+        _interpolate(k, w, i, h, share)
+        low, f_low = share, _contact_margin(k, j, w, 2, t)
+        share *= 0.5
+    for _ in range(60):
+        s = high - f_high * (high - low) / (f_high - f_low)
+        _interpolate(k, w, i, h, s)
+        f = _contact_margin(k, j, w, 2, t)
+        if f > 0.0:
+            low, f_low = s, f
+            f_high *= 0.5
+        else:
+            high, f_high = s, f
+            f_low *= 0.5
+        if abs(f) < 1e-9:
+            return s
+        if high - low < 1e-12:
+            break
+    return high
+
+
+@kernel
+def _first_change(w: Any, i: int, h: float, locate: bool, t: Any) -> Any:
+    """Earliest contact that asks for a change within the step: when, throw (-1: none), contact."""
+    first, throw, contact = 1.0, -1, 0
+    for k in range(t.throws.shape[0]):
+        after = w.stage[1 - i, k]
+        for j in range(CONTACTS):
+            if after.margin[j] < 0.0:
+                share = _locate_change(k, j, w, i, h, t) if locate else 1.0
+                if throw < 0 or share < first:
+                    first, throw, contact = share, k, j
+    return first, throw, contact
+
+
+@kernel
+def _advance(w: Any, row: int, i: int, share: float, slope: int) -> None:
+    """State of a row: that of row i moved along the rates of row `slope` over `share` [s]."""
+    for c in range(2):
+        w.crank[row, c] = w.crank[i, c] + share * w.crank[slope, 2 + c]
+    for k in range(w.stage.shape[1]):
+        here, start, rate = w.stage[row, k], w.stage[i, k], w.stage[slope, k]
+        for c in range(PER_THROW):
+            here.y[c] = start.y[c] + share * rate.rate[c]
+
+
+@kernel
+def _mean(first: float, second: float, third: float, last: float) -> float:
+    return first + 2.0 * (second + third) + last
+
+
+@kernel
+def _finish(w: Any, i: int, h: float) -> None:
+    """State at the end of the step from row i, by the weighted mean of the four rates."""
+    sixth, y = h / 6.0, w.crank
+    for c in range(2):
+        rate = _mean(y[i, 2 + c], y[2, 2 + c], y[3, 2 + c], y[4, 2 + c])
+        y[1 - i, c] = y[i, c] + sixth * rate
+    for k in range(w.stage.shape[1]):
+        end, a, b = w.stage[1 - i, k], w.stage[i, k], w.stage[2, k]
+        c_, d = w.stage[3, k], w.stage[4, k]
+        for c in range(PER_THROW):
+            end.y[c] = a.y[c] + sixth * _mean(a.rate[c], b.rate[c], c_.rate[c], d.rate[c])
+
+
+@kernel
+def _stages(w: Any, i: int, h: float, passed: float, whole: float, fresh: bool, t: Any) -> None:
+    """Runge-Kutta from row i to the other over `h`, with the contacts held as they are.
+
+    `passed` of the `whole` step lie behind. The derivative at the start is made anew unless it is
+    `fresh`; that at the end is left for the next step.
+    """
+    for stage in range(1 if fresh else 0, 5):
+        row, share = i, 0.0
+        if stage == 4:
+            row, share = 1 - i, 1.0
+            _finish(w, i, h)
+        elif stage > 0:
+            row = 1 + stage
+            share = 1.0 if stage == 3 else 0.5
+            _advance(w, row, i, share * h, i if stage == 1 else stage)
+        _derivative(w, row, (passed + share * h) / whole, t)
+
+
+@kernel
+def _flip(k: int, j: int, w: Any, i: int, t: Any) -> int:
+    """Open or close one contact; 1 where it closed more slowly than its law's floor."""
+    held = w.held[k]
+    held.touching[j] = 1 - held.touching[j]
+    if held.touching[j] == 0:
+        return 0
+    held.impact[j] = max(w.stage[i, k].approach[j], 0.0)
+    return 1 if held.impact[j] < t.contacts[k, min(j, GUIDE)].speed_floor else 0
+
+
+@kernel
+def _change(throw: int, contact: int, w: Any, i: int, t: Any, tally: Any) -> None:
+    """Change a contact, and all that ask for it at the same instant.
+
+    Both corners of a piston that stands straight do: one of them left for later would be late by
+    what is left of the step.
+    """
+    for k in range(t.throws.shape[0]):
+        for j in range(CONTACTS):
+            if (k == throw and j == contact) or w.stage[i, k].margin[j] < 0.0:
+                tally.counts[CHANGES] += 1
+                tally.counts[FLOORED] += _flip(k, j, w, i, t)
+
+
+@kernel
+def _record_forces(w: Any, i: int, weight: float, forces: Any, step: int, tally: Any) -> None:
+    """Add the impulse of one part of the step to the step's mean forces."""
+    y = w.crank
+    forces[step, 0] += weight * _mean(y[i, MOMENT], y[2, MOMENT], y[3, MOMENT], y[4, MOMENT])
+    for k in range(w.stage.shape[1]):
+        a, b, c, d = w.stage[i, k], w.stage[2, k], w.stage[3, k], w.stage[4, k]
+        f = 1 + len(FORCES) * k
+        for n in range(_VALVES):
+            forces[step, f + n] += weight * _mean(a.force[n], b.force[n], c.force[n], d.force[n])
+        tally.peak[0] = max(tally.peak[0], max(a.normal, max(b.normal, c.normal)))
+
+
+@kernel
+def _step(w: Any, i: int, h: float, fresh: bool, t: Any, forces: Any, step: int, tally: Any) -> Any:
+    """One whole step, cut wherever a contact closes or opens.
+
+    Returns the row it ended in, and whether that row's derivative is fresh.
+    """
+    left, taken, cuts, k, j = h, h, 0, -1, 0
+    while left > 0.0:
+        _stages(w, i, taken, h - left, h, fresh, t)
+        fresh = True
+        if k < 0:  # not yet cut
+            locate = cuts < _MOST_CUTS * t.throws.shape[0]
+            share, k, j = _first_change(w, i, taken, locate, t)
+            if k >= 0 and locate:
+                taken *= share
+                cuts += 1
+                continue
+            tally.counts[NOT_LOCATED] += k >= 0
+        _record_forces(w, i, taken / (6.0 * h), forces, step, tally)
+        i = 1 - i
+        if k >= 0:
+            _change(k, j, w, i, t, tally)
+            fresh, k = False, -1
+        left = 0.0 if taken == left else left - taken
+        taken = left
+    return i, fresh
+
+
+@kernel
+def _breathe(w: Any, i: int, h: float, t: Any, chamber: Any, forces: Any, step: int) -> int:
+    """Step every chamber along its piston's path; its pressure for the next step."""
+    fault = 0
+    for k in range(t.throws.shape[0]):
+        q, b, held = t.throws[k], w.stage[i, k], w.held[k]
+        if q.pressure_rung != PRESSURE_CHAMBER:
+            continue
+        last, before, v_before = chamber[k, 0], chamber[k, 6], chamber[k, 7]
+        fault += chamber_step(
+            chamber[k], held.flow, t.liquid[k], h, before, v_before, b.y[3], b.y[9], q.substeps
+        )
+        chamber[k, 6], chamber[k, 7] = b.y[3], b.y[9]
+        held.pressure[0], held.pressure[1] = chamber[k, 0], 2.0 * chamber[k, 0] - last
+        f = 1 + len(FORCES) * k
+        forces[step, f + _VALVES] = held.flow[2] / h
+        forces[step, f + _VALVES + 1] = held.flow[3] / h
+    return fault
+
+
+@kernel
+def _fault(w: Any, i: int) -> int:
+    total = w.crank[i, ANGLE] + w.crank[i, SPEED]
+    for k in range(w.stage.shape[1]):
+        b = w.stage[i, k]
+        for c in range(PER_THROW):
+            total += b.y[c]
+        if b.overlap > OVERLAP_LIMIT:
+            return 2
+        if abs(b.y[2]) > 1.5:  # rad
+            return 3
+    return 0 if math.isfinite(total) else 1
+
+
+CHANGES, NOT_LOCATED, FLOORED, IN_TENSION, WITH_VAPOUR = range(5)
+"""What a run counts: contacts that closed or opened; steps with more than could be located;
+closings below the law's speed floor; steps with a link in tension; steps with vapour."""
+
+
+class _Record(NamedTuple):
+    """What a run leaves behind; the last two have one row where they are not needed."""
+
+    turns: NDArray[np.float64]  # (n_steps + 1, 2): crank angle and speed
+    forces: NDArray[np.float64]  # (n_steps, 1 + n_throws * len(FORCES))
+    states: NDArray[np.float64]  # (n_steps + 1, n_throws, PER_THROW)
+    chambers: NDArray[np.float64]  # (n_steps + 1, n_throws, 8)
+
+
+class _Tally(NamedTuple):
+    counts: NDArray[np.int64]  # (5,)
+    peak: NDArray[np.float64]  # (1,): largest normal force
+
+
+@kernel
+def _is_compliant(q: Any, j: int) -> Any:
+    rung = q.crankpin_rung if j == CRANKPIN else q.wristpin_rung if j == WRISTPIN else q.guide_rung
+    return rung == JOINT_COMPLIANT
+
+
+@kernel
+def _begin(w: Any, t: Any, chamber: Any) -> bool:
+    """Contacts closed from the start, chambers; true where any chamber breathes."""
+    breathing = False
+    for k in range(t.throws.shape[0]):
+        q, b, held = t.throws[k], w.stage[0, k], w.held[k]
+        breathing |= q.pressure_rung == PRESSURE_CHAMBER
+        chamber[k, 6], chamber[k, 7] = b.y[3], b.y[9]
+        held.pressure[0] = held.pressure[1] = chamber[k, 0]
+        for j in range(CONTACTS):
+            for row in range(5):
+                w.stage[row, k].margin[j] = _NO_CHANGE
+            if _is_compliant(q, j):  # closed is what would close if it were open
+                held.touching[j] = 1 if _contact_margin(k, j, w, 0, t) < 0.0 else 0
+    return breathing
+
+
+@kernel
+def _keep(w: Any, i: int, chamber: Any, r: Any, row: int) -> None:
+    r.turns[row, 0], r.turns[row, 1] = w.crank[i, ANGLE], w.crank[i, SPEED]
+    for k in range(chamber.shape[0]):
+        if r.states.shape[0] > 1:
+            for c in range(PER_THROW):
+                r.states[row, k, c] = w.stage[i, k].y[c]
+        if r.chambers.shape[0] > 1:
+            for c in range(chamber.shape[1]):
+                r.chambers[row, k, c] = chamber[k, c]
+
+
+@kernel
+def _integrate(h: float, t: Any, w: Any, chamber: Any, r: Any, tally: Any) -> Any:
+    """March from row 0 of the scratch; returns status code and steps done."""
+    breathing = _begin(w, t, chamber)
+    i, fresh = 0, False
+    _keep(w, i, chamber, r, 0)
+    for step in range(r.forces.shape[0]):
+        i, fresh = _step(w, i, h, fresh, t, r.forces, step, tally)
+        code = _fault(w, i)
+        if breathing:
+            if _breathe(w, i, h, t, chamber, r.forces, step) != 0:
+                code = 4
+            fresh = False  # the step felt an extrapolated pressure, the next one knows better
+        for k in range(t.throws.shape[0]):
+            tally.counts[IN_TENSION] += w.stage[i, k].link < 0.0
+            tally.counts[WITH_VAPOUR] += chamber[k, 1] > 0.0
+        _keep(w, i, chamber, r, step + 1)
+        if code != 0:
+            return code, step + 1
+    return 0, r.forces.shape[0]
+
+
+@dataclass(frozen=True, kw_only=True)
+class CrankRun:
+    """A run of the mechanism.
+
+    Attributes
+    ----------
+    turns : numpy.ndarray [shape=(n_steps + 1, 2)]
+        Crank angle [rad] and speed [rad/s] at the ends of the steps.
+    forces : numpy.ndarray [shape=(n_steps, 1 + 9 n_throws)]
+        Drive moment [N m], then per throw the columns of :data:`FORCES` [N], means over each step.
+    bodies : numpy.ndarray [shape=(n_steps + 1, n_throws, 12)] or None
+        Columns as :data:`BODY`, then their rates, at the ends of the steps; the state in the
+        middle of a step, to which its forces belong, is the mean of two rows. None where not kept.
+    chambers : numpy.ndarray [shape=(n_steps + 1, n_throws, 6)] or None
+        Columns as ``CHAMBER_STATE``; None where nothing breathes.
+    step : float
+        [s]
+    status : Status
+        How the run ended.
+    peak_normal_force : float
+        Largest contact force met inside the steps [N].
+    contact_changes, cuts_refused : int
+        Closings plus openings; steps with more than could be located.
+    floored_closings : int
+        Contacts that closed more slowly than the speed floor of their law.
+    tension_steps : int
+        Steps at whose end a massless link was in tension: contact would be lost.
+    vapour_steps : int
+        Steps, summed over throws, at whose end a chamber held vapour.
+    """
+
+    turns: NDArray[np.float64]
+    forces: NDArray[np.float64]
+    bodies: NDArray[np.float64] | None
+    chambers: NDArray[np.float64] | None
+    step: float
+    peak_normal_force: float
+    status: Status = Status.OK
+    contact_changes: int = 0
+    cuts_refused: int = 0
+    floored_closings: int = 0
+    tension_steps: int = 0
+    vapour_steps: int = 0
+
+    def force(self, name: str, throw: int = 0) -> NDArray[np.float64]:
+        """One column of the forces, by its name in :data:`FORCES` [N]."""
+        return self.forces[:, 1 + len(FORCES) * throw + FORCES.index(name)]
+
+
+def run_mechanism(
+    t: Tables,
+    *,
+    angle: float,
+    speed: float,
+    bodies: NDArray[np.float64],
+    step: float,
+    n_steps: int,
+    chambers: NDArray[np.float64] | None = None,
+    keep_states: bool = True,
+) -> CrankRun:
+    """Integrate the mechanism with contact in its clearances.
+
+    Parameters
+    ----------
+    t : Tables
+        Validated by the scene; a kernel trusts it.
+    angle, speed : float
+        Of the crank at the start [rad], [rad/s].
+    bodies : numpy.ndarray [shape=(n_throws, 12)]
+        Columns as :data:`BODY`, then their rates. What ideal joints and links hold together must
+        be together.
+    step : float
+        [s]
+    n_steps : int
+        Steps to take.
+    chambers : numpy.ndarray [shape=(n_throws, 6)], optional
+        State of the chambers at the start.
+    keep_states : bool
+        Keep the bodies at the ends of all steps.
+
+    Returns
+    -------
+    CrankRun
+        Cut off at the step in which it failed where the status is not OK.
+    """
+    n = len(t.throws)
+    rows = n_steps + 1 if keep_states else 1
+    breathing = bool(np.any(t.throws["pressure_rung"] == PRESSURE_CHAMBER))
+    w = _Work(
+        crank=np.zeros((5, 5)),
+        stage=np.zeros((5, n), STAGE),
+        held=np.zeros(n, HELD),
+        moment=np.zeros(2),
+        matrix=np.zeros((4, 6)),
+        place=np.zeros((4, 6)),
+    )
+    w.crank[0, ANGLE], w.crank[0, SPEED] = angle, speed
+    w.stage["y"][0] = bodies
+    chamber = np.zeros((n, 8))
+    if chambers is not None:
+        chamber[:, :6] = chambers
+    r = _Record(
+        turns=np.empty((n_steps + 1, 2)),
+        forces=np.zeros((n_steps, 1 + n * len(FORCES))),
+        states=np.empty((rows, n, PER_THROW)),
+        chambers=np.empty((n_steps + 1 if breathing else 1, n, 8)),
+    )
+    tally = _Tally(counts=np.zeros(5, np.int64), peak=np.zeros(1))
+    code, done = _integrate(step, t, w, chamber, r, tally)
+    return CrankRun(
+        turns=r.turns[: done + 1],
+        forces=r.forces[:done],
+        bodies=r.states[: done + 1] if keep_states else None,
+        chambers=r.chambers[: done + 1, :, :6] if breathing else None,
+        step=step,
+        status=Status(code),
+        peak_normal_force=float(tally.peak[0]),
+        contact_changes=int(tally.counts[CHANGES]),
+        cuts_refused=int(tally.counts[NOT_LOCATED]),
+        floored_closings=int(tally.counts[FLOORED]),
+        tension_steps=int(tally.counts[IN_TENSION]),
+        vapour_steps=int(tally.counts[WITH_VAPOUR]),
+    )

@@ -1,0 +1,130 @@
+"""Where the liquid column of a pump tears: the rung heads has no vapour, its columns no give.
+
+A knock brakes the piston within a millisecond. The column that the rung *heads* moves with the
+piston as a rigid mass then pulls on it, down to pressures that no liquid bears.
+"""
+
+import math
+from typing import NamedTuple
+
+from ..scene.pump import PumpScene
+from .hydraulics import lowest_pressure
+from .setup import hydraulics_of, piston_area, run_scene
+from .slider_crank import CrankRun
+
+_TRIAL_TURNS = 2.0
+"""Revolutions of a trial after settling: what knocks, knocks in each of them."""
+
+
+class Tear(NamedTuple):
+    """A throw whose liquid would tear: its number from 0, lowest and vapour pressure [Pa gauge]."""
+
+    throw: int
+    lowest: float
+    vapour: float
+    knocks: bool
+
+    @property
+    def text(self) -> str:
+        """The fault, with its cure."""
+        cause = "the knocks pull the liquid down to" if self.knocks else "the piston needs"
+        flow = ", or pressure.flow = 'two-harmonic', which feels no knocks" * self.knocks
+        return (
+            f"pressure: {cause} {self.lowest:.4g} Pa at its lowest, must be >= the liquid's vapour "
+            f"pressure = {self.vapour:.4g} Pa gauge; set pressure.rung = 'chamber'{flow}, shorten "
+            "pressure.suction_line.length, or lower the speed"
+        )
+
+
+def torn_in_motion(scene: PumpScene) -> list[Tear]:
+    """Throws whose column tears already by the motion of a crank without clearance.
+
+    Examples
+    --------
+    >>> from ..scene.load import load_scene
+    >>> torn_in_motion(load_scene("bilge-pump", {"pressure.rung": "heads"}))
+    []
+    """
+    found = []
+    for throw in _columns(scene):
+        liquid = hydraulics_of(scene, throw)[0]
+        lowest, vapour = lowest_pressure(liquid), float(liquid["vapour"])
+        if lowest < vapour:
+            found.append(Tear(throw, lowest, vapour, knocks=False))
+    return found
+
+
+def torn_by_knocks(scene: PumpScene, step: float) -> list[Tear]:
+    """Throws whose column tears in a trial: two revolutions after settling, knocks included.
+
+    Parameters
+    ----------
+    scene : PumpScene
+        Without other faults.
+    step : float
+        [s]
+
+    Examples
+    --------
+    >>> from ..scene.load import load_scene
+    >>> worn = load_scene("bilge-pump", {"pressure.rung": "heads"})
+    >>> torn_by_knocks(worn, 1 / 51200)[0].lowest < -1e5
+    True
+    """
+    if not _columns(scene):
+        return []
+    turn = 1 / (scene.drive.speed * step)
+    begin = math.ceil(scene.settling_revolutions * turn)
+    run = run_scene(
+        scene,
+        step=step,
+        n_steps=begin + math.ceil(_TRIAL_TURNS * turn),
+        start_angle=scene.drive.start_angle,
+    )
+    return torn_in_run(scene, run, begin) if run.status.ok else []
+
+
+def torn_in_run(scene: PumpScene, run: CrankRun, begin: int) -> list[Tear]:
+    """Throws whose column tears in a run, from step `begin` on."""
+    found = []
+    for throw in _columns(scene):
+        vapour = float(hydraulics_of(scene, throw)[0]["vapour"])
+        lowest = lowest_of_run(scene, run, begin, [throw])
+        if lowest < vapour:
+            found.append(Tear(throw, lowest, vapour, knocks=True))
+    return found
+
+
+def lowest_of_run(
+    scene: PumpScene, run: CrankRun, begin: int, throws: list[int] | None = None
+) -> float:
+    """Lowest pressure on the piston faces of a run, the inertia of the liquid included.
+
+    Parameters
+    ----------
+    scene : PumpScene
+    run : CrankRun
+        Of the scene.
+    begin : int
+        First step that counts, the end of settling.
+    throws : list of int, optional
+        Those that count, from 0; all by default.
+
+    Returns
+    -------
+    float
+        Gauge [Pa], a mean over its step; infinite where no liquid pushes, or no step counts.
+    """
+    area = piston_area(scene)
+    each = range(len(scene.throws)) if throws is None else throws
+    pushed = [k for k in each if area > 0 and scene.pressures(k).rung != "none"]
+    return min(
+        (-float(run.force("piston_x", k)[begin:].max(initial=-math.inf)) / area for k in pushed),
+        default=math.inf,
+    )
+
+
+def _columns(scene: PumpScene) -> list[int]:
+    """Throws with the rung heads and a bore."""
+    bores = range(len(scene.throws)) if scene.piston.diameter > 0 else ()
+    return [throw for throw in bores if scene.pressures(throw).rung == "heads"]

@@ -1,0 +1,189 @@
+"""What a pump's rungs and steps must hold: clearances, penetrations, tears, lengths of steps."""
+
+import math
+from collections.abc import Callable, Iterator
+
+from ..output.solution import Status
+from ..scene.pump import Guide, PumpScene, RevoluteJoint
+from .setup import (
+    LARGEST_STEP_PER_CONTACT_TIME,
+    STEP_PER_CONTACT_DECAY,
+    STEP_PER_CONTACT_TIME,
+    contact_frequency,
+    contact_rate,
+    contact_table,
+    joint_loads,
+    joint_parts,
+    joint_rungs,
+    penetration_under,
+)
+from .slider_crank import JOINT_COMPLIANT, OVERLAP_LIMIT
+from .tearing import torn_by_knocks, torn_in_motion
+
+
+def joint_faults(scene: PumpScene) -> list[str]:
+    """Joints whose rung needs a clearance and has none, with the cure."""
+    return [
+        f"{path}.rung = '{part.rung}' needs a clearance > 0 m; "
+        f"set {path}.rung = 'ideal' for a joint without one"
+        for throw, path, part in _joints(scene)
+        if part.rung != "ideal" and part.clearance_radial == 0
+    ]
+
+
+def _joints(scene: PumpScene) -> Iterator[tuple[int, str, RevoluteJoint | Guide]]:
+    """Throw, path and part of every joint that is given, those of the scene's own tables once."""
+    for throw, own in enumerate(scene.throws):
+        if throw > 0 and own.joint is None and scene.throws[0].joint is None:
+            continue
+        where = "joint" if own.joint is None else f"throws.{throw}.joint"
+        names = ("crankpin", "wristpin", "guide")
+        for name, part in zip(names, joint_parts(scene, throw), strict=True):
+            if part is not None:
+                yield throw, f"{where}.{name}", part
+
+
+_UNRESOLVED = 4.0
+"""Static penetration under the ideal joint's largest force, over the radial clearance: beyond it
+the joint is a spring in which a gap of this size makes no difference."""
+
+
+def limits(scene: PumpScene) -> list[tuple[Status, str]]:
+    """What of a scene is beyond the validity of its rungs: status, and a fault with its cure.
+
+    Parameters
+    ----------
+    scene : PumpScene
+        Without faults otherwise.
+
+    Returns
+    -------
+    list of (Status, str)
+        Empty where every rung is valid.
+    """
+    checks: tuple[Callable[[PumpScene], list[tuple[Status, str]]], ...] = (
+        _sunk,
+        _torn,
+        _too_long,
+    )
+    return [found for check in checks for found in check(scene)]
+
+
+def knock_limits(scene: PumpScene) -> list[tuple[Status, str]]:
+    """What only a trial shows of a scene that :func:`limits` lets pass, in the same form.
+
+    Parameters
+    ----------
+    scene : PumpScene
+
+    Returns
+    -------
+    list of (Status, str)
+        Also empty where the step is refused for its length, which ends any trial.
+    """
+    steps = math.ceil(1 / (scene.sample_rate * pump_step(scene)) - 1e-9)
+    if steps > MOST_STEPS:
+        return []
+    step = 1 / (scene.sample_rate * max(FEWEST_STEPS, steps))
+    return [(Status.VAPOUR, tear.text) for tear in torn_by_knocks(scene, step)]
+
+
+def _sunk(scene: PumpScene) -> list[tuple[Status, str]]:
+    """Contacts too soft for their load: beyond their law, or blind to their own clearance."""
+    found = []
+    for throw, path, part in _joints(scene):
+        joint = ("crankpin", "wristpin", "guide").index(path.rpartition(".")[2])
+        if joint_rungs(scene, throw)[joint] != JOINT_COMPLIANT:
+            continue
+        load = joint_loads(scene, throw)[joint]
+        depth = penetration_under(contact_table(scene, throw)[joint], load)
+        found += [*_overlaps(path, part, depth, load), *_unresolved(path, part, depth, load)]
+    return found
+
+
+def _overlaps(
+    path: str, part: RevoluteJoint | Guide, depth: float, load: float
+) -> list[tuple[Status, str]]:
+    most = OVERLAP_LIMIT * _size(part)
+    if depth <= most:
+        return []
+    text = (
+        f"{path}: penetration under {load:.3g} N = {depth:.3g} m must be <= {most:.3g} m, "
+        f"{OVERLAP_LIMIT:g} of {_SIZE_OF[isinstance(part, Guide)]}, where the contact law ends; "
+        f"raise its stiffness, or set {path}.rung = 'ideal'"
+    )
+    return [(Status.OVERLAP, text)]
+
+
+def _unresolved(
+    path: str, part: RevoluteJoint | Guide, depth: float, load: float
+) -> list[tuple[Status, str]]:
+    gap = part.clearance_radial
+    if depth <= _UNRESOLVED * gap:
+        return []
+    text = (
+        f"{path}: radial clearance = {gap:.3g} m must be >= {depth / _UNRESOLVED:.3g} m, a "
+        f"quarter of the penetration under {load:.3g} N, for the contact to resolve it; "
+        f"raise its stiffness, or set {path}.rung = 'ideal'"
+    )
+    return [(Status.UNRESOLVED, text)]
+
+
+_SIZE_OF = ("the pin's radius", "half the height")
+
+
+def _size(part: RevoluteJoint | Guide) -> float:
+    """Length that an overlap is measured against: pin radius, half height of a guided part."""
+    return (part.height if isinstance(part, Guide) else part.pin_diameter) / 2
+
+
+def _torn(scene: PumpScene) -> list[tuple[Status, str]]:
+    """Throws whose liquid column would tear: the rung heads has no vapour."""
+    return [(Status.VAPOUR, tear.text) for tear in torn_in_motion(scene)]
+
+
+def _too_long(scene: PumpScene) -> list[tuple[Status, str]]:
+    """A step that is written, and longer than the contact can be followed with."""
+    told, rate = scene.numerics.step, contact_rate(scene)
+    if told is None or told * rate <= LARGEST_STEP_PER_CONTACT_TIME:
+        return []
+    longest = LARGEST_STEP_PER_CONTACT_TIME / rate
+    text = (
+        f"numerics.step = {told:g} s must be <= {longest:.3g} s, the contact's rate being "
+        f"{1 / longest:.4g} 1/s; shorten it, or lower joint.crankpin.stiffness and damping"
+    )
+    return [(Status.STEP, text)]
+
+
+FEWEST_STEPS = 2
+"""A sample of a pump: the casing runs once a step, and needs twice the sample rate."""
+
+MOST_STEPS = 1000
+"""Steps per sample: beyond it a step says more about a slip than about accuracy."""
+
+
+def pump_step(scene: PumpScene) -> float:
+    """Longest step of a pump: what is written, else what its contact or its casing needs [s].
+
+    Examples
+    --------
+    >>> from wearstate.sim.scene.load import load_scene
+    >>> round(1e6 * pump_step(load_scene("bilge-pump")), 2)
+    19.53
+    """
+    casing = 1 / FEWEST_STEPS / scene.sample_rate
+    if scene.numerics.step is not None:
+        return min(scene.numerics.step, casing)
+    rate = contact_rate(scene)
+    if rate == 0:
+        return casing
+    needed = min(STEP_PER_CONTACT_TIME / contact_frequency(scene), STEP_PER_CONTACT_DECAY / rate)
+    return min(needed, casing)
+
+
+def pump_steps(scene: PumpScene) -> int:
+    """Steps of a pump's run, settling included, but for the filters' edges."""
+    time = scene.duration + scene.settling_revolutions / scene.drive.speed
+    return math.ceil(time * scene.sample_rate) * math.ceil(
+        1 / (scene.sample_rate * pump_step(scene)) - 1e-9
+    )

@@ -1,0 +1,190 @@
+"""A shaker or an instrumented hammer of a scene: how it pushes, and what its force cell reads.
+
+Where it pushes is of the machine: :mod:`.scene.shaft`, :mod:`.scene.pump`. The force itself is made
+in :mod:`.excitation.forces`.
+"""
+
+from collections.abc import Iterator
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from ..output.sensor import Channel
+from .parts import (
+    GAIN_LEAST,
+    GAIN_MOST,
+    NAME_LONGEST,
+    Angle,
+    Force,
+    Frequency,
+    Length,
+    Part,
+    Ratio,
+    Time,
+)
+
+_FORCE_MOST = 1e9  # N
+_RANGE_LEAST = 1e-6  # N
+_FREQUENCY_MOST = 1e6  # Hz
+_LONGEST = 3600.0  # s
+_MOST_REPEATS = 10_000
+_SCATTER_MOST = 0.5  # of the logarithm of a peak, or rad: beyond it nobody calls it a hammer test
+
+Kind = Literal["random", "burst-random", "sweep", "stepped-sine", "hammer"]
+
+
+class Exciter(Part):
+    """A shaker or a hammer; with ``force = 0`` it is not mounted and has no channel.
+
+    ``repeats`` are spread evenly over the recording after ``quiet``: bursts, sweeps, frequencies of
+    a stepped sine, blows. The force is what acts on the machine: that a shaker gives less at a
+    resonance is not modelled, and need not be, since the cell reads what acts.
+    """
+
+    name: Annotated[str, Field(min_length=1, max_length=NAME_LONGEST)] = Field(
+        default="force", description="of the force cell's channel"
+    )
+    kind: Kind = "random"
+    force: Force = Field(
+        default=0.0, ge=0, le=_FORCE_MOST, description="rms while it pushes; hammer: median peak"
+    )
+    low: Frequency = Field(default=5.0, gt=0, le=_FREQUENCY_MOST, description="of its band")
+    high: Frequency = Field(default=400.0, gt=0, le=_FREQUENCY_MOST, description="of its band")
+    quiet: Time = Field(default=0.0, ge=0, le=_LONGEST, description="before it begins to push")
+    repeats: int = Field(default=20, ge=1, le=_MOST_REPEATS)
+    share: Ratio = Field(default=0.6, gt=0, le=1, description="of a burst or sweep that it pushes")
+    contact_time: Time = Field(
+        default=2.5e-3, gt=0, le=1.0, description="of a blow's half-sine, set by the hammer's tip"
+    )
+    peak_scatter: Ratio = Field(
+        default=0.2, ge=0, le=_SCATTER_MOST, description="of the logarithm of the blows' peaks"
+    )
+    angle_scatter: Angle = Field(
+        default=0.0, ge=0, le=_SCATTER_MOST, description="of the blows' direction"
+    )
+    double_hits: Ratio = Field(default=0.0, ge=0, le=1, description="share of blows that rebound")
+    gain: Ratio = Field(
+        default=1.0, ge=GAIN_LEAST, le=GAIN_MOST, description="true sensitivity over nominal"
+    )
+    noise: Force = Field(default=0.0, ge=0, le=_FORCE_MOST, description="rms of white noise")
+    range: Force = Field(
+        ge=_RANGE_LEAST, le=_FORCE_MOST, description="full scale of the cell, plus and minus"
+    )
+    bits: int = Field(default=24, ge=8, le=32)
+
+    @model_validator(mode="after")
+    def _band(self) -> Self:
+        if self.low >= self.high:
+            raise ValueError(
+                f"low = {self.low:g} Hz must be < high = {self.high:g} Hz; exchange them or check "
+                "the unit"
+            )
+        return self
+
+    @property
+    def mounted(self) -> bool:
+        """Whether it pushes and is recorded."""
+        return self.force > 0
+
+
+class CasingExciter(Exciter):
+    """A shaker or hammer on the casing of a pump, which is known in one direction at each place."""
+
+    place: Annotated[str, Field(min_length=1, max_length=NAME_LONGEST)] = Field(
+        description="of the mode shapes: of a force, or of a sensor that is pushed"
+    )
+    direction: str = Field(default="", description="which way it pushes, for the report")
+
+    @model_validator(mode="after")
+    def _straight(self) -> Self:
+        if self.angle_scatter:
+            raise ValueError(
+                f"angle_scatter = {self.angle_scatter:g} rad must be 0 on a casing, whose modes "
+                "tell one direction at each place; remove it"
+            )
+        return self
+
+
+class PlacedExciter(Exciter):
+    """An exciter on a shaft, whose blows scatter along it as well."""
+
+    place_scatter: Length = Field(
+        default=0.0, ge=0, le=1.0, description="of the blows along the shaft"
+    )
+
+
+def force_channel(part: Exciter, place: str, direction: str) -> Channel:
+    """Channel of the force cell: what acts where, and which way.
+
+    Examples
+    --------
+    >>> force_channel(Exciter(range=10.0), "shaft at forward", "vertical, up").label
+    'force [N]'
+    """
+    return Channel(name=part.name, unit="N", quantity="force", place=place, direction=direction)
+
+
+def exciter_faults(
+    path: str, part: Exciter, *, duration: float, sample_rate: float
+) -> Iterator[str]:
+    """What of an exciter does not go with the recording, as sentences; none where not mounted.
+
+    Parameters
+    ----------
+    path : str
+        Its dotted path in the scene.
+    part : Exciter
+    duration : float
+        Of the recording [s].
+    sample_rate : float
+        [Hz]
+
+    Examples
+    --------
+    >>> shaker = Exciter(force=10.0, range=100.0, high=600.0)
+    >>> [fault] = exciter_faults("exciters.0", shaker, duration=4.0, sample_rate=1000.0)
+    >>> fault.split(";")[0]
+    'exciters.0.high = 600 Hz must be <= 500 Hz, half the sample rate'
+    """
+    if not part.mounted:
+        return
+    stretch = (duration - part.quiet) / part.repeats
+    if part.quiet >= duration:
+        yield (
+            f"{path}.quiet = {part.quiet:g} s must be < duration = {duration:g} s; shorten it or "
+            "record longer"
+        )
+        return
+    if part.kind == "hammer":
+        yield from _blow_faults(path, part, stretch, sample_rate)
+        return
+    if part.high > sample_rate / 2:
+        yield (
+            f"{path}.high = {part.high:g} Hz must be <= {sample_rate / 2:g} Hz, half the sample "
+            "rate; lower it or raise sample_rate"
+        )
+    if part.kind != "random":
+        yield from _burst_faults(path, part, stretch)
+
+
+def _blow_faults(path: str, part: Exciter, stretch: float, sample_rate: float) -> Iterator[str]:
+    least, most = 2 / sample_rate, stretch / 10
+    if not least <= part.contact_time <= most:
+        yield (
+            f"{path}.contact_time = {part.contact_time:g} s must be >= {least:g} s, two samples, "
+            f"and <= {most:g} s, a tenth of the time for a blow; change the tip, the sample_rate "
+            "or the repeats"
+        )
+
+
+def _burst_faults(path: str, part: Exciter, stretch: float) -> Iterator[str]:
+    stepped = part.kind == "stepped-sine"
+    # settled halves of the dwells hold whole periods, their frequencies are apart by one of them
+    turns = (part.high - part.low) * stretch / 2 if stepped else part.low * part.share * stretch
+    least = part.repeats - 1 if stepped else 1
+    if turns < least:
+        yield (
+            f"{path}.repeats = {part.repeats} leaves {stretch:g} s for each, too short for "
+            f"{'frequencies that differ' if stepped else 'one period of low'}; must be fewer, or "
+            "record longer"
+        )

@@ -1,0 +1,430 @@
+"""The parts of a journal bearing with its rotor and its proximity probes, and their cross checks.
+
+X points along the load, and gravity acts along it; angles turn from X in the direction in which
+the shaft rotates, so that Y lies a quarter of a turn ahead of X.
+"""
+
+import math
+from collections.abc import Mapping
+from itertools import pairwise
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Field, model_validator
+
+from ..output.sensor import Channel
+from .oil_viscosity import walther_viscosity
+from .parts import (
+    ANGLE_MOST,
+    DAMPING_MOST,
+    GAIN_LEAST,
+    GAIN_MOST,
+    GRAVITY_MOST,
+    HEAVIEST,
+    LIGHTEST,
+    LONGEST,
+    MOST_SENSORS,
+    NAME_LONGEST,
+    PRESSURE_MOST,
+    SLIDING_LEAST,
+    SLIDING_MOST,
+    STANDARD_GRAVITY,
+    STIFFEST,
+    Acceleration,
+    Angle,
+    Damping,
+    Density,
+    Force,
+    KinematicViscosity,
+    Length,
+    Mass,
+    Numerics,
+    Part,
+    Pressure,
+    Ratio,
+    RotationSpeed,
+    Scene,
+    Stiffness,
+    Tacho,
+    Temperature,
+    Time,
+    Unbalance,
+    Velocity,
+    Viscosity,
+    Wear,
+    name_faults,
+)
+
+_FORCE_MOST = 1e9  # N
+_UNBALANCE_MOST = 1e6  # kg m
+_FORTY, _HUNDRED = 313.15, 373.15  # K, where data sheets give viscosities
+_VISCOSITY_LEAST, _VISCOSITY_MOST = 1e-6, 1e4  # Pa s, from air to pitch
+_THINNEST = 1e-9  # m, of a clearance: no film is thinner than its molecules
+_GAP_LEAST, _GAP_MOST = 1e-9, 1.0  # m
+_MOST_GROOVES = 32
+_MOST_RUN_OUT = 64
+
+_SHAFT_ANGLE = Annotated[Angle, Field(ge=-ANGLE_MOST, le=ANGLE_MOST)]
+
+
+class JournalDrive(Part):
+    """How the shaft is turned."""
+
+    speed: RotationSpeed = Field(gt=0, le=10_000, description="constant")
+    start_angle: _SHAFT_ANGLE = Field(default=0.0, description="shaft angle at the first sample")
+
+
+class AxialGroove(Part):
+    """A groove along the bearing, centred in its length, full of oil."""
+
+    angle: _SHAFT_ANGLE = Field(description="of its middle")
+    width: Angle = Field(gt=0, lt=math.tau, description="along the circumference")
+    length_share: Ratio = Field(default=0.8, gt=0, le=1, description="of the bearing's length")
+    pressure: Pressure = Field(
+        default=0.0, ge=0, le=PRESSURE_MOST, description="of the feed, gauge"
+    )
+
+
+class ShellContact(Part):
+    """Contact of journal and shell where the film ends, after Kelvin and Voigt."""
+
+    stiffness: Stiffness = Field(gt=0, le=STIFFEST)
+    damping: Damping = Field(default=0.0, ge=0, le=DAMPING_MOST)
+    friction: Ratio = Field(default=0.0, ge=0, le=1, description="Coulomb coefficient")
+    friction_speed: Velocity = Field(
+        default=0.01, ge=SLIDING_LEAST, le=SLIDING_MOST, description="full friction from about here"
+    )
+
+
+class Bearing(Part):
+    """The shell. Give exactly one of the two clearances."""
+
+    diameter: Length = Field(gt=0, le=LONGEST, description="of the bore")
+    length: Length = Field(gt=0, le=LONGEST)
+    diametral_clearance: Length | None = Field(
+        default=None, ge=_THINNEST, description="bore minus journal diameter"
+    )
+    radial_clearance: Length | None = Field(
+        default=None, ge=_THINNEST, description="bore minus journal radius"
+    )
+    scar_depth: Length = Field(
+        default=0.0, ge=0, description="deepest wear of the bore, where the shaft rubs at run-up"
+    )
+    scar_angle: _SHAFT_ANGLE = Field(default=0.0, description="of the deepest wear")
+    grooves: tuple[AxialGroove, ...] = Field(default=(), max_length=_MOST_GROOVES)
+    wall: ShellContact | None = Field(
+        default=None, description="contact law; none: a touch ends the run"
+    )
+
+    @model_validator(mode="after")
+    def _clearance_that_fits(self) -> Self:
+        given = [
+            name
+            for name in ("diametral_clearance", "radial_clearance")
+            if getattr(self, name) is not None
+        ]
+        if len(given) != 1:
+            raise ValueError(
+                f"{' and '.join(given) if given else 'no clearance'} given, must be exactly one of "
+                "diametral_clearance and radial_clearance; keep the one you measured"
+            )
+        if self.clearance_diametral >= self.diameter / 10:
+            raise ValueError(
+                f"{given[0]} = {getattr(self, given[0]):g} m must be < a tenth of the bore "
+                f"(diameter = {self.diameter:g} m), the film theory knows no curvature; check the "
+                "unit"
+            )
+        if self.scar_depth >= self.clearance_radial:
+            raise ValueError(
+                f"scar_depth = {self.scar_depth:g} m must be < the radial clearance = "
+                f"{self.clearance_radial:g} m; a deeper scar is a bearing of its own"
+            )
+        return self
+
+    @property
+    def clearance_radial(self) -> float:
+        """Radial clearance [m], whichever way it was given."""
+        if self.radial_clearance is not None:
+            return self.radial_clearance
+        return (self.diametral_clearance or 0.0) / 2
+
+    @property
+    def clearance_diametral(self) -> float:
+        """Diametral clearance [m], whichever way it was given."""
+        return 2 * self.clearance_radial
+
+
+class Oil(Part):
+    """The oil in the film, at the temperature at which it runs.
+
+    Give its viscosity, or its temperature with the two kinematic viscosities of its data sheet
+    and its density: Walther's law (ASTM D341) then gives the viscosity.
+    """
+
+    viscosity: Viscosity | None = Field(
+        default=None,
+        ge=_VISCOSITY_LEAST,
+        le=_VISCOSITY_MOST,
+        description="dynamic, in the film",
+    )
+    temperature: Temperature | None = Field(
+        default=None, ge=200, le=600, description="absolute: 50 degrees Celsius are 323.15 K"
+    )
+    viscosity_40: KinematicViscosity | None = Field(
+        default=None, ge=2e-6, le=1e-1, description="kinematic, at 40 degrees Celsius"
+    )
+    viscosity_100: KinematicViscosity | None = Field(
+        default=None, ge=2e-6, le=1e-1, description="kinematic, at 100 degrees Celsius"
+    )
+    density: Density | None = Field(default=None, ge=500, le=2000, description="in the film")
+
+    @model_validator(mode="after")
+    def _one_way_to_know_it(self) -> Self:
+        names = ("temperature", "viscosity_40", "viscosity_100", "density")
+        given = [name for name in names if getattr(self, name) is not None]
+        missing = [name for name in names if name not in given]
+        if self.viscosity is not None and given:
+            raise ValueError(
+                f"viscosity and {', '.join(given)} given, must be one or the other; remove one"
+            )
+        if self.viscosity is None and missing:
+            raise ValueError(
+                f"viscosity is missing; add it, or {', '.join(missing)} for Walther's law"
+            )
+        if self.viscosity is None:
+            try:
+                found = self.dynamic_viscosity
+            except ValueError as error:
+                raise ValueError(f"Walther's law: {error}") from None
+            if not _VISCOSITY_LEAST <= found <= _VISCOSITY_MOST:
+                raise ValueError(
+                    f"temperature = {self.temperature:g} K gives a viscosity of {found:.3g} Pa s, "
+                    f"must be within {_VISCOSITY_LEAST:g} and {_VISCOSITY_MOST:g} Pa s"
+                )
+        return self
+
+    @property
+    def dynamic_viscosity(self) -> float:
+        """In the film [Pa s], as given or by Walther's law."""
+        if self.viscosity is not None:
+            return self.viscosity
+        # the validator saw to it that all four are given
+        assert self.temperature is not None
+        assert self.viscosity_40 is not None
+        assert self.viscosity_100 is not None
+        assert self.density is not None
+        points = ((_FORTY, self.viscosity_40), (_HUNDRED, self.viscosity_100))
+        return walther_viscosity(self.temperature, points, density=self.density)
+
+
+class RunOut(Part):
+    """One harmonic of what the probes see of a perfectly still shaft: shape and magnetism."""
+
+    order: int = Field(ge=1, le=1000, description="cycles per revolution")
+    amplitude: Length = Field(ge=0, le=_GAP_MOST)
+    phase: _SHAFT_ANGLE = Field(default=0.0, description="of the track, at the keyphasor mark")
+
+
+class Rotor(Part):
+    """The part of a rigid rotor that one bearing carries."""
+
+    mass: Mass = Field(ge=LIGHTEST, le=HEAVIEST, description="on this bearing")
+    unbalance: Unbalance = Field(
+        default=0.0, ge=0, le=_UNBALANCE_MOST, description="mass times eccentricity, its share"
+    )
+    unbalance_angle: _SHAFT_ANGLE = Field(
+        default=0.0, description="from the keyphasor mark, in the direction of rotation"
+    )
+    run_out: tuple[RunOut, ...] = Field(default=(), max_length=_MOST_RUN_OUT)
+
+
+class LoadRecord(Part):
+    """A load against time from a CSV file: columns time [s], along X [N], along Y [N].
+
+    ``folder`` is where a relative file is looked for first, that of the scene file.
+    """
+
+    file: str = Field(min_length=1)
+    folder: str = Field(default="", exclude=True, description="where the file is looked for first")
+
+
+class JournalLoad(Part):
+    """What pushes on the shaft besides its weight; times count from the first sample."""
+
+    static: Force = Field(default=0.0, ge=-_FORCE_MOST, le=_FORCE_MOST, description="along X")
+    static_across: Force = Field(default=0.0, ge=-_FORCE_MOST, le=_FORCE_MOST, description="on Y")
+    history: Literal["none", "step", "rectangular", "half-sine", "file"] = "none"
+    amplitude: Force = Field(default=0.0, ge=-_FORCE_MOST, le=_FORCE_MOST)
+    angle: _SHAFT_ANGLE = Field(default=0.0, description="direction of the history, from X")
+    begin: Time = Field(default=0.0, ge=0, description="of step or pulse")
+    length: Time | None = Field(default=None, gt=0, description="of the pulse")
+    record: LoadRecord | None = None
+
+    @model_validator(mode="after")
+    def _history_complete(self) -> Self:
+        faults = []
+        if self.history in ("rectangular", "half-sine") and self.length is None:
+            faults.append(f"length is missing; the history '{self.history}' needs it")
+        if self.history == "file" and self.record is None:
+            faults.append("record is missing; the history 'file' needs it")
+        if self.history == "none" and self.amplitude != 0:
+            faults.append(
+                f"amplitude = {self.amplitude:g} N needs a history; set history = 'step' or "
+                "remove it"
+            )
+        if faults:
+            raise ValueError("\n".join(faults))
+        return self
+
+
+class Film(Part):
+    """How the oil film is computed: in closed form, from a table of solves, or anew each time."""
+
+    rung: Literal["short", "map", "direct"] = "map"
+    condition: Literal["guembel", "reynolds", "periodic"] = Field(
+        default="periodic", description="of cavitation, of the rungs map and direct"
+    )
+    n_theta: int = Field(default=72, ge=12, le=1440, description="nodes round the circle")
+    n_z: int = Field(default=17, ge=5, le=257, description="nodes over the length, odd")
+
+    @model_validator(mode="after")
+    def _odd(self) -> Self:
+        if self.n_z % 2 == 0:
+            raise ValueError(f"n_z = {self.n_z} must be odd; a node lies in the middle")
+        return self
+
+
+class JournalStart(Part):
+    """Where the journal is released, at rest, over the radial clearance."""
+
+    x: Ratio = Field(default=0.0, gt=-1, lt=1)
+    y: Ratio = Field(default=0.0, gt=-1, lt=1)
+
+    @model_validator(mode="after")
+    def _inside(self) -> Self:
+        if math.hypot(self.x, self.y) >= 1:
+            raise ValueError(
+                f"eccentricity = {math.hypot(self.x, self.y):g} must be < 1; start in the clearance"
+            )
+        return self
+
+
+class JournalNumerics(Numerics):
+    """What the integrator may be told."""
+
+    integrator: Literal["euler", "rk4", "adaptive"] = "adaptive"
+    tolerance: Ratio = Field(
+        default=1e-5, ge=1e-12, le=1e-2, description="of the adaptive one, over the gap left"
+    )
+
+
+class ProximityProbe(Part):
+    """An eddy-current probe with its converter: it reads the shaft's motion towards itself."""
+
+    name: str = Field(min_length=1, max_length=NAME_LONGEST)
+    angle: _SHAFT_ANGLE = Field(description="of its place, from X in the direction of rotation")
+    place: str = Field(default="", description="where it sits, for the report")
+    direction: str = Field(default="", description="which way it looks, for the report")
+    gain: Ratio = Field(
+        default=1.0, ge=GAIN_LEAST, le=GAIN_MOST, description="true sensitivity over nominal"
+    )
+    offset: Length = Field(
+        default=0.0, ge=-_GAP_MOST, le=_GAP_MOST, description="reading of a centred shaft"
+    )
+    noise: Length = Field(default=0.0, ge=0, le=_GAP_MOST, description="rms of white noise")
+    range: Length = Field(
+        ge=_GAP_LEAST, le=_GAP_MOST, description="full scale, plus and minus, about the set gap"
+    )
+    bits: int = Field(default=24, ge=8, le=32)
+
+
+class ScarLimits(Part):
+    """Limits of the depth of a worn scar, with their source."""
+
+    as_new: Length = Field(gt=0, le=LONGEST, description="depth after running in")
+    condemning: Length = Field(gt=0, le=LONGEST, description="the shell must be renewed above it")
+    grade_edges: tuple[Length, Length, Length] = Field(
+        description="depth at which grades 1, 2 and 3 begin"
+    )
+    source: str = Field(min_length=1)
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        values = (self.as_new, *self.grade_edges)
+        if any(low >= high for low, high in pairwise(values)):
+            raise ValueError(
+                f"as_new and grade_edges = {', '.join(f'{v:g} m' for v in values)} must rise "
+                "strictly; reorder them"
+            )
+        if self.grade_edges[-1] != self.condemning:
+            raise ValueError(
+                f"grade_edges[2] = {self.grade_edges[-1]:g} m must equal condemning = "
+                f"{self.condemning:g} m; grade 3 is condemned"
+            )
+        return self
+
+
+class JournalScene(Scene):
+    """A rigid rotor in a hydrodynamic journal bearing, seen by proximity probes."""
+
+    machine: Literal["journal-bearing"]
+    gravity: Acceleration = Field(default=STANDARD_GRAVITY, ge=0, le=GRAVITY_MOST)
+    settling_revolutions: int = Field(
+        default=3, ge=0, le=1000, description="run before the recording; 0: it begins at the start"
+    )
+    drive: JournalDrive
+    bearing: Bearing
+    oil: Oil
+    rotor: Rotor
+    load: JournalLoad = JournalLoad()
+    film: Film = Film()
+    start: JournalStart = JournalStart()
+    numerics: JournalNumerics = JournalNumerics()
+    sensors: tuple[ProximityProbe, ...] = Field(min_length=1, max_length=MOST_SENSORS)
+    wear: Wear | None = None
+    wear_scar: ScarLimits | None = None
+
+    def sensor_channels(self) -> tuple[Channel, ...]:
+        """One channel of displacement for every probe."""
+        return tuple(
+            Channel(
+                name=probe.name,
+                unit="m",
+                quantity="displacement",
+                place=probe.place,
+                direction=probe.direction,
+            )
+            for probe in self.sensors
+        )
+
+    @classmethod
+    def cross_faults(cls, parts: Mapping[str, Any]) -> list[str]:
+        """Faults between parts, of those parts that are there."""
+        checks = (
+            (_channel_faults, ("sensors", "tacho")),
+            (_film_faults, ("film", "bearing")),
+        )
+        return [
+            fault
+            for check, needs in checks
+            if all(need in parts for need in needs)
+            for fault in check(*(parts[need] for need in needs))
+        ]
+
+
+def _channel_faults(sensors: tuple[ProximityProbe, ...], tacho: Tacho | None) -> list[str]:
+    return name_faults([probe.name for probe in sensors], tacho)
+
+
+def _film_faults(film: Film, bearing: Bearing) -> list[str]:
+    """Rungs that know a plain bore only."""
+    shaped = [
+        name
+        for name, there in (("scar_depth", bearing.scar_depth > 0), ("grooves", bearing.grooves))
+        if there
+    ]
+    if film.rung == "direct" or not shaped:
+        return []
+    return [
+        f"film.rung = '{film.rung}' knows a plain bore only, bearing has {' and '.join(shaped)}; "
+        "set film.rung = 'direct'"
+    ]

@@ -1,0 +1,232 @@
+"""What the machine is: frozen, validated, without physics.
+
+A scene is a TOML file. Numbers are SI; a string carries its unit (``"0.25 mm"``, ``"300 rpm"``).
+Validation happens here once, reports every error at once as a dotted path with value, bound and
+cure, and names the nearest match of an unknown key. Kernels trust what passes.
+"""
+
+import re
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from .journal import JournalScene
+from .parts import MOST_FAULTS, Scene, SceneError, beside, nearest, validate_table, without_twin
+from .pump import PumpScene
+from .shaft import ShaftScene
+
+SCENE_FOLDER = Path(__file__).parent / "built_in"
+
+LARGEST_TEXT = 2**18
+"""Longest believable text of a scene or recipe; those built in have 20,000 characters at most.
+
+The parser takes some 50 microseconds for a key, so that this is refused or read within a second.
+"""
+
+DEEPEST = 32
+"""Tables and lists in each other; those built in have six."""
+
+# from the begin of a word, and never back: a long word must not take the square of its length
+_WORD = r"""(?:(?<![\w-])[A-Za-z0-9_-]++|"[^"\n]*+"|'[^'\n]*+')"""
+_LONG_KEY = re.compile(rf"{_WORD}(?:[ \t]*+\.[ \t]*+{_WORD}){{{2 * DEEPEST}}}")
+_LONG_NUMBER = "must have <= 64 bit; write it with a point or an exponent"
+
+
+MACHINES: dict[str, type[Scene]] = {
+    "reciprocating-pump": PumpScene,
+    "journal-bearing": JournalScene,
+    "propulsion-shaft": ShaftScene,
+}
+"""The scene type of every machine. A new machine is one row."""
+
+
+def scene_names() -> list[str]:
+    """Names of the built-in scenes, sorted.
+
+    Examples
+    --------
+    >>> "bilge-pump" in scene_names()
+    True
+    """
+    return sorted(path.stem for path in SCENE_FOLDER.glob("*.toml"))
+
+
+def scene_text(name_or_path: str | Path) -> str:
+    """TOML text of a built-in scene or of a file.
+
+    Raises
+    ------
+    SceneError
+        There is neither a built-in scene nor a file of that name; the nearest is named.
+    """
+    built_in = SCENE_FOLDER / f"{name_or_path}.toml"
+    path = built_in if built_in.is_file() else Path(name_or_path)
+    try:
+        return path.read_text(encoding="utf-8")
+    except (OSError, ValueError) as error:  # ValueError: no UTF-8, or a NUL in the name
+        hint = nearest(str(name_or_path), scene_names())
+        reason = "is no UTF-8 text" if isinstance(error, UnicodeDecodeError) else "is no scene"
+        raise SceneError(str(name_or_path), [f"{name_or_path} {reason}{hint}"]) from None
+
+
+def scene_folder(name_or_path: str | Path) -> Path:
+    """Folder in which the files that a scene names are looked for first.
+
+    Examples
+    --------
+    >>> scene_folder("bilge-pump").name
+    'scenes'
+    """
+    built_in = (SCENE_FOLDER / f"{name_or_path}.toml").is_file()
+    return SCENE_FOLDER if built_in else Path(name_or_path).parent
+
+
+def scene_table(text: str, name: str = "scene") -> dict[str, Any]:
+    """Parse TOML text into a plain table.
+
+    Raises
+    ------
+    SceneError
+        The text is no TOML; the message gives line and column.
+    """
+    if len(text) > LARGEST_TEXT:
+        fault = f"{len(text)} characters must be <= {LARGEST_TEXT}; keep tables in files beside it"
+        raise SceneError(name, [fault])
+    try:
+        if _LONG_KEY.search(text):  # the parser takes the square of its length
+            raise RecursionError
+        table = tomllib.loads(text)
+        faults = _unlike_toml(table)
+    except RecursionError:
+        raise SceneError(name, ["not TOML: lists or tables nested too deep; flatten it"]) from None
+    except tomllib.TOMLDecodeError as error:
+        raise SceneError(name, [f"not TOML: {error}; mend the line it names"]) from None
+    except ValueError:  # a whole number that Python does not turn
+        raise SceneError(name, [f"a whole number {_LONG_NUMBER}"]) from None
+    if faults:
+        raise SceneError(name, faults)
+    return table
+
+
+def _unlike_toml(table: Mapping[str, Any]) -> list[str]:
+    """Whole numbers longer than TOML has them; raises RecursionError where it is too deep."""
+    faults: list[str] = []
+    queue: list[tuple[tuple[str, ...], Any]] = [((), table)]
+    while queue:
+        path, node = queue.pop()
+        if len(path) > DEEPEST:
+            raise RecursionError
+        if isinstance(node, int) and node.bit_length() > 64:
+            faults.append(f"{'.'.join(path)}: a whole number {_LONG_NUMBER}")
+        if isinstance(node, Mapping):
+            queue += [((*path, key), value) for key, value in node.items()]
+        elif isinstance(node, list):
+            queue += [((*path, str(i)), value) for i, value in enumerate(node)]
+    return faults[:MOST_FAULTS]
+
+
+def scene_from_table(table: Mapping[str, Any]) -> Scene:
+    """Validate a plain table (numbers SI, or strings with units) into a scene.
+
+    Parameters
+    ----------
+    table : mapping
+        Nested tables, as TOML gives them.
+
+    Returns
+    -------
+    Scene
+        Frozen scene of the type that ``machine`` names.
+
+    Raises
+    ------
+    SceneError
+        Every fault at once, each as dotted path, value, bound and cure.
+    """
+    name = str(table.get("name", "scene"))
+    machine = table.get("machine")
+    if not isinstance(machine, str) or machine not in MACHINES:
+        hint = nearest(str(machine), MACHINES)
+        raise SceneError(name, [f"machine = {machine!r} is no machine of this program{hint}"])
+    return validate_table(MACHINES[machine], table, name)
+
+
+def load_scene(name_or_path: str | Path, overrides: Mapping[str, Any] | None = None) -> Scene:
+    """Load a built-in scene or a TOML file, with values replaced by dotted path.
+
+    Parameters
+    ----------
+    name_or_path : str or Path
+        A name of :func:`scene_names`, or a file.
+    overrides : mapping, optional
+        Dotted path -> number or string with unit, e.g. ``{"drive.speed": "250 rpm"}``. Setting
+        one of the two clearances of a joint removes the other.
+
+    Returns
+    -------
+    Scene
+        The validated scene.
+
+    Raises
+    ------
+    SceneError
+        Every fault at once.
+
+    Examples
+    --------
+    >>> load_scene("bilge-pump", {"drive.speed": "240 rpm"}).drive.speed
+    4.0
+    """
+    table = scene_table(scene_text(name_or_path), str(name_or_path))
+    return scene_from_table(beside(override(table, overrides or {}), scene_folder(name_or_path)))
+
+
+def override(table: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
+    """Copy of a table with values replaced by dotted path (list entries by index).
+
+    Raises
+    ------
+    SceneError
+        A path leads through something that is no table, or past the end of a list.
+
+    Examples
+    --------
+    >>> override({"rod": {"mass": 1.0}}, {"rod.mass": 2.0})
+    {'rod': {'mass': 2.0}}
+    """
+    result: dict[str, Any] = _copy(table)
+    faults = []
+    for path, value in values.items():
+        try:
+            _replace(result, path.split("."), value)
+        except (KeyError, IndexError, TypeError, ValueError):
+            faults.append(f"{path} does not lead to a value; see the scene's own tables")
+    if faults:
+        raise SceneError(str(table.get("name", "scene")), faults)
+    return result
+
+
+def _copy(node: Any) -> Any:
+    if isinstance(node, Mapping):
+        return {key: _copy(value) for key, value in node.items()}
+    return [_copy(value) for value in node] if isinstance(node, (list, tuple)) else node
+
+
+def _replace(node: Any, keys: list[str], value: Any) -> None:
+    for key in keys[:-1]:
+        node = node[_index(key)] if isinstance(node, list) else node.setdefault(key, {})
+    if isinstance(node, list):
+        node[_index(keys[-1])] = _copy(value)
+        return
+    if not isinstance(node, dict):
+        raise TypeError(keys)
+    without_twin(node, keys[-1])
+    node[keys[-1]] = _copy(value)
+
+
+def _index(key: str) -> int:
+    """Place in a list; counted from the front, in plain digits."""
+    if not re.fullmatch("[0-9]{1,9}", key):
+        raise IndexError(key)
+    return int(key)

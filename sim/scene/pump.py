@@ -1,0 +1,583 @@
+"""The parts of a reciprocating pump and their cross checks."""
+
+import math
+from collections.abc import Mapping
+from typing import Any, Literal, Self
+
+from pydantic import Field, model_validator
+
+from ..output.sensor import Channel
+from .exciters import CasingExciter, force_channel
+from .journal import ScarLimits
+from .parts import (
+    ANGLE_MOST,
+    DAMPING_MOST,
+    GRAVITY_MOST,
+    HEAVIEST,
+    INERTIA_LEAST,
+    INERTIA_MOST,
+    LIGHTEST,
+    LONGEST,
+    MOST_SENSORS,
+    SLIDING_LEAST,
+    SLIDING_MOST,
+    STANDARD_GRAVITY,
+    STIFFEST,
+    Acceleration,
+    Accelerometer,
+    Angle,
+    Casing,
+    Damping,
+    FrfFile,
+    HertzStiffness,
+    Inertia,
+    Length,
+    Mass,
+    Moment,
+    Part,
+    Pressure,
+    Ratio,
+    RotationSpeed,
+    Scene,
+    Stiffness,
+    Tacho,
+    Unbalance,
+    Velocity,
+    Wear,
+    merged,
+    name_faults,
+    nearest,
+    single_axis,
+)
+from .pump_hydraulics import CylinderPressure, PressureSensor
+
+_MOMENT_MOST = 1e9  # N m
+_UNBALANCE_MOST = 1e6  # kg m
+_HERTZ_MOST = 1e18  # N/m^1.5, a metre of steel has 1e11
+_MOST_THROWS = 32
+
+
+class Motor(Part):
+    """An asynchronous motor with everything that turns with it, all referred to the crank.
+
+    Moment ``2 M_b / (s / s_b + s_b / s)`` at the slip s, after Kloss.
+    """
+
+    synchronous_speed: RotationSpeed = Field(gt=0, le=1000, description="of the crank, no load")
+    breakdown_moment: Moment = Field(gt=0, le=_MOMENT_MOST, description="largest, at the crank")
+    breakdown_slip: Ratio = Field(
+        default=0.2, ge=1e-3, le=10, description="slip at which the moment is largest"
+    )
+    inertia: Inertia = Field(
+        ge=INERTIA_LEAST,
+        le=INERTIA_MOST,
+        description="of crank, flywheel, gear and rotor, at the crank",
+    )
+
+
+class Drive(Part):
+    """How the crank is turned: at constant speed, or by a motor whose speed gives way."""
+
+    rung: Literal["constant-speed", "motor"] = "constant-speed"
+    speed: RotationSpeed = Field(
+        gt=0, le=1000, description="crank speed in rev/s, constant, or that at the start"
+    )
+    start_angle: Angle = Field(
+        default=0.0,
+        ge=-ANGLE_MOST,
+        le=ANGLE_MOST,
+        description="crank angle at the first sample (of a motor: expected there)",
+    )
+    motor: Motor | None = None
+
+    @model_validator(mode="after")
+    def _motor_given(self) -> Self:
+        if self.rung == "motor" and self.motor is None:
+            raise ValueError("motor is missing; the rung 'motor' needs it")
+        return self
+
+
+class Crank(Part):
+    """The crank throws."""
+
+    radius: Length = Field(gt=0, le=LONGEST, description="half the stroke")
+    unbalance: Unbalance = Field(
+        default=0.0,
+        ge=0,
+        le=_UNBALANCE_MOST,
+        description="mass times eccentricity of the whole crank, along the first throw",
+    )
+
+
+class Rod(Part):
+    """The connecting rod."""
+
+    length: Length = Field(
+        gt=0, le=LONGEST, description="between the centres of wrist pin and crank-pin eye"
+    )
+    mass: Mass = Field(ge=LIGHTEST, le=HEAVIEST)
+    centre_of_mass: Length = Field(ge=0, description="distance from the wrist pin")
+    inertia: Inertia = Field(
+        ge=INERTIA_LEAST, le=INERTIA_MOST, description="about the centre of mass"
+    )
+
+    @model_validator(mode="after")
+    def _centre_between_pins(self) -> Self:
+        if self.centre_of_mass > self.length:
+            raise ValueError(
+                f"centre_of_mass = {self.centre_of_mass:g} m must be <= length = {self.length:g} m;"
+                " measure it from the wrist pin"
+            )
+        return self
+
+
+class Piston(Part):
+    """Piston with crosshead and wrist pin: everything that only slides."""
+
+    mass: Mass = Field(ge=LIGHTEST, le=HEAVIEST)
+    diameter: Length = Field(
+        ge=0, le=LONGEST, description="bore that the cylinder pressure acts on"
+    )
+    inertia: Inertia | None = Field(
+        default=None,
+        ge=INERTIA_LEAST,
+        le=INERTIA_MOST,
+        description="about the wrist pin, for a guide with clearance",
+    )
+
+
+_ELASTICITY = {
+    "linear": ("stiffness",),
+    "hertz": ("hertz_stiffness",),
+    "conformal": ("effective_modulus", "contact_length"),
+}
+"""Elasticity of a contact -> what describes it."""
+
+
+class Contact(Part):
+    """How two surfaces of a joint push and rub; alternatives, which no order ranks."""
+
+    law: Literal[
+        "kelvin-voigt",
+        "hunt-crossley",
+        "lankarani-nikravesh",
+        "flores",
+        "hu-guo",
+        "carvalho-martins",
+        "exact",
+    ] = "kelvin-voigt"
+    elasticity: Literal["linear", "hertz", "conformal"] = "linear"
+    stiffness: Stiffness | None = Field(
+        default=None, gt=0, le=STIFFEST, description="contact force per penetration"
+    )
+    hertz_stiffness: HertzStiffness | None = Field(
+        default=None, gt=0, le=_HERTZ_MOST, description="force per penetration to the power 1.5"
+    )
+    effective_modulus: Pressure | None = Field(
+        default=None, gt=0, le=1e13, description="E* of the conformal pair"
+    )
+    contact_length: Length | None = Field(
+        default=None, gt=0, le=LONGEST, description="along the pin, of the conformal pair"
+    )
+    damping: Damping = Field(
+        default=0.0, ge=0, le=DAMPING_MOST, description="C_n of the law kelvin-voigt"
+    )
+    restitution: Ratio | None = Field(
+        default=None, gt=0, le=1, description="of the hysteresis laws"
+    )
+    speed_floor: Velocity | None = Field(
+        default=None,
+        ge=SLIDING_LEAST,
+        le=SLIDING_MOST,
+        description="least impact speed a hysteresis law is given; none: damping at most critical",
+    )
+    friction_law: Literal["smooth", "ramp"] = "smooth"
+    friction: Ratio = Field(default=0.0, ge=0, le=1, description="Coulomb coefficient")
+    friction_speed: Velocity = Field(
+        default=0.01,
+        ge=SLIDING_LEAST,
+        le=SLIDING_MOST,
+        description="sliding speed that regularises the Coulomb sign; full friction of the ramp",
+    )
+    friction_dead_speed: Velocity = Field(
+        default=0.0, ge=0, le=SLIDING_MOST, description="the ramp has no friction below it"
+    )
+    tangential_damping: Damping = Field(
+        default=0.0, ge=0, le=DAMPING_MOST, description="C_t of the source paper"
+    )
+
+    @model_validator(mode="after")
+    def _law_complete(self) -> Self:
+        faults = []
+        if self.law == "kelvin-voigt" and self.restitution is not None:
+            faults.append(
+                f"restitution = {self.restitution:g} is for the hysteresis laws; remove it and "
+                "set damping, or choose another law"
+            )
+        if self.law != "kelvin-voigt" and self.restitution is None:
+            faults.append(f"restitution is missing; the law '{self.law}' needs it")
+        if self.law != "kelvin-voigt" and self.damping > 0:
+            faults.append(
+                f"damping = {self.damping:g} N s/m is for the law kelvin-voigt; remove it, the law "
+                f"'{self.law}' takes its loss from restitution"
+            )
+        if self.law == "carvalho-martins" and (self.restitution or 1) < 1 / 3:
+            faults.append(
+                f"restitution = {self.restitution:g} must be >= 1/3 for the law carvalho-martins; "
+                "choose the law 'exact'"
+            )
+        if self.friction_dead_speed >= self.friction_speed:
+            faults.append(
+                f"friction_dead_speed = {self.friction_dead_speed:g} m/s must be < friction_speed "
+                f"= {self.friction_speed:g} m/s; the ramp lies between them"
+            )
+        if faults:
+            raise ValueError("\n".join(faults))
+        return self
+
+    def elastic_faults(self) -> list[str]:
+        """What the elasticity lacks; asked by the rungs that need one."""
+        return [
+            f"{name} is missing; the elasticity '{self.elasticity}' needs it"
+            for name in _ELASTICITY[self.elasticity]
+            if getattr(self, name) is None
+        ]
+
+
+class RevoluteJoint(Contact):
+    """A pin in an eye with clearance. Give exactly one of the two clearances.
+
+    The rungs *ideal* (no clearance), *link* (always in contact) and *compliant*.
+    """
+
+    rung: Literal["ideal", "link", "compliant"] = "compliant"
+    pin_diameter: Length = Field(gt=0, le=LONGEST)
+    diametral_clearance: Length | None = Field(
+        default=None, ge=0, description="eye diameter minus pin diameter"
+    )
+    radial_clearance: Length | None = Field(
+        default=None, ge=0, description="eye radius minus pin radius"
+    )
+
+    @model_validator(mode="after")
+    def _one_clearance_that_fits(self) -> Self:
+        given = [
+            name
+            for name in ("diametral_clearance", "radial_clearance")
+            if getattr(self, name) is not None
+        ]
+        faults = self.elastic_faults() if self.rung == "compliant" else []
+        if len(given) > 1 or (not given and self.rung != "ideal"):
+            faults.append(
+                f"{' and '.join(given) if given else 'no clearance'} given, must be exactly one of "
+                "diametral_clearance and radial_clearance; keep the one you measured"
+            )
+        elif self.clearance_radial >= self.pin_diameter / 2:
+            faults.append(
+                f"{given[0]} = {getattr(self, given[0]):g} m must be smaller than the pin "
+                f"(pin_diameter = {self.pin_diameter:g} m); check the unit"
+            )
+        if faults:
+            raise ValueError("\n".join(faults))
+        return self
+
+    @property
+    def clearance_radial(self) -> float:
+        """Radial clearance [m], whichever way it was given; 0 where none was."""
+        if self.radial_clearance is not None:
+            return self.radial_clearance
+        return (self.diametral_clearance or 0.0) / 2
+
+    @property
+    def clearance_diametral(self) -> float:
+        """Diametral clearance [m], whichever way it was given; 0 where none was."""
+        return 2 * self.clearance_radial
+
+
+class Guide(Contact):
+    """The guide of piston or crosshead, across the stroke in the plane of the crank."""
+
+    rung: Literal["ideal", "compliant"] = "compliant"
+    length: Length = Field(gt=0, le=LONGEST, description="of the guided part")
+    height: Length = Field(gt=0, le=LONGEST, description="of the guided part, across the stroke")
+    diametral_clearance: Length = Field(
+        ge=0, le=LONGEST, description="height of the guide minus that of the guided part"
+    )
+
+    @property
+    def clearance_radial(self) -> float:
+        """Clearance on either side of the centred part [m]."""
+        return self.diametral_clearance / 2
+
+    @model_validator(mode="after")
+    def _surfaces(self) -> Self:
+        faults = self.elastic_faults() if self.rung == "compliant" else []
+        if faults:
+            raise ValueError("\n".join(faults))
+        return self
+
+
+class PumpJoints(Part):
+    """The joints of the crank mechanism that may have clearance; an absent one is ideal."""
+
+    crankpin: RevoluteJoint
+    wristpin: RevoluteJoint | None = None
+    guide: Guide | None = None
+
+
+class Throw(Part):
+    """One throw of the crank: its place, and where it differs from what the scene says of all.
+
+    ``joint`` and ``pressure`` are merged over the scene's own tables, so that one worn joint or
+    one leaking valve takes one line.
+    """
+
+    phase: Angle = Field(
+        default=0.0, ge=-ANGLE_MOST, le=ANGLE_MOST, description="crank angle over the first"
+    )
+    joint: PumpJoints | None = None
+    pressure: CylinderPressure | None = None
+
+
+CRANK_PLACES = ("bearing_x", "bearing_y", "guide_y", "cylinder_x")
+"""Where the crank mechanism pushes on the casing: x along the stroke, y across it."""
+
+GUIDE_PLACES = ("guide_x",)
+"""Where a piston in a guide with clearance rubs, along the stroke."""
+
+VALVE_PLACES = ("suction_valve", "discharge_valve")
+"""Where the valves strike their seats, along the stroke."""
+
+FORCE_PLACES = (*CRANK_PLACES, *GUIDE_PLACES, *VALVE_PLACES)
+"""All places of forces on the casing; with a suffix ``_1``, ``_2``, … those of one throw."""
+
+
+class FootLimits(ScarLimits):
+    """Limits of the stretch that anchor bolts have lost, with their source."""
+
+
+class PumpScene(Scene):
+    """A reciprocating pump of one to many equal throws with clearance in its joints."""
+
+    machine: Literal["reciprocating-pump"]
+    gravity: Acceleration = Field(default=STANDARD_GRAVITY, ge=0, le=GRAVITY_MOST)
+    stroke_inclination: Angle = Field(
+        default=0.0, ge=-math.tau, le=math.tau, description="0 horizontal, 90 deg piston up"
+    )
+    drive: Drive
+    crank: Crank
+    rod: Rod
+    piston: Piston
+    pressure: CylinderPressure = CylinderPressure(rung="none")
+    joint: PumpJoints
+    throws: tuple[Throw, ...] = Field(default=(Throw(),), min_length=1, max_length=_MOST_THROWS)
+    wear: Wear | None = None
+    wear_wristpin: Wear | None = None
+    wear_feet: FootLimits | None = None
+    casing: Casing
+    running: bool = Field(default=True, description="false: the crank stands, a test at rest")
+    exciters: tuple[CasingExciter, ...] = Field(default=(), max_length=MOST_SENSORS)
+    sensors: tuple[Accelerometer, ...] = Field(min_length=1, max_length=MOST_SENSORS)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _merge_throws(cls, table: Any) -> Any:
+        """Complete the tables of every throw with those of the scene."""
+        if not isinstance(table, Mapping) or not isinstance(table.get("throws"), (list, tuple)):
+            return table
+        return {**table, "throws": [_merged_throw(table, throw) for throw in table["throws"]]}
+
+    @property
+    def accelerometers(self) -> tuple[Accelerometer, ...]:
+        """One accelerometer for every channel: triaxial ones taken apart, see `single_axis`."""
+        return single_axis(self.sensors)
+
+    def sensor_channels(self) -> tuple[Channel, ...]:
+        """Acceleration of every axis of every accelerometer, then test forces, then pressures."""
+        accelerations = tuple(
+            Channel(
+                name=sensor.name,
+                unit="m/s^2",
+                quantity="acceleration",
+                place=sensor.place,
+                direction=sensor.direction,
+            )
+            for sensor in self.accelerometers
+        )
+        forces = tuple(
+            force_channel(part, f"casing at {part.place}", part.direction)
+            for part in self.mounted_exciters
+        )
+        pressures = tuple(
+            Channel(name=sensor.name, unit="Pa", quantity="pressure", place=sensor.place)
+            for _, sensor in self.pressure_sensors
+        )
+        return accelerations + forces + pressures
+
+    @property
+    def mounted_exciters(self) -> tuple[CasingExciter, ...]:
+        """Those that push; the others are not there."""
+        return tuple(part for part in self.exciters if part.mounted)
+
+    def joints(self, throw: int) -> PumpJoints:
+        """Joints of one throw, counted from 0."""
+        return self.throws[throw].joint or self.joint
+
+    def pressures(self, throw: int) -> CylinderPressure:
+        """Pressure on the piston of one throw, counted from 0."""
+        return self.throws[throw].pressure or self.pressure
+
+    @property
+    def pressure_sensors(self) -> tuple[tuple[int, PressureSensor], ...]:
+        """Throw, counted from 0, and sensor of every cylinder that has one.
+
+        Where there are several throws, the number of its throw, from 1, follows each name.
+        """
+        return _pressure_sensors(self.pressure, self.throws)
+
+    @classmethod
+    def cross_faults(cls, parts: Mapping[str, Any]) -> list[str]:
+        """Faults between parts, of those parts that are there."""
+        checks = (
+            (_rod_faults, ("crank", "joint", "rod")),
+            (_guide_faults, ("joint", "piston")),
+            (_name_faults, ("sensors", "exciters", "tacho", "pressure", "throws")),
+            (_shape_faults, ("casing", "sensors", "throws")),
+            (_exciter_faults, ("casing", "sensors", "exciters")),
+            (_rest_faults, ("running", "exciters", "fidelity")),
+        )
+        return [
+            fault
+            for check, needs in checks
+            if all(need in parts for need in needs)
+            for fault in check(*(parts[need] for need in needs))
+        ]
+
+
+def _merged_throw(scene: Mapping[str, Any], throw: Any) -> Any:
+    if not isinstance(throw, Mapping):
+        return throw
+    return {
+        **throw,
+        **{
+            name: merged(scene.get(name, {}), throw[name])
+            for name in ("joint", "pressure")
+            if isinstance(throw.get(name), Mapping)
+        },
+    }
+
+
+def _guide_faults(joint: PumpJoints, piston: Piston) -> list[str]:
+    if joint.guide is None or joint.guide.rung == "ideal" or piston.inertia is not None:
+        return []
+    return ["piston.inertia is missing; a piston in a guide with clearance tilts"]
+
+
+def _rod_faults(crank: Crank, joint: PumpJoints, rod: Rod) -> list[str]:
+    play = joint.wristpin.clearance_radial if joint.wristpin else 0.0
+    reach = crank.radius + joint.crankpin.clearance_radial + play
+    if rod.length > reach:
+        return []
+    return [
+        f"rod.length = {rod.length:g} m must be > crank radius + radial clearance = {reach:g} m; "
+        "a shorter rod locks the crank"
+    ]
+
+
+def _pressure_sensors(
+    pressure: CylinderPressure, throws: tuple[Throw, ...]
+) -> tuple[tuple[int, PressureSensor], ...]:
+    found = []
+    for i, throw in enumerate(throws):
+        sensor = (throw.pressure or pressure).sensor
+        if sensor is not None and len(throws) > 1:
+            sensor = sensor.model_copy(update={"name": f"{sensor.name}_{i + 1}"})
+        if sensor is not None:
+            found.append((i, sensor))
+    return tuple(found)
+
+
+def _name_faults(
+    sensors: tuple[Accelerometer, ...],
+    exciters: tuple[CasingExciter, ...],
+    tacho: Tacho | None,
+    pressure: CylinderPressure,
+    throws: tuple[Throw, ...],
+) -> list[str]:
+    pressures = (sensor.name for _, sensor in _pressure_sensors(pressure, throws))
+    names = [*(sensor.name for sensor in single_axis(sensors)), *(part.name for part in exciters)]
+    return name_faults([*names, *pressures], tacho)
+
+
+def _exciter_faults(
+    casing: Casing, sensors: tuple[Accelerometer, ...], exciters: tuple[CasingExciter, ...]
+) -> list[str]:
+    """Places of mounted exciters that the casing does not know."""
+    if casing.frf is not None:
+        known = set(FORCE_PLACES)
+    else:
+        known = {key for mode in casing.modes for key in mode.shape}
+        known |= {sensor.name for sensor in single_axis(sensors)}
+    return [
+        f"exciters.{i}.place = '{part.place}' is no place of the casing"
+        f"{nearest(part.place, sorted(known))}"
+        for i, part in enumerate(exciters)
+        if part.mounted and part.place not in known
+    ]
+
+
+def _rest_faults(running: bool, exciters: tuple[CasingExciter, ...], fidelity: str) -> list[str]:
+    """A pump at rest is there to be tested."""
+    faults = []
+    if not running and not any(part.mounted for part in exciters):
+        faults.append(
+            "running = false needs an exciter with force > 0: nothing moves else; set "
+            "exciters.0.force or let it run"
+        )
+    if not running and fidelity == "auto":
+        faults.append(
+            "fidelity = 'auto' must be 'given' with running = false; a casing at rest has no "
+            "rungs to choose"
+        )
+    return faults
+
+
+def _shape_faults(
+    casing: Casing, sensors: tuple[Accelerometer, ...], throws: tuple[Throw, ...]
+) -> list[str]:
+    names = [sensor.name for sensor in single_axis(sensors)]
+    forces = [
+        f"{place}{suffix}"
+        for place in FORCE_PLACES
+        for suffix in ("", *(f"_{throw}" for throw in range(1, len(throws) + 1)))
+    ]
+    if casing.frf is not None:
+        return _frf_faults(casing.frf, names, forces)
+    faults = []
+    for index, mode in enumerate(casing.modes):
+        path = f"casing.modes.{index}.shape"
+        faults += [
+            f"{path}.{key} is no place of this scene{nearest(key, (*FORCE_PLACES, *names))}"
+            for key in mode.shape
+            if key not in forces and key not in names
+        ]
+        faults += [
+            f"{path}.{name} is missing; give the shape at every sensor (0 at a node)"
+            for name in names
+            if name not in mode.shape
+        ]
+    return faults
+
+
+def _frf_faults(frf: FrfFile, sensors: list[str], forces: list[str]) -> list[str]:
+    """Names of the scene's own table of pairs; those of the file are seen when it is read."""
+    pairs = [f"{sensor}/{force}" for sensor in sensors for force in forces]
+    return [
+        f"casing.frf.pairs.{pair} is no sensor/place of this scene{nearest(pair, pairs)}"
+        for pair in frf.pairs
+        if pair not in pairs
+    ] + [
+        f"casing.frf.without: '{place}' is no place of this scene{nearest(place, forces)}"
+        for place in frf.without
+        if place not in forces
+    ]

@@ -1,0 +1,670 @@
+"""The parts of a propulsion shaft on its bearings, its loads and sensors, and their cross checks.
+
+x points along the shaft from aft, the propeller, forward, and a station is the distance in it
+from the aft end; y points up and z to starboard. The shaft turns from y towards z. Heights and
+offsets are positive up, sags and wear-down positive downwards.
+"""
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import pairwise
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Field, model_validator
+
+from ..output.sensor import Channel
+from .exciters import PlacedExciter, force_channel
+from .journal import Film, Oil, ProximityProbe, RunOut, ScarLimits
+from .parts import (
+    ANGLE_MOST,
+    DAMPING_MOST,
+    GAIN_LEAST,
+    GAIN_MOST,
+    GRAVITY_MOST,
+    HEAVIEST,
+    INERTIA_MOST,
+    LONGEST,
+    MOST_SENSORS,
+    NAME_LONGEST,
+    PRESSURE_MOST,
+    STANDARD_GRAVITY,
+    STIFFEST,
+    Acceleration,
+    Angle,
+    Damping,
+    Density,
+    Force,
+    Frequency,
+    Inertia,
+    Length,
+    Mass,
+    Moment,
+    Part,
+    Pressure,
+    Ratio,
+    RotationSpeed,
+    Scene,
+    Stiffness,
+    Tacho,
+    Unbalance,
+    name_faults,
+)
+
+_FORCE_MOST = 1e9  # N
+_MOMENT_MOST = 1e9  # N m
+_UNBALANCE_MOST = 1e6  # kg m
+_MODULUS_LEAST, _MODULUS_MOST = 1e8, 1e13  # Pa, from rubber to beyond diamond
+_DENSITY_MOST = 3e4  # kg/m^3, beyond osmium
+_STEEPEST = 0.05  # rad: small angles are their sines to 0.04 %
+_THINNEST = 1e-6  # m, of a clearance of a shaft line: a micrometre
+_NOISIEST = 1e7  # m/s^2
+_LEAST_RANGE, _MOST_RANGE = 1e-9, 1e7  # m/s^2
+_LOOSEST_FIT = 0.05  # of the diameter: bore and shaft are one but for the clearance
+_MOST_PARTS = 200
+_MOST_BLADES = 20
+
+_Station = Annotated[Length, Field(ge=0, le=LONGEST)]
+_Height = Annotated[Length, Field(ge=-1.0, le=1.0)]
+_Slope = Annotated[Angle, Field(ge=-_STEEPEST, le=_STEEPEST)]
+_Phase = Annotated[Angle, Field(ge=-ANGLE_MOST, le=ANGLE_MOST)]
+_Load = Annotated[Force, Field(ge=-_FORCE_MOST, le=_FORCE_MOST)]
+_Turning = Annotated[Moment, Field(ge=-_MOMENT_MOST, le=_MOMENT_MOST)]
+_Name = Annotated[str, Field(min_length=1, max_length=NAME_LONGEST)]
+
+
+# --- shaft
+
+
+class ShaftDrive(Part):
+    """How the shaft is turned."""
+
+    speed: RotationSpeed = Field(gt=0, le=1000, description="constant")
+    start_angle: _Phase = Field(default=0.0, description="shaft angle at the first sample")
+
+
+class ShaftMaterial(Part):
+    """What the shaft is of, and how its beam is computed."""
+
+    theory: Literal["timoshenko", "euler-bernoulli"] = "timoshenko"
+    shear_coefficient: Ratio | Literal["cowper"] = Field(
+        default="cowper", description="of the Timoshenko beam: a number, or Cowper's formula"
+    )
+    young: Pressure = Field(ge=_MODULUS_LEAST, le=_MODULUS_MOST)
+    shear_modulus: Pressure = Field(ge=_MODULUS_LEAST, le=_MODULUS_MOST)
+    density: Density = Field(gt=0, le=_DENSITY_MOST)
+    damping_ratio: Ratio = Field(
+        default=0.0, ge=0, lt=1, description="structural damping of the shaft's bending modes"
+    )
+    damping_band: tuple[Frequency, Frequency] = Field(
+        default=(2.0, 200.0), description="two frequencies at which the damping ratio holds"
+    )
+    longest_element: Length = Field(gt=0, le=LONGEST)
+
+    @model_validator(mode="after")
+    def _rising(self) -> Self:
+        low, high = self.damping_band
+        if not 0 <= low < high:
+            raise ValueError(
+                f"damping_band = {low:g} Hz, {high:g} Hz must be >= 0 and rise; reorder it"
+            )
+        return self
+
+
+class ShaftSection(Part):
+    """A piece of shaft of one diameter; sections follow each other from aft."""
+
+    length: Length = Field(gt=0, le=LONGEST)
+    outer_diameter: Length = Field(gt=0, le=LONGEST)
+    inner_diameter: Length = Field(default=0.0, ge=0, le=LONGEST)
+
+    @model_validator(mode="after")
+    def _hollow(self) -> Self:
+        if self.inner_diameter >= self.outer_diameter:
+            raise ValueError(
+                f"inner_diameter = {self.inner_diameter:g} m must be < outer_diameter = "
+                f"{self.outer_diameter:g} m; exchange them or check the unit"
+            )
+        return self
+
+
+class ShaftDisc(Part):
+    """A mass on the shaft: propeller, flange, coupling half, gear.
+
+    Entrained water has inertia and neither weight nor spin.
+    """
+
+    name: _Name
+    station: _Station
+    mass: Mass = Field(ge=0, le=HEAVIEST)
+    polar_inertia: Inertia = Field(default=0.0, ge=0, le=INERTIA_MOST)
+    diametral_inertia: Inertia = Field(default=0.0, ge=0, le=INERTIA_MOST)
+    entrained_mass: Mass = Field(default=0.0, ge=0, le=HEAVIEST)
+    entrained_polar: Inertia = Field(default=0.0, ge=0, le=INERTIA_MOST)
+    entrained_diametral: Inertia = Field(default=0.0, ge=0, le=INERTIA_MOST)
+    buoyancy: Force = Field(default=0.0, ge=0, le=_FORCE_MOST, description="lift of the water")
+    unbalance: Unbalance = Field(
+        default=0.0, ge=0, le=_UNBALANCE_MOST, description="mass times eccentricity"
+    )
+    unbalance_angle: _Phase = Field(
+        default=0.0, description="from the keyphasor mark, in the direction of rotation"
+    )
+
+
+class ShaftLoad(Part):
+    """A steady load at a station."""
+
+    station: _Station
+    up: _Load = 0.0
+    side: _Load = 0.0
+    moment_up: _Turning = Field(default=0.0, description="to the slope dy/dx")
+    moment_side: _Turning = Field(default=0.0, description="to the slope dz/dx")
+
+
+# --- bearings
+
+
+class Housing(Part):
+    """The bearing's housing on its pedestal: a mass on two springs with their dampers."""
+
+    mass: Mass = Field(gt=0, le=HEAVIEST)
+    stiffness_up: Stiffness = Field(gt=0, le=STIFFEST)
+    stiffness_side: Stiffness = Field(gt=0, le=STIFFEST)
+    damping_up: Damping = Field(default=0.0, ge=0, le=DAMPING_MOST)
+    damping_side: Damping = Field(default=0.0, ge=0, le=DAMPING_MOST)
+
+
+class AlignmentLimits(Part):
+    """What a bearing may carry, and how far it may be moved; see where each is from in `source`."""
+
+    least_load: Force = Field(default=0.0, ge=0, le=_FORCE_MOST)
+    most_pressure: Pressure | None = Field(
+        default=None, gt=0, le=PRESSURE_MOST, description="load over length times diameter"
+    )
+    most_slope: Angle | None = Field(
+        default=None, gt=0, le=_STEEPEST, description="of the shaft in the bore, in this plane"
+    )
+    least_move: Length = Field(default=0.0, ge=-1.0, le=0, description="the furthest down")
+    most_move: Length = Field(default=0.0, ge=0, le=1.0, description="the furthest up")
+    source: str = ""
+
+
+class ShaftBearing(Part):
+    """A journal bearing of the line, its place and its state.
+
+    ``offset`` is the height of the journal's centre where it lies at the bottom of the bore, as
+    aligned and as new. Wear-down lowers the bottom of the bore and widens it by as much; a sag
+    lowers the bearing.
+    """
+
+    name: _Name
+    station: _Station
+    diameter: Length = Field(gt=0, le=LONGEST, description="of the bore")
+    length: Length = Field(gt=0, le=LONGEST)
+    diametral_clearance: Length = Field(ge=_THINNEST, description="as new, bore minus journal")
+    offset: _Height = 0.0
+    side_offset: _Height = 0.0
+    slope: _Slope = Field(default=0.0, description="of the bore, dy/dx")
+    side_slope: _Slope = Field(default=0.0, description="of the bore, dz/dx")
+    wear_down: Length = Field(default=0.0, ge=0, le=1.0, description="of the bottom of the bore")
+    sag: Length = Field(default=0.0, ge=0, le=1.0, description="downwards, from its offset")
+    rise: _Height = Field(default=0.0, description="of the bearing, once it is hot")
+    lift: Length = Field(
+        default=0.0, ge=0, le=1.0, description="of the journal on its film, on rigid supports"
+    )
+    points: int = Field(default=1, ge=1, le=9, description="support points along its length")
+    housing: Housing
+    limits: AlignmentLimits = AlignmentLimits()
+
+    @model_validator(mode="after")
+    def _thin(self) -> Self:
+        gap = self.diametral_clearance + self.wear_down
+        if gap >= self.diameter / 10:
+            raise ValueError(
+                f"diametral_clearance + wear_down = {gap:g} m must be < a tenth of the bore "
+                f"(diameter = {self.diameter:g} m), the film theory knows no curvature; check the "
+                "unit"
+            )
+        if self.lift > self.diametral_clearance / 2:
+            raise ValueError(
+                f"lift = {self.lift:g} m must be <= half of diametral_clearance = "
+                f"{self.diametral_clearance:g} m; no journal runs above the middle of its bore"
+            )
+        return self
+
+
+class Hull(Part):
+    """How the hull bends under its cargo: a parabola between first and last bearing."""
+
+    deflection: _Height = Field(
+        default=0.0, description="of the middle above the line through first and last bearing"
+    )
+
+
+class ShaftCondition(Part):
+    """A state for which the alignment must hold."""
+
+    hull_deflection: _Height | None = Field(default=None, description="by default hull.deflection")
+    rise_share: Ratio = Field(default=0.0, ge=0, le=1, description="of the bearings' rise")
+    lift_share: Ratio = Field(default=0.0, ge=0, le=1, description="of the journals' lift")
+    thrust_share: Ratio = Field(default=0.0, ge=0, le=1, description="of the propeller's thrust")
+
+
+class ShaftConditions(Part):
+    """The three states of an alignment calculation."""
+
+    cold: ShaftCondition = ShaftCondition()
+    hot: ShaftCondition = ShaftCondition(rise_share=1.0)
+    running: ShaftCondition = ShaftCondition(rise_share=1.0, lift_share=1.0, thrust_share=1.0)
+
+
+# --- what excites it
+
+
+class BladeRate(Part):
+    """One harmonic of the propeller's forces, as shares of its thrust.
+
+    At the order ``harmonic * blades`` the propeller pushes with ``share * thrust *
+    cos(order * angle + phase)``, and turns with a moment of ``share * thrust * diameter``.
+    """
+
+    harmonic: int = Field(ge=1, le=100, description="of the blade rate")
+    up: Ratio = Field(default=0.0, ge=0, le=1)
+    side: Ratio = Field(default=0.0, ge=0, le=1)
+    moment_up: Ratio = Field(default=0.0, ge=0, le=1)
+    moment_side: Ratio = Field(default=0.0, ge=0, le=1)
+    up_phase: _Phase = 0.0
+    side_phase: _Phase = 0.0
+
+
+class Propeller(Part):
+    """What the propeller does to the shaft besides its weight."""
+
+    disc: _Name = Field(description="name of the disc that is the propeller")
+    blades: int = Field(ge=1, le=_MOST_BLADES)
+    diameter: Length = Field(gt=0, le=LONGEST)
+    thrust: Force = Field(ge=0, le=_FORCE_MOST, description="forward")
+    thrust_height: _Height = Field(
+        default=0.0, description="of the thrust's line of action above the shaft"
+    )
+    thrust_side: _Height = Field(default=0.0, description="of the same to starboard")
+    blade_rate: tuple[BladeRate, ...] = Field(default=(), max_length=_MOST_PARTS)
+
+
+class Coupling(Part):
+    """A flexible coupling at one end of the line, its other half misaligned.
+
+    Its elements sit on a ring and are not all alike: their stiffness has a first and a second
+    harmonic round the ring. Turning, a misaligned ring pushes steadily and at twice the speed, and
+    a ring that carries a torque at the speed.
+    """
+
+    station: _Station
+    parallel_offset: Length = Field(
+        default=0.0, ge=0, le=1.0, description="of the other half's axis, along offset_angle"
+    )
+    offset_angle: _Phase = Field(default=0.0, description="from up towards starboard")
+    angle: Annotated[Angle, Field(ge=-_STEEPEST, le=_STEEPEST)] = Field(
+        default=0.0, description="of the other half's axis, dy/dx"
+    )
+    stiffness: Stiffness = Field(gt=0, le=STIFFEST, description="to a parallel offset")
+    bending_stiffness: Moment = Field(
+        default=0.0, ge=0, le=_MOMENT_MOST, description="to an angle, per radian"
+    )
+    torque: Moment = Field(default=0.0, ge=0, le=_MOMENT_MOST, description="carried")
+    ring_radius: Length = Field(gt=0, le=LONGEST, description="of the elements")
+    uneven_once: Ratio = Field(
+        default=0.0, ge=0, lt=1, description="first harmonic of the elements' stiffness"
+    )
+    uneven_twice: Ratio = Field(
+        default=0.0, ge=0, lt=1, description="second harmonic of the elements' stiffness"
+    )
+    uneven_phase: _Phase = Field(default=0.0, description="of the stiffest element at angle 0")
+
+
+class Turbulence(Part):
+    """A random force, flat up to a corner, then falling by 6 dB an octave.
+
+    Its density is ``2 force^2 / (pi corner) / (1 + (f / corner)^2)``, in both directions,
+    independently.
+    """
+
+    place: _Name = Field(description="name of a disc or of a bearing, whose housing it pushes")
+    force: Force = Field(ge=0, le=_FORCE_MOST, description="rms over all frequencies")
+    corner: Frequency = Field(gt=0, le=1e6)
+
+
+class ShaftExciter(PlacedExciter):
+    """A shaker or hammer on the shaft or on a bearing's housing, while the line runs.
+
+    At rest the journals lie on metal, of which the model knows nothing: there is no test at
+    standstill.
+    """
+
+    place: str = Field(
+        default="", max_length=NAME_LONGEST, description="name of a bearing or a disc"
+    )
+    station: _Station | None = Field(default=None, description="of the shaft, instead of a place")
+    part: Literal["shaft", "housing"] = "shaft"
+    direction: Literal["up", "side"] = "up"
+
+    @model_validator(mode="after")
+    def _one_place(self) -> Self:
+        faults = []
+        if bool(self.place) == (self.station is not None):
+            faults.append(
+                f"{'both' if self.place else 'neither'} of place and station given, must be "
+                "exactly one; remove or add one"
+            )
+        if self.part == "housing" and self.place_scatter:
+            faults.append(
+                f"place_scatter = {self.place_scatter:g} m must be 0 on a housing, which does not "
+                "tilt here; set part = 'shaft' or remove it"
+            )
+        if self.part == "housing" and self.station is not None:
+            faults.append(
+                f"station = {self.station:g} m names no housing; name a bearing as place instead"
+            )
+        if faults:
+            raise ValueError("\n".join(faults))
+        return self
+
+    @property
+    def where(self) -> str:
+        """For people: ``shaft at forward``, ``housing of forward``."""
+        if self.part == "housing":
+            return f"housing of {self.place}"
+        return f"shaft at {self.place or f'{self.station:g} m'}"
+
+
+# --- what is seen of it
+
+
+DIRECTIONS = {"up": "vertical, up", "side": "horizontal, to starboard"}
+"""Of sensors and forces, as a report tells them."""
+
+
+class ShaftAccelerometer(Part):
+    """An accelerometer on a bearing's housing, with its converter."""
+
+    name: _Name
+    bearing: _Name
+    direction: Literal["up", "side"] = "up"
+    gain: Ratio = Field(
+        default=1.0, ge=GAIN_LEAST, le=GAIN_MOST, description="true sensitivity over nominal"
+    )
+    noise: Acceleration = Field(default=0.0, ge=0, le=_NOISIEST, description="rms of white noise")
+    range: Acceleration = Field(
+        ge=_LEAST_RANGE, le=_MOST_RANGE, description="full scale, plus and minus"
+    )
+    bits: int = Field(default=24, ge=8, le=32)
+
+
+class ShaftProbe(ProximityProbe):
+    """A proximity probe in a bearing's housing: it reads the journal's motion towards itself.
+
+    Zero where the journal is in the middle of the bore as new. Its angle is from straight down in
+    the direction of rotation, as that of a journal bearing's probe.
+    """
+
+    bearing: _Name
+
+
+# --- limits
+
+
+class StateLimits(ScarLimits):
+    """Limits of a fault of the line, with their source."""
+
+
+# --- the whole
+
+
+class ShaftScene(Scene):
+    """A propulsion shaft on its bearings, seen on its housings and by proximity probes."""
+
+    machine: Literal["propulsion-shaft"]
+    gravity: Acceleration = Field(default=STANDARD_GRAVITY, ge=0, le=GRAVITY_MOST)
+    settling_revolutions: int = Field(
+        default=0, ge=0, le=1000, description="unused: the response is the settled one"
+    )
+    drive: ShaftDrive
+    shaft: ShaftMaterial
+    sections: tuple[ShaftSection, ...] = Field(min_length=1, max_length=_MOST_PARTS)
+    discs: tuple[ShaftDisc, ...] = Field(default=(), max_length=_MOST_PARTS)
+    loads: tuple[ShaftLoad, ...] = Field(default=(), max_length=_MOST_PARTS)
+    bearings: tuple[ShaftBearing, ...] = Field(min_length=2, max_length=_MOST_PARTS)
+    oil: Oil
+    hull: Hull = Hull()
+    conditions: ShaftConditions = ShaftConditions()
+    propeller: Propeller | None = None
+    coupling: Coupling | None = None
+    turbulence: tuple[Turbulence, ...] = Field(default=(), max_length=_MOST_PARTS)
+    exciters: tuple[ShaftExciter, ...] = Field(default=(), max_length=MOST_SENSORS)
+    film: Film = Film(rung="direct")
+    run_out: tuple[RunOut, ...] = Field(default=(), max_length=_MOST_PARTS)
+    sensors: tuple[ShaftAccelerometer, ...] = Field(default=(), max_length=MOST_SENSORS)
+    probes: tuple[ShaftProbe, ...] = Field(default=(), max_length=MOST_SENSORS)
+    wear_down: StateLimits | None = None
+    wear_sag: StateLimits | None = None
+    wear_coupling: StateLimits | None = None
+
+    @property
+    def length(self) -> float:
+        """Of the whole shaft [m]."""
+        return math.fsum(section.length for section in self.sections)
+
+    def sensor_channels(self) -> tuple[Channel, ...]:
+        """Accelerations of the housings, a displacement for every probe, then the test forces."""
+        accelerations = tuple(
+            Channel(
+                name=sensor.name,
+                unit="m/s^2",
+                quantity="acceleration",
+                place=f"housing of {sensor.bearing}",
+                direction=DIRECTIONS[sensor.direction],
+            )
+            for sensor in self.sensors
+        )
+        displacements = tuple(
+            Channel(
+                name=probe.name,
+                unit="m",
+                quantity="displacement",
+                place=probe.place or f"housing of {probe.bearing}",
+                direction=probe.direction,
+            )
+            for probe in self.probes
+        )
+        forces = tuple(
+            force_channel(part, part.where, DIRECTIONS[part.direction])
+            for part in self.mounted_exciters
+        )
+        return accelerations + displacements + forces
+
+    @property
+    def mounted_exciters(self) -> tuple[ShaftExciter, ...]:
+        """Those that push; the others are not there."""
+        return tuple(part for part in self.exciters if part.mounted)
+
+    @classmethod
+    def cross_faults(cls, parts: Mapping[str, Any]) -> list[str]:
+        """Faults between parts, of those parts that are there."""
+        return [
+            fault
+            for check, needs in _CHECKS
+            if all(need in parts for need in needs)
+            for fault in check(*(parts[need] for need in needs))
+        ]
+
+
+def _channel_faults(
+    sensors: tuple[ShaftAccelerometer, ...],
+    probes: tuple[ShaftProbe, ...],
+    exciters: tuple[ShaftExciter, ...],
+    tacho: Tacho | None,
+) -> list[str]:
+    names = [*(s.name for s in sensors), *(p.name for p in probes), *(e.name for e in exciters)]
+    faults = name_faults(names, tacho)
+    if not sensors and not probes:
+        faults.append("sensors and probes: both are empty, must have >= 1 entry; add one")
+    return faults
+
+
+def _repeated(kind: str, names: Sequence[str]) -> list[str]:
+    return [
+        f"{kind}: name '{name}' is given {names.count(name)} times, must be unique; rename one"
+        for name in sorted(set(names))
+        if names.count(name) > 1
+    ]
+
+
+def _name_faults(bearings: tuple[ShaftBearing, ...], discs: tuple[ShaftDisc, ...]) -> list[str]:
+    return _repeated("bearings and discs", [*(b.name for b in bearings), *(d.name for d in discs)])
+
+
+def _outside(sections: tuple[ShaftSection, ...], places: Iterable[tuple[str, float]]) -> list[str]:
+    length = math.fsum(section.length for section in sections)
+    return [
+        f"{name}.station = {station:g} m must be <= the shaft's length = {length:g} m; lengthen a "
+        "section or move it"
+        for name, station in places
+        if station > length * (1 + 1e-12)
+    ]
+
+
+def _disc_faults(
+    sections: tuple[ShaftSection, ...],
+    discs: tuple[ShaftDisc, ...],
+    loads: tuple[ShaftLoad, ...],
+    coupling: Coupling | None,
+) -> list[str]:
+    places = [(f"discs.{i}", disc.station) for i, disc in enumerate(discs)]
+    places += [(f"loads.{i}", load.station) for i, load in enumerate(loads)]
+    places += [("coupling", coupling.station)] if coupling else []
+    return _outside(sections, places)
+
+
+def _bearing_faults(
+    sections: tuple[ShaftSection, ...], bearings: tuple[ShaftBearing, ...]
+) -> list[str]:
+    faults = _outside(sections, ((f"bearings.{i}", b.station) for i, b in enumerate(bearings)))
+    for i, (one, other) in enumerate(pairwise(bearings)):
+        room = other.station - one.station
+        if room <= (one.length + other.length) / 2:
+            faults.append(
+                f"bearings.{i + 1}.station = {other.station:g} m must be > that of bearings.{i} by "
+                f"more than half of both lengths, {(one.length + other.length) / 2:g} m; order "
+                "them from aft and keep them apart"
+            )
+    for i, bearing in enumerate(bearings):
+        there = _diameters(sections, bearing.station)
+        if there and not any(
+            abs(bearing.diameter - d) <= _LOOSEST_FIT * bearing.diameter for d in there
+        ):
+            faults.append(
+                f"bearings.{i}.diameter = {bearing.diameter:g} m must be that of the shaft at its "
+                f"station, {' or '.join(f'{d:g} m' for d in there)}; change one of them"
+            )
+    return faults
+
+
+def _diameters(sections: tuple[ShaftSection, ...], station: float) -> list[float]:
+    """Outer diameters at a station, two where sections meet."""
+    found, start = [], 0.0
+    for section in sections:
+        end = start + section.length
+        if start * (1 - 1e-12) <= station <= end * (1 + 1e-12):
+            found.append(section.outer_diameter)
+        start = end
+    return found
+
+
+def _sensor_faults(
+    bearings: tuple[ShaftBearing, ...],
+    sensors: tuple[ShaftAccelerometer, ...],
+    probes: tuple[ShaftProbe, ...],
+) -> list[str]:
+    names = [bearing.name for bearing in bearings]
+    asked = [(f"sensors.{i}", sensor.bearing) for i, sensor in enumerate(sensors)]
+    asked += [(f"probes.{i}", probe.bearing) for i, probe in enumerate(probes)]
+    return [
+        f"{place}.bearing = '{name}' is no bearing; choose one of {', '.join(names)}"
+        for place, name in asked
+        if name not in names
+    ]
+
+
+def _propeller_faults(discs: tuple[ShaftDisc, ...], propeller: Propeller | None) -> list[str]:
+    names = [disc.name for disc in discs]
+    if propeller is None or propeller.disc in names:
+        return []
+    return [
+        f"propeller.disc = '{propeller.disc}' is no disc; choose one of "
+        f"{', '.join(names) or 'none, and add it'}"
+    ]
+
+
+def _turbulence_faults(
+    bearings: tuple[ShaftBearing, ...],
+    discs: tuple[ShaftDisc, ...],
+    turbulence: tuple[Turbulence, ...],
+) -> list[str]:
+    names = [*(b.name for b in bearings), *(d.name for d in discs)]
+    return [
+        f"turbulence.{i}.place = '{part.place}' is no bearing and no disc; choose one of "
+        f"{', '.join(names)}"
+        for i, part in enumerate(turbulence)
+        if part.place not in names
+    ]
+
+
+def _exciter_faults(
+    sections: tuple[ShaftSection, ...],
+    bearings: tuple[ShaftBearing, ...],
+    discs: tuple[ShaftDisc, ...],
+    exciters: tuple[ShaftExciter, ...],
+) -> list[str]:
+    housed = [bearing.name for bearing in bearings]
+    known = {"housing": housed, "shaft": [*housed, *(disc.name for disc in discs)]}
+    mounted = [(i, part) for i, part in enumerate(exciters) if part.mounted]
+    stations = [(f"exciters.{i}", part.station) for i, part in mounted]
+    return [
+        *_outside(sections, ((name, at) for name, at in stations if at is not None)),
+        *(
+            f"exciters.{i}.place = '{part.place}' is no {'bearing' * (part.part == 'housing')}"
+            f"{'bearing and no disc' * (part.part == 'shaft')}; choose one of "
+            f"{', '.join(known[part.part])}"
+            for i, part in mounted
+            if part.place and part.place not in known[part.part]
+        ),
+    ]
+
+
+def _film_faults(film: Film) -> list[str]:
+    faults = []
+    if film.rung != "direct":
+        faults.append(
+            f"film.rung = '{film.rung}' knows no tilted journal; set film.rung = 'direct' for a "
+            "shaft line"
+        )
+    if film.condition == "reynolds":
+        faults.append(
+            "film.condition = 'reynolds' must be 'periodic' or 'guembel'; it holds P = 0 on the "
+            "line of nodes at the widest gap, of which a tilted journal has no one; 'periodic' "
+            "ruptures the film by the same law and finds the line itself"
+        )
+    return faults
+
+
+_CHECKS: tuple[tuple[Any, tuple[str, ...]], ...] = (
+    (_channel_faults, ("sensors", "probes", "exciters", "tacho")),
+    (_name_faults, ("bearings", "discs")),
+    (_disc_faults, ("sections", "discs", "loads", "coupling")),
+    (_bearing_faults, ("sections", "bearings")),
+    (_sensor_faults, ("bearings", "sensors", "probes")),
+    (_propeller_faults, ("discs", "propeller")),
+    (_turbulence_faults, ("bearings", "discs", "turbulence")),
+    (_exciter_faults, ("sections", "bearings", "discs", "exciters")),
+    (_film_faults, ("film",)),
+)
+"""Checks between parts, and the parts that each needs. A new one is one row."""

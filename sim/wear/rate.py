@@ -1,0 +1,351 @@
+"""How fast a joint of a scene wears, and where: sliding work from its own forces and motion.
+
+A pump's joint is run for some revolutions and its contact force times its sliding speed summed up.
+A journal bearing rides on its film and does not touch: there it is the turning gear that wears, at
+a few revolutions a minute, on which steam turbines were found to have worn their shells. Below the
+speed of lift-off the film carries a share of the load that grows with the speed, and the
+asperities carry the rest.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from scipy.optimize import brentq
+
+from ..film.bearing import BearingError, Equilibrium, equilibrium
+from ..film.solve import FilmGeometry
+from ..journal.recording import film_geometry
+from ..output.solution import SimulationError
+from ..pump.recording import steps_per_sample
+from ..pump.setup import pin_offsets, run_scene
+from ..pump.slider_crank import CrankRun
+from ..scene.journal import JournalScene
+from ..scene.parts import SceneError, nearest
+from ..scene.pump import PumpScene
+from .archard import Float, scar_shape, sliding_work
+
+_SETTLING = 3  # revolutions; contact forgets its start within one
+_REVOLUTIONS = 10
+
+# --- joints of a pump
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class JointWear:
+    """What slides in a joint, and where.
+
+    Attributes
+    ----------
+    power : float
+        Mean of contact force times sliding speed [W]; times the specific wear rate [m^2/N] it is
+        the volume worn off in a second [m^3/s].
+    per_revolution : numpy.ndarray [shape=(revolutions,)]
+        Sliding work of each revolution [N m].
+    eye : numpy.ndarray [shape=(360,)]
+        Share of the wear per radian of the eye, see :func:`.wear.archard.scar_shape`. Angles turn
+        as the stroke's axis turns to the one across it, from the rod's axis where it leaves the
+        rod: half a turn is where thrust presses. Of a guide: shares of upper and lower face
+        [shape=(2,)].
+    pin : numpy.ndarray [shape=(360,)]
+        The same of the pin: of a crank pin from the direction of the crank, of a wrist pin from
+        that of the stroke. Of a guide the shares again.
+    """
+
+    power: float
+    per_revolution: Float
+    eye: Float
+    pin: Float
+
+
+def joint_wear(
+    scene: PumpScene, joint: str, *, throw: int = 0, revolutions: int = _REVOLUTIONS
+) -> JointWear:
+    """Sliding work of one joint at its clearance, from a run of the mechanism.
+
+    Parameters
+    ----------
+    scene : PumpScene
+        Its duration and settling do not matter.
+    joint : {"crankpin", "wristpin", "guide"}
+        An ideal joint carries the forces of its constraint.
+    throw : int
+        Counted from 0.
+    revolutions : int
+        That are summed, >= 1, after three that settle.
+
+    Returns
+    -------
+    JointWear
+
+    Raises
+    ------
+    SceneError
+        There is no such joint, or the mechanism refuses the scene.
+    SimulationError
+        The run failed.
+
+    Notes
+    -----
+    Forces are means over each step, the motion between its ends is the difference of the states
+    there, so that no part of the work is sampled away; only of a step in which the force reverses
+    is the smaller part lost. Of a guide whose corners press on both faces at once it is the
+    difference that counts.
+
+    Examples
+    --------
+    >>> from wearstate.sim.scene.load import load_scene
+    >>> found = joint_wear(load_scene("bilge-pump"), "crankpin", revolutions=2)
+    >>> round(found.power, -1), int(found.eye.argmax()) in range(170, 190)
+    (1290.0, True)
+    """
+    if joint not in _JOINTS:
+        fault = f"joint = '{joint}' is no joint of a pump{nearest(joint, _JOINTS)}"
+        raise SceneError(scene.name, [fault])
+    run, per_turn = _run(scene, revolutions)
+    force, speed, eye_angle, pin_angle = _JOINTS[joint](scene, run, throw)
+    force, speed, eye_angle, pin_angle = (
+        values[-per_turn * revolutions :] for values in (force, speed, eye_angle, pin_angle)
+    )
+    turns = zip(np.split(force, revolutions), np.split(speed, revolutions), strict=True)
+    work = np.array([sliding_work(f, v, run.step) for f, v in turns])
+    weight = np.abs(force * speed)
+    eye, pin = _shapes(joint, force, weight, eye_angle, pin_angle)
+    return JointWear(
+        power=float(work.sum()) / (per_turn * revolutions * run.step),
+        per_revolution=work,
+        eye=eye,
+        pin=pin,
+    )
+
+
+def _run(scene: PumpScene, revolutions: int) -> tuple[CrankRun, int]:
+    """Run of whole revolutions at constant speed, and the steps of one."""
+    longest = 1 / (scene.sample_rate * steps_per_sample(scene))
+    per_turn = math.ceil(1 / (scene.drive.speed * longest))
+    run = run_scene(
+        scene,
+        step=1 / (scene.drive.speed * per_turn),
+        n_steps=(_SETTLING + revolutions) * per_turn,
+        start_angle=0.0,
+        keep_states=True,
+    )
+    if not run.status.ok:
+        raise SimulationError(run.status, scene.name)
+    return run, per_turn
+
+
+_Sliding = tuple[Float, Float, Float, Float]  # force [N], speed [m/s], angle on eye and pin [rad]
+
+
+def _crankpin(scene: PumpScene, run: CrankRun, throw: int) -> _Sliding:
+    part = scene.joints(throw).crankpin
+    alpha = run.turns[:, 0] + scene.throws[throw].phase
+    bodies = _bodies(run, throw)
+    turning = part.pin_diameter / 2 * np.diff(alpha) / run.step
+    turning += (part.pin_diameter / 2 + part.clearance_radial) * np.diff(bodies[:, 2]) / run.step
+    force, slip, angle = _pressed(scene, run, throw, slice(0, 2), ("pin_x", "pin_y"))
+    beta = _middle(bodies[:, 2])
+    return force, slip + turning, angle + beta - math.pi, angle - _middle(alpha)
+
+
+def _wristpin(scene: PumpScene, run: CrankRun, throw: int) -> _Sliding:
+    part = scene.joints(throw).wristpin
+    if part is None:
+        raise SceneError(scene.name, ["joint.wristpin is missing; give its pin_diameter"])
+    bodies = _bodies(run, throw)
+    beta, tilt = bodies[:, 2], bodies[:, 5]
+    turning = part.pin_diameter / 2 * np.diff(tilt) / run.step
+    turning += (part.pin_diameter / 2 + part.clearance_radial) * np.diff(beta) / run.step
+    force, slip, angle = _pressed(scene, run, throw, slice(2, 4), ("wrist_x", "wrist_y"))
+    return force, slip + turning, angle + _middle(beta), angle - _middle(tilt)
+
+
+def _guide(scene: PumpScene, run: CrankRun, throw: int) -> _Sliding:  # noqa: ARG001 - as the pins
+    push = run.force("guide_y", throw)
+    speed = np.diff(_bodies(run, throw)[:, 3]) / run.step
+    return push, speed, np.zeros_like(push), np.zeros_like(push)
+
+
+_JOINTS = {"crankpin": _crankpin, "wristpin": _wristpin, "guide": _guide}
+"""What slides in every joint. A new one is one row."""
+
+
+def _bodies(run: CrankRun, throw: int) -> Float:
+    assert run.bodies is not None  # they were kept
+    return run.bodies[:, throw]
+
+
+def _middle(ends: Float) -> Float:
+    return np.asarray(0.5 * (ends[1:] + ends[:-1]))
+
+
+def _pressed(
+    scene: PumpScene, run: CrankRun, throw: int, columns: slice, names: tuple[str, str]
+) -> tuple[Float, Float, Float]:
+    """Normal force of a pin [N], how fast it moves along the eye [m/s], and where it is [rad]."""
+    offset = pin_offsets(scene, run.turns[:, 0], _bodies(run, throw), throw)[:, columns]
+    on_rod = np.column_stack([run.force(name, throw) for name in names])
+    place = 0.5 * (offset[1:] + offset[:-1])
+    if _is_ideal(offset):  # the constraint has no place but the direction of its force
+        place = on_rod
+    length = np.hypot(place[:, 0], place[:, 1])
+    normal = place / np.where(length > 0, length, 1.0)[:, None]
+    rate = np.diff(offset, axis=0) / run.step
+    slip = rate[:, 1] * normal[:, 0] - rate[:, 0] * normal[:, 1]
+    force = np.einsum("ij,ij->i", on_rod, normal)
+    return force, slip, np.arctan2(normal[:, 1], normal[:, 0])
+
+
+_CENTRED = 1e-9  # m: Baumgarte's terms hold an ideal joint to less
+
+
+def _is_ideal(offset: Float) -> bool:
+    return bool(np.abs(offset).max() < _CENTRED)
+
+
+def _shapes(joint: str, force: Float, weight: Float, eye: Float, pin: Float) -> tuple[Float, Float]:
+    if joint != "guide":
+        return scar_shape(eye, weight), scar_shape(pin, weight)
+    shares = np.array([weight[force < 0].sum(), weight[force > 0].sum()]) / weight.sum()
+    return shares, shares
+
+
+# --- a journal bearing on the turning gear
+
+
+@dataclass(frozen=True, kw_only=True)
+class TurningWear:
+    """What slides in a journal bearing that is turned slowly.
+
+    Attributes
+    ----------
+    power : float
+        Load on the asperities times sliding speed [W].
+    lift_off_hz : float
+        Speed at which the film alone carries the load [rev/s].
+    boundary_share : float
+        Of the load, on the asperities.
+    """
+
+    power: float
+    lift_off_hz: float
+    boundary_share: float
+
+
+def turning_wear(scene: JournalScene, *, speed: float, least_film: float) -> TurningWear:
+    """Sliding work of a journal bearing on its turning gear.
+
+    Parameters
+    ----------
+    scene : JournalScene
+        With the scar of the moment; its own speed does not matter.
+    speed : float
+        Of the turning gear [rev/s], > 0.
+    least_film : float
+        Film at which asperities begin to touch [m], > 0 and below the radial clearance: three
+        times the root mean square of both surfaces' roughness.
+
+    Returns
+    -------
+    TurningWear
+
+    Raises
+    ------
+    SceneError
+        Speed or film is out of range, all faults at once.
+    BearingError
+        No equilibrium was found on the way.
+
+    Notes
+    -----
+    At the gap where asperities begin to touch, the pressure of an isoviscous film is proportional
+    to the speed. Held there by the asperities, whose force hardly moves the journal, the film
+    carries the share ``n / n_lift`` of the load and they carry the rest, ``1 - n / n_lift``: the
+    sharing of Johnson, Greenwood and Poon. Full film wears nothing; neither heat nor grit is
+    modelled, nor are the few turns of each start and stop.
+
+    References
+    ----------
+    Johnson, Greenwood, Poon (1972), "A simple theory of asperity contact in elastohydrodynamic
+    lubrication", Wear 19, 91-108, doi:10.1016/0043-1648(72)90445-0.
+
+    Examples
+    --------
+    >>> from wearstate.sim.scene.load import load_scene
+    >>> found = turning_wear(load_scene("journal-bearing"), speed=0.05, least_film=2e-6)
+    >>> round(found.lift_off_hz, 2), round(found.boundary_share, 2)
+    (0.35, 0.86)
+    """
+    gap = scene.bearing.clearance_radial
+    faults = []
+    if not speed > 0:
+        faults.append(f"speed = {speed:g} rev/s must be > 0; give that of the turning gear")
+    if not 0 < least_film < gap:
+        faults.append(
+            f"least_film = {least_film:g} m must be > 0 and < the radial clearance = {gap:g} m; "
+            "three times the roughness of both surfaces is usual"
+        )
+    if faults:
+        raise SceneError(scene.name, faults)
+    lift_off = _lift_off(scene, least_film)
+    share = max(0.0, 1 - speed / lift_off)
+    sliding = math.pi * scene.bearing.diameter * speed
+    load = math.hypot(*_load(scene))
+    return TurningWear(power=share * load * sliding, lift_off_hz=lift_off, boundary_share=share)
+
+
+def _load(scene: JournalScene) -> tuple[float, float]:
+    return scene.rotor.mass * scene.gravity + scene.load.static, scene.load.static_across
+
+
+def _lift_off(scene: JournalScene, least_film: float) -> float:
+    """Speed at which the least film of the equilibrium is that asked for [rev/s]."""
+    gap, load = scene.bearing.clearance_radial, np.array(_load(scene))
+    radius, length = scene.bearing.diameter / 2, scene.bearing.length
+    unit = scene.oil.dynamic_viscosity * math.tau * radius**3 * length / gap**2  # at 1 rev/s
+    for n_theta in _MESHES:
+        rest = partial(_resting, _meshed(scene, n_theta), load / unit)
+        try:
+            speed = _speed_of(rest, least_film / gap)
+        except ValueError:
+            raise SceneError(scene.name, [_no_lift_off(least_film)]) from None
+        found = rest(speed)
+        if found.status.ok:
+            return speed
+    raise BearingError(found.status, f"lift-off at {speed:g} rev/s")
+
+
+_LIFT_OFF = (1e-3, 1e2)  # rev/s, between which a shaft lifts off
+_LOG_SPEED = 1e-5  # to which its logarithm is sought
+_MESHES = (360, 720, 1440)  # nodes round the circle; the first suffices for a hundredth of the gap
+
+
+def _speed_of(rest: Callable[[float], Equilibrium], least: float) -> float:
+    """Speed of a least film over C: both logarithms, which are nearly proportional."""
+
+    def excess(log_speed: float) -> float:
+        return math.log(rest(math.exp(log_speed)).film.min_thickness / least)
+
+    low, high = (math.log(end) for end in _LIFT_OFF)
+    return math.exp(brentq(excess, low, high, xtol=_LOG_SPEED))
+
+
+def _no_lift_off(least_film: float) -> str:
+    low, high = _LIFT_OFF
+    return (
+        f"least_film = {least_film:g} m must be the film of a speed between {low:g} and {high:g} "
+        "rev/s; give the roughness of run-in surfaces, and check the viscosity"
+    )
+
+
+def _meshed(scene: JournalScene, n_theta: int) -> FilmGeometry:
+    part = scene.film
+    finer = part.model_copy(update={"rung": "direct", "n_theta": max(n_theta, part.n_theta)})
+    return film_geometry(scene.model_copy(update={"film": finer}))
+
+
+def _resting(geometry: FilmGeometry, load: Float, speed: float) -> Equilibrium:
+    return equilibrium(geometry, load / speed, raise_on_failure=False)
