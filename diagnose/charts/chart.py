@@ -20,6 +20,9 @@ from ...sim.fidelity.study import Convergence
 Progress = Callable[[int, int], None]
 Clock = Callable[[], float]
 
+RECOMMENDED = ("resolved", "so far", "unresolvable")
+"""Statuses of a choice that may be taken; others recommend nothing."""
+
 _GAIN = 0.95  # of an error: the most of it that a slower point on the front may have
 
 
@@ -97,7 +100,7 @@ class Choice:
     name : str
         Of the point.
     status : str
-        ``resolved``, ``so far``, ``unresolvable`` or ``not converged``.
+        ``resolved``, ``so far``, ``unresolvable``, ``not converged`` or ``no answer yet``.
     error, standard_error, promised : float
         Of the worst quantity, and the sum of both of the worst quantity by it [-].
     starts : int

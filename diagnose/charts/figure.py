@@ -13,7 +13,7 @@ import numpy as np
 from ..pages.page import render, save_page, visible
 from ..pages.picture import picture_bytes, save_picture
 from ..pages.plain_json import json_text
-from .chart import Chart, Choice, Point, chart_table, convergence_text, save_rows
+from .chart import RECOMMENDED, Chart, Choice, Point, chart_table, convergence_text, save_rows
 from .words import percent
 
 _FRONT, _OTHER, _DOUBTFUL, _LIMIT = "#1f5a94", "#9aa3ab", "#e07b39", "#b3261e"
@@ -114,7 +114,7 @@ def _mark_choice(axes: Any, chart: Chart, question: str, finite: list[Point]) ->
     choice = _choice_of(chart, question)
     name = chart.winner if choice is None else choice.name
     final = choice is None or choice.status == "resolved"
-    if choice is not None and choice.status == "not converged":
+    if choice is not None and choice.status not in RECOMMENDED:
         return
     for point in (p for p in finite if p.name == name):
         style = {"color": _WINNER, "ls": "-"} if final else {"color": _SO_FAR, "ls": ":"}
@@ -361,6 +361,7 @@ def chart_html(chart: Chart) -> str:
         tables=[(question, _rows(chart, question)) for question in chart.questions],
         quantities=_quantity_rows(chart),
         convergence=[convergence_text(each, chart.labels) for each in chart.convergence],
+        recommended=RECOMMENDED,
         finite=math.isfinite,
         percent=percent,
     )

@@ -19,7 +19,7 @@ from ...sim.fidelity.pilot import Candidate, Outcome, Pilot
 from ...sim.fidelity.study import Answer, Search, Study
 from ...sim.scene.parts import Scene
 from ..pages.kept import Kept
-from .chart import Chart, Choice, Clock, Point, RungCost, front_of, remaining_error
+from .chart import RECOMMENDED, Chart, Choice, Clock, Point, RungCost, front_of, remaining_error
 from .scene_edit import block_of, options_of
 from .words import (
     HERE,
@@ -181,7 +181,7 @@ def chart_of(scene: Scene, found: Study) -> Chart:
     points = tuple(p for name, a in answers.items() for p in _points(scene, found, a, name))
     choices = tuple(_choice(scene, found, a, name) for name, a in answers.items())
     final = [c for c in choices if c.status == "resolved"]
-    conclusion = (_here(scene, found), *(c.sentence for c in choices))
+    conclusion = (where_it_stands(scene, found), *(c.sentence for c in choices))
     return Chart(
         name=scene.name,
         title=f"{scene.name} (simulated): how much model does this scene need?",
@@ -241,8 +241,15 @@ def _reason(each: Candidate, scene: Scene) -> str:
     return each.reason
 
 
-def _here(scene: Scene, found: Study) -> str:
-    """Where the scene as written stands."""
+def where_it_stands(scene: Scene, found: Study) -> str:
+    """What is known of the error of a scene as written, in a sentence or two.
+
+    Parameters
+    ----------
+    scene : Scene
+    found : Study
+        Finished or not.
+    """
     whole = found.whole
     own = whole.written
     if own is None or (found.raised is None and found.raises):
@@ -289,8 +296,8 @@ def _choice(scene: Scene, found: Study, answer: Answer, question: str) -> Choice
         starts=chosen.starts,
         seconds=chosen.seconds / scene.duration,
         changes=answer.changes,
-        block=_commented(scene, found, answer),
-        options=options_of(answer.changes),
+        block=_commented(scene, found, answer) if status in RECOMMENDED else "",
+        options=options_of(answer.changes) if status in RECOMMENDED else "",
         reference=_reference_words(answer),
         sentence=_sentence(scene, found, answer, question, status, own),
         keeps=same_changes,
@@ -302,7 +309,14 @@ def _status(found: Study, answer: Answer) -> str:
         not each.converged or remaining_error(each) > found.accuracy for each in answer.convergence
     ):
         return "not converged"
+    if answer.status == "so far" and _by_default(answer) and answer.changes:
+        return "no answer yet"
     return answer.status
+
+
+def _by_default(answer: Answer) -> bool:
+    """Whether the reference itself is taken, for want of anything cheaper."""
+    return dict(answer.chosen.rungs) == dict(answer.reference.rungs)
 
 
 def _reference_words(answer: Answer) -> str:
@@ -326,10 +340,16 @@ def _sentence(
             f"{opening}, nothing can be recommended: the reference itself still moves with the "
             f"{worst.effect}, by {percent(abs(worst.steps[-1]))} in {label} at the finest level."
         )
+    if status == "no answer yet":
+        return (
+            f"{opening}, there is no answer yet: nothing cheaper than the reference is known to be "
+            f"within {asked}, with {found.measured} of {found.planned} combinations measured; "
+            "more --budget goes on."
+        )
     name = combination_words(chosen, found.written)
     what = "change nothing" if name == HERE else f"take {name}"
     errs = error_words(chosen, scene)
-    if dict(chosen.rungs) == dict(answer.reference.rungs):
+    if _by_default(answer):
         errs = f"nothing cheaper {'looks' if status == 'so far' else 'is'} within {asked}"
     faster = "" if name == HERE else f", {faster_words(chosen.seconds, own)}"
     certain = _certainty(scene, found, answer, status)

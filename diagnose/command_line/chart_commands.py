@@ -16,8 +16,16 @@ from ...sim.fidelity.study import Search
 from ...sim.scene.load import load_scene
 from ...sim.scene.parts import Scene, SceneError
 from ..charts.across import RungSets
-from ..charts.chart import Chart
-from ..charts.of_scene import KEPT, RAISED, chart_of, kept_runs, measure, scene_search
+from ..charts.chart import RECOMMENDED, Chart
+from ..charts.of_scene import (
+    KEPT,
+    RAISED,
+    chart_of,
+    kept_runs,
+    measure,
+    scene_search,
+    where_it_stands,
+)
 from ..charts.scene_edit import apply_changes
 from ..charts.verdict import verdict_chart
 from ..pages.kept import part_file
@@ -77,7 +85,7 @@ def scene_chart_command(
     search = scene_search(scene, accuracy=accuracy, jobs=jobs, kept=kept)
     interrupted = False
     try:
-        with _watched(search, jobs, budget):
+        with _watched(search, scene, jobs, budget):
             measure(search, budget=budget)
     except KeyboardInterrupt:
         interrupted = True
@@ -181,8 +189,8 @@ def _apply(
     force: bool,
 ) -> None:
     chosen = next((c for c in found.choices if c.question == _QUESTIONS[choice]), None)
-    if chosen is None or chosen.status == "not converged":
-        why = "is none" if chosen is None else "has a reference that does not converge"
+    if chosen is None or chosen.status not in RECOMMENDED:
+        why = "is none" if chosen is None else f"is none: {chosen.status}"
         fault = f"recommendation '{choice}' {why}; give more --budget, or write the scene by hand"
         raise SceneError(scene.name, [fault])
     note = f"wearstate chart {scene.name}, {chosen.question}: {chosen.sentence}"
@@ -190,23 +198,45 @@ def _apply(
 
 
 @contextmanager
-def _watched(search: Search, jobs: int, budget: float) -> Iterator[None]:
-    """A bar with what is measured and the time left, where a person watches."""
+def _watched(search: Search, scene: Scene, jobs: int, budget: float) -> Iterator[None]:
+    """What is known, on stderr as soon as it is; a bar with the time left on a terminal."""
     with time_bar() as show:
-        if show is not None:
-            search.tell = _teller(search, jobs, budget, show)
+        search.tell = _Teller(search, scene, jobs, budget, show)
         yield
 
 
-def _teller(
-    search: Search, jobs: int, budget: float, show: Callable[[str, float, float], None]
-) -> Callable[[str], None]:
-    begin = time.perf_counter()
+class _Teller:
+    """Called with what is measured next: says what is known by then."""
 
-    def tell(what: str) -> None:
-        gone = time.perf_counter() - begin
-        left = max(budget - gone, 0.0)
-        told, known = search.progress()
-        show(f"{what} ({told} of {known})", gone, min(left, search.remaining() / jobs))
+    def __init__(
+        self,
+        search: Search,
+        scene: Scene,
+        jobs: int,
+        budget: float,
+        show: Callable[[str, float, float], None] | None,
+    ) -> None:
+        self.search, self.scene, self.jobs, self.budget = search, scene, jobs, budget
+        self.show = show
+        self.begin = time.perf_counter()
+        self.answers = 0
 
-    return tell
+    def __call__(self, what: str) -> None:
+        gone = time.perf_counter() - self.begin
+        told, known = self.search.progress()
+        self._answer(gone, told)
+        if self.show is not None:
+            left = min(max(self.budget - gone, 0.0), self.search.remaining() / self.jobs)
+            self.show(f"{what} ({told} of {known})", gone, left)
+
+    def _answer(self, gone: float, told: int) -> None:
+        """The scene against its own numerics, then against the best rungs; each once."""
+        if self.answers == _ANSWERS or told == 0:
+            return
+        found = self.search.found()
+        if self.answers == 0 or found.raised is not None:
+            self.answers = _ANSWERS if found.raised is not None else 1
+            click.echo(f"after {gone:.0f} s: {where_it_stands(self.scene, found)}", err=True)
+
+
+_ANSWERS = 2
