@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from wearstate.datasets.generation.quantities import QUANTITIES, resolved, with_estimate
+from wearstate.diagnose.charts.of_scene import chart_of
 from wearstate.sim.fidelity import pilot as pilot_runs
 from wearstate.sim.fidelity.choose import resolve, resolved_scene
 from wearstate.sim.fidelity.cost import cost_of
@@ -437,6 +438,45 @@ def test_a_choice_is_that_of_auto():
         physical = [n for n in own.written if n != "step"]
         kept = chosen(pilots[2], accuracy, pinned=physical)
         assert own.kept.chosen.rungs["step"] == kept.rungs["step"]
+
+
+class EvenPilot(KnownPilot):
+    """All rungs take the same time, whatever the tables say."""
+
+    def seconds(self, values):
+        return 1.0
+
+
+def test_a_scene_that_does_and_is_as_fast_stays_as_it_is():
+    found = {}
+    for kind in (KnownPilot, EvenPilot):
+        pilot = kind({}, step_error=0.0001)
+        found[kind] = study(pilot.scene, pilot.quantities, accuracy=0.05, pilot=pilot).raised
+    assert found[KnownPilot].changes  # by the tables something is cheaper
+    assert found[EvenPilot].changes == {}
+
+
+def test_the_reference_is_no_recommendation_for_want_of_time():
+    """Where nothing cheaper is known to do yet, nothing is to be pasted."""
+    statuses = set()
+    errors = {
+        TWO_LEVEL: 0.6,
+        IDEAL_WRIST: 0.3,
+        LINK_WRIST: 0.3,
+        IDEAL_GUIDE: 0.4,
+        CONSTANT_SPEED: 0.1,
+    }
+    for runs in range(29, 38, 2):
+        pilot = KnownPilot(errors, scatter=0.01)
+        part = study(
+            pilot.scene, pilot.quantities, accuracy=0.02, pilot=pilot, late=late_after(runs)
+        )
+        for choice in chart_of(pilot.scene, part).choices:
+            statuses.add(choice.status)
+            if choice.status == "no answer yet":
+                assert "there is no answer yet" in choice.sentence
+                assert (choice.block, choice.options) == ("", "")
+    assert "no answer yet" in statuses
 
 
 @pytest.mark.parametrize("runs", [0, 1, 5, 20, 60, 150])
