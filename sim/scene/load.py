@@ -76,7 +76,7 @@ def scene_folder(name_or_path: str | Path) -> Path:
     Examples
     --------
     >>> scene_folder("bilge-pump").name
-    'scenes'
+    'built_in'
     """
     built_in = (SCENE_FOLDER / f"{name_or_path}.toml").is_file()
     return SCENE_FOLDER if built_in else Path(name_or_path).parent
