@@ -38,6 +38,7 @@ SPOKEN_BY = {
     "inspect/audit_text": {"splits"},
     "blindspots/blindspots": {"blindspots"},
     "command_line/chart_commands": {"chart"},
+    "charts/of_scene": {"chart"},
     "wear_model/estimate": {"evaluate", "report"},
     "evaluation/evaluate": {"evaluate"},
     "evaluation/splits": {"evaluate"},

@@ -39,6 +39,6 @@ def test_a_chart_keeps_to_its_budget(figures, monkeypatch):
     monkeypatch.setitem(figures.SHORTER, "journal-bearing", small)
     chart = figures.chart("journal-bearing", budget=1e-3, jobs=1)
     assert chart.status == "out of budget"
-    assert chart.choices[0].status == "so far"
+    assert chart.choices[0].status in ("so far", "no answer yet")
     assert chart.winner == ""
     assert chart.measured < chart.planned
