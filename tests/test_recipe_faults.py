@@ -700,10 +700,10 @@ def test_every_status_fits_its_column_and_has_a_text():
 
 
 def test_labels_are_no_inputs(labelled, trained, tmp_path):
-    """Confounders, the speed and other labels set to nonsense: the same severity to the last bit.
+    """Confounders, conditions and other labels set to nonsense: the same severity to the last bit.
 
-    Labels of other faults decide what is said of them, the speed what is extrapolation. Conditions
-    that a person notes, as the discharge pressure, are inputs and stay.
+    Labels of other faults decide what is said of them, conditions what is extrapolation. What a
+    person notes, as the discharge pressure, is an input of the informed estimate alone.
     """
     model, table, _ = trained
     assert not set(table.names) & set(table.manifest.columns)
@@ -714,15 +714,20 @@ def test_labels_are_no_inputs(labelled, trained, tmp_path):
         for name in rows.dtype.names:
             if name.startswith("confounder_"):
                 rows[name] = ~rows[name]
-            elif name.endswith("_value") or name == "speed_hz":
+            elif name.endswith("_value") or name in ("speed_hz", "discharge_pressure_pa"):
                 rows[name] = 1e3
         file["manifest"][:] = rows
         del file.attrs["manifest_sha256"]  # the change is wanted
     other, _, _ = train_model(copy, seed=0)
-    own = {"conditions", "confounders"}
+    own = {"conditions", "confounders", "model"}
     assert {k: v for k, v in other.card.items() if k not in own} == {
         k: v for k, v in model.card.items() if k not in own
     }
+    blind = [
+        {k: v for k, v in each.card["model"].items() if not k.startswith("informed")}
+        for each in (other, model)
+    ]
+    assert blind[0] == blind[1]
     for part in ("blind.scale", "blind.calibration", "familiarity", "levels"):
         mine, theirs = attrgetter(part)(model), attrgetter(part)(other)
         for field in dataclasses.fields(mine):

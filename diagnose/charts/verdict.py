@@ -56,16 +56,16 @@ def verdict_chart(sets: RungSets, accuracy: float) -> Chart:
         There are too few machine draws, or the best rungs cannot be simulated.
     """
     judge = sets.judge()
-    court = _Measured(sets, judge)
-    court.trial(sets.best)
+    measured = _Measured(sets, judge)
+    measured.trial(sets.best)
     singles = [
-        court.trial({**sets.best, effect.name: rung.name})
+        measured.trial({**sets.best, effect.name: rung.name})
         for effect in sets.effects
         for rung in admissible(effect, sets.plain.scene)[:-1]
     ]
-    here = court.trial(sets.written)
-    chosen = _chosen(court, singles, accuracy)
-    return _chart(court, here, chosen, accuracy)
+    here = measured.trial(sets.written)
+    chosen = _chosen(measured, singles, accuracy)
+    return _chart(measured, here, chosen, accuracy)
 
 
 class _Measured:
@@ -109,9 +109,9 @@ def _within(trial: _Trial, accuracy: float) -> bool:
     )  # NaN: no
 
 
-def _chosen(court: _Measured, singles: Sequence[_Trial], accuracy: float) -> _Trial:
+def _chosen(measured: _Measured, singles: Sequence[_Trial], accuracy: float) -> _Trial:
     """The cheapest rungs that do each by itself, together; raised until they do together."""
-    best, cost = court.sets.best, court.sets.cost
+    best, cost = measured.sets.best, measured.sets.cost
     usable = [each for each in singles if _within(each, accuracy)]
     rungs = dict(best)
     for effect in best:
@@ -120,10 +120,10 @@ def _chosen(court: _Measured, singles: Sequence[_Trial], accuracy: float) -> _Tr
             cheapest = min(own, key=lambda each: cost(each.rungs))
             if cost(cheapest.rungs) < cost(best):
                 rungs[effect] = cheapest.rungs[effect]
-    while not _within(found := court.trial(rungs), accuracy):
+    while not _within(found := measured.trial(rungs), accuracy):
         lowered = [each for each in usable if _is_part(each, rungs, best)]
         if not lowered:
-            return court.trial(best)
+            return measured.trial(best)
         dearest = max(lowered, key=lambda each: each.loss.loss.mean)
         rungs |= {effect: best[effect] for effect in best if dearest.rungs[effect] != best[effect]}
     return found
@@ -136,15 +136,15 @@ def _is_part(single: _Trial, rungs: Mapping[str, str], best: Mapping[str, str]) 
 # --- as a chart
 
 
-def _chart(court: _Measured, here: _Trial, chosen: _Trial, accuracy: float) -> Chart:
-    trials = list(court.trials.values())
-    points = [_point(court, trial, here, accuracy) for trial in trials]
+def _chart(measured: _Measured, here: _Trial, chosen: _Trial, accuracy: float) -> Chart:
+    trials = list(measured.trials.values())
+    points = [_point(measured, trial, here, accuracy) for trial in trials]
     front = front_of([(point.seconds, max(point.error, _NOTHING)) for point in points])
     shown = [replace(p, on_front=f) for p, f in zip(points, front, strict=True)]
     shown.sort(key=lambda point: point.seconds)
-    choice = _choice(court, chosen)
-    name = court.sets.plain.name
-    judge = court.judge
+    choice = _choice(measured, chosen)
+    name = measured.sets.plain.name
+    judge = measured.judge
     draws = len(np.unique(judge.draws))
     best = judge.mean(judge.own)
     return Chart(
@@ -174,10 +174,10 @@ def _chart(court: _Measured, here: _Trial, chosen: _Trial, accuracy: float) -> C
 _NOTHING = 1e-5  # of the limit: less than any loss that can be told
 
 
-def _point(court: _Measured, trial: _Trial, here: _Trial, accuracy: float) -> Point:
+def _point(measured: _Measured, trial: _Trial, here: _Trial, accuracy: float) -> Point:
     loss = trial.loss
     found = {} if loss.reason else {LOSS: _rise(loss.loss), ERROR: loss.error}
-    verdict = _verdict(trial, court, accuracy)
+    verdict = _verdict(trial, measured, accuracy)
     words = loss.reason or f"levels of bands and orders are {trial.level_change:.2g} dB off"
     if verdict == "doubtful":
         words = (
@@ -188,7 +188,7 @@ def _point(court: _Measured, trial: _Trial, here: _Trial, accuracy: float) -> Po
     return Point(
         name=f"{trial.name} (the recipe as written)" if trial is here else trial.name,
         rungs=trial.rungs,
-        seconds=court.sets.cost(trial.rungs),
+        seconds=measured.sets.cost(trial.rungs),
         errors=found,
         verdict=verdict,
         reason=words,
@@ -203,10 +203,10 @@ def _rise(loss: Difference) -> Difference:
     return replace(loss, mean=max(loss.mean, 0.0))
 
 
-def _verdict(trial: _Trial, court: _Measured, accuracy: float) -> str:
+def _verdict(trial: _Trial, measured: _Measured, accuracy: float) -> str:
     if trial.loss.reason:
         return "invalid"
-    if trial.rungs == court.sets.best:
+    if trial.rungs == measured.sets.best:
         return "reference"
     if _within(trial, accuracy):
         return "within"
@@ -214,8 +214,8 @@ def _verdict(trial: _Trial, court: _Measured, accuracy: float) -> str:
     return "beyond" if sure else "doubtful"
 
 
-def _choice(court: _Measured, chosen: _Trial) -> Choice:
-    sets, loss = court.sets, chosen.loss.loss
+def _choice(measured: _Measured, chosen: _Trial) -> Choice:
+    sets, loss = measured.sets, chosen.loss.loss
     keeps = chosen.rungs == sets.written
     changes = sets.values(chosen.rungs)
     saved = sets.cost(sets.best) / sets.cost(chosen.rungs)

@@ -125,7 +125,7 @@ def _draw_changes(axes: Any, sweep: Sweep, rows: list[Row]) -> None:
     else:
         words = [setting_words(sweep, setting, short=True) for setting in settings]
         axes.set_xticks(places, words, rotation=30, ha="right", fontsize=7)
-    axes.set_title("smallest change that is told", fontsize=10)
+    axes.set_title("smallest change that shows in one recording", fontsize=10)
     axes.set_ylabel(f"{axis.words} [{axis.unit or axis.si_unit or '-'}]", fontsize=8)
     axes.set_yscale("log")
     axes.legend(fontsize=7, framealpha=0.6)

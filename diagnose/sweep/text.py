@@ -75,13 +75,13 @@ def conclusion(sweep: Sweep) -> tuple[str, ...]:
     lost = [row for row in best if not row.detection.told]
     if not told:
         far = axis.text(axis.numbers[-1], 4)
-        return (f"{what}: nothing shown tells a change from {begin} up to {far}.",)
+        return (f"{what}: no quantity reveals a change from {begin} up to {far}.",)
     first, rest = told[0], told[1:]
     where = f" at {setting_words(sweep, first.setting)}" if first.setting else ""
     verb = "shows first" if first.setting else "shows"
     lines = [
         f"{what} {verb}{where}, in {first.shown.label}: a change of "
-        f"{change_words(sweep, first)} from {begin} is told by one recording"
+        f"{change_words(sweep, first)} from {begin} shows in one recording"
         f"{_coarse(sweep, first)}."
     ]
     if rest:
@@ -96,7 +96,7 @@ def conclusion(sweep: Sweep) -> tuple[str, ...]:
     if lost:
         places = ", ".join(setting_words(sweep, r.setting, short=True) for r in lost)
         far = axis.text(axis.numbers[-1], 4)
-        lines.append(f"At {places} nothing shown tells a change up to {far}.")
+        lines.append(f"At {places} no quantity reveals a change up to {far}.")
     unjudged = [s for s in sweep.settings if s not in {row.setting for row in best}]
     if unjudged:
         places = ", ".join(setting_words(sweep, setting, short=True) for setting in unjudged)

@@ -1,8 +1,9 @@
 """Figures of a scene beside what is usual: the rows of a deep check, and what all machines share.
 
 A quantity is one row: how it is found, in which range machines have it, why, and the cure outside.
-"Usual" is a practitioner's range, wider than any design rule, and no bound of validity: those are
-checked before, by :func:`wearstate.sim.machine.simulate.check`.
+"Usual" is our judgement of what machines have, wider than a designer would choose; no standard is
+quoted for it but where a row names one. It is no bound of validity: those are checked before, by
+:func:`wearstate.sim.machine.simulate.check`.
 """
 
 import math
@@ -44,7 +45,7 @@ class Quantity:
     least, most : float
         Usual values; infinite where there is no such end.
     reason : str
-        Why they are usual, with the source.
+        Why they are usual; the source where there is one.
     low, high : str
         Cure of a value below and above.
     doubt : str
@@ -229,8 +230,7 @@ def taylor_share(
 
     References
     ----------
-    Taylor (1923), Philosophical Transactions A 223, 289-343, doi:10.1098/rsta.1923.0008; the
-    number as in DIN 31652-1.
+    Taylor (1923), Philosophical Transactions A 223, 289-343, doi:10.1098/rsta.1923.0008.
 
     Examples
     --------

@@ -189,7 +189,7 @@ def _span(facts: ShaftFacts) -> dict[str, float]:
 
 
 def seated_modes(scene: ShaftScene) -> NDArray[np.float64]:
-    """Natural frequencies of the shaft at rest on its housings' stiffness, as in class rules.
+    """Natural frequencies of the shaft at rest on its housings' stiffness.
 
     Films are left out: they are stiffer than most housings, and the slow motions that they add at
     half the speed are no modes of the shaft.
@@ -311,7 +311,7 @@ SHAFT_ROWS = (
         measure=_each(lambda _, b: b.length / b.diameter),
         least=0.3,
         most=4.0,
-        reason="0.5 to 1.5 inside, stern 2 in oil, 4 in water (class rules)",
+        reason="0.5 to 1.5 inside, stern 2 in oil, 4 in water",
         low="raise the bearing's length, or check its unit",
         high="lower the bearing's length, or check its unit",
     ),
@@ -330,7 +330,7 @@ SHAFT_ROWS = (
         unit="",
         measure=_balanced(_load_share),
         least=0.1,
-        reason="no bearing below a fifth of its share (class rules); 0 is unloaded",
+        reason="no bearing below a fifth of its share; 0 is unloaded",
         low="raise that bearing's offset or lower its neighbours': wearstate align says how far",
         doubt="less than 5% of the mean",
     ),
@@ -340,7 +340,7 @@ SHAFT_ROWS = (
         measure=_balanced(lambda facts: 1e-6 * _loads(facts) / _areas(facts)),
         least=0.01,
         most=1.2,
-        reason="0.1 to 0.8 of white metal in ships' lines (class rules)",
+        reason="0.1 to 0.8 of white metal in ships' lines",
         low="raise that bearing's offset, or shorten it",
         high="lower that bearing's offset, or lengthen it",
     ),
@@ -426,7 +426,7 @@ SHAFT_ROWS = (
         unit="%",
         measure=_blades,
         least=10.0,
-        reason="class rules want a margin of 20 beside it; damping below 10 %, on films",
+        reason="a margin of 20 is good practice beside it; damping below 10 %, on films",
         low="choose other propeller.blades or drive.speed, or change the aftmost span",
     ),
     Quantity(

@@ -209,14 +209,6 @@ class Study:
         return tuple(found)
 
 
-_NO_GAIN = 0.9  # of the time: a change that saves less is not worth making
-
-
-def _as_fast(own: Candidate, other: Candidate) -> bool:
-    """As measured, where the tables have one cheaper; without a clock nothing is told."""
-    return other.seconds >= _NO_GAIN * own.seconds
-
-
 # --- the scene as written
 
 
@@ -574,14 +566,11 @@ class Search:
         sure = [c for c in judged if c.verdict == "within"]
         likely = sure if status != "so far" else [c for c in judged if self._likely(c)]
         chosen = next(iter(likely), reference)
-        known = comparison.known(self.written)
-        own = None if known is None else self._with_seconds(known)
-        if own is not None and own.verdict == "within" and _as_fast(own, chosen):
-            chosen = own
         doubted = [c for c in comparison.doubted() if c.cost < chosen.cost]
+        own = comparison.known(self.written)
         return Answer(
             reference=reference,
-            written=own,
+            written=None if own is None else self._with_seconds(own),
             chosen=chosen,
             status="unresolvable" if doubted and status == "resolved" else status,
             candidates=tuple(judged),
