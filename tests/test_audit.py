@@ -16,7 +16,7 @@ from wearstate.datasets.audit.columns import close_pairs, resolution
 from wearstate.datasets.audit.label import neighbour_accuracy
 from wearstate.datasets.audit.records import ANCHORS, anchors, copies, sketch
 from wearstate.datasets.audit.rows import _rank, copied_rows
-from wearstate.datasets.audit.table import Roles, Table, coded, read_table
+from wearstate.datasets.audit.table import AuditTable, Roles, coded, read_table
 from wearstate.datasets.file.machines import machine_origin
 from wearstate.datasets.file.record import Attributes, DataError, DataSet, DataSetWriter
 from wearstate.datasets.generation.generate import generate
@@ -61,7 +61,7 @@ def clean_table(seed, *, n=240, machines=40):
     nuisance["leak"] = (rng.random(n) < 0.2).astype(float)
     assert len(nuisance) == NUISANCE
     side = (rng.permutation(machines)[groups] < machines // 4).astype(np.int8)
-    return Table(
+    return AuditTable(
         source="clean.csv",
         names=tuple(columns),
         values=np.column_stack([np.asarray(v, dtype=float) for v in columns.values()]),
@@ -286,7 +286,7 @@ def test_rows_in_blocks_of_classes():
 
 
 def test_rows_in_a_cycle_of_classes():
-    table = Table(
+    table = AuditTable(
         source="t",
         names=("x",),
         values=RNG.random((N, 1)),

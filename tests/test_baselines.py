@@ -15,7 +15,7 @@ from wearstate.diagnose.evaluation.foreign_features import (
     LEFT_OUT,
     PACKAGES,
     foreign_transform,
-    kitchen,
+    transformed_rows,
 )
 from wearstate.diagnose.feature_rows.feature_table import FeatureTable
 from wearstate.diagnose.learning.grades import grades_of
@@ -263,19 +263,19 @@ def test_features_are_kept_and_a_changed_signal_is_not_taken_for_them(tmp_path, 
     )
     manifest = pd.DataFrame({"signal_crc32": np.arange(20, dtype=np.uint32)})
     table = FeatureTable(names=(), values=np.zeros((20, 0)), manifest=manifest)
-    cook = kitchen(tmp_path, np.arange(20), cache=tmp_path)
-    first = cook.rows(tmp_path, table)
+    rows_of = transformed_rows(tmp_path, np.arange(20), cache=tmp_path)
+    first = rows_of.rows(tmp_path, table)
     made = len(calls)
     assert made == 2 * 3  # 20 records, 8 at a time, two packages
-    again = cook.rows(tmp_path, table)
+    again = rows_of.rows(tmp_path, table)
     assert len(calls) == made
     # kept in single precision
     assert_allclose(again["tsfel"], first["tsfel"], rtol=1e-6)
     assert_allclose(first["tsfel"][:, 0], [recording(i).signal.std() for i in range(20)], rtol=1e-6)
     changed = FeatureTable(names=(), values=table.values, manifest=manifest + 1)
-    cook.rows(tmp_path, changed)
+    rows_of.rows(tmp_path, changed)
     assert len(calls) == 2 * made
-    quick = kitchen(tmp_path, np.arange(20), quick=True).rows(tmp_path, table)
+    quick = transformed_rows(tmp_path, np.arange(20), quick=True).rows(tmp_path, table)
     assert set(quick.values()) == {LEFT_OUT}
 
 

@@ -14,7 +14,7 @@ from wearstate.diagnose.blindspots import blindspots
 from wearstate.diagnose.blindspots.blindspots import find_blind_spots, kept_rows, recipe_of
 from wearstate.diagnose.blindspots.page import blind_spots_html
 from wearstate.diagnose.blindspots.rows import scene_rows
-from wearstate.diagnose.blindspots.scores import Row, Said, ranked, row_figures
+from wearstate.diagnose.blindspots.scores import ShiftRow, ShiftVerdict, ranked, row_figures
 from wearstate.diagnose.blindspots.shifts import SCENE_SHIFTS, Shift
 from wearstate.diagnose.blindspots.signals import signal_rows
 from wearstate.diagnose.blindspots.text import blind_spots_table, blind_spots_text
@@ -290,18 +290,22 @@ def test_rows_of_another_run_are_refused(tmp_path):
 
 def told(name, *errors, verdict="graded"):
     said = tuple(
-        Said(machine=i, truth=1e-4, verdict=verdict, found=1e-4 + e * LIMIT, low=9e-5, high=1.1e-4)
+        ShiftVerdict(
+            machine=i, truth=1e-4, verdict=verdict, found=1e-4 + e * LIMIT, low=9e-5, high=1.1e-4
+        )
         for i, e in enumerate(errors)
     )
-    return Row(name=name, shift="x 2", kind="fixed", why="<why>", said=said)
+    return ShiftRow(name=name, shift="x 2", kind="fixed", why="<why>", said=said)
 
 
-REFUSED = Row(
+REFUSED = ShiftRow(
     name="strange",
     shift="x 2",
     kind="drawn",
     why="",
-    said=(Said(machine=0, truth=1e-4, verdict="unfamiliar", found=None, low=None, high=None),),
+    said=(
+        ShiftVerdict(machine=0, truth=1e-4, verdict="unfamiliar", found=None, low=None, high=None),
+    ),
 )
 
 

@@ -15,8 +15,8 @@ from wearstate.datasets.generation.generate import generate
 from wearstate.datasets.recipe.recipe import load_recipe
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.inspect.card import (
+    CardPicture,
     Code,
-    Picture,
     Table,
     card_html,
     card_markdown,
@@ -131,7 +131,7 @@ def test_licence_and_citation(card):
 
 def test_a_picture_of_every_grade(card, manifest):
     pictures = section(card, "One recording of each grade")
-    assert all(isinstance(picture, Picture) for picture in pictures)
+    assert all(isinstance(picture, CardPicture) for picture in pictures)
     for grade in sorted(set(manifest["grade"])):
         own = [p.caption for p in pictures if p.caption.startswith(f"Grade {grade},")]
         assert len(own) == 2  # waveform and spectrum

@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 from scipy import signal
 from wearstate.sim.pump.casing import (
     PASS_BAND,
-    Modes,
+    CasingModes,
     band_limited_acceleration,
     casing_inputs,
     decimate,
@@ -33,7 +33,7 @@ def one_mode(forces, frequency=388.0, damping_ratio=0.025, shape=1.0, fs=FS):
 
 
 def mode(frequency, damping_ratio, shape=1.0):
-    return Modes(
+    return CasingModes(
         frequency=np.array([frequency]),
         damping_ratio=np.array([damping_ratio]),
         inputs=np.array([[shape]]),
@@ -146,7 +146,7 @@ def test_superposition_and_reciprocity():
     inputs, outputs = rng.standard_normal((3, 3)), rng.standard_normal((3, 2))
 
     def modes(inputs, outputs):
-        return Modes(frequency=frequency, damping_ratio=zeta, inputs=inputs, outputs=outputs)
+        return CasingModes(frequency=frequency, damping_ratio=zeta, inputs=inputs, outputs=outputs)
 
     together = housing_acceleration(forces, FS, modes(inputs, outputs))
     assert together.shape == (2, 600)

@@ -6,7 +6,12 @@ from click.testing import CliRunner
 from wearstate.datasets.file.record import DataError, DataSet
 from wearstate.datasets.generation import fidelity_choice as module
 from wearstate.datasets.generation import generate as generation
-from wearstate.datasets.generation.fidelity_choice import Choice, choose, pinned_by, with_choice
+from wearstate.datasets.generation.fidelity_choice import (
+    FidelityChoice,
+    choose,
+    pinned_by,
+    with_choice,
+)
 from wearstate.datasets.generation.generate import generate
 from wearstate.datasets.recipe.recipe import load_recipe, recorded_scene, sample_records
 from wearstate.datasets.recipe.text import recipe_names
@@ -19,7 +24,7 @@ SMALL = {
     "film.n_theta": 24,
     "film.n_z": 5,
 }
-CHOICE = Choice(
+CHOICE = FidelityChoice(
     values={"film.n_theta": 36, "film.n_z": 9, "numerics.tolerance": 1e-4},
     rungs={"mesh": "x1", "tolerance": "x2"},
     pinned=("film",),
@@ -151,7 +156,7 @@ def test_a_level_that_the_recipes_own_scene_has_not_is_the_coarser_one(monkeypat
 
 
 def test_a_choice_comes_back_from_its_text():
-    assert Choice.load(CHOICE.dump()) == CHOICE
+    assert FidelityChoice.load(CHOICE.dump()) == CHOICE
     assert "8 times as cheap as the best rungs, 4 times as cheap as what is written" in CHOICE.text
 
 
@@ -165,7 +170,7 @@ def test_the_choice_is_in_the_file_and_in_every_record(recipe, counted, tmp_path
     assert summary.fidelity == CHOICE
     with DataSet(path) as data:
         head, rows = data.attributes, data.manifest
-    assert Choice.load(head.fidelity) == CHOICE
+    assert FidelityChoice.load(head.fidelity) == CHOICE
     assert rows["estimated_error"].tolist() == [0.0123] * 3
     scene = recorded_scene(head.scene, head.recipe, head.overrides)
     assert (scene.film.n_theta, scene.numerics.tolerance, scene.fidelity) == (36, 1e-4, "given")
@@ -182,7 +187,7 @@ def test_a_stopped_run_goes_on_with_its_choice(recipe, counted, tmp_path, monkey
     with pytest.raises(KeyboardInterrupt):
         generate(recipe, 4, path, seed=4, fidelity="auto", progress=stop)
     with h5py.File(path.with_name("data.h5.part")) as file:
-        assert Choice.load(file.attrs["fidelity"]) == CHOICE
+        assert FidelityChoice.load(file.attrs["fidelity"]) == CHOICE
     counted.clear()
     monkeypatch.setattr(generation, "choose", None)  # choosing again would fail
     assert generate(recipe, 4, path, seed=4, fidelity="auto").n_resumed == 2
@@ -253,7 +258,7 @@ def test_a_real_choice_keeps_to_what_was_asked(tmp_path):
     assert "fidelity: resolved for 5 %" in done.stdout
     assert done.stderr.count("pilot, record") == 2
     with DataSet(tmp_path / "d.h5") as data:
-        found = Choice.load(data.attributes.fidelity)
+        found = FidelityChoice.load(data.attributes.fidelity)
         assert set(data.manifest["rung_film"]) == {"map"}  # pinned
     assert 0 < found.estimated_error <= 0.05
     assert found.pinned == ("film", "mesh")  # the recipe fixes the mesh

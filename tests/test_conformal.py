@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from wearstate.diagnose.learning.conformal import (
-    Calibration,
+    IntervalCalibration,
     fit_scale,
     grade_limits,
     grade_probabilities,
@@ -25,7 +25,7 @@ def known(log_error, *, estimate=None, scale=None, group=None):
     """Calibration of given errors of log severity."""
     n = len(log_error)
     estimate = np.ones(n) if estimate is None else estimate
-    return Calibration(
+    return IntervalCalibration(
         estimate=estimate,
         truth=estimate * np.exp(log_error),
         scale=np.ones(n) if scale is None else scale,

@@ -13,7 +13,7 @@ from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.feature_rows.feature_choice import choice_in, choices_of, select_set
 from wearstate.diagnose.feature_rows.feature_table import (
     USUAL,
-    Choice,
+    FeatureSelection,
     held_against,
     recording_features,
 )
@@ -81,10 +81,13 @@ def test_words_name_sets_names_and_files(tmp_path):
     file = tmp_path / "mine.txt"
     file.write_text("rms  # of every channel\n\nfrf_profile, speed\n")
     assert choices_of([]) == (USUAL,)
-    assert choices_of(["complete,standard"]) == (USUAL, Choice(feature_set="complete"))
+    assert choices_of(["complete,standard"]) == (USUAL, FeatureSelection(feature_set="complete"))
     assert [c.feature_set for c in choices_of(["select"])] == ["standard", "core", "complete"]
-    assert choices_of([str(file)]) == (Choice(only=("rms", "frf_profile", "speed")),)
-    assert choices_of(["rms", "core", "rms"]) == (Choice(only=("rms",)), Choice(feature_set="core"))
+    assert choices_of([str(file)]) == (FeatureSelection(only=("rms", "frf_profile", "speed")),)
+    assert choices_of(["rms", "core", "rms"]) == (
+        FeatureSelection(only=("rms",)),
+        FeatureSelection(feature_set="core"),
+    )
     with pytest.raises(DataError, match="must hold sets or names, holds both"):
         choices_of(["core,rms"])
     with pytest.raises(DataError, match="names 0 features"):
@@ -225,7 +228,7 @@ def test_modes_are_told_against_those_of_the_healthy_machine(data, new):
         place = int(np.argmin(np.abs(sags - 0.3 * LIMIT)))
         recording = records[place]
     known = HealthyTransfer(path=new, modes=True).of(recording.machine)
-    choice = held_against(Choice(only=("mode_changes", "frf_assurance")), known)
+    choice = held_against(FeatureSelection(only=("mode_changes", "frf_assurance")), known)
     row = dict(zip(*recording_features(recording, choice), strict=True))
     machine = np.random.default_rng(place)
     machine.uniform()

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from wearstate.sim.machine.simulate import check, simulate
 from wearstate.sim.pump.casing import (
-    Modes,
+    CasingModes,
     band_limited_acceleration,
     edge_samples,
     table_acceleration,
@@ -30,7 +30,7 @@ FACTOR = 2
 INPUTS = [("bearing_x", 1), ("guide_y", 1)]
 SENSORS = ["acc_x", "acc_y"]
 
-MODES = Modes(
+MODES = CasingModes(
     frequency=np.array([142.0, 815.0, 2240.0, 7620.0]),
     damping_ratio=np.array([0.04, 0.02, 0.018, 0.015]),
     inputs=np.array([[0.05, 0.13], [0.06, -0.09], [-0.07, 0.11], [0.08, 0.06]]),
@@ -51,7 +51,7 @@ def table_of(modes, spacing, top, first=0.0):
 
 
 def resonance(frequency, damping_ratio, shape=1.0):
-    return Modes(
+    return CasingModes(
         frequency=np.array([frequency]),
         damping_ratio=np.array([damping_ratio]),
         inputs=np.array([[shape]]),

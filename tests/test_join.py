@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from wearstate.datasets.file.record import DataError, DataSet
-from wearstate.datasets.file.views import JoinedSet, View, views_of
+from wearstate.datasets.file.views import CompletingView, JoinedSet, views_of
 from wearstate.datasets.generation.generate import generate
 from wearstate.datasets.recipe.recipe import load_recipe
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.evaluation.evaluate import evaluate_model
-from wearstate.diagnose.feature_rows.feature_table import Choice, feature_table
+from wearstate.diagnose.feature_rows.feature_table import FeatureSelection, feature_table
 from wearstate.diagnose.wear_model.file import load_model
 
 RECORDS = 16
@@ -55,7 +55,7 @@ def test_a_view_that_a_recipe_lacks():
 
 
 def test_a_joined_row_is_the_single_rows_side_by_side(sets):
-    joined = feature_table(sets / "test.h5", choice=Choice(views=views(sets)))
+    joined = feature_table(sets / "test.h5", choice=FeatureSelection(views=views(sets)))
     alone = [feature_table(sets / name) for name in ("test.h5", "running.h5")]
     assert joined.names == (*alone[0].names, *(f"running:{name}" for name in alone[1].names))
     assert np.array_equal(joined.values, np.hstack([each.values for each in alone]))
@@ -66,7 +66,7 @@ def test_a_missing_view_is_masked_and_said(sets, tmp_path):
     recipe = load_recipe("shaft-rig-small", _short(), view="running")
     generate(recipe, 10, tmp_path / "few.h5", seed=3)
     table = feature_table(
-        sets / "test.h5", choice=Choice(views=views_of([str(tmp_path / "few.h5")]))
+        sets / "test.h5", choice=FeatureSelection(views=views_of([str(tmp_path / "few.h5")]))
     )
     alone = feature_table(tmp_path / "few.h5")
     places = [table.names.index(f"running:{name}") for name in alone.names]
@@ -105,7 +105,7 @@ def test_measured_sets_are_joined_by_machine_and_state_in_any_order(tmp_path):
     one = measured(tmp_path, "one", {"may": 100.0, "june": 200.0})
     two = measured(tmp_path, "two", {"july": 300.0, "june": 420.0, "may": 310.0})
     only = ("strongest_tone", "aft:strongest_tone")
-    table = feature_table(one, choice=Choice(only=only, views=views_of([f"aft={two}"])))
+    table = feature_table(one, choice=FeatureSelection(only=only, views=views_of([f"aft={two}"])))
     hertz = [i for i, name in enumerate(table.names) if name.endswith("_hz")]
     tones = {(round(first), round(second)) for first, second in table.values[:, hertz].tolist()}
     assert tones == {(100, 310), (200, 420)}
@@ -138,7 +138,7 @@ def test_a_joined_model_is_evaluated_on_joined_rows(sets, trained):
     with pytest.raises(DataError, match=r"joined views = none, the model needs running; give"):
         evaluate_model(model, sets / "test.h5", quick=True)
     with pytest.raises(DataError, match=r"joined views = aft, the model needs running; give"):
-        evaluate_model(model, sets / "test.h5", views=(View("aft", sets / "running.h5"),))
+        evaluate_model(model, sets / "test.h5", views=(CompletingView("aft", sets / "running.h5"),))
 
 
 def test_a_report_of_two_files_of_one_machine(sets, trained):
@@ -173,13 +173,13 @@ def test_faults_of_a_view_are_found_under_its_name(sets, trained):
 
 def test_sets_that_do_not_belong_together_are_refused(sets, tmp_path):
     generate(load_recipe("shaft-rig-small", _short()), 1, tmp_path / "other.h5", seed=4)
-    choice = Choice(views=views_of([f"other={tmp_path / 'other.h5'}"]))
+    choice = FeatureSelection(views=views_of([f"other={tmp_path / 'other.h5'}"]))
     with pytest.raises(DataError, match="0 of its 1 records are of a machine and state of"):
         feature_table(sets / "test.h5", choice=choice)
     with pytest.raises(DataError, match="views named test are given twice"):
         views_of([str(sets / "test.h5"), f"test={tmp_path / 'other.h5'}"])
     with pytest.raises(DataError, match="feature running:rms is of a view that is not joined"):
-        feature_table(sets / "test.h5", choice=Choice(only=("rms", "running:rms")))
+        feature_table(sets / "test.h5", choice=FeatureSelection(only=("rms", "running:rms")))
 
 
 def run(*arguments, code=0):

@@ -195,6 +195,22 @@ def test_the_reader_sees_a_forbidden_import():
     assert violations("datasets.generation.generate", allowed) == []
 
 
+def twice(sources):
+    """Public classes that stand in two files; what a reader looks for has one place."""
+    found = {}
+    for name, tree in sources.items():
+        for node in tree.body:
+            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+                found.setdefault(node.name, []).append(name)
+    return {name: places for name, places in found.items() if len(places) > 1}
+
+
+def test_a_public_class_has_its_name_for_itself(sources):
+    assert twice(sources) == {}
+    both = {"sim.a": ast.parse("class Film: ..."), "sim.b": ast.parse("class Film: ...")}
+    assert twice(both) == {"Film": ["sim.a", "sim.b"]}
+
+
 def test_arrows_point_down(sources):
     assert {name.split(".")[0] for name in sources} == set(PACKAGES)
     assert [each for name, tree in sources.items() for each in violations(name, tree)] == []

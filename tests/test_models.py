@@ -16,7 +16,7 @@ from wearstate.diagnose.learning.regressions import CANDIDATES, Blend, Linear
 from wearstate.diagnose.wear_model import train as training
 from wearstate.diagnose.wear_model.estimate import Head, ModelError
 from wearstate.diagnose.wear_model.file import load_model, save_model
-from wearstate.diagnose.wear_model.train import Lesson, learn, train_model
+from wearstate.diagnose.wear_model.train import TrainingRows, learn, train_model
 from wearstate.sim.wear.archard import grade
 
 
@@ -62,7 +62,7 @@ def test_severity_cannot_be_learnt_from_the_identity_of_a_machine():
     names = ("a.rms", *(f"a.order_{i:02d}.level_db" for i in range(40)))
     rows = np.hstack([np.ones((120, 1)), np.eye(40)[groups]])
     known = learn(
-        Lesson(names=names, rows=rows, baseline=None, severity=severity, groups=groups)
+        TrainingRows(names=names, rows=rows, baseline=None, severity=severity, groups=groups)
     ).blind.calibration
     assert np.std(np.log(known.truth / known.estimate)) > 0.9 * np.std(np.log(severity))
 
@@ -75,7 +75,7 @@ def test_the_error_with_a_fault_is_told_beside_that_without():
     told = np.log(severity) + np.where(faulty, 0.5, 0.05) * rng.standard_normal(160)
     rows = np.column_stack([told, 1 + faulty + 0.1 * rng.standard_normal(160), np.ones(160)])
     found = learn(
-        Lesson(
+        TrainingRows(
             names=("a.shape_1", "a.kurtosis", "a.rms"),
             rows=rows,
             baseline=None,

@@ -8,13 +8,13 @@ from wearstate.diagnose.feature_rows.noted import NOTED, doubted, noted_values, 
 from wearstate.diagnose.wear_model.bundle import load_bundle
 from wearstate.diagnose.wear_model.estimate import ModelError
 from wearstate.diagnose.wear_model.file import load_model, save_model
-from wearstate.diagnose.wear_model.train import Lesson, learn
+from wearstate.diagnose.wear_model.train import TrainingRows, learn
 
 NAMES = tuple(f"acc_x.order_{i}.level_db" for i in range(1, 9))
 N = 120
 
 
-def lesson(conditions, effect, seed=0):
+def training(conditions, effect, seed=0):
     """Severities told by a level and by the viscosity, of two records a machine."""
     rng = np.random.default_rng(seed)
     severity = np.exp(rng.uniform(np.log(1e-4), np.log(4e-4), N))
@@ -22,7 +22,7 @@ def lesson(conditions, effect, seed=0):
     rows = rng.normal(0, 1, (N, len(NAMES)))
     rows[:, 0] = 10 * (np.log(severity / 2e-4) + effect * np.log(viscosity / 0.02))
     rows[:, 0] += rng.normal(0, 1, N)  # a tenth of the severity
-    return Lesson(
+    return TrainingRows(
         names=NAMES,
         rows=rows,
         baseline=None,
@@ -35,7 +35,7 @@ def lesson(conditions, effect, seed=0):
 
 @pytest.fixture(scope="module")
 def learnt():
-    return learn(lesson(("viscosity_pa_s",), effect=1.0))
+    return learn(training(("viscosity_pa_s",), effect=1.0))
 
 
 def test_a_condition_that_tells_makes_an_informed_estimate(learnt):
@@ -45,8 +45,8 @@ def test_a_condition_that_tells_makes_an_informed_estimate(learnt):
 
 
 def test_a_condition_that_tells_nothing_is_not_asked_for():
-    assert learn(lesson(("viscosity_pa_s",), effect=0.0)).informed is None
-    assert learn(lesson((), effect=1.0)).informed is None
+    assert learn(training(("viscosity_pa_s",), effect=0.0)).informed is None
+    assert learn(training((), effect=1.0)).informed is None
 
 
 def test_notes_become_inputs():

@@ -10,7 +10,7 @@ from matplotlib.text import Text
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.evaluation import figure as evaluate_figure
 from wearstate.diagnose.report import figures as report_figures
-from wearstate.diagnose.report.batch import Row
+from wearstate.diagnose.report.batch import BatchRow
 from wearstate.diagnose.report.trend import fit_trend
 
 PHONE_PX = 358  # of 390 the margins of the page take 32
@@ -66,7 +66,7 @@ def test_every_value_of_a_table_of_bearings_tells_what_it_is(tmp_path):
 
 
 def test_what_cannot_wait_is_before_what_is_worse():
-    soon = Row(
+    soon = BatchRow(
         number=0, name="a", machine="1", time_h=None, headline="", verdict="graded", grade=3,
         severity=4e-4, low=3.9e-4, high=4.1e-4, possible_grades=(3,), action="stop", advice="",
         horizon="now", days=0.0, note="",

@@ -10,7 +10,7 @@ import pytest
 from wearstate.datasets.file.record import Channel, DataSet, Recording
 from wearstate.diagnose.feature_rows.quality import (
     Levels,
-    Look,
+    Observation,
     fit_levels,
     layout_faults,
     quiet_faults,
@@ -164,7 +164,7 @@ def test_planted_faults_are_named_and_no_other(model, familiar, name):
 
 
 def a_look(*, distance=0.8, excess=0.0, speed=5.0, slow=2.5):
-    return Look(
+    return Observation(
         distance=distance,
         limit=1.4,
         free_distance=slow,

@@ -8,8 +8,8 @@ import pytest
 from wearstate.datasets.split.rules import group_folds
 from wearstate.diagnose.learning.regressions import (
     CANDIDATES,
-    Candidate,
     Linear,
+    RegressionCandidate,
     blend_weights,
     fit_blend,
 )
@@ -109,7 +109,7 @@ def constant(value, cost):
         ends = {"low": zero - 9, "high": zero + 9}
         return Linear(centre=zero, spread=zero + 1, weight=zero, **ends, offset=value, log=False)
 
-    return Candidate(name=f"constant {value:g}", cost_ms=cost, fit=fit)
+    return RegressionCandidate(name=f"constant {value:g}", cost_ms=cost, fit=fit)
 
 
 def test_what_is_hardly_better_is_not_worth_its_time():

@@ -14,7 +14,7 @@ from wearstate.datasets.file.record import Attributes, DataError, DataSet, DataS
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.command_line.commands_wear import report_exit
 from wearstate.diagnose.feature_rows.healthy import Baseline, Baselines
-from wearstate.diagnose.feature_rows.quality import Fault
+from wearstate.diagnose.feature_rows.quality import QualityFault
 from wearstate.diagnose.report.batch import judge_all, recordings_in, times_of
 from wearstate.diagnose.report.figures import moved_panel, report_pictures
 from wearstate.diagnose.report.page import batch_html, report_html
@@ -26,7 +26,7 @@ from wearstate.diagnose.report.verdict import (
     report_table,
     zone_words,
 )
-from wearstate.diagnose.wear_model.estimate import Estimate, Finding
+from wearstate.diagnose.wear_model.estimate import Estimate, FaultFinding
 from wearstate.diagnose.wear_model.file import load_model, save_model
 from wearstate.diagnose.wear_model.train import train_model
 from wearstate.sim.output.sensor import Channel
@@ -228,7 +228,7 @@ def test_a_caution_stands_in_the_verdict(model):
 @pytest.mark.parametrize("verdict", ["unfamiliar", "unusable"])
 def test_without_a_grade_no_figure_is_given(model, verdict):
     found = recording_of(2.5e-4)
-    fault = Fault(kind="dead", channel="acc", text="channel acc is dead")
+    fault = QualityFault(kind="dead", channel="acc", text="channel acc is dead")
     empty = Estimate(
         verdict=verdict,
         reasons=("it is <odd> & strange",),
@@ -247,8 +247,8 @@ def test_without_a_grade_no_figure_is_given(model, verdict):
 
 def test_a_fault_beside_the_wear_is_in_the_verdict_only_if_present(model):
     rates = {"detection_rate": 0.88, "false_alarm_rate": 0.03}
-    leak = Finding(name="valve_leak", probability=0.93, present=True, **rates)
-    air = Finding(name="air", probability=0.1, present=False, **rates)
+    leak = FaultFinding(name="valve_leak", probability=0.93, present=True, **rates)
+    air = FaultFinding(name="air", probability=0.1, present=False, **rates)
     found = recording_of(2.5e-4)
     table = report_table(found, model, graded(confounders=(leak, air)))
     page = report_html(table, found, model)

@@ -9,8 +9,8 @@ from numpy.testing import assert_allclose
 from wearstate.diagnose.learning.grades import grades_of
 from wearstate.diagnose.learning.scores import (
     FIGURES,
-    Figure,
     Judged,
+    ScoreFigure,
     bound_of,
     confusion,
     figures,
@@ -183,7 +183,7 @@ def test_confusion_counts_by_true_grade():
     ("low", "high", "word"), [(-2, -1, "better"), (1, 2, "worse"), (-1, 1, "no different")]
 )
 def test_a_difference_is_called_by_its_interval(low, high, word):
-    assert verdict_of(Figure(value=0.0, low=low, high=high)) == word
+    assert verdict_of(ScoreFigure(value=0.0, low=low, high=high)) == word
 
 
 # -- the smallest wear found

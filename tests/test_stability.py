@@ -28,7 +28,7 @@ from wearstate.diagnose.stability.maps import (
     threshold_speed,
     whirls,
 )
-from wearstate.diagnose.stability.method_map import Axis, Budget, Plan, Verdict, edge, measure
+from wearstate.diagnose.stability.method_map import Budget, MapAxis, MapPlan, Verdict, edge, measure
 from wearstate.diagnose.stability.steppers import (
     STEPPERS,
     bounce,
@@ -226,8 +226,8 @@ def test_a_rung_far_outside_its_validity_ends_in_a_status():
 
 
 def tiny(judge, x=(1.0, 2.0, 4.0), y=(1.0, 2.0)):
-    axes = {"x": Axis(name="x", unit="m", values=x), "y": Axis(name="y", unit="", values=y)}
-    return Plan(name="tiny", title="a test", judges={"method": judge}, **axes)
+    axes = {"x": MapAxis(name="x", unit="m", values=x), "y": MapAxis(name="y", unit="", values=y)}
+    return MapPlan(name="tiny", title="a test", judges={"method": judge}, **axes)
 
 
 def test_a_map_keeps_verdicts_and_words_in_their_cells():

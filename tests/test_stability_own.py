@@ -21,10 +21,10 @@ from wearstate.diagnose.stability.edges import conclusion, with_edges
 from wearstate.diagnose.stability.figure import COLOUR, SYMBOL, atlas_figure
 from wearstate.diagnose.stability.maps import MAPS, contact_oscillator
 from wearstate.diagnose.stability.method_map import (
-    Axis,
     Budget,
+    MapAxis,
+    MapPlan,
     Own,
-    Plan,
     Verdict,
     measure,
     unmeasured,
@@ -40,12 +40,12 @@ DECADE = (0.1, 0.3, 1.0, 3.0, 10.0)
 
 
 def plan_of(judge, *, x=1.0, y=1.0, others=(), **more):
-    axis = Axis(name="step", unit="s", values=DECADE)
+    axis = MapAxis(name="step", unit="s", values=DECADE)
     own = Own(method="own", x=x, y=y)
     judges = {**dict.fromkeys(others, judge), "own": judge}
     title = "a test"
     across = replace(axis, name="stiffness", unit="N/m")
-    return Plan(name="plane", title=title, x=axis, y=across, judges=judges, own=own, **more)
+    return MapPlan(name="plane", title=title, x=axis, y=across, judges=judges, own=own, **more)
 
 
 def ends_at(limit, verdict=Verdict.UNSTABLE, word="grows"):
@@ -242,9 +242,9 @@ def test_a_hertz_contact_has_its_mechanism_too_at_its_tangent_stiffness():
 def every_verdict():
     """A map in which each verdict has a column."""
     values = tuple(float(v) for v in range(1, len(Verdict) + 1))
-    x = Axis(name="step", unit="s", values=values, log=False)
+    x = MapAxis(name="step", unit="s", values=values, log=False)
     y = replace(x, values=(1.0, 2.0, 3.0))
-    plan = Plan(
+    plan = MapPlan(
         name="all", title="all", x=x, y=y,
         judges={"m": lambda x, _y: (Verdict(round(x) - 1), "word")},
     )  # fmt: skip

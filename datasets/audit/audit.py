@@ -20,10 +20,10 @@ from .table import (
     NO_ROLES,
     SHOWN,
     SMALLEST,
+    AuditTable,
     Finding,
     Roles,
     Severity,
-    Table,
     is_data_set,
     manifest_table,
     read_table,
@@ -31,7 +31,7 @@ from .table import (
 
 Verdict = Literal["alarm", "warning", "clean"]
 
-CHECKS: dict[str, Callable[[Table], Iterator[Finding]]] = {
+CHECKS: dict[str, Callable[[AuditTable], Iterator[Finding]]] = {
     "columns constant within a class": constant_columns,
     "products, ratios, sums and differences constant within a class": cancelling_pairs,
     "columns scaled class by class": class_scaled,
@@ -56,7 +56,7 @@ _ORDER: dict[Severity, int] = {"alarm": 0, "warning": 1, "note": 2}
 
 
 @dataclass(frozen=True, kw_only=True)
-class Source:
+class AuditSource:
     """What one file of an audit is.
 
     Attributes
@@ -96,7 +96,7 @@ class Audit:
 
     Attributes
     ----------
-    sources : tuple of Source
+    sources : tuple of AuditSource
         What was looked at.
     findings : tuple of Finding
         The worst first.
@@ -106,7 +106,7 @@ class Audit:
         What could not be, and what would make it possible.
     """
 
-    sources: tuple[Source, ...]
+    sources: tuple[AuditSource, ...]
     findings: tuple[Finding, ...]
     checked: tuple[str, ...]
     unchecked: tuple[str, ...]
@@ -124,7 +124,7 @@ class _Looked:
 
     path: Path
     side: str
-    table: Table
+    table: AuditTable
     data: DataSet | None = None
     kept: Sketches | None = None
     findings: list[Finding] = field(default_factory=list)
@@ -198,7 +198,7 @@ def audit(
     )
 
 
-def table_findings(table: Table) -> list[Finding]:
+def table_findings(table: AuditTable) -> list[Finding]:
     """Every finding about one table.
 
     Parameters
@@ -215,7 +215,7 @@ def table_findings(table: Table) -> list[Finding]:
     --------
     >>> label = np.repeat([0, 1], 20)
     >>> size = np.random.default_rng(0).uniform(1.0, 2.0, 40)
-    >>> table = Table(source="t.csv", names=("mean", "impulse"), label_name="state",
+    >>> table = AuditTable(source="t.csv", names=("mean", "impulse"), label_name="state",
     ...     values=np.c_[size, (1.0 + label) / size], label=label, classes=("new", "worn"))
     >>> [finding.code for finding in table_findings(table)][0]
     'constant-product'
@@ -252,10 +252,10 @@ def _looked(
     return _Looked(path=path, side=side, table=table, data=data, kept=kept)
 
 
-def _source(item: _Looked) -> Source:
+def _source(item: _Looked) -> AuditSource:
     table = item.table
     counts = () if table.label is None else np.bincount(table.label, minlength=len(table.classes))
-    return Source(
+    return AuditSource(
         path=item.path,
         kind="table" if item.data is None else "data set",
         side=item.side,

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .table import BY_CHANCE, FEWEST, SHOWN, Finding, Float, Table, has, named
+from .table import BY_CHANCE, FEWEST, SHOWN, AuditTable, Finding, Float, has, named
 
 Bool = NDArray[np.bool_]
 Pairs = NDArray[np.intp]
@@ -46,7 +46,7 @@ class _Labelled:
         return np.array([values[rows].mean(axis=0) for rows in self.rows])
 
 
-def _labelled(table: Table) -> _Labelled | None:
+def _labelled(table: AuditTable) -> _Labelled | None:
     """None where fewer than two classes have enough rows."""
     if table.label is None:
         return None
@@ -95,7 +95,7 @@ def resolution(values: Float) -> Float:
     return found
 
 
-def constant_columns(table: Table) -> Iterator[Finding]:
+def constant_columns(table: AuditTable) -> Iterator[Finding]:
     """Columns that have one value in every class, or one of their own in some class."""
     data = _labelled(table)
     if data is None:
@@ -135,7 +135,7 @@ def _is_own_value(data: _Labelled, column: int, still: Bool, tolerance: float) -
     return False
 
 
-def cancelling_pairs(table: Table) -> Iterator[Finding]:
+def cancelling_pairs(table: AuditTable) -> Iterator[Finding]:
     """Products, ratios, sums and differences of two columns that are constant in every class."""
     data = _labelled(table)
     if data is None:
@@ -247,7 +247,7 @@ def _neighbours(
 
 
 def _leak(
-    table: Table,
+    table: AuditTable,
     data: _Labelled,
     code: str,
     groups: Sequence[Sequence[int]],
@@ -297,7 +297,7 @@ def _by_class(data: _Labelled, column: Float) -> dict[str, float]:
 # --- normalised class by class
 
 
-def class_scaled(table: Table) -> Iterator[Finding]:
+def class_scaled(table: AuditTable) -> Iterator[Finding]:
     """Columns whose mean and deviation, extremes, rms or peak are the same in every class."""
     data = _labelled(table)
     if data is None:

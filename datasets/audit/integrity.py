@@ -27,7 +27,7 @@ _ROUNDING = 1e-9  # of bounds that were converted from other units
 
 
 @dataclass(frozen=True, kw_only=True)
-class Finding:
+class IntegrityFinding:
     """One thing found.
 
     Attributes
@@ -60,7 +60,7 @@ class Checked:
         Records in it, and those whose status is not ``ok``; 0 where it could not be opened.
     n_bytes : int
         Of signal that was read.
-    findings : tuple of Finding
+    findings : tuple of IntegrityFinding
         Faults first.
     """
 
@@ -68,7 +68,7 @@ class Checked:
     n_records: int
     n_failed: int
     n_bytes: int
-    findings: tuple[Finding, ...]
+    findings: tuple[IntegrityFinding, ...]
 
     @property
     def sound(self) -> bool:
@@ -118,7 +118,7 @@ def check_set(path: str | Path, *, progress: Callable[[int, int], None] | None =
         data = DataSet(place)
     except DataError as error:
         texts = [text.removeprefix(f"{place}: ") for text in str(error).split("\n")]
-        found = tuple(Finding(severity="fault", check="file", text=text) for text in texts)
+        found = tuple(IntegrityFinding(severity="fault", check="file", text=text) for text in texts)
         return Checked(path=place, n_records=0, n_failed=0, n_bytes=0, findings=found)
     with data:
         signals = _read_signals(data, progress)
@@ -233,30 +233,30 @@ def _at(flags: Any) -> tuple[int, ...]:
     return tuple(np.flatnonzero(flags).tolist())
 
 
-def _fault(check: str, text: str, flags: Any) -> Iterator[Finding]:
+def _fault(check: str, text: str, flags: Any) -> Iterator[IntegrityFinding]:
     """A fault of the flagged records, if there are any."""
     if np.any(flags):
-        yield Finding(severity="fault", check=check, text=text, records=_at(flags))
+        yield IntegrityFinding(severity="fault", check=check, text=text, records=_at(flags))
 
 
-def _note(check: str, text: str, flags: Any) -> Iterator[Finding]:
+def _note(check: str, text: str, flags: Any) -> Iterator[IntegrityFinding]:
     if np.any(flags):
-        yield Finding(severity="note", check=check, text=text, records=_at(flags))
+        yield IntegrityFinding(severity="note", check=check, text=text, records=_at(flags))
 
 
 # --- checks -------------------------------------------------------------------------------------
 
 
-def _check_hashes(seen: _Seen) -> Iterator[Finding]:
+def _check_hashes(seen: _Seen) -> Iterator[IntegrityFinding]:
     if seen.data.unhashed:
         text = (
             f"the file has no {' and no '.join(seen.data.unhashed)}, so that altered labels are "
             "not found; it was made before there were such: export it to .h5 to add them"
         )
-        yield Finding(severity="note", check="hash", text=text)
+        yield IntegrityFinding(severity="note", check="hash", text=text)
 
 
-def _check_signals(seen: _Seen) -> Iterator[Finding]:
+def _check_signals(seen: _Seen) -> Iterator[IntegrityFinding]:
     signals = seen.signals
     yield from _fault(
         "checksum",
@@ -276,7 +276,7 @@ def _check_signals(seen: _Seen) -> Iterator[Finding]:
     )
 
 
-def _check_equal_signals(seen: _Seen) -> Iterator[Finding]:
+def _check_equal_signals(seen: _Seen) -> Iterator[IntegrityFinding]:
     """Records that are the same, byte for byte, whatever their labels."""
     usable = seen.ok & ~seen.signals.damaged & ~seen.signals.zero
     first: dict[int, list[int]] = {}
@@ -301,7 +301,7 @@ def _same_signal(data: DataSet, one: int, other: int) -> bool:
     return np.array_equal(data.stored_signal(one), data.stored_signal(other))
 
 
-def _check_identities(seen: _Seen) -> Iterator[Finding]:
+def _check_identities(seen: _Seen) -> Iterator[IntegrityFinding]:
     for name in ("record_id", "seed"):
         if name == "seed" and not seen.simulated:
             continue  # a measured record has none
@@ -316,7 +316,7 @@ def _check_identities(seen: _Seen) -> Iterator[Finding]:
         )
 
 
-def _check_status(seen: _Seen) -> Iterator[Finding]:
+def _check_status(seen: _Seen) -> Iterator[IntegrityFinding]:
     failed = Counter(
         status.decode(errors="replace") for status in seen.rows["status"][~seen.ok].tolist()
     )
@@ -324,10 +324,10 @@ def _check_status(seen: _Seen) -> Iterator[Finding]:
         kinds = ", ".join(f"{count} {status}" for status, count in failed.most_common())
         severity: Literal["fault", "note"] = "note" if seen.ok.any() else "fault"
         text = f"not to be used, by their status: {kinds}"
-        yield Finding(severity=severity, check="status", text=text, records=_at(~seen.ok))
+        yield IntegrityFinding(severity=severity, check="status", text=text, records=_at(~seen.ok))
 
 
-def _check_numbers(seen: _Seen) -> Iterator[Finding]:
+def _check_numbers(seen: _Seen) -> Iterator[IntegrityFinding]:
     """Finite, known where they must be, and of the right sign."""
     for name in seen.columns:
         if seen.rows.dtype[name].kind != "f":
@@ -360,7 +360,7 @@ def _must_be_known(seen: _Seen) -> frozenset[str]:
 _MAY_END = frozenset({"remaining_life_h"})  # unknown where maintenance keeps it from its end
 
 
-def _check_grades(seen: _Seen) -> Iterator[Finding]:
+def _check_grades(seen: _Seen) -> Iterator[IntegrityFinding]:
     grades = np.asarray(seen.rows["grade"], dtype=int)
     yield from _fault(
         "grade", "grade must be -1 to 3; mend the label", (grades < -1) | (grades > 3)
@@ -377,13 +377,13 @@ def _check_grades(seen: _Seen) -> Iterator[Finding]:
     yield from _fault("grade", text, known & (grades != wanted))
 
 
-def _check_recipe(seen: _Seen) -> Iterator[Finding]:
+def _check_recipe(seen: _Seen) -> Iterator[IntegrityFinding]:
     """Every drawn value within what its recipe says."""
     recipe = seen.recipe
     if isinstance(recipe, str):
         if recipe:
             text = f"ranges and groups are not checked against the recipe in the file: {recipe}"
-            yield Finding(severity="note", check="range", text=text)
+            yield IntegrityFinding(severity="note", check="range", text=text)
         return
     for column, bands in _bands(recipe).items():
         if column in seen.columns:
@@ -420,7 +420,7 @@ def _bands_text(bands: Bands) -> str:
     return " or ".join(f"{low:.6g} to {high:.6g}" for low, high in bands)
 
 
-def _check_confounders(seen: _Seen, recipe: Recipe) -> Iterator[Finding]:
+def _check_confounders(seen: _Seen, recipe: Recipe) -> Iterator[IntegrityFinding]:
     """Value of a fault in its range where it is present, 0 where it is absent."""
     for fault in recipe.faults:
         presence, value = fault.columns
@@ -436,7 +436,7 @@ def _check_confounders(seen: _Seen, recipe: Recipe) -> Iterator[Finding]:
         yield from _fault("range", text, wrong)
 
 
-def _check_groups(seen: _Seen, recipe: Recipe) -> Iterator[Finding]:
+def _check_groups(seen: _Seen, recipe: Recipe) -> Iterator[IntegrityFinding]:
     """What is drawn per machine is the same in all records of a machine."""
     most = recipe.table.records_per_group
     groups, inverse, counts = np.unique(seen.rows["group"], return_inverse=True, return_counts=True)
@@ -451,7 +451,7 @@ def _check_groups(seen: _Seen, recipe: Recipe) -> Iterator[Finding]:
         yield from _fault("group", text, np.isin(inverse, inverse[differs]))
 
 
-def _check_lives(seen: _Seen) -> Iterator[Finding]:
+def _check_lives(seen: _Seen) -> Iterator[IntegrityFinding]:
     """Records of a machine in the order in which it aged."""
     if _HOURS in seen.columns:
         hours, groups = seen.numbers(_HOURS), seen.rows["group"]
@@ -470,7 +470,7 @@ def _machine_columns(recipe: Recipe) -> set[str]:
     return conditions | {column for fault in per_machine for column in fault.columns}
 
 
-def _check_splits(seen: _Seen) -> Iterator[Finding]:
+def _check_splits(seen: _Seen) -> Iterator[IntegrityFinding]:
     """Every split of the file: a side for every record, and machines apart where it says so."""
     try:
         for name, about in seen.data.splits.items():
@@ -479,26 +479,26 @@ def _check_splits(seen: _Seen) -> Iterator[Finding]:
                 check_no_leak(seen.rows["group"], train, test)
     except DataError as error:
         text = str(error).removeprefix(f"{seen.data.path}: ")
-        yield Finding(severity="fault", check="split", text=text)
+        yield IntegrityFinding(severity="fault", check="split", text=text)
 
 
-def _check_clipped(seen: _Seen) -> Iterator[Finding]:
+def _check_clipped(seen: _Seen) -> Iterator[IntegrityFinding]:
     if "clipped_samples" in seen.columns:
         text = "holds samples at the end of the converter's range, as a real sensor would"
         yield from _note("clipped", text, seen.rows["clipped_samples"] > 0)
 
 
-def _check_plausible(seen: _Seen) -> Iterator[Finding]:
+def _check_plausible(seen: _Seen) -> Iterator[IntegrityFinding]:
     """Records that are whole, and hardly meant; one that never changes has a note of its own."""
     for check, found in seen.signals.doubts.items():
         if check != "still":
             records, texts = zip(*found, strict=True)
             where = f"{check}, such as record {records[0]}" if len(found) > 1 else check
             text = f"{where}: {texts[0]}"
-            yield Finding(severity="note", check="plausible", text=text, records=records)
+            yield IntegrityFinding(severity="note", check="plausible", text=text, records=records)
 
 
-_CHECKS: tuple[Callable[[_Seen], Iterator[Finding]], ...] = (
+_CHECKS: tuple[Callable[[_Seen], Iterator[IntegrityFinding]], ...] = (
     _check_hashes,
     _check_signals,
     _check_equal_signals,

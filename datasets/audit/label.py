@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .table import BY_CHANCE, FEWEST, SHOWN, Finding, Float, Table, named
+from .table import BY_CHANCE, FEWEST, SHOWN, AuditTable, Finding, Float, named
 
 Bool = NDArray[np.bool_]
 
@@ -18,7 +18,7 @@ _BLOCK = 64  # columns sorted at a time: 50 MB for 100,000 rows
 _PERIODS = 64  # longest cycle of labels in the order of rows that is looked for
 
 
-def readable(table: Table) -> Iterator[Finding]:
+def readable(table: AuditTable) -> Iterator[Finding]:
     """One column, the order of rows or a word in a name that is as good as the label."""
     if table.label is None or len(np.unique(table.label)) < 2:
         return
@@ -42,7 +42,7 @@ def readable(table: Table) -> Iterator[Finding]:
     yield from _readable_text(table)
 
 
-def _skilled_columns(table: Table) -> dict[str, float]:
+def _skilled_columns(table: AuditTable) -> dict[str, float]:
     """Accuracy of each column that reads the label, the best first."""
     assert table.label is not None
     values, names = table.values, list(table.names)
@@ -124,7 +124,7 @@ def _nearest_label(
     return hit
 
 
-def _readable_order(table: Table) -> Iterator[Finding]:
+def _readable_order(table: AuditTable) -> Iterator[Finding]:
     assert table.label is not None
     place = np.arange(table.label.size, dtype=float)[:, None]
     accuracy = float(neighbour_accuracy(place, table.label, table.groups)[0])
@@ -154,7 +154,7 @@ def _cycles(label: NDArray[np.intp]) -> Iterator[tuple[float, int]]:
         yield float(table.max(axis=1).sum() / label.size), period
 
 
-def _readable_text(table: Table) -> Iterator[Finding]:
+def _readable_text(table: AuditTable) -> Iterator[Finding]:
     """Words of file names and identifiers that tell the class."""
     assert table.label is not None
     for name, texts in table.texts.items():
@@ -198,7 +198,7 @@ def _word_accuracy(
 # --- conditions that follow the label
 
 
-def confounded(table: Table) -> Iterator[Finding]:
+def confounded(table: AuditTable) -> Iterator[Finding]:
     """Nuisance whose rank correlation with the label is beyond chance."""
     if table.label is None or len(np.unique(table.label)) < 2:
         return
@@ -229,7 +229,7 @@ def confounded(table: Table) -> Iterator[Finding]:
         )
 
 
-def _association(table: Table, values: Float) -> tuple[float, float]:
+def _association(table: AuditTable, values: Float) -> tuple[float, float]:
     """Size of the rank correlation with the label, and its probability by chance."""
     from scipy import stats
 
@@ -259,7 +259,7 @@ def _one_per_machine(groups: NDArray[Any], values: Float, label: Float) -> bool:
     return any(np.array_equal(v[first][machine], v) for v in (values, label))
 
 
-def lone_machines(table: Table) -> Iterator[Finding]:
+def lone_machines(table: AuditTable) -> Iterator[Finding]:
     """Classes that one or two machines stand for, where a machine has one class only."""
     if table.label is None or table.groups is None:
         return

@@ -7,12 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .columns import close_pairs
-from .table import BY_CHANCE, FEW_DISTINCT, SHOWN, Finding, Float, Table
+from .table import BY_CHANCE, FEW_DISTINCT, SHOWN, AuditTable, Finding, Float
 
 Pairs = NDArray[np.intp]
 
 
-def row_copies(table: Table) -> Iterator[Finding]:
+def row_copies(table: AuditTable) -> Iterator[Finding]:
     """Rows that are there twice, or nearly so."""
     pairs = copied_rows(table.values)
     if len(pairs) == 0:
@@ -121,7 +121,7 @@ def crossing(sides: Mapping[str, NDArray[np.int8]], pairs: Pairs) -> dict[str, i
     return found
 
 
-def shared_machines(table: Table) -> Iterator[Finding]:
+def shared_machines(table: AuditTable) -> Iterator[Finding]:
     """Machines that are on both sides of a split."""
     if table.groups is None:
         return
@@ -144,12 +144,12 @@ def shared_machines(table: Table) -> Iterator[Finding]:
         )
 
 
-def cross_copies(tables: Sequence[Table]) -> Iterator[tuple[int, int, Pairs]]:
+def cross_copies(tables: Sequence[AuditTable]) -> Iterator[tuple[int, int, Pairs]]:
     """Rows that two tables with common columns share.
 
     Parameters
     ----------
-    tables : sequence of Table
+    tables : sequence of AuditTable
         Any.
 
     Yields

@@ -95,7 +95,7 @@ def has(names: Sequence[Any]) -> str:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Table:
+class AuditTable:
     """Rows of numbers, with what is known of them.
 
     Attributes
@@ -183,7 +183,7 @@ def is_data_set(path: Path) -> bool:
         return True  # let the reader of data sets say what is wrong with it
 
 
-def read_table(path: str | Path, roles: Roles = NO_ROLES) -> Table:
+def read_table(path: str | Path, roles: Roles = NO_ROLES) -> AuditTable:
     """Read a plain table: CSV with or without a header, Parquet, or HDF5 of columns.
 
     Parameters
@@ -196,7 +196,7 @@ def read_table(path: str | Path, roles: Roles = NO_ROLES) -> Table:
 
     Returns
     -------
-    Table
+    AuditTable
         Columns without a role, numbers and text apart.
 
     Raises
@@ -223,7 +223,7 @@ def read_table(path: str | Path, roles: Roles = NO_ROLES) -> Table:
     values = frame[numeric].to_numpy(dtype=float) if numeric else np.empty((len(frame), 0))
     values = comparable(values)
     split = taken.get("split")
-    return Table(
+    return AuditTable(
         source=place.name,
         names=tuple(map(str, numeric)),
         values=values,
@@ -494,7 +494,7 @@ def _hdf5_frame(path: Path) -> Any:
 # --- data sets
 
 
-def manifest_table(data: DataSet, roles: Roles, names: Sequence[str], values: Float) -> Table:
+def manifest_table(data: DataSet, roles: Roles, names: Sequence[str], values: Float) -> AuditTable:
     """Usable records of a data set as a table of what was measured on their signals.
 
     Parameters
@@ -510,7 +510,7 @@ def manifest_table(data: DataSet, roles: Roles, names: Sequence[str], values: Fl
 
     Returns
     -------
-    Table
+    AuditTable
         With the conditions of the manifest as nuisance.
 
     Raises
@@ -536,7 +536,7 @@ def manifest_table(data: DataSet, roles: Roles, names: Sequence[str], values: Fl
     wanted = [roles.split] if roles.split else list(data.splits)
     conditions = roles.nuisance or tuple(n for n in manifest.columns if is_nuisance(str(n)))
     apart = {name: data.splits.get(name, {}).get("machines_apart", True) for name in wanted}
-    return Table(
+    return AuditTable(
         source=data.path.name,
         names=tuple(names),
         values=comparable(values),

@@ -24,7 +24,7 @@ MARK = ":"
 
 
 @dataclass(frozen=True, order=True)
-class View:
+class CompletingView:
     """A data set that completes the records of another.
 
     Attributes
@@ -48,7 +48,7 @@ class View:
 
         Examples
         --------
-        >>> View.told("running=turning.h5").name
+        >>> CompletingView.told("running=turning.h5").name
         'running'
         """
         name, sign, file = text.partition("=")
@@ -73,7 +73,7 @@ def _name_in(path: Path) -> str:
     return (names or [""])[0] or path.stem
 
 
-def views_of(texts: Sequence[str]) -> tuple[View, ...]:
+def views_of(texts: Sequence[str]) -> tuple[CompletingView, ...]:
     """Views as a command line tells them; see :meth:`View.told`.
 
     Raises
@@ -81,7 +81,7 @@ def views_of(texts: Sequence[str]) -> tuple[View, ...]:
     DataError
         Two have the same name.
     """
-    found = tuple(View.told(text) for text in texts)
+    found = tuple(CompletingView.told(text) for text in texts)
     twice = [name for name, count in Counter(view.name for view in found).items() if count > 1]
     if twice:
         raise DataError(f"views named {', '.join(twice)} are given twice; name them: NAME=FILE")
@@ -122,7 +122,7 @@ class JoinedSet:
     ----------
     path : Path
         The data set; its manifest is that of the whole.
-    views : tuple of View
+    views : tuple of CompletingView
         May be none.
 
     Raises
@@ -133,7 +133,7 @@ class JoinedSet:
     """
 
     path: Path
-    views: tuple[View, ...] = ()
+    views: tuple[CompletingView, ...] = ()
 
     @cached_property
     def data(self) -> DataSet:

@@ -34,7 +34,7 @@ _SAMPLED = 64  # records whose step limits are looked at
 
 
 @dataclass(frozen=True, kw_only=True)
-class Choice:
+class FidelityChoice:
     """What was chosen for a data set.
 
     Attributes
@@ -94,7 +94,7 @@ class Choice:
         return json.dumps(asdict(self), sort_keys=True)
 
     @classmethod
-    def load(cls, text: str) -> "Choice":
+    def load(cls, text: str) -> "FidelityChoice":
         """Inverse of :meth:`dump`."""
         table = json.loads(text)
         return cls(**{**table, "pinned": tuple(table["pinned"])})
@@ -145,7 +145,7 @@ def choose(
     seed: int = 0,
     accuracy: float | None = None,
     say: Callable[[str], None] | None = None,
-) -> Choice:
+) -> FidelityChoice:
     """The cheapest rungs and numerics that do for the records of a recipe.
 
     Parameters
@@ -160,7 +160,7 @@ def choose(
 
     Returns
     -------
-    Choice
+    FidelityChoice
         The same on every machine.
 
     Raises
@@ -186,7 +186,7 @@ def choose(
     rungs = {effect.name: _highest(effect, found) for effect in effects}
     values = _values(effects, rungs, [sample.scene for sample in samples])
     chosen = with_values(recipe.scene, {**values, "fidelity": "given"})
-    return Choice(
+    return FidelityChoice(
         values=values,
         rungs=rungs,
         pinned=pinned,
@@ -242,7 +242,7 @@ def _step_of(scene: Scene, level: str) -> float:
     return float(step)
 
 
-def with_choice(recipe: Recipe, choice: Choice | None) -> Recipe:
+def with_choice(recipe: Recipe, choice: FidelityChoice | None) -> Recipe:
     """The recipe with what was chosen written over its scene, as an override that the file keeps.
 
     Parameters

@@ -48,7 +48,7 @@ from ..recipe.text import RecipeError
 from ..split.stored import Drawn, default_splits, split_names
 from ..workers.local import in_order
 from ..workers.pool import WorkersError
-from .fidelity_choice import Choice, choose, with_choice
+from .fidelity_choice import FidelityChoice, choose, with_choice
 
 NUMERICS = {
     "rung_joint": "S16",
@@ -120,7 +120,7 @@ class Summary:
     failures: dict[str, int]
     first_failures: tuple[str, ...]
     n_clipped: int
-    fidelity: Choice | None = None
+    fidelity: FidelityChoice | None = None
 
 
 @dataclass(frozen=True)
@@ -335,7 +335,7 @@ def _chosen(
     seed: int,
     force: bool,
     say: Callable[[str], None] | None,
-) -> Choice | None:
+) -> FidelityChoice | None:
     """The choice that an unfinished file already holds, or a new one; None for rungs as written."""
     refuse_output(Path(path).absolute(), force)
     wanted = fidelity or plan.table.fidelity or plan.scene.fidelity
@@ -349,7 +349,7 @@ def _chosen(
             f"{path}.part: fidelity = 'given', must be 'auto' to go on with it; repeat the command "
             "that began it, or use force to start anew"
         )
-    return Choice.load(begun.fidelity)
+    return FidelityChoice.load(begun.fidelity)
 
 
 def _refuse_bounds(plan: Recipe, count: int, seed: int) -> None:
@@ -370,7 +370,7 @@ def _writer(
     seed: int,
     force: bool,
     truth: bool,
-    choice: Choice | None,
+    choice: FidelityChoice | None,
 ) -> DataSetWriter:
     return DataSetWriter(
         path,
@@ -392,7 +392,7 @@ def _write_splits(writer: DataSetWriter, rows: NDArray[np.void], plan: Recipe, s
         writer.write_split(name, split.sides(len(rows)), split.attribute())
 
 
-def _attributes(plan: Recipe, seed: int, truth: bool, choice: Choice | None) -> Attributes:
+def _attributes(plan: Recipe, seed: int, truth: bool, choice: FidelityChoice | None) -> Attributes:
     scene = plan.scene
     return Attributes(
         sample_rate=scene.sample_rate,
@@ -461,7 +461,7 @@ def _numerics(solution: Solution) -> dict[str, Any]:
 class _Tally:
     """Counts of a run."""
 
-    def __init__(self, count: int, choice: Choice | None) -> None:
+    def __init__(self, count: int, choice: FidelityChoice | None) -> None:
         self.count, self.choice = count, choice
         self.n_resumed = 0
         self.faults: list[str] = []

@@ -21,8 +21,8 @@ from ..file.record import Attributes, DataError, DataSet, DataSetWriter, refuse_
 from ..readers.open import open_records
 from ..source.part import SourceOptions
 from ..workers.local import in_order
-from .labels import ROW, Labels, Limits, refusal
-from .plan import Header, Plan, plan_records, read_headers, sparing_tacho, worth_workers
+from .labels import ROW, LabelLimits, Labels, refusal
+from .plan import Header, ImportPlan, plan_records, read_headers, sparing_tacho, worth_workers
 from .recording import read_window
 from .rows import MEAN_SPEED, START, FileRows, GroupBy, file_rows
 
@@ -90,7 +90,7 @@ def import_recordings(
     tacho: str | None = None,
     pulses_per_revolution: int = 1,
     labels: Labels | None = None,
-    limits: Limits | None = None,
+    limits: LabelLimits | None = None,
     group_by: GroupBy | None = None,
     segment: float | None = None,
     overlap: float = 0.0,
@@ -251,7 +251,7 @@ def _refuse_counts(tacho: str | None, pulses_per_revolution: int, jobs: int) -> 
 
 
 def _attributes(
-    plan: Plan, reading: "_Reading", labels: Labels, limits: Limits | None
+    plan: ImportPlan, reading: "_Reading", labels: Labels, limits: LabelLimits | None
 ) -> Attributes:
     head = Attributes(
         sample_rate=plan.sample_rate,
@@ -325,7 +325,7 @@ def _batch(reading: _Reading, n_samples: int, files: _Files) -> list[_Record]:
     return [r for header, starts in files for r in _records(reading, n_samples, header, starts)]
 
 
-def _batches(plan: Plan) -> Iterator[_Files]:
+def _batches(plan: ImportPlan) -> Iterator[_Files]:
     """Files in order, small ones together up to a batch, a large one by itself."""
     frame = plan.n_samples * len(plan.channels)
     waiting: _Files = []
@@ -340,7 +340,9 @@ def _batches(plan: Plan) -> Iterator[_Files]:
     yield waiting
 
 
-def _all_records(reading: _Reading, plan: Plan, jobs: int) -> Iterator[tuple[Header, _Record]]:
+def _all_records(
+    reading: _Reading, plan: ImportPlan, jobs: int
+) -> Iterator[tuple[Header, _Record]]:
     """Records in order; workers read the small files, this process the large ones."""
     frame = plan.n_samples * len(plan.channels)
     batches = list(_batches(plan))
@@ -387,7 +389,7 @@ def _refuse_silent(rows: NDArray[np.void], tacho: str | None) -> None:
 # --- summary ------------------------------------------------------------------------------------
 
 
-def _summary(path: Path, plan: Plan, labels: Labels, table: FileRows) -> ImportSummary:
+def _summary(path: Path, plan: ImportPlan, labels: Labels, table: FileRows) -> ImportSummary:
     with DataSet(path) as data:
         manifest = data.manifest
         twins = _twins(data)

@@ -601,7 +601,7 @@ def known_severities(name: str) -> str:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Limits:
+class LabelLimits:
     """Wear limits of a severity.
 
     Attributes
@@ -616,7 +616,7 @@ class Limits:
     source: str
 
 
-def read_limits(text: str, severities: Sequence[str]) -> Limits:
+def read_limits(text: str, severities: Sequence[str]) -> LabelLimits:
     """Read wear limits as a person gives them.
 
     Parameters
@@ -647,7 +647,7 @@ def read_limits(text: str, severities: Sequence[str]) -> Limits:
             "metres and say which label it is with severity"
         )
     if "," in text:
-        return Limits(edges=_edges(text), source="given on import")
+        return LabelLimits(edges=_edges(text), source="given on import")
     scene = load_scene(text)
     found = wear_limits(scene, severities[0])
     if found is None:
@@ -657,7 +657,7 @@ def read_limits(text: str, severities: Sequence[str]) -> Limits:
             f"{listed(own) or 'none'}; name the label so, or give lengths like "
             "'0.13 mm, 0.22 mm, 0.31 mm'"
         )
-    return Limits(edges=tuple(found.grade_edges), source=found.source)
+    return LabelLimits(edges=tuple(found.grade_edges), source=found.source)
 
 
 def _edges(text: str) -> tuple[float, ...]:

@@ -242,7 +242,7 @@ def _header(options: SourceOptions, tacho: str | None, item: tuple[Path, str]) -
 
 
 @dataclass(frozen=True, kw_only=True)
-class Plan:
+class ImportPlan:
     """Records to make of files.
 
     Attributes
@@ -280,7 +280,7 @@ class Plan:
         )
 
 
-def plan_records(headers: Sequence[Header], segment: float | None, overlap: float) -> Plan:
+def plan_records(headers: Sequence[Header], segment: float | None, overlap: float) -> ImportPlan:
     """Cut files into records of one length.
 
     Parameters
@@ -316,7 +316,7 @@ def plan_records(headers: Sequence[Header], segment: float | None, overlap: floa
     if faults:
         raise refusal(faults)
     step = max(1, round(n_samples * (1 - overlap)))
-    return Plan(
+    return ImportPlan(
         headers=tuple(headers),
         channels=_common_channels(headers),
         sample_rate=headers[0].sample_rate,

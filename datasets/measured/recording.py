@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..file.hdf5_values import HDF5_FAULTS
 from ..file.record import LARGEST_RECORD, DataError, DataSet, Recording
-from ..file.views import JoinedSet, View, joined_recordings
+from ..file.views import CompletingView, JoinedSet, joined_recordings
 from ..readers.open import list_sources, open_source
 from ..source.part import Source, SourceOptions
 from .labels import refusal
@@ -87,7 +87,7 @@ def read_recording(
 
 
 def with_views(
-    recording: Recording, path: str | Path, record: int, views: Sequence[View]
+    recording: Recording, path: str | Path, record: int, views: Sequence[CompletingView]
 ) -> Recording:
     """A recording with its views: of data sets by machine and state, of other files as they are.
 
@@ -99,7 +99,7 @@ def with_views(
         Where it is from.
     record : int
         Its number, if that is a data set.
-    views : sequence of View
+    views : sequence of CompletingView
         Files of the views; those that are no data sets must declare all by themselves.
 
     Raises

@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 from ...sim.wear.archard import grade
 from ..file.machines import FILE, GROUP_NAME
-from .labels import GRADE, GROUP, ROW, Labels, Limits, Value, refusal
+from .labels import GRADE, GROUP, ROW, LabelLimits, Labels, Value, refusal
 from .plan import Header
 
 GroupBy = Literal["file", "folder", "column"]
@@ -41,7 +41,7 @@ def file_rows(
     headers: Sequence[Header],
     labels: Labels,
     *,
-    limits: Limits | None = None,
+    limits: LabelLimits | None = None,
     group_by: GroupBy | None = None,
     tacho: str | None = None,
 ) -> FileRows:
@@ -155,7 +155,7 @@ def _grades(
     headers: Sequence[Header],
     given: Sequence[Mapping[str, Value]],
     labels: Labels,
-    limits: Limits | None,
+    limits: LabelLimits | None,
     faults: list[str],
 ) -> list[int]:
     """Grade by the limits, or as labelled; -1 where neither is known."""
@@ -180,7 +180,7 @@ def _grades(
     return [a if a >= 0 else b for a, b in zip(found, labelled, strict=True)]
 
 
-def _grade(severity: Value, limits: Limits) -> int:
+def _grade(severity: Value, limits: LabelLimits) -> int:
     value = float(severity)
     return -1 if math.isnan(value) else grade(value, limits.edges)
 

@@ -19,7 +19,7 @@ from ..source.part import (
     MOST_CHANNELS,
     MOST_ROWS,
     Contents,
-    Part,
+    FilePart,
     PartChannel,
     SourceOptions,
     cut,
@@ -202,7 +202,7 @@ def raw_contents(path: Path, options: SourceOptions) -> Contents:
             f"{path}: order must be 'interleaved' (sample by sample) or 'blocks' (channel by "
             f"channel) for {count} channels; give it"
         )
-    part = Part(
+    part = FilePart(
         name="",
         about=f"{(count, layout.n_samples)}",
         channels=numbered(stem_of(path), count),
@@ -347,7 +347,7 @@ def _npy_part(
     header: _Header,
     offset: int,
     options: SourceOptions,
-) -> Part:
+) -> FilePart:
     shape, fortran, dtype = header
     axes = array_axes(shape, options, f"{path}: {name or 'array'}")
     if fortran and len(shape) == 3:
@@ -364,7 +364,7 @@ def _npy_part(
         n_samples=axes.n_samples,
         interleaved=axes.channels_first == (fortran and len(shape) > 1),
     )
-    return Part(
+    return FilePart(
         name=name,
         about=f"{shape}",
         channels=numbered(stem, axes.n_channels),
@@ -393,14 +393,14 @@ def npz_contents(path: Path, options: SourceOptions) -> Contents:
     with archive:
         found = [_npz_member(path, archive, info, options) for info in archive.infolist()]
     return Contents(
-        parts=tuple(item for item in found if isinstance(item, Part)),
+        parts=tuple(item for item in found if isinstance(item, FilePart)),
         others=tuple(item for item in found if isinstance(item, str)),
     )
 
 
 def _npz_member(
     path: Path, archive: zipfile.ZipFile, info: zipfile.ZipInfo, options: SourceOptions
-) -> Part | str:
+) -> FilePart | str:
     """A part, or why it is none; the reason is an error where this very member is asked for."""
     name = info.filename.removesuffix(".npy")
     try:
@@ -413,7 +413,7 @@ def _npz_member(
 
 def _npz_part(
     path: Path, archive: zipfile.ZipFile, info: zipfile.ZipInfo, name: str, options: SourceOptions
-) -> Part:
+) -> FilePart:
     label = f"{path}: {name}"
     if not info.filename.endswith(".npy"):
         raise DataError(f"{label} is no array; choose another variable")

@@ -19,7 +19,7 @@ from ..source.part import (
     LARGEST_INFLATED,
     Contents,
     Fetch,
-    Part,
+    FilePart,
     PartChannel,
     SourceOptions,
     damaged,
@@ -122,11 +122,11 @@ def _recording_axes(path: Path, name: str, item: Any, options: SourceOptions) ->
         return str(error).removeprefix(f"{path}: ").partition("; ")[0]
 
 
-def _hdf5_part(path: Path, name: str, item: Any, axes: Axes, texts: "_Texts") -> Part:
+def _hdf5_part(path: Path, name: str, item: Any, axes: Axes, texts: "_Texts") -> FilePart:
     own = {key: text for (owner, key), text in texts.items() if owner == name}
     unit = next((text for key in _UNIT_NAMES if (text := own.get(key) or _text(item, key))), None)
     names = numbered(name.rpartition("/")[2], axes.n_channels)
-    return Part(
+    return FilePart(
         name=name,
         about=f"{item.shape}",
         channels=tuple(PartChannel(name=c.name, unit=unit) for c in names),

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Literal
 
 from ..file.record import DataError
-from ..source.part import Contents, Fetch, Part, PartChannel, SourceOptions
+from ..source.part import Contents, Fetch, FilePart, PartChannel, SourceOptions
 from .flat import Axes, Flat, array_axes, numbered
 
 POUND_FORCE = 4.4482216152605
@@ -133,7 +133,7 @@ def tree_contents(path: Path, tree: Tree, options: SourceOptions) -> Contents:
         if known is not None and name == known.name:
             continue
         found = _part(path, name, leaf, options)
-        if isinstance(found, Part):
+        if isinstance(found, FilePart):
             parts.append(found)
         elif found:
             others.append(found)
@@ -165,7 +165,7 @@ def _member(name: str, leaf: Leaf, index: int, key: str) -> str:
     return f"{name}.{key}" if len(leaf.members) == 1 else f"{name}({index}).{key}"
 
 
-def _part(path: Path, name: str, leaf: Leaf, options: SourceOptions) -> Part | str:
+def _part(path: Path, name: str, leaf: Leaf, options: SourceOptions) -> FilePart | str:
     """A part; or words about what it is instead, none about single numbers and texts."""
     asked = name in options.variables
     if leaf.kind != "numeric" or leaf.size <= 1:
@@ -183,7 +183,7 @@ def _part(path: Path, name: str, leaf: Leaf, options: SourceOptions) -> Part | s
         return f"{name} {leaf.shape}"
 
 
-def array_part(path: Path, name: str, leaf: Leaf, options: SourceOptions) -> Part:
+def array_part(path: Path, name: str, leaf: Leaf, options: SourceOptions) -> FilePart:
     """An array of real numbers as a recording.
 
     Raises
@@ -200,7 +200,7 @@ def array_part(path: Path, name: str, leaf: Leaf, options: SourceOptions) -> Par
     axes = array_axes(shape, options, f"{path}: {name}")
     if leaf.reader is None:
         raise DataError(f"{path}: {name} holds no numbers, must hold some; choose another")
-    return Part(
+    return FilePart(
         name=name,
         about=f"{leaf.shape}",
         channels=numbered(name, axes.n_channels),
@@ -213,7 +213,7 @@ def array_part(path: Path, name: str, leaf: Leaf, options: SourceOptions) -> Par
 # --- known layouts
 
 
-def _known(path: Path, tree: Tree, options: SourceOptions) -> Part | None:
+def _known(path: Path, tree: Tree, options: SourceOptions) -> FilePart | None:
     for layout in MAT_LAYOUTS:
         struct = tree.get(layout.struct)
         fields = struct.members[0] if struct and len(struct.members) == 1 else {}
@@ -224,7 +224,7 @@ def _known(path: Path, tree: Tree, options: SourceOptions) -> Part | None:
 
 def _by_layout(
     path: Path, layout: MatLayout, fields: Mapping[str, Leaf], options: SourceOptions
-) -> Part:
+) -> FilePart:
     numbers = {
         name: (fields[name].scalar(), fields[name])
         for name in (layout.sample_rate, *layout.conditions)

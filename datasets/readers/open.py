@@ -24,7 +24,7 @@ from ..source.empty import without_empty
 from ..source.part import (
     MOST_CHANNELS,
     Contents,
-    Part,
+    FilePart,
     PartChannel,
     Source,
     SourceChannel,
@@ -238,7 +238,7 @@ def list_sources(path: str | Path, options: SourceOptions | None = None) -> tupl
         raise
 
 
-def _refuse_unread(file: Path, part: Part, options: SourceOptions) -> None:
+def _refuse_unread(file: Path, part: FilePart, options: SourceOptions) -> None:
     """Numbers must not be left out like words, unless the channels are chosen without them."""
     wanted = options.channels or (options.like.channels if options.like else ())
     chosen = {_split(entry)[1] or entry for entry in wanted}
@@ -278,7 +278,7 @@ def _refuse_options(file: Path, reader: Reader, options: SourceOptions) -> None:
 # --- which part
 
 
-def _of_record(file: Path, part: Part, options: SourceOptions, record: int) -> Part:
+def _of_record(file: Path, part: FilePart, options: SourceOptions, record: int) -> FilePart:
     """The part, or one of its rows where these are records."""
     if options.rows is None:
         return part
@@ -288,7 +288,7 @@ def _of_record(file: Path, part: Part, options: SourceOptions, record: int) -> P
         raise DataError(f"{file}: {error}") from None
 
 
-def _chosen(file: Path, contents: Contents, options: SourceOptions, record: int) -> Part:
+def _chosen(file: Path, contents: Contents, options: SourceOptions, record: int) -> FilePart:
     names = [part.name for part in contents.parts]
     wanted = [_fitting(file, pattern, names) for pattern in options.variables]
     if wanted:
@@ -329,7 +329,7 @@ def _fitting(file: Path, pattern: str, names: Sequence[str]) -> str:
     return found[0] if found else pattern
 
 
-def _by_pattern(part: Part, pattern: str) -> Part:
+def _by_pattern(part: FilePart, pattern: str) -> FilePart:
     """A part under what its name has in common with those of other files: the pattern's letters."""
     common = re.sub(r"\[[^\]]*\]|[*?]", "", pattern).strip("_. ")
     if part.name == pattern or not common:
@@ -340,7 +340,7 @@ def _by_pattern(part: Part, pattern: str) -> Part:
     return replace(part, name=common, channels=renamed)
 
 
-def _merged(file: Path, parts: Sequence[Part]) -> Part:
+def _merged(file: Path, parts: Sequence[FilePart]) -> FilePart:
     """Several parts of one length as the channels of one recording."""
     if len(parts) == 1:
         return parts[0]
@@ -372,7 +372,7 @@ def _merged(file: Path, parts: Sequence[Part]) -> Part:
     )
 
 
-def _qualified(part: Part, row: int) -> PartChannel:
+def _qualified(part: FilePart, row: int) -> PartChannel:
     """Of several arrays each gives its name to its channel, or to all of them with theirs."""
     channel = part.channels[row]
     if part.named and len(part.channels) > 1:
@@ -383,7 +383,9 @@ def _qualified(part: Part, row: int) -> PartChannel:
 # --- what its numbers mean
 
 
-def _settled(file: Path, part: Part, options: SourceOptions, close: Callable[[], None]) -> Source:
+def _settled(
+    file: Path, part: FilePart, options: SourceOptions, close: Callable[[], None]
+) -> Source:
     """Part and options together; every fault at once."""
     faults: list[str] = []
     missing: list[str] = []
@@ -419,7 +421,7 @@ def _settled(file: Path, part: Part, options: SourceOptions, close: Callable[[],
 
 
 def _rate(
-    part: Part, options: SourceOptions, faults: list[str], missing: list[str]
+    part: FilePart, options: SourceOptions, faults: list[str], missing: list[str]
 ) -> float | None:
     given = options.fs
     declared = None if part.sample_rate is None else _whole(part.sample_rate, part.rate_doubt)
@@ -467,7 +469,7 @@ def _whole(rate: float, doubt: float) -> float:
     return float(math.ceil(rate * (1 - doubt)))
 
 
-def _rows(part: Part, wanted: Sequence[str], faults: list[str]) -> tuple[list[int], list[str]]:
+def _rows(part: FilePart, wanted: Sequence[str], faults: list[str]) -> tuple[list[int], list[str]]:
     """Which rows of the part, under which names."""
     there = [channel.name for channel in part.channels]
     rows, names = list(range(len(there))), list(there)
@@ -511,7 +513,7 @@ def _split(entry: str) -> tuple[str, str]:
 
 
 def _refuse_strangers(
-    part: Part, options: SourceOptions, names: Sequence[str], faults: list[str]
+    part: FilePart, options: SourceOptions, names: Sequence[str], faults: list[str]
 ) -> None:
     """What is declared by name must be about a channel that is there, or was."""
     known = {*names, *(channel.name for channel in part.channels), *part.extras, *part.empty}
@@ -531,7 +533,7 @@ _MEANINGS: tuple[Literal["unit", "sensitivity", "full_scale"], ...] = (
 
 
 def _meaning(
-    part: Part,
+    part: FilePart,
     row: int,
     name: str,
     options: SourceOptions,
@@ -581,7 +583,7 @@ def _differ(declared: str, given: str) -> bool:
         return True
 
 
-def _unit_of(part: Part, text: str | None, full_scale: str | None) -> tuple[ChannelUnit, str]:
+def _unit_of(part: FilePart, text: str | None, full_scale: str | None) -> tuple[ChannelUnit, str]:
     """Meaning of a number of the file, and the words for it."""
     if part.bits == 0:
         if full_scale is not None:

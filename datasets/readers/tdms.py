@@ -19,7 +19,7 @@ from ..file.record import DataError
 from ..source.part import (
     DECLARED,
     Contents,
-    Part,
+    FilePart,
     PartChannel,
     SourceOptions,
     cut,
@@ -136,7 +136,7 @@ def _walk_segments(path: Path, partial: bool) -> None:
 
 def _groups(path: Path, file: Any, size: int, partial: bool) -> Contents:
     missing = _missing(file) if partial else {}
-    parts: list[Part] = []
+    parts: list[FilePart] = []
     others: list[str] = []
     total = 0
     for group in file.groups():
@@ -173,7 +173,7 @@ def _missing(file: Any) -> dict[str, int]:
 
 def _group_parts(
     path: Path, group: str, channels: Sequence[Any], missing: Mapping[str, int]
-) -> list[Part]:
+) -> list[FilePart]:
     """One part of channels that fit together; else one of each.
 
     They fit by the samples that they declare; of those cut short, the shortest gives the length.
@@ -188,9 +188,9 @@ def _group_parts(
     ]
 
 
-def _group_part(path: Path, name: str, members: Sequence[Any], declared: int) -> Part:
+def _group_part(path: Path, name: str, members: Sequence[Any], declared: int) -> FilePart:
     n_samples = min(len(channel) for channel in members)
-    return Part(
+    return FilePart(
         name=name,
         about=f"({len(members)}, {n_samples})",
         channels=tuple(PartChannel(name=str(c.name), unit=_unit(c)) for c in members),

@@ -21,7 +21,7 @@ from ..source.part import (
     MOST_CHANNELS,
     MOST_ROWS,
     Contents,
-    Part,
+    FilePart,
     PartChannel,
     SourceOptions,
     foreign,
@@ -230,7 +230,7 @@ def text_contents(path: Path, options: SourceOptions) -> Contents:
     begin = len("\n".join(lines[: dialect.first]).encode(_BYTES)) + (dialect.first > 0)
     begin += _bom(path)
     index = index_lines(path, begin, dialect.first, records=records)
-    table = Table(lines=index, dialect=dialect)
+    table = TextTable(lines=index, dialect=dialect)
     if records:
         return _line_records(path, table, options)
     time = _time_column(path, columns, _stamp_columns(table), options)
@@ -241,7 +241,7 @@ def text_contents(path: Path, options: SourceOptions) -> Contents:
     if len(kept) > MOST_CHANNELS:
         raise DataError(f"{path} has {len(kept)} columns, must have <= {MOST_CHANNELS}; split it")
     named = any(column.named for column in columns)
-    part = Part(
+    part = FilePart(
         name="",
         about=f"({len(kept)}, {index.count})",
         channels=tuple(PartChannel(name=columns[c].name, unit=columns[c].unit) for c in kept),
@@ -258,7 +258,7 @@ def text_contents(path: Path, options: SourceOptions) -> Contents:
     return Contents(parts=(part,), others=tuple(words))
 
 
-def _unread(table: "Table", columns: Sequence["_Column"], time: int | None) -> dict[str, str]:
+def _unread(table: "TextTable", columns: Sequence["_Column"], time: int | None) -> dict[str, str]:
     """Columns whose last cells are numbers in a notation that is not read, and what to do."""
     first = max(0, table.lines.count - _SAMPLE)
     found = {}
@@ -275,7 +275,7 @@ def _unread(table: "Table", columns: Sequence["_Column"], time: int | None) -> d
     return found
 
 
-def _line_records(path: Path, table: "Table", options: SourceOptions) -> Contents:
+def _line_records(path: Path, table: "TextTable", options: SourceOptions) -> Contents:
     """Lines as recordings of one channel; columns that hold words are left out."""
     if options.time_column:
         raise DataError(
@@ -290,7 +290,7 @@ def _line_records(path: Path, table: "Table", options: SourceOptions) -> Content
         wanted = columns[start:stop]
         return np.stack([table.read(row, row + 1, wanted)[:, 0] for row in rows])
 
-    part = Part(
+    part = FilePart(
         name="",
         about=f"({count}, {len(columns)})",
         channels=numbered(stem_of(path), count),
@@ -632,7 +632,7 @@ def _named(cell: str, index: int) -> _Column:
 # --- the time
 
 
-def _stamp_columns(table: "Table") -> list[int]:
+def _stamp_columns(table: "TextTable") -> list[int]:
     """Columns that begin and end with a time stamp."""
     ends = (0, table.lines.count - 1)
     return [
@@ -669,7 +669,7 @@ def _time_column(
 
 def _rate(
     path: Path,
-    table: "Table",
+    table: "TextTable",
     columns: Sequence[_Column],
     time: int | None,
     options: SourceOptions,
@@ -707,7 +707,7 @@ def _rate(
 
 
 def _stamped_rate(
-    path: Path, table: "Table", column: _Column, time: int, options: SourceOptions
+    path: Path, table: "TextTable", column: _Column, time: int, options: SourceOptions
 ) -> tuple[float, float]:
     """Sample rate by time stamps, and its relative doubt."""
     if isinstance(options.unit, Mapping) and column.name in list(options.unit):
@@ -744,7 +744,7 @@ def _stamped_rate(
     return 1.0 / clock.step, clock.doubt
 
 
-def _place(table: "Table", time: int, index: int) -> str:
+def _place(table: "TextTable", time: int, index: int) -> str:
     """A time as it is printed, and its line."""
     [text] = table.cells(index, index + 1, time)
     return f"{text} (line {table.lines.before + index + 1})"
@@ -768,7 +768,7 @@ _RATE_DOUBT = 0.01  # of a rate against times that may be printed coarsely
 
 
 @dataclass(frozen=True, kw_only=True)
-class Table:
+class TextTable:
     """Lines and how to read them."""
 
     lines: Lines
@@ -849,6 +849,6 @@ def _refuse_widths(text: Sequence[str], dialect: Dialect) -> None:
 
 
 def _fetch(
-    table: Table, kept: Sequence[int], start: int, stop: int, rows: tuple[int, ...]
+    table: TextTable, kept: Sequence[int], start: int, stop: int, rows: tuple[int, ...]
 ) -> NDArray[Any]:
     return table.read(start, stop, [kept[row] for row in rows])

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..file.record import DataError
-from ..source.part import Contents, Part, PartChannel, SourceOptions, cut, foreign
+from ..source.part import Contents, FilePart, PartChannel, SourceOptions, cut, foreign
 from ..source.time_column import even_rate, printed_resolution
 from .flat import Flat
 from .text import Lines, index_lines
@@ -318,14 +318,14 @@ def _printed(path: Path, handle: BinaryIO, item: _Set) -> _Set:
 
 def _parts(
     path: Path, sets: Sequence[_Set], scales: tuple[float, float] | None
-) -> tuple[Part, ...]:
+) -> tuple[FilePart, ...]:
     """One part of all sets where they fit together; else one of each."""
     fetches = [_fetcher(path, item) for item in sets]
     rates = [_rate(path, item) for item in sets]
     channels = [PartChannel(name=item.name, unit=_unit(item, scales)) for item in sets]
     names = _unique([item.name for item in sets])
     singles = tuple(
-        Part(
+        FilePart(
             name=name,
             about=f"(1, {item.count})",
             channels=(channel,),

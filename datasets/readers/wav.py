@@ -14,7 +14,7 @@ from ..source.part import (
     MOST_CHANNELS,
     Contents,
     Fetch,
-    Part,
+    FilePart,
     SourceOptions,
     cut,
     foreign,
@@ -86,7 +86,9 @@ def wav_contents(path: Path, options: SourceOptions) -> Contents:
     return Contents(parts=(_part(path, form, order, place, length // form.frame, declared),))
 
 
-def _part(path: Path, form: _Format, order: str, place: int, n_samples: int, declared: int) -> Part:
+def _part(
+    path: Path, form: _Format, order: str, place: int, n_samples: int, declared: int
+) -> FilePart:
     letter = "f" if form.kind == _FLOAT else "i"
     code = f"{order}{letter}{form.width}" if form.width > 1 else "|u1"
     layout = Flat(
@@ -103,7 +105,7 @@ def _part(path: Path, form: _Format, order: str, place: int, n_samples: int, dec
         fetch, bits = _expanded(layout.fetch, _TABLES[form.kind]), _COMPANDED_BITS
     elif code == "|u1":
         fetch = _signed(layout.fetch)
-    return Part(
+    return FilePart(
         name="",
         about=f"{(form.n_channels, n_samples)}",
         channels=numbered(stem_of(path), form.n_channels),

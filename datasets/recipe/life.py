@@ -43,7 +43,7 @@ machine's own. All of them tell the severity or what it will be: they are labels
 _HOUR = 3600.0  # s
 
 
-class Turning(Part):
+class TurningGear(Part):
     """The turning gear, on which a journal bearing wears."""
 
     speed: RotationSpeed = Field(gt=0, le=10, description="a few revolutions a minute")
@@ -97,7 +97,7 @@ class LifeTable(Part):
     width: Length | None = Field(
         default=None, gt=0, le=LONGEST, description="of a joint along its pin, of a guide across"
     )
-    turning: Turning | None = Field(default=None, description="of a journal bearing")
+    turning: TurningGear | None = Field(default=None, description="of a journal bearing")
     maintenance: tuple[MaintenanceTable, ...] = Field(default=(), max_length=16)
 
 

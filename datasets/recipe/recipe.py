@@ -242,7 +242,7 @@ class Wearing:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Fault:
+class RecipeFault:
     """A confounder with its place in the scene.
 
     Attributes
@@ -301,7 +301,7 @@ class Recipe:
     machine: tuple[Axis, ...]
     record: tuple[Axis, ...]
     choices: tuple[Alternatives, ...]
-    confounders: Mapping[str, tuple[Fault, ...]]
+    confounders: Mapping[str, tuple[RecipeFault, ...]]
     copulas: Mapping[str, Copula]
     held_out: tuple[HeldOut, ...]
     view: str = ""
@@ -370,7 +370,7 @@ class Recipe:
         )
 
     @property
-    def faults(self) -> tuple[Fault, ...]:
+    def faults(self) -> tuple[RecipeFault, ...]:
         """All confounders."""
         return tuple(fault for members in self.confounders.values() for fault in members)
 
@@ -780,10 +780,10 @@ def _exclusive_sets(confounders: Sequence[Confounder]) -> dict[str, list[Confoun
 
 def _fault_sets(
     confounders: Sequence[Confounder], axes: Mapping[str, list[Axis]]
-) -> dict[str, tuple[Fault, ...]]:
+) -> dict[str, tuple[RecipeFault, ...]]:
     """Confounders with their axes, those that exclude each other together."""
     faults = {
-        confounder.name: Fault(
+        confounder.name: RecipeFault(
             table=confounder,
             axes=tuple(axis for axis in axes[f"confounder.{i}"] if isinstance(axis, Range)),
         )

@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from .part import Part
+from .part import FilePart
 
 _PIECE = 2**16  # samples of a channel looked at in one read
 
 
-def without_empty(part: Part) -> Part:
+def without_empty(part: FilePart) -> FilePart:
     """The part without its channels of NaN alone, which it names; all of them if none is left.
 
     Parameters
@@ -22,7 +22,7 @@ def without_empty(part: Part) -> Part:
     >>> from .part import PartChannel
     >>> rows = np.array([[1.0, np.nan], [np.nan, np.nan]])
     >>> names = (PartChannel(name="a"), PartChannel(name="b"))
-    >>> part = Part(
+    >>> part = FilePart(
     ...     name="x",
     ...     about="",
     ...     channels=names,
@@ -54,7 +54,7 @@ def without_empty(part: Part) -> Part:
     )
 
 
-def _still_empty(part: Part, start: int, stop: int, rows: tuple[int, ...]) -> tuple[int, ...]:
+def _still_empty(part: FilePart, start: int, stop: int, rows: tuple[int, ...]) -> tuple[int, ...]:
     """Those of some channels that are NaN throughout."""
     if not rows:
         return ()

@@ -204,7 +204,7 @@ class PartChannel:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Part:
+class FilePart:
     """Something in a file that can be one recording; nothing of its signal is read yet.
 
     Attributes
@@ -260,7 +260,7 @@ class Part:
     empty: tuple[str, ...] = ()
     unread: Mapping[str, str] = field(default_factory=dict)
 
-    def row_as_record(self, row: int) -> "Part":
+    def row_as_record(self, row: int) -> "FilePart":
         """One channel as a recording of its own, named like the others.
 
         Raises
@@ -301,7 +301,7 @@ class Contents:
     ``wanted`` says what to do where nothing can be chosen; ``close`` releases the file.
     """
 
-    parts: tuple[Part, ...]
+    parts: tuple[FilePart, ...]
     others: tuple[str, ...] = ()
     close: Callable[[], None] = _nothing
 

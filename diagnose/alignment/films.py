@@ -35,7 +35,7 @@ _BAND, _LINES = (5.0, 400.0), 400  # of transfer functions that nobody measured 
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class FilmState:
+class LineFilms:
     """The films of a line as it is set, or after moves, at one speed.
 
     Attributes
@@ -58,7 +58,7 @@ def film_states(
     turns: Mapping[str, float] | None = None,
     *,
     speeds: Sequence[float] = SPEEDS,
-) -> tuple[FilmState, ...]:
+) -> tuple[LineFilms, ...]:
     """Films of a line before and after moves, at several speeds.
 
     Parameters
@@ -71,7 +71,7 @@ def film_states(
 
     Returns
     -------
-    tuple of FilmState
+    tuple of LineFilms
         As set at all speeds, then after the moves, where there are any.
 
     Examples
@@ -94,7 +94,7 @@ def film_states(
                 start = rest(model, math.tau * speed, start=start)
             except ShaftFilmError:
                 start = None
-            found.append(FilmState(after=after, speed_hz=speed, film=start))
+            found.append(LineFilms(after=after, speed_hz=speed, film=start))
     return tuple(found)
 
 
@@ -117,7 +117,7 @@ def moved_scene(
     return turned.model_copy(update={"bearings": bearings})
 
 
-def film_rows(states: Sequence[FilmState]) -> list[dict[str, Any]]:
+def film_rows(states: Sequence[LineFilms]) -> list[dict[str, Any]]:
     """One row for each bearing, speed and alignment, in SI, ready for JSON."""
     return [
         {
@@ -165,7 +165,7 @@ _CELLS = (
 )
 
 
-def film_cells(states: Sequence[FilmState]) -> list[tuple[str, ...]]:
+def film_cells(states: Sequence[LineFilms]) -> list[tuple[str, ...]]:
     """Rows of a table for people: before the moves -> after them.
 
     Examples
@@ -197,7 +197,7 @@ def _change(
     return f"{before} → {factor * other[key]:{form}}"
 
 
-def resting(states: Sequence[FilmState]) -> list[str]:
+def resting(states: Sequence[LineFilms]) -> list[str]:
     """A sentence for each state in which the line does not rest on its films."""
     return [
         f"{'after the moves' if state.after else 'as set'}, {60 * state.speed_hz:.0f} 1/min: the "
@@ -207,12 +207,12 @@ def resting(states: Sequence[FilmState]) -> list[str]:
     ]
 
 
-def pressure_figure(states: Sequence[FilmState]) -> Any:
+def pressure_figure(states: Sequence[LineFilms]) -> Any:
     """Film pressure over every bearing's unrolled bore, as set and after the moves.
 
     Parameters
     ----------
-    states : sequence of FilmState
+    states : sequence of LineFilms
         The two nearest to the scene's speed are drawn.
 
     Returns
@@ -241,7 +241,7 @@ def pressure_figure(states: Sequence[FilmState]) -> Any:
     return figure
 
 
-def _at_one_speed(states: Sequence[FilmState]) -> list[FilmState]:
+def _at_one_speed(states: Sequence[LineFilms]) -> list[LineFilms]:
     """Those of the middle speed."""
     speeds = sorted({state.speed_hz for state in states})
     middle = speeds[len(speeds) // 2]

@@ -31,7 +31,7 @@ from ..shaft_tests.rig_test import EXPECTED, BeforeAfter, rig_figure, rig_text
 from ..shaft_tests.sag_report import SagReport, next_texts, sag_figure, sag_rows
 from .films import (
     FILM_HEAD,
-    FilmState,
+    LineFilms,
     film_cells,
     film_rows,
     film_states,
@@ -736,7 +736,7 @@ def _tested(result: BeforeAfter) -> dict[str, Any]:
     }
 
 
-def _films(states: Sequence[FilmState]) -> dict[str, Any]:
+def _films(states: Sequence[LineFilms]) -> dict[str, Any]:
     """Oil films for the page; without a picture where the line does not rest."""
     rests = any(state.film is not None for state in states)
     return {

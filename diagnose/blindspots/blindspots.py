@@ -25,7 +25,7 @@ from ..nameplate.cautions import known_beside
 from ..pages.kept import Kept
 from ..wear_model.estimate import Estimate
 from .rows import SceneRow, scene_rows
-from .scores import Row, Said, row_of, said_of
+from .scores import ShiftRow, ShiftVerdict, answer_of, row_of
 from .signals import SignalRow, signal_rows
 
 OWN_SEEDS = 2**62
@@ -67,15 +67,15 @@ class BlindSpots:
         Name.
     baseline : Row
         As trained.
-    rows : tuple of Row
+    rows : tuple of ShiftRow
         Those done, in the order in which they were made.
     left : tuple of str
         Keys of those that time did not suffice for.
     """
 
     recipe: str
-    baseline: Row
-    rows: tuple[Row, ...]
+    baseline: ShiftRow
+    rows: tuple[ShiftRow, ...]
     left: tuple[str, ...]
 
 
@@ -180,10 +180,10 @@ class _Machines:
             row=noted,
         )
 
-    def judged(self, recording: Recording, sample: Sample) -> Said:
+    def judged(self, recording: Recording, sample: Sample) -> ShiftVerdict:
         """What the model says of a recording of a machine."""
         estimate = self.model.estimate(recording, **known_beside(None, recording, self.model.card))
-        return said_of(estimate, sample.group, float(sample.row[self.column]))
+        return answer_of(estimate, sample.group, float(sample.row[self.column]))
 
 
 def _samples(recipe: Recipe, machines: int, seed: int) -> list[Sample]:
@@ -232,15 +232,15 @@ def _of_signal(machines: _Machines, row: SignalRow) -> Iterator[_Outcome]:
 class _Task:
     """A row to be made."""
 
-    row: Row
+    row: ShiftRow
     outcomes: Callable[[_Machines], Iterator[_Outcome]]
 
 
 def _tasks(scenes: Sequence[SceneRow], signals: Sequence[SignalRow]) -> list[_Task]:
     """The baseline first, then the cheap rows of the signal, then those of the scene."""
 
-    def empty(name: str, shift: str, kind: str, why: str) -> Row:
-        return Row(name=name, shift=shift, kind=kind, why=why, said=())
+    def empty(name: str, shift: str, kind: str, why: str) -> ShiftRow:
+        return ShiftRow(name=name, shift=shift, kind=kind, why=why, said=())
 
     tasks = [_Task(empty(BASELINE, "", BASELINE, ""), _baseline)]
     for signal in signals:
@@ -252,7 +252,7 @@ def _tasks(scenes: Sequence[SceneRow], signals: Sequence[SignalRow]) -> list[_Ta
     return tasks
 
 
-def kept_rows(path: Path | None, key: str) -> Kept[Row]:
+def kept_rows(path: Path | None, key: str) -> Kept[ShiftRow]:
     """Finished rows in a file beside the output.
 
     Parameters
@@ -270,7 +270,7 @@ def kept_rows(path: Path | None, key: str) -> Kept[Row]:
     return Kept(
         path,
         key,
-        table_of=Row.as_dict,
+        table_of=ShiftRow.as_dict,
         piece_of=row_of,
         depends="another model, recipe, number of machines, seed or version",
     )
@@ -298,7 +298,7 @@ def find_blind_spots(
     budget: float | None = None,
     scenes: Sequence[SceneRow] | None = None,
     signals: Sequence[SignalRow] | None = None,
-    kept: Kept[Row] | None = None,
+    kept: Kept[ShiftRow] | None = None,
     progress: Progress | None = None,
 ) -> BlindSpots:
     """Judge a model on the same machines, with one thing shifted at a time.
@@ -357,7 +357,7 @@ def find_blind_spots(
     )
 
 
-def _made(task: _Task, fleet: _Machines) -> Row:
+def _made(task: _Task, fleet: _Machines) -> ShiftRow:
     said, faults = [], []
     for sample, outcome in task.outcomes(fleet):
         if isinstance(outcome, str):
@@ -365,7 +365,7 @@ def _made(task: _Task, fleet: _Machines) -> Row:
         else:
             said.append(fleet.judged(outcome, sample))
     empty = task.row
-    return Row(
+    return ShiftRow(
         name=empty.name,
         shift=empty.shift,
         kind=empty.kind,

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..learning.scores import Figure, resampled, share
+from ..learning.scores import ScoreFigure, resampled, share
 from ..wear_model.estimate import Estimate
 
 FIGURES = (
@@ -22,7 +22,7 @@ FIGURES = (
 
 
 @dataclass(frozen=True, kw_only=True)
-class Said:
+class ShiftVerdict:
     """What a model said of one machine.
 
     Attributes
@@ -45,10 +45,10 @@ class Said:
     high: float | None
 
 
-def said_of(estimate: Estimate, machine: int, truth: float) -> Said:
+def answer_of(estimate: Estimate, machine: int, truth: float) -> ShiftVerdict:
     """What is kept of an estimate."""
     ends = (estimate.severity, estimate.low, estimate.high) if estimate.graded else (None,) * 3
-    return Said(
+    return ShiftVerdict(
         machine=machine,
         truth=truth,
         verdict=estimate.verdict,
@@ -59,7 +59,7 @@ def said_of(estimate: Estimate, machine: int, truth: float) -> Said:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Row:
+class ShiftRow:
     """One row: what was shifted, and what the model said of every machine.
 
     Attributes
@@ -67,7 +67,7 @@ class Row:
     name, shift, why : str
         What, by how much, and how it comes about.
     kind : {"as trained", "fixed", "drawn", "sensor"}
-    said : tuple of Said
+    said : tuple of ShiftVerdict
         Of the machines that could be simulated so.
     faults : tuple of str
         Of those that could not.
@@ -77,7 +77,7 @@ class Row:
     shift: str
     kind: str
     why: str
-    said: tuple[Said, ...]
+    said: tuple[ShiftVerdict, ...]
     faults: tuple[str, ...] = ()
 
     @property
@@ -90,13 +90,13 @@ class Row:
         return asdict(self)
 
 
-def row_of(stored: Mapping[str, Any]) -> Row:
+def row_of(stored: Mapping[str, Any]) -> ShiftRow:
     """A row from what :meth:`Row.as_dict` gave."""
-    said = tuple(Said(**each) for each in stored["said"])
-    return Row(**{**stored, "said": said, "faults": tuple(stored["faults"])})
+    said = tuple(ShiftVerdict(**each) for each in stored["said"])
+    return ShiftRow(**{**stored, "said": said, "faults": tuple(stored["faults"])})
 
 
-def row_figures(row: Row, limit: float, *, seed: int = 0) -> dict[str, Figure]:
+def row_figures(row: ShiftRow, limit: float, *, seed: int = 0) -> dict[str, ScoreFigure]:
     """Every one of :data:`FIGURES`.
 
     Parameters
@@ -115,13 +115,13 @@ def row_figures(row: Row, limit: float, *, seed: int = 0) -> dict[str, Figure]:
     Examples
     --------
     >>> wear = {"verdict": "graded", "low": 1e-4, "high": 3e-4}
-    >>> said = [Said(machine=i, truth=2e-4, found=2e-4 + i * 1e-5, **wear) for i in (0, 2)]
-    >>> row = Row(name="", shift="", kind="fixed", why="", said=tuple(said))
+    >>> said = [ShiftVerdict(machine=i, truth=2e-4, found=2e-4 + i * 1e-5, **wear) for i in (0, 2)]
+    >>> row = ShiftRow(name="", shift="", kind="fixed", why="", said=tuple(said))
     >>> round(row_figures(row, 2e-4)["clear_error"].value, 9)
     0.05
     """
     if not row.said:
-        nothing = Figure(value=math.nan, low=math.nan, high=math.nan)
+        nothing = ScoreFigure(value=math.nan, low=math.nan, high=math.nan)
         return {name: nothing for name, _ in FIGURES}
     draws = resampled([each.machine for each in row.said], seed=seed)
     off = _numbers((e.found, e.truth) for e in row.said) / limit
@@ -145,7 +145,7 @@ def row_figures(row: Row, limit: float, *, seed: int = 0) -> dict[str, Figure]:
     }
 
 
-def _holds(said: Said) -> bool:
+def _holds(said: ShiftVerdict) -> bool:
     return said.low is not None and said.high is not None and said.low <= said.truth <= said.high
 
 
@@ -153,14 +153,14 @@ def _numbers(pairs: Iterable[tuple[float | None, float]]) -> Any:
     return np.array([math.nan if found is None else found - truth for found, truth in pairs])
 
 
-def ranked(rows: Sequence[Row], limit: float) -> list[Row]:
+def ranked(rows: Sequence[ShiftRow], limit: float) -> list[ShiftRow]:
     """Rows by the error of what is graded without caution, worst first.
 
     Rows of which nothing is graded so follow, by the error of all that is graded: there the model
     warns of itself. Rows that no machine could be simulated for come last.
     """
 
-    def place(row: Row) -> tuple[int, float]:
+    def place(row: ShiftRow) -> tuple[int, float]:
         if not row.said:
             return 2, 0.0
         figures = row_figures(row, limit)

@@ -4,9 +4,9 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from ..learning.scores import Figure
+from ..learning.scores import ScoreFigure
 from .blindspots import BlindSpots
-from .scores import FIGURES, Row, ranked, row_figures
+from .scores import FIGURES, ShiftRow, ranked, row_figures
 
 Table = dict[str, Any]
 
@@ -43,7 +43,7 @@ def blind_spots_table(found: BlindSpots, card: Mapping[str, Any]) -> Table:
     }
 
 
-def _row_table(row: Row, limit: float) -> Table:
+def _row_table(row: ShiftRow, limit: float) -> Table:
     figures = row_figures(row, limit)
     stored = row.as_dict()
     return {
@@ -55,7 +55,7 @@ def _row_table(row: Row, limit: float) -> Table:
     }
 
 
-def _plain(figure: Figure) -> dict[str, float | None]:
+def _plain(figure: ScoreFigure) -> dict[str, float | None]:
     ends = {"value": figure.value, "low": figure.low, "high": figure.high}
     return {name: None if math.isnan(end) else end for name, end in ends.items()}
 

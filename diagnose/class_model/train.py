@@ -21,7 +21,7 @@ from ..feature_rows.blows import NOISE_SCORE, blow_floors, blow_scores, blow_tab
 from ..feature_rows.feature_choice import choice_card, choice_in
 from ..feature_rows.feature_table import (
     USUAL,
-    Choice,
+    FeatureSelection,
     FeatureTable,
     Progress,
     feature_table,
@@ -30,7 +30,7 @@ from ..feature_rows.feature_table import (
 from ..feature_rows.quality import layout_faults, sample_faults
 from ..learning.conformal import COVERAGE, record_weights, weighted_quantile
 from ..learning.regressions import CANDIDATES, Blend, Folds, fit_blend
-from ..learning.scores import Figure, resampled, share
+from ..learning.scores import ScoreFigure, resampled, share
 from ..report.batch import Item, fault_of
 from ..wear_model.estimate import UNFAMILIAR_SHARE, ModelError
 from ..wear_model.novelty import Familiarity, fit_familiarity
@@ -340,7 +340,7 @@ def train_classes(
     path: str | Path,
     *,
     target: str,
-    choice: Choice = USUAL,
+    choice: FeatureSelection = USUAL,
     seed: int = 0,
     jobs: int = 1,
     progress: Progress | None = None,
@@ -646,7 +646,7 @@ def score_votes(
     }
 
 
-def _ends(figure: Figure) -> list[float]:
+def _ends(figure: ScoreFigure) -> list[float]:
     return [figure.low, figure.high]
 
 

@@ -485,7 +485,7 @@ def report(
     usual = model.card["trained_on"]["scene"]
     plate = nameplate_of(source, scene, overrides_of(pairs), usual=usual)
     ways = (output, machine, as_json, force, given, views)
-    told = _Told(source, model_file, model, baselines, plate, *ways)
+    told = _ReportTask(source, model_file, model, baselines, plate, *ways)
     verdicts = _report_many(told) if many else _report_one(told)
     raise click.exceptions.Exit(report_exit(verdicts, fail_on))
 
@@ -533,7 +533,7 @@ def _report_class(source: Path, model_file: Path, given: Mapping[str, Any], as_j
         raise click.exceptions.Exit(EXIT_BAD_INPUT)
 
 
-class _Told(NamedTuple):
+class _ReportTask(NamedTuple):
     """What both kinds of report are given."""
 
     source: Path
@@ -553,7 +553,7 @@ _Verdict = tuple[str, int | None]
 """Verdict and grade."""
 
 
-def _report_one(told: _Told) -> list[_Verdict]:
+def _report_one(told: _ReportTask) -> list[_Verdict]:
     """Report on one recording."""
     from ...datasets.measured.recording import read_recording, with_views
     from ..nameplate.cautions import known_beside
@@ -591,7 +591,7 @@ def _report_one(told: _Told) -> list[_Verdict]:
     return [(table["estimate"]["verdict"], estimate.grade)]
 
 
-def _report_many(told: _Told) -> list[_Verdict]:
+def _report_many(told: _ReportTask) -> list[_Verdict]:
     """Report on a folder or data set; of JSON one line each, as soon as it is judged."""
     from ..pages.page import save_page
     from ..report.batch import HOURS, judge_all, recordings_in

@@ -10,11 +10,11 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from ...datasets.file.record import Attributes, DataError, DataSet
-from ...datasets.file.views import View
+from ...datasets.file.views import CompletingView
 from ...datasets.split.stored import Sides, usable_sides
 from ..feature_rows.feature_choice import choice_in
 from ..feature_rows.feature_table import (
-    Choice,
+    FeatureSelection,
     FeatureTable,
     Progress,
     confounders_in,
@@ -23,7 +23,7 @@ from ..feature_rows.feature_table import (
 from ..feature_rows.healthy import references, refuse_strangers
 from ..feature_rows.noted import notes_of
 from ..feature_rows.transfer_reference import healthy_transfer
-from ..learning.conformal import Calibration, grade_limits, grade_set, interval, tails
+from ..learning.conformal import IntervalCalibration, grade_limits, grade_set, interval, tails
 from ..learning.grades import grades_of
 from ..learning.scores import (
     Judged,
@@ -39,7 +39,7 @@ from ..learning.scores import (
 from ..wear_model.estimate import Estimate, WearModel
 from ..wear_model.train import draw_identity
 from .baselines import Side, contest, side_of
-from .foreign_features import kitchen
+from .foreign_features import transformed_rows
 
 Float = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -77,7 +77,7 @@ def evaluate_model(
     model: WearModel,
     path: str | Path,
     *,
-    views: Sequence[View] = (),
+    views: Sequence[CompletingView] = (),
     trained_on: str | Path | None = None,
     healthy: str | Path | None = None,
     split: str | None = None,
@@ -95,7 +95,7 @@ def evaluate_model(
     path : str or Path
         Labelled data set. Where its machine draws are those of the training set, only the draws
         held out there are used.
-    views : sequence of View
+    views : sequence of CompletingView
         Data sets that complete the records, as the model needs them; records that lack one are
         left out.
     trained_on : str or Path, optional
@@ -155,11 +155,13 @@ def evaluate_model(
     if sides is not None and trained_on is None and train.size == 0:
         train = sides.train
     examples = train if train.size else rows
-    cook = kitchen(Path(home), examples, seed=seed, quick=quick, cache=cache, progress=progress)
-    known = cook.rows(Path(home), home_table) if train.size else None
+    rows_of = transformed_rows(
+        Path(home), examples, seed=seed, quick=quick, cache=cache, progress=progress
+    )
+    known = rows_of.rows(Path(home), home_table) if train.size else None
     background = Background(
         train=side_of(home_table, model.card["severity"], train, known) if train.size else None,
-        foreign=cook.rows(Path(path), table),
+        foreign=rows_of.rows(Path(path), table),
     )
     result = score(model, table, rows, references=reference, background=background, seed=seed)
     return result if sides is None else {**result, "split": _split_card(model, sides)}
@@ -189,7 +191,7 @@ def judged_rows(
     model: WearModel,
     path: str | Path,
     *,
-    views: Sequence[View] = (),
+    views: Sequence[CompletingView] = (),
     sides: Sides | None = None,
     healthy: str | Path | None = None,
     jobs: int = 1,
@@ -207,7 +209,7 @@ def judged_rows(
     with DataSet(path) as data:
         head = data.attributes
     refuse_other_severity(model, head, path)
-    known = healthy_transfer(healthy, [Choice(only=model.names)])
+    known = healthy_transfer(healthy, [FeatureSelection(only=model.names)])
     choice = replace(choice_in(model.card), views=_views_of(model, views, path))
     table = feature_table(path, choice=choice, healthy=known, jobs=jobs, progress=progress)
     identity = draw_identity(head)
@@ -222,7 +224,9 @@ def judged_rows(
     return table, whole
 
 
-def _views_of(model: WearModel, views: Sequence[View], path: str | Path) -> tuple[View, ...]:
+def _views_of(
+    model: WearModel, views: Sequence[CompletingView], path: str | Path
+) -> tuple[CompletingView, ...]:
     """Views in the order of the model; they must be its own."""
     known = {view.name: view for view in views}
     wanted = model.card.get("views", {})
@@ -462,7 +466,9 @@ def reliability(
     return found
 
 
-def _held(known: Calibration, judged: Judged, here: Mask, model: WearModel, nominal: float) -> Mask:
+def _held(
+    known: IntervalCalibration, judged: Judged, here: Mask, model: WearModel, nominal: float
+) -> Mask:
     """Whether interval and set hold the truth, of graded records here [shape=(2, n)]."""
     edges = model.card["grade_edges_m"]
     held = np.zeros((2, len(judged.truth)), dtype=bool)

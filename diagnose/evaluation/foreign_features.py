@@ -128,7 +128,7 @@ def foreign_rows(
 
 
 @dataclass(frozen=True, kw_only=True)
-class Kitchen:
+class TransformedRows:
     """Features by the packages of others, made once and kept.
 
     Attributes
@@ -177,7 +177,7 @@ class Kitchen:
         return f"{source}-{hashlib.sha256(b'|'.join(parts)).hexdigest()[:16]}.npy"
 
 
-def kitchen(
+def transformed_rows(
     path: Path,
     train: Index,
     *,
@@ -185,7 +185,7 @@ def kitchen(
     quick: bool = False,
     cache: Path | None = None,
     progress: Progress | None = None,
-) -> Kitchen:
+) -> TransformedRows:
     """Fit the transforms of the installed packages to a training data set.
 
     Parameters
@@ -195,12 +195,12 @@ def kitchen(
     train : numpy.ndarray
         Rows of its feature table that may be learnt from.
     seed, cache, progress
-        As of :class:`Kitchen`.
+        As of :class:`TransformedRows`.
     quick : bool
         Leave the packages of others out.
     """
     examples = np.random.default_rng(seed).permutation(train)[:_KERNEL_EXAMPLES]
-    return Kitchen(
+    return TransformedRows(
         examples=examples,
         transforms={
             source: foreign_transform(source, recordings_of(path, examples), seed=seed)

@@ -16,7 +16,7 @@ from ...datasets.split.rules import check_no_leak, condition_split, group_split
 from ...datasets.split.stored import LOADS, Drawn, drawn_of, machine_samples, usable_sides
 from ..feature_rows.feature_choice import choice_in
 from ..feature_rows.feature_table import (
-    Choice,
+    FeatureSelection,
     FeatureTable,
     Healthy,
     Progress,
@@ -27,7 +27,7 @@ from ..feature_rows.feature_table import (
 from ..feature_rows.healthy import Baseline, references
 from ..feature_rows.noted import notes_of
 from ..feature_rows.transfer_reference import healthy_transfer
-from ..learning.scores import Figure, figures, plain, resampled, smallest_found
+from ..learning.scores import ScoreFigure, figures, plain, resampled, smallest_found
 from ..wear_model.estimate import WearModel
 from ..wear_model.train import fit_model
 from .baselines import BASELINES, Rival, Side, choose, side_of
@@ -38,8 +38,8 @@ from .foreign_features import (
     Transform,
     absence,
     foreign_rows,
-    kitchen,
     recordings_of,
+    transformed_rows,
 )
 
 Float = NDArray[np.float64]
@@ -114,7 +114,7 @@ class Case:
     severity: str
     edges: tuple[float, ...]
     limit: float
-    choice: Choice
+    choice: FeatureSelection
     healthy: Healthy | None
     fit: Fit
     references: Float | None
@@ -224,13 +224,15 @@ def case_of(
         )
     choice = choice_in(card)
     ways: dict[str, Any] = {"choice": choice, "jobs": jobs, "progress": progress}
-    known = healthy_transfer(healthy, [Choice(only=tuple(card["features"]))])
+    known = healthy_transfer(healthy, [FeatureSelection(only=tuple(card["features"]))])
     table = feature_table(path, healthy=known, **ways)
     reference = None
     if healthy is not None:
         reference, _ = references(table, path, healthy, **ways)
     train, _ = group_split(table.manifest["group"].to_numpy(), test_fraction=TEST_SHARE, seed=seed)
-    cook = kitchen(Path(path), train, seed=seed, quick=quick, cache=cache, progress=progress)
+    rows_of = transformed_rows(
+        Path(path), train, seed=seed, quick=quick, cache=cache, progress=progress
+    )
 
     def fit(rows: Index) -> WearModel:
         return fit_model(
@@ -257,8 +259,8 @@ def case_of(
         fit=fit,
         references=reference,
         seed=seed,
-        foreign=cook.rows(Path(path), table),
-        transforms=cook.transforms,
+        foreign=rows_of.rows(Path(path), table),
+        transforms=rows_of.transforms,
     )
 
 
@@ -668,7 +670,7 @@ def _floor(
     threshold, smallest = smallest_found(
         truth, found, truth <= below, draws, false_alarm=FALSE_ALARM, detection=DETECTION
     )
-    over = Figure(
+    over = ScoreFigure(
         value=smallest.value / case.limit,
         low=smallest.low / case.limit,
         high=smallest.high / case.limit,

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ..feature_rows.feature_choice import choice_in, words_of
-from ..feature_rows.feature_table import Choice
+from ..feature_rows.feature_table import FeatureSelection
 from ..learning.scores import LEVEL
 from ..pages.words import severity_word
 
@@ -12,7 +12,7 @@ _FEW_RECORDS = 30
 
 
 def features_text(
-    card: Mapping[str, Any], choices: Sequence[Choice], costs: Sequence[float]
+    card: Mapping[str, Any], choices: Sequence[FeatureSelection], costs: Sequence[float]
 ) -> list[str]:
     """Features of a model, what else there was to choose from, and the time of each.
 
@@ -20,7 +20,7 @@ def features_text(
     ----------
     card : mapping
         Of the model.
-    choices : sequence of Choice
+    choices : sequence of FeatureSelection
         What it was trained with.
     costs : sequence of float
         Time of the features of one recording, of each choice [ms].

@@ -13,7 +13,13 @@ from numpy.typing import NDArray
 
 from ...datasets.file.record import Recording
 from ...features.catalogue.row import absent_features
-from .feature_table import Choice, absent_in, feature_table, recording_features, recording_layout
+from .feature_table import (
+    FeatureSelection,
+    absent_in,
+    feature_table,
+    recording_features,
+    recording_layout,
+)
 
 Float = NDArray[np.float64]
 
@@ -24,7 +30,7 @@ FEWEST_SHOWING: Final = 3
 """Recordings of a class by which it can be said always to have blows."""
 
 _FEATURE = "kurtogram"
-_ROW = Choice(only=(_FEATURE,))
+_ROW = FeatureSelection(only=(_FEATURE,))
 _WEAK_SHARE = 0.05  # windows of a recording that may be weaker: a window can fall between blows
 
 
@@ -73,7 +79,7 @@ def blow_table(path: str | Path, n_records: int, *, jobs: int = 1) -> Float:
     DataError
         As :func:`wearstate.diagnose.feature_rows.feature_table.feature_table`.
     """
-    if _FEATURE in absent_in(path, Choice(feature_set="complete")):
+    if _FEATURE in absent_in(path, FeatureSelection(feature_set="complete")):
         return np.empty((n_records, 0))
     table = feature_table(path, choice=_ROW, jobs=jobs)
     return _scores_in(table.names, table.values)

@@ -16,7 +16,7 @@ from ...features.catalogue.catalogue import SetName
 from ..learning.regressions import CANDIDATES, Folds
 from .feature_table import (
     USUAL,
-    Choice,
+    FeatureSelection,
     FeatureTable,
     Healthy,
     feature_table_names,
@@ -36,7 +36,7 @@ _TIE = 0.01  # of the error: a later set that is no better than this is not wort
 _TIMED = 3  # records whose features are timed
 
 
-def choices_of(words: Sequence[str]) -> tuple[Choice, ...]:
+def choices_of(words: Sequence[str]) -> tuple[FeatureSelection, ...]:
     """Candidates for the features of a model, from what a command line says.
 
     Parameters
@@ -47,7 +47,7 @@ def choices_of(words: Sequence[str]) -> tuple[Choice, ...]:
 
     Returns
     -------
-    tuple of Choice
+    tuple of FeatureSelection
         In the order told; the set that models are usually trained on where nothing is.
 
     Raises
@@ -66,7 +66,7 @@ def choices_of(words: Sequence[str]) -> tuple[Choice, ...]:
     return tuple(dict.fromkeys(found)) or (USUAL,)
 
 
-def _choices(word: str) -> list[Choice]:
+def _choices(word: str) -> list[FeatureSelection]:
     names = _names_in(word)
     sets = [name for name in names if name in _SETS]
     if names == [SELECT]:
@@ -79,8 +79,8 @@ def _choices(word: str) -> list[Choice]:
     if not names:
         raise DataError(f"features = {word!r} names 0 features, must name >= 1; name some")
     if sets:
-        return [Choice(feature_set=name) for name in _SETS if name in sets]
-    return [Choice(only=tuple(dict.fromkeys(names)))]
+        return [FeatureSelection(feature_set=name) for name in _SETS if name in sets]
+    return [FeatureSelection(only=tuple(dict.fromkeys(names)))]
 
 
 def _names_in(word: str) -> list[str]:
@@ -92,18 +92,18 @@ def _names_in(word: str) -> list[str]:
     return [name for name in (part.strip() for part in text.split(",")) if name]
 
 
-def words_of(choice: Choice) -> str:
+def words_of(choice: FeatureSelection) -> str:
     """A choice as a person tells it.
 
     Examples
     --------
-    >>> words_of(Choice(feature_set="core")), words_of(Choice(only=("rms", "speed")))
-    ('core', 'rms, speed')
+    >>> words_of(FeatureSelection(only=("rms", "speed")))
+    'rms, speed'
     """
     return choice.feature_set if choice.only is None else ", ".join(choice.only)
 
 
-def choice_in(card: Mapping[str, Any]) -> Choice:
+def choice_in(card: Mapping[str, Any]) -> FeatureSelection:
     """The features that a model was trained on.
 
     Parameters
@@ -119,10 +119,10 @@ def choice_in(card: Mapping[str, Any]) -> Choice:
     kept = card.get("feature_choice")
     if kept is None:
         return USUAL
-    return Choice(feature_set=kept["set"], only=tuple(kept["only"]) or None)
+    return FeatureSelection(feature_set=kept["set"], only=tuple(kept["only"]) or None)
 
 
-def choice_card(choice: Choice) -> dict[str, Any]:
+def choice_card(choice: FeatureSelection) -> dict[str, Any]:
     """What a card keeps of a choice."""
     return {"set": choice.feature_set, "only": list(choice.only or ())}
 
@@ -136,16 +136,16 @@ class Candidates:
 
     Attributes
     ----------
-    choices : tuple of Choice
+    choices : tuple of FeatureSelection
     columns : tuple of numpy.ndarray
         Of each, in the table of all.
-    whole : Choice
+    whole : FeatureSelection
         What the table of all is made of.
     """
 
-    choices: tuple[Choice, ...]
+    choices: tuple[FeatureSelection, ...]
     columns: tuple[Index, ...]
-    whole: Choice
+    whole: FeatureSelection
 
     def part(self, table: FeatureTable, place: int) -> FeatureTable:
         """A table of one candidate's columns alone."""
@@ -153,7 +153,7 @@ class Candidates:
 
 
 def candidates_of(
-    path: str | Path, choices: Sequence[Choice], healthy: Healthy | None = None
+    path: str | Path, choices: Sequence[FeatureSelection], healthy: Healthy | None = None
 ) -> Candidates:
     """Columns of each candidate, told by the first usable record of a data set.
 
@@ -161,7 +161,7 @@ def candidates_of(
     ----------
     path : str or Path
         Data set file.
-    choices : sequence of Choice
+    choices : sequence of FeatureSelection
         One or more, all of the same views.
     healthy : Healthy, optional
         As of :func:`wearstate.diagnose.feature_rows.feature_table.feature_table`.
@@ -187,7 +187,7 @@ def candidates_of(
         columns = np.arange(len(each[0]), dtype=np.intp)
         return Candidates(choices=tuple(choices), columns=(columns,), whole=choices[0])
     union = tuple(dict.fromkeys(name for names in each for name in names))
-    whole = Choice(only=union, views=choices[0].views)
+    whole = FeatureSelection(only=union, views=choices[0].views)
     place = {name: i for i, name in enumerate(feature_table_names(path, whole, healthy))}
     return Candidates(
         choices=tuple(choices),
@@ -197,7 +197,7 @@ def candidates_of(
 
 
 def costs_ms(
-    path: str | Path, choices: Sequence[Choice], healthy: Healthy | None = None
+    path: str | Path, choices: Sequence[FeatureSelection], healthy: Healthy | None = None
 ) -> list[float]:
     """Time that the features of one recording take, of each choice [ms].
 
@@ -205,7 +205,7 @@ def costs_ms(
     ----------
     path : str or Path
         Data set; the least time of its first few usable records is taken, after a first call.
-    choices : sequence of Choice
+    choices : sequence of FeatureSelection
     healthy : Healthy, optional
         As of :func:`wearstate.diagnose.feature_rows.feature_table.feature_table`; its own time is
         not counted.

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ...datasets.file.csv_cells import safe_frame
 from ...datasets.file.record import DataError, DataSet, Recording
-from ...datasets.file.views import MARK, JoinedSet, View
+from ...datasets.file.views import MARK, CompletingView, JoinedSet
 from ...datasets.workers.local import in_order
 from ...features.catalogue.analysis import STANDARD, Analysis, Settings
 from ...features.catalogue.catalogue import SetName
@@ -106,7 +106,7 @@ _CONFOUNDER = "confounder_"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Choice:
+class FeatureSelection:
     """Which features of a recording are wanted; by default those that models are trained on.
 
     Attributes
@@ -114,21 +114,21 @@ class Choice:
     feature_set, only, settings
         As of :func:`wearstate.features.catalogue.row.feature_row`; a name in `only` with a view
         before it, as ``running:rms``, is of that view alone.
-    views : tuple of View
+    views : tuple of CompletingView
         Data sets whose records complete each row.
     """
 
     feature_set: SetName = "standard"
     only: tuple[str, ...] | None = None
     settings: Settings = STANDARD
-    views: tuple[View, ...] = ()
+    views: tuple[CompletingView, ...] = ()
 
-    def part(self, view: str = "") -> "Choice | None":
+    def part(self, view: str = "") -> "FeatureSelection | None":
         """The choice among the features of one view, or of the record itself; None: none.
 
         Examples
         --------
-        >>> Choice(only=("rms", "running:rms", "running:speed")).part("running").only
+        >>> FeatureSelection(only=("rms", "running:rms", "running:speed")).part("running").only
         ('rms', 'speed')
         """
         if self.only is None:
@@ -138,7 +138,7 @@ class Choice:
         return replace(self, only=mine, views=()) if mine else None
 
 
-def held_against(choice: Choice, reference: FrfReference | None) -> Choice:
+def held_against(choice: FeatureSelection, reference: FrfReference | None) -> FeatureSelection:
     """The same features, told against a healthy reference."""
     if reference is None:
         return choice
@@ -152,7 +152,7 @@ class Healthy(Protocol):
         """Those of a machine; None where there are none."""
 
 
-USUAL = Choice()
+USUAL = FeatureSelection()
 """What models are trained on."""
 
 
@@ -167,8 +167,8 @@ def choice_of(
     bands: Sequence[Sequence[float]] = (),
     envelope_band: Sequence[float] | None = None,
     exponential: float = 1.0,
-) -> Choice:
-    """Choice of features from plain numbers and words, as a command line has them.
+) -> FeatureSelection:
+    """FeatureSelection of features from plain numbers and words, as a command line has them.
 
     Parameters
     ----------
@@ -194,7 +194,7 @@ def choice_of(
 
     Returns
     -------
-    Choice
+    FeatureSelection
         For :func:`feature_table`.
 
     Raises
@@ -232,7 +232,7 @@ def choice_of(
         bands=tuple(pair for pair in pairs[2:] if pair is not None),
         bearing=geometry,
     )
-    return Choice(feature_set=feature_set, only=tuple(only) or None, settings=settings)
+    return FeatureSelection(feature_set=feature_set, only=tuple(only) or None, settings=settings)
 
 
 def _pair(
@@ -263,14 +263,14 @@ def _geometry(values: Sequence[float] | None, faults: list[str]) -> BearingFrequ
         return None
 
 
-def absent_in(path: str | Path, choice: Choice) -> dict[str, str]:
+def absent_in(path: str | Path, choice: FeatureSelection) -> dict[str, str]:
     """Features of a choice that a data set cannot have, told by its first record.
 
     Parameters
     ----------
     path : str or Path
         Data set file.
-    choice : Choice
+    choice : FeatureSelection
         Which features.
 
     Returns
@@ -298,7 +298,7 @@ def absent_in(path: str | Path, choice: Choice) -> dict[str, str]:
 
 
 def recording_features(
-    recording: Recording, choice: Choice = USUAL
+    recording: Recording, choice: FeatureSelection = USUAL
 ) -> tuple[tuple[str, ...], NDArray[np.float64]]:
     """Feature row of one recording and the views joined to it.
 
@@ -306,7 +306,7 @@ def recording_features(
     ----------
     recording : Recording
         With or without tacho.
-    choice : Choice
+    choice : FeatureSelection
         Which features.
 
     Returns
@@ -340,7 +340,7 @@ def _of_view(view: str, labels: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def _own_features(
-    recording: Recording, choice: Choice
+    recording: Recording, choice: FeatureSelection
 ) -> tuple[tuple[str, ...], NDArray[np.float64]]:
     """Feature row of one recording alone."""
     try:
@@ -404,7 +404,7 @@ def _vibration(recording: Recording, layout: Layout) -> NDArray[np.float32]:
 def feature_table(
     path: str | Path,
     *,
-    choice: Choice = USUAL,
+    choice: FeatureSelection = USUAL,
     healthy: Healthy | None = None,
     jobs: int = 1,
     progress: Progress | None = None,
@@ -415,7 +415,7 @@ def feature_table(
     ----------
     path : str or Path
         Data set file.
-    choice : Choice
+    choice : FeatureSelection
         Which features.
     healthy : Healthy, optional
         Transfer functions of each machine when it was healthy.
@@ -464,7 +464,7 @@ def _usable(data: JoinedSet) -> NDArray[np.intp]:
 
 
 def feature_table_names(
-    path: str | Path, choice: Choice = USUAL, healthy: Healthy | None = None
+    path: str | Path, choice: FeatureSelection = USUAL, healthy: Healthy | None = None
 ) -> tuple[str, ...]:
     """Names of the columns of a feature table, told by the first usable record.
 
@@ -499,7 +499,7 @@ def feature_table_names(
     return names
 
 
-def _refuse_strange(choice: Choice, path: str | Path) -> None:
+def _refuse_strange(choice: FeatureSelection, path: str | Path) -> None:
     """Features of a view that nobody joined."""
     known = {"", *(view.name for view in choice.views)}
     strange = [name for name in choice.only or () if name.rpartition(MARK)[0] not in known]
@@ -510,11 +510,11 @@ def _refuse_strange(choice: Choice, path: str | Path) -> None:
         )
 
 
-def _listed(views: Sequence[View]) -> str:
+def _listed(views: Sequence[CompletingView]) -> str:
     return ", ".join(view.name for view in views) or "(none)"
 
 
-def _names(layout: Layout, choice: Choice, path: str | Path) -> tuple[str, ...]:
+def _names(layout: Layout, choice: FeatureSelection, path: str | Path) -> tuple[str, ...]:
     try:
         return feature_names(
             layout.channels,
@@ -534,7 +534,7 @@ def _names(layout: Layout, choice: Choice, path: str | Path) -> tuple[str, ...]:
 
 def _batch_features(
     data: JoinedSet,
-    choice: Choice,
+    choice: FeatureSelection,
     healthy: Healthy | None,
     planned: tuple[str, ...],
     indices: NDArray[np.intp],

@@ -14,7 +14,7 @@ from ...features.response.transfer import FrfReference
 from .feature_choice import choice_in
 from .feature_table import (
     USUAL,
-    Choice,
+    FeatureSelection,
     FeatureTable,
     Progress,
     feature_table,
@@ -87,7 +87,7 @@ def references(
     path: str | Path,
     healthy: str | Path,
     *,
-    choice: Choice = USUAL,
+    choice: FeatureSelection = USUAL,
     jobs: int = 1,
     progress: Progress | None = None,
 ) -> tuple[Float, int]:
@@ -121,7 +121,7 @@ def references(
         As of :func:`refuse_strangers`, or the features are others.
     """
     refuse_strangers(path, healthy)
-    against = healthy_transfer(healthy, [Choice(only=table.names)])
+    against = healthy_transfer(healthy, [FeatureSelection(only=table.names)])
     known = feature_table(healthy, choice=choice, healthy=against, jobs=jobs, progress=progress)
     if not set(table.names) <= set(known.names):
         raise DataError(
@@ -246,7 +246,7 @@ def baseline_of(
         raise DataError("\n".join(told))
     if not sound:
         raise DataError(f"{source}: 0 healthy recordings, must be >= 1; record some")
-    named = Choice(only=tuple(card["features"]))
+    named = FeatureSelection(only=tuple(card["features"]))
     reference = None
     if told_against(named):
         reference = transfer_reference(sound, modes=told_against_modes(named))

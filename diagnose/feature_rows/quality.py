@@ -50,7 +50,7 @@ _SPEED_MARGIN = 0.05  # of the trained speeds
 
 
 @dataclass(frozen=True, kw_only=True)
-class Fault:
+class QualityFault:
     """One thing wrong with a recording.
 
     Attributes
@@ -77,7 +77,7 @@ class Fault:
 # --- what the samples and the header show
 
 
-def recording_faults(recording: Recording, card: Mapping[str, Any]) -> tuple[Fault, ...]:
+def recording_faults(recording: Recording, card: Mapping[str, Any]) -> tuple[QualityFault, ...]:
     """What is wrong with a recording and its views as inputs of a model, all of it.
 
     Parameters
@@ -88,7 +88,7 @@ def recording_faults(recording: Recording, card: Mapping[str, Any]) -> tuple[Fau
 
     Returns
     -------
-    tuple of Fault
+    tuple of QualityFault
         Of layout where that does not fit, else of the samples; a view that is missing is one.
     """
     faults = [*(layout_faults(recording, card) or sample_faults(recording))]
@@ -96,7 +96,7 @@ def recording_faults(recording: Recording, card: Mapping[str, Any]) -> tuple[Fau
     for view, layout in views.items():
         if view not in recording.joined:
             text = f"view {view} is missing, which the model needs; give --join {view}=FILE"
-            faults.append(Fault(kind="layout", channel="", text=text))
+            faults.append(QualityFault(kind="layout", channel="", text=text))
             continue
         other = recording.joined[view]
         found = layout_faults(other, layout) or sample_faults(other)
@@ -105,11 +105,11 @@ def recording_faults(recording: Recording, card: Mapping[str, Any]) -> tuple[Fau
     if strange:
         known = ", ".join(views) or "none"
         text = f"views {', '.join(strange)} are joined, the model knows {known}: leave them out"
-        faults.append(Fault(kind="layout", channel="", text=text))
+        faults.append(QualityFault(kind="layout", channel="", text=text))
     return tuple(faults)
 
 
-def layout_faults(recording: Recording, card: Mapping[str, Any]) -> tuple[Fault, ...]:
+def layout_faults(recording: Recording, card: Mapping[str, Any]) -> tuple[QualityFault, ...]:
     """What a recording lacks of a model's inputs; empty where it fits.
 
     Parameters
@@ -120,7 +120,7 @@ def layout_faults(recording: Recording, card: Mapping[str, Any]) -> tuple[Fault,
 
     Returns
     -------
-    tuple of Fault
+    tuple of QualityFault
         All of them.
     """
     return (
@@ -130,7 +130,7 @@ def layout_faults(recording: Recording, card: Mapping[str, Any]) -> tuple[Fault,
     )
 
 
-def _channel_faults(found: Sequence[Channel], card: Mapping[str, Any]) -> list[Fault]:
+def _channel_faults(found: Sequence[Channel], card: Mapping[str, Any]) -> list[QualityFault]:
     wanted = [c for c in card["channels"] if c["name"] != card["tacho"]]
     units = {c["name"]: c["unit"] for c in wanted}
     names = ", ".join(c["name"] for c in wanted)
@@ -138,18 +138,18 @@ def _channel_faults(found: Sequence[Channel], card: Mapping[str, Any]) -> list[F
     if len(found) != len(wanted):
         text = f"it has {len(found)} vibration channel(s), the model needs {len(wanted)}: {names}"
         text += _mapping([c.name for c in found], [c["name"] for c in wanted])
-        faults.append(Fault(kind="layout", channel="", text=text))
+        faults.append(QualityFault(kind="layout", channel="", text=text))
     elif [c.name for c in found] != [c["name"] for c in wanted]:
         here = ", ".join(c.name for c in found)
         text = f"its channels are {here}, the model needs {names}, in this order"
         text += _mapping([c.name for c in found], [c["name"] for c in wanted])
-        faults.append(Fault(kind="layout", channel="", text=text))
+        faults.append(QualityFault(kind="layout", channel="", text=text))
     for c in found:
         # under a name that the model does not know, any unit of the model's may be right
         unit = units.get(c.name, c.unit if c.unit in units.values() else next(iter(units.values())))
         if c.unit != unit:
             text = f"channel {c.name} is in {c.unit or 'an unknown unit'}, the model needs {unit}"
-            faults.append(Fault(kind="unit", channel=c.name, text=text))
+            faults.append(QualityFault(kind="unit", channel=c.name, text=text))
     return faults
 
 
@@ -175,28 +175,28 @@ def _mapping(found: Sequence[str], wanted: Sequence[str]) -> str:
     return f"{told}: if {', '.join(stand.values())} are these, give --channels {names}"
 
 
-def _tacho_layout_faults(recording: Recording, card: Mapping[str, Any]) -> list[Fault]:
+def _tacho_layout_faults(recording: Recording, card: Mapping[str, Any]) -> list[QualityFault]:
     if (recording.tacho is None) != (card["tacho"] is None):
         needs = "it has no tacho, the model needs one; record one, or name its channel"
         text = needs if card["tacho"] else "it has a tacho, the model was trained without"
-        return [Fault(kind="tacho" if card["tacho"] else "layout", channel="", text=text)]
+        return [QualityFault(kind="tacho" if card["tacho"] else "layout", channel="", text=text)]
     if recording.pulses_per_revolution != card["pulses_per_revolution"]:
         text = (
             f"its tacho gives {recording.pulses_per_revolution} pulses per revolution, the model "
             f"needs {card['pulses_per_revolution']}"
         )
-        return [Fault(kind="layout", channel=recording.tacho or "", text=text)]
+        return [QualityFault(kind="layout", channel=recording.tacho or "", text=text)]
     return []
 
 
-def _rate_faults(found: float, wanted: float) -> list[Fault]:
+def _rate_faults(found: float, wanted: float) -> list[QualityFault]:
     if abs(found / wanted - 1) <= RATE_TOLERANCE:
         return []
     text = f"it is sampled at {found:g} Hz, the model needs {wanted:g} Hz: resample"
-    return [Fault(kind="rate", channel="", text=text)]
+    return [QualityFault(kind="rate", channel="", text=text)]
 
 
-def sample_faults(recording: Recording) -> tuple[Fault, ...]:
+def sample_faults(recording: Recording) -> tuple[QualityFault, ...]:
     """Faults that the samples alone show: flat tops, silence, a tacho that does not pulse.
 
     Parameters
@@ -205,7 +205,7 @@ def sample_faults(recording: Recording) -> tuple[Fault, ...]:
 
     Returns
     -------
-    tuple of Fault
+    tuple of QualityFault
         All of them. A saturated channel bars a verdict from a tenth of its samples on, the others
         do in any case.
 
@@ -226,17 +226,17 @@ def sample_faults(recording: Recording) -> tuple[Fault, ...]:
     >>> sample_faults(replace(recording, signal=recording.signal.clip(-0.8, 0.8)))[0].kind
     'saturated'
     """
-    faults: list[Fault] = []
+    faults: list[QualityFault] = []
     for channel, row in zip(recording.vibration_channels, recording.vibration, strict=True):
         faults += _channel_sample_faults(channel.name, channel.unit, row)
     return (*faults, *_tacho_faults(recording))
 
 
-def _channel_sample_faults(name: str, unit: str, row: NDArray[np.float32]) -> list[Fault]:
+def _channel_sample_faults(name: str, unit: str, row: NDArray[np.float32]) -> list[QualityFault]:
     low, high = float(row.min()), float(row.max())
     if low == high:
         text = f"channel {name} is {low:g} {unit} throughout: it is dead; check sensor and cable"
-        return [Fault(kind="dead", channel=name, text=text)]
+        return [QualityFault(kind="dead", channel=name, text=text)]
     ends = {end: count for end in (low, high) if (count := _piled(row, end, high - low))}
     if not ends:
         return []
@@ -246,7 +246,7 @@ def _channel_sample_faults(name: str, unit: str, row: NDArray[np.float32]) -> li
         "it is saturated; raise the range"
     )
     bars = sum(ends.values()) > _MOST_CLIPPED * row.size
-    return [Fault(kind="saturated", channel=name, text=text, bars=bars)]
+    return [QualityFault(kind="saturated", channel=name, text=text, bars=bars)]
 
 
 def _piled(row: NDArray[np.float32], end: float, swing: float) -> int:
@@ -258,7 +258,7 @@ def _piled(row: NDArray[np.float32], end: float, swing: float) -> int:
     return at if at >= _FEWEST_AT_END and at > _PILE * alike else 0
 
 
-def _tacho_faults(recording: Recording) -> list[Fault]:
+def _tacho_faults(recording: Recording) -> list[QualityFault]:
     tacho = recording.tacho_signal
     if tacho is None:
         return []
@@ -272,12 +272,12 @@ def _tacho_faults(recording: Recording) -> list[Fault]:
         )
     except ValueError as error:
         text = f"tacho {recording.tacho}: {error}"
-        return [Fault(kind="tacho", channel=str(recording.tacho), text=text)]
+        return [QualityFault(kind="tacho", channel=str(recording.tacho), text=text)]
     turns = (len(pulses) - 1) / recording.pulses_per_revolution
     if turns >= 1:
         return []
     text = f"tacho {recording.tacho} gives {turns:.2g} revolutions, must be >= 1; record longer"
-    return [Fault(kind="tacho", channel=str(recording.tacho), text=text)]
+    return [QualityFault(kind="tacho", channel=str(recording.tacho), text=text)]
 
 
 # --- the level that is to be expected
@@ -376,7 +376,7 @@ _LEVEL_PENALTY = 30.0  # of a ridge on about a hundred standardised coordinates
 
 
 @dataclass(frozen=True, kw_only=True)
-class Look:
+class Observation:
     """How a recording strikes a model.
 
     Attributes
@@ -408,19 +408,19 @@ class Look:
         return all(abs(excess) < _OFF_DB for excess in self.excess_db.values())
 
 
-See = Callable[[Recording], Look]
+Observe = Callable[[Recording], Observation]
 
 
 def suspicions(
-    recording: Recording, look: Look, see: See, speeds: tuple[float, float] | None
-) -> tuple[Fault, ...]:
+    recording: Recording, look: Observation, see: Observe, speeds: tuple[float, float] | None
+) -> tuple[QualityFault, ...]:
     """Faults that explain why a recording looks strange, each tried out.
 
     Parameters
     ----------
     recording : Recording
         With the model's inputs.
-    look : Look
+    look : Observation
         How it looks as it is.
     see : callable
         How a mended recording looks.
@@ -429,14 +429,14 @@ def suspicions(
 
     Returns
     -------
-    tuple of Fault
+    tuple of QualityFault
         The first explanation that makes the recording familiar, in the order unit (where a level
         is off), channels (where the shape is strange), rate (where shape or speed is); empty where
         none does or nothing is strange.
     """
     paced = speeds is None or look.speed_hz is None or _within(look.speed_hz, speeds)
     near = look.distance < look.limit
-    found: tuple[Fault, ...] = ()
+    found: tuple[QualityFault, ...] = ()
     if not look.level:
         found = _wrong_unit(recording, look, see)
     if not found and not near:
@@ -451,7 +451,7 @@ def _within(speed: float, speeds: tuple[float, float]) -> bool:
     return low * (1 - _SPEED_MARGIN) <= speed <= high * (1 + _SPEED_MARGIN)
 
 
-def _wrong_unit(recording: Recording, look: Look, see: See) -> tuple[Fault, ...]:
+def _wrong_unit(recording: Recording, look: Observation, see: Observe) -> tuple[QualityFault, ...]:
     off = {name: db for name, db in look.excess_db.items() if abs(db) >= _OFF_DB}
     for rank in range(_TRIED):
         factors = {name: _near_factors(excess)[rank] for name, excess in off.items()}
@@ -459,7 +459,7 @@ def _wrong_unit(recording: Recording, look: Look, see: See) -> tuple[Fault, ...]
         nearer = all(abs(mended.excess_db[n]) < _NEARER * abs(db) for n, db in off.items())
         if mended.familiar and nearer:
             return tuple(
-                Fault(
+                QualityFault(
                     kind="unit",
                     channel=name,
                     text=f"channel {name} is {off[name]:+.0f} dB off what its shape lets expect; "
@@ -493,7 +493,7 @@ def _times(factor: float) -> str:
     return f"multiplied by {factor:.4g}" if factor > 1 else f"divided by {1 / factor:.4g}"
 
 
-def _swapped(recording: Recording, see: See) -> tuple[Fault, ...]:
+def _swapped(recording: Recording, see: Observe) -> tuple[QualityFault, ...]:
     channels = [c for c in recording.channels if c.name != recording.tacho]
     for a, b in combinations(channels, 2):
         if a.quantity != b.quantity or a.unit != b.unit:
@@ -504,13 +504,13 @@ def _swapped(recording: Recording, see: See) -> tuple[Fault, ...]:
         mended = see(replace(recording, signal=recording.signal[order]))
         if mended.familiar:
             text = f"channels {a.name} and {b.name} look swapped; swap their cables or names"
-            return (Fault(kind="swapped", channel=f"{a.name}, {b.name}", text=text),)
+            return (QualityFault(kind="swapped", channel=f"{a.name}, {b.name}", text=text),)
     return ()
 
 
 def _wrong_rate(
-    recording: Recording, look: Look, see: See, speeds: tuple[float, float]
-) -> tuple[Fault, ...]:
+    recording: Recording, look: Observation, see: Observe, speeds: tuple[float, float]
+) -> tuple[QualityFault, ...]:
     if look.speed_hz is None:
         return ()
     for ratio in (*RATES, *(1 / rate for rate in RATES)):
@@ -526,7 +526,7 @@ def _wrong_rate(
                 f"the stated {stated:g} Hz; correct the rate, or, if it is right, run the machine "
                 f"within {speeds[0]:.4g} to {speeds[1]:.4g} Hz"
             )
-            return (Fault(kind="rate", channel="", text=text, factor=ratio),)
+            return (QualityFault(kind="rate", channel="", text=text, factor=ratio),)
     return ()
 
 
@@ -548,7 +548,7 @@ def _resampled(recording: Recording, ratio: float) -> Recording:
 
 def quiet_faults(
     recording: Recording, names: Sequence[str], row: Float, levels: Levels
-) -> tuple[Fault, ...]:
+) -> tuple[QualityFault, ...]:
     """Channels so quiet that nothing but noise can be on them.
 
     Parameters
@@ -561,14 +561,14 @@ def quiet_faults(
 
     Returns
     -------
-    tuple of Fault
+    tuple of QualityFault
     """
     found = level_rows(names, row[None, :])[0]
     units = recording.units
     for view, each in recording.joined.items():
         units |= {f"{view}{MARK}{name}": unit for name, unit in each.units.items()}
     return tuple(
-        Fault(
+        QualityFault(
             kind="dead",
             channel=channel,
             text=f"channel {channel} has an rms of {10 ** (level / 20):.3g} {units[channel]}, must "

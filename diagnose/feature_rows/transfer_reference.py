@@ -11,7 +11,7 @@ from ...datasets.file.record import DataSet, Recording
 from ...features.catalogue.analysis import STANDARD, Analysis, Settings
 from ...features.response.modal import Modes
 from ...features.response.transfer import FrfReference
-from .feature_table import Choice, recording_analysis
+from .feature_table import FeatureSelection, recording_analysis
 
 
 def transfer_reference(
@@ -60,25 +60,25 @@ _OF_MODES = (
 _OF_FUNCTIONS = ("frf_assurance", ".frf.assurance", *_OF_MODES)
 
 
-def told_against_modes(choice: Choice) -> bool:
+def told_against_modes(choice: FeatureSelection) -> bool:
     """Whether a feature of a choice is told against the modes of a reference.
 
     Examples
     --------
-    >>> told_against_modes(Choice()), told_against_modes(Choice(only=("mode_changes",)))
-    (False, True)
+    >>> told_against_modes(FeatureSelection(only=("mode_changes",)))
+    True
     """
     if choice.only is None:
         return choice.feature_set == "complete"
     return any(part in name for name in choice.only for part in _OF_MODES)
 
 
-def told_against(choice: Choice) -> bool:
+def told_against(choice: FeatureSelection) -> bool:
     """Whether a feature of a choice is told against a reference, where there is a force.
 
     Examples
     --------
-    >>> told_against(Choice()), told_against(Choice(feature_set="core"))
+    >>> told_against(FeatureSelection()), told_against(FeatureSelection(feature_set="core"))
     (False, True)
     """
     if choice.only is None:
@@ -142,14 +142,16 @@ def _opened(path: Path, modes: bool) -> HealthyTransfer:
     return HealthyTransfer(path=path, modes=modes)
 
 
-def healthy_transfer(path: str | Path | None, choices: Sequence[Choice]) -> HealthyTransfer | None:
+def healthy_transfer(
+    path: str | Path | None, choices: Sequence[FeatureSelection]
+) -> HealthyTransfer | None:
     """References of a healthy data set, where a feature is told against them.
 
     Parameters
     ----------
     path : str or Path, optional
         Data set of healthy records.
-    choices : sequence of Choice
+    choices : sequence of FeatureSelection
         Features.
     """
     if path is None or not any(told_against(choice) for choice in choices):

@@ -268,7 +268,7 @@ class _Problem:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Fitted:
+class FittedClearance:
     """Least squares of readings and of what is held.
 
     Attributes
@@ -300,7 +300,7 @@ class Fitted:
         return math.hypot(*mine)
 
 
-def fitted(residuals: Callable[[Float], Float], start: Float, n_readings: int) -> Fitted:
+def fitted(residuals: Callable[[Float], Float], start: Float, n_readings: int) -> FittedClearance:
     """Numbers with the least residuals, which are in standard deviations.
 
     Parameters
@@ -312,7 +312,7 @@ def fitted(residuals: Callable[[Float], Float], start: Float, n_readings: int) -
     """
     found = least_squares(residuals, start, method="lm", xtol=1e-10, ftol=1e-10)
     inverse = np.linalg.inv(found.jac.T @ found.jac)
-    return Fitted(
+    return FittedClearance(
         values=found.x,
         covariance=inverse[0],
         left=math.sqrt(2 * found.cost / max(1, n_readings - 1)),

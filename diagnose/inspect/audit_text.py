@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
-from ...datasets.audit.audit import UNSEEN, Audit, Source
+from ...datasets.audit.audit import UNSEEN, Audit, AuditSource
 from ...datasets.audit.table import Finding
 from ...datasets.file.record import DataSet
 
@@ -111,7 +111,7 @@ def splits_text(value: Mapping[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def _source_line(source: Source) -> str:
+def _source_line(source: AuditSource) -> str:
     rows = "records" if source.kind == "data set" else "rows"
     classes = ", ".join(f"{count} of {name}" for name, count in source.classes.items())
     parts = [

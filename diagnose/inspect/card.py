@@ -12,7 +12,7 @@ import pandas as pd
 
 from ...datasets.file.columns import Column, describe_columns
 from ...datasets.file.record import DataError, DataSet, manifest_hash
-from ...datasets.generation.fidelity_choice import Choice
+from ...datasets.generation.fidelity_choice import FidelityChoice
 from ...sim.scene.load import scene_table
 from ...sim.scene.parts import SceneError
 from ..feature_rows.feature_table import confounders_in
@@ -48,14 +48,14 @@ class Code:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Picture:
+class CardPicture:
     """A drawing of one recording, as a data address."""
 
     caption: str
     address: str
 
 
-Block = str | list[str] | Table | Code | Picture
+Block = str | list[str] | Table | Code | CardPicture
 """A paragraph, a list, a table, a snippet or a picture."""
 
 
@@ -275,7 +275,7 @@ def _pictures(facts: _Facts) -> Iterator[Block]:
             except DataError:
                 continue  # too short for a spectrum
             caption = f"{what}, record {index} ({facts.head.origin}). {panel.caption}"
-            yield Picture(caption=caption, address=encoded(panel_figure(panel)))
+            yield CardPicture(caption=caption, address=encoded(panel_figure(panel)))
 
 
 def _columns(facts: _Facts) -> Iterator[Block]:
@@ -340,7 +340,8 @@ def _models(facts: _Facts) -> Iterator[Block]:
 def _choice_text(facts: _Facts) -> str:
     if not facts.head.fidelity:
         return "Models and steps are those that the scene names; none was chosen by its error."
-    return f"Chosen on pilots, before the first record: {Choice.load(facts.head.fidelity).text}."
+    chosen = FidelityChoice.load(facts.head.fidelity).text
+    return f"Chosen on pilots, before the first record: {chosen}."
 
 
 def _error_text(facts: _Facts) -> str:

@@ -122,7 +122,7 @@ def fit_scale(inputs: Float, log_error: Float) -> Scale:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Calibration:
+class IntervalCalibration:
     """Behaviour of a model on machine draws that it had not seen.
 
     Attributes
@@ -225,7 +225,7 @@ class Tails:
     coverage: float
 
 
-def tails(calibration: Calibration, coverage: float = COVERAGE) -> Tails:
+def tails(calibration: IntervalCalibration, coverage: float = COVERAGE) -> Tails:
     """Tails of the errors of unseen machines.
 
     Parameters
@@ -249,8 +249,8 @@ def tails(calibration: Calibration, coverage: float = COVERAGE) -> Tails:
     Examples
     --------
     >>> one = np.ones(39)
-    >>> known = Calibration(estimate=one, truth=np.exp(np.linspace(-1.9, 1.9, 39)), scale=one,
-    ...     distance=one, group=np.arange(39))
+    >>> known = IntervalCalibration(estimate=one, truth=np.exp(np.linspace(-1.9, 1.9, 39)),
+    ...     scale=one, distance=one, group=np.arange(39))
     >>> found = tails(known)
     >>> round(found.low, 1), round(found.high, 1), found.coverage
     (1.8, 1.8, 0.9)
@@ -292,7 +292,7 @@ def interval(estimate: float, scale: float, known: Tails) -> tuple[float, float]
 
 
 def grade_probabilities(
-    estimate: float, scale: float, calibration: Calibration, edges: ArrayLike
+    estimate: float, scale: float, calibration: IntervalCalibration, edges: ArrayLike
 ) -> Float:
     """Probability of each grade, from the errors of the calibration round the estimate.
 
@@ -312,7 +312,7 @@ def grade_probabilities(
     Examples
     --------
     >>> one = np.ones(4)
-    >>> known = Calibration(estimate=one, truth=np.exp([-2, -1, 1, 2]), scale=one,
+    >>> known = IntervalCalibration(estimate=one, truth=np.exp([-2, -1, 1, 2]), scale=one,
     ...     distance=one, group=np.arange(4))
     >>> grade_probabilities(1.0, 1.0, known, [2.0]).round(2).tolist()
     [0.5, 0.5]
@@ -324,7 +324,9 @@ def grade_probabilities(
     return np.asarray(share / share.sum())
 
 
-def grade_limits(calibration: Calibration, edges: ArrayLike, coverage: float = COVERAGE) -> Float:
+def grade_limits(
+    calibration: IntervalCalibration, edges: ArrayLike, coverage: float = COVERAGE
+) -> Float:
     """How far outside its true grade an estimate may lie, each grade by its own machines.
 
     Parameters

@@ -324,7 +324,7 @@ def _depth(tree: _Tree) -> int:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Candidate:
+class RegressionCandidate:
     """One way to fit a target.
 
     Attributes
@@ -344,17 +344,19 @@ class Candidate:
 _PENALTIES = (3.0, 30.0, 300.0)  # of ridges on standardised features
 _LINES = len(_PENALTIES)
 
-CANDIDATES: tuple[Candidate, ...] = (
+CANDIDATES: tuple[RegressionCandidate, ...] = (
     *(
-        Candidate(name=f"ridge {penalty:g}", cost_ms=0.02, fit=_ridge(penalty, log=True))
+        RegressionCandidate(name=f"ridge {penalty:g}", cost_ms=0.02, fit=_ridge(penalty, log=True))
         for penalty in _PENALTIES
     ),
     *(
-        Candidate(name=f"plain ridge {penalty:g}", cost_ms=0.02, fit=_ridge(penalty, log=False))
+        RegressionCandidate(
+            name=f"plain ridge {penalty:g}", cost_ms=0.02, fit=_ridge(penalty, log=False)
+        )
         for penalty in _PENALTIES
     ),
-    Candidate(name="trees", cost_ms=0.4, fit=_fit_trees),
-    Candidate(name="boosting", cost_ms=0.4, fit=_fit_boosting),
+    RegressionCandidate(name="trees", cost_ms=0.4, fit=_fit_trees),
+    RegressionCandidate(name="boosting", cost_ms=0.4, fit=_fit_boosting),
 )
 """From fast to strong, lines of the logarithm first. The costs are tabulated, not timed at each
 training, so that the choice is the same on every computer: measured for one recording of 1,500
@@ -371,7 +373,7 @@ BUDGET_MS = 5.0
 
 
 @dataclass(frozen=True, kw_only=True)
-class Option:
+class RegressionOption:
     """A candidate alone, or a blend of the first few, with what it costs and how it errs.
 
     Attributes
@@ -408,7 +410,7 @@ class Fitted:
         Of the blend's parts, on groups they had no part in; see :meth:`Blend.disagreement`.
     shifted_estimate, shifted_disagreement : numpy.ndarray [shape=(n,)]
         The same of the records on other machines, by the weights of the blend.
-    options : tuple of Option
+    options : tuple of RegressionOption
         All that was looked at, within the budget or not.
     chosen : str
         Name of the option.
@@ -419,7 +421,7 @@ class Fitted:
     disagreement: Float
     shifted_estimate: Float
     shifted_disagreement: Float
-    options: tuple[Option, ...]
+    options: tuple[RegressionOption, ...]
     chosen: str
 
     @property
@@ -435,7 +437,7 @@ def fit_blend(
     *,
     seed: int = 0,
     budget_ms: float | None = None,
-    candidates: Sequence[Candidate] = CANDIDATES,
+    candidates: Sequence[RegressionCandidate] = CANDIDATES,
     shifted: Float | None = None,
 ) -> Fitted:
     """Fit every affordable candidate and keep the best of them, or a blend.
@@ -451,7 +453,7 @@ def fit_blend(
         Of the trees.
     budget_ms : float, optional
         Time that one prediction may take [ms]; :data:`BUDGET_MS` unless given.
-    candidates : sequence of Candidate
+    candidates : sequence of RegressionCandidate
         From fast to strong.
     shifted : numpy.ndarray [shape=(n, n_features)], optional
         The same records on other machines than those trained on; as they are unless given.
@@ -502,14 +504,16 @@ def fit_blend(
     return _chosen(usable, tables, rows, target, folds, seed=seed, limit=limit, bounds=bounds)
 
 
-def fit_line(rows: Float, target: Float, options: Sequence[Option], *, seed: int = 0) -> Linear:
+def fit_line(
+    rows: Float, target: Float, options: Sequence[RegressionOption], *, seed: int = 0
+) -> Linear:
     """Fit the best of the straight lines among the candidates.
 
     Parameters
     ----------
     rows, target, seed
         As of :func:`fit_blend`.
-    options : sequence of Option
+    options : sequence of RegressionOption
         What it found; a line is within every budget.
 
     Returns
@@ -527,7 +531,7 @@ def fit_line(rows: Float, target: Float, options: Sequence[Option], *, seed: int
 
 
 def _out_of_fold(
-    candidate: Candidate,
+    candidate: RegressionCandidate,
     rows: Float,
     asked: tuple[Float, Float],
     target: Float,
@@ -543,7 +547,7 @@ def _out_of_fold(
 
 
 def _chosen(
-    usable: Sequence[Candidate],
+    usable: Sequence[RegressionCandidate],
     tables: Float,
     rows: Float,
     target: Float,
@@ -593,7 +597,10 @@ def _chosen(
 
 
 def _with_a_line(
-    usable: Sequence[Candidate], options: Sequence[Option], best: Option, weights: Float
+    usable: Sequence[RegressionCandidate],
+    options: Sequence[RegressionOption],
+    best: RegressionOption,
+    weights: Float,
 ) -> Float:
     """Weights of all usable candidates; the best line is kept, to be held against the trees."""
     everyone = np.zeros(len(usable))
@@ -608,7 +615,7 @@ def _line_names() -> set[str]:
     return {candidate.name for candidate in CANDIDATES[: 2 * _LINES]}
 
 
-def _option_members(usable: Sequence[Candidate]) -> dict[str, tuple[int, ...]]:
+def _option_members(usable: Sequence[RegressionCandidate]) -> dict[str, tuple[int, ...]]:
     """Every candidate alone, and the blends of all up to each price."""
     alone = {item.name: (i,) for i, item in enumerate(usable)}
     prices = sorted({item.cost_ms for item in usable})
@@ -625,14 +632,14 @@ def _crossed(table: Float, target: Float, folds: Folds) -> Float:
 
 
 def _options(
-    usable: Sequence[Candidate],
+    usable: Sequence[RegressionCandidate],
     names: dict[str, tuple[int, ...]],
     crossed: dict[str, Float],
     target: Float,
     where: Index,
-) -> list[Option]:
+) -> list[RegressionOption]:
     return [
-        Option(
+        RegressionOption(
             name=name,
             members=members,
             cost_ms=sum(usable[i].cost_ms for i in members),
@@ -642,7 +649,7 @@ def _options(
     ]
 
 
-def _best(options: Sequence[Option], limit: float) -> Option:
+def _best(options: Sequence[RegressionOption], limit: float) -> RegressionOption:
     """Cheapest within the tie of the least error; of equally cheap ones the better."""
     within = [option for option in options if option.cost_ms <= limit]
     least = min(option.error for option in within)
@@ -650,7 +657,7 @@ def _best(options: Sequence[Option], limit: float) -> Option:
     return min(close, key=lambda option: (option.cost_ms, option.error))
 
 
-def _front(options: Sequence[Option]) -> tuple[Option, ...]:
+def _front(options: Sequence[RegressionOption]) -> tuple[RegressionOption, ...]:
     return tuple(
         replace(
             one,

@@ -30,7 +30,7 @@ MISSED_GRADE = 1
 
 
 @dataclass(frozen=True, kw_only=True)
-class Figure:
+class ScoreFigure:
     """A figure with its interval over machines.
 
     Attributes
@@ -97,7 +97,7 @@ def resampled(groups: ArrayLike, *, n: int = RESAMPLES, seed: int = 0) -> Resamp
     return Resamples(machine=machine.reshape(-1), weight=drawn.astype(float))
 
 
-def share(top: ArrayLike, bottom: ArrayLike, draws: Resamples) -> Figure:
+def share(top: ArrayLike, bottom: ArrayLike, draws: Resamples) -> ScoreFigure:
     """Ratio of two sums over records, with its percentile interval.
 
     Parameters
@@ -109,7 +109,7 @@ def share(top: ArrayLike, bottom: ArrayLike, draws: Resamples) -> Figure:
 
     Returns
     -------
-    Figure
+    ScoreFigure
         NaN where the sum of `bottom` is 0.
 
     Notes
@@ -127,19 +127,19 @@ def share(top: ArrayLike, bottom: ArrayLike, draws: Resamples) -> Figure:
     both = np.stack([np.asarray(top, dtype=float), np.asarray(bottom, dtype=float)], axis=1)
     whole, parts = both.sum(axis=0), draws.sums(both)
     if whole[1] == 0:
-        return Figure(value=float("nan"), low=float("nan"), high=float("nan"))
+        return ScoreFigure(value=float("nan"), low=float("nan"), high=float("nan"))
     return _figure(whole[0] / whole[1], parts[:, 0], parts[:, 1])
 
 
-def _figure(value: float, top: Float, bottom: Float) -> Figure:
+def _figure(value: float, top: Float, bottom: Float) -> ScoreFigure:
     told = bottom > 0
     return _between(value, top[told] / bottom[told])
 
 
-def _between(value: float, found: Float) -> Figure:
+def _between(value: float, found: Float) -> ScoreFigure:
     ends = [(1 - LEVEL) / 2, (1 + LEVEL) / 2]
     low, high = np.quantile(found, ends) if found.size else (np.nan, np.nan)
-    return Figure(value=float(value), low=float(low), high=float(high))
+    return ScoreFigure(value=float(value), low=float(low), high=float(high))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -227,7 +227,7 @@ FIGURES = (
 
 def figures(
     judged: Judged, edges: Sequence[float], limit: float, draws: Resamples
-) -> dict[str, Figure]:
+) -> dict[str, ScoreFigure]:
     """All of :data:`FIGURES`.
 
     Parameters
@@ -311,7 +311,7 @@ def confusion(true: Index, grade: Index, n: int) -> NDArray[np.intp]:
     return np.bincount(n * true + grade, minlength=n * n).reshape(n, n)
 
 
-def kappa(true: Index, grade: Index, over: Mask, n: int, draws: Resamples) -> Figure:
+def kappa(true: Index, grade: Index, over: Mask, n: int, draws: Resamples) -> ScoreFigure:
     """Quadratic weighted kappa of some records, with its interval.
 
     Parameters
@@ -325,7 +325,7 @@ def kappa(true: Index, grade: Index, over: Mask, n: int, draws: Resamples) -> Fi
 
     Returns
     -------
-    Figure
+    ScoreFigure
         NaN where every true grade is the same: then it is 0 or nothing, whatever the estimates.
 
     Examples
@@ -360,12 +360,12 @@ def bound_of(judged: Judged, edges: Sequence[float]) -> float | None:
     return accuracy_bound(true, edges, error)
 
 
-def verdict_of(difference: Figure) -> str:
+def verdict_of(difference: ScoreFigure) -> str:
     """Better, worse, or no different at the level of the interval.
 
     Examples
     --------
-    >>> verdict_of(Figure(value=-1.0, low=-2.0, high=0.5))
+    >>> verdict_of(ScoreFigure(value=-1.0, low=-2.0, high=0.5))
     'no different'
     """
     if difference.high < 0:
@@ -381,7 +381,7 @@ def smallest_found(
     *,
     false_alarm: float = 0.05,
     detection: float = 0.9,
-) -> tuple[float, Figure]:
+) -> tuple[float, ScoreFigure]:
     """Smallest wear that is found with a given probability at a given rate of false alarms.
 
     Parameters
@@ -430,7 +430,7 @@ def smallest_found(
     ]
     # sorted by hand: np.quantile makes NaN of a step between two infinities
     ends = np.sort(tried)[[int(len(tried) * (1 - LEVEL) / 2), int(len(tried) * (1 + LEVEL) / 2)]]
-    return threshold, Figure(value=value, low=float(ends[0]), high=float(ends[1]))
+    return threshold, ScoreFigure(value=value, low=float(ends[0]), high=float(ends[1]))
 
 
 def _threshold(found: Float, healthy: Mask, weight: Float, false_alarm: float) -> float:
@@ -456,10 +456,10 @@ def plain(value: Any) -> Any:
 
     Examples
     --------
-    >>> plain({"a": Figure(value=1.0, low=float("nan"), high=float("inf"))})
+    >>> plain({"a": ScoreFigure(value=1.0, low=float("nan"), high=float("inf"))})
     {'a': {'value': 1.0, 'low': None, 'high': None}}
     """
-    if isinstance(value, Figure):
+    if isinstance(value, ScoreFigure):
         return plain({"value": value.value, "low": value.low, "high": value.high})
     if isinstance(value, Mapping):
         return {key: plain(each) for key, each in value.items()}

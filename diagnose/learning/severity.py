@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .conformal import (
-    Calibration,
+    IntervalCalibration,
     Scale,
     Tails,
     grade_limits,
@@ -48,10 +48,10 @@ class Estimator:
     severity: Blend
     witness: Linear
     scale: Scale
-    calibration: Calibration
-    shifted: Calibration
+    calibration: IntervalCalibration
+    shifted: IntervalCalibration
 
-    def known(self, *, cautious: bool) -> Calibration:
+    def known(self, *, cautious: bool) -> IntervalCalibration:
         """The calibration of a verdict with or without caution."""
         return self.shifted if cautious else self.calibration
 

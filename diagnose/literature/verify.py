@@ -19,7 +19,7 @@ from scipy.optimize import brentq
 
 from ...sim.alignment.alignment import AlignmentLine, Seat, influence, reactions, seat_stations
 from ...sim.beam.beam import Disc, Section, assemble_beam
-from ...sim.beam.rotor import Modes, Rotor, Support, modes
+from ...sim.beam.rotor import Rotor, RotorModes, Support, modes
 from ...sim.contact.closed_forms import IdealCrank, effective_modulus, hertz_sphere_stiffness
 from ...sim.contact.law import (
     CONTACT,
@@ -85,7 +85,7 @@ _LONGEST_DROP = 1000.0  # contact times; the slowest rebound of the table is ove
 
 
 @dataclass(frozen=True, kw_only=True)
-class Check:
+class LiteratureCheck:
     """One value of the literature and how to obtain it here.
 
     Attributes
@@ -118,7 +118,7 @@ class Check:
 
 @dataclass(frozen=True, kw_only=True)
 class Result:
-    """Outcome of one check; the fields of :class:`Check`, the value obtained, and the verdict."""
+    """Outcome of one check; the check's fields, the value obtained, and the verdict."""
 
     name: str
     expected: float
@@ -130,7 +130,7 @@ class Result:
     source: str
 
 
-def checks() -> tuple[Check, ...]:
+def checks() -> tuple[LiteratureCheck, ...]:
     """Every literature check, in the order of the tables.
 
     Raises
@@ -162,7 +162,7 @@ def run_checks() -> list[Result]:
     return [_judge(check) for check in checks()]
 
 
-def _judge(check: Check) -> Result:
+def _judge(check: LiteratureCheck) -> Result:
     obtained = check.obtain()
     scale = abs(check.expected) if check.kind == "relative" else 1.0
     return Result(
@@ -177,7 +177,7 @@ def _judge(check: Check) -> Result:
     )
 
 
-def _read(file: str, table: dict[str, Callable[[], float]]) -> list[Check]:
+def _read(file: str, table: dict[str, Callable[[], float]]) -> list[LiteratureCheck]:
     with (LITERATURE_FOLDER / file).open(encoding="utf-8", newline="") as stream:
         rows = list(csv.DictReader(stream))
     named = [row["name"] for row in rows]
@@ -187,7 +187,7 @@ def _read(file: str, table: dict[str, Callable[[], float]]) -> list[Check]:
     return [_check(file, row, table[row["name"]]) for row in rows]
 
 
-def _check(file: str, row: dict[str, str], obtain: Callable[[], float]) -> Check:
+def _check(file: str, row: dict[str, str], obtain: Callable[[], float]) -> LiteratureCheck:
     tolerance = float(row["tolerance"])
     if not 0 < tolerance < math.inf:
         raise ValueError(
@@ -198,7 +198,7 @@ def _check(file: str, row: dict[str, str], obtain: Callable[[], float]) -> Check
         raise ValueError(
             f"{file}: kind of '{row['name']}' = '{row['kind']}' must be 'absolute' or 'relative'"
         )
-    return Check(
+    return LiteratureCheck(
         name=row["name"],
         expected=float(row["expected"]),
         tolerance=tolerance,
@@ -913,7 +913,7 @@ def _published_disc(station: float, outer: float) -> Disc:
 
 
 @cache
-def _published_modes(name: str, speed_rpm: int) -> Modes:
+def _published_modes(name: str, speed_rpm: int) -> RotorModes:
     rotor = _ROTORS[name]
     shaft = Section(
         length=1.5, outer_diameter=0.05, young=211e9, shear_modulus=81.2e9, density=7810.0

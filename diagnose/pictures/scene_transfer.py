@@ -7,7 +7,7 @@ import numpy as np
 from scipy.signal import find_peaks
 
 from ...sim.atomic import write_whole
-from ...sim.machine.transfer import Transfer, scene_transfer
+from ...sim.machine.transfer import SceneTransfer, scene_transfer
 from ...sim.scene.parts import Scene
 from ..pages.page import short_name
 from ..pages.picture import save_picture
@@ -27,7 +27,7 @@ _COLOURS = ("#1f5a94", "#b3541e", "#4f7d3a", "#7a4fa0", "#8a8a8a", "#a0306a")
 _TINY = 1e-300  # against the logarithm of zero
 
 
-def transfer_of(scene: Scene, low: float | None = None, high: float | None = None) -> Transfer:
+def transfer_of(scene: Scene, low: float | None = None, high: float | None = None) -> SceneTransfer:
     """Transfer functions between two frequencies.
 
     Parameters
@@ -39,7 +39,7 @@ def transfer_of(scene: Scene, low: float | None = None, high: float | None = Non
 
     Returns
     -------
-    Transfer
+    SceneTransfer
 
     Raises
     ------
@@ -68,7 +68,7 @@ class BandError(ValueError):
     """A band that holds no frequency."""
 
 
-def peaks_of(found: Transfer) -> dict[str, list[dict[str, float]]]:
+def peaks_of(found: SceneTransfer) -> dict[str, list[dict[str, float]]]:
     """Peaks of every path, by ``sensor/place``, the highest first.
 
     Examples
@@ -95,7 +95,7 @@ def _level(values: Any) -> Any:
     return 20 * np.log10(np.abs(values) + _TINY)
 
 
-def transfer_text(scene: Scene, found: Transfer) -> str:
+def transfer_text(scene: Scene, found: SceneTransfer) -> str:
     """The peaks of every path, a line each, for a terminal."""
     lines = [f"{scene.name} (simulated): accelerance [dB re 1 (m/s²)/N], highest peaks"]
     for path, peaks in peaks_of(found).items():
@@ -104,7 +104,7 @@ def transfer_text(scene: Scene, found: Transfer) -> str:
     return "\n".join(lines)
 
 
-def transfer_table(scene: Scene, found: Transfer) -> dict[str, Any]:
+def transfer_table(scene: Scene, found: SceneTransfer) -> dict[str, Any]:
     """The same, ready for JSON."""
     return {
         "scene": scene.name,
@@ -114,7 +114,7 @@ def transfer_table(scene: Scene, found: Transfer) -> dict[str, Any]:
     }
 
 
-def save_csv(found: Transfer, path: Path, *, force: bool = False) -> None:
+def save_csv(found: SceneTransfer, path: Path, *, force: bool = False) -> None:
     """Write real and imaginary part of every path, in the form that ``casing.frf`` reads.
 
     Parameters
@@ -133,7 +133,7 @@ def save_csv(found: Transfer, path: Path, *, force: bool = False) -> None:
     write_whole(path, ("\n".join([",".join(names), *rows]) + "\n").encode(), force=force)
 
 
-def transfer_figure(scene: Scene, found: Transfer) -> Any:
+def transfer_figure(scene: Scene, found: SceneTransfer) -> Any:
     """Magnitude and phase of every path: a column for each place that is pushed.
 
     Parameters
@@ -172,6 +172,6 @@ def transfer_figure(scene: Scene, found: Transfer) -> Any:
     return figure
 
 
-def save_figure(scene: Scene, found: Transfer, path: Path, *, force: bool = False) -> None:
+def save_figure(scene: Scene, found: SceneTransfer, path: Path, *, force: bool = False) -> None:
     """Write the picture, see :func:`.pages.picture.save_picture`."""
     save_picture(transfer_figure(scene, found), path, force=force)

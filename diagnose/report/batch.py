@@ -16,7 +16,7 @@ import numpy as np
 from ... import __version__
 from ...datasets.file.machines import GROUP_NAME
 from ...datasets.file.record import DataError, DataSet, Recording
-from ...datasets.file.views import JoinedSet, View
+from ...datasets.file.views import CompletingView, JoinedSet
 from ...datasets.measured.recording import read_recording
 from ...datasets.readers.open import READERS, SourceOptions
 from ..feature_rows.feature_table import Progress
@@ -64,7 +64,7 @@ class Item:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Row:
+class BatchRow:
     """What the table says of one recording.
 
     Attributes
@@ -131,7 +131,7 @@ class Batch:
     ----------
     source : str
         Folder or file.
-    rows : tuple of Row
+    rows : tuple of BatchRow
         The most urgent first.
     items : tuple of Item
         By the number of their row.
@@ -143,7 +143,7 @@ class Batch:
     """
 
     source: str
-    rows: tuple[Row, ...]
+    rows: tuple[BatchRow, ...]
     items: tuple[Item, ...]
     trends: dict[str, Trend]
     limits: dict[str, Any]
@@ -151,11 +151,11 @@ class Batch:
     notice: str
 
     @property
-    def current(self) -> tuple[Row, ...]:
+    def current(self) -> tuple[BatchRow, ...]:
         """Rows that tell how the machines are now; the worst first."""
         return tuple(row for row in self.rows if row.current)
 
-    def outlook_of(self, row: Row) -> Outlook | None:
+    def outlook_of(self, row: BatchRow) -> Outlook | None:
         """What the trend says of the machine, where the row is its latest recording."""
         trend = self.trends.get(row.machine)
         return trend.outlook if trend and row.current and row.time_h is not None else None
@@ -191,7 +191,7 @@ def recordings_in(
     tacho: str | None = None,
     pulses_per_revolution: int = 1,
     leave_out: Sequence[Path] = (),
-    views: Sequence[View] = (),
+    views: Sequence[CompletingView] = (),
 ) -> Iterator[tuple[Item, ...]]:
     """Recordings of a folder (not of folders in it), or records of a data set.
 
@@ -202,7 +202,7 @@ def recordings_in(
         As of :func:`wearstate.datasets.measured.recording.read_recording`.
     leave_out : sequence of Path
         Files of the folder that are no recordings: dates, baseline.
-    views : sequence of View
+    views : sequence of CompletingView
         Data sets that complete the records of a data set.
 
     Yields
@@ -458,10 +458,12 @@ def fault_of(item: Item, error: Exception) -> str:
     return str(error).replace(f"{item.path}: ", "", 1)  # the row has its name
 
 
-def _row(number: int, item: Item, time: float | None, estimate: Estimate, advice: Advice) -> Row:
+def _row(
+    number: int, item: Item, time: float | None, estimate: Estimate, advice: Advice
+) -> BatchRow:
     notes = (*estimate.reasons, *estimate.cautions)
     present = [f"{f.name.replace('_', ' ')} present" for f in estimate.confounders if f.present]
-    return Row(
+    return BatchRow(
         number=number,
         name=item.name,
         machine=item.machine,
@@ -513,7 +515,7 @@ def trend_table(machine: str, trend: Trend) -> dict[str, Any]:
 
 
 def _trends(
-    rows: Sequence[Row], model: WearModel, growth: Growth, operating: bool, seed: int
+    rows: Sequence[BatchRow], model: WearModel, growth: Growth, operating: bool, seed: int
 ) -> dict[str, Trend]:
     """Of every machine that has a graded recording with a time."""
     usable: dict[str, list[tuple[float, ...]]] = {}
@@ -534,7 +536,7 @@ def _trends(
     }
 
 
-def _with_past(rows: Sequence[Row]) -> list[Row]:
+def _with_past(rows: Sequence[BatchRow]) -> list[BatchRow]:
     """Rows of which those before a machine's latest are past; one without a time is not."""
     latest: dict[str, float] = {}
     for row in rows:
@@ -546,7 +548,7 @@ def _with_past(rows: Sequence[Row]) -> list[Row]:
     ]
 
 
-def _hastened(row: Row, trend: Trend | None, model: WearModel) -> Row:
+def _hastened(row: BatchRow, trend: Trend | None, model: WearModel) -> BatchRow:
     """The latest recording of a machine, advised by its trend; others as they are."""
     usable = row.current and row.time_h is not None and row.grade is not None
     if not usable or trend is None or trend.outlook is None:

@@ -34,7 +34,7 @@ _NARROW = 0.12  # of the gauge: a band that holds no name
 
 
 @dataclass(frozen=True, kw_only=True)
-class Picture:
+class ReportPicture:
     """A picture in the page.
 
     Attributes
@@ -53,8 +53,8 @@ class Picture:
     wide: bool = True
 
 
-def _picture(panel: Panel, alt: str) -> Picture:
-    return Picture(caption=panel.caption, alt=alt, data=encoded(panel_figure(panel)))
+def _picture(panel: Panel, alt: str) -> ReportPicture:
+    return ReportPicture(caption=panel.caption, alt=alt, data=encoded(panel_figure(panel)))
 
 
 def report_pictures(
@@ -65,7 +65,7 @@ def report_pictures(
     healthy: Float | None = None,
     evidence: Sequence[str] = (),
     most: int | None = None,
-) -> list[Picture]:
+) -> list[ReportPicture]:
     """What shows most of this machine: what moved, where its wear tells, and its spectrum.
 
     Parameters
@@ -84,7 +84,7 @@ def report_pictures(
 
     Returns
     -------
-    list of Picture
+    list of ReportPicture
     """
     view = View(recording=recording)
     moved = None
@@ -220,7 +220,7 @@ def _draw_moved(place: Any, *, maps: Sequence[_Moved]) -> None:
 # --- the estimate among the grades
 
 
-def gauge(estimate: Mapping[str, Any], limits: Mapping[str, Any]) -> Picture:
+def gauge(estimate: Mapping[str, Any], limits: Mapping[str, Any]) -> ReportPicture:
     """The estimate and its interval on a scale of grades."""
     limit = 1e3 * limits["condemning_limit_m"]
     caption = (
@@ -233,7 +233,7 @@ def gauge(estimate: Mapping[str, Any], limits: Mapping[str, Any]) -> Picture:
         f"condemning limit {limit:.3g} mm"
     )
     data = encoded(_gauge_figure(estimate, limits))
-    return Picture(caption=caption, alt=alt, data=data, wide=False)
+    return ReportPicture(caption=caption, alt=alt, data=data, wide=False)
 
 
 def _gauge_figure(estimate: Mapping[str, Any], limits: Mapping[str, Any]) -> Any:
@@ -272,7 +272,7 @@ def _gauge_figure(estimate: Mapping[str, Any], limits: Mapping[str, Any]) -> Any
 # --- trend
 
 
-def trend_picture(trend: Trend, limits: Mapping[str, Any], heading: str) -> Picture:
+def trend_picture(trend: Trend, limits: Mapping[str, Any], heading: str) -> ReportPicture:
     """Severity with intervals over time, the line since the last maintenance and its band."""
     from matplotlib.figure import Figure
 
@@ -280,7 +280,7 @@ def trend_picture(trend: Trend, limits: Mapping[str, Any], heading: str) -> Pict
     caption = f"Trend of {heading}: {said}"
     figure = Figure(figsize=_TREND_SIZE, layout="constrained")
     _draw_trend(figure.add_subplot(), trend, limits)
-    return Picture(caption=caption, alt=caption, data=encoded(figure), wide=False)
+    return ReportPicture(caption=caption, alt=caption, data=encoded(figure), wide=False)
 
 
 _TREND_SIZE = (4.9, 3.6)  # inches: on a phone the crossing of the limit is seen without scrolling

@@ -11,8 +11,15 @@ from ..nameplate.nameplate import Nameplate
 from ..pages.page import render
 from ..wear_model.estimate import Estimate, WearModel
 from .advice import brief_words
-from .batch import Batch, Row, machine_heading
-from .figures import GRADE_COLOURS, NO_GRADE_COLOUR, Picture, gauge, report_pictures, trend_picture
+from .batch import Batch, BatchRow, machine_heading
+from .figures import (
+    GRADE_COLOURS,
+    NO_GRADE_COLOUR,
+    ReportPicture,
+    gauge,
+    report_pictures,
+    trend_picture,
+)
 from .verdict import feature_words, finding_words, millimetres, report_table, zone_words
 
 _MOST_ROWS = 1000  # of the table of a batch: a page for reading
@@ -133,7 +140,7 @@ def _told(batch: Batch, name: str) -> str:
     return f"{machine_heading(name)}: {said}"
 
 
-def _bar(row: Row, limit: float) -> str:
+def _bar(row: BatchRow, limit: float) -> str:
     """The interval and the estimate on a line, as parts of the page: no picture for each row."""
     low, value, high = (
         100 * min(max((length or 0.0) / (_FULL_SCALE * limit), 0.0), 1.0)
@@ -186,7 +193,7 @@ def _few(
     model: WearModel,
     estimate: Estimate,
     baseline: Baseline | None,
-) -> list[Picture]:
+) -> list[ReportPicture]:
     graded = estimate.severity is not None
     first = report_pictures(
         recording,

@@ -6,7 +6,7 @@ from typing import Any
 
 from ..pages.words import severity_word
 from .advice import brief_words
-from .batch import Batch, Row, machine_heading
+from .batch import Batch, BatchRow, machine_heading
 from .verdict import feature_words, finding_words, millimetres, zone_words
 
 _WIDTH = 96  # of a line
@@ -105,7 +105,7 @@ def _assumptions(batch: Batch) -> str:
     return "; ".join(sorted(texts)) or "no trend could be drawn"
 
 
-def _row_line(row: Row, width: int) -> str:
+def _row_line(row: BatchRow, width: int) -> str:
     severity = "-"
     if row.severity is not None and row.low is not None and row.high is not None:
         severity = f"{1e3 * row.severity:.3f} ({1e3 * row.low:.3f} to {1e3 * row.high:.3f})"

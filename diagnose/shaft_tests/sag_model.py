@@ -418,7 +418,7 @@ def _jacks(scene: ShaftScene, measured: MeasuredReactions) -> Jacks:
 # --- a trial
 
 
-class Trial(NamedTuple):
+class SagTrial(NamedTuple):
     """A trial: misfit of all that was measured and of the prior, over its deviation."""
 
     values: Vector
@@ -428,7 +428,7 @@ class Trial(NamedTuple):
     cost: float
 
 
-def trial_at(question: Question, values: Vector, start: dict[float, BeamFilm]) -> Trial | None:
+def trial_at(question: Question, values: Vector, start: dict[float, BeamFilm]) -> SagTrial | None:
     """The trial, or none where the line does not rest."""
     change = question.unknowns.change(values)
     model = question.model.changed(change)
@@ -448,7 +448,7 @@ def trial_at(question: Question, values: Vector, start: dict[float, BeamFilm]) -
         parts.append(_jack_misfit(question, values))
     left = np.concatenate(parts)
     prior = values / question.unknowns.deviations
-    return Trial(values, films, model, left, float(left @ left + prior @ prior))
+    return SagTrial(values, films, model, left, float(left @ left + prior @ prior))
 
 
 def _seen(
@@ -494,7 +494,7 @@ def _jack_misfit(question: Question, values: Vector) -> Vector:
     return np.asarray((jacks.value - found[jacks.rows]) / jacks.deviation)
 
 
-def slopes_at(question: Question, point: Trial) -> Vector:
+def slopes_at(question: Question, point: SagTrial) -> Vector:
     """Of what the model says over its deviation, by the unknowns (n_data, p)."""
     own = question.unknowns
     p = own.directions.shape[0]

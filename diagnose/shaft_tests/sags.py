@@ -27,7 +27,7 @@ from .sag_model import (
     Prior,
     Question,
     SagError,
-    Trial,
+    SagTrial,
     question_of,
     slopes_at,
     trial_at,
@@ -237,7 +237,7 @@ def _mode(question: Question, sags: Vector) -> _Mode | None:
     return None
 
 
-def _step(question: Question, point: Trial, slopes: Vector) -> Vector:
+def _step(question: Question, point: SagTrial, slopes: Vector) -> Vector:
     deviations = question.unknowns.deviations
     scaled = slopes * deviations
     factor = cho_factor(scaled.T @ scaled + np.eye(deviations.size))
@@ -245,7 +245,7 @@ def _step(question: Question, point: Trial, slopes: Vector) -> Vector:
     return np.asarray(deviations * cho_solve(factor, right))
 
 
-def _followed(question: Question, point: Trial, step: Vector) -> Trial | None:
+def _followed(question: Question, point: SagTrial, step: Vector) -> SagTrial | None:
     """The trial after the step, shortened where it goes too far to be linear."""
     own = question.unknowns
     share = min(1.0, _LONGEST / float((np.abs(step) / own.deviations)[own.sags].max()))

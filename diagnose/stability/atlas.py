@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from ...sim.scene.parts import Scene, SceneError, nearest
 from .edges import with_edges
 from .maps import MAPS
-from .method_map import Budget, Plan, StabilityMap, Verdict, measure, unmeasured
+from .method_map import Budget, MapPlan, StabilityMap, Verdict, measure, unmeasured
 
 Progress = Callable[[int, int], None]
 
@@ -34,11 +34,11 @@ class _Stage:
     own: bool
     cross: bool
 
-    def covers(self, plan: Plan) -> bool:
+    def covers(self, plan: MapPlan) -> bool:
         """Whether it has anything to do in a map."""
         return self.aside in (None, plan.aside) and (plan.own is not None or not self.own)
 
-    def methods(self, plan: Plan) -> list[str]:
+    def methods(self, plan: MapPlan) -> list[str]:
         """Panels."""
         return [plan.own.method] if self.own and plan.own else list(plan.judges)
 
@@ -136,12 +136,12 @@ def _spend(
         found[name] = stage.run(found[name], Budget(share), progress)
 
 
-def _plans(scene: Scene, names: Sequence[str], size: int | None) -> list[Plan]:
+def _plans(scene: Scene, names: Sequence[str], size: int | None) -> list[MapPlan]:
     """Those that the scene has something to draw in; of one alone, its refusal is an error."""
     plans = []
     for name in names:
         plan = MAPS[scene.machine][name](scene, size)
-        if isinstance(plan, Plan):
+        if isinstance(plan, MapPlan):
             plans.append(plan)
         elif len(names) == 1:
             raise SceneError(scene.name, [f"map = '{name}': {plan}"])

@@ -8,7 +8,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import replace
 
-from .method_map import Axis, Budget, Edge, Own, StabilityMap, Verdict
+from .method_map import Budget, Edge, MapAxis, Own, StabilityMap, Verdict
 
 _HALVINGS = 3  # of an edge between two cells a factor of 1.8 apart: known to 7 per cent
 _WORTH_A_WORD = 1.1
@@ -168,7 +168,7 @@ def _halved(
     return edge
 
 
-def _between(axis: Axis, one: float, other: float) -> float:
+def _between(axis: MapAxis, one: float, other: float) -> float:
     middle = math.sqrt(one * other) if axis.log else 0.5 * (one + other)
     return float(2 * round(middle / 2)) if axis.even else middle
 

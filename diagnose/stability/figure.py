@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ...sim.scene.parts import Scene
 from ..pages.page import short_name
 from ..pages.picture import save_picture
-from .method_map import Axis, Plan, StabilityMap, Verdict
+from .method_map import MapAxis, MapPlan, StabilityMap, Verdict
 
 COLOUR = {
     Verdict.NOT_RUN: "#ffffff",
@@ -134,7 +134,7 @@ def _draw(sheet: Any, scene: Scene, found: StabilityMap) -> None:
     _legend(sheet, found, lines)
 
 
-def _name(panel: Any, plan: Plan, method: str) -> None:
+def _name(panel: Any, plan: MapPlan, method: str) -> None:
     """Title of a panel; that of the scene's own method is bold, in a heavy frame."""
     if plan.own is None or plan.own.method != method:
         panel.set_title(method, fontsize=9)
@@ -144,7 +144,7 @@ def _name(panel: Any, plan: Plan, method: str) -> None:
         spine.set_linewidth(2.2)
 
 
-def _label(grid: Any, plan: Plan, count: int) -> None:
+def _label(grid: Any, plan: MapPlan, count: int) -> None:
     columns = grid.shape[1]
     for place, panel in enumerate(grid.flat[:count]):
         if place + columns >= count:
@@ -154,7 +154,7 @@ def _label(grid: Any, plan: Plan, count: int) -> None:
             panel.set_ylabel(plan.y.label, fontsize=9)
 
 
-def _draw_panel(panel: Any, plan: Plan, codes: NDArray[np.int64]) -> None:
+def _draw_panel(panel: Any, plan: MapPlan, codes: NDArray[np.int64]) -> None:
     from matplotlib.colors import BoundaryNorm, ListedColormap
 
     colours = ListedColormap([COLOUR[verdict] for verdict in Verdict])
@@ -171,7 +171,7 @@ def _draw_panel(panel: Any, plan: Plan, codes: NDArray[np.int64]) -> None:
     panel.tick_params(labelsize=8)
 
 
-def _draw_symbols(panel: Any, plan: Plan, codes: NDArray[np.int64]) -> None:
+def _draw_symbols(panel: Any, plan: MapPlan, codes: NDArray[np.int64]) -> None:
     size = min(5.0, 120.0 / max(codes.shape))
     for verdict in Verdict:
         rows, columns = np.nonzero(codes == verdict)
@@ -187,7 +187,7 @@ def _symbol_style(verdict: Verdict, size: float) -> dict[str, Any]:
     return {**style, "mfc": "none"} if SYMBOL[verdict] in "o^" else style
 
 
-def _draw_own(panel: Any, plan: Plan) -> None:
+def _draw_own(panel: Any, plan: MapPlan) -> None:
     """Diamond at the scene's cell, or a line at its one value; both with their name."""
     own = plan.own
     if own is None:
@@ -207,7 +207,7 @@ def _draw_own(panel: Any, plan: Plan) -> None:
 _OWN_LINE: dict[str, Any] = {"color": "black", "lw": 1.6, "ls": "-.", "zorder": 5}
 
 
-def _tag(panel: Any, x: float, y: float, plan: Plan) -> None:
+def _tag(panel: Any, x: float, y: float, plan: MapPlan) -> None:
     """Name of the scene beside its marker, towards the middle of the map."""
     right = plan.x.values.index(x) < len(plan.x.values) / 2
     below = plan.y.values.index(y) > len(plan.y.values) / 2
@@ -225,7 +225,7 @@ def _tag(panel: Any, x: float, y: float, plan: Plan) -> None:
     )
 
 
-def _decade_ticks(axis: Axis, ticks: Any) -> None:
+def _decade_ticks(axis: MapAxis, ticks: Any) -> None:
     from matplotlib.ticker import LogLocator, NullFormatter
 
     ticks.set_minor_formatter(NullFormatter())  # decades say enough, where there are several
@@ -234,7 +234,7 @@ def _decade_ticks(axis: Axis, ticks: Any) -> None:
         ticks.set_major_formatter("{x:g}")
 
 
-def _bounds(axis: Axis) -> NDArray[np.float64]:
+def _bounds(axis: MapAxis) -> NDArray[np.float64]:
     """Edges of the cells about the values of an axis."""
     values = np.log(axis.values) if axis.log else np.asarray(axis.values)
     middle = 0.5 * (values[1:] + values[:-1])

@@ -25,7 +25,7 @@ from ...sim.film.solve import (
     solve_direct,
     solve_relaxed,
 )
-from ...sim.journal.orbit import Film, OrbitRun, OrbitStatus, film_force, load, run_orbit
+from ...sim.journal.orbit import OrbitFilm, OrbitRun, OrbitStatus, film_force, load, run_orbit
 from ...sim.journal.recording import film_geometry, journal_film, journal_scale
 from ...sim.journal.validity import JOURNAL_STEP
 from ...sim.machine.simulate import simulate
@@ -47,12 +47,12 @@ from ...sim.scene.journal import JournalScene, Oil
 from ...sim.scene.parts import Scene, SceneError
 from ...sim.scene.pump import PumpScene
 from ...sim.scene.shaft import ShaftScene
-from .method_map import Axis, Cell, Curve, Judge, Own, Plan, Verdict
+from .method_map import Cell, Curve, Judge, MapAxis, MapPlan, Own, Verdict
 from .own_point import journal_weight, orbit_step, own_film, plain_film
 from .steppers import STEPPERS, Stepper, bounce, decays
 
 Array = NDArray[np.float64]
-Maker = Callable[[Scene, int | None], Plan | str]
+Maker = Callable[[Scene, int | None], MapPlan | str]
 
 _JOINTS = ("crankpin", "wristpin", "guide")
 _PHASES = np.arange(8) / 8  # of a step, at which a contact may be met
@@ -153,7 +153,7 @@ def contact_restitution(damping_ratio: float) -> float:
     return math.exp(-z * end / w) * (z / w * math.sinh(end) - math.cosh(end))
 
 
-def step_stiffness(scene: Scene, size: int | None = None) -> Plan | str:
+def step_stiffness(scene: Scene, size: int | None = None) -> MapPlan | str:
     """Classical steppers on the joint's contact, and the mechanism itself: step by stiffness.
 
     Parameters
@@ -176,8 +176,8 @@ def step_stiffness(scene: Scene, size: int | None = None) -> Plan | str:
     rate = math.sqrt(contact.stiffness / contact.mass)
     step = 1 / (pump.sample_rate * steps_per_sample(pump))
     guard = LARGEST_STEP_PER_CONTACT_TIME / contact_rate(pump) / step
-    x = Axis(name="step", unit="s", values=_spread(0.02 / rate, 20 / rate, n)).through(step)
-    y = Axis(
+    x = MapAxis(name="step", unit="s", values=_spread(0.02 / rate, 20 / rate, n)).through(step)
+    y = MapAxis(
         name="contact stiffness",
         unit="N/m",
         values=_spread(contact.stiffness / 100, contact.stiffness * 100, n),
@@ -186,7 +186,7 @@ def step_stiffness(scene: Scene, size: int | None = None) -> Plan | str:
     curves = {s.name: _stepper_curve(s, contact, y) for s in STEPPERS}
     judges[_MECHANISM] = _mechanism_judge(pump, contact)
     curves[_MECHANISM] = [*curves["runge-kutta 4"], _guard_curve(pump, contact, y)]
-    return Plan(
+    return MapPlan(
         name="step-stiffness",
         title=f"contact of the {contact.joint}, step by stiffness, damping as it is",
         x=x,
@@ -207,7 +207,7 @@ def step_stiffness(scene: Scene, size: int | None = None) -> Plan | str:
 _MECHANISM = "mechanism, cut at contacts"
 
 
-def _stepper_curve(stepper: Stepper, contact: _Contact, y: Axis) -> list[Curve]:
+def _stepper_curve(stepper: Stepper, contact: _Contact, y: MapAxis) -> list[Curve]:
     points = []
     for k in np.geomspace(y.values[0] / 2, y.values[-1] * 2, 200):
         omega = math.sqrt(k / contact.mass)
@@ -223,7 +223,7 @@ def _column(points: list[tuple[float, float]], column: int) -> tuple[float, ...]
     return tuple(point[column] for point in points)
 
 
-def _guard_curve(scene: PumpScene, contact: _Contact, y: Axis) -> Curve:
+def _guard_curve(scene: PumpScene, contact: _Contact, y: MapAxis) -> Curve:
     longest = [
         LARGEST_STEP_PER_CONTACT_TIME / contact_rate(_stiff(scene, contact, k)) for k in y.values
     ]
@@ -250,7 +250,9 @@ _STIFFENED = {
 }
 
 
-def _stepper_judge(stepper: Stepper, contact: _Contact, x: Axis, y: Axis, accuracy: float) -> Judge:
+def _stepper_judge(
+    stepper: Stepper, contact: _Contact, x: MapAxis, y: MapAxis, accuracy: float
+) -> Judge:
     """A whole plane at once, on first use."""
 
     @cache
@@ -326,7 +328,7 @@ def _joint_rms(scene: PumpScene, joint: str, step: float) -> Array:
 # --- pump: clearance by speed
 
 
-def clearance_speed(scene: Scene, size: int | None = None) -> Plan | str:
+def clearance_speed(scene: Scene, size: int | None = None) -> MapPlan | str:
     """The machine itself: contact lost, chaos, statuses, over speed and crank-pin clearance.
 
     Parameters
@@ -348,15 +350,15 @@ def clearance_speed(scene: Scene, size: int | None = None) -> Plan | str:
     if gap == 0:
         return "the crank pin has no clearance; set joint.crankpin.diametral_clearance"
     method = f"step of the scene, and a {_FINER}th"
-    return Plan(
+    return MapPlan(
         name="clearance-speed",
         title="crank-pin clearance by speed, the scene otherwise as it is",
-        x=Axis(
+        x=MapAxis(
             name="speed", unit="Hz", values=_spread(pump.drive.speed / 4, 4 * pump.drive.speed, n)
         ).through(pump.drive.speed),
-        y=Axis(name="diametral clearance", unit="m", values=_spread(gap / 30, gap * 10, n)).through(
-            gap
-        ),
+        y=MapAxis(
+            name="diametral clearance", unit="m", values=_spread(gap / 30, gap * 10, n)
+        ).through(gap),
         judges={method: lambda x, y: _pump_cell(pump, x, y)},
         note=f"status and contact, repeated at a {_FINER}th of the step; chaos: a clearance larger "
         "by 1e-9 parts the orbits by a thousandth of it",
@@ -427,7 +429,7 @@ def _pin_rms(run: Solution) -> float:
 # --- journal: step by squeeze
 
 
-def step_squeeze(scene: Scene, size: int | None = None) -> Plan | str:
+def step_squeeze(scene: Scene, size: int | None = None) -> MapPlan | str:
     """Integrators of the orbit about an equilibrium: step by how far out it lies.
 
     Parameters
@@ -445,15 +447,15 @@ def step_squeeze(scene: Scene, size: int | None = None) -> Plan | str:
     journal = cast(JournalScene, scene)
     case = _orbit_case(journal)
     n, step, gap = size or 13, orbit_step(journal), own_film(journal).gap
-    x = Axis(name="step", unit="rad", values=_spread(1e-5, 1.0, n)).through(step)
-    y = Axis(name=_GAP, unit="", values=_spread(0.01, 0.95, n)).through(gap)
+    x = MapAxis(name="step", unit="rad", values=_spread(1e-5, 1.0, n)).through(step)
+    y = MapAxis(name=_GAP, unit="", values=_spread(0.01, 0.95, n)).through(gap)
     by_name = {stepper.name: stepper for stepper in STEPPERS}
     euler, runge = by_name["semi-implicit euler"], by_name["runge-kutta 4"]
     limits = {
         "euler": _squeeze_curve(case, y, euler),
         "rk4": _squeeze_curve(case, y, runge),
     }
-    return Plan(
+    return MapPlan(
         name="step-squeeze",
         title=f"orbit about an equilibrium, film '{journal.film.rung}', step by gap",
         x=x,
@@ -488,7 +490,7 @@ _GAP = "gap left, 1 - eccentricity ratio"
 
 
 class _OrbitCase(NamedTuple):
-    film: Film
+    film: OrbitFilm
     alpha: float
 
 
@@ -562,7 +564,7 @@ def squeeze_limit(case: _OrbitCase, x: float, stepper: Stepper) -> float:
     return math.inf
 
 
-def _squeeze_curve(case: _OrbitCase, y: Axis, stepper: Stepper) -> Curve:
+def _squeeze_curve(case: _OrbitCase, y: MapAxis, stepper: Stepper) -> Curve:
     gaps = np.geomspace(y.values[0] / 2, 0.999, 60)
     limits = [squeeze_limit(case, 1 - float(gap), stepper) for gap in gaps]
     return Curve(
@@ -658,7 +660,7 @@ def _orbit_cell(
 # --- journal: speed by load
 
 
-def speed_load(scene: Scene, size: int | None = None) -> Plan | str:
+def speed_load(scene: Scene, size: int | None = None) -> MapPlan | str:
     """Whirl: what a displaced journal does at each speed and load, with the linear threshold.
 
     Parameters
@@ -677,17 +679,17 @@ def speed_load(scene: Scene, size: int | None = None) -> Plan | str:
     n, weight = size or 11, journal_weight(journal)
     if not weight > 0:
         return "nothing rests on the journal; set load.static, in newtons"
-    x = Axis(
+    x = MapAxis(
         name="speed", unit="Hz", values=_spread(journal.drive.speed / 4, 8 * journal.drive.speed, n)
     ).through(journal.drive.speed)
-    y = Axis(name="load", unit="N", values=_spread(weight / 30, weight * 10, n)).through(weight)
+    y = MapAxis(name="load", unit="N", values=_spread(weight / 30, weight * 10, n)).through(weight)
     numerics = journal.numerics
     own = f"{numerics.integrator}, as written"
     settings: dict[str, tuple[str, float, float]] = {
         own: (numerics.integrator, orbit_step(journal), numerics.tolerance)
     }
     settings |= {name: setting for name, setting in _SETTINGS.items() if setting != settings[own]}
-    return Plan(
+    return MapPlan(
         name="speed-load",
         title=f"whirl over speed and load, film '{journal.film.rung}'",
         x=x,
@@ -715,7 +717,7 @@ def at_load(scene: JournalScene, speed: float, weight: float) -> JournalScene:
     return cast(JournalScene, changed(scene, values))
 
 
-def threshold_curve(scene: JournalScene, x: Axis, y: Axis) -> Curve:
+def threshold_curve(scene: JournalScene, x: MapAxis, y: MapAxis) -> Curve:
     """Speeds at which the equilibrium of each load loses its stability, by its coefficients."""
     points = []
     for weight in np.geomspace(y.values[0] / 1.2, y.values[-1] * 1.2, 40):
@@ -877,7 +879,7 @@ _SWEEPS = 6000
 _RUNG = {rung.name: rung for rung in FILM_RUNGS}
 
 
-def eccentricity_mesh(scene: Scene, size: int | None = None) -> Plan | str:
+def eccentricity_mesh(scene: Scene, size: int | None = None) -> MapPlan | str:
     """Solvers of the film over mesh and eccentricity.
 
     Parameters
@@ -910,11 +912,11 @@ def eccentricity_mesh(scene: Scene, size: int | None = None) -> Plan | str:
 
         return judge
 
-    return Plan(
+    return MapPlan(
         name="eccentricity-mesh",
         title=f"solvers of the film, L/D {geometry.length_to_diameter:.2g}, eccentricity by mesh",
         x=_nodes(nodes).through(geometry.n_theta),
-        y=Axis(name=_GAP, unit="", values=gaps).through(own.gap),
+        y=MapAxis(name=_GAP, unit="", values=gaps).through(own.gap),
         judges={
             "direct": judge_of(solve_direct),
             f"over-relaxed, {PAPER_RELAXATION}": judge_of(_relaxed),
@@ -930,8 +932,8 @@ def eccentricity_mesh(scene: Scene, size: int | None = None) -> Plan | str:
     )
 
 
-def _nodes(values: Sequence[int]) -> Axis:
-    return Axis(
+def _nodes(values: Sequence[int]) -> MapAxis:
+    return MapAxis(
         name="mesh, nodes round the circle",
         unit="",
         values=tuple(float(v) for v in values),
@@ -967,7 +969,7 @@ def _film_cell(found: FilmSolution, reference: FilmSolution, accuracy: float) ->
     return (Verdict.ACCURATE if off <= accuracy else Verdict.INACCURATE), f"force off by {off:.2g}"
 
 
-def relaxation_mesh(scene: Scene, size: int | None = None) -> Plan | str:
+def relaxation_mesh(scene: Scene, size: int | None = None) -> MapPlan | str:
     """Over-relaxation over its factor and the mesh.
 
     Parameters
@@ -1008,10 +1010,10 @@ def relaxation_mesh(scene: Scene, size: int | None = None) -> Plan | str:
         ("limit in theory: 2", 2.0),
         (f"the paper's factor: {PAPER_RELAXATION}", PAPER_RELAXATION),
     ]
-    return Plan(
+    return MapPlan(
         name="relaxation-mesh",
         title=f"projected over-relaxation, L/D {geometry.length_to_diameter:.2g}, factor by mesh",
-        x=Axis(name="relaxation factor", unit="", values=factors, log=False),
+        x=MapAxis(name="relaxation factor", unit="", values=factors, log=False),
         y=_nodes(nodes).through(geometry.n_theta),
         judges={f"eccentricity {e:g}": judge_of(e) for e in eccentricities},
         curves={"": [Curve(name=name, x=(at, at), y=(1.0, 1000.0)) for name, at in lines]},
@@ -1026,7 +1028,7 @@ def relaxation_mesh(scene: Scene, size: int | None = None) -> Plan | str:
     )
 
 
-def length_load(scene: Scene, size: int | None = None) -> Plan | str:
+def length_load(scene: Scene, size: int | None = None) -> MapPlan | str:
     """Rungs of the film over the bearing's length and its load.
 
     Parameters
@@ -1064,13 +1066,13 @@ def length_load(scene: Scene, size: int | None = None) -> Plan | str:
 
         return judge
 
-    return Plan(
+    return MapPlan(
         name="length-load",
         title=f"rungs of the film on {geometry.n_theta} x {geometry.n_z} nodes, load by length",
-        x=Axis(name="L/D", unit="", values=_spread(0.1, 6.0, n)).through(
+        x=MapAxis(name="L/D", unit="", values=_spread(0.1, 6.0, n)).through(
             geometry.length_to_diameter
         ),
-        y=Axis(
+        y=MapAxis(
             name="Sommerfeld number (light load: large)", unit="", values=_spread(0.003, 10.0, n)
         ).through(own.sommerfeld),
         judges={rung: judge_of(rung) for rung in ("short", "finite", "long", "direct")},
@@ -1116,7 +1118,7 @@ _LINE_METHOD = {
 }
 
 
-def speed_viscosity(scene: Scene, size: int | None = None) -> Plan | str:
+def speed_viscosity(scene: Scene, size: int | None = None) -> MapPlan | str:
     """A shaft line on its films: whirl, edge contact and overload over speed and viscosity.
 
     Parameters
@@ -1134,15 +1136,15 @@ def speed_viscosity(scene: Scene, size: int | None = None) -> Plan | str:
     shaft = cast(ShaftScene, scene)
     n, viscosity = size or 11, shaft.oil.dynamic_viscosity
     meshes = dict.fromkeys([(shaft.film.n_theta, shaft.film.n_z), (24, 7)])
-    return Plan(
+    return MapPlan(
         name="speed-viscosity",
         title=f"the line on its films, '{shaft.film.rung}', viscosity by speed",
-        x=Axis(
+        x=MapAxis(
             name="speed",
             unit="Hz",
             values=_spread(shaft.drive.speed / 30, 10 * shaft.drive.speed, n),
         ).through(shaft.drive.speed),
-        y=Axis(
+        y=MapAxis(
             name="viscosity", unit="Pa s", values=_spread(viscosity / 30, viscosity * 10, n)
         ).through(viscosity),
         judges={_mesh_name(*mesh): _line_judge(shaft, *mesh) for mesh in meshes},

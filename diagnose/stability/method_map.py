@@ -62,7 +62,7 @@ _TEXT = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class Axis:
+class MapAxis:
     """One quantity of a map.
 
     Attributes
@@ -94,7 +94,7 @@ class Axis:
 
         Examples
         --------
-        >>> Axis(name="gap left, 1 - eccentricity ratio", unit="", values=(0.1, 0.5)).quantity
+        >>> MapAxis(name="gap left, 1 - eccentricity ratio", unit="", values=(0.1, 0.5)).quantity
         'gap left'
         """
         return self.name.partition(",")[0].partition(" (")[0]
@@ -104,7 +104,7 @@ class Axis:
 
         Examples
         --------
-        >>> Axis(name="step", unit="s", values=(1.0, 2.0)).written(1.953e-5)
+        >>> MapAxis(name="step", unit="s", values=(1.0, 2.0)).written(1.953e-5)
         '19.5 us'
         """
         for factor, prefix in _PREFIXES:
@@ -112,14 +112,14 @@ class Axis:
                 return f"{value / factor:.3g} {prefix}{self.unit}"
         return f"{value:.3g} {self.unit}".rstrip()
 
-    def through(self, value: float | None) -> "Axis":
+    def through(self, value: float | None) -> "MapAxis":
         """The same axis with a value > 0 on it: the nearest inside gives way, the ends stay.
 
         Examples
         --------
-        >>> Axis(name="step", unit="s", values=(1.0, 2.0, 4.0)).through(2.2).values
+        >>> MapAxis(name="step", unit="s", values=(1.0, 2.0, 4.0)).through(2.2).values
         (1.0, 2.2, 4.0)
-        >>> Axis(name="step", unit="s", values=(1.0, 2.0, 4.0)).through(9.0).values
+        >>> MapAxis(name="step", unit="s", values=(1.0, 2.0, 4.0)).through(9.0).values
         (1.0, 2.0, 4.0, 9.0)
         """
         if value is None or not math.isfinite(value):
@@ -182,7 +182,7 @@ class Own:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Plan:
+class MapPlan:
     """A map to be measured.
 
     Attributes
@@ -203,8 +203,8 @@ class Plan:
 
     name: str
     title: str
-    x: Axis
-    y: Axis
+    x: MapAxis
+    y: MapAxis
     judges: Mapping[str, Judge]
     curves: Mapping[str, Sequence[Curve]] = field(default_factory=dict)
     note: str = ""
@@ -285,7 +285,7 @@ class StabilityMap:
         Of the scene's own method, from the scene.
     """
 
-    plan: Plan
+    plan: MapPlan
     verdicts: dict[str, NDArray[np.int64]]
     words: dict[str, list[list[str]]]
     edges: tuple[Edge, ...] = ()
@@ -329,7 +329,7 @@ class Budget:
 
 
 def measure(
-    plan: Plan,
+    plan: MapPlan,
     budget: Budget | None = None,
     progress: Callable[[int, int], None] | None = None,
     *,
@@ -375,7 +375,7 @@ def measure(
     return replace(found, verdicts=verdicts, words=words)
 
 
-def unmeasured(plan: Plan) -> StabilityMap:
+def unmeasured(plan: MapPlan) -> StabilityMap:
     """A map of which no cell is run."""
     n_y, n_x = len(plan.y.values), len(plan.x.values)
     return StabilityMap(

@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 from ...datasets.file.record import DataError, Recording
 from ...features.response.transfer import FrfReference
 from ..feature_rows.feature_choice import choice_in
-from ..feature_rows.feature_table import Choice, held_against, recording_features
+from ..feature_rows.feature_table import FeatureSelection, held_against, recording_features
 from ..feature_rows.healthy import Baseline, referenced_rows
 from ..feature_rows.noted import NOTED, noted_names, noted_values
 from ..feature_rows.physical import level_channels, levelled_rows
 from ..feature_rows.quality import (
-    Fault,
     Levels,
-    Look,
+    Observation,
+    QualityFault,
     layout_faults,
     quiet_faults,
     recording_faults,
@@ -51,7 +51,7 @@ class ModelError(ValueError):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Finding:
+class FaultFinding:
     """What a model says of a fault beside the wear.
 
     Attributes
@@ -110,7 +110,7 @@ class Estimate:
         Caution: graded, but read `cautions`. Unfamiliar: no grade, the machine is none of the
         trained kind. Unusable: no grade, the recording is at fault, or there is
         no healthy reference for a model that needs one.
-    faults : tuple of Fault
+    faults : tuple of QualityFault
         Of the data.
     reasons : tuple of str
         Why there is no grade; empty where there is one.
@@ -139,7 +139,7 @@ class Estimate:
         Estimate and interval [m].
     coverage : float
         Nominal coverage of the interval, and of the set.
-    confounders : tuple of Finding
+    confounders : tuple of FaultFinding
         Faults beside the wear that the model knows.
     evidence : tuple of (str, float, float, float)
         Feature, its value, the healthy one (of the baseline, or mean of as-new machines), distance
@@ -147,7 +147,7 @@ class Estimate:
     """
 
     verdict: Verdict
-    faults: tuple[Fault, ...] = ()
+    faults: tuple[QualityFault, ...] = ()
     reasons: tuple[str, ...] = ()
     cautions: tuple[str, ...] = ()
     mode: Mode = "cold"
@@ -163,7 +163,7 @@ class Estimate:
     low: float | None = None
     high: float | None = None
     coverage: float = COVERAGE
-    confounders: tuple[Finding, ...] = ()
+    confounders: tuple[FaultFinding, ...] = ()
     evidence: tuple[tuple[str, float, float, float], ...] = ()
 
     @property
@@ -350,12 +350,12 @@ class WearModel:
         if any(fault.bars for fault in faults):
             return self._unusable(faults)
         known = None if baseline is None else baseline.transfer
-        if known is None and told_against(Choice(only=self.names)):
+        if known is None and told_against(FeatureSelection(only=self.names)):
             return Estimate(verdict="unusable", reasons=(NO_BASELINE,), mode=self.mode)
         row = self._row(recording, known)
         look = self._look(row)
 
-        def see(mended: Recording) -> Look:
+        def see(mended: Recording) -> Observation:
             return self._look(self._row(mended, known))
 
         faults += suspicions(recording, look, see, self._speeds()) or quiet_faults(
@@ -367,7 +367,7 @@ class WearModel:
         noted = recording.row if conditions is None else conditions
         return self._judge(row, look, features, noted, faults, told)
 
-    def _unusable(self, faults: tuple[Fault, ...]) -> Estimate:
+    def _unusable(self, faults: tuple[QualityFault, ...]) -> Estimate:
         reasons = tuple(fault.text for fault in faults if fault.bars)
         return Estimate(verdict="unusable", faults=faults, reasons=reasons, mode=self.mode)
 
@@ -383,10 +383,10 @@ class WearModel:
             )
         return values
 
-    def _look(self, row: Float) -> Look:
+    def _look(self, row: Float) -> Observation:
         speed = row[self._columns[_SPEED_FEATURE]] if _SPEED_FEATURE in self._columns else None
         apart = self.familiarity.by_kind(self.names, row[None, :])[0]
-        return Look(
+        return Observation(
             distance=float(self.familiarity.distance(self.names, self._levelled(row))[0]),
             limit=self.distance_limit,
             free_distance=free_distance(self.names, apart),
@@ -418,7 +418,7 @@ class WearModel:
         baseline: Float | None = None,
         *,
         conditions: Mapping[str, Any] | None = None,
-        faults: tuple[Fault, ...] = (),
+        faults: tuple[QualityFault, ...] = (),
     ) -> Estimate:
         """Estimate from a feature row.
 
@@ -430,7 +430,7 @@ class WearModel:
             Healthy row of the same machine.
         conditions : mapping, optional
             Operating conditions by the names of the card, as far as they were recorded.
-        faults : tuple of Fault
+        faults : tuple of QualityFault
             Found in the recording; none of them bars a verdict.
 
         Returns
@@ -442,10 +442,10 @@ class WearModel:
     def _judge(
         self,
         row: Float,
-        look: Look,
+        look: Observation,
         baseline: Float | None,
         conditions: Mapping[str, Any],
-        faults: tuple[Fault, ...],
+        faults: tuple[QualityFault, ...],
         told: tuple[str, ...] = (),
     ) -> Estimate:
         if self.mode == "referenced" and baseline is None:
@@ -535,7 +535,7 @@ class WearModel:
             )
         return cautions
 
-    def _level_cautions(self, look: Look) -> list[str]:
+    def _level_cautions(self, look: Observation) -> list[str]:
         return [
             f"the level of {channel} is {value:+.1f} dB off what its shape lets expect, must be "
             f"within {_OFF_LEVEL * size:.1f} dB: check the sensitivity of its sensor"
@@ -543,7 +543,7 @@ class WearModel:
             if abs(value) > _OFF_LEVEL * size
         ]
 
-    def _finding_cautions(self, findings: tuple[Finding, ...]) -> list[str]:
+    def _finding_cautions(self, findings: tuple[FaultFinding, ...]) -> list[str]:
         """Faults that the intervals, which are for all machines alike, do not allow for."""
         cautions = []
         for finding, rates in zip(findings, self.card["confounders"], strict=True):
@@ -556,12 +556,12 @@ class WearModel:
                 )
         return cautions
 
-    def _findings(self, row: Float) -> tuple[Finding, ...]:
+    def _findings(self, row: Float) -> tuple[FaultFinding, ...]:
         findings = []
         for head, rates in zip(self.heads, self.card["confounders"], strict=True):
             probability = float(head.probability(row[None, :])[0])
             findings.append(
-                Finding(
+                FaultFinding(
                     name=head.name,
                     probability=probability,
                     present=probability > head.threshold,

@@ -13,7 +13,7 @@ from pydantic import Field, model_validator
 from ..feature_rows.noted import NOTED, noted_names
 from ..feature_rows.physical import level_channels, physical_rows, shape_rows
 from ..feature_rows.quality import Levels
-from ..learning.conformal import Calibration, Scale, scale_inputs
+from ..learning.conformal import IntervalCalibration, Scale, scale_inputs
 from ..learning.grades import GRADE_NAMES
 from ..learning.regressions import Linear
 from ..learning.severity import Estimator
@@ -109,8 +109,8 @@ _ARRAY_PARTS: dict[str, Any] = {"familiarity": Familiarity, "levels": Levels}
 _ESTIMATOR_PARTS: dict[str, Any] = {
     "witness": Linear,
     "scale": Scale,
-    "calibration": Calibration,
-    "shifted": Calibration,
+    "calibration": IntervalCalibration,
+    "shifted": IntervalCalibration,
 }
 """The same of an estimator."""
 
@@ -250,7 +250,7 @@ def _scale_fits(scale: Scale) -> bool:
     )
 
 
-def _calibration_fits(known: Calibration) -> bool:
+def _calibration_fits(known: IntervalCalibration) -> bool:
     arrays = (known.estimate, known.truth, known.scale, known.distance, known.group)
     return (
         len(shapes_of(*arrays)) == 1

@@ -29,7 +29,7 @@ from ..feature_rows.feature_choice import (
 )
 from ..feature_rows.feature_table import (
     USUAL,
-    Choice,
+    FeatureSelection,
     FeatureTable,
     Progress,
     confounders_in,
@@ -40,7 +40,7 @@ from ..feature_rows.noted import NOTED, doubted, noted_values, notes_of, strayed
 from ..feature_rows.physical import moved_rows, physical_rows
 from ..feature_rows.quality import Levels, fit_levels
 from ..feature_rows.transfer_reference import healthy_transfer
-from ..learning.conformal import Calibration, fit_scale, scale_inputs
+from ..learning.conformal import IntervalCalibration, fit_scale, scale_inputs
 from ..learning.grades import grades_of
 from ..learning.regressions import (
     BUDGET_MS,
@@ -76,7 +76,7 @@ def train_model(
     jobs: int = 1,
     budget_ms: float | None = None,
     baseline: str | Path | None = None,
-    choices: Sequence[Choice] = (USUAL,),
+    choices: Sequence[FeatureSelection] = (USUAL,),
     progress: Progress | None = None,
 ) -> tuple[WearModel, FeatureTable, NDArray[np.intp]]:
     """Fit a wear model on a data set's training groups.
@@ -103,7 +103,7 @@ def train_model(
         Data set of healthy records of the same machines, by identity (recipe, seed and number, or
         declared name): the model is then referenced, and needs healthy recordings of every machine
         it is asked about.
-    choices : sequence of Choice
+    choices : sequence of FeatureSelection
         Sets of features to choose from, all of the same views; records that lack a view are left
         out.
     progress : callable, optional
@@ -185,7 +185,7 @@ def fit_model(
     held_out: float = 0.0,
     seed: int = 0,
     budget_ms: float | None = None,
-    choice: Choice = USUAL,
+    choice: FeatureSelection = USUAL,
     candidates: Candidates | None = None,
     path: str | Path = "the data set",
 ) -> WearModel:
@@ -223,7 +223,7 @@ def fit_model(
         columns = np.arange(len(table.names), dtype=np.intp)
         candidates = Candidates(choices=(choice,), columns=(columns,), whole=choice)
     noted = table.manifest.iloc[train]
-    whole = Lesson(
+    whole = TrainingRows(
         conditions=tuple(c["name"] for c in _noted(noted)),
         notes=notes_of(noted),
         names=table.names,
@@ -233,15 +233,17 @@ def fit_model(
         groups=table.manifest["group"].to_numpy()[train],
         faults={name: here[train] for name, here in confounders_in(table.manifest).items()},
     )
-    lessons = [whole.part(columns) for columns in candidates.columns]
-    for each in lessons:
+    candidate_rows = [whole.part(columns) for columns in candidates.columns]
+    for each in candidate_rows:
         _refuse_undefined(each, path)
-    selection = _selection(lessons, seed)
-    lesson = lessons[selection.chosen]
-    learnt = learn(lesson, seed=seed, budget_ms=budget_ms, selection=selection, among=lessons)
+    selection = _selection(candidate_rows, seed)
+    training = candidate_rows[selection.chosen]
+    learnt = learn(
+        training, seed=seed, budget_ms=budget_ms, selection=selection, among=candidate_rows
+    )
     mine = candidates.part(table, selection.chosen)
     card = _card(head, aim, mine, train, held_out, seed) | _model_card(learnt, budget_ms)
-    card["healthy_features"] = _healthy(lesson, grades_of(lesson.severity, aim.edges))
+    card["healthy_features"] = _healthy(training, grades_of(training.severity, aim.edges))
     card["feature_choice"] = choice_card(candidates.choices[selection.chosen]) | {
         "candidates": [
             {"name": words_of(each), "values": len(columns), "line_mae_m": error}
@@ -255,29 +257,29 @@ def fit_model(
     return _model(learnt, card)
 
 
-def _selection(lessons: Sequence["Lesson"], seed: int) -> Selection:
+def _selection(candidate_rows: Sequence["TrainingRows"], seed: int) -> Selection:
     """Of one set there is nothing to choose."""
-    if len(lessons) == 1:
+    if len(candidate_rows) == 1:
         return Selection(chosen=0, errors=(), by_fold=(0,) * _FOLDS)
-    first = lessons[0]
+    first = candidate_rows[0]
     _refuse_no_wear(first.severity)
     folds = group_folds(first.groups, n=_FOLDS, seed=seed)
-    inputs = [lesson.inputs for lesson in lessons]
+    inputs = [training.inputs for training in candidate_rows]
     return select_set(inputs, first.severity, first.groups, folds, seed=seed)
 
 
-def _refuse_undefined(lesson: "Lesson", path: str | Path) -> None:
+def _refuse_undefined(training: "TrainingRows", path: str | Path) -> None:
     """Features that some records leave undefined: the coherence of a single blow."""
-    lost = np.flatnonzero(~np.isfinite(lesson.inputs).all(axis=0)) % len(lesson.names)
+    lost = np.flatnonzero(~np.isfinite(training.inputs).all(axis=0)) % len(training.names)
     if lost.size:
-        names = [lesson.names[i] for i in np.unique(lost)]
+        names = [training.names[i] for i in np.unique(lost)]
         raise DataError(
             f"{path}: {len(names)} features are undefined in some records, must be 0, as "
             f"{names[0]}; strike more often, or leave them out: wearstate train --features"
         )
-    if physical_rows(lesson.names, lesson.rows[:1]).shape[1] == 0:
+    if physical_rows(training.names, training.rows[:1]).shape[1] == 0:
         raise DataError(
-            f"{path}: its {len(lesson.names)} features are levels alone, which tell no familiar "
+            f"{path}: its {len(training.names)} features are levels alone, which tell no familiar "
             "machine from a strange one; add others: wearstate train --features"
         )
 
@@ -375,7 +377,7 @@ def _check_kept(kept: int, draws: int, what: str, path: str | Path) -> None:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Lesson:
+class TrainingRows:
     """What a model learns from.
 
     Attributes
@@ -411,7 +413,7 @@ class Lesson:
         """What the severity is told from."""
         return self.rows if self.baseline is None else referenced_rows(self.rows, self.baseline)
 
-    def moved(self, seed: int) -> "Lesson":
+    def moved(self, seed: int) -> "TrainingRows":
         """The same records of machines whose resonances stand anywhere within the reach.
 
         Each machine has its own factor, which its healthy rows share.
@@ -426,7 +428,7 @@ class Lesson:
         healthy = None if self.baseline is None else there(self.baseline)
         return replace(self, rows=there(self.rows), baseline=healthy)
 
-    def part(self, columns: NDArray[np.intp]) -> "Lesson":
+    def part(self, columns: NDArray[np.intp]) -> "TrainingRows":
         """The same records with some of the features."""
         return replace(
             self,
@@ -463,18 +465,18 @@ class Learnt:
 
 
 def learn(
-    lesson: Lesson,
+    training: TrainingRows,
     *,
     seed: int = 0,
     budget_ms: float | None = None,
     selection: Selection | None = None,
-    among: Sequence[Lesson] = (),
+    among: Sequence[TrainingRows] = (),
 ) -> Learnt:
     """Fit everything, by folds of whole groups.
 
     Parameters
     ----------
-    lesson : Lesson
+    training : TrainingRows
     seed : int
         Of the folds and the trees.
     budget_ms : float, optional
@@ -482,7 +484,7 @@ def learn(
     selection : Selection, optional
         How the features were chosen: the estimates of a fold are then those of the set that its
         training records ask for, so that the calibration knows what the choice costs.
-    among : sequence of Lesson
+    among : sequence of TrainingRows
         The sets that it was chosen from.
 
     Returns
@@ -494,13 +496,13 @@ def learn(
     DataError
         A severity is not positive, or no model is within the budget.
     """
-    _refuse_no_wear(lesson.severity)
-    folds = group_folds(lesson.groups, n=_FOLDS, seed=seed)
+    _refuse_no_wear(training.severity)
+    folds = group_folds(training.groups, n=_FOLDS, seed=seed)
     try:
-        other = lesson.moved(seed)
+        other = training.moved(seed)
         severity = fit_blend(
-            lesson.inputs,
-            lesson.severity,
+            training.inputs,
+            training.severity,
             folds,
             seed=seed,
             budget_ms=budget_ms,
@@ -517,39 +519,39 @@ def learn(
             if place in others:
                 estimate[left] = others[place].estimate[left]
         severity = replace(severity, estimate=estimate)
-    (distance, far), weight = _out_of_fold_distances(lesson, other, folds)
+    (distance, far), weight = _out_of_fold_distances(training, other, folds)
     apart = distance, far
     return Learnt(
         severity=severity,
-        blind=_estimator(lesson, lesson.inputs, severity, apart, seed),
-        informed=_informed(lesson, other, severity, folds, apart, seed),
-        familiarity=fit_familiarity(lesson.names, lesson.rows, lesson.groups, weight=weight),
-        levels=fit_levels(lesson.names, lesson.rows, folds),
-        heads=_heads(lesson, folds, np.abs(severity.estimate - lesson.severity), seed=seed),
+        blind=_estimator(training, training.inputs, severity, apart, seed),
+        informed=_informed(training, other, severity, folds, apart, seed),
+        familiarity=fit_familiarity(training.names, training.rows, training.groups, weight=weight),
+        levels=fit_levels(training.names, training.rows, folds),
+        heads=_heads(training, folds, np.abs(severity.estimate - training.severity), seed=seed),
     )
 
 
 def _estimator(
-    lesson: Lesson, inputs: Float, fitted: Fitted, apart: tuple[Float, Float], seed: int
+    training: TrainingRows, inputs: Float, fitted: Fitted, apart: tuple[Float, Float], seed: int
 ) -> Estimator:
     """A fit with its uncertainty, from how it did on machines that it had not seen."""
     distance, far = apart
     sizes = scale_inputs(fitted.estimate, distance, fitted.disagreement)
     strange = scale_inputs(fitted.shifted_estimate, far, fitted.shifted_disagreement)
-    scale = fit_scale(sizes, np.log(lesson.severity / fitted.estimate))
+    scale = fit_scale(sizes, np.log(training.severity / fitted.estimate))
 
-    def calibration(estimate: Float, sizes: Float, distance: Float) -> Calibration:
-        return Calibration(
+    def calibration(estimate: Float, sizes: Float, distance: Float) -> IntervalCalibration:
+        return IntervalCalibration(
             estimate=estimate,
-            truth=lesson.severity,
+            truth=training.severity,
             scale=scale.predict(sizes),
             distance=distance,
-            group=lesson.groups,
+            group=training.groups,
         )
 
     return Estimator(
         severity=fitted.blend,
-        witness=fit_line(inputs, lesson.severity, fitted.options, seed=seed),
+        witness=fit_line(inputs, training.severity, fitted.options, seed=seed),
         scale=scale,
         calibration=calibration(fitted.estimate, sizes, distance),
         shifted=calibration(fitted.shifted_estimate, strange, far),
@@ -557,8 +559,8 @@ def _estimator(
 
 
 def _informed(
-    lesson: Lesson,
-    other: Lesson,
+    training: TrainingRows,
+    other: TrainingRows,
     blind: Fitted,
     folds: Folds,
     apart: tuple[Float, Float],
@@ -568,25 +570,29 @@ def _informed(
 
     They are as uncertain as people know them. None where they are not worth the asking.
     """
-    if not lesson.conditions:
+    if not training.conditions:
         return None
-    noted = noted_values(lesson.conditions, lesson.notes)
+    noted = noted_values(training.conditions, training.notes)
     if not np.isfinite(noted).all():
         return None
-    noted = doubted(lesson.conditions, noted, seed)
-    inputs = np.hstack([lesson.inputs, noted])
-    moved = np.hstack([other.inputs, strayed(lesson.conditions, noted, seed, REACH)])
+    noted = doubted(training.conditions, noted, seed)
+    inputs = np.hstack([training.inputs, noted])
+    moved = np.hstack([other.inputs, strayed(training.conditions, noted, seed, REACH)])
     kept = {*blind.blend.names, *WITNESSES}
     kinds = [each for each in CANDIDATES if each.name in kept]
-    fitted = fit_blend(inputs, lesson.severity, folds, seed=seed, candidates=kinds, shifted=moved)
-    errors = [np.abs(each.estimate - lesson.severity).mean() for each in (fitted, blind)]
+    fitted = fit_blend(inputs, training.severity, folds, seed=seed, candidates=kinds, shifted=moved)
+    errors = [np.abs(each.estimate - training.severity).mean() for each in (fitted, blind)]
     if errors[0] > (1 - _WORTH) * errors[1]:
         return None
-    return _estimator(lesson, inputs, fitted, apart, seed)
+    return _estimator(training, inputs, fitted, apart, seed)
 
 
 def _fits_of_others(
-    selection: Selection, among: Sequence[Lesson], folds: Folds, seed: int, budget_ms: float | None
+    selection: Selection,
+    among: Sequence[TrainingRows],
+    folds: Folds,
+    seed: int,
+    budget_ms: float | None,
 ) -> dict[int, Fitted]:
     """Fits on the sets that some fold asks for and all records do not."""
     places = sorted(set(selection.by_fold) - {selection.chosen})
@@ -598,32 +604,34 @@ def _fits_of_others(
     }
 
 
-def _out_of_fold_distances(lesson: Lesson, other: Lesson, folds: Folds) -> tuple[Float, float]:
+def _out_of_fold_distances(
+    training: TrainingRows, other: TrainingRows, folds: Folds
+) -> tuple[Float, float]:
     """Novelty distances of records, as they are and moved, from clouds without their machine draw.
 
     And the weight of the share outside the ranges, which makes its rare values as far as those of
     the distance itself: of both together no more are refused than of one.
     """
-    apart, outside = np.empty((2, 2, len(lesson.rows)))
+    apart, outside = np.empty((2, 2, len(training.rows)))
     for train, test in folds:
-        cloud = fit_familiarity(lesson.names, lesson.rows[train], lesson.groups[train])
-        for i, each in enumerate((lesson, other)):
-            apart[i, test] = cloud.distance(lesson.names, each.rows[test])
+        cloud = fit_familiarity(training.names, training.rows[train], training.groups[train])
+        for i, each in enumerate((training, other)):
+            apart[i, test] = cloud.distance(training.names, each.rows[test])
             outside[i, test] = cloud.outside(each.rows[test])
-    rare = max(float(np.quantile(outside[0], _RARE)), 1 / len(lesson.names))
+    rare = max(float(np.quantile(outside[0], _RARE)), 1 / len(training.names))
     weight = float(np.quantile(apart[0], _RARE)) / rare
     return np.maximum(apart, weight * outside), weight
 
 
 def _heads(
-    lesson: Lesson, folds: Folds, error: Float, *, seed: int
+    training: TrainingRows, folds: Folds, error: Float, *, seed: int
 ) -> tuple[tuple[Head, dict[str, Any]], ...]:
     """A head for each fault, and its rates: with the error of severity with and without it."""
     found = []
-    for name, here in lesson.faults.items():
+    for name, here in training.faults.items():
         if min(here.sum(), (~here).sum()) < _FEWEST_FAULTS:
             continue
-        head, rates = _head(name, lesson.rows, here, folds, seed=seed)
+        head, rates = _head(name, training.rows, here, folds, seed=seed)
         rates |= {"mae_with_m": float(error[here].mean())}
         rates |= {"mae_without_m": float(error[~here].mean())}
         found.append((head, rates))
@@ -770,14 +778,14 @@ def _model_card(learnt: Learnt, budget_ms: float | None) -> dict[str, Any]:
     }
 
 
-def _healthy(lesson: Lesson, grade: NDArray[Any]) -> dict[str, list[float]]:
+def _healthy(training: TrainingRows, grade: NDArray[Any]) -> dict[str, list[float]]:
     """Mean and spread of the features of as-new machines, the reference of the evidence.
 
     Of a referenced model the spread is that about each machine's own baseline.
     """
     kept = grade == 0 if (grade == 0).any() else np.ones(len(grade), dtype=bool)
-    rows = lesson.rows[kept]
-    apart = rows if lesson.baseline is None else rows - lesson.baseline[kept]
+    rows = training.rows[kept]
+    apart = rows if training.baseline is None else rows - training.baseline[kept]
     return {"mean": rows.mean(axis=0).tolist(), "spread": apart.std(axis=0).tolist()}
 
 

@@ -1572,7 +1572,7 @@ def _check_silence(powers: list[Float]) -> None:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Shift:
+class ModeShift:
     """What has become of the modes of a reference.
 
     Attributes
@@ -1600,7 +1600,7 @@ class Shift:
     new: tuple[int, ...]
 
 
-def resonance_shift(modes: Modes, reference: Modes, *, within: float = 0.1) -> Shift:
+def resonance_shift(modes: Modes, reference: Modes, *, within: float = 0.1) -> ModeShift:
     """Pair the modes of two fits and tell how they have moved.
 
     Parameters
@@ -1612,7 +1612,7 @@ def resonance_shift(modes: Modes, reference: Modes, *, within: float = 0.1) -> S
 
     Returns
     -------
-    Shift
+    ModeShift
 
     Raises
     ------
@@ -1650,7 +1650,7 @@ def resonance_shift(modes: Modes, reference: Modes, *, within: float = 0.1) -> S
         reference.frequency_deviation[old] / reference.frequency[old],
     )
     heights = [np.abs(x.residue) / np.abs(x.pole.real) for x in (modes, reference)]
-    return Shift(
+    return ModeShift(
         pairs=pairs,
         frequency=ratio - 1,
         frequency_deviation=ratio * scatter,

@@ -370,7 +370,7 @@ class Rotor:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Modes:
+class RotorModes:
     """Free vibrations ``q = Re(shape exp(lambda t))`` of a rotor at one speed.
 
     Attributes
@@ -446,7 +446,7 @@ def modes(
     *,
     most_damping: float = 1.0,
     method: str = "auto",
-) -> Modes:
+) -> RotorModes:
     """The lowest modes of a rotor.
 
     Parameters
@@ -464,7 +464,7 @@ def modes(
 
     Returns
     -------
-    Modes
+    RotorModes
         By rising undamped frequency; the rigid motions of a free shaft come first, as zeros.
 
     Raises
@@ -500,7 +500,7 @@ def modes(
     values, shapes, real = found or _general(rotor, speed, count, most_damping, method)
     shapes = _normalised(rotor, _parted(rotor, speed, values, shapes))
     forward, backward = _circles(rotor.beam, shapes)
-    return Modes(
+    return RotorModes(
         speed=float(speed),
         eigenvalues=values,
         shapes=shapes,
@@ -739,9 +739,9 @@ class Campbell:
     eigenvalues : numpy.ndarray [shape=(n_speeds, n_modes)]
         Each column one mode [rad/s]; NaN from where the mode was lost.
     shapes : numpy.ndarray [shape=(n_speeds, n_dof, n_modes)]
-        As in :class:`Modes`; NaN likewise.
+        As in :class:`RotorModes`; NaN likewise.
     axis_ratio : numpy.ndarray [shape=(n_speeds, n_nodes, n_modes)]
-        Of the orbits, as in :class:`Modes`; NaN likewise.
+        Of the orbits, as in :class:`RotorModes`; NaN likewise.
     mac : numpy.ndarray [shape=(n_speeds, n_modes)]
         Least likeness to the shape of the step before, 1 for the same; the first row is 1.
     lost_at : numpy.ndarray [shape=(n_modes,)]
@@ -774,7 +774,7 @@ class Campbell:
 
     @property
     def direction(self) -> tuple[tuple[str, ...], ...]:
-        """For each speed that of each mode, as in :class:`Modes`; "lost" where it was."""
+        """For each speed that of each mode, as in :class:`RotorModes`; "lost" where it was."""
         return tuple(
             tuple("lost" if np.isnan(mode).any() else _direction(mode) for mode in nodes.T)
             for nodes in self.axis_ratio

@@ -17,7 +17,7 @@ from ..film.bearing import (
 from ..film.solve import LEAST_CELLS
 from ..journal.recording import film_geometry, journal_scale
 from ..scene.journal import JournalScene
-from .rows import OIL_DENSITY, RECORDING, Quantity, Trial, taylor_share, trial
+from .rows import OIL_DENSITY, RECORDING, Quantity, ShortRun, taylor_share, trial
 
 _SECONDS = 3.0  # tabulated, of the trial; a map's run costs a hundredth of it
 _HEAT = 1.7e6  # J/(m^3 K), of mineral oil
@@ -36,7 +36,7 @@ class JournalFacts:
     """
 
     scene: JournalScene
-    trial: Trial
+    trial: ShortRun
     rest: Equilibrium | None
 
 

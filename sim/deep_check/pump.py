@@ -22,7 +22,7 @@ from ..scene.parts import STANDARD_GRAVITY
 from ..scene.plausibility import largest_deflection, modal_mass
 from ..scene.pump import PumpScene
 from ..scene.pump_hydraulics import STANDARD_ATMOSPHERE
-from .rows import RECORDING, Quantity, Trial, trial
+from .rows import RECORDING, Quantity, ShortRun, trial
 
 _JOINTS = ("crankpin", "wristpin", "guide")
 _TURNS = 6.0  # of the trial: after settling every revolution is much like the last
@@ -41,7 +41,7 @@ class PumpFacts:
     """
 
     scene: PumpScene
-    trial: Trial
+    trial: ShortRun
 
 
 def pump_facts(scene: PumpScene) -> PumpFacts:

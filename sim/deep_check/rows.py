@@ -138,7 +138,7 @@ def figures(table: Sequence[Quantity], facts: Any) -> tuple[Figure, ...]:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Trial:
+class ShortRun:
     """A short simulated run of a scene.
 
     Attributes
@@ -164,7 +164,7 @@ class Trial:
         return self.solution.status.ok
 
 
-def trial(scene: Scene, *, turns: float, seconds: float, truth: bool = True) -> Trial:
+def trial(scene: Scene, *, turns: float, seconds: float, truth: bool = True) -> ShortRun:
     """Run a scene for some revolutions, fewer where they would cost too much.
 
     Parameters
@@ -179,7 +179,7 @@ def trial(scene: Scene, *, turns: float, seconds: float, truth: bool = True) -> 
 
     Returns
     -------
-    Trial
+    ShortRun
     """
     speed = float(scene.drive.speed)  # type: ignore[attr-defined]
     full = min(turns / speed, scene.duration)
@@ -191,10 +191,10 @@ def trial(scene: Scene, *, turns: float, seconds: float, truth: bool = True) -> 
     doubts = solution_doubts(short, solution)[len(of_scene) :] if solution.status.ok else ()
     known = {doubt.text for doubt in (*of_scene, *doubts)}
     told = tuple(text for text in solution.warnings if text not in known)
-    return Trial(scene=short, solution=solution, warnings=told, doubts=doubts)
+    return ShortRun(scene=short, solution=solution, warnings=told, doubts=doubts)
 
 
-def over_range(run: Trial) -> dict[str, float]:
+def over_range(run: ShortRun) -> dict[str, float]:
     """Largest deviation from its mean over the range of every sensor in a trial."""
     if not run.ok:
         return {}

@@ -20,7 +20,7 @@ from ..shaft.recording import (
     shaft_beam,
     shaft_state,
 )
-from .rows import OIL_DENSITY, RECORDING, Quantity, Trial, taylor_share, trial
+from .rows import OIL_DENSITY, RECORDING, Quantity, ShortRun, taylor_share, trial
 
 _TURNS = 4.0  # of the trial: the response is steady from its first sample
 _SECONDS = 4.0  # tabulated, of the trial
@@ -45,7 +45,7 @@ class ShaftFacts:
     """
 
     scene: ShaftScene
-    trial: Trial
+    trial: ShortRun
     state: ShaftState
     modes: Sequence[float]
     aligned: LineState | None

@@ -107,7 +107,7 @@ _STABLE = (2.0, 2.785, math.inf)  # step times damping, on the negative real axi
 # --- what a run is told
 
 
-class Film(NamedTuple):
+class OrbitFilm(NamedTuple):
     """A film behind an integer code; parts that the code does not use are empty."""
 
     code: int  # FILM_*
@@ -145,12 +145,12 @@ def _no_work() -> DirectFilm:
     return direct_film(FilmGeometry(length_to_diameter=1.0, n_theta=8, n_z=5))
 
 
-def no_film() -> Film:
+def no_film() -> OrbitFilm:
     """No film at all: the absent effect."""
-    return Film(FILM_NONE, 1.0, math.inf, _NO_TABLE, _no_work())
+    return OrbitFilm(FILM_NONE, 1.0, math.inf, _NO_TABLE, _no_work())
 
 
-def short_film(length_to_diameter: float, *, last_eccentricity: float = 0.9999) -> Film:
+def short_film(length_to_diameter: float, *, last_eccentricity: float = 0.9999) -> OrbitFilm:
     """Short-bearing film in closed form (Ocvirk, half film).
 
     Parameters
@@ -160,22 +160,22 @@ def short_film(length_to_diameter: float, *, last_eccentricity: float = 0.9999) 
     last_eccentricity : float
         Where a run ends with a status, < 1.
     """
-    return Film(FILM_SHORT, length_to_diameter, last_eccentricity, _NO_TABLE, _no_work())
+    return OrbitFilm(FILM_SHORT, length_to_diameter, last_eccentricity, _NO_TABLE, _no_work())
 
 
-def map_film(impedance: ImpedanceMap, length_to_diameter: float) -> Film:
+def map_film(impedance: ImpedanceMap, length_to_diameter: float) -> OrbitFilm:
     """Film of an impedance map of a bearing of that L / D."""
-    return Film(
+    return OrbitFilm(
         FILM_MAP, length_to_diameter, impedance.last_eccentricity, impedance.table, _no_work()
     )
 
 
-def solved_film(geometry: FilmGeometry, *, last_eccentricity: float = 0.995) -> Film:
+def solved_film(geometry: FilmGeometry, *, last_eccentricity: float = 0.995) -> OrbitFilm:
     """Film solved anew at every call, started from the call before.
 
     The workspace belongs to this value: one run at a time.
     """
-    return Film(
+    return OrbitFilm(
         FILM_DIRECT,
         geometry.length_to_diameter,
         last_eccentricity,
@@ -291,7 +291,9 @@ def half_sine_history(
 
 
 @kernel
-def film_force(film: Film, x: float, y: float, x_rate: float, y_rate: float) -> tuple[float, float]:
+def film_force(
+    film: OrbitFilm, x: float, y: float, x_rate: float, y_rate: float
+) -> tuple[float, float]:
     """Force of any film.
 
     Beyond its last eccentricity the journal is taken as at that: trial points of an integrator lie
@@ -439,7 +441,7 @@ _MORE, _TAKEN = -2, -1  # what a call may say besides a status code
 
 
 @kernel
-def _acceleration(work: _Work, tau: float, film: Film, q: Load, wall: Wall) -> None:
+def _acceleration(work: _Work, tau: float, film: OrbitFilm, q: Load, wall: Wall) -> None:
     """Acceleration at the point, into work.rate with the load and its rates."""
     x, y, u, v = work.y[_POINT, 0], work.y[_POINT, 1], work.y[_POINT, 2], work.y[_POINT, 3]
     f_x, f_y = film_force(film, x, y, u, v)
@@ -566,7 +568,7 @@ def _explicit_finish(work: _Work, method: int, h: float) -> None:
         y[_POINT, c] += h / 6.0 * (y[_STAGE, c] + 2.0 * middle + y[_STAGE + 3, c])
 
 
-def _safe_eccentricity(film: Film, alpha: float, step: float, stable: float) -> float:
+def _safe_eccentricity(film: OrbitFilm, alpha: float, step: float, stable: float) -> float:
     """Eccentricity up to which a fixed step is stable in any case; beyond, the march asks.
 
     The short film damps more than any other of its length, by at most the squeeze of a full circle:
@@ -659,7 +661,7 @@ def _hold_contact(work: _Work, wall: Wall) -> None:
 
 
 @kernel
-def _fault(work: _Work, film: Film, wall: Wall) -> int:
+def _fault(work: _Work, film: OrbitFilm, wall: Wall) -> int:
     """Status code of the state."""
     y = work.y
     square = y[_STATE, 0] ** 2 + y[_STATE, 1] ** 2
@@ -753,7 +755,7 @@ def _fixed_call(work: _Work, s: _Settings) -> int:
 
 
 @kernel
-def _adaptive_call(work: _Work, film: Film, wall: Wall, s: _Settings, t: _Tableau) -> int:
+def _adaptive_call(work: _Work, film: OrbitFilm, wall: Wall, s: _Settings, t: _Tableau) -> int:
     """After a call of an adaptive step: Jacobian, stages, and the verdict."""
     call, clock = work.counts[CALL], work.clock
     work.counts[CALL] = call + 1
@@ -810,7 +812,7 @@ def _accept(work: _Work, error: float) -> None:
 
 @kernel
 def _march(
-    film: Film, q: Load, wall: Wall, s: _Settings, t: _Tableau, work: _Work, record: Any
+    film: OrbitFilm, q: Load, wall: Wall, s: _Settings, t: _Tableau, work: _Work, record: Any
 ) -> int:
     """March to the last sample; status code.
 
@@ -879,7 +881,7 @@ class OrbitRun:
 
 
 def run_orbit(
-    film: Film,
+    film: OrbitFilm,
     q: Load,
     *,
     duration: float,
@@ -982,7 +984,7 @@ def _new_work(state: tuple[float, float, float, float]) -> _Work:
 
 
 def _check_run(
-    film: Film,
+    film: OrbitFilm,
     duration: float,
     start: tuple[float, float],
     integrator: str,
@@ -1007,7 +1009,7 @@ def _check_run(
         raise ValueError("\n".join(wrong))
 
 
-def _overloaded(film: Film, q: Load, state: NDArray[np.float64], tau: float) -> bool:
+def _overloaded(film: OrbitFilm, q: Load, state: NDArray[np.float64], tau: float) -> bool:
     """Whether the load is, now and in the end, more than the turning film carries at its edge.
 
     The unbalance does not count.
@@ -1021,7 +1023,7 @@ def _overloaded(film: Film, q: Load, state: NDArray[np.float64], tau: float) -> 
 
 
 @kernel
-def _trace(film: Film, states: Any, trace: Any) -> None:
+def _trace(film: OrbitFilm, states: Any, trace: Any) -> None:
     for n in range(states.shape[0]):
         x, y, u, v = states[n, 0], states[n, 1], states[n, 2], states[n, 3]
         trace[n, 0], trace[n, 1] = film_force(film, x, y, u, v)
@@ -1052,7 +1054,7 @@ class FilmTrace:
     peak_pressure: NDArray[np.float64] | None
 
 
-def film_trace(film: Film, run: OrbitRun) -> FilmTrace:
+def film_trace(film: OrbitFilm, run: OrbitRun) -> FilmTrace:
     """Force and largest pressure of the film at the samples of a run."""
     states = np.ascontiguousarray(np.hstack([run.position, run.velocity]))
     trace = np.empty((len(states), 3))

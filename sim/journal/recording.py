@@ -18,9 +18,9 @@ from ..output.solution import SimulationError, Solution, Status
 from ..scene.journal import JournalLoad, JournalScene
 from ..scene.parts import Scene, SceneError, channels_of
 from .orbit import (
-    Film,
     FilmTrace,
     Load,
+    OrbitFilm,
     OrbitRun,
     OrbitStatus,
     Wall,
@@ -154,7 +154,7 @@ def film_geometry(scene: JournalScene) -> FilmGeometry:
     )
 
 
-def journal_film(scene: JournalScene) -> Film:
+def journal_film(scene: JournalScene) -> OrbitFilm:
     """Film of a scene, of the rung that it names.
 
     Examples
@@ -167,21 +167,21 @@ def journal_film(scene: JournalScene) -> Film:
     return _FILMS[scene.film.rung](film_geometry(scene))
 
 
-def _mapped(geometry: FilmGeometry) -> Film:
+def _mapped(geometry: FilmGeometry) -> OrbitFilm:
     """Map of a plain bore: it has no clearance in it, so that all records of a set share one."""
     size = (geometry.length_to_diameter, geometry.n_theta, geometry.n_z, geometry.condition)
     return _plain_map(*size)
 
 
 @lru_cache(maxsize=8)
-def _plain_map(length_to_diameter: float, n_theta: int, n_z: int, condition: str) -> Film:
+def _plain_map(length_to_diameter: float, n_theta: int, n_z: int, condition: str) -> OrbitFilm:
     geometry = FilmGeometry(
         length_to_diameter=length_to_diameter, n_theta=n_theta, n_z=n_z, condition=condition
     )
     return map_film(impedance_map(geometry), length_to_diameter)
 
 
-_FILMS: dict[str, Callable[[FilmGeometry], Film]] = {
+_FILMS: dict[str, Callable[[FilmGeometry], OrbitFilm]] = {
     "short": lambda geometry: short_film(geometry.length_to_diameter),
     "map": _mapped,
     "direct": solved_film,
@@ -425,7 +425,7 @@ def _failed(scene: JournalScene, status: Status, numerics: Numerics) -> Solution
     )
 
 
-def _run(scene: JournalScene, film: Film, loads: Load, plan: "_Plan") -> OrbitRun:
+def _run(scene: JournalScene, film: OrbitFilm, loads: Load, plan: "_Plan") -> OrbitRun:
     speed = math.tau * scene.drive.speed
     sample_step = speed / scene.sample_rate
     told = scene.numerics.step
@@ -543,7 +543,7 @@ def _numerics(scene: JournalScene, scale: JournalScale, plan: _Plan, run: OrbitR
     return numerics
 
 
-def _guards(scene: JournalScene, film: Film, run: OrbitRun) -> Numerics:
+def _guards(scene: JournalScene, film: OrbitFilm, run: OrbitRun) -> Numerics:
     """What is left of the step's stability, and the error that the integrator expects."""
     method = scene.numerics.integrator
     if method == "adaptive":  # L-stable: no step is too long for a squeezed film
@@ -565,7 +565,7 @@ _STABLE = {"euler": 2.0, "rk4": 2.785}
 _NUDGE = 1e-4  # of the clearance per radian: the film is near to linear in so small a rate
 
 
-def squeeze_rate(film: Film, run: OrbitRun) -> float:
+def squeeze_rate(film: OrbitFilm, run: OrbitRun) -> float:
     """Largest damping of the film at the outermost place of an orbit.
 
     Parameters
@@ -613,7 +613,7 @@ def _truth(
     scale: JournalScale,
     plan: _Plan,
     run: OrbitRun,
-    pushes: tuple[Film, Load],
+    pushes: tuple[OrbitFilm, Load],
 ) -> dict[str, Float]:
     """Orbit, film force, thinnest film, peak pressure and load at the samples."""
     kept, (film, loads) = plan.kept, pushes

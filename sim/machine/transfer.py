@@ -20,7 +20,7 @@ Complex = NDArray[np.complex128]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Transfer:
+class SceneTransfer:
     """Accelerance from places that are pushed to accelerometers.
 
     Attributes
@@ -38,7 +38,7 @@ class Transfer:
     values: Complex
 
 
-def scene_transfer(scene: Scene, frequency: Float) -> Transfer:
+def scene_transfer(scene: Scene, frequency: Float) -> SceneTransfer:
     """Accelerance of a scene from every place of its forces, or of its exciters.
 
     Parameters
@@ -52,7 +52,7 @@ def scene_transfer(scene: Scene, frequency: Float) -> Transfer:
 
     Returns
     -------
-    Transfer
+    SceneTransfer
 
     Raises
     ------
@@ -81,13 +81,13 @@ def scene_transfer(scene: Scene, frequency: Float) -> Transfer:
     )
 
 
-def _of_pump(scene: Scene, frequency: Float) -> Transfer:
+def _of_pump(scene: Scene, frequency: Float) -> SceneTransfer:
     assert isinstance(scene, PumpScene)
     sensors = tuple(sensor.name for sensor in scene.accelerometers)
     measured = measured_casing(scene)
     if measured is not None:
         inside = (measured.frequency >= frequency[0]) & (measured.frequency <= frequency[-1])
-        return Transfer(
+        return SceneTransfer(
             frequency=measured.frequency[inside],
             sensors=sensors,
             places=measured_places(scene),
@@ -98,7 +98,7 @@ def _of_pump(scene: Scene, frequency: Float) -> Transfer:
     omega, natural = math.tau * frequency, math.tau * modes.frequency[:, None]
     receptance = 1 / (natural**2 - omega**2 + 2j * modes.damping_ratio[:, None] * natural * omega)
     values = np.einsum("mo,mi,ml->oil", modes.outputs, modes.inputs, -(omega**2) * receptance)
-    return Transfer(frequency=frequency, sensors=sensors, places=places, values=values)
+    return SceneTransfer(frequency=frequency, sensors=sensors, places=places, values=values)
 
 
 def _pump_places(scene: PumpScene) -> tuple[str, ...]:
@@ -109,7 +109,7 @@ def _pump_places(scene: PumpScene) -> tuple[str, ...]:
     return tuple(dict.fromkeys([*forces, *pushed]))
 
 
-def _of_shaft(scene: Scene, frequency: Float) -> Transfer:
+def _of_shaft(scene: Scene, frequency: Float) -> SceneTransfer:
     assert isinstance(scene, ShaftScene)
     if (frequency <= 0).any():
         raise SceneError(
@@ -125,7 +125,7 @@ def _of_shaft(scene: Scene, frequency: Float) -> Transfer:
     values = accelerance(
         state.rotor, frequency, sensors, list(forces.values()), speed=state.film.speed
     )
-    return Transfer(
+    return SceneTransfer(
         frequency=frequency,
         sensors=tuple(sensor.name for sensor in scene.sensors),
         places=tuple(forces),
@@ -139,7 +139,7 @@ def _key(part: ShaftExciter) -> str:
     return f"{at}{'_housing' * (part.part == 'housing')}_{part.direction}"
 
 
-_TRANSFERS: tuple[tuple[type[Scene], Callable[[Scene, Float], Transfer]], ...] = (
+_TRANSFERS: tuple[tuple[type[Scene], Callable[[Scene, Float], SceneTransfer]], ...] = (
     (PumpScene, _of_pump),
     (ShaftScene, _of_shaft),
 )

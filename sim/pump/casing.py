@@ -130,7 +130,7 @@ def _respond(
 
 
 @dataclass(frozen=True, kw_only=True)
-class Modes:
+class CasingModes:
     """Modes of a casing, mass-normalised.
 
     Attributes
@@ -148,7 +148,7 @@ class Modes:
 
 
 def _acceleration(
-    forces: NDArray[np.float64], taps: NDArray[np.float64], sample_rate: float, modes: Modes
+    forces: NDArray[np.float64], taps: NDArray[np.float64], sample_rate: float, modes: CasingModes
 ) -> NDArray[np.float64]:
     """Acceleration [shape=(n_samples, n_outputs)] where springs feel the forces through `taps`."""
     pairs = [
@@ -174,7 +174,7 @@ def _acceleration(
 
 
 def housing_acceleration(
-    forces: NDArray[np.float64], sample_rate: float, modes: Modes
+    forces: NDArray[np.float64], sample_rate: float, modes: CasingModes
 ) -> NDArray[np.float64]:
     """Acceleration of the housing under forces that are linear between samples.
 
@@ -203,7 +203,7 @@ def housing_acceleration(
 
 
 def band_limited_acceleration(
-    means: NDArray[np.float64], step_rate: float, factor: int, modes: Modes
+    means: NDArray[np.float64], step_rate: float, factor: int, modes: CasingModes
 ) -> NDArray[np.float64]:
     """Acceleration of the housing at the sample rate, from means of the forces over steps.
 

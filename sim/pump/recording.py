@@ -20,7 +20,7 @@ from ..scene.exciters import exciter_faults
 from ..scene.parts import Accelerometer, CasingMode, Scene, SceneError, channels_of, specific_key
 from ..scene.pump import CRANK_PLACES, FORCE_PLACES, GUIDE_PLACES, VALVE_PLACES, PumpScene
 from .casing import (
-    Modes,
+    CasingModes,
     band_limited_acceleration,
     casing_inputs,
     decimate,
@@ -447,7 +447,7 @@ def measured_places(scene: PumpScene) -> tuple[str, ...]:
     )
 
 
-def casing_modes(scene: PumpScene, places: tuple[str, ...]) -> Modes:
+def casing_modes(scene: PumpScene, places: tuple[str, ...]) -> CasingModes:
     """Modes of a scene's casing on its feet as they are, at these places and all sensors.
 
     Parameters
@@ -468,7 +468,7 @@ def casing_modes(scene: PumpScene, places: tuple[str, ...]) -> Modes:
     modes, sensors = scene.casing.modes, scene.accelerometers
     feet = scene.casing.feet
     held = [mode.on_feet(1.0 if feet is None else feet.stiffness_ratio) for mode in modes]
-    return Modes(
+    return CasingModes(
         frequency=np.array([frequency for frequency, _ in held]),
         damping_ratio=np.array([ratio for _, ratio in held]),
         inputs=np.array([[_participation(mode, key) for key in places] for mode in modes]),

@@ -224,7 +224,7 @@ class RunOut(Part):
     phase: _SHAFT_ANGLE = Field(default=0.0, description="of the track, at the keyphasor mark")
 
 
-class Rotor(Part):
+class RotorShare(Part):
     """The part of a rigid rotor that one bearing carries."""
 
     mass: Mass = Field(ge=LIGHTEST, le=HEAVIEST, description="on this bearing")
@@ -374,7 +374,7 @@ class JournalScene(Scene):
     drive: JournalDrive
     bearing: Bearing
     oil: Oil
-    rotor: Rotor
+    rotor: RotorShare
     load: JournalLoad = JournalLoad()
     film: Film = Film()
     start: JournalStart = JournalStart()

@@ -453,7 +453,7 @@ def _resolved(model: LineModel, shaft: Rotor, place: Place) -> tuple[int, bool]:
     return shaft.dof(station, coordinate), False
 
 
-class Transfer(NamedTuple):
+class ChangedTransfer(NamedTuple):
     """Accelerances, and what their slopes need."""
 
     value: Complex  # [(m/s^2)/N] (n_lines, n_resp, n_force)
@@ -463,7 +463,7 @@ class Transfer(NamedTuple):
 
 def transfer(
     model: LineModel, film: BeamFilm, line: FreeLine, change: Vector | None = None
-) -> Transfer:
+) -> ChangedTransfer:
     """Accelerance from the forces of a test to its responses.
 
     Parameters
@@ -478,7 +478,7 @@ def transfer(
 
     Returns
     -------
-    Transfer
+    ChangedTransfer
 
     Examples
     --------
@@ -496,7 +496,7 @@ def transfer(
     right = flexibility[:, :, line.forces]
     left = flexibility[:, line.responses, :]
     value = -(omega[:, None, None] ** 2) * right[:, line.responses]
-    return Transfer(value=value, right=right, left=left)
+    return ChangedTransfer(value=value, right=right, left=left)
 
 
 def _film_impedance(film: BeamFilm, omega: Vector, change: Vector | None) -> Complex:
@@ -536,7 +536,7 @@ def _joined(model: LineModel, films: Complex, line: FreeLine, omega: Vector) -> 
 def transfer_slopes(
     model: LineModel,
     line: FreeLine,
-    found: Transfer,
+    found: ChangedTransfer,
     films: tuple[Vector, Vector],
     directions: Vector,
 ) -> Complex:

@@ -23,7 +23,7 @@ from wearstate.diagnose.learning.conformal import (
 )
 from wearstate.diagnose.learning.grades import grades_of
 from wearstate.diagnose.wear_model.novelty import novelty_p_value
-from wearstate.diagnose.wear_model.train import Lesson, learn
+from wearstate.diagnose.wear_model.train import TrainingRows, learn
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,14 +47,14 @@ def figures_of(task, seed, budget_ms=None):
         Name -> share, or size.
     """
     train, test = group_split(task.groups, test_fraction=0.25, seed=seed)
-    lesson = Lesson(
+    training = TrainingRows(
         names=task.names,
         rows=task.rows[train],
         baseline=None,
         severity=task.severity[train],
         groups=task.groups[train],
     )
-    learnt = learn(lesson, seed=seed, budget_ms=budget_ms)
+    learnt = learn(training, seed=seed, budget_ms=budget_ms)
     found = learnt.blind
     rows, truth = task.rows[test], task.severity[test]
     estimate, apart = found.severity.predict(rows), found.severity.disagreement(rows)

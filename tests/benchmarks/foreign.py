@@ -30,7 +30,7 @@ from wearstate.datasets.generation.generate import generate
 from wearstate.diagnose.evaluation.evaluate import judge_rows, judged_rows
 from wearstate.diagnose.feature_rows.feature_choice import choice_in
 from wearstate.diagnose.feature_rows.healthy import Baselines, references
-from wearstate.diagnose.learning.scores import Figure, Judged, resampled, share
+from wearstate.diagnose.learning.scores import Judged, ScoreFigure, resampled, share
 from wearstate.diagnose.wear_model.estimate import Estimate, WearModel
 from wearstate.diagnose.wear_model.file import load_model, save_model
 from wearstate.diagnose.wear_model.train import train_model
@@ -108,7 +108,7 @@ def judged_set(model: WearModel, path: Path, healthy: Path | None) -> tuple[Judg
     return replace(found, graded=graded, cautious=cautious, low=low, high=high), told
 
 
-def figures(found: Judged, limit: float, condemned: float) -> dict[str, Figure]:
+def figures(found: Judged, limit: float, condemned: float) -> dict[str, ScoreFigure]:
     """Figures over all records and over those that were not refused.
 
     Returns
