@@ -16,8 +16,8 @@ from wearstate.datasets.recipe.recipe import load_recipe
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.inspect.card import (
     CardPicture,
+    CardTable,
     Code,
-    Table,
     card_html,
     card_markdown,
     data_card,
@@ -55,7 +55,7 @@ def section(card, name):
 
 
 def rows(card, name, number=0):
-    tables = [block for block in section(card, name) if isinstance(block, Table)]
+    tables = [block for block in section(card, name) if isinstance(block, CardTable)]
     return [dict(zip(tables[number].head, row, strict=True)) for row in tables[number].rows]
 
 

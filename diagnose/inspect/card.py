@@ -31,7 +31,7 @@ _FEW_TEXTS = 4  # different texts of a column that are listed
 
 
 @dataclass(frozen=True, kw_only=True)
-class Table:
+class CardTable:
     """Rows under a head; the columns named in `numbers` are set to the right."""
 
     head: tuple[str, ...]
@@ -55,7 +55,7 @@ class CardPicture:
     address: str
 
 
-Block = str | list[str] | Table | Code | CardPicture
+Block = str | list[str] | CardTable | Code | CardPicture
 """A paragraph, a list, a table, a snippet or a picture."""
 
 
@@ -192,7 +192,7 @@ class _Facts:
 # --- sections -----------------------------------------------------------------------------------
 
 
-def _identity(facts: _Facts) -> Table:
+def _identity(facts: _Facts) -> CardTable:
     head = facts.head
     n_records, n_channels, n_samples = facts.data.stored_shape
     hours = n_records * n_samples / head.sample_rate / 3600
@@ -211,12 +211,12 @@ def _identity(facts: _Facts) -> Table:
         rows.append(("recipe", f"{facts.recipe.get('name')}, seed {head.seed}"))
     if head.limit_source:
         rows.append(("wear limits", head.limit_source))
-    return Table(head=("", ""), rows=tuple(rows))
+    return CardTable(head=("", ""), rows=tuple(rows))
 
 
 def _labels(facts: _Facts) -> Iterator[Block]:
     if facts.head.severities:
-        yield Table(
+        yield CardTable(
             head=("severity", "column", "least [mm]", "median [mm]", "largest [mm]"),
             rows=tuple(_severity_row(facts, name) for name in facts.head.severities),
             numbers=("least [mm]", "median [mm]", "largest [mm]"),
@@ -230,7 +230,7 @@ def _labels(facts: _Facts) -> Iterator[Block]:
             for name, present in faults.items()
         ]
         head = ("fault", "column", "records", "share")
-        yield Table(head=head, rows=tuple(rows), numbers=head[2:])
+        yield CardTable(head=head, rows=tuple(rows), numbers=head[2:])
 
 
 def _severity_row(facts: _Facts, name: str) -> tuple[str, ...]:
@@ -246,7 +246,7 @@ def _count(count: Any, total: int) -> tuple[str, str]:
     return str(int(count)), f"{100 * count / total:.1f} %"
 
 
-def _balance(facts: _Facts) -> Table:
+def _balance(facts: _Facts) -> CardTable:
     """How many records and machines each grade has."""
     grades = facts.manifest["grade"]
     rows = []
@@ -257,7 +257,7 @@ def _balance(facts: _Facts) -> Table:
         shown = str(grade) if grade >= 0 else "-"
         rows.append((shown, name, *_count(len(inside), len(grades)), machines))
     head = ("grade", "meaning", "records", "share", "machines")
-    return Table(head=head, rows=tuple(rows), numbers=head[2:])
+    return CardTable(head=head, rows=tuple(rows), numbers=head[2:])
 
 
 def _pictures(facts: _Facts) -> Iterator[Block]:
@@ -288,7 +288,7 @@ def _columns(facts: _Facts) -> Iterator[Block]:
         else:
             told.append(_column_row(column, known, len(values)))
     head = ("column", "unit", "meaning", "least", "median", "largest", "unknown")
-    yield Table(head=head, rows=tuple(told), numbers=head[3:])
+    yield CardTable(head=head, rows=tuple(told), numbers=head[3:])
     if empty:
         yield f"Unknown in every record: {', '.join(empty)}."
 
@@ -329,7 +329,7 @@ def _models(facts: _Facts) -> Iterator[Block]:
                 shown = ", ".join(f"{name} ({count})" for name, count in counts.most_common())
                 rows.append((column.meaning.rpartition(": ")[2], column.name, shown))
     if rows:
-        yield Table(head=("effect", "column", "model (records)"), rows=tuple(rows))
+        yield CardTable(head=("effect", "column", "model (records)"), rows=tuple(rows))
     yield _choice_text(facts)
     yield _error_text(facts)
     status = Counter(facts.manifest["status"].tolist())
@@ -367,7 +367,7 @@ def _splits(facts: _Facts) -> Iterator[Block]:
         rows.append((name, text, str(len(train)), str(len(test)), str(rest), apart))
     if rows:
         head = ("split", "how it was made", "train", "test", "neither", "machines apart")
-        yield Table(head=head, rows=tuple(rows), numbers=head[2:5])
+        yield CardTable(head=head, rows=tuple(rows), numbers=head[2:5])
     else:
         yield "None is stored in the file. Split by the column group: it keeps a machine together."
 
@@ -515,10 +515,10 @@ def _markdown(block: Block) -> str:
         return "\n".join(f"- {text}" for text in block)
     if isinstance(block, Code):
         return f"{block.title}:\n\n```python\n{block.text}```"
-    return _markdown_table(block) if isinstance(block, Table) else ""
+    return _markdown_table(block) if isinstance(block, CardTable) else ""
 
 
-def _markdown_table(table: Table) -> str:
+def _markdown_table(table: CardTable) -> str:
     rule = ["---:" if name in table.numbers else "---" for name in table.head]
     return "\n".join(_markdown_row(row) for row in (table.head, rule, *table.rows))
 
@@ -544,7 +544,7 @@ def card_html(card: Card) -> str:
         (
             name,
             [
-                (_kind(block), block if isinstance(block, (str, list)) else asdict(block))
+                (_KINDS[type(block)], block if isinstance(block, (str, list)) else asdict(block))
                 for block in blocks
             ],
         )
@@ -553,7 +553,5 @@ def card_html(card: Card) -> str:
     return render("card.html.j2", card=card, sections=sections)
 
 
-def _kind(block: Block) -> str:
-    if isinstance(block, (str, list)):
-        return "text" if isinstance(block, str) else "list"
-    return type(block).__name__.lower()
+_KINDS = {str: "text", list: "list", CardTable: "table", Code: "code", CardPicture: "picture"}
+"""What the template calls each block."""
