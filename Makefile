@@ -3,13 +3,18 @@ PYTHON ?= python3
 BIN := .venv/bin
 STAMP := .venv/.ready
 
-.PHONY: demo test lint types benchmark clean
+.PHONY: demo test check lint types benchmark clean
 
 demo: $(STAMP)
 	$(BIN)/wearstate demo
 
 test: $(STAMP)
 	bash tests/run.sh $(BIN)
+
+# make check FILE="tests/test_film.py tests/test_bearing.py": lint and these tests alone
+check: $(STAMP)
+	$(BIN)/ruff check . && $(BIN)/ruff format --check .
+	$(BIN)/pytest -q $(FILE)
 
 benchmark: $(STAMP)
 	$(BIN)/pytest tests/benchmarks --benchmark-enable --benchmark-only -s

@@ -17,6 +17,15 @@ ended() {  # NAME PROCESS: what a process in the background said, where it faile
 }
 bash tests/types.sh "$bin" > "$scratch/types.log" 2>&1 & types=$!
 
+# every kernel compiled once: test processes that begin together would each compile them all
+warm() {
+  for scene in bilge-pump journal-bearing propulsion-shaft; do
+    "$bin/wearstate" simulate "$scene" --set "duration=0.4 s" -o "$scratch/warm.h5" --force || return
+  done
+  "$bin/wearstate" verify
+}
+warm > "$scratch/warm.log" 2>&1 & warm=$!
+
 # The wheel, in environments that have nothing else: a forgotten package or file shows here. One has
 # the lowest versions that pyproject.toml allows, the other the newest; each does the whole job.
 "$bin/python" -m build --wheel --outdir "$scratch" . > "$scratch/build.log" 2>&1 \
@@ -41,6 +50,7 @@ ended newest "$newest"
   newest/bin/wearstate verify
 )
 ended lowest "$lowest"
+ended warm "$warm"
 
 # every process has a core already: threads would only wait for each other
 export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
