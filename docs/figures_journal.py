@@ -23,7 +23,7 @@ from wearstate.sim.film.solve import (
     solve_direct,
 )
 from wearstate.sim.machine.simulate import simulate
-from wearstate.sim.output.solution import Solution
+from wearstate.sim.output.recording import Recording
 from wearstate.sim.scene.journal import JournalScene
 from wearstate.sim.scene.load import load_scene
 
@@ -38,7 +38,7 @@ PAPER = FilmGeometry(length_to_diameter=2 / 3, condition="periodic")
 
 def run(
     name: str, overrides: dict[str, Any] | None = None
-) -> tuple[JournalScene, Solution, NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[JournalScene, Recording, NDArray[np.float64], NDArray[np.float64]]:
     """Scene, solution, tau, and journal centre over the clearance."""
     scene = load_scene(name, overrides)
     assert isinstance(scene, JournalScene)

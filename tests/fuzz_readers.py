@@ -23,8 +23,8 @@ from typing import Any
 import h5py
 import numpy as np
 from scipy.io import savemat, wavfile
-from wearstate.datasets.file.record import DataError
 from wearstate.datasets.readers.open import SourceOptions, list_sources, open_source
+from wearstate.sim.output.recording import DataError
 
 N_SAMPLES = 60
 SIGNAL = np.random.default_rng(0).standard_normal((2, N_SAMPLES))

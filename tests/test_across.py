@@ -10,7 +10,6 @@ import pandas as pd
 import pytest
 from click.testing import CliRunner
 from numpy.testing import assert_allclose
-from wearstate.datasets.file.record import DataError
 from wearstate.datasets.split.rules import group_folds
 from wearstate.diagnose.charts import across as module
 from wearstate.diagnose.charts.across import (
@@ -22,6 +21,7 @@ from wearstate.diagnose.charts.across import (
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.feature_rows.feature_table import FeatureTable
 from wearstate.diagnose.learning.regressions import CANDIDATES, fit_blend
+from wearstate.sim.output.recording import DataError
 
 LIMIT = 1e-4
 COLUMN = "diametral_clearance_bearing_m"

@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from wearstate.datasets.file.record import DataError, Recording
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.shaft_tests.measured_tests import line_tests, read_reactions
 from wearstate.diagnose.shaft_tests.sag_report import sag_report, sag_text
 from wearstate.sim.alignment.alignment import reactions
 from wearstate.sim.machine.simulate import simulate
+from wearstate.sim.output.recording import DataError, Recording
 from wearstate.sim.scene.load import load_scene
 from wearstate.sim.shaft.changed import free_line, line_model, rest, transfer
 from wearstate.sim.shaft.recording import alignment_conditions, alignment_line

@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 from wearstate.datasets.file import lock
 from wearstate.datasets.file.lock import holding
-from wearstate.datasets.file.record import DataError
 from wearstate.sim import atomic
 from wearstate.sim.atomic import OutputError, fresh_name, replacing, sealed, unsealed, write_whole
+from wearstate.sim.output.recording import DataError
 
 
 def names(folder):

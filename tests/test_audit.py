@@ -18,11 +18,16 @@ from wearstate.datasets.audit.records import ANCHORS, anchors, copies, sketch
 from wearstate.datasets.audit.rows import _rank, copied_rows
 from wearstate.datasets.audit.table import AuditTable, Roles, coded, read_table
 from wearstate.datasets.file.machines import machine_origin
-from wearstate.datasets.file.record import Attributes, DataError, DataSet, DataSetWriter
+from wearstate.datasets.file.record import (
+    Attributes,
+    DataSet,
+    DataSetWriter,
+)
 from wearstate.datasets.generation.generate import generate
 from wearstate.datasets.recipe.recipe import load_recipe
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.inspect.audit_text import audit_text
+from wearstate.sim.output.recording import DataError
 from wearstate.sim.output.sensor import Channel
 
 NUISANCE = 3

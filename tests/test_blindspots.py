@@ -8,7 +8,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from wearstate.datasets.file.record import DataError, Recording
 from wearstate.datasets.recipe.recipe import load_recipe, sample_records
 from wearstate.diagnose.blindspots import blindspots
 from wearstate.diagnose.blindspots.blindspots import find_blind_spots, kept_rows, recipe_of
@@ -21,6 +20,7 @@ from wearstate.diagnose.blindspots.text import blind_spots_table, blind_spots_te
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.wear_model.estimate import Estimate
 from wearstate.features.rotation.order import pulse_times
+from wearstate.sim.output.recording import DataError, Recording
 from wearstate.sim.output.sensor import Channel, tacho_pulses
 from wearstate.sim.scene.parts import SceneError, channels_of
 

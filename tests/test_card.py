@@ -10,7 +10,11 @@ import h5py
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from wearstate.datasets.file.record import Attributes, DataError, DataSet, DataSetWriter
+from wearstate.datasets.file.record import (
+    Attributes,
+    DataSet,
+    DataSetWriter,
+)
 from wearstate.datasets.generation.generate import generate
 from wearstate.datasets.recipe.recipe import load_recipe
 from wearstate.diagnose.command_line.cli import cli
@@ -24,6 +28,7 @@ from wearstate.diagnose.inspect.card import (
     snippets,
     write_card,
 )
+from wearstate.sim.output.recording import DataError
 from wearstate.sim.output.sensor import Channel
 
 N = 24

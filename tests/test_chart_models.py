@@ -11,13 +11,14 @@ from numpy.testing import assert_allclose
 from sklearn.linear_model import RidgeCV
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
-from wearstate.datasets.file.record import Attributes, DataError, DataSetWriter
+from wearstate.datasets.file.record import Attributes, DataSetWriter
 from wearstate.datasets.generation.generate import generate
 from wearstate.datasets.recipe.recipe import load_recipe
 from wearstate.datasets.split.rules import group_folds
 from wearstate.diagnose.charts.of_models import FEATURE_GROUPS, MEAN, MODELS, model_chart
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.feature_rows.feature_table import feature_table
+from wearstate.sim.output.recording import DataError
 from wearstate.sim.output.sensor import Channel
 
 TINY = {"duration": "0.2 s", "film.n_theta": 24, "film.n_z": 5}

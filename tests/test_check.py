@@ -15,7 +15,6 @@ from wearstate.datasets.file.columns import MEANINGS, describe_columns
 from wearstate.datasets.file.record import (
     HASHES,
     Attributes,
-    DataError,
     DataSet,
     DataSetWriter,
     manifest_hash,
@@ -25,6 +24,7 @@ from wearstate.datasets.generation.generate import NUMERICS, generate
 from wearstate.datasets.recipe.recipe import load_recipe
 from wearstate.datasets.recipe.text import recipe_names
 from wearstate.diagnose.command_line.cli import cli
+from wearstate.sim.output.recording import DataError
 from wearstate.sim.output.sensor import Channel
 
 N = 8

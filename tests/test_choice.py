@@ -3,7 +3,7 @@
 import h5py
 import pytest
 from click.testing import CliRunner
-from wearstate.datasets.file.record import DataError, DataSet
+from wearstate.datasets.file.record import DataSet
 from wearstate.datasets.generation import fidelity_choice as module
 from wearstate.datasets.generation import generate as generation
 from wearstate.datasets.generation.fidelity_choice import (
@@ -18,6 +18,7 @@ from wearstate.datasets.recipe.text import recipe_names
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.sim.fidelity.choose import Resolution
 from wearstate.sim.fidelity.ladder import effects_of
+from wearstate.sim.output.recording import DataError
 
 SMALL = {
     "duration": "0.05 s",

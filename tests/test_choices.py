@@ -10,7 +10,7 @@ from random import Random
 import pytest
 from pydantic import BaseModel
 from wearstate.sim.machine.simulate import check, simulate
-from wearstate.sim.output.solution import SimulationError
+from wearstate.sim.output.status import SimulationError
 from wearstate.sim.scene.load import load_scene, scene_names
 from wearstate.sim.scene.parts import SceneError
 

@@ -9,11 +9,12 @@ import h5py
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from wearstate.datasets.file.record import DataError, DataSet
+from wearstate.datasets.file.record import DataSet
 from wearstate.datasets.recipe.text import recipe_text
 from wearstate.diagnose.command_line import demo
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.pages.plain_json import json_text
+from wearstate.sim.output.recording import DataError
 
 
 def run(*arguments, code=0):

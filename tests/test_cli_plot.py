@@ -5,12 +5,17 @@ import json
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from wearstate.datasets.file.record import Attributes, DataError, DataSet, DataSetWriter, Recording
+from wearstate.datasets.file.record import (
+    Attributes,
+    DataSet,
+    DataSetWriter,
+)
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.command_line.commands_data import _KINDS
 from wearstate.diagnose.inspect.info import plot_file
 from wearstate.diagnose.pictures.kinds import AUTO, KINDS
 from wearstate.diagnose.report.figures import report_pictures
+from wearstate.sim.output.recording import DataError, Recording
 from wearstate.sim.output.sensor import Channel
 
 FS = 4096.0

@@ -12,13 +12,13 @@ from contextlib import contextmanager
 import h5py
 import pytest
 from click.testing import CliRunner
-from wearstate.datasets.file.record import DataError
 from wearstate.datasets.generation.generate import generate
 from wearstate.datasets.recipe.recipe import load_recipe
 from wearstate.datasets.workers import cluster
 from wearstate.datasets.workers.local import in_order
 from wearstate.datasets.workers.pool import WorkersError
 from wearstate.diagnose.command_line.cli import cli
+from wearstate.sim.output.recording import DataError
 
 pytest.importorskip("distributed")
 cloudpickle = pytest.importorskip("cloudpickle")

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from numpy.testing import assert_allclose
-from wearstate.datasets.file.record import Channel, DataError, DataSet, Recording
+from wearstate.datasets.file.record import Channel, DataSet
 from wearstate.datasets.split.rules import check_no_leak
 from wearstate.datasets.split.stored import Split, drawn_of, store_splits, usable_sides
 from wearstate.diagnose.command_line.cli import cli
@@ -42,6 +42,7 @@ from wearstate.diagnose.wear_model import train as training
 from wearstate.diagnose.wear_model.estimate import Estimate
 from wearstate.diagnose.wear_model.file import load_model, save_model
 from wearstate.diagnose.wear_model.train import train_model
+from wearstate.sim.output.recording import DataError, Recording
 
 NAMES = ("random", "speed", "severity-beyond", "noise")  # of others, the rows are looked at
 CHEAP_MS = 0.05  # ridges only: the protocol is tested, not the model

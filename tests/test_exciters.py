@@ -16,7 +16,7 @@ from wearstate.features.response.frf import (
 from wearstate.features.response.mimo import multiple_h1
 from wearstate.sim.excitation.forces import exciter_push, stepped_frequencies
 from wearstate.sim.machine.simulate import check, simulate
-from wearstate.sim.output.solution import SimulationError, Status
+from wearstate.sim.output.status import SimulationError, Status
 from wearstate.sim.scene.exciters import Exciter, PlacedExciter
 from wearstate.sim.scene.load import load_scene
 from wearstate.sim.scene.parts import SceneError, channels_of

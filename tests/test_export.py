@@ -19,12 +19,17 @@ from scipy.io import wavfile
 from wearstate.datasets.audit.integrity import check_set
 from wearstate.datasets.convert import export
 from wearstate.datasets.convert.export import ABOUT, FORMATS, LABELS, export_set
-from wearstate.datasets.file.record import Attributes, DataError, DataSet, DataSetWriter
+from wearstate.datasets.file.record import (
+    Attributes,
+    DataSet,
+    DataSetWriter,
+)
 from wearstate.datasets.generation.generate import generate
 from wearstate.datasets.measured.labels import RESERVED
 from wearstate.datasets.recipe.recipe import load_recipe
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.feature_rows.feature_table import recording_features
+from wearstate.sim.output.recording import DataError
 from wearstate.sim.output.sensor import Channel
 
 N = 6

@@ -7,7 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from wearstate.datasets.file.record import Attributes, DataError, DataSet, DataSetWriter
+from wearstate.datasets.file.record import (
+    Attributes,
+    DataSet,
+    DataSetWriter,
+)
 from wearstate.datasets.split.rules import group_folds
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.feature_rows.feature_choice import choice_in, choices_of, select_set
@@ -22,6 +26,7 @@ from wearstate.diagnose.feature_rows.transfer_reference import HealthyTransfer
 from wearstate.diagnose.wear_model.estimate import ModelError
 from wearstate.diagnose.wear_model.file import load_model, save_model
 from wearstate.diagnose.wear_model.train import train_model
+from wearstate.sim.output.recording import DataError
 from wearstate.sim.output.sensor import Channel
 
 FS, N = 2560.0, 10_240

@@ -14,7 +14,7 @@ from wearstate.sim.fidelity.ladder import effects_of, with_values
 from wearstate.sim.fidelity.pilot import Difference, Outcome, Pilot, differences
 from wearstate.sim.fidelity.study import Search, study
 from wearstate.sim.machine.simulate import recorder, simulate
-from wearstate.sim.output.solution import SimulationError
+from wearstate.sim.output.status import SimulationError
 from wearstate.sim.scene.load import load_scene, scene_names
 from wearstate.sim.scene.parts import SceneError
 from wearstate.sim.shaft.recording import shaft_state

@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from wearstate.datasets.file.record import DataError, DataSet
+from wearstate.datasets.file.record import DataSet
 from wearstate.datasets.generation.generate import save_solution
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.feature_rows.healthy import Baseline
@@ -24,6 +24,7 @@ from wearstate.diagnose.wear_model.estimate import Estimate
 from wearstate.sim.film.rest_curve import rest_curve
 from wearstate.sim.film.solve import FilmGeometry
 from wearstate.sim.machine.simulate import simulate
+from wearstate.sim.output.recording import DataError
 from wearstate.sim.output.sensor import Channel
 from wearstate.sim.scene.load import load_scene
 

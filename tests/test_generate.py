@@ -14,7 +14,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.stats import rankdata
-from wearstate.datasets.file.record import DataError, DataSet, DataSetWriter, LostError, WriteError
+from wearstate.datasets.file.record import (
+    DataSet,
+    DataSetWriter,
+    LostError,
+    WriteError,
+)
 from wearstate.datasets.generation import generate as generation
 from wearstate.datasets.generation.generate import Stopped, generate, save_solution
 from wearstate.datasets.recipe.recipe import (
@@ -30,6 +35,7 @@ from wearstate.datasets.split.rules import group_split
 from wearstate.datasets.workers.local import in_order
 from wearstate.sim.atomic import OutputError
 from wearstate.sim.machine.simulate import simulate
+from wearstate.sim.output.recording import DataError
 from wearstate.sim.scene.load import load_scene
 from wearstate.sim.scene.parts import SceneError
 
@@ -257,7 +263,7 @@ import sys, time
 from pathlib import Path
 from wearstate.datasets.generation.generate import generate
 from wearstate.datasets.recipe.recipe import load_recipe
-from wearstate.datasets.file.record import DataError
+from wearstate.sim.output.recording import DataError
 
 folder, me, other, rounds = Path(sys.argv[1]), sys.argv[2], sys.argv[3], int(sys.argv[4])
 recipe = load_recipe("bilge-pump-small", {overrides!r})

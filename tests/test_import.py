@@ -11,13 +11,14 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.io import savemat, wavfile
-from wearstate.datasets.file.record import DataError, DataSet
+from wearstate.datasets.file.record import DataSet
 from wearstate.datasets.measured import data_set as import_set
 from wearstate.datasets.measured import labels
 from wearstate.datasets.measured import plan as import_plan
 from wearstate.datasets.measured.data_set import NO_PULSES, import_recordings
 from wearstate.datasets.measured.labels import read_labels, read_limits
 from wearstate.datasets.readers.open import SourceOptions
+from wearstate.sim.output.recording import DataError
 from wearstate.sim.scene.parts import STANDARD_GRAVITY
 
 RATE = 100

@@ -5,11 +5,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.io import loadmat, savemat, wavfile
-from wearstate.datasets.file.record import Attributes, DataError, DataSetWriter
+from wearstate.datasets.file.record import Attributes, DataSetWriter
 from wearstate.datasets.measured import recording as importers
 from wearstate.datasets.measured.plan import EachChannel
 from wearstate.datasets.measured.recording import list_contents, read_recording
 from wearstate.datasets.readers.open import SourceOptions
+from wearstate.sim.output.recording import DataError
 from wearstate.sim.output.sensor import Channel
 from wearstate.sim.scene.parts import STANDARD_GRAVITY
 

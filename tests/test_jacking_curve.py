@@ -5,13 +5,13 @@ import json
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from wearstate.datasets.file.record import DataError
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.shaft_tests.jacking_tests import measured_curves, read_curves
 from wearstate.diagnose.shaft_tests.sags import estimate_sags
 from wearstate.sim.alignment.alignment import influence, reactions
 from wearstate.sim.alignment.jacking import jacking
 from wearstate.sim.alignment.jacking_curve import CurveError, fit_curve
+from wearstate.sim.output.recording import DataError
 from wearstate.sim.scene.load import load_scene
 from wearstate.sim.shaft.recording import alignment_conditions, alignment_line
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from wearstate.datasets.file.record import DataError, DataSet
+from wearstate.datasets.file.record import DataSet
 from wearstate.datasets.file.views import CompletingView, JoinedSet, views_of
 from wearstate.datasets.generation.generate import generate
 from wearstate.datasets.recipe.recipe import load_recipe
@@ -14,6 +14,7 @@ from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.evaluation.evaluate import evaluate_model
 from wearstate.diagnose.feature_rows.feature_table import FeatureSelection, feature_table
 from wearstate.diagnose.wear_model.file import load_model
+from wearstate.sim.output.recording import DataError
 
 RECORDS = 16
 

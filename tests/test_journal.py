@@ -8,7 +8,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from wearstate.sim.journal.recording import film_geometry, journal_scale
 from wearstate.sim.machine.simulate import check, simulate
-from wearstate.sim.output.solution import SimulationError, Status
+from wearstate.sim.output.status import SimulationError, Status
 from wearstate.sim.scene.journal import JournalScene
 from wearstate.sim.scene.load import load_scene, override, scene_from_table, scene_table, scene_text
 from wearstate.sim.scene.parts import SceneError, channels_of

@@ -16,7 +16,6 @@ from numpy.testing import assert_array_equal
 from wearstate.datasets.file import record
 from wearstate.datasets.file.record import (
     Attributes,
-    DataError,
     DataSet,
     DataSetWriter,
     attributes_hash,
@@ -24,6 +23,7 @@ from wearstate.datasets.file.record import (
 )
 from wearstate.datasets.split.rules import group_split
 from wearstate.diagnose.feature_rows.feature_table import feature_table
+from wearstate.sim.output.recording import DataError
 from wearstate.sim.output.sensor import Channel
 
 N, N_SAMPLES = 12, 2048

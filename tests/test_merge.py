@@ -7,11 +7,12 @@ import pytest
 from click.testing import CliRunner
 from numpy.testing import assert_array_equal
 from wearstate.datasets.convert.merge import merge_sets
-from wearstate.datasets.file.record import DataError, DataSet
+from wearstate.datasets.file.record import DataSet
 from wearstate.datasets.measured.data_set import import_recordings
 from wearstate.datasets.measured.labels import Labels, read_labels
 from wearstate.datasets.source.part import SourceOptions
 from wearstate.diagnose.command_line.cli import cli
+from wearstate.sim.output.recording import DataError
 
 
 def made(folder, name, seeds, *, fs=100.0, labels=None, unit="g"):

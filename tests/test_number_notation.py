@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from wearstate.datasets.file.record import DataError
 from wearstate.datasets.readers.open import list_sources, open_source
 from wearstate.datasets.source.number_notation import unknown_notation
 from wearstate.datasets.source.part import SourceOptions
+from wearstate.sim.output.recording import DataError
 
 OTHERS = [
     ("1+2j", "a complex number", "two columns"),

@@ -10,7 +10,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from wearstate.datasets.file.record import DataError, DataSet
+from wearstate.datasets.file.record import DataSet
 from wearstate.datasets.measured.data_set import import_recordings
 from wearstate.datasets.measured.labels import read_labels
 from wearstate.datasets.readers.open import SourceOptions, open_source
@@ -31,6 +31,7 @@ from wearstate.diagnose.feature_rows.blows import NOISE_SCORE, blow_scores
 from wearstate.diagnose.feature_rows.feature_table import feature_table, recording_features
 from wearstate.diagnose.wear_model.estimate import ModelError
 from wearstate.diagnose.wear_model.file import load_model
+from wearstate.sim.output.recording import DataError
 
 RATE = 4000.0
 

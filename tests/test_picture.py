@@ -9,7 +9,7 @@ import pytest
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.text import Text
-from wearstate.datasets.file.record import Channel, Recording
+from wearstate.datasets.file.record import Channel
 from wearstate.diagnose.alignment.page import align, align_figure, align_html
 from wearstate.diagnose.pages.page import render, short_name, visible
 from wearstate.diagnose.pages.picture import FORMATS, encoded, picture_bytes, save_picture
@@ -18,8 +18,9 @@ from wearstate.diagnose.pictures.simulation import plot_simulation
 from wearstate.diagnose.pictures.view import View
 from wearstate.diagnose.report.figures import trend_picture
 from wearstate.diagnose.report.trend import fit_trend
+from wearstate.sim.output.recording import Recording
 from wearstate.sim.output.sensor import Channel as SensorChannel
-from wearstate.sim.output.solution import Solution, Status
+from wearstate.sim.output.status import Status
 from wearstate.sim.scene.load import load_scene
 
 HOSTILE = {
@@ -123,10 +124,13 @@ def test_a_simulated_recording_takes_any_name(tmp_path):
     n = round(0.5 * scene.sample_rate)
     noise = np.random.default_rng(0).standard_normal
     truth = {"pin_force_n": (n, 2), "pin_offset_m": (n, 2), "piston_pressure_force_n": (n,)}
-    solution = Solution(
+    solution = Recording(
         signal=noise((2, n)).astype(np.float32),
         sample_rate=scene.sample_rate,
-        channels=(SensorChannel(name=name, unit="m/s^2", quantity="acceleration"),) * 2,
+        channels=tuple(
+            SensorChannel(name=each, unit="m/s^2", quantity="acceleration")
+            for each in (name, f"{name} too")
+        ),
         status=Status.OK,
         truth={key: noise(shape) for key, shape in truth.items()},
     )

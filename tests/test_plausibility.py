@@ -8,12 +8,13 @@ import pytest
 from click.testing import CliRunner
 from wearstate.datasets.audit.integrity import check_set
 from wearstate.datasets.audit.plausibility import recording_doubts, scene_in
-from wearstate.datasets.file.record import DataSet, Recording
+from wearstate.datasets.file.record import DataSet
 from wearstate.datasets.generation.generate import save_solution
 from wearstate.datasets.recipe.recipe import load_recipe, sample_records
 from wearstate.datasets.recipe.text import recipe_names
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.sim.machine.simulate import simulate
+from wearstate.sim.output.recording import Recording
 from wearstate.sim.output.sensor import Channel
 from wearstate.sim.scene.load import load_scene, scene_names
 from wearstate.sim.scene.plausibility import (

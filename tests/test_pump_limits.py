@@ -6,7 +6,7 @@ import re
 import numpy as np
 import pytest
 from wearstate.sim.machine.simulate import check, simulate
-from wearstate.sim.output.solution import SimulationError, Status
+from wearstate.sim.output.status import SimulationError, Status
 from wearstate.sim.scene.load import load_scene
 from wearstate.sim.scene.parts import SceneError
 

@@ -5,11 +5,11 @@ import math
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from wearstate.datasets.file.record import Recording
 from wearstate.datasets.source.channel_units import parse_unit
 from wearstate.diagnose.feature_rows.feature_table import recording_features, recording_layout
 from wearstate.diagnose.pictures.view import View
 from wearstate.sim.machine.simulate import simulate
+from wearstate.sim.output.recording import Recording
 from wearstate.sim.pump.pressure_sensors import read_pressure
 from wearstate.sim.scene.load import load_scene
 from wearstate.sim.scene.parts import SceneError

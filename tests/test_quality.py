@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from wearstate.datasets.file.record import Channel, DataSet, Recording
+from wearstate.datasets.file.record import Channel, DataSet
 from wearstate.diagnose.feature_rows.quality import (
     Levels,
     Observation,
@@ -18,6 +18,7 @@ from wearstate.diagnose.feature_rows.quality import (
     suspicions,
 )
 from wearstate.diagnose.wear_model.file import load_model
+from wearstate.sim.output.recording import Recording
 
 CAMPAIGN = runpy.run_path(str(Path(__file__).parent / "benchmarks" / "quality_faults.py"))
 PLANTED = CAMPAIGN["PLANTED"]

@@ -15,7 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 from scipy.stats import rankdata
-from wearstate.datasets.file.record import DataError, DataSet
+from wearstate.datasets.file.record import DataSet
 from wearstate.datasets.generation.generate import generate
 from wearstate.datasets.recipe import recipe as recipes
 from wearstate.datasets.recipe.recipe import STRATA, load_recipe, sample_records
@@ -31,7 +31,8 @@ from wearstate.diagnose.evaluation.text import confounder_lines
 from wearstate.diagnose.feature_rows.feature_table import confounders_in
 from wearstate.diagnose.inspect.info import describe, description_text
 from wearstate.diagnose.wear_model.train import train_model
-from wearstate.sim.output.solution import Status
+from wearstate.sim.output.recording import DataError
+from wearstate.sim.output.status import Status
 from wearstate.sim.scene.load import load_scene, override, scene_table, scene_text
 
 CRANKPIN = "joint.crankpin.diametral_clearance"

@@ -16,7 +16,12 @@ import pytest
 from numpy.testing import assert_array_equal
 from wearstate.datasets.file import hdf5_values, record
 from wearstate.datasets.file.hdf5_values import is_plain
-from wearstate.datasets.file.record import Attributes, DataError, DataSet, DataSetWriter, Recording
+from wearstate.datasets.file.record import (
+    Attributes,
+    DataSet,
+    DataSetWriter,
+)
+from wearstate.sim.output.recording import DataError, Recording
 from wearstate.sim.output.sensor import Channel
 
 N_RECORDS, N_SAMPLES = 3, 40

@@ -9,7 +9,13 @@ import h5py
 import numpy as np
 import pytest
 from wearstate.datasets.file import record
-from wearstate.datasets.file.record import Attributes, DataError, DataSet, DataSetWriter, WriteError
+from wearstate.datasets.file.record import (
+    Attributes,
+    DataSet,
+    DataSetWriter,
+    WriteError,
+)
+from wearstate.sim.output.recording import DataError
 from wearstate.sim.output.sensor import Channel
 
 HEAD = Attributes(

@@ -10,7 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from wearstate.datasets.file.record import Attributes, DataError, DataSet, DataSetWriter, Recording
+from wearstate.datasets.file.record import (
+    Attributes,
+    DataSet,
+    DataSetWriter,
+)
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.command_line.commands_wear import report_exit
 from wearstate.diagnose.feature_rows.healthy import Baseline, Baselines
@@ -29,6 +33,7 @@ from wearstate.diagnose.report.verdict import (
 from wearstate.diagnose.wear_model.estimate import Estimate, FaultFinding
 from wearstate.diagnose.wear_model.file import load_model, save_model
 from wearstate.diagnose.wear_model.train import train_model
+from wearstate.sim.output.recording import DataError, Recording
 from wearstate.sim.output.sensor import Channel
 
 FS = 10240.0

@@ -3,12 +3,13 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from wearstate.datasets.file.record import DataError, DataSet
+from wearstate.datasets.file.record import DataSet
 from wearstate.datasets.measured.data_set import import_recordings
 from wearstate.datasets.measured.recording import read_recording
 from wearstate.datasets.readers.open import SourceOptions, open_source
 from wearstate.datasets.source import resampled_tacho
 from wearstate.features.rotation.order import pulse_times
+from wearstate.sim.output.recording import DataError
 
 FS = 4000.0
 

@@ -5,12 +5,13 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from scipy.io import savemat
-from wearstate.datasets.file.record import DataError, DataSet
+from wearstate.datasets.file.record import DataSet
 from wearstate.datasets.measured.data_set import import_recordings
 from wearstate.datasets.measured.labels import read_labels
 from wearstate.datasets.measured.recording import read_recording
 from wearstate.datasets.readers.open import SourceOptions, open_source
 from wearstate.diagnose.command_line.cli import cli
+from wearstate.sim.output.recording import DataError
 
 MATRIX = np.random.default_rng(7).standard_normal((180, 60))
 """More rows than columns: without the option, 60 channels of 180 samples."""

@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from wearstate.sim.alignment.alignment import influence, reactions
 from wearstate.sim.machine.simulate import check, simulate
-from wearstate.sim.output.solution import SimulationError, Status
+from wearstate.sim.output.status import SimulationError, Status
 from wearstate.sim.scene.load import load_scene
 from wearstate.sim.scene.parts import SceneError, channels_of
 from wearstate.sim.scene.shaft import Coupling, Turbulence
@@ -549,12 +549,12 @@ def test_large_motion_is_a_warning_then_a_failure():
 
 
 def test_a_line_that_whirls_is_a_failure():
-    with pytest.raises(SimulationError, match="line_unstable: the line is unstable on its films"):
+    with pytest.raises(SimulationError, match="line unstable: the line is unstable on its films"):
         simulate(ship(drive__speed="3000 rpm", sample_rate="5.12 kHz"), seed=1)
 
 
 def test_a_shaft_on_the_edge_of_its_bore_names_the_bearing():
-    with pytest.raises(SimulationError, match="bearing 'stern_aft': line_edge: the shaft touches"):
+    with pytest.raises(SimulationError, match="bearing 'stern_aft': line edge: the shaft touches"):
         simulate(ship(bearings__0__slope=0.004), seed=1)
 
 

@@ -6,12 +6,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy.signal import lfilter
-from wearstate.datasets.file.record import DataError, Recording
 from wearstate.diagnose.pages.picture import save_picture
 from wearstate.diagnose.pictures.kinds import AUTO, KINDS, make_panel, plot_recording
 from wearstate.diagnose.pictures.panel import panel_figure
 from wearstate.diagnose.pictures.view import View, thinned
 from wearstate.features.signal.envelope import bearing_frequencies
+from wearstate.sim.output.recording import DataError, Recording
 from wearstate.sim.output.sensor import Channel
 
 UNITS = {"acceleration": "m/s^2", "displacement": "m", "force": "N", "tacho": "V"}

@@ -3,8 +3,8 @@
 from datetime import datetime, timedelta
 
 import pytest
-from wearstate.datasets.file.record import DataError
 from wearstate.datasets.readers.open import SourceOptions, open_source
+from wearstate.sim.output.recording import DataError
 
 START = datetime(2024, 5, 1, 23, 59, 59, 900000)
 """A tenth of a second before midnight: a recording of 0.2 s passes it."""

@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from scipy.io import savemat, wavfile
-from wearstate.datasets.file.record import DataError
 from wearstate.datasets.measured.recording import read_recording
 from wearstate.datasets.readers.open import SourceOptions, open_source
 from wearstate.diagnose.command_line.cli import cli
+from wearstate.sim.output.recording import DataError
 
 ROWS = [f"{0.5 * i},{i}" for i in range(300)]
 

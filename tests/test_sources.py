@@ -15,7 +15,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.io import loadmat, savemat, wavfile
 from wearstate.datasets.file import hdf5_values
-from wearstate.datasets.file.record import Attributes, DataError, DataSetWriter
+from wearstate.datasets.file.record import Attributes, DataSetWriter
 from wearstate.datasets.readers import flat as source_flat
 from wearstate.datasets.readers import mat5 as source_mat5
 from wearstate.datasets.readers import text as source_text
@@ -28,6 +28,7 @@ from wearstate.datasets.source.channel_units import (
     parse_unit,
 )
 from wearstate.datasets.source.part import LARGEST_INFLATED
+from wearstate.sim.output.recording import DataError
 from wearstate.sim.output.sensor import Channel
 from wearstate.sim.scene.parts import STANDARD_GRAVITY
 

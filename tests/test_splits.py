@@ -12,7 +12,11 @@ from click.testing import CliRunner
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
-from wearstate.datasets.file.record import Attributes, DataError, DataSet, DataSetWriter
+from wearstate.datasets.file.record import (
+    Attributes,
+    DataSet,
+    DataSetWriter,
+)
 from wearstate.datasets.generation.generate import generate
 from wearstate.datasets.recipe.recipe import load_recipe, overrides_text, sample_records
 from wearstate.datasets.split import stored as split_file
@@ -38,6 +42,7 @@ from wearstate.datasets.split.stored import (
 )
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.command_line.commands_data import _SPLITS
+from wearstate.sim.output.recording import DataError
 from wearstate.sim.output.sensor import Channel
 
 MANY = st.lists(st.integers(-3, 9), min_size=2, max_size=60).filter(lambda g: len(set(g)) > 1)

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from numpy.testing import assert_allclose
-from wearstate.datasets.file.record import DataError
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.stability import atlas as stability_atlas
 from wearstate.diagnose.stability import method_map as stability
@@ -39,6 +38,7 @@ from wearstate.diagnose.stability.steppers import (
 from wearstate.sim.contact.closed_forms import kelvin_voigt_restitution
 from wearstate.sim.film.bearing import BearingStatus, equilibrium
 from wearstate.sim.film.solve import FilmGeometry, FilmState, FilmStatus, solve_relaxed
+from wearstate.sim.output.recording import DataError
 from wearstate.sim.pump.setup import contact_frequency, joint_mobility
 from wearstate.sim.scene.load import load_scene
 from wearstate.sim.scene.parts import SceneError

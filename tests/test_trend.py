@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.stats import theilslopes
-from wearstate.datasets.file.record import DataError
 from wearstate.diagnose.report.trend import (
     FEWEST_POINTS,
     LONGEST_REACH,
@@ -17,6 +16,7 @@ from wearstate.diagnose.report.trend import (
     read_dates,
     span_words,
 )
+from wearstate.sim.output.recording import DataError
 
 LIMIT = 3.1e-4  # m
 Z = 1.6448536  # of 90 %

@@ -1,5 +1,5 @@
 """Is a data set fit to train on: leaks, copies, integrity, plausibility.
 
-It may import ``sim.scene``, ``sim.wear``, ``features.rotation``, ``datasets.file``,
+It may import ``sim.output``, ``sim.scene``, ``sim.wear``, ``features.rotation``, ``datasets.file``,
 ``datasets.workers``, ``datasets.recipe``, ``datasets.split``, ``datasets.measured``.
 """

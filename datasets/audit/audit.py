@@ -9,8 +9,9 @@ from typing import Any, Literal
 
 import numpy as np
 
+from ...sim.output.recording import DataError
 from ..file.machines import machine_origin
-from ..file.record import DataError, DataSet
+from ..file.record import DataSet
 from .columns import cancelling_pairs, class_scaled, constant_columns
 from .label import confounded, lone_machines, readable
 from .records import Copy, Sketches, copies, pairs_in, sketch

@@ -14,8 +14,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from ...sim.output.recording import DataError
 from ...sim.wear.archard import grade
-from ..file.record import DataError, DataSet, signal_checksum
+from ..file.record import DataSet, signal_checksum
 from ..recipe.draws import Range
 from ..recipe.recipe import Recipe, recorded_recipe
 from ..split.rules import check_no_leak

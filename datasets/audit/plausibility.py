@@ -4,6 +4,7 @@ import json
 import math
 
 from ...features.rotation.order import pulse_times
+from ...sim.output.recording import Recording
 from ...sim.scene.load import scene_from_table
 from ...sim.scene.parts import Scene
 from ...sim.scene.plausibility import (
@@ -14,7 +15,7 @@ from ...sim.scene.plausibility import (
     scene_doubts,
     sensor_limits,
 )
-from ..file.record import Attributes, Recording
+from ..file.record import Attributes
 from ..recipe.recipe import recorded_scene
 
 

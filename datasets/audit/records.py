@@ -7,7 +7,8 @@ from functools import lru_cache, partial
 import numpy as np
 from numpy.typing import NDArray
 
-from ..file.record import DataSet, Recording
+from ...sim.output.recording import Recording
+from ..file.record import DataSet
 from ..workers.local import in_order
 from .table import Float, usable_records
 

@@ -8,8 +8,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from ...sim.output.recording import DataError
 from ..file.hdf5_values import HDF5_FAULTS, is_plain
-from ..file.record import DataError, DataSet
+from ..file.record import DataSet
 from ..measured.labels import listed
 
 Float = NDArray[np.float64]

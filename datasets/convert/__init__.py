@@ -1,4 +1,5 @@
 """Whole data sets turned into others: merged, or exported to other formats.
 
-It may import ``sim.atomic``, ``datasets.file``, ``datasets.source``, ``datasets.measured``.
+It may import ``sim.atomic``, ``sim.output``, ``datasets.file``, ``datasets.source``,
+``datasets.measured``.
 """

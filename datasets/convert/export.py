@@ -14,13 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...sim.atomic import replacing
+from ...sim.output.recording import DataError, Recording
 from ..file.csv_cells import safe_frame
 from ..file.hdf5_values import write_values
 from ..file.machines import FILE
 from ..file.record import (
-    DataError,
     DataSet,
-    Recording,
     fill_split,
     lay_out_split,
     refuse_output,

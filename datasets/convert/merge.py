@@ -11,9 +11,9 @@ from typing import Any, Literal
 import numpy as np
 
 from ...sim.atomic import OutputError
+from ...sim.output.recording import DataError
 from ..file.record import (
     Attributes,
-    DataError,
     DataSet,
     DataSetWriter,
     manifest_hash,

@@ -10,7 +10,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from ...sim.atomic import fresh_name
-from .record import DataError
+from ...sim.output.recording import DataError
 
 try:
     import fcntl

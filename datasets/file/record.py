@@ -15,7 +15,7 @@ from importlib.metadata import version
 from itertools import pairwise
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Literal, Self
+from typing import Any, Self
 
 import h5py
 import numpy as np
@@ -24,7 +24,8 @@ from numpy.typing import NDArray
 
 from ... import __version__
 from ...sim.atomic import fresh_name, put_in_place
-from ...sim.output.sensor import Channel, rate_fault
+from ...sim.output.recording import DataError, Recording, SignalLayout
+from ...sim.output.sensor import Channel
 from .hdf5_values import HDF5_FAULTS, fill_room, is_plain, make_room, plain_values, write_values
 from .machines import machine_identities
 
@@ -49,169 +50,18 @@ _HEAD = {
 _TAIL = {"signal_crc32": "<u4"}
 
 
-class DataError(ValueError):
-    """A data set or recording cannot be used; names quantity, value, bound and cure."""
-
-
 class WriteError(RuntimeError):
     """A data set file cannot be written on; names file, cause and cure. What is in it stays."""
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Recording:
-    """One recording with everything needed to interpret it.
-
-    Parameters
-    ----------
-    signal : numpy.ndarray [shape=(n_channels, n_samples)]
-        Finite, in the unit of each channel; stored as float32.
-    sample_rate : float
-        [Hz]
-    channels : tuple of Channel
-        One per row of `signal`, names unique.
-    tacho : str, optional
-        Name of the tacho channel.
-    pulses_per_revolution : int
-        Of the tacho.
-    origin : {"simulated", "measured"}
-        Where the signal is from.
-    row : mapping
-        Manifest values: conditions, severities, grade, numerics; may be empty.
-    source : str
-        File name, for messages and reports.
-    machine : str
-        Identity of the machine, as of :func:`~.file.machines.machine_identities`; empty where
-        unknown.
-    joined : mapping
-        Further tests of the same machine state, by the name of the view.
-
-    Raises
-    ------
-    DataError
-        Shape, sample rate, names or tacho do not fit, or a sample is not finite.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> channel = Channel(name="acc", unit="m/s^2", quantity="acceleration")
-    >>> Recording(signal=np.zeros((1, 8)), sample_rate=100.0, channels=(channel,)).duration
-    0.08
-    """
-
-    signal: NDArray[np.float32]
-    sample_rate: float
-    channels: tuple[Channel, ...]
-    tacho: str | None = None
-    pulses_per_revolution: int = 1
-    origin: Literal["simulated", "measured"] = "measured"
-    row: Mapping[str, Any] = field(default_factory=dict)
-    source: str = ""
-    machine: str = ""
-    joined: Mapping[str, "Recording"] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        shape = np.shape(self.signal)
-        if len(shape) != 2 or shape[0] != len(self.channels) or 0 in shape:
-            raise DataError(
-                f"{self.source or 'recording'}: signal has shape {shape}, must be "
-                f"({len(self.channels)} channels, >= 1 samples); transpose it or name its channels"
-            )
-        _check_header(self, self.source or "recording")
-        with np.errstate(over="ignore"):  # too large for float32 becomes inf, refused below
-            object.__setattr__(self, "signal", np.asarray(self.signal, dtype=np.float32))
-        _refuse_gaps(self)
-
-    @property
-    def duration(self) -> float:
-        """Length [s]."""
-        return float(self.signal.shape[1] / self.sample_rate)
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Name of every channel."""
-        return tuple(channel.name for channel in self.channels)
-
-    @property
-    def units(self) -> dict[str, str]:
-        """Unit of every channel, by name."""
-        return {channel.name: channel.unit for channel in self.channels}
-
-    @property
-    def vibration_channels(self) -> tuple[Channel, ...]:
-        """Every channel but the tacho."""
-        return tuple(channel for channel in self.channels if channel.name != self.tacho)
-
-    @property
-    def vibration_names(self) -> tuple[str, ...]:
-        """Name of every channel but the tacho."""
-        return tuple(channel.name for channel in self.vibration_channels)
-
-    @property
-    def vibration(self) -> NDArray[np.float32]:
-        """Every channel but the tacho [shape=(n_vibration, n_samples)]."""
-        rows = [i for i, name in enumerate(self.names) if name != self.tacho]
-        return self.signal[rows]
-
-    @property
-    def declared_speed_hz(self) -> float | None:
-        """Shaft speed by the manifest: the record's mean, else as set [Hz]; None without one."""
-        declared = (float(self.row.get(name, math.nan)) for name in ("mean_speed_hz", "speed_hz"))
-        return next((speed for speed in declared if 0 < speed < math.inf), None)
-
-    @property
-    def tacho_signal(self) -> NDArray[np.float32] | None:
-        """Signal of the tacho [shape=(n_samples,)], None without one."""
-        return None if self.tacho is None else self.signal[self.names.index(self.tacho)]
-
-
-def _check_header(item: "Recording | Attributes", where: str) -> None:
-    """Refuse a sample rate, channel names or a tacho that contradict each other."""
-    names = [channel.name for channel in item.channels]
-    faults = []
-    if fault := rate_fault("sample_rate", item.sample_rate, "give it in Hz"):
-        faults.append(fault)
-    if not names or len(set(names)) != len(names):
-        faults.append(f"channel names {names} must be unique and at least one; rename them")
-    if item.tacho is not None and item.tacho not in names:
-        faults.append(f"tacho = {item.tacho!r} must be one of the channels {names}; rename it")
-    if item.pulses_per_revolution < 1:
-        faults.append(f"pulses_per_revolution = {item.pulses_per_revolution} must be >= 1")
-    if item.origin not in ("simulated", "measured"):
-        faults.append(f"origin = {item.origin!r} must be 'simulated' or 'measured'")
-    if faults:
-        raise DataError("\n".join(f"{where}: {fault}" for fault in faults))
-
-
-def _refuse_gaps(recording: Recording) -> None:
-    if np.isfinite(recording.signal).all():
-        return
-    faults = []
-    for name, row in zip(recording.names, recording.signal, strict=True):
-        bad = np.flatnonzero(~np.isfinite(row))
-        if bad.size:
-            faults.append(
-                f"{recording.source or 'recording'}: channel '{name}' has {bad.size} sample(s) "
-                f"that are not finite, must be 0, first at index {bad[0]}; cut or mend the gap"
-            )
-    raise DataError("\n".join(faults))
-
-
 @dataclass(frozen=True, kw_only=True)
-class Attributes:
+class Attributes(SignalLayout):
     """What holds for every record of a data set file.
 
     Parameters
     ----------
-    sample_rate : float
-        [Hz]
-    channels : tuple of Channel
-        One per row of a record's signal.
-    origin : {"simulated", "measured"}
-        Where the signals are from.
-    tacho : str, optional
-        Name of the tacho channel.
-    pulses_per_revolution : int
-        Of the tacho.
+    sample_rate, channels, tacho, pulses_per_revolution, origin
+        As of :class:`~...sim.output.recording.SignalLayout`.
     severities : tuple of str
         Manifest columns that say how worn each record is [SI].
     grade_edges : tuple of float
@@ -236,11 +86,6 @@ class Attributes:
         Program and libraries, with versions.
     """
 
-    sample_rate: float
-    channels: tuple[Channel, ...]
-    origin: Literal["simulated", "measured"]
-    tacho: str | None = None
-    pulses_per_revolution: int = 1
     severities: tuple[str, ...] = ()
     grade_edges: tuple[float, ...] = ()
     condemning_limit: float = float("nan")
@@ -258,7 +103,7 @@ class Attributes:
     )
 
     def __post_init__(self) -> None:
-        _check_header(self, "data set")
+        self.refuse_contradictions("data set")
         _check_wear(self)
         long = [name for name, text in _texts(self).items() if len(text.encode()) > LARGEST_TEXT]
         if long:

@@ -14,7 +14,8 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from .record import Attributes, DataError, DataSet, Recording
+from ...sim.output.recording import DataError, Recording
+from .record import Attributes, DataSet
 
 VIEW, STATE = "view", "state"
 """Manifest columns: which test a record is, and of which state of its machine."""

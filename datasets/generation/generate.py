@@ -19,13 +19,12 @@ from numpy.typing import NDArray
 
 from ...sim.atomic import OutputError
 from ...sim.machine.simulate import simulate
-from ...sim.output.solution import Solution
+from ...sim.output.recording import DataError, Recording
 from ...sim.scene.parts import Scene, SceneError, channels_of
 from ...sim.wear.archard import grade
 from ..file.lock import holding
 from ..file.record import (
     Attributes,
-    DataError,
     DataSetWriter,
     LostError,
     WriteError,
@@ -454,7 +453,7 @@ def _silence(scene: Scene) -> NDArray[np.float32]:
     return np.zeros((len(channels_of(scene)), n_samples), dtype=np.float32)
 
 
-def _numerics(solution: Solution) -> dict[str, Any]:
+def _numerics(solution: Recording) -> dict[str, Any]:
     return {name: value for name, value in solution.numerics.items() if name in NUMERICS}
 
 
@@ -493,7 +492,7 @@ class _Tally:
 
 def save_solution(
     scene: Scene,
-    solution: Solution,
+    solution: Recording,
     path: str | Path,
     *,
     seed: int,
@@ -506,7 +505,7 @@ def save_solution(
     ----------
     scene : Scene
         What was simulated.
-    solution : Solution
+    solution : Recording
         Its result.
     path : str or Path
         File to write.
@@ -539,7 +538,7 @@ def save_solution(
         sample_rate=solution.sample_rate,
         channels=solution.channels,
         origin="simulated",
-        tacho=scene.tacho.name if scene.tacho else None,
+        tacho=solution.tacho,
         severities=tuple(severity),
         scene=scene.model_dump_json(),
         seed=seed,

@@ -16,7 +16,7 @@ from ...features.rotation.order import order_amplitudes
 from ...features.signal.spectrum import band_edges, band_levels, decibel
 from ...sim.fidelity.choose import Resolution, resolve, resolved_scene
 from ...sim.fidelity.pilot import Quantities, Quantity
-from ...sim.output.solution import Solution
+from ...sim.output.recording import Recording
 from ...sim.scene.journal import JournalScene
 from ...sim.scene.parts import Scene
 from ...sim.scene.shaft import ShaftScene
@@ -43,12 +43,12 @@ def absolute(value: float, scale: float) -> Quantity:
     return float(value), "absolute", scale
 
 
-def pump_quantities(solution: Solution, _scene: Scene) -> dict[str, Quantity]:
+def pump_quantities(solution: Recording, _scene: Scene) -> dict[str, Quantity]:
     """Of a reciprocating pump: bands of vibration, forces in pin and guide, force of the pressure.
 
     Parameters
     ----------
-    solution : Solution
+    solution : Recording
         With its truth.
     _scene : Scene
         Not asked.
@@ -94,7 +94,7 @@ def _mean_peak(values: Float, turns: Float) -> float:
     return float(whole.mean())
 
 
-def _bands(solution: Solution) -> dict[str, Quantity]:
+def _bands(solution: Recording) -> dict[str, Quantity]:
     """Levels of bands of all accelerations together."""
     rows = [
         row
@@ -112,7 +112,7 @@ def _edges(fs: float) -> Float:
     return band_edges(fs, n_bands=_BANDS, low=min(50.0, fs / 20))
 
 
-def journal_quantities(solution: Solution, scene: Scene) -> dict[str, Quantity]:
+def journal_quantities(solution: Recording, scene: Scene) -> dict[str, Quantity]:
     """Of a journal bearing: place and size of the orbit, thinnest film, forces of the film.
 
     Examples
@@ -153,7 +153,7 @@ def _axes(
     }
 
 
-def shaft_quantities(solution: Solution, scene: Scene) -> dict[str, Quantity]:
+def shaft_quantities(solution: Recording, scene: Scene) -> dict[str, Quantity]:
     """Of a shaft line: reactions, places and orbits of the journals, films, vibration, resonance.
 
     Examples
@@ -180,7 +180,7 @@ def shaft_quantities(solution: Solution, scene: Scene) -> dict[str, Quantity]:
     return found | _resonance(solution) | _orders(solution, shaft)
 
 
-def _resonance(solution: Solution) -> dict[str, Quantity]:
+def _resonance(solution: Recording) -> dict[str, Quantity]:
     """Frequency of the first resonance; damping ratio of the least damped motion.
 
     Not the frequency of the latter: two motions may be damped alike, and whichever is a little
@@ -191,7 +191,7 @@ def _resonance(solution: Solution) -> dict[str, Quantity]:
     return {own: relative(numerics[name]) for own, name in names.items() if name in numerics}
 
 
-def _orders(solution: Solution, scene: ShaftScene) -> dict[str, Quantity]:
+def _orders(solution: Recording, scene: ShaftScene) -> dict[str, Quantity]:
     """Accelerations at the speed and at the blade rate, all sensors together."""
     rows = solution.signal[: len(scene.sensors)]
     if not len(rows):
@@ -314,7 +314,7 @@ def resolved(scene: Scene) -> tuple[Scene, Resolution | None]:
     return resolved_scene(scene, found), found
 
 
-def with_estimate(solution: Solution, resolution: Resolution) -> Solution:
+def with_estimate(solution: Recording, resolution: Resolution) -> Recording:
     """A solution whose estimated error is the one that was measured when its rungs were chosen."""
     numerics = {**solution.numerics, "estimated_error": resolution.estimated_error}
     return replace(solution, numerics=numerics)

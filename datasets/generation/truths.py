@@ -11,7 +11,7 @@ from typing import NamedTuple, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from ...sim.output.solution import Solution
+from ...sim.output.recording import Recording
 from ...sim.scene.journal import JournalScene
 from ...sim.scene.parts import Scene
 from ...sim.scene.pump import PumpScene
@@ -34,12 +34,12 @@ class Truth(NamedTuple):
     """Computed from the signals of the sensors; the others are known to the simulator alone."""
 
 
-def truths_of(solution: Solution, scene: Scene) -> dict[str, Truth]:
+def truths_of(solution: Recording, scene: Scene) -> dict[str, Truth]:
     """Everything that is known of a run, by name.
 
     Parameters
     ----------
-    solution : Solution
+    solution : Recording
         With its truth.
     scene : Scene
         Of the run.
@@ -99,7 +99,7 @@ def _by_column(values: dict[str, float]) -> Iterator[tuple[str, Truth]]:
 # --- of each machine
 
 
-def _pump(solution: Solution, scene: Scene) -> Iterator[tuple[str, Truth]]:
+def _pump(solution: Recording, scene: Scene) -> Iterator[tuple[str, Truth]]:
     pump, truth, numbers = cast(PumpScene, scene), solution.truth, solution.numerics
     turns = float(numbers["steps"]) * float(numbers["step_s"]) * float(numbers["mean_speed_hz"])
     contacts = float(numbers["contact_changes"]) / 2 / turns
@@ -132,7 +132,7 @@ def _pressures(
         yield f"pressure_ratio{suffix}", Truth(ratio, "", f"pressure ratio, absolute{about}")
 
 
-def _journal(solution: Solution, scene: Scene) -> Iterator[tuple[str, Truth]]:
+def _journal(solution: Recording, scene: Scene) -> Iterator[tuple[str, Truth]]:
     truth, clearance = solution.truth, cast(JournalScene, scene).bearing.clearance_radial
     place = complex(*truth["journal_m"].mean(axis=0))
     load = complex(*truth["load_n"].mean(axis=0))
@@ -146,12 +146,12 @@ def _journal(solution: Solution, scene: Scene) -> Iterator[tuple[str, Truth]]:
         yield "pressure_peak", Truth(peak, "Pa", "film pressure, peak")
 
 
-def _shaft(solution: Solution, _scene: Scene) -> Iterator[tuple[str, Truth]]:
+def _shaft(solution: Recording, _scene: Scene) -> Iterator[tuple[str, Truth]]:
     total = float(solution.truth["film_force_n"].mean(axis=0)[:, 0].sum())
     yield "reaction_sum", Truth(total, "N", "sum of the vertical reactions")
 
 
-_FURTHER: dict[str, Callable[[Solution, Scene], Iterator[tuple[str, Truth]]]] = {
+_FURTHER: dict[str, Callable[[Recording, Scene], Iterator[tuple[str, Truth]]]] = {
     "reciprocating-pump": _pump,
     "journal-bearing": _journal,
     "propulsion-shaft": _shaft,

@@ -14,10 +14,16 @@ from numpy.typing import NDArray
 
 from ...features.rotation.order import pulse_times
 from ...sim.atomic import OutputError
+from ...sim.output.recording import DataError
 from ...sim.output.sensor import Channel
 from ...sim.scene.parts import nearest
 from ..file.machines import FILE, GROUP_NAME
-from ..file.record import Attributes, DataError, DataSet, DataSetWriter, refuse_output
+from ..file.record import (
+    Attributes,
+    DataSet,
+    DataSetWriter,
+    refuse_output,
+)
 from ..readers.open import open_records
 from ..source.part import SourceOptions
 from ..workers.local import in_order

@@ -11,11 +11,11 @@ from functools import partial
 from itertools import pairwise
 from pathlib import Path, PurePosixPath
 
+from ...sim.output.recording import DataError
 from ...sim.scene.load import load_scene
 from ...sim.scene.parts import UNITS, nearest, to_si
 from ..file.csv_cells import plain_cell
 from ..file.machines import FILE
-from ..file.record import DataError
 from ..recipe.recipe import SEVERITIES, clearances, wear_limits
 
 Value = float | int | bool | str

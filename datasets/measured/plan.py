@@ -7,9 +7,10 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
+from ...sim.output.recording import DataError
 from ...sim.output.sensor import Channel
 from ...sim.scene.parts import nearest
-from ..file.record import LARGEST_RECORD, DataError
+from ..file.record import LARGEST_RECORD
 from ..readers.flat import numbered
 from ..readers.open import open_source
 from ..source.part import Source, SourceOptions

@@ -10,8 +10,9 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from ...sim.output.recording import DataError, Recording
 from ..file.hdf5_values import HDF5_FAULTS
-from ..file.record import LARGEST_RECORD, DataError, DataSet, Recording
+from ..file.record import LARGEST_RECORD, DataSet
 from ..file.views import CompletingView, JoinedSet, joined_recordings
 from ..readers.open import list_sources, open_source
 from ..source.part import Source, SourceOptions

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..file.record import DataError
+from ...sim.output.recording import DataError
 from ..source.part import (
     LARGEST_INFLATED,
     MOST_CHANNELS,

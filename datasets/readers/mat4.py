@@ -11,7 +11,7 @@ from typing import BinaryIO
 
 import numpy as np
 
-from ..file.record import DataError
+from ...sim.output.recording import DataError
 from ..source.part import cut
 from .flat import Flat
 from .mat_tree import MOST_LEAVES, Leaf, Tree, fetch_of

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..file.record import DataError
+from ...sim.output.recording import DataError
 from ..source.part import LARGEST_INFLATED, cut, damaged
 from .flat import Flat
 from .mat_tree import MOST_LEAVES, Leaf, Tree, fetch_of

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
-from ..file.record import DataError
+from ...sim.output.recording import DataError
 from ..source.part import Contents, Fetch, FilePart, PartChannel, SourceOptions
 from .flat import Axes, Flat, array_axes, numbered
 

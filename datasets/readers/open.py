@@ -16,9 +16,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from ...sim.output.recording import DataError
 from ...sim.output.sensor import rate_fault
 from ...sim.scene.parts import nearest
-from ..file.record import DataError
 from ..source.channel_units import FULL_SCALE, ChannelUnit, parse_sensitivity, parse_unit
 from ..source.empty import without_empty
 from ..source.part import (

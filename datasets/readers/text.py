@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...sim.output.recording import DataError
 from ...sim.scene.parts import UNITS, nearest
 from ..file.csv_cells import plain_cell
-from ..file.record import DataError
 from ..source.channel_units import known_unit
 from ..source.clock import is_stamp, is_stamp_pattern, months_first, stamp_resolution, stamp_seconds
 from ..source.number_notation import unknown_notation

@@ -15,7 +15,7 @@ from typing import BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from ..file.record import DataError
+from ...sim.output.recording import DataError
 from ..source.part import Contents, FilePart, PartChannel, SourceOptions, cut, foreign
 from ..source.time_column import even_rate, printed_resolution
 from .flat import Flat

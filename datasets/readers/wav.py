@@ -8,7 +8,7 @@ from typing import BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from ..file.record import DataError
+from ...sim.output.recording import DataError
 from ..source.part import (
     DECLARED,
     MOST_CHANNELS,

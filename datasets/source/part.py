@@ -9,8 +9,8 @@ from typing import Any, Literal, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from ...sim.output.recording import DataError
 from ...sim.output.sensor import rate_fault
-from ..file.record import DataError
 
 LARGEST_INFLATED = 2**30
 """Largest believable content of a compressed file [byte]: beyond it a small file is a trap."""

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..file.record import DataError
+from ...sim.output.recording import DataError
 from .part import Fetch, Source
 from .resampled_tacho import ResampledTacho
 

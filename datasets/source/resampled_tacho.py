@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ...features.rotation.edges import placed_edges
 from ...features.rotation.order import HYSTERESIS_SHARE
-from ..file.record import DataError
+from ...sim.output.recording import DataError
 
 Read = Callable[[int, int], NDArray[np.float64]]
 """Samples [start, stop) of the tacho in the file."""

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..file.record import DataError
+from ...sim.output.recording import DataError
 
 MOST_JITTER = 0.01
 """Part of a step that a time may be off the even grid, beyond its last digit.

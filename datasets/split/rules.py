@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..file.record import DataError
+from ...sim.output.recording import DataError
 
 Index = NDArray[np.intp]
 

@@ -15,8 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...sim.atomic import replacing
+from ...sim.output.recording import DataError
 from ..file.lock import holding
-from ..file.record import Attributes, DataError, DataSet, fill_split, lay_out_split
+from ..file.record import (
+    Attributes,
+    DataSet,
+    fill_split,
+    lay_out_split,
+)
 from ..recipe.draws import Range
 from ..recipe.recipe import Recipe, Sample, recorded_recipe, sample_records
 from ..recipe.text import RecipeError

@@ -1,4 +1,4 @@
 """Processes that share work: on this computer or on a Dask cluster.
 
-It may import ``datasets.file``.
+It may import ``sim.output``, ``datasets.file``.
 """

@@ -20,7 +20,7 @@ from typing import Any
 from threadpoolctl import threadpool_limits
 
 from ... import __version__
-from ..file.record import DataError
+from ...sim.output.recording import DataError
 from .pool import AHEAD_PER_JOB, Pool, WorkersError, first_line
 
 CONNECT = 8.0

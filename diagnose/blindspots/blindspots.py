@@ -8,7 +8,7 @@ import hashlib
 import json
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Any, Protocol
@@ -16,10 +16,10 @@ from typing import Any, Protocol
 import numpy as np
 
 from ... import __version__
-from ...datasets.file.record import DataError, Recording
 from ...datasets.recipe.recipe import Recipe, Sample, condition_of, load_recipe, sample_records
 from ...datasets.recipe.text import recipe_names
 from ...sim.machine.simulate import simulate
+from ...sim.output.recording import DataError, Recording
 from ...sim.scene.parts import Scene, SceneError, channels_of
 from ..nameplate.cautions import known_beside
 from ..pages.kept import Kept
@@ -167,18 +167,10 @@ class _Machines:
             return "; ".join(error.faults)
         if not solution.status.ok:
             return solution.status.text
-        tacho = getattr(scene, "tacho", None)
         noted = {name: condition_of(scene, name) for name in self.model.noted}
-        if not tacho:
+        if solution.tacho is None:
             noted["speed_hz"] = condition_of(scene, "speed_hz")
-        return Recording(
-            signal=solution.signal,
-            sample_rate=solution.sample_rate,
-            channels=solution.channels,
-            tacho=tacho.name if tacho else None,
-            origin="simulated",
-            row=noted,
-        )
+        return replace(solution, row=noted, numerics={})  # a model is told what was noted alone
 
     def judged(self, recording: Recording, sample: Sample) -> ShiftVerdict:
         """What the model says of a recording of a machine."""

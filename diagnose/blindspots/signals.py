@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ...datasets.file.record import DataError, Recording
 from ...datasets.measured.plan import EachChannel
 from ...datasets.measured.recording import read_recording
 from ...datasets.source.part import SourceOptions
+from ...sim.output.recording import DataError, Recording
 from ...sim.output.sensor import (
     anti_alias_poles,
     coloured_noise,

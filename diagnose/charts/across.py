@@ -13,13 +13,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...datasets.file.record import DataError
 from ...datasets.generation.generate import generate
 from ...datasets.recipe.recipe import load_recipe, wear_limits
 from ...datasets.split.rules import group_folds
 from ...sim.fidelity.cost import cost_of
 from ...sim.fidelity.ladder import Effect, admissible, effects_of, with_values
 from ...sim.fidelity.pilot import Difference
+from ...sim.output.recording import DataError
 from ...sim.scene.parts import Scene, nearest
 from ..feature_rows.feature_table import FeatureTable, feature_table
 from ..learning.regressions import CANDIDATES, fit_blend

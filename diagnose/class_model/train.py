@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ... import __version__
-from ...datasets.file.record import Attributes, DataError, DataSet, Recording
+from ...datasets.file.record import Attributes, DataSet
 from ...datasets.split.rules import check_no_leak, group_folds
+from ...sim.output.recording import DataError, Recording
 from ..feature_rows.blows import NOISE_SCORE, blow_floors, blow_scores, blow_table, lacks_blows
 from ..feature_rows.feature_choice import choice_card, choice_in
 from ..feature_rows.feature_table import (

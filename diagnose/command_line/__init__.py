@@ -1,11 +1,11 @@
 """The commands, their options, and the demonstration.
 
-It may import ``sim.atomic``, ``sim.scene``, ``sim.machine``, ``sim.fidelity``, ``sim.deep_check``,
-``features.catalogue``, ``datasets.file``, ``datasets.workers``, ``datasets.readers``,
-``datasets.recipe``, ``datasets.split``, ``datasets.measured``, ``datasets.generation``,
-``datasets.audit``, ``datasets.convert``, ``diagnose.pages``, ``diagnose.pictures``,
-``diagnose.learning``, ``diagnose.feature_rows``, ``diagnose.wear_model``, ``diagnose.nameplate``,
-``diagnose.report``, ``diagnose.class_model``, ``diagnose.evaluation``, ``diagnose.blindspots``,
-``diagnose.charts``, ``diagnose.stability``, ``diagnose.shaft_tests``, ``diagnose.alignment``,
-``diagnose.literature``, ``diagnose.sweep``, ``diagnose.inspect``.
+It may import ``sim.atomic``, ``sim.output``, ``sim.scene``, ``sim.machine``, ``sim.fidelity``,
+``sim.deep_check``, ``features.catalogue``, ``datasets.file``, ``datasets.workers``,
+``datasets.readers``, ``datasets.recipe``, ``datasets.split``, ``datasets.measured``,
+``datasets.generation``, ``datasets.audit``, ``datasets.convert``, ``diagnose.pages``,
+``diagnose.pictures``, ``diagnose.learning``, ``diagnose.feature_rows``, ``diagnose.wear_model``,
+``diagnose.nameplate``, ``diagnose.report``, ``diagnose.class_model``, ``diagnose.evaluation``,
+``diagnose.blindspots``, ``diagnose.charts``, ``diagnose.stability``, ``diagnose.shaft_tests``,
+``diagnose.alignment``, ``diagnose.literature``, ``diagnose.sweep``, ``diagnose.inspect``.
 """

@@ -278,7 +278,7 @@ def check_outputs(inputs: Sequence[Path | str], outputs: Sequence[_Output], forc
         An output has the wrong suffix, is a folder or in none, exists and `force` is not given,
         or is the same file as an input or another output: that one `force` does not override.
     """
-    from ...datasets.file.record import DataError
+    from ...sim.output.recording import DataError
 
     wanted = [(path, suffixes) for path, suffixes in outputs if path is not None]
     paths = [path for path, _ in wanted]

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...datasets.file.record import DataError, DataSet
+from ...datasets.file.record import DataSet
 from ...datasets.generation.generate import generate
+from ...sim.output.recording import DataError
 from ..evaluation.evaluate import score
 from ..feature_rows.feature_table import Progress
 from ..pages.page import save_page

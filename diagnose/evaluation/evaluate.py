@@ -9,9 +9,10 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from ...datasets.file.record import Attributes, DataError, DataSet
+from ...datasets.file.record import Attributes, DataSet
 from ...datasets.file.views import CompletingView
 from ...datasets.split.stored import Sides, usable_sides
+from ...sim.output.recording import DataError
 from ..feature_rows.feature_choice import choice_in
 from ..feature_rows.feature_table import (
     FeatureSelection,

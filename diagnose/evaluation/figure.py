@@ -316,7 +316,7 @@ def save_evaluation(result: Result, path: Path, *, notice: str = "", force: bool
     """
     import json
 
-    from ...datasets.file.record import DataError
+    from ...sim.output.recording import DataError
 
     lasting = {name: value for name, value in result.items() if name != "cost"}
     if path.suffix == ".json":

@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...datasets.file.record import DataSet, Recording
+from ...datasets.file.record import DataSet
+from ...sim.output.recording import Recording
 from ..feature_rows.feature_table import FeatureTable, Progress
 
 Float = NDArray[np.float64]

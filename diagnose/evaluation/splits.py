@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...datasets.file.record import Attributes, DataError, DataSet, Recording
+from ...datasets.file.record import Attributes, DataSet
 from ...datasets.split.rules import check_no_leak, condition_split, group_split
 from ...datasets.split.stored import LOADS, Drawn, drawn_of, machine_samples, usable_sides
+from ...sim.output.recording import DataError, Recording
 from ..feature_rows.feature_choice import choice_in
 from ..feature_rows.feature_table import (
     FeatureSelection,

@@ -11,8 +11,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ...datasets.file.record import Recording
 from ...features.catalogue.row import absent_features
+from ...sim.output.recording import Recording
 from .feature_table import (
     FeatureSelection,
     absent_in,

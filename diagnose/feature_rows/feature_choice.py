@@ -9,10 +9,10 @@ from typing import Any, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from ...datasets.file.record import DataError
 from ...datasets.file.views import JoinedSet
 from ...datasets.split.rules import group_folds
 from ...features.catalogue.catalogue import SetName
+from ...sim.output.recording import DataError
 from ..learning.regressions import CANDIDATES, Folds
 from .feature_table import (
     USUAL,

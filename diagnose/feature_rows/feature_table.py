@@ -13,7 +13,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from ...datasets.file.csv_cells import safe_frame
-from ...datasets.file.record import DataError, DataSet, Recording
+from ...datasets.file.record import DataSet
 from ...datasets.file.views import MARK, CompletingView, JoinedSet
 from ...datasets.workers.local import in_order
 from ...features.catalogue.analysis import STANDARD, Analysis, Settings
@@ -23,6 +23,7 @@ from ...features.catalogue.row import absent_features, feature_names, feature_ro
 from ...features.response.transfer import FrfReference, Transfer
 from ...features.signal.envelope import BearingFrequencies, bearing_frequencies
 from ...sim.atomic import replacing
+from ...sim.output.recording import DataError, Recording
 
 _BATCH = 16  # records a worker reads at a time: 20 MB, and few enough to keep both cores busy
 
@@ -345,12 +346,7 @@ def _own_features(
     """Feature row of one recording alone."""
     try:
         return feature_row(
-            recording.vibration,
-            recording.sample_rate,
-            tacho=recording.tacho_signal,
-            pulses_per_revolution=recording.pulses_per_revolution,
-            channel_names=recording.vibration_names,
-            quantities=[channel.quantity for channel in recording.vibration_channels],
+            recording,
             feature_set=choice.feature_set,
             only=choice.only,
             settings=_about(recording, choice.settings),
@@ -382,10 +378,9 @@ def recording_layout(recording: Recording, settings: Settings = STANDARD) -> Lay
     Layout
         For :func:`wearstate.features.catalogue.row.absent_features`.
     """
-    quantities = tuple(channel.quantity for channel in recording.vibration_channels)
     layout = Layout(
         channels=recording.vibration_names,
-        quantities=quantities,
+        quantities=recording.vibration_quantities,
         fs=recording.sample_rate,
         tacho=recording.tacho is not None,
         pulses_per_revolution=recording.pulses_per_revolution,

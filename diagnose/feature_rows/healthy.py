@@ -9,8 +9,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from ...datasets.file.record import DataError, DataSet, Recording
+from ...datasets.file.record import DataSet
 from ...features.response.transfer import FrfReference
+from ...sim.output.recording import DataError, Recording
 from .feature_choice import choice_in
 from .feature_table import (
     USUAL,

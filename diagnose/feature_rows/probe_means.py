@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...datasets.file.record import Recording
 from ...features.rotation.order import pulse_times
+from ...sim.output.recording import Recording
 
 Float = NDArray[np.float64]
 

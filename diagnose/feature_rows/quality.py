@@ -15,9 +15,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ...datasets.file.record import Recording
 from ...datasets.file.views import MARK
 from ...features.rotation.order import pulse_times, shaft_phase
+from ...sim.output.recording import Recording
 from ...sim.output.sensor import Channel
 from .physical import level_channels, level_rows, shape_rows
 

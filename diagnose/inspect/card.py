@@ -11,8 +11,9 @@ from typing import Any
 import pandas as pd
 
 from ...datasets.file.columns import Column, describe_columns
-from ...datasets.file.record import DataError, DataSet, manifest_hash
+from ...datasets.file.record import DataSet, manifest_hash
 from ...datasets.generation.fidelity_choice import FidelityChoice
+from ...sim.output.recording import DataError
 from ...sim.scene.load import scene_table
 from ...sim.scene.parts import SceneError
 from ..feature_rows.feature_table import confounders_in

@@ -11,10 +11,11 @@ import numpy as np
 import scipy
 
 from ...datasets.audit.plausibility import recording_doubts, scene_in
-from ...datasets.file.record import DataError, DataSet, Recording
+from ...datasets.file.record import DataSet
 from ...datasets.measured.recording import read_recording
 from ...datasets.source.part import SourceOptions
 from ...features.signal import fft
+from ...sim.output.recording import DataError, Recording
 from ...sim.output.sensor import Channel
 from ...sim.scene.parts import Scene
 from ..class_model.file import CLASS_MODEL, load_class_model

@@ -7,20 +7,20 @@ from typing import Any
 import numpy as np
 
 from ...datasets.generation.truths import Truth, truths_of
-from ...sim.output.solution import Solution
+from ...sim.output.recording import Recording
 from ...sim.scene.parts import Scene
 from ..pages.si_text import plain, si_text
 
 Truths = Mapping[str, Truth]
 
 
-def simulation_summary(scene: Scene, solution: Solution) -> dict[str, Any]:
+def simulation_summary(scene: Scene, solution: Recording) -> dict[str, Any]:
     """Levels of the channels, and what the simulator alone knows.
 
     Parameters
     ----------
     scene : Scene
-    solution : Solution
+    solution : Recording
         With its truth.
 
     Returns

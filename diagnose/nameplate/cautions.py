@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from ...datasets.file.record import Recording
+from ...sim.output.recording import Recording
 from ...sim.scene.load import load_scene, scene_names
 from ..feature_rows.healthy import Baseline
 from .nameplate import Nameplate, day_of

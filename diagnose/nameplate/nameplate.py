@@ -11,9 +11,10 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from ...datasets.file.record import Attributes, DataError, DataSet
+from ...datasets.file.record import Attributes, DataSet
 from ...datasets.recipe.draws import has_value
 from ...datasets.recipe.recipe import CONDITIONS, condition_of, recorded_scene
+from ...sim.output.recording import DataError
 from ...sim.scene.journal import Oil
 from ...sim.scene.load import (
     load_scene,

@@ -7,8 +7,8 @@ from collections.abc import Callable, Iterator, MutableMapping
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
-from ...datasets.file.record import DataError
 from ...sim.atomic import write_whole
+from ...sim.output.recording import DataError
 
 Piece = TypeVar("Piece")
 

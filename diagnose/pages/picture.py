@@ -5,8 +5,8 @@ import io
 from pathlib import Path
 from typing import Any
 
-from ...datasets.file.record import DataError
 from ...sim.atomic import write_whole
+from ...sim.output.recording import DataError
 from .page import visible
 
 FORMATS = (".png", ".svg", ".pdf")

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from ...datasets.file.record import DataError
+from ...sim.output.recording import DataError
 from .envelope import envelope_panel
 from .frf import frf_panel
 from .maps import angle_panel, orders_panel, waterfall_panel
@@ -74,7 +74,7 @@ def plot_recording(view: View, kind: str = AUTO) -> Picture:
     Examples
     --------
     >>> import numpy as np
-    >>> from wearstate.datasets.file.record import Recording
+    >>> from wearstate.sim.output.recording import Recording
     >>> from wearstate.sim.output.sensor import Channel
     >>> channel = Channel(name="acc", unit="m/s^2", quantity="acceleration")
     >>> wave = np.sin(np.arange(4096))[np.newaxis]

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ...features.rotation.orbit import full_spectrum
 from ...features.signal.spectrum import decibel, power_spectral_density
-from ...sim.output.solution import Solution
+from ...sim.output.recording import Recording
 from ...sim.scene.journal import JournalScene
 from ...sim.scene.parts import Scene
 from ...sim.scene.pump import PumpScene
@@ -23,13 +23,13 @@ _REVOLUTIONS = 2
 _MOST_ORDERS = 4.0  # of a full spectrum, to either side
 
 
-def plot_simulation(scene: Scene, solution: Solution, path: Path, *, force: bool = True) -> None:
+def plot_simulation(scene: Scene, solution: Recording, path: Path, *, force: bool = True) -> None:
     """Draw a simulated recording with what its sensors do not see: forces, pressures, orbits.
 
     Parameters
     ----------
     scene : Scene
-    solution : Solution
+    solution : Recording
         With truth.
     path : Path
         ``.png``, ``.svg`` or ``.pdf``.
@@ -49,7 +49,7 @@ def plot_simulation(scene: Scene, solution: Solution, path: Path, *, force: bool
     save_picture(figure, path, force=force)
 
 
-def _draw_pump(figure: Any, scene: Scene, solution: Solution) -> None:
+def _draw_pump(figure: Any, scene: Scene, solution: Recording) -> None:
     pump = cast(PumpScene, scene)
     if not pump.running:
         _draw_rest(figure, solution)
@@ -78,7 +78,7 @@ def _draw_pump(figure: Any, scene: Scene, solution: Solution) -> None:
     _orbit(panels["orbit"], pump, solution.truth["pin_offset_m"][:n])
 
 
-def _draw_rest(figure: Any, solution: Solution) -> None:
+def _draw_rest(figure: Any, solution: Recording) -> None:
     """A test of the casing at rest: forces and accelerations over time, and their spectra."""
     rate = solution.sample_rate
     time = np.arange(solution.signal.shape[1]) / rate
@@ -99,7 +99,9 @@ def _draw_rest(figure: Any, solution: Solution) -> None:
         spectrum.set_xscale("log")
 
 
-def _pressures(axes: Any, scene: PumpScene, solution: Solution, turns: NDArray[np.float64]) -> None:
+def _pressures(
+    axes: Any, scene: PumpScene, solution: Recording, turns: NDArray[np.float64]
+) -> None:
     """Cylinder pressure of every throw, and what sensors make of it."""
     area = np.pi / 4 * scene.piston.diameter**2
     for throw in range(len(scene.throws)):
@@ -141,7 +143,7 @@ def _orbit(axes: Any, scene: PumpScene, offset: NDArray[np.float64]) -> None:
 # --- journal bearing
 
 
-def _draw_journal(figure: Any, scene: Scene, solution: Solution) -> None:
+def _draw_journal(figure: Any, scene: Scene, solution: Recording) -> None:
     """What the figures of Ma, Lu, Chen (2010) show, over tau, and the spectrum of the orbit."""
     journal = cast(JournalScene, scene)
     truth = solution.truth
@@ -201,7 +203,7 @@ def _film(
     beside.legend(fontsize=8, loc="lower right")
 
 
-def _full_spectrum(axes: Any, scene: JournalScene, solution: Solution) -> None:
+def _full_spectrum(axes: Any, scene: JournalScene, solution: Recording) -> None:
     """Radii of forward and backward motion over the order, from the true orbit."""
     path = 1e6 * (solution.truth["journal_m"] @ np.array([1.0, 1.0j]))
     frequency, vector = full_spectrum(path, solution.sample_rate)
@@ -214,7 +216,7 @@ def _full_spectrum(axes: Any, scene: JournalScene, solution: Solution) -> None:
 # --- propulsion shaft
 
 
-def _draw_shaft(figure: Any, scene: Scene, solution: Solution) -> None:
+def _draw_shaft(figure: Any, scene: Scene, solution: Recording) -> None:
     """The line with what it carries, its journals in their bores, and what its sensors see."""
     shaft = cast(ShaftScene, scene)
     state = shaft_state(shaft)
@@ -278,7 +280,7 @@ def _bores(axes: Any, state: ShaftState, path: NDArray[Any]) -> None:
     axes.legend(fontsize=6, loc="upper right")
 
 
-_DRAWERS: dict[str, Callable[[Any, Scene, Solution], None]] = {
+_DRAWERS: dict[str, Callable[[Any, Scene, Recording], None]] = {
     "reciprocating-pump": _draw_pump,
     "journal-bearing": _draw_journal,
     "propulsion-shaft": _draw_shaft,

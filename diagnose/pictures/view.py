@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...datasets.file.record import DataError, Recording
 from ...features.catalogue.analysis import DISPLACEMENT, FORCE
 from ...features.rotation.order import pulse_times, shaft_phase
 from ...features.signal.envelope import BearingFrequencies
+from ...sim.output.recording import DataError, Recording
 from ...sim.output.sensor import Channel
 
 Float = NDArray[np.float64]

@@ -15,10 +15,11 @@ import numpy as np
 
 from ... import __version__
 from ...datasets.file.machines import GROUP_NAME
-from ...datasets.file.record import DataError, DataSet, Recording
+from ...datasets.file.record import DataSet
 from ...datasets.file.views import CompletingView, JoinedSet
 from ...datasets.measured.recording import read_recording
 from ...datasets.readers.open import READERS, SourceOptions
+from ...sim.output.recording import DataError, Recording
 from ..feature_rows.feature_table import Progress
 from ..feature_rows.healthy import Baselines
 from ..film_clearance.clearance import FilmEstimate

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...datasets.file.record import DataError, Recording
+from ...sim.output.recording import DataError, Recording
 from ..feature_rows.feature_choice import choice_in
 from ..feature_rows.feature_table import recording_features
 from ..pages.page import short_name

@@ -13,7 +13,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from ...datasets.file.record import Recording
+from ...sim.output.recording import Recording
 from ...sim.scene.journal import JournalScene, ProximityProbe
 from ...sim.scene.shaft import ShaftScene
 from ..feature_rows.healthy import Baseline

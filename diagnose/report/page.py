@@ -4,7 +4,7 @@ import re
 import textwrap
 from typing import Any
 
-from ...datasets.file.record import DataError, Recording
+from ...sim.output.recording import DataError, Recording
 from ..feature_rows.healthy import Baseline, Baselines
 from ..nameplate.cautions import known_beside
 from ..nameplate.nameplate import Nameplate

@@ -13,7 +13,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...datasets.file.record import DataError
+from ...sim.output.recording import DataError
 
 Float = NDArray[np.float64]
 Clock = Literal["operating", "calendar"]

@@ -10,8 +10,8 @@ from statistics import NormalDist
 from typing import Any
 
 from ... import __version__
-from ...datasets.file.record import DataError, Recording
 from ...features.signal import iso
+from ...sim.output.recording import DataError, Recording
 from ..feature_rows.feature_choice import choice_in, words_of
 from ..feature_rows.healthy import Baseline
 from ..learning.grades import GRADE_NAMES

@@ -9,9 +9,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ...datasets.file.record import DataError, DataSet, Recording
+from ...datasets.file.record import DataSet
 from ...features.response.transfer import measured_transfer
 from ...features.rotation.order import pulse_times
+from ...sim.output.recording import DataError, Recording
 from ...sim.output.sensor import Channel
 from ...sim.scene.shaft import ShaftScene
 from ...sim.shaft.response import Place

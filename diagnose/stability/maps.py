@@ -29,7 +29,8 @@ from ...sim.journal.orbit import OrbitFilm, OrbitRun, OrbitStatus, film_force, l
 from ...sim.journal.recording import film_geometry, journal_film, journal_scale
 from ...sim.journal.validity import JOURNAL_STEP
 from ...sim.machine.simulate import simulate
-from ...sim.output.solution import Solution, Status
+from ...sim.output.recording import Recording
+from ...sim.output.status import Status
 from ...sim.pump.recording import steps_per_sample
 from ...sim.pump.setup import (
     LARGEST_STEP_PER_CONTACT_TIME,
@@ -404,11 +405,11 @@ def _told_apart(status: Status | OrbitStatus, finer: Status | OrbitStatus) -> Ce
     return (Verdict.UNSTABLE if finer.ok else Verdict.FAILS), f"{word}: {status.text}"
 
 
-def _run(scene: Scene) -> Solution:
+def _run(scene: Scene) -> Recording:
     return simulate(scene, seed=0, truth=True, raise_on_failure=False)
 
 
-def _parts(scene: PumpScene, run: Solution, clearance: float) -> bool:
+def _parts(scene: PumpScene, run: Recording, clearance: float) -> bool:
     """Whether an unmeasurable change of the clearance parts the orbits."""
     near = _run(changed(scene, {"joint.crankpin.diametral_clearance": clearance * (1 + 1e-9)}))
     if not near.status.ok:
@@ -417,12 +418,12 @@ def _parts(scene: PumpScene, run: Solution, clearance: float) -> bool:
     return bool(apart > 1e-3 * clearance / 2)
 
 
-def _flight(run: Solution, clearance: float) -> float:
+def _flight(run: Recording, clearance: float) -> float:
     """Share of the samples at which the pin touches its eye nowhere."""
     return float(np.mean(np.hypot(*run.truth["pin_offset_m"].T) < clearance / 2))
 
 
-def _pin_rms(run: Solution) -> float:
+def _pin_rms(run: Recording) -> float:
     return float(np.sqrt(np.mean(run.truth["pin_force_n"] ** 2)))
 
 

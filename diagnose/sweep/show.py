@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from ...datasets.generation.truths import Truth
 from ...features.catalogue.row import catalogue, feature_names
-from ...sim.output.solution import Solution
+from ...sim.output.recording import Recording
 from .axes import SweepError
 
 MOST_SHOWN = 200
@@ -45,12 +45,12 @@ class Shown:
         return f"{self.name} ({self.words})" if self.words else self.name
 
 
-def features_of(solution: Solution) -> dict[str, Shown]:
+def features_of(solution: Recording) -> dict[str, Shown]:
     """Values of the feature catalogue that a recording has, and rows that hold several.
 
     Parameters
     ----------
-    solution : Solution
+    solution : Recording
         Its channels, rate and length count.
 
     Returns
@@ -61,17 +61,16 @@ def features_of(solution: Solution) -> dict[str, Shown]:
     return {name: shown for _, name, shown in _feature_rows(solution)}
 
 
-def _feature_rows(solution: Solution) -> Iterator[tuple[str, str, Shown]]:
+def _feature_rows(solution: Recording) -> Iterator[tuple[str, str, Shown]]:
     """Row of the catalogue, name of a value, what is shown of it."""
-    channels = [channel for channel in solution.channels if channel.quantity != "tacho"]
-    units = {channel.name: channel.unit for channel in channels}
+    units = solution.units
     for row in catalogue("complete"):
         try:
             names = feature_names(
-                list(units),
+                solution.vibration_names,
                 solution.sample_rate,
-                tacho=len(channels) < len(solution.channels),
-                quantities=[channel.quantity for channel in channels],
+                tacho=solution.tacho is not None,
+                quantities=solution.vibration_quantities,
                 n_samples=solution.signal.shape[-1],
                 only=[row["name"]],
             )
@@ -109,7 +108,7 @@ def truths_shown(truths: Mapping[str, Truth]) -> dict[str, Shown]:
 
 
 def choose(
-    patterns: Sequence[str], solution: Solution, truths: Mapping[str, Truth]
+    patterns: Sequence[str], solution: Recording, truths: Mapping[str, Truth]
 ) -> tuple[Shown, ...]:
     """Quantities that match any of some patterns, in the order of these.
 
@@ -120,7 +119,7 @@ def choose(
         channel and the ending ``.level_db`` may be left out, zeros before a number too; the name of
         a row of the catalogue stands for all its values. Empty: levels of the channels, and the
         quantities of interest of the machine.
-    solution : Solution
+    solution : Recording
         Of the scene that is swept.
     truths : mapping of str to Truth
         Of the same.

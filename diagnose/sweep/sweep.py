@@ -21,7 +21,8 @@ from ...features.catalogue.row import feature_row
 from ...sim.fidelity.choose import resolved_scene
 from ...sim.fidelity.pilot import Outcome, Quantity, Task, outcome_of
 from ...sim.machine.simulate import simulate
-from ...sim.output.solution import SimulationError, Solution
+from ...sim.output.recording import Recording
+from ...sim.output.status import SimulationError
 from ...sim.scene.parts import Scene, SceneError
 from ..pages.kept import Kept
 from .axes import Axis, Point, SweepError, read_axes
@@ -221,7 +222,7 @@ def _resolved(scenes: Mapping[Point, Scene]) -> dict[Point, Scene]:
     return {point: resolved_scene(scene, resolution) for point, scene in scenes.items()}
 
 
-def _probed(scenes: Mapping[Point, Scene]) -> tuple[Solution, dict[str, Truth]]:
+def _probed(scenes: Mapping[Point, Scene]) -> tuple[Recording, dict[str, Truth]]:
     """A run of few revolutions at the first point that admits one, as long as the others' say."""
     fault: Exception | None = None
     for scene in scenes.values():
@@ -243,12 +244,12 @@ def _probed(scenes: Mapping[Point, Scene]) -> tuple[Solution, dict[str, Truth]]:
 # --- runs
 
 
-def values_of(solution: Solution, scene: Scene, names: Sequence[str]) -> dict[str, Quantity]:
+def values_of(solution: Recording, scene: Scene, names: Sequence[str]) -> dict[str, Quantity]:
     """Features and truths of a run, by name.
 
     Parameters
     ----------
-    solution : Solution
+    solution : Recording
         With its truth.
     scene : Scene
     names : sequence of str
@@ -267,18 +268,8 @@ def values_of(solution: Solution, scene: Scene, names: Sequence[str]) -> dict[st
     return {name: (value, "", 0.0) for name, value in found.items()}
 
 
-def _features(solution: Solution, names: Sequence[str]) -> dict[str, float]:
-    rows = list(zip(solution.channels, solution.signal, strict=True))
-    heard = [(channel, row) for channel, row in rows if channel.quantity != "tacho"]
-    tacho = next((row for channel, row in rows if channel.quantity == "tacho"), None)
-    labels, values = feature_row(
-        np.stack([row for _, row in heard]),
-        solution.sample_rate,
-        tacho=tacho,
-        channel_names=[channel.name for channel, _ in heard],
-        quantities=[channel.quantity for channel, _ in heard],
-        only=tuple(names),
-    )
+def _features(solution: Recording, names: Sequence[str]) -> dict[str, float]:
+    labels, values = feature_row(solution, only=tuple(names))
     return dict(zip(labels, map(float, values), strict=True))
 
 

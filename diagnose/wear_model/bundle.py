@@ -20,10 +20,10 @@ from numpy.lib import format as npy
 from numpy.typing import NDArray
 from pydantic import BaseModel, ValidationError
 
-from ...datasets.file.record import DataError
 from ...features.catalogue.analysis import STANDARD
 from ...features.catalogue.row import catalogue
 from ...sim.atomic import replacing
+from ...sim.output.recording import DataError
 from .estimate import ModelError
 
 BUNDLE_SCHEMA = 3

@@ -9,8 +9,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ...datasets.file.record import DataError, Recording
 from ...features.response.transfer import FrfReference
+from ...sim.output.recording import DataError, Recording
 from ..feature_rows.feature_choice import choice_in
 from ..feature_rows.feature_table import FeatureSelection, held_against, recording_features
 from ..feature_rows.healthy import Baseline, referenced_rows

@@ -5,9 +5,9 @@ from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from ...datasets.file.record import DataError
 from ...datasets.source.channel_units import known_unit
 from ...datasets.source.part import Profile
+from ...sim.output.recording import DataError
 from .arrays import Pulses, RateHz
 from .bundle import kind_of, load_bundle
 

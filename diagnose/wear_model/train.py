@@ -14,11 +14,12 @@ from numpy.typing import NDArray
 
 from ... import __version__
 from ...datasets.file.machines import machine_origin
-from ...datasets.file.record import Attributes, DataError, DataSet
+from ...datasets.file.record import Attributes, DataSet
 from ...datasets.file.views import MARK, JoinedSet, layout_card
 from ...datasets.recipe.recipe import recorded_scene, wear_limits
 from ...datasets.split.rules import check_no_leak, group_folds, group_split
 from ...datasets.split.stored import usable_sides
+from ...sim.output.recording import DataError
 from ..feature_rows.feature_choice import (
     Candidates,
     Selection,

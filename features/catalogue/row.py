@@ -5,9 +5,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import combinations
-from typing import get_args
+from typing import Protocol, get_args, runtime_checkable
 
 import numpy as np
+import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from ..response.modal import Modes
@@ -304,9 +305,38 @@ _LARGEST: SetName = get_args(SetName)[-1]
 # --- the row
 
 
+@runtime_checkable
+class Recorded(Protocol):
+    """A recording that knows its own rate, channels and tacho."""
+
+    @property
+    def vibration(self) -> NDArray[np.float32]:
+        """Every channel but the tacho [shape=(n_channels, n_samples)]."""
+
+    @property
+    def vibration_names(self) -> tuple[str, ...]:
+        """Name of each."""
+
+    @property
+    def vibration_quantities(self) -> tuple[str, ...]:
+        """Quantity of each."""
+
+    @property
+    def sample_rate(self) -> float:
+        """Sample rate [Hz]."""
+
+    @property
+    def tacho_signal(self) -> NDArray[np.float32] | None:
+        """Pulses; None without a tacho."""
+
+    @property
+    def pulses_per_revolution(self) -> int:
+        """Of the tacho."""
+
+
 def feature_row(
-    vibration: ArrayLike,
-    fs: float,
+    vibration: Recorded | ArrayLike | pd.DataFrame,
+    fs: float | None = None,
     *,
     tacho: ArrayLike | None = None,
     pulses_per_revolution: int = 1,
@@ -320,11 +350,13 @@ def feature_row(
 
     Parameters
     ----------
-    vibration : array_like, shape (n_channels, n_samples) or (n_samples,)
+    vibration : Recording, array_like of shape (n_channels, n_samples) or (n_samples,), or DataFrame
         Accelerations [m/s^2, or one other unit for all channels], displacements with their mean
-        [m]. float32 stays float32 in the transforms.
-    fs : float
-        Sample rate [Hz].
+        [m]. float32 stays float32 in the transforms. A recording says itself what `fs` to
+        `quantities` say of an array; a table has samples down its rows, its columns name the
+        channels.
+    fs : float, optional
+        Sample rate [Hz], of an array or a table.
     tacho : array_like, shape (n_samples,), optional
         Pulses [V], whose rising edge is angle 0; without it the features that need it are absent.
     pulses_per_revolution : int
@@ -382,7 +414,27 @@ def feature_row(
     >>> feature_row(wave, 25_600.0, only=["strongest_tone"])[1].round(2).tolist()
     [1000.0, -3.01]
     """
+    if isinstance(vibration, Recorded):
+        told = {"fs": fs, "tacho": tacho, "channel_names": channel_names, "quantities": quantities}
+        if given := [name for name, value in told.items() if value is not None]:
+            raise ValueError(f"{', '.join(given)} must be left out; the recording has its own")
+        return feature_row(
+            vibration.vibration,
+            vibration.sample_rate,
+            tacho=vibration.tacho_signal,
+            pulses_per_revolution=vibration.pulses_per_revolution,
+            channel_names=vibration.vibration_names,
+            quantities=vibration.vibration_quantities,
+            settings=settings,
+            feature_set=feature_set,
+            only=only,
+        )
+    if fs is None:
+        raise ValueError("fs = None must be given with an array; give the sample rate in Hz")
     check_rate(fs)
+    if isinstance(vibration, pd.DataFrame):
+        channel_names = channel_names or [str(name) for name in vibration.columns]
+        vibration = vibration.to_numpy().T
     signals = np.atleast_2d(np.asarray(vibration))
     if not np.issubdtype(signals.dtype, np.floating) or signals.dtype == np.float16:
         signals = signals.astype(np.float64)

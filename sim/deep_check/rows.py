@@ -16,7 +16,7 @@ import numpy as np
 from ..fidelity.cost import cost_of
 from ..fidelity.ladder import with_values
 from ..machine.simulate import simulate
-from ..output.solution import Solution
+from ..output.recording import Recording
 from ..scene.parts import Scene, channels_of
 from ..scene.plausibility import (
     FEWEST_TURNS,
@@ -145,7 +145,7 @@ class ShortRun:
     ----------
     scene : Scene
         As it was run, its duration changed.
-    solution : Solution
+    solution : Recording
         With its truth where the machine turns; signals of zeros where the run failed.
     warnings : tuple of str
         Of the run; without doubts.
@@ -154,7 +154,7 @@ class ShortRun:
     """
 
     scene: Scene
-    solution: Solution
+    solution: Recording
     warnings: tuple[str, ...]
     doubts: tuple[Doubt, ...]
 

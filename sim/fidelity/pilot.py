@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy.special import stdtrit
 
 from ..machine.simulate import recorder, simulate
-from ..output.solution import Recorder, Solution
+from ..output.recording import Recorder, Recording
 from ..scene.parts import Scene, SceneError
 from .cost import cost_of
 from .ladder import VALIDITY, Rung, with_values
@@ -28,7 +28,7 @@ Quantity = tuple[float, str, float]
 """Value, kind ("dB", "relative" or "absolute") and scale: the least size a relative error is taken
 of, the size an absolute one is taken of; of no meaning to a level."""
 
-Quantities = Callable[[Solution, Scene], Mapping[str, Quantity]]
+Quantities = Callable[[Recording, Scene], Mapping[str, Quantity]]
 """Quantities of interest of a run with its truth, by name."""
 
 Float = NDArray[np.float64]
@@ -180,7 +180,7 @@ def outcome_of(task: Task) -> Outcome:
     return Outcome({} if fault else task.quantities(solution, scene), fault, seconds)
 
 
-def _timed(scene: Scene, number: int, clock: Callable[[], float]) -> tuple[Solution, float]:
+def _timed(scene: Scene, number: int, clock: Callable[[], float]) -> tuple[Recording, float]:
     """A run and its least time; one that takes next to nothing is repeated."""
     least, begin, first = math.inf, clock(), scene.machine not in _warm
     while True:
@@ -332,7 +332,7 @@ def _key(values: Mapping[str, Any]) -> str:
     return json.dumps(values, sort_keys=True)
 
 
-def _fault(solution: Solution) -> str:
+def _fault(solution: Recording) -> str:
     """Why a run is outside the validity of its rungs; empty where it is not."""
     if not solution.status.ok:
         return solution.status.text

@@ -13,10 +13,12 @@ from numpy.typing import NDArray
 from ..contact.law import CONTACT
 from ..film.impedance_map import impedance_map
 from ..film.solve import LEAST_CELLS, FilmGeometry, Groove, dufrane_scar
+from ..output.recording import Recording
 from ..output.sensor import digitise
-from ..output.solution import SimulationError, Solution, Status
+from ..output.status import SimulationError, Status
 from ..scene.journal import JournalLoad, JournalScene
-from ..scene.parts import Scene, SceneError, channels_of
+from ..scene.parts import Scene, SceneError
+from ..scene.recorded import failed, recorded
 from .orbit import (
     FilmTrace,
     Load,
@@ -383,7 +385,7 @@ class _Plan:
         return np.asarray(self.scene.drive.start_angle + turned)
 
 
-def simulate_journal(scene: Scene, seed: int, truth: bool, raise_on_failure: bool) -> Solution:
+def simulate_journal(scene: Scene, seed: int, truth: bool, raise_on_failure: bool) -> Recording:
     """Simulate one recording; see :func:`wearstate.sim.machine.simulate.simulate`."""
     journal = cast(JournalScene, scene)
     check_journal(journal)
@@ -400,28 +402,16 @@ def simulate_journal(scene: Scene, seed: int, truth: bool, raise_on_failure: boo
     if not status.ok:
         if raise_on_failure:
             raise SimulationError(status, journal.name)
-        return _failed(journal, status, numerics)
+        return failed(journal, status, numerics)
     signal, clipped = _measured(journal, scale.clearance * run.position[plan.kept], plan, seed)
     numerics["clipped_samples"] = clipped
-    return Solution(
-        signal=signal,
-        sample_rate=journal.sample_rate,
-        channels=channels_of(journal),
+    return recorded(
+        journal,
+        signal,
         truth=_truth(journal, scale, plan, run, (film, loads)) if truth else {},
         status=status,
         numerics=numerics,
         warnings=_warnings(numerics),
-    )
-
-
-def _failed(scene: JournalScene, status: Status, numerics: Numerics) -> Solution:
-    n_samples = round(scene.duration * scene.sample_rate)
-    return Solution(
-        signal=np.zeros((len(channels_of(scene)), n_samples), dtype=np.float32),
-        sample_rate=scene.sample_rate,
-        channels=channels_of(scene),
-        status=status,
-        numerics=numerics,
     )
 
 

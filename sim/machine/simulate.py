@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from ..journal.recording import check_journal, simulate_journal
-from ..output.solution import Recorder, Solution
+from ..output.recording import Recorder, Recording
 from ..pump.recording import check_pump, simulate_pump
 from ..scene.parts import Scene, SceneError
 from ..scene.plausibility import solution_doubts
@@ -13,7 +13,7 @@ from ..shaft.recording import check_shaft, shaft_recorder, simulate_shaft
 
 def simulate(
     scene: Scene, *, seed: int, truth: bool = False, raise_on_failure: bool = True
-) -> Solution:
+) -> Recording:
     """Simulate one recording of a scene.
 
     Parameters
@@ -29,7 +29,7 @@ def simulate(
 
     Returns
     -------
-    Solution
+    Recording
         Signal, channels, status, numerics, and truth where asked for; its warnings include what
         of scene and signal is hardly meant, see :mod:`.scene.plausibility`. The ``estimated_error``
         of its numerics is that of rungs and steps: it cannot tell whether the scene is a machine.

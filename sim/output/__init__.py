@@ -1,4 +1,4 @@
-"""What a run gives back: the solution with its status, sensors and the converter.
+"""What a run gives back: the recording, how the run ended, sensors and the converter.
 
 It may import nothing of the house.
 """

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..excitation.forces import Push
+from ..output.recording import Recording
 from ..output.sensor import (
     anti_alias_poles,
     coloured_noise,
@@ -15,10 +16,11 @@ from ..output.sensor import (
     mains_hum,
     mounting_poles,
 )
-from ..output.solution import SimulationError, Solution, Status
+from ..output.status import SimulationError, Status
 from ..scene.exciters import exciter_faults
-from ..scene.parts import Accelerometer, CasingMode, Scene, SceneError, channels_of, specific_key
+from ..scene.parts import Accelerometer, CasingMode, Scene, SceneError, specific_key
 from ..scene.pump import CRANK_PLACES, FORCE_PLACES, GUIDE_PLACES, VALVE_PLACES, PumpScene
+from ..scene.recorded import failed, recorded
 from .casing import (
     CasingModes,
     band_limited_acceleration,
@@ -65,7 +67,7 @@ def check_pump(scene: Scene) -> None:
     measured_casing(pump)
 
 
-def simulate_pump(scene: Scene, seed: int, truth: bool, raise_on_failure: bool) -> Solution:
+def simulate_pump(scene: Scene, seed: int, truth: bool, raise_on_failure: bool) -> Recording:
     """Simulate one recording; see :func:`wearstate.sim.machine.simulate.simulate`."""
     pump = cast(PumpScene, scene)
     if not pump.running:
@@ -75,7 +77,7 @@ def simulate_pump(scene: Scene, seed: int, truth: bool, raise_on_failure: bool) 
     except LimitError as error:
         if raise_on_failure:
             raise
-        return _failed(pump, error.status, {})
+        return failed(pump, error.status, {})
     step = 1 / (pump.sample_rate * factor)
     plan = _Plan(pump, factor)
     run = run_scene(
@@ -86,17 +88,16 @@ def simulate_pump(scene: Scene, seed: int, truth: bool, raise_on_failure: bool) 
     if not status.ok:
         if raise_on_failure:
             raise SimulationError(status, pump.name)
-        return _failed(pump, status, numerics)
+        return failed(pump, status, numerics)
     pushes = plan.pushes(seed)
     places, on_casing = with_pushes(pump, *casing_forces(pump, run), pushes)
     acceleration, casing_numerics = _housing(pump, places, on_casing, 1 / step, factor)
     signal, clipped = _measured(acceleration, plan.turned(run), plan, pushes, seed, run)
     numerics |= casing_numerics
     numerics["clipped_samples"] = clipped
-    return Solution(
-        signal=signal,
-        sample_rate=pump.sample_rate,
-        channels=channels_of(pump),
+    return recorded(
+        pump,
+        signal,
         truth=_truth(run, plan) | _test_truth(plan, pushes) if truth else {},
         status=status,
         numerics=numerics,
@@ -104,7 +105,7 @@ def simulate_pump(scene: Scene, seed: int, truth: bool, raise_on_failure: bool) 
     )
 
 
-def _at_rest(pump: PumpScene, seed: int, truth: bool) -> Solution:
+def _at_rest(pump: PumpScene, seed: int, truth: bool) -> Recording:
     """A test of the casing while the crank stands: no force but those of the exciters."""
     _refuse(pump, _rest_faults(pump))
     plan = _Plan(pump, FEWEST_STEPS)
@@ -116,10 +117,9 @@ def _at_rest(pump: PumpScene, seed: int, truth: bool) -> Solution:
     signal, clipped = _measured(acceleration, angle, plan, pushes, seed, None)
     numerics |= {"step_s": 1 / rate, "steps": plan.n_steps, "mean_speed_hz": 0.0}
     numerics |= {"estimated_error": 0.0, "clipped_samples": clipped}
-    return Solution(
-        signal=signal,
-        sample_rate=pump.sample_rate,
-        channels=channels_of(pump),
+    return recorded(
+        pump,
+        signal,
         truth=_test_truth(plan, pushes) if truth else {},
         status=Status.OK,
         numerics=numerics,
@@ -151,17 +151,6 @@ def _pushing_faults(scene: PumpScene) -> list[str]:
             f"exciters.{i}", part, duration=scene.duration, sample_rate=scene.sample_rate
         )
     ]
-
-
-def _failed(scene: PumpScene, status: Status, numerics: dict[str, float | int | str]) -> Solution:
-    n_samples = round(scene.duration * scene.sample_rate)
-    return Solution(
-        signal=np.zeros((len(channels_of(scene)), n_samples), dtype=np.float32),
-        sample_rate=scene.sample_rate,
-        channels=channels_of(scene),
-        status=status,
-        numerics=numerics,
-    )
 
 
 class _Plan:

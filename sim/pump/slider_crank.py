@@ -37,7 +37,7 @@ from numpy.typing import NDArray
 
 from ..contact.law import LAW_KELVIN_VOIGT, RELEASE_AT_ZERO_FORCE, friction_force, normal_force
 from ..jit import kernel, sine_cosine
-from ..output.solution import Status
+from ..output.status import Status
 from .hydraulics import PRESSURE_CHAMBER, chamber_step, line_pressure
 
 JOINT_IDEAL, JOINT_LINK, JOINT_COMPLIANT = 0, 1, 2

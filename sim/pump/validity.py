@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Iterator
 
-from ..output.solution import Status
+from ..output.status import Status
 from ..scene.pump import Guide, PumpScene, RevoluteJoint
 from .setup import (
     LARGEST_STEP_PER_CONTACT_TIME,

@@ -14,8 +14,8 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from ..output.recording import Recording
 from ..output.sensor import Channel
-from ..output.solution import Solution
 from .journal import JournalScene
 from .parts import CasingMode, Scene
 from .pump import FORCE_PLACES, PumpScene
@@ -497,14 +497,14 @@ def _sensors(scene: Scene) -> tuple[Any, ...]:
     return tuple(cast(JournalScene, scene).sensors)
 
 
-def solution_doubts(scene: Scene, solution: Solution) -> tuple[Doubt, ...]:
+def solution_doubts(scene: Scene, solution: Recording) -> tuple[Doubt, ...]:
     """What of a run is hardly meant: its scene, and what came of it.
 
     Parameters
     ----------
     scene : Scene
         Of the run.
-    solution : Solution
+    solution : Recording
         That did not fail.
 
     Examples

@@ -19,10 +19,12 @@ from ..beam.rotor import Rotor, Support
 from ..excitation.forces import Push, read_cell
 from ..film.bearing import JournalBearing
 from ..film.solve import FilmGeometry
+from ..output.recording import Recorder, Recording
 from ..output.sensor import digitise
-from ..output.solution import Recorder, SimulationError, Solution, Status
+from ..output.status import SimulationError, Status
 from ..scene.exciters import exciter_faults
-from ..scene.parts import Scene, SceneError, channels_of
+from ..scene.parts import Scene, SceneError
+from ..scene.recorded import failed, recorded
 from ..scene.shaft import (
     Coupling,
     ShaftAccelerometer,
@@ -898,7 +900,7 @@ class _Rest(NamedTuple):
     numerics: Numerics
 
 
-def simulate_shaft(scene: Scene, seed: int, truth: bool, raise_on_failure: bool) -> Solution:
+def simulate_shaft(scene: Scene, seed: int, truth: bool, raise_on_failure: bool) -> Recording:
     """Simulate one recording; see :func:`wearstate.sim.machine.simulate.simulate`."""
     return shaft_recorder(scene)(scene, seed, truth, raise_on_failure)
 
@@ -921,19 +923,18 @@ def _rest(scene: ShaftScene) -> _Rest:
     return _Rest(state, reduced, status, culprit, numerics)
 
 
-def _record(rest: _Rest, scene: Scene, seed: int, truth: bool, raise_on_failure: bool) -> Solution:
+def _record(rest: _Rest, scene: Scene, seed: int, truth: bool, raise_on_failure: bool) -> Recording:
     shaft, state, numerics = cast(ShaftScene, scene), rest.state, dict(rest.numerics)
     if rest.reduced is None or not rest.status.ok:
         if raise_on_failure:
             raise SimulationError(rest.status, f"{shaft.name}, bearing '{rest.culprit}'")
-        return _failed(shaft, rest.status, numerics)
+        return failed(shaft, rest.status, numerics)
     motion = _Motion(shaft, state, rest.reduced, seed, truth)
     signal, clipped = _measured(shaft, state, motion, seed)
     numerics["clipped_samples"] = clipped
-    return Solution(
-        signal=signal,
-        sample_rate=shaft.sample_rate,
-        channels=channels_of(shaft),
+    return recorded(
+        shaft,
+        signal,
         truth=motion.truth() if truth else {},
         status=rest.status,
         numerics=numerics,
@@ -1216,17 +1217,6 @@ def _reading(
     turned = angle - probe.angle
     track = sum(part.amplitude * np.cos(part.order * turned + part.phase) for part in scene.run_out)
     return np.asarray(towards + track + probe.offset)
-
-
-def _failed(scene: ShaftScene, status: Status, numerics: Numerics) -> Solution:
-    n_samples = round(scene.duration * scene.sample_rate)
-    return Solution(
-        signal=np.zeros((len(channels_of(scene)), n_samples), dtype=np.float32),
-        sample_rate=scene.sample_rate,
-        channels=channels_of(scene),
-        status=status,
-        numerics=numerics,
-    )
 
 
 def _numerics(scene: ShaftScene, state: ShaftState) -> Numerics:

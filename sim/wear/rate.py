@@ -18,7 +18,7 @@ from scipy.optimize import brentq
 from ..film.bearing import BearingError, Equilibrium, equilibrium
 from ..film.solve import FilmGeometry
 from ..journal.recording import film_geometry
-from ..output.solution import SimulationError
+from ..output.status import SimulationError
 from ..pump.recording import steps_per_sample
 from ..pump.setup import pin_offsets, run_scene
 from ..pump.slider_crank import CrankRun

@@ -19,9 +19,10 @@ from pathlib import Path
 
 import numpy as np
 from scipy.signal import resample_poly
-from wearstate.datasets.file.record import DataError, DataSet
+from wearstate.datasets.file.record import DataSet
 from wearstate.datasets.measured.recording import read_recording
 from wearstate.diagnose.wear_model.file import load_model
+from wearstate.sim.output.recording import DataError
 from wearstate.sim.output.sensor import tacho_pulses
 
 MEASURED_SPEED_HZ = 25.0  # of every MFPT recording

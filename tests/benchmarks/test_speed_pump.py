@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy import signal
 from wearstate.sim.machine.simulate import simulate
-from wearstate.sim.output.solution import Status
+from wearstate.sim.output.status import Status
 from wearstate.sim.pump.casing import decimate, decimation_filter, edge_samples
 from wearstate.sim.scene.load import load_scene
 

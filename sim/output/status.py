@@ -1,14 +1,6 @@
-"""What a solver returns: a frozen solution with a status. Knows no physics."""
+"""How a run ended, and what helps where it failed. Knows no physics."""
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
 from enum import IntEnum
-from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
-
-from .sensor import Channel
 
 
 class Status(IntEnum):
@@ -46,6 +38,18 @@ class Status(IntEnum):
     def text(self) -> str:
         """One sentence with the cure."""
         return _STATUS_TEXT[self]
+
+    def __str__(self) -> str:
+        """Name and cure in words.
+
+        Examples
+        --------
+        >>> print(Status.TOO_MANY_STEPS)
+        too many steps: the adaptive integrator used up its steps; raise numerics.tolerance or \
+shorten duration
+        """
+        name = self.name.lower().replace("_", " ")
+        return name if self.ok else f"{name}: {self.text}"
 
 
 _STATUS_TEXT = {
@@ -135,39 +139,4 @@ class SimulationError(RuntimeError):
 
     def __init__(self, status: Status, where: str) -> None:
         self.status = status
-        super().__init__(f"{where}: {status.name.lower()}: {status.text}")
-
-
-@dataclass(frozen=True, kw_only=True)
-class Solution:
-    """A simulated recording.
-
-    Attributes
-    ----------
-    signal : numpy.ndarray [shape=(n_channels, n_samples)]
-        float32, in the unit of each channel.
-    sample_rate : float
-        [Hz]
-    channels : tuple of Channel
-        Name, unit and place of each row of `signal`.
-    truth : dict of str to numpy.ndarray
-        Hidden quantities, first dimension time; empty unless asked for.
-    status : Status
-        How the run ended.
-    warnings : tuple of str
-        What a user must know of a run that did not fail.
-    numerics : dict
-        Rungs, step, step count and guards of the run; no wall time.
-    """
-
-    signal: NDArray[np.float32]
-    sample_rate: float
-    channels: tuple[Channel, ...]
-    status: Status
-    warnings: tuple[str, ...] = ()
-    truth: dict[str, NDArray[np.float64]] = field(default_factory=dict)
-    numerics: dict[str, float | int | str] = field(default_factory=dict)
-
-
-Recorder = Callable[[Any, int, bool, bool], Solution]
-"""Makes a recording of a scene: scene, seed, with its truth, error where it fails."""
+        super().__init__(f"{where}: {status}")

@@ -1,0 +1,54 @@
+"""The recording of a scene: what its simulator measured, under the names that the scene gives."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..output.recording import Recording
+from ..output.status import Status
+from .parts import Scene, channels_of
+
+
+def recorded(scene: Scene, signal: NDArray[np.float32], **about: Any) -> Recording:
+    """A simulated recording of a scene.
+
+    Parameters
+    ----------
+    scene : Scene
+        Of which channels, sample rate and tacho are.
+    signal : ndarray of shape (n_channels, n_samples)
+        In the unit of each channel.
+    **about
+        Status, warnings, truth and numerics, as of :class:`~..output.recording.Recording`.
+
+    Examples
+    --------
+    >>> from .load import load_scene
+    >>> scene = load_scene("bilge-pump", {"duration": "1 s"})
+    >>> recorded(scene, np.zeros((3, 25600), dtype=np.float32))
+    <Recording bilge-pump 1 s, 25.6 kHz, acc_x acc_y tacho>
+    """
+    return Recording(
+        signal=signal,
+        sample_rate=scene.sample_rate,
+        channels=channels_of(scene),
+        tacho=None if scene.tacho is None else scene.tacho.name,
+        origin="simulated",
+        source=scene.name,
+        **about,
+    )
+
+
+def failed(scene: Scene, status: Status, numerics: dict[str, float | int | str]) -> Recording:
+    """The recording of a run that failed: zeros, and the status with the cure.
+
+    Examples
+    --------
+    >>> from .load import load_scene
+    >>> failed(load_scene("bilge-pump"), Status.OVERLAP, {}).status.name
+    'OVERLAP'
+    """
+    n_samples = round(scene.duration * scene.sample_rate)
+    silence = np.zeros((len(channels_of(scene)), n_samples), dtype=np.float32)
+    return recorded(scene, silence, status=status, numerics=numerics)

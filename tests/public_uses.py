@@ -1,0 +1,33 @@
+"""Right and wrong uses of the public names, as mypy must see them; tests/test_public.py runs it.
+
+A comment ``# error: CODE`` is the error that the line must have; no other line may have one.
+"""
+
+from pathlib import Path
+
+import numpy as np
+import wearstate
+from numpy.typing import NDArray
+
+scene: wearstate.Scene = wearstate.load_scene("bilge-pump", {"duration": "1 s"})
+recording: wearstate.Recording = wearstate.simulate(scene, seed=1, truth=True)
+time: NDArray[np.float64] = recording.time
+acceleration: NDArray[np.float32] = recording["acc_x"]
+also: wearstate.Recording = wearstate.simulate("bilge-pump")
+names, values = wearstate.feature_row(recording)
+first: str = names[0]
+wearstate.feature_row(acceleration, 25_600.0, channel_names=["acc_x"])
+measured = wearstate.read_recording(Path("pump.wav"), wearstate.SourceOptions(unit="g"))
+length: float = measured.duration
+with wearstate.DataSet("data.h5") as data:
+    record: wearstate.Recording = data[0]
+estimate = wearstate.load_model("model.wsm").estimate(record)
+low: float | None = estimate.low
+
+wearstate.simulat(scene, seed=1)  # error: attr-defined
+wearstate.simulate(scene, sed=1)  # error: call-arg
+wearstate.simulate(scene, seed="1")  # error: arg-type
+wearstate.simulate(1)  # error: arg-type
+print(wearstate.simulate(scene).signals)  # error: attr-defined
+wearstate.load_scene("bilge-pump").duration = 2.0  # error: misc
+grade: str = estimate.grade  # error: assignment

@@ -1,0 +1,79 @@
+"""The public names: typed, documented, cheap to import, and fitting together."""
+
+import ast
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import wearstate
+
+ROOT = Path(wearstate.__file__).parent
+USES = Path(__file__).with_name("public_uses.py")
+
+
+def told_to_checkers(path):
+    """What the block for type checkers of an `__init__.py` imports: name -> module."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    [block] = [
+        node
+        for node in tree.body
+        if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"
+    ]
+    return {
+        alias.asname: f"{'.' * node.level}{node.module or ''}"
+        for node in block.body
+        if isinstance(node, ast.ImportFrom) and node.level
+        for alias in node.names
+    }
+
+
+def test_type_checkers_and_python_find_the_same_names():
+    assert told_to_checkers(ROOT / "__init__.py") == wearstate._HOMES
+    for name, home in wearstate._HOMES.items():
+        assert getattr(wearstate, name).__module__ == f"wearstate{home}", name
+
+
+def expected_errors(text):
+    lines = enumerate(text.splitlines(), 1)
+    return {(i, m[1]) for i, line in lines if (m := re.search(r"# error: ([\w-]+)$", line))}
+
+
+@pytest.fixture(scope="module")
+def mypy(tmp_path_factory):
+    """Check a file against the package as it is installed, under a link of the right name."""
+    folder = tmp_path_factory.mktemp("types")
+    (folder / "wearstate").mkdir()
+    for each in ROOT.iterdir():
+        if each.suffix in {".py", ".typed"} or each.name in wearstate_floors():
+            (folder / "wearstate" / each.name).symlink_to(each)
+    (folder / "pyproject.toml").write_text((ROOT / "pyproject.toml").read_text())
+
+    def check(path):
+        done = subprocess.run(
+            [sys.executable, "-m", "mypy", "--strict", "--follow-imports=silent", str(path)],
+            cwd=folder,
+            capture_output=True,
+            text=True,
+            timeout=300,
+        )
+        return {
+            (int(line), code)
+            for line, code in re.findall(
+                rf"{path.name}:(\d+): error: .*\[([\w-]+)\]$", done.stdout, re.M
+            )
+        }, done.stdout + done.stderr
+
+    return check
+
+
+def wearstate_floors():
+    return {"sim", "features", "datasets", "diagnose"}
+
+
+def test_mypy_tells_right_uses_from_wrong_ones(mypy):
+    wanted = expected_errors(USES.read_text())
+    assert len(wanted) >= 7
+    found, text = mypy(USES)
+    assert found == wanted, text
