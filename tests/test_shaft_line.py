@@ -543,7 +543,7 @@ def test_large_motion_is_a_warning_then_a_failure():
     assert failed.status is Status.LINE_MOTION
     assert not failed.signal.any()
     with pytest.raises(
-        SimulationError, match="bearing 'stern_forward': line_motion: the journal would"
+        SimulationError, match="bearing 'stern_forward': line motion: the journal would"
     ):
         simulate(scene, seed=1)
 

@@ -720,6 +720,84 @@ def _log_step(now: _Force, load: Vector, place: Vector, reach: Callable[[float],
     return step
 
 
+def at_eccentricity(
+    geometry: FilmGeometry,
+    eccentricity_ratio: float,
+    *,
+    angle: float = 0.0,
+    rung: str = "direct",
+) -> Equilibrium:
+    """Film of a journal that is held at an eccentricity, and the load that would hold it there.
+
+    Parameters
+    ----------
+    geometry : FilmGeometry
+        Bearing and cavitation condition: ``"guembel"`` (half film), ``"reynolds"`` or
+        ``"periodic"``.
+    eccentricity_ratio : float
+        Distance of the centres over C, 0 < e < 1 (further where the bore is worn).
+    angle : float
+        Direction of the journal centre from the X axis [rad]; it matters in a bearing with grooves
+        or a worn bore.
+    rung : str
+        One of the names of ``FILM_RUNGS``.
+
+    Returns
+    -------
+    Equilibrium
+        As :func:`equilibrium` finds it for that load: `load`, `attitude_angle` and
+        `sommerfeld_number`; :func:`friction`, :func:`flow` and :func:`coefficients` take it.
+
+    Raises
+    ------
+    BearingError
+        The mesh does not resolve so thin a film, or the journal touches the bore.
+    ValueError
+        The eccentricity is not above zero, or there is no such rung.
+
+    Examples
+    --------
+    Raimondi and Boyd, L / D = 1, e = 0.6: S = 0.121, attitude angle 51 degrees.
+
+    >>> held = at_eccentricity(FilmGeometry(length_to_diameter=1.0, condition="reynolds"), 0.6)
+    >>> round(held.sommerfeld_number, 3), round(math.degrees(held.attitude_angle))
+    (0.122, 51)
+    """
+    if not 0 < eccentricity_ratio < 2:
+        raise ValueError(
+            f"eccentricity_ratio = {eccentricity_ratio} must be > 0 and < 2; it is the distance of "
+            "the centres over the radial clearance"
+        )
+    if rung not in _RUNGS:
+        raise ValueError(f"rung = '{rung}' must be one of {', '.join(_RUNGS)}")
+    plain = geometry.bore is None and not geometry.grooves
+    mesh = angle if plain and geometry.condition == "reynolds" else 0.0
+    position = eccentricity_ratio * np.array([math.cos(angle), math.sin(angle)])
+    film = _RUNGS[rung].solve(geometry, _at_rest(_turn(-mesh) @ position, (0.0, 0.0)))
+    status = _STATUS_OF_FILM.get(film.status, BearingStatus.NO_CONVERGENCE)
+    if not status.ok:
+        raise BearingError(status, f"eccentricity ratio {eccentricity_ratio:g}")
+    return Equilibrium(
+        geometry=geometry,
+        rung=rung,
+        load=-(_turn(mesh) @ film.force),
+        position=position,
+        tilt=(0.0, 0.0),
+        mesh_angle=mesh,
+        film=film,
+        residual=0.0,
+        iterations=film.iterations,
+        status=status,
+    )
+
+
+_STATUS_OF_FILM = {
+    FilmStatus.OK: BearingStatus.OK,
+    FilmStatus.COARSE: BearingStatus.COARSE,
+    FilmStatus.TOUCH: BearingStatus.NO_ROOM,
+}
+
+
 # --- stiffness and damping
 
 
@@ -1248,6 +1326,8 @@ class OperatingPoint:
     ----------
     equilibrium : Equilibrium
         Non-dimensional.
+    load : numpy.ndarray [shape=(2,)]
+        Force on the journal [N].
     sommerfeld_number : float
     eccentricity_ratio : float
     attitude_angle : float
@@ -1279,6 +1359,7 @@ class OperatingPoint:
     """
 
     equilibrium: Equilibrium
+    load: Vector
     sommerfeld_number: float
     eccentricity_ratio: float
     attitude_angle: float
@@ -1300,7 +1381,8 @@ def operate(
     bearing: JournalBearing,
     *,
     speed: float,
-    load: ArrayLike,
+    load: ArrayLike | None = None,
+    eccentricity_ratio: float | None = None,
     rung: str = "direct",
     slope: tuple[float, float] = (0.0, 0.0),
     tilt_coefficients: bool = False,
@@ -1312,8 +1394,10 @@ def operate(
     bearing : JournalBearing
     speed : float
         Of the journal, turning from X to Y [rad/s].
-    load : array_like [shape=(2,)]
-        Force on the journal [N].
+    load : array_like [shape=(2,)], optional
+        Force on the journal [N]; this or `eccentricity_ratio`.
+    eccentricity_ratio : float, optional
+        At which the journal is held on the X axis, without slope; the load follows.
     rung : str
         Of the film.
     slope : tuple of float
@@ -1330,7 +1414,8 @@ def operate(
     BearingError
         No film can carry the load, or no equilibrium was found.
     ValueError
-        The speed is not above zero, or the load is zero.
+        The speed is not above zero, the load is zero, or not exactly one of load and eccentricity
+        is given.
 
     Notes
     -----
@@ -1343,16 +1428,26 @@ def operate(
     >>> point = operate(bearing, speed=2 * math.pi * 20, load=[100e3, 0.0])
     >>> round(point.sommerfeld_number, 3), round(point.eccentricity_ratio, 2)
     (0.2, 0.47)
+    >>> held = operate(bearing, speed=2 * math.pi * 20, eccentricity_ratio=0.47)
+    >>> bool(abs(np.hypot(*held.load) / 100e3 - 1) < 0.02)
+    True
     """
     _checked_positive("speed", speed, "rad/s")
     unit = bearing.force_unit(speed)
     c, length = bearing.clearance, bearing.length
-    found = equilibrium(
-        bearing.geometry,
-        np.asarray(load, dtype=float) / unit,
-        rung=rung,
-        tilt=(slope[0] * length / c, slope[1] * length / c),
-    )
+    if (load is None) == (eccentricity_ratio is None):
+        raise ValueError("load and eccentricity_ratio: one of them must be given, not both")
+    if eccentricity_ratio is not None:
+        if slope != (0.0, 0.0):
+            raise ValueError(f"slope = {slope} rad must be 0 with eccentricity_ratio; give a load")
+        found = at_eccentricity(bearing.geometry, eccentricity_ratio, rung=rung)
+    else:
+        found = equilibrium(
+            bearing.geometry,
+            np.asarray(load, dtype=float) / unit,
+            rung=rung,
+            tilt=(slope[0] * length / c, slope[1] * length / c),
+        )
     method = "analytic" if rung == "direct" else "displacement"
     film = coefficients(found, method=method, tilt=tilt_coefficients)
     limit = whirl(found)
@@ -1363,6 +1458,7 @@ def operate(
     film = _in_metres(film, length)
     return OperatingPoint(
         equilibrium=found,
+        load=found.load * unit,
         sommerfeld_number=found.sommerfeld_number,
         eccentricity_ratio=found.eccentricity_ratio,
         attitude_angle=found.attitude_angle,

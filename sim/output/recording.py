@@ -5,7 +5,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, Literal, Self
+from typing import Any, Literal, Protocol, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,6 +14,17 @@ from .sensor import Channel, rate_fault
 from .status import Status
 
 Origin = Literal["simulated", "measured"]
+
+
+class Table(Protocol):
+    """What a pandas.DataFrame offers; other libraries' tables offer it too."""
+
+    @property
+    def columns(self) -> Any:
+        """Names of the columns."""
+
+    def to_numpy(self) -> Any:
+        """Values [shape=(n_rows, n_columns)]."""
 
 
 class DataError(ValueError):
@@ -164,7 +175,7 @@ class Recording(SignalLayout):
     @classmethod
     def from_array(
         cls,
-        data: ArrayLike,
+        data: ArrayLike | Table,
         fs: float,
         channels: Sequence[str | Channel] | None = None,
         *,
@@ -332,6 +343,45 @@ def html_table(heading: str, head: Sequence[str], rows: Sequence[Sequence[object
 
 
 # --- from arrays and tables
+
+
+def as_recording(
+    data: Recording | ArrayLike | Table,
+    fs: float | None = None,
+    channels: Sequence[str | Channel] | None = None,
+    **about: Any,
+) -> Recording:
+    """A recording as it is; an array or a table as a recording.
+
+    Parameters
+    ----------
+    data : Recording, array_like or pandas.DataFrame
+        As of :meth:`Recording.from_array`.
+    fs : float, optional
+        Sample rate of an array or a table [Hz]; a recording has its own.
+    channels : sequence of str or Channel, optional
+        Of an array or a table; a recording has its own.
+    **about
+        As of :meth:`Recording.from_array`.
+
+    Raises
+    ------
+    DataError
+        `fs` is missing, or given with a recording, or as :meth:`Recording.from_array`.
+
+    Examples
+    --------
+    >>> as_recording(np.zeros(8), 10.0)
+    <Recording 0.8 s, 10 Hz, ch_0>
+    """
+    if isinstance(data, Recording):
+        if fs is not None or channels is not None:
+            raise DataError("fs and channels must be left out; the recording has its own")
+        return data
+    if fs is None:
+        raise DataError("fs = None must be given with an array or table; give it in Hz")
+    return Recording.from_array(data, fs, channels, **about)
+
 
 _QUANTITIES = {
     "m/s^2": "acceleration",
