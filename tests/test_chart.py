@@ -24,10 +24,10 @@ from wearstate.diagnose.charts.figure import SUFFIXES, chart_figure, chart_html,
 from wearstate.diagnose.charts.of_scene import KEPT, RAISED, chart_of, scene_chart
 from wearstate.diagnose.charts.words import HERE
 from wearstate.diagnose.command_line.cli import cli
-from wearstate.sim.fidelity.ladder import with_values
 from wearstate.sim.fidelity.pilot import Candidate, Difference, Pilot, differences
 from wearstate.sim.fidelity.study import Answer, Convergence, Raise, Study
 from wearstate.sim.scene.load import load_scene
+from wearstate.sim.scene.rungs import with_values
 
 FILM = {"film": "direct", "mesh": "x1/2"}
 WRITTEN = {"film": "map", "mesh": "x1"}

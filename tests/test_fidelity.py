@@ -9,14 +9,14 @@ from wearstate.datasets.generation.quantities import QUANTITIES, resolved, with_
 from wearstate.diagnose.charts.of_scene import chart_of
 from wearstate.sim.fidelity import pilot as pilot_runs
 from wearstate.sim.fidelity.choose import resolve, resolved_scene
-from wearstate.sim.fidelity.cost import cost_of
-from wearstate.sim.fidelity.ladder import effects_of, with_values
+from wearstate.sim.fidelity.ladder import cost_of, effects_of
 from wearstate.sim.fidelity.pilot import Difference, Outcome, Pilot, differences
 from wearstate.sim.fidelity.study import Search, study
 from wearstate.sim.machine.simulate import recorder, simulate
 from wearstate.sim.output.status import SimulationError
 from wearstate.sim.scene.load import load_scene, scene_names
 from wearstate.sim.scene.parts import SceneError
+from wearstate.sim.scene.rungs import with_values
 from wearstate.sim.shaft.recording import shaft_state
 from wearstate.sim.shaft.response import receptance
 

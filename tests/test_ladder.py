@@ -6,17 +6,20 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from wearstate.sim.fidelity.cost import cost_of, journal_calls, shaft_states
-from wearstate.sim.fidelity.ladder import LADDERS, admissible, effects_of, with_values
+from wearstate.sim.fidelity.ladder import cost_of, effects_of
+from wearstate.sim.journal.ladder import journal_calls
 from wearstate.sim.journal.orbit import load, run_orbit, short_film
 from wearstate.sim.journal.recording import journal_film, squeeze_rate
 from wearstate.sim.journal.validity import orbit_faults
+from wearstate.sim.machine.registry import machine_of
 from wearstate.sim.machine.simulate import simulate
 from wearstate.sim.pump.casing import edge_samples
 from wearstate.sim.pump.validity import pump_step, pump_steps
-from wearstate.sim.scene.load import load_scene, scene_names
-from wearstate.sim.scene.parts import EFFECTS, SceneError
+from wearstate.sim.scene.load import MACHINES, load_scene, scene_names
+from wearstate.sim.scene.parts import SceneError
+from wearstate.sim.scene.rungs import admissible, with_values
 from wearstate.sim.shaft.elements import element_faults, element_lengths
+from wearstate.sim.shaft.ladder import shaft_states
 from wearstate.sim.shaft.recording import reduced_rotor, shaft_beam, shaft_state
 
 PUMPS = ("bilge-pump", "slider-crank-benchmark", "triplex-pump")
@@ -34,7 +37,7 @@ def effect(scene, name):
 def test_every_rung_goes_into_its_scene_and_is_found_there(name):
     scene = load_scene(name)
     for each in effects_of(scene):
-        assert each.name in EFFECTS[scene.machine]
+        assert each.name in scene.effects
         for rung in admissible(each, scene):
             changed = with_values(scene, rung.values)
             if each.numerical:
@@ -44,7 +47,7 @@ def test_every_rung_goes_into_its_scene_and_is_found_there(name):
 
 
 def test_every_effect_of_a_machine_is_found_in_one_of_its_scenes():
-    found = {machine: set() for machine in EFFECTS}
+    found = {machine: set() for machine in MACHINES}
     for name in scene_names():
         changes = [{}]
         if name == "journal-step":
@@ -52,7 +55,7 @@ def test_every_effect_of_a_machine_is_found_in_one_of_its_scenes():
         for change in changes:
             scene = load_scene(name, change)
             found[scene.machine] |= {each.name for each in effects_of(scene)}
-    assert found == {machine: set(names) for machine, names in EFFECTS.items()}
+    assert found == {machine: set(kind.effects) for machine, kind in MACHINES.items()}
 
 
 def test_an_absent_effect_is_absent():
@@ -61,7 +64,9 @@ def test_an_absent_effect_is_absent():
 
 
 def test_rungs_are_tabulated_from_the_cheapest():
-    for rungs in LADDERS.values():
+    machines = [machine_of(load_scene(name)) for name in scene_names()]
+    assert {name for each in machines for name in each.ladders} >= {"joint", "film", "beam"}
+    for rungs in (rungs for each in machines for rungs in each.ladders.values()):
         costs = [rung.nanoseconds_per_step for rung in rungs]
         assert costs == sorted(costs)
         assert all(rung.assumes and rung.valid for rung in rungs)

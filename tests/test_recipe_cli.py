@@ -18,7 +18,7 @@ from wearstate.datasets.recipe.recipe import (
 from wearstate.datasets.recipe.text import recipe_names, recipe_text
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.inspect.recipe_preview import MOST_DRAWN, preview, preview_text
-from wearstate.sim.fidelity.cost import cost_of
+from wearstate.sim.fidelity.ladder import cost_of
 from wearstate.sim.machine.simulate import check
 from wearstate.sim.scene.load import scene_text
 

@@ -34,6 +34,8 @@ from wearstate.diagnose.wear_model.train import train_model
 from wearstate.sim.output.recording import DataError
 from wearstate.sim.output.status import Status
 from wearstate.sim.scene.load import load_scene, override, scene_table, scene_text
+from wearstate.sim.scene.parts import WearPlace
+from wearstate.sim.scene.pump import PumpScene
 
 CRANKPIN = "joint.crankpin.diametral_clearance"
 SECOND = "rod.centre_of_mass"
@@ -81,7 +83,14 @@ high = "8 kg"
 @pytest.fixture
 def second(monkeypatch):
     """A further severity, without wear limits."""
-    monkeypatch.setitem(recipes.SEVERITIES, SECOND, "second_severity_m")
+    worn(monkeypatch)
+
+
+def worn(monkeypatch, limits=""):
+    """Let the pump wear at the second place too."""
+    first = PumpScene.wear_places[:1]
+    second = WearPlace(SECOND, "rod", "centre of mass", limits)
+    monkeypatch.setattr(PumpScene, "wear_places", (*first, second))
 
 
 def written(tmp_path, text, name="mine", base="bilge-pump-narrow"):
@@ -124,7 +133,7 @@ def two_severities(tmp_path, second):
 def test_a_further_severity_has_a_column_of_its_own(two_severities):
     rows, values, _ = drawn(two_severities, 32)
     first, further = two_severities.severity_columns
-    assert (first, further) == ("diametral_clearance_crankpin_m", "second_severity_m")
+    assert (first, further) == ("diametral_clearance_crankpin_m", "centre_of_mass_rod_m")
     assert_array_equal(rows[first], values[CRANKPIN])
     assert_array_equal(rows[further], values[SECOND])
     edges = load_scene("bilge-pump").wear.grade_edges_diametral
@@ -134,7 +143,7 @@ def test_a_further_severity_has_a_column_of_its_own(two_severities):
 
 
 def test_a_further_severity_with_limits_is_graded_by_them(tmp_path, second, monkeypatch):
-    monkeypatch.setitem(recipes.LIMITS, SECOND, "wear")
+    worn(monkeypatch, "wear")
     wear = {"as_new": "130 mm", "condemning": "180 mm"}
     fixed = "".join(f'"wear.{name}_diametral" = "{value}"\n' for name, value in wear.items())
     edges = [f'"wear.grade_edges_diametral.{i}" = "{140 + 20 * i} mm"\n' for i in range(3)]
@@ -144,9 +153,9 @@ def test_a_further_severity_with_limits_is_graded_by_them(tmp_path, second, monk
     pin += 'bounds.diametral_clearance_crankpin_m = { low = "0.31 mm" }\n'
     recipe = load_recipe(written(tmp_path, f"[fixed]\n{fixed}{''.join(edges)}{pin}{WORN}"))
     rows, _, _ = drawn(recipe, 64)
-    assert recipe.columns["grade_second_severity"] == "i1"
-    expected = np.searchsorted([0.14, 0.16, 0.18], rows["second_severity_m"], side="right")
-    assert_array_equal(rows["grade_second_severity"], expected)
+    assert recipe.columns["grade_centre_of_mass_rod"] == "i1"
+    expected = np.searchsorted([0.14, 0.16, 0.18], rows["centre_of_mass_rod_m"], side="right")
+    assert_array_equal(rows["grade_centre_of_mass_rod"], expected)
     assert set(expected) == {0, 1, 2, 3}
 
 
@@ -183,7 +192,7 @@ def test_the_first_severity_of_a_list_is_the_primary_one(tmp_path, second):
     file = tmp_path / "mine.toml"
     file.write_text(text)
     recipe = load_recipe(file)
-    assert recipe.severity_columns == ("second_severity_m", "diametral_clearance_crankpin_m")
+    assert recipe.severity_columns == ("centre_of_mass_rod_m", "diametral_clearance_crankpin_m")
     rows, _, _ = drawn(recipe, 4)
     assert rows["grade"].tolist() == [-1] * 4  # it has no limits
     assert set(rows["grade_crankpin"]) <= {0, 1, 2, 3}
@@ -823,15 +832,15 @@ def test_a_model_for_another_severity(two_labels, monkeypatch):
         DataError, match=r"target = 'wear' must be one of its severities diametral_clearance_"
     ):
         train_model(two_labels, target="wear")
-    with pytest.raises(DataError, match="second_severity_m has 0 grade edges, must have 3"):
-        train_model(two_labels, target="second_severity_m")
+    with pytest.raises(DataError, match="centre_of_mass_rod_m has 0 grade edges, must have 3"):
+        train_model(two_labels, target="centre_of_mass_rod_m")
     first, _, _ = train_model(two_labels)
     named, _, _ = train_model(two_labels, target="diametral_clearance_crankpin_m")
     assert named.card == first.card
-    monkeypatch.setitem(recipes.LIMITS, SECOND, "wear")
-    model, table, test = train_model(two_labels, target="second_severity_m")
+    worn(monkeypatch, "wear")
+    model, table, test = train_model(two_labels, target="centre_of_mass_rod_m")
     wear = load_scene("bilge-pump").wear
-    assert model.card["severity"] == "second_severity_m"
+    assert model.card["severity"] == "centre_of_mass_rod_m"
     assert model.card["grade_edges_m"] == list(wear.grade_edges_diametral)
     assert model.card["condemning_limit_m"] == wear.condemning_diametral
     assert model.card["limit_source"] == wear.source

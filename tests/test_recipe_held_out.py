@@ -6,14 +6,13 @@ import numpy as np
 import pytest
 from wearstate.datasets.recipe.held_out import DIMENSIONS
 from wearstate.datasets.recipe.recipe import (
-    CONDITIONS,
-    SEVERITIES,
     load_recipe,
     overrides_text,
     recorded_recipe,
     sample_records,
 )
 from wearstate.datasets.recipe.text import RecipeError
+from wearstate.sim.scene.load import all_condition_places, all_wear_places
 from wearstate.sim.scene.parts import UNITS
 
 SPEED = (42.5, 57.5)  # Hz, drawn by the recipe below
@@ -205,6 +204,7 @@ def test_texts_of_no_recipe_are_refused():
 
 
 def test_every_column_has_a_dimension():
-    for column in (*SEVERITIES.values(), *CONDITIONS):
+    worn = [each.column for each in all_wear_places().values()]
+    for column in (*worn, *all_condition_places()):
         ending = next(ending for ending in DIMENSIONS if column.endswith(ending))
         assert DIMENSIONS[ending] in UNITS

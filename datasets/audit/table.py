@@ -280,9 +280,9 @@ def _own_roles(frame: Any, roles: Roles) -> Roles:
 
 def is_nuisance(column: str) -> bool:
     """True of a manifest column that is drawn beside the wear: a condition, another fault."""
-    from ..recipe.recipe import CONDITIONS
+    from ...sim.scene.load import all_condition_places
 
-    return column in CONDITIONS or column.startswith("confounder_")
+    return column in all_condition_places() or column.startswith("confounder_")
 
 
 def _taken(

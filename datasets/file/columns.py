@@ -4,6 +4,8 @@ import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from ...sim.scene.load import all_condition_places, all_wear_places
+
 
 @dataclass(frozen=True, kw_only=True)
 class Column:
@@ -59,12 +61,6 @@ MEANINGS = (
     # labels
     ("grade", "label", "wear grade of the first severity, 0 as new to 3 condemned; -1 unknown"),
     ("grade_(.+)", "label", "the same of a further severity: {0}"),
-    ("diametral_clearance_(.+)_m", "label", "diametral clearance: {0}"),
-    ("scar_depth_(.+)_m", "label", "depth of the worn scar: {0}"),
-    ("wear_down_(.+)_m", "label", "how far the bore has worn down: {0}"),
-    ("sag_(.+)_m", "label", "how far the foundation has sunk: {0}"),
-    ("parallel_offset_(.+)_m", "label", "parallel offset of the shafts: {0}"),
-    ("stretch_lost_(.+)_m", "label", "stretch that the anchor bolts have lost: {0}"),
     ("choice_(.+)", "numerics", "option of the recipe that the machine or record took: {0}"),
     ("confounder_(.+)", "label", "whether this fault beside the wear is present: {0}"),
     ("(.+)_value", "label", "scene value of that fault [SI], 0 where it is absent: {0}"),
@@ -74,16 +70,7 @@ MEANINGS = (
     ("maintenance", "label", "maintenance events so far"),
     ("wear_rate_m2_per_n", "label", "specific wear rate of the machine"),
     # conditions
-    ("speed_hz", "condition", "shaft speed, as set"),
     ("mean_speed_hz", "condition", "shaft speed, mean over the record"),
-    ("discharge_pressure_pa", "condition", "pressure behind the pump, above the atmosphere"),
-    ("suction_pressure_pa", "condition", "pressure before the pump, above the atmosphere"),
-    ("start_angle_rad", "condition", "shaft angle at the first sample"),
-    ("static_load_n", "condition", "steady load of the bearing"),
-    ("viscosity_pa_s", "condition", "dynamic viscosity of the oil"),
-    ("unbalance_kg_m", "condition", "unbalance of the rotor"),
-    ("hull_deflection_m", "condition", "deflection of the hull under the bearings"),
-    ("thrust_n", "condition", "thrust of the propeller"),
     # numerics
     ("rung_(.+)", "numerics", "model that was run of this effect: {0}"),
     ("contact_law", "numerics", "law of the contact in the joint"),
@@ -109,7 +96,21 @@ MEANINGS = (
     ("least_damped_hz", "numerics", "frequency of the least damped mode"),
     ("clipped_samples", "numerics", "samples at the end of the converter's range"),
 )
-"""Name (a pattern), role, meaning. The first that fits counts; a new column is one row."""
+"""Name (a pattern), role, meaning. The first that fits counts; a new column is one row.
+
+Wear and operating conditions are those that the machines name, see :mod:`wearstate.sim.scene.load`.
+"""
+
+
+def _meanings() -> list[tuple[str, str, str]]:
+    kinds = {each.kind: each.words for each in all_wear_places().values()}
+    worn = [(f"{kind}_(.+)_m", "label", f"{words}: {{0}}") for kind, words in kinds.items()]
+    places = all_condition_places()
+    return [
+        *((column, "condition", each.words) for column, each in places.items()),
+        *worn,
+        *MEANINGS,
+    ]
 
 
 def describe_columns(names: Iterable[str]) -> list[Column]:
@@ -132,11 +133,12 @@ def describe_columns(names: Iterable[str]) -> list[Column]:
     >>> own.role, own.unit
     ('other', 'K')
     """
-    return [_column(name) for name in names]
+    meanings = _meanings()
+    return [_column(name, meanings) for name in names]
 
 
-def _column(name: str) -> Column:
-    for pattern, role, meaning in MEANINGS:
+def _column(name: str, meanings: Iterable[tuple[str, str, str]]) -> Column:
+    for pattern, role, meaning in meanings:
         match = re.fullmatch(pattern, name)
         if match:
             words = meaning.format(*(part.replace("_", " ") for part in match.groups()))

@@ -11,10 +11,10 @@ from itertools import islice
 from typing import Any
 
 from ...sim.fidelity.choose import Resolution, resolve
-from ...sim.fidelity.cost import cost_of
-from ...sim.fidelity.ladder import Effect, effects_of, with_values
+from ...sim.fidelity.ladder import cost_of, effects_of
 from ...sim.scene.load import override, scene_from_table
 from ...sim.scene.parts import Scene
+from ...sim.scene.rungs import Effect, with_values
 from ..recipe.recipe import STRATA, Recipe, Sample, sample_records
 from .quantities import QUANTITIES
 

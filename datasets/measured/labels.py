@@ -12,11 +12,11 @@ from itertools import pairwise
 from pathlib import Path, PurePosixPath
 
 from ...sim.output.recording import DataError
-from ...sim.scene.load import load_scene
+from ...sim.scene.load import all_wear_places, load_scene
 from ...sim.scene.parts import UNITS, nearest, to_si
 from ..file.csv_cells import plain_cell
 from ..file.machines import FILE
-from ..recipe.recipe import SEVERITIES, clearances, wear_limits
+from ..recipe.recipe import clearances, wear_limits
 
 Value = float | int | bool | str
 """A label: NaN, -1 or empty where it is not known."""
@@ -61,7 +61,6 @@ _NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
 _WITH_UNIT = re.compile(rf"{_NUMBER.pattern}\s*([^\s0-9].*)")
 _HEADING = re.compile(r"(.*?)\s*\[([^\[\]]*)\]")
 _SEVERITY = re.compile(r"[a-z][a-z0-9]*(?:_[a-z0-9]+)+_m")
-_KNOWN_SEVERITY = re.compile("|".join(name.replace("{}", "[0-9]+") for name in SEVERITIES.values()))
 _SHOWN = 5  # of a list in a message
 _MOST_FAULTS = 20  # of a message, before it counts the rest
 
@@ -563,7 +562,7 @@ def _severities(
     columns: Mapping[str, Sequence[Value]], declared: Sequence[str], faults: list[str]
 ) -> tuple[str, ...]:
     """Names of the labels of wear, those declared first."""
-    names = tuple(dict.fromkeys([*declared, *filter(_KNOWN_SEVERITY.fullmatch, columns)]))
+    names = tuple(dict.fromkeys([*declared, *filter(_is_severity, columns)]))
     for name in names:
         if name not in columns:
             faults.append(f"severity {name} is no label{nearest(name, list(columns))}")
@@ -591,10 +590,16 @@ def known_severities(name: str) -> str:
     >>> known_severities("sag")
     'sag_bearing_1_m'
     """
-    known = [column.replace("{}", "1") for column in SEVERITIES.values()]
+    known = [each.column.replace("{}", "1") for each in all_wear_places().values()]
     words = set(name.removesuffix("_m").split("_"))
     alike = [column for column in known if words & set(column.split("_"))]
     return listed(alike or known)
+
+
+def _is_severity(column: str) -> bool:
+    """True of a column that a machine's own wear has."""
+    known = (each.column.replace("{}", "[0-9]+") for each in all_wear_places().values())
+    return any(re.fullmatch(pattern, column) for pattern in known)
 
 
 # --- limits -------------------------------------------------------------------------------------

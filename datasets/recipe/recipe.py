@@ -21,6 +21,8 @@ from pydantic import Field, model_validator
 from ...sim.scene.journal import ScarLimits
 from ...sim.scene.load import (
     MACHINES,
+    all_condition_places,
+    all_wear_places,
     override,
     scene_folder,
     scene_from_table,
@@ -38,53 +40,6 @@ from .options import Alternatives, OptionSet, alternatives_of
 from .sampling import BLOCK, SET, Dimension, Points, Sampling, number_of
 from .text import RecipeError, beside, merged, read_recipe
 from .wear_bounds import bound_of_limits
-
-SEVERITIES = {
-    "joint.crankpin.diametral_clearance": "diametral_clearance_crankpin_m",
-    "joint.wristpin.diametral_clearance": "diametral_clearance_wristpin_m",
-    "joint.guide.diametral_clearance": "diametral_clearance_guide_m",
-    "throws.*.joint.crankpin.diametral_clearance": "diametral_clearance_crankpin_{}_m",
-    "throws.*.joint.wristpin.diametral_clearance": "diametral_clearance_wristpin_{}_m",
-    "throws.*.joint.guide.diametral_clearance": "diametral_clearance_guide_{}_m",
-    "bearing.diametral_clearance": "diametral_clearance_bearing_m",
-    "bearing.scar_depth": "scar_depth_bearing_m",
-    "bearings.*.wear_down": "wear_down_bearing_{}_m",
-    "bearings.*.sag": "sag_bearing_{}_m",
-    "coupling.parallel_offset": "parallel_offset_coupling_m",
-    "casing.feet.stretch_lost": "stretch_lost_feet_m",
-}
-"""Manifest column of every scene value that says how worn a machine is. A new one is one row.
-
-In a path, ``*`` stands for the number of a list entry, counted from 0; in its column, ``{}`` for
-the same number counted from 1, as people count throws.
-"""
-
-LIMITS = {
-    "joint.crankpin.diametral_clearance": "wear",
-    "joint.wristpin.diametral_clearance": "wear_wristpin",
-    "throws.*.joint.crankpin.diametral_clearance": "wear",
-    "throws.*.joint.wristpin.diametral_clearance": "wear_wristpin",
-    "bearing.diametral_clearance": "wear",
-    "bearing.scar_depth": "wear_scar",
-    "bearings.*.wear_down": "wear_down",
-    "bearings.*.sag": "wear_sag",
-    "coupling.parallel_offset": "wear_coupling",
-    "casing.feet.stretch_lost": "wear_feet",
-}
-"""Scene table with the wear limits of a severity. One without a row has no grade."""
-
-CONDITIONS = {
-    "speed_hz": "drive.speed",
-    "discharge_pressure_pa": "pressure.discharge",
-    "suction_pressure_pa": "pressure.suction",
-    "start_angle_rad": "drive.start_angle",
-    "static_load_n": "load.static",
-    "viscosity_pa_s": "oil.dynamic_viscosity",
-    "unbalance_kg_m": "rotor.unbalance",
-    "hull_deflection_m": "hull.deflection",
-    "thrust_n": "propeller.thrust",
-}
-"""Manifest column of every operating condition -> its place in the scene."""
 
 VIEW = "view"
 """Manifest column that names which test of its machine state a record is."""
@@ -333,7 +288,7 @@ class Recipe:
 
     @cached_property
     def conditions(self) -> dict[str, str]:
-        """Rows of `CONDITIONS` that this scene has."""
+        """Operating conditions that this scene has: manifest column -> dotted path."""
         return _conditions(self.scene)
 
     @cached_property
@@ -402,11 +357,13 @@ def condition_of(scene: Scene, column: str) -> float:
     """
     if column == "speed_hz" and not getattr(scene, "running", True):
         return 0.0
-    return float(value_at(scene, CONDITIONS[column]))
+    return float(value_at(scene, all_condition_places()[column].path))
 
 
 def _conditions(scene: Scene) -> dict[str, str]:
-    return {name: path for name, path in CONDITIONS.items() if has_value(scene, path)}
+    return {
+        each.column: each.path for each in scene.condition_places if has_value(scene, each.path)
+    }
 
 
 def load_recipe(
@@ -576,7 +533,7 @@ def limit_faults(recipe: Recipe) -> list[str]:
     first = recipe.severities[0]
     if first.edges:
         return []
-    table = LIMITS.get(_pattern(first.axis.path))
+    table = all_wear_places()[_pattern(first.axis.path)].limits
     cure = f"add its table [{table}]" if table else "put a severity that has limits first"
     return [
         f"severity.0: the scene {recipe.table.scene} has no wear limits of {first.column}, must "
@@ -661,7 +618,7 @@ def _with_own_sources(before: Mapping[str, Any], after: dict[str, Any]) -> dict[
     """Limits that are no longer those of their source must not cite it."""
     own = {
         name: {**after[name], "source": _NO_SOURCE}
-        for name in sorted(set(LIMITS.values()))
+        for name in sorted({each.limits for each in all_wear_places().values()})
         if name in before
         and after[name] != before[name]
         and after[name].get("source") == before[name].get("source")
@@ -706,7 +663,7 @@ def _of(axes: Mapping[str, list[Axis]], name: str) -> list[Axis]:
 
 
 def _severity_faults(severities: Sequence[Severity]) -> list[str]:
-    known = ", ".join(SEVERITIES)
+    known = ", ".join(all_wear_places())
     return [
         f"severity.{i}.path = {severity.path!r} is no known severity; choose one of {known}"
         for i, severity in enumerate(severities)
@@ -722,9 +679,9 @@ def severity_column(path: str) -> str | None:
     >>> severity_column("throws.0.joint.crankpin.diametral_clearance")
     'diametral_clearance_crankpin_1_m'
     """
-    column = SEVERITIES.get(_pattern(path))
+    found = all_wear_places().get(_pattern(path))
     numbers = [int(number) + 1 for number in re.findall(_ENTRY, path)]
-    return None if column is None or "*" in path else column.format(*numbers)
+    return None if found is None or "*" in path else found.column.format(*numbers)
 
 
 _ENTRY = r"(?<=\.)[0-9]+(?=\.)"
@@ -835,7 +792,8 @@ def clearances(scene: Scene) -> dict[str, float]:
     8e-05
     """
     found: dict[str, float] = {}
-    for pattern in SEVERITIES:
+    columns = {each.path: each.column for each in scene.wear_places}
+    for pattern in columns:
         before, star, _ = pattern.partition("*")
         entries = getattr(scene, before.rstrip("."), ()) if star else ("",)
         for number in range(len(entries)):
@@ -844,7 +802,7 @@ def clearances(scene: Scene) -> dict[str, float]:
             if not has_value(scene, path) or _rung_of(scene, joint) == "ideal":
                 continue
             value = getattr(value_at(scene, joint), "clearance_diametral", value_at(scene, path))
-            twin = SEVERITIES.get(pattern.partition("*.")[2])
+            twin = columns.get(pattern.partition("*.")[2])
             own = value != found.get(twin) if twin else number == 0 or value != 0
             if not star or own:
                 found[str(severity_column(path))] = float(value)
@@ -864,7 +822,7 @@ def wear_limits(scene: Scene, column: str) -> Wear | ScarLimits | None:
     scene : Scene
         Of any machine.
     column : str
-        Manifest column of the severity, as in `SEVERITIES`.
+        Manifest column of the severity, see :class:`wearstate.sim.scene.parts.WearPlace`.
 
     Examples
     --------
@@ -873,7 +831,7 @@ def wear_limits(scene: Scene, column: str) -> Wear | ScarLimits | None:
     0.00031
     """
     kind = re.sub(r"_[0-9]+_m$", "_{}_m", column)
-    tables = [LIMITS[path] for path, name in SEVERITIES.items() if name == kind and path in LIMITS]
+    tables = (each.limits for each in scene.wear_places if each.column == kind and each.limits)
     return next((getattr(scene, table, None) for table in tables), None)
 
 

@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 from ...datasets.generation.generate import generate
 from ...datasets.recipe.recipe import load_recipe, wear_limits
 from ...datasets.split.rules import group_folds
-from ...sim.fidelity.cost import cost_of
-from ...sim.fidelity.ladder import Effect, admissible, effects_of, with_values
+from ...sim.fidelity.ladder import cost_of, effects_of
 from ...sim.fidelity.pilot import Difference
 from ...sim.output.recording import DataError
 from ...sim.scene.parts import Scene, nearest
+from ...sim.scene.rungs import Effect, admissible, with_values
 from ..feature_rows.feature_table import FeatureTable, feature_table
 from ..learning.regressions import CANDIDATES, fit_blend
 

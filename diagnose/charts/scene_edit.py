@@ -8,9 +8,9 @@ from typing import Any
 from ...datasets.recipe.draws import value_at
 from ...datasets.recipe.text import toml_text
 from ...sim.atomic import write_whole
-from ...sim.fidelity.ladder import with_values
 from ...sim.scene.load import scene_from_table, scene_table, scene_text
 from ...sim.scene.parts import Scene, SceneError, beside
+from ...sim.scene.rungs import with_values
 
 _HEADER = re.compile(r"\s*(\[{1,2})\s*([^\[\]#]+?)\s*\]{1,2}\s*(#.*)?$")
 _VALUE = r"(\"[^\"]*\"|'[^']*'|[^#]*?)"  # of one line

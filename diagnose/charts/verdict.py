@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...sim.fidelity.ladder import admissible
 from ...sim.fidelity.pilot import Difference
+from ...sim.scene.rungs import admissible
 from ..feature_rows.feature_table import FeatureTable
 from .across import Loss, PairedJudge, RungSets, loss_of
 from .chart import Chart, Choice, Point, front_of

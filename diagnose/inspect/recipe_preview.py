@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from ...datasets.generation.generate import NUMERICS
 from ...datasets.recipe.draws import Draw, Range, matches
 from ...datasets.recipe.recipe import Recipe, Sample, limit_faults, sample_records
-from ...sim.fidelity.cost import cost_of
-from ...sim.fidelity.ladder import effects_of
+from ...sim.fidelity.ladder import cost_of, effects_of
 from ...sim.scene.parts import channels_of
 from ..learning.grades import GRADE_NAMES
 from ..pictures.panel import COLOURS

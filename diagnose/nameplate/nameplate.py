@@ -13,7 +13,7 @@ from typing import Any
 
 from ...datasets.file.record import Attributes, DataSet
 from ...datasets.recipe.draws import has_value
-from ...datasets.recipe.recipe import CONDITIONS, condition_of, recorded_scene
+from ...datasets.recipe.recipe import condition_of, recorded_scene
 from ...sim.output.recording import DataError
 from ...sim.scene.journal import Oil
 from ...sim.scene.load import (
@@ -63,8 +63,7 @@ class Nameplate:
         Parameters
         ----------
         row : mapping
-            Manifest values; columns of :data:`wearstate.datasets.recipe.recipe.CONDITIONS` are
-            read.
+            Manifest values; columns of the machine's operating conditions are read.
         speed_hz : float or None
             As measured [Hz].
 
@@ -75,9 +74,9 @@ class Nameplate:
         4000.0
         """
         noted = {
-            path: float(row[column])
-            for column, path in CONDITIONS.items()
-            if isinstance(row.get(column), float | int) and math.isfinite(row[column])
+            each.path: float(row[each.column])
+            for each in self.scene.condition_places
+            if isinstance(row.get(each.column), float | int) and math.isfinite(row[each.column])
         }
         scene = self.scene
         for path, value in noted.items():
@@ -106,11 +105,12 @@ class Nameplate:
         4000.0
         """
         day = self.on_the_day(row, None)
+        places = {each.column: each.path for each in day.condition_places}
         known = {
             column: condition_of(day, column)
             for column in NOTED
-            if has_value(day, CONDITIONS[column])
-            if not self.assumed or self.was_told(CONDITIONS[column])
+            if (place := places.get(column)) is not None and has_value(day, place)
+            if not self.assumed or self.was_told(place)
         }
         return {**row, **known}
 
@@ -305,9 +305,9 @@ def _warmer(scene: Any, kelvin: float) -> float:
 def told_conditions(plate: Nameplate, row: Mapping[str, Any]) -> Sequence[str]:
     """Loads and oil of the day that were noted or set, by their manifest columns."""
     return [
-        column
-        for column, path in CONDITIONS.items()
-        if column not in _MEASURED
-        if plate.was_told(path)
-        or (isinstance(row.get(column), float | int) and math.isfinite(row[column]))
+        each.column
+        for each in plate.scene.condition_places
+        if each.column not in _MEASURED
+        if plate.was_told(each.path)
+        or (isinstance(row.get(each.column), float | int) and math.isfinite(row[each.column]))
     ]

@@ -4,11 +4,14 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from ..scene.journal import JournalScene
 from ..scene.parts import Scene
 from ..scene.plausibility import Doubt, scene_doubts
+from ..scene.pump import PumpScene
+from ..scene.shaft import ShaftScene
 from .journal import JOURNAL_ROWS, journal_facts
 from .pump import PUMP_ROWS, pump_facts
-from .rows import Figure, Quantity, figures
+from .rows import RECORDING, Figure, Quantity, figures, plain_facts
 from .shaft import SHAFT_ROWS, shaft_facts
 
 
@@ -39,12 +42,12 @@ class DeepCheck:
         return tuple(figure for figure in self.figures if not figure.usual)
 
 
-_TABLES: dict[str, tuple[Callable[[Any], Any], Sequence[Quantity]]] = {
-    "reciprocating-pump": (pump_facts, PUMP_ROWS),
-    "journal-bearing": (journal_facts, JOURNAL_ROWS),
-    "propulsion-shaft": (shaft_facts, SHAFT_ROWS),
+_TABLES: dict[type[Scene], tuple[Callable[[Any], Any], Sequence[Quantity]]] = {
+    PumpScene: (pump_facts, PUMP_ROWS),
+    JournalScene: (journal_facts, JOURNAL_ROWS),
+    ShaftScene: (shaft_facts, SHAFT_ROWS),
 }
-"""Facts and table of every machine. A new machine is one row."""
+"""Facts and table of every machine with figures of its own."""
 
 
 def deep_check(scene: Scene) -> DeepCheck:
@@ -67,7 +70,7 @@ def deep_check(scene: Scene) -> DeepCheck:
     >>> found.unusual, found.failure
     ((), '')
     """
-    gather, table = _TABLES[scene.machine]
+    gather, table = _TABLES.get(type(scene), (plain_facts, RECORDING))
     facts = gather(scene)
     rows = figures(table, facts)
     told = {row.quantity.doubt for row in rows if row.quantity.doubt and not row.usual}

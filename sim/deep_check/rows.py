@@ -13,8 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ..fidelity.cost import cost_of
-from ..fidelity.ladder import with_values
+from ..fidelity.ladder import cost_of
 from ..machine.simulate import simulate
 from ..output.recording import Recording
 from ..scene.parts import Scene, channels_of
@@ -26,8 +25,11 @@ from ..scene.plausibility import (
     sensor_limits,
     solution_doubts,
 )
+from ..scene.rungs import with_values
 
 _BYTES = 4  # of a sample: float32
+_TURNS = 6.0  # of a plain run
+_SECONDS = 4.0  # tabulated, of a plain run
 _ROUNDING = 1e-6  # of a bound that a value stands on
 
 
@@ -192,6 +194,19 @@ def trial(scene: Scene, *, turns: float, seconds: float, truth: bool = True) -> 
     known = {doubt.text for doubt in (*of_scene, *doubts)}
     told = tuple(text for text in solution.warnings if text not in known)
     return ShortRun(scene=short, solution=solution, warnings=told, doubts=doubts)
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlainFacts:
+    """A scene and a short run of it: all that is known of a machine without figures of its own."""
+
+    scene: Scene
+    trial: ShortRun
+
+
+def plain_facts(scene: Scene) -> PlainFacts:
+    """Run a scene for a few revolutions."""
+    return PlainFacts(scene=scene, trial=trial(scene, turns=_TURNS, seconds=_SECONDS))
 
 
 def over_range(run: ShortRun) -> dict[str, float]:

@@ -1,5 +1,4 @@
-"""The ladders of models, what they cost, how wrong they are, and the cheapest that will do.
+"""How wrong the rungs of a scene are, what they cost, and the cheapest that will do.
 
-It may import ``sim.output``, ``sim.scene``, ``sim.pump``, ``sim.journal``, ``sim.shaft``,
-``sim.machine``.
+It may import ``sim.output``, ``sim.scene``, ``sim.machine``.
 """

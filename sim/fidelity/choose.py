@@ -11,8 +11,8 @@ from itertools import product
 from typing import Any, NamedTuple
 
 from ..scene.parts import Scene, SceneError, pinned_faults
-from .cost import cost_of
-from .ladder import Effect, Rung, admissible, effects_of, with_values
+from ..scene.rungs import Effect, Rung, admissible, with_values
+from .ladder import cost_of, effects_of
 from .pilot import Candidate, Comparison, Pilot, Quantities
 
 STARTS = 32
@@ -97,7 +97,7 @@ def free_effects(scene: Scene, pinned: Sequence[str]) -> tuple[Effect, ...]:
     SceneError
         A pinned name is no effect.
     """
-    faults = pinned_faults(scene.machine, pinned)
+    faults = pinned_faults(type(scene), pinned)
     if faults:
         raise SceneError(scene.name, faults)
     return tuple(effect for effect in effects_of(scene) if effect.name not in pinned)

@@ -21,8 +21,8 @@ from scipy.special import stdtrit
 from ..machine.simulate import recorder, simulate
 from ..output.recording import Recorder, Recording
 from ..scene.parts import Scene, SceneError
-from .cost import cost_of
-from .ladder import VALIDITY, Rung, with_values
+from ..scene.rungs import Rung, with_values
+from .ladder import VALIDITY, cost_of
 
 Quantity = tuple[float, str, float]
 """Value, kind ("dB", "relative" or "absolute") and scale: the least size a relative error is taken

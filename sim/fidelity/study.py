@@ -9,13 +9,11 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise, product
-from typing import Any, cast
+from typing import Any
 
-from ..journal.validity import journal_step
-from ..pump.validity import pump_step
-from ..scene.journal import JournalScene
+from ..machine.registry import machine_of
 from ..scene.parts import Scene
-from ..scene.pump import PumpScene
+from ..scene.rungs import STEP_LEVELS, Effect, Rung, admissible, level_name, with_values
 from .choose import (
     added_differences,
     affordable_starts,
@@ -28,8 +26,7 @@ from .choose import (
     refusals,
     refuse_bad_reference,
 )
-from .cost import cost_of
-from .ladder import STEP_LEVELS, Effect, Rung, admissible, level_name, with_values
+from .ladder import cost_of
 from .pilot import (
     FIRST,
     RESOLVED,
@@ -254,12 +251,10 @@ def _value_at(scene: Scene, path: str) -> Any:
     return node
 
 
-def _effective_step(scene: Scene) -> float:
-    """Step that a scene runs with, a whole part of a sample [s]."""
-    if isinstance(scene, JournalScene):
-        return journal_step(scene)
-    told = pump_step(cast(PumpScene, scene))
-    return 1 / scene.sample_rate / math.ceil(1 / (scene.sample_rate * told) - _SAME)
+def _effective_step(scene: Scene) -> float | None:
+    """Step that a scene runs with [s]; None of a machine without."""
+    step = machine_of(scene).step
+    return None if step is None else step(scene)
 
 
 def _ladder(effect: Effect, scene: Scene) -> tuple[Rung, ...]:

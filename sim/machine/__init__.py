@@ -1,4 +1,4 @@
-"""Any machine, whatever its kind: from a scene to a recording or to transfer functions.
+"""What each machine registers, and what is asked of any: a recording, transfer functions.
 
 It may import ``sim.output``, ``sim.scene``, ``sim.pump``, ``sim.journal``, ``sim.shaft``.
 """

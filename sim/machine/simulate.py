@@ -1,14 +1,11 @@
 """From a scene to a recording: only the physics that the scene needs."""
 
-from collections.abc import Callable
 from dataclasses import replace
 
-from ..journal.recording import check_journal, simulate_journal
 from ..output.recording import Recorder, Recording
-from ..pump.recording import check_pump, simulate_pump
 from ..scene.parts import Scene, SceneError
 from ..scene.plausibility import solution_doubts
-from ..shaft.recording import check_shaft, shaft_recorder, simulate_shaft
+from .registry import machine_of
 
 
 def simulate(
@@ -51,7 +48,7 @@ def simulate(
     (3, 5120)
     """
     _refuse_unresolved(scene)
-    solution = _SIMULATORS[scene.machine](scene, seed, truth, raise_on_failure)
+    solution = machine_of(scene).simulate(scene, seed, truth, raise_on_failure)
     if not solution.status.ok:
         return solution
     doubts = tuple(doubt.text for doubt in solution_doubts(scene, solution))
@@ -85,8 +82,8 @@ def recorder(scene: Scene) -> Recorder:
     True
     """
     _refuse_unresolved(scene)
-    share = _RECORDERS.get(scene.machine)
-    return share(scene) if share else _SIMULATORS[scene.machine]
+    machine = machine_of(scene)
+    return machine.recorder(scene) if machine.recorder else machine.simulate
 
 
 def check(scene: Scene) -> None:
@@ -102,7 +99,7 @@ def check(scene: Scene) -> None:
     >>> from wearstate.sim.scene.load import load_scene
     >>> check(load_scene("bilge-pump"))
     """
-    _CHECKS[scene.machine](scene)
+    machine_of(scene).check(scene)
 
 
 def _refuse_unresolved(scene: Scene) -> None:
@@ -113,20 +110,3 @@ def _refuse_unresolved(scene: Scene) -> None:
             "wearstate.datasets.generation.quantities.resolved(scene)"
         )
         raise SceneError(scene.name, [fault])
-
-
-_SIMULATORS: dict[str, Recorder] = {
-    "reciprocating-pump": simulate_pump,
-    "journal-bearing": simulate_journal,
-    "propulsion-shaft": simulate_shaft,
-}
-"""A new machine is one row."""
-
-_RECORDERS: dict[str, Callable[[Scene], Recorder]] = {"propulsion-shaft": shaft_recorder}
-"""Machines whose starts share something: what a film settles to does not know where it began."""
-
-_CHECKS: dict[str, Callable[[Scene], None]] = {
-    "reciprocating-pump": check_pump,
-    "journal-bearing": check_journal,
-    "propulsion-shaft": check_shaft,
-}

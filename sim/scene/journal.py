@@ -27,10 +27,14 @@ from .parts import (
     PRESSURE_MOST,
     SLIDING_LEAST,
     SLIDING_MOST,
+    SPEED,
     STANDARD_GRAVITY,
+    START_ANGLE,
     STIFFEST,
+    VISCOSITY,
     Acceleration,
     Angle,
+    ConditionPlace,
     Damping,
     Density,
     Force,
@@ -51,6 +55,7 @@ from .parts import (
     Velocity,
     Viscosity,
     Wear,
+    WearPlace,
     name_faults,
 )
 
@@ -366,6 +371,20 @@ class ScarLimits(Part):
 class JournalScene(Scene):
     """A rigid rotor in a hydrodynamic journal bearing, seen by proximity probes."""
 
+    physics = "wearstate.sim.machine.journal"
+    effects = ("film", "mesh", "tolerance", "step")
+    wear_places = (
+        WearPlace("bearing.diametral_clearance", "bearing", "diametral clearance", "wear"),
+        WearPlace("bearing.scar_depth", "bearing", "depth of the worn scar", "wear_scar"),
+    )
+    condition_places = (
+        SPEED,
+        START_ANGLE,
+        ConditionPlace("load.static", "static_load_n", "steady load of the bearing"),
+        VISCOSITY,
+        ConditionPlace("rotor.unbalance", "unbalance_kg_m", "unbalance of the rotor"),
+    )
+
     machine: Literal["journal-bearing"]
     gravity: Acceleration = Field(default=STANDARD_GRAVITY, ge=0, le=GRAVITY_MOST)
     settling_revolutions: int = Field(
@@ -395,6 +414,10 @@ class JournalScene(Scene):
             )
             for probe in self.sensors
         )
+
+    def sensor_parts(self) -> tuple[ProximityProbe, ...]:
+        """The probes."""
+        return self.sensors
 
     @classmethod
     def cross_faults(cls, parts: Mapping[str, Any]) -> list[str]:

@@ -12,7 +12,18 @@ from pathlib import Path
 from typing import Any
 
 from .journal import JournalScene
-from .parts import MOST_FAULTS, Scene, SceneError, beside, nearest, validate_table, without_twin
+from .parts import (
+    MOST_FAULTS,
+    ConditionPlace,
+    Scene,
+    SceneError,
+    WearPlace,
+    beside,
+    machine_name,
+    nearest,
+    validate_table,
+    without_twin,
+)
 from .pump import PumpScene
 from .shaft import ShaftScene
 
@@ -34,11 +45,31 @@ _LONG_NUMBER = "must have <= 64 bit; write it with a point or an exponent"
 
 
 MACHINES: dict[str, type[Scene]] = {
-    "reciprocating-pump": PumpScene,
-    "journal-bearing": JournalScene,
-    "propulsion-shaft": ShaftScene,
+    machine_name(kind): kind for kind in (PumpScene, JournalScene, ShaftScene)
 }
-"""The scene type of every machine. A new machine is one row."""
+"""The scene type of every machine. A new machine is one entry; all else is asked of the type."""
+
+
+def all_wear_places() -> dict[str, WearPlace]:
+    """Every value of any machine's scene that says how worn it is, by its dotted path.
+
+    Examples
+    --------
+    >>> all_wear_places()["bearings.*.sag"].column
+    'sag_bearing_{}_m'
+    """
+    return {each.path: each for kind in MACHINES.values() for each in kind.wear_places}
+
+
+def all_condition_places() -> dict[str, ConditionPlace]:
+    """Every operating condition of any machine, by its manifest column.
+
+    Examples
+    --------
+    >>> all_condition_places()["thrust_n"].path
+    'propeller.thrust'
+    """
+    return {each.column: each for kind in MACHINES.values() for each in kind.condition_places}
 
 
 def scene_names() -> list[str]:

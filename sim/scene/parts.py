@@ -14,7 +14,7 @@ from decimal import Decimal
 from functools import lru_cache
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Any, Generic, Literal, Self, TypeVar
+from typing import Annotated, Any, ClassVar, Generic, Literal, NamedTuple, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -570,12 +570,47 @@ class Numerics(Part):
     step: Time | None = Field(default=None, ge=_STEP_LEAST, description="largest integration step")
 
 
-EFFECTS: dict[str, tuple[str, ...]] = {
-    "reciprocating-pump": ("crankpin", "wristpin", "guide", "pressure", "drive", "step"),
-    "journal-bearing": ("film", "mesh", "tolerance", "step"),
-    "propulsion-shaft": ("film", "beam", "elements", "mesh"),
-}
-"""Effects of every machine, as ``pinned`` names them; their rungs are in :mod:`.ladder`."""
+class WearPlace(NamedTuple):
+    """A value of a scene that says how worn the machine is [m]."""
+
+    path: str
+    """Dotted; ``*`` stands for the number of a list entry, counted from 0."""
+    place: str
+    """What is worn; ``{}`` stands for that number counted from 1, as people count throws."""
+    words: str
+    limits: str = ""
+    """Table of the scene with its limits; a severity without any has no grade."""
+
+    @property
+    def kind(self) -> str:
+        """What its columns begin with: the value's own name."""
+        return self.path.rpartition(".")[2]
+
+    @property
+    def column(self) -> str:
+        """Manifest column."""
+        return f"{self.kind}_{self.place}_m"
+
+
+class ConditionPlace(NamedTuple):
+    """A value of a scene that is an operating condition [SI]."""
+
+    path: str
+    column: str
+    """Manifest column; ends in its unit."""
+    words: str
+
+
+SPEED = ConditionPlace("drive.speed", "speed_hz", "shaft speed, as set")
+"""Condition that every machine has."""
+
+START_ANGLE = ConditionPlace(
+    "drive.start_angle", "start_angle_rad", "shaft angle at the first sample"
+)
+
+VISCOSITY = ConditionPlace(
+    "oil.dynamic_viscosity", "viscosity_pa_s", "dynamic viscosity of the oil"
+)
 
 
 class Scene(Part):
@@ -583,7 +618,25 @@ class Scene(Part):
 
     With ``fidelity = "auto"`` the rungs and the numerics written in a scene are replaced by the
     cheapest that keep to ``accuracy``, but for the effects that ``pinned`` names.
+
+    A machine's scene is a subclass, one row of :data:`.scene.load.MACHINES`. Its class variables
+    are what the program must know of the machine without its physics.
+
+    Attributes
+    ----------
+    physics : str
+        Module with ``MACHINE``, a :class:`wearstate.sim.machine.registry.MachinePhysics`. It is
+        named, so that a scene is read without kernels.
+    effects : tuple of str
+        As ``pinned`` names them.
+    wear_places : tuple of WearPlace
+    condition_places : tuple of ConditionPlace
     """
+
+    physics: ClassVar[str]
+    effects: ClassVar[tuple[str, ...]] = ()
+    wear_places: ClassVar[tuple[WearPlace, ...]] = ()
+    condition_places: ClassVar[tuple[ConditionPlace, ...]] = (SPEED,)
 
     name: str = Field(min_length=1)
     machine: str
@@ -608,13 +661,17 @@ class Scene(Part):
     @model_validator(mode="after")
     def _cross_checks(self) -> Self:
         faults = self.cross_faults({name: getattr(self, name) for name in type(self).model_fields})
-        faults += pinned_faults(self.machine, self.pinned)
+        faults += pinned_faults(type(self), self.pinned)
         if faults:
             raise ValueError("\n".join(faults))
         return self
 
     def sensor_channels(self) -> tuple[Channel, ...]:
         """Channels of the sensors, in order; every machine has its own."""
+        raise NotImplementedError(self.machine)
+
+    def sensor_parts(self) -> tuple[Any, ...]:
+        """Sensors that have a range and a noise, one for each of their channels, in order."""
         raise NotImplementedError(self.machine)
 
     @classmethod
@@ -624,19 +681,32 @@ class Scene(Part):
         return []
 
 
-def pinned_faults(machine: str, pinned: Sequence[str]) -> list[str]:
-    """Names that are no effects of a machine, as sentences.
+def machine_name(kind: type[Scene]) -> str:
+    """What the scenes of a type write as their machine.
 
     Examples
     --------
-    >>> pinned_faults("reciprocating-pump", ["presure"])
+    >>> from wearstate.sim.scene.pump import PumpScene
+    >>> machine_name(PumpScene)
+    'reciprocating-pump'
+    """
+    return str(kind.model_fields["machine"].annotation.__args__[0])  # type: ignore[union-attr]
+
+
+def pinned_faults(kind: type[Scene], pinned: Sequence[str]) -> list[str]:
+    """Names that are no effects of a type of scene, as sentences.
+
+    Examples
+    --------
+    >>> from wearstate.sim.scene.pump import PumpScene
+    >>> pinned_faults(PumpScene, ["presure"])
     ["pinned: 'presure' is no effect of a reciprocating-pump; did you mean 'pressure'?"]
     """
-    known = EFFECTS.get(machine)  # none: the machine itself is at fault
     return [
-        f"pinned: '{name}' is no effect of a {machine}{nearest(name, known)}"
+        f"pinned: '{name}' is no effect of a {machine_name(kind)}"
+        + (nearest(name, kind.effects) if kind.effects else ", which has none; leave it out")
         for name in pinned
-        if known and name not in known
+        if name not in kind.effects
     ]
 
 
@@ -707,7 +777,7 @@ def validate_table(model: type[Table], table: Mapping[str, Any], name: str) -> T
         if issubclass(model, Scene) and () not in places:
             parts = _valid_parts(model, table)
             faults += model.cross_faults(parts)
-            faults += pinned_faults(parts.get("machine", ""), parts.get("pinned", ()))
+            faults += pinned_faults(model, parts.get("pinned", ()))
         raise SceneError(name, faults) from None
 
 

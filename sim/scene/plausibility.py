@@ -9,7 +9,7 @@ every warning tells the number found, what is usual, and the cure.
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -485,16 +485,8 @@ def sensor_limits(scene: Scene) -> tuple[dict[str, float], dict[str, float]]:
     >>> sensor_limits(load_scene("journal-bearing"))[0]
     {'probe_1': 0.001, 'probe_2': 0.001}
     """
-    sensors = _sensors(scene)
+    sensors = scene.sensor_parts()
     return {s.name: s.range for s in sensors}, {s.name: s.noise for s in sensors}
-
-
-def _sensors(scene: Scene) -> tuple[Any, ...]:
-    if isinstance(scene, PumpScene):
-        return scene.accelerometers
-    if isinstance(scene, ShaftScene):
-        return (*scene.sensors, *scene.probes)
-    return tuple(cast(JournalScene, scene).sensors)
 
 
 def solution_doubts(scene: Scene, solution: Recording) -> tuple[Doubt, ...]:

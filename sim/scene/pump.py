@@ -21,12 +21,15 @@ from .parts import (
     MOST_SENSORS,
     SLIDING_LEAST,
     SLIDING_MOST,
+    SPEED,
     STANDARD_GRAVITY,
+    START_ANGLE,
     STIFFEST,
     Acceleration,
     Accelerometer,
     Angle,
     Casing,
+    ConditionPlace,
     Damping,
     FrfFile,
     HertzStiffness,
@@ -44,6 +47,7 @@ from .parts import (
     Unbalance,
     Velocity,
     Wear,
+    WearPlace,
     merged,
     name_faults,
     nearest,
@@ -356,8 +360,44 @@ class FootLimits(ScarLimits):
     """Limits of the stretch that anchor bolts have lost, with their source."""
 
 
+_PLAY = "diametral clearance"
+
+
 class PumpScene(Scene):
     """A reciprocating pump of one to many equal throws with clearance in its joints."""
+
+    physics = "wearstate.sim.machine.pump"
+    effects = ("crankpin", "wristpin", "guide", "pressure", "drive", "step")
+    wear_places = (
+        WearPlace("joint.crankpin.diametral_clearance", "crankpin", _PLAY, "wear"),
+        WearPlace("joint.wristpin.diametral_clearance", "wristpin", _PLAY, "wear_wristpin"),
+        WearPlace("joint.guide.diametral_clearance", "guide", _PLAY),
+        WearPlace("throws.*.joint.crankpin.diametral_clearance", "crankpin_{}", _PLAY, "wear"),
+        WearPlace(
+            "throws.*.joint.wristpin.diametral_clearance", "wristpin_{}", _PLAY, "wear_wristpin"
+        ),
+        WearPlace("throws.*.joint.guide.diametral_clearance", "guide_{}", _PLAY),
+        WearPlace(
+            "casing.feet.stretch_lost",
+            "feet",
+            "stretch that the anchor bolts have lost",
+            "wear_feet",
+        ),
+    )
+    condition_places = (
+        SPEED,
+        ConditionPlace(
+            "pressure.discharge",
+            "discharge_pressure_pa",
+            "pressure behind the pump, above the atmosphere",
+        ),
+        ConditionPlace(
+            "pressure.suction",
+            "suction_pressure_pa",
+            "pressure before the pump, above the atmosphere",
+        ),
+        START_ANGLE,
+    )
 
     machine: Literal["reciprocating-pump"]
     gravity: Acceleration = Field(default=STANDARD_GRAVITY, ge=0, le=GRAVITY_MOST)
@@ -413,6 +453,10 @@ class PumpScene(Scene):
             for _, sensor in self.pressure_sensors
         )
         return accelerations + forces + pressures
+
+    def sensor_parts(self) -> tuple[Accelerometer, ...]:
+        """The accelerometers."""
+        return self.accelerometers
 
     @property
     def mounted_exciters(self) -> tuple[CasingExciter, ...]:

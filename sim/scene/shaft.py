@@ -27,10 +27,14 @@ from .parts import (
     MOST_SENSORS,
     NAME_LONGEST,
     PRESSURE_MOST,
+    SPEED,
     STANDARD_GRAVITY,
+    START_ANGLE,
     STIFFEST,
+    VISCOSITY,
     Acceleration,
     Angle,
+    ConditionPlace,
     Damping,
     Density,
     Force,
@@ -47,6 +51,7 @@ from .parts import (
     Stiffness,
     Tacho,
     Unbalance,
+    WearPlace,
     name_faults,
 )
 
@@ -422,6 +427,30 @@ class StateLimits(ScarLimits):
 class ShaftScene(Scene):
     """A propulsion shaft on its bearings, seen on its housings and by proximity probes."""
 
+    physics = "wearstate.sim.machine.shaft"
+    effects = ("film", "beam", "elements", "mesh")
+    wear_places = (
+        WearPlace(
+            "bearings.*.wear_down", "bearing_{}", "how far the bore has worn down", "wear_down"
+        ),
+        WearPlace("bearings.*.sag", "bearing_{}", "how far the foundation has sunk", "wear_sag"),
+        WearPlace(
+            "coupling.parallel_offset",
+            "coupling",
+            "parallel offset of the shafts",
+            "wear_coupling",
+        ),
+    )
+    condition_places = (
+        SPEED,
+        START_ANGLE,
+        VISCOSITY,
+        ConditionPlace(
+            "hull.deflection", "hull_deflection_m", "deflection of the hull under the bearings"
+        ),
+        ConditionPlace("propeller.thrust", "thrust_n", "thrust of the propeller"),
+    )
+
     machine: Literal["propulsion-shaft"]
     gravity: Acceleration = Field(default=STANDARD_GRAVITY, ge=0, le=GRAVITY_MOST)
     settling_revolutions: int = Field(
@@ -480,6 +509,10 @@ class ShaftScene(Scene):
             for part in self.mounted_exciters
         )
         return accelerations + displacements + forces
+
+    def sensor_parts(self) -> tuple[ShaftAccelerometer | ShaftProbe, ...]:
+        """Accelerometers, then probes."""
+        return (*self.sensors, *self.probes)
 
     @property
     def mounted_exciters(self) -> tuple[ShaftExciter, ...]:

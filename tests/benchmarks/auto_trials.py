@@ -21,12 +21,12 @@ from pathlib import Path
 import numpy as np
 from wearstate.datasets.generation.quantities import QUANTITIES
 from wearstate.sim.fidelity.choose import affordable_starts, resolve
-from wearstate.sim.fidelity.cost import cost_of
-from wearstate.sim.fidelity.ladder import admissible, effects_of, with_values
+from wearstate.sim.fidelity.ladder import cost_of, effects_of
 from wearstate.sim.fidelity.pilot import Pilot, differences
 from wearstate.sim.machine.simulate import simulate
 from wearstate.sim.scene.load import load_scene, scene_names
 from wearstate.sim.scene.parts import SceneError
+from wearstate.sim.scene.rungs import admissible, with_values
 
 ACCURACIES = (0.10, 0.05, 0.02, 0.01)
 DEAREST = 1.5  # of the cheapest combination that would have done

@@ -29,9 +29,10 @@ from threadpoolctl import threadpool_limits
 from wearstate.sim.alignment.alignment import AlignmentLine, Seat, influence, reactions
 from wearstate.sim.beam.beam import Disc, Section, assemble_beam
 from wearstate.sim.beam.rotor import Rotor, Support
-from wearstate.sim.fidelity.ladder import admissible, effects_of, with_values
+from wearstate.sim.fidelity.ladder import effects_of
 from wearstate.sim.machine.simulate import recorder, simulate
 from wearstate.sim.scene.load import load_scene
+from wearstate.sim.scene.rungs import admissible, with_values
 from wearstate.sim.shaft.response import (
     Broadband,
     Harmonic,

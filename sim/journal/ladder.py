@@ -1,0 +1,153 @@
+"""Rungs of a journal bearing, from the cheapest to the best, and what a run of it costs."""
+
+import math
+from collections.abc import Iterator, Mapping
+from functools import partial
+from typing import Any, cast
+
+from ..scene.journal import Film, JournalScene
+from ..scene.parts import Scene
+from ..scene.rungs import (
+    STEP_LEVELS,
+    Beyond,
+    Effect,
+    Rung,
+    as_written,
+    effect,
+    levels,
+    price,
+    whole_steps,
+    written,
+)
+from .validity import journal_step, orbit_faults
+
+FILM_RUNGS = (
+    Rung(
+        name="short",
+        assumes="flow round the circle neglected: a closed form",
+        reference="Ocvirk 1952; Dubois, Ocvirk 1953",
+        valid="a plain aligned bore, L/D below a half or so",
+        nanoseconds_per_step=100.0,
+    ),
+    Rung(
+        name="map",
+        assumes="the direct film of a plain aligned bore, interpolated in a table of it",
+        reference="Childs, Moes, van Leeuwen 1977 for the idea",
+        valid="a plain aligned bore without feed pressure",
+        nanoseconds_per_step=125.0,
+    ),
+    Rung(
+        name="direct",
+        assumes="Reynolds' equation with cavitation, solved on the mesh at every call",
+        reference="Reynolds 1886; active sets for the complementarity",
+        valid="laminar, isothermal, a film thicker than its mesh resolves",
+        nanoseconds_per_step=17_000.0,
+    ),
+)
+"""Rungs of an oil film; the cost of the last is on the mesh of 72 by 17."""
+
+FINE_LEVELS = (4.0, 2.0, 1.0, 0.5)
+"""Factors on a mesh width of an orbit's film, or the steps of an adaptive integrator."""
+
+
+def journal_effects(scene: Scene) -> Iterator[Effect]:
+    """Effects of a journal bearing, each with its rungs; their names are in its scene type."""
+    yield from film_effect(scene, orbit_faults)
+    yield from _mesh_effect(scene)
+    yield from _integrator_effect(scene)
+
+
+def film_effect(scene: Scene, beyond: Beyond) -> Iterator[Effect]:
+    """Rungs of the film that a scene may choose."""
+    rungs = written(FILM_RUNGS, ["film.rung"])
+    yield effect("film", scene, rungs, lambda one: str(one.film.rung), beyond=beyond)
+
+
+def _mesh_effect(scene: Scene) -> Iterator[Effect]:
+    film = cast(JournalScene, scene).film
+    rungs = levels("a mesh width of the film", FINE_LEVELS, partial(mesh_values, film))
+    yield effect("mesh", scene, rungs, as_written, numerical=True, beyond=orbit_faults)
+
+
+def mesh_values(
+    film: Film, factor: float, *, along: float | None = None
+) -> Mapping[str, Any] | None:
+    """Nodes of a mesh so many times as wide: cells divide evenly, a node stays in the middle."""
+    round_, over = film.n_theta / factor, (film.n_z - 1) / (along or factor)
+    if round_ % 1 or over % 2 or round_ < _FEWEST_ROUND or over < _FEWEST_OVER:
+        return None
+    return {"film.n_theta": int(round_), "film.n_z": int(over) + 1}
+
+
+_FEWEST_ROUND, _FEWEST_OVER = 24, 6
+
+
+def _integrator_effect(scene: Scene) -> Iterator[Effect]:
+    journal = cast(JournalScene, scene)
+    numerics = journal.numerics
+    if numerics.integrator == "adaptive":
+
+        def tolerance(factor: float) -> Mapping[str, Any] | None:
+            # error of a step goes with its fourth power: so steps have the factor's length
+            value = numerics.tolerance * factor**4
+            return {"numerics.tolerance": value} if 1e-12 <= value <= 1e-2 else None
+
+        rungs = levels("steps", FINE_LEVELS, tolerance)
+        yield effect("tolerance", scene, rungs, as_written, numerical=True, beyond=orbit_faults)
+        return
+    values = whole_steps("numerics.step", scene, journal_step(journal), 1)
+    rungs = levels("a step", STEP_LEVELS, values)
+    yield effect("step", scene, rungs, as_written, numerical=True, beyond=orbit_faults)
+
+
+# --- cost
+
+_MESH = 72, 17  # on which a solve is tabulated
+
+_CALLS_PER_STEP = {"euler": 1, "rk4": 4, "adaptive": 10}
+
+_STEPS_PER_TURN = 11.0  # of the adaptive integrator at the tolerance below, in the mean of scenes
+
+_TOLERANCE = 1e-5
+
+_MAP_SHARE = 2.5 * 96 * 97 / 100  # solves of a map's table, cold, shared by a hundred records
+
+_SAMPLE = 90.0  # ns of one sample of one recording of an orbit
+
+
+def journal_calls(scene: JournalScene) -> float:
+    """Solves of the film that a run is expected to ask for."""
+    turns = scene.duration * scene.drive.speed + scene.settling_revolutions
+    numerics = scene.numerics
+    if numerics.integrator == "adaptive":
+        finer = math.sqrt(math.sqrt(_TOLERANCE / numerics.tolerance))
+        steps = turns * _STEPS_PER_TURN * finer
+    else:
+        steps = turns / (scene.drive.speed * journal_step(scene))
+    return steps * _CALLS_PER_STEP[numerics.integrator]
+
+
+def solve_time(film: Film, band: float) -> float:
+    """Time of a direct solve over that of the tabulated mesh; `band` is the share of the fill.
+
+    Every node costs by itself, and by the square of those across the band of the matrix.
+    """
+
+    def time(n_theta: int, n_z: int) -> float:
+        return n_theta * n_z * (1 - band + band * (n_z / _MESH[1]) ** 2)
+
+    return time(film.n_theta, film.n_z) / time(*_MESH)
+
+
+_BAND = 0.28  # of a tabulated solve that is symmetric and starts from the last
+
+
+def journal_cost(scene: Scene) -> float:
+    """Time of a run by the tables [s]."""
+    journal = cast(JournalScene, scene)
+    film = journal.film
+    mesh = solve_time(film, _BAND)
+    solve = price(FILM_RUNGS, film.rung) * (mesh if film.rung == "direct" else 1.0)
+    table = _MAP_SHARE * price(FILM_RUNGS, "direct") * mesh if film.rung == "map" else 0.0
+    samples = journal.duration * journal.sample_rate
+    return 1e-9 * (journal_calls(journal) * solve + table + samples * _SAMPLE)

@@ -1,0 +1,25 @@
+"""The journal bearing: all that the program asks of it beside its scene."""
+
+from typing import cast
+
+from ..journal.ladder import FILM_RUNGS, journal_cost, journal_effects
+from ..journal.recording import check_journal, simulate_journal
+from ..journal.validity import journal_step
+from ..scene.journal import JournalScene
+from ..scene.parts import Scene
+from .registry import MachinePhysics
+
+
+def _step(scene: Scene) -> float:
+    return journal_step(cast(JournalScene, scene))
+
+
+MACHINE = MachinePhysics(
+    scene=JournalScene,
+    simulate=simulate_journal,
+    check=check_journal,
+    ladders={"film": FILM_RUNGS},
+    effects=journal_effects,
+    cost=journal_cost,
+    step=_step,
+)

@@ -1,0 +1,25 @@
+"""Transfer functions from places that are pushed to sensors."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, kw_only=True)
+class SceneTransfer:
+    """Accelerance from places that are pushed to accelerometers.
+
+    Attributes
+    ----------
+    frequency : ndarray, shape (n_lines,)
+        [Hz]
+    sensors, places : tuple of str
+    values : ndarray, shape (n_sensors, n_places, n_lines)
+        Complex, ``exp(+j w t)`` [(m/s^2)/N].
+    """
+
+    frequency: NDArray[np.float64]
+    sensors: tuple[str, ...]
+    places: tuple[str, ...]
+    values: NDArray[np.complex128]

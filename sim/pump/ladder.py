@@ -1,0 +1,202 @@
+"""Rungs of a reciprocating pump, from the cheapest to the best, and what a run of it costs."""
+
+import math
+from collections.abc import Iterator
+from functools import partial
+from typing import cast
+
+from ..scene.parts import Scene
+from ..scene.pump import PumpScene
+from ..scene.rungs import (
+    Effect,
+    Rung,
+    as_written,
+    effect,
+    levels,
+    price,
+    whole_steps,
+    with_values,
+    written,
+)
+from .setup import joint_parts
+from .validity import FEWEST_STEPS, joint_faults, knock_limits, limits, pump_step, pump_steps
+
+JOINT_RUNGS = (
+    Rung(
+        name="ideal",
+        assumes="no clearance: rigid links, constraint forces",
+        reference="Newton-Euler equations of the slider-crank",
+        nanoseconds_per_step=60.0,
+    ),
+    Rung(
+        name="link",
+        assumes="a massless link as long as the radial clearance: contact is never lost",
+        reference="Earles, Wu 1973",
+        valid="while the link is in compression: no step of the run in tension",
+        needs="a clearance",
+        nanoseconds_per_step=120.0,
+    ),
+    Rung(
+        name="compliant",
+        assumes="free flight and the contact law's force, with friction, in the clearance circle",
+        reference="Xia et al. 2017, eqs 1-15 with their signs mended",
+        valid="penetration below a tenth of the pin's radius, and 4 clearances under the load",
+        needs="a clearance, a contact law with its stiffness; of a guide the piston's inertia",
+        nanoseconds_per_step=140.0,
+    ),
+)
+"""Rungs of crank pin and wrist pin; a guide has the first and the last."""
+
+PRESSURE_RUNGS = (
+    Rung(
+        name="none",
+        assumes="no pressure",
+        nanoseconds_per_step=0.0,
+    ),
+    Rung(
+        name="constant",
+        assumes="a plunger against a constant pressure",
+        needs="pressure.discharge",
+        nanoseconds_per_step=1.0,
+    ),
+    Rung(
+        name="two-level",
+        assumes="suction and discharge pressure by turns",
+        reference="quasi-static limit of the rung above",
+        needs="pressure.suction and pressure.discharge",
+        nanoseconds_per_step=20.0,
+    ),
+    Rung(
+        name="heads",
+        assumes="incompressible liquid: energy balance of the lines, liquid inertia as added mass",
+        reference="Xia et al. 2017, eqs 16-27 with their misprints mended",
+        valid="while the liquid's pressure stays above that of its vapour, at every knock too",
+        needs="both lines and valves",
+        nanoseconds_per_step=30.0,
+    ),
+    Rung(
+        name="chamber",
+        assumes="compressible chamber with air and vapour, self-acting valves, leaks",
+        reference="Westphal 1893 for the plates' displacement; Hosea, Shampine 1996 for the solver",
+        needs="both lines and valves, pressure.dead_volume",
+        nanoseconds_per_step=350.0,
+    ),
+)
+"""Rungs of the cylinder pressure."""
+
+DRIVE_RUNGS = (
+    Rung(
+        name="constant-speed",
+        assumes="the crank turns evenly whatever it carries",
+        nanoseconds_per_step=0.0,
+    ),
+    Rung(
+        name="motor",
+        assumes="asynchronous motor and flywheel: the speed gives way",
+        reference="Kloss 1929",
+        needs="drive.motor",
+        nanoseconds_per_step=30.0,
+    ),
+)
+"""Rungs of the drive."""
+
+PUMP_LADDERS = {"joint": JOINT_RUNGS, "pressure": PRESSURE_RUNGS, "drive": DRIVE_RUNGS}
+"""Effect -> its rungs. A new rung is one row, its code in the kernel, and one test."""
+
+PUMP_STEP_LEVELS = (4.0, 2.0, 4 / 3, 1.0, 0.5, 0.25)
+"""Factors on a step that is written: steps are few to a sample, from two to four is a long way."""
+
+
+def pump_effects(scene: Scene) -> Iterator[Effect]:
+    """Effects of a pump, each with its rungs; their names are in its scene type."""
+    yield from _joint_effects(scene)
+    yield from _pressure_effect(scene)
+    yield from _drive_effect(scene)
+    yield from _step_effect(scene)
+
+
+def _beyond(scene: Scene) -> list[str]:
+    pump = cast(PumpScene, scene)
+    beyond = joint_faults(pump) or [fault for _, fault in limits(pump)]
+    return beyond or [fault for _, fault in knock_limits(pump)]
+
+
+def _joint_effects(scene: Scene) -> Iterator[Effect]:
+    pump = cast(PumpScene, scene)
+    for name in ("crankpin", "wristpin", "guide"):
+        part = getattr(pump.joint, name)
+        if part is None:
+            continue
+        table = tuple(r for r in JOINT_RUNGS if name != "guide" or r.name != "link")
+        rungs = written(table, _throw_paths(pump, "joint", f"{name}.rung"))
+        yield effect(name, scene, rungs, partial(_joint_rung, name), beyond=_beyond)
+
+
+def _joint_rung(name: str, scene: Scene) -> str:
+    return str(getattr(cast(PumpScene, scene).joint, name).rung)
+
+
+def _throw_paths(scene: PumpScene, table: str, leaf: str) -> Iterator[str]:
+    """Path of a value in the scene's own table, and in that of every throw that has its own."""
+    yield f"{table}.{leaf}"
+    for i, throw in enumerate(scene.throws):
+        if getattr(throw, table) is not None:
+            yield f"throws.{i}.{table}.{leaf}"
+
+
+def _pressure_effect(scene: Scene) -> Iterator[Effect]:
+    pump = cast(PumpScene, scene)
+    if pump.piston.diameter > 0:  # else there is nothing to push on
+        rungs = written(PRESSURE_RUNGS, _throw_paths(pump, "pressure", "rung"))
+        yield effect("pressure", scene, rungs, lambda one: str(one.pressure.rung), beyond=_beyond)
+
+
+def _drive_effect(scene: Scene) -> Iterator[Effect]:
+    if cast(PumpScene, scene).drive.motor is not None:
+        rungs = written(DRIVE_RUNGS, ["drive.rung"])
+        yield effect("drive", scene, rungs, lambda one: str(one.drive.rung), beyond=_beyond)
+
+
+def _stiffest(scene: PumpScene) -> PumpScene:
+    """The scene with every contact that it can have: a step that is stable there is so anywhere."""
+    for joint in _joint_effects(scene):
+        rung = joint.rungs[-1]
+        if joint.refusal(scene, rung.name) is None:
+            scene = with_values(scene, rung.values)
+    return scene
+
+
+def _step_effect(scene: Scene) -> Iterator[Effect]:
+    longest = pump_step(_stiffest(cast(PumpScene, scene)))
+    values = whole_steps("numerics.step", scene, longest, FEWEST_STEPS)
+    rungs = levels("a step", PUMP_STEP_LEVELS, values)
+    yield effect("step", scene, rungs, as_written, numerical=True, beyond=_beyond)
+
+
+def sample_step(scene: Scene) -> float:
+    """Step that a pump runs with, a whole part of a sample [s]."""
+    told = pump_step(cast(PumpScene, scene))
+    return 1 / scene.sample_rate / math.ceil(1 / (scene.sample_rate * told) - _ROUNDING)
+
+
+_ROUNDING = 1e-9  # of a number of steps that would be whole
+
+
+# --- cost
+
+_MECHANISM = 60.0  # ns of a step of one throw beside its effects
+
+_MODE = 12.0  # ns of a step of one casing mode and its sensors
+
+_CASING_FIXED = 200.0  # ns of a step beside: low-pass and bookkeeping
+
+
+def pump_cost(scene: Scene) -> float:
+    """Time of a run by the tables [s]."""
+    pump = cast(PumpScene, scene)
+    per_step = _CASING_FIXED + _MODE * len(pump.casing.modes) + price(DRIVE_RUNGS, pump.drive.rung)
+    for throw in range(len(pump.throws)):
+        per_step += _MECHANISM + price(PRESSURE_RUNGS, pump.pressures(throw).rung)
+        for part in joint_parts(pump, throw):
+            per_step += price(JOINT_RUNGS, "ideal" if part is None else part.rung)
+    return 1e-9 * per_step * pump_steps(pump)
