@@ -20,9 +20,11 @@ class Draw(Part):
     """One scene value, or every value that ``*`` matches, drawn independently."""
 
     path: str = Field(description="dotted path of the scene; * stands for every list entry")
-    distribution: Literal["uniform", "log-uniform", "factor", "log-factor", "relative-normal"]
-    low: Bound | None = None
-    high: Bound | None = None
+    distribution: Literal["uniform", "log-uniform", "factor", "log-factor", "relative-normal"] = (
+        Field(description="of the value itself, of a factor on the scene's, or of a change")
+    )
+    low: Bound | None = Field(default=None, description="lower end; of a factor, its least")
+    high: Bound | None = Field(default=None, description="upper end; of a factor, its most")
     bands: tuple[tuple[Bound, Bound], ...] = Field(
         default=(), description="several ranges instead of low and high, likely as they are wide"
     )

@@ -29,8 +29,8 @@ class Bounds(Part):
     A bound is a number in SI, a text with a unit, or a share of the scene's own value: ``110 %``.
     """
 
-    low: Bound | None = None
-    high: Bound | None = None
+    low: Bound | None = Field(default=None, description="lower end; none is open")
+    high: Bound | None = Field(default=None, description="upper end; none is open")
 
     @model_validator(mode="after")
     def _an_end(self) -> Self:

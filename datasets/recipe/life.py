@@ -98,7 +98,9 @@ class LifeTable(Part):
         default=None, gt=0, le=LONGEST, description="of a joint along its pin, of a guide across"
     )
     turning: TurningGear | None = Field(default=None, description="of a journal bearing")
-    maintenance: tuple[MaintenanceTable, ...] = Field(default=(), max_length=16)
+    maintenance: tuple[MaintenanceTable, ...] = Field(
+        default=(), max_length=16, description="what is renewed, and when"
+    )
 
 
 class Moment(NamedTuple):

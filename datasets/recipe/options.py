@@ -31,8 +31,13 @@ class OptionSet(Part):
     """A choice that nobody can make for the machine: a law, a rung, a condition."""
 
     name: str = Field(pattern="^[a-z][a-z0-9_]*$", max_length=48, description="of its column")
-    per: Literal["machine", "record"] = "machine"
-    option: tuple[Option, ...] = Field(min_length=2)
+    per: Literal["machine", "record"] = Field(
+        default="machine",
+        description="whether a machine keeps its option, or every record draws anew",
+    )
+    option: tuple[Option, ...] = Field(
+        min_length=2, description="the ways to choose from, each with its weight"
+    )
 
     @model_validator(mode="after")
     def _told_apart(self) -> Self:

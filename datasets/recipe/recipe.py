@@ -89,7 +89,9 @@ class Confounder(Draw):
         pattern="^[a-z][a-z0-9_]*$", max_length=48, description="of its manifest columns"
     )
     probability: Ratio = Field(ge=0, le=1, description="share of the machines or records")
-    per: Literal["machine", "record"] = "machine"
+    per: Literal["machine", "record"] = Field(
+        default="machine", description="whether it belongs to a machine, or to single records"
+    )
     exclusive: str = Field(
         default="", description="of all confounders with this word, one at a time at most"
     )
@@ -112,8 +114,10 @@ ViewName = Annotated[str, Field(pattern="^[a-z][a-z0-9_-]*$", max_length=32)]
 class RecipeTable(Part):
     """The tables of a recipe file."""
 
-    name: str = Field(min_length=1, max_length=64)
-    description: str = ""
+    name: str = Field(
+        min_length=1, max_length=64, description="of the recipe, kept in the data set"
+    )
+    description: str = Field(default="", description="one sentence for lists")
     scene: str = Field(min_length=1, description="a built-in scene or a file")
     records: int = Field(ge=1, le=MOST_RECORDS, description="records made unless told otherwise")
     fidelity: Literal["given", "auto"] | None = Field(

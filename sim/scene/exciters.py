@@ -44,14 +44,16 @@ class Exciter(Part):
     name: Annotated[str, Field(min_length=1, max_length=NAME_LONGEST)] = Field(
         default="force", description="of the force cell's channel"
     )
-    kind: Kind = "random"
+    kind: Kind = Field(default="random", description="waveform of its force")
     force: Force = Field(
         default=0.0, ge=0, le=_FORCE_MOST, description="rms while it pushes; hammer: median peak"
     )
     low: Frequency = Field(default=5.0, gt=0, le=_FREQUENCY_MOST, description="of its band")
     high: Frequency = Field(default=400.0, gt=0, le=_FREQUENCY_MOST, description="of its band")
     quiet: Time = Field(default=0.0, ge=0, le=_LONGEST, description="before it begins to push")
-    repeats: int = Field(default=20, ge=1, le=_MOST_REPEATS)
+    repeats: int = Field(
+        default=20, ge=1, le=_MOST_REPEATS, description="blows or periods in a recording"
+    )
     share: Ratio = Field(default=0.6, gt=0, le=1, description="of a burst or sweep that it pushes")
     contact_time: Time = Field(
         default=2.5e-3, gt=0, le=1.0, description="of a blow's half-sine, set by the hammer's tip"
@@ -70,7 +72,7 @@ class Exciter(Part):
     range: Force = Field(
         ge=_RANGE_LEAST, le=_FORCE_MOST, description="full scale of the cell, plus and minus"
     )
-    bits: int = Field(default=24, ge=8, le=32)
+    bits: int = Field(default=24, ge=8, le=32, description="of its converter")
 
     @model_validator(mode="after")
     def _band(self) -> Self:

@@ -92,8 +92,8 @@ class AxialGroove(Part):
 class ShellContact(Part):
     """Contact of journal and shell where the film ends, after Kelvin and Voigt."""
 
-    stiffness: Stiffness = Field(gt=0, le=STIFFEST)
-    damping: Damping = Field(default=0.0, ge=0, le=DAMPING_MOST)
+    stiffness: Stiffness = Field(gt=0, le=STIFFEST, description="of shell and journal in series")
+    damping: Damping = Field(default=0.0, ge=0, le=DAMPING_MOST, description="along the normal")
     friction: Ratio = Field(default=0.0, ge=0, le=1, description="Coulomb coefficient")
     friction_speed: Velocity = Field(
         default=0.01, ge=SLIDING_LEAST, le=SLIDING_MOST, description="full friction from about here"
@@ -104,7 +104,7 @@ class Bearing(Part):
     """The shell. Give exactly one of the two clearances."""
 
     diameter: Length = Field(gt=0, le=LONGEST, description="of the bore")
-    length: Length = Field(gt=0, le=LONGEST)
+    length: Length = Field(gt=0, le=LONGEST, description="along the shaft")
     diametral_clearance: Length | None = Field(
         default=None, ge=_THINNEST, description="bore minus journal diameter"
     )
@@ -115,7 +115,9 @@ class Bearing(Part):
         default=0.0, ge=0, description="deepest wear of the bore, where the shaft rubs at run-up"
     )
     scar_angle: _SHAFT_ANGLE = Field(default=0.0, description="of the deepest wear")
-    grooves: tuple[AxialGroove, ...] = Field(default=(), max_length=_MOST_GROOVES)
+    grooves: tuple[AxialGroove, ...] = Field(
+        default=(), max_length=_MOST_GROOVES, description="axial oil grooves; none: a plain bore"
+    )
     wall: ShellContact | None = Field(
         default=None, description="contact law; none: a touch ends the run"
     )
@@ -225,7 +227,7 @@ class RunOut(Part):
     """One harmonic of what the probes see of a perfectly still shaft: shape and magnetism."""
 
     order: int = Field(ge=1, le=1000, description="cycles per revolution")
-    amplitude: Length = Field(ge=0, le=_GAP_MOST)
+    amplitude: Length = Field(ge=0, le=_GAP_MOST, description="of this harmonic")
     phase: _SHAFT_ANGLE = Field(default=0.0, description="of the track, at the keyphasor mark")
 
 
@@ -248,7 +250,7 @@ class LoadRecord(Part):
     ``folder`` is where a relative file is looked for first, that of the scene file.
     """
 
-    file: str = Field(min_length=1)
+    file: str = Field(min_length=1, description="CSV: time [s], force along X and Y [N]")
     folder: str = Field(default="", exclude=True, description="where the file is looked for first")
 
 
@@ -257,8 +259,12 @@ class JournalLoad(Part):
 
     static: Force = Field(default=0.0, ge=-_FORCE_MOST, le=_FORCE_MOST, description="along X")
     static_across: Force = Field(default=0.0, ge=-_FORCE_MOST, le=_FORCE_MOST, description="on Y")
-    history: Literal["none", "step", "rectangular", "half-sine", "file"] = "none"
-    amplitude: Force = Field(default=0.0, ge=-_FORCE_MOST, le=_FORCE_MOST)
+    history: Literal["none", "step", "rectangular", "half-sine", "file"] = Field(
+        default="none", description="how the load varies in time; file: as a record"
+    )
+    amplitude: Force = Field(
+        default=0.0, ge=-_FORCE_MOST, le=_FORCE_MOST, description="peak of the load history"
+    )
     angle: _SHAFT_ANGLE = Field(default=0.0, description="direction of the history, from X")
     begin: Time = Field(default=0.0, ge=0, description="of step or pulse")
     length: Time | None = Field(default=None, gt=0, description="of the pulse")
@@ -284,7 +290,10 @@ class JournalLoad(Part):
 class Film(Part):
     """How the oil film is computed: in closed form, from a table of solves, or anew each time."""
 
-    rung: Literal["short", "map", "direct"] = "map"
+    rung: Literal["short", "map", "direct"] = Field(
+        default="map",
+        description="short: closed form; map: table of solves; direct: solved at every step",
+    )
     condition: Literal["guembel", "reynolds", "periodic"] = Field(
         default="periodic", description="of cavitation, of the rungs map and direct"
     )
@@ -301,8 +310,8 @@ class Film(Part):
 class JournalStart(Part):
     """Where the journal is released, at rest, over the radial clearance."""
 
-    x: Ratio = Field(default=0.0, gt=-1, lt=1)
-    y: Ratio = Field(default=0.0, gt=-1, lt=1)
+    x: Ratio = Field(default=0.0, gt=-1, lt=1, description="along X, over the radial clearance")
+    y: Ratio = Field(default=0.0, gt=-1, lt=1, description="along Y, over the radial clearance")
 
     @model_validator(mode="after")
     def _inside(self) -> Self:
@@ -316,7 +325,9 @@ class JournalStart(Part):
 class JournalNumerics(Numerics):
     """What the integrator may be told."""
 
-    integrator: Literal["euler", "rk4", "adaptive"] = "adaptive"
+    integrator: Literal["euler", "rk4", "adaptive"] = Field(
+        default="adaptive", description="euler and rk4 take fixed steps, adaptive follows the error"
+    )
     tolerance: Ratio = Field(
         default=1e-5, ge=1e-12, le=1e-2, description="of the adaptive one, over the gap left"
     )
@@ -325,7 +336,7 @@ class JournalNumerics(Numerics):
 class ProximityProbe(Part):
     """An eddy-current probe with its converter: it reads the shaft's motion towards itself."""
 
-    name: str = Field(min_length=1, max_length=NAME_LONGEST)
+    name: str = Field(min_length=1, max_length=NAME_LONGEST, description="of its channel")
     angle: _SHAFT_ANGLE = Field(description="of its place, from X in the direction of rotation")
     place: str = Field(default="", description="where it sits, for the report")
     direction: str = Field(default="", description="which way it looks, for the report")
@@ -339,7 +350,7 @@ class ProximityProbe(Part):
     range: Length = Field(
         ge=_GAP_LEAST, le=_GAP_MOST, description="full scale, plus and minus, about the set gap"
     )
-    bits: int = Field(default=24, ge=8, le=32)
+    bits: int = Field(default=24, ge=8, le=32, description="of its converter")
 
 
 class ScarLimits(Part):
@@ -350,7 +361,9 @@ class ScarLimits(Part):
     grade_edges: tuple[Length, Length, Length] = Field(
         description="depth at which grades 1, 2 and 3 begin"
     )
-    source: str = Field(min_length=1)
+    source: str = Field(
+        min_length=1, description="standard, maker or judgement that the limits come from"
+    )
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
@@ -385,8 +398,13 @@ class JournalScene(Scene):
         ConditionPlace("rotor.unbalance", "unbalance_kg_m", "unbalance of the rotor"),
     )
 
-    machine: Literal["journal-bearing"]
-    gravity: Acceleration = Field(default=STANDARD_GRAVITY, ge=0, le=GRAVITY_MOST)
+    machine: Literal["journal-bearing"] = Field(description="journal-bearing")
+    gravity: Acceleration = Field(
+        default=STANDARD_GRAVITY,
+        ge=0,
+        le=GRAVITY_MOST,
+        description="0 where weight does not act across the shaft",
+    )
     settling_revolutions: int = Field(
         default=3, ge=0, le=1000, description="run before the recording; 0: it begins at the start"
     )

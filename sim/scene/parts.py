@@ -250,9 +250,13 @@ class Part(BaseModel):
 class CasingMode(Part):
     """One mode of the casing: mass-normalised shape at every force and sensor place."""
 
-    frequency: Frequency = Field(ge=_MODE_SLOWEST, le=_MODE_FASTEST)
-    damping_ratio: Ratio = Field(gt=0, lt=1)
-    shape: Annotated[dict[str, ModeShape], AfterValidator(FixedTable)] = Field(min_length=1)
+    frequency: Frequency = Field(
+        ge=_MODE_SLOWEST, le=_MODE_FASTEST, description="natural, undamped"
+    )
+    damping_ratio: Ratio = Field(gt=0, lt=1, description="over the critical one")
+    shape: Annotated[dict[str, ModeShape], AfterValidator(FixedTable)] = Field(
+        min_length=1, description="place or sensor -> mass-normalised deflection"
+    )
     foot_share: Ratio = Field(
         default=0.0, ge=0, le=1, description="of its strain energy, in the feet as tightened"
     )
@@ -391,7 +395,7 @@ class Accelerometer(Part):
     :func:`single_axis`.
     """
 
-    name: str = Field(min_length=1, max_length=NAME_LONGEST)
+    name: str = Field(min_length=1, max_length=NAME_LONGEST, description="of its channel")
     axes: tuple[Literal["x", "y", "z"], ...] = Field(
         default=(), max_length=3, description="one channel for each; none: a single axis"
     )
@@ -416,7 +420,7 @@ class Accelerometer(Part):
     range: Acceleration = Field(
         ge=_ACCELERATION_LEAST, le=_ACCELERATION_MOST, description="full scale, plus and minus"
     )
-    bits: int = Field(default=24, ge=8, le=32)
+    bits: int = Field(default=24, ge=8, le=32, description="of its converter")
     mounting_resonance: Frequency | None = Field(
         default=None, ge=_FILTER_SLOWEST, le=_MODE_FASTEST, description="of sensor on its mount"
     )
@@ -429,7 +433,12 @@ class Accelerometer(Part):
     anti_alias_cutoff: Frequency | None = Field(
         default=None, ge=_FILTER_SLOWEST, le=_MODE_FASTEST, description="where 3 dB are lost"
     )
-    anti_alias_order: int | None = Field(default=None, ge=1, le=_FILTER_STEEPEST)
+    anti_alias_order: int | None = Field(
+        default=None,
+        ge=1,
+        le=_FILTER_STEEPEST,
+        description="of the filter; falls by 6 dB an octave for each",
+    )
 
     @model_validator(mode="after")
     def _whole_and_once(self) -> Self:
@@ -503,9 +512,18 @@ def single_axis(sensors: Sequence[Accelerometer]) -> tuple[Accelerometer, ...]:
 class Tacho(Part):
     """A rectangular pulse per revolution, rising at shaft angle zero or `late` after it."""
 
-    name: str = Field(default="tacho", min_length=1, max_length=NAME_LONGEST)
-    pulse_width: Angle = Field(default=math.radians(10.0), gt=0, le=math.pi)
-    level: Voltage = Field(default=5.0, ge=_LEVEL_LEAST, le=_LEVEL_MOST)
+    name: str = Field(
+        default="tacho", min_length=1, max_length=NAME_LONGEST, description="of its channel"
+    )
+    pulse_width: Angle = Field(
+        default=math.radians(10.0),
+        gt=0,
+        le=math.pi,
+        description="shaft angle for which the pulse is high",
+    )
+    level: Voltage = Field(
+        default=5.0, ge=_LEVEL_LEAST, le=_LEVEL_MOST, description="of the pulse, above 0 V"
+    )
     late: Angle = Field(
         default=0.0, ge=-math.pi, le=math.pi, description="shaft angle at which the pulse rises"
     )
@@ -531,7 +549,9 @@ class Wear(Part):
     grade_edges_diametral: tuple[Length, Length, Length] = Field(
         description="clearance at which grades 1, 2 and 3 begin"
     )
-    source: str = Field(min_length=1)
+    source: str = Field(
+        min_length=1, description="standard, maker or judgement that the limits come from"
+    )
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
@@ -638,13 +658,15 @@ class Scene(Part):
     wear_places: ClassVar[tuple[WearPlace, ...]] = ()
     condition_places: ClassVar[tuple[ConditionPlace, ...]] = (SPEED,)
 
-    name: str = Field(min_length=1)
+    name: str = Field(min_length=1, description="of the scene, kept with every recording")
     machine: str
-    description: str = ""
+    description: str = Field(default="", description="one sentence for lists")
     duration: Time = Field(
         gt=0, le=_RECORDING_LONGEST, description="length of the recording, after settling"
     )
-    sample_rate: Frequency = Field(ge=SIMULATED_RATE_LEAST, le=SIMULATED_RATE_MOST)
+    sample_rate: Frequency = Field(
+        ge=SIMULATED_RATE_LEAST, le=SIMULATED_RATE_MOST, description="of every channel"
+    )
     settling_revolutions: int = Field(
         default=3, ge=1, le=_SETTLING_MOST, description="run before the recording"
     )

@@ -82,7 +82,9 @@ class Motor(Part):
 class Drive(Part):
     """How the crank is turned: at constant speed, or by a motor whose speed gives way."""
 
-    rung: Literal["constant-speed", "motor"] = "constant-speed"
+    rung: Literal["constant-speed", "motor"] = Field(
+        default="constant-speed", description="constant-speed, or a motor that slows under load"
+    )
     speed: RotationSpeed = Field(
         gt=0, le=1000, description="crank speed in rev/s, constant, or that at the start"
     )
@@ -119,7 +121,7 @@ class Rod(Part):
     length: Length = Field(
         gt=0, le=LONGEST, description="between the centres of wrist pin and crank-pin eye"
     )
-    mass: Mass = Field(ge=LIGHTEST, le=HEAVIEST)
+    mass: Mass = Field(ge=LIGHTEST, le=HEAVIEST, description="with its bearing shells")
     centre_of_mass: Length = Field(ge=0, description="distance from the wrist pin")
     inertia: Inertia = Field(
         ge=INERTIA_LEAST, le=INERTIA_MOST, description="about the centre of mass"
@@ -138,7 +140,7 @@ class Rod(Part):
 class Piston(Part):
     """Piston with crosshead and wrist pin: everything that only slides."""
 
-    mass: Mass = Field(ge=LIGHTEST, le=HEAVIEST)
+    mass: Mass = Field(ge=LIGHTEST, le=HEAVIEST, description="with crosshead and wrist pin")
     diameter: Length = Field(
         ge=0, le=LONGEST, description="bore that the cylinder pressure acts on"
     )
@@ -169,8 +171,14 @@ class Contact(Part):
         "hu-guo",
         "carvalho-martins",
         "exact",
-    ] = "kelvin-voigt"
-    elasticity: Literal["linear", "hertz", "conformal"] = "linear"
+    ] = Field(
+        default="kelvin-voigt",
+        description="how the impact loses energy; kelvin-voigt: spring and damper",
+    )
+    elasticity: Literal["linear", "hertz", "conformal"] = Field(
+        default="linear",
+        description="normal force against overlap: linear, point contact, or pin in a close bore",
+    )
     stiffness: Stiffness | None = Field(
         default=None, gt=0, le=STIFFEST, description="contact force per penetration"
     )
@@ -195,7 +203,9 @@ class Contact(Part):
         le=SLIDING_MOST,
         description="least impact speed a hysteresis law is given; none: damping at most critical",
     )
-    friction_law: Literal["smooth", "ramp"] = "smooth"
+    friction_law: Literal["smooth", "ramp"] = Field(
+        default="smooth", description="how friction turns with the sliding velocity, near zero"
+    )
     friction: Ratio = Field(default=0.0, ge=0, le=1, description="Coulomb coefficient")
     friction_speed: Velocity = Field(
         default=0.01,
@@ -254,8 +264,11 @@ class RevoluteJoint(Contact):
     The rungs *ideal* (no clearance), *link* (always in contact) and *compliant*.
     """
 
-    rung: Literal["ideal", "link", "compliant"] = "compliant"
-    pin_diameter: Length = Field(gt=0, le=LONGEST)
+    rung: Literal["ideal", "link", "compliant"] = Field(
+        default="compliant",
+        description="ideal: no clearance; link: massless link as long as it; compliant: contact",
+    )
+    pin_diameter: Length = Field(gt=0, le=LONGEST, description="nominal")
     diametral_clearance: Length | None = Field(
         default=None, ge=0, description="eye diameter minus pin diameter"
     )
@@ -301,7 +314,9 @@ class RevoluteJoint(Contact):
 class Guide(Contact):
     """The guide of piston or crosshead, across the stroke in the plane of the crank."""
 
-    rung: Literal["ideal", "compliant"] = "compliant"
+    rung: Literal["ideal", "compliant"] = Field(
+        default="compliant", description="ideal: no clearance; compliant: contact at four corners"
+    )
     length: Length = Field(gt=0, le=LONGEST, description="of the guided part")
     height: Length = Field(gt=0, le=LONGEST, description="of the guided part, across the stroke")
     diametral_clearance: Length = Field(
@@ -399,8 +414,13 @@ class PumpScene(Scene):
         START_ANGLE,
     )
 
-    machine: Literal["reciprocating-pump"]
-    gravity: Acceleration = Field(default=STANDARD_GRAVITY, ge=0, le=GRAVITY_MOST)
+    machine: Literal["reciprocating-pump"] = Field(description="reciprocating-pump")
+    gravity: Acceleration = Field(
+        default=STANDARD_GRAVITY,
+        ge=0,
+        le=GRAVITY_MOST,
+        description="0 where weight does not act across the shaft",
+    )
     stroke_inclination: Angle = Field(
         default=0.0, ge=-math.tau, le=math.tau, description="0 horizontal, 90 deg piston up"
     )

@@ -91,7 +91,7 @@ class Line(Part):
     length: Length = Field(
         default=0.3, ge=0, le=LONGEST, description="of moving liquid, up to the next air vessel"
     )
-    diameter: Length = Field(default=0.08, gt=0, le=LONGEST)
+    diameter: Length = Field(default=0.08, gt=0, le=LONGEST, description="inside")
     friction_factor: Ratio = Field(
         default=0.02, ge=0, le=_FRICTION_MOST, description="f of Darcy and Weisbach"
     )
@@ -201,7 +201,9 @@ class PressureSensor(Part):
        effects of volumes and connecting tubing.
     """
 
-    name: str = Field(default="pressure", min_length=1, max_length=NAME_LONGEST - 3)
+    name: str = Field(
+        default="pressure", min_length=1, max_length=NAME_LONGEST - 3, description="of its channel"
+    )
     place: str = Field(default="cylinder", description="where it sits, for the report")
     range: Pressure = Field(
         ge=_SENSOR_LEAST, le=PRESSURE_MOST, description="upper end of its range, gauge"
@@ -213,7 +215,7 @@ class PressureSensor(Part):
         default=0.0, ge=-PRESSURE_MOST, le=PRESSURE_MOST, description="reading of the atmosphere"
     )
     noise: Pressure = Field(default=0.0, ge=0, le=PRESSURE_MOST, description="rms of white noise")
-    bits: int = Field(default=24, ge=8, le=32)
+    bits: int = Field(default=24, ge=8, le=32, description="of its converter")
     lag: Time | None = Field(
         default=None,
         ge=1 / (math.tau * _SENSOR_FASTEST),
@@ -254,7 +256,10 @@ class CylinderPressure(Part):
     the pressures before and after them.
     """
 
-    rung: Literal["none", "constant", "two-level", "heads", "chamber"] = "two-level"
+    rung: Literal["none", "constant", "two-level", "heads", "chamber"] = Field(
+        default="two-level",
+        description="none, constant, two levels, heads in lines, or chamber with valves",
+    )
     suction: Pressure = Field(default=0.0, ge=-STANDARD_ATMOSPHERE, description="gauge")
     discharge: Pressure = Field(default=0.0, le=PRESSURE_MOST, description="gauge")
     rise_angle: Angle = Field(

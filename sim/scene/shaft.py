@@ -90,20 +90,29 @@ class ShaftDrive(Part):
 class ShaftMaterial(Part):
     """What the shaft is of, and how its beam is computed."""
 
-    theory: Literal["timoshenko", "euler-bernoulli"] = "timoshenko"
+    theory: Literal["timoshenko", "euler-bernoulli"] = Field(
+        default="timoshenko",
+        description="timoshenko: with shear and rotary inertia; euler-bernoulli: without",
+    )
     shear_coefficient: Ratio | Literal["cowper"] = Field(
         default="cowper", description="of the Timoshenko beam: a number, or Cowper's formula"
     )
-    young: Pressure = Field(ge=_MODULUS_LEAST, le=_MODULUS_MOST)
-    shear_modulus: Pressure = Field(ge=_MODULUS_LEAST, le=_MODULUS_MOST)
-    density: Density = Field(gt=0, le=_DENSITY_MOST)
+    young: Pressure = Field(
+        ge=_MODULUS_LEAST, le=_MODULUS_MOST, description="modulus of elasticity"
+    )
+    shear_modulus: Pressure = Field(
+        ge=_MODULUS_LEAST, le=_MODULUS_MOST, description="of the material"
+    )
+    density: Density = Field(gt=0, le=_DENSITY_MOST, description="of the material")
     damping_ratio: Ratio = Field(
         default=0.0, ge=0, lt=1, description="structural damping of the shaft's bending modes"
     )
     damping_band: tuple[Frequency, Frequency] = Field(
         default=(2.0, 200.0), description="two frequencies at which the damping ratio holds"
     )
-    longest_element: Length = Field(gt=0, le=LONGEST)
+    longest_element: Length = Field(
+        gt=0, le=LONGEST, description="of the beam mesh; shorter is finer"
+    )
 
     @model_validator(mode="after")
     def _rising(self) -> Self:
@@ -118,9 +127,11 @@ class ShaftMaterial(Part):
 class ShaftSection(Part):
     """A piece of shaft of one diameter; sections follow each other from aft."""
 
-    length: Length = Field(gt=0, le=LONGEST)
-    outer_diameter: Length = Field(gt=0, le=LONGEST)
-    inner_diameter: Length = Field(default=0.0, ge=0, le=LONGEST)
+    length: Length = Field(gt=0, le=LONGEST, description="along the line")
+    outer_diameter: Length = Field(gt=0, le=LONGEST, description="of this section")
+    inner_diameter: Length = Field(
+        default=0.0, ge=0, le=LONGEST, description="of its bore; 0 is solid"
+    )
 
     @model_validator(mode="after")
     def _hollow(self) -> Self:
@@ -138,14 +149,24 @@ class ShaftDisc(Part):
     Entrained water has inertia and neither weight nor spin.
     """
 
-    name: _Name
-    station: _Station
-    mass: Mass = Field(ge=0, le=HEAVIEST)
-    polar_inertia: Inertia = Field(default=0.0, ge=0, le=INERTIA_MOST)
-    diametral_inertia: Inertia = Field(default=0.0, ge=0, le=INERTIA_MOST)
-    entrained_mass: Mass = Field(default=0.0, ge=0, le=HEAVIEST)
-    entrained_polar: Inertia = Field(default=0.0, ge=0, le=INERTIA_MOST)
-    entrained_diametral: Inertia = Field(default=0.0, ge=0, le=INERTIA_MOST)
+    name: _Name = Field(description="by which exciters and results refer to it")
+    station: _Station = Field(description="distance from the aft end of the line")
+    mass: Mass = Field(ge=0, le=HEAVIEST, description="in air")
+    polar_inertia: Inertia = Field(
+        default=0.0, ge=0, le=INERTIA_MOST, description="about the shaft"
+    )
+    diametral_inertia: Inertia = Field(
+        default=0.0, ge=0, le=INERTIA_MOST, description="about a diameter"
+    )
+    entrained_mass: Mass = Field(
+        default=0.0, ge=0, le=HEAVIEST, description="of water that moves with it"
+    )
+    entrained_polar: Inertia = Field(
+        default=0.0, ge=0, le=INERTIA_MOST, description="inertia of that water about the shaft"
+    )
+    entrained_diametral: Inertia = Field(
+        default=0.0, ge=0, le=INERTIA_MOST, description="inertia of that water about a diameter"
+    )
     buoyancy: Force = Field(default=0.0, ge=0, le=_FORCE_MOST, description="lift of the water")
     unbalance: Unbalance = Field(
         default=0.0, ge=0, le=_UNBALANCE_MOST, description="mass times eccentricity"
@@ -158,9 +179,9 @@ class ShaftDisc(Part):
 class ShaftLoad(Part):
     """A steady load at a station."""
 
-    station: _Station
-    up: _Load = 0.0
-    side: _Load = 0.0
+    station: _Station = Field(description="distance from the aft end of the line")
+    up: _Load = Field(default=0.0, description="negative is downward")
+    side: _Load = Field(default=0.0, description="horizontal")
     moment_up: _Turning = Field(default=0.0, description="to the slope dy/dx")
     moment_side: _Turning = Field(default=0.0, description="to the slope dz/dx")
 
@@ -171,17 +192,25 @@ class ShaftLoad(Part):
 class Housing(Part):
     """The bearing's housing on its pedestal: a mass on two springs with their dampers."""
 
-    mass: Mass = Field(gt=0, le=HEAVIEST)
-    stiffness_up: Stiffness = Field(gt=0, le=STIFFEST)
-    stiffness_side: Stiffness = Field(gt=0, le=STIFFEST)
-    damping_up: Damping = Field(default=0.0, ge=0, le=DAMPING_MOST)
-    damping_side: Damping = Field(default=0.0, ge=0, le=DAMPING_MOST)
+    mass: Mass = Field(gt=0, le=HEAVIEST, description="that moves with the bearing")
+    stiffness_up: Stiffness = Field(gt=0, le=STIFFEST, description="of the pedestal, vertically")
+    stiffness_side: Stiffness = Field(
+        gt=0, le=STIFFEST, description="of the pedestal, horizontally"
+    )
+    damping_up: Damping = Field(
+        default=0.0, ge=0, le=DAMPING_MOST, description="of the pedestal, vertically"
+    )
+    damping_side: Damping = Field(
+        default=0.0, ge=0, le=DAMPING_MOST, description="of the pedestal, horizontally"
+    )
 
 
 class AlignmentLimits(Part):
     """What a bearing may carry, and how far it may be moved; see where each is from in `source`."""
 
-    least_load: Force = Field(default=0.0, ge=0, le=_FORCE_MOST)
+    least_load: Force = Field(
+        default=0.0, ge=0, le=_FORCE_MOST, description="below which the bearing counts as unloaded"
+    )
     most_pressure: Pressure | None = Field(
         default=None, gt=0, le=PRESSURE_MOST, description="load over length times diameter"
     )
@@ -190,7 +219,9 @@ class AlignmentLimits(Part):
     )
     least_move: Length = Field(default=0.0, ge=-1.0, le=0, description="the furthest down")
     most_move: Length = Field(default=0.0, ge=0, le=1.0, description="the furthest up")
-    source: str = ""
+    source: str = Field(
+        default="", description="standard, maker or judgement that the limits come from"
+    )
 
 
 class ShaftBearing(Part):
@@ -201,13 +232,13 @@ class ShaftBearing(Part):
     lowers the bearing.
     """
 
-    name: _Name
-    station: _Station
+    name: _Name = Field(description="by which sensors, probes and tests refer to it")
+    station: _Station = Field(description="of its middle, from the aft end of the line")
     diameter: Length = Field(gt=0, le=LONGEST, description="of the bore")
-    length: Length = Field(gt=0, le=LONGEST)
+    length: Length = Field(gt=0, le=LONGEST, description="of the bore")
     diametral_clearance: Length = Field(ge=_THINNEST, description="as new, bore minus journal")
-    offset: _Height = 0.0
-    side_offset: _Height = 0.0
+    offset: _Height = Field(default=0.0, description="height of its centre over the reference line")
+    side_offset: _Height = Field(default=0.0, description="of its centre beside the reference line")
     slope: _Slope = Field(default=0.0, description="of the bore, dy/dx")
     side_slope: _Slope = Field(default=0.0, description="of the bore, dz/dx")
     wear_down: Length = Field(default=0.0, ge=0, le=1.0, description="of the bottom of the bore")
@@ -273,26 +304,39 @@ class BladeRate(Part):
     """
 
     harmonic: int = Field(ge=1, le=100, description="of the blade rate")
-    up: Ratio = Field(default=0.0, ge=0, le=1)
-    side: Ratio = Field(default=0.0, ge=0, le=1)
-    moment_up: Ratio = Field(default=0.0, ge=0, le=1)
-    moment_side: Ratio = Field(default=0.0, ge=0, le=1)
-    up_phase: _Phase = 0.0
-    side_phase: _Phase = 0.0
+    up: Ratio = Field(default=0.0, ge=0, le=1, description="vertical force, over the mean thrust")
+    side: Ratio = Field(
+        default=0.0, ge=0, le=1, description="horizontal force, over the mean thrust"
+    )
+    moment_up: Ratio = Field(
+        default=0.0, ge=0, le=1, description="moment that bends upwards, over thrust times diameter"
+    )
+    moment_side: Ratio = Field(
+        default=0.0,
+        ge=0,
+        le=1,
+        description="moment that bends sideways, over thrust times diameter",
+    )
+    up_phase: _Phase = Field(default=0.0, description="of the vertical force and moment")
+    side_phase: _Phase = Field(default=0.0, description="of the horizontal force and moment")
 
 
 class Propeller(Part):
     """What the propeller does to the shaft besides its weight."""
 
     disc: _Name = Field(description="name of the disc that is the propeller")
-    blades: int = Field(ge=1, le=_MOST_BLADES)
-    diameter: Length = Field(gt=0, le=LONGEST)
+    blades: int = Field(ge=1, le=_MOST_BLADES, description="number of blades")
+    diameter: Length = Field(gt=0, le=LONGEST, description="of the blade tips")
     thrust: Force = Field(ge=0, le=_FORCE_MOST, description="forward")
     thrust_height: _Height = Field(
         default=0.0, description="of the thrust's line of action above the shaft"
     )
     thrust_side: _Height = Field(default=0.0, description="of the same to starboard")
-    blade_rate: tuple[BladeRate, ...] = Field(default=(), max_length=_MOST_PARTS)
+    blade_rate: tuple[BladeRate, ...] = Field(
+        default=(),
+        max_length=_MOST_PARTS,
+        description="harmonics of the blade rate, the first first",
+    )
 
 
 class Coupling(Part):
@@ -303,7 +347,7 @@ class Coupling(Part):
     a ring that carries a torque at the speed.
     """
 
-    station: _Station
+    station: _Station = Field(description="distance from the aft end of the line")
     parallel_offset: Length = Field(
         default=0.0, ge=0, le=1.0, description="of the other half's axis, along offset_angle"
     )
@@ -335,7 +379,7 @@ class Turbulence(Part):
 
     place: _Name = Field(description="name of a disc or of a bearing, whose housing it pushes")
     force: Force = Field(ge=0, le=_FORCE_MOST, description="rms over all frequencies")
-    corner: Frequency = Field(gt=0, le=1e6)
+    corner: Frequency = Field(gt=0, le=1e6, description="above which the force falls")
 
 
 class ShaftExciter(PlacedExciter):
@@ -349,8 +393,8 @@ class ShaftExciter(PlacedExciter):
         default="", max_length=NAME_LONGEST, description="name of a bearing or a disc"
     )
     station: _Station | None = Field(default=None, description="of the shaft, instead of a place")
-    part: Literal["shaft", "housing"] = "shaft"
-    direction: Literal["up", "side"] = "up"
+    part: Literal["shaft", "housing"] = Field(default="shaft", description="that it pushes")
+    direction: Literal["up", "side"] = Field(default="up", description="up or side")
 
     @model_validator(mode="after")
     def _one_place(self) -> Self:
@@ -391,9 +435,9 @@ DIRECTIONS = {"up": "vertical, up", "side": "horizontal, to starboard"}
 class ShaftAccelerometer(Part):
     """An accelerometer on a bearing's housing, with its converter."""
 
-    name: _Name
-    bearing: _Name
-    direction: Literal["up", "side"] = "up"
+    name: _Name = Field(description="of its channel")
+    bearing: _Name = Field(description="name of the bearing whose housing it sits on")
+    direction: Literal["up", "side"] = Field(default="up", description="up or side")
     gain: Ratio = Field(
         default=1.0, ge=GAIN_LEAST, le=GAIN_MOST, description="true sensitivity over nominal"
     )
@@ -401,7 +445,7 @@ class ShaftAccelerometer(Part):
     range: Acceleration = Field(
         ge=_LEAST_RANGE, le=_MOST_RANGE, description="full scale, plus and minus"
     )
-    bits: int = Field(default=24, ge=8, le=32)
+    bits: int = Field(default=24, ge=8, le=32, description="of its converter")
 
 
 class ShaftProbe(ProximityProbe):
@@ -411,7 +455,7 @@ class ShaftProbe(ProximityProbe):
     the direction of rotation, as that of a journal bearing's probe.
     """
 
-    bearing: _Name
+    bearing: _Name = Field(description="name of the bearing whose housing it sits in")
 
 
 # --- limits
@@ -451,8 +495,13 @@ class ShaftScene(Scene):
         ConditionPlace("propeller.thrust", "thrust_n", "thrust of the propeller"),
     )
 
-    machine: Literal["propulsion-shaft"]
-    gravity: Acceleration = Field(default=STANDARD_GRAVITY, ge=0, le=GRAVITY_MOST)
+    machine: Literal["propulsion-shaft"] = Field(description="propulsion-shaft")
+    gravity: Acceleration = Field(
+        default=STANDARD_GRAVITY,
+        ge=0,
+        le=GRAVITY_MOST,
+        description="0 where weight does not act across the shaft",
+    )
     settling_revolutions: int = Field(
         default=0, ge=0, le=1000, description="unused: the response is the settled one"
     )
