@@ -316,7 +316,9 @@ def test_what_divides_has_a_least_value(path):
 
 def test_a_number_out_of_bounds_comes_with_a_cure():
     [fault] = faults_of({"rod.mass": "3e9 kg"})
-    assert fault == "rod.mass = 3e+09 kg must be <= 1e+06; check value and unit"
+    assert fault == (
+        "rod.mass = 3e+09 kg must be <= 1e+06 (with its bearing shells); check value and unit"
+    )
 
 
 def test_half_a_name_is_answered_with_every_whole_one():
