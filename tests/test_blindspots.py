@@ -14,10 +14,11 @@ from wearstate.diagnose.blindspots.blindspots import find_blind_spots, kept_rows
 from wearstate.diagnose.blindspots.page import blind_spots_html
 from wearstate.diagnose.blindspots.rows import scene_rows
 from wearstate.diagnose.blindspots.scores import ShiftRow, ShiftVerdict, ranked, row_figures
-from wearstate.diagnose.blindspots.shifts import SCENE_SHIFTS, Shift
 from wearstate.diagnose.blindspots.signals import signal_rows
 from wearstate.diagnose.blindspots.text import blind_spots_table, blind_spots_text
 from wearstate.diagnose.command_line.cli import cli
+from wearstate.diagnose.machines.registry import presentation_of
+from wearstate.diagnose.machines.shifts import Shift
 from wearstate.diagnose.wear_model.estimate import Estimate
 from wearstate.features.rotation.order import pulse_times
 from wearstate.sim.output.recording import DataError, Recording
@@ -146,7 +147,7 @@ def test_every_row_of_the_table_is_a_scene(name):
     sample = next(sample_records(recipe, 1))
     rows = scene_rows(recipe)
     assert all(row.applied(recipe, sample) != sample.scene for row in rows)
-    paths = {shift.path for shift in SCENE_SHIFTS[recipe.scene.machine]}
+    paths = {shift.path for shift in presentation_of(recipe.scene).shifts}
     told = {row.name for row in rows}
     lacking = {"coupling.angle", "bearings.*.slope"} & paths - told
     assert paths - told == lacking == set()
@@ -154,9 +155,8 @@ def test_every_row_of_the_table_is_a_scene(name):
 
 def test_a_value_that_the_scene_lacks_is_left_out():
     journal = load_recipe("journal-bearing-small")
-    assert "rod.mass" not in {
-        row.name for row in scene_rows(journal, SCENE_SHIFTS["reciprocating-pump"])
-    }
+    of_pump = presentation_of(load_recipe("bilge-pump-small").scene).shifts
+    assert "rod.mass" not in {row.name for row in scene_rows(journal, of_pump)}
 
 
 def test_a_shift_that_no_machine_takes_is_told():

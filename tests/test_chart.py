@@ -12,7 +12,7 @@ import pytest
 from click.testing import CliRunner
 from hypothesis import given
 from hypothesis import strategies as st
-from wearstate.datasets.generation.quantities import QUANTITIES
+from wearstate.datasets.generation.machines import known_of
 from wearstate.diagnose.charts.chart import (
     CSV_HEAD,
     chart_table,
@@ -389,7 +389,7 @@ def test_the_promise_is_kept_on_fresh_starts(tmp_path):
     assert raised["changes"]
     scene = load_scene(path)
     best = with_values(scene, {**FINEST, "film.rung": "direct"})
-    quantities = QUANTITIES[scene.machine]
+    quantities = known_of(scene).quantities
     own, other = (
         [run.quantities for run in Pilot(each, quantities, seed=9).outcomes({}, 32)]
         for each in (scene, best)

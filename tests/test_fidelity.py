@@ -5,7 +5,8 @@ import math
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from wearstate.datasets.generation.quantities import QUANTITIES, resolved, with_estimate
+from wearstate.datasets.generation.machines import known_of
+from wearstate.datasets.generation.quantities import resolved, with_estimate
 from wearstate.diagnose.charts.of_scene import chart_of
 from wearstate.sim.fidelity import pilot as pilot_runs
 from wearstate.sim.fidelity.choose import resolve, resolved_scene
@@ -28,7 +29,9 @@ class KnownPilot(Pilot):
     """A pump whose quantities have known errors: so much a rung, and a step to the second power."""
 
     def __init__(self, errors, *, scatter=0.0, step_error=0.0, faults=(), seed=0, base=0.0):
-        super().__init__(load_scene("bilge-pump"), QUANTITIES["reciprocating-pump"], seed=seed)
+        super().__init__(
+            load_scene("bilge-pump"), known_of(load_scene("bilge-pump")).quantities, seed=seed
+        )
         self.errors, self.scatter, self.step_error, self.faults = (
             errors,
             scatter,
@@ -309,7 +312,7 @@ def test_scatter_of_few_starts_is_no_lack_of_convergence(seed):
 def test_rungs_between_two_levels_are_no_levels_of_convergence():
     line = load_scene("shaft-rig", {"duration": "0.3 s"})
     kept = ["film", "beam", "elements"]
-    found = study(line, QUANTITIES[line.machine], accuracy=0.02, pinned=kept)
+    found = study(line, known_of(line).quantities, accuracy=0.02, pinned=kept)
     [convergence] = found.convergence
     assert convergence.levels == ("x1", "x1/2", "x1/4")
     assert "x1/2 round" in {each.rungs["mesh"] for each in found.candidates}
@@ -479,7 +482,7 @@ def test_a_search_goes_on_from_the_runs_that_are_kept():
     """Interrupted in the middle and taken up again: the same study, and no run made twice."""
     scene = load_scene("journal-bearing", {**SMALL_JOURNAL, "duration": "0.05 s"})
     whole_runs, runs = {}, {}
-    quantities = QUANTITIES[scene.machine]
+    quantities = known_of(scene).quantities
 
     def once(kept, late=None):
         pilot = Pilot(scene, quantities, kept=kept)
@@ -531,7 +534,7 @@ def test_motions_that_are_damped_alike_do_not_make_the_resonance_jump():
         line = load_scene("propulsion-shaft", {"drive.speed": 4.774, "duration": "0.4 s", **mesh})
         run = simulate(line, seed=0, truth=True)
         least.append(run.numerics["least_damped_hz"])
-        found.append(QUANTITIES[line.machine](run, line))
+        found.append(known_of(line).quantities(run, line))
     assert max(least) > 1.02 * min(least)
     for name in ("resonance_hz", "least_damping"):
         values = [each[name][0] for each in found]
@@ -550,7 +553,7 @@ def test_motions_that_are_damped_alike_do_not_make_the_resonance_jump():
 def test_a_line_that_fails_fails_from_every_start():
     line = load_scene("shaft-rig", {"duration": "0.3 s", "oil.viscosity": 1e-5})
     assert not simulate(line, seed=0, raise_on_failure=False).status.ok
-    pilot = Pilot(line, QUANTITIES[line.machine])
+    pilot = Pilot(line, known_of(line).quantities)
     [outcome] = pilot.outcomes({}, 3)  # no more is tried
     assert outcome.fault
     with pytest.raises(SimulationError):
@@ -570,7 +573,7 @@ SMALL_JOURNAL = {
 def test_auto_keeps_the_accuracy_of_a_journal_on_fresh_starts(accuracy):
     """One of the trials of tests/benchmarks/auto_trials.py, on a coarse mesh."""
     scene = load_scene("journal-unbalance", SMALL_JOURNAL)
-    quantities = QUANTITIES[scene.machine]
+    quantities = known_of(scene).quantities
     pilot = Pilot(scene, quantities)
     found = resolve(scene, quantities, accuracy, pilot=pilot, starts=16)
     assert found.status in ("resolved", "reference")
@@ -602,7 +605,7 @@ def test_a_resolved_scene_runs_and_says_its_error():
 
 def test_the_choice_is_the_same_again():
     scene = load_scene("journal-unbalance", SMALL_JOURNAL)
-    first, again = (resolve(scene, QUANTITIES[scene.machine], 0.05) for _ in range(2))
+    first, again = (resolve(scene, known_of(scene).quantities, 0.05) for _ in range(2))
     assert first == again
 
 
@@ -610,7 +613,7 @@ def test_the_choice_is_the_same_again():
 def test_every_machine_has_quantities_of_interest(name):
     scene = load_scene(name)
     short = {"duration": 2 / scene.drive.speed, "settling_revolutions": 1}
-    found = QUANTITIES[scene.machine](
+    found = known_of(scene).quantities(
         simulate(load_scene(name, short), seed=1, truth=True), load_scene(name, short)
     )
     assert len(found) >= 8
@@ -622,4 +625,4 @@ def test_every_machine_has_quantities_of_interest(name):
 
 def test_unknown_accuracy_is_refused():
     with pytest.raises(ValueError, match="accuracy = 0 must be >= 1e-06 and < 1"):
-        resolve(load_scene("bilge-pump"), QUANTITIES["reciprocating-pump"], 0.0)
+        resolve(load_scene("bilge-pump"), known_of(load_scene("bilge-pump")).quantities, 0.0)

@@ -63,6 +63,7 @@ ROOMS = {
     "diagnose": [
         "pages",
         "pictures",
+        "machines",
         "learning",
         "feature_rows",
         "wear_model",

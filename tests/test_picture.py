@@ -11,10 +11,10 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 from wearstate.datasets.file.record import Channel
 from wearstate.diagnose.alignment.page import align, align_figure, align_html
+from wearstate.diagnose.machines.picture import plot_simulation
 from wearstate.diagnose.pages.page import render, short_name, visible
 from wearstate.diagnose.pages.picture import FORMATS, encoded, picture_bytes, save_picture
 from wearstate.diagnose.pictures.kinds import AUTO, KINDS, plot_recording
-from wearstate.diagnose.pictures.simulation import plot_simulation
 from wearstate.diagnose.pictures.view import View
 from wearstate.diagnose.report.figures import trend_picture
 from wearstate.diagnose.report.trend import fit_trend

@@ -12,7 +12,7 @@ from wearstate.datasets.recipe.recipe import clearances, load_recipe, sample_rec
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.evaluation.evaluate import score
 from wearstate.diagnose.feature_rows.feature_table import recording_features
-from wearstate.diagnose.pictures.simulation import plot_simulation
+from wearstate.diagnose.machines.picture import plot_simulation
 from wearstate.diagnose.report.page import report_html
 from wearstate.diagnose.report.text import report_text
 from wearstate.diagnose.report.verdict import report_table

@@ -16,7 +16,7 @@ from ...sim.scene.load import override, scene_from_table
 from ...sim.scene.parts import Scene
 from ...sim.scene.rungs import Effect, with_values
 from ..recipe.recipe import STRATA, Recipe, Sample, sample_records
-from .quantities import QUANTITIES
+from .machines import known_of
 
 ACTS_ON = {
     "joint.crankpin": "crankpin",
@@ -179,7 +179,7 @@ def choose(
     found = []
     for sample in _pilots(recipe, samples):
         scene = sample.scene
-        found.append(resolve(scene, QUANTITIES[scene.machine], accuracy, pinned))
+        found.append(resolve(scene, known_of(scene).quantities, accuracy, pinned))
         if say is not None:
             say(f"pilot, record {sample.index}: {found[-1].text}")
     effects = [e for e in effects_of(recipe.scene) if e.name not in pinned]

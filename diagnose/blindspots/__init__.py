@@ -2,5 +2,5 @@
 
 It may import ``sim.output``, ``sim.scene``, ``sim.machine``, ``datasets.file``,
 ``datasets.source``, ``datasets.recipe``, ``datasets.measured``, ``diagnose.pages``,
-``diagnose.learning``, ``diagnose.wear_model``, ``diagnose.nameplate``.
+``diagnose.machines``, ``diagnose.learning``, ``diagnose.wear_model``, ``diagnose.nameplate``.
 """

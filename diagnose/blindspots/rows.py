@@ -17,7 +17,8 @@ from ...datasets.recipe.options import Alternatives, Taken
 from ...datasets.recipe.recipe import Recipe, Sample
 from ...sim.scene.load import override, scene_from_table
 from ...sim.scene.parts import Scene, SceneError
-from .shifts import SCENE_SHIFTS, Shift
+from ..machines.registry import presentation_of
+from ..machines.shifts import Shift
 
 BEYOND = 1.3
 """Of the edge of a range drawn by its logarithm; of others 30 % of the range is added."""
@@ -95,7 +96,7 @@ def scene_rows(recipe: Recipe, shifts: Sequence[Shift] | None = None) -> list[Sc
     ----------
     recipe : Recipe
     shifts : sequence of Shift, optional
-        Those of the machine by :data:`~.blindspots.shifts.SCENE_SHIFTS` by default.
+        Those of the machine by default.
 
     Returns
     -------
@@ -108,7 +109,7 @@ def scene_rows(recipe: Recipe, shifts: Sequence[Shift] | None = None) -> list[Sc
     >>> [(row.kind, row.shift) for row in rows if row.name == "pressure.rise_delay"]
     [('fixed', '= 6 deg'), ('fixed', '= 12 deg')]
     """
-    table = SCENE_SHIFTS.get(recipe.scene.machine, ()) if shifts is None else shifts
+    table = presentation_of(recipe.scene).shifts if shifts is None else shifts
     drawn = _drawn(recipe)
     names = {each.path for each in drawn}
     worn = {_pattern(wearing.axis.path) for wearing in recipe.severities}

@@ -12,7 +12,8 @@ from typing import Any
 from threadpoolctl import threadpool_limits
 
 from ... import __version__
-from ...datasets.generation.quantities import QUANTITIES, quantity_label
+from ...datasets.generation.machines import known_of
+from ...datasets.generation.quantities import quantity_label
 from ...datasets.workers.local import in_order
 from ...sim.fidelity.choose import estimated_error
 from ...sim.fidelity.pilot import Candidate, Outcome, Pilot
@@ -105,13 +106,13 @@ def scene_search(
     """
     pilot = Pilot(
         scene,
-        QUANTITIES[scene.machine],
+        known_of(scene).quantities,
         clock=clock,
         kept=kept,
         spread=partial(in_order, jobs=jobs),
         at_once=jobs,
     )
-    return Search(scene, QUANTITIES[scene.machine], accuracy=accuracy, pilot=pilot, tell=tell)
+    return Search(scene, known_of(scene).quantities, accuracy=accuracy, pilot=pilot, tell=tell)
 
 
 def measure(

@@ -135,7 +135,7 @@ def simulate(
     if output is not None:
         save_solution(machine, solution, output, seed=seed, force=force, truth=truth)
     if plot is not None:
-        from ..pictures.simulation import plot_simulation
+        from ..machines.picture import plot_simulation
 
         plot_simulation(machine, solution, plot, force=force)
     vibration = [

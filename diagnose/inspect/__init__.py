@@ -3,6 +3,6 @@
 It may import ``sim.output``, ``sim.scene``, ``sim.fidelity``, ``sim.deep_check``,
 ``features.signal``, ``datasets.file``, ``datasets.source``, ``datasets.recipe``,
 ``datasets.measured``, ``datasets.generation``, ``datasets.audit``, ``diagnose.pages``,
-``diagnose.pictures``, ``diagnose.learning``, ``diagnose.feature_rows``, ``diagnose.wear_model``,
-``diagnose.class_model``.
+``diagnose.pictures``, ``diagnose.machines``, ``diagnose.learning``, ``diagnose.feature_rows``,
+``diagnose.wear_model``, ``diagnose.class_model``.
 """

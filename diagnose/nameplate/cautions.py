@@ -5,27 +5,12 @@ from typing import Any
 
 from ...sim.output.recording import Recording
 from ...sim.scene.load import load_scene, scene_names
+from ...sim.scene.parts import si_unit
 from ..feature_rows.healthy import Baseline
+from ..machines.registry import presentation_of
 from .nameplate import Nameplate, day_of
 
 _SAME = 0.02  # over the trained value: nameplates are rounded
-_BUILT: dict[str, tuple[tuple[str, str], ...]] = {
-    "reciprocating-pump": (
-        ("crank.radius", "m"),
-        ("rod.length", "m"),
-        ("piston.diameter", "m"),
-        ("piston.mass", "kg"),
-        ("rod.mass", "kg"),
-    ),
-    "propulsion-shaft": (("propeller.blades", ""),),
-    "journal-bearing": (
-        ("bearing.diameter", "m"),
-        ("bearing.length", "m"),
-        ("rotor.mass", "kg"),
-        ("load.static_across", "N"),
-    ),
-}
-"""Machine -> what of its nameplate recipes leave as it is, with units."""
 
 
 def known_beside(
@@ -106,7 +91,8 @@ def _otherwise_built(day: Any, trained: str) -> list[str]:
     if usual.machine != day.machine:
         return [f"the nameplate is of a {day.machine}, the model of a {usual.machine}"]
     found = []
-    for path, unit in _BUILT.get(day.machine, ()):
+    for path in presentation_of(day).sizes:
+        unit = si_unit(type(day), path)
         mine, theirs = _value(day, path), _value(usual, path)
         if mine is None or theirs is None:
             continue  # a rig has no propeller

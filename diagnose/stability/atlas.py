@@ -103,7 +103,12 @@ def atlas(
     SceneError
         The machine has no such map, or the scene nothing to draw in it.
     """
-    makers = MAPS[scene.machine]
+    makers = MAPS.get(scene.machine, {})
+    if not makers:
+        fault = (
+            f"machine = '{scene.machine}' has no stability maps, must be one of {', '.join(MAPS)}"
+        )
+        raise SceneError(scene.name, [f"{fault}; see wearstate scene list"])
     if name is not None and name not in makers:
         raise SceneError(
             scene.name, [f"map = '{name}' is unknown for a {scene.machine}{nearest(name, makers)}"]

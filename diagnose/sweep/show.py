@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from ...datasets.generation.truths import Truth
+from ...datasets.generation.machines import Truth
 from ...features.catalogue.row import catalogue, feature_names
 from ...sim.output.recording import Recording
 from .axes import SweepError

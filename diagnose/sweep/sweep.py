@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ... import __version__
+from ...datasets.generation.machines import Truth
 from ...datasets.generation.quantities import resolved
-from ...datasets.generation.truths import Truth, truths_of
+from ...datasets.generation.truths import truths_of
 from ...datasets.workers.local import in_order
 from ...features.catalogue.row import feature_row
 from ...sim.fidelity.choose import resolved_scene

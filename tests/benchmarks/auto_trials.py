@@ -19,7 +19,7 @@ from itertools import product
 from pathlib import Path
 
 import numpy as np
-from wearstate.datasets.generation.quantities import QUANTITIES
+from wearstate.datasets.generation.machines import known_of
 from wearstate.sim.fidelity.choose import affordable_starts, resolve
 from wearstate.sim.fidelity.ladder import cost_of, effects_of
 from wearstate.sim.fidelity.pilot import Pilot, differences
@@ -211,7 +211,7 @@ def seconds_of(scene, values):
 def trial(name, seed, accuracies=ACCURACIES, *, brute=True, timed=False):
     """One row for each accuracy: what was chosen, its error on fresh starts, its cost."""
     scene = drawn(name, seed)
-    quantities, starts = QUANTITIES[scene.machine], starts_of(name, scene)
+    quantities, starts = known_of(scene).quantities, starts_of(name, scene)
     pilot, fresh = (Pilot(scene, quantities, seed=2 * seed + k) for k in range(2))
     reference = reference_values(scene)
     slowest = seconds_of(scene, reference) if timed else math.nan

@@ -1,0 +1,177 @@
+"""How a reciprocating pump is shown, and what of it a model takes for granted."""
+
+from collections.abc import Iterator
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...sim.output.recording import Recording
+from ...sim.scene.parts import Scene
+from ...sim.scene.pump import PumpScene
+from ..pages.page import short_name
+from ..pages.si_text import plain
+from ..pictures.panel import COLOURS
+from .presentation import Presentation, Truths, density, label, told
+from .shifts import factor, set_to
+
+_REVOLUTIONS = 2  # drawn
+
+
+def _draw_pump(figure: Any, scene: Scene, solution: Recording) -> None:
+    pump = cast(PumpScene, scene)
+    if not pump.running:
+        _draw_rest(figure, solution)
+        return
+    rate = solution.sample_rate
+    n = min(solution.signal.shape[1], round(_REVOLUTIONS / pump.drive.speed * rate))
+    turns = np.arange(n) / rate * pump.drive.speed + pump.drive.start_angle / (2 * np.pi)
+    panels = figure.subplot_mosaic([["wave", "wave", "orbit"], ["force", "pressure", "spectrum"]])
+    accelerations = [
+        (short_name(channel.name), row)
+        for channel, row in zip(solution.channels, solution.signal, strict=True)
+        if channel.quantity == "acceleration"
+    ]
+    for (name, row), colour in zip(accelerations, COLOURS, strict=False):
+        panels["wave"].plot(turns, row[:n], lw=0.5, color=colour, label=name)
+        frequency, level = density(row, rate)
+        panels["spectrum"].plot(frequency / 1e3, level, lw=0.6, color=colour, label=name)
+    label(panels["wave"], "crank revolutions", "acceleration [m/s²]", "Casing acceleration")
+    label(panels["spectrum"], "frequency [kHz]", "PSD [dB re 1 (m/s²)²/Hz]", "Spectrum")
+    panels["spectrum"].set_xscale("log")
+    for column, name in enumerate("xy"):
+        force = solution.truth["pin_force_n"][:n, column] / 1e3
+        panels["force"].plot(turns, force, lw=0.6, color=COLOURS[column], label=name)
+    label(panels["force"], "crank revolutions", "pin on rod [kN]", "Crank-pin force")
+    _pressures(panels["pressure"], pump, solution, turns)
+    _orbit(panels["orbit"], pump, solution.truth["pin_offset_m"][:n])
+
+
+def _draw_rest(figure: Any, solution: Recording) -> None:
+    """A test of the casing at rest: forces and accelerations over time, and their spectra."""
+    rate = solution.sample_rate
+    time = np.arange(solution.signal.shape[1]) / rate
+    panels = figure.subplots(2, 2, sharex="col")
+    rows = (("force", "force [N]", "N²/Hz"), ("acceleration", "acceleration [m/s²]", "(m/s²)²/Hz"))
+    for (quantity, shown_as, unit), (wave, spectrum) in zip(rows, panels, strict=True):
+        shown = [
+            (short_name(channel.name), row)
+            for channel, row in zip(solution.channels, solution.signal, strict=True)
+            if channel.quantity == quantity
+        ]
+        for (name, row), colour in zip(shown, COLOURS, strict=False):
+            wave.plot(time, row, lw=0.5, color=colour, label=name)
+            frequency, level = density(row, rate)
+            spectrum.plot(frequency / 1e3, level, lw=0.6, color=colour, label=name)
+        label(wave, "time [s]", shown_as, f"{quantity.capitalize()} of the test")
+        label(spectrum, "frequency [kHz]", f"PSD [dB re 1 {unit}]", "Spectrum")
+        spectrum.set_xscale("log")
+
+
+def _pressures(
+    axes: Any, scene: PumpScene, solution: Recording, turns: NDArray[np.float64]
+) -> None:
+    """Cylinder pressure of every throw, and what sensors make of it."""
+    area = np.pi / 4 * scene.piston.diameter**2
+    for throw in range(len(scene.throws)):
+        suffix = f"_{throw + 1}" if throw else ""
+        force = solution.truth[f"piston_pressure_force_n{suffix}"][: turns.size]
+        colour = COLOURS[throw % len(COLOURS)]
+        if area > 0:
+            axes.plot(turns, force / area / 1e6, lw=0.8, color=colour, label=f"{throw + 1}")
+    for channel, row in zip(solution.channels, solution.signal, strict=True):
+        if channel.quantity == "pressure":
+            told = {"label": short_name(channel.name), "color": "black", "ls": ":"}
+            axes.plot(turns, row[: turns.size] / 1e6, lw=0.9, **told)
+    label(axes, "crank revolutions", "gauge pressure [MPa]", "Cylinder pressure")
+
+
+def _orbit(axes: Any, scene: PumpScene, offset: NDArray[np.float64]) -> None:
+    """Path of the pin's centre in its clearance circle."""
+    circle = np.exp(2j * np.pi * np.linspace(0, 1, 181)) * scene.joint.crankpin.clearance_radial
+    axes.plot(1e3 * circle.real, 1e3 * circle.imag, color="black", lw=1)
+    axes.plot(1e3 * offset[:, 0], 1e3 * offset[:, 1], lw=0.5, color=COLOURS[0])
+    axes.set(xlabel="x, along the stroke [mm]", ylabel="y [mm]", title="Pin in its clearance")
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.grid(alpha=0.3)
+
+
+# --- journal bearing
+
+
+def _lines(truth: Truths) -> Iterator[tuple[str, str]]:
+    if "contacts_per_turn" not in truth:
+        yield "pump", "at rest"
+        return
+    pins = [name for name in truth if name.startswith("pin_peak")]
+    for name in pins:
+        throw = name.removeprefix("pin_peak")
+        number = (throw.removeprefix("_") or "1") if len(pins) > 1 else ""
+        force = f"peak {told(truth, name)} (mean over revolutions), "
+        force += f"rms {told(truth, f'pin_rms{throw}')}"
+        if f"wrist_peak{throw}" in truth:
+            force += f"; wrist pin {told(truth, f'wrist_peak{throw}')}"
+            force += f", guide {told(truth, f'guide_peak{throw}')} peak"
+        yield f"pin {number}".strip(), force
+        if f"pressure_lowest{throw}" in truth:
+            low, high = (told(truth, f"pressure_{end}{throw}") for end in ("lowest", "highest"))
+            ratio = truth.get(f"pressure_ratio{throw}")
+            about = f", ratio {plain(ratio.value, 3)} absolute" if ratio else ""
+            yield f"pressure {number}".strip(), f"{low} to {high} gauge{about}"
+    contacts = truth["contacts_per_turn"].value
+    yield "contacts", f"{plain(contacts, 2)} in a revolution, all joints with clearance"
+
+
+_PIN = "joint.crankpin"
+_LOSSY = {f"{_PIN}.damping": 0.0, f"{_PIN}.restitution": 0.3}
+_HERTZ = {f"{_PIN}.hertz_stiffness": 5e10}  # as stiff as the linear one at some kN
+_WRIST = {"joint.wristpin.rung": "compliant"}
+_GUIDE = {"joint.guide.rung": "compliant"}
+
+_SHIFTS = (
+    set_to("pressure.rise_delay", ("6 deg", "12 deg"), "the delivery valve opens late"),
+    set_to("pressure.fall_delay", ("6 deg", "12 deg"), "the suction valve opens late"),
+    set_to("pressure.rise_angle", ("2 deg", "12 deg"), "stiff liquid, or air in it"),
+    set_to("pressure.fall_angle", ("2 deg", "12 deg"), "stiff liquid, or air in it"),
+    set_to("pressure.rung", ("heads", "chamber"), "valves that move, instead of two levels"),
+    factor("pressure.suction", 0.5, 1.5, "level of the bilge"),
+    factor("pressure.discharge", 0.7, 1.4, "head of the line"),
+    factor("drive.speed", 0.8, 1.25, "another gear or motor"),
+    set_to("drive.rung", ("motor",), "a motor whose speed gives way under the load"),
+    factor(f"{_PIN}.stiffness", 0.5, 2.0, "oil film, bush and rod end in series"),
+    factor(f"{_PIN}.damping", 0.4, 2.5, "squeezed oil, cold or hot"),
+    factor(f"{_PIN}.friction", 0.4, 2.0, "from full film to dry metal"),
+    factor(f"{_PIN}.tangential_damping", 0.3, 3.0, "viscosity of the oil"),
+    set_to(
+        f"{_PIN}.law",
+        ("hunt-crossley", "flores", "exact"),
+        "no contact law is known to hold in a worn bearing",
+        beside=_LOSSY,
+    ),
+    set_to(f"{_PIN}.elasticity", ("hertz",), "a pin that touches on a narrow strip", beside=_HERTZ),
+    set_to("joint.wristpin.rung", ("compliant",), "a wrist pin with the play of a new one"),
+    set_to(
+        "joint.wristpin.diametral_clearance",
+        ("0.12 mm",),
+        "a wrist pin worn as well",
+        beside=_WRIST,
+    ),
+    set_to("joint.guide.rung", ("compliant",), "a crosshead with the play of a new one"),
+    set_to("joint.guide.diametral_clearance", ("0.25 mm",), "a worn crosshead", beside=_GUIDE),
+    factor("casing.modes.*.frequency", 0.85, 1.15, "another foundation or pattern"),
+    factor("casing.modes.*.damping_ratio", 0.4, 2.5, "joints, paint, pipes"),
+    factor("rod.mass", 0.8, 1.25, "another drawing"),
+    factor("rod.length", 0.85, 1.2, "another drawing"),
+    factor("rod.inertia", 0.8, 1.25, "estimated from the mass"),
+    factor("piston.mass", 0.8, 1.25, "another drawing"),
+    factor("piston.diameter", 0.93, 1.07, "another liner"),
+    factor("crank.radius", 0.9, 1.1, "another stroke"),
+)
+
+
+PRESENTATION = Presentation(
+    draw=_draw_pump,
+    lines=_lines,
+    sizes=("crank.radius", "rod.length", "piston.diameter", "piston.mass", "rod.mass"),
+    shifts=_SHIFTS,
+)
