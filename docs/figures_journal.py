@@ -14,8 +14,8 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from wearstate.sim.film.bearing import equilibrium
 from wearstate.sim.film.impedance_map import impedance_map, map_force
+from wearstate.sim.film.rungs import FILM_RUNGS
 from wearstate.sim.film.solve import (
-    FILM_RUNGS,
     FilmGeometry,
     FilmState,
     dufrane_scar,
@@ -201,11 +201,10 @@ def rungs() -> Figure:
     eccentricity = np.linspace(0.05, 0.9, 18)
     for each, length in zip(axes[0], lengths, strict=True):
         geometry = FilmGeometry(length_to_diameter=length, condition="reynolds")
-        for rung, colour in zip(FILM_RUNGS, COLOURS, strict=False):
-            if rung.name == "relaxed":
-                continue
+        shown = (rung for rung in FILM_RUNGS if rung.bearing)
+        for rung, colour in zip(shown, COLOURS, strict=False):
             force = [
-                float(np.hypot(*rung.solve(geometry, FilmState(x=e, y=0.0)).force))
+                float(np.hypot(*rung.field(geometry, FilmState(x=e, y=0.0)).force))
                 for e in eccentricity
             ]
             each.semilogy(eccentricity, force, lw=1.2, color=colour, label=rung.name)

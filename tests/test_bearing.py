@@ -767,7 +767,7 @@ def test_operating_point_scales():
     point = br.operate(bearing, speed=speed, load=load, tilt_coefficients=True)
     unit = bearing.force_unit(speed)
     state, step = point.equilibrium.state, 1e-7  # m, of 60 um
-    direct = br._RUNGS["direct"].solve
+    direct = br._RUNGS["direct"].field
     moved = dataclasses.replace(state, x=state.x + step / 60e-6)
     change = (direct(bearing.geometry, moved).force - point.equilibrium.film.force) * unit / step
     # one-sided: of first order, 0.2 % of the gap

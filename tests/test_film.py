@@ -3,6 +3,7 @@
 import math
 from dataclasses import replace
 from itertools import pairwise
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -14,9 +15,9 @@ from scipy.optimize import nnls
 from wearstate.sim.contact.closed_forms import ocvirk_film, sommerfeld_film
 from wearstate.sim.film.direct import WARM, direct_force, direct_tilted_force
 from wearstate.sim.film.line import line_force
+from wearstate.sim.film.rungs import FILM_RUNGS
 from wearstate.sim.film.short import short_force
 from wearstate.sim.film.solve import (
-    FILM_RUNGS,
     FilmGeometry,
     FilmState,
     FilmStatus,
@@ -31,6 +32,9 @@ from wearstate.sim.film.solve import (
     solve_relaxed,
     solve_short,
 )
+from wearstate.sim.journal.ladder import FILM_LADDER
+from wearstate.sim.journal.recording import _FILMS
+from wearstate.sim.scene.journal import Film
 from wearstate.sim.scene.oil_viscosity import vogel_viscosity, walther_viscosity
 
 FINE = {"n_theta": 144, "n_z": 33}
@@ -526,11 +530,23 @@ def test_call_refuses(call, words):
 
 def test_rungs_stand_in_order_and_solve_alike():
     names = [rung.name for rung in FILM_RUNGS]
-    assert names[:4] == ["short", "long", "finite", "direct"]
+    assert names == ["short", "long", "finite", "map", "direct", "mass-conserving"]
     geometry = bearing(0.1)
-    forces = {rung.name: rung.solve(geometry, HALF).force for rung in FILM_RUNGS[:4]}
+    forces = {rung.name: rung.field(geometry, HALF).force for rung in FILM_RUNGS if rung.bearing}
+    assert set(forces) == {"short", "long", "finite", "direct"}
     assert_allclose(forces["finite"], forces["short"], rtol=0.03)
     assert_allclose(forces["direct"], forces["short"], rtol=0.03)
+
+
+def test_one_table_says_which_film_is_for_what():
+    chosen = {rung.name for rung in FILM_RUNGS if rung.scene}
+    assert set(get_args(Film.model_fields["rung"].annotation)) == chosen
+    assert set(_FILMS) == chosen  # films of an orbit
+    assert {rung.name for rung in FILM_LADDER} == chosen
+    assert [rung.name for rung in FILM_RUNGS if rung.verification] == ["mass-conserving"]
+    assert not [rung for rung in FILM_RUNGS if rung.verification and (rung.scene or rung.bearing)]
+    dearest = max(FILM_RUNGS, key=lambda rung: rung.nanoseconds)
+    assert dearest.verification
 
 
 def test_pressure_of_each_rung_gives_its_force():

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from ...sim.contact.closed_forms import kelvin_voigt_restitution
 from ...sim.film.bearing import BearingError, BearingStatus, equilibrium, sommerfeld_number, whirl
 from ...sim.film.over_relaxed import PAPER_RELAXATION
+from ...sim.film.rungs import FILM_RUNGS
 from ...sim.film.solve import (
-    FILM_RUNGS,
     LEAST_CELLS,
     FilmGeometry,
     FilmSolution,
@@ -922,8 +922,8 @@ def eccentricity_mesh(scene: Scene, size: int | None = None) -> MapPlan | str:
             "direct": judge_of(solve_direct),
             f"over-relaxed, {PAPER_RELAXATION}": judge_of(_relaxed),
             "over-relaxed, 1.5": judge_of(lambda mesh, at: _relaxed(mesh, at, 1.5)),
-            "finite": judge_of(_RUNG["finite"].solve),
-            "short": judge_of(_RUNG["short"].solve),
+            "finite": judge_of(_RUNG["finite"].field),
+            "short": judge_of(_RUNG["short"].field),
         },
         curves={"": [_cells_curve(gaps)]},
         note=f"force within {scene.accuracy:.2g} of a direct solve on {_FINE[0]} x {_FINE[1]} "

@@ -26,9 +26,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .direct import DIRECT_OK, STATUS, DirectFilm, direct_tilted_force
+from .rungs import FILM_RUNGS
 from .slopes import Coefficients, perturbation
 from .solve import (
-    FILM_RUNGS,
     FilmGeometry,
     FilmSolution,
     FilmState,
@@ -369,7 +369,7 @@ def equilibrium(
         Force on the journal, of ``eta omega R^3 L / C^2``. A Sommerfeld number S is a load of
         ``1 / (pi S)``.
     rung : str
-        One of the names of ``FILM_RUNGS``.
+        ``"short"``, ``"long"``, ``"finite"`` or ``"direct"``.
     tilt : tuple of float
         tilt_x, tilt_y, held while the centre moves.
     start : array_like [shape=(2,)], optional
@@ -439,7 +439,7 @@ def equilibrium(
     return result
 
 
-_RUNGS = {rung.name: rung for rung in FILM_RUNGS}
+_RUNGS = {rung.name: rung for rung in FILM_RUNGS if rung.bearing}
 
 
 def _checked_load(load: ArrayLike) -> Vector:
@@ -501,7 +501,7 @@ def _any_force(
     geometry: FilmGeometry, rung: str, tilt: tuple[float, float], position: Vector
 ) -> _Force:
     state = _at_rest(position, tilt)
-    film = _RUNGS[rung].solve(geometry, state)
+    film = _RUNGS[rung].field(geometry, state)
     if film.status not in (FilmStatus.OK, FilmStatus.COARSE):
         return _Force(film.force, np.zeros((2, 2)), False)
     return _Force(film.force, _displaced(geometry, state, rung, _PLACES[:2], _DISPLACEMENT), True)
@@ -538,7 +538,7 @@ def _film_at(
     tilt: tuple[float, float],
     mesh_angle: float,
 ) -> FilmSolution:
-    return _RUNGS[rung].solve(geometry, _at_rest(_turn(-mesh_angle) @ position, tilt))
+    return _RUNGS[rung].field(geometry, _at_rest(_turn(-mesh_angle) @ position, tilt))
 
 
 def _plain_reach(angle: float) -> float:  # noqa: ARG001 - that of any direction
@@ -740,7 +740,7 @@ def at_eccentricity(
         Direction of the journal centre from the X axis [rad]; it matters in a bearing with grooves
         or a worn bore.
     rung : str
-        One of the names of ``FILM_RUNGS``.
+        ``"short"``, ``"long"``, ``"finite"`` or ``"direct"``.
 
     Returns
     -------
@@ -773,7 +773,7 @@ def at_eccentricity(
     plain = geometry.bore is None and not geometry.grooves
     mesh = angle if plain and geometry.condition == "reynolds" else 0.0
     position = eccentricity_ratio * np.array([math.cos(angle), math.sin(angle)])
-    film = _RUNGS[rung].solve(geometry, _at_rest(_turn(-mesh) @ position, (0.0, 0.0)))
+    film = _RUNGS[rung].field(geometry, _at_rest(_turn(-mesh) @ position, (0.0, 0.0)))
     status = _STATUS_OF_FILM.get(film.status, BearingStatus.NO_CONVERGENCE)
     if not status.ok:
         raise BearingError(status, f"eccentricity ratio {eccentricity_ratio:g}")
@@ -912,7 +912,7 @@ def _displaced(
         ends = []
         for side in (-step, step):
             moved = replace(state, **{place.name: getattr(state, place.name) + side})
-            film = _RUNGS[rung].solve(geometry, moved)
+            film = _RUNGS[rung].field(geometry, moved)
             ends.append(np.concatenate([film.force, film.moment])[: len(places)])
         columns.append((ends[0] - ends[1]) / (2 * step))
     return np.array(columns).T

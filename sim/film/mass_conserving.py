@@ -27,10 +27,8 @@ from scipy.linalg import lapack
 
 from ..jit import kernel
 from .solve import (
-    FILM_RUNGS,
     LEAST_CELLS,
     FilmGeometry,
-    FilmRung,
     FilmSolution,
     FilmState,
     FilmStatus,
@@ -640,15 +638,3 @@ def _failed(geometry: FilmGeometry, status: FilmStatus, least: float) -> FilmSol
         iterations=0,
         fill=np.zeros(shape),
     )
-
-
-MASS_RUNG = FilmRung(
-    name="mass-conserving",
-    assumes="thin laminar film, full or streamers without pressure; oil from the supply alone",
-    valid="any L/D, bore, grooves and tilt that the mesh resolves; a motion by mass_step",
-    reference="Elrod (1981), Journal of Lubrication Technology 103, 350-354",
-    cost=6e-4,
-    solve=mass_conserving,
-)
-ALL_FILM_RUNGS = (*FILM_RUNGS, MASS_RUNG)
-"""Rungs of the film from the cheapest to the one that keeps its mass."""

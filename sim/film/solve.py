@@ -1,4 +1,4 @@
-"""Oil film of a journal bearing: geometry, state, and the rungs that give its pressure.
+"""Oil film of a journal bearing: geometry, state, and solvers that give its pressure.
 
 Non-dimensional as in Ma, Lu, Chen (2010), the orbit paper: angle theta from the X axis, length z
 in [-1/2, 1/2] over L, gap ``H = 1 - X cos - Y sin`` over C (plus tilt and bore), time
@@ -11,7 +11,6 @@ newtons ``eta omega R^3 L / C^2 F``. Inertia of the oil, turbulence and heat are
 """
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from enum import Enum
 
@@ -206,27 +205,6 @@ class FilmSolution:
     residual: float
     iterations: int
     fill: Array | None = None
-
-
-@dataclass(frozen=True, kw_only=True)
-class FilmRung:
-    """One way to get the pressure, from the cheapest to the best.
-
-    Attributes
-    ----------
-    name, assumes, valid, reference : str
-    cost : float
-        Time of one compiled call [s], measured on the standard mesh, near a previous one.
-    solve : callable
-        ``(geometry, state, start=None) -> FilmSolution``; `start` is a solution nearby.
-    """
-
-    name: str
-    assumes: str
-    valid: str
-    reference: str
-    cost: float
-    solve: Callable[..., FilmSolution]
 
 
 # --- geometry
@@ -543,44 +521,6 @@ def solve_relaxed(
         most_sweeps,
     )
     return _mesh_solution(geometry, state, work, force)
-
-
-FILM_RUNGS: tuple[FilmRung, ...] = (
-    FilmRung(
-        name="short",
-        assumes="no pressure flow round the circle; pressure on the closing half (Guembel)",
-        valid="L/D up to about 1/4 at low eccentricity; plain bore, aligned",
-        reference="Ocvirk (1952), NACA TN 2808",
-        cost=5e-8,
-        solve=solve_short,
-    ),
-    FilmRung(
-        name="long",
-        assumes="no flow to the ends",
-        valid="L/D from about 4 on; aligned",
-        reference="Sommerfeld (1904), Zeitschrift fuer Mathematik und Physik 50, 97-155",
-        cost=8e-6,
-        solve=solve_long,
-    ),
-    FilmRung(
-        name="finite",
-        assumes="a parabola along the length",
-        valid="force within 2 % up to L/D = 1, 6 % up to L/D = 4, eccentricity up to 0.9; aligned",
-        reference="Galerkin's method; the share of Warner (1963), ASLE Transactions 6(1)",
-        cost=6e-6,
-        solve=solve_finite,
-    ),
-    FilmRung(
-        name="direct",
-        assumes="thin laminar film, oil supplied wherever it can be taken",
-        valid="any L/D, bore, grooves and tilt that the mesh resolves",
-        reference="Reynolds (1886), Philosophical Transactions 177, 157-234",
-        cost=2e-5,
-        solve=solve_direct,
-    ),
-)
-"""Rungs of the film without memory, from the cheapest to the best; with that which keeps its mass
-they are :data:`.film.mass_conserving.ALL_FILM_RUNGS`."""
 
 
 # --- mesh error

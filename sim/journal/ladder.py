@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping
 from functools import partial
 from typing import Any, cast
 
+from ..film.rungs import FILM_RUNGS
 from ..scene.journal import Film, JournalScene
 from ..scene.parts import Scene
 from ..scene.rungs import (
@@ -21,30 +22,18 @@ from ..scene.rungs import (
 )
 from .validity import journal_step, orbit_faults
 
-FILM_RUNGS = (
+FILM_LADDER = tuple(
     Rung(
-        name="short",
-        assumes="flow round the circle neglected: a closed form",
-        reference="Ocvirk 1952; Dubois, Ocvirk 1953",
-        valid="a plain aligned bore, L/D below a half or so",
-        nanoseconds_per_step=100.0,
-    ),
-    Rung(
-        name="map",
-        assumes="the direct film of a plain aligned bore, interpolated in a table of it",
-        reference="Childs, Moes, van Leeuwen 1977 for the idea",
-        valid="a plain aligned bore without feed pressure",
-        nanoseconds_per_step=125.0,
-    ),
-    Rung(
-        name="direct",
-        assumes="Reynolds' equation with cavitation, solved on the mesh at every call",
-        reference="Reynolds 1886; active sets for the complementarity",
-        valid="laminar, isothermal, a film thicker than its mesh resolves",
-        nanoseconds_per_step=17_000.0,
-    ),
+        name=rung.name,
+        assumes=rung.assumes,
+        reference=rung.reference,
+        valid=rung.valid,
+        nanoseconds_per_step=rung.nanoseconds,
+    )
+    for rung in FILM_RUNGS
+    if rung.scene
 )
-"""Rungs of an oil film; the cost of the last is on the mesh of 72 by 17."""
+"""Rungs of an oil film that a scene may choose."""
 
 FINE_LEVELS = (4.0, 2.0, 1.0, 0.5)
 """Factors on a mesh width of an orbit's film, or the steps of an adaptive integrator."""
@@ -59,7 +48,7 @@ def journal_effects(scene: Scene) -> Iterator[Effect]:
 
 def film_effect(scene: Scene, beyond: Beyond) -> Iterator[Effect]:
     """Rungs of the film that a scene may choose."""
-    rungs = written(FILM_RUNGS, ["film.rung"])
+    rungs = written(FILM_LADDER, ["film.rung"])
     yield effect("film", scene, rungs, lambda one: str(one.film.rung), beyond=beyond)
 
 
@@ -147,7 +136,7 @@ def journal_cost(scene: Scene) -> float:
     journal = cast(JournalScene, scene)
     film = journal.film
     mesh = solve_time(film, _BAND)
-    solve = price(FILM_RUNGS, film.rung) * (mesh if film.rung == "direct" else 1.0)
-    table = _MAP_SHARE * price(FILM_RUNGS, "direct") * mesh if film.rung == "map" else 0.0
+    solve = price(FILM_LADDER, film.rung) * (mesh if film.rung == "direct" else 1.0)
+    table = _MAP_SHARE * price(FILM_LADDER, "direct") * mesh if film.rung == "map" else 0.0
     samples = journal.duration * journal.sample_rate
     return 1e-9 * (journal_calls(journal) * solve + table + samples * _SAMPLE)

@@ -2,7 +2,7 @@
 
 from typing import cast
 
-from ..journal.ladder import FILM_RUNGS, journal_cost, journal_effects
+from ..journal.ladder import FILM_LADDER, journal_cost, journal_effects
 from ..journal.recording import check_journal, simulate_journal
 from ..journal.validity import journal_step
 from ..scene.journal import JournalScene
@@ -18,7 +18,7 @@ MACHINE = MachinePhysics(
     scene=JournalScene,
     simulate=simulate_journal,
     check=check_journal,
-    ladders={"film": FILM_RUNGS},
+    ladders={"film": FILM_LADDER},
     effects=journal_effects,
     cost=journal_cost,
     step=_step,

@@ -5,7 +5,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-from ..journal.ladder import FILM_RUNGS
+from ..journal.ladder import FILM_LADDER
 from ..output.transfer import SceneTransfer
 from ..scene.parts import Scene, SceneError
 from ..scene.shaft import ShaftExciter, ShaftScene
@@ -54,7 +54,7 @@ MACHINE = MachinePhysics(
     check=check_shaft,
     recorder=shaft_recorder,
     transfer=_transfer,
-    ladders={"film": FILM_RUNGS, "beam": BEAM_RUNGS},
+    ladders={"film": FILM_LADDER, "beam": BEAM_RUNGS},
     effects=shaft_effects,
     cost=shaft_cost,
 )

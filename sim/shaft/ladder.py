@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from functools import partial
 from typing import cast
 
-from ..journal.ladder import FILM_RUNGS, film_effect, mesh_values, solve_time
+from ..journal.ladder import FILM_LADDER, film_effect, mesh_values, solve_time
 from ..scene.journal import Film
 from ..scene.parts import Scene
 from ..scene.rungs import (
@@ -131,7 +131,7 @@ def shaft_cost(scene: Scene) -> float:
     samples = shaft.duration * shaft.sample_rate
     forces = 2 * len(shaft.turbulence)
     return 1e-9 * (
-        solves * price(FILM_RUNGS, shaft.film.rung)
+        solves * price(FILM_LADDER, shaft.film.rung)
         + len(element_lengths(shaft)) * _ELEMENT
         + shaft_states(shaft) ** 3 * _STATES
         + forces * (_FORCE + samples * _FORCE_SAMPLE)

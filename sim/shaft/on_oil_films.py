@@ -49,7 +49,7 @@ from ..beam.rotor import Support
 from ..film.bearing import JournalBearing, short_attitude, short_eccentricity
 from ..film.direct import DIRECT_OK, STATUS, DirectFilm, direct_tilted_force
 from ..film.impedance_map import ImpedanceMap, impedance_map, map_force
-from ..film.mass_conserving import ALL_FILM_RUNGS
+from ..film.rungs import FILM_RUNGS
 from ..film.slopes import Coefficients, perturbation
 from ..film.solve import FilmGeometry, FilmSolution, FilmState, FilmStatus, direct_film
 
@@ -733,11 +733,7 @@ class _Law(NamedTuple):
 
 
 _AT_REST = np.zeros(4)
-_RUNGS = {rung.name: rung for rung in ALL_FILM_RUNGS}
-SHAFT_FILM_RUNGS = ("short", "long", "finite", "map", "direct", "mass-conserving")
-"""Names of the films that a shaft may lie on, from the cheapest to the dearest."""
-
-_TILTED = ("direct", "mass-conserving")
+_RUNGS = {rung.name: rung for rung in FILM_RUNGS}
 
 
 def _law(rung: str, tilted: bool, bearing: FilmBearing) -> _Law:
@@ -747,8 +743,8 @@ def _law(rung: str, tilted: bool, bearing: FilmBearing) -> _Law:
             f"{bearing.name}.film.condition = 'reynolds' must be 'periodic' or 'guembel'; its line "
             "without pressure jumps from node to node as the journal turns"
         )
-    if rung not in SHAFT_FILM_RUNGS:
-        raise ValueError(f"rung = '{rung}' must be one of {', '.join(SHAFT_FILM_RUNGS)}")
+    if rung not in _RUNGS:
+        raise ValueError(f"rung = '{rung}' must be one of {', '.join(_RUNGS)}")
     return _law_on(rung, tilted, geometry)
 
 
@@ -757,8 +753,8 @@ def _law_on(rung: str, tilted: bool, geometry: FilmGeometry) -> _Law:
         return _direct_law(geometry, tilted)
     if rung == "map":
         load = partial(_map_load, impedance_map(geometry))
-        return _any_law(geometry, False, load, "direct")  # of which the map is made
-    tilted = tilted and rung in _TILTED
+        return _any_law(geometry, False, load, rung)
+    tilted = tilted and _RUNGS[rung].tilted
     return _any_law(geometry, tilted, partial(_rung_load, rung, geometry, tilted), rung)
 
 
@@ -797,7 +793,7 @@ def _state(tilted: bool, place: Vector, rates: Vector = _AT_REST) -> FilmState:
 
 
 def _solution(rung: str, geometry: FilmGeometry, tilted: bool, place: Vector) -> FilmSolution:
-    return _RUNGS[rung].solve(geometry, _state(tilted, place))
+    return _RUNGS[rung].field(geometry, _state(tilted, place))
 
 
 def _direct_load(work: DirectFilm, tilted: bool, place: Vector, rates: Vector) -> _Load:
@@ -825,7 +821,7 @@ def _widened(own: Coefficients) -> Coefficients:
 def _rung_load(
     name: str, geometry: FilmGeometry, tilted: bool, place: Vector, rates: Vector
 ) -> _Load:
-    film = _RUNGS[name].solve(geometry, _state(tilted, place, rates))
+    film = _RUNGS[name].field(geometry, _state(tilted, place, rates))
     ok = film.status in (FilmStatus.OK, FilmStatus.COARSE)
     return _Load(np.concatenate([film.force, film.moment]), ok)
 
