@@ -143,7 +143,7 @@ def test_page_and_json_hold_films_margins_and_jacks(rig):
     for text in (
         "Oil films by speed, as set → after the moves",
         "Distance from the nearest limit",
-        "Moves and what each jack costs, cold",
+        "Moves and jacking effort, cold",
         "Film pressure over the unrolled bore",
         "Accelerance of every housing",
     ):

@@ -168,7 +168,7 @@ def test_the_command_tells_the_bearing_that_sagged_and_what_to_test_next(tmp_pat
     assert answer["bearings"][2]["offset_m"] == pytest.approx(-third["sag_m"])
     assert answer["sags"]["next"][0]["variance_taken"] > 0.2
     html = page.read_text(encoding="utf-8")
-    assert "Sags by measured tests and reactions" in html
+    assert "Sags from measured tests and reactions" in html
     assert "Next: push the shaft at" in html
 
 

@@ -747,7 +747,7 @@ def leaky(tmp_path):
 def test_the_text_says_the_verdict_first(leaky):
     text = run("audit", leaky, "--label", "state").stdout
     lines = text.splitlines()
-    assert lines[0] == "ALARM: do not trust figures from these data before this is mended."
+    assert lines[0] == "ALARM: do not trust results from these data until this is corrected."
     assert "leaky.csv (table): 240 rows, 2 columns; label state" in lines[1]
     assert "1. alarm, leaky.csv: 1 product of two columns" in text
     assert "mean × impulse = 0.5 in 0, 0.9 in 1, 0.1 in 2, 0.7 in 3" in text

@@ -262,7 +262,7 @@ def test_a_run_is_gone_on_with(found, tmp_path, monkeypatch):
     assert (first.rows, len(first.left)) == ((), 3)
     assert first.baseline == found.baseline
     table = blind_spots_table(first, CARD)
-    assert "Left for want of time: 3 rows, of gain, piston.mass" in blind_spots_text(table)
+    assert "Out of time, 3 rows not run: gain, piston.mass" in blind_spots_text(table)
     assert "fixed: piston.mass x 1.25" in blind_spots_html(table)
 
     steps = []
@@ -353,7 +353,7 @@ def test_page_text_and_json():
     assert table["rows"][2]["clear_error"] == {"value": None, "low": None, "high": None}
     json.dumps(table, allow_nan=False)
     text = blind_spots_text(table)
-    assert "As trained it errs by 2.5 % of the condemning limit without a caution" in text
+    assert "As trained, the error without a caution is 2.5 % of the condemning limit" in text
     assert "Worst without a caution: large x 2, 30.0 %." in text
     page = blind_spots_html(table, notice="trained on simulation")
     assert "&lt;recipe&gt;" in page
@@ -421,7 +421,7 @@ def test_the_command_goes_on_where_time_ended(stub, tmp_path):
     table = json.loads(first.stdout)
     assert (table["machines"], table["rows"]) == (1, [])
     assert "fixed: pressure.rise_delay = 6 deg" in table["left"]
-    assert "Left for want of time" in page.read_text()
+    assert "Not run: out of time" in page.read_text()
     before = part.read_bytes()
 
     again = run(*ways, "--json")

@@ -416,7 +416,7 @@ def test_demo_makes_its_files_and_replaces_only_them(tmp_path):
     assert {path.name for path in folder.iterdir()} == names
     assert set(result["files"].values()) == {str(folder / n) for n in names - {demo.MARKER}}
     assert result["held_out"]["records"] > 0
-    assert run("demo", "--folder", folder, "-j", 1).stdout.startswith("Judged on")
+    assert run("demo", "--folder", folder, "-j", 1).stdout.startswith("Evaluated on")
 
 
 def test_demo_leaves_the_files_of_others_alone(tmp_path):

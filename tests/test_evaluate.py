@@ -472,7 +472,7 @@ def test_text_names_every_split_and_what_is_missing(result, trained):
 def test_text_of_a_set_without_a_familiar_record(result, trained):
     nothing = {**split_named(result, "random"), "mae_m": None}
     assert "none is familiar" in score_lines(nothing, trained[0].card)[-1]
-    assert score_lines({}, trained[0].card) == ["not judged: no machine draw was held out"]
+    assert score_lines({}, trained[0].card) == ["not evaluated: no machine draw was held out"]
 
 
 def test_the_page_stands_alone(result):

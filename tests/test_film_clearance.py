@@ -293,7 +293,7 @@ def test_a_disagreement_is_said_first():
     assert said.cautions[1:] == ("other",)
     assert with_film(trained, near) is trained
     table = film_table(untold, Nameplate(scene=load_scene("journal-bearing")), {})
-    assert json.loads(json.dumps(table))["text"] == "not told: no load"
+    assert json.loads(json.dumps(table))["text"] == "no estimate: no load"
 
 
 def test_conditions_in_the_labels_of_an_import_are_those_of_the_day(tmp_path):

@@ -135,7 +135,7 @@ def test_a_model_of_two_views_keeps_what_it_reads(trained):
 def test_a_joined_model_is_evaluated_on_joined_rows(sets, trained):
     model = load_model(trained[0])
     joined = evaluate_model(model, sets / "test.h5", views=views(sets), quick=True)
-    assert f"{1e6 * joined['mae_all_m']:.1f} um with the unfamiliar" in trained[1]
+    assert f"{1e6 * joined['mae_all_m']:.1f} um including unfamiliar records" in trained[1]
     with pytest.raises(DataError, match=r"joined views = none, the model needs running; give"):
         evaluate_model(model, sets / "test.h5", quick=True)
     with pytest.raises(DataError, match=r"joined views = aft, the model needs running; give"):

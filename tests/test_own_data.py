@@ -175,7 +175,9 @@ def test_a_condition_near_a_trained_one_is_none_of_them(trained, tmp_path):
     assert [t.verdict for t in told[16:]].count("named") >= 12
     assert told[0].p_limit == pytest.approx(1 / 9)
     assert told[0].p_value <= told[0].p_limit
-    assert "trained on 8 recordings, must be >= 10 to know strangers" in model.notice
+    assert (
+        "trained on 8 recordings, must be >= 10 to recognise unfamiliar recordings" in model.notice
+    )
     assert namings_summary(told[:1]) == "no condition is named, 1 recordings: 1 unfamiliar"
 
 

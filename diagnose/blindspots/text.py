@@ -64,16 +64,16 @@ def conclusion(table: Table) -> list[str]:
     """What the list says, in a sentence or two."""
     usual = table["baseline"]["clear_error"]["value"]
     told = [row for row in table["rows"] if row["clear_error"]["value"] is not None]
-    shown = f"As trained it errs by {percent(usual)} % of the condemning limit without a caution"
+    shown = f"As trained, the error without a caution is {percent(usual)} % of the condemning limit"
     lines = [f"{shown} ({table['machines']} simulated machines of {table['recipe']})."]
     if told:
         worst = told[0]
         lines.append(
-            f"Worst without a caution: {worst['name']} {worst['shift']}, "
+            f"Largest error without a caution: {worst['name']} {worst['shift']}, "
             f"{percent(worst['clear_error']['value'])} %."
         )
     if table["machines"] < FEW:
-        lines.append(f"Below {FEW} machines the intervals are too narrow: give more with -n.")
+        lines.append(f"With fewer than {FEW} machines the intervals are too narrow: increase -n.")
     return lines
 
 
@@ -105,7 +105,7 @@ def blind_spots_text(table: Table) -> str:
         lines.append(f"{name:{wide}}  {first}{others}{row['machines']:>11}")
     lines += [
         "",
-        "Error, bias: % of the condemning limit, 95 % interval over machines; the rest: % of them.",
+        "Error, bias: % of the condemning limit, 95 % interval over machines; rest: % of them.",
     ]
     lines += [
         f"Not simulated: {row['name']} {row['shift']}: {row['faults'][0]}"
@@ -115,7 +115,7 @@ def blind_spots_text(table: Table) -> str:
     if table["left"]:
         paths = dict.fromkeys(key.partition(": ")[2].partition(" ")[0] for key in table["left"])
         lines.append(
-            f"Left for want of time: {len(table['left'])} rows, of {', '.join(paths)}; with -o the "
-            "same command goes on with them"
+            f"Out of time, {len(table['left'])} rows not run: {', '.join(paths)}; with -o, "
+            "repeat the command to run them"
         )
     return "\n".join(lines)

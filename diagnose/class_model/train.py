@@ -214,15 +214,16 @@ class ClassModel:
     def notice(self) -> str:
         """What must be said beside every result."""
         few = [
-            f"{name}: {count} recording(s), can be neither judged nor excluded"
+            f"{name}: {count} recording(s), can be neither evaluated nor excluded"
             for name, count in zip(self.classes, self.votes.groups_of, strict=True)
             if count < _FEWEST
         ]
         recordings = len(np.unique(self.votes.group))
         if recordings < _FEWEST_TO_KNOW:
             few.append(
-                f"trained on {recordings} recordings, must be >= {_FEWEST_TO_KNOW} to know "
-                "strangers: a condition of none of its classes may well be named as one of them"
+                f"trained on {recordings} recordings, must be >= {_FEWEST_TO_KNOW} to "
+                "recognise unfamiliar recordings: a condition outside its classes "
+                "may be named as one of them"
             )
         return "; ".join(few)
 
@@ -735,7 +736,7 @@ def classes_text(result: Mapping[str, Any]) -> list[str]:
     low, high = (100 * end for end in result["recordings_interval"])
     promised = ", ".join(f"{v:.2f} {name}" for name, v in result["nominal_coverage"].items())
     lines = [
-        f"Judged on recordings that the fit had no part in: {right} of {of} named rightly "
+        f"Evaluated on recordings left out of the fit: {right} of {of} named correctly "
         f"(95 % interval {low:.0f} to {high:.0f} %)",
         f"  record accuracy  {_between(result, 'accuracy')}; the largest class alone is "
         f"{result['majority']:.2f}",
@@ -745,7 +746,7 @@ def classes_text(result: Mapping[str, Any]) -> list[str]:
         "  named            " + " ".join(f"{name:>10}" for name in result["classes"]),
     ]
     for name, row in zip(result["classes"], result["confusion"], strict=True):
-        judged = "" if name in result["judged"] else "  (too few recordings to judge)"
+        judged = "" if name in result["judged"] else "  (too few recordings to evaluate)"
         lines.append(f"    {name:15}" + " ".join(f"{count:10d}" for count in row) + judged)
     return [*lines, "  brackets         95 % intervals over recordings"]
 

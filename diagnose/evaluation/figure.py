@@ -75,7 +75,7 @@ def _panels(result: Result) -> list[tuple[str, str, Callable[[Any], None]]]:
 
 
 _ERRORS = (
-    "Mean error over all records of each split, the refused ones too, with 95 % intervals over "
+    "Mean error over all records of each split, including refused ones, with 95 % intervals over "
     "machines; baselines on the same records. Further left is better."
 )
 _CONFUSION = "Split {}: true grade against the grade given; shares of each true grade."

@@ -37,11 +37,11 @@ def features_text(
         about = tried[name]
         lines.append(
             f"{'Features:' if choice == mine else '      not'} {name}, {about['values']} values in "
-            f"{cost:.3g} ms; lines erred by {1e6 * about['line_mae_m']:.3g} um out of fold"
+            f"{cost:.3g} ms; cross-validated linear error {1e6 * about['line_mae_m']:.3g} um"
         )
     if tried:
         nested = 1e6 * card["model"]["nested_mae_m"]
-        lines.append(f"  the whole, with the set chosen anew in every fold: {nested:.3g} um")
+        lines.append(f"  error with the set chosen again in every fold: {nested:.3g} um")
     return lines
 
 
@@ -60,14 +60,14 @@ def score_lines(result: Mapping[str, Any], card: Mapping[str, Any]) -> list[str]
     list of str
     """
     if not result:
-        return ["not judged: no machine draw was held out"]
+        return ["not evaluated: no machine draw was held out"]
     lines = [
-        f"Judged on {result['records']} records of {result['draws']} unseen machine draws "
+        f"Evaluated on {result['records']} records of {result['draws']} unseen machine draws "
         f"({100 * result['unfamiliar']:.1f} % called unfamiliar, {100 * result['caution']:.1f} % "
         "graded with caution)"
     ]
     if result["records"] < _FEW_RECORDS:
-        lines.append("  so few records tell little: every figure below may be far off")
+        lines.append("  too few records: every figure below is very uncertain")
     if result["mae_m"] is None:
         return [*lines, "  none is familiar: no figure can be given for this machine"]
     return [
@@ -76,18 +76,18 @@ def score_lines(result: Mapping[str, Any], card: Mapping[str, Any]) -> list[str]
         + f"{1e6 * result['mae_m']:.1f} um mean, "
         f"{_percent(result, 'mae_share_of_limit')} of the condemning limit "
         f"{1e3 * card['condemning_limit_m']:.3g} mm "
-        f"({1e6 * result['mae_all_m']:.1f} um with the unfamiliar)",
+        f"({1e6 * result['mae_all_m']:.1f} um including unfamiliar records)",
         f"  interval coverage {_number(result, 'coverage')} (nominal "
         f"{result['nominal_coverage']:.2f}), mean width "
         f"{100 * result['mean_interval_share']:.1f} % of the limit",
         f"  set coverage      {_number(result, 'set_coverage')}, "
         f"{result['mean_set_size']:.2f} grades in a set on average",
-        f"  grade accuracy    {_number(result, 'accuracy')}; an error of that size allows about "
+        f"  grade accuracy    {_number(result, 'accuracy')}; best possible at that error "
         f"{result['accuracy_bound']:.3f}",
         f"  within one grade  {result['within_one_grade']:.4f}; quadratic kappa "
         f"{_plain(result['kappa'])}",
-        f"  false alarms      {_rate(result, 'false_alarm')} of as-new called grade 2 or 3",
-        f"  missed faults     {_rate(result, 'missed_fault')} of condemned called grade 0 or 1",
+        f"  false alarms      {_rate(result, 'false_alarm')} of as-new records graded 2 or 3",
+        f"  missed faults     {_rate(result, 'missed_fault')} of condemned records graded 0 or 1",
         f"  brackets          {100 * LEVEL:.0f} % intervals over machines",
         *baseline_lines(result["baselines"]),
         *confounder_lines(result["by_confounder"]),
@@ -133,10 +133,10 @@ def baseline_lines(rows: Mapping[str, Mapping[str, Any]]) -> list[str]:
     Examples
     --------
     >>> print(*baseline_lines({"tsfel": {"missing": "not here"}}), sep=chr(10))
-      baseline      error [% of limit]  accuracy  ours minus it [% of limit]
+      baseline      error [% of limit]  accuracy  difference [% of limit]
       tsfel         not here
     """
-    head = f"  {'baseline':12}  error [% of limit]  accuracy  ours minus it [% of limit]"
+    head = f"  {'baseline':12}  error [% of limit]  accuracy  difference [% of limit]"
     return [head, *(_baseline_line(name, row) for name, row in rows.items())]
 
 
@@ -148,7 +148,7 @@ def _baseline_line(name: str, row: Mapping[str, Any]) -> str:
     if value is None:
         return line + "none: no record was graded"
     apart = row["difference"]
-    note = "  (trained on the judged set)" if row["flattered"] else ""
+    note = "  (trained on the evaluated data set)" if row["flattered"] else ""
     return (
         f"{line}{100 * value:18.1f}  {row['accuracy']['value']:8.3f}  "
         f"{_bracketed(apart['value'], apart['low'], apart['high'], 100.0, 1)}{note}"
@@ -171,8 +171,8 @@ def splits_text(result: Mapping[str, Any]) -> str:
     )
     lines = [head, "", *_table(_SPLIT_HEAD, [_split_row(split) for split in result["splits"]])]
     lines += ["error, baseline: mean error in % of the condemning limit with 95 % intervals over"]
-    lines += ["machines; bound: accuracy that such an error allows; best baseline and difference"]
-    lines += ["(ours minus it) over all records, the refused ones too"]
+    lines += ["machines; bound: best accuracy possible at that error; best baseline and difference"]
+    lines += ["(this model minus baseline) over all records, including refused ones"]
     if "learning_curve" in result:
         lines += ["", *_table(_CURVE_HEAD, [_curve_row(row) for row in result["learning_curve"]])]
     if "detectability" in result:

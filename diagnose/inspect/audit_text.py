@@ -13,7 +13,7 @@ _WIDTH = 100
 _SHOWN = 6  # examples of a finding
 
 _VERDICTS = {
-    "alarm": "ALARM: do not trust figures from these data before this is mended.",
+    "alarm": "ALARM: do not trust results from these data until this is corrected.",
     "warning": "WARNING: look at this before trusting figures from these data.",
     "clean": "CLEAN: nothing was found that spoils figures from these data.",
 }

@@ -393,7 +393,7 @@ def _limits(facts: _Facts) -> list[str]:
             "machine on both sides. Split by the column group."
         )
     texts.append(
-        "Only the signals are inputs. Labels and numerics tell the severity, some of them exactly."
+        "Only the signals are inputs. Labels and numerics reveal the severity, some exactly."
     )
     if facts.n_failed:
         texts.append(f"{facts.n_failed} record(s) have a status other than ok: leave them out.")

@@ -8,7 +8,7 @@ from ..learning.grades import ALARM_GRADE, WARNING_GRADE, grades_of
 from ..wear_model.estimate import Estimate
 from .trend import Outlook, span_words
 
-Action = Literal["none", "watch", "confirm", "plan", "stop", "mend"]
+Action = Literal["none", "watch", "confirm", "plan", "stop", "check"]
 Confidence = Literal[
     "sure",
     "maybe_better",
@@ -32,8 +32,8 @@ class Advice:
 
     Attributes
     ----------
-    action : {"none", "watch", "confirm", "plan", "stop", "mend"}
-        ``confirm``: measure the part before acting; ``mend``: the recording, not the machine.
+    action : {"none", "watch", "confirm", "plan", "stop", "check"}
+        ``confirm``: measure the part before acting; ``check``: the recording, not the machine.
     sentence : str
         For the engineer.
     days : float or None
@@ -69,13 +69,13 @@ _RULES: dict[tuple[int | None, Confidence], _Rule] = {
     ),
     (0, "maybe_condemned"): _Rule(
         action="confirm",
-        sentence="Record again and measure at the next stop: it reads as new, but so uncertainly "
-        "that the condemning limit may be passed.",
+        sentence="Record again and measure at the next stop: the estimate is as new, but so "
+        "uncertain that the condemning limit may be passed.",
         days=7,
     ),
     (0, "caution"): _Rule(
         action="watch",
-        sentence="No action now, but do not rely on it: mend what the cautions name and record "
+        sentence="No action now, but do not rely on it: fix what the cautions name and record "
         "again.",
         days=30,
     ),
@@ -101,7 +101,7 @@ _RULES: dict[tuple[int | None, Confidence], _Rule] = {
     ),
     (1, "caution"): _Rule(
         action="confirm",
-        sentence="Mend what the cautions name and record again; measure at the next stop if it "
+        sentence="Fix what the cautions name and record again; measure at the next stop if it "
         "stays so.",
         days=14,
     ),
@@ -123,7 +123,7 @@ _RULES: dict[tuple[int | None, Confidence], _Rule] = {
     ),
     (2, "caution"): _Rule(
         action="confirm",
-        sentence="Mend what the cautions name and record again; measure before {work} is ordered.",
+        sentence="Fix what the cautions name and record again; measure before {work} is ordered.",
         days=7,
     ),
     (3, "sure"): _Rule(
@@ -139,27 +139,27 @@ _RULES: dict[tuple[int | None, Confidence], _Rule] = {
     ),
     (3, "caution"): _Rule(
         action="stop",
-        sentence="It reads as beyond the condemning limit, with the cautions named: stop at the "
+        sentence="The estimate is beyond the condemning limit, with cautions: stop at the "
         "first safe moment and measure before {work}.",
         days=1,
     ),
     (None, "unfamiliar"): _Rule(
-        action="mend",
+        action="check",
         sentence="No grade is given, which does not mean that the machine is sound. Check that it "
         "is the machine the model was trained for, and channels, units and tacho; "
         "else train a model on this machine.",
         days=None,
     ),
     (None, "unusable"): _Rule(
-        action="mend",
-        sentence="No grade is given, which does not mean that the machine is sound. Mend what is "
+        action="check",
+        sentence="No grade is given, which does not mean that the machine is sound. Fix what is "
         "named and record again.",
         days=None,
     ),
     (None, "unreferenced"): _Rule(
-        action="mend",
+        action="check",
         sentence="No grade is given, which does not mean that the machine is sound. The recording "
-        "need not be made again: judge it with healthy recordings of the machine (--baseline).",
+        "need not be repeated: assess it with healthy recordings of the machine (--baseline).",
         days=None,
     ),
 }
@@ -211,8 +211,8 @@ def brief_words(action: str, horizon: str) -> str:
     --------
     >>> brief_words("none", "within 3 months"), brief_words("plan", "within a week")
     ('none; record within 3 months', 'plan within a week')
-    >>> brief_words("mend", "")
-    'mend'
+    >>> brief_words("check", "")
+    'check'
     """
     waits = action in ("none", "watch")
     return f"{action}; record {horizon}" if waits else f"{action} {horizon}".rstrip()

@@ -170,14 +170,14 @@ def journal_fault(scene: JournalScene, means: ProbeMeans) -> str:
     ]
     if shaped:
         return (
-            f"the bore has {' and '.join(shaped)}, must be round and plain: the place of the "
-            "journal then tells of its shape as much as of its clearance"
+            f"the bore has {' and '.join(shaped)}, must be round and plain: otherwise the "
+            "journal position depends on its shape as much as on its clearance"
         )
     known = {probe.name for probe in scene.sensors}
     strange = [name for name in means.names if name not in known]
     if strange:
         return (
-            f"probes {', '.join(strange)} are none of the nameplate's {', '.join(sorted(known))}, "
+            f"probes {', '.join(strange)} are not on the nameplate ({', '.join(sorted(known))}), "
             "whose angles it gives; rename them, or give the scene with --scene"
         )
     return _missing(means)
@@ -188,7 +188,7 @@ def _missing(means: ProbeMeans) -> str:
     if len(means.names) < _FEWEST_PROBES:
         return (
             f"{len(means.names)} probes of the nameplate are in the recording, must be >= "
-            f"{_FEWEST_PROBES}: the place of a journal is two numbers"
+            f"{_FEWEST_PROBES}: a journal position has two coordinates"
         )
     if means.speed_hz is None:
         return "the speed is unknown: add a tacho, or note speed_hz"
@@ -268,7 +268,7 @@ def with_film(estimate: Estimate, film: FilmEstimate | None) -> Estimate:
         return estimate
     said = (
         f"film equilibrium and trained model disagree: {_length(asdict(film))} against "
-        f"{_length(estimate.as_dict())}; check load, viscosity and offsets that were told, the "
+        f"{_length(estimate.as_dict())}; check the given load, viscosity and offsets, the "
         "probes, and whether the machine is one of the model's kind"
     )
     return replace(estimate, verdict="caution", cautions=(said, *estimate.cautions))
@@ -307,7 +307,7 @@ def film_table(
     if plate is None:
         return {**asdict(film), "nameplate": "", "text": film_words(film)}
     day = told_conditions(plate, row)
-    usual = "" if day else "; load and oil as on the nameplate, none were noted on the day"
+    usual = "" if day else "; load and oil from the nameplate, as none are given for this day"
     return {
         **asdict(film),
         "nameplate": plate.source,
@@ -326,15 +326,15 @@ def film_words(film: FilmEstimate) -> str:
     >>> film_words(found).split("; ")[0]
     '0.210 mm (0.190 to 0.230, 90 %), without training'
     >>> film_words(found).split("; ")[1:]
-    ['no healthy recordings', 'largest doubt: load, worth 0.010 mm']
+    ['no healthy recordings', 'largest uncertainty: load, 0.010 mm']
     """
     if film.severity is None:
-        return f"not told: {film.reason}"
+        return f"no estimate: {film.reason}"
     healthy = (
         f"against {film.healthy} healthy recordings" if film.healthy else "no healthy recordings"
     )
     worst = max(film.budget, key=lambda name: film.budget[name], default="")
-    doubt = f"; largest doubt: {worst}, worth {1e3 * film.budget[worst]:.3f} mm" if worst else ""
+    doubt = f"; largest uncertainty: {worst}, {1e3 * film.budget[worst]:.3f} mm" if worst else ""
     return f"{_length(asdict(film))}, without training; {healthy}{doubt}"
 
 

@@ -83,8 +83,8 @@ class SagReport:
         if not found.plausible:
             return (
                 f"the line as described does not explain what was measured (misfit "
-                f"{found.misfit:.2f}, must be about 1): believe no sag; check places, speed, oil "
-                "and housings of the scene"
+                f"{found.misfit:.2f}, must be about 1): reject these sags; check places, speed, "
+                "oil and housings of the scene"
             )
         sure = [
             name
@@ -92,7 +92,7 @@ class SagReport:
             if low > 0 or high < 0
         ]
         if not sure:
-            return f"no bearing is told to have moved {against}"
+            return f"no bearing is known to have moved {against}"
         return f"moved, with {CONFIDENCE:.0%} confidence each, {against}: {', '.join(sure)}"
 
 

@@ -190,12 +190,12 @@ def conclusion(found: StabilityMap) -> str:
     """
     own = found.plan.own
     if own is None:
-        return "The scene has no place in this map."
+        return "The scene is outside this map."
     start = start_cell(found)
     if start is None and found.plan.cell is None and _run(found, found.plan.cross):
         return f"{_where(found)} nothing is accurate."
     if start is None:
-        return "The budget ended before the cell of this scene: nothing is known of it yet."
+        return "The budget ended before the cell of this scene was run."
     here = Verdict(found.verdicts[own.method][start])
     parts = [_as_written(found, start, here), _distance(found, here)]
     if not _run(found, found.plan.cross):
@@ -245,10 +245,10 @@ def _distance(found: StabilityMap, here: Verdict) -> str:
     if here in _BAD:
         return _way_out(found, ends)
     if not ends:
-        return f"No failure was seen: {_ranges(found, _first_ones(found))}."
+        return f"No failure found: {_ranges(found, _first_ones(found))}."
     nearest = min(ends, key=lambda edge: _ratio(found, edge))
     soft = nearest.verdict is Verdict.INACCURATE
-    said = f"{'Accurate' if soft else 'Stable'} {_reach(found, nearest)}; the next failure: "
+    said = f"{'Accurate' if soft else 'Stable'} {_reach(found, nearest)}; next failure: "
     said += f"{nearest.verdict.text}{_why(nearest.word)}."
     hard = [e for e in ends if e.axis == nearest.axis and e.rising == nearest.rising]
     if soft and len(hard) > 1:
@@ -274,7 +274,7 @@ def _goes_on(factor: float) -> bool:
 
 def _way_out(found: StabilityMap, ends: list[Edge]) -> str:
     if not ends:
-        return f"Nothing better was seen: {_ranges(found, found.edges)}."
+        return f"Nothing better found: {_ranges(found, found.edges)}."
     nearest = min(ends, key=lambda edge: _ratio(found, edge))
     return f"The nearest that is {nearest.verdict.text}: {_times(found, nearest, nearest.outside)}."
 

@@ -104,12 +104,12 @@ def stability_text(scene: Scene, maps: Sequence[StabilityMap]) -> str:
     -------
     str
     """
-    lines = [f"{scene.name} (simulated): where its methods fail"]
+    lines = [f"{scene.name} (simulated): where its numerical methods fail"]
     for found in maps:
         plan = found.plan
         lines += ["", f"{plan.name}: {plan.title}", f"  {conclusion(found)}"]
         lines += [f"  {plan.x.label} against {plan.y.label}"]
-        lines += [f"  judged by {plan.note}"] if plan.note else []
+        lines += [f"  criterion: {plan.note}"] if plan.note else []
         for method in found.methods:
             lines.append(f"  {method:24} {shares_text(found, method)}")
             lines += [f"    {count} x {word}" for word, count in reasons(found, method)]

@@ -69,7 +69,7 @@ def conclusion(sweep: Sweep) -> tuple[str, ...]:
     if not best:
         cure = "give --starts 2 or more" if sweep.plan.starts < 2 else "more runs must succeed"
         return (
-            f"{what}: no smallest change is known, as there is no scatter to judge by; {cure}.",
+            f"{what}: the smallest detectable change is unknown, because the scatter is; {cure}.",
         )
     told = sorted((r for r in best if r.detection.told), key=lambda row: row.detection.change)
     lost = [row for row in best if not row.detection.told]
@@ -100,7 +100,7 @@ def conclusion(sweep: Sweep) -> tuple[str, ...]:
     unjudged = [s for s in sweep.settings if s not in {row.setting for row in best}]
     if unjudged:
         places = ", ".join(setting_words(sweep, setting, short=True) for setting in unjudged)
-        lines.append(f"At {places} too few runs have values to tell.")
+        lines.append(f"At {places} too few runs have values.")
     return tuple(lines)
 
 
@@ -111,7 +111,7 @@ def _coarse(sweep: Sweep, row: Row) -> str:
     if not _AT_ONCE * step < row.detection.change < _WITHIN * step:
         return ""
     wide = axis.text(step / abs(axis.scale), 2)
-    return f" (interpolated in a first step of {wide}: sweep smaller steps to be sure)"
+    return f" (interpolated in a first step of {wide}: use smaller steps to confirm)"
 
 
 _WITHIN = 0.25  # of the first step
@@ -131,12 +131,11 @@ def basis(sweep: Sweep) -> str:
     level = f"{100 * plan.confidence:g}"
     return (
         f"Simulated: {plan.name}, {axes}; {len(plan.scenes)} points x {plan.starts} starts, which "
-        f"differ in start angle, sensor noise and random forces; recordings{length}. Told: one "
-        f"recording stands out against the mean of the {plan.starts} at the first value, at "
-        f"{plain(100 - 100 * plan.confidence, 2)} % false alarms (two-sided), {level} % found, "
-        "each quantity by itself; Student's t, scatter pooled over the last axis, monotone "
-        "interpolation. Scatter between starts is that of one and the same machine: between "
-        "machines it is larger."
+        f"differ in start angle, sensor noise and random forces; recordings{length}. Detected: one "
+        f"recording differs from the mean of the {plan.starts} at the first value, with "
+        f"{plain(100 - 100 * plan.confidence, 2)} % false alarms (two-sided), {level} % detected, "
+        "each quantity separately; Student's t, scatter pooled over the last axis, monotone "
+        "interpolation. Scatter between starts is for one machine; between machines it is larger."
     )
 
 
@@ -171,7 +170,7 @@ def sweep_text(sweep: Sweep) -> str:
     lines = [f"{sweep.plan.name} (simulated): sweep of {axis.words}", "", *conclusion(sweep), ""]
     lines += _aligned(cells)
     if not all(row.shown.seen for row in rows):
-        lines.append("* known to the simulator alone")
+        lines.append("* known only in simulation")
     lines += fault_lines(sweep)
     if not sweep.finished:
         lines.append(f"so far: {len(sweep.outcomes)} of {len(sweep.plan.runs)} runs are done")
