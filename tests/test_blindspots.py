@@ -354,7 +354,7 @@ def test_page_text_and_json():
     json.dumps(table, allow_nan=False)
     text = blind_spots_text(table)
     assert "As trained, the error without a caution is 2.5 % of the condemning limit" in text
-    assert "Worst without a caution: large x 2, 30.0 %." in text
+    assert "Largest error without a caution: large x 2, 30.0 %." in text
     page = blind_spots_html(table, notice="trained on simulation")
     assert "&lt;recipe&gt;" in page
     assert "<recipe>" not in page
