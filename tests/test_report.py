@@ -380,7 +380,7 @@ def test_a_referenced_model_needs_the_machine_itself(referenced, tmp_path):
     assert "give --baseline healthy.h5" in said
     assert "Verdict Healthy reference missing: no grade is given" in said
     assert "Unusable" not in said
-    assert "need not be made again" in said
+    assert "need not be repeated" in said
     whole = run("report", healthy, "--model", model_file, code=2).stdout.splitlines()[0]
     assert whole == ("healthy.h5: no grade is given, 120 recordings: 120 without healthy reference")
     page = tmp_path / "r.html"
