@@ -27,15 +27,15 @@ def quantity_label(name: str, scene: Scene) -> tuple[str, str]:
     --------
     >>> from wearstate.sim.scene.load import load_scene
     >>> quantity_label("band_3", load_scene("bilge-pump"))
-    ('vibration 306 to 758 Hz', 'dB')
+    ('vibration level, 306 to 758 Hz', 'dB')
     >>> quantity_label("pin_rms_2", load_scene("triplex-pump"))
-    ('crank pin force, rms, throw 2', 'N')
+    ('rms crank pin force, throw 2', 'N')
     """
     known = known_of(scene).words
     stem, _, last = name.rpartition("_")
     if stem in ("band", "order"):
         text = _band_words(int(last), scene.sample_rate) if stem == "band" else f"at order {last}"
-        return f"vibration {text}", "dB"
+        return f"vibration level, {text}", "dB"
     if name in known:
         return known[name]
     if stem in known and last.isdecimal():

@@ -117,6 +117,10 @@ class Choice:
         The conclusion.
     keeps : bool
         Nothing is to be changed.
+    own_seconds : float
+        Of a simulated second of the scene as written [s]; NaN where it was not timed.
+    enough : bool
+        False where the scene stays outside the accuracy even so, for its rungs.
     """
 
     question: str
@@ -133,6 +137,8 @@ class Choice:
     reference: str
     sentence: str
     keeps: bool
+    own_seconds: float = math.nan
+    enough: bool = True
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -230,6 +236,12 @@ class Chart:
     def questions(self) -> tuple[str, ...]:
         """Of its points, in their order."""
         return tuple(dict.fromkeys(point.question for point in self.points))
+
+    @property
+    def good(self) -> bool:
+        """The subject as written is within the accuracy, where one is asked."""
+        own = [point for point in self.points if point.here]
+        return all(point.verdict in ("within", "reference") for point in own)
 
     @property
     def unfinished(self) -> bool:

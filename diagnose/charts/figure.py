@@ -40,7 +40,8 @@ def chart_figure(chart: Chart) -> Any:
     rows = len(_table_points(chart))
     high = _PER_ROW * rows + _LABELS
     figure = Figure(figsize=(13, _POINTS + high), layout="constrained")
-    figure.suptitle(f"{chart.title}\n{_wrapped(chart.verdict, 150)}", fontsize=11)
+    said = "" if chart.choices else f"\n{_wrapped(chart.verdict, 150)}"
+    figure.suptitle(f"{chart.title}{said}", fontsize=11)
     questions = chart.questions or ("",)
     names = [f"points {i}" for i in range(len(questions))]
     mosaic: Any = [names, ["quantities"] * len(names)]

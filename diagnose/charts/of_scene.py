@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from threadpoolctl import threadpool_limits
 
@@ -21,7 +21,7 @@ from ...sim.fidelity.study import Answer, Search, Study
 from ...sim.scene.parts import Scene
 from ..pages.kept import Kept
 from .chart import RECOMMENDED, Chart, Choice, Clock, Point, RungCost, front_of, remaining_error
-from .scene_edit import block_of, options_of
+from .scene_edit import block_of, options_of, written_value
 from .words import (
     HERE,
     combination_words,
@@ -265,19 +265,32 @@ def where_it_stands(scene: Scene, found: Study) -> str:
         if within
         else "not within"
         if own.verdict == "beyond"
-        else "not yet told to be within"
+        else "not yet known to be within"
     )
     text = f"Your scene as written is {word} {percent(found.accuracy)} of {against}: "
-    text += error_words(own, scene)
-    costly = sorted(found.raises, key=lambda each: -each.candidate.error)
-    named = [e for e in costly if found.accuracy < e.candidate.error < math.inf][:_WORST]
+    return f"{text}{error_words(own, scene, found.accuracy)}.{_costly_rungs(found)}"
+
+
+def _costly_rungs(found: Study) -> str:
+    """Which rungs of the scene as written cost most, or that none does."""
+    if not found.raises:
+        return ""
+    known = [e for e in found.raises if math.isfinite(e.candidate.error)]
+    costly = sorted(known, key=lambda each: -each.candidate.error)
+    named = [e for e in costly if found.accuracy < e.candidate.error][:_WORST]
     if named:
         parts = [
             f"{effect_words(e.effect)} {e.written} instead of {e.best} {percent(e.candidate.error)}"
             for e in named
         ]
-        text += f". Rung by rung: {', '.join(parts)}"
-    return f"{text}."
+        return f" Each rung by itself, which do not add up: {', '.join(parts)}."
+    if len(known) < len(found.raises):
+        return ""
+    most = costly[0]
+    return (
+        f" No rung of it needs to change: the one that costs most, {effect_words(most.effect)} "
+        f"{most.written} instead of {most.best}, costs {percent(most.candidate.error)}."
+    )
 
 
 def _choice(scene: Scene, found: Study, answer: Answer, question: str) -> Choice:
@@ -302,6 +315,8 @@ def _choice(scene: Scene, found: Study, answer: Answer, question: str) -> Choice
         reference=_reference_words(answer),
         sentence=_sentence(scene, found, answer, question, status, own),
         keeps=same_changes,
+        own_seconds=own / scene.duration,
+        enough=not (answer is found.kept and _rungs_too_coarse(found)),
     )
 
 
@@ -349,12 +364,29 @@ def _sentence(
         )
     name = combination_words(chosen, found.written)
     what = "change nothing" if name == HERE else f"take {name}"
-    errs = error_words(chosen, scene)
+    errs = error_words(chosen, scene, found.accuracy)
     if _by_default(answer):
         errs = f"nothing cheaper {'looks' if status == 'so far' else 'is'} within {asked}"
     faster = "" if name == HERE else f", {faster_words(chosen.seconds, own)}"
     certain = _certainty(scene, found, answer, status)
+    if answer is found.kept and _rungs_too_coarse(found):
+        left = error_words(cast(Candidate, found.whole.written), scene)
+        if name == HERE:
+            what = "your numerics are fine, but your rungs are not"
+        certain += f". The error of these rungs stays: {left}"
+    elif name != HERE and _enough(answer.written):
+        what = f"nothing must change; to run faster, {what}"
     return f"{opening}: {what} ({errs}{faster}){certain}."
+
+
+def _rungs_too_coarse(found: Study) -> bool:
+    """Whether the scene as written surely misses the accuracy against the best rungs."""
+    own = found.raised.written if found.raised else None
+    return own is not None and own.verdict == "beyond"
+
+
+def _enough(own: Candidate | None) -> bool:
+    return own is not None and own.verdict == "within"
 
 
 def _certainty(scene: Scene, found: Study, answer: Answer, status: str) -> str:
@@ -366,9 +398,9 @@ def _certainty(scene: Scene, found: Study, answer: Answer, status: str) -> str:
     if status == "unresolvable" and doubted:
         name = combination_words(doubted[0], found.written)
         return (
-            f"; cheaper, but not told from the reference for scatter: {name} "
+            f"; cheaper, but scatter hides whether it is good enough: {name} "
             f"({error_words(doubted[0], scene)} over {doubted[0].starts} starts); a longer "
-            "duration or less accuracy would tell"
+            "duration or less accuracy would show it"
         )
     return ""
 
@@ -379,7 +411,7 @@ def _commented(scene: Scene, found: Study, answer: Answer) -> str:
         return ""
     name = combination_words(answer.chosen, found.written)
     return f"# {scene.name}: {name}; {error_words(answer.chosen, scene)} (simulated)\n" + block_of(
-        answer.changes
+        answer.changes, {path: written_value(scene, path) for path in answer.changes}
     )
 
 

@@ -16,13 +16,23 @@ _HEADER = re.compile(r"\s*(\[{1,2})\s*([^\[\]#]+?)\s*\]{1,2}\s*(#.*)?$")
 _VALUE = r"(\"[^\"]*\"|'[^']*'|[^#]*?)"  # of one line
 
 
-def block_of(changes: Mapping[str, Any]) -> str:
+def written_value(scene: Scene, path: str) -> Any:
+    """Value of a scene at a dotted path; None where it leaves that to the program."""
+    try:
+        return value_at(scene, path)
+    except (AttributeError, KeyError, IndexError, ValueError):
+        return None
+
+
+def block_of(changes: Mapping[str, Any], before: Mapping[str, Any] | None = None) -> str:
     """Values by dotted path as TOML tables.
 
     Parameters
     ----------
     changes : mapping of str to object
         Dotted path -> number or text; entries of lists by their number.
+    before : mapping of str to object, optional
+        The same paths -> what stands there now, for a comment behind each line.
 
     Returns
     -------
@@ -37,13 +47,18 @@ def block_of(changes: Mapping[str, Any]) -> str:
     <BLANKLINE>
     [numerics]
     step = 1e-05
+    >>> print(block_of({"film.n_theta": 96}, {"film.n_theta": 48}))
+    [film]
+    n_theta = 96  # was 48
     """
     tables: dict[str, dict[str, Any]] = {}
     for path, value in changes.items():
         table, _, key = path.rpartition(".")
         tables.setdefault(table, {})[key] = value
     blocks = [
-        toml_text(values) if not table else f"[{table}]\n{toml_text(values)}"
+        _lines(values, table, before)
+        if not table
+        else f"[{table}]\n{_lines(values, table, before)}"
         for table, values in sorted(tables.items(), key=lambda row: bool(row[0]))
         if not re.search(r"\.\d+(\.|$)", table)
     ]
@@ -54,6 +69,22 @@ def block_of(changes: Mapping[str, Any]) -> str:
         for line in [toml_text({path.rpartition(".")[2]: value}).strip()]
     ]
     return "\n".join([*blocks, *listed]).rstrip()
+
+
+def _lines(values: Mapping[str, Any], table: str, before: Mapping[str, Any] | None) -> str:
+    """Lines of a table, each with what it replaces."""
+    rows = []
+    for key, value in values.items():
+        line = toml_text({key: value}).strip()
+        if before is not None:
+            old = before.get(f"{table}.{key}".lstrip("."))
+            line += "  # was not set" if old is None else f"  # was {_plain(old)}"
+        rows.append(f"{line}\n")
+    return "".join(rows)
+
+
+def _plain(value: Any) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
 def options_of(changes: Mapping[str, Any]) -> str:

@@ -50,7 +50,7 @@ def rung_words(effect: str, rung: str, values: Mapping[str, Any]) -> str:
     >>> rung_words("pressure", "chamber", {"pressure.rung": "chamber"})
     'pressure chamber'
     >>> rung_words("step", "x2", {"numerics.step": 1.953125e-05})
-    'step 19.5 us'
+    'step 19.5 µs'
     >>> rung_words("mesh", "x1", {"film.n_theta": 72, "film.n_z": 17})
     'mesh 72 x 17'
     """
@@ -66,7 +66,7 @@ def rung_words(effect: str, rung: str, values: Mapping[str, Any]) -> str:
 
 
 def _seconds(value: float) -> str:
-    return f"{1e6 * value:.3g} us" if value < _MILLI else f"{1e3 * value:.3g} ms"
+    return f"{1e6 * value:.3g} µs" if value < _MILLI else f"{1e3 * value:.3g} ms"
 
 
 _MILLI = 1e-3
@@ -114,13 +114,39 @@ def percent(value: float) -> str:
 _SMALLEST = 1e-4
 
 
-def error_words(candidate: Candidate, scene: Scene) -> str:
+def percent_beside(value: float, limit: float) -> str:
+    """A share in per cent, with as many digits as it takes to differ from a limit.
+
+    Examples
+    --------
+    >>> percent_beside(0.0203, 0.02), percent_beside(0.64, 0.02), percent_beside(0.0199997, 0.02)
+    ('2.03 %', '64 %', '2 %')
+    """
+    asked, found = percent(limit), percent(value)
+    digits = 3
+    while found == asked and digits <= _MOST_DIGITS:
+        found = f"{float(f'{100 * value:.{digits}g}'):g} %"
+        digits += 1
+    return found
+
+
+_MOST_DIGITS = 4
+
+
+def error_words(candidate: Candidate, scene: Scene, accuracy: float = math.nan) -> str:
     """Largest error of a candidate with its scatter and its quantity.
+
+    Parameters
+    ----------
+    candidate : Candidate
+    scene : Scene
+    accuracy : float, optional
+        That the error must be seen to lie below or above [-].
 
     Returns
     -------
     str
-        Such as ``"64 % (+- 3 %) off in vibration 306 to 758 Hz"``.
+        Such as ``"64 % ± 3 % off in vibration level, 306 to 758 Hz"``.
     """
     if not candidate.differences:
         return f"not valid: {candidate.reason}"
@@ -128,8 +154,10 @@ def error_words(candidate: Candidate, scene: Scene) -> str:
     found = candidate.differences[worst]
     if found.error == 0:
         return "no error"
-    scatter = f" +- {percent(found.standard_error)}" if _scattered(found.standard_error) else ""
-    return f"{percent(found.error)}{scatter} off in {quantity_label(worst, scene)[0]}"
+    scatter = f" ± {percent(found.standard_error)}" if _scattered(found.standard_error) else ""
+    return (
+        f"{percent_beside(found.error, accuracy)}{scatter} off in {quantity_label(worst, scene)[0]}"
+    )
 
 
 def _scattered(standard_error: float) -> bool:
@@ -142,7 +170,7 @@ def raise_words(each: Raise, scene: Scene) -> str:
     Returns
     -------
     str
-        Such as ``"your pressure rung (two-level, not chamber) costs 64 % in vibration …"``.
+        Such as ``"your pressure rung (two-level, not chamber) is 64 % off in vibration …"``.
     """
     what = f"your {effect_words(each.effect)} rung ({each.written}, not {each.best})"
     if not each.candidate.differences:
