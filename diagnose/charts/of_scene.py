@@ -28,6 +28,7 @@ from .words import (
     effect_words,
     error_words,
     faster_words,
+    is_faster,
     percent,
     raise_words,
     rung_words,
@@ -375,7 +376,10 @@ def _sentence(
             what = "your numerics are fine, but your rungs are not"
         certain += f". The error of these rungs stays: {left}"
     elif name != HERE and _enough(answer.written):
-        what = f"nothing must change; to run faster, {what}"
+        spare = (
+            f"to run faster, {what}" if is_faster(chosen.seconds, own) else f"{name} would do too"
+        )
+        what = f"nothing must change; {spare}"
     return f"{opening}: {what} ({errs}{faster}){certain}."
 
 

@@ -196,4 +196,15 @@ def faster_words(seconds: float, own: float) -> str:
     return f"{1 / ratio:.2g} times the time of your scene"
 
 
+def is_faster(seconds: float, own: float) -> bool:
+    """Whether a time is shorter than that of the scene as written by more than its scatter.
+
+    Examples
+    --------
+    >>> is_faster(1.0, 2.0), is_faster(1.0, 1.1)
+    (True, False)
+    """
+    return own > _ALIKE * seconds
+
+
 _ALIKE = 1.15  # times of runs scatter by as much
