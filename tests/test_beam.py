@@ -289,6 +289,14 @@ def test_pinned_timoshenko_in_closed_form(slenderness):
     assert_allclose(errors[1] / expected, 1.0, atol=2 * share.max())  # the next order in s
 
 
+@pytest.mark.parametrize(("diameters", "high"), [(10, 0.047), (30, 0.0054)])
+def test_without_shear_a_wave_is_as_much_too_fast_as_its_rung_says(diameters, high):
+    s = bar(1.0, 2.0 / diameters)  # half a wave
+    k = bm.cowper_coefficient(s.poisson)
+    slender = PI**2 * math.sqrt(s.bending_stiffness / (s.density * s.area))
+    assert slender / pinned_timoshenko(s, k, 1, 1.0) - 1 == pytest.approx(high, rel=0.05)
+
+
 def test_pinned_rayleigh_in_closed_form():
     s = bar(1.0, 0.1)
     wave = (np.array([1, 2]) * PI) ** 2

@@ -154,6 +154,18 @@ def test_finite_film_is_as_near_as_it_says(ratio, most):
         assert distance(solve_finite(geometry, state).force, expected) < most
 
 
+@pytest.mark.parametrize(
+    ("ratio", "e", "high"),
+    [(0.25, 0.1, 0.025), (0.25, 0.6, 0.079), (0.5, 0.1, 0.092), (0.5, 0.6, 0.281)],
+)
+def test_short_film_is_as_much_too_strong_as_the_theory_page_says(ratio, e, high):
+    geometry, state = bearing(ratio, **FINE), at(e)
+    short, direct = (
+        np.hypot(*solve(geometry, state).force) for solve in (solve_short, solve_direct)
+    )
+    assert short / direct - 1 == pytest.approx(high, abs=0.005)  # 0.3 % of the mesh
+
+
 # --- cavitation conditions
 
 

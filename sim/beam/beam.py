@@ -8,10 +8,12 @@ on the slopes are called up and side after their planes.
 ================  ======  ===============  ===========================================
 theory            shear   rotary, gyro     valid
 ================  ======  ===============  ===========================================
-euler-bernoulli   no      discs only       wave lengths above about 30 diameters
+euler-bernoulli   no      discs only       wave lengths above about 10 diameters
 rayleigh          no      discs and shaft  little is gained without the shear
 timoshenko        yes     discs and shaft  wave lengths above about 2 diameters
 ================  ======  ===============  ===========================================
+
+Without shear the frequency of a wave of ten diameters is 5 % high, that of thirty 0.5 %.
 """
 
 import math

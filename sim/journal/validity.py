@@ -21,7 +21,7 @@ _LONGEST_STEP = {"euler": 0.1, "rk4": 0.5}
 """Of the fixed integrators [rad]: by 0.34 of its step euler shifts the threshold of whirl, and a
 dozen steps a turn are few for any load."""
 
-_LONGEST_SHORT = 1.0  # L/D of a short film: it carries half as much again as the bearing does
+_LONGEST_SHORT = 1.0  # L/D of a short film: there its force is 1.3 to 3 times the bearing's
 
 
 def orbit_faults(scene: Scene) -> list[str]:

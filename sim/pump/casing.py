@@ -184,7 +184,7 @@ def housing_acceleration(
         Forces on the casing [N].
     sample_rate : float
         [Hz]
-    modes : Modes
+    modes : CasingModes
         The casing.
 
     Returns
@@ -215,7 +215,7 @@ def band_limited_acceleration(
         Steps per second, `factor` times the sample rate.
     factor : int
         At least 2, so that the images of the hold lie beyond the band.
-    modes : Modes
+    modes : CasingModes
         The casing.
 
     Returns

@@ -27,7 +27,7 @@ BEAM_RUNGS = (
         name="euler-bernoulli",
         assumes="no shear, no rotary inertia",
         reference="Euler 1744",
-        valid="wavelengths above ten diameters",
+        valid="wavelengths above ten diameters, where frequencies are 5 % high",
         nanoseconds_per_step=1.0,
     ),
     Rung(
