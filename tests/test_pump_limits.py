@@ -190,7 +190,7 @@ def test_a_failed_run_says_why(status, scene, cure):
     with pytest.raises(SimulationError, match=re.escape(cure)) as failed:
         simulate(scene, seed=0)
     assert failed.value.status is status
-    assert str(failed.value).startswith(f"bilge-pump: {status.name.lower()}: ")
+    assert str(failed.value).startswith(f"bilge-pump: {status.name.lower().replace('_', ' ')}: ")
 
 
 @pytest.mark.parametrize("truth", [False, True])

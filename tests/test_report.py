@@ -390,7 +390,7 @@ def test_a_referenced_model_needs_the_machine_itself(referenced, tmp_path):
     assert told["estimate"]["severity"] == pytest.approx(2.5e-4, rel=0.15)
     assert told["provenance"]["baseline"] == {"source": str(healthy), "recordings": 2}
     assert told["baseline_note"] == ""
-    assert "farthest from the machine&#39;s healthy recordings" in shown(page.read_text())
+    assert "largest deviation from the machine&#39;s healthy recordings" in shown(page.read_text())
     stranger = written(tmp_path / "other.h5", [2.5e-4], groups=[60], seed=3)
     said = run("report", stranger, *args[2:], "--baseline", healthy, code=2).stderr
     assert 'must have some of machine 60 of recipe "knocking", seed 0, which other.h5[0]' in said

@@ -102,7 +102,8 @@ Wear and operating conditions are those that the machines name, see :mod:`wearst
 """
 
 
-def _meanings() -> list[tuple[str, str, str]]:
+def meanings() -> list[tuple[str, str, str]]:
+    """Name (a pattern), role and meaning of every column, those that machines name among them."""
     kinds = {each.kind: each.words for each in all_wear_places().values()}
     worn = [(f"{kind}_(.+)_m", "label", f"{words}: {{0}}") for kind, words in kinds.items()]
     places = all_condition_places()
@@ -133,12 +134,12 @@ def describe_columns(names: Iterable[str]) -> list[Column]:
     >>> own.role, own.unit
     ('other', 'K')
     """
-    meanings = _meanings()
-    return [_column(name, meanings) for name in names]
+    known = meanings()
+    return [_column(name, known) for name in names]
 
 
-def _column(name: str, meanings: Iterable[tuple[str, str, str]]) -> Column:
-    for pattern, role, meaning in meanings:
+def _column(name: str, known: Iterable[tuple[str, str, str]]) -> Column:
+    for pattern, role, meaning in known:
         match = re.fullmatch(pattern, name)
         if match:
             words = meaning.format(*(part.replace("_", " ") for part in match.groups()))
