@@ -183,7 +183,7 @@ def test_what_bars_an_estimate_is_named(tmp_path):
     strange = recording.__class__(
         signal=recording.signal[:1], sample_rate=5120.0, channels=(probe,), row={"speed_hz": 50.0}
     )
-    assert "probes gap are none of" in film_estimate(strange, CLEARANCE, plate).reason
+    assert "probes gap are not on the nameplate" in film_estimate(strange, CLEARANCE, plate).reason
     assert film_estimate(recording, "scar_depth_bearing_m", plate) is None
     assert "--scene" in film_estimate(recording, CLEARANCE, None).reason
 
