@@ -8,7 +8,7 @@ import pytest
 from numpy.testing import assert_array_equal
 from scipy.stats import kstest, qmc
 from wearstate.datasets.recipe import sampling
-from wearstate.datasets.recipe.sampling import BLOCK, SET, Dimension, Points
+from wearstate.datasets.recipe.sampling import BLOCK, SET, CubeAxis, Points
 
 METHODS = ("sobol", "latin-hypercube", "random")
 EVEN = METHODS[:2]
@@ -20,7 +20,7 @@ def stream(seed, *key):
 
 
 def dimensions(n):
-    return [Dimension(name=f"x{slot}", slot=slot) for slot in range(n)]
+    return [CubeAxis(name=f"x{slot}", slot=slot) for slot in range(n)]
 
 
 def points(method, n, n_dimensions=12, seed=0):
@@ -53,7 +53,7 @@ def test_a_point_far_away_is_that_of_the_whole_sequence(method):
 def test_a_dimension_more_or_in_another_place_moves_no_other(method):
     whole = points(method, 100)
     for kept in ([4], [7, 2, 11], [0, 1, 2, 3]):
-        some = [Dimension(name=f"x{slot}", slot=slot) for slot in kept]
+        some = [CubeAxis(name=f"x{slot}", slot=slot) for slot in kept]
         source = Points(method, partial(stream, 0), some)
         found = np.array([source.at(i) for i in range(100)])
         assert_array_equal(found, whole[:, kept])
@@ -63,7 +63,7 @@ def test_a_dimension_more_or_in_another_place_moves_no_other(method):
 def test_another_name_is_another_randomisation():
     for method in METHODS:
         one, other = (
-            Points(method, partial(stream, 0), [Dimension(name=name, slot=0)]).at(7)[0]
+            Points(method, partial(stream, 0), [CubeAxis(name=name, slot=0)]).at(7)[0]
             for name in ("speed", "load")
         )
         assert one != other

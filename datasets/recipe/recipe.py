@@ -37,7 +37,7 @@ from .draws import Axis, Bound, Draw, Range, axes_of, has_value, matches, value_
 from .held_out import HeldOut, Region, regions_of
 from .life import LIFE_COLUMNS, LifeTable, Lives, Moment, life_faults
 from .options import Alternatives, OptionSet, alternatives_of
-from .sampling import BLOCK, SET, Dimension, Points, Sampling, number_of
+from .sampling import BLOCK, SET, CubeAxis, Points, Sampling, number_of
 from .text import RecipeError, beside, merged, read_recipe
 from .wear_bounds import bound_of_limits
 
@@ -932,11 +932,11 @@ def _sources(recipe: Recipe, seed: int) -> dict[str, _Source]:
     return {name: _Source(axes[name], points[name], recipe.copulas.get(name)) for name in points}
 
 
-def _dimensions(axes: Sequence[Axis], places: range) -> list[Dimension]:
+def _dimensions(axes: Sequence[Axis], places: range) -> list[CubeAxis]:
     """Dimensions of some draws, in these places of one Sobol sequence after the other."""
     names = [entry for axis in axes for entry in axis.entries]
     return [
-        Dimension(name=name, slot=SET * (k // len(places)) + places[k % len(places)])
+        CubeAxis(name=name, slot=SET * (k // len(places)) + places[k % len(places)])
         for k, name in enumerate(names)
     ]
 

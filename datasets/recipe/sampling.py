@@ -34,7 +34,7 @@ _POWERS = 2 ** np.arange(_DIGITS - 1, -1, -1, dtype=np.int64)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Dimension:
+class CubeAxis:
     """One axis of the unit cube.
 
     Attributes
@@ -69,7 +69,7 @@ class Points:
         How even they are; see Notes.
     rng : callable
         ``rng(*key)`` is a generator that depends on the key alone.
-    dimensions : sequence of Dimension
+    dimensions : sequence of CubeAxis
         In the order of the coordinates; names and slots must differ.
 
     Notes
@@ -99,14 +99,14 @@ class Points:
     >>> points = Points(
     ...     "sobol",
     ...     lambda *key: np.random.default_rng(key),
-    ...     [Dimension(name="speed", slot=0), Dimension(name="load", slot=1)],
+    ...     [CubeAxis(name="speed", slot=0), CubeAxis(name="load", slot=1)],
     ... )
     >>> speed = [points.at(i)[0] for i in range(BLOCK)]
     >>> sorted(int(BLOCK * value) for value in speed) == list(range(BLOCK))
     True
     """
 
-    def __init__(self, method: Sampling, rng: Rng, dimensions: Sequence[Dimension]) -> None:
+    def __init__(self, method: Sampling, rng: Rng, dimensions: Sequence[CubeAxis]) -> None:
         self._make = _METHODS[method](rng, dimensions)
         self._number = -1
         self._block: Float = np.empty((BLOCK, len(dimensions)))
@@ -123,7 +123,7 @@ class Points:
 class _Sobol:
     """Blocks of scrambled, shuffled Sobol points."""
 
-    def __init__(self, rng: Rng, dimensions: Sequence[Dimension]) -> None:
+    def __init__(self, rng: Rng, dimensions: Sequence[CubeAxis]) -> None:
         self._rng = rng
         self._sets = np.array([d.slot // SET for d in dimensions], dtype=np.int64)
         self._columns = np.array([d.slot % SET for d in dimensions], dtype=np.int64)
@@ -164,7 +164,7 @@ def _scramble(rng: np.random.Generator) -> tuple[NDArray[np.int64], int]:
     return _POWERS + rng.integers(0, _POWERS), int(rng.integers(0, 2**_DIGITS))
 
 
-def _hypercube(rng: Rng, dimensions: Sequence[Dimension]) -> Callable[[int], Float]:
+def _hypercube(rng: Rng, dimensions: Sequence[CubeAxis]) -> Callable[[int], Float]:
     # scipy's own draws all dimensions from one stream: one more would move the others
     def one(free: np.random.Generator) -> Float:
         return (free.permutation(BLOCK) + free.random(BLOCK)) / BLOCK
@@ -172,13 +172,13 @@ def _hypercube(rng: Rng, dimensions: Sequence[Dimension]) -> Callable[[int], Flo
     return lambda block: _each(rng, dimensions, block, one)
 
 
-def _random(rng: Rng, dimensions: Sequence[Dimension]) -> Callable[[int], Float]:
+def _random(rng: Rng, dimensions: Sequence[CubeAxis]) -> Callable[[int], Float]:
     return lambda block: _each(rng, dimensions, block, lambda free: free.random(BLOCK))
 
 
 def _each(
     rng: Rng,
-    dimensions: Sequence[Dimension],
+    dimensions: Sequence[CubeAxis],
     block: int,
     one: Callable[[np.random.Generator], Float],
 ) -> Float:
@@ -188,7 +188,7 @@ def _each(
     return inside.reshape(-1, BLOCK).T
 
 
-_METHODS: dict[Sampling, Callable[[Rng, Sequence[Dimension]], Callable[[int], Float]]] = {
+_METHODS: dict[Sampling, Callable[[Rng, Sequence[CubeAxis]], Callable[[int], Float]]] = {
     "sobol": _Sobol,
     "latin-hypercube": _hypercube,
     "random": _random,

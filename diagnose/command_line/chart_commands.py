@@ -13,7 +13,7 @@ import click
 from ...datasets.recipe.text import recipe_names, toml_text
 from ...sim.atomic import write_whole
 from ...sim.fidelity.study import Search
-from ...sim.scene.load import load_scene
+from ...sim.scene.load import load_scene, numbered, scene_table, scene_text
 from ...sim.scene.parts import Scene, SceneError
 from ..charts.across import RungSets
 from ..charts.chart import RECOMMENDED, Chart
@@ -29,9 +29,7 @@ from ..charts.of_scene import (
 from ..charts.scene_edit import apply_changes
 from ..charts.verdict import verdict_chart
 from ..pages.kept import part_file
-from .command_options import CHART_SUFFIXES, check_outputs, time_bar
-
-SCENE_SUFFIXES = (".toml",)
+from .command_options import CHART_SUFFIXES, SCENE_SUFFIXES, check_outputs, time_bar
 
 _QUESTIONS = {"kept": KEPT, "raised": RAISED}
 
@@ -78,6 +76,8 @@ def scene_chart_command(
     going_on = part is not None and part.exists() and not force
     outputs = [(output, CHART_SUFFIXES), (applied, SCENE_SUFFIXES)]
     check_outputs([subject], outputs, force or going_on)
+    table = scene_table(scene_text(subject), subject)
+    given = {numbered(table, path): value for path, value in given.items()}
     scene = load_scene(subject, given)
     if part is not None and force:
         part.unlink(missing_ok=True)

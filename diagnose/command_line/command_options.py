@@ -263,6 +263,7 @@ def worker_count(jobs: int | None) -> int:
 
 
 DATA_SUFFIXES, MODEL_SUFFIXES, PAGE_SUFFIXES = (".h5", ".hdf5"), (".wsm",), (".html", ".htm")
+SCENE_SUFFIXES = (".toml",)
 CHART_SUFFIXES = (".svg", ".png", ".pdf", ".html", ".json", ".csv")
 PICTURE_SUFFIXES, TABLE_SUFFIXES = (".png", ".svg", ".pdf"), (".parquet", ".csv", ".h5")
 _Output = tuple[Path | None, tuple[str, ...]]

@@ -42,7 +42,7 @@ _CARD = (*PAGE_SUFFIXES, ".md")
 
 @click.group()
 def recipe() -> None:
-    """What data sets are drawn from: list, show, check, preview."""
+    """What data sets are drawn from: list, show, check, preview, explain."""
 
 
 @recipe.command("list")
@@ -92,6 +92,17 @@ def recipe_check(file: str, as_json: bool) -> None:
     lines = [f"{checked.name}: no fault{told}", *(f"warning: {text}" for text in warnings)]
     table = {"recipe": checked.name, "faults": [], "warnings": warnings}
     emit(table, as_json, "\n".join(lines))
+
+
+@recipe.command("explain")
+@click.argument("key", metavar="[KEY]", required=False, default="")
+@json_option
+def recipe_explain(key: str, as_json: bool) -> None:
+    """What every key of a recipe means: unit, range, default; KEY as severity.low."""
+    from ..inspect.keys import explained, found_recipe_keys, keys_table
+
+    found = found_recipe_keys(key)
+    emit(keys_table([found]), as_json, explained(found))
 
 
 _records_option = click.option(

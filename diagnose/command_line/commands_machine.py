@@ -6,6 +6,7 @@ from typing import Any
 
 import click
 
+from ..pages.plain_json import json_text
 from .command_options import (
     CHART_SUFFIXES,
     DATA_SUFFIXES,
@@ -16,6 +17,7 @@ from .command_options import (
     PAGE_SUFFIXES,
     PATH,
     PICTURE_SUFFIXES,
+    SCENE_SUFFIXES,
     Accuracy,
     Share,
     check_outputs,
@@ -36,7 +38,7 @@ _ALIGN_FAIL_ON_HELP = (
 
 @click.group()
 def scene() -> None:
-    """The machines: list, show, check."""
+    """The machines: list, show, check, explain; new ones, and a schema for editors."""
 
 
 @scene.command("list")
@@ -98,6 +100,68 @@ def _deep_check(checked: Any, as_json: bool) -> None:
     told = {"scene": checked.name, "faults": faults, "warnings": list(found.warnings)}
     emit({**told, **deep_check_table(found)}, as_json, deep_check_text(checked.name, found))
     raise click.exceptions.Exit(EXIT_BAD_INPUT if faults else 0)
+
+
+@scene.command("explain")
+@click.argument("subject", metavar="[SCENE|MACHINE]", required=False, default="")
+@click.argument("key", metavar="[KEY]", required=False, default="")
+@json_option
+def scene_explain(subject: str, key: str, as_json: bool) -> None:
+    """What every key of a scene means: unit, range, default, and the rungs to choose from.
+
+    MACHINE is pump, journal or shaft; of a SCENE its own values are shown as well. KEY is a dotted
+    path, a table or the end of a path: `scene explain pump pressure.rung`, for short
+    `scene explain pump.pressure.rung`.
+    """
+    from ..inspect.keys import explained, found_keys, keys_table, subjects_text
+
+    if not subject:
+        emit({"subjects": []}, as_json, subjects_text())
+        return
+    found = found_keys(subject, key)
+    emit(keys_table(found), as_json, "\n\n".join(map(explained, found)))
+
+
+_MACHINES = ("pump", "journal", "shaft")  # as wearstate.sim.scene.load, too heavy for --help
+
+
+@scene.command("schema")
+@click.argument("machine", type=click.Choice(_MACHINES))
+@click.option("-o", "--output", type=PATH, help="File to write (.json); stdout by default.")
+@force_option
+def scene_schema(machine: str, output: Path | None, force: bool) -> None:
+    """JSON schema of a scene, for an editor that completes and checks TOML.
+
+    Name it in the first line of a scene: `#:schema ./pump.json` (taplo, Even Better TOML).
+    """
+    from ...sim.scene.load import machine_type
+    from ..inspect.keys import scene_schema as schema_of
+    from ..pages.page import save_page
+
+    check_outputs([], [(output, (".json",))], force)
+    text = json_text(schema_of(machine_type(machine)), indent=1)
+    if output is None:
+        click.echo(text)
+        return
+    save_page(text, output, force=force)
+    click.echo(output)
+
+
+@scene.command("new")
+@click.argument("machine", type=click.Choice(_MACHINES))
+@click.option("-o", "--output", type=PATH, required=True, help="Scene to write (.toml).")
+@force_option
+def scene_new(machine: str, output: Path, force: bool) -> None:
+    """A scene of your own with the fewest keys that run: change its numbers, add others."""
+    from ...sim.atomic import write_whole
+    from ...sim.scene.load import minimal_text
+
+    check_outputs([], [(output, SCENE_SUFFIXES)], force)
+    write_whole(output, minimal_text(machine).encode(), force=force)
+    click.echo(
+        f"{output}\nnext: wearstate scene check {output}; wearstate simulate {output}; "
+        f"wearstate scene explain {machine}"
+    )
 
 
 @click.command()

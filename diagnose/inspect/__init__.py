@@ -1,4 +1,4 @@
-"""What files and data sets hold: info, card, audit, import and recipe in words.
+"""What files, data sets, scenes and recipes hold in words: info, card, audit, import, keys.
 
 It may import ``sim.output``, ``sim.scene``, ``sim.fidelity``, ``sim.deep_check``,
 ``features.signal``, ``datasets.file``, ``datasets.source``, ``datasets.recipe``,

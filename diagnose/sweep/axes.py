@@ -3,13 +3,13 @@
 import itertools
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from ...datasets.recipe.draws import value_at
-from ...sim.scene.load import load_scene
+from ...sim.scene.load import load_scene, numbered, scene_table, scene_text
 from ...sim.scene.parts import Scene, SceneError, si_unit
 from ..charts.words import effect_words
 from ..pages.si_text import plain
@@ -191,7 +191,10 @@ def read_axes(
         The scene itself is at fault.
     """
     load_scene(subject, given)
+    table = scene_table(scene_text(subject), subject)
+    given = {numbered(table, path): value for path, value in given.items()}
     axes, faults = _parsed(texts, points)
+    axes = [replace(axis, path=numbered(table, axis.path)) for axis in axes]
     faults += _clashes([axis.path for axis in axes], given)
     sound = []
     for axis in axes:

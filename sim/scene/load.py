@@ -29,6 +29,9 @@ from .shaft import ShaftScene
 
 SCENE_FOLDER = Path(__file__).parent / "built_in"
 
+MINIMAL_FOLDER = Path(__file__).parent / "minimal"
+"""The shortest scene of each machine, to begin one's own from: ``pump.toml`` and so on."""
+
 LARGEST_TEXT = 2**18
 """Longest believable text of a scene or recipe; those built in have 20,000 characters at most.
 
@@ -48,6 +51,58 @@ MACHINES: dict[str, type[Scene]] = {
     machine_name(kind): kind for kind in (PumpScene, JournalScene, ShaftScene)
 }
 """The scene type of every machine. A new machine is one entry; all else is asked of the type."""
+
+
+def short_name(kind: type[Scene]) -> str:
+    """What people call the machine of a scene type.
+
+    Examples
+    --------
+    >>> [short_name(kind) for kind in MACHINES.values()]
+    ['pump', 'journal', 'shaft']
+    """
+    return kind.physics.rpartition(".")[2]
+
+
+def machine_type(name: str) -> type[Scene]:
+    """Scene type of a machine, by what people call it or by its whole name.
+
+    Raises
+    ------
+    SceneError
+        There is none; the nearest is named.
+
+    Examples
+    --------
+    >>> machine_type("pump").__name__, machine_type("journal-bearing").__name__
+    ('PumpScene', 'JournalScene')
+    """
+    known = {**{short_name(kind): kind for kind in MACHINES.values()}, **MACHINES}
+    if name not in known:
+        raise SceneError(name, [f"{name} is no machine of this program{nearest(name, known)}"])
+    return known[name]
+
+
+def minimal_text(machine: str) -> str:
+    """TOML text of the shortest scene of a machine.
+
+    Parameters
+    ----------
+    machine : str
+        As of :func:`machine_type`.
+
+    Raises
+    ------
+    SceneError
+        There is no such machine.
+
+    Examples
+    --------
+    >>> scene_from_table(scene_table(minimal_text("journal"))).name
+    'my-journal'
+    """
+    path = MINIMAL_FOLDER / f"{short_name(machine_type(machine))}.toml"
+    return path.read_text(encoding="utf-8")
 
 
 def all_wear_places() -> dict[str, WearPlace]:
@@ -214,28 +269,57 @@ def load_scene(name_or_path: str | Path, overrides: Mapping[str, Any] | None = N
 
 
 def override(table: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
-    """Copy of a table with values replaced by dotted path (list entries by index).
+    """Copy of a table with values replaced by dotted path (list entries by number or name).
 
     Raises
     ------
     SceneError
-        A path leads through something that is no table, or past the end of a list.
+        A path leads through something that is no table, past the end of a list, or to a name that
+        the list does not have.
 
     Examples
     --------
     >>> override({"rod": {"mass": 1.0}}, {"rod.mass": 2.0})
     {'rod': {'mass': 2.0}}
+    >>> override({"bearings": [{"name": "aft"}]}, {"bearings.aft.sag": "1 mm"})
+    {'bearings': [{'name': 'aft', 'sag': '1 mm'}]}
     """
     result: dict[str, Any] = _copy(table)
     faults = []
     for path, value in values.items():
         try:
             _replace(result, path.split("."), value)
-        except (KeyError, IndexError, TypeError, ValueError):
+        except _NoEntryError as error:
+            faults.append(f"{path} does not lead to a value: {error}")
+        except (KeyError, TypeError, ValueError):
             faults.append(f"{path} does not lead to a value; see the scene's own tables")
     if faults:
         raise SceneError(str(table.get("name", "scene")), faults)
     return result
+
+
+def numbered(table: Mapping[str, Any], path: str) -> str:
+    """Dotted path with list entries by number where they were given by name.
+
+    What the table does not have stays as it is.
+
+    Examples
+    --------
+    >>> numbered({"bearings": [{"name": "aft"}, {"name": "forward"}]}, "bearings.forward.sag")
+    'bearings.1.sag'
+    """
+    node: Any = table
+    keys = path.split(".")
+    for place, key in enumerate(keys):
+        try:
+            if isinstance(node, list):
+                keys[place] = str(_index(node, key))
+                node = node[int(keys[place])]
+            else:
+                node = node[key]
+        except (LookupError, TypeError):
+            break
+    return ".".join(keys)
 
 
 def _copy(node: Any) -> Any:
@@ -246,9 +330,9 @@ def _copy(node: Any) -> Any:
 
 def _replace(node: Any, keys: list[str], value: Any) -> None:
     for key in keys[:-1]:
-        node = node[_index(key)] if isinstance(node, list) else node.setdefault(key, {})
+        node = node[_index(node, key)] if isinstance(node, list) else node.setdefault(key, {})
     if isinstance(node, list):
-        node[_index(keys[-1])] = _copy(value)
+        node[_index(node, keys[-1])] = _copy(value)
         return
     if not isinstance(node, dict):
         raise TypeError(keys)
@@ -256,8 +340,18 @@ def _replace(node: Any, keys: list[str], value: Any) -> None:
     node[keys[-1]] = _copy(value)
 
 
-def _index(key: str) -> int:
-    """Place in a list; counted from the front, in plain digits."""
-    if not re.fullmatch("[0-9]{1,9}", key):
-        raise IndexError(key)
-    return int(key)
+class _NoEntryError(LookupError):
+    """A list has no such entry; the text tells which it has."""
+
+
+def _index(entries: list[Any], key: str) -> int:
+    """Place in a list: counted from the front, in plain digits, or that of the entry's name."""
+    if re.fullmatch("[0-9]{1,9}", key) and int(key) < len(entries):
+        return int(key)
+    names = [entry.get("name") if isinstance(entry, Mapping) else None for entry in entries]
+    if key in names:
+        return names.index(key)
+    numbers = f"numbers 0 to {len(entries) - 1}" if entries else "no entry"
+    known = ", ".join(str(name) for name in names if name is not None)
+    named = f" and names {known}" if known else ""
+    raise _NoEntryError(f"no entry {key!r}, the list has {numbers}{named}")

@@ -24,10 +24,12 @@ from pydantic import (
     BeforeValidator,
     ConfigDict,
     Field,
+    GetJsonSchemaHandler,
     TypeAdapter,
     ValidationError,
     model_validator,
 )
+from pydantic_core import CoreSchema
 
 from ..output.sensor import SIMULATED_RATE_LEAST, SIMULATED_RATE_MOST, Channel, tacho_pulses
 
@@ -74,7 +76,8 @@ UNITS: dict[str, dict[str, float]] = {
 Table = TypeVar("Table", bound=BaseModel)
 Value = TypeVar("Value")
 
-_QUANTITY = re.compile(r"\s*([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)\s*(.*?)\s*")
+_NUMBER = r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?"
+_QUANTITY = re.compile(rf"\s*(?P<number>{_NUMBER})\s*(?P<unit>.*?)\s*")
 
 # Bounds no machine comes near: they catch a wrong unit or a slipped exponent, and keep every
 # product and quotient of the kernels finite.
@@ -156,7 +159,7 @@ def _text_to_si(value: str, dimension: str) -> float:
     if match is None:
         example = f"1.5 {_unit_symbol(dimension)}".rstrip()
         raise ValueError(f"has no leading number; write it like '{example}'")
-    number, unit = match.groups()
+    number, unit = match["number"], match["unit"]
     if unit not in units:
         missing = "has no unit" if unit == "" else f"has unit '{unit}', not one of {dimension}"
         raise ValueError(f"{missing}; use one of {_unit_list(dimension)}")
@@ -174,47 +177,71 @@ def _unit_symbol(dimension: str) -> str:
     return next(iter(UNITS[dimension]))
 
 
-class _Dimension:
-    """Marks a field with its dimension, for unit strings and for error texts."""
+class Dimension:
+    """Marks a field with its dimension: for unit strings, error texts and JSON schemas.
+
+    Examples
+    --------
+    >>> Dimension("length").unit
+    'm'
+    """
 
     def __init__(self, name: str) -> None:
         self.name = name
+
+    @property
+    def unit(self) -> str:
+        """SI unit, that of a bare number; empty for a ratio."""
+        return _unit_symbol(self.name)
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """Every unit that a string may carry, the SI unit first."""
+        return tuple(UNITS[self.name])
+
+    def __get_pydantic_json_schema__(
+        self, core: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        """A number in SI, or a string with one of the units; ``unit`` names the SI one."""
+        unit = "|".join(re.escape(each) for each in self.units)
+        text = {"type": "string", "pattern": rf"^\s*{_NUMBER}\s*({unit})\s*$"}
+        return {"anyOf": [handler(core), text], "unit": self.unit}
 
 
 def _parser(dimension: str) -> BeforeValidator:
     return BeforeValidator(lambda value: to_si(value, dimension))
 
 
-Length = Annotated[float, _parser("length"), _Dimension("length")]
-Mass = Annotated[float, _parser("mass"), _Dimension("mass")]
-Time = Annotated[float, _parser("time"), _Dimension("time")]
-RotationSpeed = Annotated[float, _parser("rotation speed"), _Dimension("rotation speed")]
-Frequency = Annotated[float, _parser("frequency"), _Dimension("frequency")]
-Angle = Annotated[float, _parser("angle"), _Dimension("angle")]
-Pressure = Annotated[float, _parser("pressure"), _Dimension("pressure")]
-Acceleration = Annotated[float, _parser("acceleration"), _Dimension("acceleration")]
-Velocity = Annotated[float, _parser("velocity"), _Dimension("velocity")]
-Inertia = Annotated[float, _parser("inertia"), _Dimension("inertia")]
-Stiffness = Annotated[float, _parser("stiffness"), _Dimension("stiffness")]
-Damping = Annotated[float, _parser("damping"), _Dimension("damping")]
-Voltage = Annotated[float, _parser("voltage"), _Dimension("voltage")]
-Ratio = Annotated[float, _parser("ratio"), _Dimension("ratio")]
-Density = Annotated[float, _parser("density"), _Dimension("density")]
-Volume = Annotated[float, _parser("volume"), _Dimension("volume")]
-Area = Annotated[float, _parser("area"), _Dimension("area")]
-Temperature = Annotated[float, _parser("temperature"), _Dimension("temperature")]
+Length = Annotated[float, _parser("length"), Dimension("length")]
+Mass = Annotated[float, _parser("mass"), Dimension("mass")]
+Time = Annotated[float, _parser("time"), Dimension("time")]
+RotationSpeed = Annotated[float, _parser("rotation speed"), Dimension("rotation speed")]
+Frequency = Annotated[float, _parser("frequency"), Dimension("frequency")]
+Angle = Annotated[float, _parser("angle"), Dimension("angle")]
+Pressure = Annotated[float, _parser("pressure"), Dimension("pressure")]
+Acceleration = Annotated[float, _parser("acceleration"), Dimension("acceleration")]
+Velocity = Annotated[float, _parser("velocity"), Dimension("velocity")]
+Inertia = Annotated[float, _parser("inertia"), Dimension("inertia")]
+Stiffness = Annotated[float, _parser("stiffness"), Dimension("stiffness")]
+Damping = Annotated[float, _parser("damping"), Dimension("damping")]
+Voltage = Annotated[float, _parser("voltage"), Dimension("voltage")]
+Ratio = Annotated[float, _parser("ratio"), Dimension("ratio")]
+Density = Annotated[float, _parser("density"), Dimension("density")]
+Volume = Annotated[float, _parser("volume"), Dimension("volume")]
+Area = Annotated[float, _parser("area"), Dimension("area")]
+Temperature = Annotated[float, _parser("temperature"), Dimension("temperature")]
 KinematicViscosity = Annotated[
-    float, _parser("kinematic viscosity"), _Dimension("kinematic viscosity")
+    float, _parser("kinematic viscosity"), Dimension("kinematic viscosity")
 ]
-Moment = Annotated[float, _parser("moment"), _Dimension("moment")]
-Unbalance = Annotated[float, _parser("unbalance"), _Dimension("unbalance")]
-HertzStiffness = Annotated[float, _parser("Hertz stiffness"), _Dimension("Hertz stiffness")]
-Force = Annotated[float, _parser("force"), _Dimension("force")]
-Viscosity = Annotated[float, _parser("viscosity"), _Dimension("viscosity")]
+Moment = Annotated[float, _parser("moment"), Dimension("moment")]
+Unbalance = Annotated[float, _parser("unbalance"), Dimension("unbalance")]
+HertzStiffness = Annotated[float, _parser("Hertz stiffness"), Dimension("Hertz stiffness")]
+Force = Annotated[float, _parser("force"), Dimension("force")]
+Viscosity = Annotated[float, _parser("viscosity"), Dimension("viscosity")]
 ModeShape = Annotated[
     float,
     _parser("mode shape"),
-    _Dimension("mode shape"),
+    Dimension("mode shape"),
     Field(ge=-_SHAPE_MOST, le=_SHAPE_MOST),
 ]
 
@@ -939,7 +966,7 @@ def _holds_many(field: Any) -> bool:
 
 
 def _dimension_of(field: Any) -> str | None:
-    return next((m.name for m in _metadata(field) if isinstance(m, _Dimension)), None)
+    return next((m.name for m in metadata_of(field) if isinstance(m, Dimension)), None)
 
 
 def _short(value: Any) -> str:
@@ -951,7 +978,7 @@ def _short(value: Any) -> str:
 _SHOWN = 60  # characters
 
 
-def _metadata(field: Any) -> list[Any]:
+def metadata_of(field: Any) -> list[Any]:
     """Metadata of a field, also of ``Annotated[...] | None``."""
     if field is None:
         return []
@@ -969,7 +996,7 @@ def _find_field(model: type[BaseModel], location: tuple[Any, ...]) -> tuple[Any,
             continue
         field = owner.model_fields.get(part)
         if part != location[-1]:
-            owner = _model_inside(field.annotation) if field is not None else None
+            owner = model_inside(field.annotation) if field is not None else None
     return owner, field
 
 
@@ -987,8 +1014,9 @@ def si_unit(model: type[BaseModel], path: str) -> str:
     return "" if dimension is None else _unit_symbol(dimension)
 
 
-def _model_inside(annotation: Any) -> type[BaseModel] | None:
+def model_inside(annotation: Any) -> type[BaseModel] | None:
+    """Model in an annotation, also in a list or beside None; None where there is none."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return annotation
-    found = (_model_inside(inner) for inner in getattr(annotation, "__args__", ()))
+    found = (model_inside(inner) for inner in getattr(annotation, "__args__", ()))
     return next((model for model in found if model is not None), None)

@@ -348,14 +348,14 @@ class Throw(Part):
     """One throw of the crank: its place, and where it differs from what the scene says of all.
 
     ``joint`` and ``pressure`` are merged over the scene's own tables, so that one worn joint or
-    one leaking valve takes one line.
+    one leaking valve takes one line; a schema takes them as ``partial``, with nothing required.
     """
 
     phase: Angle = Field(
         default=0.0, ge=-ANGLE_MOST, le=ANGLE_MOST, description="crank angle over the first"
     )
-    joint: PumpJoints | None = None
-    pressure: CylinderPressure | None = None
+    joint: PumpJoints | None = Field(default=None, json_schema_extra={"partial": True})
+    pressure: CylinderPressure | None = Field(default=None, json_schema_extra={"partial": True})
 
 
 CRANK_PLACES = ("bearing_x", "bearing_y", "guide_y", "cylinder_x")

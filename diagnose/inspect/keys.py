@@ -1,0 +1,734 @@
+"""Every key of a scene or a recipe: meaning, unit, range, default, rungs; and schemas for editors.
+
+``python -m wearstate.diagnose.inspect.keys`` prints ``docs/keys.md``.
+"""
+
+import difflib
+import textwrap
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import asdict, dataclass, replace
+from importlib import import_module
+from pathlib import Path
+from typing import Any, Literal, get_args, get_origin
+
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+from pydantic.json_schema import GenerateJsonSchema
+
+from ...datasets.recipe.recipe import RecipeTable
+from ...sim.scene.load import MACHINES, load_scene, scene_names, short_name
+from ...sim.scene.parts import Dimension, Scene, SceneError, metadata_of, model_inside
+from ...sim.scene.rungs import Rung
+from ..pages.si_text import plain, si_text
+
+_WIDTH = 100  # characters of a line
+_NO_BREAK = "\N{NO-BREAK SPACE}"
+_TABLE, _TABLES, _NAMED_TABLES = "table", "list of tables", "table of named tables"
+_TABLE_KINDS = (_TABLE, _TABLES, _NAMED_TABLES)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Key:
+    """One key of a TOML file, or one of its tables.
+
+    Attributes
+    ----------
+    path : str
+        Dotted; ``*`` stands for the number or name of a list entry, or for a name that is free.
+    words : str
+        What it means.
+    kind : str
+        What is written there: number, whole number, text, true or false, a list, a table.
+    unit : str
+        SI unit of a bare number; empty where it has none.
+    units : tuple of str
+        Units that a text may carry.
+    bounds : str
+        As ``> 0, <= 100 m``; empty without any.
+    default : str
+        ``required`` where it must be given.
+    choices : tuple of str
+        Words to choose from.
+    rungs : tuple of Rung
+        Models to choose from, cheapest first.
+    """
+
+    path: str
+    words: str
+    kind: str
+    unit: str = ""
+    units: tuple[str, ...] = ()
+    bounds: str = ""
+    default: str = ""
+    choices: tuple[str, ...] = ()
+    rungs: tuple[Rung, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """Last name of its path."""
+        return self.path.removesuffix(".*").rpartition(".")[2]
+
+    @property
+    def table(self) -> bool:
+        """Whether it holds keys of its own."""
+        return self.kind in _TABLE_KINDS
+
+
+def keys_of(model: type[BaseModel]) -> list[Key]:
+    """Every key of a scene or recipe, each table before the keys in it.
+
+    Parameters
+    ----------
+    model : type
+        A scene type, or any other pydantic model.
+
+    Returns
+    -------
+    list of Key
+
+    Examples
+    --------
+    >>> from wearstate.sim.scene.parts import Tacho
+    >>> width = keys_of(Tacho)[1]
+    >>> width.path, width.unit, width.bounds, width.default
+    ('pulse_width', 'rad', '> 0, <= 180 deg', '10 deg')
+    """
+    ladders: Mapping[str, tuple[Rung, ...]] = {}
+    if issubclass(model, Scene):
+        ladders = import_module(model.physics).MACHINE.ladders
+    return list(_rows(model, "", None, tuple(ladders.values())))
+
+
+_DIFFERING = "what differs"
+"""Default of a table that is merged over the scene's own table of that name."""
+
+
+_Ladders = tuple[tuple[Rung, ...], ...]
+
+
+def _rows(model: type[BaseModel], prefix: str, given: Any, ladders: _Ladders) -> Iterator[Key]:
+    fields = {name: field for name, field in model.model_fields.items() if not field.exclude}
+    tables = {name: model_inside(field.annotation) for name, field in fields.items()}
+    for name, field in fields.items():
+        if tables[name] is None:
+            yield _leaf(f"{prefix}{name}", field, _value(field, name, given), ladders)
+    for name, field in fields.items():
+        inner = tables[name]
+        if inner is None:
+            continue
+        value = _value(field, name, given)
+        kind = _table_kind(field.annotation)
+        path = f"{prefix}{name}" + ("" if kind == _TABLE else ".*")
+        default = "required" if field.is_required() else "" if value else "optional"
+        rows = _rows(inner, f"{path}.", value if isinstance(value, inner) else None, ladders)
+        if _is_partial(field):
+            default = _DIFFERING
+            rows = (replace(row, default=f"as in [{name}]") for row in rows)
+        yield Key(path=path, words=_table_words(field, inner), kind=kind, default=default)
+        yield from rows
+
+
+def _is_partial(field: FieldInfo) -> bool:
+    extra = field.json_schema_extra
+    return isinstance(extra, dict) and bool(extra.get("partial"))
+
+
+def _value(field: FieldInfo, name: str, given: Any) -> Any:
+    """Default of a field: that of its table where the table has one, else its own."""
+    if given is not None:
+        return getattr(given, name)
+    return None if field.is_required() else field.get_default(call_default_factory=True)
+
+
+def _table_kind(annotation: Any) -> str:
+    arguments = (annotation, *get_args(annotation))
+    origins = {get_origin(each) for each in arguments}
+    return _TABLES if tuple in origins else _NAMED_TABLES if dict in origins else _TABLE
+
+
+def _table_words(field: FieldInfo, inner: type[BaseModel]) -> str:
+    about = " ".join((inner.__doc__ or "").partition("\n\n")[0].split()).replace("``", "`")
+    return f"{field.description}. {about}" if field.description else about
+
+
+def _leaf(path: str, field: FieldInfo, value: Any, ladders: _Ladders) -> Key:
+    marks = list(_flat(metadata_of(field)))
+    dimension = next((mark for mark in marks if isinstance(mark, Dimension)), None)
+    unit = dimension.unit if dimension else ""
+    choices = tuple(_choices(field.annotation))
+    default = "required" if field.is_required() else _shown(value, unit)
+    return Key(
+        path=path,
+        words=field.description or "",
+        kind=_kind(field.annotation),
+        unit=unit,
+        units=tuple(each for each in dimension.units if each) if dimension else (),
+        bounds=_bounds(marks, unit),
+        default=default,
+        choices=choices,
+        rungs=_rungs(choices, ladders),
+    )
+
+
+def _flat(marks: Iterable[Any]) -> Iterator[Any]:
+    """Metadata with those of fields inside of an annotation."""
+    for mark in marks:
+        if isinstance(mark, FieldInfo):
+            yield from _flat(mark.metadata)
+        else:
+            yield mark
+
+
+def _bounds(marks: Iterable[Any], unit: str) -> str:
+    signs = (("gt", ">"), ("ge", ">="), ("lt", "<"), ("le", "<="))
+    limits = [(s, getattr(m, n)) for n, s in signs for m in marks if hasattr(m, n)]
+    return ", ".join(f"{sign} {_number(value, unit, 4) if value else 0}" for sign, value in limits)
+
+
+def _number(value: float, unit: str, digits: int) -> str:
+    if unit == "s" and abs(value) >= 1:  # nobody says kiloseconds
+        return f"{plain(value, digits)} s"
+    return si_text(value, unit, digits)
+
+
+def _choices(annotation: Any) -> Iterator[str]:
+    if get_origin(annotation) is Literal:
+        yield from map(str, get_args(annotation))
+    else:
+        for inner in get_args(annotation):
+            yield from _choices(inner)
+
+
+def _rungs(choices: tuple[str, ...], ladders: _Ladders) -> tuple[Rung, ...]:
+    """Rows of the ladder that has all the choices as its rungs, if there is one."""
+    for ladder in ladders:
+        if choices and {*choices} <= {rung.name for rung in ladder}:
+            return tuple(rung for rung in ladder if rung.name in choices)
+    return ()
+
+
+_KINDS = {bool: "true or false", int: "whole number", float: "number", str: "text"}
+
+
+def _kind(annotation: Any) -> str:
+    origin, arguments = get_origin(annotation), get_args(annotation)
+    if annotation in _KINDS:
+        return _KINDS[annotation]
+    if origin is Literal:
+        return "word"
+    if origin is tuple:
+        many = "list" if ... in arguments else f"list of {len(arguments)}:"
+        return f"{many} {_kind(arguments[0])}".replace("list ", "list of ", ... in arguments)
+    if origin is dict:
+        return f"table of names: {_kind(arguments[1])}"
+    if hasattr(annotation, "__metadata__"):
+        return _kind(arguments[0])
+    kinds = [_kind(each) for each in arguments if each is not type(None)]
+    return " or ".join(dict.fromkeys(kinds))
+
+
+def _shown(value: Any, unit: str) -> str:
+    """A value as one would write it."""
+    if value is None or value == () or value == {}:
+        return "none"
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, float):
+        return _number(value, unit, 6)
+    if isinstance(value, (tuple, list)):
+        return ", ".join(_shown(each, unit) for each in value)
+    if isinstance(value, Mapping):
+        return ", ".join(f"{name} {_shown(each, unit)}" for name, each in value.items())
+    return str(value) or "empty"
+
+
+# --- which keys are meant
+
+
+@dataclass(frozen=True, kw_only=True)
+class FoundKeys:
+    """Keys that were asked for.
+
+    Attributes
+    ----------
+    subject : str
+        Machine, or ``recipe``.
+    words : str
+        What it is, in one sentence.
+    keys : tuple of Key
+    values : mapping of str to str
+        Path -> what the scene that was asked for has there.
+    scene : str
+        Its name; empty where only the machine was named.
+    single : bool
+        One key was asked for, so that all of it is told.
+    """
+
+    subject: str
+    words: str
+    keys: tuple[Key, ...]
+    values: Mapping[str, str]
+    scene: str = ""
+    single: bool = False
+
+
+def found_keys(subject: str = "", key: str = "") -> list[FoundKeys]:
+    """Keys of a machine or scene, or one of them.
+
+    Parameters
+    ----------
+    subject : str
+        Machine (``pump`` or its whole name), built-in scene or file; or a key, with or without a
+        machine before it, where `key` is empty.
+    key : str
+        Dotted path, its end, or a table; entries of lists by number, name, ``*`` or left out.
+
+    Returns
+    -------
+    list of FoundKeys
+        One for each machine that has the key.
+
+    Raises
+    ------
+    SceneError
+        Nothing is called so; the nearest names are told.
+
+    Examples
+    --------
+    >>> [found.keys[0].path for found in found_keys("pump", "crank.radius")]
+    ['crank.radius']
+    >>> [found.subject for found in found_keys("film.rung")]
+    ['journal', 'shaft']
+    """
+    kinds = {short_name(kind): kind for kind in MACHINES.values()} | MACHINES
+    first, _, rest = subject.partition(".")
+    if first in kinds and subject not in scene_names():
+        return [_found(kinds[first], ".".join(filter(None, (rest, key))))]
+    if key or subject in scene_names() or Path(subject).exists():
+        return [_of_scene(load_scene(subject), subject, key)]
+    every = {short_name(kind): keys_of(kind) for kind in MACHINES.values()}
+    hits = [name for name, keys in every.items() if matching(keys, subject)]
+    if not hits:
+        names = [*every, *scene_names(), *(key.path for keys in every.values() for key in keys)]
+        raise SceneError(subject, [f"{subject} is no machine, scene or key{_near(subject, names)}"])
+    return [_found(kinds[name], subject) for name in hits]
+
+
+def found_recipe_keys(key: str = "") -> FoundKeys:
+    """Keys of a recipe, or one of them; see :func:`found_keys`."""
+    rows = [*_EXTENDING, *keys_of(RecipeTable)]
+    return _asked("recipe", "What data sets are drawn from.", rows, key, {})
+
+
+_EXTENDING = (
+    Key(path="extends", kind="text", default="none", words="recipe that this one takes over"),
+    Key(
+        path="without",
+        kind="list of text",
+        default="none",
+        words="paths and names of draws of the extended recipe that are left out",
+    ),
+)
+"""Keys of a recipe file that are gone once it is read."""
+
+
+def _of_scene(scene: Scene, name: str, key: str) -> FoundKeys:
+    return replace(_found(type(scene), key, scene), scene=name)
+
+
+def _found(kind: type[Scene], key: str, scene: Scene | None = None) -> FoundKeys:
+    rows = keys_of(kind)
+    values = {} if scene is None else {row.path: _written(scene, row) for row in rows}
+    about = (kind.__doc__ or "").partition("\n")[0]
+    return _asked(short_name(kind), about, rows, key, {k: v for k, v in values.items() if v})
+
+
+def _asked(
+    subject: str, words: str, rows: list[Key], key: str, values: Mapping[str, str]
+) -> FoundKeys:
+    asked = matching(rows, key) if key else rows
+    if not asked:
+        near = _near(key, [row.path for row in rows])
+        raise SceneError(subject, [f"{key} is no key of a {subject}{near}"])
+    single = bool(key) and not any(row.table for row in asked)
+    return FoundKeys(subject=subject, words=words, keys=tuple(asked), values=values, single=single)
+
+
+def matching(keys: list[Key], asked: str) -> list[Key]:
+    """Keys at a path, in a table, or whose paths end so; empty where there is none.
+
+    Examples
+    --------
+    >>> from wearstate.sim.scene.shaft import ShaftScene
+    >>> [key.path for key in matching(keys_of(ShaftScene), "bearings.aft.sag")]
+    ['bearings.*.sag']
+    """
+    words = asked.split(".")
+    bare = [word for word in words if word != "*" and not word.isdecimal()]
+    paths = [(key, [word for word in key.path.split(".") if word != "*"]) for key in keys]
+    ways = (
+        [key for key in keys if _leads(words, key.path.split("."), named=False)],
+        [key for key, path in paths if path[: len(bare)] == bare],
+        [key for key in keys if _leads(words, key.path.split("."), named=True)],
+        [key for key, path in paths if path[-len(bare) :] == bare],
+    )
+    return next(filter(None, ways), []) if bare else []
+
+
+def _leads(asked: list[str], path: list[str], *, named: bool) -> bool:
+    """Whether a path begins so, entries of lists by number and, if so wished, by any name."""
+    return len(asked) <= len(path) and all(
+        word == there or (there == "*" and (named or word.isdecimal()))
+        for word, there in zip(asked, path, strict=False)
+    )
+
+
+def _near(word: str, names: Iterable[str]) -> str:
+    known = list(dict.fromkeys(names))
+    ends = {name.rpartition(".")[2]: name for name in reversed(known)}
+    last = word.rpartition(".")[2]
+    close = difflib.get_close_matches(word, known, n=3, cutoff=0.6)
+    close += [ends[each] for each in difflib.get_close_matches(last, ends, n=3, cutoff=0.7)]
+    shown = " or ".join(repr(each) for each in dict.fromkeys(close[:3]))
+    return f"; did you mean {shown}?" if shown else "; see them without a KEY"
+
+
+def _written(scene: Scene, key: Key) -> str:
+    """What a scene has at a key, of lists the different values; empty where it has nothing."""
+    if key.table:
+        return ""
+    values = _reached(scene, key.path.split("."))
+    shown = dict.fromkeys(_shown(value, key.unit) for value in values if value is not None)
+    return " / ".join(list(shown)[:4]) + (" / …" if len(shown) > 4 else "")
+
+
+def _reached(node: Any, path: list[str]) -> list[Any]:
+    if not path:
+        return [node]
+    if path[0] == "*":
+        entries = node.values() if isinstance(node, Mapping) else node
+        return [value for entry in entries for value in _reached(entry, path[1:])]
+    inner = getattr(node, path[0], None)
+    return [] if inner is None else _reached(inner, path[1:])
+
+
+# --- in words
+
+
+def subjects_text() -> str:
+    """The machines, and how to ask for their keys."""
+    names = {
+        short_name(kind): (kind.__doc__ or "").partition("\n")[0] for kind in MACHINES.values()
+    }
+    lines = [f"{name:8} {words}" for name, words in names.items()]
+    return "\n".join(
+        [
+            *lines,
+            "",
+            "wearstate scene explain pump                  every key of a pump's scene",
+            "wearstate scene explain pump pressure         the keys of one table",
+            "wearstate scene explain pump pressure.rung    one key with its rungs",
+            "wearstate scene explain bilge-pump            with the values of that scene",
+        ]
+    )
+
+
+def explained(found: FoundKeys) -> str:
+    """Keys as text: one with all that is known of it, several as one line each.
+
+    Parameters
+    ----------
+    found : FoundKeys
+
+    Returns
+    -------
+    str
+    """
+    if found.single:
+        return "\n\n".join(_whole(key, found) for key in found.keys)
+    head = f"{found.subject}: {found.words}"
+    lines = [head, *_listed(found)]
+    if any(key.rungs for key in found.keys):
+        lines += ["", "A rung is a model of one effect; name its key to see what each assumes."]
+    return "\n".join(lines)
+
+
+def _listed(found: FoundKeys) -> Iterator[str]:
+    rows = _once(found.keys)
+    width = max((len(row.name) for row, _ in rows if not row.table), default=0)
+    for row, twin in rows:
+        if row.table:
+            need = f" ({row.default})" if row.default else ""
+            same = f" Keys as in {_header(twin)}." if twin else ""
+            yield ""
+            yield from _wrapped(f"{_header(row)}{need} {row.words}{same}", 0)
+            continue
+        text = f"{row.words} [{_spec(row, found.values)}]"
+        yield from _wrapped(f"  {row.name:{width}}  {text}", width + 4)
+
+
+def _wrapped(text: str, indent: int) -> list[str]:
+    """Lines of a text; a number stays with its unit (`_NO_BREAK`)."""
+    lines = textwrap.wrap(text, _WIDTH, subsequent_indent=" " * indent, break_on_hyphens=False)
+    return [line.replace(_NO_BREAK, " ") for line in lines]
+
+
+def _once(keys: Iterable[Key]) -> list[tuple[Key, Key | None]]:
+    """Keys, a table whose keys have all been told by those of another table without them."""
+    rows = list(keys)
+    own = {row.path: row for row in rows}
+    told: dict[str, Key] = {}  # a rung cannot be hashed
+    result: list[tuple[Key, Key | None]] = []
+    skipped = "\0"
+    for row in rows:
+        if row.path.startswith(skipped):
+            continue
+        inside = [
+            replace(each, path=each.path.removeprefix(row.path))
+            for each in rows
+            if row.table and each.path.startswith(f"{row.path}.")
+        ]
+        twin = told.setdefault(repr(inside), row) if inside else row
+        if row.default == _DIFFERING:
+            twin = own.get(row.name, row)
+        result.append((row, None if twin is row else twin))
+        if twin is not row:
+            skipped = f"{row.path}."
+    return result
+
+
+def _header(key: Key) -> str:
+    """As in TOML; a table of a list entry by the names alone."""
+    inside = key.path.removesuffix(".*")
+    name = inside.replace(".*", "")
+    if key.kind == _TABLES:
+        return f"[[{name}]]"
+    return f"[{name}.NAME]" if key.kind == _NAMED_TABLES else f"[{name}]"
+
+
+def _spec(key: Key, values: Mapping[str, str]) -> str:
+    """Kind, unit, range, choices and default."""
+    kind = key.unit if key.kind == "number" and key.unit else key.kind
+    if key.kind != "number" and key.unit:
+        kind += f" in {key.unit}"
+    if key.choices:
+        kind = " | ".join(key.choices)
+    default = key.default if key.default == "required" else f"default {key.default}"
+    here = [f"here {values[key.path]}"] if key.path in values else []
+    numbers = [key.bounds, default, *here]
+    return "; ".join(filter(None, [kind, *(text.replace(" ", _NO_BREAK) for text in numbers)]))
+
+
+def _whole(key: Key, found: FoundKeys) -> str:
+    """Everything about one key."""
+    here = found.values.get(key.path, "not given")
+    rows = [
+        ("", key.words),
+        ("written as", key.kind + (f", bare in {key.unit}" if key.unit else "")),
+        ("units", ", ".join(key.units)),
+        ("one of", "" if key.rungs else ", ".join(key.choices)),
+        ("range", key.bounds),
+        ("default", key.default),
+        ("here", f"{here}, in {found.scene}" if found.scene else ""),
+    ]
+    lines = [f"{key.path}  ({found.subject})"]
+    for name, text in rows:
+        if text:
+            lines += _wrapped(f"  {name:11} {text}" if name else f"  {text}", 14 if name else 2)
+    if key.rungs:
+        lines.append(f"  rungs, cheapest first ({_COST}):")
+        for rung in key.rungs:
+            lines += _rung_lines(rung)
+    return "\n".join(lines)
+
+
+_COST = "cost: tabulated time of a step of one throw or of one solve of a film, to rank them"
+
+
+def _rung_rows(rung: Rung) -> list[tuple[str, str]]:
+    """What is told of a rung."""
+    cost = si_text(1e-9 * rung.nanoseconds_per_step, "s") if rung.nanoseconds_per_step else "none"
+    rows = [
+        ("assumes", rung.assumes),
+        ("valid", rung.valid),
+        ("needs", rung.needs),
+        ("cost", cost),
+        ("reference", rung.reference),
+    ]
+    return [(name, text) for name, text in rows if text]
+
+
+def _rung_lines(rung: Rung) -> Iterator[str]:
+    yield f"    {rung.name}"
+    for name, text in _rung_rows(rung):
+        yield from _wrapped(f"      {name:10} {text}", 17)
+
+
+def keys_table(found: Iterable[FoundKeys]) -> dict[str, Any]:
+    """Keys as plain values, for JSON."""
+    return {
+        "subjects": [
+            {
+                "subject": each.subject,
+                "scene": each.scene,
+                "keys": [{**asdict(key), "value": each.values.get(key.path)} for key in each.keys],
+            }
+            for each in found
+        ]
+    }
+
+
+def keys_page() -> str:
+    """``docs/keys.md``: every key of every machine and of a recipe."""
+    parts = [_PAGE_HEAD]
+    for kind in MACHINES.values():
+        parts.append(_section(_found(kind, "")))
+    parts.append(_section(found_recipe_keys()))
+    return "\n\n".join(parts) + "\n"
+
+
+_PAGE_HEAD = """# Keys of scenes and recipes
+
+Written by `python -m wearstate.diagnose.inspect.keys`. The same on the command line:
+`wearstate scene explain pump`, `wearstate scene explain pump.pressure.rung`,
+`wearstate recipe explain`.
+
+A bare number is SI; a text carries its unit, such as `"0.25 mm"`. `--set` takes the dotted path,
+with entries of lists by number (from 0) or by name: `--set bearings.aft.sag="1 mm"`. Rungs stand
+cheapest first; their cost is the tabulated time of a step of one throw or of one film solve."""
+
+
+def _section(found: FoundKeys) -> str:
+    lines = [f"## {found.subject}", "", found.words, *_page_rows(found)]
+    return "\n".join(lines)
+
+
+def _page_rows(found: FoundKeys) -> Iterator[str]:
+    open_table = False
+    for row, twin in _once(found.keys):
+        if row.table:
+            need = f" ({row.default})" if row.default else ""
+            yield from ("", f"### `{_header(row)}`{need}", "", row.words)
+            yield from ("", f"Keys as in `{_header(twin)}`.") if twin else ()
+            open_table = False
+            continue
+        if not open_table:
+            yield from ("", "| key | meaning | value |", "|---|---|---|")
+            open_table = True
+        spec = _spec(row, {}).replace(_NO_BREAK, " ")
+        yield f"| `{row.name}` | {_cell(row.words)} | {_cell(spec)} |"
+    for row, twin in _once(found.keys):
+        if row.rungs and twin is None:
+            yield from ("", f"### Rungs of `{row.path}`", "", *_RUNG_HEAD)
+            yield from map(_rung_row, row.rungs)
+
+
+def _rung_row(rung: Rung) -> str:
+    told = dict(_rung_rows(rung))
+    names = ("assumes", "valid", "needs", "cost", "reference")
+    return f"| {rung.name} | " + " | ".join(_cell(told.get(name, "")) for name in names) + " |"
+
+
+_RUNG_HEAD = ("| rung | assumes | valid | needs | cost | reference |", "|---|---|---|---|---|---|")
+
+
+def _cell(text: str) -> str:
+    return text.replace("|", "\\|")
+
+
+# --- for editors
+
+
+def scene_schema(machine: type[Scene]) -> dict[str, Any]:
+    """JSON schema of a machine's scenes, for editors of TOML.
+
+    Numbers with a dimension take a text with a unit as well. What holds between keys (one of two
+    clearances, a rung that needs a table) is left to ``scene check``.
+
+    Parameters
+    ----------
+    machine : type
+        Scene type.
+
+    Returns
+    -------
+    dict
+
+    Examples
+    --------
+    >>> from wearstate.sim.scene.pump import PumpScene
+    >>> scene_schema(PumpScene)["$defs"]["Crank"]["properties"]["radius"]["description"]
+    'half the stroke [m]'
+    """
+    schema = _tidy(machine.model_json_schema(schema_generator=_Generator))
+    inside = schema["$defs"]
+    partial = {
+        name: _renamed({k: v for k, v in table.items() if k != "required"})
+        for name, table in inside.items()
+    }
+    inside |= {f"{name}{_PARTIAL}": table for name, table in partial.items()}
+    for table in inside.values():
+        for name, field in table.get("properties", {}).items():
+            if field.pop("partial", False):
+                table["properties"][name] = _renamed(field)
+    title = f"Scene of a {machine.__doc__ or ''}".partition("\n")[0]
+    return {"$schema": "http://json-schema.org/draft-07/schema#", **schema, "title": title}
+
+
+class _Generator(GenerateJsonSchema):
+    """A default that is a frozen table is left out, silently."""
+
+    def emit_warning(self, kind: Any, detail: str) -> None:
+        """As of pydantic, without that one."""
+        if kind != "non-serializable-default":
+            super().emit_warning(kind, detail)
+
+
+_PARTIAL = "Partial"  # ends the names of tables in which nothing is required
+_SIGNS = {"gt": "exclusiveMinimum", "ge": "minimum", "lt": "exclusiveMaximum", "le": "maximum"}
+
+
+def _renamed(node: Any) -> Any:
+    """References to tables as references to their partial twins."""
+    if isinstance(node, Mapping):
+        return {
+            key: f"{value}{_PARTIAL}" if key == "$ref" else _renamed(value)
+            for key, value in node.items()
+        }
+    return [_renamed(each) for each in node] if isinstance(node, list) else node
+
+
+def _tidy(node: Any) -> Any:
+    """A schema without nulls, which TOML lacks, with bounds by their names and units in words."""
+    if isinstance(node, list):
+        return [_tidy(each) for each in node]
+    if not isinstance(node, Mapping):
+        return node
+    found = {_SIGNS.get(str(key), str(key)): _tidy(value) for key, value in node.items()}
+    if found.get("default", 0) is None or isinstance(found.get("default"), dict):
+        del found["default"]
+    if isinstance(found.get("anyOf"), list):
+        found["anyOf"] = [each for each in found["anyOf"] if each != {"type": "null"}]
+    return _with_unit(found) if "description" in found else found
+
+
+def _with_unit(field: dict[str, Any]) -> dict[str, Any]:
+    if not isinstance(field["description"], str):
+        return field  # a key of that name
+    unit = next(_units(field), "")
+    return {**field, "description": f"{field['description']} [{unit}]"} if unit else field
+
+
+def _units(node: Any) -> Iterator[str]:
+    if isinstance(node, Mapping):
+        if isinstance(node.get("unit"), str) and node["unit"]:
+            yield node["unit"]
+        for value in node.values():
+            yield from _units(value)
+    elif isinstance(node, list):
+        for each in node:
+            yield from _units(each)
+
+
+if __name__ == "__main__":
+    print(keys_page(), end="")
