@@ -3,10 +3,11 @@
 ``wearstate`` simulates machines whose joints and bearings wear, turns simulated or measured
 signals into features, and estimates the wear state with an interval it can defend.
 
-The public names below load on first use, so that ``import wearstate`` stays cheap::
+The public names and modules below load on first use, so that ``import wearstate`` stays cheap::
 
     recording = wearstate.simulate("bilge-pump")
     names, values = wearstate.feature_row(recording)
+    wearstate.features.spectrum(recording).plot()
 """
 
 from importlib import import_module
@@ -15,14 +16,28 @@ TYPE_CHECKING = False  # not from typing: with -m, a typing.py of the current fo
 if TYPE_CHECKING:
     from typing import Any
 
+    from . import align as align
+    from . import contact as contact
+    from . import crank as crank
+    from . import features as features
+    from . import film as film
+    from . import shaft as shaft
     from .datasets.file.record import DataSet as DataSet
     from .datasets.generation.generate import generate as generate
     from .datasets.generation.simulate import simulate as simulate
     from .datasets.measured.data_set import import_recordings as import_recordings
     from .datasets.measured.recording import read_recording as read_recording
     from .datasets.source.part import SourceOptions as SourceOptions
+    from .diagnose.wear_model.estimate import Estimate as Estimate
     from .diagnose.wear_model.estimate import ModelError as ModelError
+    from .diagnose.wear_model.estimate import WearModel as WearModel
     from .diagnose.wear_model.file import load_model as load_model
+    from .diagnose.wear_model.file import save_model as save_model
+    from .diagnose.workflow.evaluate import Evaluation as Evaluation
+    from .diagnose.workflow.evaluate import evaluate as evaluate
+    from .diagnose.workflow.report import Report as Report
+    from .diagnose.workflow.report import report as report
+    from .diagnose.workflow.train import train as train
     from .features.catalogue.row import feature_row as feature_row
     from .sim.output.recording import DataError as DataError
     from .sim.output.recording import Recording as Recording
@@ -35,33 +50,46 @@ if TYPE_CHECKING:
 
 __version__ = "0.1.0"
 
+_MODULES = ("align", "contact", "crank", "features", "film", "shaft")
+"""Public modules, each with an ``__all__``."""
+
 _HOMES = {
     "Channel": ".sim.output.sensor",
     "DataError": ".sim.output.recording",
     "DataSet": ".datasets.file.record",
+    "Estimate": ".diagnose.wear_model.estimate",
+    "Evaluation": ".diagnose.workflow.evaluate",
     "ModelError": ".diagnose.wear_model.estimate",
     "Recording": ".sim.output.recording",
+    "Report": ".diagnose.workflow.report",
     "Scene": ".sim.scene.parts",
     "SceneError": ".sim.scene.parts",
     "SimulationError": ".sim.output.status",
     "SourceOptions": ".datasets.source.part",
+    "WearModel": ".diagnose.wear_model.estimate",
+    "evaluate": ".diagnose.workflow.evaluate",
     "feature_row": ".features.catalogue.row",
     "generate": ".datasets.generation.generate",
     "import_recordings": ".datasets.measured.data_set",
     "load_model": ".diagnose.wear_model.file",
     "load_scene": ".sim.scene.load",
     "read_recording": ".datasets.measured.recording",
+    "report": ".diagnose.workflow.report",
+    "save_model": ".diagnose.wear_model.file",
     "scene_names": ".sim.scene.load",
     "simulate": ".datasets.generation.simulate",
+    "train": ".diagnose.workflow.train",
 }
 """Public name -> module that defines it; the block above tells type checkers the same."""
 
-__all__ = ["__version__", *_HOMES]
+__all__ = ["__version__", *_MODULES, *_HOMES]
 
 if not TYPE_CHECKING:  # a type checker would take it that there is every name
 
     def __getattr__(name: str) -> "Any":
         """Import the public name on first use."""
+        if name in _MODULES:
+            return import_module(f".{name}", __name__)
         if name not in _HOMES:
             raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
         return getattr(import_module(_HOMES[name], __name__), name)

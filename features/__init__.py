@@ -1,1 +1,71 @@
-"""Features: pure functions of arrays, from amplitude statistics to the crank-angle map."""
+"""Features: pure functions of arrays, from amplitude statistics to the crank-angle map.
+
+The public names below load on first use; spectra and orbits take a recording, an array or a table::
+
+    wearstate.features.spectrum(recording).plot()
+"""
+
+from importlib import import_module
+
+TYPE_CHECKING = False  # as in the package itself
+if TYPE_CHECKING:
+    from typing import Any
+
+    from .catalogue.analysis import Settings as Settings
+    from .catalogue.curves import Orbit as Orbit
+    from .catalogue.curves import Spectrum as Spectrum
+    from .catalogue.curves import envelope_spectrum as envelope_spectrum
+    from .catalogue.curves import frf as frf
+    from .catalogue.curves import orbit as orbit
+    from .catalogue.curves import order_spectrum as order_spectrum
+    from .catalogue.curves import spectrum as spectrum
+    from .catalogue.row import feature_names as feature_names
+    from .catalogue.row import feature_row as feature_row
+    from .catalogue.transformer import SignalFeatures as SignalFeatures
+    from .response.modal import Modes as Modes
+    from .response.modal import modal_fit as modal_fit
+    from .response.transfer import Transfer as Transfer
+    from .rotation.orbit import full_spectrum as full_spectrum
+    from .rotation.tacholess_speed import tacholess_speed as tacholess_speed
+    from .signal.cepstrum import cepstrum as cepstrum
+    from .signal.envelope import bearing_frequencies as bearing_frequencies
+    from .signal.envelope import kurtogram as kurtogram
+    from .signal.iso import velocity_rms as velocity_rms
+
+_HOMES = {
+    "Modes": ".response.modal",
+    "Orbit": ".catalogue.curves",
+    "Settings": ".catalogue.analysis",
+    "SignalFeatures": ".catalogue.transformer",
+    "Spectrum": ".catalogue.curves",
+    "Transfer": ".response.transfer",
+    "bearing_frequencies": ".signal.envelope",
+    "cepstrum": ".signal.cepstrum",
+    "envelope_spectrum": ".catalogue.curves",
+    "feature_names": ".catalogue.row",
+    "feature_row": ".catalogue.row",
+    "frf": ".catalogue.curves",
+    "full_spectrum": ".rotation.orbit",
+    "kurtogram": ".signal.envelope",
+    "modal_fit": ".response.modal",
+    "orbit": ".catalogue.curves",
+    "order_spectrum": ".catalogue.curves",
+    "spectrum": ".catalogue.curves",
+    "tacholess_speed": ".rotation.tacholess_speed",
+    "velocity_rms": ".signal.iso",
+}
+"""Public name -> module that defines it; the block above tells type checkers the same."""
+
+__all__ = [*_HOMES]
+
+if not TYPE_CHECKING:  # a type checker would take it that there is every name
+
+    def __getattr__(name: str) -> "Any":
+        """Import the public name on first use."""
+        if name not in _HOMES:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        return getattr(import_module(_HOMES[name], __name__), name)
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -23,6 +23,15 @@ with wearstate.DataSet("data.h5") as data:
     record: wearstate.Recording = data[0]
 estimate = wearstate.load_model("model.wsm").estimate(record)
 low: float | None = estimate.low
+spectrum: wearstate.features.Spectrum = wearstate.features.spectrum(recording)
+x_axis: NDArray[np.float64] = wearstate.features.orbit(acceleration, 25_600.0).path.real
+table = wearstate.features.SignalFeatures(only=["rms"]).fit_transform([recording])
+bearing = wearstate.film.JournalBearing(diameter=0.1, length=0.05, clearance=1e-4, viscosity=0.02)
+ratio: float = wearstate.film.operate(bearing, speed=50.0, load=(0.0, -1e3)).eccentricity_ratio
+model: wearstate.WearModel = wearstate.train("data.h5", seed=1)
+page: str = wearstate.report(recording, model).html()
+text: str = wearstate.evaluate(model, "data.h5", quick=True).text
+verdict: str = wearstate.align.align(scene).verdict
 
 wearstate.simulat(scene, seed=1)  # error: attr-defined
 wearstate.simulate(scene, sed=1)  # error: call-arg
@@ -30,4 +39,6 @@ wearstate.simulate(scene, seed="1")  # error: arg-type
 wearstate.simulate(1)  # error: arg-type
 print(wearstate.simulate(scene).signals)  # error: attr-defined
 wearstate.load_scene("bilge-pump").duration = 2.0  # error: misc
+wearstate.features.spectrums(recording)  # error: attr-defined
+wearstate.film.operate(bearing, speed="50")  # error: arg-type
 grade: str = estimate.grade  # error: assignment

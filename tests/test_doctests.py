@@ -11,8 +11,11 @@ MODULES = ["wearstate"] + [
     info.name
     for info in pkgutil.walk_packages(wearstate.__path__, "wearstate.")
     if not info.name.endswith("__main__")  # importing it runs the command line
-    and info.name.split(".")[1] in {"sim", "features", "datasets", "diagnose"}
+    and info.name.split(".")[1] in {"sim", "features", "datasets", "diagnose", *wearstate._MODULES}
 ]
+
+USE_A_MODEL = ("wearstate.diagnose.workflow.", "wearstate.diagnose.wear_model.file")
+"""Their examples find a data set pump.h5 and a model pump.wsm trained on it."""
 
 
 def test_the_walk_finds_the_library():
@@ -21,8 +24,11 @@ def test_the_walk_finds_the_library():
 
 
 @pytest.mark.parametrize("name", MODULES)
-def test_docstrings(name, tmp_path, monkeypatch):
+def test_docstrings(name, tmp_path, monkeypatch, request):
     module = importlib.import_module(name)
+    if name.startswith(USE_A_MODEL):
+        for file, fixture in (("pump.h5", "small_set"), ("pump.wsm", "small_model")):
+            (tmp_path / file).symlink_to(request.getfixturevalue(fixture))
     monkeypatch.chdir(tmp_path)  # an example that writes a file leaves none behind
     failed, _ = doctest.testmod(module, optionflags=doctest.NORMALIZE_WHITESPACE)
     assert failed == 0

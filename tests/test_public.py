@@ -29,10 +29,14 @@ def told_to_checkers(path):
     }
 
 
-def test_type_checkers_and_python_find_the_same_names():
-    assert told_to_checkers(ROOT / "__init__.py") == wearstate._HOMES
-    for name, home in wearstate._HOMES.items():
-        assert getattr(wearstate, name).__module__ == f"wearstate{home}", name
+@pytest.mark.parametrize("package", [wearstate, wearstate.features])
+def test_type_checkers_and_python_find_the_same_names(package):
+    modules = dict.fromkeys(getattr(package, "_MODULES", ()), ".")
+    told = told_to_checkers(Path(package.__file__))
+    assert told == package._HOMES | modules
+    for name, home in package._HOMES.items():
+        assert getattr(package, name).__module__ == f"{package.__name__}{home}", name
+    assert all(getattr(wearstate, name).__name__ == f"wearstate.{name}" for name in modules)
 
 
 def expected_errors(text):

@@ -5,6 +5,7 @@ import pickle
 import numpy as np
 import pandas as pd
 import pytest
+import wearstate
 from numpy.testing import assert_allclose, assert_array_equal
 from sklearn.base import clone
 from sklearn.linear_model import Ridge
@@ -12,9 +13,9 @@ from sklearn.model_selection import GridSearchCV
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 from sklearn.utils import get_tags
-from wearstate.diagnose.feature_rows.transformer import SignalFeatures
 from wearstate.features.catalogue.analysis import Settings
 from wearstate.features.catalogue.row import feature_row
+from wearstate.features.catalogue.transformer import SignalFeatures
 from wearstate.features.signal import envelope
 
 FS = 8192.0
@@ -147,3 +148,78 @@ def test_other_records_are_refused():
     signals[2, 1, 5] = np.nan
     with pytest.raises(ValueError, match=r"record 2: ch_1 has 1 non-finite samples"):
         fitted.transform(signals)
+
+
+def recordings(n=4):
+    return [
+        wearstate.Recording.from_array(one, FS, ["x", "y", "tacho"], tacho="tacho")
+        for one in records(n)
+    ]
+
+
+def test_recordings_give_the_rows_of_their_arrays():
+    # recordings hold float32
+    expected = SignalFeatures(FS, channel_names=["x", "y"], tacho=2).fit_transform(
+        records().astype(np.float32)
+    )
+    found = SignalFeatures().fit_transform(recordings())
+    pd.testing.assert_frame_equal(found, expected)
+
+
+def test_recordings_in_a_pipeline_and_a_search():
+    size = 1.0 + np.arange(24)
+    model = make_pipeline(SignalFeatures(only=["rms"]), StandardScaler(), Ridge(1e-6))
+    search = GridSearchCV(model, {"signalfeatures__only": [["kurtosis"], ["rms"]]}, cv=3)
+    search.fit(recordings(24), size)
+    assert search.best_params_ == {"signalfeatures__only": ["rms"]}
+    # as of arrays above
+    assert_allclose(search.predict(recordings(24)), size, rtol=0.05)
+
+
+def test_a_data_set_is_a_list_of_recordings(small_set):
+    with wearstate.DataSet(small_set) as data:
+        wear = data.manifest[data.attributes.severities[0]].to_numpy()
+        model = make_pipeline(
+            SignalFeatures(only=["rms", "band_levels"]), StandardScaler(), Ridge()
+        )
+        search = GridSearchCV(model, {"ridge__alpha": [0.1, 1e6]}, cv=3)
+        search.fit(data, wear)
+        assert search.best_params_ == {"ridge__alpha": 0.1}
+        assert list(search.predict(data)) == list(
+            search.predict([data[i] for i in range(len(data))])
+        )
+
+
+def test_recordings_of_other_lengths_and_layouts():
+    short = wearstate.Recording.from_array(
+        records(1)[0, :, : N // 2], FS, ["x", "y", "tacho"], tacho="tacho"
+    )
+    whole = recordings(2)
+    transformer = SignalFeatures(only=["rms"]).fit([*whole, short])
+    assert transformer.n_samples_in_ == N // 2
+    assert transformer.transform([short, *whole]).shape == (3, 2)
+    other = wearstate.Recording.from_array(records(1)[0, :2], FS, ["x", "z"])
+    with pytest.raises(ValueError, match=r"of recording 1 must be .* import them alike"):
+        SignalFeatures().fit([whole[0], other])
+    with pytest.raises(ValueError, match=r"record 0: sample rate, .* of recording 0 must be"):
+        transformer.transform([other])
+
+
+@pytest.mark.parametrize(
+    ("options", "data", "message"),
+    [
+        ({"fs": FS}, recordings(1), "fs must be left out; the recordings have their own"),
+        ({}, records(1), r"fs = None must be given with an array"),
+        ({}, recordings(1)[0], "put it into brackets"),
+    ],
+)
+def test_what_a_recording_says_is_not_said_twice(options, data, message):
+    with pytest.raises(ValueError, match=message):
+        SignalFeatures(**options).fit(data)
+
+
+def test_arrays_and_recordings_do_not_mix():
+    with pytest.raises(ValueError, match="must be recordings as in fit"):
+        SignalFeatures(only=["rms"]).fit(recordings(1)).transform(records(1))
+    with pytest.raises(ValueError, match="must be an array as in fit"):
+        SignalFeatures(FS, tacho=2, only=["rms"]).fit(records(1)).transform(recordings(1))

@@ -7,7 +7,7 @@ bin=$(cd "$1" && pwd)
 scratch=$(mktemp -d)
 trap 'rm -rf "$scratch"' EXIT
 mkdir "$scratch/wearstate"
-for part in __init__.py __main__.py py.typed sim features datasets diagnose; do
+for part in __*.py align.py contact.py crank.py film.py shaft.py py.typed sim features datasets diagnose; do
   ln -s "$PWD/$part" "$scratch/wearstate/$part"
 done
 cp pyproject.toml "$scratch"

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from ... import __version__
 from ...sim.atomic import fresh_name, put_in_place
-from ...sim.output.recording import DataError, Recording, SignalLayout
+from ...sim.output.recording import DataError, Recording, SignalLayout, html_table
 from ...sim.output.sensor import Channel
 from .hdf5_values import HDF5_FAULTS, fill_room, is_plain, make_room, plain_values, write_values
 from .machines import machine_identities
@@ -229,12 +229,6 @@ class DataSet:
     path : str or Path
         A finished file of this program.
 
-    Raises
-    ------
-    DataError
-        There is no such file, it is unfinished (``.part``), truncated, damaged or altered, of
-        another program, or of another schema version.
-
     Attributes
     ----------
     attributes : Attributes
@@ -245,6 +239,12 @@ class DataSet:
         Labels, conditions and numerics, structured as in the file.
     unhashed : tuple of str
         Those of `HASHES` that the file lacks: one made before there were hashes.
+
+    Raises
+    ------
+    DataError
+        There is no such file, it is unfinished (``.part``), truncated, damaged or altered, of
+        another program, or of another schema version.
 
     Examples
     --------
@@ -276,6 +276,24 @@ class DataSet:
 
     def __len__(self) -> int:
         return len(self.rows)
+
+    def __repr__(self) -> str:
+        """File, records, length, rate, channels and label."""
+        return f"<DataSet {self.path.name}, {', '.join(self._facts)}>"
+
+    def _repr_html_(self) -> str:
+        """For notebooks: the same and the first rows of the manifest."""
+        head = self.manifest.iloc[:5]
+        rows = [tuple(row) for row in head.itertuples(index=False)]
+        return html_table(f"{self.path.name}, {', '.join(self._facts)}", list(head.columns), rows)
+
+    @property
+    def _facts(self) -> tuple[str, ...]:
+        head = self.attributes
+        records, _, samples = self.stored_shape
+        label = f"label {' '.join(head.severities)}" if head.severities else "no wear label"
+        length = f"{records} {head.origin} records of {samples / head.sample_rate:.4g} s"
+        return length, f"{head.sample_rate:.6g} Hz", " ".join(head.names), label
 
     @cached_property
     def manifest(self) -> pd.DataFrame:

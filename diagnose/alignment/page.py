@@ -129,15 +129,17 @@ def align(
     mend : bool
         Look for moves.
     prefer, target : str
-    margin : float
         As of :func:`wearstate.sim.alignment.calibration.calibrate`; the target "vibration" is that
         of :func:`wearstate.diagnose.alignment.quiet_moves.quiet_moves`.
+    margin : float
+        As of :func:`wearstate.sim.alignment.calibration.calibrate`.
     jack : str, optional
         Bearing to jack.
 
     Returns
     -------
     Alignment
+        States, moves and verdict.
 
     Raises
     ------

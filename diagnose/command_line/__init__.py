@@ -8,5 +8,5 @@ It may import ``sim.atomic``, ``sim.output``, ``sim.scene``, ``sim.machine``, ``
 ``diagnose.wear_model``, ``diagnose.nameplate``, ``diagnose.report``, ``diagnose.class_model``,
 ``diagnose.evaluation``, ``diagnose.blindspots``, ``diagnose.charts``, ``diagnose.stability``,
 ``diagnose.shaft_tests``, ``diagnose.alignment``, ``diagnose.literature``, ``diagnose.sweep``,
-``diagnose.inspect``.
+``diagnose.inspect``, ``diagnose.workflow``.
 """

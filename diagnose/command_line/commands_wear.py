@@ -326,31 +326,29 @@ def _judge(
     given: Mapping[str, Any],
 ) -> None:
     """Of a finished model, or by splits; text or JSON, and a file if asked for."""
-    from ...datasets.file.views import views_of
-    from ..evaluation.evaluate import evaluate_model
     from ..evaluation.figure import save_evaluation
-    from ..evaluation.splits import ALL_SPLITS, case_of, evaluate_splits, one_split
-    from ..evaluation.text import score_lines, splits_text
+    from ..evaluation.splits import ALL_SPLITS, case_of, evaluate_splits
+    from ..evaluation.text import splits_text
     from ..wear_model.file import load_model
+    from ..workflow.evaluate import evaluate as judge
 
     model = load_model(model_file)
-    shared = {key: given[key] for key in ("healthy", "quick", "cache")}
     with progress_bar("features") as progress:
-        ways: dict[str, Any] = {**shared, "seed": seed, "jobs": jobs, "progress": progress}
+        ways: dict[str, Any] = {"quick": given["quick"], "cache": given["cache"]}
+        ways |= {"seed": seed, "jobs": jobs, "progress": progress}
         if given["retrain"]:
             names = ALL_SPLITS if "all" in given["retrain"] else given["retrain"]
-            case = case_of(model, data, **ways)
+            case = case_of(model, data, healthy=given["healthy"], **ways)
             result = evaluate_splits(case, names, say=lambda text: click.echo(text, err=True))
-            whole, text = result, splits_text(result)
-        else:
-            ways |= {"trained_on": given["trained_on"], "split": given["split"]}
-            ways |= {"views": views_of(given["joined"])}
-            result = evaluate_model(model, data, **ways)
-            whole = one_split(result, model, data, seed)
-            text = "\n".join(score_lines(result, model.card))
+            if output is not None:
+                save_evaluation(result, output, notice=model.notice, force=force)
+            emit(result, as_json, splits_text(result))
+            return
+        ways |= {key: given[key] for key in ("trained_on", "split", "joined")}
+        found = judge(model, data, baseline=given["healthy"], **ways)
     if output is not None:
-        save_evaluation(whole, output, notice=model.notice, force=force)
-    emit(result, as_json, text)
+        found.save(output, force=force)
+    emit(found.result, as_json, found.text)
 
 
 _ACROSS = 120  # records
@@ -556,10 +554,7 @@ _Verdict = tuple[str, int | None]
 def _report_one(told: _ReportTask) -> list[_Verdict]:
     """Report on one recording."""
     from ...datasets.measured.recording import read_recording, with_views
-    from ..nameplate.cautions import known_beside
-    from ..pages.page import save_page
-    from ..report.text import report_text
-    from ..report.verdict import report_table
+    from ..workflow.report import judged
 
     recording = read_recording(
         told.source,
@@ -567,28 +562,21 @@ def _report_one(told: _ReportTask) -> list[_Verdict]:
         tacho=told.given["tacho"],
         pulses_per_revolution=told.given["pulses_per_revolution"],
     )
-    recording = with_views(recording, told.source, told.given["record"], told.views)
-    baseline = told.baselines.of(recording) if told.baselines else None
-    beside = known_beside(told.plate, recording, told.model.card, baseline)
-    estimate = told.model.estimate(recording, baseline, **beside)
-    table = report_table(
-        recording,
+    found = judged(
+        with_views(recording, told.source, told.given["record"], told.views),
         told.model,
-        estimate,
-        machine=told.machine,
-        baseline=baseline,
+        baselines=told.baselines,
         plate=told.plate,
+        machine=told.machine,
         files={"recording": told.source, "model": told.model_file},
     )
+    table, text = found.table, found.text
     if told.output is not None:
-        from ..report.page import report_html
-
-        page = report_html(table, recording, told.model, baseline=baseline)
-        save_page(page, told.output, force=told.force)
+        found.save(told.output, force=told.force)
         table["html"] = str(told.output)
-    text = report_text(table) + (f"\nPage        {told.output}" if told.output else "")
+        text += f"\nPage        {told.output}"
     click.echo(json_text(table) if told.as_json else text)
-    return [(table["estimate"]["verdict"], estimate.grade)]
+    return [(table["estimate"]["verdict"], found.estimate.grade)]
 
 
 def _report_many(told: _ReportTask) -> list[_Verdict]:

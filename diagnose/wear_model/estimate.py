@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...features.response.transfer import FrfReference
-from ...sim.output.recording import DataError, Recording
+from ...sim.output.recording import DataError, Recording, html_table
 from ..feature_rows.feature_choice import choice_in
 from ..feature_rows.feature_table import FeatureSelection, held_against, recording_features
 from ..feature_rows.healthy import Baseline, referenced_rows
@@ -100,7 +100,7 @@ class Head:
         return np.asarray(1 / (1 + np.exp(-(self.offset + self.slope * self.blend.predict(rows)))))
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Estimate:
     """What a model says of one recording.
 
@@ -180,8 +180,18 @@ class Estimate:
         """For JSON."""
         return asdict(self)
 
+    def __repr__(self) -> str:
+        """Verdict, and what it says: the wear with its interval, or why there is none."""
+        if self.severity is None or self.low is None or self.high is None:
+            return f"<Estimate {self.verdict}: {'; '.join(self.reasons) or 'no grade'}>"
+        low, high = 1e3 * self.low, 1e3 * self.high
+        return (
+            f"<Estimate {self.verdict}: {self.grade_name}, {1e3 * self.severity:.3g} mm, "
+            f"{100 * self.coverage:.0f} % within {low:.3g} to {high:.3g} mm>"
+        )
 
-@dataclass(frozen=True, kw_only=True)
+
+@dataclass(frozen=True, kw_only=True, repr=False)
 class WearModel:
     """A trained wear model.
 
@@ -208,6 +218,24 @@ class WearModel:
     levels: Levels
     heads: tuple[Head, ...] = ()
     card: dict[str, Any]
+
+    def __repr__(self) -> str:
+        """What it estimates, from what, and what it was trained on."""
+        return f"<WearModel of {self.card['severity']}, {'; '.join(self._facts)}>"
+
+    def _repr_html_(self) -> str:
+        """For notebooks: the same as a table, with the notice."""
+        rows = [(fact,) for fact in (*self._facts, self.notice) if fact]
+        return html_table(f"wear model of {self.card['severity']}", ("model",), rows)
+
+    @property
+    def _facts(self) -> tuple[str, ...]:
+        trained, origin = self.card["trained_on"], self.card["origin"]
+        return (
+            f"{len(self.names)} features",
+            f"{trained['records']} {origin} records of {trained['draws']} machine draws",
+            self.mode,
+        )
 
     @property
     def notice(self) -> str:

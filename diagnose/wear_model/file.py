@@ -54,6 +54,7 @@ def save_model(model: WearModel, path: str | Path, *, force: bool = False) -> No
     Parameters
     ----------
     model : WearModel
+        What :func:`wearstate.train` gives.
     path : str or Path
         Usually ``*.wsm``.
     force : bool
@@ -65,6 +66,10 @@ def save_model(model: WearModel, path: str | Path, *, force: bool = False) -> No
         The file exists, or its folder does not.
     ModelError
         The model could not be read again.
+
+    Examples
+    --------
+    >>> save_model(load_model("pump.wsm"), "copy.wsm")
     """
     checked(_Card, json.loads(json.dumps(model.card)), path, "card.json")  # as it will be read
     _check_structure(model, path)
@@ -85,12 +90,18 @@ def load_model(path: str | Path) -> WearModel:
     Returns
     -------
     WearModel
+        As it was saved.
 
     Raises
     ------
     ModelError
         No such file, not a wear model, damaged, changed, of another version of the format or of
         the features, or forged so that its parts do not fit each other; the text says what helps.
+
+    Examples
+    --------
+    >>> load_model("pump.wsm").mode
+    'cold'
     """
     bundle = load_bundle(path, _KIND)
     checked(_Card, bundle.card, path, "card.json")

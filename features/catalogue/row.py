@@ -137,7 +137,9 @@ def feature_names(
         Whether the force is that of a hammer; its blocks follow the record, however short.
     settings : Settings
         Bands, bins and orders.
-    feature_set, only
+    feature_set : {"standard", "core", "complete"}
+        As in `feature_row`.
+    only : sequence of str, optional
         As in `feature_row`.
 
     Returns
@@ -320,6 +322,10 @@ class Recorded(Protocol):
     @property
     def vibration_quantities(self) -> tuple[str, ...]:
         """Quantity of each."""
+
+    @property
+    def units(self) -> Mapping[str, str]:
+        """Unit of every channel, by name."""
 
     @property
     def sample_rate(self) -> float:

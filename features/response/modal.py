@@ -1112,7 +1112,7 @@ def modal_fit(
     Parameters
     ----------
     frequency : array_like, shape (n_lines,)
-        [Hz]
+        Rising [Hz].
     value : array_like, shape (n_lines,) or (n_channels, n_lines)
         Response functions to one force.
     band : tuple of float, optional
@@ -1121,14 +1121,17 @@ def modal_fit(
         Keep only so many: those that stand out highest. All that the data determine by default.
     quantity : str
         What `value` is: ``receptance``, ``mobility`` or ``accelerance``.
-    deviation, decay
+    deviation : array_like, optional
         As in `fit_modes`.
+    decay : float
+        As in `fit_modes` [1/s].
     highest_order : int, optional
         Highest order of the stabilisation; by default 30, or a third of the lines.
 
     Returns
     -------
     Modes
+        By rising frequency.
 
     Raises
     ------

@@ -7,6 +7,7 @@ what is told.
 """
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -26,7 +27,7 @@ LEAST_DIP = 6.0
 """Depth of an antiresonance below the lower of the two crests beside it [dB]."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Transfer:
     """Transfer functions of a test, one row a path.
 
@@ -48,6 +49,8 @@ class Transfer:
         By a hammer.
     decay : float
         As in :class:`wearstate.features.response.frf.Spectra` [1/s].
+    paths, units : tuple of str
+        ``response / force`` and unit of each path; empty where the channels had no names.
 
     Examples
     --------
@@ -65,6 +68,52 @@ class Transfer:
     words: str
     struck: bool = False
     decay: float = 0.0
+    paths: tuple[str, ...] = ()
+    units: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        paths = ", ".join(self.paths) or f"{len(self.value)} paths"
+        last = f"{self.frequency[-1]:.6g} Hz" if len(self.frequency) else "none"
+        return f"<Transfer {len(self.frequency)} lines to {last}, {self.words}: {paths}>"
+
+    def plot(self, *, ax: Any = None) -> Any:
+        """Draw magnitude and coherence of every path over frequency.
+
+        Parameters
+        ----------
+        ax : sequence of two matplotlib.axes.Axes, optional
+            For magnitude and coherence; a new figure by default.
+
+        Returns
+        -------
+        ndarray of matplotlib.axes.Axes, shape (2,)
+            The axes, to draw into or to save by their ``figure``.
+
+        Examples
+        --------
+        >>> force = np.random.default_rng(0).standard_normal((1, 4096))
+        >>> measured_transfer(force, 3 * force, 1024.0, nperseg=256).plot()[1].get_ylabel()
+        'coherence [-]'
+        """
+        if ax is None:
+            from matplotlib import pyplot as plt
+
+            _, ax = plt.subplots(
+                2, sharex=True, figsize=(8.0, 4.5), height_ratios=(2, 1), layout="constrained"
+            )
+        magnitude, coherence = np.ravel(ax)
+        paths = self.paths or tuple(f"path {i}" for i in range(len(self.value)))
+        for name, value, share in zip(paths, self.value, self.coherence, strict=True):
+            magnitude.semilogy(self.frequency, np.abs(value), lw=0.8, label=name)
+            coherence.plot(self.frequency, share, lw=0.8)
+        unit = f" [{self.units[0]}]" if len(set(self.units)) == 1 else ""
+        magnitude.set_ylabel(f"magnitude{unit}")
+        magnitude.legend(fontsize="small")
+        coherence.set(xlabel="frequency [Hz]", ylabel="coherence [-]", ylim=(0, 1.05))
+        for each in (magnitude, coherence):
+            each.margins(x=0)
+            each.grid(alpha=0.3)
+        return np.array([magnitude, coherence])
 
     @property
     def heard(self) -> NDArray[np.bool_]:

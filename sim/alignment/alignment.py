@@ -376,7 +376,9 @@ def reactions(
     Parameters
     ----------
     line : AlignmentLine
+        Beam and seats.
     condition : Condition
+        State of the ship.
     unilateral : bool
         False lets the bearings pull, as most class calculations do; a negative reaction then
         says that the bearing lifts.
@@ -384,6 +386,7 @@ def reactions(
     Returns
     -------
     LineState
+        Reactions, deflection and slopes.
 
     Raises
     ------
@@ -419,6 +422,7 @@ def influence(line: AlignmentLine, state: LineState | None = None) -> Vector:
     Parameters
     ----------
     line : AlignmentLine
+        Beam and seats.
     state : LineState, optional
         Points that it lifts stay away; by default all are in contact.
 
@@ -504,6 +508,16 @@ LIMIT_UNITS = {
 def check(state: LineState) -> tuple[Check, ...]:
     """Every limit of every bearing against a state; bearings without a limit give none.
 
+    Parameters
+    ----------
+    state : LineState
+        Of :func:`reactions`.
+
+    Returns
+    -------
+    tuple of Check
+        In the order of the bearings.
+
     Examples
     --------
     >>> from wearstate.sim.beam.beam import Section, assemble_beam
@@ -536,6 +550,11 @@ def _limit_rows(seat: Seat, state: LineState, i: int) -> Iterator[dict[str, Any]
 
 def span_loads(line: AlignmentLine) -> Vector:
     """What each bearing would carry if the shaft were hinged at every bearing.
+
+    Parameters
+    ----------
+    line : AlignmentLine
+        Beam and seats.
 
     Returns
     -------

@@ -97,9 +97,11 @@ def jacking(
     Parameters
     ----------
     line : AlignmentLine
+        Beam and seats.
     bearing : str
         Name of the seat.
     condition : Condition
+        State of the ship.
     station : float, optional
         Of the jack, a node outside all bearings [m]; by default the nearest to the bearing.
     n_lifts : int
@@ -108,6 +110,7 @@ def jacking(
     Returns
     -------
     Jacking
+        Load over lift, and the reaction.
 
     Raises
     ------
@@ -299,6 +302,7 @@ def gap_and_sag(
     Parameters
     ----------
     line : AlignmentLine
+        Beam and seats.
     cuts : sequence of float
         Stations of the open couplings [m], inside the shaft.
     supports : sequence of Seat

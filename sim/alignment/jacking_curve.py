@@ -68,6 +68,7 @@ def fit_curve(lifts: ArrayLike, loads: ArrayLike) -> CurveFit:
     Returns
     -------
     CurveFit
+        The line, with standard deviations.
 
     Raises
     ------

@@ -364,7 +364,7 @@ def assemble_beam(
     theory : str
         One of ``THEORIES``.
     shear_coefficient : float or str
-        k in (0, 1], the share of the cross-section that carries the shear, or "cowper" for
+        Share k in (0, 1] of the cross-section that carries the shear, or "cowper" for
         Cowper's of each section; must be given for *timoshenko*, has no part in the others.
     gravity : float
         Downward [m/s^2].
@@ -372,6 +372,7 @@ def assemble_beam(
     Returns
     -------
     Beam
+        Sparse matrices and the load.
 
     Raises
     ------
@@ -453,7 +454,7 @@ def cowper_coefficient(poisson: float, diameter_ratio: float = 0.0) -> float:
     Returns
     -------
     float
-        k, the shear area over the area.
+        Shear area over the area, k.
 
     Raises
     ------

@@ -452,6 +452,7 @@ def modes(
     Parameters
     ----------
     rotor : Rotor
+        Shaft on its supports.
     speed : float
         [rad/s], may be negative.
     count : int
@@ -518,7 +519,37 @@ def natural_frequencies(
     most_damping: float = 1.0,
     method: str = "auto",
 ) -> Vector:
-    """Undamped natural frequencies ``|lambda| / 2 pi`` [Hz]; arguments as :func:`modes`."""
+    """Undamped natural frequencies ``|lambda| / 2 pi`` of a rotor.
+
+    Parameters
+    ----------
+    rotor : Rotor
+        Shaft on its supports.
+    speed : float
+        Of the shaft [rad/s], may be negative.
+    count : int
+        Of modes wanted, >= 1.
+    most_damping : float
+        In (0, 1]: modes of a higher damping ratio are left out.
+    method : str
+        As of :func:`modes`.
+
+    Returns
+    -------
+    numpy.ndarray [shape=(count,) or fewer]
+        Rising [Hz].
+
+    Examples
+    --------
+    A free bar has rigid motions of no frequency in both planes, and ``(4.730 / l)^2 sqrt(EI / m)``:
+
+    >>> from .beam import Section, assemble_beam
+    >>> bar = Section(length=2.0, outer_diameter=0.05, young=2e11, shear_modulus=8e10,
+    ...               density=7850.0)
+    >>> beam = assemble_beam([bar], theory="euler-bernoulli", longest_element=0.1)
+    >>> natural_frequencies(Rotor(beam=beam, supports=()), count=6).round(2)[4:]
+    array([56.17, 56.17])
+    """
     found = modes(rotor, speed, count, most_damping=most_damping, method=method)
     return found.undamped_frequency_hz
 
@@ -792,8 +823,8 @@ def campbell(
     Parameters
     ----------
     rotor : Rotor or callable
-        speed [rad/s] -> Rotor, where films make stiffness and damping depend on the speed; all
-        with the same coordinates.
+        A function of the speed [rad/s] gives one, where films make stiffness and damping depend
+        on the speed; all with the same coordinates.
     speeds : array_like [shape=(n_speeds,)]
         [rad/s], rising or falling throughout.
     count : int
@@ -805,6 +836,7 @@ def campbell(
     Returns
     -------
     Campbell
+        Every mode at every speed.
 
     Raises
     ------
@@ -1055,6 +1087,7 @@ def unbalance_response(
     speeds : array_like [shape=(n_speeds,)]
         >= 0 [rad/s].
     unbalances : sequence of Unbalance
+        Masses off the axis.
 
     Returns
     -------
@@ -1116,8 +1149,10 @@ def orbit_axes(y: Complex, z: Complex) -> tuple[Vector, Vector]:
 
     Returns
     -------
-    major, minor : numpy.ndarray
-        [m]; the minor one is negative where the orbit runs backward, from z to y.
+    major : numpy.ndarray
+        Major semi-axis [m].
+    minor : numpy.ndarray
+        Minor semi-axis [m]; negative where the orbit runs backward, from z to y.
 
     Examples
     --------

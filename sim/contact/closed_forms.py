@@ -67,13 +67,15 @@ def ideal_crank(
     speed : float
         Crank speed [rad/s].
     crank_radius, rod_length : float
-        [m]
-    rod_mass, piston_mass : float
-        [kg]
+        Between the centres of the joints [m].
+    rod_mass : float
+        Of the whole rod [kg].
     rod_centre : float
         Distance of the rod's centre of mass from the wrist pin [m].
     rod_inertia : float
         About the centre of mass [kg m^2].
+    piston_mass : float
+        Piston with crosshead and wrist pin [kg].
     piston_force : numpy.ndarray or float
         Pressure force on the piston, positive towards the crank [N].
     gravity_x, gravity_y : float
@@ -176,10 +178,14 @@ def effective_modulus(young_1: float, poisson_1: float, young_2: float, poisson_
 
     Parameters
     ----------
-    young_1, young_2 : float
-        Young's moduli [Pa], > 0.
-    poisson_1, poisson_2 : float
-        Poisson's ratios, from -1 to 0.5.
+    young_1 : float
+        Young's modulus of the first body [Pa], > 0.
+    poisson_1 : float
+        Its Poisson's ratio, from -1 to 0.5.
+    young_2 : float
+        Young's modulus of the second body [Pa], > 0.
+    poisson_2 : float
+        Its Poisson's ratio, from -1 to 0.5.
 
     Returns
     -------

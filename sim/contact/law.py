@@ -242,7 +242,7 @@ def hysteresis(law: str, restitution: float) -> float:
     Returns
     -------
     float
-        a of ``F = F_e(d) (1 + a d' / d'_0)``, >= 0.
+        Factor a of ``F = F_e(d) (1 + a d' / d'_0)``, >= 0.
 
     Raises
     ------
@@ -299,7 +299,7 @@ def effective_restitution(factor: float) -> float:
     Parameters
     ----------
     factor : float
-        a of ``F = F_e(d) (1 + a d' / d'_0)``, >= 0 and finite.
+        Factor a of ``F = F_e(d) (1 + a d' / d'_0)``, >= 0 and finite.
 
     Returns
     -------
@@ -356,7 +356,7 @@ def floored_restitution(factor: float, impact_speed: float, speed_floor: float) 
     Parameters
     ----------
     factor : float
-        a of the law, >= 0.
+        Factor a of the law, >= 0.
     impact_speed, speed_floor : float
         Approach speed at first touch, and its floor, both > 0 [m/s].
 

@@ -231,6 +231,16 @@ def short_attitude(eccentricity_ratio: float) -> float:
 
     ``tan phi = pi sqrt(1 - e^2) / (4 e)``, from pi/2 at the centre to 0 at the wall.
 
+    Parameters
+    ----------
+    eccentricity_ratio : float
+        From 0 to below 1.
+
+    Returns
+    -------
+    float
+        From the load to the journal centre [rad].
+
     Examples
     --------
     >>> round(math.degrees(short_attitude(0.266298)), 2)
@@ -371,7 +381,7 @@ def equilibrium(
     rung : str
         ``"short"``, ``"long"``, ``"finite"`` or ``"direct"``.
     tilt : tuple of float
-        tilt_x, tilt_y, held while the centre moves.
+        Values of tilt_x and tilt_y, held while the centre moves.
     start : array_like [shape=(2,)], optional
         Position to start from; by default that of a short bearing.
     tolerance : float
@@ -382,6 +392,7 @@ def equilibrium(
     Returns
     -------
     Equilibrium
+        Position, film and status.
 
     Raises
     ------
@@ -825,6 +836,7 @@ def coefficients(
     Parameters
     ----------
     found : Equilibrium
+        Of :func:`equilibrium` or :func:`at_eccentricity`.
     method : str
         ``"analytic"`` or ``"mesh"`` (rung *direct* only), or ``"displacement"``.
     tilt : bool
@@ -924,6 +936,11 @@ def _displaced(
 def friction(found: Equilibrium) -> float:
     """Friction on the journal, of ``eta omega R^2 L / C``.
 
+    Parameters
+    ----------
+    found : Equilibrium
+        Of :func:`equilibrium` or :func:`at_eccentricity`.
+
     Returns
     -------
     float
@@ -973,6 +990,16 @@ class Flow:
 
 def flow(found: Equilibrium) -> Flow:
     """Flow through the widest section and out of the ends.
+
+    Parameters
+    ----------
+    found : Equilibrium
+        Of :func:`equilibrium` or :func:`at_eccentricity`.
+
+    Returns
+    -------
+    Flow
+        Of ``R C N L``.
 
     Notes
     -----
@@ -1069,6 +1096,7 @@ def stability(c: Coefficients) -> Threshold:
     Returns
     -------
     Threshold
+        Speed, frequency and mass.
 
     Raises
     ------
@@ -1392,6 +1420,7 @@ def operate(
     Parameters
     ----------
     bearing : JournalBearing
+        In SI.
     speed : float
         Of the journal, turning from X to Y [rad/s].
     load : array_like [shape=(2,)], optional
@@ -1408,6 +1437,7 @@ def operate(
     Returns
     -------
     OperatingPoint
+        In SI.
 
     Raises
     ------

@@ -155,6 +155,17 @@ class FilmState:
     """Position and velocity of the journal: centre and tilt over C, rates by tau.
 
     The axis lies at ``(x + z tilt_x, y + z tilt_y)``, with z from -1/2 to 1/2.
+
+    Attributes
+    ----------
+    x, y : float
+        Place of the journal's centre over the radial clearance C.
+    x_rate, y_rate : float
+        Its change with tau, the angle that the shaft has turned [1/rad].
+    tilt_x, tilt_y : float
+        Slope of the axis times the length, over C.
+    tilt_x_rate, tilt_y_rate : float
+        Their change with tau [1/rad].
     """
 
     x: float
@@ -295,6 +306,18 @@ def groove_nodes(geometry: FilmGeometry) -> tuple[NDArray[np.int8], Array]:
 def film_gap(geometry: FilmGeometry, state: FilmState) -> Array:
     """Gap over C at the nodes [shape=(n_theta, n_z)]; negative where the journal cuts the bore.
 
+    Parameters
+    ----------
+    geometry : FilmGeometry
+        Bearing and mesh.
+    state : FilmState
+        Place of the journal.
+
+    Returns
+    -------
+    numpy.ndarray [shape=(n_theta, n_z)]
+        At the nodes, over C.
+
     Examples
     --------
     >>> gap = film_gap(FilmGeometry(length_to_diameter=1.0), FilmState(x=0.6, y=0.0, tilt_x=0.2))
@@ -324,6 +347,11 @@ def solve_short(
         Aligned.
     start : FilmSolution, optional
         Not needed by a closed form.
+
+    Returns
+    -------
+    FilmSolution
+        Pressure and force, with a status.
 
     Raises
     ------
@@ -370,11 +398,16 @@ def solve_long(
     Parameters
     ----------
     geometry : FilmGeometry
-        n_z does not matter.
+        Its ``n_z`` does not matter.
     state : FilmState
         Aligned.
     start : FilmSolution, optional
         Not needed.
+
+    Returns
+    -------
+    FilmSolution
+        Pressure and force, with a status.
 
     Raises
     ------
@@ -406,6 +439,11 @@ def solve_finite(
     start : FilmSolution, optional
         Not needed.
 
+    Returns
+    -------
+    FilmSolution
+        Pressure and force, with a status.
+
     Raises
     ------
     ValueError
@@ -433,9 +471,16 @@ def solve_direct(
     Parameters
     ----------
     geometry : FilmGeometry
+        Any bore, grooves and condition.
     state : FilmState
+        Also tilted.
     start : FilmSolution, optional
         Of the same mesh, nearby: its cavitated region is the first guess.
+
+    Returns
+    -------
+    FilmSolution
+        Pressure and force, with a status.
 
     Raises
     ------
@@ -548,9 +593,15 @@ def mesh_error(geometry: FilmGeometry, state: FilmState) -> MeshError:
     Parameters
     ----------
     geometry : FilmGeometry
-        n_theta even and n_z one more than a multiple of four, so that every second node makes a
-        mesh.
+        Of an even ``n_theta``, and an ``n_z`` one more than a multiple of four, so that every
+        second node makes a mesh.
     state : FilmState
+        Where the journal is.
+
+    Returns
+    -------
+    MeshError
+        Of the force.
 
     Raises
     ------

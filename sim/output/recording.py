@@ -113,10 +113,18 @@ class Recording(SignalLayout):
 
     Parameters
     ----------
+    sample_rate : float
+        In samples a second [Hz].
+    channels : tuple of Channel
+        One per row of the signal, names unique.
+    tacho : str, optional
+        Name of the tacho channel.
+    pulses_per_revolution : int
+        Of the tacho.
+    origin : {"simulated", "measured"}
+        Where the signals are from.
     signal : ndarray of shape (n_channels, n_samples)
         Finite, in the unit of each channel; stored as float32.
-    sample_rate, channels, tacho, pulses_per_revolution, origin
-        As of :class:`SignalLayout`.
     row : mapping
         Manifest values: conditions, severities, grade, numerics; may be empty.
     source : str

@@ -1251,7 +1251,7 @@ def flow_shape(angle: ArrayLike, crank_to_rod: float) -> NDArray[np.float64]:
     angle : array_like
         Crank angle [rad], 0 at the top dead centre.
     crank_to_rod : float
-        lambda, crank radius over rod length, from 0 to below 1.
+        Crank radius over rod length, lambda, from 0 to below 1.
 
     Returns
     -------
@@ -1278,6 +1278,18 @@ def _flow_slope(angle: ArrayLike, crank_to_rod: float) -> NDArray[np.float64]:
 
 def even_phases(cylinders: int, turn: float = 2 * math.pi) -> NDArray[np.float64]:
     """Crank offsets of cylinders spread evenly over a turn [rad].
+
+    Parameters
+    ----------
+    cylinders : int
+        Their number.
+    turn : float
+        Angle they share [rad].
+
+    Returns
+    -------
+    numpy.ndarray [shape=(cylinders,)]
+        From 0 on [rad].
 
     Examples
     --------
@@ -1310,7 +1322,7 @@ def flow_ripple(
     Parameters
     ----------
     crank_to_rod : float
-        lambda, crank radius over rod length, from 0 to below 1.
+        Crank radius over rod length, lambda, from 0 to below 1.
     phases : array_like [shape=(n_cylinders,)]
         Offsets of the cranks [rad], see :func:`even_phases`.
     double_acting : bool
@@ -1354,7 +1366,7 @@ def acceleration_constant(
     Parameters
     ----------
     crank_to_rod : float
-        lambda, crank radius over rod length, from 0 to below 1.
+        Crank radius over rod length, lambda, from 0 to below 1.
     phases : array_like [shape=(n_cylinders,)]
         Offsets of the cranks [rad], see :func:`even_phases`.
     double_acting : bool

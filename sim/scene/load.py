@@ -130,6 +130,11 @@ def all_condition_places() -> dict[str, ConditionPlace]:
 def scene_names() -> list[str]:
     """Names of the built-in scenes, sorted.
 
+    Returns
+    -------
+    list of str
+        What :func:`load_scene` and ``wearstate.simulate`` take.
+
     Examples
     --------
     >>> "bilge-pump" in scene_names()

@@ -354,6 +354,7 @@ def beam_film(
     Returns
     -------
     BeamFilm
+        Positions, reactions, coefficients and status.
 
     Raises
     ------
@@ -425,6 +426,7 @@ def supports(
     Parameters
     ----------
     found : BeamFilm
+        Of :func:`beam_film`.
     moments : bool
         False leaves out what has to do with slopes; so do the rungs without tilt.
     housing_masses : sequence of float, optional

@@ -93,6 +93,7 @@ def shaft_beam(scene: ShaftScene) -> Beam:
     Parameters
     ----------
     scene : ShaftScene
+        Of a propulsion shaft or a shaft rig.
 
     Returns
     -------
@@ -285,6 +286,7 @@ def alignment_line(scene: ShaftScene) -> AlignmentLine:
     Parameters
     ----------
     scene : ShaftScene
+        Of a propulsion shaft or a shaft rig.
 
     Returns
     -------
@@ -334,6 +336,7 @@ def alignment_conditions(scene: ShaftScene) -> dict[str, Condition]:
     Parameters
     ----------
     scene : ShaftScene
+        Of a propulsion shaft or a shaft rig.
 
     Returns
     -------
@@ -558,6 +561,7 @@ def shaft_state(
     Parameters
     ----------
     scene : ShaftScene
+        Of a propulsion shaft or a shaft rig.
     moves : mapping of str to float, optional
         Bearing -> by how much it is moved up [m].
     raise_on_failure : bool
@@ -566,6 +570,7 @@ def shaft_state(
     Returns
     -------
     ShaftState
+        Beam, films and rotor.
 
     Raises
     ------

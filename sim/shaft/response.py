@@ -72,7 +72,7 @@ def receptance(
     rotor : Rotor
         Shaft on its supports.
     frequencies : array-like [shape=(n_freq,)]
-        [Hz]
+        Of the forces [Hz].
     responses, forces : sequence of place
         Coordinates, or what :meth:`Rotor.dof` takes.
     speed : float or array-like [shape=(n_freq,)]
@@ -86,6 +86,7 @@ def receptance(
     Returns
     -------
     numpy.ndarray [shape=(n_freq, n_resp, n_force)]
+        Complex, the responses of every force.
 
     Raises
     ------
@@ -165,7 +166,41 @@ def accelerance(
     method: str = "direct",
     modes: int | None = None,
 ) -> Complex:
-    """Acceleration over force [m/(N s^2)]; as :func:`receptance`, times ``-w^2``."""
+    """Acceleration over force [m/(N s^2)]: :func:`receptance` times ``-w^2``.
+
+    Parameters
+    ----------
+    rotor : Rotor
+        Shaft on its supports.
+    frequencies : array-like [shape=(n_freq,)]
+        Of the forces [Hz].
+    responses, forces : sequence of place
+        Coordinates, or what :meth:`Rotor.dof` takes.
+    speed : float or array-like [shape=(n_freq,)]
+        Of the shaft [rad/s].
+    method : str
+        As of :func:`receptance`.
+    modes : int, optional
+        As of :func:`receptance`.
+
+    Returns
+    -------
+    numpy.ndarray [shape=(n_freq, n_resp, n_force)]
+        Complex, the responses of every force.
+
+    Examples
+    --------
+    A free shaft, pushed in its middle far below its first frequency, is a mass:
+
+    >>> from ..beam.beam import Section, assemble_beam
+    >>> bar = Section(length=2.0, outer_diameter=0.1, young=2.1e11, shear_modulus=8e10,
+    ...               density=7850.0)
+    >>> beam = assemble_beam([bar], theory="euler-bernoulli", longest_element=0.1)
+    >>> middle = [(1.0, "y")]
+    >>> value = accelerance(Rotor(beam=beam, supports=()), [0.5], middle, middle)[0, 0, 0]
+    >>> round(float(1 / value.real), 1), round(beam.weight / 9.80665, 1)
+    (123.3, 123.3)
+    """
     values = receptance(
         rotor, frequencies, responses, forces, speed=speed, method=method, modes=modes
     )

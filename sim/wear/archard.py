@@ -73,7 +73,7 @@ def sliding_work(force: ArrayLike, speed: ArrayLike, step: float) -> float:
     speed : array_like [shape=(n,)]
         Sliding speed, means over the same steps [m/s]; neither does its.
     step : float
-        [s]
+        Of time [s].
 
     Returns
     -------
@@ -110,7 +110,7 @@ def wear_volume(wear_rate: float, work: float) -> float:
     Returns
     -------
     float
-        [m^3]
+        Volume [m^3].
 
     Raises
     ------
@@ -320,7 +320,7 @@ def dufrane_depth(volume: float, clearance: float, radius: float, width: float) 
     Returns
     -------
     float
-        [m]
+        At the deepest place [m].
 
     Raises
     ------

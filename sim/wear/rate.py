@@ -79,6 +79,7 @@ def joint_wear(
     Returns
     -------
     JointWear
+        Power, and where it goes.
 
     Raises
     ------

@@ -1,6 +1,6 @@
-"""The catalogue as a scikit-learn transformer: an array of records in, a named table out."""
+"""The catalogue as a scikit-learn transformer: recordings or an array in, a named table out."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, Self
 
 import numpy as np
@@ -10,18 +10,25 @@ from sklearn.base import BaseEstimator, TransformerMixin
 from sklearn.utils import Tags
 from sklearn.utils.validation import check_is_fitted
 
-from ...features.catalogue.analysis import STANDARD, Settings
-from ...features.catalogue.catalogue import SetName
-from ...features.catalogue.row import feature_names, feature_row
+from .analysis import STANDARD, Settings
+from .catalogue import SetName
+from .needs import struck
+from .row import Recorded, feature_names, feature_row
+
+Records = Sequence[Recorded] | ArrayLike
+"""Recordings, or an array of records."""
 
 
 class SignalFeatures(TransformerMixin, BaseEstimator):  # type: ignore[misc]
-    """Features of every record of an array.
+    """Features of recordings, or of every record of an array, as a step of a scikit-learn pipeline.
+
+    Takes a list of recordings, an open :class:`wearstate.DataSet`, or an array. Recordings say
+    themselves what `fs` to `pulses_per_revolution` say of an array.
 
     Parameters
     ----------
-    fs : float
-        Sample rate [Hz].
+    fs : float, optional
+        Sample rate of an array [Hz].
     channel_names : sequence of str, optional
         Names of the channels but the tacho; ``ch_0``, ``ch_1``, … by default.
     quantities : sequence of str, optional
@@ -40,7 +47,10 @@ class SignalFeatures(TransformerMixin, BaseEstimator):  # type: ignore[misc]
     Attributes
     ----------
     n_channels_in_, n_samples_in_ : int
-        Shape of the records seen by `fit`.
+        Shape of the records seen by `fit`; of recordings, the shortest one.
+    layout_ : tuple or None
+        Sample rate, channels, quantities, whether there is a tacho, and its pulses per revolution,
+        of the recordings seen by `fit`; None of an array.
     feature_names_out_ : tuple of str
         Columns.
 
@@ -56,11 +66,15 @@ class SignalFeatures(TransformerMixin, BaseEstimator):  # type: ignore[misc]
     >>> table = SignalFeatures(8192.0, only=["rms", "kurtosis"]).fit_transform(records)
     >>> table.shape, list(table.columns)
     ((3, 4), ['ch_0.rms', 'ch_1.rms', 'ch_0.kurtosis', 'ch_1.kurtosis'])
+    >>> import wearstate
+    >>> recordings = [wearstate.Recording.from_array(r, 8192.0, ["a", "b"]) for r in records]
+    >>> SignalFeatures(only=["rms"]).fit_transform(recordings).shape
+    (3, 2)
     """
 
     def __init__(
         self,
-        fs: float,
+        fs: float | None = None,
         *,
         channel_names: Sequence[str] | None = None,
         quantities: Sequence[str] | None = None,
@@ -79,13 +93,14 @@ class SignalFeatures(TransformerMixin, BaseEstimator):  # type: ignore[misc]
         self.only = only
         self.settings = settings
 
-    def fit(self, X: ArrayLike, y: Any = None) -> Self:  # noqa: ARG002 - scikit-learn's signature
+    def fit(self, X: Records, y: Any = None) -> Self:  # noqa: ARG002 - scikit-learn's signature
         """Settle the columns.
 
         Parameters
         ----------
-        X : array_like, shape (n_records, n_channels, n_samples)
-            Signals [units of the channels].
+        X : sequence of Recording, DataSet, or array_like
+            Signals [units of the channels], arrays of shape (n_records, n_channels, n_samples).
+            Recordings must share sample rate, channels and tacho.
         y : Any
             Ignored.
 
@@ -97,9 +112,16 @@ class SignalFeatures(TransformerMixin, BaseEstimator):  # type: ignore[misc]
         Raises
         ------
         ValueError
-            If the shape or an argument does not fit, or as
+            If the shape or an argument does not fit, recordings differ in more than their length,
+            or as
             :func:`wearstate.features.catalogue.row.feature_names`.
         """
+        recordings = _recordings(X)
+        self.layout_: _Layout | None = None
+        if recordings is not None:
+            return self._fit_recordings(recordings)
+        if self.fs is None:
+            raise ValueError("fs = None must be given with an array; give the sample rate in Hz")
         signals = self._records(X)
         self.n_channels_in_, self.n_samples_in_ = signals.shape[1:]
         n_vibration = self.n_channels_in_ - (self.tacho is not None)
@@ -122,13 +144,52 @@ class SignalFeatures(TransformerMixin, BaseEstimator):  # type: ignore[misc]
         )
         return self
 
-    def transform(self, X: ArrayLike) -> pd.DataFrame:
+    def _fit_recordings(self, recordings: Sequence[Recorded]) -> Self:
+        told = {
+            name: getattr(self, name) for name in ("fs", "channel_names", "quantities", "tacho")
+        }
+        if given := [name for name, value in told.items() if value is not None]:
+            raise ValueError(f"{', '.join(given)} must be left out; the recordings have their own")
+        first = recordings[0]
+        self.layout_ = _layout(first)
+        self.n_channels_in_ = len(first.vibration_names) + (first.tacho_signal is not None)
+        self.n_samples_in_ = first.vibration.shape[-1]
+        if isinstance(recordings, list | tuple):  # the records of a file are alike
+            for number in range(1, len(recordings)):
+                one = self._alike(recordings, number)
+                self.n_samples_in_ = min(self.n_samples_in_, one.vibration.shape[-1])
+        self.feature_names_out_ = feature_names(
+            first.vibration_names,
+            first.sample_rate,
+            tacho=first.tacho_signal is not None,
+            pulses_per_revolution=first.pulses_per_revolution,
+            quantities=first.vibration_quantities,
+            n_samples=self.n_samples_in_,
+            impact=struck(first.vibration, first.vibration_quantities),
+            settings=self.settings,
+            feature_set=self.feature_set,
+            only=self.only,
+        )
+        return self
+
+    def _alike(self, recordings: Sequence[Recorded], number: int) -> Recorded:
+        """One of the recordings, refused where it is none of the layout of `fit`."""
+        one = recordings[number]
+        if (found := _layout(one)) != self.layout_:
+            raise ValueError(
+                f"sample rate, channels, quantities, tacho and pulses = {found} of recording "
+                f"{number} must be {self.layout_} as of the first in fit; import them alike"
+            )
+        return one
+
+    def transform(self, X: Records) -> pd.DataFrame:
         """Features of every record.
 
         Parameters
         ----------
-        X : array_like, shape (n_records, n_channels, n_samples)
-            Signals [units of the channels], as many channels and samples as in `fit`.
+        X : sequence of Recording, DataSet, or array_like
+            As of `fit`, with the same channels, rate and tacho; arrays with as many samples,
+            recordings long enough for the same features.
 
         Returns
         -------
@@ -142,6 +203,13 @@ class SignalFeatures(TransformerMixin, BaseEstimator):  # type: ignore[misc]
             then the record is named.
         """
         check_is_fitted(self)
+        recordings = _recordings(X)
+        if recordings is not None:
+            if self.layout_ is None:
+                raise ValueError("X = recordings must be an array as in fit; fit on recordings")
+            return self._table(len(recordings), lambda i: self._recording_row(recordings, i))
+        if self.layout_ is not None:
+            raise ValueError("X = array must be recordings as in fit; fit on an array")
         signals = self._records(X)
         expected = (self.n_channels_in_, self.n_samples_in_)
         if signals.shape[1:] != expected:
@@ -149,14 +217,32 @@ class SignalFeatures(TransformerMixin, BaseEstimator):  # type: ignore[misc]
                 f"X has records of shape {signals.shape[1:]}, must have {expected} as in fit; cut "
                 "or resample them"
             )
+        return self._table(len(signals), lambda i: self._row(signals[i]))
+
+    def _table(self, n_records: int, row_of: Callable[[int], NDArray[np.float64]]) -> pd.DataFrame:
         columns = list(self.feature_names_out_)
-        table = np.empty((len(signals), len(columns)))
-        for number, (row, record) in enumerate(zip(table, signals, strict=True)):
+        table = np.empty((n_records, len(columns)))
+        for number, row in enumerate(table):
             try:
-                row[:] = self._row(record)
+                row[:] = row_of(number)
             except ValueError as error:
                 raise ValueError(f"record {number}: {error}") from error
         return pd.DataFrame(table, columns=columns)
+
+    def _recording_row(self, recordings: Sequence[Recorded], number: int) -> NDArray[np.float64]:
+        one = self._alike(recordings, number)
+        names, values = feature_row(
+            one, settings=self.settings, feature_set=self.feature_set, only=self.only
+        )
+        if names == self.feature_names_out_:
+            return values
+        known = dict(zip(names, values, strict=True))  # a longer recording may have more of them
+        if lacking := [name for name in self.feature_names_out_ if name not in known]:
+            raise ValueError(
+                f"{one.vibration.shape[-1]} samples must be >= {self.n_samples_in_} as in fit for "
+                f"{lacking[0]}; record longer"
+            )
+        return np.array([known[name] for name in self.feature_names_out_])
 
     def narrowed(self, columns: Sequence[str]) -> "SignalFeatures":
         """Unfitted transformer of the same kind that computes these columns only.
@@ -194,7 +280,7 @@ class SignalFeatures(TransformerMixin, BaseEstimator):  # type: ignore[misc]
         check_is_fitted(self)
         return np.array(self.feature_names_out_, dtype=object)
 
-    def _records(self, X: ArrayLike) -> NDArray[Any]:
+    def _records(self, X: Any) -> NDArray[Any]:
         signals = np.asarray(X)
         if signals.ndim != 3 or signals.dtype.kind not in "fiu":
             raise ValueError(
@@ -230,3 +316,29 @@ class SignalFeatures(TransformerMixin, BaseEstimator):  # type: ignore[misc]
         tags.input_tags.two_d_array = False
         tags.input_tags.three_d_array = True
         return tags
+
+
+_Layout = tuple[float, tuple[str, ...], tuple[str, ...], bool, int]
+
+
+def _layout(one: Recorded) -> _Layout:
+    """What recordings of one table must share."""
+    tacho = one.tacho_signal is not None
+    return (
+        float(one.sample_rate),
+        tuple(one.vibration_names),
+        tuple(one.vibration_quantities),
+        tacho,
+        one.pulses_per_revolution if tacho else 1,
+    )
+
+
+def _recordings(X: Any) -> Sequence[Recorded] | None:
+    """The recordings; None of an array."""
+    if isinstance(X, np.ndarray) and X.dtype != object:
+        return None
+    if isinstance(X, Recorded):
+        raise ValueError("X = one recording must be a list of recordings; put it into brackets")
+    if not hasattr(X, "__getitem__") or not len(X):
+        return None
+    return X if isinstance(X[0], Recorded) else None

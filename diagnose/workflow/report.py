@@ -1,0 +1,165 @@
+"""From a recording and a wear model to the verdict, as text, table and page."""
+
+import html
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ...datasets.file.record import refuse_output
+from ...datasets.measured.recording import read_recording
+from ...sim.output.recording import Recording
+from ..feature_rows.healthy import Baseline, Baselines
+from ..nameplate.cautions import known_beside
+from ..nameplate.nameplate import Nameplate, nameplate_of
+from ..pages.page import save_page
+from ..report.page import report_html
+from ..report.text import report_text
+from ..report.verdict import known_machine, report_table
+from ..wear_model.estimate import Estimate, WearModel
+from ..wear_model.file import load_model
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Report:
+    """Verdict of a model on a recording, of :func:`wearstate.report`.
+
+    Attributes
+    ----------
+    recording : Recording
+        What was judged.
+    model : WearModel
+        What judged it.
+    estimate : Estimate
+        Verdict, wear [m] with its interval, grade.
+    table : dict
+        Everything that the report says, ready for JSON.
+    baseline : Baseline or None
+        Healthy recordings of the machine.
+    """
+
+    recording: Recording
+    model: WearModel
+    estimate: Estimate
+    table: dict[str, Any]
+    baseline: Baseline | None = None
+
+    @property
+    def text(self) -> str:
+        """What ``wearstate report`` prints."""
+        return report_text(self.table)
+
+    def html(self) -> str:
+        """Self-contained page with pictures."""
+        return report_html(self.table, self.recording, self.model, baseline=self.baseline)
+
+    def save(self, path: str | Path, *, force: bool = False) -> None:
+        """Write the page.
+
+        Parameters
+        ----------
+        path : str or Path
+            HTML file.
+        force : bool
+            Replace an existing file.
+
+        Raises
+        ------
+        DataError
+            The file exists, or its folder does not.
+        """
+        file = Path(path).absolute()
+        refuse_output(file, force)
+        save_page(self.html(), file, force=force)
+
+    def __str__(self) -> str:
+        return self.text
+
+    def __repr__(self) -> str:
+        return f"<Report on {self.recording.source or 'a recording'}: {self.table['headline']}>"
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{html.escape(self.text)}</pre>"
+
+
+def report(
+    recording: Recording | str | Path,
+    model: WearModel | str | Path,
+    *,
+    baseline: str | Path | None = None,
+    scene: str | None = None,
+    values: Mapping[str, Any] | None = None,
+    machine: str | None = None,
+) -> Report:
+    """Judge one recording: wear with an interval, grade, advice, or why there is none.
+
+    Parameters
+    ----------
+    recording : Recording, str or Path
+        A recording, or a file that :func:`wearstate.read_recording` reads without options.
+    model : WearModel, str or Path
+        A model or its file.
+    baseline : str or Path, optional
+        Data set of healthy recordings of the machine.
+    scene : str, optional
+        Nameplate of the machine: a built-in scene or a TOML file.
+    values : mapping, optional
+        Dotted path -> value that replaces the nameplate's, as ``{"load.static": "4 kN +- 5 %"}``.
+    machine : str, optional
+        Kind of machine, for its ISO zone.
+
+    Returns
+    -------
+    Report
+        Its ``estimate`` holds the numbers, ``text`` what the command prints, ``save`` the page.
+
+    Raises
+    ------
+    DataError
+        The recording cannot be read or turned into features, or there is no such kind of machine.
+    ModelError
+        The file cannot be used.
+
+    Examples
+    --------
+    >>> import wearstate
+    >>> found = wearstate.report(wearstate.simulate("bilge-pump"), "pump.wsm")
+    >>> found.save("report.html")
+    >>> found.estimate.grade_name
+    'as new'
+    """
+    known_machine(machine)
+    known = model if isinstance(model, WearModel) else load_model(model)
+    source = None if isinstance(recording, Recording) else Path(recording)
+    read = recording if isinstance(recording, Recording) else read_recording(recording)
+    usual = known.card["trained_on"]["scene"]
+    return judged(
+        read,
+        known,
+        baselines=None if baseline is None else Baselines(baseline, known.card),
+        plate=nameplate_of(source, scene, values or {}, usual=usual),
+        machine=machine,
+        files={"recording": source} if source else None,
+    )
+
+
+def judged(
+    recording: Recording,
+    model: WearModel,
+    *,
+    baselines: Baselines | None,
+    plate: Nameplate | None,
+    machine: str | None,
+    files: Mapping[str, Path] | None,
+) -> Report:
+    """Report on a recording with what is known of its machine, all of it read."""
+    baseline = baselines.of(recording) if baselines else None
+    estimate = model.estimate(
+        recording, baseline, **known_beside(plate, recording, model.card, baseline)
+    )
+    table = report_table(
+        recording, model, estimate, machine=machine, baseline=baseline, plate=plate, files=files
+    )
+    return Report(
+        recording=recording, model=model, estimate=estimate, table=table, baseline=baseline
+    )

@@ -1,0 +1,78 @@
+"""Docstrings of the public names, as numpydoc validates them."""
+
+import dataclasses
+import inspect
+
+import pytest
+import wearstate
+from numpydoc.docscrape import get_doc_object
+from numpydoc.validate import validate
+
+LEFT_OUT = {
+    "GL01",  # text begins on the line of the quotes, as ruff has it
+    "GL02",
+    "ES01",  # a summary that says all needs no second one
+    "SA01",  # the reference lists neighbours
+    "SS05",  # takes every plural for a verb: "Features of one recording"
+}
+"""Checks that are not asked for."""
+
+OF_FUNCTIONS = {"PR01", "EX01"}
+"""Checks that a class meets otherwise: fields under Attributes, an example where it is made."""
+
+HOMES = [wearstate, *(getattr(wearstate, name) for name in wearstate._MODULES)]
+PUBLIC = {
+    f"{value.__module__}.{value.__qualname__}": value
+    for home in HOMES
+    for value in (getattr(home, name) for name in home.__all__)
+    if callable(value)
+}
+
+
+def faults(name, value):
+    left_out = LEFT_OUT | OF_FUNCTIONS if inspect.isclass(value) else LEFT_OUT
+    return [f"{code} {text}" for code, text in validate(name)["errors"] if code not in left_out]
+
+
+def undocumented(value):
+    """Fields of a class that stand neither under Parameters nor under Attributes."""
+    if not dataclasses.is_dataclass(value):
+        return set()
+    doc = get_doc_object(value, "class")
+    told = [row.name for row in (*doc["Parameters"], *doc["Attributes"])]
+    names = {name.strip() for each in told for name in each.split(",")}
+    return {each.name for each in dataclasses.fields(value)} - names
+
+
+def test_all_names_are_there():
+    assert len(PUBLIC) > 100
+    assert {"wearstate.sim.film.bearing.operate", "wearstate.diagnose.workflow.train.train"} <= set(
+        PUBLIC
+    )
+
+
+def test_the_judge_sees_a_fault():
+    def told_little(x):
+        """Double."""
+
+    @dataclasses.dataclass
+    class Half:
+        """A half.
+
+        Attributes
+        ----------
+        one : int
+        """
+
+        one: int
+        other: int
+
+    assert undocumented(Half) == {"other"}
+    told_little.__qualname__ = "x"
+    assert get_doc_object(told_little, "function")["Parameters"] == []
+
+
+@pytest.mark.parametrize("name", PUBLIC)
+def test_a_public_name_is_documented(name):
+    assert faults(name, PUBLIC[name]) == []
+    assert undocumented(PUBLIC[name]) == set()
