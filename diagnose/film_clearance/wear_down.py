@@ -117,7 +117,7 @@ def _with_bearing(scene: Any, bearing: int, changes: Mapping[str, float]) -> Any
 
 
 def _thicker(scene: Any) -> Any:
-    from ...sim.scene.journal import Oil
+    from ...sim.scene.oil import Oil
 
     oil = Oil(viscosity=scene.oil.dynamic_viscosity * (1 + _CHANGE))
     return scene.model_copy(update={"oil": oil})

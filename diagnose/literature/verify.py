@@ -60,6 +60,7 @@ from ...sim.pump.hydraulics import (
     hydraulic_parameters,
     run_chamber,
 )
+from ...sim.pump.oiled_joint import OIL
 from ...sim.pump.setup import ideal_motion
 from ...sim.pump.slider_crank import (
     BODY,
@@ -259,7 +260,14 @@ def _one_throw(numbers: dict[str, float], contacts: dict[int, np.void], **machin
     for joint, contact in contacts.items():
         table[0, joint] = contact
     shared = Machine(**{**dict.fromkeys(Machine._fields, 0.0), **machine})
-    return Tables(throws=throws, contacts=table, liquid=np.zeros(1, HYDRAULIC), machine=shared)
+    return Tables(
+        throws=throws,
+        contacts=table,
+        liquid=np.zeros(1, HYDRAULIC),
+        oils=np.zeros((1, 2), OIL),
+        maps=np.zeros(1),
+        machine=shared,
+    )
 
 
 def impact(

@@ -15,7 +15,6 @@ from ...datasets.file.record import Attributes, DataSet
 from ...datasets.recipe.draws import has_value
 from ...datasets.recipe.recipe import condition_of, recorded_scene
 from ...sim.output.recording import DataError
-from ...sim.scene.journal import Oil
 from ...sim.scene.load import (
     load_scene,
     override,
@@ -24,6 +23,7 @@ from ...sim.scene.load import (
     scene_table,
     scene_text,
 )
+from ...sim.scene.oil import Oil
 from ...sim.scene.parts import Scene, SceneError, to_si
 from ..feature_rows.noted import NOTED
 from ..film_clearance.clearance import Doubts

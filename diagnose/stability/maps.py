@@ -44,7 +44,8 @@ from ...sim.pump.setup import (
     tangent_stiffness,
 )
 from ...sim.pump.slider_crank import JOINT_COMPLIANT
-from ...sim.scene.journal import JournalScene, Oil
+from ...sim.scene.journal import JournalScene
+from ...sim.scene.oil import Oil
 from ...sim.scene.parts import Scene, SceneError
 from ...sim.scene.pump import PumpScene
 from ...sim.scene.shaft import ShaftScene

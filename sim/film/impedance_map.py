@@ -274,6 +274,67 @@ def map_force(
 
 
 @kernel
+def _rates(u: float) -> tuple[float, float, float, float]:
+    """Derivatives of :func:`_weights` by the share u."""
+    v = 1.0 - u
+    return (-0.5 * v * v, u * (1.5 * u - 2.0), -v * (1.5 * v - 2.0), 0.5 * u * u)
+
+
+@kernel
+def map_resistance(
+    table: MapTable, x: float, y: float, v_x: float, v_y: float
+) -> tuple[float, float, float, float]:
+    """Resistance of the film of a plain bore to the velocity of its journal, from the map.
+
+    Parameters
+    ----------
+    table : MapTable
+        Of a plain bore.
+    x, y : float
+        Journal centre over C, as for :func:`map_force`.
+    v_x, v_y : float
+        Velocity V in the frame in which both surfaces turn as much forth as back; (0, 0) counts as
+        one along the line of centres.
+
+    Returns
+    -------
+    tuple of float
+        R_xx, R_xy, R_yx, R_yy: minus the derivative of the force by V. As the force is homogeneous,
+        it is also ``-R V``.
+    """
+    eccentricity = math.sqrt(x * x + y * y)
+    n_x, n_y = 1.0, 0.0
+    if eccentricity > 0.0:
+        n_x, n_y = x / eccentricity, y / eccentricity
+    root, stretch, scale = map_scales(table, eccentricity)
+    along, across = v_x * n_x + v_y * n_y, (v_y * n_x - v_x * n_y) * stretch
+    size = math.sqrt(along * along + across * across)
+    c, s = (along / size, abs(across) / size) if size > 0.0 else (1.0, 0.0)
+    side = -1.0 if across < 0.0 else 1.0
+    shape = table.coefficients.shape
+    i, share = _cell((1.0 - root) * table.per_root, shape[2] - 3)
+    v = _weights(share)
+    j, share = _cell(stretched_angle(c, s) * table.per_radian, shape[3] - 3)
+    w, rate = _weights(share), _rates(share)
+    radial, tangential = table.coefficients[RADIAL, 0], table.coefficients[TANGENTIAL, 0]
+    f_r, f_t = _patch(radial, i, j, v, w), _patch(tangential, i, j, v, w)
+    g_r = _patch(radial, i, j, v, rate) * table.per_radian
+    g_t = _patch(tangential, i, j, v, rate) * table.per_radian
+    across_scale = side * stretch * scale
+    r_rr, r_rt = -scale * (f_r * c - g_r * s), -across_scale * (f_r * s + g_r * c)
+    r_tr, r_tt = (
+        -across_scale * (f_t * c - g_t * s),
+        -stretch * stretch * scale * (f_t * s + g_t * c),
+    )
+    return (
+        (r_rr * n_x - r_rt * n_y) * n_x - (r_tr * n_x - r_tt * n_y) * n_y,
+        (r_rr * n_y + r_rt * n_x) * n_x - (r_tr * n_y + r_tt * n_x) * n_y,
+        (r_rr * n_x - r_rt * n_y) * n_y + (r_tr * n_x - r_tt * n_y) * n_x,
+        (r_rr * n_y + r_rt * n_x) * n_y + (r_tr * n_y + r_tt * n_x) * n_x,
+    )
+
+
+@kernel
 def map_peak(table: MapTable, x: float, y: float, x_rate: float, y_rate: float) -> float:
     """Largest non-dimensional pressure of the film, arguments as :func:`map_force`.
 

@@ -44,8 +44,35 @@ JOINT_RUNGS = (
         needs="a clearance, a contact law with its stiffness; of a guide the piston's inertia",
         nanoseconds_per_step=140.0,
     ),
+    Rung(
+        name="film-short",
+        assumes="a short oil film on a yielding wall; flooded, or filled where the gap is thin",
+        reference="Ocvirk 1952; Booker 1965 for a load that turns",
+        valid="length up to a quarter of the diameter; film thicker than the roughness",
+        needs="oil with its length",
+        nanoseconds_per_step=550.0,
+    ),
+    Rung(
+        name="film-map",
+        assumes="a flooded oil film of finite length, from a table, on a yielding wall",
+        reference="Childs, Moes, van Leeuwen 1977",
+        valid="film thicker than the roughness; laminar, isothermal",
+        needs="oil with its length",
+        nanoseconds_per_step=1000.0,
+    ),
+    Rung(
+        name="mixed",
+        assumes="film and touching peaks share the load; short where starved, else finite",
+        reference="Greenwood, Tripp 1971",
+        valid="roughness far below the clearance; laminar, isothermal",
+        needs="oil with its length and roughness",
+        nanoseconds_per_step=1000.0,
+    ),
 )
-"""Rungs of crank pin and wrist pin; a guide has the first and the last."""
+"""Rungs of crank pin and wrist pin."""
+
+GUIDE_RUNGS = tuple(rung for rung in JOINT_RUNGS if rung.name in ("ideal", "compliant"))
+"""Rungs of a guide."""
 
 PRESSURE_RUNGS = (
     Rung(
@@ -127,7 +154,7 @@ def _joint_effects(scene: Scene) -> Iterator[Effect]:
         part = getattr(pump.joint, name)
         if part is None:
             continue
-        table = tuple(r for r in JOINT_RUNGS if name != "guide" or r.name != "link")
+        table = GUIDE_RUNGS if name == "guide" else JOINT_RUNGS
         rungs = written(table, _throw_paths(pump, "joint", f"{name}.rung"))
         yield effect(name, scene, rungs, partial(_joint_rung, name), beyond=_beyond)
 
@@ -160,9 +187,9 @@ def _drive_effect(scene: Scene) -> Iterator[Effect]:
 def _stiffest(scene: PumpScene) -> PumpScene:
     """The scene with every contact that it can have: a step that is stable there is so anywhere."""
     for joint in _joint_effects(scene):
-        rung = joint.rungs[-1]
-        if joint.refusal(scene, rung.name) is None:
-            scene = with_values(scene, rung.values)
+        dry = joint.rung("compliant")
+        if joint.refusal(scene, dry.name) is None:
+            scene = with_values(scene, dry.values)
     return scene
 
 

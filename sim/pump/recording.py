@@ -34,7 +34,7 @@ from .hydraulics import lift_left
 from .pressure_sensors import pressures_at_rest, read_pressures
 from .push import casing_pushes, read_cells, with_pushes
 from .setup import contact_rate, contact_table, joint_rungs, pin_offsets, run_scene
-from .slider_crank import FORCES, GUIDE, JOINT_COMPLIANT, JOINT_LINK, CrankRun
+from .slider_crank import FORCES, GUIDE, JOINT_COMPLIANT, JOINT_LINK, JOINT_OILED, CrankRun
 from .tearing import lowest_of_run, torn_in_run
 from .validity import FEWEST_STEPS, MOST_STEPS, joint_faults, knock_limits, limits, pump_step
 
@@ -605,10 +605,26 @@ def _numerics(scene: PumpScene, run: CrankRun, plan: _Plan) -> dict[str, float |
         numerics["lowest_pressure_pa"] = lowest
     if any(JOINT_LINK in row for row in rungs):
         numerics["tension_share"] = run.tension_steps / max(1, steps * len(rungs))
+    numerics |= _film_numerics(run, rungs, plan)
     if run.chambers is not None:
         numerics["cavitating_share"] = run.vapour_steps / max(1, steps * len(rungs))
         numerics["lift_left"] = _lift_left(scene, run, plan)
     return numerics
+
+
+def _film_numerics(
+    run: CrankRun, rungs: list[tuple[int, int, int]], plan: _Plan
+) -> dict[str, float | int | str]:
+    """Least film of all oiled pins, and how long rough peaks touched; empty without oil."""
+    oiled = np.array([[code == JOINT_OILED for code in row[:GUIDE]] for row in rungs])
+    if run.gaps is None:
+        return {}
+    kept = run.gaps[plan.kept.start * plan.factor : plan.kept.stop * plan.factor]
+    gaps, peaks = kept[:, :, :GUIDE][:, oiled], kept[:, :, GUIDE:][:, oiled]
+    return {
+        "min_film_m": float(gaps.min()),
+        "rubbing_share": float(np.mean((peaks > 0).any(axis=1))),
+    }
 
 
 def _has_hysteresis(scene: PumpScene) -> bool:
@@ -686,6 +702,15 @@ def _throw_truth(
         ("state_beta", bodies[:, 2]),
         ("state_beta_rate", bodies[:, 8]),
     ]
+    if run.gaps is not None:
+        gaps = plan.at_samples(run.gaps[:, throw])
+        rungs = joint_rungs(plan.scene, throw)
+        for joint, name in enumerate(("crankpin", "wristpin")):
+            if rungs[joint] == JOINT_OILED:
+                found += [
+                    (f"{name}_gap_m", gaps[:, joint]),
+                    (f"{name}_peak_force_n", gaps[:, GUIDE + joint]),
+                ]
     if run.chambers is not None:
         chamber = plan.at_samples(run.chambers[:, throw])
         found += [

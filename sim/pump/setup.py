@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..contact.asperities import asperity_scale
 from ..contact.closed_forms import IdealCrank, conformal_stiffness, ideal_crank
 from ..contact.law import (
     CONTACT,
@@ -22,8 +23,10 @@ from ..contact.law import (
     elastic_stiffness,
     hysteresis,
 )
+from ..film.impedance_map import ImpedanceMap, impedance_map
+from ..film.solve import FilmGeometry
 from ..jit import kernel
-from ..scene.pump import Guide, PumpScene, RevoluteJoint
+from ..scene.pump import OILED_RUNGS, Guide, PumpScene, RevoluteJoint
 from .hydraulics import (
     HYDRAULIC,
     PRESSURE_CHAMBER,
@@ -32,12 +35,15 @@ from .hydraulics import (
     hydraulic_parameters,
     line_pressure,
 )
+from .oiled_joint import OIL
 from .slider_crank import (
     CRANKPIN,
+    FILM,
     GUIDE,
     JOINT_COMPLIANT,
     JOINT_IDEAL,
     JOINT_LINK,
+    JOINT_OILED,
     THROW,
     WRISTPIN,
     CrankRun,
@@ -63,7 +69,12 @@ step shrinks would feed the stages' own drift back as a force that never shrinks
 _BAUMGARTE_PER_STEP = 0.1
 """Most of that rate times the step, far from RK4's limit of 2.8."""
 
-JOINT_CODES = {"ideal": JOINT_IDEAL, "link": JOINT_LINK, "compliant": JOINT_COMPLIANT}
+JOINT_CODES = {
+    "ideal": JOINT_IDEAL,
+    "link": JOINT_LINK,
+    "compliant": JOINT_COMPLIANT,
+    **dict.fromkeys(OILED_RUNGS, JOINT_OILED),
+}
 """Rung of a joint in the scene -> code of the kernels, from the cheapest to the best."""
 
 _ANGLES = 360  # of a revolution, for the forces an ideal mechanism would carry
@@ -240,7 +251,14 @@ def contact_record(
     }
     for name, value in values.items():
         record[name] = value
-    if part.rung == "link":
+    if isinstance(part, RevoluteJoint) and part.oil is not None and part.rung in OILED_RUNGS:
+        # the film drags by itself, and squeezed oil is no part of the wall
+        record["tangential_damping"] = 0.0
+        told = part.oil.wall_damping
+        spring = tangent_stiffness(record[0], load) if stiffness else 0.0
+        record["damping"] = _WALL_DAMPING * math.sqrt(spring / mobility) if told is None else told
+        record["hysteresis"] = 0.0
+    elif part.rung == "link":
         record["damping"] = _LINK_DAMPING * 2 * math.sqrt(load / max(clearance, 1e-12) / mobility)
     elif not kelvin_voigt and part.speed_floor is None and stiffness:
         spring = tangent_stiffness(record[0], load)
@@ -274,6 +292,12 @@ def tangent_stiffness(contact: Any, force: float) -> float:
 
 _MOST_DAMPING = 2.0  # of the critical one, where a hysteresis law would have no bound
 _LINK_DAMPING = 0.5  # of the critical one
+_WALL_DAMPING = 0.05  # of sqrt(K m): bolted parts lose a few per cent of what they store
+
+_WALL_PER_STEP = (
+    0.7  # least damping of a wall behind oil over stiffness times step: RK4 resolves it
+)
+_DEEPEST_START = 0.9  # eccentricity from which a film starts
 
 _PEAK_OVER_LOAD = 3.0  # what a knock may add to the ideal load, where the elasticity is not linear
 
@@ -361,7 +385,7 @@ def _springs_and_dampers(scene: PumpScene, throw: int) -> tuple[list[float], lis
     rungs = joint_rungs(scene, throw)
     for joint, (record, load, rung) in enumerate(zip(records, loads, rungs, strict=True)):
         peak = _PEAK_OVER_LOAD * load
-        if rung == JOINT_COMPLIANT:
+        if rung >= JOINT_COMPLIANT:
             linear = record["elasticity"] == ELASTIC_LINEAR
             springs.append(
                 float(record["stiffness"]) if linear else tangent_stiffness(record, peak)
@@ -435,6 +459,138 @@ def contact_table(scene: PumpScene, throw: int) -> NDArray[np.void]:
     return table
 
 
+# --- oil
+
+
+def joint_maps(scene: PumpScene) -> dict[float, ImpedanceMap]:
+    """Film maps that the joints of a scene need, by length over diameter of their lands."""
+    ratios = sorted(
+        {
+            _land(part) / part.pin_diameter
+            for throw in range(len(scene.throws))
+            for part in joint_parts(scene, throw)[:2]
+            if part is not None and _runs_on_a_map(part)
+        }
+    )
+    return {
+        ratio: impedance_map(FilmGeometry(length_to_diameter=ratio, n_theta=_N_THETA, n_z=_N_Z))
+        for ratio in ratios
+    }
+
+
+_N_THETA, _N_Z = 144, 33  # carry within half a percent of published tables up to e = 0.95
+
+
+def _runs_on_a_map(part: RevoluteJoint) -> bool:
+    """Whether a film of finite length is asked for: a starved one is narrow, and short."""
+    if part.oil is None:
+        return False
+    return part.rung == "film-map" or (part.rung == "mixed" and part.oil.filled_gap is None)
+
+
+def _land(part: RevoluteJoint) -> float:
+    """Length of film between two ends without pressure [m]."""
+    assert part.oil is not None
+    both = part.oil.length - part.oil.groove_width
+    return both / 2 if part.oil.groove_width > 0 else both
+
+
+def oil_table(
+    scene: PumpScene, throw: int, contacts: NDArray[np.void], maps: dict[float, Any], step: float
+) -> NDArray[np.void]:
+    """Records of the oil in crank pin and wrist pin of one throw; zeros where there is none.
+
+    Parameters
+    ----------
+    scene : PumpScene
+    throw : int
+        Counted from 0.
+    contacts : numpy.ndarray [shape=(3,), dtype=CONTACT]
+        Of the throw.
+    maps : dict
+        As :func:`joint_maps` gives them.
+    step : float
+        [s]
+
+    Returns
+    -------
+    numpy.ndarray [shape=(2,), dtype=OIL]
+    """
+    table = np.zeros(2, dtype=OIL)
+    loads = joint_loads(scene, throw)
+    for joint, part in enumerate(joint_parts(scene, throw)[:2]):
+        if isinstance(part, RevoluteJoint) and part.oil is not None and part.rung in OILED_RUNGS:
+            values = _oil_values(part, contacts[joint], loads[joint], maps, step)
+            for name, value in values.items():
+                table[joint][name] = value
+    return table
+
+
+def _oil_values(
+    part: RevoluteJoint, contact: Any, load: float, maps: dict[float, Any], step: float
+) -> dict[str, float]:
+    oil, gap, radius = part.oil, part.clearance_radial, part.pin_diameter / 2
+    assert oil is not None
+    land = _land(part)
+    lands = 2 if oil.groove_width > 0 else 1
+    viscosity = oil.dynamic_viscosity
+    rough = oil.roughness if part.rung == "mixed" and oil.roughness else 0.0
+    peaks = (
+        asperity_scale(rough, radius, lands * land, gap, oil.asperity_stiffness) if rough else 0.0
+    )
+    spring = tangent_stiffness(contact, _PEAK_OVER_LOAD * load)
+    values = {
+        "shear": lands * viscosity * radius**3 * land / gap,
+        "filled": 2.0 if oil.filled_gap is None else oil.filled_gap / gap,
+        "radius": radius + gap / 2,
+        "wall_damping": max(float(contact["damping"]), _WALL_PER_STEP * spring * step),
+        "roughness": rough,
+        "peaks": peaks,
+        "step": step,
+    }
+    if not _runs_on_a_map(part):
+        return values | {"short": lands * viscosity * radius * (land / gap) ** 3}
+    ratio = land / part.pin_diameter
+    table = maps[ratio].table
+    before = [maps[other] for other in maps if other < ratio]
+    return values | {
+        "map": lands * viscosity * (radius / gap) ** 3 * land,
+        "offset": 1 + sum(other.table.coefficients.size for other in before),
+        "roots": table.coefficients.shape[2],
+        "angles": table.coefficients.shape[3],
+        "gap_factor": table.gap_factor,
+        "least_root": table.least_root,
+        "per_root": table.per_root,
+        "per_radian": table.per_radian,
+    }
+
+
+def start_films(t: Tables, bodies: NDArray[np.float64], angle: float) -> NDArray[np.float64]:
+    """Where the films let the pins be at the start, by the scene's own pins; zeros without oil.
+
+    Returns
+    -------
+    numpy.ndarray [shape=(n_throws, 4)]
+        Columns as ``FILM`` [m].
+    """
+    films = np.zeros((len(t.throws), len(FILM)))
+    for throw, q in enumerate(t.throws):
+        x, y, beta, piston, across = bodies[throw, :5]
+        own = angle + q["phase"]
+        turn = np.array([math.cos(beta), -math.sin(beta)])
+        crank = q["crank_radius"] * np.array([math.cos(own), math.sin(own)])
+        offsets = (
+            crank - np.array([x, y]) + q["rod_arm"] * turn,
+            np.array([piston - x, across - y]) - q["rod_centre"] * turn,
+        )
+        for joint, rung in enumerate((q["crankpin_rung"], q["wristpin_rung"])):
+            if rung == JOINT_OILED:
+                size = float(np.hypot(*offsets[joint]))
+                most = _DEEPEST_START * t.contacts[throw, joint]["clearance"]
+                films[throw, 2 * joint : 2 * joint + 2] = offsets[joint] * min(1.0, most / size)
+    return films
+
+
 # --- tables and start
 
 
@@ -481,12 +637,16 @@ def throw_record(scene: PumpScene, throw: int, step: float) -> NDArray[np.void]:
 def tables(scene: PumpScene, step: float) -> Tables:
     """Everything the mechanism's kernel needs of a scene, at this step [s]."""
     throws = range(len(scene.throws))
+    contacts = [contact_table(scene, throw) for throw in throws]
+    maps = joint_maps(scene)
     gravity_x, gravity_y = _gravity(scene)
     motor = scene.drive.motor if scene.drive.rung == "motor" else None
     return Tables(
         throws=np.concatenate([throw_record(scene, throw, step) for throw in throws]),
-        contacts=np.stack([contact_table(scene, throw) for throw in throws]),
+        contacts=np.stack(contacts),
         liquid=np.concatenate([hydraulics_of(scene, throw) for throw in throws]).astype(HYDRAULIC),
+        oils=np.stack([oil_table(scene, throw, contacts[throw], maps, step) for throw in throws]),
+        maps=np.concatenate([np.zeros(1), *(m.table.coefficients.ravel() for m in maps.values())]),
         machine=Machine(
             gravity_x=gravity_x,
             gravity_y=gravity_y,
@@ -529,7 +689,7 @@ def _rest(contact: Any, rung: int, force: NDArray[np.float64]) -> NDArray[np.flo
     if rung == JOINT_IDEAL:
         return np.zeros(2)
     direction = force / size if size > 0 else np.array([1.0, 0.0])
-    pressed = penetration_under(contact, size) if rung == JOINT_COMPLIANT else 0.0
+    pressed = penetration_under(contact, size) if rung >= JOINT_COMPLIANT else 0.0
     return np.asarray((float(contact["clearance"]) + pressed) * direction)
 
 
@@ -637,6 +797,7 @@ def run_scene(
         speed=2 * math.pi * scene.drive.speed,
         bodies=bodies,
         chambers=start_chambers(t, bodies),
+        films=start_films(t, bodies, start_angle),
         step=step,
         n_steps=n_steps,
         keep_states=keep_states,

@@ -5,10 +5,11 @@ Bodies: the crank (one angle ``a``), and per throw a rod (centre of mass ``x_r, 
 the cylinder, y across it. The rod points from the wrist pin to the crank pin along
 ``e = (-cos b, sin b)``; ``g = de/db = (sin b, cos b)``.
 
-A joint is one of three things. *Ideal*: two constraint forces. *Link*: one constraint force along
+A joint is one of four things. *Ideal*: two constraint forces. *Link*: one constraint force along
 a massless link as long as the radial clearance, with friction at its ends; the pin never leaves
 its eye, and a link in tension says that it would. *Compliant*: the contact force of a law where
-the pin overlaps its eye, nothing in free flight. An ideal guide holds ``y = t = 0``; a compliant
+the pin overlaps its eye, nothing in free flight. *Oiled*: a film on a yielding wall, without events
+(:mod:`.oiled_joint`). An ideal guide holds ``y = t = 0``; a compliant
 one has a clearance on either side and touches the piston at its four corners.
 
 For a pin at ``d`` from the centre of its eye, with direction ``n`` and ``t`` a quarter turn
@@ -39,8 +40,10 @@ from ..contact.law import LAW_KELVIN_VOIGT, RELEASE_AT_ZERO_FORCE, friction_forc
 from ..jit import kernel, sine_cosine
 from ..output.status import Status
 from .hydraulics import PRESSURE_CHAMBER, chamber_step, line_pressure
+from .oiled_joint import oiled_joint
 
-JOINT_IDEAL, JOINT_LINK, JOINT_COMPLIANT = 0, 1, 2
+JOINT_IDEAL, JOINT_LINK, JOINT_COMPLIANT, JOINT_OILED = 0, 1, 2, 3
+"""From `JOINT_COMPLIANT` on a joint is a force that follows from the motion."""
 
 THROW = np.dtype(
     [
@@ -112,6 +115,12 @@ Before them stands the drive moment [N m]."""
 
 _PIN, _WRIST, _GUIDE, _FACE, _VALVES = 0, 2, 4, 6, 7  # first columns of FORCES
 
+FILM = ("crankpin_x", "crankpin_y", "wristpin_x", "wristpin_y")
+"""Where the films of a throw let its pins be, from the centres of their eyes [m]."""
+
+GAPS = ("crankpin_gap", "wristpin_gap", "crankpin_peaks", "wristpin_peaks")
+"""Least gap of each film [m], and what its touching peaks carry [N]; a joint without oil has 0."""
+
 OVERLAP_LIMIT = 0.1  # of the pin radius: small-penetration contact laws end there
 _MOST_CUTS = 8  # contact changes within one step and throw before the rest is taken as it is
 _NO_CHANGE = 1.0  # margin of a contact that cannot change [N]
@@ -123,6 +132,8 @@ class Tables(NamedTuple):
     throws: NDArray[Any]  # (n_throws,) of THROW
     contacts: NDArray[Any]  # (n_throws, 3) of CONTACT
     liquid: NDArray[Any]  # (n_throws,) of HYDRAULIC
+    oils: NDArray[Any]  # (n_throws, 2) of OIL
+    maps: NDArray[np.float64]  # coefficients of all films that are maps, one after the other
     machine: Machine
 
 
@@ -138,6 +149,9 @@ STAGE = np.dtype(
         ("link", "f8"),  # least force in a link: negative is tension
         ("rate_per_turn", "f8", PER_THROW),  # per crank acceleration
         ("force_per_turn", "f8", len(FORCES)),
+        ("film", "f8", len(FILM)),
+        ("film_rate", "f8", len(FILM)),
+        ("gaps", "f8", len(GAPS)),
     ]
 )
 """One throw at one stage of a step."""
@@ -148,6 +162,7 @@ HELD = np.dtype(
         ("impact", "f8", CONTACTS),  # speed at which each contact closed
         ("pressure", "f8", 2),  # of the chamber, at both ends of the step
         ("flow", "f8", 4),  # of the chamber's valves, see chamber_step
+        ("squeeze", "f8", (2, 2)),  # last velocity of each film, where the next search begins
     ]
 )
 """What one throw remembers from step to step."""
@@ -296,6 +311,40 @@ def _pin_joint(
 
 
 @kernel
+def _oiled(
+    joint: int,
+    d_x: float,
+    d_y: float,
+    v_x: float,
+    v_y: float,
+    pin_turn: float,
+    k: int,
+    b: Any,
+    held: Any,
+    t: Any,
+) -> Any:
+    """Force of a pin on the rod through oil (x, y), moments on pin and eye, and its size."""
+    n = 2 * joint
+    f_x, f_y, on_pin, on_eye, rate_x, rate_y, gap, peaks = oiled_joint(
+        b.film[n],
+        b.film[n + 1],
+        d_x,
+        d_y,
+        v_x,
+        v_y,
+        pin_turn,
+        -b.y[8],
+        held.squeeze[joint],
+        t.contacts[k, joint],
+        t.oils[k, joint],
+        t.maps,
+    )
+    b.film_rate[n], b.film_rate[n + 1] = rate_x, rate_y
+    b.gaps[joint], b.gaps[2 + joint] = gap, peaks
+    return f_x, f_y, on_pin, on_eye, math.sqrt(f_x * f_x + f_y * f_y)
+
+
+@kernel
 def _guide(q: Any, b: Any, held: Any, c: Any) -> Any:
     """Force of a guide with clearance on the piston (x, y, turning), peak normal force, overlap."""
     f_x, f_y, moment, peak, deepest = 0.0, 0.0, 0.0, 0.0, 0.0
@@ -346,29 +395,43 @@ def _throw(k: int, w: Any, row: int, share: float, t: Any) -> None:
         c, radius = t.contacts[k, CRANKPIN], q.crankpin_radius
         eye = radius + c.clearance
         d_x, d_y, v_x, v_y = _crank_offset(b, omega, q, sin_a, cos_a, sin_b, cos_b)
-        spin = omega * radius + b_rate * eye
-        pin_x, pin_y, rub, peak, overlap = _pin_joint(
-            CRANKPIN, q.crankpin_rung, d_x, d_y, v_x, v_y, spin, b, held, c
-        )
+        if q.crankpin_rung == JOINT_OILED:
+            pin_x, pin_y, on_pin, on_eye, peak = _oiled(
+                CRANKPIN, d_x, d_y, v_x, v_y, omega, k, b, held, t
+            )
+            overlap = math.sqrt(d_x * d_x + d_y * d_y) - c.clearance
+        else:
+            spin = omega * radius + b_rate * eye
+            pin_x, pin_y, rub, peak, overlap = _pin_joint(
+                CRANKPIN, q.crankpin_rung, d_x, d_y, v_x, v_y, spin, b, held, c
+            )
+            on_pin, on_eye = -radius * rub, eye * rub
         rod_x += pin_x
         rod_y += pin_y
-        rod_b += q.rod_arm * (pin_x * sin_b + pin_y * cos_b) - eye * rub
-        crank_moment -= radius * rub
+        rod_b += q.rod_arm * (pin_x * sin_b + pin_y * cos_b) - on_eye
+        crank_moment += on_pin
         overlap_ratio = overlap / radius
     if q.wristpin_rung != JOINT_IDEAL:
         c, radius = t.contacts[k, WRISTPIN], q.wristpin_radius
         eye = radius + c.clearance
         d_x, d_y, v_x, v_y = _wrist_offset(b, q, sin_b, cos_b)
-        spin = b.y[11] * radius + b_rate * eye
-        wrist_x, wrist_y, rub, normal, overlap = _pin_joint(
-            WRISTPIN, q.wristpin_rung, d_x, d_y, v_x, v_y, spin, b, held, c
-        )
+        if q.wristpin_rung == JOINT_OILED:
+            wrist_x, wrist_y, on_pin, on_eye, normal = _oiled(
+                WRISTPIN, d_x, d_y, v_x, v_y, b.y[11], k, b, held, t
+            )
+            overlap = math.sqrt(d_x * d_x + d_y * d_y) - c.clearance
+        else:
+            spin = b.y[11] * radius + b_rate * eye
+            wrist_x, wrist_y, rub, normal, overlap = _pin_joint(
+                WRISTPIN, q.wristpin_rung, d_x, d_y, v_x, v_y, spin, b, held, c
+            )
+            on_pin, on_eye = -radius * rub, eye * rub
         rod_x += wrist_x
         rod_y += wrist_y
-        rod_b -= q.rod_centre * (wrist_x * sin_b + wrist_y * cos_b) + eye * rub
+        rod_b -= q.rod_centre * (wrist_x * sin_b + wrist_y * cos_b) + on_eye
         piston_x -= wrist_x
         piston_y -= wrist_y
-        piston_t -= radius * rub
+        piston_t += on_pin
         peak, overlap_ratio = max(peak, normal), max(overlap_ratio, overlap / radius)
     if q.guide_rung == JOINT_COMPLIANT:
         guide_x, guide_y, moment, normal, overlap = _guide(q, b, held, t.contacts[k, GUIDE])
@@ -382,7 +445,7 @@ def _throw(k: int, w: Any, row: int, share: float, t: Any) -> None:
     pis_x, pis_y = piston_x * inv_px, piston_y * q.inverse_piston_across
     b.link = 0.0
     b.rate[11] = piston_t * q.inverse_piston_tilt
-    if q.crankpin_rung == JOINT_COMPLIANT and q.wristpin_rung == JOINT_IDEAL:
+    if q.crankpin_rung >= JOINT_COMPLIANT and q.wristpin_rung == JOINT_IDEAL:
         # two constraints of the wrist pin in closed form: the way a worn crank pin takes
         d_x, d_y, v_x, v_y = _wrist_offset(b, q, sin_b, cos_b)
         swing, lag = q.rod_centre * b_rate * b_rate, q.rod_centre * acc_b
@@ -407,7 +470,7 @@ def _throw(k: int, w: Any, row: int, share: float, t: Any) -> None:
     b.force[_PIN], b.force[_PIN + 1] = pin_x, pin_y
     b.force[_WRIST], b.force[_WRIST + 1] = wrist_x, wrist_y
     b.normal, b.overlap = peak, overlap_ratio
-    if q.crankpin_rung != JOINT_COMPLIANT or q.wristpin_rung == JOINT_LINK:
+    if q.crankpin_rung < JOINT_COMPLIANT or q.wristpin_rung == JOINT_LINK:
         crank_moment += _constrain(k, w, row, t, sin_a, cos_a, sin_b, cos_b, inv_px)
     pin_x, pin_y = b.force[_PIN], b.force[_PIN + 1]
     w.moment[0] += crank_moment + q.crank_radius * (pin_x * sin_a - pin_y * cos_a)
@@ -415,7 +478,7 @@ def _throw(k: int, w: Any, row: int, share: float, t: Any) -> None:
     if q.guide_rung != JOINT_COMPLIANT:  # what holds the piston up
         guide_y = b.force[_WRIST + 1] + m.gravity_y * q.piston_mass
     b.force[_GUIDE], b.force[_GUIDE + 1] = guide_x, guide_y
-    if q.crankpin_rung != JOINT_COMPLIANT and m.inverse_inertia > 0.0:
+    if q.crankpin_rung < JOINT_COMPLIANT and m.inverse_inertia > 0.0:
         b.force_per_turn[_FACE] = -added * b.rate_per_turn[9]
         if q.guide_rung != JOINT_COMPLIANT:
             b.force_per_turn[_GUIDE + 1] = b.force_per_turn[_WRIST + 1]
@@ -555,9 +618,9 @@ def _constrain(
     least, at_pin, at_wrist, n = 1.0, 1.0, 1.0, 0
     for _ in range(4):  # until every link has its friction on the side that its sign asks for
         n = 0
-        if q.crankpin_rung != JOINT_COMPLIANT:
+        if q.crankpin_rung < JOINT_COMPLIANT:
             n = _equations(CRANKPIN, n, at_pin, k, w, row, t, sin_a, cos_a, sin_b, cos_b)
-        if q.wristpin_rung != JOINT_COMPLIANT:
+        if q.wristpin_rung < JOINT_COMPLIANT:
             n = _equations(WRISTPIN, n, at_wrist, k, w, row, t, sin_a, cos_a, sin_b, cos_b)
         _mobilities(n, k, w, t, sin_b, cos_b, inv_px)
         _eliminate(w, n)
@@ -571,7 +634,7 @@ def _constrain(
         if at_pin == was_pin and at_wrist == was_wrist:
             break
     b.link = min(least, 0.0)
-    per_turn = m.inverse_inertia > 0.0 and q.crankpin_rung != JOINT_COMPLIANT
+    per_turn = m.inverse_inertia > 0.0 and q.crankpin_rung < JOINT_COMPLIANT
     if per_turn:
         for c in range(6, PER_THROW):
             b.rate_per_turn[c] = 0.0
@@ -645,7 +708,7 @@ def _derivative(w: Any, row: int, share: float, t: Any) -> None:
     w.crank[row, SPEED_RATE] = turning
     w.crank[row, MOMENT] = drive
     for k in range(t.throws.shape[0]):
-        if t.throws[k].crankpin_rung == JOINT_COMPLIANT:
+        if t.throws[k].crankpin_rung >= JOINT_COMPLIANT:
             continue
         b = w.stage[row, k]
         for c in range(6, 12):
@@ -728,6 +791,8 @@ def _advance(w: Any, row: int, i: int, share: float, slope: int) -> None:
         here, start, rate = w.stage[row, k], w.stage[i, k], w.stage[slope, k]
         for c in range(PER_THROW):
             here.y[c] = start.y[c] + share * rate.rate[c]
+        for c in range(len(FILM)):
+            here.film[c] = start.film[c] + share * rate.film_rate[c]
 
 
 @kernel
@@ -747,6 +812,9 @@ def _finish(w: Any, i: int, h: float) -> None:
         c_, d = w.stage[3, k], w.stage[4, k]
         for c in range(PER_THROW):
             end.y[c] = a.y[c] + sixth * _mean(a.rate[c], b.rate[c], c_.rate[c], d.rate[c])
+        for c in range(len(FILM)):
+            rate = _mean(a.film_rate[c], b.film_rate[c], c_.film_rate[c], d.film_rate[c])
+            end.film[c] = a.film[c] + sixth * rate
 
 
 @kernel
@@ -874,12 +942,13 @@ closings below the law's speed floor; steps with a link in tension; steps with v
 
 
 class _Record(NamedTuple):
-    """What a run leaves behind; the last two have one row where they are not needed."""
+    """What a run leaves behind; the last three have one row where they are not needed."""
 
     turns: NDArray[np.float64]  # (n_steps + 1, 2): crank angle and speed
     forces: NDArray[np.float64]  # (n_steps, 1 + n_throws * len(FORCES))
     states: NDArray[np.float64]  # (n_steps + 1, n_throws, PER_THROW)
     chambers: NDArray[np.float64]  # (n_steps + 1, n_throws, 8)
+    gaps: NDArray[np.float64]  # (n_steps + 1, n_throws, len(GAPS))
 
 
 class _Tally(NamedTuple):
@@ -920,6 +989,9 @@ def _keep(w: Any, i: int, chamber: Any, r: Any, row: int) -> None:
         if r.chambers.shape[0] > 1:
             for c in range(chamber.shape[1]):
                 r.chambers[row, k, c] = chamber[k, c]
+        if r.gaps.shape[0] > 1:
+            for c in range(len(GAPS)):
+                r.gaps[row, k, c] = w.stage[i, k].gaps[c]
 
 
 @kernel
@@ -959,6 +1031,8 @@ class CrankRun:
         middle of a step, to which its forces belong, is the mean of two rows. None where not kept.
     chambers : numpy.ndarray [shape=(n_steps + 1, n_throws, 6)] or None
         Columns as ``CHAMBER_STATE``; None where nothing breathes.
+    gaps : numpy.ndarray [shape=(n_steps + 1, n_throws, 4)] or None
+        Columns as :data:`GAPS`, at the starts of the steps' last stage; None where no pin is oiled.
     step : float
         [s]
     status : Status
@@ -981,6 +1055,7 @@ class CrankRun:
     chambers: NDArray[np.float64] | None
     step: float
     peak_normal_force: float
+    gaps: NDArray[np.float64] | None = None
     status: Status = Status.OK
     contact_changes: int = 0
     cuts_refused: int = 0
@@ -1002,6 +1077,7 @@ def run_mechanism(
     step: float,
     n_steps: int,
     chambers: NDArray[np.float64] | None = None,
+    films: NDArray[np.float64] | None = None,
     keep_states: bool = True,
 ) -> CrankRun:
     """Integrate the mechanism with contact in its clearances.
@@ -1021,6 +1097,8 @@ def run_mechanism(
         Steps to take.
     chambers : numpy.ndarray [shape=(n_throws, 6)], optional
         State of the chambers at the start.
+    films : numpy.ndarray [shape=(n_throws, 4)], optional
+        Columns as :data:`FILM`, at the start; inside the clearances.
     keep_states : bool
         Keep the bodies at the ends of all steps.
 
@@ -1032,6 +1110,10 @@ def run_mechanism(
     n = len(t.throws)
     rows = n_steps + 1 if keep_states else 1
     breathing = bool(np.any(t.throws["pressure_rung"] == PRESSURE_CHAMBER))
+    oiled = bool(
+        np.any(t.throws["crankpin_rung"] == JOINT_OILED)
+        or np.any(t.throws["wristpin_rung"] == JOINT_OILED)
+    )
     w = _Work(
         crank=np.zeros((5, 5)),
         stage=np.zeros((5, n), STAGE),
@@ -1042,6 +1124,8 @@ def run_mechanism(
     )
     w.crank[0, ANGLE], w.crank[0, SPEED] = angle, speed
     w.stage["y"][0] = bodies
+    if films is not None:
+        w.stage["film"][0] = films
     chamber = np.zeros((n, 8))
     if chambers is not None:
         chamber[:, :6] = chambers
@@ -1050,6 +1134,7 @@ def run_mechanism(
         forces=np.zeros((n_steps, 1 + n * len(FORCES))),
         states=np.empty((rows, n, PER_THROW)),
         chambers=np.empty((n_steps + 1 if breathing else 1, n, 8)),
+        gaps=np.zeros((n_steps + 1 if oiled else 1, n, len(GAPS))),
     )
     tally = _Tally(counts=np.zeros(5, np.int64), peak=np.zeros(1))
     code, done = _integrate(step, t, w, chamber, r, tally)
@@ -1058,6 +1143,7 @@ def run_mechanism(
         forces=r.forces[:done],
         bodies=r.states[: done + 1] if keep_states else None,
         chambers=r.chambers[: done + 1, :, :6] if breathing else None,
+        gaps=r.gaps[: done + 1] if oiled else None,
         step=step,
         status=Status(code),
         peak_normal_force=float(tally.peak[0]),

@@ -93,7 +93,7 @@ def _sunk(scene: PumpScene) -> list[tuple[Status, str]]:
     found = []
     for throw, path, part in _joints(scene):
         joint = ("crankpin", "wristpin", "guide").index(path.rpartition(".")[2])
-        if joint_rungs(scene, throw)[joint] != JOINT_COMPLIANT:
+        if joint_rungs(scene, throw)[joint] < JOINT_COMPLIANT:
             continue
         load = joint_loads(scene, throw)[joint]
         depth = penetration_under(contact_table(scene, throw)[joint], load)

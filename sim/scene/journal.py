@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, model_validator
 
 from ..output.sensor import Channel
-from .oil_viscosity import walther_viscosity
+from .oil import Oil
 from .parts import (
     ANGLE_MOST,
     DAMPING_MOST,
@@ -36,9 +36,7 @@ from .parts import (
     Angle,
     ConditionPlace,
     Damping,
-    Density,
     Force,
-    KinematicViscosity,
     Length,
     Mass,
     Numerics,
@@ -49,11 +47,9 @@ from .parts import (
     Scene,
     Stiffness,
     Tacho,
-    Temperature,
     Time,
     Unbalance,
     Velocity,
-    Viscosity,
     Wear,
     WearPlace,
     name_faults,
@@ -61,8 +57,6 @@ from .parts import (
 
 _FORCE_MOST = 1e9  # N
 _UNBALANCE_MOST = 1e6  # kg m
-_FORTY, _HUNDRED = 313.15, 373.15  # K, where data sheets give viscosities
-_VISCOSITY_LEAST, _VISCOSITY_MOST = 1e-6, 1e4  # Pa s, from air to pitch
 _THINNEST = 1e-9  # m, of a clearance: no film is thinner than its molecules
 _GAP_LEAST, _GAP_MOST = 1e-9, 1.0  # m
 _MOST_GROOVES = 32
@@ -158,69 +152,6 @@ class Bearing(Part):
     def clearance_diametral(self) -> float:
         """Diametral clearance [m], whichever way it was given."""
         return 2 * self.clearance_radial
-
-
-class Oil(Part):
-    """The oil in the film, at the temperature at which it runs.
-
-    Give its viscosity, or its temperature with the two kinematic viscosities of its data sheet
-    and its density: Walther's law (ASTM D341) then gives the viscosity.
-    """
-
-    viscosity: Viscosity | None = Field(
-        default=None,
-        ge=_VISCOSITY_LEAST,
-        le=_VISCOSITY_MOST,
-        description="dynamic, in the film",
-    )
-    temperature: Temperature | None = Field(
-        default=None, ge=200, le=600, description="absolute: 50 degrees Celsius are 323.15 K"
-    )
-    viscosity_40: KinematicViscosity | None = Field(
-        default=None, ge=2e-6, le=1e-1, description="kinematic, at 40 degrees Celsius"
-    )
-    viscosity_100: KinematicViscosity | None = Field(
-        default=None, ge=2e-6, le=1e-1, description="kinematic, at 100 degrees Celsius"
-    )
-    density: Density | None = Field(default=None, ge=500, le=2000, description="in the film")
-
-    @model_validator(mode="after")
-    def _one_way_to_know_it(self) -> Self:
-        names = ("temperature", "viscosity_40", "viscosity_100", "density")
-        given = [name for name in names if getattr(self, name) is not None]
-        missing = [name for name in names if name not in given]
-        if self.viscosity is not None and given:
-            raise ValueError(
-                f"viscosity and {', '.join(given)} given, must be one or the other; remove one"
-            )
-        if self.viscosity is None and missing:
-            raise ValueError(
-                f"viscosity is missing; add it, or {', '.join(missing)} for Walther's law"
-            )
-        if self.viscosity is None:
-            try:
-                found = self.dynamic_viscosity
-            except ValueError as error:
-                raise ValueError(f"Walther's law: {error}") from None
-            if not _VISCOSITY_LEAST <= found <= _VISCOSITY_MOST:
-                raise ValueError(
-                    f"temperature = {self.temperature:g} K gives a viscosity of {found:.3g} Pa s, "
-                    f"must be within {_VISCOSITY_LEAST:g} and {_VISCOSITY_MOST:g} Pa s"
-                )
-        return self
-
-    @property
-    def dynamic_viscosity(self) -> float:
-        """In the film [Pa s], as given or by Walther's law."""
-        if self.viscosity is not None:
-            return self.viscosity
-        # the validator saw to it that all four are given
-        assert self.temperature is not None
-        assert self.viscosity_40 is not None
-        assert self.viscosity_100 is not None
-        assert self.density is not None
-        points = ((_FORTY, self.viscosity_40), (_HUNDRED, self.viscosity_100))
-        return walther_viscosity(self.temperature, points, density=self.density)
 
 
 class RunOut(Part):

@@ -9,6 +9,7 @@ from pydantic import Field, model_validator
 from ..output.sensor import Channel
 from .exciters import CasingExciter, force_channel
 from .journal import ScarLimits
+from .oil import JointOil
 from .parts import (
     ANGLE_MOST,
     DAMPING_MOST,
@@ -258,16 +259,25 @@ class Contact(Part):
         ]
 
 
+OILED_RUNGS = ("film-short", "film-map", "mixed")
+"""Rungs of a joint that run in oil."""
+
+
 class RevoluteJoint(Contact):
     """A pin in an eye with clearance. Give exactly one of the two clearances.
 
-    The rungs *ideal* (no clearance), *link* (always in contact) and *compliant*.
+    The rungs *ideal* (no clearance), *link* (always in contact), *compliant* (dry impact), and in
+    oil *film-short*, *film-map* (finite length) and *mixed* (a film and the peaks of rough
+    surfaces). In oil, elasticity and stiffness are those of the parts behind the film, and
+    friction is that of the touching peaks.
     """
 
-    rung: Literal["ideal", "link", "compliant"] = Field(
+    rung: Literal["ideal", "link", "compliant", "film-short", "film-map", "mixed"] = Field(
         default="compliant",
-        description="ideal: no clearance; link: massless link as long as it; compliant: contact",
+        description="ideal: no clearance; link: massless link as long as it; compliant: contact; "
+        "film-short, film-map: oil; mixed: oil and touching peaks",
     )
+    oil: JointOil | None = Field(default=None, description="between pin and eye")
     pin_diameter: Length = Field(gt=0, le=LONGEST, description="nominal")
     diametral_clearance: Length | None = Field(
         default=None, ge=0, description="eye diameter minus pin diameter"
@@ -283,7 +293,8 @@ class RevoluteJoint(Contact):
             for name in ("diametral_clearance", "radial_clearance")
             if getattr(self, name) is not None
         ]
-        faults = self.elastic_faults() if self.rung == "compliant" else []
+        faults = self.elastic_faults() if self.rung not in ("ideal", "link") else []
+        faults += self._oil_faults()
         if len(given) > 1 or (not given and self.rung != "ideal"):
             faults.append(
                 f"{' and '.join(given) if given else 'no clearance'} given, must be exactly one of "
@@ -297,6 +308,22 @@ class RevoluteJoint(Contact):
         if faults:
             raise ValueError("\n".join(faults))
         return self
+
+    def _oil_faults(self) -> list[str]:
+        """What the oil of an oiled rung lacks."""
+        if self.rung not in OILED_RUNGS:
+            return []
+        if self.oil is None:
+            return [f"oil is missing; the rung '{self.rung}' needs it"]
+        faults = []
+        if self.rung == "mixed" and self.oil.roughness is None:
+            faults.append("oil.roughness is missing; the rung 'mixed' needs it")
+        if self.rung == "film-map" and self.oil.filled_gap is not None:
+            faults.append(
+                f"oil.filled_gap = {self.oil.filled_gap:g} m is for the rungs 'film-short' and "
+                "'mixed'; a map is of a flooded film, remove it or choose another rung"
+            )
+        return faults
 
     @property
     def clearance_radial(self) -> float:

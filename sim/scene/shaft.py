@@ -14,7 +14,8 @@ from pydantic import Field, model_validator
 
 from ..output.sensor import Channel
 from .exciters import PlacedExciter, force_channel
-from .journal import Film, Oil, ProximityProbe, RunOut, ScarLimits
+from .journal import Film, ProximityProbe, RunOut, ScarLimits
+from .oil import Oil
 from .parts import (
     ANGLE_MOST,
     DAMPING_MOST,

@@ -1,0 +1,205 @@
+"""A pin that runs in oil: film, touching peaks and yielding wall of one joint, compiled.
+
+The pin lies at d from the centre of its eye. The wall yields by ``d - s`` to where the film lets
+the pin be, s, a state of the joint. In a frame that turns with the mean of both surfaces' angular
+velocities, W, a film is squeezed but never dragged; the velocity there is ``V = s' - W x s``, and
+
+    R(s, V) V + N(s) n = K (d - s) + C (u - V),    u = d' - W x d,
+
+with the film's resistance R, the force N of touching peaks along the line of centres, and the
+wall's stiffness K and damping C. The right-hand side is the force on the rod. R depends on the
+direction of V alone (the film closes on one half of its circle), and ``R V`` is the gradient of a
+convex dissipation, so Newton's method finds V from any start in a few steps. It holds at rest, at
+the centre, where both surfaces turn against each other, and without any oil: then R is zero and
+the wall follows the pin in free flight.
+
+The wall relaxes at ``K / (R + C)``, which no gap makes fast; peaks are taken in implicitly. So the
+film never shortens the step of the mechanism.
+
+Moments: shear drags pin and eye together by M; pressure acts on the pin through its own centre and
+on the eye through another, so each bears half of ``d x F`` beside it. The power lost is then
+``V R V + M w`` plus that of the wall, whatever W is.
+
+Sources: Booker (1965), J. Basic Engineering 87(3), 537-546, for a film under a moving load in the
+frame of the mean rotation; Childs, Moes, van Leeuwen (1977), J. Lubrication Technology 99(2),
+198-210. Series of film and wall, and the implicit step, are derived here.
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from ..contact.asperities import asperity_force
+from ..contact.law import elastic_force, friction_force
+from ..film.impedance_map import MapTable, map_resistance
+from ..film.short import filled_angle, short_resistance
+from ..jit import kernel
+
+OIL = np.dtype(
+    [
+        ("short", "f8"),  # eta R L^3 / C^3, lands apart [N s/m]; 0 where the map is used
+        ("map", "f8"),  # eta R^3 L / C^3 of the same [N s/m]; 0 where the short film is used
+        ("shear", "f8"),  # eta R^3 L / C [N m s]
+        ("filled", "f8"),  # thickest gap over C that holds oil
+        ("radius", "f8"),  # in the middle of the gap [m]
+        ("wall_damping", "f8"),  # C [N s/m]
+        ("roughness", "f8"),  # of both surfaces [m]; 0 is smooth
+        ("peaks", "f8"),  # scale of the asperity force [N]
+        ("step", "f8"),  # of the mechanism [s]
+        ("offset", "i8"),  # of the map's coefficients
+        ("roots", "i8"),  # their shape
+        ("angles", "i8"),
+        ("gap_factor", "f8"),
+        ("least_root", "f8"),
+        ("per_root", "f8"),
+        ("per_radian", "f8"),
+    ]
+)
+"""Oil of one joint, in SI."""
+
+DEEPEST = 1.0 - 1e-5
+"""Eccentricity beyond which the film is that of this one: what is thinner than its finish."""
+
+_NEWTON_STEPS = 12
+_SETTLED = 1e-3  # of the velocity at the last step, whose error is the square of it
+_IMPLICIT = 0.5  # of a step, over which the peaks' stiffness is taken in
+_MOST_CLOSED = 0.7  # of the gap, in one step
+
+
+@kernel
+def _resistance(x: float, y: float, v_x: float, v_y: float, o: Any, maps: Any) -> Any:
+    """Resistance of the film at s over C to velocities in a direction [N s/m]."""
+    if o.map > 0.0:
+        n = 3 * o.roots * o.angles
+        c = maps[o.offset : o.offset + n].reshape(3, 1, o.roots, o.angles)
+        table = MapTable(c, 1, o.gap_factor, o.least_root, o.per_root, o.per_radian, 0.0)
+        xx, xy, yx, yy = map_resistance(table, x, y, v_x, v_y)
+        return o.map * xx, o.map * xy, o.map * yx, o.map * yy
+    xx, xy, yy = short_resistance(x, y, v_x, v_y, o.filled)
+    return o.short * xx, o.short * xy, o.short * xy, o.short * yy
+
+
+@kernel
+def _film_velocity(
+    x: float,
+    y: float,
+    pull_x: float,
+    pull_y: float,
+    v_x: float,
+    v_y: float,
+    wall_xx: float,
+    wall_xy: float,
+    wall_yy: float,
+    o: Any,
+    maps: Any,
+) -> Any:
+    """Velocity V at which the film resists what pulls, from a guess of it."""
+    for step in range(_NEWTON_STEPS):
+        r_xx, r_xy, r_yx, r_yy = _resistance(x, y, v_x, v_y, o, maps)
+        a, b, c, d = r_xx + wall_xx, r_xy + wall_xy, r_yx + wall_xy, r_yy + wall_yy
+        inverse = 1.0 / (a * d - b * c)
+        new_x, new_y = (d * pull_x - b * pull_y) * inverse, (a * pull_y - c * pull_x) * inverse
+        change = abs(new_x - v_x) + abs(new_y - v_y)
+        damped = 1.0 if step < _NEWTON_STEPS // 2 else 0.5  # where two pieces send to each other
+        v_x += damped * (new_x - v_x)
+        v_y += damped * (new_y - v_y)
+        if change <= _SETTLED * (abs(new_x) + abs(new_y)):
+            break
+    return v_x, v_y
+
+
+@kernel
+def oiled_joint(
+    s_x: float,
+    s_y: float,
+    d_x: float,
+    d_y: float,
+    v_x: float,
+    v_y: float,
+    pin_turn: float,
+    eye_turn: float,
+    guess: Any,
+    c: Any,
+    o: Any,
+    maps: Any,
+) -> Any:
+    """Force of a pin on its rod through oil, and how the film moves.
+
+    Parameters
+    ----------
+    s_x, s_y : float
+        Where the film lets the pin be, from the eye's centre [m].
+    d_x, d_y, v_x, v_y : float
+        Pin from the eye's centre [m], and how fast [m/s].
+    pin_turn, eye_turn : float
+        Angular velocities, counter-clockwise [rad/s].
+    guess : numpy.ndarray of shape (2,)
+        V of the last call; holds that of this one afterwards [m/s].
+    c, o : record of CONTACT, record of OIL
+        Wall and its friction; the film.
+    maps : numpy.ndarray
+        Coefficients of all maps, one after the other.
+
+    Returns
+    -------
+    tuple of float
+        Force on the rod x, y [N]; moments on pin and eye, counter-clockwise [N m]; rate of s x, y
+        [m/s]; least gap [m]; force of the peaks [N].
+    """
+    mean, slip = 0.5 * (pin_turn + eye_turn), pin_turn - eye_turn
+    u_x, u_y = v_x + mean * d_y, v_y - mean * d_x
+    yield_x, yield_y = d_x - s_x, d_y - s_y
+    deep = math.sqrt(yield_x * yield_x + yield_y * yield_y)
+    spring = elastic_force(deep, c) / deep if deep > 0.0 else 0.0
+    wall = o.wall_damping
+    pull_x, pull_y = spring * yield_x + wall * u_x, spring * yield_y + wall * u_y
+    distance = math.sqrt(s_x * s_x + s_y * s_y)
+    n_x, n_y = (s_x / distance, s_y / distance) if distance > 0.0 else (1.0, 0.0)
+    gap = c.clearance - distance
+    peaks, stiff = asperity_force(gap, o.roughness, o.peaks)
+    stiff *= _IMPLICIT * o.step
+    most = 1.0 - max(1.0 - DEEPEST, o.roughness / c.clearance)  # peaks keep the surfaces apart
+    share = min(1.0 / c.clearance, most / distance) if distance > 0.0 else 0.0
+    x, y = s_x * share, s_y * share
+    f_x, f_y = _film_velocity(
+        x,
+        y,
+        pull_x - peaks * n_x,
+        pull_y - peaks * n_y,
+        guess[0],
+        guess[1],
+        wall + stiff * n_x * n_x,
+        stiff * n_x * n_y,
+        wall + stiff * n_y * n_y,
+        o,
+        maps,
+    )
+    guess[0], guess[1] = f_x, f_y
+    closing = f_x * n_x + f_y * n_y - _MOST_CLOSED * max(0.0, gap) / o.step
+    if closing > 0.0:  # no film is crossed between two looks at it
+        f_x -= closing * n_x
+        f_y -= closing * n_y
+    force_x, force_y = pull_x - wall * f_x, pull_y - wall * f_y
+    eccentricity = math.sqrt(x * x + y * y)
+    angle = filled_angle(eccentricity, o.filled)
+    rest = math.sqrt(1.0 - eccentricity * eccentricity)
+    drag = o.shear * 2.0 * angle / rest * slip
+    # as the implicit step left it: peaks that a stage ran into carry no more than the wall gives
+    peaks = max(0.0, peaks + stiff * (f_x * n_x + f_y * n_y))
+    if peaks > 0.0:
+        rub = friction_force(f_y * n_x - f_x * n_y + o.radius * slip, peaks, c)
+        force_x -= rub * n_y
+        force_y += rub * n_x
+        drag += o.radius * rub
+    couple = 0.5 * (d_x * force_y - d_y * force_x)
+    return (
+        force_x,
+        force_y,
+        couple - drag,
+        couple + drag,
+        f_x - mean * s_y,
+        f_y + mean * s_x,
+        gap,
+        peaks,
+    )

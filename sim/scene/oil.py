@@ -1,0 +1,131 @@
+"""Oil: what a film runs in, and the film of a pin in its eye."""
+
+from typing import Self
+
+from pydantic import Field, model_validator
+
+from .oil_viscosity import walther_viscosity
+from .parts import (
+    DAMPING_MOST,
+    LONGEST,
+    PRESSURE_MOST,
+    Damping,
+    Density,
+    KinematicViscosity,
+    Length,
+    Part,
+    Pressure,
+    Temperature,
+    Viscosity,
+)
+
+_VISCOSITY_LEAST, _VISCOSITY_MOST = 1e-6, 1e4  # Pa s, from air to pitch
+_FORTY, _HUNDRED = 313.15, 373.15  # K, where data sheets give viscosities
+
+
+class Oil(Part):
+    """The oil in the film, at the temperature at which it runs.
+
+    Give its viscosity, or its temperature with the two kinematic viscosities of its data sheet
+    and its density: Walther's law (ASTM D341) then gives the viscosity.
+    """
+
+    viscosity: Viscosity | None = Field(
+        default=None,
+        ge=_VISCOSITY_LEAST,
+        le=_VISCOSITY_MOST,
+        description="dynamic, in the film",
+    )
+    temperature: Temperature | None = Field(
+        default=None, ge=200, le=600, description="absolute: 50 degrees Celsius are 323.15 K"
+    )
+    viscosity_40: KinematicViscosity | None = Field(
+        default=None, ge=2e-6, le=1e-1, description="kinematic, at 40 degrees Celsius"
+    )
+    viscosity_100: KinematicViscosity | None = Field(
+        default=None, ge=2e-6, le=1e-1, description="kinematic, at 100 degrees Celsius"
+    )
+    density: Density | None = Field(default=None, ge=500, le=2000, description="in the film")
+
+    @model_validator(mode="after")
+    def _one_way_to_know_it(self) -> Self:
+        names = ("temperature", "viscosity_40", "viscosity_100", "density")
+        given = [name for name in names if getattr(self, name) is not None]
+        missing = [name for name in names if name not in given]
+        if self.viscosity is not None and given:
+            raise ValueError(
+                f"viscosity and {', '.join(given)} given, must be one or the other; remove one"
+            )
+        if self.viscosity is None and missing:
+            raise ValueError(
+                f"viscosity is missing; add it, or {', '.join(missing)} for Walther's law"
+            )
+        if self.viscosity is None:
+            try:
+                found = self.dynamic_viscosity
+            except ValueError as error:
+                raise ValueError(f"Walther's law: {error}") from None
+            if not _VISCOSITY_LEAST <= found <= _VISCOSITY_MOST:
+                raise ValueError(
+                    f"temperature = {self.temperature:g} K gives a viscosity of {found:.3g} Pa s, "
+                    f"must be within {_VISCOSITY_LEAST:g} and {_VISCOSITY_MOST:g} Pa s"
+                )
+        return self
+
+    @property
+    def dynamic_viscosity(self) -> float:
+        """In the film [Pa s], as given or by Walther's law."""
+        if self.viscosity is not None:
+            return self.viscosity
+        # the validator saw to it that all four are given
+        assert self.temperature is not None
+        assert self.viscosity_40 is not None
+        assert self.viscosity_100 is not None
+        assert self.density is not None
+        points = ((_FORTY, self.viscosity_40), (_HUNDRED, self.viscosity_100))
+        return walther_viscosity(self.temperature, points, density=self.density)
+
+
+class JointOil(Oil):
+    """The oil between a pin and its eye, and the rough surfaces that it keeps apart."""
+
+    length: Length = Field(gt=0, le=LONGEST, description="of the eye, along the pin")
+    groove_width: Length = Field(
+        default=0.0,
+        ge=0,
+        le=LONGEST,
+        description="of a groove all round in the middle: two lands are left; 0 is none",
+    )
+    filled_gap: Length | None = Field(
+        default=None,
+        gt=0,
+        le=LONGEST,
+        description="thickest gap that holds oil: splash or grease; none: flooded",
+    )
+    wall_damping: Damping | None = Field(
+        default=None,
+        ge=0,
+        le=DAMPING_MOST,
+        description="of the parts behind the film; none: a twentieth of sqrt(stiffness x mass)",
+    )
+    roughness: Length | None = Field(
+        default=None,
+        gt=0,
+        le=1e-4,
+        description="of both surfaces, root of the sum of their squares; the rung mixed needs it",
+    )
+    asperity_stiffness: Pressure = Field(
+        default=160e6,
+        gt=0,
+        le=PRESSURE_MOST,
+        description="pressure factor of Greenwood and Tripp, about 0.003 of the contact modulus",
+    )
+
+    @model_validator(mode="after")
+    def _groove_leaves_lands(self) -> Self:
+        if self.groove_width >= self.length:
+            raise ValueError(
+                f"groove_width = {self.groove_width:g} m must be < length = {self.length:g} m; "
+                "it leaves two lands"
+            )
+        return self
