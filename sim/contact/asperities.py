@@ -43,7 +43,7 @@ def asperity_scale(
     Examples
     --------
     >>> round(asperity_scale(0.5e-6, 0.03, 0.05, 0.05e-3, 160e6), 6)
-    0.001216
+    0.964706
     """
     beta = math.gamma(0.5) * math.gamma(_POWER + 1.0) / math.gamma(_POWER + 1.5)
     return stiffness * _FACTOR * length * radius * math.sqrt(2.0 * roughness / clearance) * beta

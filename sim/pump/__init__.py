@@ -1,4 +1,5 @@
 """The reciprocating pump: crank mechanism, liquid, casing, and its recording.
 
-It may import ``sim.jit``, ``sim.output``, ``sim.scene``, ``sim.contact``, ``sim.excitation``.
+It may import ``sim.jit``, ``sim.output``, ``sim.scene``, ``sim.contact``,
+``sim.film``, ``sim.excitation``.
 """
