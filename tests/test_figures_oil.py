@@ -1,4 +1,4 @@
-"""The script of the page on lubrication: its numbers are those of the page, and say what it says."""
+"""The script of the page on lubrication: its numbers stand on the page, and say what it says."""
 
 import importlib.util
 import re
