@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 STAMP := .venv/.ready
 
-.PHONY: demo test check lint types benchmark clean
+.PHONY: demo test check lint types benchmark docs clean
 
 demo: $(STAMP)
 	$(BIN)/wearstate demo
@@ -25,6 +25,13 @@ lint: $(STAMP)
 types: $(STAMP)
 	bash tests/types.sh $(BIN)
 
+# the site, in docs/_build/html; needs the network only where the extra is not installed yet
+docs: $(STAMP)
+	$(BIN)/python -c 'import myst_parser, numpydoc, pydata_sphinx_theme, sphinx_gallery' 2> /dev/null \
+	  || $(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[docs]'
+	OMP_NUM_THREADS=1 $(BIN)/sphinx-build -q -W -n --keep-going -b html \
+	  -d docs/_build/doctrees docs docs/_build/html
+
 $(STAMP): pyproject.toml setup.py
 	@$(PYTHON) -c 'import sys; v = sys.version_info; \
 	  sys.exit(None if v >= (3, 11) else f"Python {v[0]}.{v[1]} must be >= 3.11; call make PYTHON=python3.11")'
@@ -33,4 +40,4 @@ $(STAMP): pyproject.toml setup.py
 	@touch $(STAMP)
 
 clean:
-	rm -rf .venv build dist *.egg-info .mypy_cache .ruff_cache
+	rm -rf .venv docs/_build docs/gallery docs/reference/generated build dist *.egg-info .mypy_cache .ruff_cache

@@ -1,0 +1,14 @@
+"""
+A worn crank pin
+================
+
+Each reversal of the rod force sends the pin across its clearance, and the casing rings: the
+channels of a pump with 0.25 mm of clearance, over two revolutions.
+"""
+
+import wearstate
+
+pump = wearstate.load_scene("bilge-pump", {"joint.crankpin.diametral_clearance": "0.25 mm"})
+recording = wearstate.simulate(pump, seed=1)
+axes = recording.plot()
+axes[0].set_xlim(0, 2 * 0.2)  # [s], at 300 rpm

@@ -1,0 +1,13 @@
+"""
+Transfer function from a hammer test
+====================================
+
+Twenty blows on the casing of a pump at rest: magnitude and coherence. Where the coherence falls
+the estimate is noise.
+"""
+
+import wearstate
+
+test = {"running": False, "exciters.0.force": "500 N"}
+recording = wearstate.simulate(wearstate.load_scene("bilge-pump", test), seed=1)
+wearstate.features.frf(recording).plot()

@@ -1,0 +1,131 @@
+"""The documentation site: what can be told without building it, which ``make docs`` does."""
+
+import importlib
+import re
+import shlex
+from pathlib import Path
+
+import matplotlib as mpl
+import pytest
+import wearstate
+from click.testing import CliRunner
+from matplotlib import pyplot as plt
+from wearstate.diagnose.command_line.cli import cli
+
+DOCS = Path(wearstate.__file__).parent / "docs"
+EXAMPLES = sorted((DOCS / "examples").glob("*.py"))
+GUIDES = [DOCS / "start.md", *sorted((DOCS / "how-to").glob("[!i]*.md"))]
+
+mpl.use("agg")
+
+
+@pytest.fixture(autouse=True)
+def _closed():
+    yield
+    plt.close("all")
+
+
+# --- pages
+
+
+def pages():
+    """Pages that are written by hand."""
+    built = ("_build", "gallery", "generated", "examples")
+    found = [page for page in DOCS.rglob("*.md") if not set(built) & set(page.parts)]
+    return {page.relative_to(DOCS).with_suffix("").as_posix() for page in found}
+
+
+def in_toctrees():
+    """Pages that a toctree lists."""
+    found = set()
+    for name in pages():
+        page = DOCS / f"{name}.md"
+        for tree in re.findall(r"```\{toctree\}\n(.*?)```", page.read_text("utf-8"), re.S):
+            lines = [line for line in tree.splitlines() if line and not line.startswith(":")]
+            for line in lines:
+                entry = m[1] if (m := re.search(r"<(.+)>$", line)) else line
+                for each in page.parent.glob(f"{entry}.md"):
+                    found.add(each.resolve().relative_to(DOCS.resolve()).with_suffix("").as_posix())
+    return found
+
+
+def test_every_page_is_in_a_toctree():
+    assert len(pages()) > 60
+    assert pages() - in_toctrees() == {"index"}
+
+
+def test_the_reference_names_every_public_name():
+    listed = set()
+    for page in (DOCS / "reference").glob("*.md"):
+        for table in re.findall(r"```\{eval-rst\}\n(.*?)```", page.read_text("utf-8"), re.S):
+            [module] = re.findall(r"currentmodule:: (\S+)", table)
+            listed |= {f"{module}.{name}" for name in re.findall(r"^   (\w+)$", table, re.M)}
+    public = {f"wearstate.{name}" for name in wearstate._HOMES}
+    for name in wearstate._MODULES:
+        module = importlib.import_module(f"wearstate.{name}")
+        public |= {f"{module.__name__}.{each}" for each in module.__all__}
+    public.remove("wearstate.film.FILM_RUNGS")  # a table, on the page of the solvers
+    assert listed == public
+
+
+# --- examples
+
+
+def test_there_are_enough_examples():
+    assert len(EXAMPLES) >= 25
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
+def test_an_example_is_short_and_draws_one_picture(path, tmp_path, monkeypatch):
+    text = path.read_text(encoding="utf-8")
+    assert len(text.splitlines()) <= 40
+    title, rule = text.splitlines()[1:3]
+    assert rule == "=" * len(title)
+    monkeypatch.chdir(tmp_path)
+    exec(compile(text, str(path), "exec"), {"__name__": path.stem})
+    assert len(plt.get_fignums()) == 1
+    drawn = [each for axes in plt.gcf().axes for each in axes.get_children()]
+    assert len(drawn) > 10
+
+
+# --- code in the guides
+
+
+def blocks(text):
+    """Blocks of Python and of shell, in their order."""
+    return re.findall(r"^```(python|sh)\n(.*?)^```$", text, re.S | re.M)
+
+
+def run_shell(text):
+    for line in text.replace("\\\n", " ").splitlines():
+        name, *arguments = shlex.split(line)
+        assert name == "wearstate", line
+        result = CliRunner().invoke(cli, arguments)
+        assert result.exit_code == 0, f"{line}\n{result.output}"
+
+
+@pytest.mark.parametrize("page", GUIDES, ids=lambda page: page.stem)
+def test_the_code_of_a_guide_runs(page, tmp_path, monkeypatch, request):
+    text = page.read_text(encoding="utf-8")
+    if "import torch" in text:
+        pytest.importorskip("torch")
+    for file, fixture in (("pump.h5", "small_set"), ("pump.wsm", "small_model")):
+        if file in text:
+            (tmp_path / file).symlink_to(request.getfixturevalue(fixture))
+    monkeypatch.chdir(tmp_path)
+    names = {"__name__": page.stem}
+    kinds = re.findall(r"^```([^`\s]+)", text, re.M)
+    assert len(kinds) == len(re.findall(r"^```$", text, re.M))  # none without its kind
+    found = blocks(text)
+    assert len(found) == sum(not kind.startswith("{") for kind in kinds)
+    for kind, code in found:
+        if kind == "sh":
+            run_shell(code)
+        else:
+            exec(compile(code, str(page), "exec"), names)
+
+
+def test_the_reader_of_guides_sees_an_error():
+    assert blocks("a\n```python\n1 / 0\n```\n") == [("python", "1 / 0\n")]
+    with pytest.raises(AssertionError, match="scene check missing"):
+        run_shell("wearstate scene check missing.toml")
