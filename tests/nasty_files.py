@@ -202,7 +202,7 @@ FILES: dict[str, Nasty] = {
     },
     "empty raw": Nasty(text(b""), "x.bin", "0 byte", RAW),
     "empty model": Nasty(text(b""), "x.wsm", "not a zip", INFO),
-    "empty scene": Nasty(text(b""), "x.toml", "machine = None", SCENE),
+    "empty scene": Nasty(text(b""), "x.toml", "machine is missing", SCENE),
     # text
     "BOM alone": Nasty(text(b"\xef\xbb\xbf"), "x.csv", "no line"),
     "BOM twice": Nasty(
@@ -296,7 +296,7 @@ FILES: dict[str, Nasty] = {
     # what is no file, and names
     "symlink loop": Nasty(symlink_loop, "x.csv", "is no file"),
     "FIFO": Nasty(os.mkfifo, "x.csv", "is no file"),
-    "folder": Nasty(Path.mkdir, "x.wav", "is no file"),
+    "folder": Nasty(Path.mkdir, "x.wav", "is a folder"),
     "device": Nasty(lambda p: p.symlink_to("/dev/zero"), "x.wav", "is no file"),
     "line feed in a name": Nasty(healthy_csv, "a\nb.csv", "samples +64", code=0),
     "signs in a name": Nasty(
@@ -312,7 +312,7 @@ FILES: dict[str, Nasty] = {
     "TOML of deep brackets": Nasty(text("a = " + "[" * 10**5), "x.toml", "nested too deep", SCENE),
     "TOML of a long number": Nasty(text("a = " + "9" * 10**5), "x.toml", "<= 64 bit", SCENE),
     "TOML of many keys": Nasty(
-        text("".join(f"k{i} = 1\n" for i in range(10**4))), "x.toml", "machine = None", SCENE
+        text("".join(f"k{i} = 1\n" for i in range(10**4))), "x.toml", "machine is missing", SCENE
     ),
     "TOML deep keys": Nasty(
         text(".".join("a" * 20000) + " = 1\n"), "x.toml", "nested too deep", RECIPE

@@ -24,6 +24,7 @@ FOREIGN = {"--nthreads"}  # of `dask worker`
 NAMED = {"import": "import", "train": "train", "retrain": "train", "generate": "generate"}
 """Word before an option -> command that it tells to run."""
 OWN_RULE = {
+    "command_help.py",
     "command_sweep.py",
     "commands_data.py",
     "commands_machine.py",

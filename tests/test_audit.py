@@ -699,7 +699,7 @@ def refusals(tmp_path):
         "t.csv": (Roles(label="z", group="9"), "label = 'z' must be one of its 3 columns"),
         "e.csv": (Roles(), "cannot be read as a table"),
         "t.xls": (Roles(), "suffix '.xls' must be .h5 or one of"),
-        "none.csv": (Roles(), "is no file; check the path"),
+        "none.csv": (Roles(), "no such file; check the path"),
         "s.csv": (Roles(split="part"), "holds fit, must hold train and test"),
     }
 

@@ -220,7 +220,7 @@ def test_an_old_file_is_read_and_said_to_have_no_hash(copy):
 def test_a_file_that_cannot_be_opened_has_that_as_its_finding(tmp_path):
     (tmp_path / "x.h5").write_text("no HDF5")
     assert the_fault(tmp_path / "x.h5")[2].startswith("file cannot be read")
-    with pytest.raises(DataError, match=r"no\.h5 is no file; check the path"):
+    with pytest.raises(DataError, match=r"no\.h5: no such file; check the path"):
         check_set(tmp_path / "no.h5")
 
 

@@ -154,7 +154,7 @@ def test_bad_scene_files(tmp_path):
     (tmp_path / "bad.toml").write_text("machine = 'x'\nname = \n")
     refused("scene", "check", tmp_path / "bad.toml", says=["not TOML", "line 2"])
     (tmp_path / "empty.toml").write_text("")
-    refused("scene", "check", tmp_path / "empty.toml", says=["machine = None"])
+    refused("scene", "check", tmp_path / "empty.toml", says=["machine is missing"])
     refused("simulate", "bilge-pump", "--set", "drive.speed", says=["must read PATH=VALUE"])
 
 
@@ -189,8 +189,8 @@ def test_truncated_and_foreign_files(tmp_path, small_set, small_model):
         refused("info", tmp_path / name, says=[name])
     refused("report", tmp_path / "x.mat", "--model", small_model, says=["x.mat"])
     refused("report", small_set, "--model", tmp_path / "x.wsm", says=["x.wsm"])
-    refused("report", tmp_path / "none.h5", "--model", small_model, says=["is no file"])
-    refused("report", small_set, "--model", tmp_path / "none.wsm", says=["is no file"])
+    refused("report", tmp_path / "none.h5", "--model", small_model, says=["no such file"])
+    refused("report", small_set, "--model", tmp_path / "none.wsm", says=["no such file"])
     assert not (tmp_path / "m.wsm").exists()
 
 
@@ -219,7 +219,7 @@ def test_a_folder_that_is_a_file_is_one_message(tmp_path, small_set):
     for output in ("file/t.csv", "file/deeper/t.csv"):
         refused("features", small_set, "-o", tmp_path / output, says=["is no folder; create it"])
     refused("demo", "--folder", tmp_path / "file" / "demo", says=["cannot be made a folder"])
-    refused("info", tmp_path / "file" / "x.h5", says=["is no file"])
+    refused("info", tmp_path / "file" / "x.h5", says=["no such file"])
 
 
 def test_an_output_is_never_an_input(tmp_path, small_set, small_model):
@@ -300,7 +300,7 @@ def test_only_a_scene_is_shown(tmp_path):
     assert "1234" not in refused("scene", "show", tmp_path / "secret", says=["not TOML"])
     (tmp_path / "other.toml").write_text("name = 'no scene'")
     refused("scene", "show", tmp_path / "other.toml", says=["machine is missing"])
-    refused("scene", "show", tmp_path, says=["is no scene"])
+    refused("scene", "show", tmp_path, says=["is a folder, must be a scene"])
 
 
 def test_force_is_an_option_here_and_an_argument_in_the_library(tmp_path):

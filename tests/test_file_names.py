@@ -42,7 +42,7 @@ def said(*words, code=0):
 
 def test_streams_show_the_bytes(folder):
     assert r"a\udcff.wav" in said("import", "--list", f"{NAME}.wav")
-    assert r"/a\udcff.mat is no file" in said("info", folder / f"{NAME}.mat", code=2)
+    assert r"/a\udcff.mat: no such file" in said("info", folder / f"{NAME}.mat", code=2)
 
 
 def test_names_go_into_data_sets_and_tables(folder):

@@ -193,7 +193,7 @@ def test_every_bad_file_is_named_at_once(files, tmp_path):
     text = refused(
         [*files, tmp_path / "cut.wav", tmp_path / "no.wav", tmp_path],
         tmp_path / "x.h5",
-        "no.wav is no file",
+        "no.wav: no such file",
     )
     assert "cut.wav" in text
     assert f"{tmp_path} is a folder" in text
@@ -421,7 +421,7 @@ def test_a_scene_names_the_severities_that_it_has_limits_for():
 
 def test_labels_of_other_kinds_at_fault(tmp_path, monkeypatch):
     for path, constants, severities, message in (
-        (tmp_path / "no.csv", {}, (), "is no file"),
+        (tmp_path / "no.csv", {}, (), "no such file"),
         (None, {"a": "1"}, ("b",), "severity b is no label"),
         (None, {"gap_m": "1"}, ("gap_m",), "must name kind, place and metres"),
         (

@@ -154,7 +154,7 @@ def test_contents_are_listed_without_choosing(tmp_path, mat):
     (tmp_path / "cut.mat").write_bytes(mat.read_bytes()[:150])
     with pytest.raises(DataError) as caught:
         list_contents([tmp_path / "no.wav", mat, tmp_path / "cut.mat"])
-    assert "no.wav is no file" in str(caught.value)
+    assert "no.wav: no such file" in str(caught.value)
     assert "cut.mat" in str(caught.value)
 
 

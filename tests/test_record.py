@@ -286,7 +286,7 @@ def test_files_of_others_are_refused(tmp_path):
     other.write_text("no HDF5")
     with pytest.raises(DataError, match="file cannot be read"):
         DataSet(other)
-    with pytest.raises(DataError, match=r"absent\.h5 is no file; check the path"):
+    with pytest.raises(DataError, match=r"absent\.h5: no such file; check the path"):
         DataSet(tmp_path / "absent.h5")
 
 
@@ -313,7 +313,7 @@ def test_an_unfinished_file_is_refused(path):
     part = path.with_name("data.h5.part")
     with pytest.raises(DataError, match="unfinished data set; run the same generate command"):
         DataSet(part)
-    with pytest.raises(DataError, match=r"is no file; data\.h5\.part is there"):
+    with pytest.raises(DataError, match=r"no such file; data\.h5\.part is there"):
         DataSet(path)
     shutil.copy(part, path)
     with pytest.raises(DataError, match="1 of 3 records are done, must be all"):

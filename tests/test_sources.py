@@ -1153,7 +1153,7 @@ def test_options_and_paths_at_fault(tmp_path):
     path = tmp_path / "x.npy"
     np.save(path, SIGNAL)
     assert "suffix '.dat' must be one of .wav, .mat" in refusal(tmp_path / "x.dat")
-    assert "is no file" in refusal(tmp_path / "y.npy")
+    assert "no such file" in refusal(tmp_path / "y.npy")
     assert "variable = 'a' does not fit NPY files" in refusal(path, variable="a")
     with pytest.raises(DataError) as caught:
         SourceOptions(

@@ -14,7 +14,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ...sim.output.recording import DataError
+from ...sim.output.recording import DataError, missing_file
 from ...sim.wear.archard import grade
 from ..file.record import DataSet, signal_checksum
 from ..recipe.draws import Range
@@ -114,7 +114,7 @@ def check_set(path: str | Path, *, progress: Callable[[int, int], None] | None =
     """
     place = Path(path).absolute()
     if not place.is_file():
-        raise DataError(f"{place} is no file; check the path")
+        raise DataError(missing_file(place))
     try:
         data = DataSet(place)
     except DataError as error:

@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ...sim.output.recording import DataError
+from ...sim.output.recording import DataError, missing_file
 from ..file.hdf5_values import HDF5_FAULTS, is_plain
 from ..file.record import DataSet
 from ..measured.labels import listed
@@ -412,7 +412,7 @@ def _sides(column: Any, place: Path) -> NDArray[np.int8]:
 def _frame(path: Path) -> Any:
     """Columns of a file as a data frame, named by number where it names none."""
     if not path.is_file():
-        raise DataError(f"{path} is no file; check the path")
+        raise DataError(missing_file(path))
     if path.stat().st_size > LARGEST_TABLE:
         raise DataError(
             f"{path}: {path.stat().st_size / 1e9:.1f} GB, must be <= {LARGEST_TABLE / 1e9:.1f} GB; "

@@ -24,7 +24,13 @@ from numpy.typing import NDArray
 
 from ... import __version__
 from ...sim.atomic import fresh_name, put_in_place
-from ...sim.output.recording import DataError, Recording, SignalLayout, html_table
+from ...sim.output.recording import (
+    DataError,
+    Recording,
+    SignalLayout,
+    html_table,
+    missing_file,
+)
 from ...sim.output.sensor import Channel
 from .hdf5_values import HDF5_FAULTS, fill_room, is_plain, make_room, plain_values, write_values
 from .machines import machine_identities
@@ -496,8 +502,9 @@ def _refuse_by_name(path: Path) -> None:
         )
     if not path.is_file():
         part = _part(path)
-        hint = f"; {part.name} is there: run the same command again" if part.is_file() else ""
-        raise DataError(f"{path} is no file{hint or '; check the path'}")
+        there = part.is_file()
+        cure = f"{part.name} is there: run the same command again" if there else "check the path"
+        raise DataError(missing_file(path, cure))
 
 
 def _stored_attributes(file: Any, path: Path) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from functools import partial
 from itertools import pairwise
 from pathlib import Path, PurePosixPath
 
-from ...sim.output.recording import DataError
+from ...sim.output.recording import DataError, missing_file
 from ...sim.scene.load import all_wear_places, load_scene
 from ...sim.scene.parts import UNITS, nearest, to_si
 from ..file.csv_cells import plain_cell
@@ -408,7 +408,7 @@ def _filled_table(
 
 def _table_text(path: Path) -> str:
     if not path.is_file():
-        raise DataError(f"{path} is no file; check the path of the labels")
+        raise DataError(missing_file(path, "check the path of the labels"))
     size = path.stat().st_size
     if size > LARGEST_TABLE:
         raise DataError(f"{path} has {size} byte, must be <= {LARGEST_TABLE}; is it the labels?")

@@ -16,7 +16,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ...sim.output.recording import DataError
+from ...sim.output.recording import DataError, missing_file
 from ...sim.output.sensor import rate_fault
 from ...sim.scene.parts import nearest
 from ..source.channel_units import FULL_SCALE, ChannelUnit, parse_sensitivity, parse_unit
@@ -256,7 +256,7 @@ def _contents(file: Path, options: SourceOptions) -> Contents:
         )
     _refuse_options(file, reader, options)
     if not file.is_file():
-        raise DataError(f"{file} is no file; check the path")
+        raise DataError(missing_file(file))
     if file.stat().st_size == 0:
         raise DataError(f"{file} has 0 byte, must be a {reader.name} file; take an intact copy")
     return reader.contents(file, options)

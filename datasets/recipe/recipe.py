@@ -406,6 +406,12 @@ def load_recipe(
     False
     """
     source = read_recipe(name_or_path)
+    if isinstance(source.table.get("machine"), str):
+        fault = (
+            "machine is a text, as this is a scene, not a recipe; name it in a recipe by "
+            f"scene = '{name_or_path}', with what varies: wearstate recipe explain"
+        )
+        raise RecipeError(str(name_or_path), [fault])
     try:
         table = validate_table(RecipeTable, source.table, str(name_or_path))
         place = beside(source.folder, table.scene)
@@ -439,10 +445,12 @@ def _resolved(
     n_before = len(faults)
     base = _with_fixed(scene, {**table.fixed, **overrides}, faults)
     if len(faults) > n_before:
-        raise RecipeError(table.name, faults)
+        raise RecipeError(table.name, _told_once(faults))
     in_metres = _with_limits(table, scene_from_table(base), faults)
     places = _places(in_metres)
-    axes = axes_of(places, _with_lists(base), faults)
+    unbounded = [place for place in places if any(f.startswith(f"{place}.") for f in faults)]
+    sound = {place: draw for place, draw in places.items() if place not in unbounded}
+    axes = axes_of(sound, _with_lists(base), faults)
     faults += _severity_faults(table.severity)
     choices = alternatives_of(table.choice, _with_lists(base), faults)
     paths = [axis.path for found in axes.values() for axis in found]
@@ -452,7 +460,7 @@ def _resolved(
     held_out = _held_out(in_metres, axes, base, faults) if len(axes) == len(places) else ()
     faults += _life_faults(table, axes, base)
     if faults:
-        raise RecipeError(table.name, faults)
+        raise RecipeError(table.name, _told_once(faults))
     return Recipe(
         table=table,
         **texts,
@@ -466,6 +474,38 @@ def _resolved(
         copulas=copulas,
         held_out=held_out,
     )
+
+
+_PLACED = re.compile(
+    r"(?P<place>(?:severity|machine|record|choice|confounder|fixed)\.[^\s:]+)"
+    r"(?P<about> \([^)]*\))?: (?P<fault>.+)"
+)
+
+
+_UNLIMITED = re.compile(r"(?P<place>.+ = .+)(?P<fault> of \S+ needs wear limits, .+)")
+
+
+def _told_once(faults: Sequence[str]) -> list[str]:
+    """Faults with those that several draws share told once, behind the places of all.
+
+    Examples
+    --------
+    >>> _told_once(["machine.0 (a.b): a.c is missing", "machine.1 (a.d): a.c is missing", "other"])
+    ['machine.0 (a.b), machine.1: a.c is missing', 'other']
+    """
+    places: dict[str, list[str]] = {}
+    for text in dict.fromkeys(faults):
+        if limits := _UNLIMITED.fullmatch(text):
+            places.setdefault(limits["fault"], []).append(limits["place"])
+            continue
+        match = _PLACED.fullmatch(text)
+        told = places.setdefault(match["fault"] if match else text, [])
+        if match:
+            told.append(match["place"] if told else match["place"] + (match["about"] or ""))
+    return [
+        f"{', '.join(told)}{'' if fault.startswith(' of ') else ': '}{fault}" if told else fault
+        for fault, told in places.items()
+    ]
 
 
 def _with_lists(base: Mapping[str, Any]) -> dict[str, Any]:
@@ -637,13 +677,25 @@ def _replaced(base: dict[str, Any], fixed: Mapping[str, Any], faults: list[str])
             together = override(together, dict.fromkeys(matches(together, pattern), value))
         scene_from_table(together)
         return together
+    own = _faults_of(base)  # told as such where no value mends them
     for pattern, value in fixed.items():
         try:
             base = override(base, dict.fromkeys(matches(base, pattern), value))
             scene_from_table(base)
         except SceneError as error:
-            faults += [f"fixed.{pattern}: {fault}" for fault in error.faults]
+            faults += [
+                f"the scene itself: {fault}" if fault in own else f"fixed.{pattern}: {fault}"
+                for fault in error.faults
+            ]
     return base
+
+
+def _faults_of(table: Mapping[str, Any]) -> list[str]:
+    try:
+        scene_from_table(table)
+    except SceneError as error:
+        return error.faults
+    return []
 
 
 def _places(table: RecipeTable) -> dict[str, Draw]:

@@ -1,13 +1,12 @@
 """The text of a recipe: built-in or a file, with what it takes over from another recipe."""
 
-import difflib
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ...sim.scene.load import scene_table
+from ...sim.scene.load import scene_table, unread_text
 from ...sim.scene.parts import SceneError
 from .wear_bounds import foreign_bounds
 
@@ -82,10 +81,8 @@ def recipe_text(name_or_path: str | Path) -> str:
     """
     try:
         return _location(name_or_path).read_text(encoding="utf-8")
-    except (OSError, ValueError):  # ValueError: no UTF-8, or a NUL in the name
-        near = difflib.get_close_matches(str(name_or_path), recipe_names(), n=1, cutoff=0.5)
-        hint = f"did you mean '{near[0]}'?" if near else f"choose one of {recipe_names()}"
-        fault = f"{name_or_path} is no recipe and no readable text file; {hint}"
+    except (OSError, ValueError) as error:  # ValueError: no UTF-8, or a NUL in the name
+        fault = unread_text(name_or_path, "recipe", recipe_names(), error)
         raise RecipeError(str(name_or_path), [fault]) from None
 
 

@@ -1,6 +1,8 @@
 """The command line. Commands call library functions and hold no physics.
 
-Results go to stdout, progress and talk to stderr. Exit codes: 0 done, 1 failed, 2 bad input (also
+Results go to stdout, progress and talk to stderr. With ``--json`` the result is one JSON object on
+stdout; an error is one on stderr, its last line, with ``error.message``, ``error.faults`` and
+``exit_code``, and stdout stays empty. Exit codes: 0 done, 1 failed, 2 bad input (also
 where no recording can be judged); with ``report --fail-on``: 3 warning, 4 alarm, 5 unfamiliar.
 Heavy imports stay inside the commands, so that ``--help`` answers at once.
 """
@@ -9,11 +11,14 @@ import io
 import re
 import sys
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NoReturn
 
 import click
+from click.shell_completion import get_completion_class
 
 from ... import __version__
+from ..pages.plain_json import json_text
+from .command_help import FIRST_CONTACT, HelpfulGroup, command
 from .command_options import EXIT_BAD_INPUT, EXIT_FAILED, as_options
 from .command_sweep import sweep
 from .commands_data import (
@@ -34,26 +39,37 @@ from .commands_wear import blindspots, demo, evaluate, report, train
 _UNFINISHED = re.compile(r"\.part\b|\.[0-9a-f]{8}\.tmp\b")
 
 
-class _Group(click.Group):
-    """Turns the library's own errors into one message and an exit code."""
+class _Group(HelpfulGroup):
+    """Turns the library's own errors into one message and an exit code.
+
+    With ``--json`` the message is one JSON object, the last line of stderr.
+    """
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """As of click; keeps whether an error is to be told as JSON."""
+        ctx.meta[_AS_JSON] = "--json" in args
+        return super().parse_args(ctx, args)
 
     def invoke(self, context: click.Context) -> Any:
         try:
             return super().invoke(context)
+        except click.ClickException as error:
+            if not context.meta[_AS_JSON]:
+                raise
+            _end(context, error.format_message(), error.exit_code)
         except UnicodeEncodeError as error:
             word = re.search(r"\S*[\ud800-\udfff]\S*", error.object)
             if word is None:
                 raise
             text = _UNFINISHED.sub("", word.group())
-            click.echo(f"Error: {text} is no UTF-8 text; rename or rewrite it", err=True)
-            raise click.exceptions.Exit(EXIT_BAD_INPUT) from None
+            _end(context, f"{text} is no UTF-8 text; rename or rewrite it", EXIT_BAD_INPUT)
         except (ValueError, RuntimeError) as error:
             if not type(error).__module__.startswith(__name__.split(".")[0]):
                 raise  # not ours: a defect, with its traceback
             command = self.get_command(context, context.invoked_subcommand or "")
-            click.echo(f"Error: {as_options(str(error), command)}", err=True)
-            bad_input = isinstance(error, ValueError)
-            raise click.exceptions.Exit(EXIT_BAD_INPUT if bad_input else EXIT_FAILED) from None
+            code = EXIT_BAD_INPUT if isinstance(error, ValueError) else EXIT_FAILED
+            faults = [as_options(fault, command) for fault in getattr(error, "faults", ())]
+            _end(context, as_options(str(error), command), code, faults)
         except KeyboardInterrupt as error:
             if not str(error):
                 raise  # click says that it ends
@@ -63,11 +79,22 @@ class _Group(click.Group):
             raise  # the reader of stdout has gone: click ends quietly
         except OSError as error:
             text = _UNFINISHED.sub("", str(error))
-            click.echo(f"Error: {text}; check path, rights and space", err=True)
-            raise click.exceptions.Exit(EXIT_BAD_INPUT) from None
+            _end(context, f"{text}; check path, rights and space", EXIT_BAD_INPUT)
         except MemoryError:
-            click.echo("Error: out of memory; use fewer jobs or shorter recordings", err=True)
-            raise click.exceptions.Exit(EXIT_FAILED) from None
+            _end(context, "out of memory; use fewer jobs or shorter recordings", EXIT_FAILED)
+
+
+_AS_JSON = f"{__name__}.as_json"
+
+
+def _end(context: click.Context, text: str, code: int, faults: Sequence[str] = ()) -> NoReturn:
+    """Tell an error, as words or as JSON, and end with its code."""
+    if context.meta[_AS_JSON]:
+        error = {"message": text, "faults": list(faults) or [text]}
+        click.echo(json_text({"schema_version": 1, "error": error, "exit_code": code}), err=True)
+    else:
+        click.echo(f"Error: {text}", err=True)
+    raise click.exceptions.Exit(code) from None
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -82,14 +109,33 @@ def main(arguments: Sequence[str] | None = None) -> None:
     cli.main(args=None if arguments is None else list(arguments), prog_name="wearstate")
 
 
-@click.group(cls=_Group, context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(
+    cls=_Group,
+    invoke_without_command=True,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
 @click.version_option(__version__, prog_name="wearstate")
-def cli() -> None:
+@click.pass_context
+def cli(context: click.Context) -> None:
     """Condition monitoring built around physics.
 
     Simulate a machine that wears, make labelled data sets, train a wear estimate, and report on
-    a recording.
+    a recording. Without a command: three ways to begin.
     """
+    if context.invoked_subcommand is None:
+        click.echo(FIRST_CONTACT, nl=False)
+
+
+@command()
+@click.argument("shell", type=click.Choice(["bash", "zsh", "fish"]))
+def completion(shell: str) -> None:
+    """Script that lets SHELL complete commands, options, scenes and recipes.
+
+    For bash and zsh put `eval "$(wearstate completion bash)"` into ~/.bashrc or ~/.zshrc.
+    """
+    kind = get_completion_class(shell)
+    assert kind is not None  # the choices are those that click has
+    click.echo(kind(cli, {}, "wearstate", "_WEARSTATE_COMPLETE").source())
 
 
 for _command in (
@@ -115,5 +161,6 @@ for _command in (
     report,
     blindspots,
     demo,
+    completion,
 ):
     cli.add_command(_command)

@@ -63,7 +63,9 @@ class Accuracy(Share):
 PATH = PathType(path_type=Path)
 MOST_RECORDS = 10**8  # as wearstate.datasets.recipe.recipe, which is too heavy to import for --help
 LARGEST_SEED = 2**63 - 1
-json_option = click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout.")
+json_option = click.option(
+    "--json", "as_json", is_flag=True, help="One JSON object on stdout; an error as one on stderr."
+)
 force_option = click.option("--force", is_flag=True, help="Replace an existing output.")
 
 jobs_option = click.option(
@@ -311,7 +313,34 @@ def _name_faults(path: Path, suffixes: tuple[str, ...]) -> list[str]:
         return [f"{path}: suffix {path.suffix!r} must be one of {', '.join(suffixes)}; rename it"]
     if not path.parent.is_dir():
         return [f"{path.parent} is no folder; create it"]
-    return []
+    return _unwritable(path.parent)
+
+
+def refuse_unwritable(output: Path) -> None:
+    """Refuse an output where nothing can be written, before any work.
+
+    Raises
+    ------
+    DataError
+        Names the folder and why.
+    """
+    from ...sim.output.recording import DataError
+
+    faults = _unwritable(output.parent) if output.parent.is_dir() else []
+    if faults:
+        raise DataError(faults[0])
+
+
+def _unwritable(folder: Path) -> list[str]:
+    """Tried, as rights alone do not tell: a disk may be full or mounted to be read only."""
+    from tempfile import TemporaryFile
+
+    try:
+        with TemporaryFile(dir=folder):
+            return []
+    except OSError as error:
+        why = error.strerror or type(error).__name__
+        return [f"{folder} cannot be written ({why}); check rights and space, or choose another"]
 
 
 def _same_file(one: Path, other: Path) -> bool:
@@ -369,6 +398,46 @@ def time_bar() -> Iterator[Callable[[str, float, float], None] | None]:
             )
 
         yield update
+
+
+def scene_of(name: str, pairs: Sequence[str]) -> Any:
+    """The scene of a command with the values of ``--set``; tells the unit of bare numbers."""
+    from ...sim.scene.load import load_scene
+
+    values = overrides_of(pairs)
+    tell_bare(name, values)
+    return load_scene(name, values)
+
+
+def tell_bare(name: str, values: Mapping[str, Any]) -> None:
+    """Tell on stderr as what numbers without a unit are taken."""
+    from ...sim.scene.load import MACHINES, numbered, scene_table, scene_text
+    from ...sim.scene.parts import Scene, si_unit
+
+    bare = {path: value for path, value in values.items() if not isinstance(value, str) and value}
+    if not bare:
+        return
+    table = scene_table(scene_text(name), name)
+    kind = MACHINES.get(str(table.get("machine")), Scene)
+    for path, value in bare.items():
+        unit = si_unit(kind, numbered(table, path))
+        if unit:
+            click.echo(f"{path} = {_bare_text(value, unit)}", err=True)
+
+
+def _bare_text(value: float, unit: str) -> str:
+    """A number of SI with its unit, and as people say it.
+
+    Examples
+    --------
+    >>> _bare_text(300, "rev/s"), _bare_text(0.002, "m"), _bare_text(5, "m/s^2")
+    ('300 rev/s = 18,000 rpm', '0.002 m = 2 mm', '5 m/s^2')
+    """
+    from ..pages.si_text import si_text
+
+    plain = f"{value:g} {unit}"
+    usual = f"{60 * value:,.10g} rpm" if unit == "rev/s" else si_text(value, unit, 6)
+    return plain if usual == plain else f"{plain} = {usual}"
 
 
 def overrides_of(pairs: Sequence[str]) -> dict[str, Any]:

@@ -5,6 +5,8 @@ from pathlib import Path
 
 import click
 
+from .command_help import command
+from .command_names import SCENE
 from .command_options import (
     CHART_SUFFIXES,
     EXIT_FAILED,
@@ -18,14 +20,15 @@ from .command_options import (
     overrides_of,
     progress_bar,
     seed_option,
+    tell_bare,
     worker_count,
 )
 
 _SUFFIXES = (*CHART_SUFFIXES, ".htm")
 
 
-@click.command()
-@click.argument("scene_name", metavar="SCENE")
+@command()
+@click.argument("scene_name", metavar="SCENE", type=SCENE)
 @click.option(
     "--over",
     multiple=True,
@@ -97,10 +100,12 @@ def sweep(
     part = part_file(output)
     going_on = part is not None and part.exists() and not force
     check_outputs([scene_name], [(output, _SUFFIXES)], force or going_on)
+    values = overrides_of(pairs)
+    tell_bare(scene_name, values)
     plan = sweep_plan(
         scene_name,
         over,
-        given=overrides_of(pairs),
+        given=values,
         show=[name for text in show for name in text.split(",") if name.strip()],
         points=points,
         starts=starts,

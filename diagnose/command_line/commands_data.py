@@ -9,6 +9,8 @@ from typing import Any, Literal
 
 import click
 
+from .command_help import HelpfulGroup, command
+from .command_names import DATA, FILE, RECIPE
 from .command_options import (
     DATA_SUFFIXES,
     EXIT_ALARM,
@@ -31,6 +33,7 @@ from .command_options import (
     join_option,
     json_option,
     progress_bar,
+    refuse_unwritable,
     seed_option,
     source_options,
     told_of_channels,
@@ -40,7 +43,7 @@ from .command_options import (
 _CARD = (*PAGE_SUFFIXES, ".md")
 
 
-@click.group()
+@click.group(cls=HelpfulGroup)
 def recipe() -> None:
     """What data sets are drawn from: list, show, check, preview, explain."""
 
@@ -57,7 +60,7 @@ def recipe_list(as_json: bool) -> None:
 
 
 @recipe.command("show")
-@click.argument("name")
+@click.argument("name", metavar="RECIPE", type=RECIPE)
 @click.option("--whole", is_flag=True, help="With all that it extends.")
 def recipe_show(name: str, whole: bool) -> None:
     """TOML text of a recipe: copy it, change it, check it."""
@@ -67,7 +70,7 @@ def recipe_show(name: str, whole: bool) -> None:
 
 
 @recipe.command("check")
-@click.argument("file")
+@click.argument("file", metavar="RECIPE", type=RECIPE)
 @json_option
 def recipe_check(file: str, as_json: bool) -> None:
     """Check a recipe against its scene; every fault, and warnings of what is hardly meant."""
@@ -115,7 +118,7 @@ _records_option = click.option(
 
 
 @recipe.command("preview")
-@click.argument("name")
+@click.argument("name", metavar="RECIPE", type=RECIPE)
 @_records_option
 @click.option("--plot", type=PATH, help="Picture of the draws to write (.png, .svg or .pdf).")
 @seed_option
@@ -131,7 +134,7 @@ def recipe_preview(
     force: bool,
     as_json: bool,
 ) -> None:
-    """What NAME (a built-in recipe or a TOML file) would make: draws, labels, time and size."""
+    """What RECIPE (a built-in name or a TOML file) would make: draws, labels, time and size."""
     from ...datasets.recipe.recipe import load_recipe
     from ..inspect.recipe_preview import preview, preview_figure, preview_text
 
@@ -146,8 +149,8 @@ def recipe_preview(
     emit({**found.table, "files": files}, as_json, words)
 
 
-@click.command()
-@click.argument("recipe")
+@command()
+@click.argument("recipe", type=RECIPE)
 @_records_option
 @click.option("-o", "--output", type=PATH, required=True, help="Data set to write (.h5).")
 @click.option(
@@ -246,7 +249,7 @@ class _Segment(click.ParamType):  # type: ignore[type-arg]  # generic from click
             self.fail(f"{value!r} {error}; or write whole", param, ctx)
 
 
-@click.command("import")
+@command("import")
 @click.argument("files", metavar="FILES…", nargs=-1, required=True, type=PATH)
 @click.option("-o", "--output", type=PATH, help="Data set to write (.h5).")
 @click.option("--list", "only_list", is_flag=True, help="Show what is in FILES; write nothing.")
@@ -330,8 +333,8 @@ def import_files(
     emit(imported_table(summary), as_json, imported_text(summary))
 
 
-@click.command()
-@click.argument("files", metavar="FILES…", nargs=-1, required=True, type=PATH)
+@command()
+@click.argument("files", metavar="FILES…", nargs=-1, required=True, type=DATA)
 @click.option("-o", "--output", type=PATH, required=True, help="Data set to write (.h5).")
 @click.option(
     "--duplicates",
@@ -454,8 +457,8 @@ _KINDS = (  # as wearstate.diagnose.pictures.kinds, which is too heavy to import
 _PLOT_OPTIONS = ("draw", "force_channel", "speed_hz", "bearing")
 
 
-@click.command()
-@click.argument("file", type=PATH, required=False)
+@command()
+@click.argument("file", type=FILE, required=False)
 @click.option("--fft", "of_fft", is_flag=True, help="Who computes Fourier transforms, timed here.")
 @click.option(
     "--verify", "check", is_flag=True, help="Check every record of a data set; exit 1 on a fault."
@@ -551,8 +554,8 @@ def _about_set(
     raise click.exceptions.Exit(0 if found.get("sound", True) else EXIT_FAILED)
 
 
-@click.command()
-@click.argument("data", type=PATH)
+@command()
+@click.argument("data", type=DATA)
 @click.option("-o", "--output", type=PATH, required=True, help="File or folder to write.")
 @click.option(
     "--as",
@@ -578,6 +581,7 @@ def export(
 
     from ...datasets.convert.export import export_set, exported_text
 
+    refuse_unwritable(output)
     with progress_bar("exporting") as progress:
         made = export_set(
             data,
@@ -597,8 +601,8 @@ _SPLITS = (  # as wearstate.datasets.split.stored, which is too heavy to import 
 )
 
 
-@click.command()
-@click.argument("data", type=PATH)
+@command()
+@click.argument("data", type=DATA)
 @click.option("--add", "kinds", multiple=True, type=click.Choice(_SPLITS), help="Split to store.")
 @click.option("--defaults", is_flag=True, help="Store every split that the records allow.")
 @click.option("--name", help="To store one split under; its kind by default.")
@@ -670,7 +674,7 @@ def _bounds(texts: Sequence[str]) -> dict[str, tuple[float, float]]:
     return found
 
 
-@click.command()
+@command()
 @click.argument("paths", metavar="FILES…", nargs=-1, type=PATH)
 @click.option("--label", default="", metavar="COLUMN|FILE", help="What is to be told apart.")
 @click.option("--group", default="", metavar="COLUMN", help="Machine of each row.")
@@ -734,8 +738,8 @@ _FEATURE_SETS = (
 )  # as wearstate.features.catalogue.catalogue.SetName
 
 
-@click.command()
-@click.argument("data", type=PATH, required=False)
+@command()
+@click.argument("data", type=DATA, required=False)
 @click.option("-o", "--output", type=PATH, help="Table (.parquet, .csv, .h5).")
 @click.option("--list", "listing", is_flag=True, help="What there is: unit, needs, reference.")
 @click.option(

@@ -7,6 +7,8 @@ from typing import Any
 import click
 
 from ..pages.plain_json import json_text
+from .command_help import HelpfulGroup, command
+from .command_names import SCENE, built_in
 from .command_options import (
     CHART_SUFFIXES,
     DATA_SUFFIXES,
@@ -27,7 +29,9 @@ from .command_options import (
     json_option,
     overrides_of,
     progress_bar,
+    scene_of,
     seed_option,
+    tell_bare,
     worker_count,
 )
 
@@ -36,7 +40,7 @@ _ALIGN_FAIL_ON_HELP = (
 )
 
 
-@click.group()
+@click.group(cls=HelpfulGroup)
 def scene() -> None:
     """The machines: list, show, check, explain; new ones, and a schema for editors."""
 
@@ -52,7 +56,7 @@ def scene_list(as_json: bool) -> None:
 
 
 @scene.command("show")
-@click.argument("name")
+@click.argument("name", metavar="SCENE", type=SCENE)
 def scene_show(name: str) -> None:
     """TOML text of a scene: copy it, change it, check it."""
     from ...sim.scene.load import scene_table, scene_text
@@ -65,7 +69,7 @@ def scene_show(name: str) -> None:
 
 
 @scene.command("check")
-@click.argument("file", metavar="SCENE")
+@click.argument("file", metavar="SCENE", type=SCENE)
 @click.option("--set", "pairs", multiple=True, metavar="PATH=VALUE", help="Replace a scene value.")
 @click.option("--deep", is_flag=True, help="Every figure beside what is usual; runs it shortly.")
 @json_option
@@ -77,10 +81,9 @@ def scene_check(file: str, pairs: Sequence[str], deep: bool, as_json: bool) -> N
     where a short simulated run fails; what is merely unusual is no fault.
     """
     from ...sim.machine.simulate import check
-    from ...sim.scene.load import load_scene
     from ...sim.scene.plausibility import scene_doubts
 
-    checked = load_scene(file, overrides_of(pairs))
+    checked = scene_of(file, pairs)
     check(checked)
     if deep:
         _deep_check(checked, as_json)
@@ -103,7 +106,7 @@ def _deep_check(checked: Any, as_json: bool) -> None:
 
 
 @scene.command("explain")
-@click.argument("subject", metavar="[SCENE|MACHINE]", required=False, default="")
+@click.argument("subject", metavar="[SCENE|MACHINE]", required=False, default="", type=SCENE)
 @click.argument("key", metavar="[KEY]", required=False, default="")
 @json_option
 def scene_explain(subject: str, key: str, as_json: bool) -> None:
@@ -164,8 +167,8 @@ def scene_new(machine: str, output: Path, force: bool) -> None:
     )
 
 
-@click.command()
-@click.argument("scene_name", metavar="SCENE")
+@command()
+@click.argument("scene_name", metavar="SCENE", type=SCENE)
 @click.option("--set", "pairs", multiple=True, metavar="PATH=VALUE", help="Replace a scene value.")
 @click.option("-o", "--output", type=PATH, help="Recording to write (.h5).")
 @click.option("--plot", type=PATH, help="Picture to write (.png, .svg or .pdf).")
@@ -187,11 +190,10 @@ def simulate(
     from ...datasets.generation.generate import save_solution
     from ...datasets.generation.quantities import resolved, with_estimate
     from ...sim.machine.simulate import simulate as run
-    from ...sim.scene.load import load_scene
     from ..inspect.simulate_text import simulation_summary, summary_lines
 
     check_outputs([scene_name], [(output, DATA_SUFFIXES), (plot, PICTURE_SUFFIXES)], force)
-    machine, resolution = resolved(load_scene(scene_name, overrides_of(pairs)))
+    machine, resolution = resolved(scene_of(scene_name, pairs))
     solution = run(machine, seed=seed, truth=True)
     if resolution is not None:
         solution = with_estimate(solution, resolution)
@@ -228,8 +230,8 @@ def simulate(
     )
 
 
-@click.command()
-@click.argument("scene_name", metavar="SCENE")
+@command()
+@click.argument("scene_name", metavar="SCENE", type=SCENE)
 @click.option("--set", "pairs", multiple=True, metavar="PATH=VALUE", help="Replace a scene value.")
 @click.option("--low", type=float, help="Lowest frequency [Hz]; --high / 300.")
 @click.option("--high", type=float, help="Highest frequency [Hz]; 0.45 of the rate.")
@@ -251,7 +253,6 @@ def frf(
 
     What a perfect test would measure; the table can be the `casing.frf` of a scene.
     """
-    from ...sim.scene.load import load_scene
     from ..pictures.scene_transfer import (
         save_csv,
         save_figure,
@@ -261,7 +262,7 @@ def frf(
     )
 
     check_outputs([scene_name], [(output, (".csv",)), (plot, PICTURE_SUFFIXES)], force)
-    machine = load_scene(scene_name, overrides_of(pairs))
+    machine = scene_of(scene_name, pairs)
     found = transfer_of(machine, low, high)
     if output is not None:
         save_csv(found, output, force=force)
@@ -275,8 +276,8 @@ def frf(
     )
 
 
-@click.command()
-@click.argument("scene_name", metavar="SCENE")
+@command()
+@click.argument("scene_name", metavar="SCENE", type=SCENE)
 @click.option("--set", "pairs", multiple=True, metavar="PATH=VALUE", help="Replace a scene value.")
 @click.option(
     "--condition",
@@ -369,7 +370,6 @@ def align(
     With --from-test, --reactions or --jacking the line is first taken to where these put its
     bearings.
     """
-    from ...sim.scene.load import load_scene
     from ..alignment.page import align as judge
     from ..alignment.page import align_table, align_text, save_figure, save_html
     from ..shaft_tests.sag_report import sag_table, sag_text
@@ -385,7 +385,7 @@ def align(
     outputs = [(plot, PICTURE_SUFFIXES), (output, PAGE_SUFFIXES), (test_plot, PICTURE_SUFFIXES)]
     inputs = [*tests, *(path for path in (reactions, jacking) if path)]
     check_outputs([scene_name, *inputs], outputs, force)
-    scene = load_scene(scene_name, overrides_of(pairs))
+    scene = scene_of(scene_name, pairs)
     scene, measured = _measured(scene, tests, reactions, jacking, reactions_in)
     found = judge(
         scene,
@@ -449,8 +449,8 @@ def _tested(
     return result, rig_table(result), ["", rig_text(result)]
 
 
-@click.command()
-@click.argument("scene_name", metavar="SCENE")
+@command()
+@click.argument("scene_name", metavar="SCENE", type=SCENE)
 @click.option("--set", "pairs", multiple=True, metavar="PATH=VALUE", help="Replace a scene value.")
 @click.option("--map", "map_name", help="One map only; all that the machine has by default.")
 @click.option("--size", type=click.IntRange(3, 60), help="Cells along either axis.")
@@ -479,12 +479,11 @@ def stability(
     Accurate, inaccurate or unstable, with a numerical or a physical cause; the scene is marked in
     every map.
     """
-    from ...sim.scene.load import load_scene
     from ..stability.atlas import atlas
     from ..stability.text import stability_table, stability_text
 
     check_outputs([scene_name], [(output, (*PAGE_SUFFIXES, *PICTURE_SUFFIXES))], force)
-    machine = load_scene(scene_name, overrides_of(pairs))
+    machine = scene_of(scene_name, pairs)
     with progress_bar("running cells") as progress:
         maps = atlas(machine, name=map_name, budget=budget, size=size, progress=progress)
     files = [str(output)] if output is not None else []
@@ -496,7 +495,7 @@ def stability(
     emit({**stability_table(machine, maps), "files": files}, as_json, text)
 
 
-@click.command()
+@command()
 @click.argument("subject", metavar="SCENE|DATA|RECIPE")
 @click.option("--set", "pairs", multiple=True, metavar="PATH=VALUE", help="Replace a scene value.")
 @click.option(
@@ -593,11 +592,17 @@ def chart(
         found = _data_chart(subject, budget, output, seed, jobs, force)
         _emit_chart(found, [output], as_json)
         return
+    if subject in built_in("recipe"):
+        raise click.UsageError(
+            f"{subject} is a recipe: its chart takes --accuracy verdict=2%; or name its scene"
+        )
     from .chart_commands import scene_chart_command
 
+    values = overrides_of(pairs)
+    tell_bare(subject, values)
     found, interrupted = scene_chart_command(
         subject,
-        overrides_of(pairs),
+        values,
         accuracy=share,
         budget=_CHART_BUDGET if budget is None else budget,
         output=output,
@@ -646,7 +651,7 @@ def _emit_chart(found: Any, files: Sequence[Path | None], as_json: bool) -> None
     emit({**chart_table(found), "files": written}, as_json, text)
 
 
-@click.command()
+@command()
 @json_option
 def verify(as_json: bool) -> None:
     """Every literature check: expected, obtained, tolerance, source. Exit 1 if one fails."""

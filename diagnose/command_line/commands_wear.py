@@ -8,6 +8,8 @@ from typing import Any, NamedTuple
 import click
 
 from ..pages.plain_json import json_text
+from .command_help import command
+from .command_names import DATA, MODEL
 from .command_options import (
     EXIT_ALARM,
     EXIT_BAD_INPUT,
@@ -36,8 +38,8 @@ from .command_options import (
 _FAIL_ON_HELP = "Exit 3 at a warning, 4 at an alarm, 5 when unfamiliar; alarm: only 4 and 5."
 
 
-@click.command()
-@click.argument("data", type=PATH)
+@command()
+@click.argument("data", type=DATA)
 @click.option("-o", "--output", type=PATH, required=True, help="Model to write (.wsm).")
 @click.option(
     "--target",
@@ -201,9 +203,9 @@ def _train_classes(
     emit(value, as_json, "\n".join([head, *classes_text(result), *notice]))
 
 
-@click.command()
-@click.argument("model_file", metavar="MODEL", type=PATH)
-@click.argument("data", type=PATH, required=False)
+@command()
+@click.argument("model_file", metavar="MODEL", type=MODEL)
+@click.argument("data", type=DATA, required=False)
 @click.option(
     "--across-fidelity",
     is_flag=True,
@@ -383,9 +385,9 @@ def _judge_across(
     emit(across_table(found), as_json, across_text(found))
 
 
-@click.command()
-@click.argument("source", metavar="RECORDING|FOLDER", type=PATH)
-@click.option("--model", "model_file", type=PATH, required=True)
+@command()
+@click.argument("source", metavar="RECORDING|FOLDER", type=DATA)
+@click.option("--model", "model_file", type=MODEL, required=True, help="Wear model (.wsm).")
 @click.option("--baseline", "healthy", type=PATH, help="Healthy recordings of the machine (.h5).")
 @join_option
 @click.option("-o", "--output", type=PATH, help="HTML page to write.")
@@ -649,8 +651,8 @@ def report_exit(verdicts: Sequence[_Verdict], fail_on: str | None) -> int:
     return EXIT_UNFAMILIAR if any(verdict == "unfamiliar" for verdict, _ in verdicts) else 0
 
 
-@click.command()
-@click.argument("model_file", metavar="MODEL", type=PATH)
+@command()
+@click.argument("model_file", metavar="MODEL", type=MODEL)
 @click.option("--recipe", metavar="RECIPE", help="Draws the machines; the model's own by default.")
 @click.option(
     "-n",
@@ -735,7 +737,7 @@ def blindspots(
     emit(table, as_json, blind_spots_text(table))
 
 
-@click.command()
+@command()
 @click.option(
     "--folder",
     type=PathType(path_type=Path, file_okay=False),

@@ -15,7 +15,7 @@ from ...datasets.file.record import DataSet
 from ...datasets.measured.recording import read_recording
 from ...datasets.source.part import SourceOptions
 from ...features.signal import fft
-from ...sim.output.recording import DataError, Recording
+from ...sim.output.recording import DataError, Recording, missing_file
 from ...sim.output.sensor import Channel
 from ...sim.scene.parts import Scene
 from ..class_model.file import CLASS_MODEL, load_class_model
@@ -60,7 +60,7 @@ def describe(
         The file is missing, damaged, or of no known kind.
     """
     if not path.is_file():
-        raise DataError(f"{path} is no file; check the path")
+        raise DataError(missing_file(path))
     if path.suffix == ".wsm":
         return _describe_model(path)
     if path.suffix in (".h5", ".hdf5", ".part"):

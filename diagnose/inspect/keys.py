@@ -593,9 +593,10 @@ Written by `python -m wearstate.diagnose.inspect.keys`. The same on the command 
 `wearstate scene explain pump`, `wearstate scene explain pump.pressure.rung`,
 `wearstate recipe explain`.
 
-A bare number is SI; a text carries its unit, such as `"0.25 mm"`. `--set` takes the dotted path,
-with entries of lists by number (from 0) or by name: `--set bearings.aft.sag="1 mm"`. Rungs stand
-cheapest first; their cost is the tabulated time of a step of one throw or of one film solve."""
+A bare number is SI; a text carries its unit, such as `"0.25 mm"`. On the command line a key is its
+dotted path, with entries of lists by number (from 0) or by name:
+`wearstate simulate shaft-rig --set bearings.aft.sag="1 mm"`. Rungs stand cheapest first; their cost
+is the tabulated time of a step of one throw or of one film solve."""
 
 
 def _section(found: FoundKeys) -> str:

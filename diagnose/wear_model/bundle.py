@@ -23,7 +23,7 @@ from pydantic import BaseModel, ValidationError
 from ...features.catalogue.analysis import STANDARD
 from ...features.catalogue.row import catalogue
 from ...sim.atomic import replacing
-from ...sim.output.recording import DataError
+from ...sim.output.recording import DataError, missing_file
 from .estimate import ModelError
 
 BUNDLE_SCHEMA = 3
@@ -233,13 +233,22 @@ _FAULTS = (
 """What zipfile, json and numpy raise on damaged or forged bytes."""
 
 
+_HDF5 = b"\x89HDF\r\n\x1a\n"
+"""First bytes of an HDF5 file."""
+
+
 def _members(path: Path) -> dict[str, bytes]:
     if not path.is_file():
-        raise ModelError(f"{path} is no file; make one: wearstate train DATA -o {path.name}")
+        raise ModelError(missing_file(path, f"make one: wearstate train DATA -o {path.name}"))
     try:
         with zipfile.ZipFile(path) as file:
             return _unpacked(file, _BOUNDS)
     except _FAULTS as error:
+        if path.read_bytes()[: len(_HDF5)] == _HDF5:
+            raise ModelError(
+                f"{path} is a data set or recording, must be a model (.wsm); make one of a "
+                f"labelled data set: wearstate train {path.name} -o model.wsm"
+            ) from error
         version = _schema_version(path)
         if version not in (None, BUNDLE_SCHEMA):  # its members may be others
             raise _other_version(path, "schema_version", version, BUNDLE_SCHEMA) from error

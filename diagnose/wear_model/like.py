@@ -7,7 +7,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from ...datasets.source.channel_units import known_unit
 from ...datasets.source.part import Profile
-from ...sim.output.recording import DataError
+from ...sim.output.recording import DataError, missing_file
 from .arrays import Pulses, RateHz
 from .bundle import kind_of, load_bundle
 
@@ -72,7 +72,7 @@ def read_profile(path: Path) -> tuple[Profile, str | None, int]:
 
 def _described(path: Path) -> object:
     if not path.is_file():
-        raise DataError(f"{path} is no file; name a model or a description of one")
+        raise DataError(missing_file(path, "name a model or a description of one"))
     if path.stat().st_size > _LARGEST:
         raise DataError(f"{path} has {path.stat().st_size} byte, must be <= {_LARGEST}; check it")
     try:

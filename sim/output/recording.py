@@ -2,9 +2,11 @@
 
 import html
 import math
+import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from pathlib import Path
 from typing import Any, Literal, Protocol, Self
 
 import numpy as np
@@ -29,6 +31,21 @@ class Table(Protocol):
 
 class DataError(ValueError):
     """A data set or recording cannot be used; names quantity, value, bound and cure."""
+
+
+def missing_file(path: Path, cure: str = "check the path") -> str:
+    """Why nothing can be read at a path: it is a folder, there is no such file, or it is none.
+
+    Examples
+    --------
+    >>> missing_file(Path("no.h5"))
+    'no.h5: no such file; check the path'
+    """
+    if path.is_dir():
+        return f"{path} is a folder, must be a file; name a file in it"
+    if not os.path.lexists(path):
+        return f"{path}: no such file; {cure}"
+    return f"{path} is no file; {cure}"
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,10 +7,11 @@ cure, and names the nearest match of an unknown key. Kernels trust what passes.
 
 import re
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from ..output.recording import missing_file
 from .journal import JournalScene
 from .parts import (
     MOST_FAULTS,
@@ -155,10 +156,33 @@ def scene_text(name_or_path: str | Path) -> str:
     path = built_in if built_in.is_file() else Path(name_or_path)
     try:
         return path.read_text(encoding="utf-8")
-    except (OSError, ValueError) as error:  # ValueError: no UTF-8, or a NUL in the name
-        hint = nearest(str(name_or_path), scene_names())
-        reason = "is no UTF-8 text" if isinstance(error, UnicodeDecodeError) else "is no scene"
-        raise SceneError(str(name_or_path), [f"{name_or_path} {reason}{hint}"]) from None
+    except (OSError, ValueError) as error:
+        fault = unread_text(name_or_path, "scene", scene_names(), error)
+        raise SceneError(str(name_or_path), [fault]) from None
+
+
+def unread_text(name_or_path: str | Path, what: str, names: Sequence[str], error: Exception) -> str:
+    """Why there is no text of a scene or recipe at a place; the nearest built-in one is named.
+
+    Examples
+    --------
+    >>> unread_text("bilge-pmp", "scene", ["bilge-pump"], FileNotFoundError())
+    "bilge-pmp is no scene; did you mean 'bilge-pump'?"
+    >>> unread_text("bilge-pump.toml", "scene", ["bilge-pump"], FileNotFoundError())
+    "bilge-pump.toml: no such file; check the path, or name the built-in scene 'bilge-pump'"
+    """
+    path = Path(name_or_path)
+    if isinstance(error, UnicodeDecodeError):
+        return f"{path} is no UTF-8 text, must be a {what} (.toml); data sets and models are none"
+    if path.is_dir():
+        return f"{path} is a folder, must be a {what} (.toml); name a file in it"
+    if isinstance(error, PermissionError):
+        return f"{path} cannot be read ({error.strerror}); check rights"
+    if path.suffix or len(path.parts) > 1:
+        stem = path.stem if path.stem in names else ""
+        near = f", or name the built-in {what} '{stem}'" if stem else ""
+        return missing_file(path, f"check the path{near}")
+    return f"{name_or_path} is no {what}{nearest(str(name_or_path), names)}"
 
 
 def scene_folder(name_or_path: str | Path) -> Path:
@@ -237,10 +261,19 @@ def scene_from_table(table: Mapping[str, Any]) -> Scene:
     """
     name = str(table.get("name", "scene"))
     machine = table.get("machine")
+    if machine is None or isinstance(machine, list):  # which a recipe has
+        raise SceneError(name, [f"machine is missing{_unlike_scene(table)}"])
     if not isinstance(machine, str) or machine not in MACHINES:
         hint = nearest(str(machine), MACHINES)
         raise SceneError(name, [f"machine = {machine!r} is no machine of this program{hint}"])
     return validate_table(MACHINES[machine], table, name)
+
+
+def _unlike_scene(table: Mapping[str, Any]) -> str:
+    """End of a message about a table without a machine."""
+    if {"severity", "extends", "scene", "machine"} & {*table}:
+        return ", as this is a recipe, not a scene; wearstate generate takes it, or name its scene"
+    return f", must be one of {', '.join(MACHINES)}; add it"
 
 
 def load_scene(name_or_path: str | Path, overrides: Mapping[str, Any] | None = None) -> Scene:

@@ -55,7 +55,10 @@ UNITS: dict[str, dict[str, float]] = {
     "acceleration": {"m/s^2": 1.0, "g": STANDARD_GRAVITY},
     "velocity": {"m/s": 1.0, "mm/s": 1e-3},
     "inertia": {"kg m^2": 1.0, "kg mm^2": 1e-6},
-    "stiffness": {"N/m": 1.0, "kN/m": 1e3, "MN/m": 1e6, "N/um": 1e6, "N/µm": 1e6},
+    "stiffness": {
+        **{"N/m": 1.0, "kN/m": 1e3, "MN/m": 1e6, "GN/m": 1e9},
+        **{"N/mm": 1e3, "N/um": 1e6, "N/µm": 1e6},
+    },
     "damping": {"N s/m": 1.0, "kN s/m": 1e3},
     "voltage": {"V": 1.0, "mV": 1e-3},
     "ratio": {"": 1.0, "%": 1e-2},
