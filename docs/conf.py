@@ -75,6 +75,7 @@ html_theme_options = {
     "secondary_sidebar_items": ["page-toc"],
 }
 html_show_sourcelink = False
+html_sidebars = {"index": [], "start": []}
 
 
 # --- names inside the package that have no page of their own
