@@ -13,8 +13,10 @@ convex dissipation, so Newton's method finds V from any start in a few steps. It
 the centre, where both surfaces turn against each other, and without any oil: then R is zero and
 the wall follows the pin in free flight.
 
-The wall relaxes at ``K / (R + C)``, which no gap makes fast; peaks are taken in implicitly. So the
-film never shortens the step of the mechanism.
+The wall relaxes at ``K / (R + C)``, which no gap makes fast. Without oil C alone holds it up: there
+a share of K times the step is added, so that the wall springs back in some steps at the least; the
+force does not feel it. Peaks are taken in implicitly. So a flooded film never shortens the step of
+the mechanism.
 
 Moments: shear drags pin and eye together by M; pressure acts on the pin through its own centre and
 on the eye through another, so each bears half of ``d x F`` beside it. The power lost is then
@@ -44,6 +46,7 @@ OIL = np.dtype(
         ("filled", "f8"),  # thickest gap over C that holds oil
         ("radius", "f8"),  # in the middle of the gap [m]
         ("wall_damping", "f8"),  # C [N s/m]
+        ("relaxing", "f8"),  # what is added to C where the wall springs back [N s/m]
         ("roughness", "f8"),  # of both surfaces [m]; 0 is smooth
         ("peaks", "f8"),  # scale of the asperity force [N]
         ("step", "f8"),  # of the mechanism [s]
@@ -152,7 +155,7 @@ def oiled_joint(
     yield_x, yield_y = d_x - s_x, d_y - s_y
     deep = math.sqrt(yield_x * yield_x + yield_y * yield_y)
     spring = elastic_force(deep, c) / deep if deep > 0.0 else 0.0
-    wall = o.wall_damping
+    wall = o.wall_damping + o.relaxing
     pull_x, pull_y = spring * yield_x + wall * u_x, spring * yield_y + wall * u_y
     distance = math.sqrt(s_x * s_x + s_y * s_y)
     n_x, n_y = (s_x / distance, s_y / distance) if distance > 0.0 else (1.0, 0.0)
@@ -180,7 +183,8 @@ def oiled_joint(
     if closing > 0.0:  # no film is crossed between two looks at it
         f_x -= closing * n_x
         f_y -= closing * n_y
-    force_x, force_y = pull_x - wall * f_x, pull_y - wall * f_y
+    force_x = spring * yield_x + o.wall_damping * (u_x - f_x)
+    force_y = spring * yield_y + o.wall_damping * (u_y - f_y)
     eccentricity = math.sqrt(x * x + y * y)
     angle = filled_angle(eccentricity, o.filled)
     rest = math.sqrt(1.0 - eccentricity * eccentricity)

@@ -55,6 +55,9 @@ from .slider_crank import (
 STEP_PER_CONTACT_TIME = 0.3
 """Default step times the contact's fastest angular frequency: 21 steps a contact period."""
 
+STEP_PER_STARVED_CONTACT_TIME = 0.15
+"""The same where a pin flies into a thin film, which no event locates."""
+
 STEP_PER_CONTACT_DECAY = 0.7
 """Default step times the contact's fastest decay, where damping is beyond critical."""
 
@@ -292,7 +295,7 @@ def tangent_stiffness(contact: Any, force: float) -> float:
 
 _MOST_DAMPING = 2.0  # of the critical one, where a hysteresis law would have no bound
 _LINK_DAMPING = 0.5  # of the critical one
-_WALL_DAMPING = 0.05  # of sqrt(K m): bolted parts lose a few per cent of what they store
+_WALL_DAMPING = 0.1  # of sqrt(K m): bush, bolts and rod end in a row
 
 _WALL_PER_STEP = (
     0.7  # least damping of a wall behind oil over stiffness times step: RK4 resolves it
@@ -543,7 +546,8 @@ def _oil_values(
         "shear": lands * viscosity * radius**3 * land / gap,
         "filled": 2.0 if oil.filled_gap is None else oil.filled_gap / gap,
         "radius": radius + gap / 2,
-        "wall_damping": max(float(contact["damping"]), _WALL_PER_STEP * spring * step),
+        "wall_damping": float(contact["damping"]),
+        "relaxing": max(0.0, _WALL_PER_STEP * spring * step - float(contact["damping"])),
         "roughness": rough,
         "peaks": peaks,
         "step": step,

@@ -4,11 +4,12 @@ import math
 from collections.abc import Callable, Iterator
 
 from ..output.status import Status
-from ..scene.pump import Guide, PumpScene, RevoluteJoint
+from ..scene.pump import OILED_RUNGS, Guide, PumpScene, RevoluteJoint
 from .setup import (
     LARGEST_STEP_PER_CONTACT_TIME,
     STEP_PER_CONTACT_DECAY,
     STEP_PER_CONTACT_TIME,
+    STEP_PER_STARVED_CONTACT_TIME,
     contact_frequency,
     contact_rate,
     contact_table,
@@ -177,8 +178,17 @@ def pump_step(scene: PumpScene) -> float:
     rate = contact_rate(scene)
     if rate == 0:
         return casing
-    needed = min(STEP_PER_CONTACT_TIME / contact_frequency(scene), STEP_PER_CONTACT_DECAY / rate)
-    return min(needed, casing)
+    resolved = STEP_PER_STARVED_CONTACT_TIME if _starved(scene) else STEP_PER_CONTACT_TIME
+    return min(resolved / contact_frequency(scene), STEP_PER_CONTACT_DECAY / rate, casing)
+
+
+def _starved(scene: PumpScene) -> bool:
+    """Whether any pin runs in oil that fills thin gaps only."""
+    return any(
+        part.rung in OILED_RUNGS and part.oil is not None and part.oil.filled_gap is not None
+        for _, _, part in _joints(scene)
+        if isinstance(part, RevoluteJoint)
+    )
 
 
 def pump_steps(scene: PumpScene) -> int:

@@ -106,7 +106,7 @@ class JointOil(Oil):
         default=None,
         ge=0,
         le=DAMPING_MOST,
-        description="of the parts behind the film; none: a twentieth of sqrt(stiffness x mass)",
+        description="of the parts behind the film; none: a tenth of sqrt(stiffness x mass)",
     )
     roughness: Length | None = Field(
         default=None,
