@@ -1,6 +1,7 @@
 # Every target makes .venv by itself and reuses it. PYTHON picks the interpreter (>= 3.11).
 PYTHON ?= python3
 BIN := .venv/bin
+JOBS ?= 2
 STAMP := .venv/.ready
 
 .PHONY: demo test check lint types benchmark docs clean
@@ -29,6 +30,7 @@ types: $(STAMP)
 docs: $(STAMP)
 	$(BIN)/python -c 'import myst_parser, numpydoc, pydata_sphinx_theme, sphinx_gallery' 2> /dev/null \
 	  || $(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[docs]'
+	OMP_NUM_THREADS=1 $(BIN)/python docs/pictures.py $(JOBS)
 	OMP_NUM_THREADS=1 $(BIN)/sphinx-build -q -W -n --keep-going -b html \
 	  -d docs/_build/doctrees docs docs/_build/html
 

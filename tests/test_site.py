@@ -1,6 +1,8 @@
 """The documentation site: what can be told without building it, which ``make docs`` does."""
 
+import ast
 import importlib
+import importlib.util
 import re
 import shlex
 from pathlib import Path
@@ -66,6 +68,45 @@ def test_the_reference_names_every_public_name():
         public |= {f"{module.__name__}.{each}" for each in module.__all__}
     public.remove("wearstate.film.FILM_RUNGS")  # a table, on the page of the solvers
     assert listed == public
+
+
+def made_at_build():
+    """Pictures of the three scripts that `make docs` runs."""
+    found = set()
+    for part in ("pump", "journal", "shaft"):
+        tree = ast.parse((DOCS / f"figures_{part}.py").read_text(encoding="utf-8"))
+        [figures] = [
+            node.value
+            for node in tree.body
+            if isinstance(node, ast.AnnAssign) and ast.unparse(node.target) == "FIGURES"
+        ]
+        found |= {f"img/{ast.literal_eval(key)}.png" for key in figures.keys}
+    return found
+
+
+def test_every_picture_is_stored_or_made():
+    ignored = (DOCS.parent / ".gitignore").read_text(encoding="utf-8").splitlines()
+    assert {f"/docs/{name}" for name in made_at_build()} <= set(ignored)
+    for name in pages():
+        page = DOCS / f"{name}.md"
+        for shown in re.findall(r"\]\((img/[^)]+)\)", page.read_text(encoding="utf-8")):
+            assert shown in made_at_build() or (DOCS / shown).is_file(), f"{name}: {shown}"
+
+
+def test_pictures_are_made_again_when_the_program_changes(tmp_path, monkeypatch):
+    spec = importlib.util.spec_from_file_location("pictures", DOCS / "pictures.py")
+    pictures = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(pictures)
+    monkeypatch.setattr(pictures, "FOLDER", tmp_path)
+    script = pictures.SCRIPTS[0]
+    assert pictures.stale(script)
+    stamp = tmp_path / f".{script}.made"
+    stamp.write_text(f"{pictures.current(script)}\na.png")
+    assert pictures.stale(script)  # the picture is missing
+    (tmp_path / "a.png").touch()
+    assert not pictures.stale(script)
+    stamp.write_text("another state\na.png")
+    assert pictures.stale(script)
 
 
 # --- examples
