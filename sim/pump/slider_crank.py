@@ -98,6 +98,12 @@ BODY = ("rod_x", "rod_y", "beta", "piston_x", "piston_y", "tilt")
 
 PER_THROW = 2 * len(BODY)
 
+ROD_X, ROD_Y, BETA, PISTON_X, PISTON_Y, TILT = range(len(BODY))
+ROD_X_RATE, ROD_Y_RATE, BETA_RATE, PISTON_X_RATE, PISTON_Y_RATE, TILT_RATE = range(
+    len(BODY), PER_THROW
+)
+"""Columns of a throw's state."""
+
 FORCES = (
     "pin_x",
     "pin_y",
@@ -171,6 +177,15 @@ ANGLE, SPEED, ANGLE_RATE, SPEED_RATE, MOMENT = range(5)
 """Columns of the crank's stages."""
 
 
+AT_JOINT, ALONG_X, ALONG_Y, RUBBING, NORMAL_X, NORMAL_Y = range(6)
+"""Columns of the place of a constraint force: its joint, its direction with the share that rubs
+across it, and the normal along which its equation stands."""
+
+SIZE, SIZE_PER_TURN = 4, 5
+"""Right sides of the constraint equations, and after elimination the constraint forces: at constant
+crank speed, and per crank acceleration."""
+
+
 class _Work(NamedTuple):
     """Scratch of the march; nothing is allocated in its loop.
 
@@ -181,8 +196,8 @@ class _Work(NamedTuple):
     stage: NDArray[Any]  # (5, n_throws) of STAGE
     held: NDArray[Any]  # (n_throws,) of HELD
     moment: NDArray[np.float64]  # (2,): on the crank, and per crank acceleration
-    matrix: NDArray[np.float64]  # (4, 6): constraint equations with two right sides
-    place: NDArray[np.float64]  # (4, 6): joint, direction, tangential share, normal
+    matrix: NDArray[np.float64]  # (4, 6): constraint equations with two right sides, see SIZE
+    place: NDArray[np.float64]  # (4, 6): of each constraint force, see AT_JOINT
 
 
 @kernel
@@ -191,24 +206,24 @@ def _crank_offset(
 ) -> Any:
     """Pin from its eye's centre, and how fast."""
     turn = omega * q.crank_radius
-    swing = b.y[8] * q.rod_arm
+    swing = b.y[BETA_RATE] * q.rod_arm
     return (
-        q.crank_radius * cos_a - b.y[0] + q.rod_arm * cos_b,
-        q.crank_radius * sin_a - b.y[1] - q.rod_arm * sin_b,
-        -turn * sin_a - b.y[6] - swing * sin_b,
-        turn * cos_a - b.y[7] - swing * cos_b,
+        q.crank_radius * cos_a - b.y[ROD_X] + q.rod_arm * cos_b,
+        q.crank_radius * sin_a - b.y[ROD_Y] - q.rod_arm * sin_b,
+        -turn * sin_a - b.y[ROD_X_RATE] - swing * sin_b,
+        turn * cos_a - b.y[ROD_Y_RATE] - swing * cos_b,
     )
 
 
 @kernel
 def _wrist_offset(b: Any, q: Any, sin_b: float, cos_b: float) -> Any:
     """Pin from its eye's centre, and how fast."""
-    swing = b.y[8] * q.rod_centre
+    swing = b.y[BETA_RATE] * q.rod_centre
     return (
-        b.y[3] - b.y[0] - q.rod_centre * cos_b,
-        b.y[4] - b.y[1] + q.rod_centre * sin_b,
-        b.y[9] - b.y[6] + swing * sin_b,
-        b.y[10] - b.y[7] + swing * cos_b,
+        b.y[PISTON_X] - b.y[ROD_X] - q.rod_centre * cos_b,
+        b.y[PISTON_Y] - b.y[ROD_Y] + q.rod_centre * sin_b,
+        b.y[PISTON_X_RATE] - b.y[ROD_X_RATE] + swing * sin_b,
+        b.y[PISTON_Y_RATE] - b.y[ROD_Y_RATE] + swing * cos_b,
     )
 
 
@@ -229,11 +244,11 @@ def _corner(b: Any, q: Any, corner: int, clearance: float) -> Any:
     along = q.guide_half_length if corner & 1 else -q.guide_half_length
     side = 1.0 if corner < 2 else -1.0
     across = side * q.guide_half_height
-    sin_t, cos_t = sine_cosine(b.y[5])
+    sin_t, cos_t = sine_cosine(b.y[TILT])
     r_x = along * cos_t - across * sin_t
     r_y = along * sin_t + across * cos_t
-    overlap = side * (b.y[4] + r_y) - q.guide_half_height - clearance
-    return overlap, side * (b.y[10] + b.y[11] * r_x), r_x, r_y, side
+    overlap = side * (b.y[PISTON_Y] + r_y) - q.guide_half_height - clearance
+    return overlap, side * (b.y[PISTON_Y_RATE] + b.y[TILT_RATE] * r_x), r_x, r_y, side
 
 
 @kernel
@@ -254,7 +269,7 @@ def _contact_margin(k: int, j: int, w: Any, row: int, t: Any) -> Any:
         c = t.contacts[k, GUIDE]
         overlap, speed, _, _, _ = _corner(b, q, j - GUIDE, c.clearance)
         return _margin(overlap, normal_force(overlap, speed, impact, c), touching, c)
-    sin_b, cos_b = sine_cosine(b.y[2])
+    sin_b, cos_b = sine_cosine(b.y[BETA])
     c = t.contacts[k, j]
     if j == CRANKPIN:
         sin_a, cos_a = sine_cosine(w.crank[row, ANGLE] + q.phase)
@@ -333,7 +348,7 @@ def _oiled(
         v_x,
         v_y,
         pin_turn,
-        -b.y[8],
+        -b.y[BETA_RATE],
         held.squeeze[joint],
         t.contacts[k, joint],
         t.oils[k, joint],
@@ -357,7 +372,7 @@ def _guide(q: Any, b: Any, held: Any, c: Any) -> Any:
         deepest = max(deepest, overlap)
         if touching:
             push = -side * law
-            drag = -friction_force(b.y[9] - b.y[11] * r_y, law, c)
+            drag = -friction_force(b.y[PISTON_X_RATE] - b.y[TILT_RATE] * r_y, law, c)
             f_x += drag
             f_y += push
             moment += r_x * push - r_y * drag
@@ -373,7 +388,7 @@ def _pressure(k: int, w: Any, row: int, share: float, t: Any) -> Any:
         before, after = held.pressure[0], held.pressure[1]
         return before + share * (after - before), 0.0
     angle = w.crank[row, ANGLE] + q.phase
-    return line_pressure(angle, w.crank[row, SPEED], w.stage[row, k].y[9], t.liquid[k])
+    return line_pressure(angle, w.crank[row, SPEED], w.stage[row, k].y[PISTON_X_RATE], t.liquid[k])
 
 
 @kernel
@@ -381,8 +396,8 @@ def _throw(k: int, w: Any, row: int, share: float, t: Any) -> None:
     """Rates and forces of one throw at constant crank speed, and per crank acceleration."""
     q, m, b, held = t.throws[k], t.machine, w.stage[row, k], w.held[k]
     sin_a, cos_a = sine_cosine(w.crank[row, ANGLE] + q.phase)
-    sin_b, cos_b = sine_cosine(b.y[2])
-    omega, b_rate = w.crank[row, SPEED], b.y[8]
+    sin_b, cos_b = sine_cosine(b.y[BETA])
+    omega, b_rate = w.crank[row, SPEED], b.y[BETA_RATE]
     pressure, added = _pressure(k, w, row, share, t)
     # applied forces on rod (x, y, turning with b), piston (x, y, turning with t), and crank
     rod_x, rod_y, rod_b = -m.gravity_x * q.rod_mass, -m.gravity_y * q.rod_mass, 0.0
@@ -417,11 +432,11 @@ def _throw(k: int, w: Any, row: int, share: float, t: Any) -> None:
         d_x, d_y, v_x, v_y = _wrist_offset(b, q, sin_b, cos_b)
         if q.wristpin_rung == JOINT_OILED:
             wrist_x, wrist_y, on_pin, on_eye, normal = _oiled(
-                WRISTPIN, d_x, d_y, v_x, v_y, b.y[11], k, b, held, t
+                WRISTPIN, d_x, d_y, v_x, v_y, b.y[TILT_RATE], k, b, held, t
             )
             overlap = math.sqrt(d_x * d_x + d_y * d_y) - c.clearance
         else:
-            spin = b.y[11] * radius + b_rate * eye
+            spin = b.y[TILT_RATE] * radius + b_rate * eye
             wrist_x, wrist_y, rub, normal, overlap = _pin_joint(
                 WRISTPIN, q.wristpin_rung, d_x, d_y, v_x, v_y, spin, b, held, c
             )
@@ -444,7 +459,7 @@ def _throw(k: int, w: Any, row: int, share: float, t: Any) -> None:
     acc_x, acc_y, acc_b = rod_x * inv_m, rod_y * inv_m, rod_b * inv_j
     pis_x, pis_y = piston_x * inv_px, piston_y * q.inverse_piston_across
     b.link = 0.0
-    b.rate[11] = piston_t * q.inverse_piston_tilt
+    b.rate[TILT_RATE] = piston_t * q.inverse_piston_tilt
     if q.crankpin_rung >= JOINT_COMPLIANT and q.wristpin_rung == JOINT_IDEAL:
         # two constraints of the wrist pin in closed form: the way a worn crank pin takes
         d_x, d_y, v_x, v_y = _wrist_offset(b, q, sin_b, cos_b)
@@ -463,10 +478,10 @@ def _throw(k: int, w: Any, row: int, share: float, t: Any) -> None:
         acc_b -= q.rod_centre * (wrist_x * sin_b + wrist_y * cos_b) * inv_j
         pis_x -= wrist_x * inv_px
         pis_y -= wrist_y * q.inverse_piston_across
-    for i in range(6):
-        b.rate[i] = b.y[6 + i]
-    b.rate[6], b.rate[7], b.rate[8] = acc_x, acc_y, acc_b
-    b.rate[9], b.rate[10] = pis_x, pis_y
+    for i in range(len(BODY)):
+        b.rate[i] = b.y[len(BODY) + i]
+    b.rate[ROD_X_RATE], b.rate[ROD_Y_RATE], b.rate[BETA_RATE] = acc_x, acc_y, acc_b
+    b.rate[PISTON_X_RATE], b.rate[PISTON_Y_RATE] = pis_x, pis_y
     b.force[_PIN], b.force[_PIN + 1] = pin_x, pin_y
     b.force[_WRIST], b.force[_WRIST + 1] = wrist_x, wrist_y
     b.normal, b.overlap = peak, overlap_ratio
@@ -474,12 +489,12 @@ def _throw(k: int, w: Any, row: int, share: float, t: Any) -> None:
         crank_moment += _constrain(k, w, row, t, sin_a, cos_a, sin_b, cos_b, inv_px)
     pin_x, pin_y = b.force[_PIN], b.force[_PIN + 1]
     w.moment[0] += crank_moment + q.crank_radius * (pin_x * sin_a - pin_y * cos_a)
-    b.force[_FACE] = on_face - added * b.rate[9]
+    b.force[_FACE] = on_face - added * b.rate[PISTON_X_RATE]
     if q.guide_rung != JOINT_COMPLIANT:  # what holds the piston up
         guide_y = b.force[_WRIST + 1] + m.gravity_y * q.piston_mass
     b.force[_GUIDE], b.force[_GUIDE + 1] = guide_x, guide_y
     if q.crankpin_rung < JOINT_COMPLIANT and m.inverse_inertia > 0.0:
-        b.force_per_turn[_FACE] = -added * b.rate_per_turn[9]
+        b.force_per_turn[_FACE] = -added * b.rate_per_turn[PISTON_X_RATE]
         if q.guide_rung != JOINT_COMPLIANT:
             b.force_per_turn[_GUIDE + 1] = b.force_per_turn[_WRIST + 1]
 
@@ -510,7 +525,7 @@ def _equations(
     the other in tension (-1). Returns the number of the next equation.
     """
     q, m, b, c = t.throws[k], t.machine, w.stage[row, k], t.contacts[k, joint]
-    omega, b_rate = w.crank[row, SPEED], b.y[8]
+    omega, b_rate = w.crank[row, SPEED], b.y[BETA_RATE]
     if joint == CRANKPIN:
         rung, arm, radius, spin = q.crankpin_rung, q.rod_arm, q.crankpin_radius, omega
         d_x, d_y, v_x, v_y = _crank_offset(b, omega, q, sin_a, cos_a, sin_b, cos_b)
@@ -518,44 +533,45 @@ def _equations(
         apart_x, apart_y = -pull * cos_a, -pull * sin_a
         turn_x, turn_y = -q.crank_radius * sin_a, q.crank_radius * cos_a
     else:
-        rung, arm, radius, spin = q.wristpin_rung, -q.rod_centre, q.wristpin_radius, b.y[11]
+        rung, arm, radius, spin = q.wristpin_rung, -q.rod_centre, q.wristpin_radius, b.y[TILT_RATE]
         d_x, d_y, v_x, v_y = _wrist_offset(b, q, sin_b, cos_b)
-        apart_x, apart_y = b.rate[9], b.rate[10]
+        apart_x, apart_y = b.rate[PISTON_X_RATE], b.rate[PISTON_Y_RATE]
         turn_x, turn_y = 0.0, 0.0
-    apart_x -= b.rate[6] + arm * (b.rate[8] * sin_b + b_rate * b_rate * cos_b)
-    apart_y -= b.rate[7] + arm * (b.rate[8] * cos_b - b_rate * b_rate * sin_b)
+    apart_x -= b.rate[ROD_X_RATE] + arm * (b.rate[BETA_RATE] * sin_b + b_rate * b_rate * cos_b)
+    apart_y -= b.rate[ROD_Y_RATE] + arm * (b.rate[BETA_RATE] * cos_b - b_rate * b_rate * sin_b)
     if rung == JOINT_IDEAL:
-        w.place[n, 0] = w.place[n + 1, 0] = joint
-        w.place[n, 1] = w.place[n, 4] = w.place[n + 1, 2] = w.place[n + 1, 5] = 1.0
-        w.place[n, 2] = w.place[n, 5] = w.place[n + 1, 1] = w.place[n + 1, 4] = 0.0
-        w.place[n, 3] = w.place[n + 1, 3] = 0.0
-        w.matrix[n, 4] = apart_x + _held_back(d_x, v_x, m)
-        w.matrix[n + 1, 4] = apart_y + _held_back(d_y, v_y, m)
-        w.matrix[n, 5], w.matrix[n + 1, 5] = turn_x, turn_y
+        for i in range(2):  # along x, then along y
+            x, y = 1.0 - i, 1.0 * i
+            w.place[n + i, AT_JOINT], w.place[n + i, RUBBING] = joint, 0.0
+            w.place[n + i, ALONG_X], w.place[n + i, ALONG_Y] = x, y
+            w.place[n + i, NORMAL_X], w.place[n + i, NORMAL_Y] = x, y
+        w.matrix[n, SIZE] = apart_x + _held_back(d_x, v_x, m)
+        w.matrix[n + 1, SIZE] = apart_y + _held_back(d_y, v_y, m)
+        w.matrix[n, SIZE_PER_TURN], w.matrix[n + 1, SIZE_PER_TURN] = turn_x, turn_y
         return n + 2
     distance, speed, n_x, n_y = _polar(d_x, d_y, v_x, v_y)
     swing = v_y * n_x - v_x * n_y
     sliding = swing + radius * spin + (radius + c.clearance) * b_rate
     share = side * (friction_force(sliding, 1.0, c) - c.tangential_damping * sliding)
-    w.place[n, 0], w.place[n, 3] = joint, share
-    w.place[n, 1], w.place[n, 2] = n_x - share * n_y, n_y + share * n_x
-    w.place[n, 4], w.place[n, 5] = n_x, n_y
+    w.place[n, AT_JOINT], w.place[n, RUBBING] = joint, share
+    w.place[n, ALONG_X], w.place[n, ALONG_Y] = n_x - share * n_y, n_y + share * n_x
+    w.place[n, NORMAL_X], w.place[n, NORMAL_Y] = n_x, n_y
     across = swing * swing / distance
     back = _held_back(distance - c.clearance, speed, m)
-    w.matrix[n, 4] = apart_x * n_x + apart_y * n_y + across + back
-    w.matrix[n, 5] = turn_x * n_x + turn_y * n_y
+    w.matrix[n, SIZE] = apart_x * n_x + apart_y * n_y + across + back
+    w.matrix[n, SIZE_PER_TURN] = turn_x * n_x + turn_y * n_y
     return n + 1
 
 
 @kernel
 def _unit_swing(j: int, k: int, w: Any, t: Any, sin_b: float, cos_b: float) -> Any:
     """Angular acceleration of the rod per unit of constraint force j."""
-    q, crank = t.throws[k], w.place[j, 0] == CRANKPIN
+    q, crank = t.throws[k], w.place[j, AT_JOINT] == CRANKPIN
     arm = q.rod_arm if crank else -q.rod_centre
     radius = q.crankpin_radius if crank else q.wristpin_radius
     eye = radius + t.contacts[k, CRANKPIN if crank else WRISTPIN].clearance
-    along = w.place[j, 1] * sin_b + w.place[j, 2] * cos_b
-    return (arm * along - eye * w.place[j, 3]) * q.inverse_rod_inertia
+    along = w.place[j, ALONG_X] * sin_b + w.place[j, ALONG_Y] * cos_b
+    return (arm * along - eye * w.place[j, RUBBING]) * q.inverse_rod_inertia
 
 
 @kernel
@@ -563,16 +579,16 @@ def _mobilities(n: int, k: int, w: Any, t: Any, sin_b: float, cos_b: float, inv_
     """What every unit constraint force does to every equation."""
     q = t.throws[k]
     for j in range(n):
-        u_x, u_y = w.place[j, 1], w.place[j, 2]
+        u_x, u_y = w.place[j, ALONG_X], w.place[j, ALONG_Y]
         swing = _unit_swing(j, k, w, t, sin_b, cos_b)
         for i in range(n):
-            reach = q.rod_arm if w.place[i, 0] == CRANKPIN else -q.rod_centre
+            reach = q.rod_arm if w.place[i, AT_JOINT] == CRANKPIN else -q.rod_centre
             e_x = u_x * q.inverse_rod_mass + reach * swing * sin_b
             e_y = u_y * q.inverse_rod_mass + reach * swing * cos_b
-            if w.place[j, 0] == WRISTPIN and w.place[i, 0] == WRISTPIN:
+            if w.place[j, AT_JOINT] == WRISTPIN and w.place[i, AT_JOINT] == WRISTPIN:
                 e_x += u_x * inv_px
                 e_y += u_y * q.inverse_piston_across
-            w.matrix[i, j] = e_x * w.place[i, 4] + e_y * w.place[i, 5]
+            w.matrix[i, j] = e_x * w.place[i, NORMAL_X] + e_y * w.place[i, NORMAL_Y]
 
 
 @kernel
@@ -581,19 +597,23 @@ def _add_force(
 ) -> Any:
     """Add constraint force j to rates and forces of a throw; its friction's moment on the crank."""
     q = t.throws[k]
-    f_x, f_y, rub = size * w.place[j, 1], size * w.place[j, 2], size * w.place[j, 3]
-    rate[6] += f_x * q.inverse_rod_mass
-    rate[7] += f_y * q.inverse_rod_mass
-    rate[8] += size * swing
-    if w.place[j, 0] == CRANKPIN:
+    f_x, f_y, rub = (
+        size * w.place[j, ALONG_X],
+        size * w.place[j, ALONG_Y],
+        size * w.place[j, RUBBING],
+    )
+    rate[ROD_X_RATE] += f_x * q.inverse_rod_mass
+    rate[ROD_Y_RATE] += f_y * q.inverse_rod_mass
+    rate[BETA_RATE] += size * swing
+    if w.place[j, AT_JOINT] == CRANKPIN:
         force[_PIN] += f_x
         force[_PIN + 1] += f_y
         return -q.crankpin_radius * rub
     force[_WRIST] += f_x
     force[_WRIST + 1] += f_y
-    rate[9] -= f_x * inv_px
-    rate[10] -= f_y * q.inverse_piston_across
-    rate[11] -= q.wristpin_radius * rub * q.inverse_piston_tilt
+    rate[PISTON_X_RATE] -= f_x * inv_px
+    rate[PISTON_Y_RATE] -= f_y * q.inverse_piston_across
+    rate[TILT_RATE] -= q.wristpin_radius * rub * q.inverse_piston_tilt
     return 0.0
 
 
@@ -626,26 +646,26 @@ def _constrain(
         _eliminate(w, n)
         least, was_pin, was_wrist = 1.0, at_pin, at_wrist
         if q.crankpin_rung == JOINT_LINK:  # the first equation
-            least = min(least, w.matrix[0, 4])
-            at_pin = -1.0 if w.matrix[0, 4] < 0.0 else 1.0
+            least = min(least, w.matrix[0, SIZE])
+            at_pin = -1.0 if w.matrix[0, SIZE] < 0.0 else 1.0
         if q.wristpin_rung == JOINT_LINK:  # the last one
-            least = min(least, w.matrix[n - 1, 4])
-            at_wrist = -1.0 if w.matrix[n - 1, 4] < 0.0 else 1.0
+            least = min(least, w.matrix[n - 1, SIZE])
+            at_wrist = -1.0 if w.matrix[n - 1, SIZE] < 0.0 else 1.0
         if at_pin == was_pin and at_wrist == was_wrist:
             break
     b.link = min(least, 0.0)
     per_turn = m.inverse_inertia > 0.0 and q.crankpin_rung < JOINT_COMPLIANT
     if per_turn:
-        for c in range(6, PER_THROW):
+        for c in range(len(BODY), PER_THROW):
             b.rate_per_turn[c] = 0.0
         for c in range(_VALVES):
             b.force_per_turn[c] = 0.0
     moment, rubbing = 0.0, 0.0
     for j in range(n):
         swing = _unit_swing(j, k, w, t, sin_b, cos_b)
-        moment += _add_force(w.matrix[j, 4], j, k, b.rate, b.force, w, t, swing, inv_px)
+        moment += _add_force(w.matrix[j, SIZE], j, k, b.rate, b.force, w, t, swing, inv_px)
         if per_turn:
-            more = w.matrix[j, 5]
+            more = w.matrix[j, SIZE_PER_TURN]
             rubbing += _add_force(
                 more, j, k, b.rate_per_turn, b.force_per_turn, w, t, swing, inv_px
             )
@@ -664,14 +684,14 @@ def _eliminate(w: Any, n: int) -> None:
             factor = w.matrix[r, i] * inverse
             for column in range(i + 1, n):
                 w.matrix[r, column] -= factor * w.matrix[i, column]
-            w.matrix[r, 4] -= factor * w.matrix[i, 4]
-            w.matrix[r, 5] -= factor * w.matrix[i, 5]
+            w.matrix[r, SIZE] -= factor * w.matrix[i, SIZE]
+            w.matrix[r, SIZE_PER_TURN] -= factor * w.matrix[i, SIZE_PER_TURN]
     for i in range(n - 1, -1, -1):
         for column in range(i + 1, n):
-            w.matrix[i, 4] -= w.matrix[i, column] * w.matrix[column, 4]
-            w.matrix[i, 5] -= w.matrix[i, column] * w.matrix[column, 5]
-        w.matrix[i, 4] /= w.matrix[i, i]
-        w.matrix[i, 5] /= w.matrix[i, i]
+            w.matrix[i, SIZE] -= w.matrix[i, column] * w.matrix[column, SIZE]
+            w.matrix[i, SIZE_PER_TURN] -= w.matrix[i, column] * w.matrix[column, SIZE_PER_TURN]
+        w.matrix[i, SIZE] /= w.matrix[i, i]
+        w.matrix[i, SIZE_PER_TURN] /= w.matrix[i, i]
 
 
 @kernel
@@ -711,7 +731,7 @@ def _derivative(w: Any, row: int, share: float, t: Any) -> None:
         if t.throws[k].crankpin_rung >= JOINT_COMPLIANT:
             continue
         b = w.stage[row, k]
-        for c in range(6, 12):
+        for c in range(len(BODY), PER_THROW):
             b.rate[c] += turning * b.rate_per_turn[c]
         for c in range(_VALVES):
             b.force[c] += turning * b.force_per_turn[c]
@@ -912,9 +932,17 @@ def _breathe(w: Any, i: int, h: float, t: Any, chamber: Any, forces: Any, step: 
             continue
         last, before, v_before = chamber[k, 0], chamber[k, 6], chamber[k, 7]
         fault += chamber_step(
-            chamber[k], held.flow, t.liquid[k], h, before, v_before, b.y[3], b.y[9], q.substeps
+            chamber[k],
+            held.flow,
+            t.liquid[k],
+            h,
+            before,
+            v_before,
+            b.y[PISTON_X],
+            b.y[PISTON_X_RATE],
+            q.substeps,
         )
-        chamber[k, 6], chamber[k, 7] = b.y[3], b.y[9]
+        chamber[k, 6], chamber[k, 7] = b.y[PISTON_X], b.y[PISTON_X_RATE]
         held.pressure[0], held.pressure[1] = chamber[k, 0], 2.0 * chamber[k, 0] - last
         f = 1 + len(FORCES) * k
         forces[step, f + _VALVES] = held.flow[2] / h
@@ -931,7 +959,7 @@ def _fault(w: Any, i: int) -> int:
             total += b.y[c]
         if b.overlap > OVERLAP_LIMIT:
             return 2
-        if abs(b.y[2]) > 1.5:  # rad
+        if abs(b.y[BETA]) > 1.5:  # rad
             return 3
     return 0 if math.isfinite(total) else 1
 
@@ -969,7 +997,7 @@ def _begin(w: Any, t: Any, chamber: Any) -> bool:
     for k in range(t.throws.shape[0]):
         q, b, held = t.throws[k], w.stage[0, k], w.held[k]
         breathing |= q.pressure_rung == PRESSURE_CHAMBER
-        chamber[k, 6], chamber[k, 7] = b.y[3], b.y[9]
+        chamber[k, 6], chamber[k, 7] = b.y[PISTON_X], b.y[PISTON_X_RATE]
         held.pressure[0] = held.pressure[1] = chamber[k, 0]
         for j in range(CONTACTS):
             for row in range(5):
@@ -999,6 +1027,8 @@ def _integrate(h: float, t: Any, w: Any, chamber: Any, r: Any, tally: Any) -> An
     """March from row 0 of the scratch; returns status code and steps done."""
     breathing = _begin(w, t, chamber)
     i, fresh = 0, False
+    if r.gaps.shape[0] > 1:  # the films of the start are those of its derivative
+        _derivative(w, i, 0.0, t)
     _keep(w, i, chamber, r, 0)
     for step in range(r.forces.shape[0]):
         i, fresh = _step(w, i, h, fresh, t, r.forces, step, tally)
