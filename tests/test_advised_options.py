@@ -37,6 +37,7 @@ SPOKEN_BY = {
     "report/advice": {"report"},
     "alignment/page": {"align"},
     "inspect/audit_text": {"splits"},
+    "inspect/rank_text": {"features"},
     "blindspots/blindspots": {"blindspots"},
     "command_line/chart_commands": {"chart"},
     "charts/of_scene": {"chart"},

@@ -130,4 +130,4 @@ def test_all_faults_of_a_choice_at_once():
 
 
 def test_something_must_be_asked():
-    assert "give DATA and --output, or --list" in run("features", code=2).stderr
+    assert "give DATA and --output, DATA and --rank, or --list" in run("features", code=2).stderr

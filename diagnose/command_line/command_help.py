@@ -131,7 +131,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     ),
     "features": (
         "wearstate features data.h5 -o features.csv",
-        "wearstate features --list --set standard",
+        "wearstate features data.h5 --rank -o rank.html",
     ),
     "train": (
         "wearstate train data.h5 -o pump.wsm",

@@ -749,6 +749,14 @@ _FEATURE_SETS = (
     help="What models are trained on (default); all but the dearest; everything.",
 )
 @click.option("--only", multiple=True, metavar="NAMES", help="Only these, parted by commas.")
+@click.option(
+    "--rank", is_flag=True, help="Which features tell the wear; -o is a page or a table (.csv)."
+)
+@click.option(
+    "--target",
+    metavar="COLUMN",
+    help="Of --rank: severity or label to be told; the first severity by default.",
+)
 @join_option
 @click.option("--machine", metavar="KIND", help="Kind of machine, for its ISO zone.")
 @_speed_option
@@ -776,20 +784,28 @@ def features(
     listing: bool,
     feature_set: str | None,
     only: Sequence[str],
+    rank: bool,
+    target: str | None,
     joined: Sequence[str],
     jobs: int | None,
     force: bool,
     as_json: bool,
     **about: Any,
 ) -> None:
-    """Feature table of the data set DATA (.parquet, .csv or .h5), manifest beside it."""
+    """Feature table of the data set DATA (.parquet, .csv or .h5), manifest beside it.
+
+    With --rank: which features separate the grades or follow the severity, alone and within each
+    machine, and what they cost.
+    """
+    if target and not rank:
+        raise click.UsageError("--target is of --rank")
     if listing:
-        if data is not None or output is not None:
+        if data is not None or output is not None or rank:
             raise click.UsageError("--list stands alone: it reads and writes no file")
         _emit_catalogue(feature_set or _FEATURE_SETS[-1], as_json)
         return
-    if data is None or output is None:
-        raise click.UsageError("give DATA and --output, or --list")
+    if data is None or (output is None and not rank):
+        raise click.UsageError("give DATA and --output, DATA and --rank, or --list")
     if only and feature_set:
         raise click.UsageError("give either --set or --only: names are looked for in every set")
     from ...datasets.file.views import views_of
@@ -803,7 +819,7 @@ def features(
 
     views = views_of(joined)
     sources = [data, *(view.path for view in views)]
-    check_outputs(sources, [(output, TABLE_SUFFIXES)], force)
+    check_outputs(sources, [(output, _RANKED if rank else TABLE_SUFFIXES)], force)
     names = [name.strip() for part in only for name in part.split(",")]
     wanted: Any = feature_set or _FEATURE_SETS[0]
     choice = replace(choice_of(wanted, names, **about), views=views)
@@ -815,6 +831,10 @@ def features(
         click.echo(f"absent: {', '.join(slow)}: {absent[slow[0]]}", err=True)
     with progress_bar("features") as progress:
         table = feature_table(data, choice=choice, jobs=worker_count(jobs), progress=progress)
+    if rank:
+        _emit_rank(data, table, choice, target, output, force, as_json)
+        return
+    assert output is not None  # asked for above
     save_table(table, output, force=force)
     for text in table.lacking_words:
         click.echo(f"{text}: its values are empty there", err=True)
@@ -825,6 +845,28 @@ def features(
     for note, count in told.items():
         click.echo(f"{count} records: {note}", err=True)
     emit({**size, "absent": absent, "tests": told}, as_json, text)
+
+
+_RANKED = (*PAGE_SUFFIXES, ".csv")
+
+
+def _emit_rank(
+    data: Path,
+    table: Any,
+    choice: Any,
+    target: str | None,
+    output: Path | None,
+    force: bool,
+    as_json: bool,
+) -> None:
+    """What the features of a set tell, printed and, if so wished, written."""
+    from ..inspect.rank_text import rank_set, rank_table, rank_text, save_rank
+
+    found = rank_set(data, table, choice, target=target)
+    if output is not None:
+        save_rank(found, output, force=force)
+    files = [str(output)] if output is not None else []
+    emit({**rank_table(found), "files": files}, as_json, "\n".join([rank_text(found), *files]))
 
 
 def _emit_catalogue(feature_set: Any, as_json: bool) -> None:

@@ -1,0 +1,317 @@
+"""A ranking of features in words, as a table, as CSV and as a page with pictures."""
+
+import csv
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...datasets.file.csv_cells import safe_cell
+from ...datasets.file.record import DataSet
+from ...sim.atomic import replacing
+from ...sim.output.recording import DataError
+from ..feature_rows.feature_choice import costs_ms
+from ..feature_rows.feature_rank import LEAST_OF_MACHINE, FeatureRank, Ranking, rank_features
+from ..feature_rows.feature_table import FeatureSelection, FeatureTable
+from ..pages.page import render, save_page, short_name
+from ..pages.picture import encoded
+from ..pages.si_text import plain
+from ..pages.words import quantity_name
+
+SUFFIXES = (".html", ".htm", ".csv")
+"""Of what a ranking is written as."""
+
+SHOWN = 20
+"""Features in the table of a terminal; also those whose cost is measured."""
+
+_DRAWN = 6  # features whose values are drawn
+
+
+@dataclass(frozen=True, kw_only=True)
+class RankedSet:
+    """The features of a data set, ranked.
+
+    Attributes
+    ----------
+    name : str
+        Of the data set.
+    target : str
+        Column of its manifest.
+    classes : bool
+        The target names conditions.
+    table : FeatureTable
+    ranking : Ranking
+    costs_ms : mapping of str to float
+        Time that a feature alone takes on one recording [ms], of those shown.
+    """
+
+    name: str
+    target: str
+    classes: bool
+    table: FeatureTable
+    ranking: Ranking
+    costs_ms: Mapping[str, float] = field(default_factory=dict)
+
+
+def rank_set(
+    path: Path, table: FeatureTable, choice: FeatureSelection, *, target: str | None = None
+) -> RankedSet:
+    """Rank the features of a data set against its first severity, or another label.
+
+    Parameters
+    ----------
+    path : Path
+        Data set.
+    table : FeatureTable
+        Its features.
+    choice : FeatureSelection
+        With which the table was made; the costs are measured with it.
+    target : str, optional
+        Column of the manifest.
+
+    Raises
+    ------
+    DataError
+        There is no such column, or nothing varies in it.
+    """
+    with DataSet(path) as data:
+        severities = data.attributes.severities
+    column = target or (severities[0] if severities else "")
+    if column not in table.manifest:
+        labels = ", ".join(severities) or "(the set stores no severity)"
+        raise DataError(
+            f"{path}: target = {column!r} must be a column of its manifest; severities: {labels}"
+        )
+    values = table.manifest[column].to_numpy()
+    classes = column not in severities and values.dtype.kind != "f"
+    if len(np.unique(values)) < 2:
+        raise DataError(f"{path}: {column} is the same in all records, must vary; name another")
+    grades = table.manifest["grade"].to_numpy() if severities[:1] == (column,) else None
+    ranking = rank_features(
+        table.names,
+        table.values,
+        values,
+        table.manifest["group"].to_numpy(),
+        grades=grades,
+        classes=classes,
+    )
+    shown = [each.name for each in ranking.features[:SHOWN]]
+    alone = [_only(choice, name) for name in shown]
+    return RankedSet(
+        name=path.name,
+        target=column,
+        classes=classes,
+        table=table,
+        ranking=ranking,
+        costs_ms=dict(zip(shown, costs_ms(path, alone), strict=True)),
+    )
+
+
+def _only(choice: FeatureSelection, name: str) -> FeatureSelection:
+    return replace(choice, feature_set="complete", only=(name,))
+
+
+_COLUMNS = {
+    "information": "information [bits]",
+    "grades": "of the grades",
+    "spearman": "Spearman",
+    "monotonicity": "monotonicity",
+    "trendability": "trendability",
+}
+
+
+def rank_lines(found: RankedSet) -> list[str]:
+    """What the ranking says, as sentences."""
+    ranking = found.ranking
+    best = ranking.features[0]
+    lines = [
+        f"{best.name} tells most of {found.target}: {plain(best.information)} bits",
+        f"{len(ranking.telling)} of {len(ranking.features)} features tell more than chance "
+        f"({plain(ranking.chance)} bits; a shuffled target stays below it in 95 of 100 features)",
+    ]
+    if not found.classes and ranking.n_followed < ranking.n_machines:
+        lines.append(
+            f"{ranking.n_followed} of {ranking.n_machines} machines have the "
+            f"{LEAST_OF_MACHINE} records that monotonicity and trendability need"
+        )
+    return lines
+
+
+def rank_text(found: RankedSet) -> str:
+    """The ranking for a terminal: the first features, then what it says."""
+    width = max(len(each.name) for each in found.ranking.features[:SHOWN])
+    heads = [*_used(found).values(), "cost [ms]"]
+    lines = [
+        f"{found.name}: {found.ranking.n_records} records of {found.ranking.n_machines} machines",
+        f"{'feature':{width}}  " + "  ".join(heads),
+    ]
+    for each in found.ranking.features[:SHOWN]:
+        cells = [*_cells(found, each), _number(found.costs_ms.get(each.name, math.nan))]
+        row = "  ".join(cell.rjust(len(head)) for cell, head in zip(cells, heads, strict=True))
+        lines.append(f"{each.name:{width}}  {row}")
+    hidden = len(found.ranking.features) - SHOWN
+    lines += [f"and {hidden} more: see --json or -o"] if hidden > 0 else []
+    return "\n".join([*lines, *rank_lines(found)])
+
+
+def _used(found: RankedSet) -> dict[str, str]:
+    """Columns in which something is known."""
+    rows = found.ranking.features
+    return {
+        name: head
+        for name, head in _COLUMNS.items()
+        if any(not math.isnan(getattr(each, name)) for each in rows)
+    }
+
+
+def _cells(found: RankedSet, each: FeatureRank) -> list[str]:
+    return [_number(getattr(each, name)) for name in _used(found)]
+
+
+def _number(value: float) -> str:
+    return "-" if math.isnan(value) else f"{value:.2f}"
+
+
+def rank_table(found: RankedSet) -> dict[str, Any]:
+    """The ranking as plain values, for JSON."""
+    ranking = found.ranking
+    return {
+        "data": found.name,
+        "target": found.target,
+        "chance_bits": ranking.chance,
+        "records": ranking.n_records,
+        "machines": ranking.n_machines,
+        "machines_followed": ranking.n_followed,
+        "features": [
+            {**asdict(each), "cost_ms": found.costs_ms.get(each.name)} for each in ranking.features
+        ],
+    }
+
+
+def save_rank(found: RankedSet, path: Path, *, force: bool = True) -> None:
+    """Write the ranking as page or CSV."""
+    if path.suffix == ".csv":
+        _save_csv(found, path, force=force)
+    else:
+        save_page(rank_html(found), path, force=force)
+
+
+def _save_csv(found: RankedSet, path: Path, *, force: bool) -> None:
+    rows = rank_table(found)["features"]
+    with (
+        replacing(path, force=force) as fresh,
+        fresh.open("w", newline="", encoding="utf-8", errors="backslashreplace") as file,
+    ):
+        writer = csv.writer(file)
+        writer.writerow(rows[0])
+        writer.writerows([[safe_cell(value) for value in row.values()] for row in rows])
+
+
+# --- page
+
+
+def rank_html(found: RankedSet) -> str:
+    """One self-contained page: what it says, pictures, every feature."""
+    return render(
+        "rank.html.j2",
+        name=found.name,
+        target=_axis_words(found).partition(" [")[0],
+        lines=rank_lines(found),
+        records=found.ranking.n_records,
+        machines=found.ranking.n_machines,
+        bars=encoded(bar_figure(found)),
+        values=encoded(value_figure(found)),
+        drawn=min(_DRAWN, len(found.ranking.features)),
+        heads=[*_used(found).values(), "cost [ms]"],
+        rows=[
+            {
+                "name": each.name,
+                "telling": each.information > found.ranking.chance,
+                "cells": [
+                    *_cells(found, each),
+                    _number(found.costs_ms.get(each.name, math.nan)),
+                ],
+            }
+            for each in found.ranking.features
+        ],
+        shown=SHOWN,
+    )
+
+
+def _axis_words(found: RankedSet) -> str:
+    if found.classes or not found.target.endswith("_m"):
+        return found.target
+    return f"{quantity_name(found.target)} [mm]"
+
+
+def bar_figure(found: RankedSet) -> Any:
+    """Information of the first features, and what chance reaches."""
+    from matplotlib.figure import Figure
+
+    rows = found.ranking.features[:SHOWN]
+    figure = Figure(figsize=(8.0, 0.28 * len(rows) + 1.2), layout="constrained")
+    axis = figure.subplots()
+    places = np.arange(len(rows))
+    axis.barh(places, np.nan_to_num([each.information for each in rows]), color="#2f6f9f")
+    axis.set_yticks(places, [short_name(each.name) for each in rows], fontsize=9)
+    axis.invert_yaxis()
+    axis.axvline(found.ranking.chance, color="#c03a2b", linestyle="--", label="chance")
+    axis.set_xlabel(f"information about {_axis_words(found).partition(' [')[0]} [bits]")
+    axis.legend(loc="lower right")
+    return figure
+
+
+def value_figure(found: RankedSet) -> Any:
+    """Values of the best features against the target, records of one machine joined."""
+    from matplotlib.figure import Figure
+
+    rows = found.ranking.features[:_DRAWN]
+    columns = min(3, len(rows))
+    high = math.ceil(len(rows) / columns)
+    figure = Figure(figsize=(4.2 * columns, 3.2 * high), layout="constrained")
+    panels = list(np.ravel(figure.subplots(high, columns, squeeze=False)))
+    place, ticks = _places(found)
+    for axis, each in zip(panels, rows, strict=False):
+        column = found.table.values[:, found.table.names.index(each.name)]
+        _draw_values(axis, found, place, column)
+        axis.set_title(short_name(each.name, 34), fontsize=10)
+        axis.set_xlabel(_axis_words(found), fontsize=9)
+        if ticks:
+            axis.set_xticks(range(len(ticks)), [short_name(each, 14) for each in ticks])
+    for spare in panels[len(rows) :]:
+        spare.set_visible(False)
+    return figure
+
+
+def _places(found: RankedSet) -> tuple[NDArray[np.float64], list[str]]:
+    """Where each record lies along the target, and the names of the conditions."""
+    values = found.table.manifest[found.target].to_numpy()
+    if found.classes:
+        names, number = np.unique(values, return_inverse=True)
+        return number.astype(np.float64), [_text(name) for name in names]
+    scale = 1e3 if found.target.endswith("_m") else 1.0
+    return np.asarray(values, dtype=np.float64) * scale, []
+
+
+def _text(value: Any) -> str:
+    return value.decode(errors="backslashreplace") if isinstance(value, bytes) else str(value)
+
+
+_MOST_LINES = 12  # machines whose records are joined; more would be a felt
+
+
+def _draw_values(
+    axis: Any, found: RankedSet, place: NDArray[np.float64], column: NDArray[np.float64]
+) -> None:
+    axis.plot(place, column, "o", markersize=3, alpha=0.5, color="#49535e", markeredgewidth=0)
+    if found.classes or found.ranking.n_followed == 0:
+        return
+    group = found.table.manifest["group"].to_numpy()
+    for machine in np.unique(group)[:_MOST_LINES]:
+        own = np.flatnonzero(group == machine)
+        own = own[np.argsort(place[own])]
+        axis.plot(place[own], column[own], linewidth=0.8, alpha=0.8)
