@@ -28,7 +28,8 @@ types: $(STAMP)
 
 # the site, in docs/_build/html; needs the network only where the extra is not installed yet
 docs: $(STAMP)
-	$(BIN)/python -c 'import myst_parser, numpydoc, pydata_sphinx_theme, sphinx_gallery' 2> /dev/null \
+	$(BIN)/python -c 'import myst_parser, numpydoc, pydata_sphinx_theme, sphinx_gallery; \
+	  __import__("sphinx-mathjax-offline")' 2> /dev/null \
 	  || $(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[docs]'
 	OMP_NUM_THREADS=1 $(BIN)/python docs/pictures.py $(JOBS)
 	OMP_NUM_THREADS=1 $(BIN)/sphinx-build -q -W -n --keep-going -b html \

@@ -1,6 +1,7 @@
 """Docstrings of the public names, as numpydoc validates them."""
 
 import dataclasses
+import importlib
 import inspect
 
 import pytest
@@ -51,10 +52,16 @@ def test_all_names_are_there():
     )
 
 
-def test_the_judge_sees_a_fault():
-    def told_little(x):
-        """Double."""
+def test_the_judge_sees_a_fault(tmp_path, monkeypatch):
+    code = 'def double(x):\n    """Double."""\n    return 2 * x\n'
+    (tmp_path / "told_little.py").write_text(code)
+    monkeypatch.syspath_prepend(tmp_path)
+    value = importlib.import_module("told_little").double
+    found = [each[:4] for each in faults("told_little.double", value)]
+    assert found == ["PR01", "RT01", "EX01"]
 
+
+def test_the_judge_sees_a_field_without_a_word():
     @dataclasses.dataclass
     class Half:
         """A half.
@@ -68,8 +75,6 @@ def test_the_judge_sees_a_fault():
         other: int
 
     assert undocumented(Half) == {"other"}
-    told_little.__qualname__ = "x"
-    assert get_doc_object(told_little, "function")["Parameters"] == []
 
 
 @pytest.mark.parametrize("name", PUBLIC)
