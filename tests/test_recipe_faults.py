@@ -26,8 +26,8 @@ from wearstate.datasets.recipe.text import (
     recipe_text,
     toml_text,
 )
-from wearstate.diagnose.evaluation.evaluate import by_confounder, evaluate_model, score
-from wearstate.diagnose.evaluation.text import confounder_lines
+from wearstate.diagnose.evaluation.evaluate import by_choice, by_confounder, evaluate_model, score
+from wearstate.diagnose.evaluation.text import part_lines
 from wearstate.diagnose.feature_rows.feature_table import confounders_in
 from wearstate.diagnose.inspect.info import describe, description_text
 from wearstate.diagnose.wear_model.train import train_model
@@ -781,6 +781,22 @@ def test_errors_and_coverage_are_of_the_familiar_records():
     assert list(parts) == ["none", "leak"]
 
 
+def test_errors_are_told_apart_by_option_of_every_choice():
+    """A machine that took no option, or a set without choices, is in none."""
+    manifest = pd.DataFrame({"choice_oil": ["dry", "wet", "wet", None], "grade": [0, 1, 2, 3]})
+    parts = {
+        "error": np.array([1e-5, 3e-5, 8e-5, 2e-5]),
+        "familiar": np.array([True, True, False, True]),
+        "covered": np.array([True, False, False, True]),
+    }
+    found = by_choice(manifest, **parts)
+    assert list(found) == ["oil: dry", "oil: wet"]
+    assert found["oil: wet"] == pytest.approx(
+        {"records": 2, "unfamiliar": 0.5, "mae_all_m": 5.5e-5, "mae_m": 3e-5, "coverage": 0.0}
+    )
+    assert by_choice(manifest[["grade"]], **parts) == {}
+
+
 def test_the_scene_of_a_file_is_that_of_the_recipe_with_all_its_changes():
     """Built again from the three texts that a data set file holds."""
     recipe = load_recipe("bilge-pump-shifted", {"rod.mass": "4 kg", "sensors.*.bits": 16})
@@ -798,7 +814,7 @@ def test_a_part_without_familiar_records_has_no_error(trained):
     parts = score(model, strange, np.arange(N))["by_confounder"]
     assert parts["loud_sensor"]["unfamiliar"] == 1
     assert parts["loud_sensor"]["mae_m"] is None
-    lines = confounder_lines(parts)
+    lines = part_lines("confounder", parts)
     assert len(lines) == 1 + len(parts)
     assert lines[2].endswith("none is familiar")
     assert parts["none"]["mae_m"] is not None
@@ -814,7 +830,7 @@ def two_labels(tmp_path, second):
 def test_a_set_without_confounders_is_judged_as_before(two_labels):
     result = evaluate_model(train_model(two_labels)[0], two_labels)
     assert result["by_confounder"] == {}
-    assert confounder_lines({}) == []
+    assert part_lines("confounder", {}) == []
     assert describe(two_labels)["confounders"] == {}
     assert re.search(r"confounders +none\n", description_text(describe(two_labels)))
 

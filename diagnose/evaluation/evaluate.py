@@ -358,7 +358,7 @@ def score(
         ``nominal_coverage``, ``confusion`` (true grade by row, of the graded), ``reliability`` as
         :func:`reliability`, ``familiarity`` as :func:`p_value_shares`, ``baselines`` as
         :func:`wearstate.diagnose.evaluation.baselines.contest`, ``by_confounder`` as
-        :func:`by_confounder`.
+        :func:`by_confounder`, ``by_choice`` as :func:`by_choice`.
     """
     edges, limit = model.card["grade_edges_m"], model.card["condemning_limit_m"]
     judged, estimates = judge_rows(model, table, rows, references)
@@ -371,6 +371,11 @@ def score(
     train = background.train or (side_of(table, column, others, foreign) if others.size else None)
     test = side_of(table, column, rows, foreign)
     given = [estimate.coverage for estimate in estimates if estimate.graded]
+    parts = {
+        "error": np.abs(judged.found - judged.truth),
+        "familiar": mine,
+        "covered": (judged.low <= judged.truth) & (judged.truth <= judged.high),
+    }
     result = {
         "records": len(rows),
         "draws": draws.weight.shape[1],
@@ -382,12 +387,8 @@ def score(
         "reliability": reliability(model, judged, estimates, draws),
         "familiarity": p_value_shares(estimates, draws),
         "baselines": contest(train, test, judged, edges, limit, draws, seed=seed),
-        "by_confounder": by_confounder(
-            table.manifest.iloc[rows],
-            error=np.abs(judged.found - judged.truth),
-            familiar=mine,
-            covered=(judged.low <= judged.truth) & (judged.truth <= judged.high),
-        ),
+        "by_confounder": by_confounder(table.manifest.iloc[rows], **parts),
+        "by_choice": by_choice(table.manifest.iloc[rows], **parts),
     }
     return dict(plain(result))
 
@@ -548,6 +549,50 @@ def by_confounder(
         for name, part in parts.items()
         if part.any()
     }
+
+
+def by_choice(
+    manifest: pd.DataFrame,
+    *,
+    error: Float,
+    familiar: NDArray[np.bool_],
+    covered: NDArray[np.bool_],
+) -> dict[str, dict[str, Any]]:
+    """Errors apart for each option of the recipe's choices, such as laws and lubrication.
+
+    Parameters
+    ----------
+    manifest : pandas.DataFrame
+        Of the records judged.
+    error : numpy.ndarray [shape=(n_records,)]
+        Of the severity [m], >= 0.
+    familiar, covered : numpy.ndarray [shape=(n_records,)]
+        Whether the record was graded, and whether its interval holds the truth.
+
+    Returns
+    -------
+    dict
+        ``choice: option`` -> as of :func:`by_confounder`; empty where the recipe has no choice.
+
+    Examples
+    --------
+    >>> manifest = pd.DataFrame({"choice_oil": ["dry", "flooded"]})
+    >>> yes = np.array([True, True])
+    >>> rows = by_choice(manifest, error=np.array([1e-5, 3e-5]), familiar=yes, covered=yes)
+    >>> {name: row["mae_m"] for name, row in rows.items()}
+    {'oil: dry': 1e-05, 'oil: flooded': 3e-05}
+    """
+    found = {}
+    for column in (name for name in manifest if str(name).startswith(_CHOICE)):
+        taken = manifest[column].fillna("").astype(str).to_numpy()
+        for option in sorted(set(taken) - {""}):
+            part = taken == option
+            name = f"{str(column).removeprefix(_CHOICE)}: {option}"
+            found[name] = _part_scores(error[part], familiar[part], covered[part])
+    return found
+
+
+_CHOICE = "choice_"
 
 
 def _part_scores(

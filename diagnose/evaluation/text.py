@@ -90,7 +90,8 @@ def score_lines(result: Mapping[str, Any], card: Mapping[str, Any]) -> list[str]
         f"  missed faults     {_rate(result, 'missed_fault')} of condemned records graded 0 or 1",
         f"  brackets          {100 * LEVEL:.0f} % intervals over machines",
         *baseline_lines(result["baselines"]),
-        *confounder_lines(result["by_confounder"]),
+        *part_lines("confounder", result["by_confounder"]),
+        *part_lines("choice of the recipe", result["by_choice"]),
     ]
 
 
@@ -308,25 +309,27 @@ def _cost_row(row: Mapping[str, Any]) -> list[str]:
     return [str(row["name"]), row["missing"] if value is None else f"{value:.1f}"]
 
 
-def confounder_lines(rows: Mapping[str, Mapping[str, Any]]) -> list[str]:
-    """Errors by confounder as lines for a terminal; none where there are no confounders.
+def part_lines(what: str, rows: Mapping[str, Mapping[str, Any]]) -> list[str]:
+    """Errors of parts of the records as lines for a terminal; none where there are no parts.
 
     Parameters
     ----------
+    what : str
+        Head of the first column.
     rows : mapping
-        From :func:`by_confounder`.
+        From :func:`by_confounder` or :func:`by_choice`.
 
     Examples
     --------
     >>> row = {"records": 8, "unfamiliar": 0.25, "mae_m": 2e-5, "coverage": 1.0}
-    >>> print(*confounder_lines({"none": row}), sep=chr(10))
+    >>> print(*part_lines("confounder", {"none": row}), sep=chr(10))
       confounder  records  unfamiliar  mean error  coverage
       none              8      25.0 %     20.0 um     1.000
     """
     if not rows:
         return []
-    width = max(len(name) for name in (*rows, "confounder"))
-    head = f"  {'confounder':{width}}  records  unfamiliar  mean error  coverage"
+    width = max(len(name) for name in (*rows, what))
+    head = f"  {what:{width}}  records  unfamiliar  mean error  coverage"
     return [head, *(_part_line(name, row, width) for name, row in rows.items())]
 
 

@@ -125,6 +125,12 @@ def _lines(truth: Truths) -> Iterator[tuple[str, str]]:
 _PIN = "joint.crankpin"
 _LOSSY = {f"{_PIN}.damping": 0.0, f"{_PIN}.restitution": 0.3}
 _HERTZ = {f"{_PIN}.hertz_stiffness": 5e10}  # as stiff as the linear one at some kN
+_OIL = {  # an eye 50 mm long in oil of a warm gearbox
+    f"{_PIN}.oil.viscosity": "0.06 Pa s",
+    f"{_PIN}.oil.length": "50 mm",
+    f"{_PIN}.oil.roughness": "0.6 um",
+}
+_STARVED = _OIL | {f"{_PIN}.oil.filled_gap": "10 um"}
 _WRIST = {"joint.wristpin.rung": "compliant"}
 _GUIDE = {"joint.guide.rung": "compliant"}
 
@@ -149,6 +155,8 @@ _SHIFTS = (
         beside=_LOSSY,
     ),
     set_to(f"{_PIN}.elasticity", ("hertz",), "a pin that touches on a narrow strip", beside=_HERTZ),
+    set_to(f"{_PIN}.rung", ("film-map",), "a pin fed with oil under pressure", beside=_OIL),
+    set_to(f"{_PIN}.rung", ("mixed",), "a pin that splash or grease reaches", beside=_STARVED),
     set_to("joint.wristpin.rung", ("compliant",), "a wrist pin with the play of a new one"),
     set_to(
         "joint.wristpin.diametral_clearance",
