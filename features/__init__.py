@@ -25,7 +25,13 @@ if TYPE_CHECKING:
     from .response.modal import Modes as Modes
     from .response.modal import modal_fit as modal_fit
     from .response.transfer import Transfer as Transfer
+    from .rotation.balancing import Correction as Correction
+    from .rotation.balancing import correction_masses as correction_masses
+    from .rotation.balancing import influence_coefficients as influence_coefficients
     from .rotation.orbit import full_spectrum as full_spectrum
+    from .rotation.tacho_faults import PulseFaults as PulseFaults
+    from .rotation.tacho_faults import mend_pulses as mend_pulses
+    from .rotation.tacho_faults import pulse_faults as pulse_faults
     from .rotation.tacholess_speed import tacholess_speed as tacholess_speed
     from .signal.cepstrum import cepstrum as cepstrum
     from .signal.envelope import bearing_frequencies as bearing_frequencies
@@ -33,23 +39,29 @@ if TYPE_CHECKING:
     from .signal.iso import velocity_rms as velocity_rms
 
 _HOMES = {
+    "Correction": ".rotation.balancing",
     "Modes": ".response.modal",
     "Orbit": ".catalogue.curves",
+    "PulseFaults": ".rotation.tacho_faults",
     "Settings": ".catalogue.analysis",
     "SignalFeatures": ".catalogue.transformer",
     "Spectrum": ".catalogue.curves",
     "Transfer": ".response.transfer",
     "bearing_frequencies": ".signal.envelope",
     "cepstrum": ".signal.cepstrum",
+    "correction_masses": ".rotation.balancing",
     "envelope_spectrum": ".catalogue.curves",
     "feature_names": ".catalogue.row",
     "feature_row": ".catalogue.row",
     "frf": ".catalogue.curves",
     "full_spectrum": ".rotation.orbit",
+    "influence_coefficients": ".rotation.balancing",
     "kurtogram": ".signal.envelope",
+    "mend_pulses": ".rotation.tacho_faults",
     "modal_fit": ".response.modal",
     "orbit": ".catalogue.curves",
     "order_spectrum": ".catalogue.curves",
+    "pulse_faults": ".rotation.tacho_faults",
     "spectrum": ".catalogue.curves",
     "tacholess_speed": ".rotation.tacholess_speed",
     "velocity_rms": ".signal.iso",

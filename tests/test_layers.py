@@ -404,3 +404,54 @@ def test_public_names_resolve():
 def test_unknown_public_name():
     with pytest.raises(AttributeError, match="no attribute 'simulat'"):
         importlib.import_module("wearstate").simulat  # noqa: B018 - the access is the test
+
+
+# --- reached
+
+ROOTS = ("__init__", "__main__")
+"""What a user calls: the package's public names and its command."""
+
+_DOTTED = re.compile(rf"(?:wearstate\.)?((?:{'|'.join(PACKAGES)})(?:\.\w+)+)")
+
+
+def mentioned(name, tree):
+    """Modules that a file imports, or names in a string that it imports later by name."""
+    prose = {id(n.value) for n in ast.walk(tree) if isinstance(n, ast.Expr)}
+    folder = name.split(".")[:-1]
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom):
+            above = folder[: len(folder) - node.level + 1] if node.level else []
+            base = [*above, *(node.module or "").removeprefix("wearstate.").split(".")]
+            base = [part for part in base if part]
+            yield ".".join(base)
+            yield from (".".join([*base, alias.name]) for alias in node.names)
+        elif isinstance(node, ast.Import):
+            yield from (alias.name.removeprefix("wearstate.") for alias in node.names)
+        elif isinstance(node, ast.Constant) and id(node) not in prose:
+            yield from _DOTTED.findall(str(node.value))
+            yield ".".join([*folder, str(node.value).strip(".")])
+
+
+def reached(files):
+    """Modules that the roots lead to; a package stands for its ``__init__``."""
+    found, todo = set(), [*ROOTS, *(name for name in files if "." not in name)]
+    while todo:
+        name = todo.pop()
+        name = name if name in files else f"{name}.__init__"
+        if name in files and name not in found:
+            found.add(name)
+            todo += mentioned(name, ast.parse(files[name]))
+    return found
+
+
+def test_every_module_is_reached_by_a_command_or_a_public_name():
+    paths = [*ROOT.glob("*.py"), *(p for each in PACKAGES for p in (ROOT / each).rglob("*.py"))]
+    files = {
+        ".".join(path.relative_to(ROOT).with_suffix("").parts): path.read_text(encoding="utf-8")
+        for path in paths
+        if path.name != "setup.py"
+    }
+    lost = set(files) - reached(files)
+    assert {name for name in lost if not name.endswith("__init__")} == set()
+    alone = {"__init__": "from .sim import a", "sim.a": "", "sim.b": "", "sim.__init__": ""}
+    assert reached(alone) == {"__init__", "sim.a", "sim.__init__"}
