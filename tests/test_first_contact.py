@@ -103,7 +103,8 @@ def test_a_file_of_the_other_kind_is_told_so(tmp_path):
 
 
 def test_swapped_arguments(small_set, small_model, tmp_path):
-    refused("evaluate", small_set, small_model, says=["is a data set", "evaluate MODEL [DATA]"])
+    said = refused("evaluate", small_set, small_model, says=["is a data set", "MODEL [DATA]"])
+    assert "wearstate train" not in said  # there is a model, in the other place
     refused("report", small_model, "--model", small_set, says=["must be a model (.wsm)"])
     refused("train", small_model, "-o", tmp_path / "x.wsm", says=["is a model, must be a data set"])
     other = tmp_path / "data.wsm"  # by its bytes, whatever its name
@@ -195,6 +196,12 @@ def test_bare_numbers_are_told_with_their_unit():
     assert "bearings.third.sag = 0.001 m = 1 mm" in told
     for given in ("drive.speed=300 rpm", "accuracy=0.05", "settling_revolutions=5"):
         assert run("scene", "check", "bilge-pump", "--set", given).stderr == ""
+
+
+def test_a_bare_number_of_a_nameplate_is_told(small_set, small_model):
+    given = ("--scene", "bilge-pump", "--set", "drive.speed=5")
+    done = run("report", small_set, "--record", 0, "--model", small_model, *given)
+    assert "drive.speed = 5 rev/s = 300 rpm" in done.stderr
 
 
 def test_stiffness_in_units_of_people():

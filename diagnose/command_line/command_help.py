@@ -175,8 +175,10 @@ class HelpfulCommand(click.Command):
 
     def _hint(self, ctx: click.Context, error: click.UsageError, args: list[str]) -> str:
         """How an output is named that stands bare, and where a model comes from."""
-        missing = getattr(error, "param", None)
-        missing = missing and missing.name
+        if isinstance(error, click.BadParameter) and not isinstance(error, click.MissingParameter):
+            return ""  # its value is at fault, and it says so
+        param = getattr(error, "param", None)
+        missing = None if param is None else param.name
         if missing == "model_file":
             return "train one of a labelled data set: wearstate train DATA -o model.wsm"
         if missing not in (None, "output") or "output" not in {each.name for each in self.params}:

@@ -123,9 +123,8 @@ def _order(param: Any, ctx: Any) -> str:
         return f"; {param.opts[0]} takes one, train it: wearstate train DATA -o model.wsm"
     if len(arguments) < 2:
         return ""
-    return (
-        f"; check the order: {ctx.command_path} {' '.join(p.make_metavar(ctx) for p in arguments)}"
-    )
+    usage = " ".join(ctx.command.collect_usage_pieces(ctx)[1:])  # the first is [OPTIONS]
+    return f"; check the order: {ctx.command_path} {usage}"
 
 
 _A_TEXT = {".toml": "a scene or recipe"}

@@ -32,6 +32,7 @@ from .command_options import (
     progress_bar,
     seed_option,
     source_options,
+    tell_bare,
     worker_count,
 )
 
@@ -483,7 +484,10 @@ def report(
     if views and source.is_dir():
         raise click.UsageError("--join completes a recording or a data set: name one, not a folder")
     usual = model.card["trained_on"]["scene"]
-    plate = nameplate_of(source, scene, overrides_of(pairs), usual=usual)
+    values = overrides_of(pairs)
+    if scene is not None:
+        tell_bare(scene, values)
+    plate = nameplate_of(source, scene, values, usual=usual)
     ways = (output, machine, as_json, force, given, views)
     told = _ReportTask(source, model_file, model, baselines, plate, *ways)
     verdicts = _report_many(told) if many else _report_one(told)
