@@ -2,6 +2,7 @@
 
 import csv
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,6 +10,8 @@ from wearstate.diagnose.feature_rows.feature_rank import (
     LEAST_OF_MACHINE,
     rank_features,
 )
+from wearstate.diagnose.feature_rows.feature_table import choice_of, feature_table
+from wearstate.diagnose.inspect.rank_text import rank_set, value_figure
 
 from .test_cli import refused, run, strict
 
@@ -171,6 +174,17 @@ def test_what_cannot_be_ranked_is_refused(small_set, tmp_path):
     refused("features", small_set, "--target", "grade", "-o", tmp_path / "x.csv", says=["--rank"])
     refused("features", small_set, "--rank", "-o", tmp_path / "x.parquet", says=["suffix"])
     refused("features", small_set, says=["DATA and --rank"])
+
+
+def test_records_without_a_label_are_left_out(small_set):
+    choice = choice_of("standard", [])
+    table = feature_table(small_set, choice=choice)
+    severity = "diametral_clearance_crankpin_m"
+    blank = table.manifest.assign(**{severity: table.manifest[severity].where(lambda v: v > 1e-4)})
+    found = rank_set(small_set, replace(table, manifest=blank), choice)
+    assert found.ranking.n_records == (table.manifest[severity] > 1e-4).sum()
+    assert found.ranking.features[0].information > found.ranking.chance
+    assert value_figure(found).axes
 
 
 def test_another_label_is_ranked_as_conditions(small_set):

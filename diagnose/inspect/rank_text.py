@@ -86,6 +86,7 @@ def rank_set(
         raise DataError(
             f"{path}: target = {column!r} must be a column of its manifest; severities: {labels}"
         )
+    table = _labelled(table, column)
     values = table.manifest[column].to_numpy()
     classes = column not in severities and values.dtype.kind != "f"
     if len(np.unique(values)) < 2:
@@ -109,6 +110,13 @@ def rank_set(
         ranking=ranking,
         costs_ms=dict(zip(shown, costs_ms(path, alone), strict=True)),
     )
+
+
+def _labelled(table: FeatureTable, column: str) -> FeatureTable:
+    """The records of which the target is known."""
+    known = table.manifest[column].notna().to_numpy()
+    manifest = table.manifest[known].reset_index(drop=True)
+    return replace(table, values=table.values[known], manifest=manifest, lacking={})
 
 
 def _only(choice: FeatureSelection, name: str) -> FeatureSelection:
