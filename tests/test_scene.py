@@ -24,7 +24,16 @@ from wearstate.sim.scene.load import (
     scene_table,
     scene_text,
 )
-from wearstate.sim.scene.parts import MOST_FAULTS, UNITS, FixedTable, SceneError, to_si
+from wearstate.sim.scene.parts import (
+    MOST_FAULTS,
+    UNITS,
+    Dimension,
+    FixedTable,
+    SceneError,
+    _spellings,
+    listed_unit,
+    to_si,
+)
 
 EVERY_UNIT = [(dimension, unit) for dimension, units in UNITS.items() for unit in units]
 CRANKPIN = "joint.crankpin"
@@ -73,11 +82,57 @@ def test_factors_against_their_definitions():
         ("1 g", "mass", 1e-3),
         ("2 h", "time", 7200.0),
         ("1 N/um", "stiffness", 1e6),
+        ("1 kN/mm", "stiffness", 1e6),
+        ("1 N mm", "moment", 1e-3),
+        ("6.283185307179586 rad/s", "rotation speed", 1.0),
+        ("200 nm", "length", 2e-7),
+        ("3 min", "time", 180.0),
+        ("1 N/mm^2", "pressure", 1e6),
+        ("1000 mbar", "pressure", 1e5),
         ("1 kg mm^2", "inertia", 1e-6),
         ("2.5 %", "ratio", 0.025),
     ]
     for text, dimension, expected in known:
         assert_allclose(to_si(text, dimension), expected, rtol=3e-16, err_msg=text)
+
+
+SPELLINGS = [
+    ("viscosity", "mPa s", ("mPa*s", "mPa·s", "mPa⋅s", "mPa.s", "mPa-s", "mPas", "mPa * s")),
+    ("rotation speed", "rpm", ("RPM", "rev/min", "r/min", "1/min", "min^-1", "min-1", "min⁻¹")),
+    ("rotation speed", "rev/s", ("r/s", "rev / s")),
+    ("length", "um", ("µm", "μm")),  # micro sign, Greek letter
+    ("time", "us", ("µs", "μs")),
+    ("stiffness", "N/um", ("N/µm", "N/μm", "N / um")),
+    ("moment", "kN m", ("kN·m", "kN*m", "kNm", "kN-m")),
+    ("inertia", "kg m^2", ("kg·m²", "kg*m^2", "kgm2", "kg m**2", "kg-m²")),
+    ("unbalance", "g mm", ("g·mm", "gmm", "g*mm")),
+    ("damping", "N s/m", ("N·s/m", "Ns/m", "N*s/m", "N/(m/s)")),
+    ("acceleration", "m/s^2", ("m/s²", "m/s2", "m/s**2")),
+    ("volume", "cm^3", ("cm³", "cm3")),
+    ("volume", "L", ("l",)),
+    ("Hertz stiffness", "N/m^1.5", ("N/m**1.5", "N/m1.5")),
+    ("angle", "deg", ("°",)),
+]
+
+
+@pytest.mark.parametrize(("dimension", "unit", "others"), SPELLINGS)
+def test_a_unit_is_known_by_each_of_its_spellings(dimension, unit, others):
+    schema = Dimension(dimension).__get_pydantic_json_schema__({}, lambda core: core)
+    for other in others:
+        assert to_si(f"7 {other}", dimension) == to_si(f"7 {unit}", dimension)
+        assert re.search(schema["anyOf"][1]["pattern"], f"7 {other}"), other
+
+
+def test_no_spelling_has_two_meanings():
+    told = [(d, u, other) for d, u, others in SPELLINGS for other in others]
+    for dimension, unit, other in [*told, *((d, u, u) for d, u in EVERY_UNIT)]:
+        same = [u for u in UNITS[dimension] if re.fullmatch(_spellings(u), other)]
+        assert same == [unit], other
+    # 1/s of a shaft may be revolutions or radians; a blank within a prefix is a slip
+    for dimension, other in (("rotation speed", "1/s"), ("time", "m s"), ("pressure", "Mpa")):
+        assert listed_unit(other, dimension) is None
+        with pytest.raises(ValueError, match="use one of"):
+            to_si(f"7 {other}", dimension)
 
 
 @pytest.mark.parametrize("first", UNITS)

@@ -74,6 +74,10 @@ def refusal(path, **options):
         ("0.5 mV", "voltage", "V", 5e-4),
         ("2 mil", "displacement", "m", 50.8e-6),
         ("1/min", "rotation speed", "rev/s", 1 / 60),
+        ("r/min", "rotation speed", "rev/s", 1 / 60),
+        ("m/s**2", "acceleration", "m/s^2", 1.0),
+        ("kN·m", "moment", "N m", 1e3),
+        ("mbar", "pressure", "Pa", 100.0),
         ("FS", "full scale", "FS", 1.0),
     ],
 )

@@ -5,7 +5,7 @@ import math
 import re
 from dataclasses import dataclass
 
-from ...sim.scene.parts import UNITS, to_si
+from ...sim.scene.parts import UNITS, listed_unit, to_si
 
 FULL_SCALE = "FS"
 """Unit of a converter's numbers, 1 at its largest; nothing physical, but a declaration."""
@@ -25,7 +25,6 @@ DIMENSIONS = {
 """Quantity of a channel -> row of the table of units. Mass is none: g is standard gravity here."""
 
 SAME = {
-    "m/s2": "m/s^2",
     "m/s/s": "m/s^2",
     "m s^-2": "m/s^2",
     "gn": "g",
@@ -38,30 +37,21 @@ SAME = {
     "ips": "25.4 mm/s",
     "mil": "0.001 in",
     "mils": "0.001 in",
-    "nm": "0.001 um",
     "micron": "um",
     "microns": "um",
-    "mbar": "0.001 bar",
     "hPa": "100 Pa",
     "barg": "bar",
     "bar(g)": "bar",
     "psig": "psi",
     "psi(g)": "psi",
     "uV": "0.001 mV",
-    "µV": "0.001 mV",
     "Volt": "V",
     "Volts": "V",
     "volts": "V",
-    "RPM": "rpm",
-    "1/min": "rpm",
-    "rev/min": "rpm",
-    "°": "deg",
-    "Nm": "N m",
-    "kNm": "kN m",
 }
-"""Other spellings and multiples, in units of the table."""
+"""Other names and multiples, in units of the table."""
 
-_SIGNS = str.maketrans({"μ": "µ", "²": "^2", "·": " ", "⋅": " ", "*": " "})
+_SIGNS = str.maketrans({"μ": "u", "µ": "u", "²": "^2", "·": " ", "⋅": " ", "*": " "})
 _NUMBER = re.compile(r"\s*([0-9]+\.?[0-9]*(?:[eE][-+]?[0-9]+)?|\.[0-9]+(?:[eE][-+]?[0-9]+)?)\s*")
 
 
@@ -117,7 +107,7 @@ def parse_unit(text: str) -> ChannelUnit:
     if symbol == FULL_SCALE:
         return ChannelUnit(quantity="full scale", symbol=FULL_SCALE, factor=_sane(text, number))
     for quantity, dimension in DIMENSIONS.items():
-        if symbol in UNITS[dimension]:
+        if listed_unit(symbol, dimension):
             factor = _sane(text, number * to_si(f"{scale!r} {symbol}", dimension))
             return ChannelUnit(
                 quantity=quantity, symbol=next(iter(UNITS[dimension])), factor=factor
@@ -178,7 +168,7 @@ def known_units() -> tuple[str, ...]:
 
     Examples
     --------
-    >>> {"g", "mm/s", "µm", "V"} <= set(known_units())
+    >>> {"g", "mm/s", "um", "V"} <= set(known_units())
     True
     """
     rows = (UNITS[dimension] for dimension in DIMENSIONS.values())
@@ -187,10 +177,10 @@ def known_units() -> tuple[str, ...]:
 
 def _split(text: str) -> tuple[float, str]:
     """Number before a unit, one where there is none, and the unit in the table's signs."""
-    plain = " ".join(text.translate(_SIGNS).replace("^^", "^").split())
+    plain = " ".join(text.replace("**", "^").translate(_SIGNS).replace("^^", "^").split())
     match = _NUMBER.match(plain)
     # "1/min" begins with a number that belongs to the unit
-    if match is None or plain in SAME:
+    if match is None or listed_unit(plain, "rotation speed"):
         return 1.0, plain
     return float(match.group(1)), plain[match.end() :]
 

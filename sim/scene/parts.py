@@ -38,10 +38,10 @@ _POUND_FORCE = 4.4482216152605  # N, exact by definition
 STANDARD_GRAVITY = 9.80665  # m/s^2, ISO 80000-3
 
 UNITS: dict[str, dict[str, float]] = {
-    "length": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "in": _INCH},
+    "length": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "nm": 1e-9, "in": _INCH},
     "mass": {"kg": 1.0, "g": 1e-3},
-    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "h": 3600.0},
-    "rotation speed": {"rev/s": 1.0, "Hz": 1.0, "rpm": 1.0 / 60.0},
+    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0, "h": 3600.0},
+    "rotation speed": {"rev/s": 1.0, "Hz": 1.0, "rpm": 1.0 / 60.0, "rad/s": 0.5 / math.pi},
     "frequency": {"Hz": 1.0, "kHz": 1e3, "MHz": 1e6},
     "angle": {"rad": 1.0, "deg": math.pi / 180.0},
     "pressure": {
@@ -49,7 +49,9 @@ UNITS: dict[str, dict[str, float]] = {
         "kPa": 1e3,
         "MPa": 1e6,
         "GPa": 1e9,
+        "N/mm^2": 1e6,
         "bar": 1e5,
+        "mbar": 1e2,
         "psi": _POUND_FORCE / _INCH**2,
     },
     "acceleration": {"m/s^2": 1.0, "g": STANDARD_GRAVITY},
@@ -57,7 +59,7 @@ UNITS: dict[str, dict[str, float]] = {
     "inertia": {"kg m^2": 1.0, "kg mm^2": 1e-6},
     "stiffness": {
         **{"N/m": 1.0, "kN/m": 1e3, "MN/m": 1e6, "GN/m": 1e9},
-        **{"N/mm": 1e3, "N/um": 1e6, "N/µm": 1e6},
+        **{"N/mm": 1e3, "kN/mm": 1e6, "N/um": 1e6},
     },
     "damping": {"N s/m": 1.0, "kN s/m": 1e3},
     "voltage": {"V": 1.0, "mV": 1e-3},
@@ -66,7 +68,7 @@ UNITS: dict[str, dict[str, float]] = {
     "density": {"kg/m^3": 1.0, "g/cm^3": 1e3},
     "volume": {"m^3": 1.0, "L": 1e-3, "cm^3": 1e-6, "mm^3": 1e-9},
     "area": {"m^2": 1.0, "cm^2": 1e-4, "mm^2": 1e-6},
-    "moment": {"N m": 1.0, "kN m": 1e3},
+    "moment": {"N m": 1.0, "kN m": 1e3, "N mm": 1e-3},
     "temperature": {"K": 1.0},
     "kinematic viscosity": {"m^2/s": 1.0, "mm^2/s": 1e-6, "cSt": 1e-6},
     "unbalance": {"kg m": 1.0, "kg mm": 1e-3, "g mm": 1e-6},
@@ -74,7 +76,17 @@ UNITS: dict[str, dict[str, float]] = {
     "force": {"N": 1.0, "kN": 1e3, "MN": 1e6},
     "viscosity": {"Pa s": 1.0, "mPa s": 1e-3, "cP": 1e-3},
 }
-"""Factor to SI of every unit string, by dimension. The first unit of a row is the SI one."""
+"""Factor to SI of every unit, by dimension. The first unit of a row is the SI one."""
+
+_ALSO = {
+    "rpm": ("RPM", "rev/min", "r/min", "1/min", "min^-1"),
+    "rev/s": ("r/s",),
+    "N s/m": ("N/(m/s)",),
+    "kN s/m": ("kN/(m/s)",),
+    "deg": ("°",),
+    "L": ("l",),
+}
+"""Other names of a unit, of one meaning only: 1/s is none, as it may be rev/s or rad/s."""
 
 Table = TypeVar("Table", bound=BaseModel)
 Value = TypeVar("Value")
@@ -162,14 +174,57 @@ def _text_to_si(value: str, dimension: str) -> float:
     if match is None:
         example = f"1.5 {_unit_symbol(dimension)}".rstrip()
         raise ValueError(f"has no leading number; write it like '{example}'")
-    number, unit = match["number"], match["unit"]
-    if unit not in units:
+    number, unit = match["number"], listed_unit(match["unit"], dimension)
+    if unit is None:
+        unit = match["unit"]
         missing = "has no unit" if unit == "" else f"has unit '{unit}', not one of {dimension}"
         raise ValueError(f"{missing}; use one of {_unit_list(dimension)}")
     try:  # a product of decimals keeps 0.13 mm at exactly 0.00013, that of two floats would not
         return float(Decimal(number) * Decimal(repr(units[unit])))
     except ArithmeticError:  # an exponent beyond decimals; the caller refuses what is not finite
         return float(number) * units[unit]
+
+
+def listed_unit(text: str, dimension: str) -> str | None:
+    """Unit of :data:`UNITS` that a text spells; None where it is none of the dimension.
+
+    A product may be written with a blank, ``*``, ``·``, ``.``, ``-`` or nothing, a power as ``^2``,
+    ``**2``, ``²`` or ``2``, and micro as ``u``, ``µ`` or ``μ``.
+
+    Examples
+    --------
+    >>> [listed_unit(text, "viscosity") for text in ("Pa*s", "mPa·s", "Pas", "m")]
+    ['Pa s', 'mPa s', 'Pa s', None]
+    >>> listed_unit("1/min", "rotation speed"), listed_unit("kg·m²", "inertia")
+    ('rpm', 'kg m^2')
+    """
+    units = UNITS[dimension]
+    if text in units:
+        return text
+    return next((unit for unit in units if re.fullmatch(_spellings(unit), text)), None)
+
+
+_WAYS = {
+    " ": r"\s*[*·⋅.-]?\s*",
+    "/": r"\s*/\s*",
+    "^2": r"(?:(?:\^|\*\*)?2|²)",
+    "^3": r"(?:(?:\^|\*\*)?3|³)",
+    "^-1": r"(?:(?:\^|\*\*)?-1|⁻¹)",
+    "^": r"(?:\^|\*\*)?",
+    "u": "[uµμ]",
+}
+"""Every way to write a sign of a unit, as a regular expression."""
+
+_SIGN = re.compile(r"( |/|\^[23]|\^-1|\^|\bu(?=[ms]\b))")
+
+
+@lru_cache(maxsize=256)
+def _spellings(unit: str) -> str:
+    """Regular expression of every spelling of a unit, for Python and for JSON schemas."""
+    return "|".join(
+        "".join(_WAYS.get(piece, re.escape(piece)) for piece in _SIGN.split(name))
+        for name in (unit, *_ALSO.get(unit, ()))
+    )
 
 
 def _unit_list(dimension: str) -> str:
@@ -199,14 +254,14 @@ class Dimension:
 
     @property
     def units(self) -> tuple[str, ...]:
-        """Every unit that a string may carry, the SI unit first."""
+        """Every unit that a string may carry, as listed, the SI unit first."""
         return tuple(UNITS[self.name])
 
     def __get_pydantic_json_schema__(
         self, core: CoreSchema, handler: GetJsonSchemaHandler
     ) -> dict[str, Any]:
         """A number in SI, or a string with one of the units; ``unit`` names the SI one."""
-        unit = "|".join(re.escape(each) for each in self.units)
+        unit = "|".join(map(_spellings, self.units))
         text = {"type": "string", "pattern": rf"^\s*{_NUMBER}\s*({unit})\s*$"}
         return {"anyOf": [handler(core), text], "unit": self.unit}
 
