@@ -98,6 +98,7 @@ HEAVY = {
     "pandas": {"features.catalogue", "datasets.file", "diagnose"},
     "h5py": {"datasets"},
     "pyarrow": set(),
+    "bokeh": set(),
 }
 """Library -> floors or rooms that may import it at module level."""
 

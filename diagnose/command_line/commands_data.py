@@ -466,6 +466,9 @@ _PLOT_OPTIONS = ("draw", "force_channel", "speed_hz", "bearing")
 @click.option("--card", type=PATH, help="Page about a data set to write (.html or .md).")
 @click.option("--licence", default="not stated", show_default=True, help="Of the data, for --card.")
 @click.option("--plot", type=PATH, help="Picture of a recording to write (.png, .svg or .pdf).")
+@click.option(
+    "--interactive", is_flag=True, help="Write --plot as a page (.html) to zoom and measure in."
+)
 @click.option("--kind", type=click.Choice(_KINDS), help="What to plot; by default all it supports.")
 @click.option("--draw", multiple=True, metavar="NAME", help="Channel to plot; all by default.")
 @click.option("--force-channel", metavar="NAME", help="Force of a transfer function to plot.")
@@ -482,6 +485,7 @@ def info(
     card: Path | None,
     licence: str,
     plot: Path | None,
+    interactive: bool,
     kind: str | None,
     tacho: str | None,
     pulses_per_revolution: int,
@@ -506,13 +510,13 @@ def info(
     if file is not None and (check or card is not None):
         _about_set(file, check, card, licence, force, as_json)
         return
-    if plot is None and (kind or any(wanted.values())):
+    if plot is None and (kind or interactive or any(wanted.values())):
         raise click.UsageError("what to plot is given, but no --plot to write it to")
     if file is None:
         facts = describe_fft()
         emit(facts, as_json, fft_text(facts))
         return
-    check_outputs([file], [(plot, PICTURE_SUFFIXES)], force)
+    check_outputs([file], [(plot, PAGE_SUFFIXES if interactive else PICTURE_SUFFIXES)], force)
     read: dict[str, Any] = {"tacho": tacho, "pulses_per_revolution": pulses_per_revolution}
     described = describe(file, declared_source(given), **read)
     text = description_text(described)
@@ -523,6 +527,7 @@ def info(
             declared_source(given),
             kind=kind or _KINDS[0],
             exponential=exponential,
+            interactive=interactive,
             force=force,
             **read,
             **wanted,

@@ -21,9 +21,12 @@ from ...sim.scene.parts import Scene
 from ..class_model.file import CLASS_MODEL, load_class_model
 from ..feature_rows.feature_table import choice_of, confounders_in
 from ..feature_rows.quality import sample_faults
-from ..pages.picture import save_picture
+from ..pages.page import save_page
+from ..pages.picture import encoded, save_picture
 from ..pictures.kinds import AUTO, plot_recording
 from ..pictures.view import View
+from ..pictures.zoom import STILL_COLOURS, require_bokeh, zoom_page
+from ..pictures.zoom_curves import zoom_curves
 from ..wear_model.bundle import kind_of
 from ..wear_model.file import load_model
 
@@ -287,16 +290,17 @@ def plot_file(
     exponential: float = 1.0,
     tacho: str | None = None,
     pulses_per_revolution: int = 1,
+    interactive: bool = False,
     force: bool = True,
 ) -> dict[str, Any]:
-    """Draw a recording of a file into a picture.
+    """Draw a recording of a file into a picture, or into a page of curves to zoom and measure.
 
     Parameters
     ----------
     path : Path
         Data set, of which `options` name the record, or measured file.
     picture : Path
-        ``.png``, ``.svg`` or ``.pdf``.
+        ``.png``, ``.svg`` or ``.pdf``; of an interactive page ``.html``.
     options, tacho, pulses_per_revolution
         As of :func:`describe`.
     kind : str
@@ -310,11 +314,13 @@ def plot_file(
     bearing : sequence of float, optional
         Rollers, their diameter, pitch diameter (one unit for both) and, if it is not 0, contact
         angle [deg].
-    force : bool
-        Replace an existing picture.
-
     exponential : float
         What the exponential window of an impact test has sunk to at the end of a block [-].
+    interactive : bool
+        Write a page; `kind` is then ``auto`` or a key of
+        :data:`.pictures.zoom_curves.ZOOM_KINDS`.
+    force : bool
+        Replace an existing file.
 
     Returns
     -------
@@ -324,9 +330,11 @@ def plot_file(
     Raises
     ------
     DataError
-        The file is a model or cannot be read, an argument is out of its bounds, or the recording
-        lacks what the kind needs.
+        The file is a model or cannot be read, an argument is out of its bounds, the recording
+        lacks what the kind needs, or Bokeh is not installed for an interactive page.
     """
+    if interactive:
+        require_bokeh()
     if path.suffix == ".wsm":
         raise DataError(f"{path} is a model, must be a recording or data set; name one to plot")
     about = choice_of(speed_hz=speed_hz, bearing=bearing, exponential=exponential).settings
@@ -340,9 +348,21 @@ def plot_file(
         bearing=about.bearing,
         exponential=about.exponential,
     )
+    if interactive:
+        return _save_zoom(view, kind, picture, force=force)
     made = plot_recording(view, kind)
     save_picture(made.figure, picture, force=force)
     return {"path": str(picture), "drawn": list(made.drawn), "left_out": made.left_out}
+
+
+def _save_zoom(view: View, kind: str, page: Path, *, force: bool) -> dict[str, Any]:
+    """Write the page of curves, with the picture for paper; what it holds, as `plot_file`."""
+    curves, left_out = zoom_curves(view, kind)
+    picture = encoded(plot_recording(view, kind).figure, colours=STILL_COLOURS)
+    html = zoom_page(curves, picture, heading=view.heading, speed=view.speed, missing=left_out)
+    save_page(html, page, force=force)
+    drawn = list(dict.fromkeys(curve.kind for curve in curves))
+    return {"path": str(page), "drawn": drawn, "left_out": left_out}
 
 
 def picture_text(made: Mapping[str, Any]) -> str:

@@ -62,9 +62,21 @@ def save_picture(figure: Any, path: Path, *, force: bool = True) -> None:
     write_whole(path, picture_bytes(figure, path.suffix), force=force)
 
 
-def encoded(figure: Any) -> str:
-    """PNG of a figure as a data address."""
-    return "data:image/png;base64," + base64.b64encode(picture_bytes(figure, ".png")).decode()
+def encoded(figure: Any, *, colours: int | None = None) -> str:
+    """PNG of a figure as a data address; with few colours, a third of the size."""
+    picture = picture_bytes(figure, ".png")
+    if colours is not None:
+        picture = _of_few_colours(picture, colours)
+    return "data:image/png;base64," + base64.b64encode(picture).decode()
+
+
+def _of_few_colours(picture: bytes, colours: int) -> bytes:
+    from PIL import Image  # comes with matplotlib
+
+    small = io.BytesIO()
+    whole = Image.open(io.BytesIO(picture)).convert("RGB")
+    whole.quantize(colours, dither=Image.Dither.NONE).save(small, "PNG", optimize=True)
+    return small.getvalue()
 
 
 def _take_literally(figure: Any) -> None:

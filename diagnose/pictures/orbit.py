@@ -34,7 +34,7 @@ class _Orbit:
 
 def orbit_panel(view: View) -> Panel:
     """Path between each pair of probes, and its full spectrum."""
-    orbits = [_orbit_of(view, first, second) for first, second in _pairs(view)]
+    orbits = [_orbit_of(view, first, second) for first, second in probe_pairs(view)]
     caption = "Shaft orbit"
     if isinstance(view.turning, Turning):
         caption += ", with dots at the tacho pulses and its first order,"
@@ -46,7 +46,7 @@ def orbit_panel(view: View) -> Panel:
     )
 
 
-def _pairs(view: View) -> list[tuple[Trace, Trace]]:
+def probe_pairs(view: View) -> list[tuple[Trace, Trace]]:
     """Two probes of the recording, or two of each place where there are more."""
     probes = [trace for trace in view.traces if trace.quantity == DISPLACEMENT]
     if len(probes) == 2:
@@ -64,12 +64,17 @@ def _pairs(view: View) -> list[tuple[Trace, Trace]]:
     return pairs
 
 
+def shown_samples(view: View) -> int:
+    """Samples of an orbit that are drawn: a few revolutions, no more than can be told apart."""
+    n = view.n_samples if view.speed is None else round(_SHOWN_REVOLUTIONS / view.speed * view.rate)
+    return min(view.n_samples, max(n, 2), MOST_POINTS)
+
+
 def _orbit_of(view: View, first: Trace, second: Trace) -> _Orbit:
     z = orbit.displacement(first.values, second.values)
     frequency, vector = orbit.full_spectrum(z, view.rate)
     speed = view.speed
-    n = len(z) if speed is None else round(_SHOWN_REVOLUTIONS / speed * view.rate)
-    n = min(len(z), max(n, 2), MOST_POINTS)
+    n = shown_samples(view)
     first_order = marks = np.empty(0, dtype=np.complex128)
     if isinstance(view.turning, Turning):
         turning = view.turning
