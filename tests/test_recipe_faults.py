@@ -28,8 +28,9 @@ from wearstate.datasets.recipe.text import (
 )
 from wearstate.diagnose.evaluation.evaluate import by_choice, by_confounder, evaluate_model, score
 from wearstate.diagnose.evaluation.text import part_lines
-from wearstate.diagnose.feature_rows.feature_table import confounders_in
+from wearstate.diagnose.feature_rows.feature_table import confounders_in, regimes_in
 from wearstate.diagnose.inspect.info import describe, description_text
+from wearstate.diagnose.wear_model.estimate import FaultFinding
 from wearstate.diagnose.wear_model.train import train_model
 from wearstate.sim.output.recording import DataError
 from wearstate.sim.output.status import Status
@@ -795,6 +796,28 @@ def test_errors_are_told_apart_by_option_of_every_choice():
         {"records": 2, "unfamiliar": 0.5, "mae_all_m": 5.5e-5, "mae_m": 3e-5, "coverage": 0.0}
     )
     assert by_choice(manifest[["grade"]], **parts) == {}
+
+
+def test_a_regime_is_found_like_a_fault_and_not_to_be_mended(trained):
+    """Choices that change what wear sounds like are learnt; their caution names no repair."""
+    manifest = pd.DataFrame({"choice_lubrication": ["dry", "flooded", None], "grade": [0, 1, 2]})
+    regimes = regimes_in(manifest)
+    assert {name: here.tolist() for name, here in regimes.items()} == {
+        "lubrication_dry": [True, False, False],
+        "lubrication_flooded": [False, True, False],
+    }
+    assert regimes_in(manifest[["grade"]]) == {}
+    model, _, _ = trained
+    rates = {"mae_with_m": 6e-5, "mae_without_m": 2e-5}
+    for name, cure in (("lubrication_flooded", "wear shows less"), ("stuck_valve", "mend it")):
+        finding = FaultFinding(
+            name=name, probability=0.9, present=True, detection_rate=0.9, false_alarm_rate=0.1
+        )
+        told = dataclasses.replace(model, card={**model.card, "confounders": [rates]})
+        [caution] = told._finding_cautions((finding,))
+        assert caution.startswith(name.replace("_", " "))
+        assert "0.06 mm instead of 0.02 mm" in caution
+        assert cure in caution
 
 
 def test_the_scene_of_a_file_is_that_of_the_recipe_with_all_its_changes():

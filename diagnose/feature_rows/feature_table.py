@@ -105,6 +105,46 @@ def confounders_in(manifest: pd.DataFrame) -> dict[str, NDArray[np.bool_]]:
 
 _CONFOUNDER = "confounder_"
 
+REGIMES = ("lubrication",)
+"""Choices of a recipe that change what wear sounds like: a model tells which one it hears."""
+
+
+def regimes_in(manifest: pd.DataFrame) -> dict[str, NDArray[np.bool_]]:
+    """Regimes that a manifest labels, by choice and option.
+
+    Parameters
+    ----------
+    manifest : pandas.DataFrame
+        Of a data set; its columns ``choice_<regime>`` are read.
+
+    Returns
+    -------
+    dict
+        ``<regime>_<option>`` -> whether a record has it [shape=(n_records,)].
+
+    Examples
+    --------
+    >>> regimes_in(pd.DataFrame({"choice_lubrication": ["dry", "flooded"]}))
+    {'lubrication_dry': array([ True, False]), 'lubrication_flooded': array([False,  True])}
+    """
+    return {
+        f"{regime}_{option}": (manifest[f"choice_{regime}"] == option).to_numpy(dtype=bool)
+        for regime in REGIMES
+        if f"choice_{regime}" in manifest
+        for option in sorted(set(manifest[f"choice_{regime}"].dropna()) - {""})
+    }
+
+
+def is_regime(name: str) -> bool:
+    """Whether a finding is of a regime, and not of a fault.
+
+    Examples
+    --------
+    >>> is_regime("lubrication_flooded"), is_regime("stuck_valve")
+    (True, False)
+    """
+    return name.startswith(tuple(f"{regime}_" for regime in REGIMES))
+
 
 @dataclass(frozen=True, kw_only=True)
 class FeatureSelection:

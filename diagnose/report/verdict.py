@@ -506,18 +506,18 @@ def possible_words(estimate: Estimate, edges: Sequence[float]) -> str:
 
 
 def finding_words(finding: Mapping[str, Any]) -> str:
-    """A fault beside the wear, with how far its finding can be trusted.
+    """A fault beside the wear, or a regime, with how far its finding can be trusted.
 
     Examples
     --------
     >>> rates = {"detection_rate": 0.88, "false_alarm_rate": 0.02}
     >>> finding_words({"name": "cavitation", "present": True, "probability": 0.93, **rates})
-    'cavitation: present (93 %; of 100 such faults 88 are found, of 100 without 2 are called so)'
+    'cavitation: present (93 %; of 100 such records 88 are found, of 100 others 2 are called so)'
     """
     state = "present" if finding["present"] else "not found"
     return (
         f"{finding['name'].replace('_', ' ')}: {state} ({100 * finding['probability']:.0f} %; of "
-        f"100 such faults {100 * finding['detection_rate']:.0f} are found, of 100 without "
+        f"100 such records {100 * finding['detection_rate']:.0f} are found, of 100 others "
         f"{100 * finding['false_alarm_rate']:.0f} are called so)"
     )
 

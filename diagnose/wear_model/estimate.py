@@ -12,7 +12,12 @@ from numpy.typing import NDArray
 from ...features.response.transfer import FrfReference
 from ...sim.output.recording import DataError, Recording, html_table
 from ..feature_rows.feature_choice import choice_in
-from ..feature_rows.feature_table import FeatureSelection, held_against, recording_features
+from ..feature_rows.feature_table import (
+    FeatureSelection,
+    held_against,
+    is_regime,
+    recording_features,
+)
 from ..feature_rows.healthy import Baseline, referenced_rows
 from ..feature_rows.noted import NOTED, noted_names, noted_values
 from ..feature_rows.physical import level_channels, levelled_rows
@@ -578,9 +583,14 @@ class WearModel:
             worse, usual = rates["mae_with_m"], rates["mae_without_m"]
             if finding.present and worse > _MUCH_WORSE * usual:
                 name = finding.name.replace("_", " ")
+                cure = (
+                    "wear shows less in this regime"
+                    if is_regime(finding.name)
+                    else "mend it and record again"
+                )
                 cautions.append(
                     f"{name} looks present, and with it estimates erred by {1e3 * worse:.2g} mm "
-                    f"instead of {1e3 * usual:.2g} mm: mend it and record again"
+                    f"instead of {1e3 * usual:.2g} mm: {cure}"
                 )
         return cautions
 

@@ -35,6 +35,7 @@ from ..feature_rows.feature_table import (
     Progress,
     confounders_in,
     feature_table,
+    regimes_in,
 )
 from ..feature_rows.healthy import referenced_rows, references, refuse_strangers
 from ..feature_rows.noted import NOTED, doubted, noted_values, notes_of, strayed
@@ -232,7 +233,10 @@ def fit_model(
         baseline=None if references is None else references[train],
         severity=table.manifest[aim.column].to_numpy(dtype=float)[train],
         groups=table.manifest["group"].to_numpy()[train],
-        faults={name: here[train] for name, here in confounders_in(table.manifest).items()},
+        faults={
+            name: here[train]
+            for name, here in (confounders_in(table.manifest) | regimes_in(table.manifest)).items()
+        },
     )
     candidate_rows = [whole.part(columns) for columns in candidates.columns]
     for each in candidate_rows:
