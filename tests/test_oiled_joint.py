@@ -426,7 +426,26 @@ def test_a_recording_says_how_thin_its_film_was():
     assert "crankpin_gap_m" not in dry.truth
 
 
+def test_a_run_that_fails_while_it_settles_says_so(monkeypatch):
+    monkeypatch.setattr("wearstate.sim.scene.pump._ROUGHNESSES", 0.01)
+    scene = pump("mixed", duration="0.4 s", **{"joint.crankpin.oil.roughness": "100 um"})
+    failed = simulate(scene, seed=0, raise_on_failure=False)
+    assert "shorten numerics.step" in str(failed.status)
+    assert "min_film_m" not in failed.numerics
+
+
+def test_peaks_reach_over_a_small_part_of_the_clearance():
+    gap = pump("mixed").joint.crankpin.clearance_radial
+    pump("mixed", **{"joint.crankpin.oil.roughness": gap / 8.1})
+    with pytest.raises(SceneError, match=r"oil.roughness = .* m must be < .* m, the radial clear"):
+        pump("mixed", **{"joint.crankpin.oil.roughness": gap / 7.9})
+
+
 def test_what_an_oiled_rung_lacks_is_named():
+    with pytest.raises(
+        SceneError, match=r"'mixed' needs it: add oil\.viscosity, oil\.length, oil\.rou"
+    ):
+        load_scene("bilge-pump", {"joint.crankpin.rung": "mixed"})
     with pytest.raises(SceneError, match="oil is missing; the rung 'film-map' needs it"):
         load_scene("bilge-pump", {"joint.crankpin.rung": "film-map"})
     with pytest.raises(SceneError, match=r"oil.roughness is missing; the rung 'mixed' needs it"):

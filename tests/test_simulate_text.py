@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 
 import pytest
 from click.testing import CliRunner
@@ -42,6 +43,18 @@ def test_a_pump_tells_forces_pressures_and_levels():
         "level",
         "acc_y:",
     ]
+
+
+def test_a_pump_in_oil_tells_its_film_instead_of_contacts():
+    mixed = ("rung=mixed", "oil.viscosity=0.06 Pa s", "oil.length=30 mm", "oil.roughness=0.5 um")
+    given = [word for each in mixed for word in ("--set", f"joint.crankpin.{each}")]
+    flooded = simulated("bilge-pump", *given, "--set", "duration=0.6")
+    assert re.search(r"oil +least film of the pins \d+\.\d+ um\n", flooded)
+    assert "contacts" not in flooded
+    starved = simulated(
+        "bilge-pump", *given, "--set", "duration=0.6", "--set", "joint.crankpin.oil.filled_gap=1um"
+    )
+    assert "rough peaks touch" in starved
 
 
 def test_a_pump_at_rest_has_levels_alone():

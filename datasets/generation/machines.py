@@ -137,7 +137,7 @@ def _pump_truths(solution: Recording, scene: Scene) -> Iterator[tuple[str, Truth
     pump, truth, numbers = cast(PumpScene, scene), solution.truth, solution.numerics
     turns = float(numbers["steps"]) * float(numbers["step_s"]) * float(numbers["mean_speed_hz"])
     contacts = float(numbers["contact_changes"]) / 2 / turns
-    yield "contacts_per_turn", Truth(contacts, "", "contacts made in a revolution, all joints")
+    yield "contacts_per_turn", Truth(contacts, "", "contacts made in a revolution, dry joints")
     for name in sorted(name for name in truth if name.startswith("wrist_force_n")):
         suffix = name.removeprefix("wrist_force_n")
         about = f", throw {suffix[1:]}" if suffix else ""

@@ -118,8 +118,13 @@ def _lines(truth: Truths) -> Iterator[tuple[str, str]]:
             ratio = truth.get(f"pressure_ratio{throw}")
             about = f", ratio {plain(ratio.value, 3)} absolute" if ratio else ""
             yield f"pressure {number}".strip(), f"{low} to {high} gauge{about}"
-    contacts = truth["contacts_per_turn"].value
-    yield "contacts", f"{plain(contacts, 2)} in a revolution, all joints with clearance"
+    contacts, oiled = truth["contacts_per_turn"].value, "min_film_m" in truth
+    if oiled:
+        touching = truth["rubbing_share"].value
+        rub = f", rough peaks touch {100 * touching:.2g} % of the time" if touching else ""
+        yield "oil", f"least film of the pins {told(truth, 'min_film_m')}{rub}"
+    if contacts or not oiled:  # pins in oil never lose contact with it
+        yield "contacts", f"{plain(contacts, 2)} in a revolution, dry joints with clearance"
 
 
 _PIN = "joint.crankpin"

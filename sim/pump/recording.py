@@ -615,11 +615,13 @@ def _numerics(scene: PumpScene, run: CrankRun, plan: _Plan) -> dict[str, float |
 def _film_numerics(
     run: CrankRun, rungs: list[tuple[int, int, int]], plan: _Plan
 ) -> dict[str, float | int | str]:
-    """Least film of all oiled pins, and how long rough peaks touched; empty without oil."""
+    """Least film of all oiled pins, and how long rough peaks touched; empty without either."""
     oiled = np.array([[code == JOINT_OILED for code in row[:GUIDE]] for row in rungs])
     if run.gaps is None:
         return {}
     kept = run.gaps[plan.kept.start * plan.factor : plan.kept.stop * plan.factor]
+    if not kept.size:  # a run that failed while it settled
+        return {}
     gaps, peaks = kept[:, :, :GUIDE][:, oiled], kept[:, :, GUIDE:][:, oiled]
     return {
         "min_film_m": float(gaps.min()),

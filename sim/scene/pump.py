@@ -259,6 +259,9 @@ class Contact(Part):
         ]
 
 
+_ROUGHNESSES = 8.0
+"""In a radial clearance at the least: see :mod:`wearstate.sim.contact.asperities`."""
+
 OILED_RUNGS = ("film-short", "film-map", "mixed")
 """Rungs of a joint that run in oil."""
 
@@ -314,16 +317,27 @@ class RevoluteJoint(Contact):
         if self.rung not in OILED_RUNGS:
             return []
         if self.oil is None:
-            return [f"oil is missing; the rung '{self.rung}' needs it"]
-        faults = []
-        if self.rung == "mixed" and self.oil.roughness is None:
-            faults.append("oil.roughness is missing; the rung 'mixed' needs it")
+            least = ["oil.viscosity", "oil.length", *["oil.roughness"] * (self.rung == "mixed")]
+            return [f"oil is missing; the rung '{self.rung}' needs it: add {', '.join(least)}"]
+        faults = self._roughness_faults(self.oil.roughness) if self.rung == "mixed" else []
         if self.rung == "film-map" and self.oil.filled_gap is not None:
             faults.append(
                 f"oil.filled_gap = {self.oil.filled_gap:g} m is for the rungs 'film-short' and "
                 "'mixed'; a map is of a flooded film, remove it or choose another rung"
             )
         return faults
+
+    def _roughness_faults(self, roughness: float | None) -> list[str]:
+        """Roughness that is missing, or with which peaks would touch over half the bore."""
+        if roughness is None:
+            return ["oil.roughness is missing; the rung 'mixed' needs it"]
+        most = self.clearance_radial / _ROUGHNESSES
+        if 0 < most <= roughness:
+            return [
+                f"oil.roughness = {roughness:g} m must be < {most:g} m, the radial clearance over "
+                f"{_ROUGHNESSES:g}, for peaks to touch near the least gap only; check both values"
+            ]
+        return []
 
     @property
     def clearance_radial(self) -> float:
