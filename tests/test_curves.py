@@ -107,6 +107,7 @@ def test_plots_draw_into_given_axes(one):
     [
         (lambda r: features.spectrum(r, FS), "fs must be left out; the recording has its own"),
         (lambda r: features.spectrum(r["acc"]), "fs = None must be given with an array"),
+        (lambda r: features.spectrum("pump.wav"), "'pump.wav' must be a rec.*read_recording"),
         (lambda r: features.spectrum([r["acc"]], FS, channel_names=["a", "b"]), "must have 1"),
         (lambda r: features.order_spectrum(r["acc"], FS), "tacho = none must be there"),
         (lambda r: features.orbit(r), "n_probes = 0 must be 2"),

@@ -6,6 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 import wearstate
 
@@ -81,3 +82,17 @@ def test_mypy_tells_right_uses_from_wrong_ones(mypy):
     assert len(wanted) >= 7
     found, text = mypy(USES)
     assert found == wanted, text
+
+
+def test_natural_slips_of_arguments_are_named():
+    pump = wearstate.load_scene("bilge-pump")
+    recording = wearstate.Recording.from_array(np.zeros((1, 64)), 64.0)
+    for call, message in (
+        (lambda: wearstate.simulate(pump, seed=-1), "seed = -1 must be a whole number >= 0"),
+        (lambda: wearstate.align.align("shaft-rig"), "'shaft-rig' must be a scene; .*load_scene"),
+        (lambda: wearstate.shaft.shaft_state("shaft-rig"), "'shaft-rig' must be a shaft line"),
+        (lambda: wearstate.shaft.shaft_state(pump), "'bilge-pump' must be a shaft line"),
+        (lambda: wearstate.report("pump.wsm", recording), "recording comes first"),
+    ):
+        with pytest.raises((ValueError, TypeError), match=message):
+            call()

@@ -211,6 +211,7 @@ def test_recordings_of_other_lengths_and_layouts():
         ({"fs": FS}, recordings(1), "fs must be left out; the recordings have their own"),
         ({}, records(1), r"fs = None must be given with an array"),
         ({}, recordings(1)[0], "put it into brackets"),
+        ({"only": "rms"}, recordings(1), "only = 'rms' must be a list of names; put it into"),
     ],
 )
 def test_what_a_recording_says_is_not_said_twice(options, data, message):

@@ -1,5 +1,6 @@
 """One simulated recording of a scene, by name: rungs chosen where the scene leaves them open."""
 
+from operator import index
 from pathlib import Path
 
 from ...sim.machine import simulate as machine
@@ -37,6 +38,8 @@ def simulate(
 
     Raises
     ------
+    ValueError
+        If `seed` is negative.
     SceneError
         There is no such scene, or a rung, the step or a sensor does not fit it.
     SimulationError
@@ -52,6 +55,8 @@ def simulate(
     >>> recording.truth["pin_force_n"].shape, recording.time.shape
     ((25600, 2), (25600,))
     """
+    if index(seed) < 0:
+        raise ValueError(f"seed = {seed} must be a whole number >= 0")
     chosen, resolution = resolved(scene if isinstance(scene, Scene) else load_scene(scene))
     recording = machine.simulate(chosen, seed=seed, truth=truth, raise_on_failure=raise_on_failure)
     return recording if resolution is None else with_estimate(recording, resolution)

@@ -152,6 +152,8 @@ def align(
     >>> align(load_scene("propulsion-shaft")).verdict
     'within'
     """
+    if not isinstance(scene, Scene):
+        raise AlignmentError(f"scene = {scene!r} must be a scene; wearstate.load_scene reads one")
     if not isinstance(scene, ShaftScene):
         raise AlignmentError(
             f"machine of scene '{scene.name}' = '{scene.machine}' must be 'propulsion-shaft'; "

@@ -119,6 +119,8 @@ def report(
         The recording cannot be read or turned into features, or there is no such kind of machine.
     ModelError
         The file cannot be used.
+    TypeError
+        If recording and model are swapped.
 
     Examples
     --------
@@ -129,6 +131,8 @@ def report(
     'as new'
     """
     known_machine(machine)
+    if isinstance(model, Recording):
+        raise TypeError("model = a recording must be a model or its file; recording comes first")
     known = model if isinstance(model, WearModel) else load_model(model)
     source = None if isinstance(recording, Recording) else Path(recording)
     read = recording if isinstance(recording, Recording) else read_recording(recording)

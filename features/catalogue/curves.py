@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -472,6 +473,11 @@ def _read(
             tacho=data.tacho_signal,
             pulses_per_revolution=data.pulses_per_revolution,
             told=True,
+        )
+    if isinstance(data, (str, Path)):
+        raise ValueError(
+            f"data = '{data}' must be a recording, an array or a table; read a file with "
+            "wearstate.read_recording"
         )
     if fs is None:
         raise ValueError("fs = None must be given with an array; give the sample rate in Hz")

@@ -173,7 +173,7 @@ def feature_names(
         impact=impact,
         settings=settings,
     )
-    return _plan(layout, feature_set, None if only is None else tuple(only)).names
+    return _plan(layout, feature_set, _wanted(only)).names
 
 
 def absent_features(layout: Layout, feature_set: SetName = "complete") -> dict[str, str]:
@@ -283,6 +283,12 @@ def _chosen(layout: Layout, only: tuple[str, ...]) -> _Plan:
         names=tuple(names[name][i] for name, picks in kept.items() for i in picks),
         picks=tuple(picks if len(picks) < len(names[n]) else None for n, picks in kept.items()),
     )
+
+
+def _wanted(only: Sequence[str] | None) -> tuple[str, ...] | None:
+    if isinstance(only, str):
+        raise ValueError(f"only = {only!r} must be a list of names; put it into brackets")
+    return None if only is None else tuple(only)
 
 
 def _check_wanted(only: tuple[str, ...], faults: Mapping[str, str], known: set[str]) -> None:
@@ -458,7 +464,7 @@ def feature_row(
     aside = layout.cylinders
     pressures, signals = signals[aside], signals[~aside] if aside.any() else signals
     layout = replace(layout, impact=struck(signals, layout.kinds))
-    plan = _plan(layout, feature_set, None if only is None else tuple(only))
+    plan = _plan(layout, feature_set, _wanted(only))
     pulses = None
     if tacho is not None and any(_turns(feature) for feature in plan.features):
         pulses = _pulses(tacho, fs, signals.shape[-1])

@@ -577,7 +577,7 @@ def shaft_state(
     ShaftFilmError
         No balance was found; names the bearing and the cure.
     ValueError
-        A move names no bearing of the scene, or as :func:`shaft_beam`.
+        The scene is no shaft line, a move names no bearing of it, or as :func:`shaft_beam`.
 
     Examples
     --------
@@ -586,6 +586,11 @@ def shaft_state(
     >>> bool(abs(state.film.reactions[:, 0].sum() / state.beam.downward_load - 1) < 1e-6)
     True
     """
+    if not isinstance(scene, ShaftScene):
+        raise ValueError(
+            f"scene = {getattr(scene, 'name', scene)!r} must be a shaft line; wearstate.load_scene "
+            "reads one"
+        )
     beam = running_beam(scene)
     housings = [bearing.housing for bearing in scene.bearings]
     film = beam_film(
