@@ -98,6 +98,8 @@ def short_resistance(
     (-0.4444, 0.6046)
     """
     eccentricity = math.sqrt(x * x + y * y)
+    if filled <= 1.0 - eccentricity:
+        return 0.0, 0.0, 0.0
     n_x, n_y = 1.0, 0.0
     if eccentricity > 0.0:
         n_x, n_y = x / eccentricity, y / eccentricity

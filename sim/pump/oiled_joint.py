@@ -107,8 +107,8 @@ def _film_velocity(
         damped = 1.0 if step < _NEWTON_STEPS // 2 else 0.5  # where two pieces send to each other
         v_x += damped * (new_x - v_x)
         v_y += damped * (new_y - v_y)
-        if change <= _SETTLED * (abs(new_x) + abs(new_y)):
-            break
+        if r_xx + r_yy == 0.0 or change <= _SETTLED * (abs(new_x) + abs(new_y)):
+            break  # without oil the first step is exact
     return v_x, v_y
 
 
