@@ -426,6 +426,16 @@ def test_a_recording_says_how_thin_its_film_was():
     assert "crankpin_gap_m" not in dry.truth
 
 
+@pytest.mark.parametrize("rung", ["film-short", "film-map"])
+def test_a_film_below_the_roughness_is_told(rung):
+    thin = {"joint.crankpin.oil.viscosity": "1e-6 Pa s", "duration": "0.4 s"}
+    told = [text for text in simulate(pump(rung, **thin), seed=0).warnings if "roughness" in text]
+    assert len(told) == 1
+    assert "set the joint's rung to 'mixed'" in told[0]
+    for fine in (pump(rung, duration="0.4 s"), pump("mixed", **thin)):
+        assert not any("roughness" in text for text in simulate(fine, seed=0).warnings)
+
+
 def test_a_run_that_fails_while_it_settles_says_so(monkeypatch):
     monkeypatch.setattr("wearstate.sim.scene.pump._ROUGHNESSES", 0.01)
     scene = pump("mixed", duration="0.4 s", **{"joint.crankpin.oil.roughness": "100 um"})

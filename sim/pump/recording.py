@@ -19,7 +19,14 @@ from ..output.sensor import (
 from ..output.status import SimulationError, Status
 from ..scene.exciters import exciter_faults
 from ..scene.parts import Accelerometer, CasingMode, Scene, SceneError, specific_key
-from ..scene.pump import CRANK_PLACES, FORCE_PLACES, GUIDE_PLACES, VALVE_PLACES, PumpScene
+from ..scene.pump import (
+    CRANK_PLACES,
+    FORCE_PLACES,
+    GUIDE_PLACES,
+    OILED_RUNGS,
+    VALVE_PLACES,
+    PumpScene,
+)
 from ..scene.recorded import failed, recorded
 from .casing import (
     CasingModes,
@@ -46,6 +53,7 @@ _LIFT_LEFT = 0.05
 
 _STABLE = 2.785  # step times rate of Runge-Kutta 4, on the negative real axis
 
+_ROUGHNESS = 0.4e-6  # m, of a ground pin and a bored eye together, where none is given
 _MOSTLY = 0.5  # of all contacts: the floor, not the law, decides what they lose
 
 _LATE = math.radians(60.0)  # after the dead centre; a fast pump's valves close 30 degrees late
@@ -101,7 +109,7 @@ def simulate_pump(scene: Scene, seed: int, truth: bool, raise_on_failure: bool) 
         truth=_truth(run, plan) | _test_truth(plan, pushes) if truth else {},
         status=status,
         numerics=numerics,
-        warnings=_warnings(numerics),
+        warnings=(*_warnings(numerics), *_film_warnings(pump, numerics)),
     )
 
 
@@ -656,6 +664,22 @@ def _warnings(numerics: dict[str, float | int | str]) -> tuple[str, ...]:
     if int(numerics.get("clipped_samples", 0)) > 0:
         found.append(f"{numerics['clipped_samples']} samples clipped; widen the sensor's range")
     return tuple(found)
+
+
+def _film_warnings(scene: PumpScene, numerics: dict[str, float | int | str]) -> tuple[str, ...]:
+    """Films that are thinner than their surfaces are rough, where no rung knows of peaks."""
+    pins = [part for part in (scene.joint.crankpin, scene.joint.wristpin) if part is not None]
+    oiled = [part for part in pins if part.rung in OILED_RUNGS and part.oil is not None]
+    if not oiled or any(part.rung == "mixed" for part in oiled):
+        return ()
+    given = [part.oil.roughness for part in oiled if part.oil and part.oil.roughness]
+    rough, film = max(given, default=_ROUGHNESS), float(numerics.get("min_film_m", math.inf))
+    if film >= rough:
+        return ()
+    return (
+        f"least film of the pins = {film:.2g} m is below a roughness of {rough:.2g} m, where "
+        "peaks touch; set the joint's rung to 'mixed'",
+    )
 
 
 def _test_truth(plan: _Plan, pushes: tuple[Push, ...]) -> dict[str, Any]:
