@@ -436,6 +436,17 @@ def test_a_film_below_the_roughness_is_told(rung):
         assert not any("roughness" in text for text in simulate(fine, seed=0).warnings)
 
 
+def test_a_motor_that_thick_oil_stalls_is_told():
+    motor = {"synchronous_speed": "300 rpm", "breakdown_moment": "500 N m", "inertia": "5 kg m^2"}
+    driven = {"drive.rung": "motor", "drive.motor": motor, "duration": "4 s"}
+    easy = simulate(pump("mixed", **driven), seed=0)
+    assert not any("stalls" in text for text in easy.warnings)
+    thick = pump("mixed", **driven, **{"joint.crankpin.oil.viscosity": "1e3 Pa s"})
+    told = [text for text in simulate(thick, seed=0).warnings if "it stalls" in text]
+    assert len(told) == 1
+    assert "is below 240 rpm" in told[0]
+
+
 def test_a_run_that_fails_while_it_settles_says_so(monkeypatch):
     monkeypatch.setattr("wearstate.sim.scene.pump._ROUGHNESSES", 0.01)
     scene = pump("mixed", duration="0.4 s", **{"joint.crankpin.oil.roughness": "100 um"})

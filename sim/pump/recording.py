@@ -109,7 +109,11 @@ def simulate_pump(scene: Scene, seed: int, truth: bool, raise_on_failure: bool) 
         truth=_truth(run, plan) | _test_truth(plan, pushes) if truth else {},
         status=status,
         numerics=numerics,
-        warnings=(*_warnings(numerics), *_film_warnings(pump, numerics)),
+        warnings=(
+            *_warnings(numerics),
+            *_film_warnings(pump, numerics),
+            *_motor_warnings(pump, run),
+        ),
     )
 
 
@@ -679,6 +683,21 @@ def _film_warnings(scene: PumpScene, numerics: dict[str, float | int | str]) -> 
     return (
         f"least film of the pins = {film:.2g} m is below a roughness of {rough:.2g} m, where "
         "peaks touch; set the joint's rung to 'mixed'",
+    )
+
+
+def _motor_warnings(scene: PumpScene, run: CrankRun) -> tuple[str, ...]:
+    """A motor that its load has slowed beyond its largest moment."""
+    motor = scene.drive.motor
+    if scene.drive.rung != "motor" or motor is None:
+        return ()
+    later = run.turns[3 * len(run.turns) // 4 :, 1]  # the mean of a part, as the speed swings
+    last, least = later.mean() / math.tau, motor.synchronous_speed * (1 - motor.breakdown_slip)
+    if last >= least:
+        return ()
+    return (
+        f"speed at the end = {60 * last:.3g} rpm is below {60 * least:.3g} rpm, where the motor "
+        "pulls hardest: it stalls; raise drive.motor.breakdown_moment or lower the load",
     )
 
 
