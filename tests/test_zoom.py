@@ -268,3 +268,32 @@ def test_what_is_refused(stored, tmp_path, monkeypatch, arguments, message):
     monkeypatch.setattr(zoom, "find_spec", lambda name: name)
     assert message in run("info", stored, *arguments, code=2).stderr
     assert list(tmp_path.iterdir()) == []
+
+
+# --- report
+
+
+def test_a_report_takes_the_curves_in(bokeh, small_set, small_model, tmp_path):
+    page = tmp_path / "x.html"
+    judge = ("report", small_set, "--record", 5, "--model", small_model, "-o", page)
+    run(*judge, "--interactive")
+    html = page.read_text(encoding="utf-8")
+    assert outside(html) == []
+    assert page.stat().st_size < MOST_BYTES
+    kinds = {each["title"]["attributes"]["text"]["attributes"]["text"].split(":")[0]
+             for each in models(item_in(html), "Figure")}  # fmt: skip
+    assert kinds >= {"Waveform", "Amplitude spectrum", "Order spectrum", "Envelope spectrum"}
+    assert html.count('<img src="data:image/png;base64,') == 3  # for paper, as without curves
+    run(*judge, "--force")
+    assert "<script" not in page.read_text(encoding="utf-8")
+
+
+def test_what_a_report_refuses(small_set, small_model, tmp_path, monkeypatch):
+    page = tmp_path / "x.html"
+    judge = ("report", small_set, "--model", small_model, "--interactive")
+    assert "name one with -o" in run(*judge, "--record", 5, code=2).stderr
+    assert "is for one recording" in run(*judge, "-o", page, code=2).stderr
+    monkeypatch.setattr(zoom, "find_spec", lambda name: None)
+    told = run(*judge, "--record", 5, "-o", page, code=2).stderr
+    assert 'pip install "wearstate[interactive]"' in told
+    assert not page.exists()

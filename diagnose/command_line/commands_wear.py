@@ -392,6 +392,9 @@ def _judge_across(
 @click.option("--baseline", "healthy", type=PATH, help="Healthy recordings of the machine (.h5).")
 @join_option
 @click.option("-o", "--output", type=PATH, help="HTML page to write.")
+@click.option(
+    "--interactive", is_flag=True, help="Of one recording: curves to zoom and measure in the page."
+)
 @click.option("--machine", metavar="KIND", help="Kind of machine, for its ISO zone.")
 @click.option(
     "--scene",
@@ -460,6 +463,7 @@ def report(
         wear = {
             "--baseline": healthy,
             "-o": output,
+            "--interactive": given["interactive"],
             "--machine": machine,
             "--scene": scene,
             "--set": pairs,
@@ -481,6 +485,8 @@ def report(
     many = _holds_many(source)
     if not many and (given["trend"] or given["dates"]):
         raise click.UsageError("--trend and --dates are for a folder or a data set of many records")
+    if given["interactive"]:
+        _check_interactive(output, many)
     if views and source.is_dir():
         raise click.UsageError("--join completes a recording or a data set: name one, not a folder")
     usual = model.card["trained_on"]["scene"]
@@ -492,6 +498,17 @@ def report(
     told = _ReportTask(source, model_file, model, baselines, plate, *ways)
     verdicts = _report_many(told) if many else _report_one(told)
     raise click.exceptions.Exit(report_exit(verdicts, fail_on))
+
+
+def _check_interactive(output: Path | None, many: bool) -> None:
+    """Refuse curves where there is no page, more than one recording, or nothing to draw them."""
+    from ..pictures.zoom import require_bokeh
+
+    if output is None:
+        raise click.UsageError("--interactive adds curves to the page: name one with -o")
+    if many:
+        raise click.UsageError("--interactive is for one recording: name one, or choose a --record")
+    require_bokeh()
 
 
 def _holds_many(source: Path) -> bool:
@@ -578,7 +595,7 @@ def _report_one(told: _ReportTask) -> list[_Verdict]:
     )
     table, text = found.table, found.text
     if told.output is not None:
-        found.save(told.output, force=told.force)
+        found.save(told.output, force=told.force, interactive=told.given["interactive"])
         table["html"] = str(told.output)
         text += f"\nPage        {told.output}"
     click.echo(json_text(table) if told.as_json else text)

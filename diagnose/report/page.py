@@ -1,7 +1,8 @@
-"""The report as one self-contained page: no script, no link, pictures inside."""
+"""The report as one self-contained page, pictures inside; without a script unless interactive."""
 
 import re
 import textwrap
+from collections.abc import Sequence
 from typing import Any
 
 from ...sim.output.recording import DataError, Recording
@@ -9,6 +10,9 @@ from ..feature_rows.healthy import Baseline, Baselines
 from ..nameplate.cautions import known_beside
 from ..nameplate.nameplate import Nameplate
 from ..pages.page import render
+from ..pictures.view import View
+from ..pictures.zoom import ZoomBlock, require_bokeh, zoom_block
+from ..pictures.zoom_curves import zoom_curves
 from ..wear_model.estimate import Estimate, WearModel
 from .advice import brief_words
 from .batch import Batch, BatchRow, machine_heading
@@ -35,6 +39,7 @@ def report_html(
     model: WearModel | None = None,
     *,
     baseline: Baseline | None = None,
+    interactive: bool = False,
 ) -> str:
     """The report on one recording.
 
@@ -48,30 +53,51 @@ def report_html(
         For the map of what moved against its healthy reference.
     baseline : Baseline, optional
         That the estimate was given.
+    interactive : bool
+        Add the signals as curves to zoom and measure in.
 
     Returns
     -------
     str
         HTML.
+
+    Raises
+    ------
+    DataError
+        Bokeh is not installed for an interactive page.
     """
     estimate = table["estimate"]
     graded = estimate["severity"] is not None
+    pictures = report_pictures(
+        recording,
+        model,
+        graded=graded,
+        healthy=None if baseline is None else baseline.features,
+        evidence=[item["feature"] for item in table["evidence"]],
+    )
     return _rendered(
         "report.html.j2",
         table=table,
         gauge=gauge(estimate, table["limits"]) if graded else None,
-        pictures=report_pictures(
-            recording,
-            model,
-            graded=graded,
-            healthy=None if baseline is None else baseline.features,
-            evidence=[item["feature"] for item in table["evidence"]],
-        ),
+        pictures=pictures,
+        block=_zoom_of(recording, pictures) if interactive else None,
         reference="the machine's healthy recordings"
         if baseline is not None
         else "those of as-new machines in the training set",
         simulated=" (simulated recording)" if recording.origin == "simulated" else "",
     )
+
+
+def _zoom_of(recording: Recording, pictures: Sequence[ReportPicture]) -> ZoomBlock | None:
+    """Curves of a recording beside its pictures; None where none can be computed."""
+    require_bokeh()
+    view = View(recording=recording)
+    try:
+        curves, _ = zoom_curves(view)
+    except DataError:
+        return None  # the verdict says what is wrong with the recording
+    taken = sum(len(picture.data) for picture in pictures)
+    return zoom_block(curves, speed=view.speed, taken=taken)
 
 
 def batch_html(

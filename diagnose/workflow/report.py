@@ -49,11 +49,33 @@ class Report:
         """What ``wearstate report`` prints."""
         return report_text(self.table)
 
-    def html(self) -> str:
-        """Self-contained page with pictures."""
-        return report_html(self.table, self.recording, self.model, baseline=self.baseline)
+    def html(self, *, interactive: bool = False) -> str:
+        """Self-contained page with pictures, and on demand with curves to zoom and measure in.
 
-    def save(self, path: str | Path, *, force: bool = False) -> None:
+        Parameters
+        ----------
+        interactive : bool
+            Add the curves.
+
+        Returns
+        -------
+        str
+            HTML.
+
+        Raises
+        ------
+        DataError
+            Bokeh is not installed for an interactive page.
+        """
+        return report_html(
+            self.table,
+            self.recording,
+            self.model,
+            baseline=self.baseline,
+            interactive=interactive,
+        )
+
+    def save(self, path: str | Path, *, force: bool = False, interactive: bool = False) -> None:
         """Write the page.
 
         Parameters
@@ -62,15 +84,18 @@ class Report:
             HTML file.
         force : bool
             Replace an existing file.
+        interactive : bool
+            Add the signals as curves to zoom and measure in.
 
         Raises
         ------
         DataError
-            The file exists, or its folder does not.
+            The file exists, its folder does not, or Bokeh is not installed for an interactive
+            page.
         """
         file = Path(path).absolute()
         refuse_output(file, force)
-        save_page(self.html(), file, force=force)
+        save_page(self.html(interactive=interactive), file, force=force)
 
     def __str__(self) -> str:
         return self.text
