@@ -48,6 +48,7 @@ VALUES = {
     "integrations": 1,
     "cyclic_hz": [16.0],
     "channel_names": ("a",),
+    "data": _RNG.standard_normal((2, N)),
 }
 """An argument for every name."""
 
@@ -62,6 +63,7 @@ OTHER = {
         "force": _RNG.standard_normal((4, 256)),
         "response": _RNG.standard_normal((4, 2, 256)),
     },
+    "order_spectrum": {"tacho": (np.sin(2 * np.pi * 16 * _TIME) > 0).astype(float)},
     "tacholess_speed": {"x": sum(np.cos(2 * np.pi * 16 * k * _TIME) for k in range(1, 6))},
 }
 """Arguments that differ."""
@@ -86,7 +88,8 @@ def called(name, fs):
     values = {**VALUES, **OTHER.get(name, {})}
     parameters = inspect.signature(function).parameters
     wanted = [n for n, p in parameters.items() if p.default is p.empty and n != "fs"]
-    return function(**{n: values[n] for n in wanted}, fs=fs)
+    given = {n: values[n] for n in wanted} | OTHER.get(name, {})
+    return function(**given, fs=fs)
 
 
 def test_there_are_many():
