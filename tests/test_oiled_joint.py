@@ -10,6 +10,7 @@ from scipy.optimize import brentq, root
 from wearstate.diagnose.literature.verify import checks
 from wearstate.sim.contact.asperities import asperity_force, asperity_scale
 from wearstate.sim.contact.law import CONTACT
+from wearstate.sim.fidelity.ladder import effects_of
 from wearstate.sim.film.bearing import short_coefficients
 from wearstate.sim.film.impedance_map import impedance_map, map_force, map_resistance
 from wearstate.sim.film.short import short_force, short_resistance
@@ -511,3 +512,9 @@ def test_oiled_pins_run_beside_every_other_joint(name, changes):
         weight = scene.rod.mass * scene.gravity * math.sin(scene.stroke_inclination)
         gained = scene.rod.mass * np.diff(rod_x) / step
         assert np.abs(pushed - weight - gained).max() < 1e-6 * np.abs(pushed).max()
+
+
+def test_a_chart_offers_oil_only_where_the_scene_has_some():
+    rungs = {each.name: [r.name for r in each.rungs] for each in effects_of(pump("compliant"))}
+    assert rungs["crankpin"][-3:] == ["film-short", "film-map", "mixed"]
+    assert rungs["wristpin"] == ["ideal", "link", "compliant"]

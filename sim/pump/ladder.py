@@ -6,7 +6,7 @@ from functools import partial
 from typing import cast
 
 from ..scene.parts import Scene
-from ..scene.pump import PumpScene
+from ..scene.pump import OILED_RUNGS, PumpScene, RevoluteJoint
 from ..scene.rungs import (
     Effect,
     Rung,
@@ -154,9 +154,21 @@ def _joint_effects(scene: Scene) -> Iterator[Effect]:
         part = getattr(pump.joint, name)
         if part is None:
             continue
-        table = GUIDE_RUNGS if name == "guide" else JOINT_RUNGS
+        table = GUIDE_RUNGS if name == "guide" else pin_rungs(part)
         rungs = written(table, _throw_paths(pump, "joint", f"{name}.rung"))
         yield effect(name, scene, rungs, partial(_joint_rung, name), beyond=_beyond)
+
+
+def pin_rungs(part: RevoluteJoint) -> tuple[Rung, ...]:
+    """Rungs of a pin: those in oil only where the scene says which oil.
+
+    Examples
+    --------
+    >>> dry = RevoluteJoint(pin_diameter=0.06, radial_clearance=5e-5, stiffness=2e8)
+    >>> [rung.name for rung in pin_rungs(dry)]
+    ['ideal', 'link', 'compliant']
+    """
+    return tuple(r for r in JOINT_RUNGS if part.oil is not None or r.name not in OILED_RUNGS)
 
 
 def _joint_rung(name: str, scene: Scene) -> str:
