@@ -8,6 +8,7 @@ import pytest
 from numpy.testing import assert_allclose
 from wearstate.diagnose.literature.verify import impact
 from wearstate.sim.contact.law import CONTACT, ELASTIC_HERTZ, LAW_HYSTERESIS, hysteresis
+from wearstate.sim.machine.simulate import simulate
 from wearstate.sim.pump import setup as cs
 from wearstate.sim.pump import slider_crank as sc
 from wearstate.sim.scene.load import load_scene
@@ -669,6 +670,31 @@ def test_every_contact_law_runs_in_the_pump(law, elasticity):
     last = found.force("pin_x")[-round(0.2 / step) :]
     # Over a revolution the pin carries the mean of what an ideal joint does.
     assert_allclose(last.mean(), ideal.pin_force_x[:-1].mean(), rtol=5e-3)
+
+
+def test_contacts_of_a_scene_are_made_once(monkeypatch):
+    made = []
+    monkeypatch.setattr(
+        cs, "contact_record", lambda *a, own=cs.contact_record: made.append(a) or own(*a)
+    )
+    # A stiffness that no other test has: nothing of this scene is known yet.
+    simulate(
+        load_scene("bilge-pump", {"duration": "0.25 s", "joint.crankpin.stiffness": 1.234e8}),
+        seed=0,
+    )
+    assert len(made) == 1
+    with pytest.raises(ValueError, match="read-only"):
+        cs.contact_table(load_scene("bilge-pump"), 0)["damping"] = 0.0
+
+
+def test_a_throw_has_the_mobility_of_its_own_guide():
+    long = {"guide": {"length": "300 mm"}}
+    free = pump((COMPLIANT, COMPLIANT, COMPLIANT), throws=[{}, {"phase": "90 deg", "joint": long}])
+    alone = pump((COMPLIANT, COMPLIANT, COMPLIANT), joint__guide__length="300 mm")
+    shorter, longer = (cs.joint_mobility(free, throw, sc.GUIDE) for throw in (0, 1))
+    # Both corners together or against each other: 2/m, or 2 a^2/J about the wrist pin.
+    assert_allclose(longer, 2 * 0.15**2 / TILT_INERTIA, rtol=1e-12)
+    assert shorter < longer == cs.joint_mobility(alone, 0, sc.GUIDE)
 
 
 @pytest.mark.parametrize("hertz", [False, True], ids=["linear", "hertz"])

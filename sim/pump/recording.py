@@ -585,7 +585,7 @@ def _rung_of(part: Any) -> str:
 
 
 def _numerics(scene: PumpScene, run: CrankRun, plan: _Plan) -> dict[str, float | int | str]:
-    steps = len(run.forces)
+    steps, resolved = len(run.forces), run.step * contact_rate(scene)
     numerics: dict[str, float | int | str] = {
         "rung_joint": scene.joint.crankpin.rung,
         "rung_wristpin": _rung_of(scene.joint.wristpin),
@@ -595,10 +595,10 @@ def _numerics(scene: PumpScene, run: CrankRun, plan: _Plan) -> dict[str, float |
         "contact_law": scene.joint.crankpin.law,
         "step_s": run.step,
         "steps": steps,
-        "step_per_contact_time": run.step * contact_rate(scene),
-        "stability_margin": 1 - run.step * contact_rate(scene) / _STABLE,
+        "step_per_contact_time": resolved,
+        "stability_margin": 1 - resolved / _STABLE,
         # Runge-Kutta 4 turns the fastest contact too slowly by this share
-        "estimated_error": (run.step * contact_rate(scene)) ** 4 / 120,
+        "estimated_error": resolved**4 / 120,
         "contact_changes": run.contact_changes,
         "cuts_refused": run.cuts_refused,
         "peak_normal_force_n": run.peak_normal_force,

@@ -1,6 +1,7 @@
 """From a pump scene to the crank mechanism: tables, start, contact rates, and the closed form."""
 
 import math
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -27,6 +28,7 @@ from ..film.impedance_map import ImpedanceMap, impedance_map
 from ..film.solve import FilmGeometry
 from ..jit import kernel
 from ..scene.pump import OILED_RUNGS, Guide, PumpScene, RevoluteJoint
+from ..scene.pump_hydraulics import CylinderPressure
 from .hydraulics import (
     HYDRAULIC,
     PRESSURE_CHAMBER,
@@ -82,6 +84,10 @@ JOINT_CODES = {
 
 _ANGLES = 360  # of a revolution, for the forces an ideal mechanism would carry
 
+# Scenes are frozen, and several checks of one run ask for the same of them: rows of the last throws
+# are kept, for whole scenes as key, and cannot be written to.
+_kept = lru_cache(maxsize=64)
+
 
 def joint_parts(
     scene: PumpScene, throw: int
@@ -102,8 +108,12 @@ def joint_rungs(scene: PumpScene, throw: int) -> tuple[int, int, int]:
 
 def hydraulics_of(scene: PumpScene, throw: int) -> NDArray[np.void]:
     """Hydraulics of one throw, one record."""
+    return _hydraulics(scene, scene.pressures(throw))
+
+
+def _hydraulics(scene: PumpScene, pressure: CylinderPressure) -> NDArray[np.void]:
     return hydraulic_parameters(
-        scene.pressures(throw),
+        pressure,
         area=piston_area(scene),
         crank_radius=scene.crank.radius,
         rod_length=scene.rod.length,
@@ -178,15 +188,10 @@ def _without_memory(scene: PumpScene, throw: int) -> NDArray[np.void]:
     pressure = scene.pressures(throw)
     if pressure.rung == "chamber":
         pressure = pressure.model_copy(update={"rung": "two-level"})
-    return hydraulic_parameters(
-        pressure,
-        area=piston_area(scene),
-        crank_radius=scene.crank.radius,
-        rod_length=scene.rod.length,
-        speed=2 * math.pi * scene.drive.speed,
-    )
+    return _hydraulics(scene, pressure)
 
 
+@_kept
 def joint_loads(scene: PumpScene, throw: int) -> tuple[float, float, float]:
     """Largest forces of crank pin, wrist pin and guide over a revolution, without clearance [N]."""
     motion = ideal_motion(scene, np.linspace(0.0, 2 * math.pi, _ANGLES, endpoint=False), throw)
@@ -270,10 +275,11 @@ def contact_record(
     return record
 
 
+@kernel
 def penetration_under(contact: Any, force: float) -> float:
     """Penetration at which the elastic force of a contact record is `force` [m].
 
-    Bisection on the compiled law, so that a further elasticity needs nothing here.
+    Bisection on the law, so that a further elasticity needs nothing here.
     """
     high = 1e-9
     while elastic_force(high, contact) < force and high < 1.0:
@@ -305,14 +311,15 @@ _DEEPEST_START = 0.9  # eccentricity from which a film starts
 _PEAK_OVER_LOAD = 3.0  # what a knock may add to the ideal load, where the elasticity is not linear
 
 
-def _rod_jacobian(scene: PumpScene, beta: float) -> NDArray[np.float64]:
+def _rod_jacobian(scene: PumpScene, throw: int, beta: float) -> NDArray[np.float64]:
     """Relative motion of pin and eye at crank pin (x, y), wrist pin (x, y), guide (y, two ends).
 
     Columns: rod x, y, beta; piston x, y, tilt.
     """
     arm, centre = scene.rod.length - scene.rod.centre_of_mass, scene.rod.centre_of_mass
     s, c = math.sin(beta), math.cos(beta)
-    reach = scene.joint.guide.length / 2 if scene.joint.guide else 0.0
+    guide = scene.joints(throw).guide
+    reach = guide.length / 2 if guide else 0.0
     return np.array(
         [
             [-1.0, 0.0, -arm * s, 0.0, 0.0, 0.0],
@@ -328,12 +335,16 @@ def _rod_jacobian(scene: PumpScene, beta: float) -> NDArray[np.float64]:
 _JOINT_ROWS = (slice(0, 2), slice(2, 4), slice(4, 6))
 
 
-def _compliance(scene: PumpScene, throw: int, beta: float) -> NDArray[np.float64]:
-    """Acceleration of every row of the jacobian per force along every other [1/kg]."""
+@_kept
+def _compliances(scene: PumpScene, throw: int) -> NDArray[np.float64]:
+    """Acceleration of every row of the jacobian per force along every other [1/kg].
+
+    At five swings of the rod, from none to its largest: shape (5, 6, 6).
+    """
     rod, piston = scene.rod, scene.piston
     rungs = joint_rungs(scene, throw)
     free = rungs[GUIDE] == JOINT_COMPLIANT
-    inverse = np.diag(
+    inverse: NDArray[np.float64] = np.diag(
         [
             1 / rod.mass,
             1 / rod.mass,
@@ -343,18 +354,19 @@ def _compliance(scene: PumpScene, throw: int, beta: float) -> NDArray[np.float64
             1 / piston.inertia if free and piston.inertia else 0.0,
         ]
     )
-    jacobian = _rod_jacobian(scene, beta)
-    held = [
-        row
-        for joint in (CRANKPIN, WRISTPIN)
-        if rungs[joint] == JOINT_IDEAL
-        for row in jacobian[_JOINT_ROWS[joint]]
-    ]
-    if held:
-        fixed = np.array(held)
-        through = inverse @ fixed.T
-        inverse = inverse - through @ np.linalg.pinv(fixed @ through) @ through.T
-    return np.asarray(jacobian @ inverse @ jacobian.T)
+    jacobian = np.array([_rod_jacobian(scene, throw, beta) for beta in _betas(scene)])
+    ideal = [_JOINT_ROWS[j] for j in (CRANKPIN, WRISTPIN) if rungs[j] == JOINT_IDEAL]
+    if ideal:
+        held = np.concatenate([jacobian[:, rows] for rows in ideal], axis=1)
+        through = inverse @ _transposed(held)
+        inverse = inverse - through @ np.linalg.pinv(held @ through) @ _transposed(through)
+    compliances = jacobian @ inverse @ _transposed(jacobian)
+    compliances.flags.writeable = False
+    return compliances
+
+
+def _transposed(matrices: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.swapaxes(matrices, -1, -2)
 
 
 def _betas(scene: PumpScene) -> NDArray[np.float64]:
@@ -365,22 +377,19 @@ def _betas(scene: PumpScene) -> NDArray[np.float64]:
 def joint_mobility(scene: PumpScene, throw: int, joint: int) -> float:
     """Largest acceleration of a joint per unit force in it, over a revolution [1/kg]."""
     rows = _JOINT_ROWS[joint]
-    return max(
-        float(np.linalg.eigvalsh(_compliance(scene, throw, beta)[rows, rows])[-1])
-        for beta in _betas(scene)
-    )
+    return float(np.linalg.eigvalsh(_compliances(scene, throw)[:, rows, rows]).max())
 
 
-def _largest(scene: PumpScene, throw: int, weights: list[float]) -> float:
+def _largest(scene: PumpScene, throw: int, weights: tuple[float, ...]) -> float:
     """Largest eigenvalue of the mechanism on springs (or dampers) in its joints."""
     root = np.sqrt(np.repeat(weights, 2))
-    return max(
-        float(np.linalg.eigvalsh(root[:, None] * _compliance(scene, throw, beta) * root)[-1])
-        for beta in _betas(scene)
-    )
+    return float(np.linalg.eigvalsh(root[:, None] * _compliances(scene, throw) * root).max())
 
 
-def _springs_and_dampers(scene: PumpScene, throw: int) -> tuple[list[float], list[float]]:
+@_kept
+def _springs_and_dampers(
+    scene: PumpScene, throw: int
+) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Tangent stiffness and damping of every joint: a link's own stiffness is load over length."""
     springs, dampers = [], []
     records = contact_table(scene, throw)
@@ -401,7 +410,7 @@ def _springs_and_dampers(scene: PumpScene, throw: int) -> tuple[list[float], lis
         else:
             springs.append(0.0)
             dampers.append(0.0)
-    return springs, dampers
+    return tuple(springs), tuple(dampers)
 
 
 def contact_frequency(scene: PumpScene) -> float:
@@ -416,6 +425,7 @@ def contact_frequency(scene: PumpScene) -> float:
     )
 
 
+@_kept
 def contact_rate(scene: PumpScene) -> float:
     """Fastest rate of the damped contacts [1/s]: largest root of ``s^2 + C/m s + K/m``.
 
@@ -443,12 +453,14 @@ def _different_throws(scene: PumpScene) -> list[int]:
     return found
 
 
+@_kept
 def contact_table(scene: PumpScene, throw: int) -> NDArray[np.void]:
     """Contact records of one throw: crank pin, wrist pin, guide; an ideal joint's is empty.
 
     Returns
     -------
     numpy.ndarray [shape=(3,), dtype=CONTACT]
+        Read-only.
     """
     table = np.zeros(3, dtype=CONTACT)
     table["friction_speed"] = table["speed_floor"] = 1.0  # an unused record divides by neither
@@ -459,6 +471,7 @@ def contact_table(scene: PumpScene, throw: int) -> NDArray[np.void]:
         clearance = part.clearance_radial
         mobility = joint_mobility(scene, throw, joint)
         table[joint] = contact_record(part, clearance, loads[joint], mobility)[0]
+    table.flags.writeable = False
     return table
 
 
