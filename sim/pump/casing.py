@@ -7,7 +7,6 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 from scipy import fft, signal
 
@@ -21,8 +20,16 @@ PASS_BAND = 0.45
 
 _STOP_ATTENUATION_DB = 80.0
 
-_BLOCK = 1024  # samples of a block, some 50 of which are its ends
-_AT_ONCE = 16  # blocks: more are no faster, and a long record must not double in memory
+_REACH = 3  # steps that the taps of line_inverse look ahead and back
+
+# The loops below lie in vectors because each runs over one row of doubles, without branches, over a
+# number of steps that the compiler knows. Rows are longer than a block by what is looked ahead, and
+# their addresses differ by more than the processor confuses, a multiple of 4096.
+_AHEAD = 8  # steps that a mode takes at once, the widest vector of doubles
+_BLOCK = 576  # steps
+_ROW = 640
+_KEPT = 512  # samples of a block of the decimation
+_AT_ONCE = 8  # taps
 
 
 def exact_oscillator(
@@ -73,60 +80,133 @@ def exact_oscillator(
 
 
 @kernel
+def _read(row: Any, first: int, block: Any) -> None:
+    """A block of forces with those about it; before the first and after the last these stand."""
+    last = row.size - 1
+    begin = first - _REACH
+    if begin >= 0 and begin + _BLOCK + 2 * _REACH <= row.size:
+        for i in range(_BLOCK + 2 * _REACH):
+            block[i] = row[np.uint64(begin + i)]  # unsigned: no index counts from the end
+    else:
+        for i in range(_BLOCK + 2 * _REACH):
+            block[i] = row[min(max(begin + i, 0), last)]
+
+
+@kernel
+def _raise(block: Any, taps: Any, raised: Any) -> None:
+    """Forces through the symmetric taps."""
+    t0, t1, t2, t3 = taps[3], taps[4], taps[5], taps[6]
+    for i in range(_BLOCK):
+        raised[i + _AHEAD] = (
+            t0 * block[i + 3]
+            + t1 * (block[i + 2] + block[i + 4])
+            + t2 * (block[i + 1] + block[i + 5])
+            + t3 * (block[i] + block[i + 6])
+        )
+
+
+@kernel
+def _add_direct(total: Any, a: float, block: Any, b: float, raised: Any) -> None:
+    for i in range(_BLOCK):
+        total[i] += a * block[i + _REACH] + b * raised[i + _AHEAD]
+
+
+@kernel
+def _add_modal(total: Any, a: float, real: Any, b: float, imaginary: Any) -> None:
+    for i in range(_BLOCK):
+        total[i] += a * real[i + _AHEAD] + b * imaginary[i + _AHEAD]
+
+
+@kernel
+def _add_pair(total: Any, a: float, x: Any, b: float, y: Any) -> None:
+    for i in range(_BLOCK + 4 * _AHEAD):
+        total[i] += a * x[i] + b * y[i]
+
+
+@kernel
+def _gather_four(force: Any, turn: Any, real: Any, imaginary: Any) -> None:
+    """Sum of four steps' forces, each turned on by a mode until the last of them."""
+    a1, a2, a3 = turn[0].real, turn[1].real, turn[2].real
+    b1, b2, b3 = turn[0].imag, turn[1].imag, turn[2].imag
+    for i in range(_BLOCK + 4 * _AHEAD):
+        real[i] = force[i + 3] + a1 * force[i + 2] + a2 * force[i + 1] + a3 * force[i]
+        imaginary[i] = b1 * force[i + 2] + b2 * force[i + 1] + b3 * force[i]
+
+
+@kernel
+def _turn_eight(real: Any, imaginary: Any, turn: Any, x: Any, y: Any) -> None:
+    """Every state eight steps on, from sums of four."""
+    a4, b4, a8, b8 = turn[3].real, turn[3].imag, turn[4].real, turn[4].imag
+    for i in range(_BLOCK):
+        pushed_x = real[i + 4] + a4 * real[i] - b4 * imaginary[i]
+        pushed_y = imaginary[i + 4] + b4 * real[i] + a4 * imaginary[i]
+        x_now, y_now = x[i], y[i]
+        x[i + _AHEAD] = a8 * x_now - b8 * y_now + pushed_x
+        y[i + _AHEAD] = b8 * x_now + a8 * y_now + pushed_y
+
+
+@kernel
+def _write(total: Any, first: int, n: int, row: Any) -> None:
+    for i in range(n):
+        row[np.uint64(first + i)] = total[i]
+
+
+@kernel
 def _respond(
     forces: Any,
     taps: Any,
     inputs: Any,
-    outputs: Any,
-    stiffness: Any,
-    damping: Any,
-    transition: Any,
-    gain: Any,
-    scratch: Any,
+    direct: Any,
+    raised_direct: Any,
+    turns: Any,
+    swings: Any,
+    raised: Any,
+    states: Any,
+    block: Any,
+    force: Any,
+    real: Any,
+    imaginary: Any,
+    x: Any,
+    y: Any,
+    total: Any,
     acceleration: Any,
 ) -> None:
     """Bare modal masses under `forces`, and what springs and dashpots of every mode take back.
 
     These feel straight lines between the forces filtered by the symmetric `taps`; they start in
-    balance with the first of them. `scratch` [shape=(5, n)] holds forces as they are and filtered,
-    and of every mode its force, coordinate and rate.
+    balance with the first of them. Coefficients are those of :class:`_Steps`; `raised` and what
+    follows are scratch, rows of ``_ROW``, and `states` [shape=(n_modes, 2, 8)] the last eight
+    states of every mode.
     """
-    n, n_inputs = forces.shape
-    n_modes, n_outputs = outputs.shape
-    half = taps.size // 2
-    for i in range(n):
+    n_inputs, n = forces.shape
+    for first in range(0, n, _BLOCK):
+        total[:] = 0.0
         for j in range(n_inputs):
-            raised = 0.0
-            for k in range(-half, half + 1):
-                raised += taps[half + k] * forces[min(max(i + k, 0), n - 1), j]
-            scratch[0, j] = forces[i, j]
-            scratch[1, j] = raised
-        for k in range(n_outputs):
-            acceleration[i, k] = 0.0
-        for m in range(n_modes):
-            bare, following = 0.0, 0.0
-            for j in range(n_inputs):
-                bare += inputs[m, j] * scratch[0, j]
-                following += inputs[m, j] * scratch[1, j]
-            if i == 0:
-                scratch[2, m] = following
-                scratch[3, m] = following / stiffness[m]
-                scratch[4, m] = 0.0
-            force, q, v = scratch[2, m], scratch[3, m], scratch[4, m]
-            q, v = (
-                transition[m, 0, 0] * q
-                + transition[m, 0, 1] * v
-                + gain[m, 0, 0] * force
-                + gain[m, 0, 1] * following,
-                transition[m, 1, 0] * q
-                + transition[m, 1, 1] * v
-                + gain[m, 1, 0] * force
-                + gain[m, 1, 1] * following,
-            )
-            scratch[2, m], scratch[3, m], scratch[4, m] = following, q, v
-            felt = bare - damping[m] * v - stiffness[m] * q
-            for k in range(n_outputs):
-                acceleration[i, k] += outputs[m, k] * felt
+            for i in range(_AHEAD):
+                raised[j, i] = raised[j, i + _BLOCK]
+            _read(forces[j], first, block)
+            _raise(block, taps, raised[j])
+            if first == 0:
+                for i in range(_AHEAD):
+                    raised[j, i] = raised[j, _AHEAD]
+            for k in range(len(total)):
+                _add_direct(total[k], direct[k, j], block, raised_direct[k, j], raised[j])
+        for m in range(len(inputs)):
+            force[:] = 0.0
+            for j in range(0, len(raised), 2):
+                _add_pair(force, inputs[m, j], raised[j], inputs[m, j + 1], raised[j + 1])
+            for i in range(_AHEAD):
+                balance = turns[m, 5] * force[0]
+                x[i] = balance.real if first == 0 else states[m, 0, i]
+                y[i] = balance.imag if first == 0 else states[m, 1, i]
+            _gather_four(force, turns[m], real, imaginary)
+            _turn_eight(real, imaginary, turns[m], x, y)
+            for i in range(_AHEAD):
+                states[m, 0, i], states[m, 1, i] = x[i + _BLOCK], y[i + _BLOCK]
+            for k in range(len(total)):
+                _add_modal(total[k], swings[m, k].imag, x, swings[m, k].real, y)
+        for k in range(len(total)):
+            _write(total[k], first, min(_BLOCK, n - first), acceleration[k])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -147,27 +227,71 @@ class CasingModes:
     outputs: NDArray[np.float64]
 
 
+def _steps(
+    modes: CasingModes, step: float
+) -> tuple[NDArray[np.float64], NDArray[np.complex128], NDArray[np.complex128]]:
+    """How modes move on by whole steps, each as one complex number.
+
+    Returns
+    -------
+    share : numpy.ndarray [shape=(n_modes,)]
+        Acceleration of a mode at once per filtered force, beside that of its bare mass.
+    turns : numpy.ndarray [shape=(n_modes, 6)]
+        Factors of the state over 1, 2, 3, 4 and 8 steps, and state in balance per force.
+    swings : numpy.ndarray [shape=(n_modes,)]
+        Imaginary part of it times the state: acceleration by the forces before.
+
+    Notes
+    -----
+    With ``p = -zeta w + j w_d`` the state ``z = q' - conj(p) q`` obeys ``z' = p z + f``; of it
+    ``q = Im(z) / w_d``, and springs and dashpots add ``Im(p^2 z) / w_d`` to the bare mass. Under
+    straight lines, ``z[n+1] = t z[n] + g0 f[n] + g1 f[n+1]`` with ``t = exp(p step)``, so that
+    ``z = (t g1 + g0) r + g1 f`` where ``r[n+1] = t r[n] + f[n]``. The factors follow from
+    :func:`exact_oscillator`.
+    """
+    pairs = [
+        exact_oscillator(f, z, step)
+        for f, z in zip(modes.frequency, modes.damping_ratio, strict=True)
+    ]
+    transition, gain = np.array([pair[0] for pair in pairs]), np.array([pair[1] for pair in pairs])
+    omega = 2 * np.pi * modes.frequency
+    damped = omega * np.sqrt(1 - modes.damping_ratio**2)
+    pole = -modes.damping_ratio * omega + 1j * damped
+    before, after = (gain[:, 1] - pole.conj()[:, None] * gain[:, 0]).T
+    one = transition[:, 0, 0] + pole * transition[:, 0, 1]
+    two = one * one
+    four = two * two
+    turns = np.column_stack([one, two, two * one, four, four * four, 1 / (1 - one)])
+    felt = pole**2 / damped
+    return (felt * after).imag, turns, felt * (one * after + before)
+
+
 def _acceleration(
     forces: NDArray[np.float64], taps: NDArray[np.float64], sample_rate: float, modes: CasingModes
 ) -> NDArray[np.float64]:
-    """Acceleration [shape=(n_samples, n_outputs)] where springs feel the forces through `taps`."""
-    pairs = [
-        exact_oscillator(f, z, 1 / sample_rate)
-        for f, z in zip(modes.frequency, modes.damping_ratio, strict=True)
-    ]
-    omega = 2 * np.pi * modes.frequency
-    n_modes, n_inputs = modes.inputs.shape
-    acceleration = np.empty((len(forces), modes.outputs.shape[1]))
+    """Acceleration [shape=(n_outputs, n_samples)] where springs feel the forces through `taps`."""
+    share, turns, swings = _steps(modes, 1 / sample_rate)
+    n_inputs, n_outputs = modes.inputs.shape[1], modes.outputs.shape[1]
+    pairs = max(1, -(-n_inputs // 2))
+    block, force, real, imaginary, x, y = np.zeros((6, _ROW))
+    acceleration = np.empty((n_outputs, len(forces)))
     _respond(
-        forces,
+        np.ascontiguousarray(forces.T),
         taps,
-        np.ascontiguousarray(modes.inputs),
-        np.ascontiguousarray(modes.outputs),
-        omega**2,
-        2 * modes.damping_ratio * omega,
-        np.array([pair[0] for pair in pairs]),
-        np.array([pair[1] for pair in pairs]),
-        np.empty((5, max(n_modes, n_inputs))),
+        np.pad(modes.inputs, ((0, 0), (0, 2 * pairs - n_inputs))),
+        modes.outputs.T @ modes.inputs,
+        (modes.outputs * share[:, None]).T @ modes.inputs,
+        turns,
+        modes.outputs * swings[:, None],
+        np.zeros((2 * pairs, _ROW)),
+        np.zeros((len(turns), 2, _AHEAD)),
+        block,
+        force,
+        real,
+        imaginary,
+        x,
+        y,
+        np.zeros((n_outputs, _ROW)),
         acceleration,
     )
     return acceleration
@@ -199,7 +323,10 @@ def housing_acceleration(
     ``sinc^2(f / sample_rate)``, the share of the samples' spectrum that straight lines keep;
     :func:`band_limited_acceleration` has no such loss.
     """
-    return _acceleration(np.ascontiguousarray(forces), np.ones(1), sample_rate, modes).T
+    return _acceleration(forces, _AS_THEY_ARE, sample_rate, modes)
+
+
+_AS_THEY_ARE = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])  # taps
 
 
 def band_limited_acceleration(
@@ -230,8 +357,7 @@ def band_limited_acceleration(
     that loss made up for, so that they and the bare masses, which feel the means as they are,
     cancel each other below the modes as they should.
     """
-    means = np.ascontiguousarray(means)
-    return decimate(_acceleration(means, line_inverse(), step_rate, modes), factor).T
+    return _decimated(_acceleration(means, line_inverse(), step_rate, modes), factor)
 
 
 def casing_inputs(shape: Mapping[str, float], place: str, throw: int) -> float:
@@ -310,7 +436,7 @@ def table_acceleration(
     """
     rate = step_rate / factor
     held = means[0]
-    forces = decimate(means - held, factor).T
+    forces = _decimated(np.ascontiguousarray((means - held).T), factor)
     pad = math.ceil(rate / accelerance.spacing)
     edge = edge_samples(factor)
     # the last rows run into zeros: they are led there more gently
@@ -395,44 +521,69 @@ def decimate(means: NDArray[np.float64], factor: int) -> NDArray[np.float64]:
         Row k belongs to the middle of step ``k * factor``. Within :func:`edge_samples` of either
         end the filter runs into zeros.
     """
-    n_kept = means.shape[0] // factor
-    edge = edge_samples(factor)
-    hop = _BLOCK - 2 * edge
-    n_blocks = -(-n_kept // hop)
-    padded = np.zeros((means.shape[1], (n_blocks * hop + 2 * edge) * factor))
-    padded[:, edge * factor : edge * factor + means.shape[0]] = means.T
-    blocks = sliding_window_view(padded, _BLOCK * factor, axis=1)[:, :: hop * factor]
-    kept = np.empty((means.shape[1], n_blocks, hop))
-    for first in range(0, n_blocks, _AT_ONCE):
-        some = slice(first, first + _AT_ONCE)
-        spectrum = fft.rfft(blocks[:, some])
-        spectrum *= _decimation_response(factor)
-        kept[:, some] = fft.irfft(_folded(spectrum, factor), _BLOCK)[..., edge : edge + hop]
-    return np.ascontiguousarray(kept.reshape(means.shape[1], -1)[:, :n_kept].T)
+    return np.ascontiguousarray(_decimated(np.ascontiguousarray(means.T), factor).T)
+
+
+def _decimated(rows: NDArray[np.float64], factor: int) -> NDArray[np.float64]:
+    """As :func:`decimate`, of rows [shape=(n_columns, n_steps)]."""
+    phases = _filter_phases(factor)
+    kept = np.empty((len(rows), rows.shape[1] // factor))
+    scratch = np.empty(_KEPT + phases.shape[1]), np.empty(_KEPT)
+    _low_pass(rows, phases, edge_samples(factor), *scratch, kept)
+    return kept
 
 
 @lru_cache(maxsize=8)
-def _decimation_response(factor: int) -> NDArray[np.float64]:
-    """Of the filter over a block; real, since it is symmetric, and led by no delay."""
+def _filter_phases(factor: int) -> NDArray[np.float64]:
+    """Every factor-th tap of the filter, from each of the first ones on, and zeros."""
     taps = decimation_filter(factor)
-    half = len(taps) // 2
-    circular = np.zeros(_BLOCK * factor)
-    circular[: half + 1], circular[-half:] = taps[half:], taps[:half]
-    return np.asarray(fft.rfft(circular).real)
+    columns = _AT_ONCE * math.ceil(len(taps) / factor / _AT_ONCE)
+    padded = np.zeros(columns * factor)
+    padded[: len(taps)] = taps
+    return np.ascontiguousarray(padded.reshape(columns, factor).T)
 
 
-def _folded(spectrum: NDArray[np.complex128], factor: int) -> NDArray[np.complex128]:
-    """One-sided spectrum of every factor-th sample: the sum of all that look alike there."""
-    n = _BLOCK // 2
-    folded = spectrum[..., : n + 1].copy()
-    for turn in range(1, factor):
-        first = turn * _BLOCK
-        if 2 * turn < factor:
-            folded += spectrum[..., first : first + n + 1]
-        else:  # negative frequencies, mirrored
-            last = (factor - turn) * _BLOCK
-            folded += spectrum[..., last - n : last + 1][..., ::-1].conj()
-    return np.asarray(folded / factor)
+@kernel
+def _pick(row: Any, first: int, factor: int, picked: Any) -> None:
+    """Every factor-th value; zeros beyond the ends."""
+    n = picked.size
+    if first >= 0 and first + (n - 1) * factor < row.size:
+        for i in range(n):
+            picked[i] = row[np.uint64(first + i * factor)]
+    else:
+        for i in range(n):
+            at = first + i * factor
+            picked[i] = row[at] if 0 <= at < row.size else 0.0
+
+
+@kernel
+def _add_taps(total: Any, taps: Any, first: int, x: Any) -> None:
+    """Eight taps from the first on."""
+    t0, t1, t2, t3 = taps[first], taps[first + 1], taps[first + 2], taps[first + 3]
+    t4, t5, t6, t7 = taps[first + 4], taps[first + 5], taps[first + 6], taps[first + 7]
+    for i in range(_KEPT):
+        k = np.uint64(first + i)
+        early = (t0 * x[k] + t1 * x[k + _ONE]) + (t2 * x[k + _TWO] + t3 * x[k + _THREE])
+        late = (t4 * x[k + _FOUR] + t5 * x[k + _FIVE]) + (t6 * x[k + _SIX] + t7 * x[k + _SEVEN])
+        total[i] += early + late
+
+
+_ONE, _TWO, _THREE, _FOUR, _FIVE, _SIX, _SEVEN = (np.uint64(i) for i in range(1, 8))
+
+
+@kernel
+def _low_pass(rows: Any, phases: Any, edge: int, picked: Any, total: Any, kept: Any) -> None:
+    """Filter and keep one in so many: of each phase of the filter, one phase of the rows."""
+    factor, columns = phases.shape
+    n_kept = kept.shape[1]
+    for c in range(len(rows)):
+        for first in range(0, n_kept, _KEPT):
+            total[:] = 0.0
+            for phase in range(factor):
+                _pick(rows[c], (first - edge) * factor + phase, factor, picked)
+                for tap in range(0, columns, _AT_ONCE):
+                    _add_taps(total, phases[phase], tap, picked)
+            _write(total, first, min(_KEPT, n_kept - first), kept[c])
 
 
 def edge_samples(factor: int) -> int:
