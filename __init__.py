@@ -28,6 +28,9 @@ if TYPE_CHECKING:
     from .datasets.measured.data_set import import_recordings as import_recordings
     from .datasets.measured.recording import read_recording as read_recording
     from .datasets.source.part import SourceOptions as SourceOptions
+    from .diagnose.twin.calibration import CalibratedScene as CalibratedScene
+    from .diagnose.twin.calibration import MisfitError as MisfitError
+    from .diagnose.twin.calibration import calibrate as calibrate
     from .diagnose.wear_model.estimate import Estimate as Estimate
     from .diagnose.wear_model.estimate import ModelError as ModelError
     from .diagnose.wear_model.estimate import WearModel as WearModel
@@ -54,11 +57,13 @@ _MODULES = ("align", "contact", "crank", "features", "film", "shaft")
 """Public modules, each with an ``__all__``."""
 
 _HOMES = {
+    "CalibratedScene": ".diagnose.twin.calibration",
     "Channel": ".sim.output.sensor",
     "DataError": ".sim.output.recording",
     "DataSet": ".datasets.file.record",
     "Estimate": ".diagnose.wear_model.estimate",
     "Evaluation": ".diagnose.workflow.evaluate",
+    "MisfitError": ".diagnose.twin.calibration",
     "ModelError": ".diagnose.wear_model.estimate",
     "Recording": ".sim.output.recording",
     "Report": ".diagnose.workflow.report",
@@ -67,6 +72,7 @@ _HOMES = {
     "SimulationError": ".sim.output.status",
     "SourceOptions": ".datasets.source.part",
     "WearModel": ".diagnose.wear_model.estimate",
+    "calibrate": ".diagnose.twin.calibration",
     "evaluate": ".diagnose.workflow.evaluate",
     "feature_row": ".features.catalogue.row",
     "generate": ".datasets.generation.generate",

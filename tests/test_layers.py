@@ -69,6 +69,7 @@ ROOMS = {
         "wear_model",
         "film_clearance",
         "nameplate",
+        "twin",
         "report",
         "class_model",
         "evaluation",

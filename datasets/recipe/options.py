@@ -4,13 +4,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, Self
 
-import numpy as np
 from pydantic import Field, model_validator
 
 from ...sim.scene.load import override, scene_from_table
 from ...sim.scene.parts import Part, Ratio, SceneError
 from .draws import Axis, Bound, Draw, axes_of, matches
-from .sampling import number_of
 
 _WORD = "^[a-z][a-z0-9_-]*$"
 _LONGEST = 32  # characters of an option's name, in the manifest
@@ -99,16 +97,22 @@ class Alternatives:
         """Scene values that any option decides."""
         return {path for option in self.options for path in option.paths}
 
-    def take(self, rng: Callable[..., np.random.Generator]) -> tuple[str, dict[str, Any]]:
+    @property
+    def coordinates(self) -> tuple[str, ...]:
+        """Names of the numbers that it is drawn by: of the option, then of what options draw."""
+        entries = [e for option in self.options for axis in option.axes for e in axis.entries]
+        return (self.name, *dict.fromkeys(f"{self.name}.{entry}" for entry in entries))
+
+    def take(self, at: Callable[[str], float]) -> tuple[str, dict[str, Any]]:
         """Name and scene values of the option of one machine or record.
 
         Parameters
         ----------
-        rng : callable
-            Random stream of that machine or record for every key of whole numbers. An option's
-            draws do not depend on which other options there are.
+        at : callable
+            Number in (0, 1) of every name of `coordinates`. An option's draws do not depend on
+            which other options there are.
         """
-        left = rng(number_of(self.name)).random()
+        left = at(self.name)
         chosen = self.options[-1]
         for option in self.options:
             if left < option.share:
@@ -116,9 +120,7 @@ class Alternatives:
                 break
             left -= option.share
         drawn = {
-            axis.path: axis.value(
-                [rng(number_of(f"{self.name}.{entry}")).random() for entry in axis.entries]
-            )
+            axis.path: axis.value([at(f"{self.name}.{entry}") for entry in axis.entries])
             for axis in chosen.axes
         }
         return chosen.name, {**chosen.values, **drawn}

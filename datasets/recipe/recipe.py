@@ -39,7 +39,11 @@ from .life import LIFE_COLUMNS, LifeTable, Lives, Moment, life_faults
 from .options import Alternatives, OptionSet, alternatives_of
 from .sampling import BLOCK, SET, CubeAxis, Points, Sampling, number_of
 from .text import RecipeError, beside, merged, read_recipe
+from .twin import Twin, TwinTable, coordinate_names
 from .wear_bounds import bound_of_limits
+
+IS_TWIN = "twin"
+"""Manifest column that says whether a record is of the calibrated machine."""
 
 VIEW = "view"
 """Manifest column that names which test of its machine state a record is."""
@@ -67,7 +71,8 @@ RESERVED = ("none", "combined")
     _MOMENT,
     _MACHINE_CHOICE,
     _RECORD_CHOICE,
-) = range(9)
+    _TWIN,
+) = range(10)
 
 _SEVERITIES_OF_SET = 1
 """Dimensions of a Sobol sequence kept for severities: the first one is even together with the first
@@ -148,6 +153,10 @@ class RecipeTable(Part):
     held_out: tuple[Region, ...] = Field(default=(), description="to test on, not to train on")
     life: LifeTable | None = Field(
         default=None, description="machines over their lives: their wear gives the first severity"
+    )
+    twin: TwinTable | None = Field(
+        default=None,
+        description="a calibrated machine among those drawn; in a file, the name of its scene",
     )
 
 
@@ -309,6 +318,7 @@ class Recipe:
             **dict.fromkeys(presence, "?"),
             **dict.fromkeys(values, "<f8"),
             **({} if self.table.life is None else LIFE_COLUMNS),
+            **({} if self.table.twin is None else {IS_TWIN: "?"}),
             **dict.fromkeys(self.conditions, "<f8"),
         }
 
@@ -327,6 +337,11 @@ class Recipe:
             limit=self.severities[0].edges[-1],
             recordings=self.table.records_per_group,
         )
+
+    @cached_property
+    def twin(self) -> Twin | None:
+        """The calibrated machine among those drawn."""
+        return None if self.table.twin is None else Twin(self.table.twin)
 
     @property
     def faults(self) -> tuple[RecipeFault, ...]:
@@ -371,7 +386,12 @@ def _conditions(scene: Scene) -> dict[str, str]:
 
 
 def load_recipe(
-    name_or_path: str | Path, overrides: Mapping[str, Any] | None = None, *, view: str = ""
+    name_or_path: str | Path,
+    overrides: Mapping[str, Any] | None = None,
+    *,
+    view: str = "",
+    scene: str | Path | None = None,
+    twin: str | Path | None = None,
 ) -> Recipe:
     """Load a built-in recipe or a TOML file, and check it against its scene.
 
@@ -384,6 +404,11 @@ def load_recipe(
     view : str
         Which of its ``[views]``, further tests of the same machine states; what the view sets is
         set like an override, and an override of the same path wins.
+    scene : str or Path, optional
+        Built-in scene or file in place of the one that the recipe names.
+    twin : str or Path, optional
+        Calibrated scene, of ``wearstate calibrate``: a share of the machines is drawn from what
+        is known of it, beside those that the recipe draws.
 
     Returns
     -------
@@ -405,7 +430,7 @@ def load_recipe(
     >>> load_recipe("shaft-rig-small", view="running").scene.exciters[0].mounted
     False
     """
-    source = read_recipe(name_or_path)
+    source = read_recipe(name_or_path, twin=twin)
     if isinstance(source.table.get("machine"), str):
         fault = (
             "machine is a text, as this is a scene, not a recipe; name it in a recipe by "
@@ -414,13 +439,13 @@ def load_recipe(
         raise RecipeError(str(name_or_path), [fault])
     try:
         table = validate_table(RecipeTable, source.table, str(name_or_path))
-        place = beside(source.folder, table.scene)
-        scene = scene_text(place)
-        base = dict(files_beside(scene_table(scene, table.scene), scene_folder(place)))
+        place = beside(source.folder, table.scene) if scene is None else scene
+        text = scene_text(place)
+        base = dict(files_beside(scene_table(text, str(place)), scene_folder(place)))
     except SceneError as error:
         raise RecipeError(str(name_or_path), error.faults) from None
     faults = [*source.foreign, *_machine_faults(table, source.machines_folder)]
-    texts = {"text": source.text, "scene_text": scene}
+    texts = {"text": source.text, "scene_text": text}
     changes = {**_view_values(table, view), **(overrides or {})}
     return replace(_resolved(table, base, changes, texts, faults), view=view)
 
@@ -459,6 +484,7 @@ def _resolved(
     copulas = copula_of(table.correlation, _levels(places, axes), faults)
     held_out = _held_out(in_metres, axes, base, faults) if len(axes) == len(places) else ()
     faults += _life_faults(table, axes, base)
+    faults += _twin_faults(table, _of(axes, "machine"), choices)
     if faults:
         raise RecipeError(table.name, _told_once(faults))
     return Recipe(
@@ -597,6 +623,21 @@ def _life_faults(
     condemning = None if limits is None else limits.condemning
     low, high = worn.bands[0]
     return life_faults(table.life, worn.path, low, high, condemning)
+
+
+def _twin_faults(
+    table: RecipeTable, machine: Sequence[Axis], choices: Sequence[Alternatives]
+) -> list[str]:
+    """Numbers of a twin that the recipe does not draw."""
+    if table.twin is None:
+        return []
+    lost = sorted(set(table.twin.names) - set(coordinate_names(machine, choices)))
+    if not lost:
+        return []
+    return [
+        f"twin: {', '.join(lost[:3])} ({len(lost)} in all) must be drawn by the recipe; use the "
+        "one that it was calibrated with"
+    ]
 
 
 def _machine_faults(table: RecipeTable, folder: Path) -> list[str]:
@@ -956,11 +997,18 @@ class _Source:
     points: Points
     copula: Copula | None
 
-    def values(self, number: int) -> dict[str, Any]:
-        """Values of one machine or record by path."""
+    def coordinates(self, number: int) -> dict[str, float]:
+        """Numbers in (0, 1) that one machine or record is drawn by."""
         point = self.points.at(number)
-        left = iter((point if self.copula is None else self.copula(point)).tolist())
-        return {axis.path: axis.value([next(left) for _ in axis.entries]) for axis in self.axes}
+        names = [entry for axis in self.axes for entry in axis.entries]
+        return dict(
+            zip(names, (point if self.copula is None else self.copula(point)).tolist(), strict=True)
+        )
+
+    def values(self, number: int, known: Mapping[str, float] | None = None) -> dict[str, Any]:
+        """Values of one machine or record by path, at coordinates that are known or drawn."""
+        at = {**self.coordinates(number), **(known or {})}
+        return {axis.path: axis.value([at[entry] for entry in axis.entries]) for axis in self.axes}
 
 
 def _sources(recipe: Recipe, seed: int) -> dict[str, _Source]:
@@ -995,10 +1043,11 @@ def _dimensions(axes: Sequence[Axis], places: range) -> list[CubeAxis]:
 
 def _sample(recipe: Recipe, sources: Mapping[str, _Source], index: int, seed: int) -> Sample:
     group = index // recipe.table.records_per_group
-    drawn = sources["machine"].values(group)
+    known = _known(recipe, group, seed)
+    drawn = sources["machine"].values(group, known)
     drawn |= sources["record"].values(index)
     drawn |= sources["severity"].values(index)
-    taken = _choices(recipe, group, index, seed)
+    taken = _choices(recipe, group, index, seed, known)
     drawn |= {path: value for _, values in taken.values() for path, value in values.items()}
     life = _moment(recipe, group, index, seed)
     if life is not None:
@@ -1015,23 +1064,34 @@ def _sample(recipe: Recipe, sources: Mapping[str, _Source], index: int, seed: in
         **_severity_labels(recipe, drawn),
         **{column: name for column, (name, _) in taken.items()},
         **({} if life is None else life.labels),
+        **({} if recipe.twin is None else {IS_TWIN: bool(known)}),
         **_confounder_labels(recipe, faults),
         **{name: condition_of(scene, name) for name in recipe.conditions},
     }
     return Sample(index=index, group=group, seed=noise_seed, row=row, drawn=drawn, scene=scene)
 
 
+def _known(recipe: Recipe, group: int, seed: int) -> dict[str, float]:
+    """Coordinates of a machine that is the twin; none of one that the recipe draws."""
+    if recipe.twin is None:
+        return {}
+    rng = recipe.rng(seed, _TWIN, group)
+    return recipe.twin.draw(rng) if rng.random() < recipe.twin.table.share else {}
+
+
 def _choices(
-    recipe: Recipe, group: int, index: int, seed: int
+    recipe: Recipe, group: int, index: int, seed: int, known: Mapping[str, float]
 ) -> dict[str, tuple[str, dict[str, Any]]]:
     """Option and scene values of every choice, by its manifest column."""
     streams = {"machine": (_MACHINE_CHOICE, group), "record": (_RECORD_CHOICE, index)}
 
-    def rng(per: str, *key: int) -> np.random.Generator:
+    def at(per: str, word: str) -> float:
+        if per == "machine" and word in known:
+            return known[word]
         stream, number = streams[per]
-        return recipe.rng(seed, stream, number, *key)
+        return float(recipe.rng(seed, stream, number, number_of(word)).random())
 
-    return {each.column: each.take(partial(rng, each.per)) for each in recipe.choices}
+    return {each.column: each.take(partial(at, each.per)) for each in recipe.choices}
 
 
 def _moment(recipe: Recipe, group: int, index: int, seed: int) -> Moment | None:

@@ -91,13 +91,15 @@ def _location(name_or_path: str | Path) -> Path:
     return built_in if built_in.is_file() else Path(name_or_path)
 
 
-def read_recipe(name_or_path: str | Path) -> RecipeSource:
-    """Read a recipe with all that it extends.
+def read_recipe(name_or_path: str | Path, *, twin: str | Path | None = None) -> RecipeSource:
+    """Read a recipe with all that it extends, and its twin.
 
     Parameters
     ----------
     name_or_path : str or Path
         A name of `recipe_names`, or a file.
+    twin : str or Path, optional
+        Calibrated scene in place of the one that the recipe names as its twin.
 
     Returns
     -------
@@ -108,7 +110,7 @@ def read_recipe(name_or_path: str | Path) -> RecipeSource:
     ------
     RecipeError
         A recipe of the chain is missing or no TOML, the chain is a circle or longer than
-        `LONGEST_CHAIN`, or ``without`` names what is not there.
+        `LONGEST_CHAIN`, ``without`` names what is not there, or the twin has no file.
 
     Examples
     --------
@@ -127,7 +129,9 @@ def read_recipe(name_or_path: str | Path) -> RecipeSource:
         inherited = _inherited(own, table, inherited)
         folders |= {key: place.parent for key in folders if key in own}
         table = merged(table, own)
-    text = recipe_text(name_or_path) if len(chain) == 1 else toml_text(table)
+    plain = len(chain) == 1 and twin is None and not isinstance(table.get("twin"), str)
+    table = _with_twin(table, str(name_or_path), chain[0][0].parent, twin)
+    text = recipe_text(name_or_path) if plain else toml_text(table)
     return RecipeSource(
         table=table,
         text=text,
@@ -136,6 +140,34 @@ def read_recipe(name_or_path: str | Path) -> RecipeSource:
         foreign=tuple(foreign),
         inherited=inherited,
     )
+
+
+def _with_twin(
+    table: dict[str, Any], name: str, folder: Path, twin: str | Path | None
+) -> dict[str, Any]:
+    """A table with the numbers of its twin in place of the file that holds them."""
+    given = table.get("twin") if twin is None else str(twin)
+    if not isinstance(given, str):
+        return table
+    place = twin_path(given) if twin is not None else folder / twin_path(given)
+    try:
+        text = place.read_text(encoding="utf-8")
+    except (OSError, ValueError) as error:
+        fault = f"twin = {given!r}: {place} cannot be read ({error}); make it: wearstate calibrate"
+        raise RecipeError(name, [fault]) from None
+    return {**table, "twin": scene_table(text, str(place))}
+
+
+def twin_path(scene: str | Path) -> Path:
+    """File of the posterior that belongs to a calibrated scene.
+
+    Examples
+    --------
+    >>> twin_path("mine.toml").name
+    'mine.twin.toml'
+    """
+    path = Path(scene)
+    return path if path.name.endswith(".twin.toml") else path.with_suffix(".twin.toml")
 
 
 def _foreign(own: Mapping[str, Any], base: Mapping[str, Any], before: list[str]) -> list[str]:

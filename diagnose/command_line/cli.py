@@ -33,7 +33,7 @@ from .commands_data import (
     splits,
 )
 from .commands_machine import align, chart, frf, scene, simulate, stability, verify
-from .commands_wear import blindspots, demo, evaluate, report, train
+from .commands_wear import blindspots, calibrate, demo, evaluate, report, train
 
 # files are written under another name first, which says nothing to the caller
 _UNFINISHED = re.compile(r"\.part\b|\.[0-9a-f]{8}\.tmp\b")
@@ -156,6 +156,7 @@ for _command in (
     splits,
     audit,
     features,
+    calibrate,
     train,
     evaluate,
     report,

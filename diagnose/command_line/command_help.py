@@ -133,6 +133,10 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "wearstate features data.h5 -o features.csv",
         "wearstate features data.h5 --rank -o rank.html",
     ),
+    "calibrate": (
+        "wearstate calibrate mine-sheet.toml healthy.h5 -o mine.toml",
+        "wearstate calibrate bilge-pump slow.h5 fast.h5 --unknown 'casing.modes.*' -o mine.toml",
+    ),
     "train": (
         "wearstate train data.h5 -o pump.wsm",
         "wearstate train data.h5 --baseline healthy.h5 --held-out 0.3 -o pump.wsm",

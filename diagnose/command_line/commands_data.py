@@ -158,6 +158,11 @@ def recipe_preview(
 )
 @click.option("--truth", is_flag=True, help="Also store forces and orbit.")
 @click.option(
+    "--twin",
+    type=PATH,
+    help="Calibrated scene (wearstate calibrate): every other machine is drawn as this one.",
+)
+@click.option(
     "--fidelity",
     type=click.Choice(["auto", "given"]),
     default=None,
@@ -178,6 +183,7 @@ def generate(
     output: Path,
     view: str,
     truth: bool,
+    twin: Path | None,
     fidelity: Literal["auto", "given"] | None,
     seed: int,
     jobs: int | None,
@@ -192,13 +198,14 @@ def generate(
     from dataclasses import asdict
 
     from ...datasets.generation.generate import generate as run
+    from ...datasets.recipe.recipe import load_recipe
 
     if scheduler is not None and jobs is not None:
         raise click.UsageError("--jobs is for this machine, not for the workers of --scheduler")
     check_outputs([recipe], [(output, DATA_SUFFIXES)], force)
     with progress_bar("simulating") as progress:
         summary = run(
-            recipe,
+            recipe if twin is None else load_recipe(recipe, view=view, twin=twin),
             records,
             output,
             view=view,

@@ -9,7 +9,7 @@ import click
 
 from ..pages.plain_json import json_text
 from .command_help import command
-from .command_names import DATA, MODEL
+from .command_names import DATA, MODEL, RECIPE, SCENE
 from .command_options import (
     EXIT_ALARM,
     EXIT_BAD_INPUT,
@@ -19,6 +19,7 @@ from .command_options import (
     MOST_RECORDS,
     PAGE_SUFFIXES,
     PATH,
+    SCENE_SUFFIXES,
     PathType,
     Share,
     check_outputs,
@@ -37,6 +38,70 @@ from .command_options import (
 )
 
 _FAIL_ON_HELP = "Exit 3 at a warning, 4 at an alarm, 5 when unfamiliar; alarm: only 4 and 5."
+
+
+@command()
+@click.argument("scene", type=SCENE)
+@click.argument("recordings", type=PATH, nargs=-1, required=True)
+@click.option("-o", "--output", type=PATH, required=True, help="Scene to write (.toml).")
+@click.option(
+    "--unknown",
+    "unknown",
+    multiple=True,
+    metavar="NAME",
+    help="What to estimate, a path or choice of the recipe, * for any; repeat it. All by default.",
+)
+@click.option(
+    "--recipe",
+    type=RECIPE,
+    default=None,
+    help="What is unknown of such machines, and how widely; the standard one by default.",
+)
+@click.option(
+    "--budget",
+    type=click.FloatRange(1, 86_400),
+    default=None,
+    metavar="SECONDS",
+    help="Time of a usual core; decides how many machines are simulated.",
+)
+@seed_option
+@jobs_option
+@force_option
+@json_option
+def calibrate(
+    scene: str,
+    recordings: Sequence[Path],
+    output: Path,
+    unknown: Sequence[str],
+    recipe: str | None,
+    budget: float | None,
+    seed: int,
+    jobs: int | None,
+    force: bool,
+    as_json: bool,
+) -> None:
+    """Estimate what is unknown of the pump SCENE from healthy RECORDINGS of it.
+
+    Writes the calibrated scene, and beside it what is known of its numbers, to generate records
+    from. Recordings that no machine of the scene could have made are refused.
+    """
+    from ..twin.calibration import PRIOR
+    from ..twin.calibration import calibrate as run
+
+    check_outputs([scene, *recordings], [(output, SCENE_SUFFIXES)], force)
+    with progress_bar("simulating") as progress:
+        found = run(
+            scene,
+            recordings,
+            recipe=recipe or PRIOR,
+            unknown=unknown,
+            budget_s=budget,
+            seed=seed,
+            jobs=worker_count(jobs),
+            progress=progress,
+        )
+    found.save(output, force=force)
+    emit({**found.table, "files": [str(output)]}, as_json, f"{found.text}\n{output}")
 
 
 @command()

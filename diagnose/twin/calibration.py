@@ -1,0 +1,412 @@
+"""From healthy recordings of one machine to its scene with what is unknown of it estimated."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...datasets.file.record import DataSet, refuse_output
+from ...datasets.measured.recording import read_recording
+from ...datasets.recipe.recipe import Recipe, load_recipe
+from ...datasets.recipe.text import recipe_names, toml_text, twin_path
+from ...sim.atomic import write_whole
+from ...sim.output.recording import DataError, Recording
+from ...sim.scene.load import override, scene_from_table
+from ...sim.scene.parts import si_unit
+from ..pages.si_text import si_text
+from .inversion import LEAST_TOLD, Inverted, inverted, rounds_of, standard
+from .levels import layout_of, levels_of, speed_of
+from .misfit import Misfit, misfit, refusal
+from .unknowns import WEAR, TwinUnknowns, unknowns_of
+
+Float = NDArray[np.float64]
+
+MOST_RECORDINGS = 8
+"""Of one calibration: each is simulated for every member."""
+PRIOR = "bilge-pump-standard"
+"""Recipe whose draws are the prior of a pump."""
+DRAWS = 400
+"""Of prior and posterior, for the table."""
+DIGITS = 4
+
+
+class MisfitError(ValueError):
+    """The recordings are not of a machine of this scene."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class CalibratedNumber:
+    """One number of the scene before and after.
+
+    Attributes
+    ----------
+    path, unit : str
+        Dotted path and SI unit.
+    prior, posterior : tuple of float
+        Mean and standard deviation.
+    narrower : float
+        Standard deviation of the prior over that of the posterior, both in normal scores.
+    """
+
+    path: str
+    unit: str
+    prior: tuple[float, float]
+    posterior: tuple[float, float]
+    narrower: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class CalibratedScene:
+    """A calibrated scene, of :func:`wearstate.calibrate`.
+
+    Attributes
+    ----------
+    unknowns : TwinUnknowns
+        What was estimated, and its prior.
+    found : Inverted
+        Joint distribution of the normal scores.
+    misfit : Misfit
+        How well the recordings fit machines of this scene.
+    recordings : tuple of str
+        What was used.
+    """
+
+    unknowns: TwinUnknowns
+    found: Inverted
+    misfit: Misfit
+    recordings: tuple[str, ...]
+
+    @cached_property
+    def numbers(self) -> tuple[CalibratedNumber, ...]:
+        """Numbers of the scene that the recordings tell something of, best told first."""
+        rng = np.random.default_rng(0)
+        draws = [each.draw(DRAWS, rng) for each in (self.found.prior, self.found.posterior)]
+        kind = type(self.unknowns.recipe.scene)
+        sd = self.found.posterior.sd / self.found.prior.sd
+        rows = []
+        for name in self.unknowns.named:
+            ratio = sd[self.unknowns.names.index(name)]
+            if ratio < LEAST_TOLD:
+                path = self.unknowns.path_of(name)
+                spread = [self.unknowns.numbers(name, draw) for draw in draws]
+                before, after = ((float(s.mean()), float(s.std())) for s in spread)
+                rows.append(
+                    CalibratedNumber(
+                        path=path,
+                        unit=si_unit(kind, path),
+                        prior=before,
+                        posterior=after,
+                        narrower=float(1 / ratio),
+                    )
+                )
+        return tuple(sorted(rows, key=lambda row: -row.narrower))
+
+    @property
+    def table(self) -> dict[str, Any]:
+        """Everything that it says, ready for JSON."""
+        return {
+            "scene": self.unknowns.recipe.scene.name,
+            "recipe": self.unknowns.recipe.name,
+            "recordings": list(self.recordings),
+            "members": self.found.members,
+            "p": self.misfit.p,
+            "misfit": self.misfit.text,
+            "unknowns": len(self.unknowns.named),
+            "numbers": [
+                {
+                    "path": each.path,
+                    "unit": each.unit,
+                    "prior_mean": each.prior[0],
+                    "prior_sd": each.prior[1],
+                    "mean": each.posterior[0],
+                    "sd": each.posterior[1],
+                    "narrower": each.narrower,
+                }
+                for each in self.numbers
+            ],
+        }
+
+    @property
+    def text(self) -> str:
+        """What ``wearstate calibrate`` prints."""
+        return calibration_text(self)
+
+    @property
+    def scene_table(self) -> dict[str, Any]:
+        """Plain table of the scene: what was learnt at its mean, all else as it was."""
+        mean, learnt = self.found.posterior.mean[np.newaxis], self._learnt
+        values = {
+            self.unknowns.path_of(name): float(self.unknowns.numbers(name, mean)[0])
+            for name in self.unknowns.named
+            if name in learnt and self.unknowns.holds(name, self.unknowns.recipe.scene)
+        }
+        table = override(self.unknowns.recipe.base, values)
+        scene_from_table(table)
+        return table
+
+    @property
+    def twin_table(self) -> dict[str, Any]:
+        """Plain table of the posterior, for recipes: of what was learnt alone."""
+        names = [name for name in self._learnt if name != WEAR]
+        places = [self.unknowns.names.index(name) for name in names]
+        posterior = self.found.posterior
+        sd = posterior.sd[places]
+        correlation = posterior.covariance[np.ix_(places, places)] / np.outer(sd, sd)
+        return {
+            "scene": self.unknowns.recipe.scene.name,
+            "names": names,
+            "mean": [round(float(each), DIGITS) for each in posterior.mean[places]],
+            "sd": [round(float(each), DIGITS) for each in sd],
+            "correlation": [
+                [round(float(each), DIGITS) for each in row[: i + 1]]
+                for i, row in enumerate(correlation)
+            ],
+        }
+
+    @property
+    def _learnt(self) -> tuple[str, ...]:
+        told = self.found.posterior.sd < LEAST_TOLD * self.found.prior.sd
+        return tuple(n for n, each in zip(self.unknowns.names, told, strict=True) if each)
+
+    def save(self, path: str | Path, *, force: bool = False) -> None:
+        """Write the scene, and beside it the posterior, ``mine.twin.toml`` for ``mine.toml``.
+
+        Parameters
+        ----------
+        path : str or Path
+            Scene to write (.toml).
+        force : bool
+            Replace existing files.
+
+        Raises
+        ------
+        DataError
+            A file exists, the folder does not, or nothing was learnt.
+        """
+        file = Path(path).absolute()
+        beside = twin_path(file)
+        for each in (file, beside):
+            refuse_output(each, force)
+        if not self.twin_table["names"]:
+            raise DataError("recordings tell none of the unknowns; give more or longer ones")
+        for each, table in ((file, self.scene_table), (beside, self.twin_table)):
+            write_whole(each, toml_text(table).encode(), force=force)
+
+    def __str__(self) -> str:
+        return self.text
+
+    def __repr__(self) -> str:
+        return (
+            f"<CalibratedScene {self.unknowns.recipe.scene.name}: {len(self.numbers)} of "
+            f"{len(self.unknowns.named)} numbers told, p = {self.misfit.p:.2g}>"
+        )
+
+
+def calibrate(
+    scene: str | Path,
+    recordings: Sequence[Recording | str | Path],
+    *,
+    recipe: str | Path = PRIOR,
+    unknown: Sequence[str] = (),
+    budget_s: float | None = None,
+    seed: int = 0,
+    jobs: int = 1,
+    progress: Callable[[int, int], None] | None = None,
+) -> CalibratedScene:
+    """Estimate the unknown numbers of a reciprocating pump from healthy recordings of it.
+
+    Parameters
+    ----------
+    scene : str or Path
+        A built-in scene or a TOML file: data sheet and drawings.
+    recordings : sequence of Recording, str or Path
+        Of this machine while its wear was within the limits as new, at one or several speeds, with
+        a tacho; a data set stands for all its records.
+    recipe : str or Path
+        What is unknown, and how widely: its draws of machines, around the scene.
+    unknown : sequence of str
+        Paths of the recipe's draws, or its choices, with ``*`` for any; all by default. What is
+        left out is as in the scene.
+    budget_s : float, optional
+        Time to spend on a usual core [s]. It decides how many machines are simulated, and so the
+        result, which is the same on any computer; 330 machines by default.
+    seed : int
+        Of draws and sensor noise, >= 0.
+    jobs : int
+        Worker processes; the result does not depend on them.
+    progress : callable, optional
+        Called with (machines simulated, all).
+
+    Returns
+    -------
+    CalibratedScene
+        Its ``text`` is the table, ``save`` writes scene and posterior.
+
+    Raises
+    ------
+    DataError
+        A recording cannot be read, has no tacho, or has other channels than the scene.
+    MisfitError
+        No machine of the scene sounds like the recordings.
+    RecipeError, SceneError
+        Scene or recipe are at fault.
+
+    Notes
+    -----
+    Regularised ensemble Kalman inversion: each round draws machines, simulates them under the
+    conditions of the recordings, and regresses normal scores of the unknowns on levels of the
+    crank-angle map and the spectrum, on scanned mode frequencies and the places of knocks. The
+    errors on machines left out are the posterior. Laws of contact are carried along, not chosen.
+
+    References
+    ----------
+    Iglesias, Law, Stuart, "Ensemble Kalman methods for inverse problems", Inverse Problems 29
+    (2013) 045001, doi:10.1088/0266-5611/29/4/045001.
+
+    Examples
+    --------
+    >>> import wearstate
+    >>> mine = wearstate.calibrate("bilge-pump", ["healthy.h5"])  # doctest: +SKIP
+    >>> mine.save("mine.toml")  # doctest: +SKIP
+    """
+    heard, names = _read(recordings)
+    plan = _prior(recipe, scene, heard[0])
+    unknowns = unknowns_of(plan, _as_new(plan), unknown)
+    _refuse_channels(plan, heard)
+    runs = [_conditions(plan, each) for each in heard]
+    layout = layout_of(heard[0])
+    observed = np.array([levels_of(each) for each in heard])
+    found = inverted(
+        unknowns,
+        layout,
+        observed,
+        runs,
+        prior=standard(len(unknowns.names)),
+        rounds=rounds_of(budget_s, len(runs)),
+        seed=seed,
+        jobs=jobs,
+        progress=progress,
+        look=lambda rows: _refuse_misfit(plan, names, misfit(layout, rows, observed)),
+    )
+    return CalibratedScene(
+        unknowns=unknowns,
+        found=found,
+        misfit=misfit(layout, found.levels, observed),
+        recordings=names,
+    )
+
+
+def _read(
+    recordings: Sequence[Recording | str | Path],
+) -> tuple[list[Recording], tuple[str, ...]]:
+    """Recordings and what to call them."""
+    heard: list[Recording] = []
+    for each in recordings:
+        if isinstance(each, Recording):
+            heard.append(each)
+        elif Path(each).suffix.lower() in (".h5", ".hdf5") and Path(each).is_file():
+            heard += _of_data_set(Path(each))
+        else:
+            heard.append(read_recording(each))
+    if not 1 <= len(heard) <= MOST_RECORDINGS:
+        raise DataError(
+            f"recordings = {len(heard)} must be >= 1 and <= {MOST_RECORDINGS}; choose some"
+        )
+    return heard, tuple(each.source or "recording" for each in heard)
+
+
+def _of_data_set(path: Path) -> list[Recording]:
+    with DataSet(path) as data:
+        if len(data) > MOST_RECORDINGS or len(set(data.machines)) > 1:
+            machines = len(set(data.machines))
+            raise DataError(
+                f"{path}: {len(data)} records of {machines} machines must be <= {MOST_RECORDINGS} "
+                "of one; take those of this machine: wearstate export"
+            )
+        return [replace(data[i], source=f"{path.name}:{i}") for i in range(len(data))]
+
+
+def _prior(recipe: str | Path, scene: str | Path, first: Recording) -> Recipe:
+    """The recipe around the scene, sampled as the recordings are."""
+    own = f"{scene}-standard"
+    chosen = own if recipe == PRIOR and own in recipe_names() else recipe
+    plan = load_recipe(chosen, {"sample_rate": first.sample_rate}, scene=scene)
+    if plan.scene.machine != "reciprocating-pump":
+        raise DataError(
+            f"machine = '{plan.scene.machine}' must be 'reciprocating-pump' to be calibrated; use "
+            "wearstate align or a film's clearance for others"
+        )
+    return plan
+
+
+def _as_new(plan: Recipe) -> tuple[float, float]:
+    """Wear of a sound machine [m]: between the first limit and where grade 1 begins."""
+    edges = plan.severities[0].edges
+    low = plan.severity.extremes()[0]
+    if not edges or edges[0] <= low:
+        raise DataError(
+            f"wear limits of {plan.scene.name} must be there, and as new < the first grade edge; "
+            "add the table [wear]"
+        )
+    return low, edges[0]
+
+
+def _refuse_channels(plan: Recipe, heard: Sequence[Recording]) -> None:
+    wanted = tuple(sensor.name for sensor in getattr(plan.scene, "sensors", ()))
+    faults = [
+        f"{each.source or 'recording'}: channels {', '.join(each.vibration_names)} at "
+        f"{each.sample_rate:g} Hz must be {', '.join(wanted)} at {heard[0].sample_rate:g} Hz, as "
+        "in the scene; rename channels, or sensors of the scene"
+        for each in heard
+        if each.vibration_names != wanted or each.sample_rate != heard[0].sample_rate
+    ]
+    if faults:
+        raise DataError("\n".join(faults))
+
+
+def _conditions(plan: Recipe, heard: Recording) -> dict[str, float]:
+    """Conditions of a recording by dotted path: its tacho's speed, and what its row tells."""
+    told = {
+        path: float(heard.row[column])
+        for column, path in plan.conditions.items()
+        if column in heard.row and np.isfinite(heard.row[column]) and "start_angle" not in column
+    }
+    speed, drive = speed_of(heard), getattr(plan.scene, "drive", None)
+    if drive is not None and drive.motor is not None:  # a motor turns as fast as it was turned
+        ratio = drive.motor.synchronous_speed / drive.speed
+        told["drive.motor.synchronous_speed"] = ratio * speed
+    return {**told, "drive.speed": speed}
+
+
+def _refuse_misfit(plan: Recipe, names: Sequence[str], found: Misfit) -> None:
+    if found.refused:
+        raise MisfitError(refusal(plan.scene.name, sorted(set(names)), found))
+
+
+_WIDTH = 52  # characters of a path
+
+
+def calibration_text(found: "CalibratedScene") -> str:
+    """The table of a calibration, for people."""
+    learnt, plan = found.numbers, found.unknowns.recipe
+    head = (
+        f"{plan.scene.name}, calibrated on {len(found.recordings)} recording(s) with "
+        f"{found.found.members} simulated machines of {plan.name}: {len(learnt)} of "
+        f"{len(found.unknowns.named)} numbers told"
+    )
+    lines = [f"{'':{_WIDTH}} {'before':>21} {'now':>21}   narrower"]
+    lines += [
+        f"{each.path:{_WIDTH}} {_spread(each.prior, each.unit):>21} "
+        f"{_spread(each.posterior, each.unit):>21}   {each.narrower:.1f} x"
+        for each in learnt
+    ]
+    return "\n".join([head, *lines, f"largest misfit: {found.misfit.text}"])
+
+
+def _spread(value: tuple[float, float], unit: str) -> str:
+    """Mean and deviation."""
+    return f"{si_text(value[0], unit)} ± {si_text(value[1], unit, 2)}"

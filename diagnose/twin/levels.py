@@ -1,0 +1,158 @@
+"""What a calibration compares: levels of crank-angle map and spectrum, and where it knocks."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...features.catalogue.analysis import Settings
+from ...features.rotation import order
+from ...features.signal.spectrum import decibel
+from ...sim.output.recording import DataError, Recording
+
+Float = NDArray[np.float64]
+
+SETTINGS = Settings()
+"""Angle bins and bands of the map: those of the standard features."""
+LINE_STEP = 0.012
+"""Ratio between two points of the spectrum, less one: a mode of one per cent damping is two of them
+wide."""
+LOWEST, HIGHEST = 90.0, 9500.0
+"""Ends of the spectrum [Hz]: below, orders of the crank alone; above, the converter's filter."""
+LINES = 8192
+"""Samples of a window of the spectrum."""
+
+KNOCK_EDGES = (200.0, 1000.0, 3000.0, 9500.0)
+"""Of the bands in which knocks are placed [Hz]."""
+KNOCK_BINS, KNOCK_WINDOW = 120, 128
+"""Angle bins in a revolution, and samples of the window: 3 degrees, and 2 ms at half its height."""
+DEAD_CENTRES = (0, 180)
+BEFORE, AFTER = 20, 70
+"""Degrees around a dead centre in which the pressure turns and the pin changes sides."""
+SHARES = (0.15, 0.5, 0.85)
+"""Of the energy there: the crank angles by which they have come."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class LevelLayout:
+    """Where the levels of one recording are in their row.
+
+    Attributes
+    ----------
+    channels : tuple of str
+    sample_rate : float
+        [Hz]
+    """
+
+    channels: tuple[str, ...]
+    sample_rate: float
+
+    @property
+    def edges(self) -> Float:
+        """Of the bands of the map [Hz]."""
+        return SETTINGS.map_edges(self.sample_rate)
+
+    @property
+    def points(self) -> Float:
+        """Frequencies of the spectrum [Hz]."""
+        top = min(HIGHEST, 0.37 * self.sample_rate)
+        count = int(np.log(top / LOWEST) / LINE_STEP)
+        found: Float = LOWEST * np.exp(LINE_STEP * np.arange(count + 1))
+        return found
+
+    def map_of(self, levels: Float) -> Float:
+        """Map of rows of levels [dB, shape=(..., n_channels, angle_bins, n_bands)]."""
+        shape = (len(self.channels), SETTINGS.angle_bins, len(self.edges) - 1)
+        return levels[..., : np.prod(shape)].reshape(*levels.shape[:-1], *shape)
+
+    def spectrum_of(self, levels: Float) -> Float:
+        """Spectrum of rows of levels [dB, shape=(..., n_channels, n_points)]."""
+        count = len(self.channels) * len(self.points)
+        part = levels[..., -self.n_knocks - count : -self.n_knocks]
+        return part.reshape(*levels.shape[:-1], len(self.channels), -1)
+
+    def levels_of(self, rows: Float) -> Float:
+        """Map and spectrum of rows [dB, shape=(..., n_levels)]."""
+        return rows[..., : -self.n_knocks]
+
+    def knocks_of(self, rows: Float) -> Float:
+        """Where it knocks [deg, shape=(..., n_knocks)]."""
+        return rows[..., -self.n_knocks :]
+
+    @property
+    def n_knocks(self) -> int:
+        """Crank angles of each row."""
+        bands = len(KNOCK_EDGES) - 1
+        return len(self.channels) * bands * len(DEAD_CENTRES) * len(SHARES)
+
+
+def layout_of(recording: Recording) -> LevelLayout:
+    """LevelLayout of a recording's levels."""
+    return LevelLayout(channels=recording.vibration_names, sample_rate=recording.sample_rate)
+
+
+def levels_of(recording: Recording) -> Float:
+    """Map and spectrum [dB] and places of knocks [deg] of a recording in a row [shape=(n,)].
+
+    Raises
+    ------
+    DataError
+        It has no tacho of one pulse per revolution, or is shorter than two revolutions.
+    """
+    pulses = pulses_of(recording)
+    signals, fs = recording.vibration, recording.sample_rate
+    phase = order.shaft_phase(pulses, signals.shape[-1], fs)
+    layout = layout_of(recording)
+    energy = order.crank_angle_map(
+        signals, fs, phase, edges=layout.edges, angle_bins=SETTINGS.angle_bins
+    )
+    fine = order.crank_angle_map(
+        signals, fs, phase, edges=KNOCK_EDGES, angle_bins=KNOCK_BINS, nperseg=KNOCK_WINDOW
+    )
+    parts = decibel(energy), _spectrum(signals, layout), _knocks(fine)
+    return np.concatenate([part.ravel() for part in parts])
+
+
+def _knocks(energy: Float) -> Float:
+    """Crank angles by which shares of the energy around each dead centre have come [deg].
+
+    From energy over the angle [shape=(n_channels, KNOCK_BINS, n_bands)] to
+    [shape=(n_centres, n_channels, n_bands, n_shares)].
+    """
+    width = 360 // KNOCK_BINS
+    inside = np.arange(-BEFORE // width, AFTER // width)
+    ends = width * (np.arange(len(inside) + 1) + inside[0])
+    found = []
+    for centre in DEAD_CENTRES:
+        part = energy[:, (centre // width + inside) % KNOCK_BINS].swapaxes(1, 2)
+        grown = np.cumsum(part, axis=-1) / part.sum(axis=-1, keepdims=True)
+        rows = [np.interp(SHARES, [0, *row], ends) for row in grown.reshape(-1, len(inside))]
+        found.append(rows)
+    return np.array(found)
+
+
+def speed_of(recording: Recording) -> float:
+    """Mean speed between the first and the last pulse of the tacho [Hz]."""
+    pulses = pulses_of(recording)
+    return float((pulses.size - 1) / (pulses[-1] - pulses[0]))
+
+
+def pulses_of(recording: Recording) -> Float:
+    """Times of the pulses of the tacho [s]."""
+    tacho = recording.tacho_signal
+    who = recording.source or "recording"
+    if tacho is None or recording.pulses_per_revolution != 1:
+        raise DataError(f"{who}: tacho must be there, with one pulse per revolution; record one")
+    pulses = order.pulse_times(tacho, recording.sample_rate)
+    if pulses.size < 3:
+        raise DataError(f"{who}: {pulses.size} pulses must be >= 3; give a longer recording")
+    return pulses
+
+
+def _spectrum(signals: NDArray[np.float32], layout: LevelLayout) -> Float:
+    """Welch's density at the points [dB, shape=(n_channels, n_points)]."""
+    from scipy.signal import welch
+
+    length = min(LINES, signals.shape[-1])
+    lines, density = welch(signals, layout.sample_rate, nperseg=length, noverlap=3 * length // 4)
+    return np.stack([np.interp(layout.points, lines, row) for row in decibel(density)])

@@ -1,0 +1,107 @@
+"""One step of the inversion: unknowns as a linear function of levels, over an ensemble.
+
+The gain of an ensemble Kalman step is the regression of the unknowns on what is observed. Of fewer
+members than levels it is not determined, so that it is regularised; how much, each unknown decides
+by its own error on members left out. The same errors are what the step does not know: noise, levels
+that do not tell, and what is not linear. They are the posterior.
+"""
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Float = NDArray[np.float64]
+
+LEAST_SCATTER = 0.5
+"""Added to the scatter of a level [dB]: no simulated level agrees better with a measured one."""
+HUBER = 3.0
+"""Deviations of the ensemble beyond which a level of the recording counts less."""
+STRENGTHS = 10.0 ** np.arange(-3.5, 2.1, 0.5)
+"""Regularisation, in mean eigenvalues."""
+WEIGHTS = (0.0, 1.0, 30.0)
+"""Of each kind of further numbers beside all levels together."""
+
+
+@dataclass(frozen=True)
+class Regressed:
+    """TwinUnknowns of one recording by an ensemble.
+
+    Attributes
+    ----------
+    mean : ndarray [shape=(n_names,)]
+        Normal scores.
+    residuals : ndarray [shape=(n_members, n_names)]
+        Errors on members left out.
+    """
+
+    mean: Float
+    residuals: Float
+
+    @property
+    def sd(self) -> Float:
+        """Root mean square of the residuals [shape=(n_names,)]."""
+        return np.asarray(np.sqrt((self.residuals**2).mean(axis=0)))
+
+
+def regressed(scores: Float, levels: Float, *further: Float) -> Regressed:
+    """Regress scores on levels and more; the last row of all but the scores is the recording's.
+
+    Parameters
+    ----------
+    scores : ndarray [shape=(n, n_names)]
+        Of the members.
+    levels : ndarray [shape=(n + 1, n_levels)]
+        [dB]
+    further : ndarray [shape=(n + 1, n_numbers)]
+        Other kinds of numbers that depend on the unknowns, each about as wide as the scores.
+    """
+    mean, residuals = scores.mean(axis=0), scores - scores.mean(axis=0)
+    best = (residuals**2).mean(axis=0)
+    centred, base = residuals.copy(), mean.copy()
+    of_levels, others = _products(_scaled(levels)), [_products(each) for each in further]
+    for weights in itertools.product(WEIGHTS, repeat=len(others)):
+        products = of_levels + sum(w * o for w, o in zip(weights, others, strict=True))
+        for found, left_out in _ridges(products, centred):
+            error = (left_out**2).mean(axis=0)
+            better = error < best
+            best = np.where(better, error, best)
+            mean = np.where(better, base + found, mean)
+            residuals = np.where(better, left_out, residuals)
+    return Regressed(mean=mean, residuals=residuals)
+
+
+def _scaled(rows: Float) -> Float:
+    """Deviations from the members, levels that no member has counting less."""
+    members = rows[:-1]
+    scatter = np.sqrt(members.var(axis=0) + LEAST_SCATTER**2)
+    found = (rows - members.mean(axis=0)) / scatter
+    weights = np.minimum(1.0, HUBER / np.maximum(np.abs(found[-1]), 1e-9))
+    return np.asarray(found * weights)
+
+
+def _products(rows: Float) -> Float:
+    return np.asarray(rows @ rows[:-1].T / max(rows.shape[1], 1))
+
+
+def _ridges(products: Float, scores: Float) -> list[tuple[Float, Float]]:
+    """Prediction and left-out errors for every strength, by one decomposition."""
+    count = len(scores)
+    inner = products[:-1]
+    last = products[-1] - inner.mean(axis=0)
+    inner = inner - inner.mean(axis=0)
+    inner = inner - inner.mean(axis=1, keepdims=True)
+    last = last - last.mean()
+    values, vectors = np.linalg.eigh((inner + inner.T) / 2)
+    values = np.maximum(values, 0.0)
+    turned = vectors.T @ scores
+    found = []
+    for strength in STRENGTHS * values.mean():
+        smooth = values / (values + strength)
+        leverage = (vectors**2) @ smooth + 1 / count
+        fitted = vectors @ (smooth[:, np.newaxis] * turned)
+        left_out = (scores - fitted) / (1 - leverage)[:, np.newaxis]
+        ahead = (last @ vectors) / (values + strength) @ turned
+        found.append((ahead, left_out))
+    return found

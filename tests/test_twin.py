@@ -1,0 +1,254 @@
+"""A twin of one machine: what is drawn from it, what the inversion tells, what it refuses."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import wearstate
+from scipy.special import ndtri
+from wearstate.datasets.recipe.recipe import load_recipe, sample_records
+from wearstate.datasets.recipe.text import RecipeError, toml_text
+from wearstate.datasets.recipe.twin import Twin, TwinTable, coordinate_names, machine_values
+from wearstate.diagnose.twin.inversion import Gaussian, corrected, rounds_of, widened
+from wearstate.diagnose.twin.levels import LevelLayout, layout_of, levels_of, speed_of
+from wearstate.diagnose.twin.misfit import misfit
+from wearstate.diagnose.twin.regression import Regressed, regressed
+from wearstate.diagnose.twin.scan import scanned
+from wearstate.diagnose.twin.unknowns import WEAR, unknowns_of
+from wearstate.sim.output.recording import DataError
+
+RECIPE = "bilge-pump-standard"
+MODE = "casing.modes.2.frequency"
+DELAY = "pressure.pressure.rise_delay"
+
+
+@pytest.fixture(scope="module")
+def twin_file(tmp_path_factory):
+    """A twin whose third mode is a little high; its pressure turns by angles, early."""
+    table = {
+        "scene": "bilge-pump",
+        "names": [MODE, "pressure", DELAY],
+        "mean": [1.0, -2.0, -1.0],
+        "sd": [0.05, 0.1, 0.2],
+        "correlation": [[1.0], [0.0, 1.0], [0.8, 0.0, 1.0]],
+    }
+    path = tmp_path_factory.mktemp("twin") / "mine.twin.toml"
+    path.write_text(toml_text(table), encoding="utf-8")
+    return path
+
+
+def test_records_of_a_twin_stand_beside_those_of_the_recipe(twin_file):
+    plain = list(sample_records(load_recipe(RECIPE), 80, seed=3))
+    mixed = list(sample_records(load_recipe(RECIPE, twin=twin_file), 80, seed=3))
+    own = [sample.row["twin"] for sample in mixed]
+    assert 20 < sum(own) < 60  # half of 40 machines, two records each
+    for before, after, is_twin in zip(plain, mixed, own, strict=True):
+        if not is_twin:
+            assert after.drawn == before.drawn
+        else:
+            assert after.drawn["joint.crankpin.friction"] == before.drawn["joint.crankpin.friction"]
+            assert after.row["choice_pressure"] == "two-level"
+            # 815 Hz * (0.94 + 0.12 * Phi(1 -+ 4 * 0.05))
+            assert 843.1 < after.drawn[MODE] < 852.7
+
+
+def test_the_scene_of_a_twin_names_the_file_beside_it(twin_file):
+    recipe = load_recipe(RECIPE, twin=twin_file.with_name("mine.toml"))
+    assert recipe.table.twin.names == (MODE, "pressure", DELAY)
+    again = wearstate.datasets.recipe.recipe.recorded_recipe(recipe.scene_text, recipe.text, "{}")
+    assert [s.drawn for s in sample_records(again, 4)] == [
+        s.drawn for s in sample_records(recipe, 4)
+    ]
+
+
+def test_a_recipe_may_name_its_twin(twin_file):
+    file = twin_file.with_name("with-twin.toml")
+    file.write_text(f'name = "mine"\nextends = "{RECIPE}"\ntwin = "mine.toml"\n', encoding="utf-8")
+    assert load_recipe(file).twin is not None
+
+
+def test_a_twin_that_is_not_there_or_of_another_recipe_is_refused(twin_file):
+    with pytest.raises(RecipeError, match="make it: wearstate calibrate"):
+        load_recipe(RECIPE, twin=twin_file.with_name("none.toml"))
+    with pytest.raises(RecipeError, match=r"must be drawn by the recipe"):
+        load_recipe("journal-bearing-standard", twin=twin_file)
+
+
+def test_draws_of_a_twin_have_its_moments():
+    table = TwinTable(
+        names=("a", "b"), mean=(1.0, 0.0), sd=(0.1, 0.5), correlation=((1.0,), (0.8, 1.0))
+    )
+    rng = np.random.default_rng(1)
+    drawn = ndtri([list(Twin(table).draw(rng).values()) for _ in range(4000)])
+    # 4 standard errors of 4,000 draws
+    assert drawn.mean(axis=0) == pytest.approx([1.0, 0.0], abs=0.035)
+    assert drawn.std(axis=0) == pytest.approx([0.1, 0.5], rel=0.05)
+    assert np.corrcoef(drawn.T)[0, 1] == pytest.approx(0.8, abs=0.03)
+
+
+def test_a_twin_that_contradicts_itself_is_refused():
+    for wrong in (
+        {"sd": (0.0,)},
+        {"correlation": ((1.0,), (0.0, 1.0))},
+        {"names": ("a", "a"), "mean": (0.0, 0.0)},
+    ):
+        given = {"names": ("a",), "mean": (0.0,), "sd": (1.0,), "correlation": ((1.0,),), **wrong}
+        with pytest.raises(ValueError, match="calibrate again"):
+            TwinTable(**given)
+
+
+def test_coordinates_decide_a_machine_as_the_recipe_does():
+    recipe = load_recipe(RECIPE)
+    names = coordinate_names(recipe.machine, recipe.choices)
+    values, options = machine_values(recipe.machine, recipe.choices, lambda _: 0.4)
+    assert len(set(names)) == len(names)
+    assert values[MODE] == pytest.approx(815.0 * (0.94 + 0.4 * 0.12))
+    assert options["choice_pressure"] == "two-level"
+
+
+# --- unknowns
+
+
+def test_unknowns_can_be_chosen_and_all_else_is_as_in_the_scene():
+    recipe = load_recipe(RECIPE)
+    few = unknowns_of(recipe, (5e-5, 1.3e-4), ["casing.modes.*.frequency", "tacho.late"])
+    assert len(few.names) == 8 + 1 + 1
+    scene = few.scene(np.ones(len(few.names)), {"drive.speed": 4.0})
+    assert scene.joint.crankpin.friction == recipe.scene.joint.crankpin.friction
+    assert scene.casing.modes[0].frequency > recipe.scene.casing.modes[0].frequency
+    assert scene.drive.speed == 4.0
+    with pytest.raises(DataError, match=r"drive\.speeed must be drawn by the recipe"):
+        unknowns_of(recipe, (5e-5, 1.3e-4), ["drive.speeed"])
+
+
+def test_wear_stays_in_its_range():
+    few = unknowns_of(load_recipe(RECIPE), (5e-5, 1.3e-4), ["tacho.late"])
+    ends = few.numbers(WEAR, np.array([[0.0, -9.0], [0.0, 9.0]]))
+    assert ends == pytest.approx([5e-5, 1.3e-4], rel=1e-6)
+
+
+# --- inversion
+
+
+def linear(n, rng):
+    """Unknowns, and levels that are linear in the first two of three."""
+    gain = rng.standard_normal((3, 40)) * 3
+    gain[2] = 0
+    scores = rng.standard_normal((n, 3))
+    return scores, scores @ gain + 3 * rng.standard_normal((n, 40)) + 60
+
+
+def test_errors_left_out_are_those_of_doing_without():
+    rng = np.random.default_rng(0)
+    scores, levels = linear(30, rng)
+    found = regressed(scores[:-1], levels)
+    # the last machine as the recording, and as one left out of all thirty
+    whole = regressed(scores, np.concatenate([levels, levels[-1:]]))
+    here = scores[-1] - found.mean
+    # both choose their strength of regularisation and scatter by other members
+    assert here[:2] == pytest.approx(whole.residuals[-1][:2], abs=0.15)
+
+
+def test_regression_tells_what_is_told_and_no_more():
+    rng = np.random.default_rng(2)
+    z = []
+    for _ in range(60):
+        scores, levels = linear(80, rng)
+        found = regressed(scores[:-1], levels)
+        assert (found.sd[:2] < 0.3).all()
+        assert found.sd[2] > 0.75
+        z.append((scores[-1] - found.mean) / found.sd)
+    inside = (np.abs(z) < ndtri(0.95)).mean()
+    assert 0.85 < inside < 0.95  # 0.9 within 2.2 standard errors of 180
+
+
+def test_a_level_that_no_member_has_counts_less():
+    rng = np.random.default_rng(3)
+    scores, levels = linear(80, rng)
+    plain = regressed(scores[:-1], levels).mean
+    levels[-1, 0] += 1000.0
+    assert regressed(scores[:-1], levels).mean == pytest.approx(plain, abs=0.3)
+
+
+def test_the_prior_is_counted_once():
+    """Product of Gaussians: precision of likelihood 3, of the prior 1, whatever was drawn from."""
+    prior = Gaussian(mean=np.zeros(1), covariance=np.eye(1))
+    for centre, variance in ((0.0, 1.0), (0.5, 0.5)):
+        proposal = Gaussian(mean=np.array([centre]), covariance=np.array([[variance]]))
+        precision = 3 + 1 / variance
+        mean = (3 * 0.8 + centre / variance) / precision
+        residuals = np.array([[1.0], [-1.0]]) / np.sqrt(precision)
+        found = corrected(Regressed(np.array([mean]), residuals), proposal, prior)
+        assert found.mean == pytest.approx([0.6])
+        assert found.covariance == pytest.approx(np.array([[0.25]]))
+
+
+def test_the_next_ensemble_is_wider_and_no_wider_than_the_prior():
+    prior = Gaussian(mean=np.zeros(3), covariance=np.eye(3))
+    told = Gaussian(mean=np.array([1.0, 1.0, 1.0]), covariance=np.diag([0.01, 0.49, 0.9]))
+    found = widened(told, prior)
+    assert found.sd == pytest.approx([0.16, 1.0, 1.0])
+    assert found.mean == pytest.approx([1.0, 1.0, 0.0])
+
+
+def test_a_budget_decides_the_members():
+    assert sum(rounds_of(200.0, 2)) == pytest.approx(2 * sum(rounds_of(200.0, 4)), abs=3)
+
+
+def resonance(frequency, points, rng):
+    """Level of a mode of 2 per cent damping, with scatter [dB]."""
+    ratio = points / frequency
+    level = -10 * np.log10((1 - ratio**2) ** 2 + (0.04 * ratio) ** 2)
+    return level[np.newaxis] + rng.standard_normal((1, len(points)))
+
+
+def test_a_scan_finds_the_frequency_of_a_mode():
+    rng = np.random.default_rng(5)
+    points = LevelLayout(channels=("a",), sample_rate=25_600.0).points
+    frequencies = 815 * rng.uniform(0.94, 1.06, 60)
+    spectra = np.array([resonance(each, points, rng) for each in (*frequencies, 790.0)])
+    found = scanned(spectra, frequencies, np.log(points), (760.0, 870.0))
+    # a scatter of 1 dB over the ten points of the resonance leaves some 0.1 %
+    assert found[-1] == pytest.approx(790.0, rel=0.003)
+    assert np.median(np.abs(found[:-1] / frequencies - 1)) < 0.002
+
+
+# --- misfit
+
+
+@pytest.fixture(scope="module")
+def recording():
+    return wearstate.simulate(wearstate.load_scene("bilge-pump", {"duration": "1 s"}))
+
+
+def test_levels_hold_map_spectrum_and_knocks(recording):
+    layout, row = layout_of(recording), levels_of(recording)
+    assert speed_of(recording) == pytest.approx(5.0, rel=1e-4)
+    sizes = [layout.map_of(row).size, layout.spectrum_of(row).size, layout.knocks_of(row).size]
+    assert sum(sizes) == row.size
+    assert -20 <= layout.knocks_of(row).min() < layout.knocks_of(row).max() <= 70
+
+
+def test_a_recording_without_tacho_is_refused(recording):
+    bare = replace(
+        recording, signal=recording.vibration, channels=recording.channels[:2], tacho=None
+    )
+    with pytest.raises(DataError, match="tacho must be there"):
+        levels_of(bare)
+
+
+def test_what_no_member_shows_is_told_with_its_place(recording):
+    layout = layout_of(recording)
+    rng = np.random.default_rng(7)
+    base = levels_of(recording)
+    ways = rng.standard_normal((6, base.size))
+    rows = base + 3 * rng.standard_normal((80, 6)) @ ways + rng.standard_normal((80, base.size))
+    usual = base + 3 * rng.standard_normal(6) @ ways + rng.standard_normal(base.size)
+    assert not misfit(layout, rows[:, None], usual[None]).refused
+    wrong = usual.copy()
+    layout.map_of(wrong)[1, 3:6, 10] += 60.0
+    found = misfit(layout, rows[:, None], wrong[None])
+    assert found.refused
+    assert found.text.startswith("acc_y, ")
+    assert "crank angle 30 to 60 deg" in found.text
+    assert "above the nearest machine" in found.text
