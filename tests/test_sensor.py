@@ -7,10 +7,12 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from wearstate.sim.machine.simulate import simulate
 from wearstate.sim.output.sensor import (
+    HUM,
     anti_alias_poles,
     digitise,
     low_pass,
     low_pass_response,
+    mains_hum,
     mounting_poles,
     tacho_pulses,
 )
@@ -40,6 +42,20 @@ def test_noise_has_its_rms_and_is_white():
     assert abs(noise.mean()) < 4 * 0.3 / np.sqrt(200_000)
     correlation = np.mean(noise[1:] * noise[:-1]) / noise.var()
     assert abs(correlation) < 4 / np.sqrt(200_000)
+
+
+@pytest.mark.parametrize(("n", "fs", "heard"), [(1537, 1e3, 4), (512, 320.0, 3), (100, 90.0, 0)])
+def test_hum_is_the_sum_of_its_harmonics(n, fs, heard):
+    """Over block ends; at low rates without the fifth harmonic, and without any."""
+    phases = np.random.default_rng(4).random(4)
+    amplitude = 0.2 * np.sqrt(2 / sum(share**2 for _, share in HUM))
+    expected = sum(
+        amplitude * share * np.sin(2 * np.pi * (order * 50.0 / fs * np.arange(n) + phase))
+        for (order, share), phase in list(zip(HUM, phases, strict=True))[:heard]
+    )
+    hum = mains_hum(n, fs, rms=0.2, frequency=50.0, rng=np.random.default_rng(4))
+    assert hum.shape == (n,)
+    assert_allclose(hum, expected, rtol=0, atol=1e-12)  # rounding of 2400 rad
 
 
 def test_noise_is_added_after_the_gain():

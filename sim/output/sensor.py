@@ -320,16 +320,23 @@ def mains_hum(
     (1.0, 50)
     """
     phases = math.tau * rng.random(len(HUM))
-    angle = math.tau * frequency / fs * np.arange(n)
     scale = rms * math.sqrt(2 / sum(share**2 for _, share in HUM))
-    return np.asarray(
-        scale
-        * sum(
-            share * np.sin(order * angle + phase)
-            for (order, share), phase in zip(HUM, phases, strict=True)
-            if order * frequency < fs / 2
-        )
-    )
+    kept = [
+        (order, scale * share, phase)
+        for (order, share), phase in zip(HUM, phases, strict=True)
+        if order * frequency < fs / 2
+    ]
+    orders, sizes, begins = np.array(kept).reshape(-1, 3).T
+    # sin(a + b) of the angle a at the start of each block and b within it: few sines, one product
+    starts = np.arange(0, n, _HUM_BLOCK)[:, None]
+    turn = math.tau * frequency / fs * orders
+    early = turn * starts + begins
+    late = turn[:, None] * np.arange(_HUM_BLOCK)
+    sums = np.hstack([sizes * np.sin(early), sizes * np.cos(early)])
+    return np.asarray((sums @ np.vstack([np.cos(late), np.sin(late)])).ravel()[:n])
+
+
+_HUM_BLOCK = 512  # samples
 
 
 def digitise(

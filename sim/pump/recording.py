@@ -93,8 +93,9 @@ def simulate_pump(scene: Scene, seed: int, truth: bool, raise_on_failure: bool) 
     run = run_scene(
         pump, step=step, n_steps=plan.n_steps, start_angle=plan.first_angle, keep_states=truth
     )
-    status = _judged(pump, run, plan) if run.status.ok else run.status
-    numerics = _numerics(pump, run, plan)
+    lift = _lift_left(pump, run, plan)
+    status = _judged(pump, run, plan, lift) if run.status.ok else run.status
+    numerics = _numerics(pump, run, plan, lift)
     if not status.ok:
         if raise_on_failure:
             raise SimulationError(status, pump.name)
@@ -555,11 +556,11 @@ def _front_end(sensor: Accelerometer, row: NDArray[np.float64], fs: float) -> ND
     return low_pass(row, fs, np.concatenate(poles)) if poles else row
 
 
-def _judged(scene: PumpScene, run: CrankRun, plan: _Plan) -> Status:
+def _judged(scene: PumpScene, run: CrankRun, plan: _Plan, lift: float) -> Status:
     """A column that tears; a valve that never shuts in time, its spring too soft for the speed."""
     if torn_in_run(scene, run, plan.kept.start * plan.factor):
         return Status.VAPOUR
-    return Status.VALVE_OPEN if _lift_left(scene, run, plan) > _LIFT_LEFT else Status.OK
+    return Status.VALVE_OPEN if lift > _LIFT_LEFT else Status.OK
 
 
 def _lift_left(scene: PumpScene, run: CrankRun, plan: _Plan) -> float:
@@ -593,7 +594,9 @@ def _rung_of(part: Any) -> str:
     return "ideal" if part is None else str(part.rung)
 
 
-def _numerics(scene: PumpScene, run: CrankRun, plan: _Plan) -> dict[str, float | int | str]:
+def _numerics(
+    scene: PumpScene, run: CrankRun, plan: _Plan, lift: float
+) -> dict[str, float | int | str]:
     steps, resolved = len(run.forces), run.step * contact_rate(scene)
     numerics: dict[str, float | int | str] = {
         "rung_joint": scene.joint.crankpin.rung,
@@ -629,7 +632,7 @@ def _numerics(scene: PumpScene, run: CrankRun, plan: _Plan) -> dict[str, float |
     numerics |= _film_numerics(run, rungs, plan)
     if run.chambers is not None:
         numerics["cavitating_share"] = run.vapour_steps / max(1, steps * len(rungs))
-        numerics["lift_left"] = _lift_left(scene, run, plan)
+        numerics["lift_left"] = lift
     return numerics
 
 
