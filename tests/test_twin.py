@@ -11,7 +11,7 @@ from wearstate.datasets.recipe.text import RecipeError, toml_text
 from wearstate.datasets.recipe.twin import Twin, TwinTable, coordinate_names, machine_values
 from wearstate.diagnose.twin.inversion import Gaussian, corrected, rounds_of, widened
 from wearstate.diagnose.twin.levels import LevelLayout, layout_of, levels_of, speed_of
-from wearstate.diagnose.twin.misfit import misfit
+from wearstate.diagnose.twin.misfit import misfit, refusal
 from wearstate.diagnose.twin.regression import Regressed, regressed
 from wearstate.diagnose.twin.scan import scanned
 from wearstate.diagnose.twin.unknowns import WEAR, unknowns_of
@@ -186,7 +186,7 @@ def test_the_prior_is_counted_once():
 def test_the_next_ensemble_is_wider_and_no_wider_than_the_prior():
     prior = Gaussian(mean=np.zeros(3), covariance=np.eye(3))
     told = Gaussian(mean=np.array([1.0, 1.0, 1.0]), covariance=np.diag([0.01, 0.49, 0.9]))
-    found = widened(told, prior)
+    found = widened(told, prior, 1.6)
     assert found.sd == pytest.approx([0.16, 1.0, 1.0])
     assert found.mean == pytest.approx([1.0, 1.0, 0.0])
 
@@ -245,10 +245,16 @@ def test_what_no_member_shows_is_told_with_its_place(recording):
     rows = base + 3 * rng.standard_normal((80, 6)) @ ways + rng.standard_normal((80, base.size))
     usual = base + 3 * rng.standard_normal(6) @ ways + rng.standard_normal(base.size)
     assert not misfit(layout, rows[:, None], usual[None]).refused
+    other = usual.copy()
+    layout.map_of(other)[:] = layout.map_of(usual)[::-1]
+    swapped = misfit(layout, rows[:, None], other[None])
+    assert swapped.order == ("acc_y", "acc_x")
+    assert "fit far better as acc_y, acc_x" in refusal("bilge-pump", ["a.h5"], swapped)
     wrong = usual.copy()
     layout.map_of(wrong)[1, 3:6, 10] += 60.0
     found = misfit(layout, rows[:, None], wrong[None])
     assert found.refused
+    assert not found.order
     assert found.text.startswith("acc_y, ")
     assert "crank angle 30 to 60 deg" in found.text
     assert "above the nearest machine" in found.text

@@ -16,8 +16,9 @@ Float = NDArray[np.float64]
 
 ROUNDS = (130, 90, 90)
 """Members of the rounds: the first draws from the prior, each further one around the last."""
-WIDENED = 1.6
-"""How much wider than what is known the next ensemble is drawn."""
+WIDENED = (3.0, 1.6)
+"""How much wider than what is known the next ensemble is drawn, after the first round and later:
+the first knows the scatter of all machines of the recipe, and not of this one."""
 UNTOLD = 0.75
 """Deviation, in those of the prior, above which an unknown is drawn from the prior again."""
 LEAST_TOLD = 0.9
@@ -130,7 +131,7 @@ def inverted(
     progress : callable, optional
         Called with (members done, members).
     look : callable, optional
-        Called with the levels of each ensemble; may raise to stop.
+        Called with the levels of the first ensemble; may raise to stop.
     """
     rng = np.random.default_rng(seed)
     proposal, before, done = prior, None, 0
@@ -144,11 +145,12 @@ def inverted(
             progress=_moved(progress, done, sum(rounds)),
         )
         done += count
-        if look is not None:
+        if look is not None and number == 0:  # further ones hold fewer machines of the scene
             look(members[1])
         used = members if number < 2 or before is None else _joined(before, members)
         posterior = _step(unknowns, layout, used, observed, prior if number == 0 else None, prior)
-        proposal, before = widened(posterior, prior), members
+        proposal = widened(posterior, prior, WIDENED[min(number, 1)])
+        before = members
     return Inverted(
         posterior=posterior, prior=prior, scores=used[0], levels=used[1], members=sum(rounds)
     )
@@ -237,10 +239,10 @@ def _correlation(residuals: Float) -> Float:
     return np.asarray(shrunk + np.eye(len(found)))
 
 
-def widened(posterior: Gaussian, prior: Gaussian) -> Gaussian:
+def widened(posterior: Gaussian, prior: Gaussian, factor: float) -> Gaussian:
     """Where the next ensemble is drawn: wider, and no farther than the prior."""
     told = posterior.sd < UNTOLD * prior.sd
-    sd = np.where(told, np.minimum(WIDENED * posterior.sd, prior.sd), prior.sd)
+    sd = np.where(told, np.minimum(factor * posterior.sd, prior.sd), prior.sd)
     mean = np.where(told, posterior.mean, prior.mean)
     correlation = posterior.covariance / np.outer(posterior.sd, posterior.sd)
     both = np.outer(told, told) | np.eye(len(sd), dtype=bool)

@@ -4,8 +4,9 @@ A level that no machine of the scene shows is no matter of its numbers: it is an
 wrong channel, a wrong geometry.
 """
 
+import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,8 +20,12 @@ LEAST_SCATTER = 1.0
 """Added to the scatter of a level [dB]: models of machines agree with machines no better."""
 NUGGET = 0.05
 """Part of a level's variance that belongs to each recording alone."""
-LEAST_P = 0.005
+LEAST_P = 0.02
 """Of a machine of the scene, below which recordings are refused."""
+OTHER_ORDER = 5.0
+"""Times as likely with the channels in another order: then they are."""
+DOUBT = 0.2
+"""Of recordings that fit no worse than this the order of channels is not asked."""
 SECTORS = 12
 """Of the crank angle, for words."""
 
@@ -39,6 +44,8 @@ class Misfit:
     angle_deg : tuple of float
     level_db : float
         There, above what the nearest machine shows; below it where negative.
+    order : tuple of str
+        Channels in the order in which they would fit far better; empty where there is none.
     """
 
     p: float
@@ -46,11 +53,12 @@ class Misfit:
     band_hz: tuple[float, float]
     angle_deg: tuple[float, float]
     level_db: float
+    order: tuple[str, ...] = ()
 
     @property
     def refused(self) -> bool:
         """Whether no calibration mends it."""
-        return self.p < LEAST_P
+        return self.p < LEAST_P or bool(self.order)
 
     @property
     def text(self) -> str:
@@ -80,17 +88,30 @@ def misfit(layout: LevelLayout, rows: Float, observed: Float) -> Misfit:
     The predictive variance of a Gaussian process with a linear kernel, left out one by one for the
     members; their logarithms are taken as normal.
     """
-    maps = layout.map_of(np.concatenate([rows, observed[np.newaxis]]))
+    members, here = layout.map_of(rows), layout.map_of(observed)
+    found = _distance(layout, members, here)
+    if found.p > DOUBT:
+        return found
+    for order in itertools.permutations(range(len(layout.channels))):
+        if _distance(layout, members, here[:, list(order)]).p > OTHER_ORDER * found.p:
+            return replace(found, order=tuple(layout.channels[i] for i in order))
+    return found
+
+
+def _distance(layout: LevelLayout, members: Float, here: Float) -> Misfit:
+    """Misfit of maps, with the channels as they stand."""
+    maps = np.concatenate([members, here[np.newaxis]])
     flat = maps.reshape(len(maps), -1)
     scatter = np.sqrt(flat[:-1].var(axis=0) + LEAST_SCATTER**2)
     scaled = (flat - flat[:-1].mean(axis=0)) / scatter
     products = scaled @ scaled[:-1].T / scaled.shape[1]
     inner, last = products[:-1], products[-1]
-    inverse = np.linalg.inv(inner + NUGGET * np.mean(np.diag(inner)) * np.eye(len(inner)))
+    nugget = NUGGET * np.mean(np.diag(inner))
+    inverse = np.linalg.inv(inner + nugget * np.eye(len(inner)))
     weights = inverse @ last
     own = np.log(1 / np.diag(inverse))
-    here = np.log((scaled[-1] ** 2).mean() + NUGGET * np.mean(np.diag(inner)) - last @ weights)
-    p = float(ndtr(-(here - own.mean()) / own.std()))
+    distance = np.log((scaled[-1] ** 2).mean() + nugget - last @ weights)
+    p = float(ndtr(-(distance - own.mean()) / own.std()))
     left = (scaled[-1] - weights @ scaled[:-1]) * scatter
     return _worst(layout, left.reshape(maps.shape[1:]), p)
 
@@ -113,8 +134,14 @@ def _worst(layout: LevelLayout, residual: Float, p: float) -> Misfit:
 
 def refusal(scene: str, files: Sequence[str], found: Misfit) -> str:
     """Why recordings are refused."""
+    who = ", ".join(files) or "recordings"
+    if found.order:
+        return (
+            f"{who}: channels must be in the order of the scene {scene}; they fit far better as "
+            f"{', '.join(found.order)} (p = {found.p:.2g} as they are); check which sensor is which"
+        )
     return (
-        f"{', '.join(files) or 'recordings'}: p = {found.p:.2g} must be >= {LEAST_P:g}, or no "
+        f"{who}: p = {found.p:.2g} must be >= {LEAST_P:g}, or no "
         f"machine of the scene {scene} sounds so: {found.text}; check channels and their order, "
         "throws, geometry, conditions, and whether it is this machine"
     )
