@@ -169,7 +169,7 @@ def drawn_by_options(recipe, seed=0):
     """What the options draw that a thousand machines take."""
     columns = {}
     for i in range(N // 2):
-        for _, values in recipes._choices(recipe, i, 2 * i, seed).values():
+        for _, values in recipes._choices(recipe, i, 2 * i, seed, {}).values():
             for path, value in values.items():
                 if value:  # 0 where another law has no such number
                     columns.setdefault(path, []).append(value)
