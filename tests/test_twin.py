@@ -258,3 +258,20 @@ def test_what_no_member_shows_is_told_with_its_place(recording):
     assert found.text.startswith("acc_y, ")
     assert "crank angle 30 to 60 deg" in found.text
     assert "above the nearest machine" in found.text
+
+
+def test_recordings_of_swapped_channels_are_refused(recording):
+    signal = recording.signal.copy()
+    signal[:2] = recording.signal[1::-1]
+    swapped = replace(recording, signal=signal, source="swapped.h5")
+    with pytest.raises(
+        wearstate.MisfitError, match=r"swapped\.h5.* fit far better as acc_y, acc_x"
+    ):
+        wearstate.calibrate("bilge-pump", [swapped], unknown=["casing.modes.*"], budget_s=1.0)
+
+
+def test_channels_of_another_name_are_refused(recording):
+    first, *rest = recording.channels
+    other = replace(recording, channels=(replace(first, name="a"), *rest), source="a.h5")
+    with pytest.raises(DataError, match=r"a\.h5: channels a, acc_y .* must be acc_x, acc_y"):
+        wearstate.calibrate("bilge-pump", [other])
