@@ -28,6 +28,9 @@ if TYPE_CHECKING:
     from .datasets.measured.data_set import import_recordings as import_recordings
     from .datasets.measured.recording import read_recording as read_recording
     from .datasets.source.part import SourceOptions as SourceOptions
+    from .diagnose.class_model.file import load_class_model as load_class_model
+    from .diagnose.class_model.file import save_class_model as save_class_model
+    from .diagnose.class_model.train import ClassModel as ClassModel
     from .diagnose.twin.calibration import CalibratedScene as CalibratedScene
     from .diagnose.twin.calibration import MisfitError as MisfitError
     from .diagnose.twin.calibration import calibrate as calibrate
@@ -41,6 +44,7 @@ if TYPE_CHECKING:
     from .diagnose.workflow.report import Report as Report
     from .diagnose.workflow.report import report as report
     from .diagnose.workflow.train import train as train
+    from .diagnose.workflow.train import train_classes as train_classes
     from .features.catalogue.row import feature_row as feature_row
     from .sim.output.recording import DataError as DataError
     from .sim.output.recording import Recording as Recording
@@ -59,6 +63,7 @@ _MODULES = ("align", "contact", "crank", "features", "film", "shaft")
 _HOMES = {
     "CalibratedScene": ".diagnose.twin.calibration",
     "Channel": ".sim.output.sensor",
+    "ClassModel": ".diagnose.class_model.train",
     "DataError": ".sim.output.recording",
     "DataSet": ".datasets.file.record",
     "Estimate": ".diagnose.wear_model.estimate",
@@ -77,14 +82,17 @@ _HOMES = {
     "feature_row": ".features.catalogue.row",
     "generate": ".datasets.generation.generate",
     "import_recordings": ".datasets.measured.data_set",
+    "load_class_model": ".diagnose.class_model.file",
     "load_model": ".diagnose.wear_model.file",
     "load_scene": ".sim.scene.load",
     "read_recording": ".datasets.measured.recording",
     "report": ".diagnose.workflow.report",
+    "save_class_model": ".diagnose.class_model.file",
     "save_model": ".diagnose.wear_model.file",
     "scene_names": ".sim.scene.load",
     "simulate": ".datasets.generation.simulate",
     "train": ".diagnose.workflow.train",
+    "train_classes": ".diagnose.workflow.train",
 }
 """Public name -> module that defines it; the block above tells type checkers the same."""
 

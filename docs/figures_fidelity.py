@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from wearstate.diagnose.charts.chart import Chart, chart_text
-from wearstate.diagnose.charts.figure import save_chart
 from wearstate.diagnose.charts.of_scene import scene_chart
+from wearstate.diagnose.charts.page import save_chart
 from wearstate.diagnose.stability.atlas import atlas
 from wearstate.diagnose.stability.figure import save_figure
 from wearstate.sim.scene.load import load_scene, scene_names

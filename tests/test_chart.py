@@ -20,8 +20,8 @@ from wearstate.diagnose.charts.chart import (
     front_of,
     remaining_error,
 )
-from wearstate.diagnose.charts.figure import SUFFIXES, chart_figure, chart_html, save_chart
 from wearstate.diagnose.charts.of_scene import KEPT, RAISED, chart_of, scene_chart
+from wearstate.diagnose.charts.page import SUFFIXES, chart_figure, chart_html, save_chart
 from wearstate.diagnose.charts.words import HERE
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.sim.fidelity.pilot import Candidate, Difference, Pilot, differences

@@ -238,6 +238,7 @@ def with_a_fault(model, *, slope, mae_with_m):
     head = Head(name="stuck_valve", blend=blend, slope=slope, offset=0.0, threshold=0.5)
     rates = {"name": "stuck_valve", "share": 0.1, "detection_rate": 0.9, "false_alarm_rate": 0.1}
     rates |= {"mae_with_m": mae_with_m, "mae_without_m": 1e-5, "members": {"flat": 1.0}}
+    rates |= {"visible_from_m": None}
     card = {**model.card, "confounders": [rates]}
     return dataclasses.replace(model, heads=(head,), card=card)
 

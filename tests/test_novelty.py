@@ -297,3 +297,33 @@ def test_another_machine_made_to_match_is_refused(small_model, small_set, tmp_pa
     told = script["campaign"](load_model(small_model), strangers)
     assert told["journals, stretched"] == {"unfamiliar": 4}
     assert set(told["journals, own time"]) <= {"unfamiliar", "no features"}
+
+
+# --- too quiet
+
+
+def test_a_machine_that_does_not_knock_is_refused_by_name(small_trained):
+    """A flooded pin: the same shape, peaks far below; a dry one of the same speed is graded."""
+    model, table, _ = small_trained
+    row = table.values[table.manifest["grade"].to_numpy().argmin()].copy()
+    assert model.judge(row).verdict != "unfamiliar"
+    cloud = model.familiarity
+    peaks = [i for i, name in enumerate(model.names) if name.endswith(".peak")]
+    assert peaks
+    lack = float(cloud.lacking(model.names, row[None, :])[0])
+    for beyond, verdict in ((-0.5, {"graded", "caution"}), (0.5, {"unfamiliar"})):
+        quiet = row.copy()
+        quiet[peaks] *= 10 ** ((lack - cloud.most_lacking - beyond) / 20)
+        found = model.judge(quiet)
+        said = " ".join(found.reasons)
+        assert found.verdict in verdict, said
+        told = "flooded pins, which do not knock, are not in this model" in said
+        assert told == (found.verdict == "unfamiliar")
+
+
+def test_few_of_its_own_machines_are_too_quiet_for_a_model(small_trained):
+    model, table, _ = small_trained
+    lacking = model.familiarity.lacking(model.names, table.values)
+    # 2 % of the training set by the calibration, and as many again by chance in so few
+    assert (lacking > model.familiarity.seldom_lacking).mean() <= 0.04
+    assert model.familiarity.seldom_lacking <= model.familiarity.most_lacking

@@ -96,3 +96,31 @@ def test_natural_slips_of_arguments_are_named():
     ):
         with pytest.raises((ValueError, TypeError), match=message):
             call()
+
+
+@pytest.mark.parametrize("given", [[1, 2], np.zeros((3, 10))])
+def test_training_on_recordings_in_memory_is_refused_by_name(given):
+    for train in (wearstate.train, lambda data: wearstate.train_classes(data, "grade")):
+        with pytest.raises(wearstate.DataError, match="must be the file of a labelled data set"):
+            train(given)
+
+
+def test_values_by_path_are_no_scene():
+    with pytest.raises(
+        wearstate.SceneError, match=r"drive.speed is a value of a scene.*load_scene"
+    ):
+        wearstate.simulate({"drive.speed": "250 rpm"})
+
+
+@pytest.mark.parametrize("kind", ["spectrum", "envelope_spectrum", "order_spectrum", "orbit"])
+def test_gaps_are_refused_with_channel_number_and_place(kind):
+    signal = np.zeros((2, 1000))
+    signal[1, [7, 9]] = np.nan, np.inf
+    with pytest.raises(ValueError, match=r"channel ch_1 has 2 sample.*first at index 7; cut"):
+        getattr(wearstate.features, kind)(signal, 1000.0)
+
+
+@pytest.mark.parametrize("unit", ["m/s²", "m/s**2", "m / s2", "m/s^2"])
+def test_an_array_takes_every_spelling_of_a_unit(unit):
+    [channel] = wearstate.Recording.from_array(np.zeros(10), 10.0, unit=unit).channels
+    assert (channel.unit, channel.quantity) == ("m/s^2", "acceleration")

@@ -571,6 +571,7 @@ def test_a_folder_keeps_no_file_open(model, folder):
 def test_json_of_a_folder_is_one_object_a_line(folder, model_file, tmp_path):
     page = tmp_path / "all.html"
     done = run("report", folder, "--model", model_file, "--trend", "-o", page, "--json")
+    assert "<script" not in page.read_text(encoding="utf-8")
     lines = [json.loads(line) for line in done.stdout.splitlines()]
     assert [line["kind"] for line in lines] == ["recording"] * 11 + ["trend"]
     assert {line["schema_version"] for line in lines} == {2}

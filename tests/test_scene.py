@@ -15,6 +15,7 @@ from numpy.testing import assert_allclose
 from pydantic import ValidationError
 from wearstate.sim.contact.closed_forms import kelvin_voigt_restitution
 from wearstate.sim.machine.simulate import simulate
+from wearstate.sim.output.spellings import spellings
 from wearstate.sim.pump.setup import contact_frequency, ideal_motion
 from wearstate.sim.scene.load import (
     SCENE_FOLDER,
@@ -30,7 +31,6 @@ from wearstate.sim.scene.parts import (
     Dimension,
     FixedTable,
     SceneError,
-    _spellings,
     listed_unit,
     to_si,
 )
@@ -126,7 +126,7 @@ def test_a_unit_is_known_by_each_of_its_spellings(dimension, unit, others):
 def test_no_spelling_has_two_meanings():
     told = [(d, u, other) for d, u, others in SPELLINGS for other in others]
     for dimension, unit, other in [*told, *((d, u, u) for d, u in EVERY_UNIT)]:
-        same = [u for u in UNITS[dimension] if re.fullmatch(_spellings(u), other)]
+        same = [u for u in UNITS[dimension] if re.fullmatch(spellings(u), other)]
         assert same == [unit], other
     # 1/s of a shaft may be revolutions or radians; a blank within a prefix is a slip
     for dimension, other in (("rotation speed", "1/s"), ("time", "m s"), ("pressure", "Mpa")):

@@ -11,11 +11,12 @@ import pytest
 from click.testing import CliRunner
 from hypothesis import given
 from hypothesis import strategies as st
-from wearstate.datasets.file.record import Attributes, DataSetWriter
+from wearstate.datasets.file.record import Attributes, DataSet, DataSetWriter
 from wearstate.diagnose.command_line.cli import cli
-from wearstate.diagnose.pictures import zoom
+from wearstate.diagnose.pages import embed
+from wearstate.diagnose.pages.embed import MOST_BYTES
 from wearstate.diagnose.pictures.view import View
-from wearstate.diagnose.pictures.zoom import MOST_BYTES, zoom_block, zoom_page
+from wearstate.diagnose.pictures.zoom import zoom_block, zoom_page
 from wearstate.diagnose.pictures.zoom_curves import MOST_CHANNELS, ZoomCurve, zoom_curves
 from wearstate.sim.output.recording import DataError, Recording
 from wearstate.sim.output.sensor import Channel
@@ -246,7 +247,7 @@ def test_the_same_page_every_time(bokeh, view):
 
 
 def test_without_bokeh_it_is_refused_with_the_cure(stored, tmp_path, monkeypatch):
-    monkeypatch.setattr(zoom, "find_spec", lambda name: None)
+    monkeypatch.setattr(embed, "find_spec", lambda name: None)
     page = tmp_path / "x.html"
     told = run("info", stored, "--plot", page, "--interactive", code=2).stderr
     assert 'pip install "wearstate[interactive]"' in told
@@ -265,7 +266,7 @@ def test_without_bokeh_it_is_refused_with_the_cure(stored, tmp_path, monkeypatch
 )
 def test_what_is_refused(stored, tmp_path, monkeypatch, arguments, message):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(zoom, "find_spec", lambda name: name)
+    monkeypatch.setattr(embed, "find_spec", lambda name: name)
     assert message in run("info", stored, *arguments, code=2).stderr
     assert list(tmp_path.iterdir()) == []
 
@@ -293,7 +294,27 @@ def test_what_a_report_refuses(small_set, small_model, tmp_path, monkeypatch):
     judge = ("report", small_set, "--model", small_model, "--interactive")
     assert "name one with -o" in run(*judge, "--record", 5, code=2).stderr
     assert "is for one recording" in run(*judge, "-o", page, code=2).stderr
-    monkeypatch.setattr(zoom, "find_spec", lambda name: None)
+    monkeypatch.setattr(embed, "find_spec", lambda name: None)
     told = run(*judge, "--record", 5, "-o", page, code=2).stderr
     assert 'pip install "wearstate[interactive]"' in told
     assert not page.exists()
+
+
+def test_a_trend_tells_its_recordings(bokeh, small_set, small_model, tmp_path):
+    page, dates = tmp_path / "x.html", tmp_path / "dates.csv"
+    with DataSet(small_set) as data:
+        names = data.manifest["record_id"]
+    dates.write_text("file,hours\n" + "".join(f"{n},{100 * i}\n" for i, n in enumerate(names)))
+    judge = ("report", small_set, "--model", small_model, "--dates", dates, "-o", page)
+    run(*judge, "--interactive")
+    html = page.read_text(encoding="utf-8")
+    assert outside(html) == []
+    assert page.stat().st_size < MOST_BYTES
+    told = [
+        text
+        for each in models(item_in(html), "ColumnDataSource")
+        for text in dict(each["data"]["entries"]).get("block", [])
+    ]
+    assert told
+    assert all(re.match(r"recording: .*\ntime: [0-9.]+ h\nestimate: ", text) for text in told)
+    assert re.search(r'(?s)<div class="still">.*data:image/png', html)

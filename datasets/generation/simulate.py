@@ -1,17 +1,19 @@
 """One simulated recording of a scene, by name: rungs chosen where the scene leaves them open."""
 
+from collections.abc import Mapping
 from operator import index
 from pathlib import Path
+from typing import Any
 
 from ...sim.machine import simulate as machine
 from ...sim.output.recording import Recording
-from ...sim.scene.load import load_scene
-from ...sim.scene.parts import Scene
+from ...sim.scene.load import load_scene, scene_from_table
+from ...sim.scene.parts import Scene, SceneError
 from .quantities import resolved, with_estimate
 
 
 def simulate(
-    scene: Scene | str | Path,
+    scene: Scene | str | Path | Mapping[str, Any],
     *,
     seed: int = 0,
     truth: bool = False,
@@ -21,8 +23,9 @@ def simulate(
 
     Parameters
     ----------
-    scene : Scene, str or Path
-        A scene, as of :func:`wearstate.load_scene`, the name of a built-in one, or a TOML file.
+    scene : Scene, str, Path or mapping
+        A scene, as of :func:`wearstate.load_scene`, the name of a built-in one, a TOML file, or the
+        table of a scene as such a file has it.
         With ``fidelity = "auto"`` the cheapest rungs that meet its accuracy are chosen first.
     seed : int
         Seed of the sensor noise; the mechanics are deterministic.
@@ -54,9 +57,30 @@ def simulate(
     >>> recording = wearstate.simulate(scene, truth=True)
     >>> recording.truth["pin_force_n"].shape, recording.time.shape
     ((25600, 2), (25600,))
+
+    A table as of a TOML file is a scene too:
+
+    >>> table = scene.model_dump(mode="json", exclude_none=True)
+    >>> wearstate.simulate({**table, "duration": "0.5 s"}).duration
+    0.5
     """
     if index(seed) < 0:
         raise ValueError(f"seed = {seed} must be a whole number >= 0")
-    chosen, resolution = resolved(scene if isinstance(scene, Scene) else load_scene(scene))
+    chosen, resolution = resolved(_scene_of(scene))
     recording = machine.simulate(chosen, seed=seed, truth=truth, raise_on_failure=raise_on_failure)
     return recording if resolution is None else with_estimate(recording, resolution)
+
+
+def _scene_of(scene: Scene | str | Path | Mapping[str, Any]) -> Scene:
+    """A scene however it is given."""
+    if isinstance(scene, Scene):
+        return scene
+    if isinstance(scene, Mapping):
+        paths = [str(key) for key in scene if "." in str(key)]
+        if paths and "machine" not in scene:
+            fault = (
+                "is a value of a scene, must be a scene: load_scene(NAME, {...}) replaces values"
+            )
+            raise SceneError("scene", [f"{path} {fault}" for path in paths])
+        return scene_from_table(scene)
+    return load_scene(scene)

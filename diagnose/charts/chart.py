@@ -56,6 +56,9 @@ class Point:
         question.
     here : bool
         The scene as it is written.
+    block : str
+        TOML to paste into the scene or recipe; comment only where nothing is to be changed, empty
+        where the choice is none of a scene.
     """
 
     name: str
@@ -69,6 +72,7 @@ class Point:
     counts: str = ""
     question: str = ""
     here: bool = False
+    block: str = ""
 
     @property
     def worst(self) -> str:
@@ -392,6 +396,7 @@ def _point_table(point: Point) -> dict[str, Any]:
         "on_front": point.on_front,
         "question": point.question,
         "here": point.here,
+        "block": point.block,
         "errors": {
             name: {"mean": each.mean, "standard_error": each.standard_error}
             for name, each in point.errors.items()

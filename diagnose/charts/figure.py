@@ -1,24 +1,20 @@
-"""Pictures and pages of a chart: where one stands, what to take, the front, every quantity."""
+"""Picture of a chart: where one stands, what to take, the front, every quantity."""
 
 import math
 import re
 import textwrap
-from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 from xml.sax.saxutils import escape
 
 import numpy as np
 
-from ..pages.page import render, save_page, visible
-from ..pages.picture import picture_bytes, save_picture
-from ..pages.plain_json import json_text
-from .chart import RECOMMENDED, Chart, Choice, Point, chart_table, convergence_text, save_rows
-from .words import percent
+from ..pages.page import visible
+from ..pages.picture import picture_bytes
+from .chart import RECOMMENDED, Chart, Choice, Point
 
-_FRONT, _OTHER, _DOUBTFUL, _LIMIT = "#1f5a94", "#9aa3ab", "#e07b39", "#b3261e"
-_WINNER, _SO_FAR, _HERE = "#3a923a", "#e07b39", "#111111"
-_FLOOR = 1e-3  # %, the least error that is drawn; the reference sits on it
+FRONT, OTHER, DOUBTFUL, LIMIT = "#1f5a94", "#9aa3ab", "#e07b39", "#b3261e"
+WINNER, SO_FAR, HERE_COLOUR = "#3a923a", "#e07b39", "#111111"
+FLOOR = 1e-3  # %, the least error that is drawn; the reference sits on it
 _MOST_ROWS = 12  # of the front, in the table of quantities
 _WIDE = 46  # characters of a name on one line
 
@@ -61,9 +57,9 @@ def _wrapped(text: str, width: int) -> str:
     return "\n".join(textwrap.wrap(text, width))
 
 
-def _shown(point: Point) -> float:
+def shown_error(point: Point) -> float:
     """Error in per cent, not below the floor."""
-    return max(100 * point.error, _FLOOR)
+    return max(100 * point.error, FLOOR)
 
 
 def _draw_points(axes: Any, chart: Chart, question: str) -> None:
@@ -72,9 +68,9 @@ def _draw_points(axes: Any, chart: Chart, question: str) -> None:
     front = sorted((p for p in finite if p.on_front), key=lambda p: p.seconds)
     axes.step(
         [p.seconds for p in front],
-        [_shown(p) for p in front],
+        [shown_error(p) for p in front],
         where="post",
-        color=_FRONT,
+        color=FRONT,
         lw=1.2,
         label="front",
         zorder=1,
@@ -83,17 +79,17 @@ def _draw_points(axes: Any, chart: Chart, question: str) -> None:
         if any(point is each for each in finite):
             _draw_point(axes, point, number)
     if chart.accuracy is not None:
-        axes.axhline(100 * chart.accuracy, color=_LIMIT, lw=1, ls="--", label="accuracy asked")
+        axes.axhline(100 * chart.accuracy, color=LIMIT, lw=1, ls="--", label="accuracy asked")
     if chart.remaining > 0:
         axes.axhspan(
-            _FLOOR / 2,
-            max(100 * chart.remaining, _FLOOR / 2),
+            FLOOR / 2,
+            max(100 * chart.remaining, FLOOR / 2),
             color="#dfe3e8",
             zorder=0,
             label="the reference's own error",
         )
     for label, style in _KINDS.items():
-        if any(_kind(p) == label for p in finite):
+        if any(kind_of(p) == label for p in finite):
             axes.plot([], [], ls="none", label=label, **style)
     _mark_choice(axes, chart, question, finite)
     _mark_here(axes, finite, chart.subject)
@@ -102,7 +98,7 @@ def _draw_points(axes: Any, chart: Chart, question: str) -> None:
         axes.set_title(question, fontsize=10)
     if chart.accuracy is not None:
         axes.set_yscale("log")
-        axes.set_ylim(_FLOOR / 2, _HEADROOM * _highest(chart))
+        axes.set_ylim(FLOOR / 2, _HEADROOM * _highest(chart))
     _plain_numbers(axes.xaxis)
     _plain_numbers(axes.yaxis)
     axes.grid(alpha=0.3, which="both")
@@ -112,17 +108,17 @@ def _draw_points(axes: Any, chart: Chart, question: str) -> None:
 
 def _mark_choice(axes: Any, chart: Chart, question: str, finite: list[Point]) -> None:
     """Ring round what to take: green where that is final."""
-    choice = _choice_of(chart, question)
+    choice = choice_of(chart, question)
     name = chart.winner if choice is None else choice.name
     final = choice is None or choice.status == "resolved"
     if choice is not None and choice.status not in RECOMMENDED:
         return
     for point in (p for p in finite if p.name == name):
-        style = {"color": _WINNER, "ls": "-"} if final else {"color": _SO_FAR, "ls": ":"}
-        label = _fastest(chart) if final else "may be enough, not certain"
+        style = {"color": WINNER, "ls": "-"} if final else {"color": SO_FAR, "ls": ":"}
+        label = winner_words(chart) if final else "may be enough, not certain"
         axes.scatter(
             point.seconds,
-            _shown(point),
+            shown_error(point),
             s=260,
             facecolors="none",
             edgecolors=style["color"],
@@ -133,14 +129,17 @@ def _mark_choice(axes: Any, chart: Chart, question: str, finite: list[Point]) ->
         )
 
 
-def _choice_of(chart: Chart, question: str) -> Choice | None:
+def choice_of(chart: Chart, question: str) -> Choice | None:
+    """What to take for a question; None where nothing is recommended."""
     return next((each for each in chart.choices if each.question == question), None)
 
 
 def _mark_here(axes: Any, finite: list[Point], subject: str) -> None:
     for point in (p for p in finite if p.here):
-        place = (point.seconds, _shown(point))
-        axes.plot(*place, "*", ms=16, mfc="#ffd23f", mec=_HERE, label=f"your {subject}", zorder=5)
+        place = (point.seconds, shown_error(point))
+        axes.plot(
+            *place, "*", ms=16, mfc="#ffd23f", mec=HERE_COLOUR, label=f"your {subject}", zorder=5
+        )
         right = axes.transAxes.inverted().transform(axes.transData.transform(place))[0] > _RIGHT
         axes.annotate(
             f"your {subject}",
@@ -151,7 +150,7 @@ def _mark_here(axes: Any, finite: list[Point], subject: str) -> None:
             va="top",
             fontsize=9,
             weight="bold",
-            color=_HERE,
+            color=HERE_COLOUR,
             zorder=5,
         )
 
@@ -166,7 +165,7 @@ def _number(axes: Any, front: list[Point]) -> None:
     to_panel = axes.transData + axes.transAxes.inverted()
     before, below = np.array([-1.0, -1.0]), True
     for number, point in enumerate(front, start=1):
-        place = (point.seconds, _shown(point))
+        place = (point.seconds, shown_error(point))
         here = to_panel.transform(place)
         below = bool(np.all(np.abs(here - before) < _NEAR)) and not below
         before = here
@@ -178,7 +177,7 @@ def _number(axes: Any, front: list[Point]) -> None:
             va="top" if below else "bottom",
             fontsize=9,
             weight="bold",
-            color=_FRONT,
+            color=FRONT,
             path_effects=[withStroke(linewidth=2, foreground="white")],
             zorder=4,
         )
@@ -186,8 +185,8 @@ def _number(axes: Any, front: list[Point]) -> None:
 
 def _highest(chart: Chart) -> float:
     """Largest error that is drawn, or the accuracy asked [%]."""
-    errors = [_shown(p) for p in chart.points if math.isfinite(p.error)]
-    return max([*errors, 100 * (chart.accuracy or 0.0), _FLOOR])
+    errors = [shown_error(p) for p in chart.points if math.isfinite(p.error)]
+    return max([*errors, 100 * (chart.accuracy or 0.0), FLOOR])
 
 
 _HEADROOM = 2.5  # of the error axis: the highest number stays inside the frame
@@ -201,7 +200,8 @@ def _legend_below(axes: Any, ncols: int) -> None:
     )
 
 
-def _fastest(chart: Chart) -> str:
+def winner_words(chart: Chart) -> str:
+    """What the ring round a point says."""
     if chart.accuracy is None:
         return "fastest within the standard error of the best"
     return "cheapest within the accuracy"
@@ -223,13 +223,14 @@ def _plain_numbers(axis: Any) -> None:
 _NARROW = 200.0  # of an axis, last over first: so few decades need numbers between
 
 _KINDS: dict[str, dict[str, Any]] = {
-    "on the front": {"marker": "o", "ms": 8, "color": _FRONT},
-    "beaten": {"marker": "o", "ms": 5, "color": _OTHER},
-    "scatter too large to tell": {"marker": "s", "ms": 6, "mfc": "none", "color": _DOUBTFUL},
+    "on the front": {"marker": "o", "ms": 8, "color": FRONT},
+    "beaten": {"marker": "o", "ms": 5, "color": OTHER},
+    "scatter too large to tell": {"marker": "s", "ms": 6, "mfc": "none", "color": DOUBTFUL},
 }
 
 
-def _kind(point: Point) -> str:
+def kind_of(point: Point) -> str:
+    """How a point is drawn, in the words of the legend."""
     if point.verdict == "doubtful":
         return "scatter too large to tell"
     return "on the front" if point.on_front else "beaten"
@@ -239,9 +240,11 @@ def _draw_point(axes: Any, point: Point, number: int) -> None:
     """One point with its standard error, under an id that the page gives a name to."""
     error = 100 * point.standard_error
     if math.isfinite(error) and error > 0:
-        low = max(_shown(point) - error, _FLOOR)
-        axes.vlines(point.seconds, low, _shown(point) + error, color=_OTHER, lw=0.8, zorder=1)
-    (mark,) = axes.plot(point.seconds, _shown(point), ls="none", zorder=3, **_KINDS[_kind(point)])
+        low = max(shown_error(point) - error, FLOOR)
+        axes.vlines(point.seconds, low, shown_error(point) + error, color=OTHER, lw=0.8, zorder=1)
+    (mark,) = axes.plot(
+        point.seconds, shown_error(point), ls="none", zorder=3, **_KINDS[kind_of(point)]
+    )
     mark.set_gid(f"point-{number}")
 
 
@@ -261,7 +264,7 @@ def _draw_quantities(figure: Any, axes: Any, chart: Chart) -> None:
         [[100 * p.errors[n].error if n in p.errors else np.nan for n in names] for _, p in points]
     )
     shown = axes.imshow(
-        np.maximum(values, _FLOOR),
+        np.maximum(values, FLOOR),
         aspect="auto",
         cmap="YlOrRd",
         norm=LogNorm(vmin=_palest(chart, values), vmax=max(100.0, float(np.nanmax(values)))),
@@ -288,7 +291,7 @@ def _draw_quantities(figure: Any, axes: Any, chart: Chart) -> None:
 
 def _palest(chart: Chart, values: Any) -> float:
     """Of an accuracy that is asked all decades below it; else from what there is."""
-    return 10 * _FLOOR if chart.accuracy is not None else max(_FLOOR, float(np.nanmin(values)) / 2)
+    return 10 * FLOOR if chart.accuracy is not None else max(FLOOR, float(np.nanmin(values)) / 2)
 
 
 _DARK = 20.0  # %, above it a cell is dark
@@ -316,7 +319,7 @@ def _percent(value: float) -> str:
         return ""
     if value >= 100:
         return f"{value:.0f}"
-    return "0" if value < _FLOOR else f"{value:.1g}" if value < 10 * _FLOOR else f"{value:.2g}"
+    return "0" if value < FLOOR else f"{value:.1g}" if value < 10 * FLOOR else f"{value:.2g}"
 
 
 def chart_svg(chart: Chart) -> str:
@@ -341,82 +344,3 @@ def _pointer(chart: Chart, point: Point) -> str:
     worst = chart.label(point.worst) or "none"
     words = f"{point.name}: {point.seconds:.3g} s, error {point.error:.2%} ({worst})"
     return f"<title>{escape(visible(words))}</title>"
-
-
-def chart_html(chart: Chart) -> str:
-    """One self-contained page: verdict, picture with named points, tables.
-
-    Parameters
-    ----------
-    chart : Chart
-
-    Returns
-    -------
-    str
-    """
-    svg = chart_svg(chart)
-    return render(
-        "chart.html.j2",
-        chart=chart,
-        svg=svg[svg.index("<svg") :],
-        tables=[(question, _rows(chart, question)) for question in chart.questions],
-        quantities=_quantity_rows(chart),
-        convergence=[convergence_text(each, chart.labels) for each in chart.convergence],
-        recommended=RECOMMENDED,
-        finite=math.isfinite,
-        percent=percent,
-    )
-
-
-def _rows(chart: Chart, question: str) -> list[tuple[int | str, Point, bool]]:
-    """Number on the front, point, whether it is what to take."""
-    points, choice = chart.of(question), _choice_of(chart, question)
-    front = sorted((p for p in points if p.on_front), key=lambda p: p.seconds)
-    numbers: dict[int, int | str] = {id(point): i for i, point in enumerate(front, start=1)}
-    wanted = choice.name if choice else None
-    return [(numbers.get(id(point), ""), point, point.name == wanted) for point in points]
-
-
-def _quantity_rows(chart: Chart) -> list[tuple[str, list[Any]]]:
-    """Of the scene as written: quantity in words, its difference for each question."""
-    own = [next((p for p in chart.of(q) if p.here), None) for q in chart.questions]
-    shown = [point for point in own if point is not None]
-    return [(words, [p.errors.get(name) for p in shown]) for name, words in chart.labels.items()]
-
-
-def save_chart(chart: Chart, path: Path, *, force: bool = True) -> None:
-    """Write a chart in the form that the suffix asks for, whole or not at all.
-
-    Parameters
-    ----------
-    chart : Chart
-    path : Path
-        One of :data:`SUFFIXES`.
-    force : bool
-        Replace an existing file.
-
-    Raises
-    ------
-    KeyError
-        Another suffix.
-    """
-    if path.suffix == ".csv":
-        save_rows(chart, path, force=force)
-    elif path.suffix in (".png", ".pdf"):
-        save_picture(chart_figure(chart), path, force=force)
-    else:
-        save_page(_PAGES[path.suffix](chart), path, force=force)
-
-
-def _json(chart: Chart) -> str:
-    return json_text(chart_table(chart), indent=1)
-
-
-_PAGES: dict[str, Callable[[Chart], str]] = {
-    ".svg": chart_svg,
-    ".html": chart_html,
-    ".json": _json,
-}
-
-SUFFIXES = (".svg", ".png", ".pdf", ".html", ".json", ".csv")
-"""Forms in which a chart can be written."""

@@ -233,7 +233,16 @@ def _points(scene: Scene, found: Study, answer: Answer, question: str) -> Iterat
             on_front=on_front,
             question=question,
             here=here,
+            block=f"# {scene.name}: {name}" if here else _point_block(scene, each, name),
         )
+
+
+def _point_block(scene: Scene, each: Candidate, name: str) -> str:
+    """What a scene must change to be this point."""
+    before = {path: written_value(scene, path) for path in each.values}
+    changes = {path: value for path, value in each.values.items() if before[path] != value}
+    head = f"# {scene.name}: {name}"
+    return f"{head}\n{block_of(changes, before)}" if changes else head
 
 
 def _reason(each: Candidate, scene: Scene) -> str:

@@ -195,6 +195,7 @@ def _point(measured: _Measured, trial: _Trial, here: _Trial, accuracy: float) ->
         counts=LOSS if found else "",
         question=QUESTION,
         here=trial is here,
+        block=f"# scene values: {trial.name}\n{block_of(measured.sets.values(trial.rungs))}",
     )
 
 

@@ -29,6 +29,7 @@ from ..wear_model.arrays import (
 from ..wear_model.bundle import Bundle, checked, load_bundle, save_bundle
 from ..wear_model.estimate import ModelError
 from ..wear_model.novelty import Familiarity
+from ..wear_model.quietness import peak_channels
 from .train import ClassModel, Votes
 
 CLASS_MODEL = "class model"
@@ -81,6 +82,14 @@ def save_class_model(model: ClassModel, path: str | Path, *, force: bool = False
         The file exists, or its folder does not.
     ModelError
         The model could not be read again.
+
+    Examples
+    --------
+    >>> import wearstate
+    >>> model = wearstate.train_classes("pump.h5", "grade", features=["core"])
+    >>> wearstate.save_class_model(model, "grades.wsm")
+    >>> wearstate.load_class_model("grades.wsm")
+    <ClassModel of grade: 0, 1, 2, 3; 60 groups>
     """
     _check(model, path)
     structure = {"blends": [blend_structure(blend) for blend in model.blends]}
@@ -107,6 +116,14 @@ def load_class_model(path: str | Path) -> ClassModel:
     ModelError
         No such file, another kind of model, damaged, changed, of another version of the format or
         of the features, or forged so that its parts do not fit each other.
+
+    Examples
+    --------
+    >>> import wearstate
+    >>> model = wearstate.train_classes("pump.h5", "grade", features=["core"])
+    >>> wearstate.save_class_model(model, "grades.wsm")
+    >>> wearstate.load_class_model("grades.wsm").classes
+    ('0', '1', '2', '3')
     """
     bundle = load_bundle(path, CLASS_MODEL)
     checked(_Card, bundle.card, path, "card.json")
@@ -148,7 +165,7 @@ def _model_of(structure: _Structure, bundle: Bundle) -> ClassModel:
 
 def _check(model: ClassModel, path: str | Path) -> None:
     """Shapes that fit each other, so that a forged file fails here and not in a prediction."""
-    n = len(model.names)
+    n, peaks = len(model.names), len(peak_channels(model.names))
     try:
         physical = physical_rows(model.names, np.zeros((1, n)))
     except ValueError as error:
@@ -158,7 +175,9 @@ def _check(model: ClassModel, path: str | Path) -> None:
         and all(blend_fits(blend, n) for blend in model.blends),
         "votes": _votes_fit(model.votes, len(model.classes)),
         "familiarity": len(model.familiarity) == len(model.classes)
-        and all(familiarity_fits(cloud, physical.shape[1], n) for cloud in model.familiarity),
+        and all(
+            familiarity_fits(cloud, physical.shape[1], n, peaks) for cloud in model.familiarity
+        ),
         "numbers": numbers_fit(_arrays_of(model)),
     }
     bad = [name for name, good in fits.items() if not good]

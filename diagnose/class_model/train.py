@@ -210,6 +210,17 @@ class ClassModel:
         """Names of the features of a row."""
         return tuple(self.card["features"])
 
+    @cached_property
+    def scores(self) -> dict[str, Any]:
+        """Accuracy by recordings left out, as of :func:`score_votes`."""
+        return score_votes(self.votes, self.classes)
+
+    def __repr__(self) -> str:
+        recordings = len(np.unique(self.votes.group))
+        return (
+            f"<ClassModel of {self.card['target']}: {', '.join(self.classes)}; {recordings} groups>"
+        )
+
     @property
     def notice(self) -> str:
         """What must be said beside every result."""

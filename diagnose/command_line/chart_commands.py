@@ -45,6 +45,7 @@ def scene_chart_command(
     choice: str,
     jobs: int,
     force: bool,
+    interactive: bool,
 ) -> tuple[Chart, bool]:
     """Measure a scene, write what is asked for.
 
@@ -65,6 +66,8 @@ def scene_chart_command(
     jobs : int
     force : bool
         Replace existing files, and begin anew.
+    interactive : bool
+        Of a page: points to tap.
 
     Returns
     -------
@@ -93,9 +96,9 @@ def scene_chart_command(
         kept.save()
     found = chart_of(scene, search.found())
     if output is not None:
-        from ..charts.figure import save_chart
+        from ..charts.page import save_chart
 
-        save_chart(found, output, force=force or going_on)
+        save_chart(found, output, force=force or going_on, interactive=interactive)
         if not found.unfinished:
             kept.drop()
     if applied is not None:
@@ -116,6 +119,7 @@ def verdict_chart_command(
     seed: int,
     jobs: int,
     force: bool,
+    interactive: bool,
 ) -> Chart:
     """Measure what the rungs of a recipe are worth to the verdict, write what is asked for.
 
@@ -138,6 +142,8 @@ def verdict_chart_command(
     seed, jobs : int
     force : bool
         Replace existing files.
+    interactive : bool
+        Of a page: points to tap.
 
     Returns
     -------
@@ -159,9 +165,9 @@ def verdict_chart_command(
         )
         found = verdict_chart(sets, accuracy)
     if output is not None:
-        from ..charts.figure import save_chart
+        from ..charts.page import save_chart
 
-        save_chart(found, output, force=force)
+        save_chart(found, output, force=force, interactive=interactive)
     if applied is not None:
         [chosen] = found.choices
         table = {

@@ -66,6 +66,12 @@ LARGEST_SEED = 2**63 - 1
 json_option = click.option(
     "--json", "as_json", is_flag=True, help="One JSON object on stdout; an error as one on stderr."
 )
+points_option = click.option(
+    "--interactive",
+    is_flag=True,
+    help="In the page (.html): points to zoom in on and to tap for their settings.",
+)
+
 force_option = click.option("--force", is_flag=True, help="Replace an existing output.")
 
 jobs_option = click.option(
@@ -270,6 +276,17 @@ CHART_SUFFIXES = (".svg", ".png", ".pdf", ".html", ".json", ".csv")
 PICTURE_SUFFIXES, TABLE_SUFFIXES = (".png", ".svg", ".pdf"), (".parquet", ".csv", ".h5")
 _Output = tuple[Path | None, tuple[str, ...]]
 """A file to write, None where it was not asked for, and the suffixes it may have."""
+
+
+def check_interactive(interactive: bool, output: Path | None) -> None:
+    """Refuse points to tap where there is no page, or nothing to draw them."""
+    if not interactive:
+        return
+    if output is None or output.suffix not in PAGE_SUFFIXES:
+        raise click.UsageError("--interactive is for a page: name one with -o, as -o page.html")
+    from ..pages.embed import require_bokeh
+
+    require_bokeh()
 
 
 def check_outputs(inputs: Sequence[Path | str], outputs: Sequence[_Output], force: bool) -> None:

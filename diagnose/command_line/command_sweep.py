@@ -12,12 +12,14 @@ from .command_options import (
     EXIT_FAILED,
     PATH,
     Share,
+    check_interactive,
     check_outputs,
     emit,
     force_option,
     jobs_option,
     json_option,
     overrides_of,
+    points_option,
     progress_bar,
     seed_option,
     tell_bare,
@@ -67,6 +69,7 @@ _SUFFIXES = (*CHART_SUFFIXES, ".htm")
 @click.option(
     "-o", "--output", type=PATH, help="Page, table or picture (.html, .csv, .json, .png, .svg)."
 )
+@points_option
 @seed_option
 @jobs_option
 @force_option
@@ -80,6 +83,7 @@ def sweep(
     starts: int,
     confidence: float,
     output: Path | None,
+    interactive: bool,
     seed: int,
     jobs: int | None,
     force: bool,
@@ -93,10 +97,11 @@ def sweep(
     """
     from ..pages.kept import part_file
     from ..sweep.axes import SweepError
-    from ..sweep.figure import save_sweep
+    from ..sweep.page import save_sweep
     from ..sweep.sweep import kept_runs, measure, sweep_of, sweep_plan
     from ..sweep.text import sweep_table, sweep_text
 
+    check_interactive(interactive, output)
     part = part_file(output)
     going_on = part is not None and part.exists() and not force
     check_outputs([scene_name], [(output, _SUFFIXES)], force or going_on)
@@ -126,7 +131,7 @@ def sweep(
         kept.drop()
         raise SweepError([f"no run succeeded: {fault}" for fault in found.faults])
     if output is not None and found.outcomes:
-        save_sweep(found, output, force=force or going_on)
+        save_sweep(found, output, force=force or going_on, interactive=interactive)
         if found.finished:
             kept.drop()
     files = [str(output)] if output is not None and found.outcomes else []

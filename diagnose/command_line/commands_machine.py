@@ -22,12 +22,14 @@ from .command_options import (
     SCENE_SUFFIXES,
     Accuracy,
     Share,
+    check_interactive,
     check_outputs,
     emit,
     force_option,
     jobs_option,
     json_option,
     overrides_of,
+    points_option,
     progress_bar,
     scene_of,
     seed_option,
@@ -531,6 +533,7 @@ def stability(
     show_default=True,
     help="Of --apply: with the rungs of the scene kept, or with rungs that may change.",
 )
+@points_option
 @seed_option
 @jobs_option
 @force_option
@@ -546,6 +549,7 @@ def chart(
     output: Path | None,
     applied: Path | None,
     choice: str,
+    interactive: bool,
     seed: int,
     jobs: int | None,
     force: bool,
@@ -559,6 +563,7 @@ def chart(
     on from there. Of a data set (.h5): features and models, cost against error. Of a recipe, with
     --accuracy verdict=2%: which rungs may be cheaper while training on them keeps the verdict.
     """
+    check_interactive(interactive, output)
     of_data = subject.endswith(DATA_SUFFIXES)
     of_verdict, share = accuracy if accuracy is not None else (False, None)
     if of_verdict and not of_data:
@@ -579,6 +584,7 @@ def chart(
             seed=seed,
             jobs=worker_count(jobs),
             force=force,
+            interactive=interactive,
         )
         _emit_chart(found, [output, applied], as_json)
         return
@@ -589,7 +595,7 @@ def chart(
     if seed and not of_data:
         raise click.UsageError("--seed is of the models on a data set; a scene's chart draws none")
     if of_data:
-        found = _data_chart(subject, budget, output, seed, jobs, force)
+        found = _data_chart(subject, budget, output, seed, jobs, force, interactive)
         _emit_chart(found, [output], as_json)
         return
     if subject in built_in("recipe"):
@@ -610,6 +616,7 @@ def chart(
         choice=choice,
         jobs=worker_count(jobs),
         force=force,
+        interactive=interactive,
     )
     _emit_chart(found, [output, applied], as_json)
     if interrupted:
@@ -629,9 +636,10 @@ def _data_chart(
     seed: int,
     jobs: int | None,
     force: bool,
+    interactive: bool,
 ) -> Any:
-    from ..charts.figure import save_chart
     from ..charts.of_models import model_chart
+    from ..charts.page import save_chart
 
     check_outputs([subject], [(output, CHART_SUFFIXES)], force)
     with progress_bar("measuring") as progress:
@@ -639,7 +647,7 @@ def _data_chart(
             subject, seed=seed, budget=budget, jobs=worker_count(jobs), progress=progress
         )
     if output is not None:
-        save_chart(found, output, force=force)
+        save_chart(found, output, force=force, interactive=interactive)
     return found
 
 

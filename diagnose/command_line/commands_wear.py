@@ -458,7 +458,9 @@ def _judge_across(
 @join_option
 @click.option("-o", "--output", type=PATH, help="HTML page to write.")
 @click.option(
-    "--interactive", is_flag=True, help="Of one recording: curves to zoom and measure in the page."
+    "--interactive",
+    is_flag=True,
+    help="Of one recording: curves to zoom and measure in the page; of many: their trends.",
 )
 @click.option("--machine", metavar="KIND", help="Kind of machine, for its ISO zone.")
 @click.option(
@@ -551,7 +553,7 @@ def report(
     if not many and (given["trend"] or given["dates"]):
         raise click.UsageError("--trend and --dates are for a folder or a data set of many records")
     if given["interactive"]:
-        _check_interactive(output, many)
+        _check_interactive(output, many and not (given["trend"] or given["dates"]))
     if views and source.is_dir():
         raise click.UsageError("--join completes a recording or a data set: name one, not a folder")
     usual = model.card["trained_on"]["scene"]
@@ -565,14 +567,17 @@ def report(
     raise click.exceptions.Exit(report_exit(verdicts, fail_on))
 
 
-def _check_interactive(output: Path | None, many: bool) -> None:
-    """Refuse curves where there is no page, more than one recording, or nothing to draw them."""
-    from ..pictures.zoom import require_bokeh
+def _check_interactive(output: Path | None, untimed: bool) -> None:
+    """Refuse curves where there is no page, many recordings without trend, or nothing to draw."""
+    from ..pages.embed import require_bokeh
 
     if output is None:
         raise click.UsageError("--interactive adds curves to the page: name one with -o")
-    if many:
-        raise click.UsageError("--interactive is for one recording: name one, or choose a --record")
+    if untimed:
+        raise click.UsageError(
+            "--interactive is for one recording or a trend: name one, choose a --record, or add "
+            "--trend"
+        )
     require_bokeh()
 
 
@@ -712,6 +717,7 @@ def _report_many(told: _ReportTask) -> list[_Verdict]:
                 machine=told.machine,
                 baselines=told.baselines,
                 plate=told.plate,
+                interactive=given["interactive"],
             )
             save_page(page, told.output, force=told.force)
     if not told.as_json:

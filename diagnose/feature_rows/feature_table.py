@@ -105,8 +105,9 @@ def confounders_in(manifest: pd.DataFrame) -> dict[str, NDArray[np.bool_]]:
 
 _CONFOUNDER = "confounder_"
 
-REGIMES = ("lubrication",)
-"""Choices of a recipe that change what wear sounds like: a model tells which one it hears."""
+REGIMES = {"lubrication": "pin"}
+"""Choices of a recipe that change what wear sounds like, and what they are of: a model tells which
+one it hears."""
 
 
 def regimes_in(manifest: pd.DataFrame) -> dict[str, NDArray[np.bool_]]:
@@ -144,6 +145,31 @@ def is_regime(name: str) -> bool:
     (True, False)
     """
     return name.startswith(tuple(f"{regime}_" for regime in REGIMES))
+
+
+def regime_words(name: str) -> str:
+    """A regime with what it is of.
+
+    Examples
+    --------
+    >>> regime_words("lubrication_flooded")
+    'flooded pin'
+    """
+    choice = next(regime for regime in REGIMES if name.startswith(f"{regime}_"))
+    return f"{name.removeprefix(f'{choice}_')} {REGIMES[choice]}"
+
+
+def knows_no_oil(severity: str, findings: Sequence[str]) -> bool:
+    """Whether a model of the clearance of a pin was trained without regimes of lubrication.
+
+    Examples
+    --------
+    >>> knows_no_oil("diametral_clearance_crankpin_m", [])
+    True
+    >>> knows_no_oil("diametral_clearance_crankpin_m", ["lubrication_dry", "lubrication_flooded"])
+    False
+    """
+    return "pin_" in severity and not any(is_regime(name) for name in findings)
 
 
 @dataclass(frozen=True, kw_only=True)

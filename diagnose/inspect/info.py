@@ -21,11 +21,12 @@ from ...sim.scene.parts import Scene
 from ..class_model.file import CLASS_MODEL, load_class_model
 from ..feature_rows.feature_table import choice_of, confounders_in
 from ..feature_rows.quality import sample_faults
+from ..pages.embed import require_bokeh
 from ..pages.page import save_page
 from ..pages.picture import encoded, save_picture
 from ..pictures.kinds import AUTO, plot_recording
 from ..pictures.view import View
-from ..pictures.zoom import STILL_COLOURS, require_bokeh, zoom_page
+from ..pictures.zoom import STILL_COLOURS, zoom_page
 from ..pictures.zoom_curves import zoom_curves
 from ..wear_model.bundle import kind_of
 from ..wear_model.file import load_model

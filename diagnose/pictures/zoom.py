@@ -3,28 +3,22 @@
 Bokeh draws them: an optional library, whose script goes into the page from the installed package.
 """
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
 
-from ...sim.output.recording import DataError
+from ..pages.embed import MOST_BYTES, SPARE_BYTES, bokeh_script, item_text, require_bokeh
 from ..pages.page import render, visible
 from .panel import COLOURS
 from .zoom_curves import ZoomCurve
-
-MOST_BYTES = 2_500_000
-"""Of a page with curves."""
 
 STILL_COLOURS = 128
 """Of the picture that stands for the curves on paper."""
 
 _FEWEST_POINTS = 200  # of a curve
 _POINT_BYTES = 2 * 4 * 4 / 3  # x and y as single floats in base64
-_SPARE_BYTES = 100_000  # words of the page
 _CURVE_BYTES = 9_000  # axes and tools
 _HARMONICS, _SIDEBANDS = 10, 3
 _MARGIN = 0.05  # of the values' range, above and below
@@ -102,21 +96,6 @@ class ZoomBlock:
     shares: tuple[tuple[str, int, int], ...]
 
 
-def require_bokeh() -> None:
-    """Refuse where the library that draws is missing.
-
-    Raises
-    ------
-    DataError
-        It names the cure.
-    """
-    if find_spec("bokeh") is None:
-        raise DataError(
-            "an interactive page needs Bokeh, which is not installed; "
-            'pip install "wearstate[interactive]"'
-        )
-
-
 def zoom_block(curves: Sequence[ZoomCurve], *, speed: float | None, taken: int = 0) -> ZoomBlock:
     """Curves as a part of a page.
 
@@ -138,17 +117,13 @@ def zoom_block(curves: Sequence[ZoomCurve], *, speed: float | None, taken: int =
         Bokeh is not installed.
     """
     require_bokeh()
-    from bokeh.embed import json_item
-    from bokeh.resources import Resources
-
-    script = Resources(mode="inline", components=["bokeh"]).render_js()
-    room = MOST_BYTES - _SPARE_BYTES - taken - len(script.encode()) - _CURVE_BYTES * len(curves)
+    script = bokeh_script()
+    room = MOST_BYTES - SPARE_BYTES - taken - len(script.encode()) - _CURVE_BYTES * len(curves)
     most = max(_share([len(each.x) for each in curves], int(room / _POINT_BYTES)), _FEWEST_POINTS)
     drawn = [each.thinned(most) for each in curves]
-    item = json.dumps(json_item(_column(drawn, speed)))
     return ZoomBlock(
         script=script,
-        item=item.replace("&", "\\u0026").replace("<", "\\u003c"),
+        item=item_text(_column(drawn, speed)),
         shares=tuple(
             (thin.title, len(thin.x), len(curve.x))
             for thin, curve in zip(drawn, curves, strict=True)

@@ -9,9 +9,11 @@ from ...sim.output.recording import DataError, Recording
 from ..feature_rows.healthy import Baseline, Baselines
 from ..nameplate.cautions import known_beside
 from ..nameplate.nameplate import Nameplate
+from ..pages.embed import require_bokeh
 from ..pages.page import render
+from ..pages.points import PointBlock, point_block
 from ..pictures.view import View
-from ..pictures.zoom import ZoomBlock, require_bokeh, zoom_block
+from ..pictures.zoom import ZoomBlock, zoom_block
 from ..pictures.zoom_curves import zoom_curves
 from ..wear_model.estimate import Estimate, WearModel
 from .advice import brief_words
@@ -24,6 +26,7 @@ from .figures import (
     report_pictures,
     trend_picture,
 )
+from .points import trend_points
 from .verdict import feature_words, finding_words, millimetres, report_table, zone_words
 
 _MOST_ROWS = 1000  # of the table of a batch: a page for reading
@@ -107,6 +110,7 @@ def batch_html(
     machine: str | None = None,
     baselines: Baselines | None = None,
     plate: Nameplate | None = None,
+    interactive: bool = False,
 ) -> str:
     """The report on many recordings: counts, trends, a table, and the most urgent in full.
 
@@ -121,13 +125,25 @@ def batch_html(
         That the estimates were given.
     plate : Nameplate, optional
         Of the machines, as of :func:`wearstate.diagnose.report.verdict.report_table`.
+    interactive : bool
+        Trends to zoom in, whose points tell their recordings.
 
     Returns
     -------
     str
         HTML.
+
+    Raises
+    ------
+    DataError
+        Bokeh is not installed for an interactive page.
     """
     order = _machines(batch)
+    shown = order[:_MOST_TRENDS]
+    trends = [
+        trend_picture(batch.trends[name], batch.limits, machine_heading(name)) for name in shown
+    ]
+    details = _details(batch, model, machine, baselines, plate)
     grades = [row.grade for row in batch.current if row.grade is not None]
     outlooks = [trend.outlook for trend in batch.trends.values() if trend.outlook]
     return _rendered(
@@ -136,17 +152,34 @@ def batch_html(
         rows=batch.rows[:_MOST_ROWS],
         hidden=max(len(batch.rows) - _MOST_ROWS, 0),
         worst=max(grades, default=None),
-        trends=[
-            trend_picture(batch.trends[name], batch.limits, machine_heading(name))
-            for name in order[:_MOST_TRENDS]
-        ],
+        trends=trends,
+        block=_zoom_of_trends(batch, shown, [*trends, *_pictures(details)])
+        if interactive and shown
+        else None,
         untold=[_told(batch, name) for name in order[_MOST_TRENDS:]],
         assumptions=sorted({outlook.assumption for outlook in outlooks}),
-        details=_details(batch, model, machine, baselines, plate),
+        details=details,
         brief=brief_words,
         bar=lambda row: _bar(row, batch.limits["condemning_limit_m"]),
         short=lambda text: textwrap.shorten(text, _MOST_LETTERS, placeholder=" …"),
     )
+
+
+def _pictures(details: Sequence[dict[str, Any]]) -> list[ReportPicture]:
+    return [picture for each in details for picture in each["pictures"]]
+
+
+def _zoom_of_trends(
+    batch: Batch, machines: Sequence[str], pictures: Sequence[ReportPicture]
+) -> PointBlock:
+    """Trends beside their pictures."""
+    taken = sum(len(picture.data) for picture in pictures) + _ROW_BYTES * len(batch.rows)
+    return point_block(
+        [trend_points(batch, name, machine_heading(name)) for name in machines], taken=taken
+    )
+
+
+_ROW_BYTES = 1_000  # of a recording in the table
 
 
 def _machines(batch: Batch) -> list[str]:

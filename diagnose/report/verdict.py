@@ -18,7 +18,7 @@ from ..learning.grades import GRADE_NAMES
 from ..nameplate.nameplate import Nameplate
 from ..pages.words import quantity_name
 from ..pictures.view import View
-from ..wear_model.estimate import Estimate, WearModel, input_faults
+from ..wear_model.estimate import Estimate, WearModel, input_faults, unseen_words
 from .advice import advise, touched_grades
 from .film import film_estimate, film_table, with_film
 from .trend import Outlook
@@ -515,10 +515,12 @@ def finding_words(finding: Mapping[str, Any]) -> str:
     'cavitation: present (93 %; of 100 such records 88 are found, of 100 others 2 are called so)'
     """
     state = "present" if finding["present"] else "not found"
+    unseen = unseen_words(finding["name"], finding.get("visible_from_m"))
+    hidden = f"; {unseen}" if finding["present"] and unseen else ""
     return (
         f"{finding['name'].replace('_', ' ')}: {state} ({100 * finding['probability']:.0f} %; of "
         f"100 such records {100 * finding['detection_rate']:.0f} are found, of 100 others "
-        f"{100 * finding['false_alarm_rate']:.0f} are called so)"
+        f"{100 * finding['false_alarm_rate']:.0f} are called so){hidden}"
     )
 
 

@@ -1,32 +1,17 @@
-"""Picture and page of a sweep."""
+"""Picture of a sweep."""
 
 import math
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..pages.page import render, save_page, short_name
-from ..pages.picture import encoded, save_picture
-from ..pages.plain_json import json_text
-from ..pages.si_text import si_text
+from ..pages.page import short_name
 from .sweep import Row, Sweep
-from .text import (
-    basis,
-    best_rows,
-    change_words,
-    conclusion,
-    fault_lines,
-    save_csv,
-    setting_words,
-    slope_words,
-    sweep_table,
-)
+from .text import best_rows, setting_words
 
-SUFFIXES = (".html", ".htm", ".json", ".csv", ".png", ".svg", ".pdf")
-"""Of what a sweep is written as."""
+MOST_PANELS = 8
+"""And that of the smallest changes."""
 
-_MOST_PANELS = 8  # and that of the smallest changes
 _MOST_LINES = 6  # quantities in the panel of smallest changes
 _COLUMNS = 3
 
@@ -45,7 +30,7 @@ def sweep_figure(sweep: Sweep) -> Any:
     from matplotlib.figure import Figure
 
     rows = sweep.rows()
-    names = _panel_names(sweep, rows)
+    names = panel_names(sweep, rows)
     summary = len(sweep.plan.axes) > 1 and any(row.detection.told for row in rows)
     count = len(names) + summary
     columns = min(_COLUMNS, count)
@@ -66,7 +51,7 @@ def sweep_figure(sweep: Sweep) -> Any:
     return figure
 
 
-def _panel_names(sweep: Sweep, rows: list[Row]) -> list[str]:
+def panel_names(sweep: Sweep, rows: list[Row]) -> list[str]:
     """Quantities that tell the smallest changes first, those of the conclusion among them."""
     least: dict[str, float] = {}
     for row in rows:
@@ -75,7 +60,7 @@ def _panel_names(sweep: Sweep, rows: list[Row]) -> list[str]:
         least[row.shown.name] = min(least.get(row.shown.name, math.inf), rank)
     best = [row.shown.name for row in best_rows(sweep)]
     ranked = [*dict.fromkeys(best), *sorted(least, key=lambda name: least[name])]
-    return list(dict.fromkeys(ranked))[:_MOST_PANELS]
+    return list(dict.fromkeys(ranked))[:MOST_PANELS]
 
 
 def _draw_quantity(axes: Any, sweep: Sweep, rows: list[Row]) -> None:
@@ -113,7 +98,7 @@ def _draw_changes(axes: Any, sweep: Sweep, rows: list[Row]) -> None:
     single = len(sweep.plan.axes) == 2
     places = list(sweep.plan.axes[0].numbers) if single else list(range(len(settings)))
     judged = [row for row in rows if row.shown.seen] or rows
-    names = [n for n in _panel_names(sweep, judged) if any(r.shown.name == n for r in judged)]
+    names = [n for n in panel_names(sweep, judged) if any(r.shown.name == n for r in judged)]
     for name in names[:_MOST_LINES]:
         own = {row.setting: row.detection.change for row in judged if row.shown.name == name}
         values = np.array([own[setting] for setting in settings]) / abs(axis.scale)
@@ -131,76 +116,3 @@ def _draw_changes(axes: Any, sweep: Sweep, rows: list[Row]) -> None:
     axes.legend(fontsize=7, framealpha=0.6)
     axes.tick_params(labelsize=8)
     axes.grid(alpha=0.3)
-
-
-def sweep_html(sweep: Sweep) -> str:
-    """One self-contained page: conclusion, picture, table.
-
-    Parameters
-    ----------
-    sweep : Sweep
-
-    Returns
-    -------
-    str
-    """
-    axis, rows = sweep.plan.axes[-1], sweep.rows()
-    best = {(row.setting, row.shown.name) for row in best_rows(sweep) if row.detection.told}
-    panels = min(len(sweep.plan.shown), _MOST_PANELS)
-    return render(
-        "sweep.html.j2",
-        name=sweep.plan.name,
-        axis=axis,
-        conclusion=conclusion(sweep),
-        basis=basis(sweep),
-        faults=fault_lines(sweep),
-        finished=sweep.finished,
-        done=len(sweep.outcomes),
-        planned=len(sweep.plan.runs),
-        heads=[axis.text(number, 4) for number in axis.numbers],
-        panels=panels,
-        hidden=len(sweep.plan.shown) - panels,
-        several=len(sweep.plan.axes) > 1,
-        picture=encoded(sweep_figure(sweep)),
-        rows=[
-            {
-                "label": row.shown.label,
-                "seen": row.shown.seen,
-                "setting": setting_words(sweep, row.setting),
-                "cells": [_cell(row, i) for i in range(len(row.means))],
-                "slope": slope_words(sweep, row),
-                "change": change_words(sweep, row),
-                "best": (row.setting, row.shown.name) in best,
-            }
-            for row in rows
-        ],
-    )
-
-
-def _cell(row: Row, i: int) -> str:
-    if not row.counts[i]:
-        return "–"
-    mean = si_text(row.means[i], row.shown.unit)
-    scatter = row.scatters[i]
-    return mean if math.isnan(scatter) else f"{mean} ± {si_text(scatter, row.shown.unit, 2)}"
-
-
-def save_sweep(sweep: Sweep, path: Path, *, force: bool = True) -> None:
-    """Write a sweep in the form that the suffix asks for, whole or not at all.
-
-    Parameters
-    ----------
-    sweep : Sweep
-    path : Path
-        One of :data:`SUFFIXES`.
-    force : bool
-        Replace an existing file.
-    """
-    if path.suffix == ".csv":
-        save_csv(sweep, path, force=force)
-    elif path.suffix == ".json":
-        save_page(json_text(sweep_table(sweep), indent=1), path, force=force)
-    elif path.suffix in (".html", ".htm"):
-        save_page(sweep_html(sweep), path, force=force)
-    else:
-        save_picture(sweep_figure(sweep), path, force=force)

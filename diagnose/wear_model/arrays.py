@@ -284,13 +284,17 @@ def _within(index: NDArray[np.intp], n: int) -> bool:
     return bool((index >= 0).all() and (index < n).all())
 
 
-def familiarity_fits(cloud: Familiarity, n: int, n_features: int) -> bool:
-    """Whether a cloud has n coordinates, and a range for each of n_features."""
+def familiarity_fits(cloud: Familiarity, n: int, n_features: int, n_peaks: int) -> bool:
+    """Whether a cloud has n coordinates, ranges of n_features, and n_peaks usual peaks."""
     return (
         shapes_of(cloud.centre, cloud.spread) == {(n,)}
         and shapes_of(cloud.low, cloud.high) == {(n_features,)}
         and isinstance(cloud.weight, float)
         and cloud.weight >= 0
+        and isinstance(cloud.most_lacking, float)
+        and isinstance(cloud.seldom_lacking, float)
+        and 0 <= cloud.seldom_lacking <= cloud.most_lacking
+        and shapes_of(cloud.usual_peak, cloud.peak_slope) == {(n_peaks,)}
         and np.shape(cloud.whiten) == (n, n)
         and np.ndim(cloud.groups) == 1
         and np.size(cloud.groups) > 0

@@ -16,7 +16,9 @@ from ..feature_rows.feature_table import (
     FeatureSelection,
     held_against,
     is_regime,
+    knows_no_oil,
     recording_features,
+    regime_words,
 )
 from ..feature_rows.healthy import Baseline, referenced_rows
 from ..feature_rows.noted import NOTED, noted_names, noted_values
@@ -35,6 +37,7 @@ from ..learning.conformal import COVERAGE
 from ..learning.regressions import Blend
 from ..learning.severity import Estimator
 from .novelty import Familiarity, free_distance, novelty_p_value
+from .quietness import CAUTIONED_SHARE
 
 Float = NDArray[np.float64]
 Verdict = Literal["graded", "caution", "unfamiliar", "unusable"]
@@ -70,6 +73,9 @@ class FaultFinding:
     detection_rate, false_alarm_rate : float
         Share of present ones found, and of absent ones called present, on machines that had no
         part in the fit.
+    visible_from_m : float or None
+        Of a regime: wear that is told from as new in nine of ten machines without part in the fit,
+        at 5 % false alarms [m]; less is not seen.
     """
 
     name: str
@@ -77,6 +83,28 @@ class FaultFinding:
     present: bool
     detection_rate: float
     false_alarm_rate: float
+    visible_from_m: float | None = None
+
+    @property
+    def unseen(self) -> str:
+        """What wear a regime hides, in words; empty where that is not known."""
+        return unseen_words(self.name, self.visible_from_m)
+
+
+def unseen_words(name: str, visible_from_m: float | None) -> str:
+    """What wear a regime hides.
+
+    Examples
+    --------
+    >>> unseen_words("lubrication_flooded", 2.1e-4)
+    'wear below 0.21 mm cannot be seen on a flooded pin of this kind'
+    """
+    if visible_from_m is None:
+        return ""
+    return (
+        f"wear below {1e3 * visible_from_m:.2g} mm cannot be seen on a {regime_words(name)} of "
+        "this kind"
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -395,13 +423,13 @@ class WearModel:
             recording, self.names, row, self.levels
         )
         if any(fault.bars for fault in faults):
-            return self._unusable(faults)
+            return self._unusable(faults, self._too_quiet(row))
         features = None if baseline is None else baseline.features
         noted = recording.row if conditions is None else conditions
         return self._judge(row, look, features, noted, faults, told)
 
-    def _unusable(self, faults: tuple[QualityFault, ...]) -> Estimate:
-        reasons = tuple(fault.text for fault in faults if fault.bars)
+    def _unusable(self, faults: tuple[QualityFault, ...], others: tuple[str, ...] = ()) -> Estimate:
+        reasons = (*(fault.text for fault in faults if fault.bars), *others)
         return Estimate(verdict="unusable", faults=faults, reasons=reasons, mode=self.mode)
 
     def _row(self, recording: Recording, reference: FrfReference | None) -> Float:
@@ -492,7 +520,9 @@ class WearModel:
         }
         if known["p_value"] <= self.p_limit:
             reason = _strangeness(look.distance, self.blind.calibration.distance)
-            return Estimate(verdict="unfamiliar", reasons=(reason,), **known)
+            return Estimate(verdict="unfamiliar", reasons=(*self._too_quiet(row), reason), **known)
+        if too_quiet := self._too_quiet(row):
+            return Estimate(verdict="unfamiliar", reasons=too_quiet, **known)
         asked, inputs = self._asked(row, baseline, conditions)
         findings = self._findings(row)
         cautions = (
@@ -502,6 +532,7 @@ class WearModel:
             *self._range_cautions(asked, inputs),
             *self._condition_cautions(row, conditions),
             *self._level_cautions(look),
+            *self._quiet_cautions(row),
             *_disagreement_cautions(asked, inputs),
             *self._finding_cautions(findings),
         )
@@ -515,6 +546,41 @@ class WearModel:
             **asked.grading(
                 inputs, look.distance, self.card["grade_edges_m"], cautious=bool(cautions)
             ),
+        )
+
+    def _too_quiet(self, row: Float) -> tuple[str, ...]:
+        """That a machine is quieter than any in training, with the cause; empty if it is not."""
+        lack, most = self._lacking(row), self.familiarity.most_lacking
+        if lack <= most:
+            return ()
+        oil = "flooded pins, which do not knock, are not in this model: train one on a recipe that "
+        oil = f"{oil}draws them, or " if self._knows_no_oil else ""
+        return (
+            f"it is quieter than any {self.card['trained_on']['scene'] or 'machine'} trained on: "
+            f"its peaks are {lack:.1f} dB below those usual at its speed, must be at most "
+            f"{most:.1f} dB below; {oil}check the sensitivity of the sensors",
+        )
+
+    def _quiet_cautions(self, row: Float) -> list[str]:
+        """That few trained pins are as quiet, where a flooded one would not be known."""
+        lack, seldom = self._lacking(row), self.familiarity.seldom_lacking
+        if lack <= seldom or not self._knows_no_oil:
+            return []
+        return [
+            f"it is quieter than {1 - CAUTIONED_SHARE:.0%} of the machines trained on: its peaks "
+            f"are {lack:.1f} dB below those usual at its speed, in all but a few at most "
+            f"{seldom:.1f} dB; flooded pins, which do not knock, are not in this model: if this "
+            "one may be flooded, train one on a recipe that draws them"
+        ]
+
+    def _lacking(self, row: Float) -> float:
+        """How far the peaks of a recording are below those usual at its speed [dB]."""
+        return float(self.familiarity.lacking(self.names, row[None, :])[0])
+
+    @property
+    def _knows_no_oil(self) -> bool:
+        return knows_no_oil(
+            self.card["severity"], [rates["name"] for rates in self.card["confounders"]]
         )
 
     def _nearest(self, row: Float) -> str:
@@ -583,11 +649,9 @@ class WearModel:
             worse, usual = rates["mae_with_m"], rates["mae_without_m"]
             if finding.present and worse > _MUCH_WORSE * usual:
                 name = finding.name.replace("_", " ")
-                cure = (
-                    "wear shows less in this regime"
-                    if is_regime(finding.name)
-                    else "mend it and record again"
-                )
+                cure = "mend it and record again"
+                if is_regime(finding.name):
+                    cure = finding.unseen or "wear shows less in this regime"
                 cautions.append(
                     f"{name} looks present, and with it estimates erred by {1e3 * worse:.2g} mm "
                     f"instead of {1e3 * usual:.2g} mm: {cure}"
@@ -605,6 +669,7 @@ class WearModel:
                     present=probability > head.threshold,
                     detection_rate=rates["detection_rate"],
                     false_alarm_rate=rates["false_alarm_rate"],
+                    visible_from_m=rates["visible_from_m"],
                 )
             )
         return tuple(findings)

@@ -42,6 +42,7 @@ from .arrays import (
 from .bundle import Bundle, checked, load_bundle, save_bundle
 from .estimate import Head, ModelError, WearModel
 from .novelty import Familiarity
+from .quietness import peak_channels
 
 _KIND = "wear model"
 
@@ -230,7 +231,9 @@ def _check_structure(model: WearModel, path: str | Path) -> None:
         or (more > 0 and _estimator_fits(model.informed, inputs + more)),
         "heads": all(blend_fits(head.blend, n) for head in model.heads)
         and [h.name for h in model.heads] == [c["name"] for c in model.card["confounders"]],
-        "familiarity": familiarity_fits(model.familiarity, physical.shape[1], n),
+        "familiarity": familiarity_fits(
+            model.familiarity, physical.shape[1], n, len(peak_channels(names))
+        ),
         "levels": _levels_fit(model.levels, len(level_channels(names)), shapes.shape[1]),
         "numbers": numbers_fit(_arrays_of(model)),
     }
@@ -335,6 +338,7 @@ class _Rates(Strict):
     false_alarm_rate: Portion
     mae_with_m: float = Field(ge=0)
     mae_without_m: float = Field(ge=0)
+    visible_from_m: float | None = Field(gt=0)
     members: dict[str, float]
 
 

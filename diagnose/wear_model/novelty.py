@@ -15,11 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..feature_rows.physical import coordinates_of, moved_rows, physical_rows
+from .quietness import UsualPeaks, fit_usual_peaks, shortfall
 
 Float = NDArray[np.float64]
 
 REACH = 1.2
 """Another machine of the kind has its resonances within this factor of the known ones."""
+
+NEVER_DB = 1e4
+"""No signal is so far below another."""
 
 _LEAST_SPREAD = 1e-6  # of the largest: a feature that never moves says nothing
 _CLIP = 10.0  # standard deviations: one wild feature must not stand for a strange recording
@@ -46,6 +50,14 @@ class Familiarity:
     weight : float
         Distance that stands for all features outside that range: a machine may be near in all
         coordinates and still show cells of its map that no training machine ever did.
+    usual_peak, peak_slope : numpy.ndarray [shape=(n_channels,)]
+        Of :class:`~.quietness.UsualPeaks`.
+    most_lacking : float
+        How far familiar peaks may be below the usual ones [dB]; :data:`NEVER_DB` where that was
+        not asked.
+        A machine that does not knock is near in shape, and still none of the trained ones.
+    seldom_lacking : float
+        How far few familiar peaks are below the usual ones [dB].
     """
 
     centre: Float
@@ -56,6 +68,14 @@ class Familiarity:
     low: Float
     high: Float
     weight: float
+    usual_peak: Float
+    peak_slope: Float
+    most_lacking: float
+    seldom_lacking: float
+
+    def lacking(self, names: Sequence[str], rows: Float) -> Float:
+        """How far peaks are below the usual ones [dB, shape=(n_recordings,)]."""
+        return shortfall(names, rows, UsualPeaks(self.usual_peak, self.peak_slope))
 
     def outside(self, rows: Float) -> Float:
         """Share of the features outside what was trained on [shape=(n_recordings,)]."""
@@ -155,7 +175,13 @@ def _standardised(values: Float, centre: Float, spread: Float) -> Float:
 
 
 def fit_familiarity(
-    names: Sequence[str], rows: Float, groups: NDArray[np.intp], *, weight: float = 0.0
+    names: Sequence[str],
+    rows: Float,
+    groups: NDArray[np.intp],
+    *,
+    weight: float = 0.0,
+    most_lacking: float = NEVER_DB,
+    seldom_lacking: float = NEVER_DB,
 ) -> Familiarity:
     """Learn the cloud of training recordings.
 
@@ -169,6 +195,8 @@ def fit_familiarity(
         Machine draw of each.
     weight : float
         Of the share of features outside the trained range; 0: it does not count.
+    most_lacking, seldom_lacking : float
+        How far familiar peaks may be, and few are, below the usual ones [dB].
 
     Returns
     -------
@@ -204,6 +232,7 @@ def fit_familiarity(
     machines, place = np.unique(groups, return_inverse=True)
     means = np.zeros((len(machines), standard.shape[1]))
     np.add.at(means, place, standard @ whiten)
+    usual = fit_usual_peaks(names, rows)
     return Familiarity(
         centre=centre,
         spread=spread,
@@ -213,6 +242,10 @@ def fit_familiarity(
         low=rows.min(axis=0),
         high=rows.max(axis=0),
         weight=weight,
+        usual_peak=usual.level,
+        peak_slope=usual.slope,
+        most_lacking=most_lacking,
+        seldom_lacking=seldom_lacking,
     )
 
 

@@ -35,6 +35,7 @@ from ..feature_rows.feature_table import (
     Progress,
     confounders_in,
     feature_table,
+    is_regime,
     regimes_in,
 )
 from ..feature_rows.healthy import referenced_rows, references, refuse_strangers
@@ -43,6 +44,7 @@ from ..feature_rows.physical import moved_rows, physical_rows
 from ..feature_rows.quality import Levels, fit_levels
 from ..feature_rows.transfer_reference import healthy_transfer
 from ..learning.conformal import IntervalCalibration, fit_scale, scale_inputs
+from ..learning.detection import visible_from
 from ..learning.grades import grades_of
 from ..learning.regressions import (
     BUDGET_MS,
@@ -56,6 +58,7 @@ from ..learning.regressions import (
 from ..learning.severity import Estimator
 from .estimate import Head, WearModel
 from .novelty import REACH, Familiarity, fit_familiarity
+from .quietness import CAUTIONED_SHARE, REFUSED_SHARE, most_lacking
 
 Float = NDArray[np.float64]
 
@@ -244,7 +247,12 @@ def fit_model(
     selection = _selection(candidate_rows, seed)
     training = candidate_rows[selection.chosen]
     learnt = learn(
-        training, seed=seed, budget_ms=budget_ms, selection=selection, among=candidate_rows
+        training,
+        seed=seed,
+        budget_ms=budget_ms,
+        selection=selection,
+        among=candidate_rows,
+        as_new=aim.edges[0],
     )
     mine = candidates.part(table, selection.chosen)
     card = _card(head, aim, mine, train, held_out, seed) | _model_card(learnt, budget_ms)
@@ -476,6 +484,7 @@ def learn(
     budget_ms: float | None = None,
     selection: Selection | None = None,
     among: Sequence[TrainingRows] = (),
+    as_new: float | None = None,
 ) -> Learnt:
     """Fit everything, by folds of whole groups.
 
@@ -491,6 +500,9 @@ def learn(
         training records ask for, so that the calibration knows what the choice costs.
     among : sequence of TrainingRows
         The sets that it was chosen from.
+    as_new : float, optional
+        Severity up to which a machine counts as new [m], to tell from which wear on each regime
+        shows it.
 
     Returns
     -------
@@ -524,15 +536,15 @@ def learn(
             if place in others:
                 estimate[left] = others[place].estimate[left]
         severity = replace(severity, estimate=estimate)
-    (distance, far), weight = _out_of_fold_distances(training, other, folds)
+    (distance, far), limits = _out_of_fold_distances(training, other, folds)
     apart = distance, far
     return Learnt(
         severity=severity,
         blind=_estimator(training, training.inputs, severity, apart, seed),
         informed=_informed(training, other, severity, folds, apart, seed),
-        familiarity=fit_familiarity(training.names, training.rows, training.groups, weight=weight),
+        familiarity=fit_familiarity(training.names, training.rows, training.groups, **limits),
         levels=fit_levels(training.names, training.rows, folds),
-        heads=_heads(training, folds, np.abs(severity.estimate - training.severity), seed=seed),
+        heads=_heads(training, folds, severity.estimate, as_new, seed=seed),
     )
 
 
@@ -611,35 +623,48 @@ def _fits_of_others(
 
 def _out_of_fold_distances(
     training: TrainingRows, other: TrainingRows, folds: Folds
-) -> tuple[Float, float]:
+) -> tuple[Float, dict[str, float]]:
     """Novelty distances of records, as they are and moved, from clouds without their machine draw.
 
     And the weight of the share outside the ranges, which makes its rare values as far as those of
-    the distance itself: of both together no more are refused than of one.
+    the distance itself: of both together no more are refused than of one. And how far peaks may
+    be below the usual ones.
     """
+    names = training.names
     apart, outside = np.empty((2, 2, len(training.rows)))
+    lacking = np.empty(len(training.rows))
     for train, test in folds:
-        cloud = fit_familiarity(training.names, training.rows[train], training.groups[train])
+        cloud = fit_familiarity(names, training.rows[train], training.groups[train])
         for i, each in enumerate((training, other)):
-            apart[i, test] = cloud.distance(training.names, each.rows[test])
+            apart[i, test] = cloud.distance(names, each.rows[test])
             outside[i, test] = cloud.outside(each.rows[test])
-    rare = max(float(np.quantile(outside[0], _RARE)), 1 / len(training.names))
+        lacking[test] = cloud.lacking(names, training.rows[test])
+    rare = max(float(np.quantile(outside[0], _RARE)), 1 / len(names))
     weight = float(np.quantile(apart[0], _RARE)) / rare
-    return np.maximum(apart, weight * outside), weight
+    limits = {
+        "weight": weight,
+        "most_lacking": most_lacking(lacking, REFUSED_SHARE),
+        "seldom_lacking": most_lacking(lacking, CAUTIONED_SHARE),
+    }
+    return np.maximum(apart, weight * outside), limits
 
 
 def _heads(
-    training: TrainingRows, folds: Folds, error: Float, *, seed: int
+    training: TrainingRows, folds: Folds, estimate: Float, as_new: float | None, *, seed: int
 ) -> tuple[tuple[Head, dict[str, Any]], ...]:
-    """A head for each fault, and its rates: with the error of severity with and without it."""
+    """A head for each fault, and its rates: how the severity is told with and without it."""
     found = []
+    error = np.abs(estimate - training.severity)
     for name, here in training.faults.items():
         if min(here.sum(), (~here).sum()) < _FEWEST_FAULTS:
             continue
         head, rates = _head(name, training.rows, here, folds, seed=seed)
         rates |= {"mae_with_m": float(error[here].mean())}
         rates |= {"mae_without_m": float(error[~here].mean())}
-        found.append((head, rates))
+        visible = None
+        if as_new is not None and is_regime(name):
+            visible = visible_from(training.severity[here], estimate[here], as_new)
+        found.append((head, rates | {"visible_from_m": visible}))
     return tuple(found)
 
 

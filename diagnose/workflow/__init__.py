@@ -2,5 +2,5 @@
 
 It may import ``sim.output``, ``datasets.file``, ``datasets.measured``, ``diagnose.pages``,
 ``diagnose.feature_rows``, ``diagnose.wear_model``, ``diagnose.nameplate``, ``diagnose.report``,
-``diagnose.evaluation``.
+``diagnose.class_model``, ``diagnose.evaluation``.
 """

@@ -1,10 +1,13 @@
-"""From a labelled data set to a wear model."""
+"""From a labelled data set to a wear model, or to a model of named conditions."""
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Sized
 from dataclasses import replace
 from pathlib import Path
 
 from ...datasets.file.views import views_of
+from ...sim.output.recording import DataError
+from ..class_model.train import ClassModel
+from ..class_model.train import train_classes as fit_class_model
 from ..feature_rows.feature_choice import choices_of
 from ..feature_rows.feature_table import Progress
 from ..wear_model.estimate import WearModel
@@ -73,6 +76,7 @@ def train(
     >>> model.card["severity"], model.mode, model.card["trained_on"]["records"]
     ('diametral_clearance_crankpin_m', 'cold', 90)
     """
+    _refuse_recordings(data)
     views = views_of(joined)
     model, _, _ = train_model(
         data,
@@ -87,3 +91,75 @@ def train(
         progress=progress,
     )
     return model
+
+
+def train_classes(
+    data: str | Path,
+    target: str,
+    *,
+    features: Sequence[str] = (),
+    seed: int = 0,
+    jobs: int = 1,
+    progress: Progress | None = None,
+) -> ClassModel:
+    """Train a model that names conditions, such as healthy, unbalance, looseness.
+
+    Parameters
+    ----------
+    data : str or Path
+        File of :func:`wearstate.generate` or :func:`wearstate.import_recordings`, with a label of
+        texts. Its groups (files, unless others were named) decide every split.
+    target : str
+        Column of the label.
+    features : sequence of str
+        One set of features (standard, core, complete), or names; the standard set by default.
+    seed : int
+        Of folds, trees and resamples.
+    jobs : int
+        Worker processes for the features.
+    progress : callable, optional
+        Called with (records done, records).
+
+    Returns
+    -------
+    ClassModel
+        Fitted on all recordings; its ``scores`` judge it by recordings left out,
+        :func:`wearstate.save_class_model` writes it.
+
+    Raises
+    ------
+    DataError
+        No such label, a label that differs within a recording, fewer than two classes of enough
+        recordings, or more than one set of features.
+
+    Examples
+    --------
+    >>> import wearstate
+    >>> model = wearstate.train_classes("pump.h5", "grade", features=["core"])
+    >>> model.classes
+    ('0', '1', '2', '3')
+    >>> recording = wearstate.DataSet("pump.h5")[0]
+    >>> model.estimate(recording).verdict in ("named", "unfamiliar", "unsure")
+    True
+    """
+    _refuse_recordings(data)
+    choices = choices_of(features)
+    if len(choices) > 1:
+        raise DataError(f"features = {len(choices)} sets must be 1 for classes; name one")
+    model, _ = fit_class_model(
+        data, target=target, choice=choices[0], seed=seed, jobs=jobs, progress=progress
+    )
+    return model
+
+
+def _refuse_recordings(data: object) -> None:
+    """A model is trained on a file, whose labels and machines decide what is learnt and split."""
+    if isinstance(data, (str, Path)):
+        return
+    given = f"{len(data)} items" if isinstance(data, Sized) else "no path"
+    raise DataError(
+        f"data = {type(data).__name__} of {given} must be the file of a labelled data set: labels "
+        "and machines decide every split; make one of recordings' files with "
+        'wearstate.import_recordings(files, "data.h5", labels=...), or of a recipe with '
+        "wearstate.generate"
+    )

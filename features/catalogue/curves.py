@@ -491,6 +491,9 @@ def _read(
         raise ValueError(
             f"channel_names has {len(names)} names, must have {len(signals)}; name every channel"
         )
+    _refuse_gaps(signals, names)
+    if tacho is not None:
+        _refuse_gaps(np.atleast_2d(np.asarray(tacho)), ("tacho",))
     return _Given(
         signals=signals,
         fs=float(fs),
@@ -500,6 +503,20 @@ def _read(
         tacho=None if tacho is None else np.asarray(tacho),
         pulses_per_revolution=pulses_per_revolution,
     )
+
+
+def _refuse_gaps(signals: NDArray[Any], names: Sequence[str]) -> None:
+    """Refuse samples that are no numbers: one spoils every line of a transform."""
+    faults = []
+    for name, row in zip(names, signals, strict=True):
+        bad = np.flatnonzero(~np.isfinite(row))
+        if bad.size:
+            faults.append(
+                f"channel {name} has {bad.size} sample(s) that are not finite, must be 0, first at "
+                f"index {bad[0]}; cut or mend the gap"
+            )
+    if faults:
+        raise ValueError("\n".join(faults))
 
 
 def _axes(n: int, given: Any) -> Any:

@@ -3,6 +3,7 @@
 import html
 import math
 import os
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -13,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .sensor import Channel, rate_fault
+from .spellings import spellings
 from .status import Status
 
 Origin = Literal["simulated", "measured"]
@@ -222,7 +224,8 @@ class Recording(SignalLayout):
             Names of the rows; of a table, the columns wanted. By default ``ch_0``, ``ch_1``, …, or
             all columns.
         unit : str or mapping
-            SI unit of all channels, or by name of channel; the quantity follows from it.
+            SI unit of all channels, or by name of channel, in any spelling (``m/s²``, ``m/s**2``);
+            the quantity follows from it.
         tacho : str, optional
             Name of the tacho channel, in volts unless `unit` says otherwise.
         pulses_per_revolution : int
@@ -465,7 +468,7 @@ def _channels(
             found.append(name)
             continue
         known = unit.get(name) if isinstance(unit, Mapping) else None if name == tacho else unit
-        told = known or ("V" if name == tacho else "")
+        told = _listed(known or ("V" if name == tacho else ""))
         if name != tacho and told not in _QUANTITIES:
             faults.append(
                 f"unit of channel {name!r} = {told!r} must be of {', '.join(_QUANTITIES)}; convert "
@@ -476,6 +479,18 @@ def _channels(
     if faults:
         raise DataError("\n".join(f"{where}: {fault}" for fault in faults))
     return tuple(found)
+
+
+def _listed(unit: str) -> str:
+    """An SI unit in the spelling of the list; another as it is.
+
+    Examples
+    --------
+    >>> _listed("m/s²"), _listed("furlong")
+    ('m/s^2', 'furlong')
+    """
+    text = unit.strip()
+    return next((each for each in _QUANTITIES if re.fullmatch(spellings(each), text)), unit)
 
 
 def _refuse_gaps(recording: Recording) -> None:

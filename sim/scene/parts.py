@@ -32,6 +32,7 @@ from pydantic import (
 from pydantic_core import CoreSchema
 
 from ..output.sensor import SIMULATED_RATE_LEAST, SIMULATED_RATE_MOST, Channel, tacho_pulses
+from ..output.spellings import spellings
 
 _INCH = 0.0254  # m, exact by definition
 _POUND_FORCE = 4.4482216152605  # N, exact by definition
@@ -77,16 +78,6 @@ UNITS: dict[str, dict[str, float]] = {
     "viscosity": {"Pa s": 1.0, "mPa s": 1e-3, "cP": 1e-3},
 }
 """Factor to SI of every unit, by dimension. The first unit of a row is the SI one."""
-
-_ALSO = {
-    "rpm": ("RPM", "rev/min", "r/min", "1/min", "min^-1"),
-    "rev/s": ("r/s",),
-    "N s/m": ("N/(m/s)",),
-    "kN s/m": ("kN/(m/s)",),
-    "deg": ("°",),
-    "L": ("l",),
-}
-"""Other names of a unit, of one meaning only: 1/s is none, as it may be rev/s or rad/s."""
 
 Table = TypeVar("Table", bound=BaseModel)
 Value = TypeVar("Value")
@@ -201,30 +192,7 @@ def listed_unit(text: str, dimension: str) -> str | None:
     units = UNITS[dimension]
     if text in units:
         return text
-    return next((unit for unit in units if re.fullmatch(_spellings(unit), text)), None)
-
-
-_WAYS = {
-    " ": r"\s*[*·⋅.-]?\s*",
-    "/": r"\s*/\s*",
-    "^2": r"(?:(?:\^|\*\*)?2|²)",
-    "^3": r"(?:(?:\^|\*\*)?3|³)",
-    "^-1": r"(?:(?:\^|\*\*)?-1|⁻¹)",
-    "^": r"(?:\^|\*\*)?",
-    "u": "[uµμ]",
-}
-"""Every way to write a sign of a unit, as a regular expression."""
-
-_SIGN = re.compile(r"( |/|\^[23]|\^-1|\^|\bu(?=[ms]\b))")
-
-
-@lru_cache(maxsize=256)
-def _spellings(unit: str) -> str:
-    """Regular expression of every spelling of a unit, for Python and for JSON schemas."""
-    return "|".join(
-        "".join(_WAYS.get(piece, re.escape(piece)) for piece in _SIGN.split(name))
-        for name in (unit, *_ALSO.get(unit, ()))
-    )
+    return next((unit for unit in units if re.fullmatch(spellings(unit), text)), None)
 
 
 def _unit_list(dimension: str) -> str:
@@ -261,7 +229,7 @@ class Dimension:
         self, core: CoreSchema, handler: GetJsonSchemaHandler
     ) -> dict[str, Any]:
         """A number in SI, or a string with one of the units; ``unit`` names the SI one."""
-        unit = "|".join(map(_spellings, self.units))
+        unit = "|".join(map(spellings, self.units))
         text = {"type": "string", "pattern": rf"^\s*{_NUMBER}\s*({unit})\s*$"}
         return {"anyOf": [handler(core), text], "unit": self.unit}
 

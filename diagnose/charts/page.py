@@ -1,0 +1,108 @@
+"""Page of a chart, and the forms in which it is written."""
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from ..pages.page import render, save_page
+from ..pages.picture import save_picture
+from ..pages.plain_json import json_text
+from ..pages.points import point_block
+from .chart import RECOMMENDED, Chart, Point, chart_table, convergence_text, save_rows
+from .figure import chart_figure, chart_svg, choice_of
+from .points import chart_points
+from .words import percent
+
+_ROW_BYTES = 3_000  # of a point in the tables of a page
+
+
+def chart_html(chart: Chart, *, interactive: bool = False) -> str:
+    """One self-contained page: verdict, picture with named points, tables.
+
+    Parameters
+    ----------
+    chart : Chart
+    interactive : bool
+        Points to zoom in and to tap for their settings.
+
+    Returns
+    -------
+    str
+    """
+    svg = chart_svg(chart)
+    block = None
+    if interactive:
+        block = point_block(chart_points(chart), taken=len(svg) + _ROW_BYTES * len(chart.points))
+    return render(
+        "chart.html.j2",
+        chart=chart,
+        svg=svg[svg.index("<svg") :],
+        block=block,
+        tapped="its settings as TOML" if any(p.block for p in chart.points) else "its figures",
+        tables=[(question, _rows(chart, question)) for question in chart.questions],
+        quantities=_quantity_rows(chart),
+        convergence=[convergence_text(each, chart.labels) for each in chart.convergence],
+        recommended=RECOMMENDED,
+        finite=math.isfinite,
+        percent=percent,
+    )
+
+
+def _rows(chart: Chart, question: str) -> list[tuple[int | str, Point, bool]]:
+    """Number on the front, point, whether it is what to take."""
+    points, choice = chart.of(question), choice_of(chart, question)
+    front = sorted((p for p in points if p.on_front), key=lambda p: p.seconds)
+    numbers: dict[int, int | str] = {id(point): i for i, point in enumerate(front, start=1)}
+    wanted = choice.name if choice else None
+    return [(numbers.get(id(point), ""), point, point.name == wanted) for point in points]
+
+
+def _quantity_rows(chart: Chart) -> list[tuple[str, list[Any]]]:
+    """Of the scene as written: quantity in words, its difference for each question."""
+    own = [next((p for p in chart.of(q) if p.here), None) for q in chart.questions]
+    shown = [point for point in own if point is not None]
+    return [(words, [p.errors.get(name) for p in shown]) for name, words in chart.labels.items()]
+
+
+def save_chart(chart: Chart, path: Path, *, force: bool = True, interactive: bool = False) -> None:
+    """Write a chart in the form that the suffix asks for, whole or not at all.
+
+    Parameters
+    ----------
+    chart : Chart
+    path : Path
+        One of :data:`SUFFIXES`.
+    force : bool
+        Replace an existing file.
+    interactive : bool
+        As of :func:`chart_html`; of no matter to other forms.
+
+    Raises
+    ------
+    KeyError
+        Another suffix.
+    DataError
+        Bokeh is not installed for an interactive page.
+    """
+    if path.suffix == ".html":
+        save_page(chart_html(chart, interactive=interactive), path, force=force)
+    elif path.suffix == ".csv":
+        save_rows(chart, path, force=force)
+    elif path.suffix in (".png", ".pdf"):
+        save_picture(chart_figure(chart), path, force=force)
+    else:
+        save_page(_PAGES[path.suffix](chart), path, force=force)
+
+
+def _json(chart: Chart) -> str:
+    return json_text(chart_table(chart), indent=1)
+
+
+_PAGES: dict[str, Callable[[Chart], str]] = {
+    ".svg": chart_svg,
+    ".json": _json,
+}
+
+SUFFIXES = (".svg", ".png", ".pdf", ".html", ".json", ".csv")
+"""Forms in which a chart can be written."""

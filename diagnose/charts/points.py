@@ -1,0 +1,122 @@
+"""Points of a chart for a page to zoom in: what is drawn, under the pointer and at a tap."""
+
+import math
+from collections.abc import Iterator
+
+from ..pages.points import DrawnLine, Mark, PointAxes, Series
+from .chart import RECOMMENDED, Chart, Point
+from .figure import (
+    DOUBTFUL,
+    FLOOR,
+    FRONT,
+    HERE_COLOUR,
+    OTHER,
+    SO_FAR,
+    WINNER,
+    choice_of,
+    kind_of,
+    shown_error,
+    winner_words,
+)
+from .words import percent
+
+_LOOKS = {
+    "on the front": (FRONT, 10.0, True),
+    "beaten": (OTHER, 8.0, True),
+    "scatter too large to tell": (DOUBTFUL, 8.0, False),
+}
+"""Colour, size [px] and filling of each kind."""
+
+
+def chart_points(chart: Chart) -> list[PointAxes]:
+    """Axes of a chart, one for each question.
+
+    Parameters
+    ----------
+    chart : Chart
+
+    Returns
+    -------
+    list of PointAxes
+        Without points that never ran or have no error.
+    """
+    return [_points(chart, question) for question in chart.questions]
+
+
+def _points(chart: Chart, question: str) -> PointAxes:
+    finite = [p for p in chart.of(question) if math.isfinite(p.error) and math.isfinite(p.seconds)]
+    front = sorted((p for p in finite if p.on_front), key=lambda p: p.seconds)
+    line = DrawnLine(
+        name="front",
+        x=tuple(p.seconds for p in front),
+        y=tuple(shown_error(p) for p in front),
+        colour=FRONT,
+        steps=True,
+    )
+    asked = chart.accuracy
+    return PointAxes(
+        title=question or chart.title,
+        x_name=chart.cost_label,
+        y_name=chart.error_label,
+        x_kind="log",
+        y_kind="linear" if asked is None else "log",
+        lines=(line,),
+        level=() if asked is None else ("accuracy asked", 100 * asked),
+        series=tuple(_series(chart, question, finite)),
+    )
+
+
+def _series(chart: Chart, question: str, finite: list[Point]) -> Iterator[Series]:
+    """Plain points by their kind; rings below and a star above them."""
+    wanted, final = _wanted(chart, question)
+    for name, (colour, size, filled) in _LOOKS.items():
+        marks = tuple(_mark(chart, p) for p in finite if kind_of(p) == name and not p.here)
+        if marks:
+            yield Series(name=name, marks=marks, colour=colour, size=size, filled=filled)
+    taken = tuple(_mark(chart, p) for p in finite if p.name == wanted)
+    if taken:
+        words = winner_words(chart) if final else "may be enough, not certain"
+        colour = WINNER if final else SO_FAR
+        yield Series(name=words, marks=taken, colour=colour, size=22.0, filled=False)
+    here = tuple(_mark(chart, p) for p in finite if p.here)
+    if here:
+        words = f"your {chart.subject}"
+        yield Series(name=words, marks=here, colour=HERE_COLOUR, marker="star", size=18.0)
+
+
+def _wanted(chart: Chart, question: str) -> tuple[str, bool]:
+    """Name of what to take, empty where nothing is; whether that is final."""
+    choice = choice_of(chart, question)
+    if choice is None:
+        return chart.winner, True
+    return (choice.name if choice.status in RECOMMENDED else ""), choice.status == "resolved"
+
+
+def _mark(chart: Chart, point: Point) -> Mark:
+    error, value = 100 * point.standard_error, shown_error(point)
+    known = math.isfinite(error) and error > 0
+    lines = _lines(chart, point)
+    plain = "\n".join(f"# {line}" for text in lines[1:] for line in text.splitlines())
+    return Mark(
+        x=point.seconds,
+        y=value,
+        low=max(value - error, FLOOR) if known else math.nan,
+        high=value + error if known else math.nan,
+        told="\n".join(lines),
+        block=f"{point.block or f'# {point.name}'}\n{plain}",
+    )
+
+
+def _lines(chart: Chart, point: Point) -> list[str]:
+    """Name and figures of a point."""
+    error = percent(point.error)
+    if point.standard_error > 0:
+        error += f" ± {percent(point.standard_error)}"
+    worst = chart.label(point.worst)
+    cost, _, unit = chart.cost_label.partition(" [")
+    return [
+        point.name,
+        f"{cost}: {point.seconds:.3g} {unit.rstrip(']')}",
+        f"error: {error} ({worst})",
+        f"verdict: {point.verdict}",
+    ]
