@@ -71,6 +71,7 @@ def save_class_model(model: ClassModel, path: str | Path, *, force: bool = False
     Parameters
     ----------
     model : ClassModel
+        What :func:`wearstate.train_classes` gives.
     path : str or Path
         Usually ``*.wsm``.
     force : bool
@@ -110,6 +111,7 @@ def load_class_model(path: str | Path) -> ClassModel:
     Returns
     -------
     ClassModel
+        As it was saved.
 
     Raises
     ------
