@@ -88,7 +88,7 @@ def rounds_of(budget_s: float | None, n_runs: int) -> tuple[int, ...]:
     Examples
     --------
     >>> rounds_of(None, 3), rounds_of(60.0, 3)
-    ((130, 90, 90), (104, 72, 72))
+    ((130, 90, 90), (105, 73, 73))
     """
     if budget_s is None:
         return ROUNDS
