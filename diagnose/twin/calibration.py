@@ -270,8 +270,13 @@ def calibrate(
     Examples
     --------
     >>> import wearstate
-    >>> mine = wearstate.calibrate("bilge-pump", ["healthy.h5"])  # doctest: +SKIP
-    >>> mine.save("mine.toml")  # doctest: +SKIP
+    >>> sound = wearstate.simulate(wearstate.load_scene("bilge-pump", {"duration": "1 s"}))
+    >>> mine = wearstate.calibrate(
+    ...     "bilge-pump", [sound], unknown=["casing.modes.*.frequency"], budget_s=1.0
+    ... )
+    >>> mine.save("mine.toml")
+    >>> mine.misfit.refused, "casing.modes.1.frequency" in [each.path for each in mine.numbers]
+    (False, True)
     """
     heard, names = _read(recordings)
     plan = _prior(recipe, scene, heard[0])
