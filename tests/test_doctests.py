@@ -14,7 +14,11 @@ MODULES = ["wearstate"] + [
     and info.name.split(".")[1] in {"sim", "features", "datasets", "diagnose", *wearstate._MODULES}
 ]
 
-USE_A_MODEL = ("wearstate.diagnose.workflow.", "wearstate.diagnose.wear_model.file")
+USE_A_MODEL = (
+    "wearstate.diagnose.workflow.",
+    "wearstate.diagnose.wear_model.file",
+    "wearstate.diagnose.class_model.file",
+)
 """Their examples find a data set pump.h5 and a model pump.wsm trained on it."""
 
 
