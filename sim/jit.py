@@ -27,12 +27,12 @@ from numba.core import serialize
 
 from .atomic import sealed, unsealed, write_whole
 
-# Contraction to fused multiply-add is the only freedom given to the compiler. Forced inlining
+# No freedom is given to the compiler, not even contraction to fused multiply-add, which it would
+# use here and not there: a record has the same bytes alone and beside others. Forced inlining
 # halves the time of a crank step: its parameters would be copied at every call. Without numba's
 # runtime a kernel allocates nothing and counts no references, which doubles its speed again.
 _OPTIONS: dict[str, Any] = {
     "error_model": "numpy",
-    "fastmath": {"contract"},
     "forceinline": True,
     "_nrt": False,
 }
@@ -205,20 +205,29 @@ class _SealedFiles:
 
 def kernel(function: Function) -> Function:
     """Compile a function of floats, integers and arrays, cached by the sources it can see."""
+    return _compiled(function, _OPTIONS)
+
+
+def subroutine(function: Function) -> Function:
+    """As :func:`kernel`, but called where it is used: compiled once, however many call it."""
+    return _compiled(function, _OPTIONS | {"forceinline": False})
+
+
+def _compiled(function: Function, options: dict[str, Any]) -> Function:
     folder = cache_folder()
     if folder is None:
-        return numba.njit(**_OPTIONS)(function)  # type: ignore[no-any-return]
+        return numba.njit(**options)(function)  # type: ignore[no-any-return]
     settings: Any = numba.config
     before = settings.CACHE_DIR
     settings.CACHE_DIR = str(folder)  # read by numba while it decorates, restored at once
     try:
-        compiled: Any = numba.njit(cache=True, **_OPTIONS)(function)
+        compiled: Any = numba.njit(cache=True, **options)(function)
     finally:
         settings.CACHE_DIR = before
     files = compiled._cache
     place = Path(files.cache_path)
     if not place.is_relative_to(folder):  # numba found it unwritable and took another
-        return numba.njit(**_OPTIONS)(function)  # type: ignore[no-any-return]
+        return numba.njit(**options)(function)  # type: ignore[no-any-return]
     names = files._impl
     stamp = names.locator.get_source_stamp()
     source, here = Path(compiled.py_func.__code__.co_filename), Path(__file__).parent
@@ -247,9 +256,7 @@ def sine_cosine(angle: float) -> tuple[float, float]:
     c = (c * z - 2.75573143513906633035e-07) * z + 2.48015872894767294178e-05
     c = (c * z - 1.38888888888741095749e-03) * z + 4.16666666666666019037e-02
     cosine = 1.0 - 0.5 * z + z * z * c
-    turn = int(quarter) & 3
-    if turn & 1:
-        sine, cosine = cosine, -sine
-    if turn & 2:
-        sine, cosine = -sine, -cosine
-    return sine, cosine
+    turn = quarter - 4.0 * math.floor(0.25 * quarter)  # 0 to 3, chosen rather than branched upon
+    odd = turn == 1.0 or turn == 3.0
+    first, second = cosine if odd else sine, sine if odd else cosine
+    return (-first if turn >= 2.0 else first), (-second if 0.5 < turn < 2.5 else second)

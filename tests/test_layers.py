@@ -35,6 +35,7 @@ ROOMS = {
         "beam",
         "alignment",
         "pump",
+        "pump_lanes",
         "journal",
         "shaft",
         "wear",

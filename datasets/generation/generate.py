@@ -3,13 +3,15 @@
 Workers simulate, this process alone writes. A killed run is resumed by the same call.
 """
 
+import math
 import signal
 import threading
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from functools import partial
+from itertools import chain, islice
 from pathlib import Path
 from types import FrameType
 from typing import Any, Literal
@@ -18,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...sim.atomic import OutputError
-from ...sim.machine.simulate import simulate
+from ...sim.machine.simulate import simulate, simulate_many, simulates_together
 from ...sim.output.recording import DataError, Recording
 from ...sim.scene.parts import Scene, SceneError, channels_of
 from ...sim.wear.archard import grade
@@ -81,6 +83,12 @@ NUMERICS = {
     "clipped_samples": "<i8",
 }
 """Manifest columns taken from a solution; -1, NaN or empty where it does not give them."""
+
+_TOGETHER = 64
+"""Records of a batch: enough of each kind to fill the lanes, few enough to be kept in memory."""
+
+_FEWEST = 5
+"""Records of a batch that is worth it."""
 
 REFUSED = "refused"
 """Status of a record whose drawn scene the simulation does not accept."""
@@ -248,11 +256,17 @@ def generate(
             tally.n_resumed = int(np.count_nonzero(writer.done))
             samples = sample_records(plan, count, seed=seed, skip=writer.done.copy())
             jobs = min(jobs, max(1, count - tally.n_resumed))
+            size = 1 if truth else _batch_size(plan.scene, count - tally.n_resumed, jobs)
             found = in_order(
-                work, samples, jobs=jobs, scheduler=scheduler, say=say, watch=writer.refuse_lost
+                partial(_each, work) if size == 1 else partial(_together, error=error),
+                _batches(samples, size),
+                jobs=jobs,
+                scheduler=scheduler,
+                say=say,
+                watch=writer.refuse_lost,
             )
-            with closing(found) as outcomes, _listening() as asked:
-                for outcome in outcomes:
+            with closing(found) as batches, _listening() as asked:
+                for outcome in chain.from_iterable(batches):
                     if scheduler is not None and outcome.refused is not None:
                         _refuse_refusal(outcome, work)
                     writer.write(outcome.index, outcome.signal, outcome.row, outcome.truth)
@@ -420,12 +434,44 @@ def _limits(scene: Scene, severity: str) -> dict[str, Any]:
     }
 
 
+def _batch_size(scene: Scene, todo: int, jobs: int) -> int:
+    """Records that a worker simulates side by side: no bytes depend on it, only time and memory."""
+    each = math.ceil(todo / jobs)
+    return min(_TOGETHER, each) if simulates_together(scene) and each >= _FEWEST else 1
+
+
+def _batches(samples: Iterable[Sample], size: int) -> Iterator[tuple[Sample, ...]]:
+    ahead = iter(samples)
+    while batch := tuple(islice(ahead, size)):
+        yield batch
+
+
+def _each(work: Callable[[Sample], _Outcome], samples: tuple[Sample, ...]) -> list[_Outcome]:
+    return [work(sample) for sample in samples]
+
+
+def _together(samples: tuple[Sample, ...], *, error: float | None) -> list[_Outcome]:
+    """Simulate records side by side; runs in a worker."""
+    found = {
+        number: _refused(samples[number], str(solution))
+        if isinstance(solution, SceneError)
+        else _outcome(samples[number], solution, error)
+        for number, solution in simulate_many([(each.scene, each.seed) for each in samples])
+    }
+    return [found[number] for number in range(len(samples))]
+
+
 def _simulated(sample: Sample, *, truth: bool, error: float | None) -> _Outcome:
-    """Simulate one record; runs in a worker. An error measured on pilots replaces its own guess."""
+    """Simulate one record; runs in a worker."""
     try:
         solution = simulate(sample.scene, seed=sample.seed, truth=truth, raise_on_failure=False)
-    except SceneError as error:
-        return _refused(sample, str(error))
+    except SceneError as fault:
+        return _refused(sample, str(fault))
+    return _outcome(sample, solution, error)
+
+
+def _outcome(sample: Sample, solution: Recording, error: float | None) -> _Outcome:
+    """An error measured on pilots replaces a record's own guess."""
     status = solution.status
     row = {**sample.row, "status": status.name.lower(), **_numerics(solution)}
     return _Outcome(

@@ -2,7 +2,7 @@
 
 from typing import Any, Protocol
 
-AHEAD_PER_JOB = 3
+AHEAD_PER_JOB = 2
 """Items handed out and not yet taken back, per worker; bounds the memory of a run."""
 
 

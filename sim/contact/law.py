@@ -91,13 +91,12 @@ def elastic_force(penetration: float, contact: Any) -> float:
     ----------
     Liu, Zhang, Yang (2007), Mechanism and Machine Theory 42(2), 183-197: the conformal law.
     """
-    if penetration <= 0.0:
-        return 0.0
-    force: float = contact.stiffness * penetration
-    if contact.elasticity == ELASTIC_HERTZ:
-        force *= math.sqrt(penetration)
-    elif contact.elasticity == ELASTIC_CONFORMAL:
-        force *= math.sqrt(0.5 * penetration / (contact.clearance + penetration))
+    inside = max(penetration, 0.0)
+    reach = contact.clearance + inside
+    conformal = 0.5 * inside / (reach if reach > 0.0 else 1.0)
+    share = conformal if contact.elasticity == ELASTIC_CONFORMAL else 1.0
+    share = inside if contact.elasticity == ELASTIC_HERTZ else share
+    force: float = contact.stiffness * inside * math.sqrt(share)
     return force
 
 
@@ -141,14 +140,15 @@ def normal_force(
         Approach speed at the touch that began this contact [m/s].
     contact : record of CONTACT
     """
-    force: float = elastic_force(penetration, contact)
-    if contact.law == LAW_KELVIN_VOIGT:
-        if penetration <= 0.0:
-            force = contact.stiffness * penetration
-        force += contact.damping * approach_speed
-    else:
-        loss = contact.hysteresis * approach_speed / max(impact_speed, contact.speed_floor)
-        force *= max(0.0, 1.0 + loss)
+    elastic = elastic_force(penetration, contact)
+    spring = elastic if penetration > 0.0 else contact.stiffness * penetration
+    floor = max(impact_speed, contact.speed_floor)
+    loss = contact.hysteresis * approach_speed / (floor if floor > 0.0 else 1.0)
+    force: float = (
+        spring + contact.damping * approach_speed
+        if contact.law == LAW_KELVIN_VOIGT
+        else elastic * max(0.0, 1.0 + loss)
+    )
     return force
 
 
@@ -182,12 +182,10 @@ def ramp_sign(speed: float, dead_speed: float, full_speed: float) -> float:
     ----------
     Ambrosio (2003), Virtual Nonlinear Multibody Systems, NATO Science Series 103, 57-81.
     """
-    size = abs(speed)
-    if size <= dead_speed:
-        return 0.0
-    share = 1.0
-    if size < full_speed:
-        share = (size - dead_speed) / (full_speed - dead_speed)
+    size, reach = abs(speed), full_speed - dead_speed
+    beyond = max(size - dead_speed, 0.0)
+    share = beyond / (reach if reach > 0.0 else 1.0) if size < full_speed else 1.0
+    share = share if size > dead_speed else 0.0
     return share if speed > 0.0 else -share
 
 
@@ -201,10 +199,9 @@ def friction_force(sliding_speed: float, normal_force: float, contact: Any) -> f
     acts in the opposite sense, it never adds energy. At rest there is no friction: a constant
     load creeps.
     """
-    if contact.friction_law == FRICTION_SMOOTH:
-        sign = smooth_sign(sliding_speed, contact.friction_speed)
-    else:
-        sign = ramp_sign(sliding_speed, contact.friction_dead_speed, contact.friction_speed)
+    smooth = smooth_sign(sliding_speed, contact.friction_speed)
+    ramp = ramp_sign(sliding_speed, contact.friction_dead_speed, contact.friction_speed)
+    sign = smooth if contact.friction_law == FRICTION_SMOOTH else ramp
     coulomb = contact.friction * max(0.0, normal_force) * sign
     force: float = coulomb + contact.tangential_damping * sliding_speed
     return force

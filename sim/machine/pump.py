@@ -15,6 +15,7 @@ from ..pump.recording import (
     measured_places,
     simulate_pump,
 )
+from ..pump_lanes.many import simulate_pumps
 from ..scene.parts import Scene
 from ..scene.pump import FORCE_PLACES, PumpScene
 from .registry import MachinePhysics
@@ -53,6 +54,7 @@ def _places(scene: PumpScene) -> tuple[str, ...]:
 MACHINE = MachinePhysics(
     scene=PumpScene,
     simulate=simulate_pump,
+    many=simulate_pumps,
     check=check_pump,
     transfer=_transfer,
     ladders=PUMP_LADDERS,

@@ -1,6 +1,6 @@
 """What a machine registers beside its scene, and where any other code asks for it."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import import_module
 from typing import cast
@@ -8,10 +8,12 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-from ..output.recording import Recorder
+from ..output.recording import Recorder, Recording
 from ..output.transfer import SceneTransfer
-from ..scene.parts import Scene
+from ..scene.parts import Scene, SceneError
 from ..scene.rungs import Effect, Rung
+
+Many = Callable[[Sequence[tuple[Scene, int]]], Iterator[tuple[int, Recording | SceneError]]]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,6 +32,9 @@ class MachinePhysics:
         Scene -> time of a run by the tables, for ranking [s].
     recorder : callable, optional
         Scene -> a `simulate` that has done what all starts of the scene share.
+    many : callable, optional
+        Sequence of (scene, seed) -> (number, recording without truth or SceneError) of each, in
+        any order: as `simulate` one by one, but faster.
     transfer : callable, optional
         Scene, frequency [Hz, shape=(n_lines,)] -> its transfer functions.
     ladders : mapping of str to tuple of Rung
@@ -45,6 +50,7 @@ class MachinePhysics:
     check: Callable[[Scene], None]
     cost: Callable[[Scene], float]
     recorder: Callable[[Scene], Recorder] | None = None
+    many: Many | None = None
     transfer: Callable[[Scene, NDArray[np.float64]], SceneTransfer] | None = None
     ladders: Mapping[str, tuple[Rung, ...]] = field(default_factory=dict)
     effects: Callable[[Scene], Iterable[Effect]] = lambda _scene: ()

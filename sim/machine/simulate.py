@@ -1,5 +1,6 @@
 """From a scene to a recording: only the physics that the scene needs."""
 
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from ..output.recording import Recorder, Recording
@@ -48,7 +49,68 @@ def simulate(
     (3, 5120)
     """
     _refuse_unresolved(scene)
-    solution = machine_of(scene).simulate(scene, seed, truth, raise_on_failure)
+    return _with_doubts(scene, machine_of(scene).simulate(scene, seed, truth, raise_on_failure))
+
+
+def simulate_many(
+    jobs: Sequence[tuple[Scene, int]],
+) -> Iterator[tuple[int, Recording | SceneError]]:
+    """Simulate recordings of many scenes of one machine, side by side where it can.
+
+    Parameters
+    ----------
+    jobs : sequence of (Scene, int)
+        Scene and seed of each, all of the same machine.
+
+    Yields
+    ------
+    number : int
+        Of the job. Every job comes once, in any order.
+    recording : Recording or SceneError
+        The bytes of :func:`simulate` without truth, whatever is beside it; a failed run with its
+        status and a signal of zeros. Or the faults of a scene that is refused.
+
+    Examples
+    --------
+    >>> from wearstate.sim.scene.load import load_scene
+    >>> scene = load_scene("bilge-pump", {"duration": "0.25 s"})
+    >>> found = dict(simulate_many([(scene, seed) for seed in range(2)]))
+    >>> bool((found[1].signal == simulate(scene, seed=1).signal).all())
+    True
+    """
+    if not jobs:
+        return
+    many = machine_of(jobs[0][0]).many or _one_by_one
+    for number, found in many(jobs):
+        yield (
+            number,
+            found if isinstance(found, SceneError) else _with_doubts(jobs[number][0], found),
+        )
+
+
+def simulates_together(scene: Scene) -> bool:
+    """Whether records of a scene's machine are faster side by side.
+
+    Examples
+    --------
+    >>> from wearstate.sim.scene.load import load_scene
+    >>> simulates_together(load_scene("bilge-pump")), simulates_together(load_scene("shaft-rig"))
+    (True, False)
+    """
+    return machine_of(scene).many is not None
+
+
+def _one_by_one(
+    jobs: Sequence[tuple[Scene, int]],
+) -> Iterator[tuple[int, Recording | SceneError]]:
+    for number, (scene, seed) in enumerate(jobs):
+        try:
+            yield number, machine_of(scene).simulate(scene, seed, False, False)
+        except SceneError as error:
+            yield number, error
+
+
+def _with_doubts(scene: Scene, solution: Recording) -> Recording:
     if not solution.status.ok:
         return solution
     doubts = tuple(doubt.text for doubt in solution_doubts(scene, solution))

@@ -297,16 +297,10 @@ def two_level_pressure(angle: float, suction: float, discharge: float, h: Any) -
     """
     turn = 2.0 * math.pi
     phase = angle - turn * math.floor(angle / turn)
-    if phase < math.pi:
-        before, after = discharge, suction
-        u = (phase - h.fall_delay) / h.fall_angle
-    else:
-        before, after = suction, discharge
-        u = (phase - math.pi - h.rise_delay) / h.rise_angle
-    if u >= 1.0:
-        return after
-    if u <= 0.0:
-        return before
+    falls = phase < math.pi
+    before, after = (discharge, suction) if falls else (suction, discharge)
+    since = phase - h.fall_delay if falls else phase - math.pi - h.rise_delay
+    u = min(max(since / (h.fall_angle if falls else h.rise_angle), 0.0), 1.0)
     level: float = before + (after - before) * u * u * (3.0 - 2.0 * u)
     return level
 

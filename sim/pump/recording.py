@@ -83,16 +83,53 @@ def simulate_pump(scene: Scene, seed: int, truth: bool, raise_on_failure: bool) 
     if not pump.running:
         return _at_rest(pump, seed, truth)
     try:
-        factor = steps_per_sample(pump)
+        plan = planned(pump)
     except LimitError as error:
         if raise_on_failure:
             raise
-        return failed(pump, error.status, {})
-    step = 1 / (pump.sample_rate * factor)
-    plan = _Plan(pump, factor)
+        return refused_run(pump, error)
     run = run_scene(
-        pump, step=step, n_steps=plan.n_steps, start_angle=plan.first_angle, keep_states=truth
+        pump,
+        step=plan.step,
+        n_steps=plan.n_steps,
+        start_angle=plan.first_angle,
+        keep_states=truth,
     )
+    return recording_of(plan, run, seed, truth=truth, raise_on_failure=raise_on_failure)
+
+
+def refused_run(scene: PumpScene, error: "LimitError") -> Recording:
+    """Recording of a scene beyond the limits of its methods: its status and a signal of zeros."""
+    return failed(scene, error.status, {})
+
+
+def planned(scene: PumpScene) -> "RunPlan":
+    """Steps and samples of a running scene.
+
+    Raises
+    ------
+    SceneError, LimitError
+        As :func:`steps_per_sample`.
+    """
+    return RunPlan(scene, steps_per_sample(scene))
+
+
+def recording_of(
+    plan: "RunPlan",
+    run: CrankRun,
+    seed: int,
+    *,
+    truth: bool = False,
+    raise_on_failure: bool = False,
+) -> Recording:
+    """Recording of a run of the mechanism as it was planned.
+
+    Raises
+    ------
+    SimulationError
+        The run failed and `raise_on_failure` is true.
+    """
+    pump, factor = plan.scene, plan.factor
     lift = _lift_left(pump, run, plan)
     status = _judged(pump, run, plan, lift) if run.status.ok else run.status
     numerics = _numerics(pump, run, plan, lift)
@@ -102,7 +139,7 @@ def simulate_pump(scene: Scene, seed: int, truth: bool, raise_on_failure: bool) 
         return failed(pump, status, numerics)
     pushes = plan.pushes(seed)
     places, on_casing = with_pushes(pump, *casing_forces(pump, run), pushes)
-    acceleration, casing_numerics = _housing(pump, places, on_casing, 1 / step, factor)
+    acceleration, casing_numerics = _housing(pump, places, on_casing, 1 / plan.step, factor)
     signal, clipped = _measured(acceleration, plan.turned(run), plan, pushes, seed, run)
     numerics |= casing_numerics
     numerics["clipped_samples"] = clipped
@@ -123,7 +160,7 @@ def simulate_pump(scene: Scene, seed: int, truth: bool, raise_on_failure: bool) 
 def _at_rest(pump: PumpScene, seed: int, truth: bool) -> Recording:
     """A test of the casing while the crank stands: no force but those of the exciters."""
     _refuse(pump, _rest_faults(pump))
-    plan = _Plan(pump, FEWEST_STEPS)
+    plan = RunPlan(pump, FEWEST_STEPS)
     pushes = plan.pushes(seed)
     places, forces = with_pushes(pump, (), np.zeros((plan.n_steps, 0)), pushes)
     rate = pump.sample_rate * plan.factor
@@ -168,8 +205,8 @@ def _pushing_faults(scene: PumpScene) -> list[str]:
     ]
 
 
-class _Plan:
-    """Which steps are run, and which samples are kept."""
+class RunPlan:
+    """Which steps of a scene are run, and which samples are kept."""
 
     def __init__(self, scene: PumpScene, factor: int) -> None:
         rate, speed = scene.sample_rate, scene.drive.speed
@@ -177,6 +214,7 @@ class _Plan:
         settling = math.ceil(scene.settling_revolutions / speed * rate) + edge
         self.scene = scene
         self.factor = factor
+        self.step = 1 / (rate * factor)
         self.n_samples = round(scene.duration * rate)
         self.n_steps = (settling + self.n_samples + edge) * factor
         self.kept = slice(settling, settling + self.n_samples)
@@ -339,9 +377,9 @@ def casing_forces(scene: PumpScene, run: CrankRun) -> tuple[tuple[str, ...], NDA
         table = run.forces[first : first + _AT_ONCE]
         some = rows[:, first : first + _AT_ONCE]
         for row, ((column, sign), *others) in zip(some, columns.values(), strict=True):
-            np.multiply(table[:, column], sign, out=row)
+            np.multiply(table[:, run.place(column)], sign, out=row)
             for other, its_sign in others:
-                row += its_sign * table[:, other]
+                row += its_sign * table[:, run.place(other)]
     keys, forces = list(columns), rows.T
     if scene.crank.unbalance > 0:
         bearings = [keys.index(_force_key(scene, place, 1)) for place in ("bearing_x", "bearing_y")]
@@ -498,7 +536,7 @@ def _participation(mode: CasingMode, key: str) -> float:
 def _measured(
     acceleration: NDArray[np.float64],
     angle: NDArray[np.float64],
-    plan: _Plan,
+    plan: RunPlan,
     pushes: tuple[Push, ...],
     seed: int,
     run: CrankRun | None,
@@ -556,14 +594,14 @@ def _front_end(sensor: Accelerometer, row: NDArray[np.float64], fs: float) -> ND
     return low_pass(row, fs, np.concatenate(poles)) if poles else row
 
 
-def _judged(scene: PumpScene, run: CrankRun, plan: _Plan, lift: float) -> Status:
+def _judged(scene: PumpScene, run: CrankRun, plan: RunPlan, lift: float) -> Status:
     """A column that tears; a valve that never shuts in time, its spring too soft for the speed."""
     if torn_in_run(scene, run, plan.kept.start * plan.factor):
         return Status.VAPOUR
     return Status.VALVE_OPEN if lift > _LIFT_LEFT else Status.OK
 
 
-def _lift_left(scene: PumpScene, run: CrankRun, plan: _Plan) -> float:
+def _lift_left(scene: PumpScene, run: CrankRun, plan: RunPlan) -> float:
     """Least lift left in the idle strokes of any free valve, over the stop's: what recurs."""
     begin = plan.kept.start * plan.factor  # after settling
     if run.chambers is None or len(run.turns) <= begin:  # a run may fail before
@@ -595,9 +633,9 @@ def _rung_of(part: Any) -> str:
 
 
 def _numerics(
-    scene: PumpScene, run: CrankRun, plan: _Plan, lift: float
+    scene: PumpScene, run: CrankRun, plan: RunPlan, lift: float
 ) -> dict[str, float | int | str]:
-    steps, resolved = len(run.forces), run.step * contact_rate(scene)
+    steps, resolved = run.steps, run.step * contact_rate(scene)
     numerics: dict[str, float | int | str] = {
         "rung_joint": scene.joint.crankpin.rung,
         "rung_wristpin": _rung_of(scene.joint.wristpin),
@@ -637,7 +675,7 @@ def _numerics(
 
 
 def _film_numerics(
-    run: CrankRun, rungs: list[tuple[int, int, int]], plan: _Plan
+    run: CrankRun, rungs: list[tuple[int, int, int]], plan: RunPlan
 ) -> dict[str, float | int | str]:
     """Least film of all oiled pins, and how long rough peaks touched; empty without either."""
     oiled = np.array([[code == JOINT_OILED for code in row[:GUIDE]] for row in rungs])
@@ -713,14 +751,14 @@ def _motor_warnings(scene: PumpScene, run: CrankRun) -> tuple[str, ...]:
     )
 
 
-def _test_truth(plan: _Plan, pushes: tuple[Push, ...]) -> dict[str, Any]:
+def _test_truth(plan: RunPlan, pushes: tuple[Push, ...]) -> dict[str, Any]:
     if not pushes:
         return {}
     forces = np.stack([push.along for push in pushes], axis=1)
     return {"test_force_n": decimate(forces, plan.factor)[plan.kept]}
 
 
-def _truth(run: CrankRun, plan: _Plan) -> dict[str, Any]:
+def _truth(run: CrankRun, plan: RunPlan) -> dict[str, Any]:
     """Forces, low-passed as the signal is, and states at the sample instants, per throw."""
     truth: dict[str, Any] = {"state_alpha": plan.turned(run)}
     truth["state_alpha_rate"] = plan.at_samples(run.turns[:, 1])
@@ -740,7 +778,7 @@ _KEPT = ("pin_x", "pin_y", "wrist_x", "wrist_y", "guide_y", "piston_x")
 
 
 def _throw_truth(
-    run: CrankRun, plan: _Plan, throw: int, force: NDArray[np.float64]
+    run: CrankRun, plan: RunPlan, throw: int, force: NDArray[np.float64]
 ) -> list[tuple[str, NDArray[np.float64]]]:
     assert run.bodies is not None  # truth was asked for
     bodies = plan.at_samples(run.bodies[:, throw])

@@ -2,7 +2,7 @@
 
 import math
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -782,6 +782,24 @@ def needs_integration(scene: PumpScene) -> bool:
     return not ideal or breathing or scene.drive.rung != "constant-speed"
 
 
+class Start(NamedTuple):
+    """Where a mechanism begins; as :func:`run_mechanism` is told it."""
+
+    angle: float
+    speed: float
+    bodies: NDArray[np.float64]
+    chambers: NDArray[np.float64]
+
+
+def begun(scene: PumpScene, step: float, start_angle: float) -> tuple[Tables, Start]:
+    """Tables of a scene for a step [s], and where its mechanism begins at a crank angle [rad]."""
+    t = tables(scene, step)
+    bodies = start_state(scene, start_angle, t)
+    speed = 2 * math.pi * scene.drive.speed
+    chambers = start_chambers(t, bodies)
+    return t, Start(angle=start_angle, speed=speed, bodies=bodies, chambers=chambers)
+
+
 def run_scene(
     scene: PumpScene, *, step: float, n_steps: int, start_angle: float, keep_states: bool = False
 ) -> CrankRun:
@@ -806,15 +824,14 @@ def run_scene(
     """
     if not needs_integration(scene):
         return _run_ideal(scene, step=step, n_steps=n_steps, start_angle=start_angle)
-    t = tables(scene, step)
-    bodies = start_state(scene, start_angle, t)
+    t, start = begun(scene, step, start_angle)
     return run_mechanism(
         t,
-        angle=start_angle,
-        speed=2 * math.pi * scene.drive.speed,
-        bodies=bodies,
-        chambers=start_chambers(t, bodies),
-        films=start_films(t, bodies, start_angle),
+        angle=start.angle,
+        speed=start.speed,
+        bodies=start.bodies,
+        chambers=start.chambers,
+        films=start_films(t, start.bodies, start_angle),
         step=step,
         n_steps=n_steps,
         keep_states=keep_states,

@@ -36,11 +36,27 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..contact.law import LAW_KELVIN_VOIGT, RELEASE_AT_ZERO_FORCE, friction_force, normal_force
+from ..contact.law import friction_force
 from ..jit import kernel, sine_cosine
 from ..output.status import Status
 from .hydraulics import PRESSURE_CHAMBER, chamber_step, line_pressure
 from .oiled_joint import oiled_joint
+from .throw_motion import (
+    PinLoad,
+    Pose,
+    crank_load,
+    crank_offset,
+    dry_pin,
+    free_motion,
+    guide_corner,
+    held_back,
+    held_wrist,
+    link_drag,
+    motor_moment,
+    pin_touch,
+    polar,
+    wrist_offset,
+)
 
 JOINT_IDEAL, JOINT_LINK, JOINT_COMPLIANT, JOINT_OILED = 0, 1, 2, 3
 """From `JOINT_COMPLIANT` on a joint is a force that follows from the motion."""
@@ -129,7 +145,7 @@ GAPS = ("crankpin_gap", "wristpin_gap", "crankpin_peaks", "wristpin_peaks")
 
 OVERLAP_LIMIT = 0.1  # of the pin radius: small-penetration contact laws end there
 _MOST_CUTS = 8  # contact changes within one step and throw before the rest is taken as it is
-_NO_CHANGE = 1.0  # margin of a contact that cannot change [N]
+NO_CHANGE = 1.0  # margin of a contact that cannot change [N]
 
 
 class Tables(NamedTuple):
@@ -186,7 +202,7 @@ SIZE, SIZE_PER_TURN = 4, 5
 crank speed, and per crank acceleration."""
 
 
-class _Work(NamedTuple):
+class Work(NamedTuple):
     """Scratch of the march; nothing is allocated in its loop.
 
     Rows 0 and 1 are the ends of the step in turn, rows 2 to 4 the stages between them.
@@ -201,128 +217,34 @@ class _Work(NamedTuple):
 
 
 @kernel
-def _crank_offset(
-    b: Any, omega: float, q: Any, sin_a: float, cos_a: float, sin_b: float, cos_b: float
-) -> Any:
-    """Pin from its eye's centre, and how fast."""
-    turn = omega * q.crank_radius
-    swing = b.y[BETA_RATE] * q.rod_arm
-    return (
-        q.crank_radius * cos_a - b.y[ROD_X] + q.rod_arm * cos_b,
-        q.crank_radius * sin_a - b.y[ROD_Y] - q.rod_arm * sin_b,
-        -turn * sin_a - b.y[ROD_X_RATE] - swing * sin_b,
-        turn * cos_a - b.y[ROD_Y_RATE] - swing * cos_b,
-    )
-
-
-@kernel
-def _wrist_offset(b: Any, q: Any, sin_b: float, cos_b: float) -> Any:
-    """Pin from its eye's centre, and how fast."""
-    swing = b.y[BETA_RATE] * q.rod_centre
-    return (
-        b.y[PISTON_X] - b.y[ROD_X] - q.rod_centre * cos_b,
-        b.y[PISTON_Y] - b.y[ROD_Y] + q.rod_centre * sin_b,
-        b.y[PISTON_X_RATE] - b.y[ROD_X_RATE] + swing * sin_b,
-        b.y[PISTON_Y_RATE] - b.y[ROD_Y_RATE] + swing * cos_b,
-    )
-
-
-@kernel
-def _polar(d_x: float, d_y: float, v_x: float, v_y: float) -> Any:
-    """Length, its rate, and direction; a centred pin has the stroke's, never NaN."""
-    distance = math.sqrt(d_x * d_x + d_y * d_y)
-    if distance > 0.0:
-        n_x, n_y = d_x / distance, d_y / distance
-    else:
-        n_x, n_y = 1.0, 0.0
-    return distance, v_x * n_x + v_y * n_y, n_x, n_y
-
-
-@kernel
-def _corner(b: Any, q: Any, corner: int, clearance: float) -> Any:
-    """Overlap of a corner with its guide, its rate, and the corner from the wrist pin."""
-    along = q.guide_half_length if corner & 1 else -q.guide_half_length
-    side = 1.0 if corner < 2 else -1.0
-    across = side * q.guide_half_height
-    sin_t, cos_t = sine_cosine(b.y[TILT])
-    r_x = along * cos_t - across * sin_t
-    r_y = along * sin_t + across * cos_t
-    overlap = side * (b.y[PISTON_Y] + r_y) - q.guide_half_height - clearance
-    return overlap, side * (b.y[PISTON_Y_RATE] + b.y[TILT_RATE] * r_x), r_x, r_y, side
-
-
-@kernel
-def _margin(overlap: float, force: float, touching: bool, c: Any) -> Any:
-    """Positive while the contact stays as it is, negative once it should change [N]."""
-    elastic = c.stiffness * overlap
-    if c.law == LAW_KELVIN_VOIGT and c.release == RELEASE_AT_ZERO_FORCE:
-        return force if touching else -min(elastic, force)
-    return elastic if touching else -elastic
+def _pose(b: Any) -> Any:
+    y = b.y
+    return Pose(y[0], y[1], y[2], y[3], y[4], y[5], y[6], y[7], y[8], y[9], y[10], y[11])
 
 
 @kernel
 def _contact_margin(k: int, j: int, w: Any, row: int, t: Any) -> Any:
     """Margin of one contact alone, for the search of its change."""
-    q, b, omega = t.throws[k], w.stage[row, k], w.crank[row, SPEED]
+    q, p, omega = t.throws[k], _pose(w.stage[row, k]), w.crank[row, SPEED]
     touching, impact = w.held[k].touching[j] != 0, w.held[k].impact[j]
     if j > WRISTPIN:
-        c = t.contacts[k, GUIDE]
-        overlap, speed, _, _, _ = _corner(b, q, j - GUIDE, c.clearance)
-        return _margin(overlap, normal_force(overlap, speed, impact, c), touching, c)
-    sin_b, cos_b = sine_cosine(b.y[BETA])
-    c = t.contacts[k, j]
+        along, side = _corner_place(j - GUIDE)
+        _, _, _, touch = guide_corner(p, q, along, side, touching, impact, t.contacts[k, GUIDE])
+        return touch.margin
+    sin_b, cos_b = sine_cosine(p.beta)
     if j == CRANKPIN:
         sin_a, cos_a = sine_cosine(w.crank[row, ANGLE] + q.phase)
-        d_x, d_y, v_x, v_y = _crank_offset(b, omega, q, sin_a, cos_a, sin_b, cos_b)
+        d_x, d_y, v_x, v_y = crank_offset(p, omega, q, sin_a, cos_a, sin_b, cos_b)
     else:
-        d_x, d_y, v_x, v_y = _wrist_offset(b, q, sin_b, cos_b)
-    distance, speed, _, _ = _polar(d_x, d_y, v_x, v_y)
-    overlap = distance - c.clearance
-    return _margin(overlap, normal_force(overlap, speed, impact, c), touching, c)
+        d_x, d_y, v_x, v_y = wrist_offset(p, q, sin_b, cos_b)
+    touch, _, _ = pin_touch(d_x, d_y, v_x, v_y, touching, impact, t.contacts[k, j])
+    return touch.margin
 
 
 @kernel
-def _link_drag(d_x: float, d_y: float, v_x: float, v_y: float, spin: float, c: Any) -> Any:
-    """Viscous force on the rod along a link's end (x, y), and its share between the surfaces.
-
-    The contact's damping resists the swing of the link, `tangential_damping` the sliding.
-    """
-    _, _, n_x, n_y = _polar(d_x, d_y, v_x, v_y)
-    swing = v_y * n_x - v_x * n_y
-    sliding = c.tangential_damping * (swing + spin)
-    drag = c.damping * swing + sliding
-    return -drag * n_y, drag * n_x, sliding
-
-
-@kernel
-def _pin_joint(
-    joint: int,
-    rung: int,
-    d_x: float,
-    d_y: float,
-    v_x: float,
-    v_y: float,
-    spin: float,
-    b: Any,
-    held: Any,
-    c: Any,
-) -> Any:
-    """Applied force of a pin on the rod (x, y), what of it rubs, what presses, and the overlap.
-
-    `spin` is the sliding velocity that comes from turning alone.
-    """
-    if rung == JOINT_LINK:
-        f_x, f_y, rub = _link_drag(d_x, d_y, v_x, v_y, spin, c)
-        return f_x, f_y, rub, 0.0, 0.0
-    distance, speed, n_x, n_y = _polar(d_x, d_y, v_x, v_y)
-    overlap = distance - c.clearance
-    law = normal_force(overlap, speed, held.impact[joint], c)
-    touching = held.touching[joint] != 0
-    b.margin[joint], b.approach[joint] = _margin(overlap, law, touching, c), speed
-    if not touching:
-        return 0.0, 0.0, 0.0, 0.0, overlap
-    rub = friction_force(v_y * n_x - v_x * n_y + spin, law, c)
-    return law * n_x - rub * n_y, law * n_y + rub * n_x, rub, law, overlap
+def _corner_place(number: int) -> Any:
+    """Along and across of a corner of the piston: rear and front, upper then lower."""
+    return (1.0 if number & 1 else -1.0), (1.0 if number < 2 else -1.0)
 
 
 @kernel
@@ -338,7 +260,7 @@ def _oiled(
     held: Any,
     t: Any,
 ) -> Any:
-    """Force of a pin on the rod through oil (x, y), moments on pin and eye, and its size."""
+    """Load of a pin on the rod through oil, and the size of its force."""
     n = 2 * joint
     f_x, f_y, on_pin, on_eye, rate_x, rate_y, gap, peaks = oiled_joint(
         b.film[n],
@@ -356,27 +278,55 @@ def _oiled(
     )
     b.film_rate[n], b.film_rate[n + 1] = rate_x, rate_y
     b.gaps[joint], b.gaps[2 + joint] = gap, peaks
-    return f_x, f_y, on_pin, on_eye, math.sqrt(f_x * f_x + f_y * f_y)
+    return PinLoad(f_x, f_y, on_pin, on_eye), math.sqrt(f_x * f_x + f_y * f_y)
 
 
 @kernel
-def _guide(q: Any, b: Any, held: Any, c: Any) -> Any:
+def _pin_load(
+    joint: int,
+    rung: int,
+    radius: float,
+    offset: Any,
+    pin_turn: float,
+    k: int,
+    b: Any,
+    held: Any,
+    t: Any,
+) -> Any:
+    """Load of a pin on the rod by any rung that is a force, what presses, and the overlap.
+
+    A link's load is its viscous part; the pin of an ideal joint has none.
+    """
+    if rung == JOINT_IDEAL:
+        return PinLoad(0.0, 0.0, 0.0, 0.0), 0.0, 0.0
+    d_x, d_y, v_x, v_y = offset
+    c = t.contacts[k, joint]
+    if rung == JOINT_OILED:
+        load, peak = _oiled(joint, d_x, d_y, v_x, v_y, pin_turn, k, b, held, t)
+        return load, peak, math.sqrt(d_x * d_x + d_y * d_y) - c.clearance
+    spin = pin_turn * radius + b.y[BETA_RATE] * (radius + c.clearance)
+    if rung == JOINT_LINK:
+        f_x, f_y, rub = link_drag(d_x, d_y, v_x, v_y, spin, c)
+        return PinLoad(f_x, f_y, -radius * rub, (radius + c.clearance) * rub), 0.0, 0.0
+    touching = held.touching[joint] != 0
+    load, touch = dry_pin(d_x, d_y, v_x, v_y, spin, radius, touching, held.impact[joint], c)
+    b.margin[joint], b.approach[joint] = touch.margin, touch.approach
+    return load, touch.normal, touch.overlap
+
+
+@kernel
+def _guide(p: Any, q: Any, b: Any, held: Any, c: Any) -> Any:
     """Force of a guide with clearance on the piston (x, y, turning), peak normal force, overlap."""
     f_x, f_y, moment, peak, deepest = 0.0, 0.0, 0.0, 0.0, 0.0
-    for corner in range(4):
-        j = GUIDE + corner
-        overlap, speed, r_x, r_y, side = _corner(b, q, corner, c.clearance)
-        law = normal_force(overlap, speed, held.impact[j], c)
-        touching = held.touching[j] != 0
-        b.margin[j], b.approach[j] = _margin(overlap, law, touching, c), speed
-        deepest = max(deepest, overlap)
-        if touching:
-            push = -side * law
-            drag = -friction_force(b.y[PISTON_X_RATE] - b.y[TILT_RATE] * r_y, law, c)
-            f_x += drag
-            f_y += push
-            moment += r_x * push - r_y * drag
-            peak = max(peak, law)
+    for number in range(4):
+        j = GUIDE + number
+        along, side = _corner_place(number)
+        drag, push, turn, touch = guide_corner(
+            p, q, along, side, held.touching[j] != 0, held.impact[j], c
+        )
+        b.margin[j], b.approach[j] = touch.margin, touch.approach
+        f_x, f_y, moment = f_x + drag, f_y + push, moment + turn
+        peak, deepest = max(peak, touch.normal), max(deepest, touch.overlap)
     return f_x, f_y, moment, peak, deepest
 
 
@@ -395,96 +345,43 @@ def _pressure(k: int, w: Any, row: int, share: float, t: Any) -> Any:
 def _throw(k: int, w: Any, row: int, share: float, t: Any) -> None:
     """Rates and forces of one throw at constant crank speed, and per crank acceleration."""
     q, m, b, held = t.throws[k], t.machine, w.stage[row, k], w.held[k]
+    p, omega = _pose(b), w.crank[row, SPEED]
     sin_a, cos_a = sine_cosine(w.crank[row, ANGLE] + q.phase)
-    sin_b, cos_b = sine_cosine(b.y[BETA])
-    omega, b_rate = w.crank[row, SPEED], b.y[BETA_RATE]
+    sin_b, cos_b = sine_cosine(p.beta)
     pressure, added = _pressure(k, w, row, share, t)
-    # applied forces on rod (x, y, turning with b), piston (x, y, turning with t), and crank
-    rod_x, rod_y, rod_b = -m.gravity_x * q.rod_mass, -m.gravity_y * q.rod_mass, 0.0
-    on_face = -q.piston_area * pressure
-    piston_x, piston_y = on_face - m.gravity_x * q.piston_mass, -m.gravity_y * q.piston_mass
-    piston_t, guide_x, guide_y, crank_moment = 0.0, 0.0, 0.0, 0.0
-    pin_x, pin_y, wrist_x, wrist_y = 0.0, 0.0, 0.0, 0.0
-    peak, overlap_ratio = 0.0, 0.0
-    if q.crankpin_rung != JOINT_IDEAL:
-        c, radius = t.contacts[k, CRANKPIN], q.crankpin_radius
-        eye = radius + c.clearance
-        d_x, d_y, v_x, v_y = _crank_offset(b, omega, q, sin_a, cos_a, sin_b, cos_b)
-        if q.crankpin_rung == JOINT_OILED:
-            pin_x, pin_y, on_pin, on_eye, peak = _oiled(
-                CRANKPIN, d_x, d_y, v_x, v_y, omega, k, b, held, t
-            )
-            overlap = math.sqrt(d_x * d_x + d_y * d_y) - c.clearance
-        else:
-            spin = omega * radius + b_rate * eye
-            pin_x, pin_y, rub, peak, overlap = _pin_joint(
-                CRANKPIN, q.crankpin_rung, d_x, d_y, v_x, v_y, spin, b, held, c
-            )
-            on_pin, on_eye = -radius * rub, eye * rub
-        rod_x += pin_x
-        rod_y += pin_y
-        rod_b += q.rod_arm * (pin_x * sin_b + pin_y * cos_b) - on_eye
-        crank_moment += on_pin
-        overlap_ratio = overlap / radius
+    on_face, inv_px = -q.piston_area * pressure, 1.0 / (q.piston_mass + added)
+    at_crank = crank_offset(p, omega, q, sin_a, cos_a, sin_b, cos_b)
+    pin, peak, overlap = _pin_load(
+        CRANKPIN, q.crankpin_rung, q.crankpin_radius, at_crank, omega, k, b, held, t
+    )
+    overlap_ratio = overlap / q.crankpin_radius if q.crankpin_rung != JOINT_IDEAL else 0.0
+    wrist, guide_x, guide_y, guide_moment = PinLoad(0.0, 0.0, 0.0, 0.0), 0.0, 0.0, 0.0
     if q.wristpin_rung != JOINT_IDEAL:
-        c, radius = t.contacts[k, WRISTPIN], q.wristpin_radius
-        eye = radius + c.clearance
-        d_x, d_y, v_x, v_y = _wrist_offset(b, q, sin_b, cos_b)
-        if q.wristpin_rung == JOINT_OILED:
-            wrist_x, wrist_y, on_pin, on_eye, normal = _oiled(
-                WRISTPIN, d_x, d_y, v_x, v_y, b.y[TILT_RATE], k, b, held, t
-            )
-            overlap = math.sqrt(d_x * d_x + d_y * d_y) - c.clearance
-        else:
-            spin = b.y[TILT_RATE] * radius + b_rate * eye
-            wrist_x, wrist_y, rub, normal, overlap = _pin_joint(
-                WRISTPIN, q.wristpin_rung, d_x, d_y, v_x, v_y, spin, b, held, c
-            )
-            on_pin, on_eye = -radius * rub, eye * rub
-        rod_x += wrist_x
-        rod_y += wrist_y
-        rod_b -= q.rod_centre * (wrist_x * sin_b + wrist_y * cos_b) + on_eye
-        piston_x -= wrist_x
-        piston_y -= wrist_y
-        piston_t += on_pin
-        peak, overlap_ratio = max(peak, normal), max(overlap_ratio, overlap / radius)
+        at_wrist = wrist_offset(p, q, sin_b, cos_b)
+        wrist, normal, overlap = _pin_load(
+            WRISTPIN, q.wristpin_rung, q.wristpin_radius, at_wrist, p.tilt_rate, k, b, held, t
+        )
+        peak, overlap_ratio = max(peak, normal), max(overlap_ratio, overlap / q.wristpin_radius)
     if q.guide_rung == JOINT_COMPLIANT:
-        guide_x, guide_y, moment, normal, overlap = _guide(q, b, held, t.contacts[k, GUIDE])
-        piston_x += guide_x
-        piston_y += guide_y
-        piston_t += moment
+        guide_x, guide_y, guide_moment, normal, overlap = _guide(
+            p, q, b, held, t.contacts[k, GUIDE]
+        )
         peak, overlap_ratio = max(peak, normal), max(overlap_ratio, overlap / q.guide_half_height)
-    inv_m, inv_j = q.inverse_rod_mass, q.inverse_rod_inertia
-    inv_px = 1.0 / (q.piston_mass + added)
-    acc_x, acc_y, acc_b = rod_x * inv_m, rod_y * inv_m, rod_b * inv_j
-    pis_x, pis_y = piston_x * inv_px, piston_y * q.inverse_piston_across
-    b.link = 0.0
-    b.rate[TILT_RATE] = piston_t * q.inverse_piston_tilt
+    rates = free_motion(
+        q, m, on_face, inv_px, pin, wrist, guide_x, guide_y, guide_moment, sin_b, cos_b
+    )
+    wrist_x, wrist_y = wrist.x, wrist.y
     if q.crankpin_rung >= JOINT_COMPLIANT and q.wristpin_rung == JOINT_IDEAL:
-        # two constraints of the wrist pin in closed form: the way a worn crank pin takes
-        d_x, d_y, v_x, v_y = _wrist_offset(b, q, sin_b, cos_b)
-        swing, lag = q.rod_centre * b_rate * b_rate, q.rod_centre * acc_b
-        need_x = pis_x - acc_x + lag * sin_b + swing * cos_b + _held_back(d_x, v_x, m)
-        need_y = pis_y - acc_y + lag * cos_b - swing * sin_b + _held_back(d_y, v_y, m)
-        turning = q.rod_centre * q.rod_centre * inv_j
-        a_xx = inv_m + inv_px + turning * sin_b * sin_b
-        a_yy = inv_m + q.inverse_piston_across + turning * cos_b * cos_b
-        a_xy = turning * sin_b * cos_b
-        inverse = 1.0 / (a_xx * a_yy - a_xy * a_xy)
-        wrist_x = (a_yy * need_x - a_xy * need_y) * inverse
-        wrist_y = (a_xx * need_y - a_xy * need_x) * inverse
-        acc_x += wrist_x * inv_m
-        acc_y += wrist_y * inv_m
-        acc_b -= q.rod_centre * (wrist_x * sin_b + wrist_y * cos_b) * inv_j
-        pis_x -= wrist_x * inv_px
-        pis_y -= wrist_y * q.inverse_piston_across
+        rates, wrist_x, wrist_y = held_wrist(q, m, p, rates, inv_px, sin_b, cos_b, 1.0)
     for i in range(len(BODY)):
         b.rate[i] = b.y[len(BODY) + i]
-    b.rate[ROD_X_RATE], b.rate[ROD_Y_RATE], b.rate[BETA_RATE] = acc_x, acc_y, acc_b
-    b.rate[PISTON_X_RATE], b.rate[PISTON_Y_RATE] = pis_x, pis_y
-    b.force[_PIN], b.force[_PIN + 1] = pin_x, pin_y
+    b.rate[ROD_X_RATE], b.rate[ROD_Y_RATE], b.rate[BETA_RATE] = rates.rod_x, rates.rod_y, rates.beta
+    b.rate[PISTON_X_RATE], b.rate[PISTON_Y_RATE] = rates.piston_x, rates.piston_y
+    b.rate[TILT_RATE] = rates.tilt
+    b.force[_PIN], b.force[_PIN + 1] = pin.x, pin.y
     b.force[_WRIST], b.force[_WRIST + 1] = wrist_x, wrist_y
-    b.normal, b.overlap = peak, overlap_ratio
+    b.normal, b.overlap, b.link = peak, overlap_ratio, 0.0
+    crank_moment = pin.on_pin
     if q.crankpin_rung < JOINT_COMPLIANT or q.wristpin_rung == JOINT_LINK:
         crank_moment += _constrain(k, w, row, t, sin_a, cos_a, sin_b, cos_b, inv_px)
     pin_x, pin_y = b.force[_PIN], b.force[_PIN + 1]
@@ -497,12 +394,6 @@ def _throw(k: int, w: Any, row: int, share: float, t: Any) -> None:
         b.force_per_turn[_FACE] = -added * b.rate_per_turn[PISTON_X_RATE]
         if q.guide_rung != JOINT_COMPLIANT:
             b.force_per_turn[_GUIDE + 1] = b.force_per_turn[_WRIST + 1]
-
-
-@kernel
-def _held_back(distance: float, speed: float, m: Any) -> Any:
-    """Baumgarte's term: acceleration that brings a drifting constraint back."""
-    return m.baumgarte * (2.0 * speed + m.baumgarte * distance)
 
 
 @kernel
@@ -528,13 +419,13 @@ def _equations(
     omega, b_rate = w.crank[row, SPEED], b.y[BETA_RATE]
     if joint == CRANKPIN:
         rung, arm, radius, spin = q.crankpin_rung, q.rod_arm, q.crankpin_radius, omega
-        d_x, d_y, v_x, v_y = _crank_offset(b, omega, q, sin_a, cos_a, sin_b, cos_b)
+        d_x, d_y, v_x, v_y = crank_offset(_pose(b), omega, q, sin_a, cos_a, sin_b, cos_b)
         pull = q.crank_radius * omega * omega
         apart_x, apart_y = -pull * cos_a, -pull * sin_a
         turn_x, turn_y = -q.crank_radius * sin_a, q.crank_radius * cos_a
     else:
         rung, arm, radius, spin = q.wristpin_rung, -q.rod_centre, q.wristpin_radius, b.y[TILT_RATE]
-        d_x, d_y, v_x, v_y = _wrist_offset(b, q, sin_b, cos_b)
+        d_x, d_y, v_x, v_y = wrist_offset(_pose(b), q, sin_b, cos_b)
         apart_x, apart_y = b.rate[PISTON_X_RATE], b.rate[PISTON_Y_RATE]
         turn_x, turn_y = 0.0, 0.0
     apart_x -= b.rate[ROD_X_RATE] + arm * (b.rate[BETA_RATE] * sin_b + b_rate * b_rate * cos_b)
@@ -545,11 +436,11 @@ def _equations(
             w.place[n + i, AT_JOINT], w.place[n + i, RUBBING] = joint, 0.0
             w.place[n + i, ALONG_X], w.place[n + i, ALONG_Y] = x, y
             w.place[n + i, NORMAL_X], w.place[n + i, NORMAL_Y] = x, y
-        w.matrix[n, SIZE] = apart_x + _held_back(d_x, v_x, m)
-        w.matrix[n + 1, SIZE] = apart_y + _held_back(d_y, v_y, m)
+        w.matrix[n, SIZE] = apart_x + held_back(d_x, v_x, m)
+        w.matrix[n + 1, SIZE] = apart_y + held_back(d_y, v_y, m)
         w.matrix[n, SIZE_PER_TURN], w.matrix[n + 1, SIZE_PER_TURN] = turn_x, turn_y
         return n + 2
-    distance, speed, n_x, n_y = _polar(d_x, d_y, v_x, v_y)
+    distance, speed, n_x, n_y = polar(d_x, d_y, v_x, v_y)
     swing = v_y * n_x - v_x * n_y
     sliding = swing + radius * spin + (radius + c.clearance) * b_rate
     share = side * (friction_force(sliding, 1.0, c) - c.tangential_damping * sliding)
@@ -557,7 +448,7 @@ def _equations(
     w.place[n, ALONG_X], w.place[n, ALONG_Y] = n_x - share * n_y, n_y + share * n_x
     w.place[n, NORMAL_X], w.place[n, NORMAL_Y] = n_x, n_y
     across = swing * swing / distance
-    back = _held_back(distance - c.clearance, speed, m)
+    back = held_back(distance - c.clearance, speed, m)
     w.matrix[n, SIZE] = apart_x * n_x + apart_y * n_y + across + back
     w.matrix[n, SIZE_PER_TURN] = turn_x * n_x + turn_y * n_y
     return n + 1
@@ -695,31 +586,15 @@ def _eliminate(w: Any, n: int) -> None:
 
 
 @kernel
-def motor_moment(speed: float, m: Any) -> Any:
-    """Moment of the drive at a crank speed [N m]: constant part plus Kloss's curve.
-
-    ``2 M_b / (s / s_b + s_b / s)`` with the slip s of an asynchronous motor, breakdown moment M_b
-    at the slip s_b. Source: Kloss (1929); Boldea and Nasar, The Induction Machine Handbook.
-    """
-    if m.breakdown_moment == 0.0:
-        return m.drive_moment
-    slip = 1.0 - speed / m.synchronous_speed
-    both = slip * slip + m.breakdown_slip * m.breakdown_slip
-    return m.drive_moment + 2.0 * m.breakdown_moment * slip * m.breakdown_slip / both
-
-
-@kernel
-def _derivative(w: Any, row: int, share: float, t: Any) -> None:
+def derivative_of_record(w: Any, row: int, share: float, t: Any) -> None:
     """Rates, forces and margins at the state of a row; `share` of the step has passed."""
     m = t.machine
     w.moment[0] = w.moment[1] = 0.0
     for k in range(t.throws.shape[0]):
         _throw(k, w, row, share, t)
     w.crank[row, ANGLE_RATE], w.crank[row, SPEED_RATE] = w.crank[row, SPEED], 0.0
-    load = w.moment[0]
-    if m.static_moment != 0.0:
-        sin_a, cos_a = sine_cosine(w.crank[row, ANGLE] + t.throws[0].phase)
-        load += m.static_moment * (m.gravity_x * sin_a - m.gravity_y * cos_a)
+    sin_a, cos_a = sine_cosine(w.crank[row, ANGLE] + t.throws[0].phase)
+    load = crank_load(w.moment[0], sin_a, cos_a, m)
     w.crank[row, MOMENT] = -load
     if m.inverse_inertia == 0.0:
         return
@@ -816,7 +691,8 @@ def _advance(w: Any, row: int, i: int, share: float, slope: int) -> None:
 
 
 @kernel
-def _mean(first: float, second: float, third: float, last: float) -> float:
+def mean_of_stages(first: float, second: float, third: float, last: float) -> float:
+    """Six times the weighted mean of the four stages of a step."""
     return first + 2.0 * (second + third) + last
 
 
@@ -825,15 +701,15 @@ def _finish(w: Any, i: int, h: float) -> None:
     """State at the end of the step from row i, by the weighted mean of the four rates."""
     sixth, y = h / 6.0, w.crank
     for c in range(2):
-        rate = _mean(y[i, 2 + c], y[2, 2 + c], y[3, 2 + c], y[4, 2 + c])
+        rate = mean_of_stages(y[i, 2 + c], y[2, 2 + c], y[3, 2 + c], y[4, 2 + c])
         y[1 - i, c] = y[i, c] + sixth * rate
     for k in range(w.stage.shape[1]):
         end, a, b = w.stage[1 - i, k], w.stage[i, k], w.stage[2, k]
         c_, d = w.stage[3, k], w.stage[4, k]
         for c in range(PER_THROW):
-            end.y[c] = a.y[c] + sixth * _mean(a.rate[c], b.rate[c], c_.rate[c], d.rate[c])
+            end.y[c] = a.y[c] + sixth * mean_of_stages(a.rate[c], b.rate[c], c_.rate[c], d.rate[c])
         for c in range(len(FILM)):
-            rate = _mean(a.film_rate[c], b.film_rate[c], c_.film_rate[c], d.film_rate[c])
+            rate = mean_of_stages(a.film_rate[c], b.film_rate[c], c_.film_rate[c], d.film_rate[c])
             end.film[c] = a.film[c] + sixth * rate
 
 
@@ -853,7 +729,7 @@ def _stages(w: Any, i: int, h: float, passed: float, whole: float, fresh: bool, 
             row = 1 + stage
             share = 1.0 if stage == 3 else 0.5
             _advance(w, row, i, share * h, i if stage == 1 else stage)
-        _derivative(w, row, (passed + share * h) / whole, t)
+        derivative_of_record(w, row, (passed + share * h) / whole, t)
 
 
 @kernel
@@ -885,17 +761,23 @@ def _change(throw: int, contact: int, w: Any, i: int, t: Any, tally: Any) -> Non
 def _record_forces(w: Any, i: int, weight: float, forces: Any, step: int, tally: Any) -> None:
     """Add the impulse of one part of the step to the step's mean forces."""
     y = w.crank
-    forces[step, 0] += weight * _mean(y[i, MOMENT], y[2, MOMENT], y[3, MOMENT], y[4, MOMENT])
+    forces[step, 0] += weight * mean_of_stages(
+        y[i, MOMENT], y[2, MOMENT], y[3, MOMENT], y[4, MOMENT]
+    )
     for k in range(w.stage.shape[1]):
         a, b, c, d = w.stage[i, k], w.stage[2, k], w.stage[3, k], w.stage[4, k]
         f = 1 + len(FORCES) * k
         for n in range(_VALVES):
-            forces[step, f + n] += weight * _mean(a.force[n], b.force[n], c.force[n], d.force[n])
+            forces[step, f + n] += weight * mean_of_stages(
+                a.force[n], b.force[n], c.force[n], d.force[n]
+            )
         tally.peak[0] = max(tally.peak[0], max(a.normal, max(b.normal, c.normal)))
 
 
 @kernel
-def _step(w: Any, i: int, h: float, fresh: bool, t: Any, forces: Any, step: int, tally: Any) -> Any:
+def step_of_record(
+    w: Any, i: int, h: float, fresh: bool, t: Any, forces: Any, step: int, tally: Any
+) -> Any:
     """One whole step, cut wherever a contact closes or opens.
 
     Returns the row it ended in, and whether that row's derivative is fresh.
@@ -923,6 +805,20 @@ def _step(w: Any, i: int, h: float, fresh: bool, t: Any, forces: Any, step: int,
 
 
 @kernel
+def breathe(
+    chamber: Any, held: Any, liquid: Any, h: float, x: float, v: float, substeps: int
+) -> Any:
+    """Step one chamber along its piston's path: fault, and its pressure at both ends of the next.
+
+    The pressure [Pa] is extrapolated: the mechanism steps first.
+    """
+    last = chamber[0]
+    fault = chamber_step(chamber, held.flow, liquid, h, chamber[6], chamber[7], x, v, substeps)
+    chamber[6], chamber[7] = x, v
+    return fault, chamber[0], 2.0 * chamber[0] - last
+
+
+@kernel
 def _breathe(w: Any, i: int, h: float, t: Any, chamber: Any, forces: Any, step: int) -> int:
     """Step every chamber along its piston's path; its pressure for the next step."""
     fault = 0
@@ -930,20 +826,10 @@ def _breathe(w: Any, i: int, h: float, t: Any, chamber: Any, forces: Any, step: 
         q, b, held = t.throws[k], w.stage[i, k], w.held[k]
         if q.pressure_rung != PRESSURE_CHAMBER:
             continue
-        last, before, v_before = chamber[k, 0], chamber[k, 6], chamber[k, 7]
-        fault += chamber_step(
-            chamber[k],
-            held.flow,
-            t.liquid[k],
-            h,
-            before,
-            v_before,
-            b.y[PISTON_X],
-            b.y[PISTON_X_RATE],
-            q.substeps,
-        )
-        chamber[k, 6], chamber[k, 7] = b.y[PISTON_X], b.y[PISTON_X_RATE]
-        held.pressure[0], held.pressure[1] = chamber[k, 0], 2.0 * chamber[k, 0] - last
+        x, v = b.y[PISTON_X], b.y[PISTON_X_RATE]
+        own, before, after = breathe(chamber[k], held, t.liquid[k], h, x, v, q.substeps)
+        fault += own
+        held.pressure[0], held.pressure[1] = before, after
         f = 1 + len(FORCES) * k
         forces[step, f + _VALVES] = held.flow[2] / h
         forces[step, f + _VALVES + 1] = held.flow[3] / h
@@ -979,7 +865,9 @@ class _Record(NamedTuple):
     gaps: NDArray[np.float64]  # (n_steps + 1, n_throws, len(GAPS))
 
 
-class _Tally(NamedTuple):
+class Tally(NamedTuple):
+    """What a run counts, see :data:`CHANGES`."""
+
     counts: NDArray[np.int64]  # (5,)
     peak: NDArray[np.float64]  # (1,): largest normal force
 
@@ -991,7 +879,7 @@ def _is_compliant(q: Any, j: int) -> Any:
 
 
 @kernel
-def _begin(w: Any, t: Any, chamber: Any) -> bool:
+def begin(w: Any, t: Any, chamber: Any) -> bool:
     """Contacts closed from the start, chambers; true where any chamber breathes."""
     breathing = False
     for k in range(t.throws.shape[0]):
@@ -1001,7 +889,7 @@ def _begin(w: Any, t: Any, chamber: Any) -> bool:
         held.pressure[0] = held.pressure[1] = chamber[k, 0]
         for j in range(CONTACTS):
             for row in range(5):
-                w.stage[row, k].margin[j] = _NO_CHANGE
+                w.stage[row, k].margin[j] = NO_CHANGE
             if _is_compliant(q, j):  # closed is what would close if it were open
                 held.touching[j] = 1 if _contact_margin(k, j, w, 0, t) < 0.0 else 0
     return breathing
@@ -1025,13 +913,13 @@ def _keep(w: Any, i: int, chamber: Any, r: Any, row: int) -> None:
 @kernel
 def _integrate(h: float, t: Any, w: Any, chamber: Any, r: Any, tally: Any) -> Any:
     """March from row 0 of the scratch; returns status code and steps done."""
-    breathing = _begin(w, t, chamber)
+    breathing = begin(w, t, chamber)
     i, fresh = 0, False
     if r.gaps.shape[0] > 1:  # the films of the start are those of its derivative
-        _derivative(w, i, 0.0, t)
+        derivative_of_record(w, i, 0.0, t)
     _keep(w, i, chamber, r, 0)
     for step in range(r.forces.shape[0]):
-        i, fresh = _step(w, i, h, fresh, t, r.forces, step, tally)
+        i, fresh = step_of_record(w, i, h, fresh, t, r.forces, step, tally)
         code = _fault(w, i)
         if breathing:
             if _breathe(w, i, h, t, chamber, r.forces, step) != 0:
@@ -1063,6 +951,8 @@ class CrankRun:
         Columns as ``CHAMBER_STATE``; None where nothing breathes.
     gaps : numpy.ndarray [shape=(n_steps + 1, n_throws, 4)] or None
         Columns as :data:`GAPS`, at the starts of the steps' last stage; None where no pin is oiled.
+    columns : tuple of int or None
+        Of the forces: those that were kept; None for all.
     step : float
         [s]
     status : Status
@@ -1086,6 +976,7 @@ class CrankRun:
     step: float
     peak_normal_force: float
     gaps: NDArray[np.float64] | None = None
+    columns: tuple[int, ...] | None = None
     status: Status = Status.OK
     contact_changes: int = 0
     cuts_refused: int = 0
@@ -1093,9 +984,18 @@ class CrankRun:
     tension_steps: int = 0
     vapour_steps: int = 0
 
+    @property
+    def steps(self) -> int:
+        """Steps that were taken."""
+        return len(self.turns) - 1
+
+    def place(self, column: int) -> int:
+        """Where a column of all forces is among those that were kept."""
+        return column if self.columns is None else self.columns.index(column)
+
     def force(self, name: str, throw: int = 0) -> NDArray[np.float64]:
         """One column of the forces, by its name in :data:`FORCES` [N]."""
-        return self.forces[:, 1 + len(FORCES) * throw + FORCES.index(name)]
+        return self.forces[:, self.place(1 + len(FORCES) * throw + FORCES.index(name))]
 
 
 def run_mechanism(
@@ -1144,7 +1044,7 @@ def run_mechanism(
         np.any(t.throws["crankpin_rung"] == JOINT_OILED)
         or np.any(t.throws["wristpin_rung"] == JOINT_OILED)
     )
-    w = _Work(
+    w = Work(
         crank=np.zeros((5, 5)),
         stage=np.zeros((5, n), STAGE),
         held=np.zeros(n, HELD),
@@ -1166,7 +1066,7 @@ def run_mechanism(
         chambers=np.empty((n_steps + 1 if breathing else 1, n, 8)),
         gaps=np.zeros((n_steps + 1 if oiled else 1, n, len(GAPS))),
     )
-    tally = _Tally(counts=np.zeros(5, np.int64), peak=np.zeros(1))
+    tally = Tally(counts=np.zeros(5, np.int64), peak=np.zeros(1))
     code, done = _integrate(step, t, w, chamber, r, tally)
     return CrankRun(
         turns=r.turns[: done + 1],

@@ -1,0 +1,98 @@
+"""Recordings of many pumps at once: those that can, side by side in lanes, the others alone.
+
+A recording has the same bytes either way, so only time decides.
+"""
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple, cast
+
+from ..output.recording import Recording
+from ..pump.recording import (
+    LimitError,
+    RunPlan,
+    planned,
+    recording_of,
+    refused_run,
+    simulate_pump,
+)
+from ..pump.setup import begun, needs_integration
+from ..scene.parts import Scene, SceneError
+from ..scene.pump import PumpScene
+from .lanes import LaneJob, lane_kind, run_lanes
+
+_FEWEST = 5
+"""Records of a kind: fewer are as fast one after the other."""
+
+
+class _Job(NamedTuple):
+    number: int
+    seed: int
+    plan: RunPlan
+
+
+def simulate_pumps(
+    jobs: Sequence[tuple[Scene, int]],
+) -> Iterator[tuple[int, Recording | SceneError]]:
+    """Simulate recordings of pumps, without truth.
+
+    Parameters
+    ----------
+    jobs : sequence of (Scene, int)
+        Scene and seed of each.
+
+    Yields
+    ------
+    number : int
+        Of the job; every job comes once, in any order.
+    recording : Recording or SceneError
+        As of :func:`.recording.simulate_pump` with `raise_on_failure` false; why a scene is
+        refused.
+    """
+    kinds: dict[tuple[bool, bool], list[_Job]] = {}
+    for number, (scene, seed) in enumerate(jobs):
+        pump = cast(PumpScene, scene)
+        try:
+            kind = _kind(pump)
+            plan = planned(pump) if kind else None
+        except LimitError as error:
+            yield number, refused_run(pump, error)
+            continue
+        except SceneError as error:
+            yield number, error
+            continue
+        if kind is None or plan is None:
+            yield number, _alone(pump, seed)
+            continue
+        kinds.setdefault(kind, []).append(_Job(number, seed, plan))
+    for kind, group in kinds.items():
+        yield from _together(group, kind)
+
+
+def _alone(scene: PumpScene, seed: int) -> Recording | SceneError:
+    try:
+        return simulate_pump(scene, seed, truth=False, raise_on_failure=False)
+    except SceneError as error:
+        return error
+
+
+def _kind(scene: PumpScene) -> tuple[bool, bool] | None:
+    """What records side by side must have in common; None of a scene that runs alone."""
+    simple = scene.running and len(scene.throws) == 1
+    return lane_kind(scene) if simple and needs_integration(scene) else None
+
+
+def _together(
+    group: list[_Job], kind: tuple[bool, bool]
+) -> Iterator[tuple[int, Recording | SceneError]]:
+    if len(group) < _FEWEST:
+        for job in group:
+            yield job.number, _alone(job.plan.scene, job.seed)
+        return
+    for n, run in run_lanes([lane_job(job.plan) for job in group], kind):
+        yield group[n].number, recording_of(group[n].plan, run, group[n].seed)
+
+
+def lane_job(plan: RunPlan) -> LaneJob:
+    """What a lane is told of a planned recording whose :func:`.lanes.lane_kind` is not None."""
+    tables, start = begun(plan.scene, plan.step, plan.first_angle)
+    return LaneJob(tables=tables, start=start, step=plan.step, n_steps=plan.n_steps)

@@ -1,0 +1,195 @@
+"""Records side by side: the bytes of each alone, whatever lies beside it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from wearstate.datasets.generation.generate import generate
+from wearstate.datasets.recipe.recipe import load_recipe, sample_records
+from wearstate.sim.machine.simulate import simulate, simulate_many, simulates_together
+from wearstate.sim.output.status import Status
+from wearstate.sim.pump.casing import CasingModes, housing_acceleration, line_inverse
+from wearstate.sim.pump.recording import planned
+from wearstate.sim.pump_lanes.casing_in_lanes import (
+    INPUTS,
+    LANES,
+    REACH,
+    casing_dtype,
+    respond_in_lanes,
+    set_casing,
+)
+from wearstate.sim.pump_lanes.lanes import lane_kind, run_lanes
+from wearstate.sim.pump_lanes.many import lane_job
+from wearstate.sim.scene.load import load_scene
+from wearstate.sim.scene.parts import SceneError
+
+SHORT = {"duration": "0.3 s"}
+N = 40  # of the standard set's unknowns: contact laws, chamber, play, motor, all of them drawn
+
+
+@pytest.fixture(scope="module")
+def drawn():
+    recipe = load_recipe("bilge-pump-standard", SHORT)
+    samples = sample_records(recipe, N, seed=7, skip=np.zeros(N, bool))
+    return [(sample.scene, sample.seed) for sample in samples]
+
+
+@pytest.fixture(scope="module")
+def alone(drawn):
+    return [simulate(scene, seed=seed, raise_on_failure=False) for scene, seed in drawn]
+
+
+def same(one, other):
+    return (
+        one.status == other.status
+        and np.array_equal(one.signal, other.signal)
+        and one.numerics == other.numerics
+        and one.warnings == other.warnings
+    )
+
+
+def test_the_drawn_records_are_of_every_kind(drawn):
+    """Else the tests below would compare less than they say."""
+    assert {lane_kind(scene) for scene, _ in drawn} == {
+        (play, breathes) for play in (False, True) for breathes in (False, True)
+    }
+    pins = [scene.joint.crankpin for scene, _ in drawn]
+    assert {"kelvin-voigt", "hunt-crossley", "exact"} <= {pin.law for pin in pins}
+    assert {pin.elasticity for pin in pins} >= {"linear", "hertz"}
+    assert {scene.drive.rung for scene, _ in drawn} == {"constant-speed", "motor"}
+
+
+def test_bytes_are_those_of_each_alone(drawn, alone):
+    found = dict(simulate_many(drawn))
+    assert [n for n in range(N) if not same(found[n], alone[n])] == []
+
+
+@pytest.mark.parametrize("some", [slice(0, 7), slice(5, 22), slice(None, None, -1)])
+def test_neighbours_number_and_place_change_no_byte(drawn, alone, some):
+    found = dict(simulate_many(drawn[some]))
+    assert [n for n, one in enumerate(alone[some]) if not same(found[n], one)] == []
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"pressure.rung": "constant"},
+        {"pressure.rung": "none"},
+        {
+            "joint.crankpin.elasticity": "conformal",
+            "joint.crankpin.effective_modulus": "60 GPa",
+            "joint.crankpin.contact_length": "50 mm",
+        },
+        {"joint.wristpin.rung": "compliant", "joint.guide.rung": "compliant"},
+    ],
+)
+def test_rungs_that_the_standard_set_does_not_draw(changes):
+    jobs = [(load_scene("bilge-pump", SHORT | changes), seed) for seed in range(6)]
+    assert lane_kind(jobs[0][0]) is not None
+    found = dict(simulate_many(jobs))
+    assert all(same(found[n], simulate(scene, seed=seed)) for n, (scene, seed) in enumerate(jobs))
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"pressure.rung": "heads"},
+        {"joint.crankpin.rung": "link"},
+        {"joint.crankpin.rung": "ideal"},
+        {"crank.unbalance": "0.1 kg m"},
+        {"exciters.0.force": "500 N"},
+        {"exciters.0.force": "500 N", "running": False},
+    ],
+)
+def test_what_lanes_do_not_know_runs_alone(changes):
+    jobs = [(load_scene("bilge-pump", SHORT | {"duration": "0.5 s"} | changes), 1)] * 6
+    found = dict(simulate_many(jobs))
+    assert len(found) == 6
+    assert same(found[3], simulate(*jobs[0][:1], seed=1))
+
+
+def test_a_refused_and_a_failed_scene_leave_the_others_alone():
+    good = [(load_scene("bilge-pump", SHORT), seed) for seed in range(6)]
+    refused = load_scene("bilge-pump", {"duration": "0.1 s"})  # less than a revolution
+    beyond = load_scene("bilge-pump", SHORT | {"numerics.step": "39 us"})
+    found = dict(simulate_many([*good[:3], (refused, 0), (beyond, 0), *good[3:]]))
+    assert isinstance(found[3], SceneError)
+    assert found[4].status == simulate(beyond, seed=0, raise_on_failure=False).status
+    assert not found[4].status.ok
+    assert same(found[7], simulate(good[5][0], seed=5))
+
+
+def test_a_run_that_fails_on_its_way_is_left_behind():
+    """Its state is no number from the start; its neighbours end as ever."""
+    scenes = [
+        load_scene("bilge-pump", SHORT | {"drive.speed": f"{300 + n} rpm"}) for n in range(20)
+    ]
+    jobs = [lane_job(planned(scene)) for scene in scenes]
+    kind = lane_kind(scenes[0])
+    whole = {n: run.acceleration.copy() for n, run in run_lanes(jobs, kind)}
+    bad = jobs[4].start._replace(bodies=np.full((1, 12), np.nan))
+    jobs[4] = replace(jobs[4], start=bad)
+    found = {n: (run.status, run.acceleration.copy()) for n, run in run_lanes(jobs, kind)}
+    assert found[4][0] == Status(1)
+    assert len(found[4][1]) == 1
+    others = [n for n in range(20) if n != 4]
+    assert all(found[n][0].ok and np.array_equal(found[n][1], whole[n]) for n in others)
+
+
+def test_machines_without_lanes_are_simulated_one_by_one():
+    scene = load_scene("propulsion-shaft", {"duration": "0.4 s"})
+    assert not simulates_together(scene)
+    found = dict(simulate_many([(scene, 1), (scene, 2)]))
+    assert np.array_equal(found[1].signal, simulate(scene, seed=2).signal)
+
+
+def test_a_data_set_has_the_bytes_of_its_records_alone(tmp_path):
+    """With truth every record runs alone; without, those of a batch run side by side."""
+    recipe = load_recipe("bilge-pump-small", SHORT)
+    for name, settings in {
+        "lanes": {"jobs": 1},
+        "two": {"jobs": 2},
+        "truth": {"truth": True},
+    }.items():
+        generate(recipe, 14, tmp_path / f"{name}.h5", seed=3, **settings)
+    import h5py
+
+    with (
+        h5py.File(tmp_path / "lanes.h5") as lanes,
+        h5py.File(tmp_path / "two.h5") as two,
+        h5py.File(tmp_path / "truth.h5") as truth,
+    ):
+        for other in (two, truth):
+            assert np.array_equal(lanes["signal"][:], other["signal"][:])
+            assert np.array_equal(lanes["manifest"][:], other["manifest"][:])
+
+
+def test_the_casing_sums_in_the_order_of_one_record():
+    rng = np.random.default_rng(0)
+    n, modes = 50, []
+    forces = rng.normal(size=(n + 2 * REACH, 1 + INPUTS, LANES))
+    forces[:REACH], forces[-REACH:] = forces[REACH], forces[-REACH - 1]
+    casing = np.zeros(1, casing_dtype(3, 2))
+    for lane in range(LANES):
+        modes.append(
+            CasingModes(
+                frequency=rng.uniform(100, 7000, 3),
+                damping_ratio=rng.uniform(0.01, 0.03, 3),
+                inputs=rng.normal(size=(3, INPUTS)),
+                outputs=rng.normal(size=(3, 2)),
+            )
+        )
+        set_casing(casing[0], lane, modes[lane], 1 / 51200)
+    casing["first"] = REACH
+    out = np.zeros((n, 2, LANES))
+    columns = np.arange(1, 1 + INPUTS)
+    taps = np.zeros(2 * REACH + 1)
+    taps[REACH] = 1.0  # the one tap of `housing_acceleration`
+    respond_in_lanes(forces, columns, REACH, REACH + n, taps, casing[0], out)
+    for lane in (0, 5, 15):
+        expected = housing_acceleration(forces[REACH:-REACH, columns, lane], 51200, modes[lane])
+        assert np.array_equal(out[:, :, lane].T, expected)
+
+
+def test_the_filter_reaches_as_far_as_lanes_look_ahead():
+    assert len(line_inverse()) == 2 * REACH + 1
