@@ -8,16 +8,7 @@ from wearstate.datasets.generation.generate import generate
 from wearstate.datasets.recipe.recipe import load_recipe, sample_records
 from wearstate.sim.machine.simulate import simulate, simulate_many, simulates_together
 from wearstate.sim.output.status import Status
-from wearstate.sim.pump.casing import CasingModes, housing_acceleration, line_inverse
 from wearstate.sim.pump.recording import planned
-from wearstate.sim.pump_lanes.casing_in_lanes import (
-    INPUTS,
-    LANES,
-    REACH,
-    casing_dtype,
-    respond_in_lanes,
-    set_casing,
-)
 from wearstate.sim.pump_lanes.lanes import lane_kind, run_lanes
 from wearstate.sim.pump_lanes.many import lane_job
 from wearstate.sim.scene.load import load_scene
@@ -81,10 +72,12 @@ def test_neighbours_number_and_place_change_no_byte(drawn, alone, some):
             "joint.crankpin.contact_length": "50 mm",
         },
         {"joint.wristpin.rung": "compliant", "joint.guide.rung": "compliant"},
+        {"crank.unbalance": "0.1 kg m"},
+        {"exciters.0.force": "500 N"},
     ],
 )
 def test_rungs_that_the_standard_set_does_not_draw(changes):
-    jobs = [(load_scene("bilge-pump", SHORT | changes), seed) for seed in range(6)]
+    jobs = [(load_scene("bilge-pump", {"duration": "0.5 s"} | changes), n) for n in range(6)]
     assert lane_kind(jobs[0][0]) is not None
     found = dict(simulate_many(jobs))
     assert all(same(found[n], simulate(scene, seed=seed)) for n, (scene, seed) in enumerate(jobs))
@@ -93,28 +86,27 @@ def test_rungs_that_the_standard_set_does_not_draw(changes):
 @pytest.mark.parametrize(
     "changes",
     [
-        {"pressure.rung": "heads"},
+        {"pressure.rung": "heads", "pressure.flow": "two-harmonic"},
         {"joint.crankpin.rung": "link"},
         {"joint.crankpin.rung": "ideal"},
-        {"crank.unbalance": "0.1 kg m"},
-        {"exciters.0.force": "500 N"},
         {"exciters.0.force": "500 N", "running": False},
     ],
 )
 def test_what_lanes_do_not_know_runs_alone(changes):
-    jobs = [(load_scene("bilge-pump", SHORT | {"duration": "0.5 s"} | changes), 1)] * 6
+    jobs = [(load_scene("bilge-pump", {"duration": "0.5 s"} | changes), 1)] * 6
     found = dict(simulate_many(jobs))
     assert len(found) == 6
     assert same(found[3], simulate(*jobs[0][:1], seed=1))
 
 
-def test_a_refused_and_a_failed_scene_leave_the_others_alone():
+@pytest.mark.parametrize("stiffness", ["2 MN/m", "0.2 MN/m"])
+def test_a_refused_and_a_failed_scene_leave_the_others_alone(stiffness):
     good = [(load_scene("bilge-pump", SHORT), seed) for seed in range(6)]
     refused = load_scene("bilge-pump", {"duration": "0.1 s"})  # less than a revolution
-    beyond = load_scene("bilge-pump", SHORT | {"numerics.step": "39 us"})
-    found = dict(simulate_many([*good[:3], (refused, 0), (beyond, 0), *good[3:]]))
+    soft = load_scene("bilge-pump", SHORT | {"joint.crankpin.stiffness": stiffness})
+    found = dict(simulate_many([*good[:3], (refused, 0), (soft, 0), *good[3:]]))
     assert isinstance(found[3], SceneError)
-    assert found[4].status == simulate(beyond, seed=0, raise_on_failure=False).status
+    assert found[4].status == simulate(soft, seed=0, raise_on_failure=False).status
     assert not found[4].status.ok
     assert same(found[7], simulate(good[5][0], seed=5))
 
@@ -126,10 +118,10 @@ def test_a_run_that_fails_on_its_way_is_left_behind():
     ]
     jobs = [lane_job(planned(scene)) for scene in scenes]
     kind = lane_kind(scenes[0])
-    whole = {n: run.acceleration.copy() for n, run in run_lanes(jobs, kind)}
+    whole = {n: run.forces.copy() for n, run in run_lanes(jobs, kind)}
     bad = jobs[4].start._replace(bodies=np.full((1, 12), np.nan))
     jobs[4] = replace(jobs[4], start=bad)
-    found = {n: (run.status, run.acceleration.copy()) for n, run in run_lanes(jobs, kind)}
+    found = {n: (run.status, run.forces.copy()) for n, run in run_lanes(jobs, kind)}
     assert found[4][0] == Status(1)
     assert len(found[4][1]) == 1
     others = [n for n in range(20) if n != 4]
@@ -161,35 +153,4 @@ def test_a_data_set_has_the_bytes_of_its_records_alone(tmp_path):
     ):
         for other in (two, truth):
             assert np.array_equal(lanes["signal"][:], other["signal"][:])
-            assert np.array_equal(lanes["manifest"][:], other["manifest"][:])
-
-
-def test_the_casing_sums_in_the_order_of_one_record():
-    rng = np.random.default_rng(0)
-    n, modes = 50, []
-    forces = rng.normal(size=(n + 2 * REACH, 1 + INPUTS, LANES))
-    forces[:REACH], forces[-REACH:] = forces[REACH], forces[-REACH - 1]
-    casing = np.zeros(1, casing_dtype(3, 2))
-    for lane in range(LANES):
-        modes.append(
-            CasingModes(
-                frequency=rng.uniform(100, 7000, 3),
-                damping_ratio=rng.uniform(0.01, 0.03, 3),
-                inputs=rng.normal(size=(3, INPUTS)),
-                outputs=rng.normal(size=(3, 2)),
-            )
-        )
-        set_casing(casing[0], lane, modes[lane], 1 / 51200)
-    casing["first"] = REACH
-    out = np.zeros((n, 2, LANES))
-    columns = np.arange(1, 1 + INPUTS)
-    taps = np.zeros(2 * REACH + 1)
-    taps[REACH] = 1.0  # the one tap of `housing_acceleration`
-    respond_in_lanes(forces, columns, REACH, REACH + n, taps, casing[0], out)
-    for lane in (0, 5, 15):
-        expected = housing_acceleration(forces[REACH:-REACH, columns, lane], 51200, modes[lane])
-        assert np.array_equal(out[:, :, lane].T, expected)
-
-
-def test_the_filter_reaches_as_far_as_lanes_look_ahead():
-    assert len(line_inverse()) == 2 * REACH + 1
+            assert lanes["manifest"][:].tobytes() == other["manifest"][:].tobytes()

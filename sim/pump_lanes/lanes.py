@@ -46,7 +46,6 @@ from .rates import (
     ContactLane,
     LiquidLane,
     ThrowLane,
-    derivative,
 )
 
 _ALWAYS = ("pin_x", "pin_y", "guide_y", "piston_x")
@@ -116,9 +115,8 @@ class _Lanes:
     """All lanes, what their runs are at, and what they have left behind so far."""
 
     def __init__(self, kind: tuple[bool, bool], jobs: Sequence[LaneJob]) -> None:
-        play, self._breathing = kind
+        self._play, self._breathing = kind
         self._jobs = jobs
-        self._rates = derivative(play)
         self._plan = np.zeros(1, PLAN)
         self._rows = np.zeros(5, ROW)
         self._rows["margin"] = NO_CHANGE
@@ -128,7 +126,11 @@ class _Lanes:
         self._at = np.zeros(LANES, np.int64)  # steps taken of it
         self._left = np.zeros(LANES, np.int64)
         self._alone = alone(jobs[0].tables)
-        names = (*_ALWAYS, *(_WITH_PLAY if play else ()), *(_BREATHING if self._breathing else ()))
+        names = (
+            *_ALWAYS,
+            *(_WITH_PLAY if self._play else ()),
+            *(_BREATHING if self._breathing else ()),
+        )
         self._columns = np.array([1 + FORCES.index(name) for name in names])
         self._kept = Stretch(
             turns=np.zeros((_STRETCH, 2, LANES)),
@@ -189,7 +191,8 @@ class _Lanes:
         n = int(min(_STRETCH, self._left[busy].min()))
         self._kept.done[:] = n
         self._row = march(
-            self._rates,
+            self._play,
+            self._breathing,
             n,
             self._plan[0],
             self._rows,
@@ -197,7 +200,6 @@ class _Lanes:
             self._held[0],
             self._alone,
             self._kept,
-            self._breathing,
         )
         take(self._kept, self._columns, n, self._at, self._past, self._breathing)
         done = np.where(busy, self._kept.done, 0)

@@ -25,7 +25,7 @@ from ..pump.slider_crank import (
     mean_of_stages,
     step_of_record,
 )
-from .rates import COORDINATES, FORCES_IN_LANES, LANES, machine_of_lane
+from .rates import COORDINATES, FORCES_IN_LANES, LANES, machine_of_lane, rates
 
 
 class Alone(NamedTuple):
@@ -238,21 +238,29 @@ def _lanes_breathe(rows: Any, i: int, p: Any, held: Any, a: Any, k: Any, n: int)
 
 @subroutine
 def march(
-    rates: Any, n: int, p: Any, rows: Any, i: int, held: Any, a: Any, k: Any, breathing: bool
+    play: bool,
+    breathing: bool,
+    n: int,
+    p: Any,
+    rows: Any,
+    i: int,
+    held: Any,
+    a: Any,
+    k: Any,
 ) -> int:
-    """Take n steps of all lanes from row i; the row in which they end. `rates` is a derivative."""
+    """Take n steps of all lanes, of one kind, from row i; the row in which they end."""
     fresh = False
     for step in range(n):
         if not fresh:
-            rates(p, rows[i], held, 0.0)
+            rates(p, rows[i], held, 0.0, play)
         _advance(rows, 2, i, 0.5, i, p)
-        rates(p, rows[2], held, 0.5)
+        rates(p, rows[2], held, 0.5, play)
         _advance(rows, 3, i, 0.5, 2, p)
-        rates(p, rows[3], held, 0.5)
+        rates(p, rows[3], held, 0.5, play)
         _advance(rows, 4, i, 1.0, 3, p)
-        rates(p, rows[4], held, 1.0)
+        rates(p, rows[4], held, 1.0, play)
         _finish(rows, i, p, k, step)
-        rates(p, rows[1 - i], held, 1.0)
+        rates(p, rows[1 - i], held, 1.0, play)
         _keep_peaks(rows, i, a)
         if _judge(rows[1 - i], held) > 0:
             _mend(p, rows, i, held, a, k, step)

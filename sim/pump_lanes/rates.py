@@ -4,8 +4,6 @@ What has no play in a record's wrist pin or guide is told by numbers, not by bra
 different machines lie side by side.
 """
 
-from collections.abc import Callable
-from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -276,85 +274,97 @@ def _at_corner(
     return drag, push, turn, touch.normal, touch.overlap
 
 
-@cache
-def derivative(play: bool) -> Callable[..., None]:
-    """Rates, forces and margins of all lanes, with or without play beside the crank pin's."""
+@kernel
+def rates(p: Any, row: Any, held: Any, share: float, play: bool) -> None:
+    """Rates, forces and margins of all lanes at a row's state; `share` of the step has passed.
 
-    @subroutine
-    def all_lanes(p: Any, row: Any, held: Any, share: float) -> None:
-        y, rate, force = row.y, row.rate, row.force
-        for lane in range(LANES):
-            q, m, c = _throw_of(p, lane), machine_of_lane(p, lane), _contact_of(p, 0, lane)
-            pose, angle, omega = _pose_of(y, lane), y[12, lane], y[13, lane]
-            sin_a, cos_a = sine_cosine(angle + q.phase)
-            sin_b, cos_b = sine_cosine(pose.beta)
-            pressure = _pressure(
-                angle + q.phase,
-                _liquid_of(p, lane),
-                held.pressure[0, lane],
-                held.pressure[1, lane],
-                share,
-            )
-            on_face, inv_px = -q.piston_area * pressure, 1.0 / q.piston_mass
-            d_x, d_y, v_x, v_y = crank_offset(pose, omega, q, sin_a, cos_a, sin_b, cos_b)
-            radius = q.crankpin_radius
-            spin = omega * radius + pose.beta_rate * (radius + c.clearance)
-            pin, touch = dry_pin(
-                d_x,
-                d_y,
-                v_x,
-                v_y,
-                spin,
-                radius,
-                held.touching[0, lane] != 0.0,
-                held.impact[0, lane],
-                c,
-            )
-            row.margin[0, lane], row.approach[0, lane] = touch.margin, touch.approach
-            peak, overlap = touch.normal, touch.overlap / radius
-            wrist, guide_x, guide_y, guide_moment = PinLoad(0.0, 0.0, 0.0, 0.0), 0.0, 0.0, 0.0
-            if play:
-                wrist, touch = _wrist_load(pose, q, p, row, held, sin_b, cos_b, lane)
-                ratio = touch.overlap / q.wristpin_radius
-                peak, overlap = max(peak, touch.normal), max(overlap, ratio)
-                guide_x, guide_y, guide_moment, normal, ratio = _guide_load(
-                    pose, q, p, row, held, lane
-                )
-                peak, overlap = max(peak, normal), max(overlap, ratio)
-            free = free_motion(
-                q, m, on_face, inv_px, pin, wrist, guide_x, guide_y, guide_moment, sin_b, cos_b
-            )
-            # a factor of 1 or 0 changes no bit of what it keeps, and is no branch
-            rates, wrist_x, wrist_y = held_wrist(
-                q, m, pose, free, inv_px, sin_b, cos_b, q.tight_wrist
-            )
-            wrist_x, wrist_y = wrist.x + wrist_x, wrist.y + wrist_y
-            guide_y += q.tight_guide * (wrist_y + m.gravity_y * q.piston_mass)
-            rate[0, lane], rate[1, lane], rate[2, lane] = (
-                pose.rod_x_rate,
-                pose.rod_y_rate,
-                pose.beta_rate,
-            )
-            rate[3, lane], rate[4, lane] = pose.piston_x_rate, pose.piston_y_rate
-            rate[5, lane] = pose.tilt_rate
-            rate[6, lane], rate[7, lane], rate[8, lane] = rates.rod_x, rates.rod_y, rates.beta
-            rate[9, lane], rate[10, lane], rate[11, lane] = (
-                rates.piston_x,
-                rates.piston_y,
-                rates.tilt,
-            )
-            force[0, lane], force[1, lane], force[2, lane], force[3, lane] = (
-                pin.x,
-                pin.y,
-                wrist_x,
-                wrist_y,
-            )
-            force[4, lane], force[5, lane], force[6, lane] = guide_x, guide_y, on_face
-            row.normal[lane], row.overlap[lane] = peak, overlap
-            moment = pin.on_pin + q.crank_radius * (pin.x * sin_a - pin.y * cos_a)
-            load = crank_load(moment, sin_a, cos_a, m)
-            drive = motor_moment(omega, m)
-            rate[12, lane], rate[13, lane] = omega, m.inverse_inertia * (drive + load)
-            force[7, lane] = -load if m.inverse_inertia == 0.0 else drive
+    `play` beside the crank pin's: without any, half the work.
+    """
+    if play:
+        _rates_with_play(p, row, held, share)
+    else:
+        _rates_without(p, row, held, share)
 
-    return all_lanes
+
+@subroutine
+def _rates_with_play(p: Any, row: Any, held: Any, share: float) -> None:
+    _rates(p, row, held, share, True)
+
+
+@subroutine
+def _rates_without(p: Any, row: Any, held: Any, share: float) -> None:
+    _rates(p, row, held, share, False)
+
+
+@kernel
+def _rates(p: Any, row: Any, held: Any, share: float, play: bool) -> None:
+    y, rate, force = row.y, row.rate, row.force
+    for lane in range(LANES):
+        q, m, c = _throw_of(p, lane), machine_of_lane(p, lane), _contact_of(p, 0, lane)
+        pose, angle, omega = _pose_of(y, lane), y[12, lane], y[13, lane]
+        sin_a, cos_a = sine_cosine(angle + q.phase)
+        sin_b, cos_b = sine_cosine(pose.beta)
+        pressure = _pressure(
+            angle + q.phase,
+            _liquid_of(p, lane),
+            held.pressure[0, lane],
+            held.pressure[1, lane],
+            share,
+        )
+        on_face, inv_px = -q.piston_area * pressure, 1.0 / q.piston_mass
+        d_x, d_y, v_x, v_y = crank_offset(pose, omega, q, sin_a, cos_a, sin_b, cos_b)
+        radius = q.crankpin_radius
+        spin = omega * radius + pose.beta_rate * (radius + c.clearance)
+        pin, touch = dry_pin(
+            d_x,
+            d_y,
+            v_x,
+            v_y,
+            spin,
+            radius,
+            held.touching[0, lane] != 0.0,
+            held.impact[0, lane],
+            c,
+        )
+        row.margin[0, lane], row.approach[0, lane] = touch.margin, touch.approach
+        peak, overlap = touch.normal, touch.overlap / radius
+        wrist, guide_x, guide_y, guide_moment = PinLoad(0.0, 0.0, 0.0, 0.0), 0.0, 0.0, 0.0
+        if play:
+            wrist, touch = _wrist_load(pose, q, p, row, held, sin_b, cos_b, lane)
+            ratio = touch.overlap / q.wristpin_radius
+            peak, overlap = max(peak, touch.normal), max(overlap, ratio)
+            guide_x, guide_y, guide_moment, normal, ratio = _guide_load(pose, q, p, row, held, lane)
+            peak, overlap = max(peak, normal), max(overlap, ratio)
+        free = free_motion(
+            q, m, on_face, inv_px, pin, wrist, guide_x, guide_y, guide_moment, sin_b, cos_b
+        )
+        # a factor of 1 or 0 changes no bit of what it keeps, and is no branch
+        rates, wrist_x, wrist_y = held_wrist(q, m, pose, free, inv_px, sin_b, cos_b, q.tight_wrist)
+        wrist_x, wrist_y = wrist.x + wrist_x, wrist.y + wrist_y
+        guide_y += q.tight_guide * (wrist_y + m.gravity_y * q.piston_mass)
+        rate[0, lane], rate[1, lane], rate[2, lane] = (
+            pose.rod_x_rate,
+            pose.rod_y_rate,
+            pose.beta_rate,
+        )
+        rate[3, lane], rate[4, lane] = pose.piston_x_rate, pose.piston_y_rate
+        rate[5, lane] = pose.tilt_rate
+        rate[6, lane], rate[7, lane], rate[8, lane] = rates.rod_x, rates.rod_y, rates.beta
+        rate[9, lane], rate[10, lane], rate[11, lane] = (
+            rates.piston_x,
+            rates.piston_y,
+            rates.tilt,
+        )
+        force[0, lane], force[1, lane], force[2, lane], force[3, lane] = (
+            pin.x,
+            pin.y,
+            wrist_x,
+            wrist_y,
+        )
+        force[4, lane], force[5, lane], force[6, lane] = guide_x, guide_y, on_face
+        row.normal[lane], row.overlap[lane] = peak, overlap
+        moment = pin.on_pin + q.crank_radius * (pin.x * sin_a - pin.y * cos_a)
+        load = crank_load(moment, sin_a, cos_a, m)
+        drive = motor_moment(omega, m)
+        rate[12, lane], rate[13, lane] = omega, m.inverse_inertia * (drive + load)
+        force[7, lane] = -load if m.inverse_inertia == 0.0 else drive
