@@ -11,7 +11,7 @@ import pytest
 from click.testing import CliRunner
 from hypothesis import given
 from hypothesis import strategies as st
-from wearstate.datasets.file.record import Attributes, DataSet, DataSetWriter
+from wearstate.datasets.file.record import Attributes, DataSetWriter
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.pages import embed
 from wearstate.diagnose.pages.embed import MOST_BYTES
@@ -298,23 +298,3 @@ def test_what_a_report_refuses(small_set, small_model, tmp_path, monkeypatch):
     told = run(*judge, "--record", 5, "-o", page, code=2).stderr
     assert 'pip install "wearstate[interactive]"' in told
     assert not page.exists()
-
-
-def test_a_trend_tells_its_recordings(bokeh, small_set, small_model, tmp_path):
-    page, dates = tmp_path / "x.html", tmp_path / "dates.csv"
-    with DataSet(small_set) as data:
-        names = data.manifest["record_id"]
-    dates.write_text("file,hours\n" + "".join(f"{n},{100 * i}\n" for i, n in enumerate(names)))
-    judge = ("report", small_set, "--model", small_model, "--dates", dates, "-o", page)
-    run(*judge, "--interactive")
-    html = page.read_text(encoding="utf-8")
-    assert outside(html) == []
-    assert page.stat().st_size < MOST_BYTES
-    told = [
-        text
-        for each in models(item_in(html), "ColumnDataSource")
-        for text in dict(each["data"]["entries"]).get("block", [])
-    ]
-    assert told
-    assert all(re.match(r"recording: .*\ntime: [0-9.]+ h\nestimate: ", text) for text in told)
-    assert re.search(r'(?s)<div class="still">.*data:image/png', html)
