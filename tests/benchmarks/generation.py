@@ -19,7 +19,7 @@ import threading
 import time
 from collections.abc import Iterator
 from functools import partial
-from itertools import islice
+from itertools import chain, islice
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +32,9 @@ RECIPE, SHORT = "bilge-pump-narrow", "journal-bearing-small"
 
 LEAST_RATE = 50.0
 """Seconds of three-channel signal made in a second, with two processes."""
+
+LARGEST_RATE = 200.0
+"""Records a second that would need more room in the file than it is given."""
 
 LEAST_GAIN = 1.8
 """Of the second core."""
@@ -67,13 +70,15 @@ def endless(recipe: Recipe) -> Iterator[Any]:
 def rate(folder: Path, seconds: float, jobs: int) -> dict[str, float]:
     """Signal made and written in a second in steady state, and the writer's share of it."""
     recipe = load_recipe(RECIPE)
-    work = partial(generation._simulated, truth=False, error=None)
-    ahead = 4 * jobs  # until every worker has started and compiled, and the pipeline is full
-    most = ahead + int(seconds * LEAST_RATE)
+    work = partial(generation._together, error=None)
+    size = generation._TOGETHER
+    ahead = 3 * jobs * size  # until every worker has started and compiled, and the pipeline is full
+    most = ahead + int(seconds * LARGEST_RATE)
     args = {"seed": 0, "force": True, "truth": False, "choice": None}
     generation.DataSetWriter = Clocked  # type: ignore[misc]
     with generation._writer(recipe, most, folder / f"rate-{jobs}.h5", **args) as writer:
-        outcomes = in_order(work, endless(recipe), jobs=jobs)
+        batches = in_order(work, generation._batches(endless(recipe), size), jobs=jobs)
+        outcomes = chain.from_iterable(batches)
         for outcome in islice(outcomes, ahead):
             writer.write(outcome.index, outcome.signal, outcome.row, outcome.truth)
         Clocked.wall = Clocked.processor = 0.0
@@ -85,7 +90,7 @@ def rate(folder: Path, seconds: float, jobs: int) -> dict[str, float]:
             count += 1
         passed = time.perf_counter() - start
         after = [processor_time(pid) for pid in (os.getpid(), *children(os.getpid()))]
-        outcomes.close()
+        batches.close()
     writer.part.unlink()
     made = count * recipe.scene.duration
     return {

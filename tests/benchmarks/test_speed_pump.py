@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy import signal
-from wearstate.sim.machine.simulate import simulate
+from wearstate.sim.machine.simulate import simulate, simulate_many
 from wearstate.sim.output.status import Status
 from wearstate.sim.pump.casing import decimate, decimation_filter, edge_samples
 from wearstate.sim.scene.load import load_scene
@@ -41,6 +41,34 @@ def test_speed_of_a_recording(benchmark):
     # second: knocks of 50 m/s^2 for some 20 ms of each 100 give 5 to 25 m/s^2. A pump without
     # knocks has 0.5.
     assert np.all((rms > 5) & (rms < 25))
+
+
+@pytest.mark.parametrize(
+    "overrides",
+    [{}, {"joint.wristpin.rung": "compliant"}, {"pressure.rung": "chamber"}],
+    ids=["crank pin", "two pins", "valves"],
+)
+def test_speed_of_many_records(benchmark, overrides):
+    """Thirty-two clearances side by side; the opponent is `simulate`, one after the other."""
+    clearances = [f"{0.05 + 0.01 * n} mm" for n in range(32)]
+    path = "joint.crankpin.diametral_clearance"
+    scenes = [load_scene("bilge-pump", {**overrides, path: each}) for each in clearances]
+    jobs = [(scene, seed) for seed, scene in enumerate(scenes)]
+
+    def together():
+        return {number: recording.signal for number, recording in simulate_many(jobs)}
+
+    together(), simulate(scenes[0], seed=0)  # compile, or read the cache
+    begin = time.perf_counter()
+    alone = [simulate(scene, seed=seed).signal for scene, seed in jobs[:8]]
+    took = (time.perf_counter() - begin) / 8
+    found = benchmark.pedantic(together, rounds=3)
+    if benchmark.enabled:
+        each = benchmark.stats.stats.min / len(jobs)
+        print(
+            f"\n{4.8 / each:.0f} simulated seconds per second, {took / each:.1f} times of one alone"
+        )
+    assert all(np.array_equal(found[n], signal) for n, signal in enumerate(alone))
 
 
 @pytest.mark.parametrize(
