@@ -18,7 +18,7 @@ import numpy as np
 from ... import __version__
 from ...datasets.recipe.recipe import Recipe, Sample, condition_of, load_recipe, sample_records
 from ...datasets.recipe.text import recipe_names
-from ...sim.machine.simulate import simulate
+from ...sim.machine.simulate import simulate_many
 from ...sim.output.recording import DataError, Recording
 from ...sim.scene.parts import Scene, SceneError, channels_of
 from ..nameplate.cautions import known_beside
@@ -156,15 +156,21 @@ class _Machines:
     @cached_property
     def recordings(self) -> dict[int, Recording]:
         """As trained, by machine; those whose simulation fails are missing."""
-        found = {s.group: self.recorded(s.scene, s.seed) for s in self.samples}
-        return {group: each for group, each in found.items() if isinstance(each, Recording)}
+        found = self.recorded([(s.scene, s.seed) for s in self.samples])
+        return {
+            sample.group: each
+            for sample, each in zip(self.samples, found, strict=True)
+            if isinstance(each, Recording)
+        }
 
-    def recorded(self, scene: Scene, seed: int) -> Recording | str:
-        """Recording of a scene, or why there is none."""
-        try:
-            solution = simulate(scene, seed=seed, raise_on_failure=False)
-        except SceneError as error:
-            return "; ".join(error.faults)
+    def recorded(self, jobs: Sequence[tuple[Scene, int]]) -> list[Recording | str]:
+        """Recordings of scenes with their seeds, or why there is none."""
+        found = dict(simulate_many(jobs))
+        return [self._told(jobs[n][0], found[n]) for n in range(len(jobs))]
+
+    def _told(self, scene: Scene, solution: Recording | SceneError) -> Recording | str:
+        if isinstance(solution, SceneError):
+            return "; ".join(solution.faults)
         if not solution.status.ok:
             return solution.status.text
         noted = {name: condition_of(scene, name) for name in self.model.noted}
@@ -197,13 +203,15 @@ def _baseline(machines: _Machines) -> Iterator[_Outcome]:
 
 
 def _of_scene(machines: _Machines, row: SceneRow) -> Iterator[_Outcome]:
+    jobs, refused = [], {}
     for sample in machines.samples:
         try:
-            scene = row.applied(machines.recipe, sample)
+            jobs.append((row.applied(machines.recipe, sample), sample.seed))
         except SceneError as error:
-            yield sample, "; ".join(error.faults)
-            continue
-        yield sample, machines.recorded(scene, sample.seed)
+            refused[sample.index] = "; ".join(error.faults)
+    found = iter(machines.recorded(jobs))
+    for sample in machines.samples:
+        yield sample, refused[sample.index] if sample.index in refused else next(found)
 
 
 def _of_signal(machines: _Machines, row: SignalRow) -> Iterator[_Outcome]:

@@ -1,16 +1,19 @@
 """Simulated members of a twin's ensemble under the conditions of the recordings."""
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...datasets.workers.local import in_order
-from ...sim.machine.simulate import simulate
+from ...sim.machine.simulate import simulate_many
+from ...sim.output.recording import Recording
 from ...sim.output.status import Status
-from ...sim.scene.parts import SceneError
+from ...sim.scene.parts import Scene, SceneError
 from .levels import levels_of
 from .unknowns import TwinUnknowns
 
@@ -21,6 +24,8 @@ REVOLUTIONS = 4.3
 the scatter of the noise alone, as the mechanism repeats itself."""
 SETTLING = 1
 """Revolutions before: the contact forgets its start within one."""
+
+_TOGETHER = 48  # members that a worker simulates side by side
 
 
 @dataclass(frozen=True)
@@ -71,8 +76,9 @@ def simulated(
     """
     members = [Member(row, seed + i) for i, row in enumerate(scores)]
     work = partial(_levels, unknowns, runs)
-    found = []
-    for number, levels in enumerate(in_order(work, members, jobs=jobs), 1):
+    batches = [members[first : first + _TOGETHER] for first in range(0, len(members), _TOGETHER)]
+    found: list[Float | None] = []
+    for number, levels in enumerate(chain.from_iterable(in_order(work, batches, jobs=jobs)), 1):
         found.append(levels)
         if progress is not None:
             progress(number, len(members))
@@ -81,17 +87,25 @@ def simulated(
 
 
 def _levels(
-    unknowns: TwinUnknowns, runs: Sequence[Mapping[str, float]], member: Member
-) -> Float | None:
-    rows = []
-    for run in runs:
-        short = {"duration": REVOLUTIONS / run["drive.speed"], "settling_revolutions": SETTLING}
-        try:
-            scene = unknowns.scene(member.scores, {**run, **short})
-            recording = simulate(scene, seed=member.seed, raise_on_failure=False)
-        except SceneError:  # a step that a stiff contact does not allow
-            return None
-        if recording.status is not Status.OK:
-            return None
-        rows.append(levels_of(recording))
-    return np.array(rows)
+    unknowns: TwinUnknowns, runs: Sequence[Mapping[str, float]], members: Sequence[Member]
+) -> list[Float | None]:
+    """Levels of each member [shape=(n_runs, n_levels)], None where it does not run."""
+    jobs: list[tuple[Scene, int]] = []
+    owners: list[tuple[int, int]] = []
+    levels: list[list[Float | None]] = [[None] * len(runs) for _ in members]
+    for i, member in enumerate(members):
+        for j, run in enumerate(runs):
+            short = {"duration": REVOLUTIONS / run["drive.speed"], "settling_revolutions": SETTLING}
+            with suppress(SceneError):  # numbers that no scene takes
+                jobs.append((unknowns.scene(member.scores, {**run, **short}), member.seed))
+                owners.append((i, j))
+    for number, found in simulate_many(jobs):
+        i, j = owners[number]
+        if isinstance(found, Recording) and found.status is Status.OK:
+            levels[i][j] = levels_of(found)
+    return [_whole(rows) for rows in levels]
+
+
+def _whole(rows: Sequence[Float | None]) -> Float | None:
+    found = [row for row in rows if row is not None]
+    return np.array(found) if len(found) == len(rows) else None
