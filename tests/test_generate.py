@@ -353,14 +353,15 @@ def test_failures_keep_their_row(tmp_path):
 
 def test_scenes_the_simulation_refuses_keep_their_row(short, tmp_path, monkeypatch):
     middle = load_scene("bilge-pump").joint.crankpin.friction
-    simulate = generation.simulate
+    simulate_many = generation.simulate_many
 
-    def particular(scene, **options):
-        if scene.joint.crankpin.friction > middle:
-            raise SceneError(scene.name, ["joint.crankpin.friction is beyond the model"])
-        return simulate(scene, **options)
+    def particular(jobs):
+        for number, found in simulate_many(jobs):
+            scene = jobs[number][0]
+            fault = SceneError(scene.name, ["joint.crankpin.friction is beyond the model"])
+            yield number, fault if scene.joint.crankpin.friction > middle else found
 
-    monkeypatch.setattr(generation, "simulate", particular)
+    monkeypatch.setattr(generation, "simulate_many", particular)
     samples = list(sample_records(short, 12, seed=1))
     expected = [sample.scene.joint.crankpin.friction > middle for sample in samples]
     summary = generate(short, 12, tmp_path / "data.h5", seed=1)

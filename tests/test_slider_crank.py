@@ -389,7 +389,7 @@ def run_worn(scene, t, *, step, n_steps, angle=0.3):
 
 def scratch(state, contact):
     """Scratch of the kernels with a state in its row 0."""
-    w = sc._Work(
+    w = sc.Work(
         crank=np.zeros((5, 5)),
         stage=np.zeros((5, 1), sc.STAGE),
         held=np.zeros(1, sc.HELD),
@@ -407,7 +407,7 @@ def scratch(state, contact):
 def rate_of(state, contact, t):
     """Rates of a state in the coordinates of `states_of`."""
     w = scratch(state, contact)
-    sc._derivative(w, 0, 0.0, t)
+    sc.derivative_of_record(w, 0, 0.0, t)
     rate = w.stage["rate"][0, 0]
     return np.array([*w.crank[0, 2:4], *rate[[3, 9, 2, 8]]])
 
@@ -680,7 +680,7 @@ def test_recorded_impulse_is_the_change_of_momentum():
 
 
 def test_a_centred_pin_has_a_finite_normal():
-    assert sc._polar(0.0, 0.0, 3.0, 4.0) == (0.0, 3.0, 1.0, 0.0)
+    assert sc.polar(0.0, 0.0, 3.0, 4.0) == (0.0, 3.0, 1.0, 0.0)
     t = free_crank()
     state = (0.0, 31.4, FREE.crank.radius + FREE.rod.length, 0.1, 0.0, 2.0)
     for contact in (False, True):
