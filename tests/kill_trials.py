@@ -66,11 +66,11 @@ CLUSTER = ("writer of a cluster", "dask worker", "dask scheduler")
 # -- the command, in a process of its own --------------------------------------------------------
 
 
-def noted(log: str, function: Callable[[Any], Any], item: Any) -> Any:
+def noted(log: str, function: Callable[[Any], Any], batch: Any) -> Any:
     """Simulate, and leave a line for each record begun; runs in a worker."""
     with open(log, "a", encoding="ascii") as file:
-        file.write(f"{item.index}\n")
-    return function(item)
+        file.writelines(f"{sample.index}\n" for sample in batch)
+    return function(batch)
 
 
 def command(log: str, claim: bool, arguments: list[str]) -> None:

@@ -49,6 +49,7 @@ SPOKEN_BY = {
     "film_clearance/wear_down": {"report"},
     "response/impact": {"features", "info"},
     "pages/kept": {"blindspots", "chart"},
+    "pages/points": {"chart", "report", "sweep"},
     "feature_rows/quality": {"report"},
     "report/verdict": {"report"},
     "templates/report_batch.html": {"report"},

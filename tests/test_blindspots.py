@@ -271,7 +271,7 @@ def test_a_run_is_gone_on_with(found, tmp_path, monkeypatch):
     assert again == found
     assert steps == [(1, 4), (2, 4), (3, 4), (4, 4)]
 
-    monkeypatch.setattr(blindspots, "simulate", None)
+    monkeypatch.setattr(blindspots, "simulate_many", None)
     assert find_blind_spots(MODEL, PUMP, **ways, kept=kept_rows(path, "key")) == found
 
 

@@ -44,6 +44,7 @@ _TRIED = 2  # factors of units
 _NEARER = (
     0.5  # of the excess: one of 11 dB is no factor of 20 dB, though 9 dB the other way is less
 )
+_FREE = 0.75  # of the limit: familiar recordings are within half of it in what hangs on no rate
 _QUIET = 1 / 30  # of the least level ever trained: wear and speed do not make a channel so quiet
 _OFF_DB = 10.0  # half-way to 9.81 [dB]
 _SPEED_MARGIN = 0.05  # of the trained speeds
@@ -439,7 +440,7 @@ def suspicions(
     found: tuple[QualityFault, ...] = ()
     if not look.level:
         found = _wrong_unit(recording, look, see)
-    if not found and not near:
+    if not found and not near and paced:  # no cable changes the speed
         found = _swapped(recording, see)
     if not found and not (near and paced) and speeds is not None:
         found = _wrong_rate(recording, look, see, speeds)
@@ -518,7 +519,7 @@ def _wrong_rate(
             continue
         mended = see(_resampled(recording, ratio))
         # true samples that are slower than stated hold no high bands to compare
-        lacking = ratio < 1 and mended.free_distance < mended.limit
+        lacking = ratio < 1 and mended.free_distance < _FREE * mended.limit and mended.level
         if mended.familiar or lacking:
             stated = recording.sample_rate
             text = (
