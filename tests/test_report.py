@@ -19,6 +19,7 @@ from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.command_line.commands_wear import report_exit
 from wearstate.diagnose.feature_rows.healthy import Baseline, Baselines
 from wearstate.diagnose.feature_rows.quality import QualityFault
+from wearstate.diagnose.pages.embed import MOST_BYTES
 from wearstate.diagnose.report.batch import judge_all, recordings_in, times_of
 from wearstate.diagnose.report.figures import moved_panel, report_pictures
 from wearstate.diagnose.report.page import batch_html, report_html
@@ -616,6 +617,25 @@ def test_with_times_only_the_latest_counts(model, tmp_path):
     assert timed.trends[""].starts == (0, 3)
     assert "6 recordings, the latest 1: 1 as new" in shown(page)
     assert "3 usable recordings since the last maintenance" in shown(page)
+
+
+def test_a_trend_to_zoom_in_names_its_recordings(model_file, tmp_path):
+    pytest.importorskip("bokeh")
+    data = written(tmp_path / "life.h5", np.linspace(1e-4, 2e-4, 6))
+    judge = ("report", data, "--model", model_file, "--interactive")
+    page, dates = tmp_path / "r.html", tmp_path / "dates.csv"
+    dates.write_text("file,hours\n" + "".join(f"life.h5[{i}],{100 * i}\n" for i in range(6)))
+    run(*judge, "--dates", dates, "-o", page)
+    html = page.read_text(encoding="utf-8")
+    assert len(html.encode()) < MOST_BYTES
+    item = re.search(r'(?s)id="zoom-item">(.*?)</script>', html)[1]
+    blocks = item[item.index('["block"') :]
+    told = re.findall(r'"recording: life\.h5\[(\d)\]\\ntime: (\d+) h\\nestimate: ', blocks)
+    assert sorted(told) == [(str(i), str(100 * i)) for i in range(6)]
+    assert re.search(r'(?s)<div class="still">.*data:image/png', html)
+    dates.write_text("file,hours\n1,100\n2,200\n")  # by record_id: no name of a recording
+    refused = run(*judge, "--dates", dates, "-o", tmp_path / "no.html", code=2).stderr
+    assert "'life.h5[0]'" in refused
 
 
 def test_a_short_life_hastens_the_advice(model, tmp_path):

@@ -331,7 +331,8 @@ def times_of(items: Sequence[Item], dates: str) -> tuple[float | None, ...]:
     if all(time is None for time in found):
         raise DataError(
             f"dates = {dates!r} gives a time to 0 of {len(items)} recordings, must give >= 1; use "
-            f"names, mtime, a CSV file with columns file,date, or a column such as {HOURS}"
+            f"names, mtime, a CSV file with columns file,date that names recordings as "
+            f"{items[0].name!r}, or a column such as {HOURS}"
         )
     return tuple(found)
 

@@ -36,7 +36,7 @@ def trend_points(batch: Batch, machine: str, heading: str) -> PointAxes:
     lines: tuple[DrawnLine, ...] = ()
     if ahead:
         y = tuple((1e3 * trend.line).tolist())
-        lines = (DrawnLine(name="line", x=ahead, y=y, colour="#1f5a94"),)
+        lines = (DrawnLine(name="trend", x=ahead, y=y, colour="#1f5a94"),)
     return PointAxes(
         title=heading,
         x_name="operating hours [h]" if trend.clock == "operating" else "date (UTC)",
