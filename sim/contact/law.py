@@ -182,11 +182,17 @@ def ramp_sign(speed: float, dead_speed: float, full_speed: float) -> float:
     ----------
     Ambrosio (2003), Virtual Nonlinear Multibody Systems, NATO Science Series 103, 57-81.
     """
+    part, whole = _ramp_parts(speed, dead_speed, full_speed)
+    return part / whole
+
+
+@kernel
+def _ramp_parts(speed: float, dead_speed: float, full_speed: float) -> Any:
+    """Numerator and denominator of :func:`ramp_sign`."""
     size, reach = abs(speed), full_speed - dead_speed
-    beyond = max(size - dead_speed, 0.0)
-    share = beyond / (reach if reach > 0.0 else 1.0) if size < full_speed else 1.0
-    share = share if size > dead_speed else 0.0
-    return share if speed > 0.0 else -share
+    rises = dead_speed < size < full_speed
+    part = size - dead_speed if rises else (1.0 if size > dead_speed else 0.0)
+    return (part if speed > 0.0 else -part), (reach if rises else 1.0)
 
 
 @kernel
@@ -199,9 +205,11 @@ def friction_force(sliding_speed: float, normal_force: float, contact: Any) -> f
     acts in the opposite sense, it never adds energy. At rest there is no friction: a constant
     load creeps.
     """
-    smooth = smooth_sign(sliding_speed, contact.friction_speed)
-    ramp = ramp_sign(sliding_speed, contact.friction_dead_speed, contact.friction_speed)
-    sign = smooth if contact.friction_law == FRICTION_SMOOTH else ramp
+    full, smooth = contact.friction_speed, contact.friction_law == FRICTION_SMOOTH
+    part, whole = _ramp_parts(sliding_speed, contact.friction_dead_speed, full)
+    rounded = math.sqrt(sliding_speed * sliding_speed + full * full)
+    # one division for either law: it takes longer than all else here
+    sign = (sliding_speed if smooth else part) / (rounded if smooth else whole)
     coulomb = contact.friction * max(0.0, normal_force) * sign
     force: float = coulomb + contact.tangential_damping * sliding_speed
     return force

@@ -296,7 +296,7 @@ def two_level_pressure(angle: float, suction: float, discharge: float, h: Any) -
        chapters on valves and on volumetric efficiency.
     """
     turn = 2.0 * math.pi
-    phase = angle - turn * math.floor(angle / turn)
+    phase = angle - turn * math.floor(angle * (1.0 / turn))  # off by rounding at a dead centre
     falls = phase < math.pi
     before, after = (discharge, suction) if falls else (suction, discharge)
     since = phase - h.fall_delay if falls else phase - math.pi - h.rise_delay

@@ -691,9 +691,9 @@ def _advance(w: Any, row: int, i: int, share: float, slope: int) -> None:
 
 
 @kernel
-def mean_of_stages(first: float, second: float, third: float, last: float) -> float:
-    """Six times the weighted mean of the four stages of a step."""
-    return first + 2.0 * (second + third) + last
+def mean_of_stages(first: float, middle: float, last: float) -> float:
+    """Six times the weighted mean of the four stages of a step, `middle` the sum of two."""
+    return first + 2.0 * middle + last
 
 
 @kernel
@@ -701,15 +701,15 @@ def _finish(w: Any, i: int, h: float) -> None:
     """State at the end of the step from row i, by the weighted mean of the four rates."""
     sixth, y = h / 6.0, w.crank
     for c in range(2):
-        rate = mean_of_stages(y[i, 2 + c], y[2, 2 + c], y[3, 2 + c], y[4, 2 + c])
+        rate = mean_of_stages(y[i, 2 + c], y[2, 2 + c] + y[3, 2 + c], y[4, 2 + c])
         y[1 - i, c] = y[i, c] + sixth * rate
     for k in range(w.stage.shape[1]):
         end, a, b = w.stage[1 - i, k], w.stage[i, k], w.stage[2, k]
         c_, d = w.stage[3, k], w.stage[4, k]
         for c in range(PER_THROW):
-            end.y[c] = a.y[c] + sixth * mean_of_stages(a.rate[c], b.rate[c], c_.rate[c], d.rate[c])
+            end.y[c] = a.y[c] + sixth * mean_of_stages(a.rate[c], b.rate[c] + c_.rate[c], d.rate[c])
         for c in range(len(FILM)):
-            rate = mean_of_stages(a.film_rate[c], b.film_rate[c], c_.film_rate[c], d.film_rate[c])
+            rate = mean_of_stages(a.film_rate[c], b.film_rate[c] + c_.film_rate[c], d.film_rate[c])
             end.film[c] = a.film[c] + sixth * rate
 
 
@@ -762,14 +762,14 @@ def _record_forces(w: Any, i: int, weight: float, forces: Any, step: int, tally:
     """Add the impulse of one part of the step to the step's mean forces."""
     y = w.crank
     forces[step, 0] += weight * mean_of_stages(
-        y[i, MOMENT], y[2, MOMENT], y[3, MOMENT], y[4, MOMENT]
+        y[i, MOMENT], y[2, MOMENT] + y[3, MOMENT], y[4, MOMENT]
     )
     for k in range(w.stage.shape[1]):
         a, b, c, d = w.stage[i, k], w.stage[2, k], w.stage[3, k], w.stage[4, k]
         f = 1 + len(FORCES) * k
         for n in range(_VALVES):
             forces[step, f + n] += weight * mean_of_stages(
-                a.force[n], b.force[n], c.force[n], d.force[n]
+                a.force[n], b.force[n] + c.force[n], d.force[n]
             )
         tally.peak[0] = max(tally.peak[0], max(a.normal, max(b.normal, c.normal)))
 

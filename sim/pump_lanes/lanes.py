@@ -12,6 +12,7 @@ Lanes are for one throw whose crank pin has clearance without oil, whose wrist p
 ideal or have clearance, under a pressure that follows from the crank angle, or a chamber.
 """
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -28,7 +29,6 @@ from ..pump.slider_crank import (
     FORCES,
     JOINT_COMPLIANT,
     JOINT_IDEAL,
-    NO_CHANGE,
     NOT_LOCATED,
     PER_THROW,
     WITH_VAPOUR,
@@ -38,11 +38,10 @@ from ..pump.slider_crank import (
 from ..scene.pump import PumpScene
 from .march import Stretch, alone, enter_lane, march
 from .rates import (
-    HELD_LANES,
     LANES,
     NEVER,
     PLAN,
-    ROW,
+    STATE,
     ContactLane,
     LiquidLane,
     ThrowLane,
@@ -81,7 +80,7 @@ def lane_kind(scene: PumpScene) -> tuple[bool, bool] | None:
     return JOINT_COMPLIANT in (wristpin, guide), rung == "chamber"
 
 
-_STRETCH = 1024  # steps: what they leave fits a processor's cache
+_STRETCH = 512  # steps: what they leave fits a processor's cache
 
 
 def run_lanes(jobs: Sequence[LaneJob], kind: tuple[bool, bool]) -> Iterator[tuple[int, CrankRun]]:
@@ -105,23 +104,30 @@ def run_lanes(jobs: Sequence[LaneJob], kind: tuple[bool, bool]) -> Iterator[tupl
     if not jobs:
         return
     longest = sorted(range(len(jobs)), key=lambda n: -jobs[n].n_steps)  # the last lanes end alike
-    ahead, lanes = iter(longest), _Lanes(kind, jobs)
-    while lanes.fill(ahead):
-        lanes.go_on()
-        yield from lanes.ended()
+    room = _spare_room.pop() if _spare_room else np.empty(0)
+    ahead, lanes = iter(longest), _Lanes(kind, jobs, room)
+    try:
+        while lanes.fill(ahead):
+            lanes.go_on()
+            yield from lanes.ended()
+    finally:
+        _spare_room[:] = [lanes.room]
+
+
+_spare_room: list[NDArray[np.float64]] = []
+"""Of the last run of lanes: memory that is new costs as much time as what is written into it."""
 
 
 class _Lanes:
     """All lanes, what their runs are at, and what they have left behind so far."""
 
-    def __init__(self, kind: tuple[bool, bool], jobs: Sequence[LaneJob]) -> None:
+    def __init__(
+        self, kind: tuple[bool, bool], jobs: Sequence[LaneJob], room: NDArray[np.float64]
+    ) -> None:
         self._play, self._breathing = kind
         self._jobs = jobs
         self._plan = np.zeros(1, PLAN)
-        self._rows = np.zeros(5, ROW)
-        self._rows["margin"] = NO_CHANGE
-        self._held = np.zeros(1, HELD_LANES)
-        self._row = 0
+        self._state = np.zeros(1, STATE)
         self._number = np.full(LANES, -1)  # of the job in each lane
         self._at = np.zeros(LANES, np.int64)  # steps taken of it
         self._left = np.zeros(LANES, np.int64)
@@ -131,20 +137,16 @@ class _Lanes:
             *(_WITH_PLAY if self._play else ()),
             *(_BREATHING if self._breathing else ()),
         )
-        self._columns = np.array([1 + FORCES.index(name) for name in names])
+        self._columns = np.array([FORCES.index(name) for name in names])
         self._kept = Stretch(
             turns=np.zeros((_STRETCH, 2, LANES)),
-            forces=np.zeros((_STRETCH, 1 + len(FORCES), LANES)),
+            forces=np.zeros((_STRETCH, len(FORCES), LANES)),
             chambers=np.zeros((_STRETCH, LANES, 8)),
             code=np.ones(LANES, np.int64),
             done=np.zeros(LANES, np.int64),
         )
         most = max(job.n_steps for job in jobs)
-        self._past = _Past(
-            turns=np.empty((LANES, most + 1, 2)),
-            forces=np.empty((LANES, len(names), most)),
-            chambers=np.empty((LANES, most + 1 if self._breathing else 1, 1, 8)),
-        )
+        self.room, self._past = _past(most, len(names), self._breathing, room)
 
     def fill(self, ahead: Iterator[int]) -> bool:
         """Put the next jobs into free lanes; False where all is done."""
@@ -158,28 +160,27 @@ class _Lanes:
     def _enter(self, lane: int, number: int) -> None:
         job = self._jobs[number]
         t, a, start = job.tables, self._alone, job.start
-        row, plan, held = self._rows[self._row], self._plan[0], self._held[0]
+        state, plan = self._state[0], self._plan[0]
         a.throws[lane], a.contacts[lane], a.liquid[lane] = t.throws, t.contacts, t.liquid
         a.chambers[lane, 0] = 0.0
         a.chambers[lane, 0, :6] = start.chambers[0]
         q = t.throws[0]
         tight = (q["wristpin_rung"] == JOINT_IDEAL, q["guide_rung"] == JOINT_IDEAL)
-        plan["throw"][:-2, lane] = _numbers(q, ThrowLane._fields[:-2])
-        plan["throw"][-2:, lane] = tight
+        plan["throw"][:-3, lane] = _numbers(q, ThrowLane._fields[:-3])
+        plan["throw"][-3:, lane] = 1.0 / q["piston_mass"], *tight
         for joint in range(3):
             plan["contact"][joint, :, lane] = _numbers(t.contacts[0, joint], ContactLane._fields)
         for joint in map(int, np.flatnonzero(tight) + 1):
             plan["contact"][joint, :, lane] = NEVER
         plan["machine"][:, lane] = t.machine
         plan["liquid"][:, lane] = _numbers(t.liquid[0], LiquidLane._fields)
-        plan["step"][lane] = job.step
-        for name in ("touching", "impact", "pressure"):
-            held[name][:, lane] = 0.0
-        for name in ("rate", "force", "approach"):
-            row[name][:, lane] = 0.0
-        row["y"][:PER_THROW, lane] = start.bodies[0]
-        row["y"][PER_THROW:, lane] = start.angle, start.speed
-        enter_lane(lane, plan, self._rows, self._row, held, a)
+        plan["step"][lane], plan["sixth"][lane] = job.step, job.step / 6.0
+        plan["weight"][lane] = job.step / (6.0 * job.step)
+        for name in state.dtype.names:
+            state[name][..., lane] = 0.0
+        state["y0"][:PER_THROW, lane] = start.bodies[0]
+        state["y0"][PER_THROW:, lane] = start.angle, start.speed
+        enter_lane(lane, plan, state, a)
         self._past.turns[lane, 0] = start.angle, start.speed
         self._past.chambers[lane, 0] = a.chambers[lane]
         self._kept.code[lane] = 0
@@ -190,14 +191,12 @@ class _Lanes:
         busy = self._number >= 0
         n = int(min(_STRETCH, self._left[busy].min()))
         self._kept.done[:] = n
-        self._row = march(
+        march(
             self._play,
             self._breathing,
             n,
             self._plan[0],
-            self._rows,
-            self._row,
-            self._held[0],
+            self._state[0],
             self._alone,
             self._kept,
         )
@@ -220,7 +219,7 @@ class _Lanes:
         return CrankRun(
             turns=past.turns[lane, : n + 1],
             forces=past.forces[lane, :, :n].T,
-            columns=tuple(map(int, self._columns)),
+            columns=tuple(int(column) + 1 for column in self._columns),
             bodies=None,
             chambers=past.chambers[lane, : n + 1, :, :6] if self._breathing else None,
             step=float(self._plan["step"][0, lane]),
@@ -239,6 +238,22 @@ class _Past(NamedTuple):
     turns: NDArray[np.float64]  # (LANES, n + 1, 2)
     forces: NDArray[np.float64]  # (LANES, n_kept, n)
     chambers: NDArray[np.float64]  # (LANES, n + 1, 1, 8); one row where nothing breathes
+
+
+def _past(
+    most: int, n_kept: int, breathing: bool, room: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], _Past]:
+    """Room for `most` steps of all lanes, the old one where it is large enough, and its parts."""
+    shapes = (
+        (LANES, most + 1, 2),
+        (LANES, n_kept, most),
+        (LANES, most + 1 if breathing else 1, 1, 8),
+    )
+    ends = np.cumsum([math.prod(shape) for shape in shapes])
+    if room.size < ends[-1]:
+        room = np.empty(ends[-1])
+    parts = np.split(room[: ends[-1]], ends[:-1])
+    return room, _Past(*(part.reshape(shape) for part, shape in zip(parts, shapes, strict=True)))
 
 
 @subroutine

@@ -57,6 +57,7 @@ class ThrowLane(NamedTuple):
     wristpin_radius: float
     guide_half_length: float
     guide_half_height: float
+    inverse_piston_along: float  # [1/kg]
     tight_wrist: float  # 1 where an ideal wrist pin holds rod and piston together, else 0
     tight_guide: float  # 1 where an ideal guide holds the piston up, else 0
 
@@ -103,33 +104,39 @@ PLAN = np.dtype(
         ("machine", "f8", (len(Machine._fields), LANES)),
         ("liquid", "f8", (len(LiquidLane._fields), LANES)),
         ("step", "f8", LANES),
+        ("sixth", "f8", LANES),  # of the step
+        ("weight", "f8", LANES),  # of a step's force in its mean, as the march of one weighs it
     ]
 )
 """Numbers of all lanes, codes as numbers too; columns as the fields of the tuples above."""
 
-ROW = np.dtype(
+STATE = np.dtype(
     [
-        ("y", "f8", (COORDINATES, LANES)),
+        ("y0", "f8", (COORDINATES, LANES)),  # where the step began
+        ("rate0", "f8", (COORDINATES, LANES)),
+        ("force0", "f8", (FORCES_IN_LANES, LANES)),
+        ("margin0", "f8", (CONTACTS, LANES)),
+        ("approach0", "f8", (CONTACTS, LANES)),
+        ("normal0", "f8", LANES),
+        ("y", "f8", (COORDINATES, LANES)),  # the stage that was looked at last
         ("rate", "f8", (COORDINATES, LANES)),
         ("force", "f8", (FORCES_IN_LANES, LANES)),
         ("margin", "f8", (CONTACTS, LANES)),
         ("approach", "f8", (CONTACTS, LANES)),
         ("normal", "f8", LANES),
-        ("overlap", "f8", LANES),
-    ]
-)
-"""All lanes at one stage of a step."""
-
-HELD_LANES = np.dtype(
-    [
-        ("touching", "f8", (CONTACTS, LANES)),
+        ("overlap", "f8", (3, LANES)),  # of crank pin, wrist pin and guide [m]
+        ("middle_rate", "f8", (COORDINATES, LANES)),  # of the stages in the middle, added
+        ("middle_force", "f8", (FORCES_IN_LANES, LANES)),
+        ("high", "f8", LANES),  # largest normal force of the step
+        ("touching", "f8", (CONTACTS, LANES)),  # 0 or 1
         ("impact", "f8", (CONTACTS, LANES)),
         ("pressure", "f8", (2, LANES)),
         ("asks", "f8", LANES),  # 1 where a contact asks for a change within this step
         ("bad", "f8", LANES),  # status code of this step
     ]
 )
-"""What the lanes remember from step to step."""
+"""All lanes in the middle of their step. One record: the compiler lays a loop into vectors where it
+sees that what it writes is not what it reads."""
 
 
 @kernel
@@ -153,6 +160,7 @@ def _throw_of(p: Any, lane: int) -> Any:
         a[14, lane],
         a[15, lane],
         a[16, lane],
+        a[17, lane],
     )
 
 
@@ -229,29 +237,27 @@ def _pressure(angle: float, h: Any, before: float, after: float, share: float) -
 
 
 @kernel
-def _wrist_load(
-    pose: Any, q: Any, p: Any, row: Any, held: Any, sin_b: float, cos_b: float, lane: int
-) -> Any:
+def _wrist_load(pose: Any, q: Any, p: Any, s: Any, sin_b: float, cos_b: float, lane: int) -> Any:
     """Load of the wrist pin, and the state of its contact; a tight one never touches."""
     c, radius = _contact_of(p, 1, lane), q.wristpin_radius
     d_x, d_y, v_x, v_y = wrist_offset(pose, q, sin_b, cos_b)
     spin = pose.tilt_rate * radius + pose.beta_rate * (radius + c.clearance)
     load, touch = dry_pin(
-        d_x, d_y, v_x, v_y, spin, radius, held.touching[1, lane] != 0.0, held.impact[1, lane], c
+        d_x, d_y, v_x, v_y, spin, radius, s.touching[1, lane] != 0.0, s.impact[1, lane], c
     )
-    row.margin[1, lane], row.approach[1, lane] = touch.margin, touch.approach
+    s.margin[1, lane], s.approach[1, lane] = touch.margin, touch.approach
     return load, touch
 
 
 @kernel
-def _guide_load(pose: Any, q: Any, p: Any, row: Any, held: Any, lane: int) -> Any:
-    """Force of the guide (x, y, turning), what presses, and the overlap over its half height."""
+def _guide_load(pose: Any, q: Any, p: Any, s: Any, lane: int) -> Any:
+    """Force of the guide (x, y, turning), what presses, and the overlap."""
     c = _contact_of(p, 2, lane)
     # written out: the compiler lays no loop within its loop of lanes into vectors
-    one = _at_corner(pose, q, c, row, held, GUIDE, -1.0, 1.0, lane)
-    two = _at_corner(pose, q, c, row, held, GUIDE + 1, 1.0, 1.0, lane)
-    three = _at_corner(pose, q, c, row, held, GUIDE + 2, -1.0, -1.0, lane)
-    four = _at_corner(pose, q, c, row, held, GUIDE + 3, 1.0, -1.0, lane)
+    one = _at_corner(pose, q, c, s, GUIDE, -1.0, 1.0, lane)
+    two = _at_corner(pose, q, c, s, GUIDE + 1, 1.0, 1.0, lane)
+    three = _at_corner(pose, q, c, s, GUIDE + 2, -1.0, -1.0, lane)
+    four = _at_corner(pose, q, c, s, GUIDE + 3, 1.0, -1.0, lane)
     normal = max(max(max(0.0, one[3]), two[3]), max(three[3], four[3]))
     deepest = max(max(max(0.0, one[4]), two[4]), max(three[4], four[4]))
     return (
@@ -259,46 +265,56 @@ def _guide_load(pose: Any, q: Any, p: Any, row: Any, held: Any, lane: int) -> An
         one[1] + two[1] + three[1] + four[1],
         one[2] + two[2] + three[2] + four[2],
         normal,
-        deepest / q.guide_half_height,
+        deepest,
     )
 
 
 @kernel
 def _at_corner(
-    pose: Any, q: Any, c: Any, row: Any, held: Any, j: int, along: float, side: float, lane: int
+    pose: Any, q: Any, c: Any, s: Any, j: int, along: float, side: float, lane: int
 ) -> Any:
     drag, push, turn, touch = guide_corner(
-        pose, q, along, side, held.touching[j, lane] != 0.0, held.impact[j, lane], c
+        pose, q, along, side, s.touching[j, lane] != 0.0, s.impact[j, lane], c
     )
-    row.margin[j, lane], row.approach[j, lane] = touch.margin, touch.approach
+    s.margin[j, lane], s.approach[j, lane] = touch.margin, touch.approach
     return drag, push, turn, touch.normal, touch.overlap
 
 
 @kernel
-def rates(p: Any, row: Any, held: Any, share: float, play: bool) -> None:
-    """Rates, forces and margins of all lanes at a row's state; `share` of the step has passed.
+def overlap_of_lane(p: Any, s: Any, lane: int) -> float:
+    """Largest overlap of a lane, over the radius of its pin or half the height of its guide."""
+    q, o = _throw_of(p, lane), s.overlap
+    return max(
+        max(o[0, lane] / q.crankpin_radius, o[1, lane] / q.wristpin_radius),
+        o[2, lane] / q.guide_half_height,
+    )
+
+
+@kernel
+def rates(p: Any, s: Any, share: float, play: bool) -> None:
+    """Rates, forces and margins of all lanes at their state; `share` of the step has passed.
 
     `play` beside the crank pin's: without any, half the work.
     """
     if play:
-        _rates_with_play(p, row, held, share)
+        _rates_with_play(p, s, share)
     else:
-        _rates_without(p, row, held, share)
+        _rates_without(p, s, share)
 
 
 @subroutine
-def _rates_with_play(p: Any, row: Any, held: Any, share: float) -> None:
-    _rates(p, row, held, share, True)
+def _rates_with_play(p: Any, s: Any, share: float) -> None:
+    _rates(p, s, share, True)
 
 
 @subroutine
-def _rates_without(p: Any, row: Any, held: Any, share: float) -> None:
-    _rates(p, row, held, share, False)
+def _rates_without(p: Any, s: Any, share: float) -> None:
+    _rates(p, s, share, False)
 
 
 @kernel
-def _rates(p: Any, row: Any, held: Any, share: float, play: bool) -> None:
-    y, rate, force = row.y, row.rate, row.force
+def _rates(p: Any, s: Any, share: float, play: bool) -> None:
+    y, rate, force = s.y, s.rate, s.force
     for lane in range(LANES):
         q, m, c = _throw_of(p, lane), machine_of_lane(p, lane), _contact_of(p, 0, lane)
         pose, angle, omega = _pose_of(y, lane), y[12, lane], y[13, lane]
@@ -307,11 +323,11 @@ def _rates(p: Any, row: Any, held: Any, share: float, play: bool) -> None:
         pressure = _pressure(
             angle + q.phase,
             _liquid_of(p, lane),
-            held.pressure[0, lane],
-            held.pressure[1, lane],
+            s.pressure[0, lane],
+            s.pressure[1, lane],
             share,
         )
-        on_face, inv_px = -q.piston_area * pressure, 1.0 / q.piston_mass
+        on_face, inv_px = -q.piston_area * pressure, q.inverse_piston_along
         d_x, d_y, v_x, v_y = crank_offset(pose, omega, q, sin_a, cos_a, sin_b, cos_b)
         radius = q.crankpin_radius
         spin = omega * radius + pose.beta_rate * (radius + c.clearance)
@@ -322,19 +338,18 @@ def _rates(p: Any, row: Any, held: Any, share: float, play: bool) -> None:
             v_y,
             spin,
             radius,
-            held.touching[0, lane] != 0.0,
-            held.impact[0, lane],
+            s.touching[0, lane] != 0.0,
+            s.impact[0, lane],
             c,
         )
-        row.margin[0, lane], row.approach[0, lane] = touch.margin, touch.approach
-        peak, overlap = touch.normal, touch.overlap / radius
+        s.margin[0, lane], s.approach[0, lane] = touch.margin, touch.approach
+        s.overlap[0, lane], peak = touch.overlap, touch.normal
         wrist, guide_x, guide_y, guide_moment = PinLoad(0.0, 0.0, 0.0, 0.0), 0.0, 0.0, 0.0
         if play:
-            wrist, touch = _wrist_load(pose, q, p, row, held, sin_b, cos_b, lane)
-            ratio = touch.overlap / q.wristpin_radius
-            peak, overlap = max(peak, touch.normal), max(overlap, ratio)
-            guide_x, guide_y, guide_moment, normal, ratio = _guide_load(pose, q, p, row, held, lane)
-            peak, overlap = max(peak, normal), max(overlap, ratio)
+            wrist, touch = _wrist_load(pose, q, p, s, sin_b, cos_b, lane)
+            s.overlap[1, lane], peak = touch.overlap, max(peak, touch.normal)
+            guide_x, guide_y, guide_moment, normal, overlap = _guide_load(pose, q, p, s, lane)
+            s.overlap[2, lane], peak = overlap, max(peak, normal)
         free = free_motion(
             q, m, on_face, inv_px, pin, wrist, guide_x, guide_y, guide_moment, sin_b, cos_b
         )
@@ -362,7 +377,7 @@ def _rates(p: Any, row: Any, held: Any, share: float, play: bool) -> None:
             wrist_y,
         )
         force[4, lane], force[5, lane], force[6, lane] = guide_x, guide_y, on_face
-        row.normal[lane], row.overlap[lane] = peak, overlap
+        s.normal[lane] = peak
         moment = pin.on_pin + q.crank_radius * (pin.x * sin_a - pin.y * cos_a)
         load = crank_load(moment, sin_a, cos_a, m)
         drive = motor_moment(omega, m)
