@@ -21,6 +21,8 @@ from scipy.integrate import odeint, solve_ivp
 from wearstate.sim.contact.law import RELEASE_AT_ZERO_FORCE, RELEASE_AT_ZERO_PENETRATION
 from wearstate.sim.pump import setup as crank_setup
 from wearstate.sim.pump.slider_crank import CRANKPIN, run_mechanism
+from wearstate.sim.pump_lanes.lanes import LaneJob, lane_kind, run_lanes
+from wearstate.sim.pump_lanes.rates import LANES
 from wearstate.sim.scene.load import load_scene
 
 SAMPLES_PER_REVOLUTION = 256  # three a contact period; every fixed step divides it
@@ -35,6 +37,8 @@ RELEASES = {
 EXUDYN_CONTACT = {"hollow sphere": "zero penetration", "symbolic force": "zero force"}
 TIMING_REVOLUTIONS = 4.0
 EXUDYN_PATIENCE = 60.0  # s for one setting; those that reach 1e-4 need 10 s
+
+MANY = ", many at once"
 
 # --- adapter: all that knows how the mechanism is called
 
@@ -70,24 +74,45 @@ def start_state(angle):
     return (angle, speed, *(float(bodies[column]) for column in STATE_COLUMNS))
 
 
-def prepared_run(start, release, step, n_steps, *, keep_states):
-    """The run as a function without arguments; tables and start are made beforehand."""
+def tables_and_bodies(start, release, step):
+    """What the mechanism is told of its numbers, and where its bodies begin."""
     tables = crank_setup.tables(SCENE, step)
     tables.contacts[0, CRANKPIN]["release"] = RELEASES[release]
-    alpha, omega, x, u, beta, b = start
+    _, _, x, u, beta, b = start
     centre, sine, cosine = SCENE.rod.centre_of_mass, np.sin(beta), np.cos(beta)
     rod = [x - centre * cosine, centre * sine]
     rod_velocity = [u + centre * sine * b, centre * cosine * b]
+    return tables, np.array([[*rod, beta, x, 0.0, 0.0, *rod_velocity, b, u, 0.0, 0.0]])
+
+
+def prepared_run(start, release, step, n_steps, *, keep_states):
+    """The run as a function without arguments; tables and start are made beforehand."""
+    tables, bodies = tables_and_bodies(start, release, step)
     return partial(
         run_mechanism,
         tables,
-        angle=alpha,
-        speed=omega,
-        bodies=np.array([[*rod, beta, x, 0.0, 0.0, *rod_velocity, b, u, 0.0, 0.0]]),
+        angle=start[0],
+        speed=start[1],
+        bodies=bodies,
         step=step,
         n_steps=n_steps,
         keep_states=keep_states,
     )
+
+
+def prepared_lanes(starts, release, step, n_steps):
+    """Runs side by side as a function without arguments; they have the states of each alone."""
+    jobs = []
+    for start in starts:
+        tables, bodies = tables_and_bodies(start, release, step)
+        begin = crank_setup.Start(start[0], start[1], bodies, np.zeros((1, 6)))
+        jobs.append(LaneJob(tables=tables, start=begin, step=step, n_steps=n_steps))
+
+    def run():
+        for _, found in run_lanes(jobs, lane_kind(SCENE)):
+            assert found.status.ok
+
+    return run
 
 
 def run_ours(start, release, step, n_steps):
@@ -304,16 +329,23 @@ SCALES = np.array([1.0, 100.0, 1e-3, 1.0, 1e-2, 10.0])
 # --- the methods
 
 
-def ours(release, references, repeats):
-    """Fixed steps, from the coarsest that is admitted."""
-    curve = Curve(f"wearstate, {release}")
+def ours(release, references, repeats, many=False):
+    """Fixed steps, from the coarsest that is admitted; `many`: 16 records at once, time of one."""
+    curve = Curve(f"wearstate, {release}{MANY if many else ''}")
     for part in (6, 8, 11, 16, 23, 32, 45, 64, 91, 128):
         step = REVOLUTION / SAMPLES_PER_REVOLUTION / part
         count = (len(sample_times()) - 1) * part
         states = [run_ours(start_state(a), release, step, count)[::part] for a in START_ANGLES]
         steps = round(TIMING_REVOLUTIONS * SAMPLES_PER_REVOLUTION) * part
-        timed = prepared_run(start_state(0.1), release, step, steps, keep_states=False)
-        seconds = processor_time(timed, repeats)
+        if many:
+            starts = [start_state(a) for a in np.tile(START_ANGLES, LANES // len(START_ANGLES))]
+            timed, runs = prepared_lanes(starts, release, step, steps), LANES
+        else:
+            timed, runs = (
+                prepared_run(start_state(0.1), release, step, steps, keep_states=False),
+                1,
+            )
+        seconds = processor_time(timed, repeats) / runs
         curve.points.append(
             {
                 "steps": part * SAMPLES_PER_REVOLUTION,
@@ -339,6 +371,68 @@ def solver_call(name, right_hand_side):
         ).y.T
 
     return by_odeint if name == "odeint" else by_solve_ivp
+
+
+def stacked(name, right_hand_side):
+    """As :func:`solver_call`, of all start angles as one system: Python's share is paid once."""
+    size, n = 6, len(START_ANGLES)
+
+    @njit
+    def all_rates(t, y):
+        rates = np.empty(n * size)
+        for k in range(0, n * size, size):
+            rates[k : k + size] = right_hand_side(t, y[k : k + size])
+        return rates
+
+    def by_odeint(starts, times, rtol, atol):
+        return odeint(
+            all_rates,
+            starts.ravel(),
+            times,
+            tfirst=True,
+            rtol=rtol,
+            atol=np.tile(atol, n),
+            ml=size - 1,  # the Jacobian is a band: no crank knows of the others
+            mu=size - 1,
+            mxstep=10**8,
+        )
+
+    def by_solve_ivp(starts, times, rtol, atol):
+        banded = {"lband": size - 1, "uband": size - 1} if name == "LSODA" else {}
+        return solve_ivp(
+            all_rates,
+            (times[0], times[-1]),
+            starts.ravel(),
+            method=name,
+            t_eval=times,
+            rtol=rtol,
+            atol=np.tile(atol, n),
+            **banded,
+        ).y.T
+
+    return by_odeint if name == "odeint" else by_solve_ivp
+
+
+def scipy_at_once(name, release, references, repeats):
+    """A scipy method on all start angles as one system, over its tolerance; time of one."""
+    curve = Curve({"odeint": "LSODA (odeint)"}.get(name, f"{name} (solve_ivp)") + MANY)
+    call = stacked(name, compiled_mechanism(release)[2])
+    starts = np.array([start_state(a) for a in START_ANGLES])
+    times, n = sample_times(), len(START_ANGLES)
+    ends = np.array([0.0, REVOLUTION])
+    for tolerance in 10.0 ** np.arange(-4.0, -10.5, -1.0):
+        settings = (tolerance, tolerance * SCALES)
+        found = call(starts, times, *settings)
+        states = [found[:, 6 * k : 6 * k + 6] for k in range(n)]
+        seconds = processor_time(lambda settings=settings: call(starts, ends, *settings), repeats)
+        curve.points.append(
+            {
+                "tolerance": tolerance,
+                "seconds": seconds / REVOLUTION / n,
+                "errors": errors(states, references[release]),
+            }
+        )
+    return curve
 
 
 def scipy_solver(name, release, references, repeats):
@@ -517,8 +611,13 @@ def measure(python, repeats):
     for release, found in apart.items():
         print(f"references apart, {release}: {found}", file=sys.stderr)
     curves = [ours(release, references, repeats) for release in RELEASES]
+    curves += [ours("zero force", references, repeats, many=True)]
     curves += [
         scipy_solver(name, "zero force", references, repeats)
+        for name in ("odeint", "LSODA", "DOP853")
+    ]
+    curves += [
+        scipy_at_once(name, "zero force", references, repeats)
         for name in ("odeint", "LSODA", "DOP853")
     ]
     return curves + exudyn_curves(python, references, repeats), apart
@@ -536,12 +635,18 @@ def main():
     of_exudyn = [c for c in curves if c.name.startswith("Exudyn")]
     jointed = joined("Exudyn, bodies and joints", [c for c in of_exudyn if "joints" in c.name])
     exudyn = joined("Exudyn, tuned", [c for c in of_exudyn if "joints" not in c.name])
-    dop = joined("DOP853", [c for c in curves if c.name.startswith("DOP853")])
-    found = ratios(base, [*lsoda, dop, exudyn, jointed])
+    dop = joined(
+        "DOP853", [c for c in curves if c.name.startswith("DOP853") and MANY not in c.name]
+    )
+    alone = [*(c for c in lsoda if MANY not in c.name), dop, exudyn, jointed]
+    [lanes] = [c for c in curves if c.name.startswith("wearstate") and MANY in c.name]
+    many = [c for c in curves if MANY in c.name and c is not lanes]
+    found = ratios(base, alone)
+    found |= {f"{LANES} records at once: {k}": r for k, r in ratios(lanes, alone + many).items()}
     for key, ratio in found.items():
         print(f"{key}: {'not reached' if ratio is None else f'{ratio:.0f} x'}", file=sys.stderr)
     if options.plot:
-        draw([base, *lsoda, dop, exudyn, jointed], options.plot)
+        draw([base, lanes, *alone], options.plot)
     curves = [{"name": curve.name, "points": curve.points} for curve in curves]
     json.dump({"references_apart": apart, "ratios": found, "curves": curves}, sys.stdout)
 
