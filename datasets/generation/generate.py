@@ -437,7 +437,8 @@ def _limits(scene: Scene, severity: str) -> dict[str, Any]:
 def _batch_size(scene: Scene, todo: int, jobs: int) -> int:
     """Records that a worker simulates side by side: no bytes depend on it, only time and memory."""
     each = math.ceil(todo / jobs)
-    return min(_TOGETHER, each) if simulates_together(scene) and each >= _FEWEST else 1
+    rounds = math.ceil(each / _TOGETHER)  # as many batches for every worker, of one size
+    return math.ceil(each / rounds) if simulates_together(scene) and each >= _FEWEST else 1
 
 
 def _batches(samples: Iterable[Sample], size: int) -> Iterator[tuple[Sample, ...]]:
