@@ -183,7 +183,8 @@ def ramp_sign(speed: float, dead_speed: float, full_speed: float) -> float:
     Ambrosio (2003), Virtual Nonlinear Multibody Systems, NATO Science Series 103, 57-81.
     """
     part, whole = _ramp_parts(speed, dead_speed, full_speed)
-    return part / whole
+    sign: float = part / whole
+    return sign
 
 
 @kernel

@@ -284,10 +284,9 @@ def _at_corner(
 def overlap_of_lane(p: Any, s: Any, lane: int) -> float:
     """Largest overlap of a lane, over the radius of its pin or half the height of its guide."""
     q, o = _throw_of(p, lane), s.overlap
-    return max(
-        max(o[0, lane] / q.crankpin_radius, o[1, lane] / q.wristpin_radius),
-        o[2, lane] / q.guide_half_height,
-    )
+    pins = max(o[0, lane] / q.crankpin_radius, o[1, lane] / q.wristpin_radius)
+    largest: float = max(pins, o[2, lane] / q.guide_half_height)
+    return largest
 
 
 @kernel
