@@ -97,7 +97,7 @@ def test_the_nominal_numbers_are_those_of_the_scene():
         (pump.FRICTION, pin.friction),
         (pump.FRICTION_SPEED, pin.friction_speed),
         (pump.DRAG, pin.tangential_damping),
-        (pump.SYNCHRONOUS, motor.synchronous_speed),
+        (pump.SYNCHRONOUS, scene.drive.synchronous_speed),
         (pump.BREAKDOWN_MOMENT, motor.breakdown_moment),
         (pump.BREAKDOWN_SLIP, motor.breakdown_slip),
         (pump.INERTIA, motor.inertia),

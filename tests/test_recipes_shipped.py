@@ -15,7 +15,8 @@ from wearstate.datasets.recipe.recipe import (
     sample_records,
 )
 from wearstate.datasets.recipe.text import RecipeError, recipe_names
-from wearstate.sim.machine.simulate import simulate
+from wearstate.features.rotation.order import pulse_times
+from wearstate.sim.machine.simulate import simulate, simulate_many
 from wearstate.sim.scene.load import load_scene
 from wearstate.sim.scene.parts import channels_of
 
@@ -45,6 +46,34 @@ def drawn(recipe, n=N, seed=0):
     return {path: np.array(numbers) for path, numbers in columns.items()}
 
 
+MAINS = {"drive.motor.synchronous_speed": "306 rpm"}
+"""A motor that drive.speed does not govern, two per cent above it."""
+
+
+@pytest.mark.parametrize("motor", [{}, MAINS], ids=["rated slip", "mains"])
+def test_a_motor_turns_as_fast_as_its_label_says(motor):
+    """By the tacho, over whole revolutions: what the load of each leaves of its slip."""
+    brief = {"duration": "1.5 s", "settling_revolutions": 2, **motor}
+    recipe = load_recipe("bilge-pump-standard", brief)
+    driven = [s for s in sample_records(recipe, 60) if s.scene.drive.rung == "motor"][:8]
+    jobs = [(sample.scene, sample.seed) for sample in driven]
+    told = np.array([sample.row["speed_hz"] for sample in driven])
+    pulses = {
+        number: pulse_times(found.tacho_signal, found.sample_rate)
+        for number, found in simulate_many(jobs)
+    }
+    turned = np.array([1 / np.diff(pulses[number]).mean() for number in range(len(jobs))])
+    assert np.ptp(told) > 0.5
+    assert_allclose(turned, told, rtol=0.015 if motor else 0.01)
+
+
+def test_a_motor_far_from_its_label_is_refused_with_the_cure():
+    far = {"drive.motor.synchronous_speed": "360 rpm"}
+    with pytest.raises(RecipeError, match=r"drive\.speed = 5 must be >= 5\.7 and <= .* = 6 where"):
+        load_recipe("bilge-pump-standard", far)
+    assert load_recipe("bilge-pump-standard", {**far, "drive.speed": "355 rpm"})
+
+
 @pytest.fixture(scope="module", params=MACHINES)
 def standard(request):
     recipe = load_recipe(f"{request.param}-standard")
@@ -68,6 +97,8 @@ def test_the_first_records_of_every_recipe_simulate(name):
     for sample in sample_records(recipe, 2, seed=1):
         solution = simulate(sample.scene, seed=sample.seed)
         assert solution.status.ok
+        # a part of a revolution on a small flywheel: its ripple is up to some 2 %
+        assert_allclose(solution.numerics["mean_speed_hz"], sample.row["speed_hz"], rtol=0.02)
         assert np.ptp(solution.signal[0]) > 0
 
 

@@ -49,6 +49,29 @@ def faults_of(overrides):
     return caught.value.faults
 
 
+# --- alternatives
+
+
+def test_a_motor_has_one_of_its_two_speeds():
+    table = pump_table()
+    table["drive"]["motor"]["synchronous_speed"] = "306 rpm"
+    both = "rated_slip and synchronous_speed given, must be exactly one of rated_slip and sync"
+    with pytest.raises(SceneError, match=f"drive.motor: {both}"):
+        scene_from_table(table)
+    del table["drive"]["motor"]["rated_slip"]
+    assert_allclose(scene_from_table(table).drive.synchronous_speed, 5.1)
+    del table["drive"]["motor"]["synchronous_speed"]
+    with pytest.raises(SceneError, match="neither given, must be exactly one of rated_slip and"):
+        scene_from_table(table)
+
+
+def test_a_speed_of_a_motor_replaces_the_other():
+    mains = load_scene("bilge-pump", {"drive.motor.synchronous_speed": "306 rpm", "drive.speed": 4})
+    assert_allclose(mains.drive.synchronous_speed, 5.1)
+    governed = load_scene("bilge-pump", {"drive.motor.rated_slip": 0.2, "drive.speed": 4})
+    assert_allclose(governed.drive.synchronous_speed, 5.0)
+
+
 # --- units
 
 

@@ -9,6 +9,7 @@ from scipy.special import ndtri
 from wearstate.datasets.recipe.recipe import load_recipe, sample_records
 from wearstate.datasets.recipe.text import RecipeError, toml_text
 from wearstate.datasets.recipe.twin import Twin, TwinTable, coordinate_names, machine_values
+from wearstate.diagnose.twin.calibration import conditions_of
 from wearstate.diagnose.twin.inversion import Gaussian, corrected, rounds_of, widened
 from wearstate.diagnose.twin.levels import LevelLayout, layout_of, levels_of, speed_of
 from wearstate.diagnose.twin.misfit import misfit, refusal
@@ -211,6 +212,13 @@ def test_a_scan_finds_the_frequency_of_a_mode():
     # a scatter of 1 dB over the ten points of the resonance leaves some 0.1 %
     assert found[-1] == pytest.approx(790.0, rel=0.003)
     assert np.median(np.abs(found[:-1] / frequencies - 1)) < 0.002
+
+
+def test_a_motor_on_the_mains_is_calibrated_at_the_measured_speed(recording):
+    mains = {"drive.rung": "motor", "drive.motor.synchronous_speed": "306 rpm"}
+    at = conditions_of(load_recipe(RECIPE, mains), recording)
+    assert at["drive.motor.synchronous_speed"] == pytest.approx(5.1 * at["drive.speed"] / 5.0)
+    assert "drive.motor.synchronous_speed" not in conditions_of(load_recipe(RECIPE), recording)
 
 
 # --- misfit

@@ -36,6 +36,7 @@ from .correlation import Copula, Correlation, copula_of
 from .draws import Axis, Bound, Draw, Range, axes_of, has_value, matches, value_at
 from .held_out import HeldOut, Region, regions_of
 from .life import LIFE_COLUMNS, LifeTable, Lives, Moment, life_faults
+from .motor import motor_faults, motors_to_take, taken_along
 from .options import Alternatives, OptionSet, alternatives_of
 from .sampling import BLOCK, SET, CubeAxis, Points, Sampling, number_of
 from .text import RecipeError, beside, merged, read_recipe
@@ -343,6 +344,11 @@ class Recipe:
         """The calibrated machine among those drawn."""
         return None if self.table.twin is None else Twin(self.table.twin)
 
+    @cached_property
+    def takes_motors_along(self) -> bool:
+        """Whether a drawn speed takes motors on the mains along."""
+        return bool(motors_to_take(self.base, (*self.machine, *self.record), self.choices))
+
     @property
     def faults(self) -> tuple[RecipeFault, ...]:
         """All confounders."""
@@ -485,6 +491,8 @@ def _resolved(
     held_out = _held_out(in_metres, axes, base, faults) if len(axes) == len(places) else ()
     faults += _life_faults(table, axes, base)
     faults += _twin_faults(table, _of(axes, "machine"), choices)
+    drawn = [axis for found in axes.values() for axis in found]
+    faults += motor_faults(motors_to_take(base, drawn, choices))
     if faults:
         raise RecipeError(table.name, _told_once(faults))
     return Recipe(
@@ -1054,7 +1062,8 @@ def _sample(recipe: Recipe, sources: Mapping[str, _Source], index: int, seed: in
         drawn[recipe.severity.path] = life.severity
     faults = _confounded(recipe, group, index, seed)
     drawn |= {path: value for values in faults.values() for path, value in values.items()}
-    scene = scene_from_table(override(recipe.base, drawn))
+    along = taken_along(recipe.base, drawn) if recipe.takes_motors_along else {}
+    scene = scene_from_table(override(recipe.base, {**drawn, **along}))
     noise_seed = recipe.noise_seed(seed, index)
     row = {
         "record_id": f"{index:08d}",

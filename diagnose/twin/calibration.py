@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ...datasets.file.record import DataSet, refuse_output
 from ...datasets.measured.recording import read_recording
+from ...datasets.recipe.motor import motor_speed
 from ...datasets.recipe.recipe import Recipe, load_recipe
 from ...datasets.recipe.text import recipe_names, toml_text, twin_path
 from ...sim.atomic import write_whole
@@ -282,7 +283,7 @@ def calibrate(
     plan = _prior(recipe, scene, heard[0])
     unknowns = unknowns_of(plan, _as_new(plan), unknown)
     _refuse_channels(plan, heard)
-    runs = [_conditions(plan, each) for each in heard]
+    runs = [conditions_of(plan, each) for each in heard]
     layout = layout_of(heard[0])
     observed = np.array([levels_of(each) for each in heard])
     found = inverted(
@@ -373,18 +374,15 @@ def _refuse_channels(plan: Recipe, heard: Sequence[Recording]) -> None:
         raise DataError("\n".join(faults))
 
 
-def _conditions(plan: Recipe, heard: Recording) -> dict[str, float]:
+def conditions_of(plan: Recipe, heard: Recording) -> dict[str, float]:
     """Conditions of a recording by dotted path: its tacho's speed, and what its row tells."""
     told = {
         path: float(heard.row[column])
         for column, path in plan.conditions.items()
         if column in heard.row and np.isfinite(heard.row[column]) and "start_angle" not in column
     }
-    speed, drive = speed_of(heard), getattr(plan.scene, "drive", None)
-    if drive is not None and drive.motor is not None:  # a motor turns as fast as it was turned
-        ratio = drive.motor.synchronous_speed / drive.speed
-        told["drive.motor.synchronous_speed"] = ratio * speed
-    return {**told, "drive.speed": speed}
+    speed = speed_of(heard)
+    return {**told, **motor_speed(plan.scene, speed), "drive.speed": speed}
 
 
 def _refuse_misfit(plan: Recipe, names: Sequence[str], found: Misfit) -> None:

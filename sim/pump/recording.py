@@ -742,7 +742,8 @@ def _motor_warnings(scene: PumpScene, run: CrankRun) -> tuple[str, ...]:
     if scene.drive.rung != "motor" or motor is None:
         return ()
     later = run.turns[3 * len(run.turns) // 4 :, 1]  # the mean of a part, as the speed swings
-    last, least = later.mean() / math.tau, motor.synchronous_speed * (1 - motor.breakdown_slip)
+    last = later.mean() / math.tau
+    least = scene.drive.synchronous_speed * (1 - motor.breakdown_slip)
     if last >= least:
         return ()
     return (

@@ -670,7 +670,7 @@ def tables(scene: PumpScene, step: float) -> Tables:
             inverse_inertia=1 / motor.inertia if motor else 0.0,
             static_moment=scene.crank.unbalance,
             drive_moment=0.0,
-            synchronous_speed=2 * math.pi * motor.synchronous_speed if motor else 0.0,
+            synchronous_speed=2 * math.pi * scene.drive.synchronous_speed if motor else 0.0,
             breakdown_moment=motor.breakdown_moment if motor else 0.0,
             breakdown_slip=motor.breakdown_slip if motor else 0.0,
             baumgarte=min(

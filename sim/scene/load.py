@@ -285,7 +285,8 @@ def load_scene(name_or_path: str | Path, overrides: Mapping[str, Any] | None = N
         A name of :func:`scene_names`, or a file.
     overrides : mapping, optional
         Dotted path -> number or string with unit, e.g. ``{"drive.speed": "250 rpm"}``. Setting
-        one of the two clearances of a joint removes the other.
+        one of the two clearances of a joint, or one of the two speeds of a motor, removes the
+        other.
 
     Returns
     -------

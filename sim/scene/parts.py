@@ -877,15 +877,17 @@ def _valid_parts(model: type[BaseModel], table: Mapping[str, Any]) -> dict[str, 
     return parts
 
 
-_CLEARANCE_TWINS = {
+_TWINS = {
     "diametral_clearance": "radial_clearance",
     "radial_clearance": "diametral_clearance",
+    "rated_slip": "synchronous_speed",
+    "synchronous_speed": "rated_slip",
 }
 
 
 def without_twin(table: dict[str, Any], key: str) -> None:
-    """Remove the other clearance of a joint that is about to be given one."""
-    table.pop(_CLEARANCE_TWINS.get(key, ""), None)
+    """Remove the other clearance of a joint, or speed of a motor, about to be given one."""
+    table.pop(_TWINS.get(key, ""), None)
 
 
 def merged(base: Any, over: Any) -> Any:

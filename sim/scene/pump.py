@@ -65,10 +65,22 @@ _MOST_THROWS = 32
 class Motor(Part):
     """An asynchronous motor with everything that turns with it, all referred to the crank.
 
-    Moment ``2 M_b / (s / s_b + s_b / s)`` at the slip s, after Kloss.
+    Moment ``2 M_b / (s / s_b + s_b / s)`` at the slip s, after Kloss. Give exactly one of
+    `rated_slip` and `synchronous_speed`: a motor that drive.speed governs, or one on the mains.
     """
 
-    synchronous_speed: RotationSpeed = Field(gt=0, le=1000, description="of the crank, no load")
+    rated_slip: Ratio | None = Field(
+        default=None,
+        ge=0,
+        lt=0.5,
+        description="slip at drive.speed: without load it is speed / (1 - rated_slip)",
+    )
+    synchronous_speed: RotationSpeed | None = Field(
+        default=None,
+        gt=0,
+        le=1000,
+        description="of the crank, no load, whatever drive.speed, that at the start",
+    )
     breakdown_moment: Moment = Field(gt=0, le=_MOMENT_MOST, description="largest, at the crank")
     breakdown_slip: Ratio = Field(
         default=0.2, ge=1e-3, le=10, description="slip at which the moment is largest"
@@ -79,6 +91,17 @@ class Motor(Part):
         description="of crank, flywheel, gear and rotor, at the crank",
     )
 
+    @model_validator(mode="after")
+    def _one_speed(self) -> Self:
+        names = ("rated_slip", "synchronous_speed")
+        given = [name for name in names if getattr(self, name) is not None]
+        if len(given) != 1:
+            raise ValueError(
+                f"{' and '.join(given) or 'neither'} given, must be exactly one of rated_slip and "
+                "synchronous_speed; keep rated_slip where drive.speed sets the speed"
+            )
+        return self
+
 
 class Drive(Part):
     """How the crank is turned: at constant speed, or by a motor whose speed gives way."""
@@ -87,7 +110,9 @@ class Drive(Part):
         default="constant-speed", description="constant-speed, or a motor that slows under load"
     )
     speed: RotationSpeed = Field(
-        gt=0, le=1000, description="crank speed in rev/s, constant, or that at the start"
+        gt=0,
+        le=1000,
+        description="crank speed in rev/s, constant, or that of the motor at its usual load",
     )
     start_angle: Angle = Field(
         default=0.0,
@@ -102,6 +127,13 @@ class Drive(Part):
         if self.rung == "motor" and self.motor is None:
             raise ValueError("motor is missing; the rung 'motor' needs it")
         return self
+
+    @property
+    def synchronous_speed(self) -> float:
+        """Of the motor without load, at the crank [Hz]; `speed` without a motor."""
+        if self.motor is None:
+            return self.speed
+        return self.motor.synchronous_speed or self.speed / (1 - (self.motor.rated_slip or 0.0))
 
 
 class Crank(Part):
