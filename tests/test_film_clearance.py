@@ -19,7 +19,8 @@ from wearstate.diagnose.film_clearance.clearance import (
 )
 from wearstate.diagnose.nameplate.cautions import known_beside, nameplate_cautions
 from wearstate.diagnose.nameplate.nameplate import Nameplate, day_of, nameplate_of
-from wearstate.diagnose.report.film import disagree, film_estimate, film_table, with_film
+from wearstate.diagnose.report.beside import disagree
+from wearstate.diagnose.report.film import film_estimate, film_table, with_film
 from wearstate.diagnose.wear_model.estimate import Estimate
 from wearstate.sim.film.rest_curve import rest_curve
 from wearstate.sim.film.solve import FilmGeometry

@@ -15,6 +15,7 @@ from wearstate.datasets.file.record import (
     DataSet,
     DataSetWriter,
 )
+from wearstate.datasets.recipe.text import toml_text
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.command_line.commands_wear import report_exit
 from wearstate.diagnose.feature_rows.healthy import Baseline, Baselines
@@ -31,6 +32,7 @@ from wearstate.diagnose.report.verdict import (
     report_table,
     zone_words,
 )
+from wearstate.diagnose.twin.opinion import TwinOpinion
 from wearstate.diagnose.wear_model.estimate import Estimate, FaultFinding
 from wearstate.diagnose.wear_model.file import load_model, save_model
 from wearstate.diagnose.wear_model.train import train_model
@@ -206,6 +208,47 @@ def test_an_interval_beyond_the_possible_grades_is_said(model):
     assert said in shown(report_html(beyond, found, model))
     assert "also reaches 1" in " ".join(report_text(beyond).split())
     assert "Possible" not in report_text(within)
+
+
+def test_a_twin_stands_beside_the_model_and_a_disagreement_before_the_verdict(model):
+    found = recording_of(2.5e-4)
+    near = TwinOpinion(severity=2.4e-4, low=2.2e-4, high=2.7e-4, members=210, scene="mine")
+    agreed = report_table(found, model, graded(), twin=near)
+    assert (agreed["twin"]["agrees"], agreed["disagreements"]) == (True, [])
+    assert "Twin        0.240 mm (0.220 to 0.270, 90 %), by 210 sim" in report_text(agreed)
+    assert "Twin of the machine: 0.240 mm" in shown(report_html(agreed, found, model))
+
+    far = TwinOpinion(severity=1.4e-4, low=1.2e-4, high=1.7e-4, members=210, scene="mine")
+    apart = report_table(found, model, graded(), twin=far)
+    lines = report_text(apart).splitlines()
+    assert lines[1].startswith("Disagree    twin of the machine and trained model disagree: 0.140")
+    assert "Grade 2 of 3: plan renewal, with caution" in "\n".join(lines)
+    assert not any(line.startswith("Caution") for line in lines)  # once is enough
+    page = shown(report_html(apart, found, model))
+    assert page.lower().index("trained model disagree") < page.index("Grade 2 of 3")
+    assert page.count("trained model disagree") == 1
+    assert not apart["twin"]["agrees"]
+
+    silent = report_table(found, model, graded(), twin=TwinOpinion(reason="tacho must be there"))
+    assert silent["twin"]["agrees"] is None
+    assert "Twin        no estimate: tacho must be there" in report_text(silent)
+
+
+def test_a_twin_is_asked_by_the_command(model_file, tmp_path):
+    """Of a recording with other channels it says why it says nothing; of many none is asked."""
+    given = {"recipe": "bilge-pump-standard", "base": "bilge-pump", "names": ["tacho.late"]}
+    given |= {"mean": [0.0], "sd": [0.5], "correlation": [[1.0]]}
+    (tmp_path / "mine.twin.toml").write_text(toml_text(given), encoding="utf-8")
+    one = tmp_path / "one.h5"
+    written(one, [2.5e-4])
+    two = tmp_path / "two.h5"
+    written(two, [2.5e-4, 2.6e-4])
+    twin = ("--model", model_file, "--twin", tmp_path / "mine.toml")
+    assert "Twin        no estimate: " in run("report", one, *twin).output
+    many = run("report", two, *twin, code=2).output
+    assert "--twin is for one recording: name one, or choose a --record" in many
+    lost = run("report", one, "--model", model_file, "--twin", tmp_path / "no.toml", code=2).output
+    assert "make it: wearstate calibrate" in " ".join(lost.split())
 
 
 def test_chance_is_no_evidence(model):

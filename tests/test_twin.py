@@ -9,6 +9,7 @@ from scipy.special import ndtri
 from wearstate.datasets.recipe.recipe import load_recipe, sample_records
 from wearstate.datasets.recipe.text import RecipeError, toml_text
 from wearstate.datasets.recipe.twin import Twin, TwinTable, coordinate_names, machine_values
+from wearstate.diagnose.twin import opinion
 from wearstate.diagnose.twin.calibration import conditions_of
 from wearstate.diagnose.twin.inversion import Gaussian, corrected, rounds_of, widened
 from wearstate.diagnose.twin.levels import LevelLayout, layout_of, levels_of, speed_of
@@ -283,3 +284,79 @@ def test_channels_of_another_name_are_refused(recording):
     other = replace(recording, channels=(replace(first, name="a"), *rest), source="a.h5")
     with pytest.raises(DataError, match=r"a\.h5: channels a, acc_y .* must be acc_x, acc_y"):
         wearstate.calibrate("bilge-pump", [other])
+
+
+# --- second opinion
+
+
+@pytest.fixture(scope="module")
+def mine(recording, tmp_path_factory):
+    """A pump of which all is known but the frequencies of its casing and its wear."""
+    path = tmp_path_factory.mktemp("mine") / "mine.toml"
+    unknown = ["casing.modes.*.frequency"]
+    wearstate.calibrate("bilge-pump", [recording], unknown=unknown, budget_s=1.0).save(path)
+    return path
+
+
+def worn(clearance):
+    path = "joint.crankpin.diametral_clearance"
+    given = {"duration": "1 s", "drive.speed": "270 rpm", path: clearance}
+    return wearstate.simulate(wearstate.load_scene("bilge-pump", given), seed=5)
+
+
+def test_a_twin_tells_the_wear_without_a_model(mine, monkeypatch):
+    monkeypatch.setattr(opinion, "OPINION_ROUNDS", (60, 40))
+    found = opinion.second_opinion(mine, worn(2.4e-4), wear="diametral_clearance_crankpin_m")
+    assert (found.members, found.scene, found.reason) == (100, "bilge-pump", "")
+    # a third of the range that it could be in, .05 to .465 mm, and the truth in it
+    assert found.low < 2.4e-4 < found.high < found.low + 1.4e-4
+    assert 1.9e-4 < found.severity < 2.9e-4
+    again = opinion.second_opinion(mine.with_name("mine.twin.toml"), worn(2.4e-4))
+    assert again == found
+    other = opinion.second_opinion(mine, worn(2.4e-4), seed=1)
+    assert other.severity != found.severity
+
+
+def test_a_recording_that_a_twin_cannot_hear_gets_a_reason(mine, recording):
+    bare = replace(
+        recording, signal=recording.vibration, channels=recording.channels[:2], tacho=None
+    )
+    found = opinion.second_opinion(mine, bare)
+    assert found.severity is None
+    assert "tacho must be there" in found.reason
+
+
+def test_a_twin_of_another_wear_or_without_its_scene_is_refused(mine, recording, tmp_path):
+    with pytest.raises(DataError, match="wear = diametral_clearance_crankpin_m must be sag_m"):
+        opinion.second_opinion(mine, recording, wear="sag_m")
+    table = {"names": [MODE], "mean": [0.0], "sd": [0.5], "correlation": [[1.0]]}
+    (tmp_path / "old.twin.toml").write_text(toml_text(table), encoding="utf-8")
+    with pytest.raises(DataError, match="recipe and base must be there"):
+        opinion.second_opinion(tmp_path / "old.toml", recording)
+
+
+def test_a_twin_and_its_scene_can_be_moved_together(recording, tmp_path):
+    here, there = tmp_path / "here", tmp_path / "there"
+    here.mkdir()
+    own = wearstate.sim.scene.load.scene_text("bilge-pump")
+    (here / "pump.toml").write_text(own, encoding="utf-8")
+    made = wearstate.calibrate(
+        here / "pump.toml", [recording], unknown=["casing.modes.*.frequency"], budget_s=1.0
+    )
+    made.save(here / "mine.toml")
+    here.rename(there)
+    table, folder = opinion.read_twin(there / "mine.toml")
+    assert (table.base, table.recipe) == ("pump.toml", RECIPE)
+    assert opinion.plan_of(table, folder, recording.sample_rate).scene.name == "bilge-pump"
+
+
+def test_what_a_calibration_left_is_the_prior_of_an_opinion(mine, recording):
+    table, folder = opinion.read_twin(mine)
+    plan = opinion.plan_of(table, folder, recording.sample_rate)
+    known = unknowns_of(plan, plan.severity.extremes(), table.unknown)
+    prior = opinion.prior_of(table, known)
+    assert set(known.kept) == {f"casing.modes.{i}.frequency" for i in range(8)}
+    for name, mean, sd in zip(table.names, table.mean, table.sd, strict=True):
+        place = known.names.index(name)
+        assert (prior.mean[place], prior.sd[place]) == pytest.approx((mean, sd))
+    assert (prior.mean[-1], prior.sd[-1]) == (0.0, 1.0)  # the wear

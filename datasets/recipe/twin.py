@@ -33,6 +33,11 @@ class TwinTable(Part):
         default=0.5, gt=0, le=0.9, description="machines that are the twin, beside those drawn"
     )
     scene: str = Field(default="", description="that was calibrated, for reports")
+    recipe: str = Field(default="", description="that draws such machines; beside this file")
+    base: str = Field(default="", description="scene before calibration, built in or beside it")
+    unknown: tuple[str, ...] = Field(
+        default=(), description="what was to be estimated; all that the recipe draws where empty"
+    )
     names: tuple[str, ...] = Field(min_length=1, description="coordinates, as the recipe has them")
     mean: tuple[Ratio, ...] = Field(description="of each, in normal scores: 0 is the middle")
     sd: tuple[Ratio, ...] = Field(description="of each, in normal scores: 1 is as the recipe draws")
@@ -76,10 +81,15 @@ class Twin:
 
     table: TwinTable
 
+    @property
+    def covariance(self) -> Float:
+        """Of the normal scores [shape=(n, n)]."""
+        sd = np.array(self.table.sd)
+        return np.asarray(self.table.matrix * np.outer(sd, sd))
+
     @cached_property
     def _factor(self) -> Float:
-        sd = np.array(self.table.sd)
-        values, vectors = np.linalg.eigh(self.table.matrix * np.outer(sd, sd))
+        values, vectors = np.linalg.eigh(self.covariance)
         factor: Float = vectors * np.sqrt(np.maximum(values, 0.0))
         return factor
 

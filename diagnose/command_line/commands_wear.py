@@ -475,6 +475,12 @@ def _judge_across(
     metavar="PATH=VALUE",
     help="Replace a value of the nameplate, as load.static='4 kN +- 5 %'.",
 )
+@click.option(
+    "--twin",
+    type=PATH,
+    metavar="SCENE",
+    help="Calibrated scene of this machine (wearstate calibrate): estimates the wear as well.",
+)
 @click.option("--trend", is_flag=True, help="Of many recordings: severity over time, life left.")
 @click.option(
     "--dates",
@@ -536,6 +542,7 @@ def report(
             "--set": pairs,
             "--fail-on": fail_on,
             "--join": given["joined"],
+            "--twin": given["twin"],
             "--trend": given["trend"],
             "--dates": given["dates"],
         }
@@ -552,6 +559,8 @@ def report(
     many = _holds_many(source)
     if not many and (given["trend"] or given["dates"]):
         raise click.UsageError("--trend and --dates are for a folder or a data set of many records")
+    if many and given["twin"]:
+        raise click.UsageError("--twin is for one recording: name one, or choose a --record")
     if given["interactive"]:
         _check_interactive(output, many and not (given["trend"] or given["dates"]))
     if views and source.is_dir():
@@ -655,12 +664,14 @@ def _report_one(told: _ReportTask) -> list[_Verdict]:
         tacho=told.given["tacho"],
         pulses_per_revolution=told.given["pulses_per_revolution"],
     )
+    heard = with_views(recording, told.source, told.given["record"], told.views)
     found = judged(
-        with_views(recording, told.source, told.given["record"], told.views),
+        heard,
         told.model,
         baselines=told.baselines,
         plate=told.plate,
         machine=told.machine,
+        twin=_opinion(told, heard),
         files={"recording": told.source, "model": told.model_file},
     )
     table, text = found.table, found.text
@@ -670,6 +681,17 @@ def _report_one(told: _ReportTask) -> list[_Verdict]:
         text += f"\nPage        {told.output}"
     click.echo(json_text(table) if told.as_json else text)
     return [(table["estimate"]["verdict"], found.estimate.grade)]
+
+
+def _opinion(told: _ReportTask, heard: Any) -> Any:
+    """What the twin says of a recording, if one was named."""
+    from ..twin.opinion import second_opinion
+
+    if not told.given["twin"]:
+        return None
+    wear, seed = told.model.card["severity"], told.given["seed"]
+    with progress_bar("simulating") as progress:
+        return second_opinion(told.given["twin"], heard, wear=wear, seed=seed, progress=progress)
 
 
 def _report_many(told: _ReportTask) -> list[_Verdict]:

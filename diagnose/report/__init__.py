@@ -3,5 +3,5 @@
 It may import ``sim.output``, ``sim.scene``, ``sim.film``, ``sim.journal``, ``features.signal``,
 ``datasets.file``, ``datasets.readers``, ``datasets.measured``, ``diagnose.pages``,
 ``diagnose.pictures``, ``diagnose.learning``, ``diagnose.feature_rows``, ``diagnose.wear_model``,
-``diagnose.film_clearance``, ``diagnose.nameplate``.
+``diagnose.film_clearance``, ``diagnose.nameplate``, ``diagnose.twin``.
 """

@@ -1,8 +1,6 @@
 """The film equilibrium beside a trained model: its estimate of a recording, and whether they agree.
 
 What the equilibrium needs is no training but the machine's nameplate and the conditions of the day.
-Where both estimates are there and contradict each other, that is the first thing to be said: one of
-them is told something wrong, or the machine is not what either takes it for.
 """
 
 import re
@@ -22,6 +20,7 @@ from ..film_clearance.clearance import FilmEstimate, JournalRun, film_clearance
 from ..film_clearance.wear_down import SinkingRun, film_wear_down, sinking_places
 from ..nameplate.nameplate import Nameplate, told_conditions
 from ..wear_model.estimate import Estimate
+from .beside import length_words, with_second
 
 Float = NDArray[np.float64]
 
@@ -264,23 +263,11 @@ def with_film(estimate: Estimate, film: FilmEstimate | None) -> Estimate:
     >>> with_film(trained, film).cautions[0][:46]
     'film equilibrium and trained model disagree: 0'
     """
-    if film is None or not disagree(estimate, film):
-        return estimate
-    said = (
-        f"film equilibrium and trained model disagree: {_length(asdict(film))} against "
-        f"{_length(estimate.as_dict())}; check the given load, viscosity and offsets, the "
-        "probes, and whether the machine is one of the model's kind"
+    cure = (
+        "check the given load, viscosity and offsets, the probes, and whether the machine is one "
+        "of the model's kind"
     )
-    return replace(estimate, verdict="caution", cautions=(said, *estimate.cautions))
-
-
-def disagree(estimate: Estimate, film: FilmEstimate) -> bool:
-    """Whether two estimates have intervals that do not touch."""
-    ends = (estimate.low, estimate.high, film.low, film.high)
-    if any(end is None for end in ends):
-        return False
-    low, high, film_low, film_high = cast(tuple[float, float, float, float], ends)
-    return film_high < low or high < film_low
+    return estimate if film is None else with_second(estimate, film, "film equilibrium", cure)
 
 
 _UNKNOWN = (
@@ -335,11 +322,4 @@ def film_words(film: FilmEstimate) -> str:
     )
     worst = max(film.budget, key=lambda name: film.budget[name], default="")
     doubt = f"; largest uncertainty: {worst}, {1e3 * film.budget[worst]:.3f} mm" if worst else ""
-    return f"{_length(asdict(film))}, without training; {healthy}{doubt}"
-
-
-def _length(found: Mapping[str, Any]) -> str:
-    return (
-        f"{1e3 * found['severity']:.3f} mm ({1e3 * found['low']:.3f} to {1e3 * found['high']:.3f}, "
-        f"{100 * found['coverage']:.0f} %)"
-    )
+    return f"{length_words(film)}, without training; {healthy}{doubt}"

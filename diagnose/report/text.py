@@ -7,6 +7,7 @@ from typing import Any
 from ..pages.words import severity_word
 from .advice import brief_words
 from .batch import Batch, BatchRow, machine_heading
+from .beside import is_first
 from .verdict import feature_words, finding_words, millimetres, zone_words
 
 _WIDTH = 96  # of a line
@@ -23,7 +24,9 @@ def report_text(table: Mapping[str, Any]) -> str:
         Of :func:`wearstate.diagnose.report.verdict.report_table`.
     """
     estimate, limits, advice = table["estimate"], table["limits"], table["advice"]
-    lines = [("Recording", table["recording"]["label"]), ("Verdict", table["headline"])]
+    lines = [("Recording", table["recording"]["label"])]
+    lines += [("Disagree", text) for text in table["disagreements"]]
+    lines.append(("Verdict", table["headline"]))
     lines += [("  because", reason) for reason in estimate["reasons"]]
     if estimate["severity"] is not None:
         share = estimate["severity"] / limits["condemning_limit_m"]
@@ -38,13 +41,15 @@ def report_text(table: Mapping[str, Any]) -> str:
             lines.append(("Possible", table["grades_text"]))
     if table["film"] is not None:
         lines.append(("Film", f"equilibrium: {table['film']['text']}"))
+    if table["twin"] is not None:
+        lines.append(("Twin", table["twin"]["text"]))
     lines.append(("Advice", advice["sentence"]))
     if advice["horizon"]:
         lines.append(("How soon", f"{advice['horizon']} ({advice['basis']})"))
     if table["outlook"] is not None:
         lines.append(("Trend", table["outlook"]["text"]))
     lines += [("Also", finding_words(f)) for f in estimate["confounders"] if f["present"]]
-    lines += [("Caution", caution) for caution in estimate["cautions"]]
+    lines += [("Caution", each) for each in estimate["cautions"] if not is_first(each, table)]
     if table["iso"]["machine"] is not None:
         lines.append(("ISO zone", zone_words(table["iso"])))
     lines += [("Moved", text) for text in _changes(table)]

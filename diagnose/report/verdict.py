@@ -18,8 +18,10 @@ from ..learning.grades import GRADE_NAMES
 from ..nameplate.nameplate import Nameplate
 from ..pages.words import quantity_name
 from ..pictures.view import View
+from ..twin.opinion import TwinOpinion
 from ..wear_model.estimate import Estimate, WearModel, input_faults, unseen_words
 from .advice import advise, touched_grades
+from .beside import new_cautions, twin_table, with_twin
 from .film import film_estimate, film_table, with_film
 from .trend import Outlook
 
@@ -55,6 +57,7 @@ def report_table(
     machine: str | None = None,
     baseline: Baseline | None = None,
     plate: Nameplate | None = None,
+    twin: TwinOpinion | None = None,
     outlook: Outlook | None = None,
     files: Mapping[str, Path] | None = None,
 ) -> dict[str, Any]:
@@ -72,6 +75,8 @@ def report_table(
         That the estimate was given.
     plate : Nameplate, optional
         Of the machine, for the estimate by its film equilibrium.
+    twin : TwinOpinion, optional
+        What the twin of the machine says of the recording.
     outlook : Outlook, optional
         Of the machine's trend, for how soon to act.
     files : mapping, optional
@@ -81,7 +86,8 @@ def report_table(
     -------
     dict
         ``schema_version``, ``headline``, ``recording``, ``estimate``, ``film`` (what the film
-        equilibrium says, None where it says nothing of this machine), ``grades_text``,
+        equilibrium says, None where it says nothing of this machine), ``twin`` (what the twin
+        says, None without), ``disagreements`` (of these with the model), ``grades_text``,
         ``advice``, ``limits``, ``iso``, ``outlook``, ``evidence_summary``, ``evidence``,
         ``baseline_note``, ``notice``, ``provenance``. Lengths in metres, speeds in revolutions
         per second.
@@ -94,13 +100,15 @@ def report_table(
     card = model.card
     quantity = quantity_name(card["severity"])
     film = film_estimate(recording, card["severity"], plate, baseline)
-    estimate = with_film(estimate, film)
+    trained, estimate = estimate, with_twin(with_film(estimate, film), twin)
     return {
         "schema_version": REPORT_SCHEMA,
         "headline": headline(estimate),
         "recording": _recording_table(recording, card),
         "estimate": estimate.as_dict(),
         "film": film_table(film, plate, recording.row),
+        "twin": twin_table(twin, trained),
+        "disagreements": new_cautions(trained, estimate),
         "grades_text": possible_words(estimate, card["grade_edges_m"]),
         "advice": asdict(advise(estimate, quantity, card["grade_edges_m"], outlook)),
         "limits": limits_table(card),

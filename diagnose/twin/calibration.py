@@ -1,5 +1,6 @@
 """From healthy recordings of one machine to its scene with what is unknown of it estimated."""
 
+import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -74,12 +75,19 @@ class CalibratedScene:
         How well the recordings fit machines of this scene.
     recordings : tuple of str
         What was used.
+    recipe, base : str
+        Recipe and scene before calibration: names of built-in ones, or files.
+    unknown : tuple of str
+        What was to be estimated; empty for all.
     """
 
     unknowns: TwinUnknowns
     found: Inverted
     misfit: Misfit
     recordings: tuple[str, ...]
+    recipe: str
+    base: str
+    unknown: tuple[str, ...]
 
     @cached_property
     def numbers(self) -> tuple[CalibratedNumber, ...]:
@@ -159,6 +167,9 @@ class CalibratedScene:
         correlation = posterior.covariance[np.ix_(places, places)] / np.outer(sd, sd)
         return {
             "scene": self.unknowns.recipe.scene.name,
+            "recipe": self.recipe,
+            "base": self.base,
+            "unknown": list(self.unknown),
             "names": names,
             "mean": [round(float(each), DIGITS) for each in posterior.mean[places]],
             "sd": [round(float(each), DIGITS) for each in sd],
@@ -194,7 +205,13 @@ class CalibratedScene:
             refuse_output(each, force)
         if not self.twin_table["names"]:
             raise DataError("recordings tell none of the unknowns; give more or longer ones")
-        for each, table in ((file, self.scene_table), (beside, self.twin_table)):
+        from_there = {
+            key: _seen_from(file.parent, getattr(self, key)) for key in ("recipe", "base")
+        }
+        for each, table in (
+            (file, self.scene_table),
+            (beside, {**self.twin_table, **from_there}),
+        ):
             write_whole(each, toml_text(table).encode(), force=force)
 
     def __str__(self) -> str:
@@ -280,9 +297,10 @@ def calibrate(
     (False, True)
     """
     heard, names = _read(recordings)
-    plan = _prior(recipe, scene, heard[0])
+    chosen = _chosen(recipe, scene)
+    plan = _prior(chosen, scene, heard[0])
     unknowns = unknowns_of(plan, _as_new(plan), unknown)
-    _refuse_channels(plan, heard)
+    refuse_channels(plan, heard)
     runs = [conditions_of(plan, each) for each in heard]
     layout = layout_of(heard[0])
     observed = np.array([levels_of(each) for each in heard])
@@ -303,6 +321,9 @@ def calibrate(
         found=found,
         misfit=misfit(layout, found.levels, observed),
         recordings=names,
+        recipe=str(chosen),
+        base=str(scene),
+        unknown=tuple(unknown),
     )
 
 
@@ -336,11 +357,21 @@ def _of_data_set(path: Path) -> list[Recording]:
         return [replace(data[i], source=f"{path.name}:{i}") for i in range(len(data))]
 
 
+def _seen_from(folder: Path, name: str) -> str:
+    """A built-in name as it is, a file by its path from a folder, so that both can be moved."""
+    path = Path(name)
+    return os.path.relpath(path.absolute(), folder) if path.is_file() else name
+
+
+def _chosen(recipe: str | Path, scene: str | Path) -> str | Path:
+    """The scene's own standard recipe unless another was named."""
+    own = f"{scene}-standard"
+    return own if recipe == PRIOR and own in recipe_names() else recipe
+
+
 def _prior(recipe: str | Path, scene: str | Path, first: Recording) -> Recipe:
     """The recipe around the scene, sampled as the recordings are."""
-    own = f"{scene}-standard"
-    chosen = own if recipe == PRIOR and own in recipe_names() else recipe
-    plan = load_recipe(chosen, {"sample_rate": first.sample_rate}, scene=scene)
+    plan = load_recipe(recipe, {"sample_rate": first.sample_rate}, scene=scene)
     if plan.scene.machine != "reciprocating-pump":
         raise DataError(
             f"machine = '{plan.scene.machine}' must be 'reciprocating-pump' to be calibrated; use "
@@ -361,7 +392,8 @@ def _as_new(plan: Recipe) -> tuple[float, float]:
     return low, edges[0]
 
 
-def _refuse_channels(plan: Recipe, heard: Sequence[Recording]) -> None:
+def refuse_channels(plan: Recipe, heard: Sequence[Recording]) -> None:
+    """Raise DataError where recordings have other channels than the scene, or other rates."""
     wanted = tuple(sensor.name for sensor in getattr(plan.scene, "sensors", ()))
     faults = [
         f"{each.source or 'recording'}: channels {', '.join(each.vibration_names)} at "

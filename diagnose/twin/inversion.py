@@ -104,6 +104,7 @@ def inverted(
     *,
     prior: Gaussian,
     rounds: Sequence[int] = ROUNDS,
+    wider: Sequence[float] = WIDENED,
     seed: int = 0,
     jobs: int = 1,
     progress: Callable[[int, int], None] | None = None,
@@ -124,6 +125,8 @@ def inverted(
         Of the normal scores.
     rounds : sequence of int
         Members of each round.
+    wider : sequence of float
+        How much wider than what is known an ensemble is drawn, after the first round and later.
     seed : int
         Of draws and sensor noise.
     jobs : int
@@ -149,7 +152,7 @@ def inverted(
             look(members[1])
         used = members if number < 2 or before is None else _joined(before, members)
         posterior = _step(unknowns, layout, used, observed, prior if number == 0 else None, prior)
-        proposal = widened(posterior, prior, WIDENED[min(number, 1)])
+        proposal = widened(posterior, prior, wider[min(number, 1)])
         before = members
     return Inverted(
         posterior=posterior, prior=prior, scores=used[0], levels=used[1], members=sum(rounds)

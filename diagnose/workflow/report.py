@@ -16,6 +16,7 @@ from ..pages.page import save_page
 from ..report.page import report_html
 from ..report.text import report_text
 from ..report.verdict import known_machine, report_table
+from ..twin.opinion import TwinOpinion, second_opinion
 from ..wear_model.estimate import Estimate, WearModel
 from ..wear_model.file import load_model
 
@@ -115,6 +116,8 @@ def report(
     scene: str | None = None,
     values: Mapping[str, Any] | None = None,
     machine: str | None = None,
+    twin: str | Path | None = None,
+    seed: int = 0,
 ) -> Report:
     """Judge one recording: wear with an interval, grade, advice, or why there is none.
 
@@ -132,6 +135,11 @@ def report(
         Dotted path -> value that replaces the nameplate's, as ``{"load.static": "4 kN +- 5 %"}``.
     machine : str, optional
         Kind of machine, for its ISO zone.
+    twin : str or Path, optional
+        Calibrated scene of this machine, of :func:`wearstate.calibrate`: it tells the wear as well,
+        by simulation.
+    seed : int
+        Of the twin's draws, >= 0.
 
     Returns
     -------
@@ -168,6 +176,9 @@ def report(
         baselines=None if baseline is None else Baselines(baseline, known.card),
         plate=nameplate_of(source, scene, values or {}, usual=usual),
         machine=machine,
+        twin=None
+        if twin is None
+        else second_opinion(twin, read, wear=known.card["severity"], seed=seed),
         files={"recording": source} if source else None,
     )
 
@@ -179,6 +190,7 @@ def judged(
     baselines: Baselines | None,
     plate: Nameplate | None,
     machine: str | None,
+    twin: TwinOpinion | None = None,
     files: Mapping[str, Path] | None,
 ) -> Report:
     """Report on a recording with what is known of its machine, all of it read."""
@@ -187,7 +199,14 @@ def judged(
         recording, baseline, **known_beside(plate, recording, model.card, baseline)
     )
     table = report_table(
-        recording, model, estimate, machine=machine, baseline=baseline, plate=plate, files=files
+        recording,
+        model,
+        estimate,
+        machine=machine,
+        baseline=baseline,
+        plate=plate,
+        twin=twin,
+        files=files,
     )
     return Report(
         recording=recording, model=model, estimate=estimate, table=table, baseline=baseline

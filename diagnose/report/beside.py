@@ -1,0 +1,110 @@
+"""A second estimate beside the trained model's, made in another way, and whether the two agree.
+
+Where both are there and contradict each other, that is the first thing to be said: one of them is
+told something wrong, or the machine is not what either takes it for.
+"""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+from ..film_clearance.clearance import FilmEstimate
+from ..twin.opinion import TwinOpinion
+from ..wear_model.estimate import Estimate
+
+SecondEstimate = FilmEstimate | TwinOpinion
+"""Either has `severity`, `low` and `high`, None where it says nothing, and `coverage`."""
+
+
+def disagree(estimate: Estimate, second: SecondEstimate) -> bool:
+    """Whether two estimates have intervals that do not touch."""
+    if estimate.low is None or estimate.high is None or second.low is None or second.high is None:
+        return False
+    return second.high < estimate.low or estimate.high < second.low
+
+
+def with_second(estimate: Estimate, second: SecondEstimate, who: str, cure: str) -> Estimate:
+    """An estimate that says first where a second one contradicts it.
+
+    Parameters
+    ----------
+    estimate : Estimate
+    second : FilmEstimate or TwinOpinion
+    who : str
+        What the second one is from.
+    cure : str
+        What to check.
+    """
+    if not disagree(estimate, second):
+        return estimate
+    said = (
+        f"{who} and trained model disagree: {length_words(second)} against "
+        f"{length_words(estimate)}; {cure}"
+    )
+    return replace(estimate, verdict="caution", cautions=(said, *estimate.cautions))
+
+
+def length_words(found: SecondEstimate | Estimate) -> str:
+    """A wear with its interval [mm].
+
+    Examples
+    --------
+    >>> length_words(TwinOpinion(severity=2.1e-4, low=1.9e-4, high=2.3e-4))
+    '0.210 mm (0.190 to 0.230, 90 %)'
+    """
+    if found.severity is None or found.low is None or found.high is None:
+        return "no estimate"
+    return (
+        f"{1e3 * found.severity:.3f} mm ({1e3 * found.low:.3f} to {1e3 * found.high:.3f}, "
+        f"{100 * found.coverage:.0f} %)"
+    )
+
+
+def with_twin(estimate: Estimate, twin: TwinOpinion | None) -> Estimate:
+    """An estimate that says first where the twin of the machine contradicts it.
+
+    Examples
+    --------
+    >>> trained = Estimate(verdict="graded", grade=2, severity=2.4e-4, low=2.2e-4, high=2.6e-4)
+    >>> twin = TwinOpinion(severity=1.5e-4, low=1.4e-4, high=1.6e-4)
+    >>> with_twin(trained, twin).cautions[0][:49]
+    'twin of the machine and trained model disagree: 0'
+    """
+    cure = (
+        "check that recording and twin are of one machine, the pressures given, and by feeler gauge"
+    )
+    return estimate if twin is None else with_second(estimate, twin, "twin of the machine", cure)
+
+
+def twin_table(twin: TwinOpinion | None, estimate: Estimate) -> dict[str, Any] | None:
+    """For JSON and pages; None without a twin."""
+    if twin is None:
+        return None
+    agrees = None if None in (twin.severity, estimate.severity) else not disagree(estimate, twin)
+    return {**twin.as_dict(), "agrees": agrees, "text": twin_words(twin)}
+
+
+def twin_words(twin: TwinOpinion) -> str:
+    """What the twin says in a clause.
+
+    Examples
+    --------
+    >>> twin_words(TwinOpinion(severity=2.1e-4, low=1.9e-4, high=2.3e-4, members=210, scene="mine"))
+    '0.210 mm (0.190 to 0.230, 90 %), by 210 simulated machines like mine, without training'
+    """
+    if twin.severity is None:
+        return f"no estimate: {twin.reason}"
+    return (
+        f"{length_words(twin)}, by {twin.members} simulated machines like {twin.scene}, without "
+        "training"
+    )
+
+
+def new_cautions(before: Estimate, after: Estimate) -> list[str]:
+    """Disagreements that were put before the cautions of an estimate."""
+    return list(after.cautions[: len(after.cautions) - len(before.cautions)])
+
+
+def is_first(caution: str, table: Mapping[str, Any]) -> bool:
+    """Whether a caution of a report's table is said first, and not once more among the others."""
+    return caution in table["disagreements"]
