@@ -34,6 +34,7 @@ ROOMS = {
         "excitation",
         "beam",
         "alignment",
+        "piping",
         "pump",
         "pump_lanes",
         "journal",

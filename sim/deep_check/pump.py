@@ -70,7 +70,8 @@ def _crank_ratio(facts: PumpFacts) -> dict[str, float]:
 
 
 def _pumping(scene: PumpScene) -> bool:
-    return scene.pressure.rung in ("two-level", "heads", "chamber") and scene.piston.diameter > 0
+    pumping = scene.pressure.rung not in ("none", "constant")
+    return pumping and scene.piston.diameter > 0
 
 
 def _suction(facts: PumpFacts) -> dict[str, float]:

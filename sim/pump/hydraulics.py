@@ -12,10 +12,11 @@ two-level    quasi-static, lines without loss          `suction` and `discharge`
 heads        quasi-static, liquid without compression  energy balance of the lines, added mass
 chamber      one pressure in the chamber, manifolds    compression, air, vapour, moving valves,
              at constant pressure                      leaks, stuck valves
+*-lines      as chamber, on two pipes of all throws    pulsation, waves, damper, relief valve
 ===========  ========================================  =====================================
 
 The first four are functions of the piston's motion (:func:`line_pressure`); the chamber has a
-state of its own (:func:`chamber_step`).
+state of its own (:func:`chamber_step`), and so have pipes (:mod:`wearstate.sim.piping.pipe`).
 """
 
 import math
@@ -27,7 +28,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..jit import kernel
 from ..scene.parts import STANDARD_GRAVITY
-from ..scene.pump_hydraulics import STANDARD_ATMOSPHERE, CylinderPressure, Line, Liquid, Valve
+from ..scene.pump_hydraulics import (
+    BREATHING_RUNGS,
+    PIPED_RUNGS,
+    STANDARD_ATMOSPHERE,
+    CylinderPressure,
+    Line,
+    Liquid,
+    Valve,
+)
 
 PRESSURE_NONE = 0
 PRESSURE_CONSTANT = 1
@@ -40,9 +49,9 @@ PRESSURE_CODES = {
     "constant": PRESSURE_CONSTANT,
     "two-level": PRESSURE_TWO_LEVEL,
     "heads": PRESSURE_HEADS,
-    "chamber": PRESSURE_CHAMBER,
+    **dict.fromkeys(BREATHING_RUNGS, PRESSURE_CHAMBER),
 }
-"""Rung of the scene -> code of the kernels, from the cheapest to the best."""
+"""Rung of the scene -> code of the kernels, from the cheapest to the best; pipes are told apart."""
 
 CHAMBER_OK = 0
 CHAMBER_NOT_FINITE = 1
@@ -177,6 +186,8 @@ def hydraulic_parameters(
     """
     record = np.zeros(1, dtype=HYDRAULIC)
     liquid = pressure.liquid
+    piped = pressure.rung in PIPED_RUNGS
+    suction, discharge = pressure.at_pump if piped else (pressure.suction, pressure.discharge)
     values: dict[str, float] = {
         "rung": PRESSURE_CODES[pressure.rung],
         "two_harmonic": pressure.flow == "two-harmonic",
@@ -184,8 +195,8 @@ def hydraulic_parameters(
         "crank_radius": crank_radius,
         "rod_length": rod_length,
         "speed": speed,
-        "suction": pressure.suction,
-        "discharge": pressure.discharge,
+        "suction": suction,
+        "discharge": discharge,
         "rise_delay": pressure.rise_delay,
         "rise_angle": pressure.rise_angle,
         "fall_delay": pressure.fall_delay,

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from ..output.sensor import digitise, low_pass, mounting_poles
 from ..scene.pump import PumpScene
-from ..scene.pump_hydraulics import STANDARD_ATMOSPHERE, PressureSensor
+from ..scene.pump_hydraulics import PIPED_RUNGS, STANDARD_ATMOSPHERE, PressureSensor
 from .casing import decimate
 from .slider_crank import CrankRun
 
@@ -55,7 +55,9 @@ def pressures_at_rest(
     """As :func:`read_pressures`, of a crank that stands: every cylinder is at suction pressure."""
     rows, clipped = [], 0
     for throw, sensor in scene.pressure_sensors:
-        level = np.full(n_samples, scene.pressures(throw).suction)
+        pressure = scene.pressures(throw)
+        rest = pressure.at_pump[0] if pressure.rung in PIPED_RUNGS else pressure.suction
+        level = np.full(n_samples, rest)
         row, lost = read_pressure(sensor, level, rng)
         rows.append(row)
         clipped += lost

@@ -27,6 +27,7 @@ from ..scene.pump import (
     VALVE_PLACES,
     PumpScene,
 )
+from ..scene.pump_hydraulics import BREATHING_RUNGS, PIPED_RUNGS
 from ..scene.recorded import failed, recorded
 from .casing import (
     CasingModes,
@@ -397,7 +398,7 @@ def _throw_on_casing(scene: PumpScene, throw: int) -> dict[str, tuple[str, float
     }
     if _rubs(scene, throw):
         reactions |= {place: (place, -1.0) for place in GUIDE_PLACES}
-    if scene.pressures(throw).rung == "chamber":
+    if scene.pressures(throw).rung in BREATHING_RUNGS:
         reactions |= {place: (place, 1.0) for place in VALVE_PLACES}
     return reactions
 
@@ -491,7 +492,7 @@ def measured_places(scene: PumpScene) -> tuple[str, ...]:
         for place in (
             *CRANK_PLACES,
             *(GUIDE_PLACES if _rubs(scene, throw) else ()),
-            *(VALVE_PLACES if scene.pressures(throw).rung == "chamber" else ()),
+            *(VALVE_PLACES if scene.pressures(throw).rung in BREATHING_RUNGS else ()),
         )
     )
 
@@ -671,6 +672,8 @@ def _numerics(
     if run.chambers is not None:
         numerics["cavitating_share"] = run.vapour_steps / max(1, steps * len(rungs))
         numerics["lift_left"] = lift
+    for side, parted in zip(("suction", "discharge"), run.parted_steps, strict=False):
+        numerics[f"{side}_line_parted_share"] = parted / max(1, steps)
     return numerics
 
 
@@ -709,6 +712,14 @@ def _warnings(numerics: dict[str, float | int | str]) -> tuple[str, ...]:
             f"a cylinder holds vapour in {float(numerics['cavitating_share']):.1%} of the steps: "
             "the suction cavitates"
         )
+    for side in ("suction", "discharge"):
+        share = float(numerics.get(f"{side}_line_parted_share", 0.0))
+        if share > 0:
+            found.append(
+                f"the liquid column of the {side} line parts in {share:.1%} of the steps: vapour "
+                "is counted at the nodes of the line alone, so the pressures when it closes are "
+                "those of a coarse model; raise the pressure at its far end, or shorten it"
+            )
     if float(numerics.get("floored_share", 0.0)) > _MOSTLY:
         found.append(
             f"{float(numerics['floored_share']):.1%} of the contacts closed more slowly than "
@@ -767,6 +778,10 @@ def _truth(run: CrankRun, plan: RunPlan) -> dict[str, Any]:
     columns = [1 + len(FORCES) * throw + FORCES.index(name) for throw in throws for name in _KEPT]
     force = decimate(run.forces[:, [0, *columns]], plan.factor)[plan.kept]  # it costs by the column
     truth["drive_moment_n_m"] = force[:, 0]
+    if run.ends is not None:
+        ends = plan.at_samples(run.ends)
+        truth["suction_line_pressure_pa"] = ends[:, 0]
+        truth["discharge_line_pressure_pa"] = ends[:, 1]
     for throw in throws:
         suffix = f"_{throw + 1}" if throw else ""
         own = force[:, 1 + len(_KEPT) * throw :]

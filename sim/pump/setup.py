@@ -28,7 +28,8 @@ from ..film.impedance_map import ImpedanceMap, impedance_map
 from ..film.solve import FilmGeometry
 from ..jit import kernel
 from ..scene.pump import OILED_RUNGS, Guide, PumpScene, RevoluteJoint
-from ..scene.pump_hydraulics import CylinderPressure
+from ..scene.pump_hydraulics import BREATHING_RUNGS, PIPED_RUNGS, CylinderPressure
+from ..piping.pipe import pipe_parameters, pipe_start
 from .hydraulics import (
     HYDRAULIC,
     PRESSURE_CHAMBER,
@@ -49,6 +50,7 @@ from .slider_crank import (
     THROW,
     WRISTPIN,
     CrankRun,
+    Lines,
     Machine,
     Tables,
     run_mechanism,
@@ -150,8 +152,8 @@ def ideal_motion(scene: PumpScene, angle: NDArray[np.float64], throw: int = 0) -
     Returns
     -------
     IdealCrank
-        With the pressure of the scene's rung; the rung *chamber*, which has a memory, is stood
-        in for by its two levels.
+        With the pressure of the scene's rung; a chamber, which has a memory, is stood in for by
+        its two levels.
     """
     speed = 2 * math.pi * scene.drive.speed
     gravity_x, gravity_y = _gravity(scene)
@@ -186,8 +188,12 @@ def _line_pressures(
 
 def _without_memory(scene: PumpScene, throw: int) -> NDArray[np.void]:
     pressure = scene.pressures(throw)
-    if pressure.rung == "chamber":
-        pressure = pressure.model_copy(update={"rung": "two-level"})
+    if pressure.rung in BREATHING_RUNGS:
+        suction, discharge = pressure.suction, pressure.discharge
+        if pressure.rung in PIPED_RUNGS:
+            suction, discharge = pressure.at_pump
+        levels = {"rung": "two-level", "suction": suction, "discharge": discharge}
+        pressure = pressure.model_copy(update=levels)
     return _hydraulics(scene, pressure)
 
 
@@ -768,6 +774,46 @@ def start_chambers(t: Tables, bodies: NDArray[np.float64]) -> NDArray[np.float64
     return chambers
 
 
+def lines_of(scene: PumpScene, step: float) -> Lines | None:
+    """Suction and discharge line of a scene, with the pump's mean flow in them; None without.
+
+    Parameters
+    ----------
+    scene : PumpScene
+    step : float
+        [s]
+
+    Examples
+    --------
+    >>> from ..scene.load import load_scene
+    >>> lines_of(load_scene("bilge-pump"), 2e-5) is None
+    True
+    """
+    pressure = scene.pressures(0)
+    inlet, outlet = pressure.suction_line, pressure.discharge_line
+    if pressure.rung not in PIPED_RUNGS or inlet is None or outlet is None:
+        return None
+    suction, discharge = pressure.at_pump
+    known: dict[str, Any] = {
+        "liquid": pressure.liquid,
+        "relief_back": suction,
+        "step": step,
+        "waves": pressure.rung == "wave-lines",
+    }
+    flow = 2 * piston_area(scene) * scene.crank.radius * scene.drive.speed * len(scene.throws)
+    pipes = [
+        pipe_parameters(inlet, far=suction, **known),
+        pipe_parameters(outlet, far=discharge, **known),
+    ]
+    starts = [pipe_start(pipes[0][0], flow), pipe_start(pipes[1][0], -flow)]
+    return Lines(
+        pipes=np.concatenate(pipes),
+        states=np.concatenate([state for state, _ in starts]),
+        suction_nodes=starts[0][1],
+        discharge_nodes=starts[1][1],
+    )
+
+
 # --- runs
 
 
@@ -778,7 +824,7 @@ def needs_integration(scene: PumpScene) -> bool:
         for throw in range(len(scene.throws))
         for rung in joint_rungs(scene, throw)
     )
-    breathing = any(scene.pressures(k).rung == "chamber" for k in range(len(scene.throws)))
+    breathing = any(scene.pressures(k).rung in BREATHING_RUNGS for k in range(len(scene.throws)))
     return not ideal or breathing or scene.drive.rung != "constant-speed"
 
 
@@ -832,6 +878,7 @@ def run_scene(
         bodies=start.bodies,
         chambers=start.chambers,
         films=start_films(t, start.bodies, start_angle),
+        lines=lines_of(scene, step),
         step=step,
         n_steps=n_steps,
         keep_states=keep_states,

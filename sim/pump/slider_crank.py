@@ -23,7 +23,9 @@ throw's constraints linearly, so that it too comes out in closed form.
 Classical Runge-Kutta with a fixed step; a step in which a contact closes or opens is cut there, so
 the order is kept across contact. Forces are recorded as means over the step, that is as exact
 impulses, whatever the contacts did in between. A chamber with valves is stepped after the
-mechanism, which feels its pressure extrapolated from the two steps before (second order).
+mechanism, which feels its pressure extrapolated from the two steps before (second order). Where
+the throws share two lines, all chambers are tried over a step until the pressures at the lines'
+ends agree with what the pump draws (:mod:`wearstate.sim.piping.pipe`).
 
 Sources: Xia, Zhang, Yu, Zhu (2017), Ship Science and Technology 39(1), 51-55; Baumgarte (1972),
 doi:10.1016/0045-7825(72)90018-7.
@@ -37,8 +39,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..contact.law import friction_force
-from ..jit import kernel, sine_cosine
+from ..jit import kernel, sine_cosine, subroutine
 from ..output.status import Status
+from ..piping.pipe import PIPE, PIPE_STATE, SEARCH, advance_pipe, begin_search, seek
 from .hydraulics import PRESSURE_CHAMBER, chamber_step, line_pressure
 from .oiled_joint import oiled_joint
 from .throw_motion import (
@@ -214,6 +217,23 @@ class Work(NamedTuple):
     moment: NDArray[np.float64]  # (2,): on the crank, and per crank acceleration
     matrix: NDArray[np.float64]  # (4, 6): constraint equations with two right sides, see SIZE
     place: NDArray[np.float64]  # (4, 6): of each constraint force, see AT_JOINT
+
+
+class Lines(NamedTuple):
+    """Suction and discharge line of all throws, in this order; without any row there are none."""
+
+    pipes: NDArray[np.void]  # (2,) of PIPE
+    states: NDArray[np.void]  # (2,) of PIPE_STATE
+    suction_nodes: NDArray[np.float64]
+    discharge_nodes: NDArray[np.float64]
+
+
+class _Shared(NamedTuple):
+    """The lines with the scratch of their coupling."""
+
+    lines: Any  # of Lines
+    searches: NDArray[np.void]  # (2,) of SEARCH
+    trials: NDArray[np.float64]  # (n_throws, 6): chambers at the end of a step that is tried
 
 
 @kernel
@@ -837,6 +857,55 @@ def _breathe(w: Any, i: int, h: float, t: Any, chamber: Any, forces: Any, step: 
 
 
 @kernel
+def _try_chambers(w: Any, i: int, h: float, t: Any, chamber: Any, shared: Any) -> Any:
+    """Step every chamber under the lines' pressures that are tried: fault, and both volumes.
+
+    The trials hold the outcome; volumes [m^3] as of ``CHAMBER_FLOWS``, of all throws.
+    """
+    fault, suction, discharge = 0, 0.0, 0.0
+    for k in range(t.throws.shape[0]):
+        b, liquid, trial, flow = w.stage[i, k], t.liquid[k], shared.trials[k], w.held[k].flow
+        liquid.suction = shared.searches[0].pressure
+        liquid.discharge = shared.searches[1].pressure
+        for c in range(6):
+            trial[c] = chamber[k, c]
+        x, v, substeps = b.y[PISTON_X], b.y[PISTON_X_RATE], t.throws[k].substeps
+        fault += chamber_step(trial, flow, liquid, h, chamber[k, 6], chamber[k, 7], x, v, substeps)
+        suction += flow[0]
+        discharge += flow[1]
+    return fault, suction, discharge
+
+
+@subroutine
+def _breathe_on_lines(
+    w: Any, i: int, h: float, t: Any, chamber: Any, shared: Any, forces: Any, step: int
+) -> int:
+    """Step all chambers and both lines together; pressures for the next step."""
+    lines, searches = shared.lines, shared.searches
+    inlet, outlet = lines.pipes[0], lines.pipes[1]
+    before, after = lines.suction_nodes, lines.discharge_nodes
+    begin_search(searches[0], inlet, lines.states[0])
+    begin_search(searches[1], outlet, lines.states[1])
+    fault, drawn, pushed, found = 0, 0.0, 0.0, False
+    while not found and fault == 0:
+        fault, drawn, pushed = _try_chambers(w, i, h, t, chamber, shared)
+        found = seek(searches[0], drawn / h, inlet, lines.states[0], before, h)
+        found &= seek(searches[1], -pushed / h, outlet, lines.states[1], after, h)
+    advance_pipe(searches[0].pressure, drawn / h, inlet, lines.states[0], before, h)
+    advance_pipe(searches[1].pressure, -pushed / h, outlet, lines.states[1], after, h)
+    for k in range(t.throws.shape[0]):
+        held, b, f = w.held[k], w.stage[i, k], 1 + len(FORCES) * k
+        last, now = chamber[k, 0], shared.trials[k, 0]
+        held.pressure[0], held.pressure[1] = now, 2.0 * now - last
+        for c in range(6):
+            chamber[k, c] = shared.trials[k, c]
+        chamber[k, 6], chamber[k, 7] = b.y[PISTON_X], b.y[PISTON_X_RATE]
+        forces[step, f + _VALVES] = held.flow[2] / h
+        forces[step, f + _VALVES + 1] = held.flow[3] / h
+    return fault
+
+
+@kernel
 def _fault(w: Any, i: int) -> int:
     total = w.crank[i, ANGLE] + w.crank[i, SPEED]
     for k in range(w.stage.shape[1]):
@@ -856,13 +925,14 @@ closings below the law's speed floor; steps with a link in tension; steps with v
 
 
 class _Record(NamedTuple):
-    """What a run leaves behind; the last three have one row where they are not needed."""
+    """What a run leaves behind; the last four have one row where they are not needed."""
 
     turns: NDArray[np.float64]  # (n_steps + 1, 2): crank angle and speed
     forces: NDArray[np.float64]  # (n_steps, 1 + n_throws * len(FORCES))
     states: NDArray[np.float64]  # (n_steps + 1, n_throws, PER_THROW)
     chambers: NDArray[np.float64]  # (n_steps + 1, n_throws, 8)
     gaps: NDArray[np.float64]  # (n_steps + 1, n_throws, len(GAPS))
+    ends: NDArray[np.float64]  # (n_steps + 1, 2): pressures of the lines at the pump
 
 
 class Tally(NamedTuple):
@@ -896,7 +966,9 @@ def begin(w: Any, t: Any, chamber: Any) -> bool:
 
 
 @kernel
-def _keep(w: Any, i: int, chamber: Any, r: Any, row: int) -> None:
+def _keep(w: Any, i: int, chamber: Any, states: Any, r: Any, row: int) -> None:
+    for side in range(states.shape[0]):
+        r.ends[row, side] = states[side].mean
     r.turns[row, 0], r.turns[row, 1] = w.crank[i, ANGLE], w.crank[i, SPEED]
     for k in range(chamber.shape[0]):
         if r.states.shape[0] > 1:
@@ -911,24 +983,29 @@ def _keep(w: Any, i: int, chamber: Any, r: Any, row: int) -> None:
 
 
 @kernel
-def _integrate(h: float, t: Any, w: Any, chamber: Any, r: Any, tally: Any) -> Any:
+def _integrate(h: float, t: Any, w: Any, chamber: Any, shared: Any, r: Any, tally: Any) -> Any:
     """March from row 0 of the scratch; returns status code and steps done."""
     breathing = begin(w, t, chamber)
     i, fresh = 0, False
     if r.gaps.shape[0] > 1:  # the films of the start are those of its derivative
         derivative_of_record(w, i, 0.0, t)
-    _keep(w, i, chamber, r, 0)
+    lines = shared.lines
+    _keep(w, i, chamber, lines.states, r, 0)
     for step in range(r.forces.shape[0]):
         i, fresh = step_of_record(w, i, h, fresh, t, r.forces, step, tally)
         code = _fault(w, i)
         if breathing:
-            if _breathe(w, i, h, t, chamber, r.forces, step) != 0:
+            if lines.pipes.shape[0] > 0:
+                choked = _breathe_on_lines(w, i, h, t, chamber, shared, r.forces, step)
+            else:
+                choked = _breathe(w, i, h, t, chamber, r.forces, step)
+            if choked != 0:
                 code = 4
             fresh = False  # the step felt an extrapolated pressure, the next one knows better
         for k in range(t.throws.shape[0]):
             tally.counts[IN_TENSION] += w.stage[i, k].link < 0.0
             tally.counts[WITH_VAPOUR] += chamber[k, 1] > 0.0
-        _keep(w, i, chamber, r, step + 1)
+        _keep(w, i, chamber, lines.states, r, step + 1)
         if code != 0:
             return code, step + 1
     return 0, r.forces.shape[0]
@@ -951,6 +1028,9 @@ class CrankRun:
         Columns as ``CHAMBER_STATE``; None where nothing breathes.
     gaps : numpy.ndarray [shape=(n_steps + 1, n_throws, 4)] or None
         Columns as :data:`GAPS`, at the starts of the steps' last stage; None where no pin is oiled.
+    ends : numpy.ndarray [shape=(n_steps + 1, 2)] or None
+        Pressure [Pa] of suction and discharge line at the pump, means over the steps before; None
+        where no line is modelled.
     columns : tuple of int or None
         Of the forces: those that were kept; None for all.
     step : float
@@ -967,6 +1047,8 @@ class CrankRun:
         Steps at whose end a massless link was in tension: contact would be lost.
     vapour_steps : int
         Steps, summed over throws, at whose end a chamber held vapour.
+    parted_steps : tuple of int
+        Steps in which suction and discharge line held vapour.
     """
 
     turns: NDArray[np.float64]
@@ -976,6 +1058,7 @@ class CrankRun:
     step: float
     peak_normal_force: float
     gaps: NDArray[np.float64] | None = None
+    ends: NDArray[np.float64] | None = None
     columns: tuple[int, ...] | None = None
     status: Status = Status.OK
     contact_changes: int = 0
@@ -983,6 +1066,7 @@ class CrankRun:
     floored_closings: int = 0
     tension_steps: int = 0
     vapour_steps: int = 0
+    parted_steps: tuple[int, ...] = ()
 
     @property
     def steps(self) -> int:
@@ -998,6 +1082,14 @@ class CrankRun:
         return self.forces[:, self.place(1 + len(FORCES) * throw + FORCES.index(name))]
 
 
+_NO_LINES = Lines(
+    pipes=np.zeros(0, PIPE),
+    states=np.zeros(0, PIPE_STATE),
+    suction_nodes=np.zeros((4, 1)),
+    discharge_nodes=np.zeros((4, 1)),
+)
+
+
 def run_mechanism(
     t: Tables,
     *,
@@ -1008,6 +1100,7 @@ def run_mechanism(
     n_steps: int,
     chambers: NDArray[np.float64] | None = None,
     films: NDArray[np.float64] | None = None,
+    lines: Lines | None = None,
     keep_states: bool = True,
 ) -> CrankRun:
     """Integrate the mechanism with contact in its clearances.
@@ -1029,6 +1122,9 @@ def run_mechanism(
         State of the chambers at the start.
     films : numpy.ndarray [shape=(n_throws, 4)], optional
         Columns as :data:`FILM`, at the start; inside the clearances.
+    lines : Lines, optional
+        Shared by the chambers of all throws, each of which then breathes; replaced by their state
+        at the end.
     keep_states : bool
         Keep the bodies at the ends of all steps.
 
@@ -1052,6 +1148,13 @@ def run_mechanism(
         matrix=np.zeros((4, 6)),
         place=np.zeros((4, 6)),
     )
+    shared = _Shared(
+        lines=_NO_LINES if lines is None else lines,
+        searches=np.zeros(2, SEARCH),
+        trials=np.zeros((n, 6)),
+    )
+    if lines is not None:  # the pressures before and after the valves are those of the lines
+        t = t._replace(liquid=t.liquid.copy())
     w.crank[0, ANGLE], w.crank[0, SPEED] = angle, speed
     w.stage["y"][0] = bodies
     if films is not None:
@@ -1065,15 +1168,17 @@ def run_mechanism(
         states=np.empty((rows, n, PER_THROW)),
         chambers=np.empty((n_steps + 1 if breathing else 1, n, 8)),
         gaps=np.zeros((n_steps + 1 if oiled else 1, n, len(GAPS))),
+        ends=np.zeros((n_steps + 1 if lines else 1, 2)),
     )
     tally = Tally(counts=np.zeros(5, np.int64), peak=np.zeros(1))
-    code, done = _integrate(step, t, w, chamber, r, tally)
+    code, done = _integrate(step, t, w, chamber, shared, r, tally)
     return CrankRun(
         turns=r.turns[: done + 1],
         forces=r.forces[:done],
         bodies=r.states[: done + 1] if keep_states else None,
         chambers=r.chambers[: done + 1, :, :6] if breathing else None,
         gaps=r.gaps[: done + 1] if oiled else None,
+        ends=r.ends[: done + 1] if lines else None,
         step=step,
         status=Status(code),
         peak_normal_force=float(tally.peak[0]),
@@ -1082,4 +1187,5 @@ def run_mechanism(
         floored_closings=int(tally.counts[FLOORED]),
         tension_steps=int(tally.counts[IN_TENSION]),
         vapour_steps=int(tally.counts[WITH_VAPOUR]),
+        parted_steps=tuple(int(steps) for steps in shared.lines.states["parted"]),
     )

@@ -54,7 +54,7 @@ from .parts import (
     nearest,
     single_axis,
 )
-from .pump_hydraulics import CylinderPressure, PressureSensor
+from .pump_hydraulics import PIPED_RUNGS, CylinderPressure, PressureSensor
 
 _MOMENT_MOST = 1e9  # N m
 _UNBALANCE_MOST = 1e6  # kg m
@@ -578,6 +578,7 @@ class PumpScene(Scene):
         checks = (
             (_rod_faults, ("crank", "joint", "rod")),
             (_guide_faults, ("joint", "piston")),
+            (_line_faults, ("pressure", "throws")),
             (_name_faults, ("sensors", "exciters", "tacho", "pressure", "throws")),
             (_shape_faults, ("casing", "sensors", "throws")),
             (_exciter_faults, ("casing", "sensors", "exciters")),
@@ -608,6 +609,21 @@ def _guide_faults(joint: PumpJoints, piston: Piston) -> list[str]:
     if joint.guide is None or joint.guide.rung == "ideal" or piston.inertia is not None:
         return []
     return ["piston.inertia is missing; a piston in a guide with clearance tilts"]
+
+
+def _line_faults(pressure: CylinderPressure, throws: tuple[Throw, ...]) -> list[str]:
+    """Throws on pipes of their own: all of them share one suction and one discharge line."""
+    each = [throw.pressure or pressure for throw in throws]
+    if not any(one.rung in PIPED_RUNGS for one in each):
+        return []
+    names = ("rung", "suction", "discharge", "suction_line", "discharge_line", "liquid")
+    return [
+        f"throws.{i}.pressure.{name} must be that of the first throw: all throws share the lines "
+        "of the rungs 'lumped-lines' and 'wave-lines'; set it in the scene's own table"
+        for i, one in enumerate(each)
+        for name in names
+        if getattr(one, name) != getattr(each[0], name)
+    ]
 
 
 def _rod_faults(crank: Crank, joint: PumpJoints, rod: Rod) -> list[str]:

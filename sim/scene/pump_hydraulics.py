@@ -14,6 +14,7 @@ from .parts import (
     LONGEST,
     NAME_LONGEST,
     PRESSURE_MOST,
+    STANDARD_GRAVITY,
     STIFFEST,
     Angle,
     Area,
@@ -27,6 +28,7 @@ from .parts import (
     Ratio,
     Stiffness,
     Time,
+    Velocity,
     Volume,
 )
 
@@ -41,6 +43,7 @@ _LOSS_MOST = 1e4
 _VOLUME_LEAST, _VOLUME_MOST = 1e-9, 1e3  # m^3
 _LEVEL_MOST = 1e4  # m
 _MOST_VALVES = 100
+_WAVE_SLOWEST, _WAVE_FASTEST = 10.0, 5000.0  # m/s, from a froth to solid steel
 _CONTACT_FASTEST = 1e6  # rad/s, a ball of a gram on hard steel has half of it
 _SENSOR_SLOWEST, _SENSOR_FASTEST = 1.0, 1e6  # Hz: below it no stroke is left, above it is no line
 _SENSOR_LEAST = 1.0  # Pa, a microphone's range
@@ -75,11 +78,70 @@ class Liquid(Part):
         default=2339.0, ge=1, le=PRESSURE_MOST, description="absolute, of the liquid as it is"
     )
 
+    def wave_speed(self, pressure: float) -> float:
+        """Speed of sound of liquid with its air, ``sqrt(K / rho)`` after Wood [m/s].
+
+        Parameters
+        ----------
+        pressure : float
+            Gauge [Pa], above vacuum.
+
+        Examples
+        --------
+        >>> round(Liquid(air_fraction=0.0).wave_speed(0.0)), round(Liquid().wave_speed(0.0))
+        (1478, 262)
+        """
+        absolute = max(pressure + STANDARD_ATMOSPHERE, 1.0)
+        n = self.air_exponent
+        air = self.air_fraction * (STANDARD_ATMOSPHERE / absolute) ** (1 / n)
+        stiff = self.bulk_modulus + pressure
+        liquid = (1 - self.air_fraction) * self.bulk_modulus / stiff
+        modulus = (liquid + air) / (liquid / stiff + air / (n * absolute))
+        return math.sqrt(modulus * (liquid + air) / self.density)
+
+
+class Damper(Part):
+    """A gas vessel on a line, at the pump: ``p V^n`` of its gas stays as it is at rest."""
+
+    gas_volume: Volume = Field(
+        ge=_VOLUME_LEAST, le=_VOLUME_MOST, description="of the gas at the line's pressure at rest"
+    )
+    exponent: Ratio = Field(
+        default=1.4,
+        ge=1,
+        le=5 / 3,
+        description="polytropic exponent of the gas: 1 isothermal, 1.4 isentropic",
+    )
+
+
+class ReliefValve(Part):
+    """A spring-loaded relief valve on a line, at the pump, that returns to the suction side.
+
+    It opens in proportion to the pressure above `set_pressure`, without inertia, and is fully open
+    at ``(1 + accumulation) set_pressure``.
+    """
+
+    set_pressure: Pressure = Field(
+        gt=0, le=PRESSURE_MOST, description="gauge, in the line, at which it begins to open"
+    )
+    diameter: Length = Field(gt=0, le=LONGEST, description="of its bore, fully open")
+    accumulation: Ratio = Field(
+        default=0.1,
+        gt=0,
+        le=1,
+        description="rise above the set pressure, over it, at which it is fully open",
+    )
+    discharge_coefficient: Ratio = Field(
+        default=0.7, gt=0, le=1, description="flow over that of the bore without losses"
+    )
+
 
 class Line(Part):
-    """A pipe between a reservoir or air vessel and the pump, for the rung *heads*.
+    """A pipe between a reservoir or air vessel and the pump.
 
-    Its pressure drop is ``rho (f L / D + K) u |u| / 2``, its inertia ``rho L du/dt``.
+    Its pressure drop is ``rho (f L / D + K) u |u| / 2``, its inertia ``rho L du/dt``. `wave_speed`,
+    `damper` and `relief` are for the rungs *lumped-lines* and *wave-lines*, in which all throws
+    share it.
     """
 
     rise: Length = Field(
@@ -98,6 +160,25 @@ class Line(Part):
     minor_loss: Ratio = Field(
         default=1.5, ge=0, le=_LOSS_MOST, description="sum of the loss coefficients of fittings"
     )
+    wave_speed: Velocity | None = Field(
+        default=None,
+        ge=_WAVE_SLOWEST,
+        le=_WAVE_FASTEST,
+        description="of pressure waves: water in steel 1000 to 1400 m/s, with air a few hundred",
+    )
+    damper: Damper | None = Field(default=None, description="gas vessel at the pump; none: none")
+    relief: ReliefValve | None = Field(
+        default=None, description="relief valve at the pump; none: none"
+    )
+
+    @model_serializer(mode="wrap")
+    def _without_absent_parts(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Lines of the rung *heads* are written as they were before there were any waves."""
+        table: dict[str, Any] = handler(self)
+        for name in ("wave_speed", "damper", "relief"):
+            if getattr(self, name) is None:
+                table.pop(name, None)
+        return table
 
 
 class Valve(Part):
@@ -244,6 +325,13 @@ class PressureSensor(Part):
         return self
 
 
+PIPED_RUNGS = ("lumped-lines", "wave-lines")
+"""Rungs of the pressure with pipes between the valves and the far ends."""
+
+BREATHING_RUNGS = ("chamber", *PIPED_RUNGS)
+"""Rungs of the pressure with a compressible chamber and moving valves."""
+
+
 class CylinderPressure(Part):
     """Gauge pressure on the piston face.
 
@@ -253,12 +341,17 @@ class CylinderPressure(Part):
     with numbers of its own, since clearance volume and air expand there. ``heads``: the
     quasi-static energy balance of the two lines, whose far ends are at `suction` and `discharge`.
     ``chamber``: a compressible chamber with self-acting valves, `suction` and `discharge` being
-    the pressures before and after them.
+    the pressures before and after them. ``lumped-lines`` and ``wave-lines``: such chambers on two
+    pipes shared by all throws, at whose far ends `suction` and `discharge` are; a pipe is one mass
+    on one spring, or carries waves.
     """
 
-    rung: Literal["none", "constant", "two-level", "heads", "chamber"] = Field(
+    rung: Literal[
+        "none", "constant", "two-level", "heads", "chamber", "lumped-lines", "wave-lines"
+    ] = Field(
         default="two-level",
-        description="none, constant, two levels, heads in lines, or chamber with valves",
+        description="none, constant, two levels, heads in lines, chamber with valves, or chamber "
+        "with lumped-lines or wave-lines",
     )
     suction: Pressure = Field(default=0.0, ge=-STANDARD_ATMOSPHERE, description="gauge")
     discharge: Pressure = Field(default=0.0, le=PRESSURE_MOST, description="gauge")
@@ -332,18 +425,50 @@ class CylinderPressure(Part):
         ]
 
     def _missing(self) -> list[str]:
-        return [
+        faults = [
             f"{name} is missing; the rung '{self.rung}' needs it (an empty table takes defaults)"
             if name != "dead_volume"
             else f"{name} is missing; the rung '{self.rung}' needs it, about half the swept volume"
             for name in _NEEDS.get(self.rung, ())
             if getattr(self, name) is None
         ]
+        return faults + self._wave_faults()
+
+    def _wave_faults(self) -> list[str]:
+        """Pipes whose wave speed is not told, with that of a rigid pipe and this liquid."""
+        if self.rung not in PIPED_RUNGS:
+            return []
+        sides = (("suction", self.suction_line), ("discharge", self.discharge_line))
+        return [
+            f"{name}_line.wave_speed is missing; the rung '{self.rung}' needs it, at most "
+            f"{self.liquid.wave_speed(level):.3g} m/s of this liquid with its air at {level:.3g} Pa"
+            for (name, line), level in zip(sides, self.at_pump, strict=True)
+            if line is not None and line.wave_speed is None
+        ]
+
+    @property
+    def at_pump(self) -> tuple[float, float]:
+        """Pressures at rest before and after the valves: those of the lines' far ends [Pa gauge].
+
+        Examples
+        --------
+        >>> well = CylinderPressure(suction_line=Line(rise=3.0), discharge=2e5)
+        >>> [round(p) for p in well.at_pump]
+        [-29367, 200000]
+        """
+        weight = self.liquid.density * STANDARD_GRAVITY
+        inlet, outlet = self.suction_line, self.discharge_line
+        return (
+            self.suction - (weight * inlet.rise if inlet else 0.0),
+            self.discharge + (weight * outlet.rise if outlet else 0.0),
+        )
 
     def _vapour_faults(self) -> list[str]:
         vapour = self.liquid.vapour_pressure - STANDARD_ATMOSPHERE
         name = "discharge" if self.rung == "constant" else "suction"
         lowest = getattr(self, name)
+        if self.rung in PIPED_RUNGS:
+            name, lowest = "suction at the pump", self.at_pump[0]
         if self.rung == "none" or lowest > vapour:
             return []
         return [
@@ -353,18 +478,22 @@ class CylinderPressure(Part):
 
     def _deadlock(self) -> list[str]:
         inlet, outlet = self.suction_valve, self.discharge_valve
-        if self.rung != "chamber" or inlet is None or outlet is None:
+        if self.rung not in BREATHING_RUNGS or inlet is None or outlet is None:
             return []
         if outlet.stuck_lift != 0 or (inlet.stuck_lift or 0) > 0:
             return []
         return [
             "discharge_valve.stuck_lift = 0 m must be > 0 m or the suction valve stuck open: "
-            "a cylinder without a way out bursts, and there is no relief valve in the model"
+            "a cylinder without a way out bursts, and has no relief valve of its own"
         ]
 
 
 _NEEDS = {
     "heads": ("suction_line", "discharge_line"),
     "chamber": ("suction_valve", "discharge_valve", "dead_volume"),
+    **dict.fromkeys(
+        PIPED_RUNGS,
+        ("suction_line", "discharge_line", "suction_valve", "discharge_valve", "dead_volume"),
+    ),
 }
 """Rung -> what it cannot do without."""
