@@ -1,16 +1,17 @@
 """One pipe between a far end at constant pressure and a node at the pump, compiled.
 
 The flow Q counts towards the pump, on the discharge side too. A step of length h works with means
-over the step: what a pump draws from the node is a volume, the node's pressure p its mean. All that
-the node takes up by itself is a function of p alone, so a step solves one equation for p::
+over the step: what a pump draws from the node is a volume, the node's pressure p its mean. All
+that the node takes up by itself is a function of p alone, so a step solves one equation for p::
 
     pipe_flow(p) = q + demand(p) + void / h
 
-with the flow q that the pump draws, what spring, gas and relief valve take (:func:`demand`), and the
-volume of vapour at the node (:func:`excess`).
+with the flow q that the pump draws, what spring, gas and relief valve take (:func:`demand`), and
+the volume of vapour at the node (:func:`excess`). Where q depends on p in turn, :func:`seek` finds
+both.
 
 A pipe is a rigid column with a spring at the node (*lumped-lines*), or carries waves between nodes
-one step of travel apart (*wave-lines*); the length that is left over beside whole reaches is a rigid
+one step of travel apart (*wave-lines*); what is left of its length beside whole reaches is a rigid
 column at the far end, where the pressure does not change and a spring would do nothing.
 """
 
@@ -61,8 +62,8 @@ PIPE_STATE = np.dtype(
 """What one pipe remembers from step to step, beside its inner nodes."""
 
 PRESSURE, ARRIVES, LEAVES, VOID = range(4)
-"""Rows of the inner nodes: pressure [Pa], flow that arrives from the far side and that leaves to the
-pump's side [m^3/s], volume of vapour [m^3]; columns from the pump (0) to the far end."""
+"""Rows of the inner nodes: pressure [Pa], flow that arrives from the far side and that leaves to
+the pump's side [m^3/s], volume of vapour [m^3]; columns from the pump (0) to the far end."""
 
 FEWEST_REACHES = 5
 """Of a pipe with waves: the first organ-pipe frequency is then within 0.5 %, see the tests."""

@@ -7,6 +7,7 @@ from typing import cast
 
 from ..scene.parts import Scene
 from ..scene.pump import OILED_RUNGS, PumpScene, RevoluteJoint
+from ..scene.pump_hydraulics import PIPED_RUNGS
 from ..scene.rungs import (
     Effect,
     Rung,
@@ -18,7 +19,7 @@ from ..scene.rungs import (
     with_values,
     written,
 )
-from .setup import joint_parts
+from .setup import joint_parts, lines_of
 from .validity import FEWEST_STEPS, joint_faults, knock_limits, limits, pump_step, pump_steps
 
 JOINT_RUNGS = (
@@ -108,6 +109,22 @@ PRESSURE_RUNGS = (
         needs="both lines and valves, pressure.dead_volume",
         nanoseconds_per_step=350.0,
     ),
+    Rung(
+        name="lumped-lines",
+        assumes="such chambers on two pipes of all throws, each a mass on a spring at the pump",
+        reference="Wylie, Streeter 1993, chapter 12",
+        valid="up to the first organ-pipe frequency of a pipe; liquid column without vapour",
+        needs="as chamber, and the wave speeds of both lines",
+        nanoseconds_per_step=900.0,
+    ),
+    Rung(
+        name="wave-lines",
+        assumes="such chambers on two pipes of all throws with waves, five reaches at the least",
+        reference="Wylie, Streeter 1993, chapters 3 and 8",
+        valid="plane waves, quasi-steady friction; vapour at the pipe's nodes alone",
+        needs="as chamber, and the wave speeds of both lines",
+        nanoseconds_per_step=900.0,
+    ),
 )
 """Rungs of the cylinder pressure."""
 
@@ -186,8 +203,23 @@ def _throw_paths(scene: PumpScene, table: str, leaf: str) -> Iterator[str]:
 def _pressure_effect(scene: Scene) -> Iterator[Effect]:
     pump = cast(PumpScene, scene)
     if pump.piston.diameter > 0:  # else there is nothing to push on
-        rungs = written(PRESSURE_RUNGS, _throw_paths(pump, "pressure", "rung"))
+        rungs = written(pressure_rungs(pump), _throw_paths(pump, "pressure", "rung"))
         yield effect("pressure", scene, rungs, lambda one: str(one.pressure.rung), beyond=_beyond)
+
+
+def pressure_rungs(pump: PumpScene) -> tuple[Rung, ...]:
+    """Rungs of the pressure: those with pipes only where the scene says how fast their waves are.
+
+    Examples
+    --------
+    >>> from ..scene.load import load_scene
+    >>> pump = load_scene("bilge-pump")
+    >>> pressure_rungs(pump)[-1].name
+    'chamber'
+    """
+    lines = (pump.pressure.suction_line, pump.pressure.discharge_line)
+    told = all(line is not None and line.wave_speed is not None for line in lines)
+    return tuple(rung for rung in PRESSURE_RUNGS if told or rung.name not in PIPED_RUNGS)
 
 
 def _drive_effect(scene: Scene) -> Iterator[Effect]:
@@ -227,6 +259,8 @@ _MECHANISM = 60.0  # ns of a step of one throw beside its effects
 
 _MODE = 12.0  # ns of a step of one casing mode and its sensors
 
+_REACH = 6.0  # ns of a step of one reach of a pipe with waves
+
 _CASING_FIXED = 200.0  # ns of a step beside: low-pass and bookkeeping
 
 
@@ -234,8 +268,15 @@ def pump_cost(scene: Scene) -> float:
     """Time of a run by the tables [s]."""
     pump = cast(PumpScene, scene)
     per_step = _CASING_FIXED + _MODE * len(pump.casing.modes) + price(DRIVE_RUNGS, pump.drive.rung)
+    per_step += _REACH * _reaches(pump)
     for throw in range(len(pump.throws)):
         per_step += _MECHANISM + price(PRESSURE_RUNGS, pump.pressures(throw).rung)
         for part in joint_parts(pump, throw):
             per_step += price(JOINT_RUNGS, "ideal" if part is None else part.rung)
     return 1e-9 * per_step * pump_steps(pump)
+
+
+def _reaches(pump: PumpScene) -> int:
+    """Reaches of both pipes at the step of the run; without waves 0."""
+    lines = lines_of(pump, sample_step(pump))
+    return 0 if lines is None else int(lines.pipes["reaches"].sum())

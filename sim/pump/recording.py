@@ -27,7 +27,7 @@ from ..scene.pump import (
     VALVE_PLACES,
     PumpScene,
 )
-from ..scene.pump_hydraulics import BREATHING_RUNGS, PIPED_RUNGS
+from ..scene.pump_hydraulics import BREATHING_RUNGS
 from ..scene.recorded import failed, recorded
 from .casing import (
     CasingModes,

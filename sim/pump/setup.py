@@ -27,9 +27,9 @@ from ..contact.law import (
 from ..film.impedance_map import ImpedanceMap, impedance_map
 from ..film.solve import FilmGeometry
 from ..jit import kernel
+from ..piping.pipe import pipe_parameters, pipe_start
 from ..scene.pump import OILED_RUNGS, Guide, PumpScene, RevoluteJoint
 from ..scene.pump_hydraulics import BREATHING_RUNGS, PIPED_RUNGS, CylinderPressure
-from ..piping.pipe import pipe_parameters, pipe_start
 from .hydraulics import (
     HYDRAULIC,
     PRESSURE_CHAMBER,

@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable, Iterator
 
 from ..output.status import Status
+from ..piping.pipe import FEWEST_REACHES
 from ..scene.pump import OILED_RUNGS, Guide, PumpScene, RevoluteJoint
 from .setup import (
     LARGEST_STEP_PER_CONTACT_TIME,
@@ -66,6 +67,7 @@ def limits(scene: PumpScene) -> list[tuple[Status, str]]:
         _sunk,
         _torn,
         _too_long,
+        _too_short,
     )
     return [found for check in checks for found in check(scene)]
 
@@ -156,6 +158,45 @@ def _too_long(scene: PumpScene) -> list[tuple[Status, str]]:
     return [(Status.STEP, text)]
 
 
+def _too_short(scene: PumpScene) -> list[tuple[Status, str]]:
+    """Pipes with waves that a step, which is written, crosses too soon (Courant)."""
+    told = scene.numerics.step
+    return [
+        (
+            Status.STEP,
+            f"numerics.step = {told:g} s must be <= {longest:.3g} s, in which a wave passes a "
+            f"{FEWEST_REACHES}th of {path}; shorten it, or set pressure.rung = 'lumped-lines'",
+        )
+        for path, longest in wave_steps(scene)
+        if told is not None and told > longest * (1 + _ROUNDING)
+    ]
+
+
+_ROUNDING = 1e-9  # of a step that is a whole part of a pipe's time of travel
+
+
+def wave_steps(scene: PumpScene) -> list[tuple[str, float]]:
+    """Pipes that carry waves, each with the longest step it can be resolved with [s].
+
+    Examples
+    --------
+    >>> from wearstate.sim.scene.load import load_scene
+    >>> piped = {"pressure.rung": "wave-lines", "pressure.suction_line.wave_speed": 1000.0,
+    ...     "pressure.discharge_line.wave_speed": 1200.0}
+    >>> [round(1e6 * step) for _, step in wave_steps(load_scene("bilge-pump", piped))]
+    [60, 50]
+    """
+    pressure = scene.pressures(0)
+    if pressure.rung != "wave-lines":
+        return []
+    lines = {"suction": pressure.suction_line, "discharge": pressure.discharge_line}
+    return [
+        (f"pressure.{side}_line", line.length / (FEWEST_REACHES * line.wave_speed))
+        for side, line in lines.items()
+        if line is not None and line.wave_speed is not None and line.length > 0
+    ]
+
+
 FEWEST_STEPS = 2
 """A sample of a pump: the casing runs once a step, and needs twice the sample rate."""
 
@@ -164,7 +205,7 @@ MOST_STEPS = 1000
 
 
 def pump_step(scene: PumpScene) -> float:
-    """Longest step of a pump: what is written, else what its contact or its casing needs [s].
+    """Longest step of a pump: what is written, else what contact, casing and waves need [s].
 
     Examples
     --------
@@ -173,6 +214,7 @@ def pump_step(scene: PumpScene) -> float:
     19.53
     """
     casing = 1 / FEWEST_STEPS / scene.sample_rate
+    casing = min([casing, *(longest for _, longest in wave_steps(scene))])
     if scene.numerics.step is not None:
         return min(scene.numerics.step, casing)
     rate = contact_rate(scene)

@@ -36,6 +36,7 @@ from ..pump.slider_crank import (
     Tables,
 )
 from ..scene.pump import PumpScene
+from ..scene.pump_hydraulics import PIPED_RUNGS
 from .march import Stretch, alone, enter_lane, march
 from .rates import (
     LANES,
@@ -73,7 +74,7 @@ def lane_kind(scene: PumpScene) -> tuple[bool, bool] | None:
     known = (
         crankpin == JOINT_COMPLIANT
         and wristpin in (JOINT_IDEAL, JOINT_COMPLIANT)
-        and rung != "heads"
+        and rung not in ("heads", *PIPED_RUNGS)
     )
     if not known:
         return None
