@@ -52,6 +52,7 @@ from ...sim.film.solve import (
     solve_long,
 )
 from ...sim.jit import kernel
+from ...sim.piping.pipe import drive_pipe, pipe_parameters, pipe_start
 from ...sim.pump.hydraulics import (
     HYDRAULIC,
     acceleration_constant,
@@ -75,7 +76,7 @@ from ...sim.pump.slider_crank import (
 )
 from ...sim.scene.load import load_scene
 from ...sim.scene.pump import PumpScene
-from ...sim.scene.pump_hydraulics import CylinderPressure, Liquid, Valve
+from ...sim.scene.pump_hydraulics import CylinderPressure, Damper, Line, Liquid, Valve
 from .verify_bearing import finite_bearing_checks
 
 LITERATURE_FOLDER = Path(__file__).parent
@@ -588,6 +589,27 @@ def _westphal_value(name: str) -> float:
     return _westphal()[name]
 
 
+@cache
+def _pipe(quantity: str) -> float:
+    """A smooth pipe of 12 m by 80 mm of water, 1200 m/s, whose flow is stopped at once."""
+    vessel = Damper(gas_volume=1e-3) if quantity == "vessel" else None
+    line = Line(length=12.0, wave_speed=1200.0, friction_factor=0.0, minor_loss=0.0, damper=vessel)
+    step, far = 1e-4, 5e6
+    pipes = pipe_parameters(
+        line, Liquid(), far=far, relief_back=0.0, step=step, waves=quantity != "lumped"
+    )
+    start = math.pi / 4 * 0.08**2 if quantity == "surge" else 1e-4  # 1 m/s, or far from vapour
+    states, nodes = pipe_start(pipes[0], start)
+    pressure, entering = np.zeros(80_000), np.zeros(80_000)
+    drive_pipe(pipes, states, nodes, np.zeros(80_000), step, pressure, entering)
+    if quantity == "surge":
+        return float(pressure[100] - far)
+    rest = pressure - far
+    up = np.flatnonzero((rest[:-1] < 0) & (rest[1:] >= 0))
+    times = up - rest[up] / (rest[up + 1] - rest[up])
+    return (len(times) - 1) / float((times[-1] - times[0]) * step)
+
+
 # --- journal bearing
 
 
@@ -1084,6 +1106,10 @@ _TABLES: dict[str, dict[str, Callable[[], float]]] = {
         "valve after Westphal: phase [rad]": partial(_westphal_value, "phase"),
         "valve after Westphal: lift at dead centre [m]": partial(_westphal_value, "left"),
         "valve after Westphal: closing delay [rad]": partial(_westphal_value, "delay"),
+        "pipe: surge of a column stopped at once [Pa]": partial(_pipe, "surge"),
+        "pipe: first frequency of a closed end, waves [Hz]": partial(_pipe, "waves"),
+        "pipe: first frequency of a closed end, lumped [Hz]": partial(_pipe, "lumped"),
+        "pipe: frequency with a gas vessel, waves [Hz]": partial(_pipe, "vessel"),
     },
     "cavitation.csv": {
         f"mass-conserving film: {name}": partial(_cavitated_value, name)

@@ -458,8 +458,8 @@ def advance_pipe(p: float, drawn: float, pipe: Any, state: Any, nodes: Any, h: f
 
     References
     ----------
-    .. [1] E. B. Wylie, V. L. Streeter, Fluid Transients in Systems, Prentice Hall 1993, chapters 3
-       and 8.
+    .. [1] E. B. Wylie, V. L. Streeter, Fluid Transients in Systems, Prentice Hall 1993, on the
+       method of characteristics and on column separation.
     """
     if pipe.fixed != 0:
         state.drawn = state.column_mean = drawn

@@ -112,7 +112,7 @@ PRESSURE_RUNGS = (
     Rung(
         name="lumped-lines",
         assumes="such chambers on two pipes of all throws, each a mass on a spring at the pump",
-        reference="Wylie, Streeter 1993, chapter 12",
+        reference="first mode of an organ pipe closed at the pump",
         valid="up to the first organ-pipe frequency of a pipe; liquid column without vapour",
         needs="as chamber, and the wave speeds of both lines",
         nanoseconds_per_step=900.0,
@@ -120,7 +120,7 @@ PRESSURE_RUNGS = (
     Rung(
         name="wave-lines",
         assumes="such chambers on two pipes of all throws with waves, five reaches at the least",
-        reference="Wylie, Streeter 1993, chapters 3 and 8",
+        reference="method of characteristics: Wylie, Streeter 1993",
         valid="plane waves, quasi-steady friction; vapour at the pipe's nodes alone",
         needs="as chamber, and the wave speeds of both lines",
         nanoseconds_per_step=900.0,

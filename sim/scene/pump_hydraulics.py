@@ -166,10 +166,8 @@ class Line(Part):
         le=_WAVE_FASTEST,
         description="of pressure waves: water in steel 1000 to 1400 m/s, with air a few hundred",
     )
-    damper: Damper | None = Field(default=None, description="gas vessel at the pump; none: none")
-    relief: ReliefValve | None = Field(
-        default=None, description="relief valve at the pump; none: none"
-    )
+    damper: Damper | None = Field(default=None, description="gas vessel at the pump")
+    relief: ReliefValve | None = Field(default=None, description="relief valve at the pump")
 
     @model_serializer(mode="wrap")
     def _without_absent_parts(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
