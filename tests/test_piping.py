@@ -259,6 +259,18 @@ def test_a_pipe_with_waves_never_gains(step):
         assert_allclose(levels[2], levels[0], rtol=1e-9)
 
 
+@pytest.mark.parametrize("volume", [None, 1e-3])
+def test_a_column_on_a_spring_or_gas_is_hardly_damped(volume):
+    """By (w h)^3 / 4 of the critical, as BDF2 is: first order anywhere would halve the swing."""
+    damper = None if volume is None else Damper(gas_volume=volume)
+    line, n = SMOOTH.model_copy(update={"damper": damper}), 40_000
+    pressure, *_ = march(line, np.zeros(n), step=1e-4, waves=False, start=1e-4)
+    begin, end = np.ptp(pressure[: n // 8]), np.ptp(pressure[-n // 8 :])
+    rate = 2 * math.pi * (SPEED / (4 * LENGTH) if volume is None else 8.07)
+    left = math.exp(-((rate * 1e-4) ** 3) / 4 * rate * 1e-4 * n)
+    assert 2 * left - 1.001 < end / begin < 1.0001
+
+
 # --- in a pump
 
 

@@ -310,6 +310,30 @@ def test_every_map_of_a_machine_is_drawn_with_words_and_theory(scene, tmp_path):
         save_figure(machine, maps, tmp_path / "atlas.gif")
 
 
+def test_the_guard_of_a_pipe_with_waves_is_where_its_frequency_is_right():
+    pipes = {
+        "pressure.rung": "wave-lines",
+        "pressure.suction_line.wave_speed": 1000.0,
+        "pressure.discharge_line.wave_speed": 1200.0,
+    }
+    assert "set pressure.rung" in MAPS["reciprocating-pump"]["step-line"](
+        load_scene("bilge-pump"), 3
+    )
+    scene = load_scene("bilge-pump", pipes | {"pressure.discharge_line.length": 3.0})
+    plan = MAPS["reciprocating-pump"]["step-line"](scene, 7)
+    assert plan.own is not None
+    assert (plan.own.method, plan.own.y) == ("wave-lines", 3.0)
+    [guard] = plan.curves["wave-lines"]
+    for step, length in zip(guard.x, guard.y, strict=True):
+        for share in (0.3, 0.77, 0.999):
+            verdict, word = plan.judges["wave-lines"](share * step, length)
+            assert verdict is Verdict.ACCURATE
+            assert float(word.rpartition(" ")[2]) < 5e-3
+        assert plan.judges["wave-lines"](10 * step, length)[0] is Verdict.INACCURATE
+        assert plan.judges["lumped-lines"](10 * step, length)[0] is Verdict.INACCURATE
+        assert plan.judges["lumped-lines"](0.1 * step, length)[0] is Verdict.ACCURATE
+
+
 def test_the_pump_loses_contact_by_its_clearance_and_not_by_its_step(monkeypatch):
     judge = next(
         iter(

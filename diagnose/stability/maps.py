@@ -31,6 +31,7 @@ from ...sim.journal.validity import JOURNAL_STEP
 from ...sim.machine.simulate import simulate
 from ...sim.output.recording import Recording
 from ...sim.output.status import Status
+from ...sim.piping.pipe import FEWEST_REACHES, drive_pipe, pipe_parameters, pipe_start
 from ...sim.pump.recording import steps_per_sample
 from ...sim.pump.setup import (
     LARGEST_STEP_PER_CONTACT_TIME,
@@ -48,6 +49,7 @@ from ...sim.scene.journal import JournalScene
 from ...sim.scene.oil import Oil
 from ...sim.scene.parts import Scene, SceneError
 from ...sim.scene.pump import PumpScene
+from ...sim.scene.pump_hydraulics import PIPED_RUNGS, Line, Liquid
 from ...sim.scene.shaft import ShaftScene
 from .method_map import Cell, Curve, Judge, MapAxis, MapPlan, Own, Verdict
 from .own_point import journal_weight, orbit_step, own_film, plain_film
@@ -325,6 +327,93 @@ def _joint_rms(scene: PumpScene, joint: str, step: float) -> Array:
             square = sum(run.force(name)[turn:] ** 2 for name in columns)
         found.append(math.sqrt(np.mean(square)) if run.status.ok else math.nan)
     return np.array(found)
+
+
+# --- pump: length of a pipe by step
+
+
+def step_line(scene: Scene, size: int | None = None) -> MapPlan | str:
+    """Pulsation of the discharge pipe at its first frequency: step by length, both rungs of pipes.
+
+    Parameters
+    ----------
+    scene : Scene
+        A pump.
+    size : int, optional
+        Cells along either axis.
+
+    Returns
+    -------
+    Plan or str
+        Or why there is none.
+    """
+    pump = cast(PumpScene, scene)
+    line = pump.pressure.discharge_line
+    if pump.pressure.rung not in PIPED_RUNGS or line is None or not line.wave_speed:
+        return "the pressure has no pipes; set pressure.rung = 'wave-lines' and the wave speeds"
+    if line.length == 0:
+        return "the discharge line has no length; set pressure.discharge_line.length"
+    n, speed = size or 13, line.wave_speed
+    step = 1 / (pump.sample_rate * steps_per_sample(pump))
+    guard = line.length / (FEWEST_REACHES * speed)
+    x = MapAxis(name="step", unit="s", values=_spread(guard / 10, guard * 10, n)).through(step)
+    y = MapAxis(
+        name="length of the discharge line",
+        unit="m",
+        values=_spread(line.length / 10, line.length * 10, n),
+    ).through(line.length)
+    crossed = Curve(
+        name=f"guard: {FEWEST_REACHES} steps of travel",
+        x=tuple(length / (FEWEST_REACHES * speed) for length in y.values),
+        y=y.values,
+    )
+    return MapPlan(
+        name="step-line",
+        title="first frequency of the discharge line closed at the pump, step by length",
+        x=x,
+        y=y,
+        judges={rung: _line_pulsation(line, rung, scene.accuracy) for rung in PIPED_RUNGS},
+        curves={"wave-lines": [crossed]},
+        note=f"against wave speed over four lengths, within {scene.accuracy:.2g}",
+        own=Own(method=pump.pressure.rung, x=step, y=line.length),
+    )
+
+
+_RUNG_PERIODS = 12
+_LEAST_PER_PERIOD = 3.0  # steps, to tell a frequency
+_RINGING_AT = 1e7  # Pa, far from the vapour
+
+
+def _line_pulsation(line: Line, rung: str, accuracy: float) -> Judge:
+    def judge(step: float, length: float) -> Cell:
+        bare = {"friction_factor": 0.0, "minor_loss": 0.0, "damper": None, "relief": None}
+        smooth = line.model_copy(update={"length": length, **bare})
+        assert smooth.wave_speed is not None
+        exact = smooth.wave_speed / (4 * length)
+        if step * exact * _LEAST_PER_PERIOD > 1:
+            return Verdict.INACCURATE, "fewer than three steps a period: a rigid column"
+        found = _ringing(smooth, step, math.ceil(_RUNG_PERIODS / (exact * step)), rung)
+        off = abs(found / exact - 1)
+        fine = off <= accuracy  # not so where it rings no more
+        return (Verdict.ACCURATE if fine else Verdict.INACCURATE), f"frequency off by {off:.2g}"
+
+    return judge
+
+
+def _ringing(line: Line, step: float, n_steps: int, rung: str) -> float:
+    """Frequency of a pipe whose flow is stopped, from upward zeros [Hz]; NaN where it is still."""
+    pipes = pipe_parameters(
+        line, Liquid(), far=_RINGING_AT, relief_back=0.0, step=step, waves=rung == "wave-lines"
+    )
+    states, nodes = pipe_start(pipes[0], 1e-3 * line.diameter**2)  # about 1 mm/s
+    pressure, entering = np.zeros(n_steps), np.zeros(n_steps)
+    drive_pipe(pipes, states, nodes, np.zeros(n_steps), step, pressure, entering)
+    rest = pressure - _RINGING_AT
+    up = np.flatnonzero((rest[:-1] < 0) & (rest[1:] >= 0))
+    if len(up) < 3:
+        return math.nan
+    times = up - rest[up] / (rest[up + 1] - rest[up])
+    return (len(times) - 1) / float((times[-1] - times[0]) * step)
 
 
 # --- pump: clearance by speed
@@ -1204,7 +1293,11 @@ _FILMS: dict[str, Maker] = {
 }
 
 MAPS: dict[str, dict[str, Maker]] = {
-    "reciprocating-pump": {"step-stiffness": step_stiffness, "clearance-speed": clearance_speed},
+    "reciprocating-pump": {
+        "step-stiffness": step_stiffness,
+        "clearance-speed": clearance_speed,
+        "step-line": step_line,
+    },
     "journal-bearing": {"step-squeeze": step_squeeze, "speed-load": speed_load, **_FILMS},
     "propulsion-shaft": {"speed-viscosity": speed_viscosity, **_FILMS},
 }

@@ -50,7 +50,7 @@ from .slider_crank import (
     THROW,
     WRISTPIN,
     CrankRun,
-    Lines,
+    LinePair,
     Machine,
     Tables,
     run_mechanism,
@@ -774,7 +774,7 @@ def start_chambers(t: Tables, bodies: NDArray[np.float64]) -> NDArray[np.float64
     return chambers
 
 
-def lines_of(scene: PumpScene, step: float) -> Lines | None:
+def lines_of(scene: PumpScene, step: float) -> LinePair | None:
     """Suction and discharge line of a scene, with the pump's mean flow in them; None without.
 
     Parameters
@@ -806,7 +806,7 @@ def lines_of(scene: PumpScene, step: float) -> Lines | None:
         pipe_parameters(outlet, far=discharge, **known),
     ]
     starts = [pipe_start(pipes[0][0], flow), pipe_start(pipes[1][0], -flow)]
-    return Lines(
+    return LinePair(
         pipes=np.concatenate(pipes),
         states=np.concatenate([state for state, _ in starts]),
         suction_nodes=starts[0][1],

@@ -219,7 +219,7 @@ class Work(NamedTuple):
     place: NDArray[np.float64]  # (4, 6): of each constraint force, see AT_JOINT
 
 
-class Lines(NamedTuple):
+class LinePair(NamedTuple):
     """Suction and discharge line of all throws, in this order; without any row there are none."""
 
     pipes: NDArray[np.void]  # (2,) of PIPE
@@ -231,7 +231,7 @@ class Lines(NamedTuple):
 class _Shared(NamedTuple):
     """The lines with the scratch of their coupling."""
 
-    lines: Any  # of Lines
+    lines: Any  # of LinePair
     searches: NDArray[np.void]  # (2,) of SEARCH
     trials: NDArray[np.float64]  # (n_throws, 6): chambers at the end of a step that is tried
 
@@ -1082,7 +1082,7 @@ class CrankRun:
         return self.forces[:, self.place(1 + len(FORCES) * throw + FORCES.index(name))]
 
 
-_NO_LINES = Lines(
+_NO_LINES = LinePair(
     pipes=np.zeros(0, PIPE),
     states=np.zeros(0, PIPE_STATE),
     suction_nodes=np.zeros((4, 1)),
@@ -1100,7 +1100,7 @@ def run_mechanism(
     n_steps: int,
     chambers: NDArray[np.float64] | None = None,
     films: NDArray[np.float64] | None = None,
-    lines: Lines | None = None,
+    lines: LinePair | None = None,
     keep_states: bool = True,
 ) -> CrankRun:
     """Integrate the mechanism with contact in its clearances.
@@ -1122,7 +1122,7 @@ def run_mechanism(
         State of the chambers at the start.
     films : numpy.ndarray [shape=(n_throws, 4)], optional
         Columns as :data:`FILM`, at the start; inside the clearances.
-    lines : Lines, optional
+    lines : LinePair, optional
         Shared by the chambers of all throws, each of which then breathes; replaced by their state
         at the end.
     keep_states : bool
