@@ -442,6 +442,7 @@ def test_a_recording_tells_of_its_lines(rung):
         assert 0.2 * abs(level) < np.ptp(line) < 3 * abs(level)
         assert solution.numerics[f"{side}_line_parted_share"] == 0
     assert not any("parts" in text for text in solution.warnings)
+    assert solution.numerics["lines_unsettled_share"] == 0
     torn = simulate(
         load_scene(
             "bilge-pump",

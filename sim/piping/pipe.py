@@ -57,6 +57,7 @@ PIPE_STATE = np.dtype(
         ("void", "f8"),  # vapour at the node, and what a step's equation was left open by [m^3]
         ("drawn", "f8"),  # flow that the pump drew in the last step [m^3/s]
         ("parted", "i8"),  # steps with vapour anywhere in the pipe
+        ("unsettled", "i8"),  # steps whose search ended with more left over than it may
     ]
 )
 """What one pipe remembers from step to step, beside its inner nodes."""
@@ -350,6 +351,8 @@ def _settled(p: float, gap: float, slope: float, pipe: Any) -> bool:
     return abs(gap) <= _TOLERANCE * (p + STANDARD_ATMOSPHERE) * slope
 
 
+_NOTABLE = 1e-3  # as the tolerance: what is left over of a step that counts as unsettled
+
 _TOLERANCE = 1e-8  # of the absolute pressure; what is left is booked as volume and made up for
 
 
@@ -406,7 +409,10 @@ def seek(search: Any, drawn: float, pipe: Any, state: Any, nodes: Any, h: float)
         return True
     p = search.pressure
     gap, slope = excess(p, drawn, pipe, state, nodes, h)
-    if _settled(p, gap, slope, pipe) or search.tries >= MOST_TRIES:
+    if _settled(p, gap, slope, pipe):
+        return True
+    if search.tries >= MOST_TRIES:
+        state.unsettled += abs(gap) > _NOTABLE * (p + STANDARD_ATMOSPHERE) * slope
         return True
     if gap > 0.0:
         search.high = p

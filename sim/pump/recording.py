@@ -674,6 +674,8 @@ def _numerics(
         numerics["lift_left"] = lift
     for side, parted in zip(("suction", "discharge"), run.parted_steps, strict=False):
         numerics[f"{side}_line_parted_share"] = parted / max(1, steps)
+    if run.unsettled_steps:
+        numerics["lines_unsettled_share"] = max(run.unsettled_steps) / max(1, steps)
     return numerics
 
 
@@ -718,8 +720,15 @@ def _warnings(numerics: dict[str, float | int | str]) -> tuple[str, ...]:
             found.append(
                 f"the liquid column of the {side} line parts in {share:.1%} of the steps: vapour "
                 "is counted at the nodes of the line alone, so the pressures when it closes are "
-                "those of a coarse model; raise the pressure at its far end, or shorten it"
+                "those of a coarse model; raise the pressure at its far end, shorten it, or "
+                "give it a damper"
             )
+    if float(numerics.get("lines_unsettled_share", 0.0)) > 0:
+        found.append(
+            f"pump and lines agree to a thousandth of the pressure in all but "
+            f"{float(numerics['lines_unsettled_share']):.2%} of the steps: what is left over is "
+            "made up for in the next ones; shorten numerics.step, or give the lines dampers"
+        )
     if float(numerics.get("floored_share", 0.0)) > _MOSTLY:
         found.append(
             f"{float(numerics['floored_share']):.1%} of the contacts closed more slowly than "

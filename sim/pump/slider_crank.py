@@ -1047,8 +1047,9 @@ class CrankRun:
         Steps at whose end a massless link was in tension: contact would be lost.
     vapour_steps : int
         Steps, summed over throws, at whose end a chamber held vapour.
-    parted_steps : tuple of int
-        Steps in which suction and discharge line held vapour.
+    parted_steps, unsettled_steps : tuple of int
+        Steps in which suction and discharge line held vapour; steps in which no pressure was found
+        at which they give what the pump draws, and the rest was booked.
     """
 
     turns: NDArray[np.float64]
@@ -1067,6 +1068,7 @@ class CrankRun:
     tension_steps: int = 0
     vapour_steps: int = 0
     parted_steps: tuple[int, ...] = ()
+    unsettled_steps: tuple[int, ...] = ()
 
     @property
     def steps(self) -> int:
@@ -1188,4 +1190,5 @@ def run_mechanism(
         tension_steps=int(tally.counts[IN_TENSION]),
         vapour_steps=int(tally.counts[WITH_VAPOUR]),
         parted_steps=tuple(int(steps) for steps in shared.lines.states["parted"]),
+        unsettled_steps=tuple(int(steps) for steps in shared.lines.states["unsettled"]),
     )
