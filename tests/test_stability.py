@@ -292,9 +292,19 @@ def test_a_map_goes_on_with_what_the_others_leave_of_a_budget(monkeypatch):
     assert_allclose(now[0], 12.6)
 
 
-@pytest.mark.parametrize("scene", ["bilge-pump", "journal-bearing", "propulsion-shaft"])
-def test_every_map_of_a_machine_is_drawn_with_words_and_theory(scene, tmp_path):
-    machine = load_scene(scene)
+PIPES_WITH_WAVES = {
+    "pressure.rung": "wave-lines",
+    "pressure.suction_line.wave_speed": 1000.0,
+    "pressure.discharge_line.wave_speed": 1200.0,
+}
+
+
+@pytest.mark.parametrize(
+    ("scene", "more"),
+    [("bilge-pump", PIPES_WITH_WAVES), ("journal-bearing", {}), ("propulsion-shaft", {})],
+)
+def test_every_map_of_a_machine_is_drawn_with_words_and_theory(scene, more, tmp_path):
+    machine = load_scene(scene, more)
     maps = atlas(machine, size=3)
     assert [found.plan.name for found in maps] == list(MAPS[machine.machine])
     for found in maps:
@@ -311,15 +321,10 @@ def test_every_map_of_a_machine_is_drawn_with_words_and_theory(scene, tmp_path):
 
 
 def test_the_guard_of_a_pipe_with_waves_is_where_its_frequency_is_right():
-    pipes = {
-        "pressure.rung": "wave-lines",
-        "pressure.suction_line.wave_speed": 1000.0,
-        "pressure.discharge_line.wave_speed": 1200.0,
-    }
     assert "set pressure.rung" in MAPS["reciprocating-pump"]["step-line"](
         load_scene("bilge-pump"), 3
     )
-    scene = load_scene("bilge-pump", pipes | {"pressure.discharge_line.length": 3.0})
+    scene = load_scene("bilge-pump", PIPES_WITH_WAVES | {"pressure.discharge_line.length": 3.0})
     plan = MAPS["reciprocating-pump"]["step-line"](scene, 7)
     assert plan.own is not None
     assert (plan.own.method, plan.own.y) == ("wave-lines", 3.0)
