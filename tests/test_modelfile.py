@@ -4,10 +4,12 @@ import importlib.util
 import io
 import json
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from wearstate.diagnose.learning.nets import Nets
 from wearstate.diagnose.learning.regressions import Blend, Forest
 from wearstate.diagnose.wear_model import bundle as bundle_module
 from wearstate.diagnose.wear_model.arrays import blend_fits
@@ -148,6 +150,49 @@ def forest(**changes):
 )
 def test_trees_that_lead_nowhere_are_seen(changes, fits):
     assert blend_fits(forest(**changes), 2) is fits
+
+
+def nets(**changes):
+    """Two networks of three directions of two features, with hidden layers of five and four."""
+    sizes = {
+        "centre": (2,),
+        "spread": (2,),
+        "direction": (2, 3),
+        "first": (2, 3, 5),
+        "first_bias": (2, 5),
+        "second": (2, 5, 4),
+        "second_bias": (2, 4),
+        "last": (2, 4),
+        "last_bias": (2,),
+    }
+    part = Nets(scale=1.0, offset=0.0, **{n: np.ones(size) for n, size in sizes.items()})
+    part = replace(part, **changes)
+    return Blend(names=("nets",), parts=(part,), weights=np.ones(1), low=0.0, high=1.0)
+
+
+@pytest.mark.parametrize(
+    ("changes", "fits"),
+    [
+        ({}, True),
+        ({"spread": np.zeros(2)}, False),
+        ({"centre": np.ones(3)}, False),
+        ({"direction": np.ones((3, 2))}, False),
+        ({"direction": np.ones(6)}, False),
+        ({"first": np.ones((2, 5, 3))}, False),
+        ({"first_bias": np.ones(5)}, False),
+        ({"second": np.ones((1, 5, 4))}, False),
+        ({"second_bias": np.ones((2, 5))}, False),
+        ({"last": np.ones((2, 4, 1))}, False),
+        ({"last_bias": np.ones((2, 1))}, False),
+        ({"scale": np.ones(1)}, False),
+        ({"first": np.ones((0, 3, 5)), "second": np.ones((0, 5, 4))}, False),
+    ],
+)
+def test_nets_whose_layers_do_not_join_are_seen(changes, fits):
+    blend = nets(**changes)
+    assert blend_fits(blend, 2) is fits
+    if fits:
+        assert blend.predict(np.ones((3, 2))).shape == (3,)
 
 
 def stored_arrays(members):

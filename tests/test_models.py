@@ -343,7 +343,9 @@ def both(trained):
     rows = {candidate.name: candidate for candidate in CANDIDATES}
     blend = Blend(
         names=("ridge 30", "trees"),
-        parts=tuple(rows[n].fit(table.values, severity, 0) for n in ("ridge 30", "trees")),
+        parts=tuple(
+            rows[n].fit(table.values, table.values, severity, 0) for n in ("ridge 30", "trees")
+        ),
         weights=np.array([0.25, 0.75]),
         low=1e-5,
         high=1e-3,

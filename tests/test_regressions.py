@@ -44,7 +44,7 @@ def test_flattened_trees_say_what_the_library_says(task, more, of_trees, of_boos
     )
     for name, model in (("trees", trees), ("boosting", boosting)):
         theirs = np.exp(model.fit(single[:200], np.log(target[:200])).predict(single))
-        ours = ROWS[name].fit(rows[:200], target[:200], 3).predict(rows)
+        ours = ROWS[name].fit(rows[:200], rows[:200], target[:200], 3).predict(rows)
         # sums of 100 to 200 leaves in another order
         np.testing.assert_allclose(ours, theirs, rtol=1e-12)
         assert np.std(ours) > 0.1
@@ -53,7 +53,7 @@ def test_flattened_trees_say_what_the_library_says(task, more, of_trees, of_boos
 @pytest.mark.parametrize("name", ROWS)
 def test_one_row_is_told_as_among_many(task, name):
     rows, target, _ = task
-    part = ROWS[name].fit(rows, target, 0)
+    part = ROWS[name].fit(rows, rows, target, 0)
     # matrix and row products may add up in another order
     assert part.predict(rows[7:8])[0] == pytest.approx(part.predict(rows)[7], rel=1e-12)
 
@@ -104,7 +104,7 @@ def test_the_front_has_no_option_that_is_dearer_and_no_better(task):
 
 
 def constant(value, cost):
-    def fit(_rows, target, _seed):
+    def fit(_rows, _moved, target, _seed):
         zero = np.zeros(_rows.shape[1])
         ends = {"low": zero - 9, "high": zero + 9}
         return Linear(centre=zero, spread=zero + 1, weight=zero, **ends, offset=value, log=False)
@@ -213,3 +213,31 @@ def test_a_line_is_kept_beside_trees_that_are_better(task):
         "ridge 300": 0.02,
         "trees": 0.98,
     }
+
+
+def test_nets_follow_a_bend_and_what_they_met_on_other_machines():
+    """The first feature tells the target here and misleads elsewhere, the second tells it always:
+    a net that was taught both kinds of machine goes by the second."""
+    rng = np.random.default_rng(8)
+    bend = rng.standard_normal((900, 6))
+    target = np.exp(np.abs(bend[:, 1]))
+    rows, moved = bend.copy(), bend.copy()
+    rows[:, 0] = np.abs(bend[:, 1])
+    rows[:, 1:3] += 0.1 * rng.standard_normal((900, 2))
+    train, test = slice(0, 700), slice(700, 900)
+
+    def errors(taught):
+        part = ROWS["nets"].fit(rows[train], taught[train], target[train], 0)
+        return [np.abs(np.log(part.predict(each[test]) / target[test])).mean() for each in seen]
+
+    seen = rows, moved
+    alone, both = errors(rows), errors(moved)
+    assert alone[0] < 0.1
+    assert both[0] < 0.15
+    assert both[1] < 0.25 * alone[1]
+
+
+def test_few_records_train_no_net(task):
+    rows, target, groups = task
+    fitted = fit_blend(rows, target, group_folds(groups, n=3, seed=0))
+    assert "nets" not in {option.name for option in fitted.options}

@@ -12,11 +12,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .nets import FEWEST_RECORDS, Nets, fit_nets
+
 Float = NDArray[np.float64]
 Index = NDArray[np.intp]
 Folds = Sequence[tuple[Index, Index]]
 
 _TREES = 100
+_ROUNDS = 200, 0.08  # of boosting, and what each adds of what is missing
+_MANY_ROUNDS = 400, 0.05
+_MANY_RECORDS = 1000
 _LEAST_WEIGHT = 0.02  # of a blend: a part that says less is left out, and its time saved
 _TIE = 0.01  # of the error: a blend that is no better than this is not worth its time
 _SLACK = 0.1  # of a feature's range: as far beyond it a line may go on
@@ -105,7 +110,7 @@ class Forest:
         return _back(self.value[node].sum(axis=1) + self.offset, self.log)
 
 
-Part = Linear | Forest
+Part = Linear | Forest | Nets
 
 
 def _back(value: Float, log: bool) -> Float:
@@ -121,15 +126,15 @@ class Blend:
     ----------
     names : tuple of str
         Candidate that each part is of.
-    parts : tuple of Linear or Forest
+    parts : tuple of Linear, Forest or Nets
     weights : numpy.ndarray [shape=(n_parts,)]
         Positive, of sum 1.
     low, high : float
         Estimates outside are set to the bound: a factor of two beyond what was trained, where an
         estimate is a bound anyway.
     tube : float
-        Lines may point this far from the trees, as a logarithm; farther, they are set to it: what
-        99 of 100 held-out records keep to. 0 where all parts are of one kind.
+        Lines and nets may point this far from the trees, as a logarithm; farther, they are set to
+        it: what 99 of 100 held-out records keep to. 0 where all parts are of one kind.
 
     Examples
     --------
@@ -152,60 +157,67 @@ class Blend:
 
     def predict(self, rows: Float) -> Float:
         """Target [shape=(n,)] of feature rows [shape=(n, n_features)]."""
-        lines, trees = self._sides(rows)
-        share = float(self.weights @ self._straight)
-        return np.clip(together(lines, trees, share, self.tube), self.low, self.high)
+        smooth, trees = self._sides(rows)
+        share = float(self.weights @ self._smooth)
+        return np.clip(together(smooth, trees, share, self.tube), self.low, self.high)
 
     def disagreement(self, rows: Float) -> Float:
-        """How far lines and trees are apart, as a logarithm [shape=(n,)]; 0 of one kind alone."""
-        lines, trees = self._sides(rows)
-        return np.abs(np.log(lines / trees))
+        """How far smooth parts and trees are apart, as a logarithm [shape=(n,)]; 0 of one kind."""
+        smooth, trees = self._sides(rows)
+        return np.abs(np.log(smooth / trees))
 
     def _sides(self, rows: Float) -> tuple[Float, Float]:
         found = np.stack([part.predict(rows) for part in self.parts], axis=1)
-        return sides(np.clip(found, self.low, self.high), self.weights, self._straight)
+        return sides(np.clip(found, self.low, self.high), self.weights, self._smooth)
 
     @property
-    def _straight(self) -> Float:
-        return np.array([isinstance(part, Linear) for part in self.parts], dtype=np.float64)
+    def _smooth(self) -> Float:
+        return np.array([is_smooth(part) for part in self.parts], dtype=np.float64)
 
 
-def together(lines: Float, trees: Float, share: float, tube: float) -> Float:
-    """Mean of lines, of this share, and trees; lines are held within the tube round the trees."""
+def is_smooth(part: Part) -> bool:
+    """Whether a part goes on beyond what it learnt, as a line or a net does and no tree."""
+    return not isinstance(part, Forest)
+
+
+def together(smooth: Float, trees: Float, share: float, tube: float) -> Float:
+    """Mean of smooth parts, of this share, and trees, which hold them within the tube."""
     if 0 < share < 1:
-        lines = trees * np.exp(np.clip(np.log(lines / trees), -tube, tube))
-    return np.asarray(share * lines + (1 - share) * trees)
+        smooth = trees * np.exp(np.clip(np.log(smooth / trees), -tube, tube))
+    return np.asarray(share * smooth + (1 - share) * trees)
 
 
-def sides(found: Float, weights: Float, straight: Float) -> tuple[Float, Float]:
-    """Estimates of the lines and of the trees; where one kind is missing, those of the other.
+def sides(found: Float, weights: Float, smooth: Float) -> tuple[Float, Float]:
+    """Estimates of smooth parts and of trees; where one kind is missing, those of the other.
 
     Parameters
     ----------
     found : numpy.ndarray [shape=(…, n, n_parts)]
-    weights, straight : numpy.ndarray [shape=(n_parts,)]
-        One where a part is a line.
+    weights, smooth : numpy.ndarray [shape=(n_parts,)]
+        One where a part is smooth, see :func:`is_smooth`.
 
     Returns
     -------
-    lines, trees : numpy.ndarray [shape=(…, n)]
+    smooth, trees : numpy.ndarray [shape=(…, n)]
 
     Examples
     --------
-    >>> lines, trees = sides(np.array([[1.0, 2.0, 4.0]]), np.full(3, 1 / 3), np.array([1, 0, 0]))
-    >>> lines.tolist(), trees.round(9).tolist()
+    >>> line, trees = sides(np.array([[1.0, 2.0, 4.0]]), np.full(3, 1 / 3), np.array([1, 0, 0]))
+    >>> line.tolist(), trees.round(9).tolist()
     ([1.0], [3.0])
     """
-    own = [weights * straight, weights * (1 - straight)]
-    lines, trees = (each if each.any() else weights for each in own)
-    return found @ lines / lines.sum(), found @ trees / trees.sum()
+    own = [weights * smooth, weights * (1 - smooth)]
+    one, other = (each if each.any() else weights for each in own)
+    return found @ one / one.sum(), found @ other / other.sum()
 
 
 # --- candidates
 
+Fit = Callable[[Float, Float, Float, int], Part]
 
-def _ridge(penalty: float, *, log: bool) -> Callable[[Float, Float, int], Part]:
-    def fit(rows: Float, target: Float, _seed: int) -> Part:
+
+def _ridge(penalty: float, *, log: bool) -> Fit:
+    def fit(rows: Float, _moved: Float, target: Float, _seed: int) -> Linear:
         from sklearn.linear_model import Ridge
         from sklearn.preprocessing import StandardScaler
 
@@ -232,7 +244,7 @@ def _share(tried: int, rows: Float) -> float:
     return min(1.0, tried / int(rows.shape[1]))
 
 
-def _fit_trees(rows: Float, target: Float, seed: int) -> Part:
+def _fit_trees(rows: Float, _moved: Float, target: Float, seed: int) -> Part:
     """Extremely randomised trees."""
     from sklearn.ensemble import ExtraTreesRegressor
 
@@ -253,14 +265,15 @@ def _fit_trees(rows: Float, target: Float, seed: int) -> Part:
     return _forest(tables, offset=0.0, log=True)
 
 
-def _fit_boosting(rows: Float, target: Float, seed: int) -> Part:
+def _fit_boosting(rows: Float, _moved: Float, target: Float, seed: int) -> Part:
     """Boosted trees over histograms of the features."""
     from sklearn.ensemble import HistGradientBoostingRegressor
     from threadpoolctl import threadpool_limits
 
+    rounds, rate = _MANY_ROUNDS if len(rows) >= _MANY_RECORDS else _ROUNDS
     model = HistGradientBoostingRegressor(
-        max_iter=200,
-        learning_rate=0.08,
+        max_iter=rounds,
+        learning_rate=rate,
         max_leaf_nodes=15,
         max_features=_share(160, rows),
         random_state=seed,
@@ -281,6 +294,10 @@ def _fit_boosting(rows: Float, target: Float, seed: int) -> Part:
         for table in nodes
     ]
     return _forest(tables, offset=float(np.ravel(model._baseline_prediction)[0]), log=True)
+
+
+def _nets(rows: Float, moved: Float, target: Float, seed: int) -> Part:
+    return fit_nets(rows, moved, target, seed)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -333,12 +350,16 @@ class RegressionCandidate:
     cost_ms : float
         Of one prediction [ms].
     fit : callable
-        ``fit(rows, target, seed)`` gives the part; the target is > 0.
+        ``fit(rows, moved, target, seed)`` gives the part; `moved` are the same records on other
+        machines, the target is > 0.
+    fewest : int
+        Records that it needs.
     """
 
     name: str
     cost_ms: float
-    fit: Callable[[Float, Float, int], Part]
+    fit: Fit
+    fewest: int = 0
 
 
 _PENALTIES = (3.0, 30.0, 300.0)  # of ridges on standardised features
@@ -357,6 +378,7 @@ CANDIDATES: tuple[RegressionCandidate, ...] = (
     ),
     RegressionCandidate(name="trees", cost_ms=0.4, fit=_fit_trees),
     RegressionCandidate(name="boosting", cost_ms=0.4, fit=_fit_boosting),
+    RegressionCandidate(name="nets", cost_ms=0.4, fit=_nets, fewest=FEWEST_RECORDS),
 )
 """From fast to strong, lines of the logarithm first. The costs are tabulated, not timed at each
 training, so that the choice is the same on every computer: measured for one recording of 1,500
@@ -491,7 +513,8 @@ def fit_blend(
     'ridge 3'
     """
     limit = BUDGET_MS if budget_ms is None else budget_ms
-    usable = [item for item in candidates if item.cost_ms <= limit]
+    enough = [item for item in candidates if item.fewest <= len(target)]
+    usable = [item for item in enough if item.cost_ms <= limit]
     if not usable:
         cheapest = min(candidate.cost_ms for candidate in candidates)
         raise ValueError(
@@ -499,9 +522,9 @@ def fit_blend(
         )
     bounds = (float(target.min()) / _FAR, float(target.max()) * _FAR)
     asked = (rows, rows if shifted is None else shifted)
-    both = [_out_of_fold(item, rows, asked, target, folds, seed) for item in usable]
+    both = [_out_of_fold(item, asked, target, folds, seed) for item in usable]
     tables = np.clip(np.stack(both, axis=2), *bounds)
-    return _chosen(usable, tables, rows, target, folds, seed=seed, limit=limit, bounds=bounds)
+    return _chosen(usable, tables, asked, target, folds, seed=seed, limit=limit, bounds=bounds)
 
 
 def fit_line(
@@ -524,7 +547,7 @@ def fit_line(
     """
     lines = {each.name: each for each in CANDIDATES if each.name in WITNESSES}
     best = min((o for o in options if o.name in lines), key=lambda option: option.error)
-    part = lines[best.name].fit(rows, target, seed)
+    part = lines[best.name].fit(rows, rows, target, seed)
     assert isinstance(part, Linear)
     room = _ENDLESS * part.spread
     return replace(part, low=part.centre - room, high=part.centre + room)
@@ -532,7 +555,6 @@ def fit_line(
 
 def _out_of_fold(
     candidate: RegressionCandidate,
-    rows: Float,
     asked: tuple[Float, Float],
     target: Float,
     folds: Folds,
@@ -541,7 +563,7 @@ def _out_of_fold(
     """Estimates of every record as it is and shifted [shape=(2, n)]."""
     estimate = np.empty((2, len(target)))
     for train, test in folds:
-        part = candidate.fit(rows[train], target[train], seed)
+        part = candidate.fit(asked[0][train], asked[1][train], target[train], seed)
         estimate[:, test] = [part.predict(each[test]) for each in asked]
     return estimate
 
@@ -549,7 +571,7 @@ def _out_of_fold(
 def _chosen(
     usable: Sequence[RegressionCandidate],
     tables: Float,
-    rows: Float,
+    asked: tuple[Float, Float],
     target: Float,
     folds: Folds,
     *,
@@ -572,24 +594,25 @@ def _chosen(
     )
     kept = np.flatnonzero(weights).tolist()
     members = [usable[i] for i in kept]
-    straight = np.array([item.name in _line_names() for item in members], dtype=np.float64)
-    lines, trees = sides(tables[:, :, kept], weights[kept], straight)
-    apart, strange = np.abs(np.log(lines / trees))
+    parts = tuple(item.fit(*asked, target, seed) for item in members)
+    smooth = np.array([is_smooth(part) for part in parts], dtype=np.float64)
+    held, trees = sides(tables[:, :, kept], weights[kept], smooth)
+    apart, strange = np.abs(np.log(held / trees))
     tube = float(np.quantile(apart, _USUAL))
     blend = Blend(
         names=tuple(item.name for item in members),
-        parts=tuple(item.fit(rows, target, seed) for item in members),
+        parts=parts,
         weights=weights[kept],
         low=bounds[0],
         high=bounds[1],
         tube=tube,
     )
-    held = together(lines[1], trees[1], float(weights[kept] @ straight), tube)
+    elsewhere = together(held[1], trees[1], float(weights[kept] @ smooth), tube)
     return Fitted(
         blend=blend,
         estimate=estimate,
         disagreement=apart,
-        shifted_estimate=held,
+        shifted_estimate=elsewhere,
         shifted_disagreement=strange,
         options=_front(options),
         chosen=best.name,

@@ -10,14 +10,15 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from ...features.catalogue.catalogue import SetName
 from ...sim.output.sensor import RATE_LEAST, RATE_MOST
-from ..learning.regressions import Blend, Forest, Linear
+from ..learning.nets import Nets
+from ..learning.regressions import Blend, Forest, Linear, Part
 from .novelty import Familiarity
 
 _LARGEST_NUMBER = 1e60  # of an array: products of a few are still finite
 _LEAST_SPREAD = 1e-60
 _DEEPEST = 256  # steps down a tree: four times what 10^5 records grow
 
-_PART_KINDS: dict[str, Any] = {"linear": Linear, "forest": Forest}
+_PART_KINDS: dict[str, Any] = {"linear": Linear, "forest": Forest, "nets": Nets}
 """Kinds of the parts of a blend."""
 
 
@@ -43,7 +44,7 @@ class BlendStructure(Strict):
     """Which parts a blend has; their numbers are in the arrays."""
 
     names: list[str] = Field(min_length=1, max_length=100)
-    kinds: list[Literal["linear", "forest"]] = Field(min_length=1, max_length=100)
+    kinds: list[Literal["linear", "forest", "nets"]] = Field(min_length=1, max_length=100)
     low: float
     high: float
     tube: float = Field(ge=0)
@@ -223,11 +224,14 @@ def blend_fits(blend: Blend, n: int) -> bool:
         and bool((weights > 0).all())
         and abs(float(weights.sum()) - 1) < _ROUNDING
         and blend.low < blend.high
-        and all(
-            linear_fits(part, n) if isinstance(part, Linear) else _forest_fits(part, n)
-            for part in blend.parts
-        )
+        and all(_part_fits(part, n) for part in blend.parts)
     )
+
+
+def _part_fits(part: Part, n: int) -> bool:
+    if isinstance(part, Linear):
+        return linear_fits(part, n)
+    return _nets_fit(part, n) if isinstance(part, Nets) else _forest_fits(part, n)
 
 
 _ROUNDING = 1e-9
@@ -245,6 +249,24 @@ def linear_fits(part: Linear, n: int) -> bool:
         and bool((part.low <= part.high).all())
         and isinstance(part.offset, float)
         and isinstance(part.log, bool)
+        and spreads_fit(part.spread)
+    )
+
+
+def _nets_fit(part: Nets, n: int) -> bool:
+    shapes = [np.shape(weights) for weights in (part.direction, part.first, part.second)]
+    if [len(shape) for shape in shapes] != [2, 3, 3]:
+        return False
+    (_, seen), (count, _, first), (_, _, second) = shapes
+    return (
+        shapes_of(part.centre, part.spread) == {(n,)}
+        and shapes == [(n, seen), (count, seen, first), (count, first, second)]
+        and np.shape(part.first_bias) == (count, first)
+        and shapes_of(part.second_bias, part.last) == {(count, second)}
+        and np.shape(part.last_bias) == (count,)
+        and count > 0
+        and isinstance(part.scale, float)
+        and isinstance(part.offset, float)
         and spreads_fit(part.spread)
     )
 

@@ -694,12 +694,12 @@ NO_BASELINE = (
 
 
 def _disagreement_cautions(asked: Estimator, inputs: Float) -> list[str]:
-    """Lines and trees learnt the same; where they part, one of them knows nothing."""
+    """Smooth parts and trees learnt the same; where they part, one of them knows nothing."""
     apart, usual = float(asked.severity.disagreement(inputs)[0]), asked.severity.tube
     if apart <= usual:
         return []
     return [
-        f"straight lines and trees of the model differ by a factor of {math.exp(apart):.3g}, "
+        f"smooth parts and trees of the model differ by a factor of {math.exp(apart):.3g}, "
         f"on familiar machines by {math.exp(usual):.3g} at most: this one is unlike them"
     ]
 

@@ -1,0 +1,137 @@
+"""Small neural networks of severity: smooth as a line, and bent where the features bend.
+
+They see a recording as some hundred principal directions of its features. What is fitted is plain
+arrays, asked with numpy alone.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Float = NDArray[np.float64]
+
+FEWEST_RECORDS = 500
+"""Records from which a net is worth its training: of fewer it learns no more than a ridge."""
+
+_DIRECTIONS = 150
+_HIDDEN = (128, 32)
+_NETS = 4
+_PENALTY = 0.1
+_BATCH = 200  # records a step
+_ROUNDS = 40
+_FARTHEST = 4.0  # deviations of a feature: where a net's own tail begins, which nothing taught
+_LARGEST = 50.0  # logarithm of an estimate: e^50 is absurd enough, and finite
+
+
+@dataclass(frozen=True, kw_only=True)
+class Nets:
+    """Mean of a few networks of two hidden layers, whose units pass what is positive.
+
+    Attributes
+    ----------
+    centre, spread : numpy.ndarray [shape=(n_features,)]
+        Features are taken as deviations, within +-4.
+    direction : numpy.ndarray [shape=(n_features, n_directions)]
+        Principal directions, scaled so that the first has one deviation over the training records.
+    first, second, last : numpy.ndarray [shape=(n_nets, n_directions, n_1), (n_nets, n_1, n_2), \
+(n_nets, n_2)]
+        Weights.
+    first_bias, second_bias, last_bias : numpy.ndarray [shape=(n_nets, n_1), (n_nets, n_2), \
+(n_nets,)]
+    scale, offset : float
+        The logarithm of the target is ``offset + scale * output``.
+    """
+
+    centre: Float
+    spread: Float
+    direction: Float
+    first: Float
+    first_bias: Float
+    second: Float
+    second_bias: Float
+    last: Float
+    last_bias: Float
+    scale: float
+    offset: float
+
+    def predict(self, rows: Float) -> Float:
+        """Target [shape=(n,)] of feature rows [shape=(n, n_features)]."""
+        seen = deviations(rows, self.centre, self.spread) @ self.direction
+        found = np.zeros(len(rows))
+        for i in range(len(self.first)):
+            hidden = np.maximum(seen @ self.first[i] + self.first_bias[i], 0.0)
+            hidden = np.maximum(hidden @ self.second[i] + self.second_bias[i], 0.0)
+            found += hidden @ self.last[i] + self.last_bias[i]
+        value = self.offset + self.scale * found / len(self.first)
+        return np.asarray(np.exp(np.clip(value, -_LARGEST, _LARGEST)))
+
+
+def deviations(rows: Float, centre: Float, spread: Float) -> Float:
+    """Standardised features, held within what a net was taught."""
+    return np.clip((rows - centre) / spread, -_FARTHEST, _FARTHEST)
+
+
+def fit_nets(rows: Float, moved: Float, target: Float, seed: int) -> Nets:
+    """Fit on records as they are and on the same records with their resonances elsewhere.
+
+    Parameters
+    ----------
+    rows, moved : numpy.ndarray [shape=(n, n_features)]
+        Both are taught, with the same target.
+    target : numpy.ndarray [shape=(n,)]
+        > 0.
+    seed : int
+        Of the weights that a net starts from, and of the order of its records.
+
+    Returns
+    -------
+    Nets
+    """
+    from sklearn.decomposition import PCA
+    from sklearn.preprocessing import StandardScaler
+
+    scaler = StandardScaler().fit(rows)
+    here = deviations(rows, scaler.mean_, scaler.scale_)
+    count = min(_DIRECTIONS, here.shape[1], len(here) // 2)
+    found = PCA(count, svd_solver="covariance_eigh").fit(here)
+    # not whitened: what the directions of small variance hold is noise for the most part
+    direction = found.components_.T / np.sqrt(found.explained_variance_[0])
+    there = deviations(moved, scaler.mean_, scaler.scale_)
+    seen = np.vstack([here, there]) @ direction
+    level = np.log(target)
+    offset, scale = float(level.mean()), float(level.std()) or 1.0
+    taught = np.tile((level - offset) / scale, 2)
+    nets = [_net(seen, taught, seed + i) for i in range(_NETS)]
+
+    def stacked(of: str, layer: int) -> Float:
+        return np.stack([np.asarray(getattr(net, of)[layer], dtype=np.float64) for net in nets])
+
+    return Nets(
+        centre=scaler.mean_,
+        spread=scaler.scale_,
+        direction=direction,
+        first=stacked("coefs_", 0),
+        first_bias=stacked("intercepts_", 0),
+        second=stacked("coefs_", 1),
+        second_bias=stacked("intercepts_", 1),
+        last=stacked("coefs_", 2)[:, :, 0],
+        last_bias=stacked("intercepts_", 2)[:, 0],
+        scale=scale,
+        offset=offset,
+    )
+
+
+def _net(seen: Float, taught: Float, seed: int) -> Any:
+    from sklearn.neural_network import MLPRegressor
+
+    net = MLPRegressor(
+        hidden_layer_sizes=_HIDDEN,
+        alpha=_PENALTY,
+        batch_size=min(_BATCH, len(seen)),
+        random_state=seed,
+    )
+    for _ in range(_ROUNDS):  # each through all records; ended by number, not when it gains little
+        net.partial_fit(seen, taught)
+    return net
