@@ -83,7 +83,7 @@ def test_generic_features_reach_their_own_noise(name):
     if name == "minirocket":  # its penalties are for ten thousand features
         features, unseen = np.tile(features, 1000), np.tile(unseen, 1000)
     fitted, tried = choose(ROWS[name], features, severity, groups, EDGES)
-    assert tried == 8
+    assert tried == 10
     # a guess at the median errs by 29 % of the limit, the noise of the column alone by 0.9 %
     assert np.abs(fitted(unseen).severity - truth).mean() < 0.12 * LIMIT
 
@@ -91,7 +91,7 @@ def test_generic_features_reach_their_own_noise(name):
 def test_every_baseline_is_tuned_as_much_as_the_model():
     assert FOLDS == 5
     for name in ("tsfel", "minirocket"):
-        assert len(ROWS[name].configurations(10)) == len(CANDIDATES)
+        assert len(ROWS[name].configurations(10)) >= len(CANDIDATES)
 
 
 def test_a_ridge_in_the_span_of_its_rows_is_the_same_ridge():
