@@ -7,8 +7,8 @@ that the node takes up by itself is a function of p alone, so a step solves one 
     pipe_flow(p) = q + demand(p) + void / h
 
 with the flow q that the pump draws, what spring, gas and relief valve take (:func:`demand`), and
-the volume of vapour at the node (:func:`excess`). Where q depends on p in turn, :func:`seek` finds
-both.
+the volume of vapour at the node (:func:`excess`). :func:`seek` finds p under a given q; where q
+depends on the pressures of two pipes in turn, :mod:`wearstate.sim.piping.coupling` finds both.
 
 A pipe is a rigid column with a spring at the node (*lumped-lines*), or carries waves between nodes
 one step of travel apart (*wave-lines*); what is left of its length beside whole reaches is a rigid
@@ -351,8 +351,6 @@ def _settled(p: float, gap: float, slope: float, pipe: Any) -> bool:
     return abs(gap) <= _TOLERANCE * (p + STANDARD_ATMOSPHERE) * slope
 
 
-_NOTABLE = 1e-3  # as the tolerance: what is left over of a step that counts as unsettled
-
 _TOLERANCE = 1e-8  # of the absolute pressure; what is left is booked as volume and made up for
 
 
@@ -361,13 +359,10 @@ SEARCH = np.dtype(
         ("pressure", "f8"),  # tried at present [Pa gauge]
         ("low", "f8"),  # excess was negative there
         ("high", "f8"),  # excess was positive there
-        ("last", "f8"),  # tried before
-        ("last_drawn", "f8"),  # what the pump drew there [m^3/s]
-        ("per_pressure", "f8"),  # by which that rose with the pressure; kept between steps
         ("tries", "i8"),  # in this step
     ]
 )
-"""A search for the pressure of a node while the pump's flow depends on it."""
+"""A search for the pressure of a node under a given flow."""
 
 MOST_TRIES = 40
 """Of a search: what is then left over is booked as volume, and made up for in the next steps."""
@@ -397,37 +392,29 @@ def seek(search: Any, drawn: float, pipe: Any, state: Any, nodes: Any, h: float)
     ----------
     search : record of dtype SEARCH
     drawn : float
-        Flow that the pump draws under the pressure tried last [m^3/s]; it never falls with it.
+        Flow that the pump draws [m^3/s].
     pipe, state, nodes, h
         As of :func:`pipe_flow`.
 
     Notes
     -----
-    Newton with the slope of the pipe and a secant of the pump's, kept inside what was tried.
+    Newton, kept inside what was tried.
     """
     if pipe.fixed != 0:
         return True
     p = search.pressure
     gap, slope = excess(p, drawn, pipe, state, nodes, h)
-    if _settled(p, gap, slope, pipe):
-        return True
-    if search.tries >= MOST_TRIES:
-        state.unsettled += abs(gap) > _NOTABLE * (p + STANDARD_ATMOSPHERE) * slope
+    if _settled(p, gap, slope, pipe) or search.tries >= MOST_TRIES:
         return True
     if gap > 0.0:
         search.high = p
     else:
         search.low = p
-    if search.tries > 0 and p != search.last:
-        search.per_pressure = max((drawn - search.last_drawn) / (p - search.last), 0.0)
     search.tries += 1
-    search.last, search.last_drawn = p, drawn
-    after = max(p - gap / (slope + search.per_pressure), pipe.vapour)
+    after = max(p - gap / slope, pipe.vapour)
     between = math.isfinite(search.high - search.low)
     if between and (not (search.low < after < search.high) or search.tries % 4 == 0):
         after = 0.5 * (search.low + search.high)
-    if search.low >= search.high:  # the other line has moved what this one was held between
-        search.low, search.high = -math.inf, math.inf
     search.pressure = after
     return False
 

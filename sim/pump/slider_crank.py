@@ -25,7 +25,7 @@ the order is kept across contact. Forces are recorded as means over the step, th
 impulses, whatever the contacts did in between. A chamber with valves is stepped after the
 mechanism, which feels its pressure extrapolated from the two steps before (second order). Where
 the throws share two lines, all chambers are tried over a step until the pressures at the lines'
-ends agree with what the pump draws (:mod:`wearstate.sim.piping.pipe`).
+ends agree with what the pump draws (:mod:`wearstate.sim.piping.coupling`).
 
 Sources: Xia, Zhang, Yu, Zhu (2017), Ship Science and Technology 39(1), 51-55; Baumgarte (1972),
 doi:10.1016/0045-7825(72)90018-7.
@@ -41,7 +41,8 @@ from numpy.typing import NDArray
 from ..contact.law import friction_force
 from ..jit import kernel, sine_cosine, subroutine
 from ..output.status import Status
-from ..piping.pipe import PIPE, PIPE_STATE, SEARCH, advance_pipe, begin_search, seek
+from ..piping.coupling import PAIR, begin_pair, seek_pair
+from ..piping.pipe import PIPE, PIPE_STATE, advance_pipe
 from .hydraulics import PRESSURE_CHAMBER, chamber_step, line_pressure
 from .oiled_joint import oiled_joint
 from .throw_motion import (
@@ -232,7 +233,7 @@ class _Shared(NamedTuple):
     """The lines with the scratch of their coupling."""
 
     lines: Any  # of LinePair
-    searches: NDArray[np.void]  # (2,) of SEARCH
+    pairs: NDArray[np.void]  # (1,) of PAIR
     trials: NDArray[np.float64]  # (n_throws, 6): chambers at the end of a step that is tried
 
 
@@ -865,8 +866,8 @@ def _try_chambers(w: Any, i: int, h: float, t: Any, chamber: Any, shared: Any) -
     fault, suction, discharge = 0, 0.0, 0.0
     for k in range(t.throws.shape[0]):
         b, liquid, trial, flow = w.stage[i, k], t.liquid[k], shared.trials[k], w.held[k].flow
-        liquid.suction = shared.searches[0].pressure
-        liquid.discharge = shared.searches[1].pressure
+        liquid.suction = shared.pairs[0].pressure[0]
+        liquid.discharge = shared.pairs[0].pressure[1]
         for c in range(6):
             trial[c] = chamber[k, c]
         x, v, substeps = b.y[PISTON_X], b.y[PISTON_X_RATE], t.throws[k].substeps
@@ -881,18 +882,16 @@ def _breathe_on_lines(
     w: Any, i: int, h: float, t: Any, chamber: Any, shared: Any, forces: Any, step: int
 ) -> int:
     """Step all chambers and both lines together; pressures for the next step."""
-    lines, searches = shared.lines, shared.searches
-    inlet, outlet = lines.pipes[0], lines.pipes[1]
-    before, after = lines.suction_nodes, lines.discharge_nodes
-    begin_search(searches[0], inlet, lines.states[0])
-    begin_search(searches[1], outlet, lines.states[1])
+    lines, pair = shared.lines, shared.pairs[0]
+    pipes, states = lines.pipes, lines.states
+    nodes = (lines.suction_nodes, lines.discharge_nodes)
+    begin_pair(pair, pipes, states)
     fault, drawn, pushed, found = 0, 0.0, 0.0, False
     while not found and fault == 0:
         fault, drawn, pushed = _try_chambers(w, i, h, t, chamber, shared)
-        found = seek(searches[0], drawn / h, inlet, lines.states[0], before, h)
-        found &= seek(searches[1], -pushed / h, outlet, lines.states[1], after, h)
-    advance_pipe(searches[0].pressure, drawn / h, inlet, lines.states[0], before, h)
-    advance_pipe(searches[1].pressure, -pushed / h, outlet, lines.states[1], after, h)
+        found = seek_pair(pair, drawn / h, -pushed / h, pipes, states, nodes, h)
+    advance_pipe(pair.pressure[0], drawn / h, pipes[0], states[0], nodes[0], h)
+    advance_pipe(pair.pressure[1], -pushed / h, pipes[1], states[1], nodes[1], h)
     for k in range(t.throws.shape[0]):
         held, b, f = w.held[k], w.stage[i, k], 1 + len(FORCES) * k
         last, now = chamber[k, 0], shared.trials[k, 0]
@@ -1152,7 +1151,7 @@ def run_mechanism(
     )
     shared = _Shared(
         lines=_NO_LINES if lines is None else lines,
-        searches=np.zeros(2, SEARCH),
+        pairs=np.zeros(1, PAIR),
         trials=np.zeros((n, 6)),
     )
     if lines is not None:  # the pressures before and after the valves are those of the lines
