@@ -33,6 +33,11 @@ ACC = Channel(name="acc", unit="m/s^2", quantity="acceleration")
 SHAPES = {f"casing.modes.{i}.shape.{key}": 1.5 for i in range(8) for key in ("acc_x", "bearing_x")}
 FREQUENCIES = {f"casing.modes.{i}.frequency": f"{20 + i} kHz" for i in range(8)}
 SOFT = {f"casing.modes.{i}.frequency": f"{2 + i / 10} Hz" for i in range(8)}
+PIPES = {
+    "pressure.rung": "lumped-lines",
+    "pressure.suction_line.wave_speed": "1470 m/s",
+    "pressure.discharge_line.wave_speed": "1490 m/s",
+}
 NODES = {f"casing.modes.{i}.shape.acc_x": 0 for i in range(8)}
 BALANCED = {f"discs.{i}.unbalance": 0 for i in range(5)} | {
     "turbulence": [],
@@ -85,6 +90,11 @@ DOUBTFUL = {
     "sensor at nodes": (
         ("bilge-pump", NODES),
         "sensors: 'acc_x' moves in none of 8 casing modes that a force drives",
+    ),
+    "fast waves": (
+        ("bilge-pump", PIPES),
+        r"pressure.discharge_line.wave_speed = 1490 m/s is above the speed of sound .* = 1478 m/s, "
+        "the limit of a rigid pipe",
     ),
     "no excitation of a shaft": (("propulsion-shaft", BALANCED), "0 of them have an unbalance"),
     "no excitation of a journal": (

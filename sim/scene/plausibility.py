@@ -19,6 +19,7 @@ from ..output.sensor import Channel
 from .journal import JournalScene
 from .parts import CasingMode, Scene
 from .pump import FORCE_PLACES, PumpScene
+from .pump_hydraulics import PIPED_RUNGS
 from .shaft import ShaftScene
 
 Signal = NDArray[np.float32]
@@ -253,6 +254,28 @@ def _driven(mode: CasingMode) -> bool:
     return any(value for key, value in mode.shape.items() if key.startswith(FORCE_PLACES))
 
 
+def _fast_waves(pump: PumpScene) -> Iterator[str]:
+    """Pipes whose waves outrun sound in their liquid without air.
+
+    Korteweg (1878): ``a = c / sqrt(1 + K D / (E e))`` in a pipe of modulus E and wall e, so a rigid
+    one has the speed of sound c of the liquid itself, and any other less.
+    """
+    pressure = pump.pressure
+    if pressure.rung not in PIPED_RUNGS:
+        return
+    airless = pressure.liquid.model_copy(update={"air_fraction": 0.0})
+    sides = (("suction", pressure.suction_line), ("discharge", pressure.discharge_line))
+    for (side, line), level in zip(sides, pressure.at_pump, strict=True):
+        most = airless.wave_speed(level)
+        if line is not None and line.wave_speed is not None and line.wave_speed > most:
+            yield (
+                f"pressure.{side}_line.wave_speed = {line.wave_speed:g} m/s is above the speed of "
+                f"sound in the liquid without air at {level:.3g} Pa = {most:.4g} m/s, the limit of "
+                "a rigid pipe, usual are 0.7 to 0.95 times that in steel; lower it, or raise "
+                "pressure.liquid.bulk_modulus"
+            )
+
+
 def _unexcited_shaft(shaft: ShaftScene) -> Iterator[str]:
     propeller, coupling = shaft.propeller, shaft.coupling
     excited = (
@@ -327,6 +350,12 @@ SCENE_CHECKS: tuple[SceneCheck, ...] = (
         machine=PumpScene,
         function=_nodes,
         usual="every sensor moves in most modes",
+    ),
+    SceneCheck(
+        name="fast waves",
+        machine=PumpScene,
+        function=_fast_waves,
+        usual="0.7 to 0.95 times the speed of sound of the liquid without air",
     ),
     SceneCheck(
         name="no excitation",
