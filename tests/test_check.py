@@ -20,7 +20,8 @@ from wearstate.datasets.file.record import (
     manifest_hash,
     signal_checksum,
 )
-from wearstate.datasets.generation.generate import NUMERICS, generate
+from wearstate.datasets.generation.generate import generate
+from wearstate.datasets.generation.work import NUMERICS
 from wearstate.datasets.recipe.recipe import load_recipe
 from wearstate.datasets.recipe.text import recipe_names
 from wearstate.diagnose.command_line.cli import cli

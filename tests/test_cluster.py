@@ -175,18 +175,18 @@ def test_what_the_function_raises_is_raised(pair):
 
 def test_a_refusal_there_must_be_one_here(pair, recipe, tmp_path, monkeypatch):
     """A worker may lack a file of the scene, and would make rows of failures of it."""
-    monkeypatch.setattr("wearstate.datasets.generation.generate._simulated", refused_unless_here)
+    monkeypatch.setattr("wearstate.datasets.generation.generate.simulated", refused_unless_here)
     with pytest.raises(WorkersError, match=r"record 0 is refused by a worker \(no such file\) and"):
         generate(recipe, 2, tmp_path / "data.h5", scheduler=pair.address)
 
 
 def refused_unless_here(sample, *, truth, error):
-    from wearstate.datasets.generation.generate import _Outcome, _silence
+    from wearstate.datasets.generation.work import RecordOutcome, silence
 
     lacking = None if os.getpid() == HERE else sample
     fault = "no such file" if lacking else ""
     row = {**sample.row, "status": "refused" if lacking else "ok"}
-    return _Outcome(sample.index, _silence(sample.scene), row, {}, fault, lacking)
+    return RecordOutcome(sample.index, silence(sample.scene), row, {}, fault, lacking)
 
 
 HERE = os.getpid()

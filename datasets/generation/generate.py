@@ -20,9 +20,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...sim.atomic import OutputError
-from ...sim.machine.simulate import simulate, simulate_many, simulates_together
+from ...sim.machine.simulate import simulates_together
 from ...sim.output.recording import DataError, Recording
-from ...sim.scene.parts import Scene, SceneError, channels_of
+from ...sim.scene.parts import Scene, channels_of
 from ...sim.wear.archard import grade
 from ..file.lock import holding
 from ..file.record import (
@@ -50,48 +50,21 @@ from ..split.stored import Drawn, default_splits, split_names
 from ..workers.local import in_order
 from ..workers.pool import WorkersError
 from .fidelity_choice import FidelityChoice, choose, with_choice
-
-NUMERICS = {
-    "rung_joint": "S16",
-    "rung_wristpin": "S16",
-    "rung_guide": "S16",
-    "rung_pressure": "S16",
-    "rung_drive": "S16",
-    "rung_film": "S16",
-    "contact_law": "S24",
-    "frf_sha256": "S64",
-    "mean_speed_hz": "<f8",
-    "step_s": "<f8",
-    "steps": "<i8",
-    "step_per_contact_time": "<f8",
-    "contact_changes": "<i8",
-    "cuts_refused": "<i8",
-    "peak_normal_force_n": "<f8",
-    "min_film_m": "<f8",
-    "peak_eccentricity": "<f8",
-    "least_reaction_n": "<f8",
-    "motion_share": "<f8",
-    "cavitating_share": "<f8",
-    "lift_left": "<f8",
-    "tension_share": "<f8",
-    "floored_share": "<f8",
-    "residual": "<f8",
-    "estimated_error": "<f8",
-    "stability_margin": "<f8",
-    "least_damping_ratio": "<f8",
-    "least_damped_hz": "<f8",
-    "clipped_samples": "<i8",
-}
-"""Manifest columns taken from a solution; -1, NaN or empty where it does not give them."""
+from .work import (
+    NUMERICS,
+    RecordJob,
+    RecordOutcome,
+    each_alone,
+    numerics_of,
+    simulated,
+    together,
+)
 
 _TOGETHER = 64
 """Records of a batch: enough of each kind to fill the lanes, few enough to be kept in memory."""
 
 _FEWEST = 5
 """Records of a batch that is worth it."""
-
-REFUSED = "refused"
-"""Status of a record whose drawn scene the simulation does not accept."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -128,18 +101,6 @@ class Summary:
     first_failures: tuple[str, ...]
     n_clipped: int
     fidelity: FidelityChoice | None = None
-
-
-@dataclass(frozen=True)
-class _Outcome:
-    """What a worker sends back: arrays and plain values only."""
-
-    index: int
-    signal: NDArray[np.float32]
-    row: dict[str, Any]
-    truth: dict[str, NDArray[np.float32]]
-    fault: str
-    refused: Sample | None = None
 
 
 class Stopped(KeyboardInterrupt):
@@ -246,7 +207,7 @@ def generate(
         plan = with_choice(plan, choice)
         tally = _Tally(count, choice)
         error = None if choice is None else choice.estimated_error
-        work = partial(_simulated, truth=truth, error=error)
+        work = partial(simulated, truth=truth, error=error)
         with (
             _writer(
                 plan, count, path, seed=seed, force=force, truth=truth, choice=choice
@@ -258,7 +219,7 @@ def generate(
             jobs = min(jobs, max(1, count - tally.n_resumed))
             size = 1 if truth else _batch_size(plan.scene, count - tally.n_resumed, jobs)
             found = in_order(
-                partial(_each, work) if size == 1 else partial(_together, error=error),
+                partial(each_alone, work) if size == 1 else partial(together, error=error),
                 _batches(samples, size),
                 jobs=jobs,
                 scheduler=scheduler,
@@ -331,7 +292,7 @@ def _kept(writer: DataSetWriter) -> str:
     )
 
 
-def _refuse_refusal(outcome: _Outcome, work: Callable[[Sample], _Outcome]) -> None:
+def _refuse_refusal(outcome: RecordOutcome, work: Callable[[RecordJob], RecordOutcome]) -> None:
     """A worker elsewhere may only lack a file that the scene names: ask again here."""
     if outcome.refused is not None and work(outcome.refused).refused is None:
         raise WorkersError(
@@ -441,67 +402,10 @@ def _batch_size(scene: Scene, todo: int, jobs: int) -> int:
     return math.ceil(each / rounds) if simulates_together(scene) and each >= _FEWEST else 1
 
 
-def _batches(samples: Iterable[Sample], size: int) -> Iterator[tuple[Sample, ...]]:
-    ahead = iter(samples)
+def _batches(samples: Iterable[Sample], size: int) -> Iterator[tuple[RecordJob, ...]]:
+    ahead = (RecordJob(each.index, each.seed, each.row, each.scene) for each in samples)
     while batch := tuple(islice(ahead, size)):
         yield batch
-
-
-def _each(work: Callable[[Sample], _Outcome], samples: tuple[Sample, ...]) -> list[_Outcome]:
-    return [work(sample) for sample in samples]
-
-
-def _together(samples: tuple[Sample, ...], *, error: float | None) -> list[_Outcome]:
-    """Simulate records side by side; runs in a worker."""
-    found = {
-        number: _refused(samples[number], str(solution))
-        if isinstance(solution, SceneError)
-        else _outcome(samples[number], solution, error)
-        for number, solution in simulate_many([(each.scene, each.seed) for each in samples])
-    }
-    return [found[number] for number in range(len(samples))]
-
-
-def _simulated(sample: Sample, *, truth: bool, error: float | None) -> _Outcome:
-    """Simulate one record; runs in a worker."""
-    try:
-        solution = simulate(sample.scene, seed=sample.seed, truth=truth, raise_on_failure=False)
-    except SceneError as fault:
-        return _refused(sample, str(fault))
-    return _outcome(sample, solution, error)
-
-
-def _outcome(sample: Sample, solution: Recording, error: float | None) -> _Outcome:
-    """An error measured on pilots replaces a record's own guess."""
-    status = solution.status
-    row = {**sample.row, "status": status.name.lower(), **_numerics(solution)}
-    return _Outcome(
-        index=sample.index,
-        signal=solution.signal,
-        row=row if error is None else {**row, "estimated_error": error},
-        truth={name: array.astype(np.float32) for name, array in solution.truth.items()},
-        fault="" if status.ok else status.text,
-    )
-
-
-def _refused(sample: Sample, text: str) -> _Outcome:
-    return _Outcome(
-        index=sample.index,
-        signal=_silence(sample.scene),
-        row={**sample.row, "status": REFUSED},
-        truth={},
-        fault=text,
-        refused=sample,
-    )
-
-
-def _silence(scene: Scene) -> NDArray[np.float32]:
-    n_samples = round(scene.duration * scene.sample_rate)
-    return np.zeros((len(channels_of(scene)), n_samples), dtype=np.float32)
-
-
-def _numerics(solution: Recording) -> dict[str, Any]:
-    return {name: value for name, value in solution.numerics.items() if name in NUMERICS}
 
 
 class _Tally:
@@ -512,7 +416,7 @@ class _Tally:
         self.n_resumed = 0
         self.faults: list[str] = []
 
-    def note(self, outcome: _Outcome) -> None:
+    def note(self, outcome: RecordOutcome) -> None:
         if outcome.fault and len(self.faults) < 3:
             self.faults.append(f"record {outcome.index}: {outcome.fault}")
 
@@ -577,7 +481,7 @@ def save_solution(
         "status": solution.status.name.lower(),
         "speed_hz": condition_of(scene, "speed_hz"),
         **severity,
-        **_numerics(solution),
+        **numerics_of(solution),
     }
     if limits:
         row["grade"] = grade(severity[primary], limits["grade_edges"])

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...datasets.generation.generate import NUMERICS
+from ...datasets.generation.work import NUMERICS
 from ...datasets.recipe.draws import Draw, Range, matches
 from ...datasets.recipe.recipe import Recipe, Sample, limit_faults, sample_records
 from ...sim.fidelity.ladder import cost_of, effects_of

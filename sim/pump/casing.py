@@ -1,7 +1,7 @@
 """Force to housing acceleration: the casing as a set of modes, or as it was measured."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
@@ -29,6 +29,7 @@ _AHEAD = 8  # steps that a mode takes at once, the widest vector of doubles
 _BLOCK = 576  # steps
 _ROW = 640
 _KEPT = 512  # samples of a block of the decimation
+_PIECE = 16 * _BLOCK  # steps that are driven at once: what is on its way stays near the processor
 _AT_ONCE = 8  # taps
 
 
@@ -81,15 +82,9 @@ def exact_oscillator(
 
 @kernel
 def _read(row: Any, first: int, block: Any) -> None:
-    """A block of forces with those about it; before the first and after the last these stand."""
-    last = row.size - 1
-    begin = first - _REACH
-    if begin >= 0 and begin + _BLOCK + 2 * _REACH <= row.size:
-        for i in range(_BLOCK + 2 * _REACH):
-            block[i] = row[np.uint64(begin + i)]  # unsigned: no index counts from the end
-    else:
-        for i in range(_BLOCK + 2 * _REACH):
-            block[i] = row[min(max(begin + i, 0), last)]
+    """A block of forces with those about it."""
+    for i in range(_BLOCK + 2 * _REACH):
+        block[i] = row[np.uint64(first + i)]  # unsigned: no index counts from the end
 
 
 @kernel
@@ -154,6 +149,8 @@ def _write(total: Any, first: int, n: int, row: Any) -> None:
 @kernel
 def _respond(
     forces: Any,
+    fresh: bool,
+    acceleration: Any,
     taps: Any,
     inputs: Any,
     direct: Any,
@@ -169,24 +166,24 @@ def _respond(
     x: Any,
     y: Any,
     total: Any,
-    acceleration: Any,
 ) -> None:
     """Bare modal masses under `forces`, and what springs and dashpots of every mode take back.
 
-    These feel straight lines between the forces filtered by the symmetric `taps`; they start in
-    balance with the first of them. Coefficients are those of :class:`_Steps`; `raised` and what
-    follows are scratch, rows of ``_ROW``, and `states` [shape=(n_modes, 2, 8)] the last eight
-    states of every mode.
+    These feel straight lines between the forces filtered by the symmetric `taps`; where `fresh`,
+    they start in balance with the first of them. The forces are whole blocks, with those of
+    ``_REACH`` steps before and after. Coefficients are those of :class:`_Steps`; `raised` and what
+    follows are scratch, rows of ``_ROW``, of which `raised` and `states` [shape=(n_modes, 2, 8)],
+    the last eight states of every mode, go on from one call to the next.
     """
-    n_inputs, n = forces.shape
-    for first in range(0, n, _BLOCK):
+    for first in range(0, acceleration.shape[1], _BLOCK):
+        begins = fresh and first == 0
         total[:] = 0.0
-        for j in range(n_inputs):
+        for j in range(len(forces)):
             for i in range(_AHEAD):
                 raised[j, i] = raised[j, i + _BLOCK]
             _read(forces[j], first, block)
             _raise(block, taps, raised[j])
-            if first == 0:
+            if begins:
                 for i in range(_AHEAD):
                     raised[j, i] = raised[j, _AHEAD]
             for k in range(len(total)):
@@ -197,8 +194,8 @@ def _respond(
                 _add_pair(force, inputs[m, j], raised[j], inputs[m, j + 1], raised[j + 1])
             for i in range(_AHEAD):
                 balance = turns[m, 5] * force[0]
-                x[i] = balance.real if first == 0 else states[m, 0, i]
-                y[i] = balance.imag if first == 0 else states[m, 1, i]
+                x[i] = balance.real if begins else states[m, 0, i]
+                y[i] = balance.imag if begins else states[m, 1, i]
             _gather_four(force, turns[m], real, imaginary)
             _turn_eight(real, imaginary, turns[m], x, y)
             for i in range(_AHEAD):
@@ -206,7 +203,7 @@ def _respond(
             for k in range(len(total)):
                 _add_modal(total[k], swings[m, k].imag, x, swings[m, k].real, y)
         for k in range(len(total)):
-            _write(total[k], first, min(_BLOCK, n - first), acceleration[k])
+            _write(total[k], first, _BLOCK, acceleration[k])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -266,35 +263,60 @@ def _steps(
     return (felt * after).imag, turns, felt * (one * after + before)
 
 
-def _acceleration(
-    forces: NDArray[np.float64], taps: NDArray[np.float64], sample_rate: float, modes: CasingModes
-) -> NDArray[np.float64]:
-    """Acceleration [shape=(n_outputs, n_samples)] where springs feel the forces through `taps`."""
-    share, turns, swings = _steps(modes, 1 / sample_rate)
-    n_inputs, n_outputs = modes.inputs.shape[1], modes.outputs.shape[1]
-    pairs = max(1, -(-n_inputs // 2))
-    block, force, real, imaginary, x, y = np.zeros((6, _ROW))
-    acceleration = np.empty((n_outputs, len(forces)))
-    _respond(
-        np.ascontiguousarray(forces.T),
-        taps,
-        np.pad(modes.inputs, ((0, 0), (0, 2 * pairs - n_inputs))),
-        modes.outputs.T @ modes.inputs,
-        (modes.outputs * share[:, None]).T @ modes.inputs,
-        turns,
-        modes.outputs * swings[:, None],
-        np.zeros((2 * pairs, _ROW)),
-        np.zeros((len(turns), 2, _AHEAD)),
-        block,
-        force,
-        real,
-        imaginary,
-        x,
-        y,
-        np.zeros((n_outputs, _ROW)),
-        acceleration,
-    )
-    return acceleration
+class _ModesInMotion:
+    """Modes of a casing under forces that come piece by piece, their springs feeling `taps`."""
+
+    def __init__(self, modes: CasingModes, taps: NDArray[np.float64], step_rate: float) -> None:
+        share, turns, swings = _steps(modes, 1 / step_rate)
+        n_inputs, n_outputs = modes.inputs.shape[1], modes.outputs.shape[1]
+        pairs = max(1, -(-n_inputs // 2))
+        self._window = np.empty((n_inputs, _PIECE + 2 * (_BLOCK + _REACH)))
+        self._filled = 0
+        self._fresh = True
+        self._n_outputs = n_outputs
+        self._told: tuple[Any, ...] = (
+            taps,
+            np.pad(modes.inputs, ((0, 0), (0, 2 * pairs - n_inputs))),
+            modes.outputs.T @ modes.inputs,
+            (modes.outputs * share[:, None]).T @ modes.inputs,
+            turns,
+            modes.outputs * swings[:, None],
+            np.zeros((2 * pairs, _ROW)),
+            np.zeros((len(turns), 2, _AHEAD)),
+            *np.zeros((6, _ROW)),
+            np.zeros((n_outputs, _ROW)),
+        )
+
+    def add(self, forces: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Take ``_PIECE`` steps at most; the acceleration of those that are known by now."""
+        if not self._filled:
+            self._window[:, :_REACH] = forces[:, :1]
+            self._filled = _REACH
+        return self._on(forces)
+
+    def _on(self, forces: NDArray[np.float64]) -> NDArray[np.float64]:
+        end = self._filled + forces.shape[1]
+        self._window[:, self._filled : end] = forces
+        known = (end - 2 * _REACH) // _BLOCK * _BLOCK
+        acceleration = np.empty((self._n_outputs, max(0, known)))
+        if known > 0:
+            _respond(self._window, self._fresh, acceleration, *self._told)
+            self._window[:, : end - known] = self._window[:, known:end]
+            self._fresh, end = False, end - known
+        self._filled = end
+        return acceleration
+
+    def finish(self) -> NDArray[np.float64]:
+        """Acceleration of what is left; the last forces stand."""
+        left = self._filled - _REACH
+        last = self._window[:, self._filled - 1 : self._filled]
+        more = -(-left // _BLOCK) * _BLOCK + 2 * _REACH - self._filled
+        return self._on(np.repeat(last, more, axis=1))[:, :left]
+
+
+def _pieces(rows: NDArray[np.float64]) -> Iterator[NDArray[np.float64]]:
+    for first in range(0, rows.shape[1], _PIECE):
+        yield rows[:, first : first + _PIECE]
 
 
 def housing_acceleration(
@@ -323,7 +345,9 @@ def housing_acceleration(
     ``sinc^2(f / sample_rate)``, the share of the samples' spectrum that straight lines keep;
     :func:`band_limited_acceleration` has no such loss.
     """
-    return _acceleration(forces, _AS_THEY_ARE, sample_rate, modes)
+    casing = _ModesInMotion(modes, _AS_THEY_ARE, sample_rate)
+    found = [casing.add(piece) for piece in _pieces(forces.T)]
+    return np.hstack([*found, casing.finish()])
 
 
 _AS_THEY_ARE = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])  # taps
@@ -357,7 +381,35 @@ def band_limited_acceleration(
     that loss made up for, so that they and the bare masses, which feel the means as they are,
     cancel each other below the modes as they should.
     """
-    return _decimated(_acceleration(means, line_inverse(), step_rate, modes), factor)
+    casing = ModalCasing(modes, step_rate, factor, len(means))
+    casing.add(means.T)
+    return casing.finish()
+
+
+class ModalCasing:
+    """:func:`band_limited_acceleration` of forces that come piece by piece; the same bytes.
+
+    Parameters
+    ----------
+    modes, step_rate, factor
+        As there.
+    n_steps : int
+        Of all pieces together.
+    """
+
+    def __init__(self, modes: CasingModes, step_rate: float, factor: int, n_steps: int) -> None:
+        self._modes = _ModesInMotion(modes, line_inverse(), step_rate)
+        self._low = Decimation(modes.outputs.shape[1], n_steps, factor)
+
+    def add(self, means: NDArray[np.float64]) -> None:
+        """Take the next steps, means of the forces [shape=(n_inputs, n)] [N]."""
+        for piece in _pieces(means):
+            self._low.add(self._modes.add(piece))
+
+    def finish(self) -> NDArray[np.float64]:
+        """Acceleration [shape=(n_outputs, n_steps // factor)] [m/s^2], after the last step."""
+        self._low.add(self._modes.finish())
+        return self._low.finish()
 
 
 def casing_inputs(shape: Mapping[str, float], place: str, throw: int) -> float:
@@ -434,9 +486,50 @@ def table_acceleration(
     its beginning. The casing starts in balance with the first forces, as the modes do: they have
     stood there for ever and meet the accelerance at zero frequency.
     """
-    rate = step_rate / factor
-    held = means[0]
-    forces = _decimated(np.ascontiguousarray((means - held).T), factor)
+    casing = MeasuredCasing(accelerance, step_rate, factor, len(means))
+    casing.add(means.T)
+    return casing.finish()
+
+
+class MeasuredCasing:
+    """:func:`table_acceleration` of forces that come piece by piece.
+
+    Parameters
+    ----------
+    accelerance, step_rate, factor
+        As there.
+    n_steps : int
+        Of all pieces together.
+    """
+
+    def __init__(
+        self, accelerance: Accelerance, step_rate: float, factor: int, n_steps: int
+    ) -> None:
+        self.accelerance, self._rate, self._factor = accelerance, step_rate / factor, factor
+        self._low = Decimation(accelerance.values.shape[1], n_steps, factor)
+        self._held = np.empty(0)
+
+    def add(self, means: NDArray[np.float64]) -> None:
+        """Take the next steps, means of the forces [shape=(n_inputs, n)] [N]."""
+        if not self._held.size:
+            self._held = means[:, 0].copy()
+        self._low.add(means - self._held[:, None])
+
+    def finish(self) -> TableRun:
+        """Acceleration and what was left out, after the last step."""
+        return _through_table(
+            self._low.finish(), self._held, self._rate, self._factor, self.accelerance
+        )
+
+
+def _through_table(
+    forces: NDArray[np.float64],
+    held: NDArray[np.float64],
+    rate: float,
+    factor: int,
+    accelerance: Accelerance,
+) -> TableRun:
+    """Forces at the sample rate, less those `held` from ever, times the accelerance."""
     pad = math.ceil(rate / accelerance.spacing)
     edge = edge_samples(factor)
     # the last rows run into zeros: they are led there more gently
@@ -521,16 +614,57 @@ def decimate(means: NDArray[np.float64], factor: int) -> NDArray[np.float64]:
         Row k belongs to the middle of step ``k * factor``. Within :func:`edge_samples` of either
         end the filter runs into zeros.
     """
-    return np.ascontiguousarray(_decimated(np.ascontiguousarray(means.T), factor).T)
+    low = Decimation(means.shape[1], len(means), factor)
+    low.add(means.T)
+    return np.ascontiguousarray(low.finish().T)
 
 
-def _decimated(rows: NDArray[np.float64], factor: int) -> NDArray[np.float64]:
-    """As :func:`decimate`, of rows [shape=(n_columns, n_steps)]."""
-    phases = _filter_phases(factor)
-    kept = np.empty((len(rows), rows.shape[1] // factor))
-    scratch = np.empty(_KEPT + phases.shape[1]), np.empty(_KEPT)
-    _low_pass(rows, phases, edge_samples(factor), *scratch, kept)
-    return kept
+class Decimation:
+    """:func:`decimate` of rows that come piece by piece; the same bytes.
+
+    Parameters
+    ----------
+    n_rows, n_steps : int
+        Shape of all pieces together.
+    factor : int
+        Steps per sample, >= 1.
+    """
+
+    def __init__(self, n_rows: int, n_steps: int, factor: int) -> None:
+        self._phases = _filter_phases(factor)
+        self._kept = np.empty((n_rows, n_steps // factor))
+        self._done = 0
+        self._advance = _KEPT * factor
+        self._span = self._phases.size + self._advance  # steps that a block of samples looks at
+        self._window = np.zeros((n_rows, self._span + max(_PIECE, self._advance)))
+        self._filled = edge_samples(factor) * factor  # zeros before the first step
+        self._scratch = np.empty(_KEPT + self._phases.shape[1]), np.empty(_KEPT)
+
+    def add(self, rows: NDArray[np.float64]) -> None:
+        """Take the next steps [shape=(n_rows, n)]."""
+        for piece in _pieces(rows):
+            end = self._filled + piece.shape[1]
+            self._window[:, self._filled : end] = piece
+            self._filled = end
+            self._keep()
+
+    def _keep(self) -> None:
+        blocks = max(0, (self._filled - self._span) // self._advance + 1)
+        if not blocks:
+            return
+        begin, end = self._done, min(self._done + blocks * _KEPT, self._kept.shape[1])
+        _low_pass(self._window, self._phases, *self._scratch, self._kept[:, begin:end])
+        self._done, gone = end, blocks * self._advance
+        self._filled -= gone
+        self._window[:, : self._filled] = self._window[:, gone : gone + self._filled]
+
+    def finish(self) -> NDArray[np.float64]:
+        """Kept values [shape=(n_rows, n_steps // factor)], after the last step."""
+        while self._done < self._kept.shape[1]:
+            self._window[:, self._filled : self._span] = 0.0
+            self._filled = max(self._filled, self._span)
+            self._keep()
+        return self._kept
 
 
 @lru_cache(maxsize=8)
@@ -545,15 +679,9 @@ def _filter_phases(factor: int) -> NDArray[np.float64]:
 
 @kernel
 def _pick(row: Any, first: int, factor: int, picked: Any) -> None:
-    """Every factor-th value; zeros beyond the ends."""
-    n = picked.size
-    if first >= 0 and first + (n - 1) * factor < row.size:
-        for i in range(n):
-            picked[i] = row[np.uint64(first + i * factor)]
-    else:
-        for i in range(n):
-            at = first + i * factor
-            picked[i] = row[at] if 0 <= at < row.size else 0.0
+    """Every factor-th value."""
+    for i in range(picked.size):
+        picked[i] = row[np.uint64(first + i * factor)]
 
 
 @kernel
@@ -572,7 +700,7 @@ _ONE, _TWO, _THREE, _FOUR, _FIVE, _SIX, _SEVEN = (np.uint64(i) for i in range(1,
 
 
 @kernel
-def _low_pass(rows: Any, phases: Any, edge: int, picked: Any, total: Any, kept: Any) -> None:
+def _low_pass(rows: Any, phases: Any, picked: Any, total: Any, kept: Any) -> None:
     """Filter and keep one in so many: of each phase of the filter, one phase of the rows."""
     factor, columns = phases.shape
     n_kept = kept.shape[1]
@@ -580,7 +708,7 @@ def _low_pass(rows: Any, phases: Any, edge: int, picked: Any, total: Any, kept: 
         for first in range(0, n_kept, _KEPT):
             total[:] = 0.0
             for phase in range(factor):
-                _pick(rows[c], (first - edge) * factor + phase, factor, picked)
+                _pick(rows[c], first * factor + phase, factor, picked)
                 for tap in range(0, columns, _AT_ONCE):
                     _add_taps(total, phases[phase], tap, picked)
             _write(total, first, min(_KEPT, n_kept - first), kept[c])

@@ -8,41 +8,36 @@ from numpy.typing import NDArray
 from ..output.sensor import digitise, low_pass, mounting_poles
 from ..scene.pump import PumpScene
 from ..scene.pump_hydraulics import PIPED_RUNGS, STANDARD_ATMOSPHERE, PressureSensor
-from .casing import decimate
-from .slider_crank import CrankRun
 
 Float = NDArray[np.float64]
 
 
-def cylinder_pressure(scene: PumpScene, run: CrankRun, throw: int) -> Float:
-    """Gauge pressure on the face of a piston, means over the steps [Pa, shape=(n_steps,)].
+def cylinder_pressure(scene: PumpScene, force: Float) -> Float:
+    """Gauge pressure on the face of a piston that the liquid pushes along x by `force` [Pa].
 
-    It is what the liquid does to the piston over its area, so every rung has it, with the inertia
-    of the columns that *heads* adds.
+    Every rung has it so, with the inertia of the columns that *heads* adds.
     """
-    return np.asarray(-run.force("piston_x", throw) / (math.pi / 4 * scene.piston.diameter**2))
+    return np.asarray(-force / (math.pi / 4 * scene.piston.diameter**2))
 
 
 def read_pressures(
-    scene: PumpScene, run: CrankRun, factor: int, kept: slice, rng: np.random.Generator
+    scene: PumpScene, pressures: list[Float], kept: slice, rng: np.random.Generator
 ) -> tuple[list[NDArray[np.float32]], int]:
     """Channels of the pressure sensors, and how many samples were clipped.
 
     Parameters
     ----------
     scene : PumpScene
-    run : CrankRun
-        Of the scene.
-    factor : int
-        Steps per sample; the pressure is band-limited as the accelerations are.
+    pressures : list of numpy.ndarray [shape=(n,)]
+        On the piston of every sensor's throw at all samples [Pa gauge], band-limited as the
+        accelerations are.
     kept : slice
         Samples that are recorded: lines and transmitters have settled before.
     rng : numpy.random.Generator
         Of the noise.
     """
     rows, clipped = [], 0
-    for throw, sensor in scene.pressure_sensors:
-        pressure = decimate(cylinder_pressure(scene, run, throw)[:, None], factor)[:, 0]
+    for (_, sensor), pressure in zip(scene.pressure_sensors, pressures, strict=True):
         row, lost = read_pressure(sensor, _lagged(sensor, pressure, scene.sample_rate)[kept], rng)
         rows.append(row)
         clipped += lost

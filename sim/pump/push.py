@@ -51,30 +51,9 @@ def casing_pushes(
     )
 
 
-def with_pushes(
-    scene: PumpScene, places: tuple[str, ...], forces: Float, pushes: tuple[Push, ...]
-) -> tuple[tuple[str, ...], Float]:
-    """Forces on the casing with those of the exciters beside them.
-
-    Parameters
-    ----------
-    scene : PumpScene
-    places : tuple of str
-        Key of every column of `forces`.
-    forces : ndarray, shape (n_steps, n_places)
-        [N]
-    pushes : tuple of Push
-
-    Returns
-    -------
-    tuple of str, ndarray
-        With a place and a column more for every exciter.
-    """
-    if not pushes:
-        return places, forces
-    own = tuple(pushed_place(scene, part.place) for part in scene.mounted_exciters)
-    columns = [forces, *(push.along[:, None] for push in pushes)]
-    return (*places, *own), np.concatenate(columns, axis=1)
+def pushed_places(scene: PumpScene) -> tuple[str, ...]:
+    """Keys of the places of all mounted exciters, as the casing knows them."""
+    return tuple(pushed_place(scene, part.place) for part in scene.mounted_exciters)
 
 
 def pushed_place(scene: PumpScene, place: str) -> str:

@@ -31,25 +31,34 @@ from ..scene.pump_hydraulics import BREATHING_RUNGS
 from ..scene.recorded import failed, recorded
 from .casing import (
     CasingModes,
-    band_limited_acceleration,
+    Decimation,
+    MeasuredCasing,
+    ModalCasing,
     casing_inputs,
     decimate,
     edge_samples,
-    table_acceleration,
 )
 from .casing_frf import Accelerance, load_accelerance
 from .hydraulics import lift_left
-from .pressure_sensors import pressures_at_rest, read_pressures
-from .push import casing_pushes, read_cells, with_pushes
+from .pressure_sensors import cylinder_pressure, pressures_at_rest, read_pressures
+from .push import casing_pushes, pushed_places, read_cells
 from .setup import contact_rate, contact_table, joint_rungs, pin_offsets, run_scene
-from .slider_crank import FORCES, GUIDE, JOINT_COMPLIANT, JOINT_LINK, JOINT_OILED, CrankRun
-from .tearing import lowest_of_run, torn_in_run
+from .slider_crank import (
+    FORCES,
+    GUIDE,
+    JOINT_COMPLIANT,
+    JOINT_LINK,
+    JOINT_OILED,
+    CrankRun,
+    CrankTally,
+)
+from .tearing import lowest_under_pull, torn_by_pull
 from .validity import FEWEST_STEPS, MOST_STEPS, joint_faults, knock_limits, limits, pump_step
 
 _MEMORY = 4e9  # byte, what one run may take: a data set runs one on every core
 _BYTES_PER_STEP = 3 * 10 * 8  # of one throw: forces and chamber as doubles, two passes over them
 
-_AT_ONCE = 2048  # rows of a table of forces that stay in the processor's cache
+_AT_ONCE = 9216  # steps that are gathered at once: they stay in the processor's cache
 
 _LIFT_LEFT = 0.05
 """Of the stop's lift: a valve that is open by more so long after its stroke does not close."""
@@ -96,7 +105,17 @@ def simulate_pump(scene: Scene, seed: int, truth: bool, raise_on_failure: bool) 
         start_angle=plan.first_angle,
         keep_states=truth,
     )
-    return recording_of(plan, run, seed, truth=truth, raise_on_failure=raise_on_failure)
+    gathered = Gathering(plan, seed, None)
+    for first in range(0, run.steps, _AT_ONCE):
+        steps = slice(first, first + _AT_ONCE)
+        ends = slice(first, first + _AT_ONCE + 1)
+        gathered.add(
+            run.turns[ends],
+            run.forces[steps].T,
+            None if run.chambers is None else run.chambers[ends],
+        )
+    whole = run if truth else None
+    return recording_of(gathered, run, truth=whole, raise_on_failure=raise_on_failure)
 
 
 def refused_run(scene: PumpScene, error: "LimitError") -> Recording:
@@ -116,44 +135,51 @@ def planned(scene: PumpScene) -> "RunPlan":
 
 
 def recording_of(
-    plan: "RunPlan",
-    run: CrankRun,
-    seed: int,
+    gathered: "Gathering",
+    run: CrankTally,
     *,
-    truth: bool = False,
+    truth: CrankRun | None = None,
     raise_on_failure: bool = False,
 ) -> Recording:
-    """Recording of a run of the mechanism as it was planned.
+    """Recording of a run of the mechanism, of which all steps were gathered.
+
+    Parameters
+    ----------
+    gathered : Gathering
+    run : CrankTally
+    truth : CrankRun, optional
+        The run with its states, where the truth is asked for.
+    raise_on_failure : bool
 
     Raises
     ------
     SimulationError
         The run failed and `raise_on_failure` is true.
     """
-    pump, factor = plan.scene, plan.factor
-    lift = _lift_left(pump, run, plan)
-    status = _judged(pump, run, plan, lift) if run.status.ok else run.status
-    numerics = _numerics(pump, run, plan, lift)
+    plan, pushes, seed = gathered.plan, gathered.pushes, gathered.seed
+    pump = plan.scene
+    lift = _lift_left(gathered)
+    status = _judged(gathered, lift) if run.status.ok else run.status
+    numerics = _numerics(gathered, run, lift)
     if not status.ok:
         if raise_on_failure:
             raise SimulationError(status, pump.name)
         return failed(pump, status, numerics)
-    pushes = plan.pushes(seed)
-    places, on_casing = with_pushes(pump, *casing_forces(pump, run), pushes)
-    acceleration, casing_numerics = _housing(pump, places, on_casing, 1 / plan.step, factor)
-    signal, clipped = _measured(acceleration, plan.turned(run), plan, pushes, seed, run)
+    acceleration, casing_numerics = _heard(gathered.casing)
+    pressures = gathered.pressures()
+    signal, clipped = _measured(acceleration, gathered.turned(), plan, pushes, seed, pressures)
     numerics |= casing_numerics
     numerics["clipped_samples"] = clipped
     return recorded(
         pump,
         signal,
-        truth=_truth(run, plan) | _test_truth(plan, pushes) if truth else {},
+        truth=_truth(truth, plan) | _test_truth(plan, pushes) if truth else {},
         status=status,
         numerics=numerics,
         warnings=(
             *_warnings(numerics),
             *_film_warnings(pump, numerics),
-            *_motor_warnings(pump, run),
+            *_motor_warnings(pump, gathered.turns[:, 0, 1]),
         ),
     )
 
@@ -163,12 +189,12 @@ def _at_rest(pump: PumpScene, seed: int, truth: bool) -> Recording:
     _refuse(pump, _rest_faults(pump))
     plan = RunPlan(pump, FEWEST_STEPS)
     pushes = plan.pushes(seed)
-    places, forces = with_pushes(pump, (), np.zeros((plan.n_steps, 0)), pushes)
-    rate = pump.sample_rate * plan.factor
-    acceleration, numerics = _housing(pump, places, forces, rate, plan.factor)
+    casing = _casing(plan, pushed_places(pump))
+    casing.add(np.array([push.along for push in pushes]).reshape(len(pushes), plan.n_steps))
+    acceleration, numerics = _heard(casing)
     angle = np.full(plan.n_samples, pump.drive.start_angle)
     signal, clipped = _measured(acceleration, angle, plan, pushes, seed, None)
-    numerics |= {"step_s": 1 / rate, "steps": plan.n_steps, "mean_speed_hz": 0.0}
+    numerics |= {"step_s": plan.step, "steps": plan.n_steps, "mean_speed_hz": 0.0}
     numerics |= {"estimated_error": 0.0, "clipped_samples": clipped}
     return recorded(
         pump,
@@ -238,11 +264,9 @@ class RunPlan:
             seed=seed,
         )
 
-    def turned(self, run: CrankRun) -> NDArray[np.float64]:
+    def turned(self, made: NDArray[np.float64]) -> NDArray[np.float64]:
         """Crank angle at the samples [rad]: exact at constant speed, else as the run made it."""
-        if self.scene.drive.rung == "constant-speed":
-            return self.angle
-        return self.at_samples(run.turns[:, 0])
+        return self.angle if self.scene.drive.rung == "constant-speed" else made
 
     def at_samples(self, ends: NDArray[np.float64]) -> NDArray[np.float64]:
         """Values at the samples from those at the ends of all steps, first axis time.
@@ -351,41 +375,169 @@ def _sampling_faults(scene: PumpScene) -> list[str]:
 # --- casing
 
 
-def casing_forces(scene: PumpScene, run: CrankRun) -> tuple[tuple[str, ...], NDArray[np.float64]]:
-    """Forces of the mechanism on the casing, summed over the throws that one key stands for.
+class Gathering:
+    """What a recording needs of a run, gathered step by step while the mechanism runs.
+
+    So that forces of all steps need not be kept: they go through the casing at once.
 
     Parameters
     ----------
-    scene : PumpScene
-    run : CrankRun
-        Of the scene.
+    plan : RunPlan
+    seed : int
+        Of the recording.
+    columns : tuple of int or None
+        Of all forces: the rows of those that will be added; None for all.
 
-    Returns
-    -------
-    places : tuple of str
-        Key of every column, as in a mode shape: a place, or that of one throw.
-    forces : numpy.ndarray [shape=(n_steps, n_places)]
-        Means over each step [N]: reactions of bearing and guide, liquid on the cylinder head,
-        valves on their seats, and what the unbalanced crank itself weighs and throws.
+    Attributes
+    ----------
+    plan, seed
+        As given.
+    pushes : tuple of Push
+        Forces of the mounted exciters at all steps.
+    casing : ModalCasing or MeasuredCasing
+        Under all forces that were added.
+    turns : numpy.ndarray [shape=(n, 2, 2)]
+        Crank angle [rad] and speed [rad/s] where the first step of every sample begins and ends;
+        n is 0 where a crank of constant speed drives what does not breathe.
+    lifts : numpy.ndarray [shape=(n, n_throws, 2)]
+        Of suction and discharge valve [m], where the first step of every sample begins; n is 0
+        where nothing breathes.
+    vapour : numpy.ndarray [shape=(n_throws,)]
+        Whether a chamber ever held vapour.
+    pull : numpy.ndarray [shape=(n_throws,)]
+        Largest force of the liquid along x on each piston after settling [N], a mean over its step.
+    mean_speed : float
+        Of the crank over all steps [rad/s].
     """
-    columns: dict[str, list[tuple[int, float]]] = {}
+
+    def __init__(self, plan: "RunPlan", seed: int, columns: tuple[int, ...] | None) -> None:
+        scene = plan.scene
+        n_throws = len(scene.throws)
+        self.plan, self.seed = plan, seed
+        self.pushes = plan.pushes(seed)
+        self._sources = _sources(scene, columns)
+        self._pistons = [_row_of("piston_x", throw, columns) for throw in range(n_throws)]
+        self._bearings = [
+            list(self._sources).index(_force_key(scene, place, 1))
+            for place in ("bearing_x", "bearing_y")
+        ]
+        self.casing = _casing(plan, (*self._sources, *pushed_places(scene)))
+        self._sensors = [
+            (self._pistons[throw], Decimation(1, plan.n_steps, plan.factor))
+            for throw, _ in scene.pressure_sensors
+        ]
+        self._steps = self._samples = 0
+        breathing = _breathes(scene)
+        turning = breathing or scene.drive.rung != "constant-speed"
+        most = -(-plan.n_steps // plan.factor)
+        self._turns = np.empty((most if turning else 0, 2, 2))
+        self._lifts = np.empty((most if breathing else 0, n_throws, 2))
+        self.vapour = np.zeros(n_throws, dtype=bool)
+        self.pull = np.full(n_throws, -math.inf)
+        self._ends = [0.0, 0.0]
+
+    def add(
+        self,
+        turns: NDArray[np.float64],
+        forces: NDArray[np.float64],
+        chambers: NDArray[np.float64] | None,
+    ) -> None:
+        """Take the next steps.
+
+        Parameters
+        ----------
+        turns : numpy.ndarray [shape=(n + 1, 2)]
+            As of :class:`CrankRun`, from where the first of them begins.
+        forces : numpy.ndarray [shape=(n_columns, n)]
+        chambers : numpy.ndarray [shape=(n + 1, n_throws, 6)] or None
+        """
+        first, n = self._steps, forces.shape[1]
+        if not first:
+            self._ends[0] = float(turns[0, 0])
+        self._ends[1] = float(turns[-1, 0])
+        self._steps += n
+        samples = np.arange(-first % self.plan.factor, n, self.plan.factor)
+        begin, self._samples = self._samples, self._samples + len(samples)
+        if len(self._turns):
+            self._turns[begin : self._samples, 0] = turns[samples]
+            self._turns[begin : self._samples, 1] = turns[samples + 1]
+        if chambers is not None:
+            self._lifts[begin : self._samples] = chambers[samples][:, :, [2, 4]]
+            self.vapour |= (chambers[:, :, 1] > 0).any(axis=0)
+        self._note_pull(forces, first)
+        for row, low in self._sensors:
+            low.add(cylinder_pressure(self.plan.scene, forces[row : row + 1]))
+        self.casing.add(self._on_casing(turns, forces, first))
+
+    def _note_pull(self, forces: NDArray[np.float64], first: int) -> None:
+        settled = max(0, self.plan.kept.start * self.plan.factor - first)
+        for throw, row in enumerate(self._pistons):
+            found = forces[row, settled:].max(initial=-math.inf)
+            self.pull[throw] = max(self.pull[throw], found)
+
+    def _on_casing(
+        self, turns: NDArray[np.float64], forces: NDArray[np.float64], first: int
+    ) -> NDArray[np.float64]:
+        """Forces on the casing [shape=(n_places, n)]: of the mechanism, and of exciters."""
+        n = forces.shape[1]
+        rows = np.empty((len(self._sources) + len(self.pushes), n))
+        for row, ((source, sign), *others) in zip(rows, self._sources.values(), strict=False):
+            np.multiply(forces[source], sign, out=row)
+            for other, its_sign in others:
+                row += its_sign * forces[other]
+        if self.plan.scene.crank.unbalance > 0:
+            rows[self._bearings] += _crank_throws(self.plan, turns)
+        for row, push in zip(rows[len(self._sources) :], self.pushes, strict=True):
+            row[:] = push.along[first : first + n]
+        return rows
+
+    @property
+    def turns(self) -> NDArray[np.float64]:
+        """Crank at the samples so far; see the class."""
+        return self._turns[: self._samples]
+
+    @property
+    def lifts(self) -> NDArray[np.float64]:
+        """Valves at the samples so far; see the class."""
+        return self._lifts[: self._samples]
+
+    @property
+    def mean_speed(self) -> float:
+        """Of the crank; see the class."""
+        return (self._ends[1] - self._ends[0]) / (self._steps * self.plan.step)
+
+    def turned(self) -> NDArray[np.float64]:
+        """Crank angle at the samples [rad]: exact at constant speed, else as the run made it."""
+        if not len(self.turns):
+            return self.plan.angle
+        angle = self.turns[self.plan.kept, :, 0]
+        return self.plan.turned(0.5 * (angle[:, 0] + angle[:, 1]))
+
+    def pressures(self) -> list[NDArray[np.float64]]:
+        """Pressure on the piston of every sensor's throw at all samples [Pa], band-limited."""
+        return [low.finish()[0] for _, low in self._sensors]
+
+
+def _row_of(force: str, throw: int, columns: tuple[int, ...] | None) -> int:
+    """Row of a force of a throw among those that are kept."""
+    column = 1 + len(FORCES) * throw + FORCES.index(force)
+    return column if columns is None else columns.index(column)
+
+
+def _sources(
+    scene: PumpScene, columns: tuple[int, ...] | None
+) -> dict[str, list[tuple[int, float]]]:
+    """Rows of forces, with their signs, behind every place of the casing where the crank pushes.
+
+    Reactions of bearing and guide, liquid on the cylinder head, valves on their seats. Keys are
+    those of a mode shape, a place or that of one throw; throws that one key stands for add up.
+    """
+    found: dict[str, list[tuple[int, float]]] = {}
     for throw in range(len(scene.throws)):
         for place, (name, sign) in _throw_on_casing(scene, throw).items():
-            column = 1 + len(FORCES) * throw + FORCES.index(name)
-            columns.setdefault(_force_key(scene, place, throw + 1), []).append((column, sign))
-    rows = np.empty((len(columns), len(run.forces)))  # the casing takes one force after the other
-    for first in range(0, len(run.forces), _AT_ONCE):
-        table = run.forces[first : first + _AT_ONCE]
-        some = rows[:, first : first + _AT_ONCE]
-        for row, ((column, sign), *others) in zip(some, columns.values(), strict=True):
-            np.multiply(table[:, run.place(column)], sign, out=row)
-            for other, its_sign in others:
-                row += its_sign * table[:, run.place(other)]
-    keys, forces = list(columns), rows.T
-    if scene.crank.unbalance > 0:
-        bearings = [keys.index(_force_key(scene, place, 1)) for place in ("bearing_x", "bearing_y")]
-        forces[:, bearings] += _crank_throws(scene, run)
-    return tuple(keys), forces
+            row = _row_of(name, throw, columns)
+            found.setdefault(_force_key(scene, place, throw + 1), []).append((row, sign))
+    return found
 
 
 def _throw_on_casing(scene: PumpScene, throw: int) -> dict[str, tuple[str, float]]:
@@ -403,19 +555,24 @@ def _throw_on_casing(scene: PumpScene, throw: int) -> dict[str, tuple[str, float
     return reactions
 
 
+def _breathes(scene: PumpScene) -> bool:
+    return any(scene.pressures(k).rung in BREATHING_RUNGS for k in range(len(scene.throws)))
+
+
 def _rubs(scene: PumpScene, throw: int) -> bool:
     return joint_rungs(scene, throw)[GUIDE] == JOINT_COMPLIANT
 
 
-def _crank_throws(scene: PumpScene, run: CrankRun) -> NDArray[np.float64]:
+def _crank_throws(plan: RunPlan, turns: NDArray[np.float64]) -> NDArray[np.float64]:
     """What the unbalance of the crank does to its bearing (x, y), but for its steady weight."""
-    angle = 0.5 * (run.turns[:-1, 0] + run.turns[1:, 0]) + scene.throws[0].phase
-    speed = 0.5 * (run.turns[:-1, 1] + run.turns[1:, 1])
-    spin_up = np.diff(run.turns[:, 1]) / run.step
+    scene = plan.scene
+    angle = 0.5 * (turns[:-1, 0] + turns[1:, 0]) + scene.throws[0].phase
+    speed = 0.5 * (turns[:-1, 1] + turns[1:, 1])
+    spin_up = np.diff(turns[:, 1]) / plan.step
     sin, cos = np.sin(angle), np.cos(angle)
     along = scene.crank.unbalance * (speed**2 * cos + spin_up * sin)
     across = scene.crank.unbalance * (speed**2 * sin - spin_up * cos)
-    return np.column_stack([along, across])
+    return np.stack([along, across])
 
 
 def _force_key(scene: PumpScene, place: str, throw: int) -> str:
@@ -432,23 +589,26 @@ def _split(key: str) -> tuple[str, int]:
     return (key, 1) if key in FORCE_PLACES else (place, int(throw))
 
 
-def _housing(
-    scene: PumpScene,
-    places: tuple[str, ...],
-    means: NDArray[np.float64],
-    step_rate: float,
-    factor: int,
+def _casing(plan: RunPlan, places: tuple[str, ...]) -> ModalCasing | MeasuredCasing:
+    """The casing of a scene, to be driven at these places."""
+    step_rate = plan.scene.sample_rate * plan.factor
+    accelerance = measured_casing(plan.scene, places)
+    if accelerance is not None:
+        return MeasuredCasing(accelerance, step_rate, plan.factor, plan.n_steps)
+    return ModalCasing(casing_modes(plan.scene, places), step_rate, plan.factor, plan.n_steps)
+
+
+def _heard(
+    casing: ModalCasing | MeasuredCasing,
 ) -> tuple[NDArray[np.float64], dict[str, float | int | str]]:
     """Acceleration at every accelerometer, and the numerics of a measured casing."""
-    accelerance = measured_casing(scene, places)
-    if accelerance is None:
-        modes = casing_modes(scene, places)
-        return band_limited_acceleration(means, step_rate, factor, modes), {}
-    run = table_acceleration(means, step_rate, factor, accelerance)
+    if isinstance(casing, ModalCasing):
+        return casing.finish(), {}
+    run = casing.finish()
     return run.acceleration, {
-        "frf_sha256": accelerance.sha256,
-        "frf_top_hz": float(accelerance.frequency[-1]),
-        "frf_late_share": accelerance.late_share(),
+        "frf_sha256": casing.accelerance.sha256,
+        "frf_top_hz": float(casing.accelerance.frequency[-1]),
+        "frf_late_share": casing.accelerance.late_share(),
         "frf_force_share_above": run.force_share_above,
     }
 
@@ -540,9 +700,12 @@ def _measured(
     plan: RunPlan,
     pushes: tuple[Push, ...],
     seed: int,
-    run: CrankRun | None,
+    pressures: list[NDArray[np.float64]] | None,
 ) -> tuple[NDArray[np.float32], int]:
-    """Signal of every channel, and how many samples were clipped; no run where the crank stands."""
+    """Signal of every channel, and how many samples were clipped.
+
+    Pressures are those at the sensors of all samples; None where the crank stands.
+    """
     scene = plan.scene
     rng = np.random.default_rng(seed)
     rows, clipped = [], 0
@@ -560,11 +723,11 @@ def _measured(
     cells, lost = read_cells(scene, pushes, plan.factor, plan.kept, rng)
     rows += cells
     clipped += lost
-    if run is None:
-        pressures, lost = pressures_at_rest(scene, plan.n_samples, rng)
+    if pressures is None:
+        told, lost = pressures_at_rest(scene, plan.n_samples, rng)
     else:
-        pressures, lost = read_pressures(scene, run, plan.factor, plan.kept, rng)
-    rows += pressures
+        told, lost = read_pressures(scene, pressures, plan.kept, rng)
+    rows += told
     clipped += lost
     if scene.tacho and not scene.running:
         rows.append(np.zeros(plan.n_samples, dtype=np.float32))
@@ -595,47 +758,40 @@ def _front_end(sensor: Accelerometer, row: NDArray[np.float64], fs: float) -> ND
     return low_pass(row, fs, np.concatenate(poles)) if poles else row
 
 
-def _judged(scene: PumpScene, run: CrankRun, plan: RunPlan, lift: float) -> Status:
+def _judged(gathered: Gathering, lift: float) -> Status:
     """A column that tears; a valve that never shuts in time, its spring too soft for the speed."""
-    if torn_in_run(scene, run, plan.kept.start * plan.factor):
+    if torn_by_pull(gathered.plan.scene, gathered.pull):
         return Status.VAPOUR
     return Status.VALVE_OPEN if lift > _LIFT_LEFT else Status.OK
 
 
-def _lift_left(scene: PumpScene, run: CrankRun, plan: RunPlan) -> float:
+def _lift_left(gathered: Gathering) -> float:
     """Least lift left in the idle strokes of any free valve, over the stop's: what recurs."""
-    begin = plan.kept.start * plan.factor  # after settling
-    if run.chambers is None or len(run.turns) <= begin:  # a run may fail before
+    scene, settled = gathered.plan.scene, gathered.plan.kept.start
+    lifts = gathered.lifts[settled:]
+    if not len(lifts):  # nothing breathes; or a run has failed before
         return 0.0
     largest = 0.0
-    for throw in range(len(scene.throws)):
-        if _cavitates(run, throw):
-            continue
+    for throw in np.flatnonzero(~gathered.vapour).tolist():
+        # vapour keeps a suction valve open until it is refilled, whatever its spring
         pressure = scene.pressures(throw)
-        angle = run.turns[begin:, 0] + scene.throws[throw].phase
-        sides = (("suction", pressure.suction_valve, 2), ("discharge", pressure.discharge_valve, 4))
+        angle = gathered.turns[settled:, 0, 0] + scene.throws[throw].phase
+        sides = (("suction", pressure.suction_valve, 0), ("discharge", pressure.discharge_valve, 1))
         for side, valve, column in sides:
             if valve is None or valve.stuck_lift is not None:
                 continue
-            lift = run.chambers[begin:, throw, column]
-            left = lift_left(angle, lift, side, valve.max_lift, after=_LATE)
+            left = lift_left(angle, lifts[:, throw, column], side, valve.max_lift, after=_LATE)
             if left.size:
                 largest = max(largest, float(left.min()))
     return largest
-
-
-def _cavitates(run: CrankRun, throw: int) -> bool:
-    """Vapour keeps the suction valve open until it is refilled, whatever its spring."""
-    return run.chambers is not None and bool(np.any(run.chambers[:, throw, 1] > 0))
 
 
 def _rung_of(part: Any) -> str:
     return "ideal" if part is None else str(part.rung)
 
 
-def _numerics(
-    scene: PumpScene, run: CrankRun, plan: RunPlan, lift: float
-) -> dict[str, float | int | str]:
+def _numerics(gathered: Gathering, run: CrankTally, lift: float) -> dict[str, float | int | str]:
+    plan, scene = gathered.plan, gathered.plan.scene
     steps, resolved = run.steps, run.step * contact_rate(scene)
     numerics: dict[str, float | int | str] = {
         "rung_joint": scene.joint.crankpin.rung,
@@ -653,7 +809,7 @@ def _numerics(
         "contact_changes": run.contact_changes,
         "cuts_refused": run.cuts_refused,
         "peak_normal_force_n": run.peak_normal_force,
-        "mean_speed_hz": float(run.turns[:, 1].mean()) / (2 * math.pi),
+        "mean_speed_hz": gathered.mean_speed / (2 * math.pi),
     }
     rungs = [joint_rungs(scene, throw) for throw in range(len(scene.throws))]
     if any(JOINT_COMPLIANT in row for row in rungs) and _has_hysteresis(scene):
@@ -663,13 +819,14 @@ def _numerics(
             float(contact_table(scene, throw)["speed_floor"][:2].min())
             for throw in range(len(scene.throws))
         )
-    lowest = lowest_of_run(scene, run, plan.kept.start * plan.factor)
+    lowest = lowest_under_pull(scene, gathered.pull)
     if math.isfinite(lowest):
         numerics["lowest_pressure_pa"] = lowest
     if any(JOINT_LINK in row for row in rungs):
         numerics["tension_share"] = run.tension_steps / max(1, steps * len(rungs))
-    numerics |= _film_numerics(run, rungs, plan)
-    if run.chambers is not None:
+    if isinstance(run, CrankRun):  # oiled pins run alone
+        numerics |= _film_numerics(run, rungs, plan)
+    if _breathes(scene):
         numerics["cavitating_share"] = run.vapour_steps / max(1, steps * len(rungs))
         numerics["lift_left"] = lift
     for side, parted in zip(("suction", "discharge"), run.parted_steps, strict=False):
@@ -756,12 +913,12 @@ def _film_warnings(scene: PumpScene, numerics: dict[str, float | int | str]) -> 
     )
 
 
-def _motor_warnings(scene: PumpScene, run: CrankRun) -> tuple[str, ...]:
+def _motor_warnings(scene: PumpScene, speed: NDArray[np.float64]) -> tuple[str, ...]:
     """A motor that its load has slowed beyond its largest moment."""
     motor = scene.drive.motor
     if scene.drive.rung != "motor" or motor is None:
         return ()
-    later = run.turns[3 * len(run.turns) // 4 :, 1]  # the mean of a part, as the speed swings
+    later = speed[3 * len(speed) // 4 :]  # the mean of a part, as the speed swings
     last = later.mean() / math.tau
     least = scene.drive.synchronous_speed * (1 - motor.breakdown_slip)
     if last >= least:
@@ -781,7 +938,8 @@ def _test_truth(plan: RunPlan, pushes: tuple[Push, ...]) -> dict[str, Any]:
 
 def _truth(run: CrankRun, plan: RunPlan) -> dict[str, Any]:
     """Forces, low-passed as the signal is, and states at the sample instants, per throw."""
-    truth: dict[str, Any] = {"state_alpha": plan.turned(run)}
+    turned = plan.turned(plan.at_samples(run.turns[:, 0]))
+    truth: dict[str, Any] = {"state_alpha": turned}
     truth["state_alpha_rate"] = plan.at_samples(run.turns[:, 1])
     throws = range(len(plan.scene.throws))
     columns = [1 + len(FORCES) * throw + FORCES.index(name) for throw in throws for name in _KEPT]
@@ -794,7 +952,9 @@ def _truth(run: CrankRun, plan: RunPlan) -> dict[str, Any]:
     for throw in throws:
         suffix = f"_{throw + 1}" if throw else ""
         own = force[:, 1 + len(_KEPT) * throw :]
-        truth |= {f"{name}{suffix}": value for name, value in _throw_truth(run, plan, throw, own)}
+        truth |= {
+            f"{name}{suffix}": value for name, value in _throw_truth(run, plan, throw, turned, own)
+        }
     return truth
 
 
@@ -803,11 +963,15 @@ _KEPT = ("pin_x", "pin_y", "wrist_x", "wrist_y", "guide_y", "piston_x")
 
 
 def _throw_truth(
-    run: CrankRun, plan: RunPlan, throw: int, force: NDArray[np.float64]
+    run: CrankRun,
+    plan: RunPlan,
+    throw: int,
+    turned: NDArray[np.float64],
+    force: NDArray[np.float64],
 ) -> list[tuple[str, NDArray[np.float64]]]:
     assert run.bodies is not None  # truth was asked for
     bodies = plan.at_samples(run.bodies[:, throw])
-    offsets = pin_offsets(plan.scene, plan.turned(run), bodies, throw)
+    offsets = pin_offsets(plan.scene, turned, bodies, throw)
     found = [
         ("pin_force_n", force[:, 0:2]),
         ("wrist_force_n", force[:, 2:4]),

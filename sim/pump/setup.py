@@ -913,6 +913,7 @@ def _run_ideal(scene: PumpScene, *, step: float, n_steps: int, start_angle: floa
     first = middle + scene.throws[0].phase
     moment -= scene.crank.unbalance * (weight_x * np.sin(first) - weight_y * np.cos(first))
     return CrankRun(
+        steps=n_steps,
         turns=np.column_stack([angle, np.full(n_steps + 1, speed)]),
         forces=np.column_stack([moment, *columns]),
         bodies=np.stack(bodies, axis=1),

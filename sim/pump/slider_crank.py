@@ -1011,27 +1011,13 @@ def _integrate(h: float, t: Any, w: Any, chamber: Any, shared: Any, r: Any, tall
 
 
 @dataclass(frozen=True, kw_only=True)
-class CrankRun:
-    """A run of the mechanism.
+class CrankTally:
+    """How a run of the mechanism went.
 
     Attributes
     ----------
-    turns : numpy.ndarray [shape=(n_steps + 1, 2)]
-        Crank angle [rad] and speed [rad/s] at the ends of the steps.
-    forces : numpy.ndarray [shape=(n_steps, 1 + 9 n_throws)]
-        Drive moment [N m], then per throw the columns of :data:`FORCES` [N], means over each step.
-    bodies : numpy.ndarray [shape=(n_steps + 1, n_throws, 12)] or None
-        Columns as :data:`BODY`, then their rates, at the ends of the steps; the state in the
-        middle of a step, to which its forces belong, is the mean of two rows. None where not kept.
-    chambers : numpy.ndarray [shape=(n_steps + 1, n_throws, 6)] or None
-        Columns as ``CHAMBER_STATE``; None where nothing breathes.
-    gaps : numpy.ndarray [shape=(n_steps + 1, n_throws, 4)] or None
-        Columns as :data:`GAPS`, at the starts of the steps' last stage; None where no pin is oiled.
-    ends : numpy.ndarray [shape=(n_steps + 1, 2)] or None
-        Pressure [Pa] of suction and discharge line at the pump, means over the steps before; None
-        where no line is modelled.
-    columns : tuple of int or None
-        Of the forces: those that were kept; None for all.
+    steps : int
+        That were taken.
     step : float
         [s]
     status : Status
@@ -1051,15 +1037,9 @@ class CrankRun:
         at which they give what the pump draws, and the rest was booked.
     """
 
-    turns: NDArray[np.float64]
-    forces: NDArray[np.float64]
-    bodies: NDArray[np.float64] | None
-    chambers: NDArray[np.float64] | None
+    steps: int
     step: float
     peak_normal_force: float
-    gaps: NDArray[np.float64] | None = None
-    ends: NDArray[np.float64] | None = None
-    columns: tuple[int, ...] | None = None
     status: Status = Status.OK
     contact_changes: int = 0
     cuts_refused: int = 0
@@ -1069,18 +1049,39 @@ class CrankRun:
     parted_steps: tuple[int, ...] = ()
     unsettled_steps: tuple[int, ...] = ()
 
-    @property
-    def steps(self) -> int:
-        """Steps that were taken."""
-        return len(self.turns) - 1
 
-    def place(self, column: int) -> int:
-        """Where a column of all forces is among those that were kept."""
-        return column if self.columns is None else self.columns.index(column)
+@dataclass(frozen=True, kw_only=True)
+class CrankRun(CrankTally):
+    """A run of the mechanism with all its steps.
+
+    Attributes
+    ----------
+    turns : numpy.ndarray [shape=(n_steps + 1, 2)]
+        Crank angle [rad] and speed [rad/s] at the ends of the steps.
+    forces : numpy.ndarray [shape=(n_steps, 1 + 9 n_throws)]
+        Drive moment [N m], then per throw the columns of :data:`FORCES` [N], means over each step.
+    bodies : numpy.ndarray [shape=(n_steps + 1, n_throws, 12)] or None
+        Columns as :data:`BODY`, then their rates, at the ends of the steps; the state in the
+        middle of a step, to which its forces belong, is the mean of two rows. None where not kept.
+    chambers : numpy.ndarray [shape=(n_steps + 1, n_throws, 6)] or None
+        Columns as ``CHAMBER_STATE``; None where nothing breathes.
+    gaps : numpy.ndarray [shape=(n_steps + 1, n_throws, 4)] or None
+        Columns as :data:`GAPS`, at the starts of the steps' last stage; None where no pin is oiled.
+    ends : numpy.ndarray [shape=(n_steps + 1, 2)] or None
+        Pressure [Pa] of suction and discharge line at the pump, means over the steps before; None
+        where no line is modelled.
+    """
+
+    turns: NDArray[np.float64]
+    forces: NDArray[np.float64]
+    bodies: NDArray[np.float64] | None
+    chambers: NDArray[np.float64] | None
+    gaps: NDArray[np.float64] | None = None
+    ends: NDArray[np.float64] | None = None
 
     def force(self, name: str, throw: int = 0) -> NDArray[np.float64]:
         """One column of the forces, by its name in :data:`FORCES` [N]."""
-        return self.forces[:, self.place(1 + len(FORCES) * throw + FORCES.index(name))]
+        return self.forces[:, 1 + len(FORCES) * throw + FORCES.index(name)]
 
 
 _NO_LINES = LinePair(
@@ -1174,6 +1175,7 @@ def run_mechanism(
     tally = Tally(counts=np.zeros(5, np.int64), peak=np.zeros(1))
     code, done = _integrate(step, t, w, chamber, shared, r, tally)
     return CrankRun(
+        steps=done,
         turns=r.turns[: done + 1],
         forces=r.forces[:done],
         bodies=r.states[: done + 1] if keep_states else None,

@@ -7,10 +7,12 @@ piston as a rigid mass then pulls on it, down to pressures that no liquid bears.
 import math
 from typing import NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ..scene.pump import PumpScene
 from .hydraulics import lowest_pressure
 from .setup import hydraulics_of, piston_area, run_scene
-from .slider_crank import CrankRun
 
 _TRIAL_TURNS = 2.0
 """Revolutions of a trial after settling: what knocks, knocks in each of them."""
@@ -81,32 +83,39 @@ def torn_by_knocks(scene: PumpScene, step: float) -> list[Tear]:
         n_steps=begin + math.ceil(_TRIAL_TURNS * turn),
         start_angle=scene.drive.start_angle,
     )
-    return torn_in_run(scene, run, begin) if run.status.ok else []
+    throws = range(len(scene.throws))
+    pull = np.array([run.force("piston_x", k)[begin:].max(initial=-math.inf) for k in throws])
+    return torn_by_pull(scene, pull) if run.status.ok else []
 
 
-def torn_in_run(scene: PumpScene, run: CrankRun, begin: int) -> list[Tear]:
-    """Throws whose column tears in a run, from step `begin` on."""
+def torn_by_pull(scene: PumpScene, pull: NDArray[np.float64]) -> list[Tear]:
+    """Throws whose column tears in a run.
+
+    Parameters
+    ----------
+    scene : PumpScene
+    pull : numpy.ndarray [shape=(n_throws,)]
+        As of :func:`lowest_under_pull`.
+    """
     found = []
     for throw in _columns(scene):
         vapour = float(hydraulics_of(scene, throw)[0]["vapour"])
-        lowest = lowest_of_run(scene, run, begin, [throw])
+        lowest = lowest_under_pull(scene, pull, [throw])
         if lowest < vapour:
             found.append(Tear(throw, lowest, vapour, knocks=True))
     return found
 
 
-def lowest_of_run(
-    scene: PumpScene, run: CrankRun, begin: int, throws: list[int] | None = None
+def lowest_under_pull(
+    scene: PumpScene, pull: NDArray[np.float64], throws: list[int] | None = None
 ) -> float:
     """Lowest pressure on the piston faces of a run, the inertia of the liquid included.
 
     Parameters
     ----------
     scene : PumpScene
-    run : CrankRun
-        Of the scene.
-    begin : int
-        First step that counts, the end of settling.
+    pull : numpy.ndarray [shape=(n_throws,)]
+        Largest force of the liquid along x on each piston [N], after settling.
     throws : list of int, optional
         Those that count, from 0; all by default.
 
@@ -118,10 +127,7 @@ def lowest_of_run(
     area = piston_area(scene)
     each = range(len(scene.throws)) if throws is None else throws
     pushed = [k for k in each if area > 0 and scene.pressures(k).rung != "none"]
-    return min(
-        (-float(run.force("piston_x", k)[begin:].max(initial=-math.inf)) / area for k in pushed),
-        default=math.inf,
-    )
+    return min((-float(pull[k]) / area for k in pushed), default=math.inf)
 
 
 def _columns(scene: PumpScene) -> list[int]:

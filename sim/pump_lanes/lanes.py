@@ -12,10 +12,9 @@ Lanes are for one throw whose crank pin has clearance without oil, whose wrist p
 ideal or have clearance, under a pressure that follows from the crank angle, or a chamber.
 """
 
-import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,7 +31,7 @@ from ..pump.slider_crank import (
     NOT_LOCATED,
     PER_THROW,
     WITH_VAPOUR,
-    CrankRun,
+    CrankTally,
     Tables,
 )
 from ..scene.pump import PumpScene
@@ -47,6 +46,8 @@ from .rates import (
     LiquidLane,
     ThrowLane,
 )
+
+Float = NDArray[np.float64]
 
 _ALWAYS = ("pin_x", "pin_y", "guide_y", "piston_x")
 _WITH_PLAY = ("guide_x",)
@@ -82,9 +83,26 @@ def lane_kind(scene: PumpScene) -> tuple[bool, bool] | None:
 
 
 _STRETCH = 512  # steps: what they leave fits a processor's cache
+_ROOM = 16 * _STRETCH  # steps of a lane that are handed on together
 
 
-def run_lanes(jobs: Sequence[LaneJob], kind: tuple[bool, bool]) -> Iterator[tuple[int, CrankRun]]:
+class Steps(Protocol):
+    """What is told of the steps of a run, and may not keep what it is given."""
+
+    def add(self, turns: Float, forces: Float, chambers: Float | None) -> None:
+        """As :meth:`.recording.Gathering.add`, with forces of :func:`lane_columns`."""
+
+
+def lane_columns(kind: tuple[bool, bool]) -> tuple[int, ...]:
+    """Of all forces of a run: those that lanes of a kind keep, on the casing and on the piston."""
+    play, breathing = kind
+    names = (*_ALWAYS, *_WITH_PLAY * play, *_BREATHING * breathing)
+    return tuple(1 + FORCES.index(name) for name in names)
+
+
+def run_lanes(
+    jobs: Sequence[LaneJob], kind: tuple[bool, bool], steps: Callable[[int], Steps]
+) -> Iterator[tuple[int, CrankTally]]:
     """Run mechanisms of one kind side by side.
 
     Parameters
@@ -93,52 +111,41 @@ def run_lanes(jobs: Sequence[LaneJob], kind: tuple[bool, bool]) -> Iterator[tupl
         Taken as lanes become free.
     kind : tuple of bool
         Of all of them, see :func:`lane_kind`.
+    steps : callable
+        Called with the number of a job that begins: who is told of its steps.
 
     Yields
     ------
     number : int
         Of the job; in the order in which runs end.
-    run : CrankRun
-        Without bodies, with the forces on the casing alone. Its arrays are the lane's: they hold
-        until the next run is asked for.
+    run : CrankTally
+        All its steps have been handed on.
     """
     if not jobs:
         return
     longest = sorted(range(len(jobs)), key=lambda n: -jobs[n].n_steps)  # the last lanes end alike
-    room = _spare_room.pop() if _spare_room else np.empty(0)
-    ahead, lanes = iter(longest), _Lanes(kind, jobs, room)
-    try:
-        while lanes.fill(ahead):
-            lanes.go_on()
-            yield from lanes.ended()
-    finally:
-        _spare_room[:] = [lanes.room]
-
-
-_spare_room: list[NDArray[np.float64]] = []
-"""Of the last run of lanes: memory that is new costs as much time as what is written into it."""
+    ahead, lanes = iter(longest), _Lanes(kind, jobs, steps)
+    while lanes.fill(ahead):
+        lanes.go_on()
+        yield from lanes.ended()
 
 
 class _Lanes:
-    """All lanes, what their runs are at, and what they have left behind so far."""
+    """All lanes, what their runs are at, and their last steps that were not handed on yet."""
 
     def __init__(
-        self, kind: tuple[bool, bool], jobs: Sequence[LaneJob], room: NDArray[np.float64]
+        self, kind: tuple[bool, bool], jobs: Sequence[LaneJob], steps: Callable[[int], Steps]
     ) -> None:
         self._play, self._breathing = kind
-        self._jobs = jobs
+        self._jobs, self._steps = jobs, steps
+        self._told: dict[int, Steps] = {}  # by lane
         self._plan = np.zeros(1, PLAN)
         self._state = np.zeros(1, STATE)
         self._number = np.full(LANES, -1)  # of the job in each lane
-        self._at = np.zeros(LANES, np.int64)  # steps taken of it
+        self._at = np.zeros(LANES, np.int64)  # steps taken of it and not handed on
         self._left = np.zeros(LANES, np.int64)
         self._alone = alone(jobs[0].tables)
-        names = (
-            *_ALWAYS,
-            *(_WITH_PLAY if self._play else ()),
-            *(_BREATHING if self._breathing else ()),
-        )
-        self._columns = np.array([FORCES.index(name) for name in names])
+        self._columns = np.array(lane_columns(kind)) - 1
         self._kept = Stretch(
             turns=np.zeros((_STRETCH, 2, LANES)),
             forces=np.zeros((_STRETCH, len(FORCES), LANES)),
@@ -146,8 +153,11 @@ class _Lanes:
             code=np.ones(LANES, np.int64),
             done=np.zeros(LANES, np.int64),
         )
-        most = max(job.n_steps for job in jobs)
-        self.room, self._past = _past(most, len(names), self._breathing, room)
+        self._past = _Past(
+            turns=np.empty((LANES, _ROOM + 1, 2)),
+            forces=np.empty((LANES, len(self._columns), _ROOM)),
+            chambers=np.empty((LANES, _ROOM + 1 if self._breathing else 1, 1, 8)),
+        )
 
     def fill(self, ahead: Iterator[int]) -> bool:
         """Put the next jobs into free lanes; False where all is done."""
@@ -186,6 +196,7 @@ class _Lanes:
         self._past.chambers[lane, 0] = a.chambers[lane]
         self._kept.code[lane] = 0
         self._number[lane], self._at[lane], self._left[lane] = number, 0, job.n_steps
+        self._told[lane] = self._steps(number)
 
     def go_on(self) -> None:
         """March until the first run ends, or as far as is kept at once."""
@@ -205,24 +216,35 @@ class _Lanes:
         done = np.where(busy, self._kept.done, 0)
         self._at += done
         self._left -= done
+        for lane in map(int, np.flatnonzero(self._at > _ROOM - _STRETCH)):
+            self._hand_on(lane)
 
-    def ended(self) -> Iterator[tuple[int, CrankRun]]:
+    def _hand_on(self, lane: int) -> None:
+        n, past = int(self._at[lane]), self._past
+        ends = slice(n + 1)
+        chambers = past.chambers[lane, ends, :, :6] if self._breathing else None
+        self._told[lane].add(past.turns[lane, ends], past.forces[lane, :, :n], chambers)
+        past.turns[lane, 0] = past.turns[lane, n]
+        if self._breathing:
+            past.chambers[lane, 0] = past.chambers[lane, n]
+        self._at[lane] = 0
+
+    def ended(self) -> Iterator[tuple[int, CrankTally]]:
         """Runs at their end, taken out of their lanes."""
         over = (self._number >= 0) & ((self._left == 0) | (self._kept.code != 0))
         if not over.any():
             return
         for lane in map(int, np.flatnonzero(over)):
-            yield int(self._number[lane]), self._run(lane)
-            self._number[lane], self._at[lane], self._kept.code[lane] = -1, 0, 1
+            if self._at[lane]:
+                self._hand_on(lane)
+            yield int(self._number[lane]), self._tally(lane)
+            self._number[lane], self._kept.code[lane] = -1, 1
 
-    def _run(self, lane: int) -> CrankRun:
-        n, past, counts = int(self._at[lane]), self._past, self._alone.counts[lane]
-        return CrankRun(
-            turns=past.turns[lane, : n + 1],
-            forces=past.forces[lane, :, :n].T,
-            columns=tuple(int(column) + 1 for column in self._columns),
-            bodies=None,
-            chambers=past.chambers[lane, : n + 1, :, :6] if self._breathing else None,
+    def _tally(self, lane: int) -> CrankTally:
+        counts = self._alone.counts[lane]
+        job = self._jobs[int(self._number[lane])]
+        return CrankTally(
+            steps=job.n_steps - int(self._left[lane]),
             step=float(self._plan["step"][0, lane]),
             peak_normal_force=float(self._alone.peak[lane, 0]),
             status=Status(int(self._kept.code[lane])),
@@ -234,27 +256,11 @@ class _Lanes:
 
 
 class _Past(NamedTuple):
-    """What the runs in the lanes have left behind."""
+    """What the runs in the lanes have left behind since it was handed on."""
 
-    turns: NDArray[np.float64]  # (LANES, n + 1, 2)
-    forces: NDArray[np.float64]  # (LANES, n_kept, n)
-    chambers: NDArray[np.float64]  # (LANES, n + 1, 1, 8); one row where nothing breathes
-
-
-def _past(
-    most: int, n_kept: int, breathing: bool, room: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], _Past]:
-    """Room for `most` steps of all lanes, the old one where it is large enough, and its parts."""
-    shapes = (
-        (LANES, most + 1, 2),
-        (LANES, n_kept, most),
-        (LANES, most + 1 if breathing else 1, 1, 8),
-    )
-    ends = np.cumsum([math.prod(shape) for shape in shapes])
-    if room.size < ends[-1]:
-        room = np.empty(ends[-1])
-    parts = np.split(room[: ends[-1]], ends[:-1])
-    return room, _Past(*(part.reshape(shape) for part, shape in zip(parts, shapes, strict=True)))
+    turns: Float  # (LANES, _ROOM + 1, 2)
+    forces: Float  # (LANES, n_kept, _ROOM)
+    chambers: Float  # (LANES, _ROOM + 1, 1, 8); one row where nothing breathes
 
 
 @subroutine

@@ -8,6 +8,7 @@ from typing import NamedTuple, cast
 
 from ..output.recording import Recording
 from ..pump.recording import (
+    Gathering,
     LimitError,
     RunPlan,
     planned,
@@ -18,7 +19,7 @@ from ..pump.recording import (
 from ..pump.setup import begun, needs_integration
 from ..scene.parts import Scene, SceneError
 from ..scene.pump import PumpScene
-from .lanes import LaneJob, lane_kind, run_lanes
+from .lanes import LaneJob, lane_columns, lane_kind, run_lanes
 
 _FEWEST = 5
 """Records of a kind: fewer are as fast one after the other."""
@@ -88,8 +89,14 @@ def _together(
         for job in group:
             yield job.number, _alone(job.plan.scene, job.seed)
         return
-    for n, run in run_lanes([lane_job(job.plan) for job in group], kind):
-        yield group[n].number, recording_of(group[n].plan, run, group[n].seed)
+    columns, begun = lane_columns(kind), {}
+
+    def gathering(n: int) -> Gathering:
+        begun[n] = Gathering(group[n].plan, group[n].seed, columns)
+        return begun[n]
+
+    for n, run in run_lanes([lane_job(job.plan) for job in group], kind, gathering):
+        yield group[n].number, recording_of(begun.pop(n), run)
 
 
 def lane_job(plan: RunPlan) -> LaneJob:
