@@ -21,6 +21,7 @@ from wearstate.datasets.file.record import (
     WriteError,
 )
 from wearstate.datasets.generation import generate as generation
+from wearstate.datasets.generation import work
 from wearstate.datasets.generation.generate import Stopped, generate, save_solution
 from wearstate.datasets.recipe.recipe import (
     LARGEST_SEED,
@@ -336,7 +337,7 @@ def test_the_file_tells_all(short, tmp_path):
 
 def test_each_record_is_the_simulation_of_its_sample(short, reference, tmp_path):
     sample = list(sample_records(short, N, seed=5))[4]
-    alone = generation.simulate(sample.scene, seed=sample.seed).signal.tobytes()
+    alone = work.simulate(sample.scene, seed=sample.seed).signal.tobytes()
     size = len(alone)
     assert reference[0][4 * size : 5 * size] == alone
 
@@ -353,7 +354,7 @@ def test_failures_keep_their_row(tmp_path):
 
 def test_scenes_the_simulation_refuses_keep_their_row(short, tmp_path, monkeypatch):
     middle = load_scene("bilge-pump").joint.crankpin.friction
-    simulate_many = generation.simulate_many
+    simulate_many = work.simulate_many
 
     def particular(jobs):
         for number, found in simulate_many(jobs):
@@ -361,7 +362,7 @@ def test_scenes_the_simulation_refuses_keep_their_row(short, tmp_path, monkeypat
             fault = SceneError(scene.name, ["joint.crankpin.friction is beyond the model"])
             yield number, fault if scene.joint.crankpin.friction > middle else found
 
-    monkeypatch.setattr(generation, "simulate_many", particular)
+    monkeypatch.setattr(work, "simulate_many", particular)
     samples = list(sample_records(short, 12, seed=1))
     expected = [sample.scene.joint.crankpin.friction > middle for sample in samples]
     summary = generate(short, 12, tmp_path / "data.h5", seed=1)
@@ -376,7 +377,7 @@ def test_scenes_the_simulation_refuses_keep_their_row(short, tmp_path, monkeypat
 def test_existing_output_is_refused_before_any_work(short, tmp_path, monkeypatch):
     path = tmp_path / "data.h5"
     path.write_text("mine")
-    monkeypatch.setattr(generation, "simulate", None)
+    monkeypatch.setattr(work, "simulate", None)
     with pytest.raises(DataError, match="exists"):
         generate(short, N, path)
     assert path.read_text() == "mine"

@@ -25,6 +25,7 @@ from typing import Any
 
 from wearstate.datasets.file.record import DataSet, DataSetWriter
 from wearstate.datasets.generation import generate as generation
+from wearstate.datasets.generation.work import together
 from wearstate.datasets.recipe.recipe import Recipe, load_recipe, sample_records
 from wearstate.datasets.workers.local import in_order
 
@@ -70,7 +71,7 @@ def endless(recipe: Recipe) -> Iterator[Any]:
 def rate(folder: Path, seconds: float, jobs: int) -> dict[str, float]:
     """Signal made and written in a second in steady state, and the writer's share of it."""
     recipe = load_recipe(RECIPE)
-    work = partial(generation._together, error=None)
+    work = partial(together, error=None)
     size = generation._TOGETHER
     ahead = 3 * jobs * size  # until every worker has started and compiled, and the pipeline is full
     most = ahead + int(seconds * LARGEST_RATE)
