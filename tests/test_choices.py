@@ -28,6 +28,26 @@ JOURNAL = {"duration": "0.05 s", "film.n_theta": 36, "film.n_z": 9}
 NOT_TRIED = {"fidelity", "machine"}  # resolved above this floor; one value for a scene
 NEEDS_A_FILE = "file"
 
+CHAMBER = {
+    "pressure.dead_volume": 1e-4,
+    "pressure.suction_valve": {},
+    "pressure.discharge_valve": {},
+}
+HEADS = {"pressure.suction_line": {}, "pressure.discharge_line": {}}
+LINES = {f"{line}.wave_speed": 260 for line in HEADS}
+NEEDED = {
+    ("drive.rung", "motor"): {
+        "drive.motor.breakdown_moment": 500,
+        "drive.motor.inertia": 2,
+        "drive.motor.rated_slip": 0.03,
+    },
+    ("pressure.rung", "chamber"): CHAMBER,
+    ("pressure.rung", "lumped-lines"): CHAMBER | LINES,
+    ("pressure.rung", "wave-lines"): CHAMBER | LINES,
+    ("pressure.rung", "heads"): HEADS,
+}
+"""What a rung needs and a scene may lack."""
+
 SAMPLED = {"journal-bearing": 6, "shaft-rig": 2, "slider-crank-benchmark": 8, "bilge-pump": 5}
 """Rows of the cover that every run of the tests takes; all of them are a campaign."""
 
@@ -94,10 +114,26 @@ def settings(name, row):
     for path, value in row.items():
         if path.endswith(".anti_alias") and value != "none":
             found |= {f"{path}_cutoff": "10 kHz", f"{path}_order": 4}
+    for path, rung in NEEDED:
+        if row.get(path) == rung:
+            found = lacking(name, NEEDED[path, rung]) | found
     if row.get("load.history", "none") != "none":
         found |= {"load.amplitude": 2000, "load.begin": "0.02 s", "load.length": "0.01 s"}
     if row.get("load.history") == "none":
         found["load.amplitude"] = 0
+    return found
+
+
+def lacking(name, needed):
+    """Of what a rung needs: what the scene has not."""
+    scene = load_scene(name)
+    return {path: value for path, value in needed.items() if value_at(scene, path) is None}
+
+
+def value_at(scene, path):
+    found = scene
+    for key in path.split("."):
+        found = getattr(found, key, None)
     return found
 
 
