@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.stats import rankdata
-from sklearn.feature_selection import mutual_info_classif, mutual_info_regression
+
+from ..learning.information import mutual_information
 
 Float = NDArray[np.float64]
 
@@ -170,11 +171,10 @@ def _information(column: Float, aim: NDArray[Any], *, classes: bool, seed: int) 
     there = np.isfinite(column)
     if there.sum() < _LEAST:
         return math.nan
-    own = _ranks(column[there])[:, None]
+    own = _ranks(column[there])
     if np.ptp(own) == 0:
         return 0.0
-    estimate = mutual_info_classif if classes else mutual_info_regression
-    return float(estimate(own, aim[there], random_state=seed)[0]) / _PER_BIT
+    return mutual_information(own, aim[there], classes=classes, seed=seed) / _PER_BIT
 
 
 def _of_grades(column: Float, grades: NDArray[np.int64], seed: int) -> float:
