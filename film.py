@@ -51,6 +51,8 @@ from .sim.film.solve import (
     solve_long,
     solve_short,
 )
+from .sim.journal.mass_orbit import MassOrbit, mass_orbit
+from .sim.journal.orbit import load
 
 __all__ = [
     "FILM_RUNGS",
@@ -64,6 +66,7 @@ __all__ = [
     "Groove",
     "ImpedanceMap",
     "JournalBearing",
+    "MassOrbit",
     "OperatingPoint",
     "Threshold",
     "Whirl",
@@ -75,7 +78,9 @@ __all__ = [
     "flow",
     "friction",
     "impedance_map",
+    "load",
     "mass_conserving",
+    "mass_orbit",
     "mesh_error",
     "operate",
     "short_attitude",

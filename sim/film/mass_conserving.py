@@ -40,6 +40,9 @@ _SETTLED = 1e-12  # of the highest pressure, and of a full gap: what rounding ma
 _LOSS = 1e-13  # of the stream: empties a steady ring that nothing feeds, else undetermined
 _MOST_SETS = 100  # 3500 random films, from any start, settled within 50
 
+EndPressure = float | tuple[float, float]
+"""Pressure at both ends alike, or at z = -1/2 and z = 1/2."""
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MassStep:
@@ -95,7 +98,7 @@ def mass_conserving(
     state: FilmState,
     start: FilmSolution | None = None,
     *,
-    end_pressure: float = 0.0,
+    end_pressure: EndPressure = 0.0,
     end_fill: float = 1.0,
 ) -> FilmSolution:
     """Film with mass-conserving cavitation: steady, and what a velocity at once adds to it.
@@ -110,8 +113,9 @@ def mass_conserving(
         which oil is carried over one cell at these rates.
     start : FilmSolution, optional
         Of this mesh; its full and cavitated cells are tried first. Does not change the answer.
-    end_pressure : float
-        Non-dimensional pressure P >= 0 at both ends; above zero they are flooded.
+    end_pressure : float or (float, float)
+        Non-dimensional pressure P >= 0 at both ends, or at z = -1/2 and z = 1/2; where it is above
+        zero the end is flooded.
     end_fill : float
         Film fraction of the ends in [0, 1]; matters for the volume of oil alone, since nothing
         flows in from an end at zero pressure.
@@ -154,14 +158,15 @@ def mass_conserving(
     least = _least_gap(geometry, state)
     if not least > 0.0:
         return _failed(geometry, FilmStatus.TOUCH, least)
-    if not (held[0][:, 1:-1].any() or end_pressure > 0.0):
+    if not (held[0][:, 1:-1].any() or max(_both(end_pressure)) > 0.0):
         return _failed(geometry, FilmStatus.STARVED, least)
     cells = _cells(geometry, state, held)
-    answer = _solve(cells, not state.tilted, end_fill, None if start is None else start.fill)
+    mirrored = not state.tilted and _alike(end_pressure)
+    answer = _solve(cells, mirrored, end_fill, None if start is None else start.fill)
     if answer.settled and _moves(state):
         oil, step = _oil_before(geometry, state, answer.fill)
         cells = _moving_cells(geometry, state, held, oil, step)
-        after = _solve(cells, not state.tilted, end_fill, answer.fill)
+        after = _solve(cells, mirrored, end_fill, answer.fill)
         answer = after._replace(iterations=answer.iterations + after.iterations)
     return _solution(geometry, state, cells, answer, least)
 
@@ -173,7 +178,7 @@ def mass_step(
     step: float,
     start: FilmSolution | None = None,
     *,
-    end_pressure: float = 0.0,
+    end_pressure: EndPressure = 0.0,
     end_fill: float = 1.0,
 ) -> MassStep:
     """Carry the film over one step in time by the implicit Euler method.
@@ -222,7 +227,7 @@ def mass_step(
             intake=np.zeros_like(oil),
         )
     cells = _moving_cells(geometry, state, _held(geometry, state, end_pressure), oil, step)
-    mirrored = not state.tilted and bool(np.array_equal(oil, oil[:, ::-1]))
+    mirrored = not state.tilted and _alike(end_pressure) and bool(np.array_equal(oil, oil[:, ::-1]))
     answer = _solve(cells, mirrored, end_fill, None if start is None else start.fill)
     return MassStep(
         solution=_solution(geometry, state, cells, answer, least),
@@ -269,7 +274,11 @@ def oil_volume(oil: NDArray[np.float64]) -> float:
 
 
 def oil_intake(
-    geometry: FilmGeometry, state: FilmState, solution: FilmSolution, *, end_pressure: float = 0.0
+    geometry: FilmGeometry,
+    state: FilmState,
+    solution: FilmSolution,
+    *,
+    end_pressure: EndPressure = 0.0,
 ) -> NDArray[np.float64]:
     """What each cell of a steady film takes in from outside, volume over R L C in unit tau.
 
@@ -310,14 +319,27 @@ def oil_intake(
 # --- mesh
 
 
-def _require_ends(pressure: float, fill: float) -> None:
+def _both(end_pressure: EndPressure) -> tuple[float, float]:
+    """Pressure at z = -1/2 and at z = 1/2."""
+    return end_pressure if isinstance(end_pressure, tuple) else (end_pressure, end_pressure)
+
+
+def _alike(end_pressure: EndPressure) -> bool:
+    """Whether one half of the length mirrors the other."""
+    first, last = _both(end_pressure)
+    return first == last
+
+
+def _require_ends(end_pressure: EndPressure, fill: float) -> None:
     faults = []
-    if not 0.0 <= pressure < math.inf:
-        faults.append(f"end_pressure = {pressure:g} must be >= 0 and finite: cavities are at 0")
+    both = _both(end_pressure)
+    for pressure in both if both[0] != both[1] else both[:1]:
+        if not 0.0 <= pressure < math.inf:
+            faults.append(f"end_pressure = {pressure:g} must be >= 0 and finite: cavities are at 0")
     if not 0.0 <= fill <= 1.0:
         faults.append(f"end_fill = {fill:g} must be in [0, 1]")
-    elif pressure > 0.0 and fill < 1.0:
-        faults.append(f"end_fill = {fill:g} must be 1 at end_pressure = {pressure:g} > 0")
+    elif max(both) > 0.0 and fill < 1.0:
+        faults.append(f"end_fill = {fill:g} must be 1 at end_pressure = {max(both):g} > 0")
     if faults:
         raise ValueError("; ".join(faults))
 
@@ -393,7 +415,7 @@ def _cell_gap(geometry: FilmGeometry, state: FilmState) -> NDArray[np.float64]:
 _Held = tuple[NDArray[np.int8], NDArray[np.float64]]
 
 
-def _held(geometry: FilmGeometry, state: FilmState, end_pressure: float) -> _Held:
+def _held(geometry: FilmGeometry, state: FilmState, end_pressure: EndPressure) -> _Held:
     """Cells that are kept full, and their pressure: ends, grooves, or a line at the widest gap."""
     held, pressure = groove_nodes(geometry)
     if geometry.condition == "reynolds" and not geometry.grooves:
@@ -401,7 +423,7 @@ def _held(geometry: FilmGeometry, state: FilmState, end_pressure: float) -> _Hel
         line = math.floor(turn * geometry.n_theta + 0.5) % geometry.n_theta
         held[line, 1:-1] = 1
     held[:, [0, -1]] = 1
-    pressure[:, [0, -1]] = end_pressure
+    pressure[:, [0, -1]] = _both(end_pressure)
     return held, pressure
 
 

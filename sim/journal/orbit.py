@@ -55,6 +55,7 @@ class OrbitStatus(IntEnum):
     OVERLAP = 6
     FILM = 7
     STEPS = 8
+    UNSETTLED = 9
 
     @property
     def ok(self) -> bool:
@@ -95,6 +96,10 @@ _STATUS_TEXT = {
     ),
     OrbitStatus.STEPS: (
         "the adaptive integrator used up its steps; raise max_steps, or loosen the tolerance"
+    ),
+    OrbitStatus.UNSETTLED: (
+        "where a step ends was not found, as where film and journal change too much in it; shorten "
+        "the step, or refine the mesh"
     ),
 }
 
@@ -215,6 +220,11 @@ def load(
         first and after the last the history keeps their value.
     history : array_like [shape=(n, 2)], optional
         Load along X and Y at those instants, linear between them.
+
+    Returns
+    -------
+    Load
+        For :func:`run_orbit` and :func:`.mass_orbit.mass_orbit`.
 
     Raises
     ------
