@@ -142,6 +142,21 @@ def test_a_ctrl_c_that_a_callback_loses_is_kept_in_mind(short, tmp_path):
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
+@pytest.mark.usefixtures("interruptible")
+def test_a_ctrl_c_in_a_finaliser_is_kept_in_mind_and_not_reported(short, tmp_path, capsys):
+    class Gone:
+        def __del__(self):
+            signal.raise_signal(signal.SIGINT)
+
+    def lose(done, total):
+        if done == 1:
+            Gone()
+
+    with pytest.raises(KeyboardInterrupt, match="1 of 4 records are kept"):
+        generate(short, 4, tmp_path / "data.h5", progress=lose)
+    assert "Traceback" not in capsys.readouterr().err
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals")
 def test_progress_and_ctrl_c_on_a_terminal(tmp_path):
     import pty

@@ -5,6 +5,7 @@ Workers simulate, this process alone writes. A killed run is resumed by the same
 
 import math
 import signal
+import sys
 import threading
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
@@ -244,7 +245,10 @@ def generate(
 
 @contextmanager
 def _listening() -> Iterator[threading.Event]:
-    """Keep a Ctrl-C in mind: one that arrives in a callback, of HDF5 or a finaliser, is lost."""
+    """Keep a Ctrl-C in mind: one that arrives in a callback, of HDF5 or a finaliser, is lost.
+
+    It is not reported as lost either: the run stops at the next record.
+    """
     asked = threading.Event()
 
     def hear(number: int, frame: FrameType | None) -> None:
@@ -255,11 +259,19 @@ def _listening() -> Iterator[threading.Event]:
     if not ours or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
         yield asked
         return
+    usual = sys.unraisablehook
+
+    def report(lost: "sys.UnraisableHookArgs") -> None:
+        if not (asked.is_set() and lost.exc_type is KeyboardInterrupt):
+            usual(lost)
+
     signal.signal(signal.SIGINT, hear)
+    sys.unraisablehook = report
     try:
         yield asked
     finally:
         signal.signal(signal.SIGINT, signal.default_int_handler)
+        sys.unraisablehook = usual
 
 
 @contextmanager
