@@ -241,3 +241,10 @@ def test_few_records_train_no_net(task):
     rows, target, groups = task
     fitted = fit_blend(rows, target, group_folds(groups, n=3, seed=0))
     assert "nets" not in {option.name for option in fitted.options}
+
+
+@pytest.mark.parametrize(("n", "trees"), [(999, 200), (1000, 400)])
+def test_many_records_grow_more_and_smaller_trees(n, trees):
+    rows = np.random.default_rng(9).standard_normal((n, 3))
+    part = ROWS["boosting"].fit(rows, rows, np.exp(rows[:, 0]), 0)
+    assert len(part.root) == trees
