@@ -1,9 +1,10 @@
 #!/usr/bin/env bash
 # mypy takes a package's name from its folder, so it checks a link that is named right.
-# Usage: tests/types.sh BIN
+# What it knows stays in .mypy_cache. Usage: tests/types.sh BIN
 set -euo pipefail
 cd "$(dirname "$0")/.."
 bin=$(cd "$1" && pwd)
+root=$PWD
 scratch=$(mktemp -d)
 trap 'rm -rf "$scratch"' EXIT
 mkdir "$scratch/wearstate"
@@ -12,4 +13,4 @@ for part in __*.py align.py contact.py crank.py film.py shaft.py py.typed sim fe
 done
 cp pyproject.toml "$scratch"
 cd "$scratch"
-"$bin/mypy" --config-file pyproject.toml --cache-dir "$scratch/cache" -p wearstate
+"$bin/mypy" --config-file pyproject.toml --cache-dir "$root/.mypy_cache" -p wearstate
