@@ -11,6 +11,7 @@ from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import brentq
 
 from ...sim.contact.closed_forms import kelvin_voigt_restitution
 from ...sim.film.bearing import BearingError, BearingStatus, equilibrium, sommerfeld_number, whirl
@@ -631,13 +632,20 @@ def growth(stepper: Stepper, stiffness: Array, damping: Array, step: float) -> f
     >>> round(growth(STEPPERS[0], np.eye(2), np.zeros((2, 2)), 1.0), 6)
     1.0
     """
+    return float(_growths(stepper, stiffness, damping, np.array([step]))[0])
+
+
+def _growths(stepper: Stepper, stiffness: Array, damping: Array, steps: Array) -> Array:
+    """Growth of each of many steps, as in :func:`growth`."""
 
     def acceleration(x: Array, v: Array) -> Array:
-        return -(stiffness @ x + damping @ v)
+        return -(np.tensordot(stiffness, x, 1) + np.tensordot(damping, v, 1))
 
-    columns = np.eye(4)
-    x, v = stepper.step(columns[:2], columns[2:], acceleration, np.asarray(step))
-    return float(np.abs(np.linalg.eigvals(np.vstack([x, v]))).max())
+    unit = np.broadcast_to(np.eye(4)[:, :, None], (4, 4, len(steps)))
+    x, v = stepper.step(unit[:2], unit[2:], acceleration, steps)
+    matrices = np.moveaxis(np.concatenate([x, v]), 2, 0)
+    largest: Array = np.abs(np.linalg.eigvals(matrices)).max(axis=1)
+    return largest
 
 
 def squeeze_limit(case: _OrbitCase, x: float, stepper: Stepper) -> float:
@@ -649,9 +657,11 @@ def squeeze_limit(case: _OrbitCase, x: float, stepper: Stepper) -> float:
     stiffness, damping = linear_film(case, x)
     own = np.vstack([np.hstack([np.zeros((2, 2)), np.eye(2)]), -np.hstack([stiffness, damping])])
     rate = max(0.0, float(np.linalg.eigvals(own).real.max()))
-    for step in np.geomspace(1e-5, 10.0, 2000):
-        if growth(stepper, stiffness, damping, float(step)) > 1.01 * math.exp(rate * step):
-            return float(step)
+    for steps in np.split(np.geomspace(1e-5, 10.0, 2000), 20):  # mostly found in an early one
+        allowed = 1.01 * np.exp(rate * steps)
+        over = steps[_growths(stepper, stiffness, damping, steps) > allowed]
+        if len(over):
+            return float(over[0])
     return math.inf
 
 
@@ -838,12 +848,19 @@ def threshold_speed(scene: JournalScene, weight: float, low: float, high: float)
     >>> round(60 * threshold_speed(scene, 257.74 * 9.80665, 20.0, 200.0), -1)
     4910.0
     """
-    if _margin(scene, weight, low) >= 0 or _margin(scene, weight, high) <= 0:
+    margins = {each: _margin(scene, weight, each) for each in (low, high)}
+    if margins[low] >= 0 or margins[high] <= 0:
         return math.nan
-    for _ in range(20):
-        middle = math.sqrt(low * high)
-        low, high = (middle, high) if _margin(scene, weight, middle) < 0 else (low, middle)
-    return math.sqrt(low * high)
+
+    def beyond(speed: float) -> float:
+        """Margin, where endless cut to a number: an end of a bracket all the same."""
+        margin = margins[speed] if speed in margins else _margin(scene, weight, speed)
+        return float(np.clip(margin, -_FAR, _FAR))
+
+    return float(brentq(beyond, low, high, xtol=1e-6 * low))
+
+
+_FAR = 5.0  # e^5 of the threshold's mass: no root is near
 
 
 def _margin(scene: JournalScene, weight: float, speed: float) -> float:
