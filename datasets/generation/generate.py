@@ -8,11 +8,11 @@ import signal
 import sys
 import threading
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Hashable, Iterable, Iterator
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from functools import partial
-from itertools import chain, islice
+from itertools import chain
 from pathlib import Path
 from types import FrameType
 from typing import Any, Literal
@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...sim.atomic import OutputError
-from ...sim.machine.simulate import simulates_together
+from ...sim.machine.simulate import alike, simulates_together
 from ...sim.output.recording import DataError, Recording
 from ...sim.scene.parts import Scene, channels_of
 from ...sim.wear.archard import grade
@@ -61,8 +61,8 @@ from .work import (
     together,
 )
 
-_TOGETHER = 64
-"""Records of a batch: enough of each kind to fill the lanes, few enough to be kept in memory."""
+_TOGETHER = 48
+"""Records of a batch: three for every lane, few enough to be kept in memory."""
 
 _FEWEST = 5
 """Records of a batch that is worth it."""
@@ -415,9 +415,15 @@ def _batch_size(scene: Scene, todo: int, jobs: int) -> int:
 
 
 def _batches(samples: Iterable[Sample], size: int) -> Iterator[tuple[RecordJob, ...]]:
-    ahead = (RecordJob(each.index, each.seed, each.row, each.scene) for each in samples)
-    while batch := tuple(islice(ahead, size)):
-        yield batch
+    """Records to simulate together: of one kind, that none runs beside empty lanes."""
+    waiting: dict[Hashable, list[RecordJob]] = {}
+    for each in samples:
+        kind = alike(each.scene) if size > 1 else None
+        same = waiting.setdefault(kind, [])
+        same.append(RecordJob(each.index, each.seed, each.row, each.scene))
+        if len(same) == size:
+            yield tuple(waiting.pop(kind))
+    yield from map(tuple, sorted(waiting.values(), key=len, reverse=True))
 
 
 class _Tally:
@@ -426,19 +432,20 @@ class _Tally:
     def __init__(self, count: int, choice: FidelityChoice | None) -> None:
         self.count, self.choice = count, choice
         self.n_resumed = 0
-        self.faults: list[str] = []
+        self.faults: list[tuple[int, str]] = []  # of the first records that failed
 
     def note(self, outcome: RecordOutcome) -> None:
-        if outcome.fault and len(self.faults) < 3:
-            self.faults.append(f"record {outcome.index}: {outcome.fault}")
+        if outcome.fault:
+            self.faults = sorted([*self.faults, (outcome.index, outcome.fault)])[:3]
 
     def summary(self, path: Path, rows: NDArray[np.void]) -> Summary:
         status = Counter(name.decode() for name in rows["status"].tolist())
+        faults = tuple(f"record {index}: {fault}" for index, fault in self.faults)
         del status["ok"]
         if status.total() == self.count:
             raise DataError(
                 f"{path}: 0 of {self.count} records are simulated, must be >= 1; "
-                f"{self.faults[0] if self.faults else 'see the status column'}"
+                f"{faults[0] if faults else 'see the status column'}"
             )
         return Summary(
             path=path,
@@ -447,7 +454,7 @@ class _Tally:
             n_resumed=self.n_resumed,
             grades=dict(sorted(Counter(rows["grade"].tolist()).items())),
             failures=dict(status),
-            first_failures=tuple(self.faults),
+            first_failures=faults,
             n_clipped=int(np.count_nonzero(rows["clipped_samples"] > 0)),
             fidelity=self.choice,
         )

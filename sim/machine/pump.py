@@ -15,7 +15,7 @@ from ..pump.recording import (
     measured_places,
     simulate_pump,
 )
-from ..pump_lanes.many import simulate_pumps
+from ..pump_lanes.many import pumps_alike, simulate_pumps
 from ..scene.parts import Scene
 from ..scene.pump import FORCE_PLACES, PumpScene
 from .registry import MachinePhysics
@@ -55,6 +55,7 @@ MACHINE = MachinePhysics(
     scene=PumpScene,
     simulate=simulate_pump,
     many=simulate_pumps,
+    alike=pumps_alike,
     check=check_pump,
     transfer=_transfer,
     ladders=PUMP_LADDERS,

@@ -1,6 +1,6 @@
 """What a machine registers beside its scene, and where any other code asks for it."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import import_module
 from typing import cast
@@ -35,6 +35,9 @@ class MachinePhysics:
     many : callable, optional
         Sequence of (scene, seed) -> (number, recording without truth or SceneError) of each, in
         any order: as `simulate` one by one, but faster.
+    alike : callable, optional
+        Scene -> what scenes have in common that `many` makes faster together than mixed; needed
+        beside `many`.
     transfer : callable, optional
         Scene, frequency [Hz, shape=(n_lines,)] -> its transfer functions.
     ladders : mapping of str to tuple of Rung
@@ -51,6 +54,7 @@ class MachinePhysics:
     cost: Callable[[Scene], float]
     recorder: Callable[[Scene], Recorder] | None = None
     many: Many | None = None
+    alike: Callable[[Scene], Hashable] = lambda _scene: None
     transfer: Callable[[Scene, NDArray[np.float64]], SceneTransfer] | None = None
     ladders: Mapping[str, tuple[Rung, ...]] = field(default_factory=dict)
     effects: Callable[[Scene], Iterable[Effect]] = lambda _scene: ()

@@ -1,6 +1,6 @@
 """From a scene to a recording: only the physics that the scene needs."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import replace
 
 from ..output.recording import Recorder, Recording
@@ -98,6 +98,19 @@ def simulates_together(scene: Scene) -> bool:
     (True, False)
     """
     return machine_of(scene).many is not None
+
+
+def alike(scene: Scene) -> Hashable:
+    """What scenes of a machine have in common that are best simulated together.
+
+    Examples
+    --------
+    >>> from wearstate.sim.scene.load import load_scene
+    >>> tight = load_scene("bilge-pump", {"joint.crankpin.rung": "link"})
+    >>> alike(load_scene("bilge-pump")) == alike(tight)
+    False
+    """
+    return machine_of(scene).alike(scene)
 
 
 def _one_by_one(

@@ -82,8 +82,8 @@ def lane_kind(scene: PumpScene) -> tuple[bool, bool] | None:
     return JOINT_COMPLIANT in (wristpin, guide), rung == "chamber"
 
 
-_STRETCH = 512  # steps: what they leave fits a processor's cache
-_ROOM = 16 * _STRETCH  # steps of a lane that are handed on together
+_STRETCH = 64  # steps: what they leave fits the innermost but one of a processor's caches
+_ROOM = 8192  # steps of a lane that are handed on together
 
 
 class Steps(Protocol):
@@ -199,24 +199,20 @@ class _Lanes:
         self._told[lane] = self._steps(number)
 
     def go_on(self) -> None:
-        """March until the first run ends, or as far as is kept at once."""
-        busy = self._number >= 0
-        n = int(min(_STRETCH, self._left[busy].min()))
-        self._kept.done[:] = n
-        march(
+        """March until the first run ends, or a lane has no room left."""
+        march_on(
             self._play,
             self._breathing,
-            n,
             self._plan[0],
             self._state[0],
             self._alone,
             self._kept,
+            self._columns,
+            self._at,
+            self._left,
+            self._past,
         )
-        take(self._kept, self._columns, n, self._at, self._past, self._breathing)
-        done = np.where(busy, self._kept.done, 0)
-        self._at += done
-        self._left -= done
-        for lane in map(int, np.flatnonzero(self._at > _ROOM - _STRETCH)):
+        for lane in map(int, np.flatnonzero(self._at == _ROOM)):
             self._hand_on(lane)
 
     def _hand_on(self, lane: int) -> None:
@@ -264,10 +260,47 @@ class _Past(NamedTuple):
 
 
 @subroutine
-def take(k: Any, columns: Any, n: int, at: Any, past: Any, breathing: bool) -> None:
-    """Add the last n steps of every lane to its past."""
+def march_on(
+    play: bool,
+    breathing: bool,
+    p: Any,
+    s: Any,
+    a: Any,
+    k: Any,
+    columns: Any,
+    at: Any,
+    left: Any,
+    past: Any,
+) -> None:
+    """March all lanes until a run ends or fails, or a lane has no room left for its past.
+
+    Compiled as a whole: handing these tables over costs as much as a hundred steps.
+    """
+    while True:
+        n = _STRETCH
+        for lane in range(LANES):
+            if k.code[lane] == 0:
+                n = min(n, left[lane], _ROOM - at[lane])
+        if n == 0:
+            return
+        for lane in range(LANES):
+            k.done[lane] = n if k.code[lane] == 0 else 0
+        march(play, breathing, n, p, s, a, k)
+        _take(k, columns, at, past, breathing)
+        failed = False
+        for lane in range(LANES):
+            at[lane] += k.done[lane]
+            left[lane] -= k.done[lane]
+            failed = failed or (k.done[lane] > 0 and k.code[lane] != 0)
+        if failed:
+            return
+
+
+@subroutine
+def _take(k: Any, columns: Any, at: Any, past: Any, breathing: bool) -> None:
+    """Add the last steps of every lane to its past."""
     for lane in range(LANES):
-        begin, steps = at[lane], min(n, k.done[lane])
+        begin, steps = at[lane], k.done[lane]
         for j in range(columns.size):
             for i in range(steps):
                 past.forces[lane, j, begin + i] = k.forces[i, columns[j], lane]

@@ -53,7 +53,7 @@ def simulate_pumps(
     for number, (scene, seed) in enumerate(jobs):
         pump = cast(PumpScene, scene)
         try:
-            kind = _kind(pump)
+            kind = pumps_alike(pump)
             plan = planned(pump) if kind else None
         except LimitError as error:
             yield number, refused_run(pump, error)
@@ -69,17 +69,18 @@ def simulate_pumps(
         yield from _together(group, kind)
 
 
+def pumps_alike(scene: Scene) -> tuple[bool, bool] | None:
+    """What records side by side must have in common; None of a scene that runs alone."""
+    pump = cast(PumpScene, scene)
+    simple = pump.running and len(pump.throws) == 1
+    return lane_kind(pump) if simple and needs_integration(pump) else None
+
+
 def _alone(scene: PumpScene, seed: int) -> Recording | SceneError:
     try:
         return simulate_pump(scene, seed, truth=False, raise_on_failure=False)
     except SceneError as error:
         return error
-
-
-def _kind(scene: PumpScene) -> tuple[bool, bool] | None:
-    """What records side by side must have in common; None of a scene that runs alone."""
-    simple = scene.running and len(scene.throws) == 1
-    return lane_kind(scene) if simple and needs_integration(scene) else None
 
 
 def _together(

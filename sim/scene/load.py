@@ -361,7 +361,12 @@ def numbered(table: Mapping[str, Any], path: str) -> str:
     return ".".join(keys)
 
 
+_PLAIN = frozenset({str, float, int, bool})
+
+
 def _copy(node: Any) -> Any:
+    if type(node) in _PLAIN:  # nearly all of a table; asking for its abstract class is slow
+        return node
     if isinstance(node, Mapping):
         return {key: _copy(value) for key, value in node.items()}
     return [_copy(value) for value in node] if isinstance(node, (list, tuple)) else node
