@@ -73,15 +73,36 @@ def small_set(common: Path) -> Path:
     )
 
 
-@pytest.fixture(scope="module")
-def small_trained(common: Path, small_set: Path) -> Any:
-    """What `train_model` returns of `small_set`: model, feature table and rows held out."""
+def trained_once(path: Path, data: Path) -> Any:
+    """What `train_model` returns of a set, kept in a file for all test processes."""
     from wearstate.diagnose.wear_model.train import train_model
 
     def train(path: Path) -> None:
-        path.write_bytes(pickle.dumps(train_model(small_set, seed=0)))
+        path.write_bytes(pickle.dumps(train_model(data, seed=0)))
 
-    return pickle.loads(made_once(common / "trained.pickle", train).read_bytes())
+    return pickle.loads(made_once(path, train).read_bytes())
+
+
+@pytest.fixture(scope="module")
+def small_trained(common: Path, small_set: Path) -> Any:
+    """What `train_model` returns of `small_set`: model, feature table and rows held out."""
+    return trained_once(common / "trained.pickle", small_set)
+
+
+@pytest.fixture(scope="session")
+def few_set(common: Path) -> Path:
+    """The first 24 records of `small_set`, of 12 machine draws: where no accuracy is asked."""
+    from wearstate.datasets.generation.generate import generate
+
+    return made_once(
+        common / "few.h5", lambda path: generate("bilge-pump-small", 24, path, seed=0, jobs=1)
+    )
+
+
+@pytest.fixture(scope="module")
+def few_trained(common: Path, few_set: Path) -> Any:
+    """What `train_model` returns of `few_set`."""
+    return trained_once(common / "few-trained.pickle", few_set)
 
 
 @pytest.fixture(scope="module")

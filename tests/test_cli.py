@@ -87,17 +87,17 @@ def test_simulate_writes_a_recording_that_info_and_report_read(tmp_path, small_m
     assert "trained on simulation" in table["notice"]
 
 
-def test_generate_features_train_evaluate_report(tmp_path, small_set):
+def test_generate_features_train_evaluate_report(tmp_path, few_set):
     for suffix in ("parquet", "csv", "h5"):
-        run("features", small_set, "-o", tmp_path / f"table.{suffix}", "-j", 1)
+        run("features", few_set, "-o", tmp_path / f"table.{suffix}", "-j", 1)
     with h5py.File(tmp_path / "table.h5") as file:
-        assert {len(column) for column in file.values()} == {120}
+        assert {len(column) for column in file.values()} == {24}
     model = tmp_path / "model.wsm"
-    held_out = strict(run("train", small_set, "-o", model, "-j", 1, "--json").stdout)["held_out"]
-    judged = strict(run("evaluate", model, small_set, "-j", 1, "--json").stdout)
+    held_out = strict(run("train", few_set, "-o", model, "-j", 1, "--json").stdout)["held_out"]
+    judged = strict(run("evaluate", model, few_set, "-j", 1, "--json").stdout)
     assert judged["mae_m"] == pytest.approx(held_out["mae_m"])
     page = tmp_path / "report.html"
-    text = run("report", small_set, "--record", 5, "--model", model, "-o", page).stdout
+    text = run("report", few_set, "--record", 5, "--model", model, "-o", page).stdout
     assert "Notice      trained on simulation" in text
     html = page.read_text()
     assert html.count("data:image/png;base64,") == 3

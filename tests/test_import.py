@@ -489,12 +489,12 @@ def test_a_large_file_is_imported_with_flat_memory(tmp_path):
     assert peak < 48e6
 
 
-def test_a_simulated_set_comes_back_with_the_same_features(small_set, small_trained, tmp_path):
+def test_a_simulated_set_comes_back_with_the_same_features(few_set, few_trained, tmp_path):
     from wearstate.diagnose.feature_rows.feature_table import feature_table
     from wearstate.diagnose.wear_model.train import train_model
 
     options = SourceOptions(channels=("acc_x", "acc_y", "tacho"), unit="m/s^2")
-    with DataSet(small_set) as data:
+    with DataSet(few_set) as data:
         rows = [["file", "group", CLEARANCE]]
         for i, item in enumerate(data):
             wavfile.write(tmp_path / f"{i:03d}.wav", int(item.sample_rate), item.signal.T)
@@ -508,12 +508,12 @@ def test_a_simulated_set_comes_back_with_the_same_features(small_set, small_trai
         sorted(tmp_path.glob("*.wav")), path, options=options, tacho="tacho",
         labels=read_labels(tmp_path / "labels.csv"), limits=limits, jobs=2,
     )  # fmt: skip
-    before, after = feature_table(small_set), feature_table(path)
+    before, after = feature_table(few_set), feature_table(path)
     assert after.names == before.names
     assert_array_equal(after.values, before.values)  # a float WAV keeps every bit
     for column in ("group", "grade", CLEARANCE, "signal_crc32"):
         assert_array_equal(after.manifest[column], before.manifest[column])
-    ours, theirs = small_trained[0], train_model(path)[0]
+    ours, theirs = few_trained[0], train_model(path)[0]
     assert_array_equal(theirs.predict(after.values), ours.predict(before.values))
     assert (theirs.notice, ours.notice != "") == ("", True)  # origin: measured
 

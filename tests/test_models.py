@@ -96,9 +96,9 @@ def test_the_error_with_a_fault_is_told_beside_that_without():
     assert rates["detection_rate"] > 0.95  # ten standard deviations apart
 
 
-def test_training_depends_on_the_seed_alone(trained, small_set):
-    model, table, _ = trained
-    again, table_2, _ = train_model(small_set, seed=0, jobs=2)
+def test_training_depends_on_the_seed_alone(few_trained, few_set):
+    model, table, _ = few_trained
+    again, table_2, _ = train_model(few_set, seed=0, jobs=2)
     assert np.array_equal(table.values, table_2.values)
     assert np.array_equal(model.predict(table.values), again.predict(table.values))
     assert again.card == model.card
@@ -123,13 +123,14 @@ def test_one_rms_alone_does_not_solve_the_task(trained):
     assert told["single_rms"]["accuracy"]["value"] <= 0.70
 
 
-def test_the_training_set_is_judged_on_its_held_out_draws_only(trained, small_set, monkeypatch):
-    model, table, test = trained
-    assert evaluate_model(model, small_set)["records"] == len(test)
+def test_the_training_set_is_judged_on_its_held_out_draws_only(few_trained, few_set, monkeypatch):
+    model, table, test = few_trained
+    assert 0 < len(test) < len(table.values)
+    assert evaluate_model(model, few_set)["records"] == len(test)
     monkeypatch.setattr(training, "feature_table", lambda path, **_: table)  # as it was computed
-    everything, *_ = train_model(small_set, held_out=0.0)
+    everything, *_ = train_model(few_set, held_out=0.0)
     with pytest.raises(DataError, match="has not seen"):
-        evaluate_model(everything, small_set)
+        evaluate_model(everything, few_set)
 
 
 def test_too_few_machines_are_refused(tmp_path):

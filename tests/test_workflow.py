@@ -51,12 +51,12 @@ def test_an_evaluation_is_that_of_the_command(small_set, small_model, tmp_path):
     assert found._repr_html_().count("<tr>") > 5
 
 
-def test_train_is_that_of_the_fit(small_set, small_trained):
-    expected, _, _ = small_trained
-    found = wearstate.train(small_set, seed=0)
+def test_train_is_that_of_the_fit(few_set, few_trained):
+    expected, _, _ = few_trained
+    found = wearstate.train(few_set, seed=0)
     assert found.card == expected.card
     assert repr(found) == (
-        "<WearModel of diametral_clearance_crankpin_m, 1543 features; 90 simulated records of 45 "
+        "<WearModel of diametral_clearance_crankpin_m, 1543 features; 18 simulated records of 9 "
         "machine draws; cold>"
     )
     assert "no measured joint" in found._repr_html_()
