@@ -161,8 +161,13 @@ def test_a_ctrl_c_in_a_finaliser_is_kept_in_mind_and_not_reported(short, tmp_pat
 def test_progress_and_ctrl_c_on_a_terminal(tmp_path):
     import pty
 
-    path = tmp_path / "data.h5"
-    command = [sys.executable, "-P", "-m", "wearstate", "generate", "bilge-pump-small"]
+    path, recipe = tmp_path / "data.h5", tmp_path / "brief.toml"
+    # brief records in several batches: the first is told early, and others are left to stop
+    fixed = "".join(f"{name} = {value!r}\n" for name, value in SHORT.items())
+    recipe.write_text(
+        f'name = "brief"\nextends = "bilge-pump-small"\nrecords = 400\n[fixed]\n{fixed}'
+    )
+    command = [sys.executable, "-P", "-m", "wearstate", "generate", str(recipe)]
     pid, terminal = pty.fork()
     if pid == 0:
         os.chdir(tmp_path)
@@ -178,8 +183,8 @@ def test_progress_and_ctrl_c_on_a_terminal(tmp_path):
     _, status = os.waitpid(pid, 0)
     assert os.waitstatus_to_exitcode(status) == 1
     plain = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", seen)  # colours and moves of the cursor
-    assert re.search(r"simulating \S+ +[0-9]+/120 [0-9:-]+ [0-9.]+/s", plain)
-    assert re.search(r"stopped; [0-9]+ of 120 records are kept in data.h5.part: repeat", seen)
+    assert re.search(r"simulating \S+ +[0-9]+/400 [0-9:-]+ [0-9.]+/s", plain)
+    assert re.search(r"stopped; [0-9]+ of 400 records are kept in data.h5.part: repeat", seen)
     assert "Traceback" not in seen
 
 
