@@ -10,7 +10,7 @@ import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
-from functools import cached_property
+from functools import cache, cached_property
 from importlib.metadata import version
 from itertools import pairwise
 from pathlib import Path
@@ -60,6 +60,12 @@ class WriteError(RuntimeError):
     """A data set file cannot be written on; names file, cause and cure. What is in it stays."""
 
 
+@cache  # each look-up reads a file: a sixth of the time of a small data set
+def _library_versions() -> str:
+    """Versions of what the records depend on, as JSON."""
+    return json.dumps({name: version(name) for name in _LIBRARIES})
+
+
 @dataclass(frozen=True, kw_only=True)
 class Attributes(SignalLayout):
     """What holds for every record of a data set file.
@@ -104,9 +110,7 @@ class Attributes(SignalLayout):
     seed: int = 0
     truth: bool = False
     created_by: str = f"wearstate {__version__}"
-    libraries: str = field(
-        default_factory=lambda: json.dumps({name: version(name) for name in _LIBRARIES})
-    )
+    libraries: str = field(default_factory=_library_versions)
 
     def __post_init__(self) -> None:
         self.refuse_contradictions("data set")

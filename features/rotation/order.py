@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import PchipInterpolator
 from scipy.ndimage import maximum_filter1d
 
 from ..signal.fft import rfft
@@ -166,6 +165,8 @@ def shaft_phase(
     >>> shaft_phase([0.1, 0.3], n_samples=5, fs=10.0).round(6).tolist()
     [-0.5, 0.0, 0.5, 1.0, 1.5]
     """
+    from scipy.interpolate import PchipInterpolator  # a third of a second: not at every start
+
     check_rate(fs)
     times = np.asarray(pulses, dtype=np.float64)
     _check_pulses(times, n_samples, fs, pulses_per_revolution)
