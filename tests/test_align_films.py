@@ -144,8 +144,8 @@ def test_page_and_json_hold_films_margins_and_jacks(rig):
         "Oil films by speed, as set → after the moves",
         "Distance from the nearest limit",
         "Moves and jacking effort, cold",
-        "Film pressure over the unrolled bore",
-        "Accelerance of every housing",
+        "Film pressure (computed), over length and angle",
+        "Accelerance of the housings from the model",
     ):
         assert text in page
 

@@ -108,7 +108,7 @@ def test_page_and_picture(tmp_path):
     shown = strict(run(SCENE, *SAGGED, *files, "--json").stdout)
     assert shown["files"] == [str(picture), str(page)]
     html = page.read_text()
-    assert html.count("data:image/png;base64,") == 3  # line, films, model
+    assert html.count("data:image/png;base64,") == 13  # line, films and model of five bearings
     assert "intermediate_aft" in html
     assert "raise intermediate_aft by " in html
     assert "http://" not in html
@@ -190,7 +190,9 @@ def test_the_page_holds_the_verdict_beside_the_name_and_the_test(tmp_path):
     text = run("shaft-rig", "--test", "shaker", "-o", page).stdout
     html = page.read_text()
     assert html.index('<th class="left">verdict</th>') < html.index("station <span")
-    assert html.count("data:image/png;base64,") == 4  # line, films, model, test
+    assert (
+        html.count("data:image/png;base64,") == 15
+    )  # line; films, model and test of four bearings
     assert "Simulated shaker test, pushing aft up" in html
     assert "orange: after the moves" in html
     # the lift of 0.06 mm moves no peak by more than the test scatters, and both say so

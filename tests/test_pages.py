@@ -4,47 +4,29 @@ import dataclasses
 import re
 
 import numpy as np
-import pytest
 from click.testing import CliRunner
-from matplotlib.text import Text
 from wearstate.diagnose.command_line.cli import cli
-from wearstate.diagnose.evaluation import figure as evaluate_figure
-from wearstate.diagnose.report import figures as report_figures
+from wearstate.diagnose.pages.picture import PHONE_PX
 from wearstate.diagnose.report.batch import BatchRow
+from wearstate.diagnose.report.figures import gauge, trend_picture
 from wearstate.diagnose.report.trend import fit_trend
 
-PHONE_PX = 358  # of 390 the margins of the page take 32
-LEAST_PX = 8
 
-
-def smallest_px(figure):
-    """Height of the smallest text of a picture that is shown as wide as the page [px]."""
-    figure.draw_without_rendering()
-    sizes = [text.get_fontsize() for text in figure.findobj(Text) if text.get_text().strip()]
-    return min(sizes) * PHONE_PX / (72 * figure.get_figwidth())
-
-
-def test_text_of_the_pictures_that_shrink_is_legible():
+def test_the_gauge_and_a_trend_are_read_on_a_phone():
     edges = [1e-4, 2e-4, 3e-4]
     limits = {
         "grade_edges_m": edges,
         "grade_names": ["as new", "worn", "plan renewal", "condemned"],
         "condemning_limit_m": 3e-4,
         "quantity": "diametral clearance, crankpin",
+        "source": "manual",
     }
-    estimate = {"low": 2.1e-4, "severity": 2.2e-4, "high": 2.4e-4}
-    assert smallest_px(report_figures._gauge_figure(estimate, limits)) >= LEAST_PX
-    shown = []
+    estimate = {"low": 2.1e-4, "severity": 2.2e-4, "high": 2.4e-4, "coverage": 0.9}
+    assert gauge(estimate, limits).image.least <= PHONE_PX
     hours = 700.0 * np.arange(12)
     wear = np.where(hours < 4000, 1e-4 + 3e-8 * hours, 1e-4)  # with a maintenance
     trend = fit_trend(hours, wear, 0.97 * wear, 1.03 * wear, limit=3e-4)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(report_figures, "encoded", lambda figure: shown.append(figure) or "")
-        report_figures.trend_picture(trend, limits, "machine 1")
-        patch.setattr(evaluate_figure, "encoded", lambda figure: shown.append(figure) or "")
-        evaluate_figure._picture(lambda axes: axes.text(0, 0, "smallest", fontsize=8))
-    assert len(shown) == 2
-    assert min(smallest_px(figure) for figure in shown) >= LEAST_PX
+    assert trend_picture(trend, limits, "machine 1").image.least <= PHONE_PX
 
 
 def test_every_value_of_a_table_of_bearings_tells_what_it_is(tmp_path):

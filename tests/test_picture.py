@@ -13,7 +13,7 @@ from wearstate.datasets.file.record import Channel
 from wearstate.diagnose.alignment.page import align, align_figure, align_html
 from wearstate.diagnose.machines.picture import plot_simulation
 from wearstate.diagnose.pages.page import render, short_name, visible
-from wearstate.diagnose.pages.picture import FORMATS, encoded, picture_bytes, save_picture
+from wearstate.diagnose.pages.picture import FORMATS, page_image, picture_bytes, save_picture
 from wearstate.diagnose.pictures.kinds import AUTO, KINDS, plot_recording
 from wearstate.diagnose.pictures.view import View
 from wearstate.diagnose.report.figures import trend_picture
@@ -148,7 +148,7 @@ def test_a_trend_takes_any_name(name):
         picture = trend_picture(
             fit_trend(hours, wear, 0.98 * wear, 1.02 * wear, limit=3.1e-4), limits, name
         )
-    assert picture.data.startswith("data:image/png")
+    assert picture.image.address.startswith("data:image/png")
 
 
 @pytest.mark.parametrize("suffix", FORMATS)
@@ -163,7 +163,7 @@ def test_any_figure_takes_any_word(tmp_path, suffix):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         save_picture(figure, tmp_path / f"x{suffix}")
-        encoded(figure)
+        page_image(figure)
 
 
 def test_a_dollar_is_drawn_and_powers_of_ten_stay_powers():

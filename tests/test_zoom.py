@@ -15,6 +15,7 @@ from wearstate.datasets.file.record import Attributes, DataSetWriter
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.pages import embed
 from wearstate.diagnose.pages.embed import MOST_BYTES
+from wearstate.diagnose.pages.picture import PageImage
 from wearstate.diagnose.pictures.view import View
 from wearstate.diagnose.pictures.zoom import zoom_block, zoom_page
 from wearstate.diagnose.pictures.zoom_curves import MOST_CHANNELS, ZoomCurve, zoom_curves
@@ -200,7 +201,7 @@ def test_a_page_stands_alone(bokeh, stored, tmp_path):
     ]  # fmt: skip
     assert outside(html) == []
     assert page.stat().st_size < MOST_BYTES
-    assert 'class="still" src="data:image/png;base64,' in html
+    assert re.search("still pictures.*?<img src=.data:image/png;base64,", html, re.DOTALL)
     assert "@media print" in html
     item = item_in(html)
     # a name between dollar signs is no formula: that would ask the network for its script
@@ -217,8 +218,10 @@ def test_many_channels_leave_a_page_small(bokeh):
     curves, left_out = zoom_curves(view)
     assert len({curve.title for curve in curves if curve.kind == "waveform"}) == MOST_CHANNELS
     assert left_out["channels"] == "9 to 14 have no room; name the channels to draw"
-    picture = "data:image/png;base64," + 400_000 * "A"
-    html = zoom_page(curves, picture, heading=view.heading, speed=view.speed, missing=left_out)
+    still = PageImage(address="data:image/png;base64," + 400_000 * "A", least=352, most=647)
+    html = zoom_page(
+        curves, [("all", still)], heading=view.heading, speed=view.speed, missing=left_out
+    )
     assert len(html.encode()) < MOST_BYTES
     assert "have no room" in html
 

@@ -21,6 +21,7 @@ from ...sim.shaft.changed import free_line, line_model, rest, transfer
 from ...sim.shaft.on_oil_films import BeamFilm, ShaftFilmError
 from ...sim.shaft.response import Place
 from ..pages.page import short_name
+from ..pages.picture import PAGE_WIDTH, PageImage, page_image
 from ..shaft_tests.measured_tests import LineTest
 from ..shaft_tests.rig_test import turned_scene
 
@@ -241,6 +242,29 @@ def pressure_figure(states: Sequence[LineFilms]) -> Any:
     return figure
 
 
+def pressure_images(states: Sequence[LineFilms]) -> list[PageImage]:
+    """Of :func:`pressure_figure` every bearing as a picture of a page, as set beside after."""
+    rows = [state for state in _at_one_speed(states) if state.film is not None]
+    films = [state.film for state in rows if state.film is not None]
+    count = min(len(films[0].bearings) if films else 0, _SHOWN_PANELS)
+    return [page_image(_bearing_figure(rows, films, i)) for i in range(count)]
+
+
+def _bearing_figure(rows: Sequence[LineFilms], films: Sequence[BeamFilm], i: int) -> Any:
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(PAGE_WIDTH, 2.7), layout="constrained")
+    panels = figure.subplots(1, len(rows), squeeze=False, sharey=True)[0]
+    highest = max(float(film.peak_pressure[i]) for film in films)
+    for axes, state, film in zip(panels, rows, films, strict=True):
+        image = _draw_pressure(axes, film, i, highest)
+        axes.set_title("after" if state.after else "as set", fontsize=9)
+    figure.colorbar(image, ax=list(panels), label="MPa")
+    panels[0].set_ylabel("angle from the bottom [deg]", fontsize=9)
+    figure.suptitle(short_name(films[0].bearings[i].name, 40), fontsize=10)
+    return figure
+
+
 def _at_one_speed(states: Sequence[LineFilms]) -> list[LineFilms]:
     """Those of the middle speed."""
     speeds = sorted({state.speed_hz for state in states})
@@ -312,19 +336,7 @@ def transfer_figure(
         rows, across, squeeze=False, sharex=True, sharey="row", height_ratios=ratios
     )
     for k in range(across):
-        level = panels[0, k]
-        if measured is not None:
-            value = measured.transfer.value[:, k]
-            level.plot(
-                plan.frequencies, _level(value), ".", ms=2.5, color="#7a828b", label="measured"
-            )
-            panels[1, k].plot(plan.frequencies, measured.coherence[:, k], color="#7a828b", lw=0.8)
-            panels[1, k].set(ylim=(0, 1.02), xlabel="frequency [Hz]")
-        for label, colour, curve in curves:
-            level.plot(plan.frequencies, _level(curve[:, k]), color=colour, lw=0.9, label=label)
-        level.set_title(_response_name(plan.responses[k]), fontsize=9)
-        for axes in panels[:, k]:
-            axes.grid(alpha=0.3)
+        _draw_response(panels[:, k], plan, curves, measured, k)
     panels[0, 0].set_ylabel("accelerance [dB re 1 (m/s²)/N]")
     panels[-1, 0].set_xlabel("frequency [Hz]")
     if measured is not None:
@@ -332,6 +344,62 @@ def transfer_figure(
     panels[0, -1].legend(fontsize=8)
     figure.suptitle(f"Transfer functions, pushing {_response_name(plan.force)}")
     return figure
+
+
+def transfer_images(
+    scene: ShaftScene,
+    moves: Mapping[str, float] | None = None,
+    turns: Mapping[str, float] | None = None,
+    *,
+    measured: LineTest | None = None,
+) -> list[PageImage]:
+    """Of :func:`transfer_figure` every response as a picture of a page."""
+    plan = _plan(scene, measured, None)
+    curves = _curves(scene, moves or {}, turns or {}, plan)
+    shown = range(min(len(plan.responses), _SHOWN_PANELS))
+    return [page_image(_response_figure(plan, curves, measured, k)) for k in shown]
+
+
+def _response_figure(
+    plan: "_Plan", curves: Sequence[tuple[str, str, Any]], measured: LineTest | None, k: int
+) -> Any:
+    from matplotlib.figure import Figure
+
+    rows = 1 if measured is None else 2
+    figure = Figure(figsize=(PAGE_WIDTH, 3.2 + 1.2 * (rows - 1)), layout="constrained")
+    ratios = [3, 1][:rows]
+    panels = figure.subplots(rows, 1, squeeze=False, sharex=True, height_ratios=ratios)[:, 0]
+    _draw_response(panels, plan, curves, measured, k)
+    panels[0].set_ylabel("accelerance [dB re 1 (m/s²)/N]", fontsize=9)
+    panels[0].set_title(
+        f"{_response_name(plan.responses[k])}, pushing {_response_name(plan.force)}", fontsize=9
+    )
+    panels[-1].set_xlabel("frequency [Hz]")
+    if measured is not None:
+        panels[1].set_ylabel("coherence")
+    panels[0].legend(fontsize=8)
+    return figure
+
+
+def _draw_response(
+    column: Any,
+    plan: "_Plan",
+    curves: Sequence[tuple[str, str, Any]],
+    measured: LineTest | None,
+    k: int,
+) -> None:
+    """Level of one response over its coherence, or level alone where nothing is measured."""
+    level = column[0]
+    if measured is not None:
+        value = measured.transfer.value[:, k]
+        level.plot(plan.frequencies, _level(value), ".", ms=2.5, color="#7a828b", label="measured")
+        column[1].plot(plan.frequencies, measured.coherence[:, k], color="#7a828b", lw=0.8)
+        column[1].set(ylim=(0, 1.02), xlabel="frequency [Hz]")
+    for label, colour, curve in curves:
+        level.plot(plan.frequencies, _level(curve[:, k]), color=colour, lw=0.9, label=label)
+    level.set_title(_response_name(plan.responses[k]), fontsize=9)
+    for axes in column:
+        axes.grid(alpha=0.3)
 
 
 class _Plan(NamedTuple):

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -25,19 +26,19 @@ from ...sim.scene.shaft import ShaftScene
 from ...sim.shaft.on_oil_films import ShaftFilmError
 from ...sim.shaft.recording import alignment_conditions, alignment_line
 from ..pages.page import render, save_page, short_name
-from ..pages.picture import encoded, save_picture
+from ..pages.picture import PageImage, drawn_alone, page_image, save_picture
 from ..shaft_tests.measured_tests import LineTest
 from ..shaft_tests.rig_test import EXPECTED, BeforeAfter, rig_figure, rig_text
-from ..shaft_tests.sag_report import SagReport, next_texts, sag_figure, sag_rows
+from ..shaft_tests.sag_report import SagReport, next_texts, sag_images, sag_rows
 from .films import (
     FILM_HEAD,
     LineFilms,
     film_cells,
     film_rows,
     film_states,
-    pressure_figure,
+    pressure_images,
     resting,
-    transfer_figure,
+    transfer_images,
 )
 from .margins import jack_cells, jack_rows, margin_cells, margin_rows
 from .quiet_moves import QuietMoves, quiet_moves
@@ -550,6 +551,15 @@ def align_figure(found: Alignment) -> Any:
     return figure
 
 
+def align_images(found: Alignment) -> list[PageImage]:
+    """The panels of :func:`align_figure` as pictures of a page."""
+    draws = [_draw_deflection, _draw_moment, _draw_reactions]
+    images = [drawn_alone(partial(draw, found=found), height=3.4) for draw in draws]
+    if found.jacking is not None:
+        images.append(drawn_alone(partial(_draw_jacking, found=found.jacking), height=3.4))
+    return images
+
+
 def save_figure(found: Alignment, path: Path, *, force: bool = True) -> None:
     """Draw :func:`align_figure` into a .png, .svg or .pdf file."""
     save_picture(align_figure(found), path, force=force)
@@ -574,9 +584,26 @@ def _draw_deflection(axes: Any, found: Alignment) -> None:
             middle = np.array([seat.station - half, seat.station + half])
             axes.plot(middle, ends, color=colour, lw=4, alpha=0.5, solid_capstyle="butt")
     for seat in found.line.seats:
-        place = {"xycoords": ("data", "axes fraction"), "ha": "center", "fontsize": 8}
-        axes.annotate(short_name(seat.name, 20), (seat.station, 1.02), color=_LIMIT, **place)
-    _finish(axes, "height [mm]", "Shaft and bottoms of the bores", pad=18)  # names stand below it
+        name, place = short_name(seat.name, 20), (seat.station, 1.02)
+        axes.annotate(name, place, color=_NAMES, **_above(axes))
+    # names stand below the title
+    pad = 62.0 if _is_narrow(axes) else 18.0
+    _finish(axes, "height [mm]", "Shaft and bottoms of the bores", pad=pad)
+
+
+def _is_narrow(axes: Any) -> bool:
+    """Whether names of bearings side by side would overlap."""
+    return bool(axes.get_figure().get_figwidth() < _ROOM_FOR_NAMES)
+
+
+_ROOM_FOR_NAMES = 8.0  # [inch]
+_NAMES = "#49535e"
+
+
+def _above(axes: Any) -> dict[str, Any]:
+    """How names stand above the axes, slanted where they have no room."""
+    place = {"xycoords": ("data", "axes fraction"), "fontsize": 8}
+    return place | ({"rotation": 35, "ha": "left"} if _is_narrow(axes) else {"ha": "center"})
 
 
 def _rises(state: LineState) -> Sequence[float]:
@@ -610,7 +637,9 @@ def _draw_reactions(axes: Any, found: Alignment) -> None:
     highest = max(float(state.reactions.max()) for state, _ in pairs)
     axes.set_ylim(0, 1.35 * highest / 1e3)  # limits far above it say little
     axes.legend(handles=_meanings(pairs), fontsize=8, loc="upper right", ncols=3)
-    axes.set_xticks(range(n), [short_name(name, 20) for name in found.line.names])
+    slant = {"rotation": 25, "ha": "right"} if _is_narrow(axes) else {}
+    names = [short_name(name, 20) for name in found.line.names]
+    axes.set_xticks(range(n), names, fontsize=9, **slant)
     axes.set(ylabel="reaction [kN]", title="Reactions")
     axes.grid(axis="y", alpha=0.3)
 
@@ -693,7 +722,7 @@ def align_html(
         moves=_move_lines(found.calibration) if found.calibration else [],
         before_after=_before_after(found.calibration) if found.calibration else [],
         jack=_jacking_text(found.jacking, found.states[0].condition.name) if found.jacking else "",
-        image=encoded(align_figure(found)),
+        images=align_images(found),
         margins=_margin_lines(found.calibration, found.margin) if found.calibration else [],
         tested=None if tested is None else _tested(tested),
         measured=None if measured is None else _measured(measured),
@@ -736,7 +765,10 @@ def _tested(result: BeforeAfter) -> dict[str, Any]:
         "heading": heading,
         "summary": result.summary,
         "rows": rows,
-        "image": encoded(rig_figure(result, columns=_TEST_COLUMNS)),
+        "images": [
+            page_image(rig_figure(result, channels=[name], title=False))
+            for name in result.before.channels
+        ],
     }
 
 
@@ -747,7 +779,7 @@ def _films(states: Sequence[LineFilms]) -> dict[str, Any]:
         "head": FILM_HEAD,
         "rows": film_cells(states),
         "faults": resting(states),
-        "image": encoded(pressure_figure(states)) if rests else "",
+        "images": pressure_images(states) if rests else [],
     }
 
 
@@ -756,12 +788,14 @@ def _transfers(
     moves: Mapping[str, float],
     turns: Mapping[str, float],
     measured: SagReport | None,
-) -> list[str]:
+) -> list[PageImage]:
     """Pictures of transfer functions, one for each measured test, else one of the model."""
     tests: Sequence[LineTest | None] = (measured.tests if measured else ()) or (None,)
     try:
         return [
-            encoded(transfer_figure(found.scene, moves, turns, measured=test)) for test in tests
+            image
+            for test in tests
+            for image in transfer_images(found.scene, moves, turns, measured=test)
         ]
     except ShaftFilmError:  # said beside the table of the films
         return []
@@ -777,11 +811,8 @@ def _measured(report: SagReport) -> dict[str, Any]:
         "rows": rows,
         "tests": [*report.doubts, *report.sources],
         "next": next_texts(report),
-        "image": encoded(sag_figure(report)),
+        "images": sag_images(report),
     }
-
-
-_TEST_COLUMNS = 3  # of the picture of a test, on a page
 
 
 def save_html(

@@ -1,10 +1,11 @@
 """A list of blind spots as a page and a picture."""
 
+import textwrap
 from collections.abc import Sequence
 from typing import Any
 
 from ..pages.page import render, short_name
-from ..pages.picture import encoded
+from ..pages.picture import PAGE_WIDTH, page_image
 from ..pages.words import quantity_name
 from .text import Table, conclusion, percent, with_ends
 
@@ -14,7 +15,7 @@ _WORDS = {
     "drawn": "drawn, beyond its range",
     "sensor": "sensor and converter",
 }
-_WIDTH, _PER_ROW, _MARGIN = 6.4, 0.22, 1.0  # inches
+_PER_ROW, _MARGIN = 0.32, 1.0  # inches
 _MOST = 25  # rows of the picture
 
 
@@ -45,7 +46,7 @@ def blind_spots_html(table: Table, *, notice: str = "") -> str:
         notice=notice,
         percent=percent,
         with_ends=with_ends,
-        picture=encoded(blind_spots_figure(table)),
+        picture=page_image(blind_spots_figure(table)),
     )
 
 
@@ -59,21 +60,26 @@ def blind_spots_figure(table: Table) -> Any:
     from matplotlib.figure import Figure
 
     rows = [row for row in table["rows"] if row["clear_error"]["value"] is not None][:_MOST]
-    figure = Figure(figsize=(_WIDTH, _MARGIN + _PER_ROW * max(len(rows), 4)), layout="constrained")
+    height = _MARGIN + _PER_ROW * max(len(rows), 4)
+    figure = Figure(figsize=(PAGE_WIDTH, height), layout="constrained")
     axes = figure.add_subplot()
     usual = table["baseline"]["clear_error"]["value"]
     if usual is not None:
         axes.axvline(100 * usual, color=_COLOURS["as trained"], ls="--", label="as trained")
     for kind, word in _WORDS.items():
         _draw(axes, [(i, row) for i, row in enumerate(rows) if row["kind"] == kind], kind, word)
-    names = [short_name(f"{row['name']} {row['shift']}", 56) for row in rows]
-    axes.set_yticks(range(len(rows)), names, fontsize=7)
+    names = [_in_two_lines(f"{row['name']} {row['shift']}") for row in rows]
+    axes.set_yticks(range(len(rows)), names, fontsize=8, linespacing=0.9)
     axes.set_ylim(max(len(rows), 1) - 0.5, -0.5)
     axes.set_xlim(left=0)
     axes.set_xlabel("error without a caution [% of the condemning limit]", fontsize=8)
     axes.grid(axis="x", alpha=0.3)
-    axes.legend(fontsize=7, loc="lower right")
+    axes.legend(fontsize=8, loc="lower right")
     return figure
+
+
+def _in_two_lines(name: str) -> str:
+    return textwrap.fill(short_name(name, 54), 28)
 
 
 def _draw(axes: Any, rows: Sequence[tuple[int, Table]], kind: str, word: str) -> None:

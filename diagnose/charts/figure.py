@@ -3,13 +3,20 @@
 import math
 import re
 import textwrap
+from dataclasses import dataclass
 from typing import Any
 from xml.sax.saxutils import escape
 
 import numpy as np
 
 from ..pages.page import visible
-from ..pages.picture import picture_bytes
+from ..pages.picture import (
+    PAGE_WIDTH,
+    PageImage,
+    least_width,
+    picture_bytes,
+    plain_numbers,
+)
 from .chart import RECOMMENDED, Chart, Choice, Point
 
 FRONT, OTHER, DOUBTFUL, LIMIT = "#1f5a94", "#9aa3ab", "#e07b39", "#b3261e"
@@ -62,7 +69,7 @@ def shown_error(point: Point) -> float:
     return max(100 * point.error, FLOOR)
 
 
-def _draw_points(axes: Any, chart: Chart, question: str) -> None:
+def _draw_points(axes: Any, chart: Chart, question: str, *, columns: int = 3) -> None:
     points = chart.of(question)
     finite = [p for p in points if math.isfinite(p.error) and math.isfinite(p.seconds)]
     front = sorted((p for p in finite if p.on_front), key=lambda p: p.seconds)
@@ -99,11 +106,11 @@ def _draw_points(axes: Any, chart: Chart, question: str) -> None:
     if chart.accuracy is not None:
         axes.set_yscale("log")
         axes.set_ylim(FLOOR / 2, _HEADROOM * _highest(chart))
-    _plain_numbers(axes.xaxis)
-    _plain_numbers(axes.yaxis)
+    plain_numbers(axes.xaxis)
+    plain_numbers(axes.yaxis)
     axes.grid(alpha=0.3, which="both")
     _number(axes, front)
-    _legend_below(axes, ncols=3)
+    _legend_below(axes, ncols=columns)
 
 
 def _mark_choice(axes: Any, chart: Chart, question: str, finite: list[Point]) -> None:
@@ -207,21 +214,6 @@ def winner_words(chart: Chart) -> str:
     return "cheapest within the accuracy"
 
 
-def _plain_numbers(axis: Any) -> None:
-    """0.01 rather than a power of ten, at few places."""
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
-
-    if axis.get_scale() != "log":
-        return
-    low, high = axis.get_view_interval()
-    narrow = high < _NARROW * low
-    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if narrow else (1.0,)))
-    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axis.set_minor_formatter(NullFormatter())
-
-
-_NARROW = 200.0  # of an axis, last over first: so few decades need numbers between
-
 _KINDS: dict[str, dict[str, Any]] = {
     "on the front": {"marker": "o", "ms": 8, "color": FRONT},
     "beaten": {"marker": "o", "ms": 5, "color": OTHER},
@@ -260,33 +252,30 @@ def _draw_quantities(figure: Any, axes: Any, chart: Chart) -> None:
     if not names:
         axes.set_axis_off()
         return
-    values = np.array(
-        [[100 * p.errors[n].error if n in p.errors else np.nan for n in names] for _, p in points]
-    )
+    values = _errors(points, names)
     shown = axes.imshow(
         np.maximum(values, FLOOR),
         aspect="auto",
         cmap="YlOrRd",
-        norm=LogNorm(vmin=_palest(chart, values), vmax=max(100.0, float(np.nanmax(values)))),
+        norm=LogNorm(vmin=_palest(chart, values), vmax=_reddest(values)),
     )
     for (row, column), value in np.ndenumerate(values):
-        dark = value > _DARK
         axes.text(
             column,
             row,
             _percent(value),
             ha="center",
             va="center",
-            fontsize=6.5,
-            color="white" if dark else "black",
+            fontsize=8,
+            color=_ink_on(value),
         )
     words = [chart.label(name) for name in names]
-    axes.set_xticks(range(len(names)), words, rotation=35, ha="right", fontsize=7)
+    axes.set_xticks(range(len(names)), words, rotation=35, ha="right", fontsize=8)
     labels = [_wrapped(label, _WIDE) for label, _ in points]
-    axes.set_yticks(range(len(points)), labels, fontsize=7)
+    axes.set_yticks(range(len(points)), labels, fontsize=8)
     what = "" if chart.choices else " on the front"
     axes.set_title(f"Error of every quantity{what} [{_unit(chart)}]", fontsize=10)
-    figure.colorbar(shown, ax=axes, pad=0.01).ax.tick_params(labelsize=7)
+    figure.colorbar(shown, ax=axes, pad=0.01).ax.tick_params(labelsize=8)
 
 
 def _palest(chart: Chart, values: Any) -> float:
@@ -322,6 +311,79 @@ def _percent(value: float) -> str:
     return "0" if value < FLOOR else f"{value:.1g}" if value < 10 * FLOOR else f"{value:.2g}"
 
 
+@dataclass(frozen=True, kw_only=True)
+class ShadedCell:
+    """An error in the table of a page, on the colour that the picture gives it."""
+
+    text: str
+    ground: str
+    ink: str
+
+
+def question_images(chart: Chart) -> list[PageImage]:
+    """A picture of points for each question; a point tells its name under the pointer."""
+    from matplotlib.figure import Figure
+
+    images = []
+    for question in chart.questions or ("",):
+        figure = Figure(figsize=(PAGE_WIDTH, _POINTS - 0.8), layout="constrained")
+        _draw_points(figure.subplots(), chart, question, columns=2)
+        svg = picture_bytes(figure, ".svg").decode()
+        images.append(
+            PageImage(
+                svg=_pointed(chart, svg[svg.index("<svg") :]),
+                least=least_width(figure),
+                most=_MOST_PX,
+            )
+        )
+    return images
+
+
+_MOST_PX = 760  # width of points in a page
+
+
+def shaded_rows(chart: Chart) -> tuple[list[str], list[tuple[str, list[ShadedCell]]]]:
+    """Heads and rows of the errors by quantity, in the colours of the picture."""
+    from matplotlib import colormaps
+    from matplotlib.colors import LogNorm, to_hex
+
+    points = _table_points(chart)
+    names = list(dict.fromkeys(name for _, point in points for name in point.errors))
+    if not names:
+        return [], []
+    values = _errors(points, names)
+    norm = LogNorm(vmin=_palest(chart, values), vmax=_reddest(values), clip=True)
+
+    def cell(value: float) -> ShadedCell:
+        if not math.isfinite(value):
+            return ShadedCell(text="–", ground="#ffffff", ink=_INK)
+        ground = to_hex(colormaps["YlOrRd"](norm(max(value, FLOOR))))
+        return ShadedCell(text=_percent(value), ground=ground, ink=_ink_on(value))
+
+    rows = [
+        (label, [cell(float(value)) for value in line])
+        for (label, _), line in zip(points, values, strict=True)
+    ]
+    return [chart.label(name) for name in names], rows
+
+
+_INK = "#1c232b"
+
+
+def _ink_on(value: float) -> str:
+    return "white" if value > _DARK else "black"
+
+
+def _errors(points: list[tuple[str, Point]], names: list[str]) -> Any:
+    return np.array(
+        [[100 * p.errors[n].error if n in p.errors else np.nan for n in names] for _, p in points]
+    )
+
+
+def _reddest(values: Any) -> float:
+    return max(100.0, float(np.nanmax(values)))
+
+
 def chart_svg(chart: Chart) -> str:
     """The figure as SVG whose points tell their names under the pointer.
 
@@ -333,7 +395,10 @@ def chart_svg(chart: Chart) -> str:
     -------
     str
     """
-    text = picture_bytes(chart_figure(chart), ".svg").decode()
+    return _pointed(chart, picture_bytes(chart_figure(chart), ".svg").decode())
+
+
+def _pointed(chart: Chart, text: str) -> str:
     return _PLACE.sub(lambda found: found[0] + _pointer(chart, chart.points[int(found[1])]), text)
 
 

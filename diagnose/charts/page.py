@@ -10,7 +10,7 @@ from ..pages.picture import save_picture
 from ..pages.plain_json import json_text
 from ..pages.points import point_block
 from .chart import RECOMMENDED, Chart, Point, chart_table, convergence_text, save_rows
-from .figure import chart_figure, chart_svg, choice_of
+from .figure import chart_figure, chart_svg, choice_of, question_images, shaded_rows
 from .points import chart_points
 from .words import percent
 
@@ -30,14 +30,16 @@ def chart_html(chart: Chart, *, interactive: bool = False) -> str:
     -------
     str
     """
-    svg = chart_svg(chart)
+    images = question_images(chart)
     block = None
     if interactive:
-        block = point_block(chart_points(chart), taken=len(svg) + _ROW_BYTES * len(chart.points))
+        taken = sum(len(image.svg) for image in images) + _ROW_BYTES * len(chart.points)
+        block = point_block(chart_points(chart), taken=taken)
     return render(
         "chart.html.j2",
         chart=chart,
-        svg=svg[svg.index("<svg") :],
+        images=images,
+        shaded=shaded_rows(chart),
         block=block,
         tapped="its settings as TOML" if any(p.block for p in chart.points) else "its figures",
         tables=[(question, _rows(chart, question)) for question in chart.questions],

@@ -6,7 +6,7 @@ from typing import Any
 
 from ..learning.grades import GRADE_NAMES
 from ..pages.page import render, save_page, short_name
-from ..pages.picture import encoded, save_picture
+from ..pages.picture import PAGE_HEIGHT, PAGE_WIDTH, drawn_alone, save_picture
 from ..pages.words import quantity_name
 from .text import best_baseline
 
@@ -21,7 +21,6 @@ _RIVALS = {
 }
 """Baseline -> colour and marker."""
 
-_WIDTH, _HEIGHT = 4.9, 3.6  # inches of a picture: its 8 points are 8 pixels on a phone
 _BEYOND = 1.15  # of the axis: where an open end is drawn to
 
 
@@ -47,7 +46,7 @@ def evaluation_figure(result: Result) -> Any:
 
     panels = _panels(result)
     rows = (len(panels) + 1) // 2
-    figure = Figure(figsize=(2 * _WIDTH, _HEIGHT * rows), layout="constrained")
+    figure = Figure(figsize=(2 * PAGE_WIDTH, PAGE_HEIGHT * rows), layout="constrained")
     what = f"{quantity_name(result['severity'])}, {result['origin']}"
     figure.suptitle(f"{short_name(result['data'], 60)}: {what}", fontsize=11)
     for place, (_, _, draw) in enumerate(panels, start=1):
@@ -280,17 +279,8 @@ def evaluation_html(result: Result, *, notice: str = "") -> str:
         quantity=quantity_name(result["severity"]),
         notice=notice,
         best=best_baseline,
-        figures=[(caption, _picture(draw)) for _, caption, draw in panels],
+        figures=[(caption, drawn_alone(draw)) for _, caption, draw in panels],
     )
-
-
-def _picture(draw: Callable[[Any], None]) -> str:
-    """PNG of one picture as a data address."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(_WIDTH, _HEIGHT), layout="constrained")
-    draw(figure.add_subplot())
-    return encoded(figure)
 
 
 def save_evaluation(result: Result, path: Path, *, notice: str = "", force: bool = True) -> None:

@@ -3,7 +3,7 @@
 import json
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -19,7 +19,7 @@ from ...sim.scene.parts import SceneError
 from ..feature_rows.feature_table import confounders_in
 from ..learning.grades import GRADE_NAMES
 from ..pages.page import render, save_page
-from ..pages.picture import encoded
+from ..pages.picture import PageImage, page_image
 from ..pages.words import quantity_name
 from ..pictures.kinds import make_panel
 from ..pictures.panel import panel_figure
@@ -50,10 +50,10 @@ class Code:
 
 @dataclass(frozen=True, kw_only=True)
 class CardPicture:
-    """A drawing of one recording, as a data address."""
+    """A drawing of one recording."""
 
     caption: str
-    address: str
+    image: PageImage
 
 
 Block = str | list[str] | CardTable | Code | CardPicture
@@ -276,7 +276,7 @@ def _pictures(facts: _Facts) -> Iterator[Block]:
             except DataError:
                 continue  # too short for a spectrum
             caption = f"{what}, record {index} ({facts.head.origin}). {panel.caption}"
-            yield CardPicture(caption=caption, address=encoded(panel_figure(panel)))
+            yield CardPicture(caption=caption, image=page_image(panel_figure(panel)))
 
 
 def _columns(facts: _Facts) -> Iterator[Block]:
@@ -544,10 +544,7 @@ def card_html(card: Card) -> str:
     sections = [
         (
             name,
-            [
-                (_KINDS[type(block)], block if isinstance(block, (str, list)) else asdict(block))
-                for block in blocks
-            ],
+            [(_KINDS[type(block)], block) for block in blocks],
         )
         for name, blocks in card.sections
     ]

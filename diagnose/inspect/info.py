@@ -23,8 +23,9 @@ from ..feature_rows.feature_table import choice_of, confounders_in
 from ..feature_rows.quality import sample_faults
 from ..pages.embed import require_bokeh
 from ..pages.page import save_page
-from ..pages.picture import encoded, save_picture
+from ..pages.picture import page_image, save_picture
 from ..pictures.kinds import AUTO, plot_recording
+from ..pictures.panel import panel_figure
 from ..pictures.view import View
 from ..pictures.zoom import STILL_COLOURS, zoom_page
 from ..pictures.zoom_curves import zoom_curves
@@ -359,8 +360,11 @@ def plot_file(
 def _save_zoom(view: View, kind: str, page: Path, *, force: bool) -> dict[str, Any]:
     """Write the page of curves, with the picture for paper; what it holds, as `plot_file`."""
     curves, left_out = zoom_curves(view, kind)
-    picture = encoded(plot_recording(view, kind).figure, colours=STILL_COLOURS)
-    html = zoom_page(curves, picture, heading=view.heading, speed=view.speed, missing=left_out)
+    stills = [
+        (panel.caption, page_image(panel_figure(panel), colours=STILL_COLOURS))
+        for panel in plot_recording(view, kind).panels
+    ]
+    html = zoom_page(curves, stills, heading=view.heading, speed=view.speed, missing=left_out)
     save_page(html, page, force=force)
     drawn = list(dict.fromkeys(curve.kind for curve in curves))
     return {"path": str(page), "drawn": drawn, "left_out": left_out}

@@ -4,6 +4,7 @@ import csv
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,7 @@ from ..feature_rows.feature_choice import costs_ms
 from ..feature_rows.feature_rank import LEAST_OF_MACHINE, FeatureRank, Ranking, rank_features
 from ..feature_rows.feature_table import FeatureSelection, FeatureTable
 from ..pages.page import render, save_page, short_name
-from ..pages.picture import encoded
+from ..pages.picture import PAGE_WIDTH, PageImage, drawn_alone, page_image
 from ..pages.si_text import plain
 from ..pages.words import quantity_name
 
@@ -28,6 +29,7 @@ SUFFIXES = (".html", ".htm", ".csv")
 SHOWN = 20
 """Features in the table of a terminal; also those whose cost is measured."""
 
+_OPEN = 60  # features of a page that are shown, and printed, without asking for more
 _DRAWN = 6  # features whose values are drawn
 
 
@@ -231,8 +233,8 @@ def rank_html(found: RankedSet) -> str:
         lines=rank_lines(found),
         records=found.ranking.n_records,
         machines=found.ranking.n_machines,
-        bars=encoded(bar_figure(found)),
-        values=encoded(value_figure(found)),
+        bars=page_image(bar_figure(found)),
+        values=value_images(found),
         drawn=min(_DRAWN, len(found.ranking.features)),
         heads=[*_used(found).values(), "cost [ms]"],
         rows=[
@@ -247,6 +249,7 @@ def rank_html(found: RankedSet) -> str:
             for each in found.ranking.features
         ],
         shown=SHOWN,
+        open=_OPEN,
     )
 
 
@@ -261,38 +264,34 @@ def bar_figure(found: RankedSet) -> Any:
     from matplotlib.figure import Figure
 
     rows = found.ranking.features[:SHOWN]
-    figure = Figure(figsize=(8.0, 0.28 * len(rows) + 1.2), layout="constrained")
+    figure = Figure(figsize=(PAGE_WIDTH, 0.26 * len(rows) + 1.0), layout="constrained")
     axis = figure.subplots()
     places = np.arange(len(rows))
     axis.barh(places, np.nan_to_num([each.information for each in rows]), color="#2f6f9f")
-    axis.set_yticks(places, [short_name(each.name) for each in rows], fontsize=9)
+    axis.set_yticks(places, [short_name(each.name, 34) for each in rows], fontsize=8)
     axis.invert_yaxis()
     axis.axvline(found.ranking.chance, color="#c03a2b", linestyle="--", label="chance")
-    axis.set_xlabel(f"information about {_axis_words(found).partition(' [')[0]} [bits]")
+    axis.set_xlabel(
+        f"information about {_axis_words(found).partition(' [')[0]} [bits]", fontsize=9, loc="right"
+    )
     axis.legend(loc="lower right")
     return figure
 
 
-def value_figure(found: RankedSet) -> Any:
-    """Values of the best features against the target, records of one machine joined."""
-    from matplotlib.figure import Figure
-
-    rows = found.ranking.features[:_DRAWN]
-    columns = min(3, len(rows))
-    high = math.ceil(len(rows) / columns)
-    figure = Figure(figsize=(4.2 * columns, 3.2 * high), layout="constrained")
-    panels = list(np.ravel(figure.subplots(high, columns, squeeze=False)))
+def value_images(found: RankedSet) -> list[PageImage]:
+    """Values of each of the best features against the target, records of one machine joined."""
     place, ticks = _places(found)
-    for axis, each in zip(panels, rows, strict=False):
+
+    def draw(axis: Any, each: FeatureRank) -> None:
         column = found.table.values[:, found.table.names.index(each.name)]
         _draw_values(axis, found, place, column)
-        axis.set_title(short_name(each.name, 34), fontsize=10)
+        axis.set_title(short_name(each.name, 44), fontsize=10)
         axis.set_xlabel(_axis_words(found), fontsize=9)
         if ticks:
             axis.set_xticks(range(len(ticks)), [short_name(each, 14) for each in ticks])
-    for spare in panels[len(rows) :]:
-        spare.set_visible(False)
-    return figure
+
+    best = found.ranking.features[:_DRAWN]
+    return [drawn_alone(partial(draw, each=each), height=3.2) for each in best]
 
 
 def _places(found: RankedSet) -> tuple[NDArray[np.float64], list[str]]:

@@ -2,6 +2,9 @@
 
 import base64
 import io
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +17,48 @@ FORMATS = (".png", ".svg", ".pdf")
 
 DOTS_PER_INCH = 110
 """Of a picture in points."""
+
+PAGE_WIDTH = 4.9
+"""Of a picture that a phone shows whole, text of 8 points and more [inch]."""
+
+PAGE_HEIGHT = 3.6
+"""And its height, where nothing asks for another [inch]."""
+
+PHONE_PX = 358
+"""Of the 390 pixels of a phone, less the margins of a page."""
+
+LEAST_TEXT_PX = 8
+"""Height of the smallest text that can be read."""
+
+_ENLARGED = 1.2  # a picture in a wide page, over its own size
+_EXPONENT = 0.7  # height of a raised letter, over the others
+
+
+@dataclass(frozen=True, kw_only=True)
+class PageImage:
+    """A picture in a page, with the widths at which it can be read.
+
+    Attributes
+    ----------
+    address : str
+        PNG as a data address.
+    svg : str
+        Instead of it, where points tell their names under the pointer.
+    least : int
+        Narrower, its smallest text is below :data:`LEAST_TEXT_PX` [CSS px].
+    most : int
+        Wider, it is only coarse [CSS px].
+    """
+
+    address: str = ""
+    svg: str = ""
+    least: int
+    most: int
+
+    @property
+    def sideways(self) -> bool:
+        """Whether a phone cannot show it whole."""
+        return self.least > PHONE_PX
 
 
 def picture_bytes(figure: Any, suffix: str) -> bytes:
@@ -62,12 +107,85 @@ def save_picture(figure: Any, path: Path, *, force: bool = True) -> None:
     write_whole(path, picture_bytes(figure, path.suffix), force=force)
 
 
-def encoded(figure: Any, *, colours: int | None = None) -> str:
-    """PNG of a figure as a data address; with few colours, a third of the size."""
+def page_image(figure: Any, *, colours: int | None = None) -> PageImage:
+    """A figure for a page.
+
+    Parameters
+    ----------
+    figure : matplotlib.figure.Figure
+    colours : int, optional
+        With few, a third of the size.
+
+    Returns
+    -------
+    PageImage
+    """
     picture = picture_bytes(figure, ".png")
     if colours is not None:
         picture = _of_few_colours(picture, colours)
-    return "data:image/png;base64," + base64.b64encode(picture).decode()
+    return PageImage(
+        address="data:image/png;base64," + base64.b64encode(picture).decode(),
+        least=least_width(figure),
+        most=round(_ENLARGED * DOTS_PER_INCH * figure.get_figwidth()),
+    )
+
+
+def drawn_alone(
+    draw: Callable[[Any], None], *, width: float = PAGE_WIDTH, height: float = PAGE_HEIGHT
+) -> PageImage:
+    """One pair of axes as a picture of a page.
+
+    Parameters
+    ----------
+    draw : callable
+        ``draw(axes)``
+    width, height : float
+        [inch]
+
+    Returns
+    -------
+    PageImage
+    """
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height), layout="constrained")
+    draw(figure.add_subplot())
+    return page_image(figure)
+
+
+def least_width(figure: Any) -> int:
+    """Width below which the smallest text of a figure that was drawn cannot be read [CSS px]."""
+    from matplotlib.text import Text
+
+    sizes = [_height(text) for text in figure.findobj(Text) if text.get_visible()]
+    smallest = min((size for size in sizes if size), default=math.inf)
+    width: float = figure.get_figwidth()
+    return math.ceil(LEAST_TEXT_PX * 72 * width / smallest)
+
+
+def _height(text: Any) -> float:
+    """Of the smallest letter [pt]; 0 without letters."""
+    words = text.get_text()
+    if not words.strip():
+        return 0.0
+    raised = text.get_parse_math() and words.count("$") > 1 and "^" in words
+    return float(text.get_fontsize() * (_EXPONENT if raised else 1.0))
+
+
+def plain_numbers(axis: Any) -> None:
+    """On a logarithmic axis 0.01 rather than a power of ten, whose exponent nobody can read."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    if axis.get_scale() != "log":
+        return
+    low, high = axis.get_view_interval()
+    narrow = high < _NARROW * low
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if narrow else (1.0,)))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())
+
+
+_NARROW = 200.0  # of an axis, last over first: so few decades need numbers between
 
 
 def _of_few_colours(picture: bytes, colours: int) -> bytes:

@@ -110,7 +110,7 @@ def _draw_envelopes(
         axis.set_ylabel(f"[{item.trace.unit}]", fontsize=9)
         if item.faults:
             _fault_lines(axis, item.faults, highest)
-            axis.legend(loc="upper right", fontsize=7)
+            axis.legend(loc="upper right", fontsize=8)
         else:
             order_cursors(axis, speed, 0, highest)
         axis.set_title(_band_words(item), fontsize=8, loc="left", pad=2)

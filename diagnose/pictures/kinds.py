@@ -41,6 +41,8 @@ class Picture:
     Parameters
     ----------
     figure : matplotlib.figure.Figure
+    panels : tuple of Panel
+        On it.
     drawn : tuple of str
         Kinds on it.
     left_out : dict
@@ -48,6 +50,7 @@ class Picture:
     """
 
     figure: Any
+    panels: tuple[Panel, ...]
     drawn: tuple[str, ...]
     left_out: dict[str, str]
 
@@ -87,7 +90,8 @@ def plot_recording(view: View, kind: str = AUTO) -> Picture:
     """
     if kind != AUTO:
         panel = make_panel(view, kind)
-        return Picture(figure=sheet(view.heading, [[panel]]), drawn=(kind,), left_out={})
+        figure = sheet(view.heading, [[panel]])
+        return Picture(figure=figure, panels=(panel,), drawn=(kind,), left_out={})
     panels, left_out = [], {}
     for name in KINDS:
         try:
@@ -98,7 +102,8 @@ def plot_recording(view: View, kind: str = AUTO) -> Picture:
         reasons = "\n".join(f"{view.recording.source}: {k} {why}" for k, why in left_out.items())
         raise DataError(reasons)
     figure = sheet(view.heading, columns_of(panels))
-    return Picture(figure=figure, drawn=tuple(p.kind for p in panels), left_out=left_out)
+    drawn = tuple(panel.kind for panel in panels)
+    return Picture(figure=figure, panels=tuple(panels), drawn=drawn, left_out=left_out)
 
 
 def make_panel(view: View, kind: str) -> Panel:

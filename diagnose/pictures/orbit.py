@@ -10,7 +10,7 @@ import numpy as np
 from ...features.catalogue.analysis import DISPLACEMENT
 from ...features.rotation import orbit
 from ..pages.page import short_name
-from .panel import COLOURS, MOST_POINTS, LackError, Panel
+from .panel import COLOURS, MOST_POINTS, WIDTH, LackError, Panel
 from .view import Float, Trace, Turning, View
 
 _SHOWN_REVOLUTIONS = 10
@@ -97,7 +97,8 @@ def _orbit_of(view: View, first: Trace, second: Trace) -> _Orbit:
 
 def _draw_orbits(place: Any, *, orbits: Sequence[_Orbit]) -> None:
     panels = place.subplots(len(orbits), 2, width_ratios=(1, 1.4), squeeze=False)
-    place.subplots_adjust(wspace=0.3, hspace=0.3)
+    narrow = place.bbox.width / place.dpi < WIDTH
+    place.subplots_adjust(wspace=0.6 if narrow else 0.3, hspace=0.3)
     for (path, lines), item in zip(panels, orbits, strict=True):
         path.plot(item.path.real, item.path.imag, lw=0.6, color=COLOURS[0], label="path")
         if item.first_order.size:
@@ -105,12 +106,15 @@ def _draw_orbits(place: Any, *, orbits: Sequence[_Orbit]) -> None:
                 item.first_order.real, item.first_order.imag, lw=1.2, color=COLOURS[1], label="1×"
             )
             path.plot(item.marks.real, item.marks.imag, ".", ms=4, color="black", label="tacho")
-            path.legend(loc="upper right", fontsize=7)
+            path.legend(loc="upper right", fontsize=8)
         path.set_aspect("equal", adjustable="datalim")
-        path.set(xlabel=f"x, between {item.title} [{item.unit}]", ylabel=f"y [{item.unit}]")
+        between = f"x [{item.unit}], between" + ("\n" if narrow else " ") + item.title
+        path.set_xlabel(between, fontsize=8 if narrow else 10)
+        path.set_ylabel(f"y [{item.unit}]")
         shown = slice(None) if item.most is None else np.abs(item.place) <= item.most
         lines.plot(item.place[shown], item.radius[shown], lw=0.8, color=COLOURS[0])
-        lines.set(xlabel=f"backward   [{item.axis}]   forward", ylabel=f"radius [{item.unit}]")
+        lines.set_xlabel(f"backward   [{item.axis}]   forward", fontsize=8 if narrow else 10)
+        lines.set_ylabel(f"radius [{item.unit}]")
         lines.margins(x=0)
         lines.set_ylim(0, None)
         for axes in (path, lines):

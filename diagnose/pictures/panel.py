@@ -12,15 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..pages.page import short_name
+from ..pages.picture import PAGE_WIDTH
 from .view import Trace, Turning, View
 
 COLOURS = ("#1f5a94", "#b3541e", "#4f7d3a", "#7a4a8c", "#8a7a14", "#2a8a8a", "#a0405f", "#5b6470")
 """Of channels, one after the other."""
 
 WIDTH = 8.0
-"""Of a panel [inch]."""
+"""Of a panel on a sheet [inch]."""
 
-RIGHT_OF_MAP = 0.55
+RIGHT_OF_MAP = 0.7
 """Margin that holds the unit beside a bar of colours [inch]."""
 
 MOST_ROWS = 4
@@ -32,7 +33,7 @@ MOST_POINTS = 4000
 CURSOR_ORDERS = 20
 """Orders marked in a spectrum."""
 
-_NAMED_CURSORS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 14, 16, 18, 20)  # those with room for a number
+_NAMED_CURSORS = (1, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20)  # those with room for a number
 _LEFT, _RIGHT, _BOTTOM, _TOP = 0.85, 0.25, 0.5, 0.12  # inch, round a panel
 _LINE_HEIGHT = 0.17  # inch, of a line of a caption
 _LETTERS = 118  # of a caption in a line
@@ -73,12 +74,12 @@ class LackError(ValueError):
 
 
 def panel_figure(panel: Panel) -> Any:
-    """A panel alone, without caption, for a page that has its own."""
+    """A panel alone, as wide as a phone shows, without caption: a page has its own."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(WIDTH, panel.height))
+    figure = Figure(figsize=(PAGE_WIDTH, panel.height))
     panel.draw(figure)
-    _set_margins(figure, panel, panel.height, _TOP)
+    _set_margins(figure, panel, panel.height, _TOP, width=PAGE_WIDTH)
     return figure
 
 
@@ -143,11 +144,13 @@ def sheet(heading: str, columns: Sequence[Sequence[Panel]]) -> Any:
     return figure
 
 
-def _set_margins(place: Any, panel: Panel, height: float, top: float) -> None:
+def _set_margins(
+    place: Any, panel: Panel, height: float, top: float, *, width: float = WIDTH
+) -> None:
     """Fixed margins: fitting them to the labels would take half of the time of a report."""
     place.subplots_adjust(
-        left=_LEFT / WIDTH,
-        right=1 - panel.right / WIDTH,
+        left=_LEFT / width,
+        right=1 - panel.right / width,
         bottom=_BOTTOM / height,
         top=1 - (top + panel.above) / height,
     )
@@ -212,7 +215,7 @@ def _at_top(axes: Any, x: float, text: str, colour: str) -> None:
         xytext=(2, -2),
         textcoords="offset points",
         va="top",
-        fontsize=7,
+        fontsize=8,
         color=colour,
     )
 

@@ -180,7 +180,7 @@ def _draw_density(axes: Any, group: _Spectra, span: tuple[float, float]) -> None
     legend_rows = -(-len(shown) // _LEGEND_COLUMNS)
     axes.set_ylim(lowest - 0.05 * room, highest + (0.06 + 0.1 * legend_rows) * room)
     axes.set_ylabel(f"PSD\n[dB re 1 {group.unit.square}/Hz]", fontsize=9)
-    axes.legend(loc="upper right", fontsize=7, ncols=min(_LEGEND_COLUMNS, len(shown)))
+    axes.legend(loc="upper right", fontsize=8, ncols=min(_LEGEND_COLUMNS, len(shown)))
     log_frequency(axes, "x")
     axes.set_xlim(span)
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from ..pages.embed import MOST_BYTES, SPARE_BYTES, bokeh_script, item_text, require_bokeh
 from ..pages.page import render, visible
+from ..pages.picture import PageImage
 from .panel import COLOURS
 from .zoom_curves import ZoomCurve
 
@@ -150,19 +151,19 @@ def _share(sizes: Sequence[int], total: int) -> int:
 
 def zoom_page(
     curves: Sequence[ZoomCurve],
-    picture: str,
+    stills: Sequence[tuple[str, PageImage]],
     *,
     heading: str,
     speed: float | None,
     missing: Any = (),
 ) -> str:
-    """A page of curves, with a picture for paper and for readers without scripts.
+    """A page of curves, with pictures for paper and for readers without scripts.
 
     Parameters
     ----------
     curves : sequence of ZoomCurve
-    picture : str
-        Data address.
+    stills : sequence of (str, PageImage)
+        Captions and pictures.
     heading : str
         Of the recording.
     speed : float, optional
@@ -175,9 +176,9 @@ def zoom_page(
     str
         HTML.
     """
-    block = zoom_block(curves, speed=speed, taken=len(picture))
+    block = zoom_block(curves, speed=speed, taken=sum(len(image.address) for _, image in stills))
     return render(
-        "zoom.html.j2", heading=heading, picture=picture, block=block, missing=dict(missing)
+        "zoom.html.j2", heading=heading, stills=stills, block=block, missing=dict(missing)
     )
 
 

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from ...sim.output.recording import DataError, Recording
 from ..feature_rows.feature_choice import choice_in
 from ..feature_rows.feature_table import recording_features
+from ..learning.grades import GRADE_COLOURS
 from ..pages.page import short_name
-from ..pages.picture import encoded
+from ..pages.picture import PAGE_WIDTH, PageImage, drawn_alone, page_image
 from ..pictures.kinds import make_panel
 from ..pictures.panel import RIGHT_OF_MAP, Panel, log_frequency, panel_figure, stack
 from ..pictures.view import View
@@ -22,11 +23,6 @@ from .trend import Trend
 from .verdict import MAP_CELL
 
 Float = NDArray[np.float64]
-
-GRADE_COLOURS = ("#3a923a", "#c8b400", "#e07b00", "#c03a2b")
-"""Of grades 0 to 3; the name stands beside the colour wherever it is used."""
-
-NO_GRADE_COLOUR = "#5b6470"
 
 _LEAST_SPAN_DB = 6.0  # of the colours of a map: less is nothing
 _MOST_MAPS = 2
@@ -41,20 +37,16 @@ class ReportPicture:
     ----------
     caption, alt : str
         Below it, and instead of it.
-    data : str
-        PNG as a data address.
-    wide : bool
-        It needs the width of a page; a phone scrolls it.
+    image : PageImage
     """
 
     caption: str
     alt: str
-    data: str
-    wide: bool = True
+    image: PageImage
 
 
 def _picture(panel: Panel, alt: str) -> ReportPicture:
-    return ReportPicture(caption=panel.caption, alt=alt, data=encoded(panel_figure(panel)))
+    return ReportPicture(caption=panel.caption, alt=alt, image=page_image(panel_figure(panel)))
 
 
 def report_pictures(
@@ -232,15 +224,15 @@ def gauge(estimate: Mapping[str, Any], limits: Mapping[str, Any]) -> ReportPictu
         f"{1e3 * estimate['low']:.3f} to {1e3 * estimate['high']:.3f} mm, on the scale of grades; "
         f"condemning limit {limit:.3g} mm"
     )
-    data = encoded(_gauge_figure(estimate, limits))
-    return ReportPicture(caption=caption, alt=alt, data=data, wide=False)
+    image = page_image(_gauge_figure(estimate, limits))
+    return ReportPicture(caption=caption, alt=alt, image=image)
 
 
 def _gauge_figure(estimate: Mapping[str, Any], limits: Mapping[str, Any]) -> Any:
     """Small enough to be read on a phone."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(4.9, 1.6))
+    figure = Figure(figsize=(PAGE_WIDTH, 1.6))
     figure.subplots_adjust(left=0.04, right=0.96, bottom=0.32, top=0.97)
     edges = [1e3 * edge for edge in limits["grade_edges_m"]]
     low, value, high = (1e3 * estimate[key] for key in ("low", "severity", "high"))
@@ -274,16 +266,10 @@ def _gauge_figure(estimate: Mapping[str, Any], limits: Mapping[str, Any]) -> Any
 
 def trend_picture(trend: Trend, limits: Mapping[str, Any], heading: str) -> ReportPicture:
     """Severity with intervals over time, the line since the last maintenance and its band."""
-    from matplotlib.figure import Figure
-
     said = trend.outlook.text if trend.outlook else f"no line: {trend.reason}"
     caption = f"Trend of {heading}: {said}"
-    figure = Figure(figsize=_TREND_SIZE, layout="constrained")
-    _draw_trend(figure.add_subplot(), trend, limits)
-    return ReportPicture(caption=caption, alt=caption, data=encoded(figure), wide=False)
-
-
-_TREND_SIZE = (4.9, 3.6)  # inches: on a phone the crossing of the limit is seen without scrolling
+    image = drawn_alone(partial(_draw_trend, trend=trend, limits=limits))
+    return ReportPicture(caption=caption, alt=caption, image=image)
 
 
 def _draw_trend(axes: Any, trend: Trend, limits: Mapping[str, Any]) -> None:

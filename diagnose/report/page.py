@@ -7,6 +7,7 @@ from typing import Any
 
 from ...sim.output.recording import DataError, Recording
 from ..feature_rows.healthy import Baseline, Baselines
+from ..learning.grades import GRADE_COLOURS, NO_GRADE_COLOUR
 from ..nameplate.cautions import known_beside
 from ..nameplate.nameplate import Nameplate
 from ..pages.embed import require_bokeh
@@ -19,8 +20,6 @@ from ..wear_model.estimate import Estimate, WearModel
 from .advice import brief_words
 from .batch import Batch, BatchRow, machine_heading
 from .figures import (
-    GRADE_COLOURS,
-    NO_GRADE_COLOUR,
     ReportPicture,
     gauge,
     report_pictures,
@@ -99,7 +98,7 @@ def _zoom_of(recording: Recording, pictures: Sequence[ReportPicture]) -> ZoomBlo
         curves, _ = zoom_curves(view)
     except DataError:
         return None  # the verdict says what is wrong with the recording
-    taken = sum(len(picture.data) for picture in pictures)
+    taken = sum(len(picture.image.address) for picture in pictures)
     return zoom_block(curves, speed=view.speed, taken=taken)
 
 
@@ -173,7 +172,7 @@ def _zoom_of_trends(
     batch: Batch, machines: Sequence[str], pictures: Sequence[ReportPicture]
 ) -> PointBlock:
     """Trends beside their pictures."""
-    taken = sum(len(picture.data) for picture in pictures) + _ROW_BYTES * len(batch.rows)
+    taken = sum(len(picture.image.address) for picture in pictures) + _ROW_BYTES * len(batch.rows)
     return point_block(
         [trend_points(batch, name, machine_heading(name)) for name in machines], taken=taken
     )

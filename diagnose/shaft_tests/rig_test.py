@@ -1329,7 +1329,11 @@ def _in_words(place: Place) -> str:
 
 
 def rig_figure(
-    result: BeforeAfter, *, channels: Sequence[str] | None = None, columns: int | None = None
+    result: BeforeAfter,
+    *,
+    channels: Sequence[str] | None = None,
+    columns: int | None = None,
+    title: bool = True,
 ) -> Any:
     """Accelerance at the bearings before and after, with confidence, model and coherence.
 
@@ -1340,6 +1344,8 @@ def rig_figure(
         Those to draw; all by default.
     columns : int, optional
         Channels beside each other; all by default.
+    title : bool
+        Above them; a page says the same.
 
     Returns
     -------
@@ -1361,9 +1367,9 @@ def rig_figure(
     across = min(columns or len(names), len(names))
     down = math.ceil(len(names) / across)
     figure = Figure(figsize=(1 + 3.6 * across, 5.6 * down), layout="constrained")
-    figure.suptitle(
-        f"{short_name(result.scene, 60)}: accelerance before and after the moves (simulated test)"
-    )
+    if title:
+        name = short_name(result.scene, 60)
+        figure.suptitle(f"{name}: accelerance before and after the moves (simulated test)")
     panels = figure.subplots(
         2 * down, across, sharex=True, sharey="row", height_ratios=[3, 1] * down, squeeze=False
     )
@@ -1426,5 +1432,5 @@ def _mark(axes: Any, changes: Sequence[PeakChange]) -> None:
             textcoords="offset points",
             ha="left",
             rotation=60,
-            fontsize=7,
+            fontsize=8,
         )

@@ -1,8 +1,10 @@
 """What tests of a shaft line say of its sags, and the test to do next: table, text, picture."""
 
 import math
+import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +13,7 @@ import numpy as np
 from ...sim.scene.parts import Scene
 from ...sim.scene.shaft import ShaftScene
 from ..pages.page import short_name
+from ..pages.picture import PageImage, drawn_alone
 from .jacking_tests import JackedBearing, measured_curves, read_curves
 from .measured_tests import LineTest, read_reactions, read_tests
 from .next_test import PlannedTest, candidate_places, rank_tests
@@ -296,23 +299,42 @@ def sag_figure(report: SagReport) -> Any:
     """
     from matplotlib.figure import Figure
 
-    found = report.posterior
     figure = Figure(figsize=(10, 3.2), layout="constrained")
-    axes = figure.subplots(1, 2)
+    left, right = figure.subplots(1, 2)
+    _draw_sags(left, report)
+    _draw_next(right, report)
+    return figure
+
+
+def sag_images(report: SagReport) -> list[PageImage]:
+    """The panels of :func:`sag_figure` as pictures of a page."""
+    return [
+        drawn_alone(partial(_draw_sags, report=report), height=3.2),
+        drawn_alone(partial(_draw_next, report=report), height=3.2),
+    ]
+
+
+def _draw_sags(axes: Any, report: SagReport) -> None:
+    found = report.posterior
     at = np.arange(len(found.bearings))
     width = 1e3 * (found.interval(CONFIDENCE)[:, 1] - found.mean)
-    axes[0].errorbar(
+    axes.errorbar(
         at, 1e3 * found.mean, yerr=width, fmt="o", color="#1f5a94", capsize=4,
         label=f"estimate, {CONFIDENCE:.0%} interval",
     )  # fmt: skip
-    axes[0].axhline(0, color="black", lw=0.6)
-    axes[0].set_xticks(at, [short_name(name, 20) for name in found.bearings])
-    axes[0].set_xlim(-0.5, at.size - 0.5)
-    axes[0].set(ylabel="sag [mm]", title="Sags by the tests")
-    axes[0].legend(fontsize=8)
+    axes.axhline(0, color="black", lw=0.6)
+    names = [short_name(name, 20) for name in found.bearings]
+    axes.set_xticks(at, names, rotation=20, ha="right", fontsize=9)
+    axes.set_xlim(-0.5, at.size - 0.5)
+    axes.set(ylabel="sag [mm]", title="Sags by the tests")
+    axes.legend(fontsize=8)
+    axes.grid(alpha=0.3)
+
+
+def _draw_next(axes: Any, report: SagReport) -> None:
     shown = report.planned[:_SHOWN][::-1]
-    axes[1].barh([one.text for one in shown], [100 * one.gain for one in shown], color="#b3541e")
-    axes[1].set(xlim=(0, 100), xlabel="share of the variance taken [%]", title="Test next")
-    for one in axes:
-        one.grid(alpha=0.3)
-    return figure
+    names = [textwrap.fill(one.text, 26) for one in shown]
+    axes.barh(names, [100 * one.gain for one in shown], color="#b3541e")
+    axes.set(xlim=(0, 100), xlabel="share of the variance taken [%]", title="Test next")
+    axes.tick_params(axis="y", labelsize=8)
+    axes.grid(alpha=0.3)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ...sim.scene.parts import Scene
 from ..pages.page import short_name
-from ..pages.picture import save_picture
+from ..pages.picture import PAGE_WIDTH, PageImage, page_image, save_picture
 from .method_map import MapAxis, MapPlan, StabilityMap, Verdict
 
 COLOUR = {
@@ -111,6 +111,33 @@ def atlas_figure(scene: Scene, maps: Sequence[StabilityMap]) -> Any:
     return figure
 
 
+def map_images(found: StabilityMap) -> list[tuple[str, PageImage]]:
+    """Each panel of a map as a picture of a page, with its method, and last its legend."""
+    from matplotlib.figure import Figure
+
+    images = []
+    lines: dict[str, Any] = {}
+    for method in found.methods:
+        figure = Figure(figsize=_PANEL, layout="constrained")
+        panel = figure.subplots()
+        _fill(panel, found, method, lines)
+        panel.set_xlabel(found.plan.x.label, fontsize=9)
+        panel.set_ylabel(found.plan.y.label, fontsize=9)
+        images.append((method, page_image(figure)))
+    return [*images, ("legend", page_image(_legend_figure(found, lines)))]
+
+
+def _legend_figure(found: StabilityMap, lines: Mapping[str, Any]) -> Any:
+    """What colours, symbols and lines mean, one below the other in two columns."""
+    from matplotlib.figure import Figure
+
+    handles, labels = _meanings(found, lines)
+    figure = Figure(figsize=(PAGE_WIDTH, 0.15 + 0.19 * math.ceil(len(labels) / 2)))
+    style: dict[str, Any] = {"loc": "center", "ncols": 2, "fontsize": 8, "frameon": False}
+    figure.legend(handles, labels, handler_map=_together(), **style)
+    return figure
+
+
 def _rows(found: StabilityMap) -> int:
     return math.ceil(len(found.verdicts) / COLUMNS)
 
@@ -124,14 +151,20 @@ def _draw(sheet: Any, scene: Scene, found: StabilityMap) -> None:
         panel.remove()
     lines: dict[str, Any] = {}
     for panel, method in zip(grid.flat, methods, strict=False):
-        _draw_panel(panel, plan, found.verdicts[method])
-        _draw_own(panel, plan)
-        _name(panel, plan, method)
-        for number, curve in enumerate(plan.theory(method)):
-            (line,) = panel.plot(curve.x, curve.y, **_LINES[number % len(_LINES)])
-            lines.setdefault(curve.name, line)
+        _fill(panel, found, method, lines)
     _label(grid, plan, len(methods))
     _legend(sheet, found, lines)
+
+
+def _fill(panel: Any, found: StabilityMap, method: str, lines: dict[str, Any]) -> None:
+    """One method: its verdicts, the scene, and theory, whose lines are noted by name."""
+    plan = found.plan
+    _draw_panel(panel, plan, found.verdicts[method])
+    _draw_own(panel, plan)
+    _name(panel, plan, method)
+    for number, curve in enumerate(plan.theory(method)):
+        (line,) = panel.plot(curve.x, curve.y, **_LINES[number % len(_LINES)])
+        lines.setdefault(curve.name, line)
 
 
 def _name(panel: Any, plan: MapPlan, method: str) -> None:
@@ -210,7 +243,7 @@ _OWN_LINE: dict[str, Any] = {"color": "black", "lw": 1.6, "ls": "-.", "zorder": 
 def _tag(panel: Any, x: float, y: float, plan: MapPlan) -> None:
     """Name of the scene beside its marker, towards the middle of the map."""
     right = plan.x.values.index(x) < len(plan.x.values) / 2
-    below = plan.y.values.index(y) > len(plan.y.values) / 2
+    below = plan.y.values.index(y) >= len(plan.y.values) / 2
     panel.annotate(
         "this scene",
         (x, y),
@@ -226,12 +259,27 @@ def _tag(panel: Any, x: float, y: float, plan: MapPlan) -> None:
 
 
 def _decade_ticks(axis: MapAxis, ticks: Any) -> None:
-    from matplotlib.ticker import LogLocator, NullFormatter
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
+    ticks.set_major_formatter(FuncFormatter(lambda value, _: _decade(value)))
     ticks.set_minor_formatter(NullFormatter())  # decades say enough, where there are several
     if axis.values[-1] < _DECADES * axis.values[0]:
         ticks.set_major_locator(LogLocator(subs=(1, 2, 5)))
         ticks.set_major_formatter("{x:g}")
+
+
+def _decade(value: float) -> str:
+    """A power of ten without a raised exponent, which would be too small to read.
+
+    Examples
+    --------
+    >>> _decade(1e-5), _decade(0.1), _decade(20000.0)
+    ('1e-5', '0.1', '2e4')
+    """
+    if 1e-3 < value < 1e4:
+        return f"{value:g}"
+    mantissa, exponent = f"{value:.0e}".split("e")
+    return f"{mantissa}e{int(exponent)}"
 
 
 def _bounds(axis: MapAxis) -> NDArray[np.float64]:
@@ -243,7 +291,20 @@ def _bounds(axis: MapAxis) -> NDArray[np.float64]:
 
 
 def _legend(sheet: Any, found: StabilityMap, lines: Mapping[str, Any]) -> None:
+    handles, labels = _meanings(found, lines)
+    style = {"loc": "outside lower center", "ncols": 3, "fontsize": 8, "frameon": False}
+    sheet.legend(handles, labels, handler_map=_together(), **style)
+
+
+def _together() -> dict[type, Any]:
+    """A patch and its symbol are one entry of a legend."""
     from matplotlib.legend_handler import HandlerTuple
+
+    return {tuple: HandlerTuple(ndivide=1)}
+
+
+def _meanings(found: StabilityMap, lines: Mapping[str, Any]) -> tuple[list[Any], list[str]]:
+    """Entries of the legend: verdicts that occur, then lines of theory."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
@@ -253,13 +314,4 @@ def _legend(sheet: Any, found: StabilityMap, lines: Mapping[str, Any]) -> None:
         patch = Patch(facecolor=COLOUR[verdict], edgecolor="grey")
         symbol = Line2D([], [], **_symbol_style(verdict, 5.0)) if SYMBOL[verdict] else None
         handles.append((patch, symbol) if symbol else patch)
-    labels = [*(Verdict(code).text for code in seen), *lines]
-    sheet.legend(
-        [*handles, *lines.values()],
-        labels,
-        handler_map={tuple: HandlerTuple(ndivide=1)},
-        loc="outside lower center",
-        ncols=3,
-        fontsize=8,
-        frameon=False,
-    )
+    return [*handles, *lines.values()], [*(Verdict(code).text for code in seen), *lines]

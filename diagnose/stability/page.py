@@ -6,9 +6,8 @@ from typing import Any
 
 from ...sim.scene.parts import Scene
 from ..pages.page import render, save_page
-from ..pages.picture import encoded
 from .edges import conclusion
-from .figure import atlas_figure, save_figure
+from .figure import map_images, save_figure
 from .method_map import StabilityMap
 from .text import reasons, shares_text
 
@@ -53,10 +52,10 @@ def atlas_html(scene: Scene, maps: Sequence[StabilityMap]) -> str:
     str
         HTML.
     """
-    return render("stability.html.j2", name=scene.name, maps=[_shown(scene, m) for m in maps])
+    return render("stability.html.j2", name=scene.name, maps=[_shown(m) for m in maps])
 
 
-def _shown(scene: Scene, found: StabilityMap) -> dict[str, Any]:
+def _shown(found: StabilityMap) -> dict[str, Any]:
     plan = found.plan
     return {
         "name": plan.name,
@@ -66,8 +65,7 @@ def _shown(scene: Scene, found: StabilityMap) -> dict[str, Any]:
         "conclusion": conclusion(found),
         "aside": plan.aside,
         "whole": found.whole,
-        "single": len(found.verdicts) == 1,
-        "picture": encoded(atlas_figure(scene, [found])),
+        "images": map_images(found),
         "rows": [
             {
                 "method": method,

@@ -1,11 +1,13 @@
 """Picture of a sweep."""
 
 import math
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from ..pages.page import short_name
+from ..pages.picture import PageImage, drawn_alone, plain_numbers
 from .sweep import Row, Sweep
 from .text import best_rows, setting_words
 
@@ -49,6 +51,29 @@ def sweep_figure(sweep: Sweep) -> Any:
     if labels:
         figure.legend(handles, labels, loc="outside lower center", ncols=min(6, len(labels)))
     return figure
+
+
+def sweep_images(sweep: Sweep) -> list[PageImage]:
+    """The panels of :func:`sweep_figure` as pictures of a page."""
+    rows = sweep.rows()
+    names = panel_names(sweep, rows)
+    images = []
+    if len(sweep.plan.axes) > 1 and any(row.detection.told for row in rows):
+        images.append(drawn_alone(lambda axes: _draw_changes(axes, sweep, rows)))
+    for name in names:
+        shown = [row for row in rows if row.shown.name == name]
+        images.append(drawn_alone(partial(_draw_with_legend, sweep=sweep, rows=shown)))
+    return images
+
+
+def _draw_with_legend(axes: Any, sweep: Sweep, rows: list[Row]) -> None:
+    _draw_quantity(axes, sweep, rows)
+    _, labels = axes.get_legend_handles_labels()
+    if labels:
+        axes.legend(fontsize=8, framealpha=0.6, ncols=1 + (len(labels) > _ONE_COLUMN))
+
+
+_ONE_COLUMN = 4  # settings in a legend; more stand in two
 
 
 def panel_names(sweep: Sweep, rows: list[Row]) -> list[str]:
@@ -109,10 +134,11 @@ def _draw_changes(axes: Any, sweep: Sweep, rows: list[Row]) -> None:
         axes.set_xlabel(f"{first.words} [{first.unit or first.si_unit or '-'}]", fontsize=9)
     else:
         words = [setting_words(sweep, setting, short=True) for setting in settings]
-        axes.set_xticks(places, words, rotation=30, ha="right", fontsize=7)
+        axes.set_xticks(places, words, rotation=30, ha="right", fontsize=8)
     axes.set_title("smallest change that shows in one recording", fontsize=10)
     axes.set_ylabel(f"{axis.words} [{axis.unit or axis.si_unit or '-'}]", fontsize=8)
     axes.set_yscale("log")
-    axes.legend(fontsize=7, framealpha=0.6)
+    plain_numbers(axes.yaxis)
+    axes.legend(fontsize=8, framealpha=0.6)
     axes.tick_params(labelsize=8)
     axes.grid(alpha=0.3)

@@ -4,11 +4,11 @@ import math
 from pathlib import Path
 
 from ..pages.page import render, save_page
-from ..pages.picture import encoded, save_picture
+from ..pages.picture import save_picture
 from ..pages.plain_json import json_text
 from ..pages.points import point_block
 from ..pages.si_text import si_text
-from .figure import MOST_PANELS, sweep_figure
+from .figure import MOST_PANELS, sweep_figure, sweep_images
 from .points import sweep_points
 from .sweep import Row, Sweep
 from .text import (
@@ -45,10 +45,11 @@ def sweep_html(sweep: Sweep, *, interactive: bool = False) -> str:
     axis, rows = sweep.plan.axes[-1], sweep.rows()
     best = {(row.setting, row.shown.name) for row in best_rows(sweep) if row.detection.told}
     panels = min(len(sweep.plan.shown), MOST_PANELS)
-    picture = encoded(sweep_figure(sweep))
+    images = sweep_images(sweep)
     block = None
     if interactive:
-        taken = len(picture) + _CELL_BYTES * sum(len(row.means) for row in rows)
+        taken = _CELL_BYTES * sum(len(row.means) for row in rows)
+        taken += sum(len(image.address) for image in images)
         block = point_block(sweep_points(sweep), taken=taken)
     return render(
         "sweep.html.j2",
@@ -64,7 +65,7 @@ def sweep_html(sweep: Sweep, *, interactive: bool = False) -> str:
         panels=panels,
         hidden=len(sweep.plan.shown) - panels,
         several=len(sweep.plan.axes) > 1,
-        picture=picture,
+        images=images,
         block=block,
         rows=[
             {
