@@ -11,8 +11,10 @@ from ...datasets.generation.work import NUMERICS
 from ...datasets.recipe.draws import Draw, Range, matches
 from ...datasets.recipe.recipe import Recipe, Sample, limit_faults, sample_records
 from ...sim.fidelity.ladder import cost_of, effects_of
-from ...sim.scene.parts import channels_of
-from ..learning.grades import GRADE_NAMES
+from ...sim.scene.parts import channels_of, si_unit
+from ..learning.grades import GRADE_COLOURS, GRADE_NAMES, NO_GRADE_COLOUR
+from ..pages.page import short_name
+from ..pages.picture import PAGE_WIDTH
 from ..pictures.panel import COLOURS
 
 MOST_DRAWN = 1000
@@ -20,7 +22,8 @@ MOST_DRAWN = 1000
 
 _COSTED = 16  # drawn scenes whose cost is looked up
 _ROW_BYTES = 64  # of a manifest's row: name, group, seed, status, checksum
-_HEAD, _ROW = 0.4, 1.9  # inch, of the heading and of a row of panels
+_COLUMNS = 2  # of panels: text is read on a phone
+_HEAD, _ROW = 0.8, 1.75  # inch, of the heading and of a row of panels
 _LEVELS = ("severity", "machine", "record", "confounder")
 
 
@@ -284,10 +287,10 @@ def preview_figure(found: Preview) -> Any:
     from matplotlib.figure import Figure
 
     paths = [path for path in _plotted(found) if path != found.recipe.severity.path]
-    columns = 4
+    columns = _COLUMNS
     rows = -(-(len(paths) + 1) // columns)
     height = _HEAD + _ROW * rows
-    figure = Figure(figsize=(3 * columns, height))
+    figure = Figure(figsize=(PAGE_WIDTH, height))
     axes = figure.subplots(rows, columns, squeeze=False).ravel()
     _draw_severity(axes[0], found)
     for place, path in zip(axes[1:], paths, strict=False):
@@ -297,22 +300,53 @@ def preview_figure(found: Preview) -> Any:
     count = len(found.samples)
     figure.text(
         0.5,
-        1 - 0.4 * _HEAD / height,
-        f"{found.recipe.name}: draws of {count} records (nothing simulated yet); across: severity "
-        "[mm], colour: its grade; values in SI",
+        1 - 0.3 * _HEAD / height,
+        f"{short_name(found.recipe.name, 40)}: draws of {count} records\n"
+        "(nothing simulated yet); across: severity [mm]",
         ha="center",
         va="center",
-        fontsize=10,
+        fontsize=9,
     )
+    _draw_legend(figure, found, 1 - 0.75 * _HEAD / height)
     figure.subplots_adjust(
-        left=0.06,
+        left=0.13,
         right=0.985,
         bottom=0.35 / height,
         top=1 - (_HEAD + 0.25) / height,
-        wspace=0.38,
+        wspace=0.42,
         hspace=0.5,
     )
     return figure
+
+
+def _draw_legend(figure: Any, found: Preview, middle: float) -> None:
+    """Colours of the grades that were drawn, in a row below the heading."""
+    from matplotlib.lines import Line2D
+
+    shown = sorted(set(_grades(found)))
+    names = {i: f"{i} {name}" for i, name in enumerate(GRADE_NAMES)} | {-1: "no grade"}
+    marks = [Line2D([], [], ls="none", marker="o", ms=5, color=_colour(grade)) for grade in shown]
+    figure.legend(
+        marks,
+        [names[grade] for grade in shown],
+        loc="center",
+        bbox_to_anchor=(0.5, middle),
+        ncols=len(shown),
+        fontsize=8,
+        columnspacing=1.0,
+        handletextpad=0.1,
+        frameon=False,
+    )
+
+
+def _colour(grade: int) -> str:
+    return NO_GRADE_COLOUR if grade < 0 else GRADE_COLOURS[grade]
+
+
+def _titled(found: Preview, path: str) -> str:
+    """Path and SI unit; numbers without a unit have none."""
+    unit = si_unit(type(found.recipe.scene), path)
+    return f"{short_name(path, 38)}\n[{unit or '-'}]"
 
 
 def _plotted(found: Preview) -> list[str]:
@@ -334,7 +368,7 @@ def _draw_severity(axes: Any, found: Preview) -> None:
     ticks = [low, np.sqrt(low * high), high]
     axes.set(xticks=ticks, xticklabels=[f"{tick:.3g}" for tick in ticks])
     axes.set_title("records by severity [mm]", fontsize=8)
-    axes.tick_params(labelsize=7)
+    axes.tick_params(labelsize=8)
 
 
 def _edges(values: Sequence[float]) -> NDArray[np.float64]:
@@ -344,12 +378,12 @@ def _edges(values: Sequence[float]) -> NDArray[np.float64]:
 
 def _draw_path(axes: Any, found: Preview, path: str) -> None:
     severity = np.array([s.row[found.recipe.severity_columns[0]] for s in found.samples])
-    colours = [COLOURS[grade] for grade in _grades(found)]
+    colours = [_colour(grade) for grade in _grades(found)]
     axes.scatter(1e3 * severity, found.values(path), s=2, c=colours, linewidths=0)
     axes.set(xscale="log")
     axes.minorticks_off()
     low, high = 1e3 * severity.min(), 1e3 * severity.max()
     axes.set(xticks=[low, high], xticklabels=[f"{low:.3g}", f"{high:.3g}"])
-    axes.set_title(path, fontsize=7, loc="right")  # a power of ten stands on the left
-    axes.tick_params(labelsize=7)
-    axes.yaxis.get_offset_text().set_fontsize(6)
+    axes.set_title(_titled(found, path), fontsize=8, loc="right")
+    axes.tick_params(labelsize=8)
+    axes.yaxis.set_major_formatter("{x:.6g}")  # a power of ten has no place beside the title
