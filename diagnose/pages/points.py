@@ -14,6 +14,7 @@ from .embed import MOST_BYTES, SPARE_BYTES, bokeh_script, item_text, require_bok
 from .page import visible
 
 _HEIGHT = 430  # [px]
+_DATE_SPAN = 14 * 86_400_000  # [ms]
 _PICKED = "#b02a1c"
 _PLAIN_TICKS = "return String(parseFloat(tick.toPrecision(4)))"
 _TOLD = '<div style="white-space: pre-line; max-width: 19rem">@told</div>'
@@ -232,6 +233,9 @@ def _axes(panel: PointAxes) -> Any:
     )
     plot.add_tools(HoverTool(mode="mouse", tooltips=_TOLD, renderers=[]))
     plot.toolbar.logo = None
+    if panel.x_kind == "datetime":
+        across: Any = plot.x_range
+        across.default_span = _DATE_SPAN  # round a single date; Bokeh's own is 2 ms
     return plot
 
 
