@@ -148,7 +148,7 @@ def test_few_records_of_a_machine_and_gaps():
 
 
 def test_the_clearance_of_a_pump_is_told_by_its_knocks(small_set, tmp_path):
-    page, table = tmp_path / "rank.html", tmp_path / "rank.csv"
+    page = tmp_path / "rank.html"
     told = strict(run("features", small_set, "--rank", "-o", page, "-j", 1, "--json").stdout)
     assert told["target"] == "diametral_clearance_crankpin_m"
     assert told["files"] == [str(page)]
@@ -162,8 +162,13 @@ def test_the_clearance_of_a_pump_is_told_by_its_knocks(small_set, tmp_path):
     assert html.count("data:image/png;base64,") == 7  # bars, and values of six
     assert first["name"] in html
     assert "<script" not in html
-    text = run("features", small_set, "--rank", "-o", table, "-j", 1).stdout
-    assert f"{first['name']} tells most of" in text
+
+
+def test_text_table_and_json_tell_the_same(few_set, tmp_path):
+    table = tmp_path / "rank.csv"
+    told = strict(run("features", few_set, "--rank", "-j", 1, "--json").stdout)
+    text = run("features", few_set, "--rank", "-o", table, "-j", 1).stdout
+    assert f"{told['features'][0]['name']} tells most of" in text
     rows = list(csv.DictReader(table.read_text().splitlines()))
     assert [row["name"] for row in rows] == [each["name"] for each in told["features"]]
 
