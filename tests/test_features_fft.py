@@ -230,6 +230,22 @@ assert error < 1e-4, error  # 9 eps of the largest line, 90
 print(known)
 """
 
+DAMAGED = """
+import importlib, json
+import pyfftw
+from wearstate.features.signal import fft
+file = fft.wisdom_file()
+for text in {texts!r}:
+    file.write_bytes(text)
+    pyfftw.forget_wisdom()  # and no plan is left either: as at the start of a process
+    importlib.reload(fft)
+    begun = dict(print=lambda known: None)
+    exec({code!r}, begun)
+    assert begun["known"] is False, text
+    assert json.loads(file.read_text()).keys() == {{"sha256", "wisdom"}}, text
+print("mended")
+"""
+
 
 def test_wisdom_is_kept_and_a_damaged_file_ignored(tmp_path):
     assert in_a_process(SMALL, tmp_path, "measure") == "False"
@@ -242,12 +258,9 @@ def test_wisdom_is_kept_and_a_damaged_file_ignored(tmp_path):
     assert fewer != held["wisdom"][1]
     edited = [json.dumps(held | {"wisdom": pair}) for pair in (["(", fewer], ["", ""])]
     edited.append(json.dumps(held | {"wisdom": [held["wisdom"][0], fewer]}))
-    for text in (sound[:-40], "", "[]", *edited, '{"wisdom": 3, "sha256": ""}'):
-        file.write_text(text)
-        assert in_a_process(SMALL, tmp_path, "measure") == "False"
-        assert json.loads(file.read_text()).keys() == {"sha256", "wisdom"}  # mended
-    file.write_bytes(b"\xff\xfe\x00")
-    assert in_a_process(SMALL, tmp_path, "measure") == "False"
+    damaged = [sound[:-40], "", "[]", *edited, '{"wisdom": 3, "sha256": ""}']
+    texts = [*(text.encode() for text in damaged), b"\xff\xfe\x00"]
+    assert in_a_process(DAMAGED.format(texts=texts, code=SMALL), tmp_path, "measure") == "mended"
     assert [path.name for path in tmp_path.iterdir()] == [file.name]
 
 
