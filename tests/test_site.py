@@ -115,6 +115,17 @@ def test_pictures_are_made_again_when_the_program_changes(tmp_path, monkeypatch)
 # --- examples
 
 
+def test_a_site_without_a_browser_says_so(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(DOCS)
+    screenshots = importlib.import_module("screenshots")
+    monkeypatch.setattr(screenshots, "BUILD", tmp_path)
+    monkeypatch.setattr(screenshots, "WORDS", tmp_path / "screens.md")
+    monkeypatch.setattr(screenshots.shutil, "which", lambda name: None)
+    screenshots.main()
+    assert "no Chromium was found" in (tmp_path / "screens.md").read_text()
+    assert "_build/screens.md" in (DOCS / "pages.md").read_text()
+
+
 def test_there_are_enough_examples():
     assert len(EXAMPLES) >= 25
 

@@ -1,0 +1,81 @@
+"""Pages as a phone and a window show them; said in words where Chromium is missing.
+
+``python docs/screenshots.py``, which ``make docs`` calls; one to four minutes, nothing where the
+program is as before. Writes ``docs/_build/screens.md``, which ``docs/pages.md`` takes in.
+"""
+
+import shutil
+import subprocess
+import sys
+from html import escape
+from pathlib import Path
+
+from pictures import DOCS, FOLDER, current
+
+BUILD = DOCS / "_build"
+WORDS = BUILD / "screens.md"
+STAMP = BUILD / ".screens.made"
+BROWSERS = ("chromium", "chromium-browser", "google-chrome")
+PHONE, WINDOW, HEIGHT = 390, 1280, 1100  # px
+
+PAGES = {
+    "report": ("One recording", "report demo/data.h5 --record 5 --model demo/model.wsm -o"),
+    "card": ("A data set", "info demo/data.h5 --card"),
+    "evaluate": ("A model judged", "evaluate demo/model.wsm demo/data.h5 --quick -o"),
+    "align": ("A shaft line", "align propulsion-shaft --set bearings.2.sag=1.6mm -o"),
+    "chart": ("How much model", "chart journal-bearing --set duration=0.3 --budget 10 -o"),
+    "atlas": (
+        "Where methods fail",
+        "stability journal-bearing --map eccentricity-mesh --size 6 -o",
+    ),
+}
+"""Kind -> heading and command, to which the page is added."""
+
+SIDE_BY_SIDE = """<!DOCTYPE html><meta charset="utf-8">
+<body style="margin: 0; display: flex; gap: 20px; background: #9aa3ab">
+<iframe width="{phone}" height="{height}" style="border: 0" srcdoc="{page}"></iframe>
+<iframe width="{window}" height="{height}" style="border: 0" srcdoc="{page}"></iframe>"""
+
+
+def wearstate(command: str) -> None:
+    """Run a command of the program in the folder of the build."""
+    program = [sys.executable, "-m", "wearstate", *command.split()]
+    subprocess.run(program, check=True, capture_output=True, cwd=BUILD)
+
+
+def shoot(browser: str, kind: str, command: str) -> None:
+    """Write a page, and its picture at both widths: a window alone is never so narrow."""
+    wearstate(f"{command} {kind}.html --force")
+    html = (BUILD / f"{kind}.html").read_text(encoding="utf-8")
+    sizes = {"phone": PHONE, "window": WINDOW, "height": HEIGHT}
+    sheet = BUILD / f"{kind}.both.html"
+    sheet.write_text(SIDE_BY_SIDE.format(page=escape(html), **sizes), encoding="utf-8")
+    options = ["--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars"]
+    options += [f"--window-size={PHONE + 20 + WINDOW},{HEIGHT}"]
+    picture = FOLDER / f"screen-{kind}.png"
+    command_line = [browser, *options, f"--screenshot={picture}", sheet.as_uri()]
+    subprocess.run(command_line, check=True, capture_output=True, timeout=120)
+
+
+def main() -> None:
+    """Make the pictures and the words about them, where the program has changed since."""
+    BUILD.mkdir(exist_ok=True)
+    browser = next((path for name in BROWSERS if (path := shutil.which(name))), None)
+    if browser is None:
+        WORDS.write_text("No pictures here: no Chromium was found when this site was built.\n")
+        return
+    known = current(Path(__file__).name)
+    if STAMP.is_file() and STAMP.read_text() == known and WORDS.is_file():
+        return
+    wearstate("demo --folder demo")
+    parts = []
+    for kind, (heading, command) in PAGES.items():
+        shoot(browser, kind, command)
+        call = f"wearstate {command.replace('demo/', '')} {kind}.html"
+        parts.append(f"## {heading}\n\n`{call}`\n\n![{heading}](img/screen-{kind}.png)\n")
+    WORDS.write_text("\n".join(parts))
+    STAMP.write_text(known)
+
+
+if __name__ == "__main__":
+    main()
