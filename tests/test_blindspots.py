@@ -251,6 +251,17 @@ def test_a_background_comes_from_a_file(recording, tmp_path):
         signal_rows(path)
 
 
+def test_a_background_keeps_the_unit_that_its_file_declares(recording, tmp_path):
+    from scipy.io import savemat
+
+    path = tmp_path / "hall.mat"
+    rattle = np.random.default_rng(1).standard_normal((4000, 1))
+    savemat(path, {"bearing": {"gs": rattle, "sr": 8000.0, "rate": 25, "load": "100"}})  # in g
+    noisy = applied(recording, "background hall.mat", "-20 dB", background=path)
+    added = noisy.signal[0].astype(float) - recording.signal[0]
+    assert added.std() == pytest.approx(0.1 * 3 / math.sqrt(2), rel=0.05)
+
+
 # --- going on -------------------------------------------------------------------------------------
 
 

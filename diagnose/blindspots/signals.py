@@ -227,10 +227,10 @@ def _without_first(recording: Recording, speed: float, _rng: np.random.Generator
 
 def _sound(path: Path) -> tuple[Float, float]:
     """First vibration channel of a file, of rms 1, and its sample rate [Hz]."""
-    ours = path.suffix.lower() in (".h5", ".hdf5")
-    # only its shape is used: its level is set by each channel's own, so that any unit will do
-    unit = None if ours else EachChannel({}, others="m/s^2")
-    recording = read_recording(path, SourceOptions(unit=unit))
+    try:
+        recording = read_recording(path)
+    except DataError:  # it may lack a unit alone: its level is set by each channel's own
+        recording = read_recording(path, SourceOptions(unit=EachChannel({}, others="m/s^2")))
     sound = recording.vibration[0].astype(float)
     sound -= sound.mean()
     if not sound.any():
