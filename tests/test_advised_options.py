@@ -20,7 +20,7 @@ SOURCES = [
 ]
 OPTION = re.compile(r"(?<![\w-])--[a-z][a-z-]*")
 COMMAND = re.compile(r"\bwearstate ((?:[a-z]+ )?[a-z]+)")
-FOREIGN = {"--nthreads"}  # of `dask worker`
+FOREIGN = {"--nthreads", "--least", "--most"}  # of `dask worker`; properties of a page's style
 NAMED = {"import": "import", "train": "train", "retrain": "train", "generate": "generate"}
 """Word before an option -> command that it tells to run."""
 OWN_RULE = {
