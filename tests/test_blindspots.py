@@ -259,7 +259,7 @@ def test_a_background_keeps_the_unit_that_its_file_declares(recording, tmp_path)
     savemat(path, {"bearing": {"gs": rattle, "sr": 8000.0, "rate": 25, "load": "100"}})  # in g
     noisy = applied(recording, "background hall.mat", "-20 dB", background=path)
     added = noisy.signal[0].astype(float) - recording.signal[0]
-    assert added.std() == pytest.approx(0.1 * 3 / math.sqrt(2), rel=0.05)
+    assert added.std() == pytest.approx(0.1 * 3 / math.sqrt(2), rel=0.02)
 
 
 # --- going on -------------------------------------------------------------------------------------

@@ -35,7 +35,7 @@ from wearstate.datasets.recipe.text import RecipeError, recipe_names
 from wearstate.datasets.split.rules import group_split
 from wearstate.datasets.workers.local import in_order
 from wearstate.sim.atomic import OutputError
-from wearstate.sim.machine.simulate import simulate
+from wearstate.sim.machine.simulate import alike, simulate
 from wearstate.sim.output.recording import DataError
 from wearstate.sim.scene.load import load_scene
 from wearstate.sim.scene.parts import SceneError
@@ -737,3 +737,26 @@ def test_a_split_that_cannot_be_made_is_bad_data():
         group_split([1, 1])
     with pytest.raises(DataError, match="test_fraction = nan must be > 0 and < 1"):
         group_split([1, 2], test_fraction=float("nan"))
+
+
+# --- batches --------------------------------------------------------------------------------------
+
+
+def test_records_of_a_batch_are_of_one_kind_and_each_comes_once():
+    recipe = load_recipe("bilge-pump-standard")
+    samples = list(sample_records(recipe, 60, seed=0))
+    assert len({alike(each.scene) for each in samples}) > 2
+    batches = list(generation._batches(samples, 8))
+    assert all(len({alike(job.scene) for job in batch}) == 1 for batch in batches)
+    assert sorted(job.index for batch in batches for job in batch) == list(range(60))
+    kinds = [alike(batch[0].scene) for batch in batches if len(batch) < 8]
+    assert len(kinds) == len(set(kinds))  # only what is left over of a kind runs beside empty lanes
+
+
+def test_the_first_failures_are_those_of_the_first_records_whatever_ends_first():
+    tally = generation._Tally(9, None)
+    for index in (7, 3, 8, 1, 5):
+        tally.note(
+            work.RecordOutcome(index, np.zeros((1, 1), np.float32), {}, {}, f"fault {index}")
+        )
+    assert [index for index, _ in tally.faults] == [1, 3, 5]
