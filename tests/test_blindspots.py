@@ -15,7 +15,7 @@ from wearstate.diagnose.blindspots.page import blind_spots_html
 from wearstate.diagnose.blindspots.rows import scene_rows
 from wearstate.diagnose.blindspots.scores import ShiftRow, ShiftVerdict, ranked, row_figures
 from wearstate.diagnose.blindspots.signals import signal_rows
-from wearstate.diagnose.blindspots.text import blind_spots_table, blind_spots_text
+from wearstate.diagnose.blindspots.text import blind_spots_table, blind_spots_text, conclusion
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.machines.registry import presentation_of
 from wearstate.diagnose.machines.shifts import Shift
@@ -260,6 +260,17 @@ def test_a_background_keeps_the_unit_that_its_file_declares(recording, tmp_path)
     noisy = applied(recording, "background hall.mat", "-20 dB", background=path)
     added = noisy.signal[0].astype(float) - recording.signal[0]
     assert added.std() == pytest.approx(0.1 * 3 / math.sqrt(2), rel=0.02)
+
+
+def test_a_model_that_cautions_always_is_told_so():
+    table = {
+        "baseline": {"clear_error": {"value": None}},
+        "rows": [],
+        "machines": 30,
+        "recipe": "x",
+    }
+    lines = conclusion(table)
+    assert lines == ["As trained, no verdict is without a caution (30 simulated machines of x)."]
 
 
 # --- going on -------------------------------------------------------------------------------------

@@ -64,7 +64,12 @@ def conclusion(table: Table) -> list[str]:
     """What the list says, in a sentence or two."""
     usual = table["baseline"]["clear_error"]["value"]
     told = [row for row in table["rows"] if row["clear_error"]["value"] is not None]
-    shown = f"As trained, the error without a caution is {percent(usual)} % of the condemning limit"
+    shown = (
+        "As trained, no verdict is without a caution"
+        if usual is None
+        else f"As trained, the error without a caution is {percent(usual)} % of the "
+        "condemning limit"
+    )
     lines = [f"{shown} ({table['machines']} simulated machines of {table['recipe']})."]
     if told:
         worst = told[0]
