@@ -31,7 +31,7 @@ LIMIT = 3.1e-4
 CARD = {
     "mode": "cold",
     "views": {},
-    "trained_on": {"recipe": "bilge-pump-narrow"},
+    "trained_on": {"recipe": "bilge-pump-narrow", "scene": "bilge-pump"},
     "severity": "diametral_clearance_crankpin_m",
     "condemning_limit_m": LIMIT,
     "sample_rate_hz": 25600.0,
@@ -86,6 +86,23 @@ def test_a_gain_scales_what_is_judged(found):
     pairs = zip(by_name(found)["gain x 1.26"].said, found.baseline.said, strict=True)
     # float32 signals
     assert [one.found / other.found for one, other in pairs] == pytest.approx([1.26] * 2, rel=1e-6)
+
+
+def test_a_model_is_told_the_nameplate_of_the_shifted_machine():
+    """A rod of another length shows in no signal: only its nameplate can say so."""
+    heard = []
+
+    def listening(recording, baseline=None, conditions=None, told=()):
+        heard.append(told)
+        return loudness(recording)
+
+    model = SimpleNamespace(card=CARD, noted=(), estimate=listening)
+    rows = shifts_of("rod.length", 1.2)
+    find_blind_spots(model, PUMP, machines=1, scenes=rows, signals=gains())
+    as_trained, gained, longer = heard
+    assert as_trained == gained == ()
+    assert len(longer) == 1
+    assert longer[0].startswith("rod.length = 0.3 m by the nameplate")
 
 
 def test_machines_are_of_seeds_of_their_own():

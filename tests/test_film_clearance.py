@@ -8,6 +8,7 @@ import pytest
 from click.testing import CliRunner
 from wearstate.datasets.file.record import DataSet
 from wearstate.datasets.generation.generate import save_solution
+from wearstate.datasets.recipe.recipe import load_recipe
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.feature_rows.healthy import Baseline
 from wearstate.diagnose.feature_rows.probe_means import probe_means
@@ -264,7 +265,7 @@ def test_the_day_is_what_a_person_told_then_what_was_noted_then_the_nameplate():
 
 def test_probes_without_healthy_recordings_are_a_caution(tmp_path):
     recording = recorded(tmp_path / "a.h5", {})
-    assert "offsets of its probes" in known_beside(None, recording, CARD)["told"][0]
+    assert "offsets of its probes" in " ".join(known_beside(None, recording, CARD)["told"])
     told = nameplate_of(None, "journal-bearing", {"sensors.0.offset": "0 um +- 5 um"})
     assert known_beside(told, recording, CARD)["told"] == ()
 
@@ -272,7 +273,35 @@ def test_probes_without_healthy_recordings_are_a_caution(tmp_path):
 def test_a_nameplate_of_another_machine_is_a_caution():
     plate = nameplate_of(None, "bilge-pump", {})
     assert "is of a reciprocating-pump" in nameplate_cautions(plate, {}, CARD)[0]
-    assert nameplate_cautions(None, {}, CARD) == ()
+    assert nameplate_cautions(None, {}, {"trained_on": {"scene": "of another program"}}) == ()
+
+
+PUMP_CARD = {"trained_on": {"scene": "bilge-pump", "recipe": "bilge-pump-standard"}}
+
+
+def test_sizes_that_nobody_gave_are_a_caution():
+    """No signal shows a rod of another length; a mass that training drew needs no caution."""
+    [said] = nameplate_cautions(None, {}, PUMP_CARD)
+    assert "crank.radius" in said
+    assert "rod.length" in said
+    assert "piston.mass" not in said
+    usual = nameplate_of(None, "bilge-pump", {})
+    assert nameplate_cautions(usual, {}, PUMP_CARD) == ()
+    # told some numbers without a scene: what was not told is taken for granted still
+    some = nameplate_of(None, None, {"rod.length": "250 mm"}, usual="bilge-pump")
+    [said] = nameplate_cautions(some, {}, PUMP_CARD)
+    assert "rod.length" not in said
+    assert "crank.radius" in said
+
+
+def test_sizes_that_training_drew_are_held_against_their_range():
+    axes = load_recipe("bilge-pump-standard").machine
+    low, high = next(axis.extremes() for axis in axes if axis.path == "piston.mass")
+    for mass, cautioned in ((low, False), (high, False), (1.1 * high, True), (0.9 * low, True)):
+        plate = nameplate_of(None, "bilge-pump", {"piston.mass": mass})
+        said = nameplate_cautions(plate, {}, PUMP_CARD)
+        assert len(said) == cautioned
+        assert all(f"trained at {low:.4g} to {high:.4g} kg" in each for each in said)
 
 
 # --- beside the trained model

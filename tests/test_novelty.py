@@ -1,6 +1,8 @@
 """The physical space, and how far a recording lies from the familiar."""
 
+import re
 import runpy
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +17,7 @@ from wearstate.diagnose.feature_rows.physical import (
     physical_rows,
     shape_rows,
 )
+from wearstate.diagnose.wear_model.noise_floor import noise_floors, noisiest
 from wearstate.diagnose.wear_model.novelty import fit_familiarity, free_distance, novelty_p_value
 from wearstate.features.catalogue.row import feature_names, feature_row
 
@@ -327,3 +330,58 @@ def test_few_of_its_own_machines_are_too_quiet_for_a_model(small_trained):
     # 2 % of the training set by the calibration, and as many again by chance in so few
     assert (lacking > model.familiarity.seldom_lacking).mean() <= 0.04
     assert model.familiarity.seldom_lacking <= model.familiarity.most_lacking
+
+
+# --- noise floor
+
+
+def turning(recording):
+    return recording.signal[recording.names.index(recording.tacho)]
+
+
+def edges_of(names):
+    """Of the bands of the crank-angle map [Hz]."""
+    cells = re.findall(r"x\.angle_000_010\.band_(\d+)_(\d+)", " ".join(names))
+    return [(float(low), float(high)) for low, high in cells]
+
+
+def test_the_floor_of_noise_is_its_level_in_each_band(recording):
+    """White noise alone: the same energy at all angles, so the quiet ones tell its density."""
+    rms = 3.0
+    noise = np.random.default_rng(5).normal(0.0, rms, recording.signal.shape[1])
+    names, row = feature_row(noise, 25_600.0, tacho=turning(recording), channel_names=["x"])
+    [floor] = noise_floors(names, row[None]).values()
+    widths = [b - a for a, b in edges_of(names)]
+    wanted = 10 * np.log10(rms**2 * np.array(widths) / 12_800)
+    # levels of narrow bands scatter by some decibels over few turns, and quiet angles are below
+    assert np.abs(floor[0] - wanted).max() < 4.0
+    assert np.median(floor[0] - wanted) == pytest.approx(-1.0, abs=1.0)
+
+
+def test_a_noisy_sensor_is_a_caution_that_names_it(small_trained, recording):
+    """Ten decibels below the signal: between knocks nothing but noise is left."""
+    model, _, _ = small_trained
+    assert "noise floor" not in " ".join(model.estimate(recording).cautions)
+    rng = np.random.default_rng(6)
+    signal = recording.signal.astype(float)
+    own = recording.names.index("acc_y")
+    signal[own] += rng.normal(0.0, 10**-0.5 * signal[own].std(), signal.shape[1])
+    said = model.estimate(replace(recording, signal=signal.astype(np.float32)))
+    assert said.verdict == "caution"
+    assert [text for text in said.cautions if text.startswith("the noise floor of acc_y")]
+
+
+def test_few_of_its_own_machines_are_too_noisy_for_a_model(small_trained):
+    model, table, _ = small_trained
+    cloud = model.familiarity
+    noisy = cloud.noise(model.names, table.values) > cloud.most_noise
+    # 1 % by the calibration on machines left out; those of the training set fit better
+    assert noisy.mean() <= 0.02
+
+
+def test_a_model_without_a_map_has_no_floor():
+    rows = np.random.default_rng(7).standard_normal((50, 2))
+    cloud = cloud_of(rows)
+    assert cloud.floor_ceiling.size == 0
+    assert noisiest(NAMES[:2], rows[0], cloud.floor_ceiling) is None
+    assert (cloud.noise(NAMES[:2], rows) < -1000).all()

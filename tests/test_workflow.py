@@ -1,6 +1,7 @@
 """Train, evaluate and report from Python: what the commands say, and short texts for notebooks."""
 
 import json
+from dataclasses import replace
 
 import pytest
 import wearstate
@@ -34,6 +35,14 @@ def test_a_recording_and_a_model_in_memory_are_as_good(record, small_model):
     assert found.estimate == model.estimate(record, conditions=dict(record.row))
     assert repr(found).startswith("<Report on small.h5[0]: Grade ")
     assert found._repr_html_().startswith("<pre>Recording ")
+
+
+def test_a_measured_recording_is_asked_for_its_nameplate(record, small_model):
+    measured = replace(record, origin="measured", numerics={})
+    found = wearstate.report(measured, small_model)
+    assert [text for text in found.estimate.cautions if "--scene bilge-pump" in text]
+    told = wearstate.report(measured, small_model, scene="bilge-pump")
+    assert "nameplate" not in " ".join(told.estimate.cautions)
 
 
 def test_the_nameplate_reaches_the_estimate(record, small_model):

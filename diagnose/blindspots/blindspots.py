@@ -1,7 +1,8 @@
 """What a wear model takes for granted: the same machines again, with one thing shifted a row.
 
 Every machine is drawn from the model's recipe, under a seed that no data set has by custom, and
-judged as a user's recording would be: without a word about its conditions.
+judged as a user's recording would be: its conditions and its nameplate are known, where the model
+asks for them.
 """
 
 import hashlib
@@ -21,7 +22,9 @@ from ...datasets.recipe.text import recipe_names
 from ...sim.machine.simulate import simulate_many
 from ...sim.output.recording import DataError, Recording
 from ...sim.scene.parts import Scene, SceneError, channels_of
+from ..machines.registry import presentation_of
 from ..nameplate.cautions import known_beside
+from ..nameplate.nameplate import Nameplate
 from ..pages.kept import Kept
 from ..wear_model.estimate import Estimate
 from .rows import SceneRow, scene_rows
@@ -178,9 +181,10 @@ class _Machines:
             noted["speed_hz"] = condition_of(scene, "speed_hz")
         return replace(solution, row=noted, numerics={})  # a model is told what was noted alone
 
-    def judged(self, recording: Recording, sample: Sample) -> ShiftVerdict:
-        """What the model says of a recording of a machine."""
-        estimate = self.model.estimate(recording, **known_beside(None, recording, self.model.card))
+    def judged(self, recording: Recording, scene: Scene, sample: Sample) -> ShiftVerdict:
+        """What the model says of a recording of a machine whose nameplate is known."""
+        plate = Nameplate(scene=scene, told=frozenset(presentation_of(scene).sizes), assumed=True)
+        estimate = self.model.estimate(recording, **known_beside(plate, recording, self.model.card))
         return answer_of(estimate, sample.group, float(sample.row[self.column]))
 
 
@@ -193,25 +197,27 @@ def _samples(recipe: Recipe, machines: int, seed: int) -> list[Sample]:
     return list(drawn)
 
 
-_Outcome = tuple[Sample, Recording | str]
+_Outcome = tuple[Sample, Scene, Recording | str]
+"""A machine, its scene with the shift, and its recording or why there is none."""
 
 
 def _baseline(machines: _Machines) -> Iterator[_Outcome]:
     for sample in machines.samples:
         known = machines.recordings.get(sample.group)
-        yield sample, known if known is not None else "its simulation fails as trained"
+        outcome = known if known is not None else "its simulation fails as trained"
+        yield sample, sample.scene, outcome
 
 
 def _of_scene(machines: _Machines, row: SceneRow) -> Iterator[_Outcome]:
-    jobs, refused = [], {}
+    taken: list[tuple[Sample, Scene]] = []
     for sample in machines.samples:
         try:
-            jobs.append((row.applied(machines.recipe, sample), sample.seed))
+            taken.append((sample, row.applied(machines.recipe, sample)))
         except SceneError as error:
-            refused[sample.index] = "; ".join(error.faults)
-    found = iter(machines.recorded(jobs))
-    for sample in machines.samples:
-        yield sample, refused[sample.index] if sample.index in refused else next(found)
+            yield sample, sample.scene, "; ".join(error.faults)
+    found = machines.recorded([(scene, sample.seed) for sample, scene in taken])
+    for (sample, scene), outcome in zip(taken, found, strict=True):
+        yield sample, scene, outcome
 
 
 def _of_signal(machines: _Machines, row: SignalRow) -> Iterator[_Outcome]:
@@ -223,9 +229,9 @@ def _of_signal(machines: _Machines, row: SignalRow) -> Iterator[_Outcome]:
         key = [machines.seed, sample.group, int.from_bytes(word[:4])]
         try:
             speed = condition_of(sample.scene, "speed_hz")
-            yield sample, row.apply(recording, speed, np.random.default_rng(key))
+            yield sample, sample.scene, row.apply(recording, speed, np.random.default_rng(key))
         except DataError as error:
-            yield sample, str(error)
+            yield sample, sample.scene, str(error)
 
 
 @dataclass(frozen=True)
@@ -359,11 +365,11 @@ def find_blind_spots(
 
 def _made(task: _Task, fleet: _Machines) -> ShiftRow:
     said, faults = [], []
-    for sample, outcome in task.outcomes(fleet):
+    for sample, scene, outcome in task.outcomes(fleet):
         if isinstance(outcome, str):
             faults.append(outcome)
         else:
-            said.append(fleet.judged(outcome, sample))
+            said.append(fleet.judged(outcome, scene, sample))
     empty = task.row
     return ShiftRow(
         name=empty.name,

@@ -29,7 +29,6 @@ from ..wear_model.arrays import (
 from ..wear_model.bundle import Bundle, checked, load_bundle, save_bundle
 from ..wear_model.estimate import ModelError
 from ..wear_model.novelty import Familiarity
-from ..wear_model.quietness import peak_channels
 from .train import ClassModel, Votes
 
 CLASS_MODEL = "class model"
@@ -164,7 +163,7 @@ def _model_of(structure: _Structure, bundle: Bundle) -> ClassModel:
 
 def _check(model: ClassModel, path: str | Path) -> None:
     """Shapes that fit each other, so that a forged file fails here and not in a prediction."""
-    n, peaks = len(model.names), len(peak_channels(model.names))
+    n = len(model.names)
     try:
         physical = physical_rows(model.names, np.zeros((1, n)))
     except ValueError as error:
@@ -175,7 +174,7 @@ def _check(model: ClassModel, path: str | Path) -> None:
         "votes": _votes_fit(model.votes, len(model.classes)),
         "familiarity": len(model.familiarity) == len(model.classes)
         and all(
-            familiarity_fits(cloud, physical.shape[1], n, peaks) for cloud in model.familiarity
+            familiarity_fits(cloud, model.names, physical.shape[1]) for cloud in model.familiarity
         ),
         "numbers": numbers_fit(_arrays_of(model)),
     }

@@ -1,13 +1,18 @@
 """Where a nameplate is not what a model was trained on: nothing in the signals need show it."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from functools import cache
 from typing import Any
 
+from ...datasets.recipe.draws import Vector
+from ...datasets.recipe.recipe import load_recipe
+from ...datasets.recipe.text import recipe_names
 from ...sim.output.recording import Recording
 from ...sim.scene.load import load_scene, scene_names
 from ...sim.scene.parts import si_unit
 from ..feature_rows.healthy import Baseline
 from ..machines.registry import presentation_of
+from ..pages.si_text import si_text
 from .nameplate import Nameplate, day_of
 
 _SAME = 0.02  # over the trained value: nameplates are rounded
@@ -35,7 +40,8 @@ def known_beside(
     dict
         ``conditions`` and ``told`` of :meth:`~.wear_model.estimate.WearModel.estimate`.
     """
-    told = nameplate_cautions(plate, recording.row, card)
+    simulated = recording.origin == "simulated"  # in memory: whoever made it knows its scene
+    told = () if plate is None and simulated else nameplate_cautions(plate, recording.row, card)
     return {
         "conditions": day_of(plate, recording.row),
         "told": (*told, *_gap_cautions(plate, recording, baseline)),
@@ -75,34 +81,69 @@ def nameplate_cautions(
     Returns
     -------
     tuple of str
-        Of each size that is not that of the machine that the model was trained on.
+        Of each size that is not that of the machines that the model was trained on, or of all of
+        them where nobody gave a nameplate.
     """
-    if plate is None:
-        return ()
-    day = plate.on_the_day(row, None)
-    return tuple(_otherwise_built(day, card["trained_on"]["scene"]))
-
-
-def _otherwise_built(day: Any, trained: str) -> list[str]:
-    """Sizes that differ from those of the scene that the model was trained on."""
+    trained = card["trained_on"]["scene"]
     if trained not in scene_names():
-        return []
+        return ()
     usual: Any = load_scene(trained)
+    drawn = _drawn_by(card["trained_on"].get("recipe", ""))
+    if plate is None:
+        return tuple(_taken_for_granted(usual, drawn, frozenset()))
+    day: Any = plate.on_the_day(row, None)
     if usual.machine != day.machine:
-        return [f"the nameplate is of a {day.machine}, the model of a {usual.machine}"]
-    found = []
+        return (f"the nameplate is of a {day.machine}, the model of a {usual.machine}",)
+    granted = _taken_for_granted(usual, drawn, plate.told) if plate.assumed else ()
+    return (*granted, *_otherwise_built(day, usual, drawn))
+
+
+@cache
+def _drawn_by(recipe: str) -> Mapping[str, tuple[float, float]]:
+    """Least and largest value of each number that a built-in recipe draws, by its path."""
+    if recipe not in recipe_names():
+        return {}
+    found = load_recipe(recipe)
+    axes = (*found.machine, *found.record)
+    return {axis.path: axis.extremes() for axis in axes if not isinstance(axis, Vector)}
+
+
+def _taken_for_granted(usual: Any, drawn: Mapping[str, Any], told: frozenset[str]) -> Iterator[str]:
+    """That a model knows machines of one size, and nobody said that this one has it."""
+    sizes = {
+        path: value
+        for path in presentation_of(usual).sizes
+        if path not in drawn and path not in told and (value := _value(usual, path))
+    }
+    if sizes:
+        words = [
+            f"{path} = {si_text(value, si_unit(type(usual), path))}"
+            for path, value in sizes.items()
+        ]
+        yield (
+            f"no nameplate says how this machine is built; {', '.join(words)} are taken for "
+            "granted, and the signals do not show whether that is right: give --scene MINE.toml, "
+            f"or --scene {usual.name} where these values hold"
+        )
+
+
+def _otherwise_built(
+    day: Any, usual: Any, drawn: Mapping[str, tuple[float, float]]
+) -> Iterator[str]:
+    """Sizes that differ from those of the machines that the model was trained on."""
     for path in presentation_of(day).sizes:
         unit = si_unit(type(day), path)
         mine, theirs = _value(day, path), _value(usual, path)
         if mine is None or theirs is None:
             continue  # a rig has no propeller
+        low, high = drawn.get(path, (theirs, theirs))
         scale = max(abs(theirs), _LEAST_FORCE if unit == "N" else 0.0)
-        if abs(mine - theirs) > _SAME * scale:
-            found.append(
+        if max(low - mine, mine - high) > _SAME * scale:
+            trained = f"{low:.4g}" if low == high else f"{low:.4g} to {high:.4g}"
+            yield (
                 f"{path} = {mine:.4g} {unit} by the nameplate, the model was trained at "
-                f"{theirs:.4g} {unit} and knows no other: see the film equilibrium"
+                f"{trained} {unit} and knows no other"
             )
-    return found
 
 
 _LEAST_FORCE = 1e3  # N: a component that the trained scene has none of is told from 20 N on

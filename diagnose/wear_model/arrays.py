@@ -12,7 +12,9 @@ from ...features.catalogue.catalogue import SetName
 from ...sim.output.sensor import RATE_LEAST, RATE_MOST
 from ..learning.nets import Nets
 from ..learning.regressions import Blend, Forest, Linear, Part
+from .noise_floor import floors_in
 from .novelty import Familiarity
+from .quietness import peak_channels
 
 _LARGEST_NUMBER = 1e60  # of an array: products of a few are still finite
 _LEAST_SPREAD = 1e-60
@@ -306,17 +308,20 @@ def _within(index: NDArray[np.intp], n: int) -> bool:
     return bool((index >= 0).all() and (index < n).all())
 
 
-def familiarity_fits(cloud: Familiarity, n: int, n_features: int, n_peaks: int) -> bool:
-    """Whether a cloud has n coordinates, ranges of n_features, and n_peaks usual peaks."""
+def familiarity_fits(cloud: Familiarity, names: Sequence[str], n: int) -> bool:
+    """Whether a cloud is one of features of these names, with n coordinates."""
+    peaks, floors = len(peak_channels(names)), floors_in(names)
     return (
         shapes_of(cloud.centre, cloud.spread) == {(n,)}
-        and shapes_of(cloud.low, cloud.high) == {(n_features,)}
+        and shapes_of(cloud.low, cloud.high) == {(len(names),)}
         and isinstance(cloud.weight, float)
         and cloud.weight >= 0
         and isinstance(cloud.most_lacking, float)
         and isinstance(cloud.seldom_lacking, float)
         and 0 <= cloud.seldom_lacking <= cloud.most_lacking
-        and shapes_of(cloud.usual_peak, cloud.peak_slope) == {(n_peaks,)}
+        and shapes_of(cloud.usual_peak, cloud.peak_slope) == {(peaks,)}
+        and np.shape(cloud.floor_ceiling) == (floors,)
+        and isinstance(cloud.most_noise, float)
         and np.shape(cloud.whiten) == (n, n)
         and np.ndim(cloud.groups) == 1
         and np.size(cloud.groups) > 0

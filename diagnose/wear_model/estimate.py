@@ -36,6 +36,7 @@ from ..feature_rows.transfer_reference import told_against
 from ..learning.conformal import COVERAGE
 from ..learning.regressions import Blend
 from ..learning.severity import Estimator
+from .noise_floor import noisiest
 from .novelty import Familiarity, free_distance, novelty_p_value
 from .quietness import CAUTIONED_SHARE
 
@@ -533,6 +534,7 @@ class WearModel:
             *self._condition_cautions(row, conditions),
             *self._level_cautions(look),
             *self._quiet_cautions(row),
+            *self._noise_cautions(row),
             *_disagreement_cautions(asked, inputs),
             *self._finding_cautions(findings),
         )
@@ -571,6 +573,19 @@ class WearModel:
             f"are {lack:.1f} dB below those usual at its speed, in all but a few at most "
             f"{seldom:.1f} dB; flooded pins, which do not knock, are not in this model: if this "
             "one may be flooded, train one on a recipe that draws them"
+        ]
+
+    def _noise_cautions(self, row: Float) -> list[str]:
+        """That noise, or a machine near by, hides more than it did in training."""
+        cloud = self.familiarity
+        floor = noisiest(self.names, row, cloud.floor_ceiling)
+        if floor is None or floor.excess_db <= cloud.most_noise:
+            return []
+        return [
+            f"the noise floor of {floor.channel} (its level at quiet crank angles) is "
+            f"{floor.excess_db:.1f} dB above the loudest usual one in training, must be at most "
+            f"{cloud.most_noise:.1f} dB above: it hides what a sound machine shows; "
+            "check sensor, cable and grounding, or what runs near by"
         ]
 
     def _lacking(self, row: Float) -> float:

@@ -42,7 +42,6 @@ from .arrays import (
 from .bundle import Bundle, checked, load_bundle, save_bundle
 from .estimate import Head, ModelError, WearModel
 from .novelty import Familiarity
-from .quietness import peak_channels
 
 _KIND = "wear model"
 
@@ -231,9 +230,7 @@ def _check_structure(model: WearModel, path: str | Path) -> None:
         or (more > 0 and _estimator_fits(model.informed, inputs + more)),
         "heads": all(blend_fits(head.blend, n) for head in model.heads)
         and [h.name for h in model.heads] == [c["name"] for c in model.card["confounders"]],
-        "familiarity": familiarity_fits(
-            model.familiarity, physical.shape[1], n, len(peak_channels(names))
-        ),
+        "familiarity": familiarity_fits(model.familiarity, names, physical.shape[1]),
         "levels": _levels_fit(model.levels, len(level_channels(names)), shapes.shape[1]),
         "numbers": numbers_fit(_arrays_of(model)),
     }

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..feature_rows.physical import coordinates_of, moved_rows, physical_rows
+from .noise_floor import fit_ceiling, loudest_floor
 from .quietness import UsualPeaks, fit_usual_peaks, shortfall
 
 Float = NDArray[np.float64]
@@ -58,6 +59,10 @@ class Familiarity:
         A machine that does not knock is near in shape, and still none of the trained ones.
     seldom_lacking : float
         How far few familiar peaks are below the usual ones [dB].
+    floor_ceiling : numpy.ndarray [shape=(n_channels * n_bands,)]
+        Of :func:`~.noise_floor.fit_ceiling` [dB].
+    most_noise : float
+        How far the noise floor of few familiar recordings is above that ceiling [dB].
     """
 
     centre: Float
@@ -72,10 +77,16 @@ class Familiarity:
     peak_slope: Float
     most_lacking: float
     seldom_lacking: float
+    floor_ceiling: Float
+    most_noise: float
 
     def lacking(self, names: Sequence[str], rows: Float) -> Float:
         """How far peaks are below the usual ones [dB, shape=(n_recordings,)]."""
         return shortfall(names, rows, UsualPeaks(self.usual_peak, self.peak_slope))
+
+    def noise(self, names: Sequence[str], rows: Float) -> Float:
+        """How far noise floors are above the loudest usual ones [dB, shape=(n_recordings,)]."""
+        return loudest_floor(names, rows, self.floor_ceiling)
 
     def outside(self, rows: Float) -> Float:
         """Share of the features outside what was trained on [shape=(n_recordings,)]."""
@@ -182,6 +193,7 @@ def fit_familiarity(
     weight: float = 0.0,
     most_lacking: float = NEVER_DB,
     seldom_lacking: float = NEVER_DB,
+    most_noise: float = NEVER_DB,
 ) -> Familiarity:
     """Learn the cloud of training recordings.
 
@@ -197,6 +209,8 @@ def fit_familiarity(
         Of the share of features outside the trained range; 0: it does not count.
     most_lacking, seldom_lacking : float
         How far familiar peaks may be, and few are, below the usual ones [dB].
+    most_noise : float
+        How far noise floors of few familiar recordings are above the loudest usual ones [dB].
 
     Returns
     -------
@@ -246,6 +260,8 @@ def fit_familiarity(
         peak_slope=usual.slope,
         most_lacking=most_lacking,
         seldom_lacking=seldom_lacking,
+        floor_ceiling=fit_ceiling(names, rows),
+        most_noise=most_noise,
     )
 
 

@@ -57,6 +57,7 @@ from ..learning.regressions import (
 )
 from ..learning.severity import Estimator
 from .estimate import Head, WearModel
+from .noise_floor import usual_excess
 from .novelty import REACH, Familiarity, fit_familiarity
 from .quietness import CAUTIONED_SHARE, REFUSED_SHARE, most_lacking
 
@@ -628,23 +629,25 @@ def _out_of_fold_distances(
 
     And the weight of the share outside the ranges, which makes its rare values as far as those of
     the distance itself: of both together no more are refused than of one. And how far peaks may
-    be below the usual ones.
+    be below the usual ones, and noise floors above them.
     """
     names = training.names
     apart, outside = np.empty((2, 2, len(training.rows)))
-    lacking = np.empty(len(training.rows))
+    lacking, noise = np.empty((2, len(training.rows)))
     for train, test in folds:
         cloud = fit_familiarity(names, training.rows[train], training.groups[train])
         for i, each in enumerate((training, other)):
             apart[i, test] = cloud.distance(names, each.rows[test])
             outside[i, test] = cloud.outside(each.rows[test])
         lacking[test] = cloud.lacking(names, training.rows[test])
+        noise[test] = cloud.noise(names, training.rows[test])
     rare = max(float(np.quantile(outside[0], _RARE)), 1 / len(names))
     weight = float(np.quantile(apart[0], _RARE)) / rare
     limits = {
         "weight": weight,
         "most_lacking": most_lacking(lacking, REFUSED_SHARE),
         "seldom_lacking": most_lacking(lacking, CAUTIONED_SHARE),
+        "most_noise": usual_excess(noise),
     }
     return np.maximum(apart, weight * outside), limits
 
