@@ -356,9 +356,9 @@ def test_bulk_moduli_of_water_and_air_at_atmospheric_pressure():
 def test_series_for_the_air(p, e, exponent):
     h = record(liquid=Liquid(air_fraction=0.2, air_exponent=exponent))
     near = p + e * (p + ATMOSPHERE)
-    known = (p, hy._air(p, h), 1 / (p + ATMOSPHERE))
+    known = (p, hy.air_volume(p, h), 1 / (p + ATMOSPHERE))
     # five terms: the sixth is below 1e-12 of the air, and half of it at the end of the reach
-    assert_allclose(hy._air_near(near, known, h), hy._air(near, h), rtol=2e-12)
+    assert_allclose(hy._air_near(near, known, h), hy.air_volume(near, h), rtol=2e-12)
 
 
 def shut(**fields):

@@ -74,6 +74,13 @@ def test_neighbours_number_and_place_change_no_byte(drawn, alone, some):
         {"joint.wristpin.rung": "compliant", "joint.guide.rung": "compliant"},
         {"crank.unbalance": "0.1 kg m"},
         {"exciters.0.force": "500 N"},
+        {"pressure.rung": "chamber", "pressure.suction": "-80 kPa"},  # some vapour
+        {"pressure.rung": "chamber", "pressure.suction_valve.stuck_lift": "2 mm"},  # much of it
+        {"pressure.rung": "chamber", "pressure.liquid.air_fraction": 0.0},
+        {
+            "pressure.rung": "chamber",
+            "pressure.suction_valve.seat_stiffness": "300 MN/m",
+        },  # substeps
     ],
 )
 def test_rungs_that_the_standard_set_does_not_draw(changes):

@@ -472,7 +472,7 @@ def lowest_pressure(h: Any) -> float:
 
 
 @kernel
-def _air(pressure: float, h: Any) -> float:
+def air_volume(pressure: float, h: Any) -> float:
     """Volume of the air per volume of mixture at atmospheric pressure."""
     if h.air_fraction == 0.0:
         return 0.0
@@ -483,19 +483,23 @@ def _air(pressure: float, h: Any) -> float:
 
 
 @kernel
-def _air_near(pressure: float, known: Any, h: Any) -> float:
-    """The same, from a known value: a series saves the power within a hundredth of it."""
+def _air_series(pressure: float, known: Any, h: Any) -> Any:
+    """The same, from a known value, and whether that is near enough for this series."""
     e = (pressure - known[0]) * known[2]
-    if abs(e) > _SERIES_REACH:
-        far: float = _air(pressure, h)
-        return far
     k = h.air_power
     s = 1.0 - e * (k + 4.0) * 0.2
     s = 1.0 - e * (k + 3.0) * 0.25 * s
     s = 1.0 - e * (k + 2.0) * (1.0 / 3.0) * s
     s = 1.0 - e * (k + 1.0) * 0.5 * s
-    near: float = known[1] * (1.0 - e * k * s)
-    return near
+    return known[1] * (1.0 - e * k * s), abs(e) <= _SERIES_REACH
+
+
+@kernel
+def _air_near(pressure: float, known: Any, h: Any) -> float:
+    """The same: within a hundredth of a known value a series saves the power."""
+    near, good = _air_series(pressure, known, h)
+    volume: float = near if good else air_volume(pressure, h)
+    return volume
 
 
 @kernel
@@ -545,13 +549,13 @@ def specific_volume(pressure: float, h: Any) -> Any:
     >>> round(v, 12), round(-v / slope / 1e6, 1)  # two per mille of air: a thirtieth of water's
     (1.0, 68.7)
     """
-    return _specific(pressure, _air(pressure, h), h)
+    return _specific(pressure, air_volume(pressure, h), h)
 
 
 # --- the valves
 
 
-class _Side(NamedTuple):
+class ValveSide(NamedTuple):
     """The valves of one side, as one valve."""
 
     gap_conductance: float
@@ -569,8 +573,9 @@ class _Side(NamedTuple):
 
 
 @kernel
-def _suction_side(h: Any) -> Any:
-    return _Side(
+def suction_side(h: Any) -> Any:
+    """Suction valves of a record of dtype HYDRAULIC."""
+    return ValveSide(
         h.suction_gap_conductance,
         h.suction_leak_conductance,
         h.suction_area,
@@ -587,8 +592,9 @@ def _suction_side(h: Any) -> Any:
 
 
 @kernel
-def _discharge_side(h: Any) -> Any:
-    return _Side(
+def discharge_side(h: Any) -> Any:
+    """Discharge valves of a record of dtype HYDRAULIC."""
+    return ValveSide(
         h.discharge_gap_conductance,
         h.discharge_leak_conductance,
         h.discharge_area,
@@ -605,28 +611,25 @@ def _discharge_side(h: Any) -> Any:
 
 
 @kernel
-def _touches(lift: float, rate: float, side: Any) -> int:
+def _touches(lift: float, rate: float, side: Any) -> float:
     """-1 on the seat, 1 on the stop, 0 free: contact pushes and never pulls."""
-    if lift < 0.0:
-        return -1 if side.seat_stiffness * lift + side.seat_damping * rate < 0.0 else 0
     over = lift - side.max_lift
-    if over > 0.0:
-        return 1 if side.seat_stiffness * over + side.seat_damping * rate > 0.0 else 0
-    return 0
+    damped = side.seat_damping * rate
+    on_seat = lift < 0.0 and side.seat_stiffness * lift + damped < 0.0
+    on_stop = lift >= 0.0 and over > 0.0 and side.seat_stiffness * over + damped > 0.0
+    return -1.0 if on_seat else 1.0 if on_stop else 0.0
 
 
 @kernel
-def _seat_force(lift: float, rate: float, contact: int, side: Any) -> float:
+def _seat_force(lift: float, rate: float, contact: float, side: Any) -> float:
     """Force of seat or stop on the valve, positive in the direction of opening [N]."""
-    if contact == 0:
-        return 0.0
-    over = lift - side.max_lift if contact > 0 else lift
+    over = lift - side.max_lift if contact > 0.0 else lift
     force: float = -side.seat_stiffness * over - side.seat_damping * rate
-    return force
+    return force if contact != 0.0 else 0.0
 
 
 @kernel
-def _shares(dt: float, side: Any) -> Any:
+def valve_shares(dt: float, side: Any) -> Any:
     """What of a force becomes rate in an implicit stage, free and in contact; momentum factor."""
     if side.stuck >= 0.0:
         return 0.0, 0.0, 0.0
@@ -637,17 +640,16 @@ def _shares(dt: float, side: Any) -> Any:
 
 
 @kernel
-def _lift_line(lift: float, rate: float, contact: int, shares: Any, side: Any) -> Any:
+def _lift_line(lift: float, rate: float, contact: float, shares: Any, side: Any) -> Any:
     """Rate at the end of an implicit stage, as a line over the pressure drop: ``a + b dp``.
 
     `lift` and `rate` are what the stage starts from; solves ``v = rate + dt F(z, v, dp) / m`` with
     ``z = lift + dt v``.
     """
-    force = rate * shares[2] - side.preload - side.stiffness * lift
-    if contact == 0:
-        return force * shares[0], side.force_area * shares[0]
-    force -= side.seat_stiffness * (lift - side.max_lift if contact > 0 else lift)
-    return force * shares[1], side.force_area * shares[1]
+    free = rate * shares[2] - side.preload - side.stiffness * lift
+    held = free - side.seat_stiffness * (lift - side.max_lift if contact > 0.0 else lift)
+    share = shares[1] if contact != 0.0 else shares[0]
+    return (held if contact != 0.0 else free) * share, side.force_area * share
 
 
 @kernel
@@ -666,11 +668,9 @@ def _valve_flow(drop: float, lift: float, dt: float, line: Any, side: Any) -> An
     """
     rate = line[0] + line[1] * drop
     gap = lift + dt * rate
-    conductance = side.leak_conductance
-    opening = 0.0
-    if gap > 0.0:
-        conductance += side.gap_conductance * gap
-        opening = side.gap_conductance * dt * line[1]
+    wide = side.leak_conductance + side.gap_conductance * gap
+    conductance = wide if gap > 0.0 else side.leak_conductance
+    opening = side.gap_conductance * dt * line[1] if gap > 0.0 else 0.0
     flow, slope = side.area * rate, side.area * line[1]
     if conductance > 0.0:
         root, root_slope = _orifice(drop)
@@ -687,17 +687,36 @@ def _flow_now(drop: float, lift: float, rate: float, side: Any) -> float:
 
 
 @kernel
-def _pull(drop: float, lift: float, rate: float, contact: int, side: Any) -> float:
+def _pull(drop: float, lift: float, rate: float, contact: float, side: Any) -> float:
     """Acceleration of a valve [m/s^2]."""
-    if side.stuck >= 0.0:
-        return 0.0
     force: float = _seat_force(lift, rate, contact, side) + side.force_area * drop
     force -= side.preload + side.stiffness * lift + side.damping * rate
     pull: float = force / side.mass
-    return pull
+    return 0.0 if side.stuck >= 0.0 else pull
 
 
 # --- the chamber
+
+
+@kernel
+def _newton(
+    p: float, air: float, mass: float, volume: float, dt: float, valves: Any, h: Any
+) -> Any:
+    """Room that a stage's pressure leaves, Newton's change of it, flows with slopes; if it will do.
+
+    The equation is that of :func:`_balance`.
+    """
+    lift_s, line_s, suction, lift_d, line_d, discharge = valves
+    v, slope = _specific(p, air, h)
+    q_s, s_s = _valve_flow(h.suction - p, lift_s, dt, line_s, suction)
+    q_d, s_d = _valve_flow(p - h.discharge, lift_d, dt, line_d, discharge)
+    held = mass + dt * (q_s - q_d)
+    room = volume - v * held
+    change = room / (slope * held - v * dt * (s_s + s_d))
+    fine = abs(change) <= 1e-9 * (p + STANDARD_ATMOSPHERE) + _NEWTON_SHARE * min(
+        abs(h.suction - p), abs(p - h.discharge)
+    )
+    return room, change, q_s, q_d, s_s, s_d, fine and p + change > h.vapour
 
 
 @kernel
@@ -718,37 +737,29 @@ def _balance(
     room is vapour. The flows end on the tangent of the last iterate, so that the mass
     is booked exactly and the pressure follows it.
     """
-    lift_s, line_s, suction, lift_d, line_d, discharge = valves
     low, high, floor_open = h.vapour, _PRESSURE_LIMIT, True
-    p = max(guess, low)
+    p, q_s, q_d = max(guess, low), 0.0, 0.0
     last = 2.0 * _PRESSURE_LIMIT
     for _ in range(_MOST_ITERATIONS):
-        v, slope = _specific(p, _air_near(p, known, h), h)
-        q_s, s_s = _valve_flow(h.suction - p, lift_s, dt, line_s, suction)
-        q_d, s_d = _valve_flow(p - h.discharge, lift_d, dt, line_d, discharge)
-        held = mass + dt * (q_s - q_d)
-        room = volume - v * held
+        air = _air_near(p, known, h)
+        room, change, q_s, q_d, s_s, s_d, fine = _newton(p, air, mass, volume, dt, valves, h)
         if p <= h.vapour:
             if room >= 0.0:
                 return p, q_s, q_d, room
             floor_open = False
-        newton = room / (slope * held - v * dt * (s_s + s_d))
-        q_s -= s_s * newton
-        q_d += s_d * newton
+        q_s -= s_s * change
+        q_d += s_d * change
         if room > 0.0:
             high = p
         else:
             low = p
-        fine = abs(newton) <= 1e-9 * (p + STANDARD_ATMOSPHERE) + _NEWTON_SHARE * min(
-            abs(h.suction - p), abs(p - h.discharge)
-        )
-        if fine and p + newton > h.vapour:
-            p += newton
+        after = p + change
+        if fine:
+            p = after
             break
-        after = p + newton
         if floor_open and after <= h.vapour:
             after = h.vapour
-        elif not (low < after < high) or abs(newton) > 0.5 * last:
+        elif not (low < after < high) or abs(change) > 0.5 * last:
             after = 0.5 * (low + high) if high < _PRESSURE_LIMIT else min(after, high)
         last = abs(after - p)
         p = after
@@ -762,17 +773,102 @@ def _balance(
 def _settled(p: float, volume: float, held: float, known: Any, h: Any) -> Any:
     """Pressure and vapour of a mass in a volume, from a good guess: the books are exact."""
     for _ in range(_MOST_ITERATIONS):
-        v, slope = _specific(p, _air_near(p, known, h), h)
-        change = (volume - v * held) / (slope * held)
+        change = _settling(p, _air_near(p, known, h), volume, held, h)
         p += change
         if p <= h.vapour:
-            v = _specific(h.vapour, _air(h.vapour, h), h)[0]
+            v = _specific(h.vapour, air_volume(h.vapour, h), h)[0]
             if volume >= v * held:
                 return h.vapour, volume - v * held
             p = h.vapour
         elif abs(change) <= _SETTLED * (p + STANDARD_ATMOSPHERE):
             break
     return p, 0.0
+
+
+@kernel
+def _settling(p: float, air: float, volume: float, held: float, h: Any) -> float:
+    v, slope = _specific(p, air, h)
+    change: float = (volume - v * held) / (slope * held)
+    return change
+
+
+@kernel
+def _balance_at_once(
+    mass: float,
+    volume: float,
+    dt: float,
+    guess: float,
+    known: Any,
+    valves: Any,
+    last_stage: bool,
+    h: Any,
+) -> Any:
+    """As :func:`_balance`, in the fewest iterations that mostly do; whether they did.
+
+    Newton twice, or once and once more for the books, and no bound had a say in it: then these
+    are the same numbers in the same order, without a loop or a branch.
+    """
+    air, near = _air_series(guess, known, h)
+    room, change, q_s, q_d, s_s, s_d, fine = _newton(guess, air, mass, volume, dt, valves, h)
+    sure, p = near and guess > h.vapour, guess + change
+    q_s, q_d = q_s - s_s * change, q_d + s_d * change
+    if last_stage:
+        air, near = _air_series(p, known, h)
+        change = _settling(p, air, volume, mass + dt * (q_s - q_d), h)
+        p += change
+        settled = p > h.vapour and abs(change) <= _SETTLED * (p + STANDARD_ATMOSPHERE)
+        return p, q_s, q_d, sure and fine and near and settled
+    between = h.vapour < p and (p < guess if room > 0.0 else guess < p < _PRESSURE_LIMIT)
+    air, near = _air_series(p, known, h)
+    _, change, r_s, r_d, s_s, s_d, finer = _newton(p, air, mass, volume, dt, valves, h)
+    sure = sure and (fine or (between and near and finer))
+    return (
+        p if fine else p + change,
+        q_s if fine else r_s - s_s * change,
+        q_d if fine else r_d + s_d * change,
+        sure,
+    )
+
+
+@kernel
+def _expected_contacts(dt: float, guess: float, start: Any, valves: Any, h: Any) -> Any:
+    """Which valves touch at the end of a stage under a guessed pressure."""
+    lift_s, rate_s, lift_d, rate_d = start
+    suction, shares_s, discharge, shares_d = valves
+    line_s = _lift_line(lift_s, rate_s, 0.0, shares_s, suction)
+    line_d = _lift_line(lift_d, rate_d, 0.0, shares_d, discharge)
+    v_s = line_s[0] + line_s[1] * (h.suction - guess)
+    v_d = line_d[0] + line_d[1] * (guess - h.discharge)
+    return _touches(lift_s + dt * v_s, v_s, suction), _touches(lift_d + dt * v_d, v_d, discharge)
+
+
+@kernel
+def _lines(on_s: float, on_d: float, start: Any, valves: Any) -> Any:
+    """Both valves as lines over the pressure drop, as :func:`_balance` takes them."""
+    lift_s, rate_s, lift_d, rate_d = start
+    suction, shares_s, discharge, shares_d = valves
+    return (
+        lift_s,
+        _lift_line(lift_s, rate_s, on_s, shares_s, suction),
+        suction,
+        lift_d,
+        _lift_line(lift_d, rate_d, on_d, shares_d, discharge),
+        discharge,
+    )
+
+
+@kernel
+def _outcome(p: float, dt: float, on_s: float, on_d: float, lines: Any, h: Any) -> Any:
+    """Rates of both valves at the end of a stage, and the contacts that agree with them."""
+    lift_s, line_s, suction, lift_d, line_d, discharge = lines
+    v_s = line_s[0] + line_s[1] * (h.suction - p)
+    v_d = line_d[0] + line_d[1] * (p - h.discharge)
+    return (
+        v_s,
+        v_d,
+        _touches_still(lift_s + dt * v_s, v_s, on_s, suction),
+        _touches_still(lift_d + dt * v_d, v_d, on_d, discharge),
+    )
 
 
 @kernel
@@ -785,41 +881,37 @@ def _stage(
     start: Any,
     valves: Any,
     last_stage: bool,
+    at_once: bool,
     h: Any,
 ) -> Any:
-    """One implicit stage: pressure first, the valves as lines over it; contact as it turns out."""
-    lift_s, rate_s, lift_d, rate_d = start
-    suction, shares_s, discharge, shares_d = valves
-    line_s = _lift_line(lift_s, rate_s, 0, shares_s, suction)
-    line_d = _lift_line(lift_d, rate_d, 0, shares_d, discharge)
-    v_s = line_s[0] + line_s[1] * (h.suction - guess)
-    v_d = line_d[0] + line_d[1] * (guess - h.discharge)
-    on_s = _touches(lift_s + dt * v_s, v_s, suction)
-    on_d = _touches(lift_d + dt * v_d, v_d, discharge)
-    p, q_s, q_d, vapour, was_s, was_d = guess, 0.0, 0.0, 0.0, on_s, on_d
+    """One implicit stage: pressure first, the valves as lines over it; contact as it turns out.
+
+    The last value is false where a stage `at_once` did not find its end.
+    """
+    on_s, on_d = _expected_contacts(dt, guess, start, valves, h)
+    if at_once:
+        lines = _lines(on_s, on_d, start, valves)
+        p, q_s, q_d, sure = _balance_at_once(mass, volume, dt, guess, known, lines, last_stage, h)
+        v_s, v_d, then_s, then_d = _outcome(p, dt, on_s, on_d, lines, h)
+        sure = sure and then_s == on_s and then_d == on_d
+        return p, 0.0, q_s, q_d, v_s, v_d, on_s, on_d, sure
+    p, q_s, q_d, vapour, v_s, v_d, was_s, was_d = guess, 0.0, 0.0, 0.0, 0.0, 0.0, on_s, on_d
     for _ in range(3):
-        line_s = _lift_line(lift_s, rate_s, on_s, shares_s, suction)
-        line_d = _lift_line(lift_d, rate_d, on_d, shares_d, discharge)
-        both = (lift_s, line_s, suction, lift_d, line_d, discharge)
-        p, q_s, q_d, vapour = _balance(mass, volume, dt, guess, known, both, last_stage, h)
-        v_s = line_s[0] + line_s[1] * (h.suction - p)
-        v_d = line_d[0] + line_d[1] * (p - h.discharge)
         was_s, was_d = on_s, on_d
-        on_s = _touches_still(lift_s + dt * v_s, v_s, was_s, suction)
-        on_d = _touches_still(lift_d + dt * v_d, v_d, was_d, discharge)
+        lines = _lines(was_s, was_d, start, valves)
+        p, q_s, q_d, vapour = _balance(mass, volume, dt, p, known, lines, last_stage, h)
+        v_s, v_d, on_s, on_d = _outcome(p, dt, was_s, was_d, lines, h)
         if on_s == was_s and on_d == was_d:
             break
-        guess = p
-    return p, vapour, q_s, q_d, v_s, v_d, was_s, was_d
+    return p, vapour, q_s, q_d, v_s, v_d, was_s, was_d, True
 
 
 @kernel
-def _touches_still(lift: float, rate: float, contact: int, side: Any) -> int:
+def _touches_still(lift: float, rate: float, contact: float, side: Any) -> float:
     """Contact that agrees with a stage's outcome; one that pushes is kept."""
-    if contact != 0:
-        force = _seat_force(lift, rate, contact, side)
-        return contact if force * contact <= 0.0 else 0
-    return _touches(lift, rate, side)
+    pushes = _seat_force(lift, rate, contact, side) * contact <= 0.0
+    kept = contact if pushes else 0.0
+    return kept if contact != 0.0 else _touches(lift, rate, side)
 
 
 @kernel
@@ -838,9 +930,20 @@ def _volume(x: float, h: Any) -> float:
 
 @kernel
 def _substep(
-    state: Any, mass: float, air: float, dt: float, middle: float, end: float, valves: Any, h: Any
+    state: Any,
+    mass: float,
+    air: float,
+    dt: float,
+    middle: float,
+    end: float,
+    valves: Any,
+    at_once: bool,
+    h: Any,
 ) -> Any:
-    """TR-BDF2 over one substep: two implicit stages with the same implicit part."""
+    """TR-BDF2 over one substep: two implicit stages with the same implicit part.
+
+    The last value is false where a stage `at_once` did not find its end.
+    """
     p0, _, z_s, v_s, z_d, v_d = state
     suction, _, discharge, _ = valves
     known = (p0, air, 1.0 / (p0 + STANDARD_ATMOSPHERE))
@@ -852,10 +955,10 @@ def _substep(
     a_d0 = _pull(drop_d, z_d, v_d, on_d, discharge)
     f_s0 = _seat_force(z_s, v_s, on_s, suction)
     f_d0 = _seat_force(z_d, v_d, on_d, discharge)
-    c = _IMPLICIT * dt
+    c = implicit_part(dt)
     start = (z_s + c * v_s, v_s + c * a_s0, z_d + c * v_d, v_d + c * a_d0)
-    p1, _, q_s1, q_d1, v_s1, v_d1, on_s, on_d = _stage(
-        mass + c * (q_s0 - q_d0), middle, c, p0, known, start, valves, False, h
+    p1, _, q_s1, q_d1, v_s1, v_d1, on_s, on_d, sure = _stage(
+        mass + c * (q_s0 - q_d0), middle, c, p0, known, start, valves, False, at_once, h
     )
     f_s1 = _seat_force(start[0] + c * v_s1, v_s1, on_s, suction)
     f_d1 = _seat_force(start[2] + c * v_d1, v_d1, on_d, discharge)
@@ -867,8 +970,9 @@ def _substep(
         v_d + w * (a_d0 + (v_d1 - start[3]) * per_c),
     )
     guess = p0 + (p1 - p0) / _GAMMA
-    p2, vapour, q_s2, q_d2, v_s2, v_d2, on_s, on_d = _stage(
-        mass + w * (q_s0 - q_d0 + q_s1 - q_d1), end, c, guess, known, start, valves, True, h
+    held = mass + w * (q_s0 - q_d0 + q_s1 - q_d1)
+    p2, vapour, q_s2, q_d2, v_s2, v_d2, on_s, on_d, surer = _stage(
+        held, end, c, guess, known, start, valves, True, at_once, h
     )
     z_s2, z_d2 = start[0] + c * v_s2, start[2] + c * v_d2
     f_s2 = _seat_force(z_s2, v_s2, on_s, suction)
@@ -879,7 +983,67 @@ def _substep(
         w * (q_d0 + q_d1) + c * q_d2,
         w * (f_s0 + f_s1) + c * f_s2,
         w * (f_d0 + f_d1) + c * f_d2,
+        sure and surer,
     )
+
+
+@kernel
+def _mass(pressure: float, air: float, volume: float, h: Any) -> float:
+    """What a volume holds, in volumes at atmospheric pressure [m^3]."""
+    mass: float = volume / _specific(pressure, air, h)[0]
+    return mass
+
+
+@kernel
+def chamber_at_once(
+    state: Any,
+    air: float,
+    h: Any,
+    valves: Any,
+    step: float,
+    x0: float,
+    v0: float,
+    x1: float,
+    v1: float,
+) -> Any:
+    """As :func:`chamber_step` in one substep, for chambers side by side.
+
+    Parameters
+    ----------
+    state : tuple of float
+        As :data:`CHAMBER_STATE`.
+    air : float
+        :func:`air_volume` at its pressure.
+    h : record of dtype HYDRAULIC, or a tuple with its names
+    valves : tuple
+        :func:`suction_side`, what :func:`valve_shares` makes of it over an :func:`implicit_part` of
+        the step, and both of the discharge side.
+    step, x0, v0, x1, v1 : float
+        As there.
+
+    Returns
+    -------
+    state : tuple of float
+        At the end of the step.
+    suction_impulse, discharge_impulse : float
+        As :data:`CHAMBER_FLOWS` [N s].
+    sure : bool
+        These are the very numbers of :func:`chamber_step`; else it must be asked. That is so in
+        one step of a hundred: where a valve comes down on its seat, vapour fills the chamber, or
+        the pressure leaps.
+    """
+    mass = _mass(state[0], air, _volume(x0, h) - state[1], h)
+    middle, end = _volume(_hermite(_GAMMA, step, x0, v0, x1, v1), h), _volume(x1, h)
+    now, q_s, _, f_s, f_d, sure = _substep(state, mass, air, step, middle, end, valves, True, h)
+    total = now[3] + now[5] + q_s
+    sound = middle > 0.0 and end > 0.0 and total - total == 0.0 and now[0] < _PRESSURE_LIMIT
+    return now, 0.0 + f_s, 0.0 + f_d, sure and sound
+
+
+@kernel
+def implicit_part(step: float) -> float:
+    """Of a substep: what either stage of TR-BDF2 takes implicitly [s]."""
+    return _IMPLICIT * step
 
 
 @kernel
@@ -955,14 +1119,14 @@ def chamber_step(
     >>> f"{flows[0]:.3g}"  # what the piston makes room for: 7.9e-3 * 3.2e-5
     '2.53e-07'
     """
-    inlet, outlet = _suction_side(h), _discharge_side(h)
+    inlet, outlet = suction_side(h), discharge_side(h)
     now = (state[0], state[1], state[2], state[3], state[4], state[5])
     share = 1.0 / substeps
     dt = step * share
-    c = _IMPLICIT * dt
-    valves = (inlet, _shares(c, inlet), outlet, _shares(c, outlet))
-    air = _air(now[0], h)
-    mass = (_volume(x0, h) - now[1]) / _specific(now[0], air, h)[0]
+    c = implicit_part(dt)
+    valves = (inlet, valve_shares(c, inlet), outlet, valve_shares(c, outlet))
+    air = air_volume(now[0], h)
+    mass = _mass(now[0], air, _volume(x0, h) - now[1], h)
     suction, discharge, impulse_s, impulse_d = 0.0, 0.0, 0.0, 0.0
     for i in range(substeps):
         middle = _volume(_hermite((i + _GAMMA) * share, step, x0, v0, x1, v1), h)
@@ -971,7 +1135,7 @@ def chamber_step(
         )
         if not (middle > 0.0 and end > 0.0):
             return CHAMBER_NO_VOLUME
-        now, q_s, q_d, f_s, f_d = _substep(now, mass, air, dt, middle, end, valves, h)
+        now, q_s, q_d, f_s, f_d, _ = _substep(now, mass, air, dt, middle, end, valves, False, h)
         mass += q_s - q_d
         suction += q_s
         discharge += q_d
@@ -980,7 +1144,7 @@ def chamber_step(
         if not (math.isfinite(now[3] + now[5] + suction) and now[0] < _PRESSURE_LIMIT):
             return CHAMBER_NOT_FINITE
         if i + 1 < substeps:
-            air = _air(now[0], h)
+            air = air_volume(now[0], h)
     for column in range(6):
         state[column] = now[column]
     flows[0] = suction

@@ -6,7 +6,8 @@ are those of :mod:`.throw_motion`, so are the bytes: a lane's result does not de
 its neighbours or how many there are, and equals that of the record alone.
 
 A step in which a contact of a lane changes is taken again for that lane by the march of one record,
-which cuts it. A chamber with valves is stepped lane by lane. A failed lane is left behind.
+which cuts it; so is that of a chamber whose pressure or valves are not found at once. A failed lane
+is left behind.
 
 Lanes are for one throw whose crank pin has clearance without oil, whose wrist pin and guide are
 ideal or have clearance, under a pressure that follows from the crank angle, or a chamber.
@@ -21,6 +22,7 @@ from numpy.typing import NDArray
 
 from ..jit import subroutine
 from ..output.status import Status
+from ..pump.hydraulics import ValveSide
 from ..pump.setup import Start, joint_rungs
 from ..pump.slider_crank import (
     CHANGES,
@@ -38,10 +40,12 @@ from ..scene.pump import PumpScene
 from ..scene.pump_hydraulics import PIPED_RUNGS
 from .march import Stretch, alone, enter_lane, march
 from .rates import (
+    CHAMBER_COLUMNS,
     LANES,
     NEVER,
     PLAN,
     STATE,
+    ChamberLane,
     ContactLane,
     LiquidLane,
     ThrowLane,
@@ -149,14 +153,14 @@ class _Lanes:
         self._kept = Stretch(
             turns=np.zeros((_STRETCH, 2, LANES)),
             forces=np.zeros((_STRETCH, len(FORCES), LANES)),
-            chambers=np.zeros((_STRETCH, LANES, 8)),
+            chambers=np.zeros((_STRETCH, CHAMBER_COLUMNS, LANES)),
             code=np.ones(LANES, np.int64),
             done=np.zeros(LANES, np.int64),
         )
         self._past = _Past(
             turns=np.empty((LANES, _ROOM + 1, 2)),
             forces=np.empty((LANES, len(self._columns), _ROOM)),
-            chambers=np.empty((LANES, _ROOM + 1 if self._breathing else 1, 1, 8)),
+            chambers=np.empty((LANES, _ROOM + 1 if self._breathing else 1, 1, CHAMBER_COLUMNS)),
         )
 
     def fill(self, ahead: Iterator[int]) -> bool:
@@ -184,7 +188,12 @@ class _Lanes:
         for joint in map(int, np.flatnonzero(tight) + 1):
             plan["contact"][joint, :, lane] = NEVER
         plan["machine"][:, lane] = t.machine
-        plan["liquid"][:, lane] = _numbers(t.liquid[0], LiquidLane._fields)
+        liquid = t.liquid[0]
+        plan["liquid"][:, lane] = _numbers(liquid, LiquidLane._fields)
+        plan["chamber"][:, lane] = _numbers(liquid, ChamberLane._fields)
+        for n, side in enumerate(("suction", "discharge")):
+            names = [f"{side}_{name}" for name in ValveSide._fields]
+            plan["valve"][n, :, lane] = _numbers(liquid, names)
         plan["step"][lane], plan["sixth"][lane] = job.step, job.step / 6.0
         plan["weight"][lane] = job.step / (6.0 * job.step)
         for name in state.dtype.names:
@@ -256,7 +265,7 @@ class _Past(NamedTuple):
 
     turns: Float  # (LANES, _ROOM + 1, 2)
     forces: Float  # (LANES, n_kept, _ROOM)
-    chambers: Float  # (LANES, _ROOM + 1, 1, 8); one row where nothing breathes
+    chambers: Float  # (LANES, _ROOM + 1, 1, CHAMBER_COLUMNS); one row where nothing breathes
 
 
 @subroutine
@@ -308,8 +317,8 @@ def _take(k: Any, columns: Any, at: Any, past: Any, breathing: bool) -> None:
             past.turns[lane, begin + 1 + i, 0] = k.turns[i, 0, lane]
             past.turns[lane, begin + 1 + i, 1] = k.turns[i, 1, lane]
             if breathing:
-                for c in range(8):
-                    past.chambers[lane, begin + 1 + i, 0, c] = k.chambers[i, lane, c]
+                for c in range(CHAMBER_COLUMNS):
+                    past.chambers[lane, begin + 1 + i, 0, c] = k.chambers[i, c, lane]
 
 
 def _numbers(record: Any, names: Sequence[str]) -> list[float]:

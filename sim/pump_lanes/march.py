@@ -1,4 +1,4 @@
-"""Steps of all lanes: Runge-Kutta side by side; contacts and chambers a lane at a time."""
+"""Steps of all lanes side by side; those in which a contact changes, a lane at a time."""
 
 from typing import Any, NamedTuple
 
@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..jit import kernel, subroutine
-from ..pump.hydraulics import PRESSURE_CHAMBER
 from ..pump.slider_crank import (
     CONTACTS,
     FORCES,
@@ -15,17 +14,17 @@ from ..pump.slider_crank import (
     OVERLAP_LIMIT,
     PER_THROW,
     STAGE,
-    WITH_VAPOUR,
     Tables,
     Tally,
     Work,
     begin,
-    breathe,
     derivative_of_record,
     mean_of_stages,
     step_of_record,
 )
+from .chambers import breathe_alone, count_vapour, enter_chamber, lanes_breathe
 from .rates import (
+    CHAMBER_COLUMNS,
     COORDINATES,
     FORCES_IN_LANES,
     LANES,
@@ -55,7 +54,7 @@ class Stretch(NamedTuple):
 
     turns: NDArray[np.float64]  # (n, 2, LANES): at the ends of the steps
     forces: NDArray[np.float64]  # (n, len(FORCES), LANES)
-    chambers: NDArray[np.float64]  # (n, LANES, 8)
+    chambers: NDArray[np.float64]  # (n, CHAMBER_COLUMNS, LANES)
     code: NDArray[np.int64]  # (LANES,): of the first step that failed
     done: NDArray[np.int64]  # (LANES,): steps up to it
 
@@ -85,7 +84,7 @@ def _to_record(lane: int, s: Any, w: Any) -> None:
         b.margin[j], b.approach[j] = s.margin0[j, lane], s.approach0[j, lane]
         one.touching[j], one.impact[j] = int(s.touching[j, lane]), s.impact[j, lane]
     b.normal = s.normal0[lane]
-    one.pressure[0], one.pressure[1] = s.pressure[0, lane], s.pressure[1, lane]
+    one.pressure[0], one.pressure[1] = s.pressure0[0, lane], s.pressure0[1, lane]
 
 
 @kernel
@@ -141,6 +140,7 @@ def enter_lane(lane: int, p: Any, s: Any, a: Any) -> None:
     for j in range(CONTACTS):
         w.stage[0, 0].margin[j] = NO_CHANGE
     _from_record(lane, s, w, 0)
+    enter_chamber(lane, p, s, a)
     for c in range(5):
         a.counts[lane, c] = 0
     a.peak[lane, 0] = 0.0
@@ -235,51 +235,58 @@ def _judge(p: Any, s: Any) -> int:
             min(m[4, lane], m[5, lane]),
         )
         s.asks[lane] = 1.0 if least < 0.0 else 0.0
-        s.bad[lane] = _failed(s.y, overlap_of_lane(p, s, lane), lane)
+        failed = _failed(s.y, overlap_of_lane(p, s, lane), lane)
+        s.bad[lane] = _CHOKED if s.choked[lane] != 0.0 else failed
     for lane in range(LANES):
         found += s.asks[lane] != 0.0 or s.bad[lane] != 0.0
     return found
 
 
 @subroutine
-def _mend(p: Any, s: Any, a: Any, k: Any, step: int) -> None:
-    """Take the step again in the lanes that ask for it; leave those behind that fail in it."""
+def _mend(breathing: bool, p: Any, s: Any, a: Any, k: Any, step: int) -> int:
+    """Take the step again in the lanes that ask for it; leave those behind that fail in it.
+
+    Returns how many have taken it again.
+    """
+    again = 0
     for lane in range(LANES):
         if k.code[lane] != 0:
             continue
         if s.asks[lane] != 0.0:
+            again += 1
             s.bad[lane] = _failed(s.y, _step_alone(lane, p, s, a, k, step), lane)
+            if breathing:
+                breathe_alone(lane, p, s, a)
+                s.bad[lane] = _CHOKED if s.choked[lane] != 0.0 else s.bad[lane]
         if s.bad[lane] != 0.0:
             k.code[lane], k.done[lane] = int(s.bad[lane]), step + 1
+    return again
 
 
-@subroutine
-def _lanes_breathe(p: Any, s: Any, a: Any, k: Any, n: int) -> None:
-    one = a.work.held[0]
+_CHOKED = 4.0  # status code of a chamber that has failed
+
+
+@kernel
+def _keep_chambers(p: Any, s: Any, k: Any, n: int) -> None:
     for lane in range(LANES):
-        q = a.throws[lane, 0]
-        if q.pressure_rung != PRESSURE_CHAMBER or k.code[lane] != 0:
-            continue
-        y, h = s.y, p.step[lane]
-        fault, before, after = breathe(
-            a.chambers[lane, 0], one, a.liquid[lane, 0], h, y[3, lane], y[9, lane], q.substeps
-        )
-        if fault != 0:
-            k.code[lane], k.done[lane] = 4, n + 1
-        s.pressure[0, lane], s.pressure[1, lane] = before, after
-        k.forces[n, 7, lane], k.forces[n, 8, lane] = one.flow[2] / h, one.flow[3] / h
-        a.counts[lane, WITH_VAPOUR] += a.chambers[lane, 0, 1] > 0.0
-        for c in range(8):
-            k.chambers[n, lane, c] = a.chambers[lane, 0, c]
+        k.forces[n, _VALVES, lane] = s.flow[0, lane] / p.step[lane]
+        k.forces[n, _VALVES + 1, lane] = s.flow[1, lane] / p.step[lane]
+        for c in range(CHAMBER_COLUMNS):
+            k.chambers[n, c, lane] = s.chamber[c, lane]
+
+
+_VALVES = FORCES.index("suction_valve")
 
 
 @subroutine
 def march(play: bool, breathing: bool, n: int, p: Any, s: Any, a: Any, k: Any) -> None:
-    """Take n steps of all lanes, of one kind."""
-    fresh = False
+    """Take n steps of all lanes, of one kind.
+
+    Chambers are stepped before the rates at the end of a step are made, which so feel the pressure
+    that is found, not the extrapolated one. What asks for a cut does not depend on it.
+    """
+    rates(p, s, 0.0, play)
     for step in range(n):
-        if not fresh:
-            rates(p, s, 0.0, play)
         _to_second_stage(p, s)
         rates(p, s, 0.5, play)
         _to_third_stage(p, s)
@@ -287,13 +294,18 @@ def march(play: bool, breathing: bool, n: int, p: Any, s: Any, a: Any, k: Any) -
         _to_last_stage(p, s)
         rates(p, s, 1.0, play)
         _to_end(p, s)
-        rates(p, s, 1.0, play)
+        with_care = lanes_breathe(p, s, a, k.code) if breathing else 0
+        rates(p, s, 0.0, play)
         _keep(s, a, k, step)
         if _judge(p, s) > 0:
-            _mend(p, s, a, k, step)
-        fresh = not breathing
+            again = _mend(breathing, p, s, a, k, step)
+            if breathing and again > 0:
+                with_care += again
+                rates(p, s, 0.0, play)
         if breathing:
-            _lanes_breathe(p, s, a, k, step)
+            _keep_chambers(p, s, k, step)
+            if with_care > 0:
+                count_vapour(s, a)
         for lane in range(LANES):
             k.turns[step, 0, lane], k.turns[step, 1, lane] = s.y[12, lane], s.y[13, lane]
 

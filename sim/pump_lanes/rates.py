@@ -13,6 +13,7 @@ from ..pump.hydraulics import (
     PRESSURE_CHAMBER,
     PRESSURE_CONSTANT,
     PRESSURE_TWO_LEVEL,
+    ValveSide,
     two_level_pressure,
 )
 from ..pump.slider_crank import CONTACTS, GUIDE, Machine
@@ -37,6 +38,9 @@ COORDINATES = 14
 
 FORCES_IN_LANES = 8
 """Columns of the forces: those of a throw without its valves, then the drive moment."""
+
+CHAMBER_COLUMNS = 8
+"""Of a chamber: ``CHAMBER_STATE``, then position and velocity of its piston."""
 
 
 class ThrowLane(NamedTuple):
@@ -92,6 +96,21 @@ class LiquidLane(NamedTuple):
     rise_angle: float
 
 
+class ChamberLane(NamedTuple):
+    """Numbers of a chamber in a lane, as in ``HYDRAULIC``; its valves are ``ValveSide``."""
+
+    suction: float
+    discharge: float
+    area: float
+    crank_radius: float
+    rod_length: float
+    dead_volume: float
+    bulk_modulus: float
+    air_fraction: float
+    air_power: float
+    vapour: float
+
+
 NEVER = ContactLane(*[0.0] * len(ContactLane._fields))._replace(
     stiffness=1.0, clearance=1e9, speed_floor=1.0, friction_speed=1.0
 )
@@ -103,6 +122,9 @@ PLAN = np.dtype(
         ("contact", "f8", (3, len(ContactLane._fields), LANES)),
         ("machine", "f8", (len(Machine._fields), LANES)),
         ("liquid", "f8", (len(LiquidLane._fields), LANES)),
+        ("chamber", "f8", (len(ChamberLane._fields), LANES)),
+        ("valve", "f8", (2, len(ValveSide._fields), LANES)),  # suction, discharge
+        ("share", "f8", (2, 3, LANES)),  # see valve_shares
         ("step", "f8", LANES),
         ("sixth", "f8", LANES),  # of the step
         ("weight", "f8", LANES),  # of a step's force in its mean, as the march of one weighs it
@@ -130,7 +152,14 @@ STATE = np.dtype(
         ("high", "f8", LANES),  # largest normal force of the step
         ("touching", "f8", (CONTACTS, LANES)),  # 0 or 1
         ("impact", "f8", (CONTACTS, LANES)),
-        ("pressure", "f8", (2, LANES)),
+        ("pressure0", "f8", (2, LANES)),  # on the piston at both ends of the step, of a chamber
+        ("pressure", "f8", (2, LANES)),  # the same, of the step that is being looked at
+        ("chamber0", "f8", (CHAMBER_COLUMNS, LANES)),  # where the step began
+        ("chamber", "f8", (CHAMBER_COLUMNS, LANES)),
+        ("air", "f8", LANES),  # of the chamber where the step began
+        ("flow", "f8", (2, LANES)),  # impulses of the valves
+        ("sure", "f8", LANES),  # 1 where the chambers' step side by side is good
+        ("choked", "f8", LANES),  # 1 where a chamber has failed
         ("asks", "f8", LANES),  # 1 where a contact asks for a change within this step
         ("bad", "f8", LANES),  # status code of this step
     ]

@@ -1,0 +1,153 @@
+"""Chambers with valves of all lanes: steps side by side, and alone where that will not do."""
+
+from typing import Any
+
+from ..jit import kernel, subroutine
+from ..pump.hydraulics import (
+    ValveSide,
+    air_volume,
+    chamber_at_once,
+    implicit_part,
+    valve_shares,
+)
+from ..pump.slider_crank import WITH_VAPOUR, breathe
+from .rates import CHAMBER_COLUMNS, LANES, ChamberLane
+
+
+@kernel
+def _chamber_of(p: Any, lane: int) -> Any:
+    a = p.chamber
+    return ChamberLane(
+        a[0, lane],
+        a[1, lane],
+        a[2, lane],
+        a[3, lane],
+        a[4, lane],
+        a[5, lane],
+        a[6, lane],
+        a[7, lane],
+        a[8, lane],
+        a[9, lane],
+    )
+
+
+@kernel
+def _side_of(p: Any, side: int, lane: int) -> Any:
+    a = p.valve
+    return ValveSide(
+        a[side, 0, lane],
+        a[side, 1, lane],
+        a[side, 2, lane],
+        a[side, 3, lane],
+        a[side, 4, lane],
+        a[side, 5, lane],
+        a[side, 6, lane],
+        a[side, 7, lane],
+        a[side, 8, lane],
+        a[side, 9, lane],
+        a[side, 10, lane],
+        a[side, 11, lane],
+    )
+
+
+@kernel
+def _valves_of(p: Any, lane: int) -> Any:
+    a = p.share
+    return (
+        _side_of(p, 0, lane),
+        (a[0, 0, lane], a[0, 1, lane], a[0, 2, lane]),
+        _side_of(p, 1, lane),
+        (a[1, 0, lane], a[1, 1, lane], a[1, 2, lane]),
+    )
+
+
+@kernel
+def enter_chamber(lane: int, p: Any, s: Any, a: Any) -> None:
+    """Begin the chamber of a record in a lane."""
+    for side in range(2):
+        shares = valve_shares(implicit_part(p.step[lane]), _side_of(p, side, lane))
+        p.share[side, 0, lane], p.share[side, 1, lane], p.share[side, 2, lane] = shares
+    for c in range(CHAMBER_COLUMNS):
+        s.chamber[c, lane] = a.chambers[lane, 0, c]
+
+
+@kernel
+def _air(p: Any, s: Any) -> None:
+    for lane in range(LANES):
+        s.air[lane] = air_volume(s.chamber[0, lane], _chamber_of(p, lane))
+
+
+@kernel
+def _side_by_side(p: Any, s: Any) -> None:
+    before, y = s.chamber0, s.y
+    for lane in range(LANES):
+        for c in range(CHAMBER_COLUMNS):
+            before[c, lane] = s.chamber[c, lane]
+        for c in range(2):
+            s.pressure0[c, lane] = s.pressure[c, lane]
+    for lane in range(LANES):
+        x, v = y[3, lane], y[9, lane]
+        now = (
+            before[0, lane],
+            before[1, lane],
+            before[2, lane],
+            before[3, lane],
+            before[4, lane],
+            before[5, lane],
+        )
+        now, f_s, f_d, sure = chamber_at_once(
+            now,
+            s.air[lane],
+            _chamber_of(p, lane),
+            _valves_of(p, lane),
+            p.step[lane],
+            before[6, lane],
+            before[7, lane],
+            x,
+            v,
+        )
+        s.chamber[0, lane], s.chamber[1, lane], s.chamber[2, lane] = now[0], now[1], now[2]
+        s.chamber[3, lane], s.chamber[4, lane], s.chamber[5, lane] = now[3], now[4], now[5]
+        s.chamber[6, lane], s.chamber[7, lane] = x, v
+        s.pressure[0, lane], s.pressure[1, lane] = now[0], 2.0 * now[0] - before[0, lane]
+        s.flow[0, lane], s.flow[1, lane] = f_s, f_d
+        s.sure[lane], s.choked[lane] = (1.0 if sure else 0.0), 0.0
+
+
+@subroutine
+def breathe_alone(lane: int, p: Any, s: Any, a: Any) -> None:
+    """Step the chamber of one lane, however hard that is."""
+    chamber, one = a.chambers[lane, 0], a.work.held[0]
+    for c in range(CHAMBER_COLUMNS):
+        chamber[c] = s.chamber0[c, lane]
+    h, substeps = p.step[lane], a.throws[lane, 0].substeps
+    fault, before, after = breathe(
+        chamber, one, a.liquid[lane, 0], h, s.y[3, lane], s.y[9, lane], substeps
+    )
+    for c in range(CHAMBER_COLUMNS):
+        s.chamber[c, lane] = chamber[c]
+    s.pressure[0, lane], s.pressure[1, lane] = before, after
+    s.flow[0, lane], s.flow[1, lane] = one.flow[2], one.flow[3]
+    s.sure[lane], s.choked[lane] = 0.0, (1.0 if fault != 0 else 0.0)
+
+
+@subroutine
+def lanes_breathe(p: Any, s: Any, a: Any, code: Any) -> int:
+    """Step all chambers along their pistons' paths; how many of them alone."""
+    _air(p, s)
+    _side_by_side(p, s)
+    alone = 0
+    for lane in range(LANES):
+        if code[lane] != 0:
+            s.sure[lane] = 1.0
+        elif s.sure[lane] == 0.0 or a.throws[lane, 0].substeps > 1:
+            breathe_alone(lane, p, s, a)
+            alone += 1
+    return alone
+
+
+@kernel
+def count_vapour(s: Any, a: Any) -> None:
+    """Count the lanes whose chamber holds vapour: they have breathed alone."""
+    for lane in range(LANES):
+        a.counts[lane, WITH_VAPOUR] += s.sure[lane] == 0.0 and s.chamber[1, lane] > 0.0
