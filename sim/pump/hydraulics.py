@@ -80,6 +80,9 @@ CHAMBER_STATE = (
 )
 """Names of the chamber's state: [Pa], [m^3], [m], [m/s], [m], [m/s]."""
 
+GATHERED = (1, 2, 4)
+"""Columns of the chamber's state that a recording needs at every step: vapour and lifts."""
+
 CHAMBER_FLOWS = ("suction_volume", "discharge_volume", "suction_impulse", "discharge_impulse")
 """Names of what a chamber step hands out: [m^3] twice, [N s] twice."""
 

@@ -39,7 +39,7 @@ from .casing import (
     edge_samples,
 )
 from .casing_frf import Accelerance, load_accelerance
-from .hydraulics import lift_left
+from .hydraulics import GATHERED, lift_left
 from .pressure_sensors import cylinder_pressure, pressures_at_rest, read_pressures
 from .push import casing_pushes, pushed_places, read_cells
 from .setup import contact_rate, contact_table, joint_rungs, pin_offsets, run_scene
@@ -112,7 +112,7 @@ def simulate_pump(scene: Scene, seed: int, truth: bool, raise_on_failure: bool) 
         gathered.add(
             run.turns[ends],
             run.forces[steps].T,
-            None if run.chambers is None else run.chambers[ends],
+            None if run.chambers is None else run.chambers[ends][:, :, list(GATHERED)],
         )
     whole = run if truth else None
     return recording_of(gathered, run, truth=whole, raise_on_failure=raise_on_failure)
@@ -449,21 +449,22 @@ class Gathering:
         turns : numpy.ndarray [shape=(n + 1, 2)]
             As of :class:`CrankRun`, from where the first of them begins.
         forces : numpy.ndarray [shape=(n_columns, n)]
-        chambers : numpy.ndarray [shape=(n + 1, n_throws, 6)] or None
+        chambers : numpy.ndarray [shape=(n + 1, n_throws, 3)] or None
+            Columns :data:`GATHERED` of ``CHAMBER_STATE``.
         """
-        first, n = self._steps, forces.shape[1]
+        first, n, factor = self._steps, forces.shape[1], self.plan.factor
         if not first:
             self._ends[0] = float(turns[0, 0])
         self._ends[1] = float(turns[-1, 0])
         self._steps += n
-        samples = np.arange(-first % self.plan.factor, n, self.plan.factor)
-        begin, self._samples = self._samples, self._samples + len(samples)
+        early = -first % factor  # steps before one that begins with a sample
+        begin, self._samples = self._samples, self._samples + len(range(early, n, factor))
         if len(self._turns):
-            self._turns[begin : self._samples, 0] = turns[samples]
-            self._turns[begin : self._samples, 1] = turns[samples + 1]
+            self._turns[begin : self._samples, 0] = turns[early:n:factor]
+            self._turns[begin : self._samples, 1] = turns[early + 1 :: factor]
         if chambers is not None:
-            self._lifts[begin : self._samples] = chambers[samples][:, :, [2, 4]]
-            self.vapour |= (chambers[:, :, 1] > 0).any(axis=0)
+            self._lifts[begin : self._samples] = chambers[early:n:factor, :, 1:]
+            self.vapour |= (chambers[:, :, 0] > 0).any(axis=0)
         self._note_pull(forces, first)
         for row, low in self._sensors:
             low.add(cylinder_pressure(self.plan.scene, forces[row : row + 1]))

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from ..jit import subroutine
 from ..output.status import Status
-from ..pump.hydraulics import ValveSide
+from ..pump.hydraulics import GATHERED, ValveSide
 from ..pump.setup import Start, joint_rungs
 from ..pump.slider_crank import (
     CHANGES,
@@ -40,7 +40,6 @@ from ..scene.pump import PumpScene
 from ..scene.pump_hydraulics import PIPED_RUNGS
 from .march import Stretch, alone, enter_lane, march
 from .rates import (
-    CHAMBER_COLUMNS,
     LANES,
     NEVER,
     PLAN,
@@ -153,14 +152,14 @@ class _Lanes:
         self._kept = Stretch(
             turns=np.zeros((_STRETCH, 2, LANES)),
             forces=np.zeros((_STRETCH, len(FORCES), LANES)),
-            chambers=np.zeros((_STRETCH, CHAMBER_COLUMNS, LANES)),
+            chambers=np.zeros((_STRETCH, len(GATHERED), LANES)),
             code=np.ones(LANES, np.int64),
             done=np.zeros(LANES, np.int64),
         )
         self._past = _Past(
             turns=np.empty((LANES, _ROOM + 1, 2)),
             forces=np.empty((LANES, len(self._columns), _ROOM)),
-            chambers=np.empty((LANES, _ROOM + 1 if self._breathing else 1, 1, CHAMBER_COLUMNS)),
+            chambers=np.empty((LANES, _ROOM + 1 if self._breathing else 1, 1, len(GATHERED))),
         )
 
     def fill(self, ahead: Iterator[int]) -> bool:
@@ -202,7 +201,7 @@ class _Lanes:
         state["y0"][PER_THROW:, lane] = start.angle, start.speed
         enter_lane(lane, plan, state, a)
         self._past.turns[lane, 0] = start.angle, start.speed
-        self._past.chambers[lane, 0] = a.chambers[lane]
+        self._past.chambers[lane, 0] = start.chambers[:, list(GATHERED)]
         self._kept.code[lane] = 0
         self._number[lane], self._at[lane], self._left[lane] = number, 0, job.n_steps
         self._told[lane] = self._steps(number)
@@ -227,7 +226,7 @@ class _Lanes:
     def _hand_on(self, lane: int) -> None:
         n, past = int(self._at[lane]), self._past
         ends = slice(n + 1)
-        chambers = past.chambers[lane, ends, :, :6] if self._breathing else None
+        chambers = past.chambers[lane, ends] if self._breathing else None
         self._told[lane].add(past.turns[lane, ends], past.forces[lane, :, :n], chambers)
         past.turns[lane, 0] = past.turns[lane, n]
         if self._breathing:
@@ -265,7 +264,7 @@ class _Past(NamedTuple):
 
     turns: Float  # (LANES, _ROOM + 1, 2)
     forces: Float  # (LANES, n_kept, _ROOM)
-    chambers: Float  # (LANES, _ROOM + 1, 1, CHAMBER_COLUMNS); one row where nothing breathes
+    chambers: Float  # (LANES, _ROOM + 1, 1, len(GATHERED)); one row where nothing breathes
 
 
 @subroutine
@@ -317,7 +316,7 @@ def _take(k: Any, columns: Any, at: Any, past: Any, breathing: bool) -> None:
             past.turns[lane, begin + 1 + i, 0] = k.turns[i, 0, lane]
             past.turns[lane, begin + 1 + i, 1] = k.turns[i, 1, lane]
             if breathing:
-                for c in range(CHAMBER_COLUMNS):
+                for c in range(len(GATHERED)):
                     past.chambers[lane, begin + 1 + i, 0, c] = k.chambers[i, c, lane]
 
 

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..jit import kernel, subroutine
+from ..pump.hydraulics import GATHERED
 from ..pump.slider_crank import (
     CONTACTS,
     FORCES,
@@ -24,7 +25,6 @@ from ..pump.slider_crank import (
 )
 from .chambers import breathe_alone, count_vapour, enter_chamber, lanes_breathe
 from .rates import (
-    CHAMBER_COLUMNS,
     COORDINATES,
     FORCES_IN_LANES,
     LANES,
@@ -54,7 +54,7 @@ class Stretch(NamedTuple):
 
     turns: NDArray[np.float64]  # (n, 2, LANES): at the ends of the steps
     forces: NDArray[np.float64]  # (n, len(FORCES), LANES)
-    chambers: NDArray[np.float64]  # (n, CHAMBER_COLUMNS, LANES)
+    chambers: NDArray[np.float64]  # (n, len(GATHERED), LANES)
     code: NDArray[np.int64]  # (LANES,): of the first step that failed
     done: NDArray[np.int64]  # (LANES,): steps up to it
 
@@ -271,11 +271,13 @@ def _keep_chambers(p: Any, s: Any, k: Any, n: int) -> None:
     for lane in range(LANES):
         k.forces[n, _VALVES, lane] = s.flow[0, lane] / p.step[lane]
         k.forces[n, _VALVES + 1, lane] = s.flow[1, lane] / p.step[lane]
-        for c in range(CHAMBER_COLUMNS):
-            k.chambers[n, c, lane] = s.chamber[c, lane]
+        k.chambers[n, 0, lane] = s.chamber[_VAPOUR, lane]
+        k.chambers[n, 1, lane] = s.chamber[_SUCTION_LIFT, lane]
+        k.chambers[n, 2, lane] = s.chamber[_DISCHARGE_LIFT, lane]
 
 
 _VALVES = FORCES.index("suction_valve")
+_VAPOUR, _SUCTION_LIFT, _DISCHARGE_LIFT = GATHERED
 
 
 @subroutine
