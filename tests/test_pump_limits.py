@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from wearstate.sim.machine.simulate import check, simulate
 from wearstate.sim.output.status import SimulationError, Status
+from wearstate.sim.pump.setup import contact_rate
 from wearstate.sim.scene.load import load_scene
 from wearstate.sim.scene.parts import SceneError
 
@@ -315,3 +316,19 @@ def test_what_a_user_must_know_is_a_warning(scene, text, share):
     assert re.search(text, warning)
     assert all(other.startswith(FEW_TURNS) for other in others)
     assert 0 < solution.numerics[share] <= 1
+
+
+def test_what_is_kept_of_a_scene_is_not_told_of_another():
+    """Scenes are known by identity: the next one may lie where the last one did."""
+    base = load_scene("bilge-pump")
+    kept, anew = [], []
+    for n in range(200):
+        stiffness = {"stiffness": 1e8 * (1 + n)}
+        crankpin = base.joint.crankpin.model_copy(update=stiffness)
+        joint = base.joint.model_copy(update={"crankpin": crankpin})
+        scene = base.model_copy(update={"joint": joint})
+        kept.append((contact_rate(scene), contact_rate(scene)))
+        anew.append(contact_rate.__wrapped__(scene))
+        del scene, joint, crankpin
+    assert kept == [(rate, rate) for rate in anew]
+    assert len(set(anew)) == 200

@@ -1,8 +1,10 @@
 """From a pump scene to the crank mechanism: tables, start, contact rates, and the closed form."""
 
 import math
-from functools import lru_cache
-from typing import Any, NamedTuple
+from collections import OrderedDict
+from collections.abc import Callable
+from functools import wraps
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -86,9 +88,31 @@ JOINT_CODES = {
 
 _ANGLES = 360  # of a revolution, for the forces an ideal mechanism would carry
 
-# Scenes are frozen, and several checks of one run ask for the same of them: rows of the last throws
-# are kept, for whole scenes as key, and cannot be written to.
-_kept = lru_cache(maxsize=64)
+Result = TypeVar("Result")
+
+
+def _kept(function: Callable[..., Result]) -> Callable[..., Result]:
+    """Keep the last results of a function of a scene, and of a throw where it has one.
+
+    Scenes are frozen, and several checks of one run ask for the same of them; what is kept cannot
+    be written to. A scene is known by its identity: a hash of all its values takes as long as
+    most of these functions.
+    """
+    found: OrderedDict[tuple[int, ...], tuple[PumpScene, Result]] = OrderedDict()
+
+    @wraps(function)
+    def kept(scene: PumpScene, *throw: int) -> Result:
+        key = (id(scene), *throw)
+        _, result = found.get(key) or (scene, function(scene, *throw))
+        found[key] = scene, result  # no other scene takes the identity of one that is held
+        while len(found) > _MOST_KEPT:
+            found.popitem(last=False)
+        return result
+
+    return kept
+
+
+_MOST_KEPT = 64
 
 
 def joint_parts(

@@ -220,8 +220,9 @@ class _Lanes:
             self._left,
             self._past,
         )
-        for lane in map(int, np.flatnonzero(self._at == _ROOM)):
-            self._hand_on(lane)
+        if np.any(self._at == _ROOM):  # all at once, or one lane after the other would have none
+            for lane in map(int, np.flatnonzero(self._at)):
+                self._hand_on(lane)
 
     def _hand_on(self, lane: int) -> None:
         n, past = int(self._at[lane]), self._past
