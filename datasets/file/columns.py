@@ -82,6 +82,7 @@ MEANINGS = (
     ("cuts_refused", "numerics", "changes of contact that were not located in time"),
     ("peak_normal_force_n", "numerics", "largest force of the contact"),
     ("min_film_m", "numerics", "least thickness of the oil film"),
+    ("film_temperature_k", "numerics", "temperature of the warmest film, by its heat balance"),
     ("rubbing_share", "numerics", "part of the steps in which rough surfaces touch in their oil"),
     ("peak_eccentricity", "numerics", "largest eccentricity ratio of the journal"),
     ("least_reaction_n", "numerics", "least vertical reaction of a bearing"),

@@ -59,6 +59,7 @@ _GUARDS = (
     "tension_share",
     "peak_eccentricity",
     "min_film_m",
+    "film_temperature_k",
     "rubbing_share",
     "least_reaction_n",
     "motion_share",

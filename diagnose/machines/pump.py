@@ -16,6 +16,7 @@ from .presentation import Presentation, Truths, density, label, told
 from .shifts import factor, set_to
 
 _REVOLUTIONS = 2  # drawn
+_CELSIUS = 273.15  # K, of its zero
 
 
 def _draw_pump(figure: Any, scene: Scene, solution: Recording) -> None:
@@ -122,7 +123,9 @@ def _lines(truth: Truths) -> Iterator[tuple[str, str]]:
     if oiled:
         touching = truth["rubbing_share"].value
         rub = f", rough peaks touch {100 * touching:.2g} % of the time" if touching else ""
-        yield "oil", f"least film of the pins {told(truth, 'min_film_m')}{rub}"
+        warm = truth.get("film_temperature_k")
+        heat = f", the warmest at {warm.value - _CELSIUS:.3g} degrees Celsius" if warm else ""
+        yield "oil", f"least film of the pins {told(truth, 'min_film_m')}{heat}{rub}"
     if contacts or not oiled:  # pins in oil never lose contact with it
         yield "contacts", f"{plain(contacts, 2)} in a revolution, dry joints with clearance"
 

@@ -42,7 +42,14 @@ from .casing_frf import Accelerance, load_accelerance
 from .hydraulics import GATHERED, lift_left
 from .pressure_sensors import cylinder_pressure, pressures_at_rest, read_pressures
 from .push import casing_pushes, pushed_places, read_cells
-from .setup import contact_rate, contact_table, joint_rungs, pin_offsets, run_scene
+from .setup import (
+    contact_rate,
+    contact_table,
+    film_temperature_of,
+    joint_rungs,
+    pin_offsets,
+    run_scene,
+)
 from .slider_crank import (
     FORCES,
     GUIDE,
@@ -848,7 +855,11 @@ def _film_numerics(
     if not kept.size:  # a run that failed while it settled
         return {}
     gaps, peaks = kept[:, :, :GUIDE][:, oiled], kept[:, :, GUIDE:][:, oiled]
+    pins = zip(*np.nonzero(oiled), strict=True)
+    warm = [film_temperature_of(plan.scene, int(throw), int(joint)) for throw, joint in pins]
+    known = [each for each in warm if each is not None]
     return {
+        **({"film_temperature_k": max(known)} if known else {}),
         "min_film_m": float(gaps.min()),
         "rubbing_share": float(np.mean((peaks > 0).any(axis=1))),
     }

@@ -26,6 +26,7 @@ from ..contact.law import (
     elastic_stiffness,
     hysteresis,
 )
+from ..film.heat import film_temperature, friction_power
 from ..film.impedance_map import ImpedanceMap, impedance_map
 from ..film.solve import FilmGeometry
 from ..jit import kernel
@@ -566,20 +567,81 @@ def oil_table(
     loads = joint_loads(scene, throw)
     for joint, part in enumerate(joint_parts(scene, throw)[:2]):
         if isinstance(part, RevoluteJoint) and part.oil is not None and part.rung in OILED_RUNGS:
-            values = _oil_values(part, contacts[joint], loads[joint], maps, step)
+            warm = film_temperature_of(scene, throw, joint)
+            oil = part.oil
+            viscosity = oil.dynamic_viscosity if warm is None else oil.viscosity_at(warm)
+            values = _oil_values(part, viscosity, contacts[joint], loads[joint], maps, step)
             for name, value in values.items():
                 table[joint][name] = value
     return table
 
 
+@_kept
+def film_temperature_of(scene: PumpScene, throw: int, joint: int) -> float | None:
+    """Temperature at which the film of a pin runs, by its heat balance [K].
+
+    Parameters
+    ----------
+    scene : PumpScene
+    throw, joint : int
+        Counted from 0; joint 0 is the crank pin, 1 the wrist pin.
+
+    Returns
+    -------
+    float or None
+        None of a pin that is not asked for one: its oil is as warm as the scene says.
+    """
+    part = joint_parts(scene, throw)[joint]
+    if not isinstance(part, RevoluteJoint) or part.rung not in OILED_RUNGS or part.oil is None:
+        return None
+    oil, carried = part.oil, part.oil.carried_per_kelvin
+    if not carried or oil.temperature is None:
+        return None
+    spin, load = _usual_spin_and_load(scene, throw)[joint]
+    lands = 2 if oil.groove_width > 0 else 1
+
+    def power(temperature: float) -> float:
+        return lands * friction_power(
+            oil.viscosity_at(temperature),
+            spin=spin,
+            load=load / lands,
+            radius=part.pin_diameter / 2,
+            length=_land(part),
+            gap=part.clearance_radial,
+        )
+
+    return film_temperature(oil.temperature, power, carried)
+
+
+def _usual_spin_and_load(scene: PumpScene, throw: int) -> list[tuple[float, float]]:
+    """Root mean squares of the spin [rad/s] and load [N] of crank pin and wrist pin."""
+    angle = np.linspace(0.0, math.tau, _ANGLES, endpoint=False)
+    motion = ideal_motion(scene, angle, throw)
+    turning = math.tau * scene.drive.speed
+    # sin(beta) = (r / l) sin(a): the rod swings against crank and piston
+    ratio, own = scene.crank.radius / scene.rod.length, angle + scene.throws[throw].phase
+    swing = turning * ratio * np.cos(own) / np.sqrt(1 - (ratio * np.sin(own)) ** 2)
+
+    def usual(values: NDArray[np.float64]) -> float:
+        return math.sqrt(float(np.mean(values**2)))
+
+    crank = np.hypot(motion.pin_force_x, motion.pin_force_y)
+    wrist = np.hypot(motion.wrist_force_x, motion.wrist_force_y)
+    return [(usual(turning + swing), usual(crank)), (usual(swing), usual(wrist))]
+
+
 def _oil_values(
-    part: RevoluteJoint, contact: Any, load: float, maps: dict[float, Any], step: float
+    part: RevoluteJoint,
+    viscosity: float,
+    contact: Any,
+    load: float,
+    maps: dict[float, Any],
+    step: float,
 ) -> dict[str, float]:
     oil, gap, radius = part.oil, part.clearance_radial, part.pin_diameter / 2
     assert oil is not None
     land = _land(part)
     lands = 2 if oil.groove_width > 0 else 1
-    viscosity = oil.dynamic_viscosity
     rough = oil.roughness if part.rung == "mixed" and oil.roughness else 0.0
     peaks = (
         asperity_scale(rough, radius, lands * land, gap, oil.asperity_stiffness) if rough else 0.0

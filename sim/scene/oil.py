@@ -11,15 +11,20 @@ from .parts import (
     PRESSURE_MOST,
     Damping,
     Density,
+    HeatConductance,
     KinematicViscosity,
     Length,
     Part,
     Pressure,
+    SpecificHeat,
     Temperature,
     Viscosity,
+    VolumeFlow,
 )
 
 _VISCOSITY_LEAST, _VISCOSITY_MOST = 1e-6, 1e4  # Pa s, from air to pitch
+_CONDUCTANCE_MOST = 1e4  # W/K, a water-cooled housing has hundreds
+_FLOW_MOST = 1.0  # m^3/s, a turbine's bearing takes a hundredth
 _FORTY, _HUNDRED = 313.15, 373.15  # K, where data sheets give viscosities
 
 
@@ -77,13 +82,27 @@ class Oil(Part):
         """In the film [Pa s], as given or by Walther's law."""
         if self.viscosity is not None:
             return self.viscosity
-        # the validator saw to it that all four are given
-        assert self.temperature is not None
+        assert self.temperature is not None  # the validator saw to it that all four are given
+        return self.viscosity_at(self.temperature)
+
+    def viscosity_at(self, temperature: float) -> float:
+        """Dynamic viscosity at a temperature [Pa s], by Walther's law.
+
+        Parameters
+        ----------
+        temperature : float
+            Absolute [K].
+
+        Raises
+        ------
+        ValueError
+            The temperature is outside what the law knows.
+        """
         assert self.viscosity_40 is not None
         assert self.viscosity_100 is not None
         assert self.density is not None
         points = ((_FORTY, self.viscosity_40), (_HUNDRED, self.viscosity_100))
-        return walther_viscosity(self.temperature, points, density=self.density)
+        return walther_viscosity(temperature, points, density=self.density)
 
 
 class JointOil(Oil):
@@ -108,6 +127,22 @@ class JointOil(Oil):
         le=DAMPING_MOST,
         description="of the parts behind the film; none: a tenth of sqrt(stiffness x mass)",
     )
+    conductance: HeatConductance | None = Field(
+        default=None,
+        gt=0,
+        le=_CONDUCTANCE_MOST,
+        description="of heat from the film to what is at `temperature`; with it, or with a flow, "
+        "the film runs warmer by its friction, and is thinner",
+    )
+    flow: VolumeFlow | None = Field(
+        default=None,
+        gt=0,
+        le=_FLOW_MOST,
+        description="of oil through the film, fed at `temperature`; it carries heat away",
+    )
+    specific_heat: SpecificHeat = Field(
+        default=2000.0, ge=500, le=10_000, description="of the oil that flows through"
+    )
     roughness: Length | None = Field(
         default=None,
         gt=0,
@@ -120,6 +155,35 @@ class JointOil(Oil):
         le=PRESSURE_MOST,
         description="pressure factor of Greenwood and Tripp, about 0.003 of the contact modulus",
     )
+
+    @property
+    def carried_per_kelvin(self) -> float:
+        """Heat carried away for each kelvin above `temperature` [W/K]; 0 where none is asked for.
+
+        That of the flow, density x specific heat x flow, and of the metal.
+        """
+        flow = (self.flow or 0.0) * (self.density or 0.0) * self.specific_heat
+        return flow + (self.conductance or 0.0)
+
+    @model_validator(mode="after")
+    def _heat_is_known(self) -> Self:
+        asked = [name for name in ("conductance", "flow") if getattr(self, name) is not None]
+        if not asked:
+            return self
+        faults = []
+        if self.viscosity is not None:
+            faults.append(
+                f"viscosity = {self.viscosity:g} Pa s with {' and '.join(asked)}: a film that "
+                "warms needs temperature, viscosity_40, viscosity_100, density instead"
+            )
+        if self.filled_gap is not None:
+            faults.append(
+                f"filled_gap = {self.filled_gap:g} m with {' and '.join(asked)}: the heat balance "
+                "is of a flooded film; remove one"
+            )
+        if faults:
+            raise ValueError("; ".join(faults))
+        return self
 
     @model_validator(mode="after")
     def _groove_leaves_lands(self) -> Self:

@@ -76,6 +76,9 @@ UNITS: dict[str, dict[str, float]] = {
     "Hertz stiffness": {"N/m^1.5": 1.0},
     "force": {"N": 1.0, "kN": 1e3, "MN": 1e6},
     "viscosity": {"Pa s": 1.0, "mPa s": 1e-3, "cP": 1e-3},
+    "heat conductance": {"W/K": 1.0},
+    "specific heat": {"J/(kg K)": 1.0, "kJ/(kg K)": 1e3},
+    "volume flow": {"m^3/s": 1.0, "L/s": 1e-3, "L/min": 1e-3 / 60, "mL/min": 1e-6 / 60},
 }
 """Factor to SI of every unit, by dimension. The first unit of a row is the SI one."""
 
@@ -263,6 +266,9 @@ Moment = Annotated[float, _parser("moment"), Dimension("moment")]
 Unbalance = Annotated[float, _parser("unbalance"), Dimension("unbalance")]
 HertzStiffness = Annotated[float, _parser("Hertz stiffness"), Dimension("Hertz stiffness")]
 Force = Annotated[float, _parser("force"), Dimension("force")]
+HeatConductance = Annotated[float, _parser("heat conductance"), Dimension("heat conductance")]
+SpecificHeat = Annotated[float, _parser("specific heat"), Dimension("specific heat")]
+VolumeFlow = Annotated[float, _parser("volume flow"), Dimension("volume flow")]
 Viscosity = Annotated[float, _parser("viscosity"), Dimension("viscosity")]
 ModeShape = Annotated[
     float,
