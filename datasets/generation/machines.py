@@ -303,11 +303,15 @@ class Known:
         Quantity, without the throw or the bearing -> words and unit.
     truths : callable
         Recording with its truth, scene -> further numbers by name.
+    fewest_turns : int or None
+        Revolutions in which the quantities can be told; None where a recording must be whole, as
+        its load or speed changes, or its orbit takes a time of its own.
     """
 
     quantities: Quantities = band_quantities
     words: Mapping[str, tuple[str, str]] = field(default_factory=dict)
     truths: Callable[[Recording, Scene], Iterator[tuple[str, Truth]]] = no_truths
+    fewest_turns: int | None = None
 
 
 KNOWN: dict[type[Scene], Known] = {
@@ -320,6 +324,7 @@ KNOWN: dict[type[Scene], Known] = {
             "pressure_rms": ("rms pressure force on the piston", "N"),
         },
         truths=_pump_truths,
+        fewest_turns=4,  # orders and peaks are those of each revolution
     ),
     JournalScene: Known(
         quantities=journal_quantities,

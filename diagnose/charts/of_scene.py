@@ -105,15 +105,19 @@ def scene_search(
     ValueError
         The accuracy is out of bounds.
     """
+    known = known_of(scene)
     pilot = Pilot(
         scene,
-        known_of(scene).quantities,
+        known.quantities,
         clock=clock,
         kept=kept,
         spread=partial(in_order, jobs=jobs),
         at_once=jobs,
     )
-    return Search(scene, known_of(scene).quantities, accuracy=accuracy, pilot=pilot, tell=tell)
+    search = Search(scene, known.quantities, accuracy=accuracy, pilot=pilot, tell=tell)
+    if known.fewest_turns is not None:
+        search.shorten(known.fewest_turns)
+    return search
 
 
 def measure(
@@ -204,8 +208,24 @@ def chart_of(scene: Scene, found: Study) -> Chart:
         pruned=found.pruned,
         measured=found.measured,
         planned=found.planned,
-        note=f"{scene.duration:g} s a run, with its settling; the least time of several runs",
+        note=_note(scene, found),
     )
+
+
+def _note(scene: Scene, found: Study) -> str:
+    """How it was measured."""
+    how = "with its settling; the least time of several runs"
+    if found.duration is None:
+        return f"{scene.duration:g} s a run, {how}"
+    return (
+        f"{found.duration:.3g} s a run, cut from {scene.duration:g} s for more starts, {how}, "
+        "brought to the whole length"
+    )
+
+
+def _rate(seconds: float, scene: Scene, found: Study) -> float:
+    """Time of a simulated second of a scene, by the time of a run [s]."""
+    return seconds / found.share / scene.duration
 
 
 REFERENCE = "reference"
@@ -214,7 +234,7 @@ REFERENCE = "reference"
 
 def _points(scene: Scene, found: Study, answer: Answer, question: str) -> Iterator[Point]:
     """The scene as written first, then the cheapest first."""
-    rates = [each.seconds / scene.duration for each in answer.candidates]
+    rates = [_rate(each.seconds, scene, found) for each in answer.candidates]
     places = [(rate, c.error) for rate, c in zip(rates, answer.candidates, strict=True)]
     rows = list(zip(answer.candidates, rates, front_of(places), strict=True))
     rows.sort(key=lambda row: dict(row[0].rungs) != dict(found.written))
@@ -318,14 +338,14 @@ def _choice(scene: Scene, found: Study, answer: Answer, question: str) -> Choice
         standard_error=chosen.standard_error,
         promised=estimated_error(chosen),
         starts=chosen.starts,
-        seconds=chosen.seconds / scene.duration,
+        seconds=_rate(chosen.seconds, scene, found),
         changes=answer.changes,
         block=_commented(scene, found, answer) if status in RECOMMENDED else "",
         options=options_of(answer.changes) if status in RECOMMENDED else "",
         reference=_reference_words(answer),
         sentence=_sentence(scene, found, answer, question, status, own),
         keeps=same_changes,
-        own_seconds=own / scene.duration,
+        own_seconds=_rate(own, scene, found),
         enough=not (answer is found.kept and _rungs_too_coarse(found)),
     )
 
@@ -370,7 +390,8 @@ def _sentence(
         return (
             f"{opening}, there is no answer yet: nothing cheaper than the reference is known to be "
             f"within {asked}, with {found.measured} of {found.planned} combinations measured; "
-            "more --budget goes on."
+            f"more --budget goes on. Until then {combination_words(chosen, found.written)} is the "
+            f"safe choice, {faster_words(chosen.seconds, own)}."
         )
     name = combination_words(chosen, found.written)
     what = "change nothing" if name == HERE else f"take {name}"

@@ -230,14 +230,14 @@ class _Teller:
     def __call__(self, what: str) -> None:
         gone = time.perf_counter() - self.begin
         told, known = self.search.progress()
-        self._answer(gone, told)
+        self._answer(gone)
         if self.show is not None:
             left = min(max(self.budget - gone, 0.0), self.search.remaining() / self.jobs)
             self.show(f"{what} ({told} of {known})", gone, left)
 
-    def _answer(self, gone: float, told: int) -> None:
+    def _answer(self, gone: float) -> None:
         """The scene against its own numerics, then against the best rungs; each once."""
-        if self.answers == _ANSWERS or told == 0:
+        if self.answers == _ANSWERS or self.search.progress(at_all=True)[0] == 0:
             return
         found = self.search.found()
         if self.answers == 0 or found.raised is not None:

@@ -46,7 +46,7 @@ TIMED = 3
 """Starts of a rung that are timed, each of which does all that a recording takes."""
 
 _LEAST_TIMED = 0.3  # s: a run that takes less is repeated until so much has gone by
-_MOST_COLD = 10.0  # s: the first run of a process, which loads its kernels, is repeated up to here
+_MOST_COLD = 3.0  # s: the first run of a process, which loads its kernels, is repeated up to here
 _SURELY_OFF = 0.99865  # chance of as much, by Student's distribution
 _SURELY_NEAR = 0.99  # as one looks up to seven times
 _TOLD = 1.0 / 6.0  # of the accuracy: a standard error that takes up two fifths of it by itself
@@ -244,8 +244,10 @@ class Pilot:
         self.runs = 0
         self.late: Callable[[float], bool] = lambda _expected: False
         self._spread, self.at_once = spread, at_once
+        self.common: Mapping[str, Any] = {}  # values of every run besides, such as its length
         self._kept: MutableMapping[str, Outcome] = {} if kept is None else kept
         self._outcomes: dict[str, list[Outcome]] = {}
+        self._tabulated: dict[str, float] = {}
         self._own = hashlib.sha256(pickle.dumps(scene)).hexdigest()
 
     def outcomes(self, values: Mapping[str, Any], starts: int) -> list[Outcome]:
@@ -281,15 +283,18 @@ class Pilot:
     def _has(self, values: Mapping[str, Any], start: int) -> bool:
         rows = self._outcomes.setdefault(_key(values), [])
         while len(rows) <= start and not (rows and rows[-1].fault):
-            kept = self._kept.get(f"{_key(values)} {len(rows)}")
+            kept = self._kept.get(f"{self._name(values)} {len(rows)}")
             if kept is None:
                 return False
             rows.append(kept)
         return True
 
     def _add(self, values: Mapping[str, Any], start: int, found: Outcome) -> None:
-        self._kept[f"{_key(values)} {start}"] = found
+        self._kept[f"{self._name(values)} {start}"] = found
         self._has(values, start)
+
+    def _name(self, values: Mapping[str, Any]) -> str:
+        return _key({**values, **self.common})
 
     def _batch(self, values: Mapping[str, Any]) -> int:
         """Runs that are handed out together: a second's for each worker, and one at least."""
@@ -299,8 +304,35 @@ class Pilot:
 
     def _expected(self, batch: Sequence[tuple[Mapping[str, Any], int]]) -> float:
         """Time that a batch is expected to take [s]; 0 where nothing is known."""
-        told = [self.seconds(values) for values, _ in batch]
-        return sum(each for each in told if math.isfinite(each)) / self.at_once
+        if self.clock is None:
+            return 0.0
+        scale = self._scale()
+        told = {_key(values): self.seconds(values) for values, _ in batch}
+        for values, _ in batch:
+            if not math.isfinite(told[_key(values)]):
+                told[_key(values)] = scale * self._cost(values)
+        return sum(told[_key(values)] for values, _ in batch) / self.at_once
+
+    def _scale(self) -> float:
+        """Measured time for a tabulated second, as the combinations that ran tell; 0 of none."""
+        told = [
+            each.seconds / self._tabulated[key]
+            for key, rows in self._outcomes.items()
+            for each in rows[:1]
+            if math.isfinite(each.seconds) and self._tabulated.get(key, 0.0) > 0
+        ]
+        return float(np.median(told)) if told else 0.0
+
+    def _cost(self, values: Mapping[str, Any]) -> float:
+        """Tabulated time of a run [s]; 0 of a combination that the scene refuses."""
+        key = _key(values)
+        if key not in self._tabulated:
+            try:
+                cost = cost_of(with_values(self.scene, {**values, **self.common}))
+            except SceneError:
+                cost = 0.0
+            self._tabulated[key] = cost
+        return self._tabulated[key]
 
     def _made(self, batch: Sequence[tuple[Mapping[str, Any], int]]) -> Iterable[Outcome]:
         if self.at_once == 1:
@@ -317,9 +349,9 @@ class Pilot:
         turn = math.tau * (number * _GOLDEN % 1.0)
         return Task(
             scene=self.scene,
-            values={**values, "drive.start_angle": turn, "fidelity": "given"},
+            values={**values, **self.common, "drive.start_angle": turn, "fidelity": "given"},
             quantities=self.quantities,
-            shared=f"{self._own} {_key(values)}",
+            shared=f"{self._own} {self._name(values)}",
             number=number,
             clock=self.clock if start < TIMED else None,
         )
