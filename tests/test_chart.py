@@ -20,13 +20,26 @@ from wearstate.diagnose.charts.chart import (
     front_of,
     remaining_error,
 )
-from wearstate.diagnose.charts.of_scene import KEPT, RAISED, chart_of, scene_chart
+from wearstate.diagnose.charts.of_scene import (
+    KEPT,
+    RAISED,
+    chart_of,
+    scene_chart,
+    scene_search,
+)
 from wearstate.diagnose.charts.page import SUFFIXES, chart_figure, chart_html, save_chart
 from wearstate.diagnose.charts.words import HERE
 from wearstate.diagnose.command_line.cli import cli
-from wearstate.sim.fidelity.pilot import Candidate, Difference, Pilot, differences
+from wearstate.sim.fidelity.ladder import cost_of
+from wearstate.sim.fidelity.pilot import (
+    Candidate,
+    Difference,
+    OutOfTimeError,
+    Pilot,
+    differences,
+)
 from wearstate.sim.fidelity.study import Answer, Convergence, Raise, Study
-from wearstate.sim.scene.load import load_scene
+from wearstate.sim.scene.load import load_scene, scene_text
 from wearstate.sim.scene.rungs import with_values
 
 FILM = {"film": "direct", "mesh": "x1/2"}
@@ -357,6 +370,9 @@ def replace_written(found, *_others):
 # -- real scenes
 
 
+OTHERS = ["crankpin", "wristpin", "guide", "drive"]
+"""Effects of a pump beside its pressure and step."""
+
 SMALL = {"duration": "0.1 s", "film.n_theta": 24, "film.n_z": 5}
 
 
@@ -415,36 +431,58 @@ def run_chart(name, sizes, *arguments):
     return CliRunner().invoke(cli, ["chart", name, *pairs, "-j", "1", *arguments])
 
 
-def test_an_interrupted_chart_goes_on_to_the_same_page(tmp_path, monkeypatch):
+@pytest.mark.parametrize(
+    ("name", "sizes", "dear"),
+    [
+        ("journal-bearing", {**SMALL, "numerics.tolerance": 1e-4, "duration": 0.05}, 1.0),
+        # of 3 s, cut to four revolutions
+        ("bilge-pump", {"duration": 3, "sample_rate": 5120, "settling_revolutions": 1}, 0.01),
+    ],
+)  # fmt: skip
+def test_an_interrupted_chart_goes_on_to_the_same_page(name, sizes, dear, tmp_path, monkeypatch):
     """Ctrl-C in the middle: an answer, exit code 1, and the same command ends as if nothing was."""
     ticks = itertools.count()
     monkeypatch.setattr(
         "wearstate.diagnose.charts.of_scene.time.perf_counter", lambda: 1e-9 * next(ticks)
     )
-    sizes = {**SMALL, "numerics.tolerance": 1e-4, "pinned": "", "duration": 0.05}
-    sizes.pop("pinned")
-    whole, page = tmp_path / "whole.csv", tmp_path / "page.csv"
-    assert run_chart("journal-bearing", sizes, "-o", str(whole)).exit_code == 0
-    assert list(tmp_path.iterdir()) == [whole]  # nothing is left beside it
-
+    monkeypatch.setattr("wearstate.sim.fidelity.study._DEAR", dear)
+    (tmp_path / "pages").mkdir()
+    whole, page = (tmp_path / "pages" / f"{kind}.csv" for kind in ("whole", "page"))
+    subject = name
+    if name == "bilge-pump":  # all rungs pinned: a chart of its step
+        pinned = f"accuracy = 0.2\npinned = {[*OTHERS, 'pressure']}"
+        subject = str(tmp_path / "pump.toml")
+        text = re.sub("(?m)^accuracy = .*$", pinned, scene_text(name), count=1)
+        (tmp_path / "pump.toml").write_text(text)
     made = Pilot._run
     calls = itertools.count()
 
+    def counted(self, values, start):
+        next(calls)
+        return made(self, values, start)
+
+    monkeypatch.setattr(Pilot, "_run", counted)
+    done = run_chart(subject, sizes, "-o", str(whole))
+    assert done.exit_code == 0, done.output
+    assert list(whole.parent.iterdir()) == [whole]  # nothing is left beside it
+    needed = next(calls)
+    half, calls = needed // 2, itertools.count()
+
     def stopped(self, values, start):
-        if next(calls) == 12:
+        if next(calls) == half:
             raise KeyboardInterrupt
         return made(self, values, start)
 
     monkeypatch.setattr(Pilot, "_run", stopped)
-    done = run_chart("journal-bearing", sizes, "-o", str(page))
+    done = run_chart(subject, sizes, "-o", str(page))
     assert done.exit_code == 1
     assert "the same command goes on from there" in done.stderr
     assert "Your scene as written is" in done.stdout
     assert page.with_suffix(".part.json").exists()
-    again = run_chart("journal-bearing", sizes, "-o", str(page))
+    again = run_chart(subject, sizes, "-o", str(page))
     assert again.exit_code == 0, again.output
     assert not page.with_suffix(".part.json").exists()
-    assert next(calls) > 12
+    assert next(calls) == needed + 1  # one was broken off, none is made twice
     assert without_seconds(page) == without_seconds(whole)
 
 
@@ -485,3 +523,93 @@ def test_refusals(arguments, message):
     done = CliRunner().invoke(cli, ["chart", *arguments])
     assert done.exit_code == 2
     assert message in done.output
+
+
+# -- pumps: dear runs, and pipes
+
+
+PUMP = {
+    "sample_rate": 5120, "duration": 0.8, "settling_revolutions": 2,
+    "pressure.rung": "lumped-lines",
+    "pressure.suction_line.wave_speed": 1200, "pressure.discharge_line.wave_speed": 1200,
+}  # fmt: skip
+"""A bilge pump on bare pipes."""
+
+
+def late_after(looks):
+    """No time is left after so many looks at the clock."""
+    ticks = itertools.count()
+    return lambda _expected: next(ticks) >= looks
+
+
+def test_a_pump_with_pipes_has_an_answer_at_any_budget():
+    """What is safe or enough, and how sure that is; with each look more, both questions in 30."""
+    pump = load_scene("bilge-pump", {**PUMP, "pinned": OTHERS, "accuracy": 0.05})
+    search = scene_search(pump)
+    for looks in (0, 6, 24):  # the same search goes on
+        search.measure(late_after(looks))
+        chart = chart_of(pump, search.found())
+        assert chart.unfinished
+        assert re.search(r"written is .*: [\d.]+ % .*off in", chart.conclusion[0])
+        for choice in chart.choices:
+            if choice.status == "no answer yet":
+                assert "is the safe choice" in choice.sentence
+            else:
+                assert choice.keeps or tomllib.loads(choice.block)
+    assert [choice.question for choice in chart.choices] == [KEPT, RAISED]
+    assert {choice.status for choice in chart.choices} <= {"resolved", "so far"}
+    # the best of its rungs has waves
+    assert "pressure wave-lines" in chart.choices[1].reference
+
+
+def test_runs_of_a_dear_pump_are_cut_and_starts_are_more(monkeypatch):
+    """The triplex pump's 24 revolutions become four, and as much time is simulated in all."""
+    triplex = load_scene("triplex-pump")
+    search = scene_search(triplex)
+    speed, settling = triplex.drive.speed, triplex.settling_revolutions
+    assert search.duration * speed == pytest.approx(4)
+    whole = triplex.duration * speed + settling
+    assert search.share == pytest.approx((4 + settling) / whole)
+    monkeypatch.setattr("wearstate.sim.fidelity.study._DEAR", 1e9)
+    uncut = scene_search(triplex)
+    assert (uncut.duration, uncut.share, uncut.pilot.common) == (None, 1.0, {})
+    assert 1 <= search.kept.starts * search.share / uncut.kept.starts < 2
+    # a journal's load may come at any time of its recording
+    assert scene_search(load_scene("journal-step")).duration is None
+
+
+def test_a_cut_run_is_timed_as_a_whole_one_and_said_to_be_cut():
+    pump = load_scene("triplex-pump")
+    found = replace(study_of(SHORT), duration=0.5, share=0.25)
+    whole, cut = chart_of(pump, study_of(SHORT)), chart_of(pump, found)
+    for one, other in zip(whole.points, cut.points, strict=True):
+        assert other.seconds == pytest.approx(4 * one.seconds)
+    assert cut.choices[0].own_seconds == pytest.approx(4 * whole.choices[0].own_seconds)
+    assert "0.5 s a run, cut from 3.2 s" in cut.note
+    assert "cut" not in whole.note
+
+
+def test_time_of_a_run_is_foretold_from_others_by_the_tables():
+    """What never ran takes as many times its tabulated cost as what did."""
+    looks = []
+    scene = load_scene("journal-bearing", {**SMALL, "duration": "0.05 s"})
+    search = scene_search(scene)
+    pilot, ran = search.pilot, search.kept.values(search.written)
+    pilot.late = lambda expected: bool(looks.append(expected))
+    pilot.fill([ran], 1)
+    assert looks == [0.0]  # nothing is known yet
+    other = {**ran, "duration": 0.5}
+    pilot.late = lambda expected: looks.append(expected) or True
+    with pytest.raises(OutOfTimeError):
+        pilot.fill([other], 1)
+    table = [cost_of(with_values(scene, values)) for values in (ran, other)]
+    assert looks[1] == pytest.approx(pilot.seconds(ran) * table[1] / table[0])
+
+
+def test_the_first_answer_is_told_however_unsure(tmp_path):
+    """Two starts of knocks tell nothing for sure: what they tell is said all the same."""
+    sizes = {**PUMP, "pressure.rung": "two-level", "accuracy": 0.001}
+    done = run_chart("bilge-pump", sizes, "--budget", "1", "-o", str(tmp_path / "page.json"))
+    assert done.exit_code == 0, done.output
+    told = r"^after \d+ s: Your scene as written is not (yet known to be )?within 0.1 % of its "
+    assert re.search(told, done.stderr, flags=re.MULTILINE)

@@ -388,10 +388,10 @@ def _sentence(
         )
     if status == "no answer yet":
         return (
-            f"{opening}, there is no answer yet: nothing cheaper than the reference is known to be "
-            f"within {asked}, with {found.measured} of {found.planned} combinations measured; "
-            f"more --budget goes on. Until then {combination_words(chosen, found.written)} is the "
-            f"safe choice, {faster_words(chosen.seconds, own)}."
+            f"{opening}: {combination_words(chosen, found.written)} is the safe choice "
+            f"({faster_words(chosen.seconds, own)}); whether anything cheaper does, there is no "
+            f"answer yet: nothing else is known to be within {asked}, with {found.measured} of "
+            f"{found.planned} combinations measured; more --budget goes on."
         )
     name = combination_words(chosen, found.written)
     what = "change nothing" if name == HERE else f"take {name}"
@@ -434,7 +434,7 @@ def _certainty(scene: Scene, found: Study, answer: Answer, status: str) -> str:
         return (
             f"; cheaper, but scatter hides whether it is good enough: {name} "
             f"({error_words(doubted[0], scene)} over {doubted[0].starts} starts); a longer "
-            "duration or less accuracy would show it"
+            "duration, more settling_revolutions or less accuracy would show it"
         )
     return ""
 

@@ -342,6 +342,7 @@ class Pilot:
 
     def _run(self, values: Mapping[str, Any], start: int) -> Outcome:
         self.runs += 1
+        _warm.add(self.scene.machine)  # the next start is of this process too, and warm
         return outcome_of(self._task(values, start))
 
     def _task(self, values: Mapping[str, Any], start: int) -> Task:

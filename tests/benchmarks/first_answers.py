@@ -93,6 +93,7 @@ def chart_times(label: str, budget: float, jobs: int) -> Times:
             stdout=subprocess.DEVNULL,
             stderr=subprocess.PIPE,
             text=True,
+            env={k: v for k, v in os.environ.items() if k != "PYTHONDONTWRITEBYTECODE"},
             start_new_session=True,
         )
         answer = answer_busy = float("inf")
@@ -103,9 +104,10 @@ def chart_times(label: str, budget: float, jobs: int) -> Times:
                 said = line.strip()
                 answer, answer_busy = time.perf_counter() - begin, busy_seconds(run.pid)
         _, status, used = os.wait4(run.pid, 0)
+        run.returncode = os.waitstatus_to_exitcode(status)
         whole, end_busy = time.perf_counter() - begin, used.ru_utime + used.ru_stime
-        if os.waitstatus_to_exitcode(status):
-            raise SystemExit(f"{label}: exit code {os.waitstatus_to_exitcode(status)}")
+        if run.returncode:
+            raise SystemExit(f"{label}: exit code {run.returncode}")
         found = json.loads(page.read_text())
     return Times(
         scene=label,
