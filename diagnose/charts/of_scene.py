@@ -387,11 +387,12 @@ def _sentence(
             f"{worst.effect}, by {percent(abs(worst.steps[-1]))} in {label} at the finest level."
         )
     if status == "no answer yet":
+        nearest = _nearest(scene, found, answer)
         return (
             f"{opening}: {combination_words(chosen, found.written)} is the safe choice "
             f"({faster_words(chosen.seconds, own)}); whether anything cheaper does, there is no "
-            f"answer yet: nothing else is known to be within {asked}, with {found.measured} of "
-            f"{found.planned} combinations measured; more --budget goes on."
+            f"answer yet: nothing else is known to be within {asked}{nearest}, with "
+            f"{found.measured} of {found.planned} combinations measured; more --budget goes on."
         )
     name = combination_words(chosen, found.written)
     what = "change nothing" if name == HERE else f"take {name}"
@@ -411,6 +412,16 @@ def _sentence(
         )
         what = f"nothing must change; {spare}"
     return f"{opening}: {what} ({errs}{faster}){certain}."
+
+
+def _nearest(scene: Scene, found: Study, answer: Answer) -> str:
+    """What of the cheaper errs least, with its scatter; empty where nothing could be run."""
+    cheaper = [c for c in answer.candidates if c.cost < answer.reference.cost and c.differences]
+    if not cheaper:
+        return ""
+    least = min(cheaper, key=lambda each: each.error)
+    name = combination_words(least, found.written)
+    return f" ({name}, the nearest, is {error_words(least, scene, found.accuracy)})"
 
 
 def _rungs_too_coarse(found: Study) -> bool:
