@@ -16,14 +16,21 @@ settings.load_profile("results")
 
 DEAR = (
     "test_same_bytes",
+    "test_chart",
+    "test_stability",
     "test_evaluate",
-    "test_choices",
-    "test_kill",
+    "test_site",
+    "test_looks",
     "test_generate",
-    "test_bearing",
     "test_cli",
+    "test_kill",
+    "test_choices",
+    "test_doctests",
+    "test_assemble",
+    "test_bearing",
 )
-"""Files of the longest tests: begun first, so that no process is left alone with one of them."""
+"""Files of the longest tests: begun first, so that no process is left alone with one of them. The
+first ones ask for no model, which one process makes while the others wait."""
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
