@@ -543,10 +543,10 @@ def late_after(looks):
 
 
 def test_a_pump_with_pipes_has_an_answer_at_any_budget():
-    """What is safe or enough, and how sure that is; with each look more, both questions in 30."""
-    pump = load_scene("bilge-pump", {**PUMP, "pinned": OTHERS, "accuracy": 0.05})
+    """What is safe or enough, and how sure that is; both questions in 24 runs."""
+    pump = load_scene("bilge-pump", {**PUMP, "pinned": OTHERS, "accuracy": 0.1})
     search = scene_search(pump)
-    for looks in (0, 6, 24):  # the same search goes on
+    for looks in (0, 20):  # the same search goes on
         search.measure(late_after(looks))
         chart = chart_of(pump, search.found())
         assert chart.unfinished

@@ -335,7 +335,7 @@ def _choice(scene: Scene, found: Study, answer: Answer, question: str) -> Choice
         name=name,
         status=status,
         error=chosen.error,
-        standard_error=chosen.standard_error,
+        standard_error=_scatter(chosen),
         promised=estimated_error(chosen),
         starts=chosen.starts,
         seconds=_rate(chosen.seconds, scene, found),
@@ -348,6 +348,12 @@ def _choice(scene: Scene, found: Study, answer: Answer, question: str) -> Choice
         own_seconds=_rate(own, scene, found),
         enough=not (answer is found.kept and _rungs_too_coarse(found)),
     )
+
+
+def _scatter(chosen: Candidate) -> float:
+    """Standard error of the worst quantity; infinite where nothing could be run."""
+    worst = max(chosen.differences.values(), key=lambda each: each.error, default=None)
+    return math.inf if worst is None else worst.standard_error
 
 
 def _status(found: Study, answer: Answer) -> str:
@@ -404,8 +410,8 @@ def _sentence(
     if answer is found.kept and _rungs_too_coarse(found):
         left = error_words(cast(Candidate, found.whole.written), scene)
         if name == HERE:
-            what = "your numerics are fine, but your rungs are not"
-        certain += f". The error of these rungs stays: {left}"
+            what = "your numerics are fine"
+        certain += f", but your rungs are not: their error stays, {left}"
     elif name != HERE and _enough(answer.written):
         spare = (
             f"to run faster, {what}" if is_faster(chosen.seconds, own) else f"{name} would do too"

@@ -350,7 +350,7 @@ class Search:
         fewest_turns : int
             Revolutions that a recording must have.
         """
-        scene, speed = self.scene, self.scene.drive.speed
+        scene, speed = self.scene, float(_value_at(self.scene, "drive.speed"))
         settling = scene.settling_revolutions / speed
         whole = scene.duration + settling
         affordable = whole * _DEAR / reference_cost(self.best or self.kept) - settling
