@@ -255,9 +255,6 @@ class RunPlan:
         # a sample stands for the middle of its first step, see decimate
         before = (settling * factor + 0.5) / (rate * factor)
         self.first_angle = scene.drive.start_angle - 2 * math.pi * speed * before
-        self.angle = scene.drive.start_angle + 2 * math.pi * speed * (
-            np.arange(self.n_samples) / rate
-        )
 
     def pushes(self, seed: int) -> tuple[Push, ...]:
         """Forces of the mounted exciters at all steps."""
@@ -271,9 +268,16 @@ class RunPlan:
             seed=seed,
         )
 
+    @property
+    def angle(self) -> NDArray[np.float64]:
+        """Crank angle at the samples [rad], at constant speed; made anew, as many plans wait."""
+        scene = self.scene
+        seconds = np.arange(self.n_samples) / scene.sample_rate
+        return np.asarray(scene.drive.start_angle + 2 * math.pi * scene.drive.speed * seconds)
+
     def turned(self, made: NDArray[np.float64]) -> NDArray[np.float64]:
         """Crank angle at the samples [rad]: exact at constant speed, else as the run made it."""
-        return self.angle if self.scene.drive.rung == "constant-speed" else made
+        return made if self.scene.drive.rung != "constant-speed" else self.angle
 
     def at_samples(self, ends: NDArray[np.float64]) -> NDArray[np.float64]:
         """Values at the samples from those at the ends of all steps, first axis time.
