@@ -112,12 +112,13 @@ def judged(given: argparse.Namespace) -> Iterator[dict]:
             "twin": told(fitted(like, (wide, 1), (pool, 1)), worn),
             "weighted": told(fitted(like, (wide, 1), (pool, given.weight)), worn),
         }
+        spent = time.process_time() - began
         for i, one in enumerate(worn):
             yield {
                 "machine": number,
                 "truth": one.row[COLUMN],
                 **{name: float(each[i]) for name, each in found.items()},
-                "seconds": time.process_time() - began,
+                "seconds": spent,
             }
 
 
