@@ -121,9 +121,9 @@ def _taken_for_granted(usual: Any, drawn: Mapping[str, Any], told: frozenset[str
             for path, value in sizes.items()
         ]
         yield (
-            f"no nameplate says how this machine is built; {', '.join(words)} are taken for "
-            "granted, and the signals do not show whether that is right: give --scene MINE.toml, "
-            f"or --scene {usual.name} where these values hold"
+            f"no nameplate: the model takes for granted that {', '.join(words)}, and no signal "
+            "shows whether that is so: give --scene MINE.toml, or --scene "
+            f"{usual.name} where it is"
         )
 
 
