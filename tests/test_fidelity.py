@@ -432,6 +432,54 @@ def test_rungs_are_kept_or_may_change():
     assert changed == with_values(pilot.scene, found.raised.chosen.values)
 
 
+def test_a_doubt_of_few_starts_does_not_keep_a_whole_search_from_its_answer():
+    """Combinations that a shortlist tried on four starts are judged on more, where cheaper."""
+    pilot = KnownPilot({TWO_LEVEL: 0.6, CONSTANT: 0.7, NONE: 0.8}, scatter=0.02)
+    found = study(pilot.scene, pilot.quantities, accuracy=0.02, pilot=pilot)
+    assert found.raised.status in ("resolved", "unresolvable")
+    assert all(c.starts > 4 for c in found.raised.doubted)
+
+
+COMPLIANT_WRIST, MOTOR = ("joint.wristpin.rung", "compliant"), ("drive.rung", "motor")
+
+
+@pytest.mark.parametrize(
+    ("faults", "best"), [([COMPLIANT_WRIST], "link"), ([COMPLIANT_WRIST, LINK_WRIST], "ideal")]
+)
+def test_a_rung_that_does_not_hold_leaves_the_next_below_as_the_reference(faults, best):
+    pilot = KnownPilot({TWO_LEVEL: 0.6, IDEAL_WRIST: 0.3, CONSTANT: 0.7, NONE: 0.8}, faults=faults)
+    found = study(pilot.scene, pilot.quantities, accuracy=0.02, pilot=pilot)
+    assert found.status == found.raised.status == "resolved"
+    assert found.raised.reference.rungs["wristpin"] == best
+    assert found.raised.chosen.rungs["pressure"] == "chamber"
+    dropped = [text for text in found.refused if "does not hold on this machine" in text]
+    assert len(dropped) == len(faults)
+    assert all("out of its validity" in text for text in dropped)
+    raised = {each.effect: each.best for each in found.raises}
+    assert raised.get("wristpin", "ideal") == best  # none to charge where ideal is the best left
+
+
+@pytest.mark.parametrize("first", [0, 5])
+def test_rungs_that_do_not_hold_together_give_way_one_at_a_time(first):
+    """Motor and chamber are each valid by itself; together they fail from some start on."""
+
+    class Together(KnownPilot):
+        def _run(self, values, start):
+            self.faults = [MOTOR] if values["pressure.rung"] == "chamber" and start >= first else []
+            return super()._run(values, start)
+
+    pilot = Together({TWO_LEVEL: 0.6, CONSTANT: 0.7, NONE: 0.8}, scatter=0.02)
+    found = study(pilot.scene, pilot.quantities, accuracy=0.02, pilot=pilot)
+    assert found.raised.status == "resolved"
+    reference = found.raised.reference.rungs
+    assert (reference["pressure"], reference["drive"]) in (
+        ("two-level", "motor"),
+        ("chamber", "constant-speed"),
+    )
+    [text] = [text for text in found.refused if "does not hold on this machine" in text]
+    assert "with the other best rungs" in text
+
+
 def test_a_choice_is_that_of_auto():
     errors = {TWO_LEVEL: 0.6, CONSTANT: 0.7, NONE: 0.8, IDEAL_WRIST: 0.015, LINK_WRIST: 0.01,
               IDEAL_CRANK: 0.2, LINK_CRANK: 0.2}  # fmt: skip

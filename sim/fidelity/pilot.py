@@ -255,6 +255,11 @@ class Pilot:
         self.fill([values], starts)
         return self._outcomes[_key(values)][:starts]
 
+    def fault(self, values: Mapping[str, Any]) -> str:
+        """Why a combination cannot be run, by the starts made so far and the first at least."""
+        self.outcomes(values, 1)
+        return next((each.fault for each in self._outcomes[_key(values)] if each.fault), "")
+
     def fill(self, combinations: Sequence[Mapping[str, Any]], starts: int) -> None:
         """Make what is missing of the first so many starts of some combinations.
 
@@ -483,6 +488,14 @@ class Comparison:
             self._kept[names(rungs)] = known = self._judged(rungs)
         return known
 
+    def judge_again(self, candidate: Candidate) -> Candidate:
+        """A candidate of an earlier judgement, on more starts where they may tell."""
+        rungs = {
+            name: next(rung for rung in self.rungs[name] if rung.name == own)
+            for name, own in candidate.rungs.items()
+        }
+        return self.judge(rungs)
+
     def known(self, rungs: Mapping[str, Rung]) -> Candidate | None:
         """Candidate of a combination that has been judged."""
         return self._kept.get(names(rungs))
@@ -492,10 +505,6 @@ class Comparison:
         if candidate.verdict != "doubtful" or 2 * candidate.starts > self.starts:
             return True
         return self._hopeless(candidate.differences, candidate.starts)
-
-    def settled(self) -> bool:
-        """Whether that holds of everything judged."""
-        return all(self.told(each) for each in self.judged())
 
     def reference(self) -> Candidate:
         """The reference against itself: its errors are none."""

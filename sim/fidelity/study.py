@@ -321,23 +321,21 @@ class Search:
         self.tell = tell or (lambda _what: None)
         self.numerical = {each.name for each in self.effects if each.numerical}
         self.written = {each.name: written_rung(each, scene) for each in self.effects}
-        ladders = {each.name: _ladder(each, scene) for each in self.effects}
+        self.ladders = {each.name: _ladder(each, scene) for each in self.effects}
+        self._starts = starts
+        self.share = 1.0  # of the time that a run of the scene simulates
         self.kept = self._comparison(
-            {n: r if n in self.numerical else (self.written[n],) for n, r in ladders.items()},
-            starts,
+            {n: r if n in self.numerical else (self.written[n],) for n, r in self.ladders.items()}
         )
-        physical = [n for n, r in ladders.items() if n not in self.numerical and len(r) > 1]
-        self.best = self._comparison(ladders, starts) if physical else None
-        self.raises = {
-            n: self._raise(n, ladders, starts) for n in physical if self._low(n, ladders)
-        }
+        self.best = self._whole()
+        self.raises = {n: self._raise(n) for n in self.ladders if self._low(n)}
         self.fault = ""  # of the best rungs
+        self._dropped: list[str] = []  # rungs that do not hold on this machine
         self._pruned: list[str] = []
         self._done: set[int] = set()  # comparisons whose answer is final
         self._convergence: dict[int, list[Convergence]] = {}
         self._complete = False
         self.duration: float | None = None  # of the recording of a run, where it is cut [s]
-        self.share = 1.0  # of the time that a run of the scene simulates
 
     def shorten(self, fewest_turns: int) -> None:
         """Cut the recordings of runs to come, where one of the reference is dear.
@@ -361,29 +359,39 @@ class Search:
         self.share = (self.duration + settling) / whole
         self.pilot.common = {"duration": self.duration}
         for each in self._all():
-            each.starts <<= math.ceil(math.log2(1 / self.share))  # starts are doubled
+            each.starts <<= self._more_starts()
 
-    def _comparison(self, ladders: Mapping[str, Sequence[Rung]], starts: int | None) -> Comparison:
-        found = Comparison(self.pilot, ladders, self.accuracy, starts or 1)
-        if starts is None:
+    def _more_starts(self) -> int:
+        """Times that starts are doubled for what the runs are shorter."""
+        return math.ceil(math.log2(1 / self.share))
+
+    def _comparison(self, ladders: Mapping[str, Sequence[Rung]]) -> Comparison:
+        found = Comparison(self.pilot, ladders, self.accuracy, self._starts or 1)
+        if self._starts is None:
             found.starts = affordable_starts(reference_cost(found))
+        found.starts <<= self._more_starts()
         return found
 
-    def _low(self, name: str, ladders: Mapping[str, Sequence[Rung]]) -> bool:
-        return self.written[name].name != ladders[name][-1].name
+    def _whole(self) -> Comparison | None:
+        """All rungs against the best of them; None where there is no rung to choose."""
+        physical = [n for n, r in self.ladders.items() if n not in self.numerical and len(r) > 1]
+        return self._comparison(self.ladders) if physical else None
 
-    def _raise(
-        self, name: str, ladders: Mapping[str, Sequence[Rung]], starts: int | None
-    ) -> Comparison:
+    def _low(self, name: str) -> bool:
+        """Whether an effect has a better rung than the one that is written."""
+        best = self.ladders[name][-1].name
+        return name not in self.numerical and self.written[name].name != best
+
+    def _raise(self, name: str) -> Comparison:
         """The scene as written against itself with one rung raised, at numerics fit for both."""
         base = level_name(1.0)
         rungs = {
-            each: (next((r for r in ladders[each] if r.name == base), own),)
+            each: (next((r for r in self.ladders[each] if r.name == base), own),)
             if each in self.numerical
             else (own,)
             for each, own in self.written.items()
         }
-        return self._comparison({**rungs, name: (self.written[name], ladders[name][-1])}, starts)
+        return self._comparison({**rungs, name: (self.written[name], self.ladders[name][-1])})
 
     def measure(self, late: Callable[[float], bool] | None = None) -> None:
         """Measure until everything is told, or there is no time.
@@ -426,24 +434,69 @@ class Search:
             each.cap = cap
         self.tell("numerics of the scene as written")
         self._answered(self.kept)
-        for name, each in self.raises.items():
+        for name in list(self.raises):
             self.tell(f"what the rung of {name} costs")
-            each.judge({n: rungs[0] for n, rungs in each.rungs.items()})
-        if self.best is None or self._faulty(self.best):
-            return
+            self._charge(name)
+        while self.best is not None and not self._faulty():
+            best = self.best
+            self._compare(best, cap)
+            if not self.pilot.fault(best.values(best.top)):  # from a later start neither
+                break
+
+    def _compare(self, best: Comparison, cap: float) -> None:
         self.tell("the scene as written against the best rungs")
-        self.best.judge(self.written)
-        for rungs in self._shortlist(self.best):
-            if self.best.judge(rungs).verdict == "within":
+        best.judge(self.written)
+        for rungs in self._shortlist(best):
+            if best.judge(rungs).verdict == "within":
                 break
         if cap > _CAPS[0]:
             self.tell("combinations of rungs")
-            self._answered(self.best)
+            self._answered(best)
 
-    def _faulty(self, best: Comparison) -> bool:
-        found = best.judge(best.top)
-        self.fault = found.reason if found.verdict == "invalid" else ""
+    def _charge(self, name: str) -> None:
+        """What a rung of the scene as written costs, against the best that holds."""
+        while name in self.raises:
+            pair = self.raises[name]
+            pair.judge({n: rungs[0] for n, rungs in pair.rungs.items()})
+            fault = self.pilot.fault(pair.values(pair.top))
+            if not fault:
+                return
+            self._drop(name, fault)
+
+    def _faulty(self) -> bool:
+        """Whether the best rungs cannot be run, even without those that do not hold together."""
+        while self.best is not None:
+            best = self.best
+            best.judge(best.top)
+            self.fault = self.pilot.fault(best.values(best.top))
+            raised = [name for name in best.rungs if self._low(name)]
+            if not self.fault or not raised:
+                break
+            lower = {n: best.values({**best.top, n: best.rungs[n][-2]}) for n in raised}
+            cured = next((n for n in raised if not self.pilot.fault(lower[n])), raised[0])
+            self._drop(cured, f"with the other best rungs, {self.fault}")
         return bool(self.fault)
+
+    def _drop(self, name: str, fault: str) -> None:
+        """Take the best rung of an effect off its ladder: the next below it is the reference."""
+        *lower, bad = self.ladders[name]
+        self.ladders = {**self.ladders, name: tuple(lower)}
+        self._dropped.append(
+            f"{name} = {bad.name}: does not hold on this machine, {fault}; errors are against "
+            f"{name} = {lower[-1].name}"
+        )
+        if name in self.raises:
+            cap = self.raises.pop(name).cap
+            if self._low(name):
+                self.raises[name] = self._raise(name)
+                self.raises[name].cap = cap
+        if self.best is not None:
+            cap = self.best.cap
+            self._done.discard(id(self.best))
+            self._convergence.pop(id(self.best), None)
+            self.best = self._whole()
+            if self.best is not None:
+                self.best.cap = cap
 
     def _answered(self, comparison: Comparison) -> None:
         """Search a comparison for its cheapest combination that will do."""
@@ -451,11 +504,15 @@ class Search:
             return
         comparison.judge(self.written)
         singles = descent(comparison)
-        for found in combinations(comparison, singles):
-            if found.verdict == "within":
-                break
+        chosen = next(
+            (each for each in combinations(comparison, singles) if each.verdict == "within"),
+            comparison.judge(comparison.top),
+        )
+        for each in comparison.judged():  # shortlists leave doubts of few starts
+            if each.cost < chosen.cost and not comparison.told(each):
+                comparison.judge_again(each)
         self._convergence[id(comparison)] = list(self._convergences(comparison))
-        if comparison.settled():
+        if all(comparison.told(e) for e in comparison.judged() if e.cost <= chosen.cost):
             self._done.add(id(comparison))
 
     def _shortlist(self, best: Comparison) -> Iterator[dict[str, Rung]]:
@@ -573,6 +630,7 @@ class Search:
 
     def _refused(self) -> Iterator[str]:
         yield from refusals(self.scene, self.effects)
+        yield from self._dropped
         if self.fault:
             yield f"the best rungs of every effect together: {self.fault}"
 
