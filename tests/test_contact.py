@@ -285,6 +285,21 @@ def test_an_impact_below_the_floor_returns_with_the_documented_speed(elasticity)
         assert_allclose(drop(contact, speed=speed), expected, rtol=0, atol=1e-6)
 
 
+@pytest.mark.parametrize("elasticity", ELASTICITIES)
+def test_a_constant_loss_costs_faster_impacts_more(elasticity):
+    factor = c.hysteresis("exact", 0.4)
+    found = []
+    for speed in (0.1, 0.5, 1.0, 2.0):
+        contact = record(
+            law=c.LAW_CONSTANT_LOSS, elasticity=elasticity, hysteresis=factor, speed_floor=1.0
+        )
+        found.append(drop(contact, speed=speed))
+        # the motion of that speed with a / d'_0 as it is: the exact relation at a times the speed
+        assert_allclose(found[-1], c.effective_restitution(factor * speed), rtol=0, atol=1e-6)
+    assert_allclose(found[2], 0.4, rtol=0, atol=1e-6)
+    assert found == sorted(found, reverse=True)
+
+
 # --- normal force
 
 

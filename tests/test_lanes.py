@@ -73,6 +73,13 @@ def test_neighbours_number_and_place_change_no_byte(drawn, alone, some):
         },
         {"joint.wristpin.rung": "compliant", "joint.guide.rung": "compliant"},
         {"crank.unbalance": "0.1 kg m"},
+        {"piston.seal_friction": "80 N", "piston.seal_friction_share": 0.02},
+        {
+            "joint.crankpin.law": "exact",
+            "joint.crankpin.damping": 0.0,
+            "joint.crankpin.restitution": 0.3,
+            "joint.crankpin.restitution_speed": "0.3 m/s",
+        },
         {"exciters.0.force": "500 N"},
         {"pressure.rung": "chamber", "pressure.suction": "-80 kPa"},  # some vapour
         {"pressure.rung": "chamber", "pressure.suction_valve.stuck_lift": "2 mm"},  # much of it

@@ -182,10 +182,11 @@ def test_energy_of_the_free_crank(rungs):
 
 @every_combination
 def test_impulses_are_the_changes_of_momentum(rungs):
-    scene = pump(rungs)
+    scene = pump(rungs, piston__seal_friction=60.0, piston__seal_friction_share=0.02)
     step = 1e-5
     t = turning(cs.tables(scene, step), drive_moment=20.0)
     found = run(scene, t, step=step, duration=0.2)
+    assert abs(found.force("seal_x")).max() > 60.0
     rod, piston, m = scene.rod.mass, scene.piston.mass, t.machine
     pin, wrist = found.force("pin_x"), found.force("wrist_x")
     across, wrist_across = found.force("pin_y"), found.force("wrist_y")
@@ -195,7 +196,9 @@ def test_impulses_are_the_changes_of_momentum(rungs):
         (
             piston,
             9,
-            found.force("piston_x") + found.force("guide_x") - wrist - piston * m.gravity_x,
+            sum(found.force(f"{place}_x") for place in ("piston", "seal", "guide"))
+            - wrist
+            - piston * m.gravity_x,
         ),
         (piston, 10, found.force("guide_y") - wrist_across - piston * m.gravity_y),
     )
@@ -462,7 +465,7 @@ def test_triplex_at_constant_speed_is_three_simplexes(rungs, pressure):
     for throw in range(3):
         scene = pump(rungs, throws=[THREE[throw]], **changes)
         alone = run(scene, cs.tables(scene, step), step=step, duration=0.2)
-        own = slice(1 + 9 * throw, 10 + 9 * throw)
+        own = slice(1 + len(sc.FORCES) * throw, 1 + len(sc.FORCES) * (throw + 1))
         # A change of contact cuts the step of all throws: equal but for the integrator.
         tolerance = 1e-3 if together.contact_changes else 1e-12
         size = abs(alone.forces[:, 1:]).max()
@@ -722,3 +725,43 @@ def test_slow_closings_are_counted():
     floored, changes = counts["10 m/s"]
     assert changes > 10
     assert floored in (changes // 2, changes // 2 + changes % 2)  # every closing, no opening
+
+
+def test_the_seal_takes_its_friction_over_both_strokes():
+    """Work of a revolution without any other friction: pressure times area, and 4 r F of Coulomb's.
+
+    With the pressure's share, F is the mean over both strokes of what presses the seal on.
+    """
+    free = pump((IDEAL, IDEAL, IDEAL), pressure__rung="two-level")
+    tension, share = 60.0, 0.02
+    dragged = pump(
+        (IDEAL, IDEAL, IDEAL),
+        pressure__rung="two-level",
+        piston__seal_friction=tension,
+        piston__seal_friction_share=share,
+        piston__seal_friction_speed=1e-4,
+    )
+    step = 1 / (4000 * free.drive.speed)
+    work = []
+    for scene in (free, dragged):
+        found = run(scene, cs.tables(scene, step), step=step, duration=2 / scene.drive.speed)
+        moment = found.forces[4000:, 0]  # the second revolution
+        work.append(2 * math.pi * moment.mean())
+    area, stroke = math.pi * free.piston.diameter**2 / 4, 2 * free.crank.radius
+    pressed = area * (abs(free.pressure.suction) + free.pressure.discharge)
+    # transitions of 6 degrees about the dead centres: some of a per mille of the stroke
+    assert_allclose(work[1] - work[0], stroke * (2 * tension + share * pressed), rtol=2e-3)
+
+
+def test_the_closed_form_has_the_seal_of_the_march():
+    changes = {"piston__seal_friction": 60.0, "piston__seal_friction_share": 0.02}
+    scene = pump((IDEAL, IDEAL, IDEAL), **changes)
+    step = 1 / (4000 * scene.drive.speed)
+    marched = run(scene, cs.tables(scene, step), step=step, duration=1 / scene.drive.speed)
+    closed = cs.run_scene(scene, step=step, n_steps=4000, start_angle=0.3)
+    for name in ("seal_x", "piston_x", "pin_x"):
+        size = abs(closed.force(name)).max()
+        # the middle of a step against its mean, where the sign turns within ten steps
+        difference = abs(marched.force(name) - closed.force(name))
+        assert np.percentile(difference, 99.5) < 1e-3 * size
+    assert abs(closed.force("seal_x")).max() > 60.0

@@ -39,6 +39,7 @@ from ..jit import kernel
 
 LAW_KELVIN_VOIGT = 0
 LAW_HYSTERESIS = 1
+LAW_CONSTANT_LOSS = 2  # hysteresis whose d'_0 is the same for every impact
 
 ELASTIC_LINEAR = 0
 ELASTIC_HERTZ = 1
@@ -58,7 +59,7 @@ CONTACT = np.dtype(
         ("damping", np.float64),  # C of Kelvin-Voigt [N s/m]
         ("hysteresis", np.float64),  # a of the hysteresis laws
         ("clearance", np.float64),  # radial [m]
-        ("speed_floor", np.float64),  # least d'_0 of the hysteresis laws, > 0 [m/s]
+        ("speed_floor", np.float64),  # least d'_0, or the constant one, > 0 [m/s]
         ("release", np.int64),  # RELEASE_*
         ("friction_law", np.int64),  # FRICTION_*
         ("friction", np.float64),  # Coulomb's coefficient
@@ -128,7 +129,8 @@ def normal_force(
     Hysteresis: ``max(0, F_e(d) (1 + a d' / d'_0))``, continuous at first touch and at release, both
     at zero penetration. It never pulls; a free impact does not come to the limit, as it leaves
     slower than ``d'_0 / a``. d'_0 is `impact_speed`, at least the record's `speed_floor`
-    (:func:`floored_restitution` gives the price).
+    (:func:`floored_restitution` gives the price). With a constant loss d'_0 is `speed_floor` for
+    every impact, so that faster ones lose more, as Hunt and Crossley (1975) found.
 
     Parameters
     ----------
@@ -142,7 +144,8 @@ def normal_force(
     """
     elastic = elastic_force(penetration, contact)
     spring = elastic if penetration > 0.0 else contact.stiffness * penetration
-    floor = max(impact_speed, contact.speed_floor)
+    told = impact_speed if contact.law == LAW_HYSTERESIS else 0.0
+    floor = max(told, contact.speed_floor)
     loss = contact.hysteresis * approach_speed / (floor if floor > 0.0 else 1.0)
     force: float = (
         spring + contact.damping * approach_speed

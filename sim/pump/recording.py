@@ -546,24 +546,26 @@ def _sources(
     """
     found: dict[str, list[tuple[int, float]]] = {}
     for throw in range(len(scene.throws)):
-        for place, (name, sign) in _throw_on_casing(scene, throw).items():
+        for place, name, sign in _throw_on_casing(scene, throw):
             row = _row_of(name, throw, columns)
             found.setdefault(_force_key(scene, place, throw + 1), []).append((row, sign))
     return found
 
 
-def _throw_on_casing(scene: PumpScene, throw: int) -> dict[str, tuple[str, float]]:
-    """Force of the mechanism behind every place of the casing, and its sign there."""
-    reactions = {
-        "bearing_x": ("pin_x", -1.0),
-        "bearing_y": ("pin_y", -1.0),
-        "guide_y": ("guide_y", -1.0),
-        "cylinder_x": ("piston_x", -1.0),
-    }
+def _throw_on_casing(scene: PumpScene, throw: int) -> list[tuple[str, str, float]]:
+    """Places of the casing, the force of the mechanism behind each, and its sign there."""
+    reactions = [
+        ("bearing_x", "pin_x", -1.0),
+        ("bearing_y", "pin_y", -1.0),
+        ("guide_y", "guide_y", -1.0),
+        ("cylinder_x", "piston_x", -1.0),
+    ]
+    if scene.piston.seal_friction or scene.piston.seal_friction_share:
+        reactions.append(("cylinder_x", "seal_x", -1.0))
     if _rubs(scene, throw):
-        reactions |= {place: (place, -1.0) for place in GUIDE_PLACES}
+        reactions += [(place, place, -1.0) for place in GUIDE_PLACES]
     if scene.pressures(throw).rung in BREATHING_RUNGS:
-        reactions |= {place: (place, 1.0) for place in VALVE_PLACES}
+        reactions += [(place, place, 1.0) for place in VALVE_PLACES]
     return reactions
 
 

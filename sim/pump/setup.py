@@ -18,6 +18,7 @@ from ..contact.law import (
     ELASTIC_LINEAR,
     FRICTION_RAMP,
     FRICTION_SMOOTH,
+    LAW_CONSTANT_LOSS,
     LAW_HYSTERESIS,
     LAW_KELVIN_VOIGT,
     RELEASE_AT_ZERO_FORCE,
@@ -58,6 +59,7 @@ from .slider_crank import (
     Tables,
     run_mechanism,
 )
+from .throw_motion import seal_drag
 
 STEP_PER_CONTACT_TIME = 0.3
 """Default step times the contact's fastest angular frequency: 21 steps a contact period."""
@@ -195,20 +197,63 @@ def ideal_motion(scene: PumpScene, angle: NDArray[np.float64], throw: int = 0) -
         "gravity_y": gravity_y,
     }
     motion = ideal_crank(own, **known)
-    pressure, added = np.empty(own.size), np.empty(own.size)
-    velocity = np.ravel(motion.piston_velocity)
-    liquid = _without_memory(scene, throw)
-    _line_pressures(np.ravel(own), speed, velocity, liquid, pressure, added)
-    force = piston_area(scene) * pressure + added * np.ravel(motion.piston_acceleration)
-    return ideal_crank(own, piston_force=force.reshape(own.shape), **known)
+    liquid, seal = _on_piston(scene, motion, own, throw)
+    return ideal_crank(own, piston_force=-(liquid + seal), **known)
+
+
+def _on_piston(
+    scene: PumpScene, motion: IdealCrank, own: NDArray[np.float64], throw: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Forces of liquid and seal along x on the piston of a motion without clearance [N].
+
+    `own` are the crank angles of the throw itself [rad].
+    """
+    speed, acceleration = 2 * math.pi * scene.drive.speed, motion.piston_acceleration
+    pressure, added, drag = np.empty((3, own.size))
+    _in_cylinder(
+        np.ravel(own),
+        speed,
+        np.ravel(motion.piston_velocity),
+        _without_memory(scene, throw),
+        _seal_record(scene),
+        pressure,
+        added,
+        drag,
+    )
+    force = piston_area(scene) * pressure + added * np.ravel(acceleration)
+    return -force.reshape(own.shape), drag.reshape(own.shape)
 
 
 @kernel
-def _line_pressures(
-    angle: Any, speed: float, velocity: Any, liquid: Any, pressure: Any, added: Any
+def _in_cylinder(
+    angle: Any,
+    speed: float,
+    velocity: Any,
+    liquid: Any,
+    seal: Any,
+    pressure: Any,
+    added: Any,
+    drag: Any,
 ) -> None:
     for i in range(angle.size):
         pressure[i], added[i] = line_pressure(angle[i], speed, velocity[i], liquid[0])
+        drag[i] = seal_drag(velocity[i], pressure[i], seal[0])
+
+
+def _seal_record(scene: PumpScene) -> NDArray[np.void]:
+    record = np.zeros(1, dtype=THROW)
+    for name, value in _seal(scene).items():
+        record[name] = value
+    return record
+
+
+def _seal(scene: PumpScene) -> dict[str, float]:
+    piston = scene.piston
+    return {
+        "seal_friction": piston.seal_friction,
+        "seal_friction_area": piston.seal_friction_share * piston_area(scene),
+        "seal_friction_speed": piston.seal_friction_speed,
+    }
 
 
 def _without_memory(scene: PumpScene, throw: int) -> NDArray[np.void]:
@@ -263,6 +308,7 @@ def contact_record(
     """
     record = np.zeros(1, dtype=CONTACT)
     kelvin_voigt = part.law == "kelvin-voigt"
+    hysteretic = LAW_HYSTERESIS if part.restitution_speed is None else LAW_CONSTANT_LOSS
     code, stiffness = {
         "linear": (ELASTIC_LINEAR, part.stiffness),
         "hertz": (ELASTIC_HERTZ, part.hertz_stiffness),
@@ -274,7 +320,7 @@ def contact_record(
         ),
     }[part.elasticity]
     values = {
-        "law": LAW_KELVIN_VOIGT if kelvin_voigt else LAW_HYSTERESIS,
+        "law": LAW_KELVIN_VOIGT if kelvin_voigt else hysteretic,
         "elasticity": code,
         "stiffness": stiffness or 0.0,
         "damping": part.damping,
@@ -286,7 +332,7 @@ def contact_record(
         "friction_speed": part.friction_speed,
         "friction_dead_speed": part.friction_dead_speed,
         "tangential_damping": part.tangential_damping,
-        "speed_floor": part.speed_floor or 1.0,
+        "speed_floor": part.restitution_speed or part.speed_floor or 1.0,
     }
     for name, value in values.items():
         record[name] = value
@@ -299,7 +345,7 @@ def contact_record(
         record["hysteresis"] = 0.0
     elif part.rung == "link":
         record["damping"] = _LINK_DAMPING * 2 * math.sqrt(load / max(clearance, 1e-12) / mobility)
-    elif not kelvin_voigt and part.speed_floor is None and stiffness:
+    elif record["law"] == LAW_HYSTERESIS and part.speed_floor is None and stiffness:
         spring = tangent_stiffness(record[0], load)
         most = _MOST_DAMPING * 2 * math.sqrt(spring / mobility)
         record["speed_floor"] = max(float(record["hysteresis"][0]) * load / most, 1e-9)
@@ -738,7 +784,7 @@ def throw_record(scene: PumpScene, throw: int, step: float) -> NDArray[np.void]:
         "pressure_rung": liquid["rung"],
         "substeps": chamber_substeps(liquid, step) if breathing else 1,
     }
-    for name, value in values.items():
+    for name, value in (values | _seal(scene)).items():
         record[name] = value
     return record
 
@@ -980,7 +1026,8 @@ def _run_ideal(scene: PumpScene, *, step: float, n_steps: int, start_angle: floa
     for throw in range(len(scene.throws)):
         motion = ideal_motion(scene, middle, throw)
         pull = scene.piston.mass * (motion.piston_acceleration + _gravity(scene)[0])
-        nothing = np.zeros(n_steps)
+        own = middle + scene.throws[throw].phase
+        nothing, (_, seal) = np.zeros(n_steps), _on_piston(scene, motion, own, throw)
         columns += [
             motion.pin_force_x,
             motion.pin_force_y,
@@ -988,7 +1035,8 @@ def _run_ideal(scene: PumpScene, *, step: float, n_steps: int, start_angle: floa
             -motion.wrist_force_y,
             nothing,
             motion.guide_force,
-            pull - motion.wrist_force_x,
+            pull - motion.wrist_force_x - seal,
+            seal,
             nothing,
             nothing,
         ]

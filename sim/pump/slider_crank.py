@@ -38,7 +38,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..contact.law import friction_force
+from ..contact.law import LAW_CONSTANT_LOSS, friction_force
 from ..jit import kernel, sine_cosine, subroutine
 from ..output.status import Status
 from ..piping.coupling import PAIR, begin_pair, seek_pair
@@ -59,6 +59,7 @@ from .throw_motion import (
     motor_moment,
     pin_touch,
     polar,
+    seal_drag,
     wrist_offset,
 )
 
@@ -78,6 +79,9 @@ THROW = np.dtype(
         ("inverse_piston_across", "f8"),  # 0 in an ideal guide [1/kg]
         ("inverse_piston_tilt", "f8"),  # about the wrist pin; 0 in an ideal guide [1/(kg m^2)]
         ("piston_area", "f8"),
+        ("seal_friction", "f8"),  # by the seal's tension [N]
+        ("seal_friction_area", "f8"),  # more of it per pressure [N/Pa]
+        ("seal_friction_speed", "f8"),  # that regularises its sign [m/s]
         ("crankpin_rung", "i8"),
         ("wristpin_rung", "i8"),
         ("guide_rung", "i8"),
@@ -132,14 +136,16 @@ FORCES = (
     "guide_x",
     "guide_y",
     "piston_x",
+    "seal_x",
     "suction_valve",
     "discharge_valve",
 )
 """Mean forces of a throw over a step [N]: crank pin on rod, wrist pin on rod, guide on piston
-(friction along x, push along y), liquid on piston, each valve on the casing along the stroke.
+(friction along x, push along y), liquid on piston, seal on piston, each valve on the casing along
+the stroke.
 Before them stands the drive moment [N m]."""
 
-_PIN, _WRIST, _GUIDE, _FACE, _VALVES = 0, 2, 4, 6, 7  # first columns of FORCES
+_PIN, _WRIST, _GUIDE, _FACE, _SEAL, _VALVES = 0, 2, 4, 6, 7, 8  # first columns of FORCES
 
 FILM = ("crankpin_x", "crankpin_y", "wristpin_x", "wristpin_y")
 """Where the films of a throw let its pins be, from the centres of their eyes [m]."""
@@ -388,8 +394,9 @@ def _throw(k: int, w: Any, row: int, share: float, t: Any) -> None:
             p, q, b, held, t.contacts[k, GUIDE]
         )
         peak, overlap_ratio = max(peak, normal), max(overlap_ratio, overlap / q.guide_half_height)
+    seal = seal_drag(p.piston_x_rate, pressure, q)
     rates = free_motion(
-        q, m, on_face, inv_px, pin, wrist, guide_x, guide_y, guide_moment, sin_b, cos_b
+        q, m, on_face + seal, inv_px, pin, wrist, guide_x, guide_y, guide_moment, sin_b, cos_b
     )
     wrist_x, wrist_y = wrist.x, wrist.y
     if q.crankpin_rung >= JOINT_COMPLIANT and q.wristpin_rung == JOINT_IDEAL:
@@ -407,7 +414,7 @@ def _throw(k: int, w: Any, row: int, share: float, t: Any) -> None:
         crank_moment += _constrain(k, w, row, t, sin_a, cos_a, sin_b, cos_b, inv_px)
     pin_x, pin_y = b.force[_PIN], b.force[_PIN + 1]
     w.moment[0] += crank_moment + q.crank_radius * (pin_x * sin_a - pin_y * cos_a)
-    b.force[_FACE] = on_face - added * b.rate[PISTON_X_RATE]
+    b.force[_FACE], b.force[_SEAL] = on_face - added * b.rate[PISTON_X_RATE], seal
     if q.guide_rung != JOINT_COMPLIANT:  # what holds the piston up
         guide_y = b.force[_WRIST + 1] + m.gravity_y * q.piston_mass
     b.force[_GUIDE], b.force[_GUIDE + 1] = guide_x, guide_y
@@ -761,7 +768,8 @@ def _flip(k: int, j: int, w: Any, i: int, t: Any) -> int:
     if held.touching[j] == 0:
         return 0
     held.impact[j] = max(w.stage[i, k].approach[j], 0.0)
-    return 1 if held.impact[j] < t.contacts[k, min(j, GUIDE)].speed_floor else 0
+    c = t.contacts[k, min(j, GUIDE)]
+    return 1 if c.law != LAW_CONSTANT_LOSS and held.impact[j] < c.speed_floor else 0
 
 
 @kernel

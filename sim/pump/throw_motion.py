@@ -157,6 +157,20 @@ def dry_pin(
 
 
 @kernel
+def seal_drag(speed: float, pressure: float, q: Any) -> Any:
+    """Coulomb friction of a piston's rings or packing, along x on the piston [N].
+
+    Their tension and the gauge pressure in the cylinder press them on.
+    """
+    pressed = q.seal_friction + q.seal_friction_area * abs(pressure)
+    sharp = q.seal_friction_speed
+    return -pressed * speed / math.sqrt(speed * speed + sharp * sharp + _REST)
+
+
+_REST = 1e-30  # [m^2/s^2]: a record of zeros has no seal, and no division by zero
+
+
+@kernel
 def corner(p: Any, q: Any, along: float, side: float, clearance: float) -> Any:
     """Overlap of a piston's corner with its guide, its rate, and the corner from the wrist pin.
 
@@ -189,7 +203,7 @@ def guide_corner(
 def free_motion(
     q: Any,
     m: Any,
-    on_face: float,
+    along: float,
     inv_px: float,
     pin: Any,
     wrist: Any,
@@ -201,6 +215,7 @@ def free_motion(
 ) -> Any:
     """Accelerations under the applied loads, before any constraint force.
 
+    `along` is what liquid and seal do to the piston along the stroke [N].
     `inv_px` is the inverse mass of the piston along the stroke, its liquid included [1/kg].
     """
     rod_x = pin.x + wrist.x - m.gravity_x * q.rod_mass
@@ -211,7 +226,7 @@ def free_motion(
         rod_x * q.inverse_rod_mass,
         rod_y * q.inverse_rod_mass,
         rod_b * q.inverse_rod_inertia,
-        (on_face - m.gravity_x * q.piston_mass - wrist.x + guide_x) * inv_px,
+        (along - m.gravity_x * q.piston_mass - wrist.x + guide_x) * inv_px,
         (guide_y - m.gravity_y * q.piston_mass - wrist.y) * q.inverse_piston_across,
         (wrist.on_pin + guide_moment) * q.inverse_piston_tilt,
     )

@@ -52,7 +52,7 @@ from .rates import (
 
 Float = NDArray[np.float64]
 
-_ALWAYS = ("pin_x", "pin_y", "guide_y", "piston_x")
+_ALWAYS = ("pin_x", "pin_y", "guide_y", "piston_x", "seal_x")
 _WITH_PLAY = ("guide_x",)
 _BREATHING = ("suction_valve", "discharge_valve")
 """Forces of a throw on its casing: what is kept of every run, of those with play, of chambers."""

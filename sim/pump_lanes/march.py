@@ -78,7 +78,7 @@ def _to_record(lane: int, s: Any, w: Any) -> None:
         s.rate0[13, lane],
         s.force0[7, lane],
     )
-    for n in range(7):
+    for n in range(FORCES_IN_LANES - 1):
         b.force[n] = s.force0[n, lane]
     for j in range(CONTACTS):
         b.margin[j], b.approach[j] = s.margin0[j, lane], s.approach0[j, lane]
@@ -94,12 +94,12 @@ def _from_record(lane: int, s: Any, w: Any, i: int) -> None:
     for c in range(PER_THROW):
         s.y[c, lane], s.rate[c, lane] = b.y[c], b.rate[c]
     s.y[12, lane], s.y[13, lane] = w.crank[i, 0], w.crank[i, 1]
-    s.rate[12, lane], s.rate[13, lane], s.force[7, lane] = (
+    s.rate[12, lane], s.rate[13, lane], s.force[FORCES_IN_LANES - 1, lane] = (
         w.crank[i, 2],
         w.crank[i, 3],
         w.crank[i, 4],
     )
-    for n in range(7):
+    for n in range(FORCES_IN_LANES - 1):
         s.force[n, lane] = b.force[n]
     for j in range(CONTACTS):
         s.margin[j, lane], s.approach[j, lane] = b.margin[j], b.approach[j]

@@ -27,6 +27,7 @@ from ..pump.throw_motion import (
     guide_corner,
     held_wrist,
     motor_moment,
+    seal_drag,
     wrist_offset,
 )
 
@@ -36,7 +37,7 @@ LANES = 16
 COORDINATES = 14
 """Columns of a state: those of a throw, then crank angle and speed."""
 
-FORCES_IN_LANES = 8
+FORCES_IN_LANES = 9
 """Columns of the forces: those of a throw without its valves, then the drive moment."""
 
 CHAMBER_COLUMNS = 8
@@ -57,6 +58,9 @@ class ThrowLane(NamedTuple):
     inverse_piston_across: float
     inverse_piston_tilt: float
     piston_area: float
+    seal_friction: float
+    seal_friction_area: float
+    seal_friction_speed: float
     crankpin_radius: float
     wristpin_radius: float
     guide_half_length: float
@@ -190,6 +194,9 @@ def _throw_of(p: Any, lane: int) -> Any:
         a[15, lane],
         a[16, lane],
         a[17, lane],
+        a[18, lane],
+        a[19, lane],
+        a[20, lane],
     )
 
 
@@ -378,8 +385,9 @@ def _rates(p: Any, s: Any, share: float, play: bool) -> None:
             s.overlap[1, lane], peak = touch.overlap, max(peak, touch.normal)
             guide_x, guide_y, guide_moment, normal, overlap = _guide_load(pose, q, p, s, lane)
             s.overlap[2, lane], peak = overlap, max(peak, normal)
+        seal = seal_drag(pose.piston_x_rate, pressure, q)
         free = free_motion(
-            q, m, on_face, inv_px, pin, wrist, guide_x, guide_y, guide_moment, sin_b, cos_b
+            q, m, on_face + seal, inv_px, pin, wrist, guide_x, guide_y, guide_moment, sin_b, cos_b
         )
         # a factor of 1 or 0 changes no bit of what it keeps, and is no branch
         rates, wrist_x, wrist_y = held_wrist(q, m, pose, free, inv_px, sin_b, cos_b, q.tight_wrist)
@@ -405,9 +413,10 @@ def _rates(p: Any, s: Any, share: float, play: bool) -> None:
             wrist_y,
         )
         force[4, lane], force[5, lane], force[6, lane] = guide_x, guide_y, on_face
+        force[7, lane] = seal
         s.normal[lane] = peak
         moment = pin.on_pin + q.crank_radius * (pin.x * sin_a - pin.y * cos_a)
         load = crank_load(moment, sin_a, cos_a, m)
         drive = motor_moment(omega, m)
         rate[12, lane], rate[13, lane] = omega, m.inverse_inertia * (drive + load)
-        force[7, lane] = -load if m.inverse_inertia == 0.0 else drive
+        force[8, lane] = -load if m.inverse_inertia == 0.0 else drive

@@ -11,6 +11,7 @@ from pydantic import Field, model_validator
 
 from ..output.sensor import Channel
 from .parts import (
+    FORCE_MOST,
     GAIN_LEAST,
     GAIN_MOST,
     NAME_LONGEST,
@@ -23,7 +24,6 @@ from .parts import (
     Time,
 )
 
-_FORCE_MOST = 1e9  # N
 _RANGE_LEAST = 1e-6  # N
 _FREQUENCY_MOST = 1e6  # Hz
 _LONGEST = 3600.0  # s
@@ -46,7 +46,7 @@ class Exciter(Part):
     )
     kind: Kind = Field(default="random", description="waveform of its force")
     force: Force = Field(
-        default=0.0, ge=0, le=_FORCE_MOST, description="rms while it pushes; hammer: median peak"
+        default=0.0, ge=0, le=FORCE_MOST, description="rms while it pushes; hammer: median peak"
     )
     low: Frequency = Field(default=5.0, gt=0, le=_FREQUENCY_MOST, description="of its band")
     high: Frequency = Field(default=400.0, gt=0, le=_FREQUENCY_MOST, description="of its band")
@@ -68,9 +68,9 @@ class Exciter(Part):
     gain: Ratio = Field(
         default=1.0, ge=GAIN_LEAST, le=GAIN_MOST, description="true sensitivity over nominal"
     )
-    noise: Force = Field(default=0.0, ge=0, le=_FORCE_MOST, description="rms of white noise")
+    noise: Force = Field(default=0.0, ge=0, le=FORCE_MOST, description="rms of white noise")
     range: Force = Field(
-        ge=_RANGE_LEAST, le=_FORCE_MOST, description="full scale of the cell, plus and minus"
+        ge=_RANGE_LEAST, le=FORCE_MOST, description="full scale of the cell, plus and minus"
     )
     bits: int = Field(default=24, ge=8, le=32, description="of its converter")
 

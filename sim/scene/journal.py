@@ -16,6 +16,7 @@ from .oil import Oil
 from .parts import (
     ANGLE_MOST,
     DAMPING_MOST,
+    FORCE_MOST,
     GAIN_LEAST,
     GAIN_MOST,
     GRAVITY_MOST,
@@ -55,7 +56,6 @@ from .parts import (
     name_faults,
 )
 
-_FORCE_MOST = 1e9  # N
 _UNBALANCE_MOST = 1e6  # kg m
 _THINNEST = 1e-9  # m, of a clearance: no film is thinner than its molecules
 _GAP_LEAST, _GAP_MOST = 1e-9, 1.0  # m
@@ -188,13 +188,13 @@ class LoadRecord(Part):
 class JournalLoad(Part):
     """What pushes on the shaft besides its weight; times count from the first sample."""
 
-    static: Force = Field(default=0.0, ge=-_FORCE_MOST, le=_FORCE_MOST, description="along X")
-    static_across: Force = Field(default=0.0, ge=-_FORCE_MOST, le=_FORCE_MOST, description="on Y")
+    static: Force = Field(default=0.0, ge=-FORCE_MOST, le=FORCE_MOST, description="along X")
+    static_across: Force = Field(default=0.0, ge=-FORCE_MOST, le=FORCE_MOST, description="on Y")
     history: Literal["none", "step", "rectangular", "half-sine", "file"] = Field(
         default="none", description="how the load varies in time; file: as a record"
     )
     amplitude: Force = Field(
-        default=0.0, ge=-_FORCE_MOST, le=_FORCE_MOST, description="peak of the load history"
+        default=0.0, ge=-FORCE_MOST, le=FORCE_MOST, description="peak of the load history"
     )
     angle: _SHAFT_ANGLE = Field(default=0.0, description="direction of the history, from X")
     begin: Time = Field(default=0.0, ge=0, description="of step or pulse")

@@ -97,6 +97,7 @@ PRESSURE_MOST = 1e9  # Pa, a waterjet intensifier has 6e8
 GRAVITY_MOST = 1000.0  # m/s^2, a hundred g
 STIFFEST = 1e13  # N/m, a metre of steel has 1e11
 DAMPING_MOST = 1e9  # N s/m
+FORCE_MOST = 1e9  # N
 SLIDING_LEAST, SLIDING_MOST = 1e-6, 1e3  # m/s
 ANGLE_MOST = 1e4  # rad, beyond it a cosine has lost four digits
 _ACCELERATION_LEAST, _ACCELERATION_MOST = 1e-9, 1e7  # m/s^2, a shock sensor ends at 1e6

@@ -13,6 +13,7 @@ from .oil import JointOil
 from .parts import (
     ANGLE_MOST,
     DAMPING_MOST,
+    FORCE_MOST,
     GRAVITY_MOST,
     HEAVIEST,
     INERTIA_LEAST,
@@ -32,6 +33,7 @@ from .parts import (
     Casing,
     ConditionPlace,
     Damping,
+    Force,
     FrfFile,
     HertzStiffness,
     Inertia,
@@ -183,6 +185,21 @@ class Piston(Part):
         le=INERTIA_MOST,
         description="about the wrist pin, for a guide with clearance",
     )
+    seal_friction: Force = Field(
+        default=0.0, ge=0, le=FORCE_MOST, description="by the tension of the rings or packing"
+    )
+    seal_friction_share: Ratio = Field(
+        default=0.0,
+        ge=0,
+        le=1,
+        description="of the force of the pressure on the piston, which presses the seal on",
+    )
+    seal_friction_speed: Velocity = Field(
+        default=0.01,
+        ge=SLIDING_LEAST,
+        le=SLIDING_MOST,
+        description="sliding speed that regularises the Coulomb sign",
+    )
 
 
 _ELASTICITY = {
@@ -230,6 +247,12 @@ class Contact(Part):
     restitution: Ratio | None = Field(
         default=None, gt=0, le=1, description="of the hysteresis laws"
     )
+    restitution_speed: Velocity | None = Field(
+        default=None,
+        ge=SLIDING_LEAST,
+        le=SLIDING_MOST,
+        description="impact speed of the restitution; faster impacts lose more; none: all alike",
+    )
     speed_floor: Velocity | None = Field(
         default=None,
         ge=SLIDING_LEAST,
@@ -267,6 +290,16 @@ class Contact(Part):
             faults.append(
                 f"damping = {self.damping:g} N s/m is for the law kelvin-voigt; remove it, the law "
                 f"'{self.law}' takes its loss from restitution"
+            )
+        if self.law == "kelvin-voigt" and self.restitution_speed is not None:
+            faults.append(
+                f"restitution_speed = {self.restitution_speed:g} m/s is for the hysteresis laws; "
+                "remove it, or choose another law"
+            )
+        if self.restitution_speed is not None and self.speed_floor is not None:
+            faults.append(
+                f"speed_floor = {self.speed_floor:g} m/s has no use with restitution_speed, which "
+                "is the law's speed at every impact; remove one of them"
             )
         if self.law == "carvalho-martins" and (self.restitution or 1) < 1 / 3:
             faults.append(

@@ -19,6 +19,7 @@ from .oil import Oil
 from .parts import (
     ANGLE_MOST,
     DAMPING_MOST,
+    FORCE_MOST,
     GAIN_LEAST,
     GAIN_MOST,
     GRAVITY_MOST,
@@ -56,7 +57,6 @@ from .parts import (
     name_faults,
 )
 
-_FORCE_MOST = 1e9  # N
 _MOMENT_MOST = 1e9  # N m
 _UNBALANCE_MOST = 1e6  # kg m
 _MODULUS_LEAST, _MODULUS_MOST = 1e8, 1e13  # Pa, from rubber to beyond diamond
@@ -73,7 +73,7 @@ _Station = Annotated[Length, Field(ge=0, le=LONGEST)]
 _Height = Annotated[Length, Field(ge=-1.0, le=1.0)]
 _Slope = Annotated[Angle, Field(ge=-_STEEPEST, le=_STEEPEST)]
 _Phase = Annotated[Angle, Field(ge=-ANGLE_MOST, le=ANGLE_MOST)]
-_Load = Annotated[Force, Field(ge=-_FORCE_MOST, le=_FORCE_MOST)]
+_Load = Annotated[Force, Field(ge=-FORCE_MOST, le=FORCE_MOST)]
 _Turning = Annotated[Moment, Field(ge=-_MOMENT_MOST, le=_MOMENT_MOST)]
 _Name = Annotated[str, Field(min_length=1, max_length=NAME_LONGEST)]
 
@@ -168,7 +168,7 @@ class ShaftDisc(Part):
     entrained_diametral: Inertia = Field(
         default=0.0, ge=0, le=INERTIA_MOST, description="inertia of that water about a diameter"
     )
-    buoyancy: Force = Field(default=0.0, ge=0, le=_FORCE_MOST, description="lift of the water")
+    buoyancy: Force = Field(default=0.0, ge=0, le=FORCE_MOST, description="lift of the water")
     unbalance: Unbalance = Field(
         default=0.0, ge=0, le=_UNBALANCE_MOST, description="mass times eccentricity"
     )
@@ -210,7 +210,7 @@ class AlignmentLimits(Part):
     """What a bearing may carry, and how far it may be moved; see where each is from in `source`."""
 
     least_load: Force = Field(
-        default=0.0, ge=0, le=_FORCE_MOST, description="below which the bearing counts as unloaded"
+        default=0.0, ge=0, le=FORCE_MOST, description="below which the bearing counts as unloaded"
     )
     most_pressure: Pressure | None = Field(
         default=None, gt=0, le=PRESSURE_MOST, description="load over length times diameter"
@@ -328,7 +328,7 @@ class Propeller(Part):
     disc: _Name = Field(description="name of the disc that is the propeller")
     blades: int = Field(ge=1, le=_MOST_BLADES, description="number of blades")
     diameter: Length = Field(gt=0, le=LONGEST, description="of the blade tips")
-    thrust: Force = Field(ge=0, le=_FORCE_MOST, description="forward")
+    thrust: Force = Field(ge=0, le=FORCE_MOST, description="forward")
     thrust_height: _Height = Field(
         default=0.0, description="of the thrust's line of action above the shaft"
     )
@@ -379,7 +379,7 @@ class Turbulence(Part):
     """
 
     place: _Name = Field(description="name of a disc or of a bearing, whose housing it pushes")
-    force: Force = Field(ge=0, le=_FORCE_MOST, description="rms over all frequencies")
+    force: Force = Field(ge=0, le=FORCE_MOST, description="rms over all frequencies")
     corner: Frequency = Field(gt=0, le=1e6, description="above which the force falls")
 
 
