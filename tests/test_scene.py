@@ -274,6 +274,17 @@ def test_unknown_scene_and_machine_name_the_nearest():
         ({"wear.as_new_diametral": "0.2 mm"}, "must rise strictly"),
         ({"sensors.1.name": "acc_x"}, "'acc_x' is given 2 times"),
         ({"casing.modes.2.shape.bearing_z": 0.1}, "casing.modes.2.shape.bearing_z is no place"),
+        ({f"{CRANKPIN}.restitution_speed": 0.3}, "restitution_speed = 0.3 m/s is for the hyster"),
+        (
+            {
+                f"{CRANKPIN}.law": "exact",
+                f"{CRANKPIN}.damping": 0.0,
+                f"{CRANKPIN}.restitution": 0.3,
+                f"{CRANKPIN}.restitution_speed": 0.3,
+                f"{CRANKPIN}.speed_floor": 0.1,
+            },
+            "speed_floor = 0.1 m/s has no use with restitution_speed",
+        ),
         ({"rod.mass": math.inf}, "rod.mass = inf kg"),
         ({"rod.mass": "1e999 kg"}, "rod.mass = inf kg"),
     ],
