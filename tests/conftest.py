@@ -1,9 +1,10 @@
 """Fixtures shared by all tests."""
 
 import fcntl
+import gc
 import os
 import pickle
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +32,17 @@ DEAR = (
 )
 """Files of the longest tests: begun first, so that no process is left alone with one of them. The
 first ones ask for no model, which one process makes while the others wait."""
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection() -> Generator[None, object, object]:
+    """Half a million objects of modules stay: the garbage collector need not look at them."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.enable()
+        gc.freeze()
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:

@@ -10,7 +10,7 @@ from wearstate.diagnose.feature_rows.feature_rank import (
     LEAST_OF_MACHINE,
     rank_features,
 )
-from wearstate.diagnose.feature_rows.feature_table import choice_of, feature_table
+from wearstate.diagnose.feature_rows.feature_table import USUAL
 from wearstate.diagnose.inspect.rank_text import rank_set, value_images
 
 from .test_cli import refused, run, strict
@@ -181,12 +181,11 @@ def test_what_cannot_be_ranked_is_refused(small_set, tmp_path):
     refused("features", small_set, says=["DATA and --rank"])
 
 
-def test_records_without_a_label_are_left_out(small_set):
-    choice = choice_of("standard", [])
-    table = feature_table(small_set, choice=choice)
+def test_records_without_a_label_are_left_out(small_set, small_trained):
+    _, table, _ = small_trained
     severity = "diametral_clearance_crankpin_m"
     blank = table.manifest.assign(**{severity: table.manifest[severity].where(lambda v: v > 1e-4)})
-    found = rank_set(small_set, replace(table, manifest=blank), choice)
+    found = rank_set(small_set, replace(table, manifest=blank), USUAL)
     assert found.ranking.n_records == (table.manifest[severity] > 1e-4).sum()
     assert found.ranking.features[0].information > found.ranking.chance
     assert len(value_images(found)) == 6

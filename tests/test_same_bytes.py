@@ -10,7 +10,7 @@ COMMANDS = """
 simulate bilge-pump --set duration=0.6 -o one.h5 --truth --plot one.svg
 simulate bilge-pump --set duration=0.6 --plot one.pdf
 generate bilge-pump-small -n 24 -o data.h5 -j 1
-splits data.h5 --defaults
+splits data.h5 --defaults --force
 recipe preview bilge-pump-small -n 20 -j 1 --plot draws.svg
 features data.h5 -o table.csv -j 1
 features data.h5 -o table.parquet -j 1
@@ -19,7 +19,7 @@ export data.h5 -o copy.h5 --compress
 export data.h5 -o copy.npz
 export data.h5 -o copy.parquet --signals
 export data.h5 --as wav -o wav
-import wav/000000.wav wav/000001.wav --unit m/s2 -o measured.h5
+import wav/00000000.wav wav/00000001.wav --unit m/s2 -o measured.h5
 info data.h5 --card card.html
 info data.h5 --card card.md
 info one.h5 --plot sheet.svg
@@ -44,9 +44,10 @@ import shlex, sys
 from wearstate.diagnose.command_line.cli import cli
 for line in sys.stdin.read().strip().splitlines():
     try:
-        cli.main(shlex.split(line), standalone_mode=False)
+        code = cli.main(shlex.split(line), standalone_mode=False)  # of a refusal it is returned
     except SystemExit as end:
-        assert not end.code, (line, end.code)
+        code = end.code
+    assert not code, (line, code)
 """
 
 
