@@ -260,6 +260,23 @@ def test_doubt_about_something_cheaper_is_said():
     assert told in chart.conclusion[-1]
 
 
+def test_rungs_that_are_too_coarse_are_said_whatever_comes_of_the_numerics():
+    rungs_off = candidate(0.02, 0.4, "beyond", "force_peak is off by 40.00%", film="map", mesh="x1")
+    doubt = candidate(0.015, 0.02, "doubtful", "peak is off by 2.00%", film="map", mesh="x2")
+    fine = candidate(0.1, 0.0, film="map", mesh="x1/2")
+    found = replace(
+        study_of(SHORT),
+        kept=answer_of(doubt, reference=fine, status="unresolvable"),
+        raised=answer_of(rungs_off, written=rungs_off),
+    )
+    kept = chart_of(load_scene("journal-bearing", {"duration": "0.5 s"}), found).choices[0].sentence
+    assert "or less accuracy would show it. Your rungs are too coarse whatever" in kept
+    resolved = replace(found, kept=answer_of(HERE_POINT, reference=fine))
+    kept = chart_of(load_scene("journal-bearing", {"duration": "0.5 s"}), resolved).choices[0]
+    assert "your numerics are fine" in kept.sentence
+    assert "but your rungs are not: their error stays, 40 %" in kept.sentence
+
+
 def test_an_order_near_none_is_not_extrapolated_from():
     # of theory: Richardson leaves d / (2^p - 1)
     assert remaining_error(convergence()) == pytest.approx(0.001 / 3)

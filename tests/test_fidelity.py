@@ -8,10 +8,19 @@ from numpy.testing import assert_allclose
 from wearstate.datasets.generation.machines import known_of
 from wearstate.datasets.generation.quantities import resolved, with_estimate
 from wearstate.diagnose.charts.of_scene import chart_of
+from wearstate.diagnose.charts.words import percent
 from wearstate.sim.fidelity import pilot as pilot_runs
 from wearstate.sim.fidelity.choose import resolve, resolved_scene
 from wearstate.sim.fidelity.ladder import cost_of, effects_of
-from wearstate.sim.fidelity.pilot import Difference, Outcome, Pilot, differences
+from wearstate.sim.fidelity.pilot import (
+    Candidate,
+    Difference,
+    Outcome,
+    Pilot,
+    differences,
+    starts_to_tell,
+    surely_within,
+)
 from wearstate.sim.fidelity.study import Search, study
 from wearstate.sim.machine.simulate import recorder, simulate
 from wearstate.sim.output.status import SimulationError
@@ -514,6 +523,62 @@ def test_the_reference_is_no_recommendation_for_want_of_time():
                 assert "there is no answer yet" in choice.sentence
                 assert (choice.block, choice.options) == ("", "")
     assert "no answer yet" in statuses
+
+
+def test_without_the_time_to_tell_the_least_unsure_is_said_with_its_certainty():
+    """Steps that only scatter: none is shown to do, none to be off."""
+    kept = ["crankpin", "wristpin", "guide", "pressure", "drive"]
+    pilot = KnownPilot({}, scatter=0.15)
+    found = study(
+        pilot.scene, pilot.quantities, accuracy=0.02, pinned=kept, pilot=pilot, late=late_after(30)
+    )
+    chosen, reference = found.kept.chosen, found.kept.reference
+    assert chosen.error > found.accuracy  # else there is nothing to test: other starts
+    assert (found.kept.status, chosen.verdict) == ("so far", "doubtful")
+    assert chosen.cost < reference.cost
+    bounds = [surely_within(c) for c in found.kept.candidates if c.cost < reference.cost]
+    assert surely_within(chosen) <= 1.5 * min(bounds)
+    cheaper = [surely_within(c) for c in found.kept.candidates if c.cost < chosen.cost]
+    assert all(bound > 1.5 * min(bounds) for bound in cheaper)
+    [choice] = chart_of(pilot.scene, found).choices
+    assert choice.status == "so far"
+    sure = percent(surely_within(chosen))
+    assert f"may be enough, not certain yet: surely within {sure} (95 in 100)" in choice.sentence
+    assert "is the safe choice" in choice.sentence
+
+
+def test_the_sure_bound_is_that_of_students_distribution():
+    """Of samples of six starts with a known error, 2.5 per cent have a bound below it."""
+    rng, held, many = np.random.default_rng(5), 0, 4000
+    for sample in 101 + rng.standard_normal((many, 6)):
+        own = [{"one": (value, "absolute", 100.0)} for value in sample]
+        other = [{"one": (100.0, "absolute", 100.0)}] * 6
+        found = Candidate(
+            rungs={}, values={}, cost=1.0, differences=differences(own, other), starts=6
+        )
+        held += surely_within(found) >= 0.01
+    assert abs(held / many - 0.975) < 3 * math.sqrt(0.975 * 0.025 / many)
+
+
+def test_the_sure_bound_is_wider_for_the_worst_of_many():
+    one = Difference(mean=0.01, standard_error=0.002)
+    bounds = [
+        surely_within(
+            Candidate(
+                rungs={}, values={}, cost=1.0, differences={str(i): one for i in range(n)}, starts=6
+            )
+        )
+        for n in (1, 14)
+    ]
+    # 0.975 and 1 - 0.025 / 14 of Student's distribution with 5 degrees of freedom
+    assert_allclose(bounds, [0.01 + 0.002 * 2.5706, 0.01 + 0.002 * 5.1645], rtol=1e-3)
+
+
+def test_starts_to_tell_go_with_the_square_of_the_scatter():
+    for ratio, starts in ((0.5, 8), (1.0, 8), (2.0, 32), (3.0, 72)):
+        scatter = {"one": Difference(mean=0.0, standard_error=ratio * 0.03 / 3)}
+        found = Candidate(rungs={}, values={}, cost=1.0, differences=scatter, starts=8)
+        assert starts_to_tell(found, 0.03) == starts
 
 
 @pytest.mark.parametrize("runs", [0, 1, 5, 20, 60, 150])

@@ -16,7 +16,7 @@ from ...datasets.generation.machines import known_of
 from ...datasets.generation.quantities import quantity_label
 from ...datasets.workers.local import in_order
 from ...sim.fidelity.choose import estimated_error
-from ...sim.fidelity.pilot import Candidate, Outcome, Pilot
+from ...sim.fidelity.pilot import Candidate, Outcome, Pilot, starts_to_tell, surely_within
 from ...sim.fidelity.study import Answer, Search, Study
 from ...sim.scene.parts import Scene
 from ..pages.kept import Kept
@@ -409,9 +409,12 @@ def _sentence(
     certain = _certainty(scene, found, answer, status)
     if answer is found.kept and _rungs_too_coarse(found):
         left = error_words(cast(Candidate, found.whole.written), scene)
-        if name == HERE:
+        if name == HERE and status == "resolved":
             what = "your numerics are fine"
-        certain += f", but your rungs are not: their error stays, {left}"
+        if name == HERE and status == "resolved":
+            certain += f", but your rungs are not: their error stays, {left}"
+        else:
+            certain += f". Your rungs are too coarse whatever their numerics: {left}"
     elif name != HERE and _enough(answer.written):
         spare = (
             f"to run faster, {what}" if is_faster(chosen.seconds, own) else f"{name} would do too"
@@ -443,9 +446,10 @@ def _enough(own: Candidate | None) -> bool:
 def _certainty(scene: Scene, found: Study, answer: Answer, status: str) -> str:
     doubted = answer.doubted
     if status == "so far":
-        sure = answer.chosen.verdict != "doubtful"
-        word = "is enough" if sure else "looks enough, not certain yet"
-        return f"; so far this {word}: {found.measured} of {found.planned} combinations measured"
+        measured = f"{found.measured} of {found.planned} combinations measured"
+        if answer.chosen.verdict != "doubtful":
+            return f"; so far this is enough: {measured}"
+        return f"; so far this {_likelihood(found, answer)}; {measured}"
     if status == "unresolvable" and doubted:
         name = combination_words(doubted[0], found.written)
         return (
@@ -454,6 +458,32 @@ def _certainty(scene: Scene, found: Study, answer: Answer, status: str) -> str:
             "duration, more settling_revolutions or less accuracy would show it"
         )
     return ""
+
+
+def _likelihood(found: Study, answer: Answer) -> str:
+    """How sure it is that a choice of few starts is enough, and what it takes to know."""
+    chosen = answer.chosen
+    word = "looks enough" if chosen.error <= found.accuracy else "may be enough"
+    most, needed = surely_within(chosen), starts_to_tell(chosen, found.accuracy)
+    known = f"surely within {percent(most)} (95 in 100)" if most < 1 else "nothing is sure yet"
+    text = f"{word}, not certain yet: {known} after {chosen.starts} starts"
+    seconds = (needed - chosen.starts) * (chosen.seconds + answer.reference.seconds)
+    if needed > chosen.starts and math.isfinite(seconds):
+        text += f". To tell takes some {needed} starts, {_time_words(seconds)} more of one core"
+    if chosen.error > found.accuracy:
+        safe = combination_words(answer.reference, found.written)
+        own = math.nan if answer.written is None else answer.written.seconds
+        text += f"; {safe} is the safe choice, {faster_words(answer.reference.seconds, own)}"
+    return text
+
+
+def _time_words(seconds: float) -> str:
+    if seconds < _MINUTE:
+        return f"{float(f'{seconds:.2g}'):g} s"
+    return f"{float(f'{seconds / _MINUTE:.2g}'):g} min"
+
+
+_MINUTE = 60.0
 
 
 def _commented(scene: Scene, found: Study, answer: Answer) -> str:

@@ -450,6 +450,54 @@ def _judgement(found: Mapping[str, Difference], starts: int, accuracy: float) ->
     return "within" if close and enough and scatter <= RESOLVED * accuracy else "more"
 
 
+def surely_within(candidate: Candidate) -> float:
+    """Error that no quantity of a candidate exceeds, with 95 per cent confidence [-].
+
+    Parameters
+    ----------
+    candidate : Candidate
+
+    Returns
+    -------
+    float
+        By Student's distribution of the starts, Bonferroni's share of the doubt to each quantity;
+        infinite of fewer than two starts, or where nothing could be run.
+
+    Examples
+    --------
+    >>> told = {"rms": Difference(mean=0.01, standard_error=0.002)}
+    >>> one = Candidate(rungs={}, values={}, cost=1.0, differences=told, starts=16)
+    >>> round(surely_within(one), 4)
+    0.0143
+    """
+    if candidate.starts < _FEWEST or not candidate.differences:
+        return math.inf
+    doubt = _DOUBT / 2 / len(candidate.differences)
+    factor = float(stdtrit(candidate.starts - 1, 1 - doubt))
+    return max(d.error + factor * d.standard_error for d in candidate.differences.values())
+
+
+_FEWEST = 2
+_DOUBT = 0.05
+
+
+def starts_to_tell(candidate: Candidate, accuracy: float) -> int:
+    """Starts that would bring the scatter of a candidate down to what a judgement needs.
+
+    Examples
+    --------
+    >>> told = {"rms": Difference(mean=0.01, standard_error=0.02)}
+    >>> one = Candidate(rungs={}, values={}, cost=1.0, differences=told, starts=4)
+    >>> starts_to_tell(one, 0.03)
+    16
+    """
+    ratio = candidate.standard_error / (RESOLVED * accuracy)
+    return math.ceil(candidate.starts * max(ratio, 1.0) ** 2 - _ROUNDING)
+
+
+_ROUNDING = 1e-9
+
+
 class Comparison:
     """Judges combinations of rungs against the best of them, with as few starts as tell.
 

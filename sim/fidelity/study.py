@@ -39,6 +39,7 @@ from .pilot import (
     Quantities,
     differences,
     names,
+    surely_within,
 )
 
 _CAPS = (4, 16)  # starts of the first rounds; the last takes as many as the accuracy wants
@@ -48,6 +49,7 @@ _LEVELS_SHOWN = 3
 _SPARED = 1.5  # a predicted error up to this factor behind the front is run: sums are guesses
 _SHORTLIST = 2  # predicted combinations that are measured before the search goes on
 _SAME = 1e-9  # of two values
+_NO_BOUND = 1.0  # an error that may be as large as the quantity itself is none known
 _DEAR = 0.8  # s by the tables: a run of the reference that takes more is cut, where it may be
 
 
@@ -113,7 +115,8 @@ class Answer:
         The scene as it is written; None where it has not been measured.
     chosen : Candidate
         Cheapest that is within the accuracy, by the tables; the reference where nothing else is.
-        Of a search that was ended before, the cheapest that may be, for all that is known.
+        Of a search that was ended before, the cheapest that may be, for all that is known, or
+        else the cheapest of those that are surely off by the least.
     status : str
         ``resolved``; ``so far`` where the search was ended before; ``unresolvable`` where
         something cheaper could not be told from the reference for scatter; ``not converged``.
@@ -655,6 +658,8 @@ class Search:
         sure = [c for c in judged if c.verdict == "within"]
         likely = sure if status != "so far" else [c for c in judged if self._likely(c)]
         chosen = next(iter(likely), reference)
+        if status == "so far" and dict(chosen.rungs) == top:
+            chosen = _best_bet(judged, reference) or reference
         doubted = [c for c in comparison.doubted() if c.cost < chosen.cost]
         own = comparison.known(self.written)
         return Answer(
@@ -732,6 +737,14 @@ def study(
     search = Search(scene, quantities, accuracy=accuracy, pinned=pinned, starts=starts, pilot=pilot)
     search.measure(late)
     return search.found()
+
+
+def _best_bet(judged: Sequence[Candidate], reference: Candidate) -> Candidate | None:
+    """Of what is cheaper and not surely off, the cheapest that is sure of little error."""
+    open_ = [c for c in judged if c.verdict == "doubtful" and c.cost < reference.cost]
+    least = min(map(surely_within, open_), default=math.inf)
+    most = min(_SPARED * least, _NO_BOUND)  # bounds of few starts scatter themselves
+    return min((c for c in open_ if surely_within(c) <= most), key=lambda c: c.cost, default=None)
 
 
 def _by_cost(comparison: Comparison, kept: Mapping[str, list[Rung]]) -> list[dict[str, Rung]]:
