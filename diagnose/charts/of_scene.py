@@ -357,9 +357,8 @@ def _scatter(chosen: Candidate) -> float:
 
 
 def _status(found: Study, answer: Answer) -> str:
-    if any(
-        not each.converged or remaining_error(each) > found.accuracy for each in answer.convergence
-    ):
+    most = max([answer.left, *map(remaining_error, answer.convergence)])
+    if most > found.accuracy:
         return "not converged"
     if answer.status == "so far" and _by_default(answer) and answer.changes:
         return "no answer yet"
@@ -405,6 +404,8 @@ def _sentence(
     errs = error_words(chosen, scene, found.accuracy)
     if _by_default(answer):
         errs = f"nothing cheaper {'looks' if status == 'so far' else 'is'} within {asked}"
+    if answer.left:
+        errs += f", the reference itself up to {percent(answer.left)}, both within {asked}"
     faster = "" if name == HERE else f", {faster_words(chosen.seconds, own)}"
     certain = _certainty(scene, found, answer, status)
     if answer is found.kept and _rungs_too_coarse(found):

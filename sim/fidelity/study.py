@@ -20,6 +20,7 @@ from .choose import (
     checked_accuracy,
     combinations,
     descent,
+    estimated_error,
     free_effects,
     largest_sum,
     reference_cost,
@@ -119,7 +120,8 @@ class Answer:
         else the cheapest of those that are surely off by the least.
     status : str
         ``resolved``; ``so far`` where the search was ended before; ``unresolvable`` where
-        something cheaper could not be told from the reference for scatter; ``not converged``.
+        something cheaper could not be told from the reference for scatter; ``not converged``
+        where the reference itself is off by more than the accuracy.
     candidates : tuple of Candidate
         All that were measured, cheapest first.
     convergence : tuple of Convergence
@@ -135,6 +137,11 @@ class Answer:
     candidates: tuple[Candidate, ...]
     convergence: tuple[Convergence, ...]
     changes: Mapping[str, Any]
+
+    @property
+    def left(self) -> float:
+        """Error of the reference itself, of the effects that have not converged [-]."""
+        return unconverged(self.convergence)
 
     @property
     def doubted(self) -> tuple[Candidate, ...]:
@@ -449,6 +456,7 @@ class Search:
     def _compare(self, best: Comparison, cap: float) -> None:
         self.tell("the scene as written against the best rungs")
         best.judge(self.written)
+        best.judge({**best.top, **{n: r for n, r in self.written.items() if n in self.numerical}})
         for rungs in self._shortlist(best):
             if best.judge(rungs).verdict == "within":
                 break
@@ -654,9 +662,12 @@ class Search:
             (c for c in judged if dict(c.rungs) == top),
             self._with_seconds(comparison.reference()),
         )
-        status = self._answer_status(comparison)
-        sure = [c for c in judged if c.verdict == "within"]
-        likely = sure if status != "so far" else [c for c in judged if self._likely(c)]
+        convergence = tuple(self._convergence.get(id(comparison), ()))
+        left = unconverged(convergence)
+        status = self._answer_status(comparison, left)
+        unsure = ("within", "doubtful") if status == "so far" else ("within",)
+        room = max(self.accuracy - left, 0.0)  # what the reference is off by counts as well
+        likely = [c for c in judged if c.verdict in unsure and self._fits(c, room)]
         chosen = next(iter(likely), reference)
         if status == "so far" and dict(chosen.rungs) == top:
             chosen = _best_bet(judged, reference) or reference
@@ -668,18 +679,18 @@ class Search:
             chosen=chosen,
             status="unresolvable" if doubted and status == "resolved" else status,
             candidates=tuple(judged),
-            convergence=tuple(self._convergence.get(id(comparison), ())),
+            convergence=convergence,
             changes=self._changes(chosen),
         )
 
-    def _likely(self, candidate: Candidate) -> bool:
-        """Whether a candidate may be within the accuracy, for all that is known."""
+    def _fits(self, candidate: Candidate, room: float) -> bool:
+        """Whether a candidate is within what the reference leaves of the accuracy."""
         if candidate.verdict == "doubtful":
-            return candidate.error <= self.accuracy
-        return candidate.verdict == "within"
+            return candidate.error <= room
+        return room == self.accuracy or estimated_error(candidate) <= room
 
-    def _answer_status(self, comparison: Comparison) -> str:
-        if not all(each.converged for each in self._convergence.get(id(comparison), ())):
+    def _answer_status(self, comparison: Comparison, left: float) -> str:
+        if left > self.accuracy:
             return "not converged"
         if id(comparison) not in self._done:
             return "so far"
@@ -688,7 +699,7 @@ class Search:
     def _status(self, answer: Answer) -> str:
         if not self._complete:
             return "out of budget"
-        if answer.status == "not converged":
+        if unconverged(answer.convergence):
             return "not converged"
         doubtful = any(each.verdict == "doubtful" for each in answer.candidates)
         return "unresolvable" if doubtful else "resolved"
@@ -704,6 +715,15 @@ class Search:
 
     def _with_seconds(self, candidate: Candidate) -> Candidate:
         return replace(candidate, seconds=self.pilot.seconds(candidate.values))
+
+
+def unconverged(levels: Sequence[Convergence]) -> float:
+    """Error that effects which have not converged leave in a reference, all together [-].
+
+    Infinite where changes do not shrink from level to level: the last of them bounds nothing.
+    """
+    open_ = [each for each in levels if not each.converged]
+    return sum(e.remaining if math.isfinite(e.order) else math.inf for e in open_)
 
 
 def study(
