@@ -54,7 +54,11 @@ def words(artist):
     return [] if artist is None else [text.get_text() for text in artist.findobj(Text)]
 
 
-def hostile_recording(name):
+THIRDS = [list(HOSTILE.values())[i::3] for i in range(3)]
+
+
+def hostile_recording(name, *others):
+    """Acceleration, force, orbit and tacho of one name, accelerations of others."""
     fs, rng = 8192.0, np.random.default_rng(5)
     t = np.arange(round(4 * fs)) / fs
     force, acc = rng.standard_normal((2, t.size))
@@ -64,6 +68,7 @@ def hostile_recording(name):
         f"{name} x": ("m", "displacement", 3e-5 * np.cos(40 * np.pi * t)),
         f"{name} y": ("m", "displacement", 2e-5 * np.sin(40 * np.pi * t)),
         "tacho": ("V", "tacho", np.where(20 * t % 1 < 0.1, 5.0, 0.0)),
+        **{f"{other} 1": ("m/s2", "acceleration", acc) for other in others},
     }
     channels = tuple(
         Channel(name=key, unit=unit, quantity=quantity, place="")
@@ -86,16 +91,16 @@ def test_a_sheet_of_every_kind_takes_a_dollar():
     drawn(made.figure)
 
 
-@pytest.mark.parametrize("name", HOSTILE.values(), ids=HOSTILE)
-def test_a_spectrum_names_any_channel_in_its_legend(name):
-    made = plot_recording(View(recording=hostile_recording(name)), "spectrum")
+@pytest.mark.parametrize("names", THIRDS)
+def test_a_spectrum_names_any_channel_in_its_legend(names):
+    made = plot_recording(View(recording=hostile_recording(*names)), "spectrum")
     drawn(made.figure)
     told = [word for axes in made.figure.findobj(Axes) for word in words(axes.get_legend())]
-    whole = visible(short_name(f"{name} 1")).replace("加速度", "\ufffd" * 3)
-    assert whole in told
+    for name in names:
+        assert visible(short_name(f"{name} 1")).replace("加速度", "\ufffd" * 3) in told
 
 
-@pytest.mark.parametrize("names", [list(HOSTILE.values())[i::3] for i in range(3)])
+@pytest.mark.parametrize("names", THIRDS)
 def test_the_alignment_takes_any_name(names):
     scene = load_scene("propulsion-shaft", {"bearings.2.sag": 1.6e-3})
     found = align(scene, condition="cold", jack=scene.bearings[4].name)
