@@ -264,8 +264,9 @@ def test_rungs_that_are_too_coarse_are_said_whatever_comes_of_the_numerics():
     rungs_off = candidate(0.02, 0.4, "beyond", "force_peak is off by 40.00%", film="map", mesh="x1")
     doubt = candidate(0.015, 0.02, "doubtful", "peak is off by 2.00%", film="map", mesh="x2")
     fine = candidate(0.1, 0.0, film="map", mesh="x1/2")
+    film = Raise(effect="film", written="map", best="direct", candidate=rungs_off)
     found = replace(
-        study_of(SHORT),
+        study_of(SHORT, raises=(film,)),
         kept=answer_of(doubt, reference=fine, status="unresolvable"),
         raised=answer_of(rungs_off, written=rungs_off),
     )
@@ -275,6 +276,10 @@ def test_rungs_that_are_too_coarse_are_said_whatever_comes_of_the_numerics():
     kept = chart_of(load_scene("journal-bearing", {"duration": "0.5 s"}), resolved).choices[0]
     assert "your numerics are fine" in kept.sentence
     assert "but your rungs are not: their error stays, 40 %" in kept.sentence
+    # the best rungs already: what is off is the mesh
+    best = replace(found, raises=())
+    kept = chart_of(load_scene("journal-bearing", {"duration": "0.5 s"}), best).choices[0].sentence
+    assert "rungs are" not in kept
 
 
 def test_an_order_near_none_is_not_extrapolated_from():
@@ -604,6 +609,18 @@ def test_a_cut_run_is_timed_as_a_whole_one_and_said_to_be_cut():
     assert cut.choices[0].own_seconds == pytest.approx(4 * whole.choices[0].own_seconds)
     assert "0.5 s a run, cut from 3.2 s" in cut.note
     assert "cut" not in whole.note
+
+
+def test_an_unfinished_chart_says_what_is_left():
+    found = replace(study_of(SHORT, status="out of budget"), seconds_left=754.0)
+    chart = chart_of(load_scene("journal-bearing", {"duration": "0.5 s"}), found)
+    assert chart_table(chart)["left"] == "at least 13 min more of one core"
+    assert "so far: 5 of 9 combinations measured; the rest takes at least 13 min" in chart_text(
+        chart
+    )
+    assert "The rest takes at least 13 min more of one core." in chart_html(chart)
+    untimed = replace(found, seconds_left=math.nan)
+    assert chart_of(load_scene("journal-bearing", {"duration": "0.5 s"}), untimed).left == ""
 
 
 def test_time_of_a_run_is_foretold_from_others_by_the_tables():

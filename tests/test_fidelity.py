@@ -585,6 +585,30 @@ def test_the_best_rungs_with_the_numerics_as_written_are_known_as_soon_as_the_be
     assert {**own.reference.rungs, "step": "x2"} in [dict(c.rungs) for c in own.candidates]
 
 
+@pytest.mark.parametrize("runs", [16, 60])
+def test_what_a_cut_search_still_takes_at_least_is_foretold(runs):
+    """By the starts that the scatter seen so far asks for: a sixth of what it takes, or more."""
+
+    class Costed(KnownPilot):
+        cost = 0.0
+
+        def _run(self, values, start):
+            self.cost += cost_of(with_values(self.scene, values))
+            return super()._run(values, start)
+
+    kept = ["crankpin", "wristpin", "guide", "pressure", "drive"]
+    pilot = Costed({}, scatter=0.03, step_error=0.0005)
+    pilot.scene = load_scene("bilge-pump", {"duration": "0.4 s"})
+    search = Search(pilot.scene, pilot.quantities, accuracy=0.02, pinned=kept, pilot=pilot)
+    search.measure(late_after(runs))
+    foretold, spent = search.remaining(), pilot.cost
+    assert search.found().status == "out of budget"
+    search.measure()
+    assert 1 / 6 < foretold / (pilot.cost - spent) <= 1
+    assert search.remaining() == 0.0
+    assert search.found().seconds_left == 0.0
+
+
 def test_the_sure_bound_is_that_of_students_distribution():
     """Of samples of six starts with a known error, 2.5 per cent have a bound below it."""
     rng, held, many = np.random.default_rng(5), 0, 4000

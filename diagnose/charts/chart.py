@@ -210,6 +210,8 @@ class Chart:
         Quantity -> words and unit; a quantity that has none stands for itself.
     measured, planned : int
         Points measured, of those of interest; 0 of 0 where nothing was left out.
+    left : str
+        What an unfinished search still takes, in words; empty where that is not known.
     subject : str
         ``scene``, or ``recipe`` where the errors are those of the verdict.
     """
@@ -234,6 +236,7 @@ class Chart:
     labels: Mapping[str, str] = field(default_factory=dict)
     measured: int = 0
     planned: int = 0
+    left: str = ""
     subject: str = "scene"
 
     @property
@@ -380,6 +383,7 @@ def chart_table(chart: Chart) -> dict[str, Any]:
         "quantities": dict(chart.labels),
         "measured_points": chart.measured,
         "planned_points": chart.planned,
+        "left": chart.left,
     }
 
 
@@ -480,7 +484,8 @@ def chart_text(chart: Chart) -> str:
     ):
         lines += ["", title, *(f"  {text}" for text in texts)] if texts else []
     if chart.unfinished and chart.planned:
-        lines += ["", f"so far: {chart.measured} of {chart.planned} combinations measured"]
+        left = f"; the rest takes {chart.left}" if chart.left else ""
+        lines += ["", f"so far: {chart.measured} of {chart.planned} combinations measured{left}"]
     return "\n".join([*lines, "", f"measured: {chart.note}"])
 
 

@@ -32,6 +32,7 @@ from .words import (
     percent,
     raise_words,
     rung_words,
+    time_words,
 )
 
 KEPT, RAISED = "your rungs kept", "rungs may change"
@@ -208,8 +209,16 @@ def chart_of(scene: Scene, found: Study) -> Chart:
         pruned=found.pruned,
         measured=found.measured,
         planned=found.planned,
+        left=_left_words(found),
         note=_note(scene, found),
     )
+
+
+def _left_words(found: Study) -> str:
+    """What an unfinished search still takes; empty where that is not known."""
+    if found.status != "out of budget" or not found.seconds_left > 0:
+        return ""
+    return f"at least {time_words(found.seconds_left)} more of one core"
 
 
 def _note(scene: Scene, found: Study) -> str:
@@ -435,9 +444,13 @@ def _nearest(scene: Scene, found: Study, answer: Answer) -> str:
 
 
 def _rungs_too_coarse(found: Study) -> bool:
-    """Whether the scene as written surely misses the accuracy against the best rungs."""
+    """Whether the scene as written surely misses the accuracy for its rungs, not its numerics."""
     own = found.raised.written if found.raised else None
-    return own is not None and own.verdict == "beyond"
+    if own is None or own.verdict != "beyond" or not found.raises:
+        return False
+    numerics = found.kept.written
+    by_itself = any(each.candidate.verdict == "beyond" for each in found.raises)
+    return by_itself or numerics is None or numerics.verdict != "beyond"
 
 
 def _enough(own: Candidate | None) -> bool:
@@ -470,21 +483,12 @@ def _likelihood(found: Study, answer: Answer) -> str:
     text = f"{word}, not certain yet: {known} after {chosen.starts} starts"
     seconds = (needed - chosen.starts) * (chosen.seconds + answer.reference.seconds)
     if needed > chosen.starts and math.isfinite(seconds):
-        text += f". To tell takes some {needed} starts, {_time_words(seconds)} more of one core"
+        text += f". To tell takes some {needed} starts, {time_words(seconds)} more of one core"
     if chosen.error > found.accuracy:
         safe = combination_words(answer.reference, found.written)
         own = math.nan if answer.written is None else answer.written.seconds
         text += f"; {safe} is the safe choice, {faster_words(answer.reference.seconds, own)}"
     return text
-
-
-def _time_words(seconds: float) -> str:
-    if seconds < _MINUTE:
-        return f"{float(f'{seconds:.2g}'):g} s"
-    return f"{float(f'{seconds / _MINUTE:.2g}'):g} min"
-
-
-_MINUTE = 60.0
 
 
 def _commented(scene: Scene, found: Study, answer: Answer) -> str:

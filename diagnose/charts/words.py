@@ -196,6 +196,25 @@ def faster_words(seconds: float, own: float) -> str:
     return f"{1 / ratio:.2g} times the time of your scene"
 
 
+def time_words(seconds: float) -> str:
+    """A time with two digits.
+
+    Examples
+    --------
+    >>> time_words(12.34), time_words(754.0), time_words(36000.0)
+    ('12 s', '13 min', '10 h')
+    """
+    if seconds < _MINUTE:
+        return f"{float(f'{seconds:.2g}'):g} s"
+    if seconds < _HOURS * _MINUTE:
+        return f"{float(f'{seconds / _MINUTE:.2g}'):g} min"
+    return f"{float(f'{seconds / _MINUTE / _MINUTE:.2g}'):g} h"
+
+
+_MINUTE = 60.0
+_HOURS = 120.0  # min from which hours are told
+
+
 def is_faster(seconds: float, own: float) -> bool:
     """Whether a time is shorter than that of the scene as written by more than its scatter.
 

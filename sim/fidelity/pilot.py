@@ -285,6 +285,10 @@ class Pilot:
         told = [each.seconds for each in self._outcomes.get(_key(values), [])[:TIMED]]
         return min((each for each in told if math.isfinite(each)), default=math.nan)
 
+    def measured(self, tabulated: float) -> float:
+        """Time that so much by the tables takes here [s]; NaN where nothing was timed."""
+        return self._scale() * tabulated if self._scale() > 0 else math.nan
+
     def _has(self, values: Mapping[str, Any], start: int) -> bool:
         rows = self._outcomes.setdefault(_key(values), [])
         while len(rows) <= start and not (rows and rows[-1].fault):
@@ -321,10 +325,10 @@ class Pilot:
     def _scale(self) -> float:
         """Measured time for a tabulated second, as the combinations that ran tell; 0 of none."""
         told = [
-            each.seconds / self._tabulated[key]
+            each.seconds / self._cost(json.loads(key))
             for key, rows in self._outcomes.items()
             for each in rows[:1]
-            if math.isfinite(each.seconds) and self._tabulated.get(key, 0.0) > 0
+            if math.isfinite(each.seconds) and self._cost(json.loads(key)) > 0
         ]
         return float(np.median(told)) if told else 0.0
 

@@ -40,6 +40,7 @@ from .pilot import (
     Quantities,
     differences,
     names,
+    starts_to_tell,
     surely_within,
 )
 
@@ -50,6 +51,7 @@ _LEVELS_SHOWN = 3
 _SPARED = 1.5  # a predicted error up to this factor behind the front is run: sums are guesses
 _SHORTLIST = 2  # predicted combinations that are measured before the search goes on
 _SAME = 1e-9  # of two values
+_FEWEST = 2  # starts of a comparison
 _NO_BOUND = 1.0  # an error that may be as large as the quantity itself is none known
 _DEAR = 0.8  # s by the tables: a run of the reference that takes more is cut, where it may be
 
@@ -178,6 +180,8 @@ class Study:
         Length of the recording of each run, where it was cut [s].
     share : float
         Of the time that a run of the scene simulates: what each run did.
+    seconds_left : float
+        Of one core, that the known combinations still take [s]; NaN without a clock.
     """
 
     accuracy: float
@@ -192,6 +196,7 @@ class Study:
     status: str
     duration: float | None = None
     share: float = 1.0
+    seconds_left: float = math.nan
 
     @property
     def whole(self) -> Answer:
@@ -607,15 +612,30 @@ class Search:
         return (known, known) if self._complete else (told, known)
 
     def remaining(self) -> float:
-        """Seconds of runs that the known combinations still take, by the tables."""
+        """Seconds of runs that the known combinations still take at least, by the tables.
+
+        Combinations that come up on the way, and doubts near the accuracy, take more.
+        """
         whole = sum(self._remaining(each) for each in self._all() if id(each) not in self._done)
         return self.share * whole
 
     def _remaining(self, comparison: Comparison) -> float:
         singles = [{**comparison.top, n: r} for n, rungs in comparison.rungs.items() for r in rungs]
-        most = max((c.starts for c in comparison.judged()), default=_CAPS[0])
-        open_ = [r for r in singles if (c := comparison.known(r)) is None or not comparison.told(c)]
-        return most * sum(cost_of(with_values(self.scene, comparison.values(r))) for r in open_)
+        singles = [rungs for rungs in singles if names(rungs) != names(comparison.top)]
+        found = {names(rungs): (rungs, comparison.known(rungs)) for rungs in singles}
+        open_ = [(r, c) for r, c in found.values() if c is None or not comparison.told(c)]
+        done = max((c.starts for c in comparison.judged()), default=0)
+        needed = [self._needed(c, comparison.starts) for _, c in open_ if c is not None]
+        most, total = max([done, _FEWEST, *needed]), 0.0
+        for rungs, known in open_:  # of what has not run at all, as many as of the rest
+            more = most if known is None else self._needed(known, comparison.starts) - known.starts
+            total += more * cost_of(with_values(self.scene, comparison.values(rungs)))
+        return total + (most - done) * reference_cost(comparison) if open_ else 0.0
+
+    def _needed(self, candidate: Candidate, most: int) -> int:
+        """Starts that a doubt takes, which are doubled; twice as many at the least."""
+        ratio = max(starts_to_tell(candidate, self.accuracy) / candidate.starts, 2.0)
+        return max(min(most, candidate.starts << math.ceil(math.log2(ratio))), candidate.starts)
 
     def found(self) -> Study:
         """What has been measured so far; nothing is run."""
@@ -637,6 +657,7 @@ class Search:
             status=self._status(raised or kept),
             duration=self.duration,
             share=self.share,
+            seconds_left=0.0 if self._complete else self.pilot.measured(self.remaining()),
         )
 
     def _refused(self) -> Iterator[str]:
