@@ -33,10 +33,10 @@ warm > "$scratch/warm.log" 2>&1 & warm=$!
 # the lowest versions that pyproject.toml allows, the other the newest; each does the whole job.
 "$bin/python" -m build --wheel --outdir "$scratch" . > "$scratch/build.log" 2>&1 \
   || { cat "$scratch/build.log"; exit 1; }
-whole_job() {  # NAME RESOLUTION
+whole_job() {  # NAME RESOLUTION; lowest-direct makes low what -r names, and not what a wheel needs
   "$bin/uv" venv --quiet --python "$bin/python" "$scratch/$1" \
     && "$bin/uv" pip install --quiet --python "$scratch/$1/bin/python" --resolution "$2" \
-      "$scratch"/*.whl \
+      "$scratch"/*.whl -r pyproject.toml \
     && exec "$scratch/$1/bin/wearstate" demo --folder "$scratch/demo-$1" -j 1
 }
 whole_job lowest lowest-direct > "$scratch/lowest.log" 2>&1 & lowest=$!
@@ -54,6 +54,11 @@ ended newest "$newest"
   newest/bin/wearstate verify
 )
 ended lowest "$lowest"
+versions() {  # NAME
+  "$bin/uv" pip freeze --quiet --python "$scratch/$1/bin/python" | grep -i '^num'
+}
+[ "$(versions lowest)" != "$(versions newest)" ] \
+  || { echo "lowest and newest have the same libraries: $(versions lowest)"; exit 1; }
 
 # every process has a core already: threads would only wait for each other
 export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
