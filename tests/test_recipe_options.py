@@ -149,7 +149,7 @@ def test_standard_draws_what_a_pump_leaves_open():
         for name in ("contact_law", "elasticity", "pressure", "wristpin", "guide", "drive")
     }
     assert {name: len(options) for name, options in seen.items()} == {
-        "contact_law": 3,
+        "contact_law": 4,
         "elasticity": 2,
         "pressure": 2,
         "wristpin": 2,
