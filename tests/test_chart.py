@@ -282,6 +282,19 @@ def test_rungs_that_are_too_coarse_are_said_whatever_comes_of_the_numerics():
     assert "rungs are" not in kept
 
 
+def test_a_choice_that_is_not_surely_within_is_not_called_so_for_the_references_error():
+    doubt = candidate(0.015, 0.03, "doubtful", film="map", mesh="x2")
+    slow = convergence(steps=(0.012, 0.006), converged=False)  # leaves 0.2 % of the peak force
+    told = replace(answer_of(doubt, HERE_POINT, level=slow, status="so far"), chosen=doubt)
+    found = replace(study_of(status="out of budget"), raised=told)
+    said = chart_of(load_scene("journal-bearing", {"duration": "0.5 s"}), found).choices[-1]
+    assert "the reference itself up to 0.2 %" in said.sentence
+    assert "both within" not in said.sentence
+    sure = replace(found, raised=replace(told, chosen=HERE_POINT, status="resolved"))
+    said = chart_of(load_scene("journal-bearing", {"duration": "0.5 s"}), sure).choices[-1]
+    assert "the reference itself up to 0.2 %, both within 2 %" in said.sentence
+
+
 def test_an_order_near_none_is_not_extrapolated_from():
     # of theory: Richardson leaves d / (2^p - 1)
     assert remaining_error(convergence()) == pytest.approx(0.001 / 3)

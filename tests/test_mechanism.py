@@ -727,6 +727,16 @@ def test_slow_closings_are_counted():
     assert floored in (changes // 2, changes // 2 + changes % 2)  # every closing, no opening
 
 
+def test_a_constant_loss_has_no_floor_to_count():
+    pin = {"joint.crankpin.law": "exact", "joint.crankpin.damping": 0.0}
+    pin |= {"joint.crankpin.restitution": 0.3, "duration": "0.8 s"}
+    speed = {"joint.crankpin.restitution_speed": "10 m/s"}  # every closing is slower
+    told = [simulate(load_scene("bilge-pump", pin | more), seed=1).numerics for more in ({}, speed)]
+    assert "floored_share" in told[0]
+    assert told[0]["contact_changes"] > 0 < told[1]["contact_changes"]
+    assert not {"floored_share", "speed_floor_m_s"} & told[1].keys()
+
+
 def test_the_seal_takes_its_friction_over_both_strokes():
     """Work of a revolution without any other friction: pressure times area, and 4 r F of Coulomb's.
 

@@ -57,19 +57,20 @@ def words(artist):
 THIRDS = [list(HOSTILE.values())[i::3] for i in range(3)]
 
 
-def hostile_recording(name, *others):
-    """Acceleration, force, orbit and tacho of one name, accelerations of others."""
+def hostile_recording(*names):
+    """Acceleration, force and orbit of each name, and a tacho."""
     fs, rng = 8192.0, np.random.default_rng(5)
     t = np.arange(round(4 * fs)) / fs
     force, acc = rng.standard_normal((2, t.size))
-    rows = {
-        f"{name} 1": ("m/s2", "acceleration", acc + force),
-        f"{name} force": ("N", "force", force),
-        f"{name} x": ("m", "displacement", 3e-5 * np.cos(40 * np.pi * t)),
-        f"{name} y": ("m", "displacement", 2e-5 * np.sin(40 * np.pi * t)),
-        "tacho": ("V", "tacho", np.where(20 * t % 1 < 0.1, 5.0, 0.0)),
-        **{f"{other} 1": ("m/s2", "acceleration", acc) for other in others},
-    }
+    rows = {}
+    for name in names:
+        rows |= {
+            f"{name} 1": ("m/s2", "acceleration", acc + force),
+            f"{name} force": ("N", "force", force),
+            f"{name} x": ("m", "displacement", 3e-5 * np.cos(40 * np.pi * t)),
+            f"{name} y": ("m", "displacement", 2e-5 * np.sin(40 * np.pi * t)),
+        }
+    rows["tacho"] = ("V", "tacho", np.where(20 * t % 1 < 0.1, 5.0, 0.0))
     channels = tuple(
         Channel(name=key, unit=unit, quantity=quantity, place="")
         for key, (unit, quantity, _) in rows.items()
@@ -81,7 +82,7 @@ def hostile_recording(name, *others):
         tacho="tacho",
         pulses_per_revolution=1,
         row={},
-        source=f"{name}.h5[0]",
+        source=f"{names[0]}.h5[0]",
     )
 
 

@@ -414,14 +414,15 @@ def _sentence(
     if _by_default(answer):
         errs = f"nothing cheaper {'looks' if status == 'so far' else 'is'} within {asked}"
     if answer.left:
-        errs += f", the reference itself up to {percent(answer.left)}, both within {asked}"
+        both = chosen.verdict == "within" and not _by_default(answer)
+        errs += f", the reference itself up to {percent(answer.left)}"
+        errs += f", both within {asked}" if both else ""
     faster = "" if name == HERE else f", {faster_words(chosen.seconds, own)}"
     certain = _certainty(scene, found, answer, status)
     if answer is found.kept and _rungs_too_coarse(found):
         left = error_words(cast(Candidate, found.whole.written), scene)
         if name == HERE and status == "resolved":
             what = "your numerics are fine"
-        if name == HERE and status == "resolved":
             certain += f", but your rungs are not: their error stays, {left}"
         else:
             certain += f". Your rungs are too coarse whatever their numerics: {left}"

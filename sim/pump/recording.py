@@ -343,7 +343,7 @@ def _step_fault(scene: PumpScene, steps: float) -> str | None:
     return (
         f"the contact needs steps of {shortest * MOST_STEPS / steps:.3g} s, must be >= "
         f"{shortest:.3g} s, {MOST_STEPS} steps a sample; raise sample_rate, lower stiffness and "
-        "damping of the joints, or raise their speed_floor"
+        "damping of the joints, or raise their speed_floor or restitution_speed"
     )
 
 
@@ -358,7 +358,7 @@ def _size_fault(scene: PumpScene, steps: float) -> str | None:
         f"duration = {scene.duration:g} s at sample_rate = {scene.sample_rate:g} Hz with "
         f"{max(steps, FEWEST_STEPS):.0f} steps a sample needs {needed / 1e9:.3g} GB, must be <= "
         f"{_MEMORY / 1e9:g} GB; shorten duration or settling_revolutions, lower sample_rate, "
-        "lengthen numerics.step, or raise a joint's speed_floor"
+        "lengthen numerics.step, or raise a joint's speed_floor or restitution_speed"
     )
 
 
@@ -826,7 +826,7 @@ def _numerics(gathered: Gathering, run: CrankTally, lift: float) -> dict[str, fl
         "mean_speed_hz": gathered.mean_speed / (2 * math.pi),
     }
     rungs = [joint_rungs(scene, throw) for throw in range(len(scene.throws))]
-    if any(JOINT_COMPLIANT in row for row in rungs) and _has_hysteresis(scene):
+    if any(JOINT_COMPLIANT in row for row in rungs) and _has_floor(scene):
         closings = max(1, run.contact_changes // 2)
         numerics["floored_share"] = run.floored_closings / closings
         numerics["speed_floor_m_s"] = max(
@@ -871,9 +871,13 @@ def _film_numerics(
     }
 
 
-def _has_hysteresis(scene: PumpScene) -> bool:
+def _has_floor(scene: PumpScene) -> bool:
+    """Whether a contact law takes the speed of each impact, and so has a least one."""
     parts = (scene.joint.crankpin, scene.joint.wristpin, scene.joint.guide)
-    return any(part is not None and part.law != "kelvin-voigt" for part in parts)
+    return any(
+        part is not None and part.law != "kelvin-voigt" and part.restitution_speed is None
+        for part in parts
+    )
 
 
 def _warnings(numerics: dict[str, float | int | str]) -> tuple[str, ...]:

@@ -76,7 +76,7 @@ def _to_record(lane: int, s: Any, w: Any) -> None:
     w.crank[0, 2], w.crank[0, 3], w.crank[0, 4] = (
         s.rate0[12, lane],
         s.rate0[13, lane],
-        s.force0[7, lane],
+        s.force0[FORCES_IN_LANES - 1, lane],
     )
     for n in range(FORCES_IN_LANES - 1):
         b.force[n] = s.force0[n, lane]

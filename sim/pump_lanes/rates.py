@@ -419,4 +419,4 @@ def _rates(p: Any, s: Any, share: float, play: bool) -> None:
         load = crank_load(moment, sin_a, cos_a, m)
         drive = motor_moment(omega, m)
         rate[12, lane], rate[13, lane] = omega, m.inverse_inertia * (drive + load)
-        force[8, lane] = -load if m.inverse_inertia == 0.0 else drive
+        force[FORCES_IN_LANES - 1, lane] = -load if m.inverse_inertia == 0.0 else drive
