@@ -22,7 +22,7 @@ from ...sim.output.sensor import Channel
 from .physical import level_channels, level_rows, shape_rows
 
 Float = NDArray[np.float64]
-Kind = Literal["saturated", "dead", "swapped", "unit", "rate", "tacho", "layout"]
+Kind = Literal["saturated", "dead", "swapped", "unit", "rate", "tacho", "layout", "hum"]
 
 FACTORS = (9.80665, 1000.0)
 """Ratios of units that are mixed up: g for m/s^2, and milli or micro for the next unit."""
@@ -57,7 +57,7 @@ class QualityFault:
     Attributes
     ----------
     kind : str
-        ``saturated``, ``dead``, ``swapped``, ``unit``, ``rate``, ``tacho`` or ``layout``.
+        ``saturated``, ``dead``, ``swapped``, ``unit``, ``rate``, ``tacho``, ``layout`` or ``hum``.
     channel : str
         Where; empty for the whole recording.
     text : str

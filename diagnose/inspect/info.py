@@ -20,6 +20,7 @@ from ...sim.output.sensor import Channel
 from ...sim.scene.parts import Scene
 from ..class_model.file import CLASS_MODEL, load_class_model
 from ..feature_rows.feature_table import choice_of, confounders_in
+from ..feature_rows.hum import hum_faults
 from ..feature_rows.quality import sample_faults
 from ..pages.embed import require_bokeh
 from ..pages.page import save_page
@@ -246,14 +247,17 @@ class _Warnings:
 def _doubts(
     recording: Recording, scene: Scene | None = None, *, run: bool = False
 ) -> list[tuple[str, str]]:
-    """Check and text of what is hardly meant, and of saturated channels of a measured one."""
+    """Check and text of what is hardly meant; of a measured one saturated channels and hum too."""
     texts = [
         (doubt.check, doubt.text) for doubt in recording_doubts(recording, scene, scene_too=run)
     ]
     if recording.origin == "simulated":  # the converter has counted its clipped samples
         return texts
-    faults = (fault for fault in sample_faults(recording) if fault.kind == "saturated")
-    return [*texts, *((fault.kind, fault.text) for fault in faults)]
+    faults = sample_faults(recording)
+    shown = [fault for fault in faults if fault.kind == "saturated"]
+    if all(fault.kind != "tacho" for fault in faults):
+        shown += hum_faults(recording)
+    return [*texts, *((fault.kind, fault.text) for fault in shown)]
 
 
 def _counts(column: Any) -> dict[str, int]:

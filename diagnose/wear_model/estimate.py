@@ -21,6 +21,7 @@ from ..feature_rows.feature_table import (
     regime_words,
 )
 from ..feature_rows.healthy import Baseline, referenced_rows
+from ..feature_rows.hum import hum_faults
 from ..feature_rows.noted import NOTED, noted_names, noted_values
 from ..feature_rows.physical import level_channels, levelled_rows
 from ..feature_rows.quality import (
@@ -411,6 +412,7 @@ class WearModel:
         faults = recording_faults(recording, self.card)
         if any(fault.bars for fault in faults):
             return self._unusable(faults)
+        faults += hum_faults(recording)
         known = None if baseline is None else baseline.transfer
         if known is None and told_against(FeatureSelection(only=self.names)):
             return Estimate(verdict="unusable", reasons=(NO_BASELINE,), mode=self.mode)
