@@ -20,6 +20,10 @@ PHONE, WINDOW, HEIGHT = 390, 1280, 1100  # px
 
 PAGES = {
     "report": ("One recording", "report demo/data.h5 --record 5 --model demo/model.wsm -o"),
+    "zoom": (
+        "A recording to zoom and measure in",
+        "info demo/data.h5 --record 5 --interactive --plot",
+    ),
     "card": ("A data set", "info demo/data.h5 --card"),
     "evaluate": ("A model judged", "evaluate demo/model.wsm demo/data.h5 --quick -o"),
     "align": ("A shaft line", "align propulsion-shaft --set bearings.2.sag=1.6mm -o"),
@@ -51,7 +55,7 @@ def shoot(browser: str, kind: str, command: str) -> None:
     sheet = BUILD / f"{kind}.both.html"
     sheet.write_text(SIDE_BY_SIDE.format(page=escape(html), **sizes), encoding="utf-8")
     options = ["--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars"]
-    options += [f"--window-size={PHONE + 20 + WINDOW},{HEIGHT}"]
+    options += [f"--window-size={PHONE + 20 + WINDOW},{HEIGHT}", "--virtual-time-budget=20000"]
     picture = FOLDER / f"screen-{kind}.png"
     command_line = [browser, *options, f"--screenshot={picture}", sheet.as_uri()]
     subprocess.run(command_line, check=True, capture_output=True, timeout=120)

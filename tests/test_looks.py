@@ -4,18 +4,27 @@ import json
 import re
 import shutil
 import subprocess
+from importlib.util import find_spec
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
 from matplotlib.figure import Figure
+from wearstate.datasets.file.record import DataSet, DataSetWriter
 from wearstate.datasets.recipe.recipe import load_recipe
 from wearstate.diagnose.blindspots.page import blind_spots_html
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.inspect.recipe_preview import preview, preview_figure
 from wearstate.diagnose.pages import page as pages_module
-from wearstate.diagnose.pages.picture import PHONE_PX, drawn_alone, least_width, page_image
+from wearstate.diagnose.pages.picture import (
+    PHONE_PX,
+    drawn_alone,
+    least_width,
+    page_image,
+    plain_numbers,
+)
 
 PHONE, WINDOW, PAPER = 390, 1280, 703  # px; paper is A4 less margins of 12 mm
 TEMPLATES = Path(pages_module.__file__).parent / "templates"
@@ -31,8 +40,20 @@ COMMANDS = {
     "report": "report {data} --record 5 --model {model}",
     "sweep": "sweep bilge-pump --set duration=0.6 --starts 2 -j 1 --over drive.speed=200,300rpm "
     "--over joint.crankpin.diametral_clearance=.1,.2mm",
+    "trend": "report {life} --model {model} --trend",
 }
 """Kind of page -> command that writes a small one."""
+
+ZOOMABLE = {
+    "zoom": "info {data} --record 5 --interactive",
+    "sweep-zoom": "sweep journal-step --set duration=0.05 --starts 2 -j 1 "
+    "--over drive.speed=2900,3000rpm --interactive",
+    **{f"{kind}-zoom": f"{COMMANDS[kind]} --interactive" for kind in ("chart", "report", "trend")},
+}
+"""The same of pages whose curves can be zoomed."""
+
+OUTPUT = {"card": "", "zoom": "--plot"}
+"""What stands before the name of the page, where that is not -o."""
 
 
 def one_row(name, value, *, kind="fixed"):
@@ -56,18 +77,41 @@ def blind_spots():
     return blind_spots_html(table, notice="trained on simulation")
 
 
-@pytest.fixture(scope="module")
-def looks(small_set, small_model, tmp_path_factory):
+def one_life(data, folder):
+    """Write recordings of one machine as it wears, a month between them, into a new folder."""
+    folder.mkdir()
+    label = "diametral_clearance_crankpin_m"
+    with DataSet(data) as records:
+        head, sizes = records.attributes, {"n_records": 1, "n_samples": records.stored_shape[2]}
+        worn = np.argsort(records.rows[label])[np.linspace(10, 70, 6).astype(int)]
+        for month, number in enumerate(worn, start=1):
+            path = folder / f"pump_2026-{month:02d}-05.h5"
+            row = {"record_id": "0", "status": "ok", label: records.rows[label][number]}
+            with DataSetWriter(path, head, **sizes, columns={label: "<f8"}) as writer:
+                writer.write(0, records[number].signal, row)
+                writer.finish()
+    return folder
+
+
+def written(data, model, folder):
     """A small page of every kind."""
-    folder = tmp_path_factory.mktemp("looks")
+    life = one_life(data, folder / "life")
+    commands = COMMANDS | (ZOOMABLE if find_spec("bokeh") else {})
     made = {"blindspots": blind_spots()}
-    for kind, command in COMMANDS.items():
-        words = [word.format(data=small_set, model=small_model) for word in command.split()]
+    for kind, command in commands.items():
+        words = command.format(data=data, model=model, life=life).split()
         page = folder / f"{kind}.html"
-        done = CliRunner().invoke(cli, [*words, *([] if kind == "card" else ["-o"]), str(page)])
+        words += [*OUTPUT.get(kind, "-o").split(), str(page)]
+        done = CliRunner().invoke(cli, words)
         assert done.exit_code == 0, done.output + repr(done.exception)
         made[kind] = page.read_text()
     return made
+
+
+@pytest.fixture(scope="module")
+def looks(small_set, small_model, tmp_path_factory):
+    """Pages of every kind."""
+    return written(small_set, small_model, tmp_path_factory.mktemp("looks"))
 
 
 # --- without a browser
@@ -86,6 +130,19 @@ def test_the_least_width_follows_from_the_smallest_text():
     assert least_width(raised) == 412  # of 7 points
     assert page_image(figure).sideways
     assert not drawn_alone(lambda axes: axes.text(0, 0, "a", fontsize=8)).sideways
+
+
+@pytest.mark.parametrize("last", [0.033, 0.07, 0.9])
+def test_numbers_on_a_short_logarithmic_axis_do_not_touch(last):
+    axes = Figure(figsize=(4.0, 3.0)).add_subplot()
+    axes.loglog([0.016, last], [0.016, last])
+    plain_numbers(axes.xaxis)
+    axes.figure.draw_without_rendering()
+    low, high = axes.get_xlim()
+    places = [each for each in axes.xaxis.get_ticklabels() if low <= each.get_position()[0] <= high]
+    boxes = sorted((each.get_window_extent() for each in places), key=lambda box: box.x0)
+    assert len(boxes) >= 2
+    assert all(left.x1 + 4 < right.x0 for left, right in pairwise(boxes))
 
 
 def test_every_picture_is_read_on_a_phone_without_moving_it(looks):
@@ -139,9 +196,46 @@ function ground(element) {
   }
   return 1
 }
+function measureCurves(frame, say) {
+  // their texts are drawn on a canvas: sizes and places are those that the library tells
+  const { Bokeh } = frame.contentWindow, wide = frame.contentDocument.documentElement.clientWidth
+  const models = [...Bokeh.documents[0]._all_models.values()]
+  const pen = document.createElement("canvas").getContext("2d")
+  const long = (text, style, size) => {
+    pen.font = `${style} ${size} helvetica, arial, sans-serif`
+    return pen.measureText(text).width
+  }
+  for (const model of models)
+    for (const [name, size] of Object.entries(model.attributes))
+      if (name.endsWith("text_font_size") && parseFloat(size) < 8) say("small " + size, model.type)
+  for (const figure of models.filter(each => each.type == "Figure")) {
+    const view = Bokeh.index.find_one(figure), { width, height } = view.frame.bbox
+    const title = figure.title.text.text, box = view.el.getBoundingClientRect()
+    if (box.right > wide + 1 || !box.width) say("curves cut", title)
+    if (width < 0.6 * box.width || height < 90) say(`curves ${width} px by ${height}`, title)
+    if (long(title, "bold", "13px") > box.width - view.frame.bbox.left) say("title cut", title)
+    for (const [axis, room] of [[figure.below[0], width], [figure.left[0], height]])
+      if (long(axis.axis_label.text, "italic", "13px") > room) say("axis cut", axis.axis_label.text)
+    for (const legend of figure.below.filter(each => each.type == "Legend"))
+      if (Bokeh.index.find_one(legend).bbox.right > box.width) say("legend cut", title)
+    const hidden = root => [...root.querySelectorAll("*")].some(each =>
+      each.className == "bk-tool-overflow" || (each.shadowRoot && hidden(each.shadowRoot)))
+    if (hidden(view.shadow_el)) say("tools hidden", title)
+  }
+}
+function shown(element) {
+  return element.checkVisibility() && element.getBoundingClientRect().width > 0
+}
 function measure(frame) {
   const page = frame.contentDocument, wide = page.documentElement.clientWidth, faults = []
   const say = (what, text) => faults.push(what + ": " + text.trim().slice(0, 40))
+  const curves = page.getElementById("zoom"), drawn = page.querySelector(".zoomed")
+  if (curves && !drawn && !frame.hasAttribute("sandbox")) say("no curves", page.title)
+  if (curves && drawn && shown(curves) == (frame.className == "paper"))
+    say("curves shown on paper, or nowhere else", page.title)
+  if (drawn && frame.className != "paper") measureCurves(frame, say)
+  const stills = [...page.querySelectorAll(".picture img, .picture svg")]
+  if ((frame.className == "paper" || !drawn) && !stills.every(shown)) say("no picture", page.title)
   if (page.documentElement.scrollWidth > wide)
     faults.push("wider than the page: " + page.documentElement.scrollWidth)
   const texts = page.createTreeWalker(page.body, NodeFilter.SHOW_TEXT)
@@ -162,19 +256,25 @@ function measure(frame) {
     if (contrast < 3) say("contrast " + contrast.toFixed(1), text)
   }
   for (const picture of page.querySelectorAll(".picture")) {
-    const shown = picture.firstElementChild.getBoundingClientRect().width
+    const { width } = picture.firstElementChild.getBoundingClientRect()
     const least = parseFloat(picture.style.getPropertyValue("--least"))
-    if (shown < least - 1 && frame.className != "paper")
-      faults.push(`picture of ${shown} px, readable from ${least}`)
+    if (width < least - 1 && frame.className != "paper" && !(drawn && !shown(picture)))
+      faults.push(`picture of ${width} px, readable from ${least}`)
   }
   for (const each of page.querySelectorAll("table, img, svg"))
     if (frame.className == "paper" && each.getBoundingClientRect().right > wide + 1)
       faults.push(each.tagName + " wider than paper: " + each.textContent.trim().slice(0, 40))
   return {faults, height: page.documentElement.scrollHeight}
 }
-addEventListener("load", () => {
-  const found = {}
-  for (const frame of document.querySelectorAll("iframe")) found[frame.title] = measure(frame)
+function isDrawn(frame) {
+  const page = frame.contentDocument, { Bokeh } = frame.contentWindow
+  if (!page.getElementById("zoom") || frame.hasAttribute("sandbox")) return true
+  return page.querySelector(".zoomed") && Bokeh.documents[0].is_idle
+}
+addEventListener("load", async () => {
+  const found = {}, frames = [...document.querySelectorAll("iframe")]
+  for (let i = 0; i < 100 && !frames.every(isDrawn); i++) await new Promise(r => setTimeout(r, 100))
+  for (const frame of frames) found[frame.title] = measure(frame)
   document.body.innerHTML = ""
   document.body.textContent = "<<" + JSON.stringify(found) + ">>"
 })
@@ -193,24 +293,30 @@ def chromium():
 
 def browse(chromium, *arguments):
     command = [chromium, "--headless", "--no-sandbox", "--disable-gpu", *arguments]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=True)
     return done.stdout
+
+
+def frames_of(kind, html):
+    """A page on a phone, in a window, on paper, and where curves are on a phone without scripts."""
+    printed = html
+    for there, here in ON_PAPER:
+        printed = printed.replace(there, here)
+    ways = [(PHONE, html, ""), (WINDOW, html, ""), (PAPER, printed, 'class="paper"')]
+    if 'id="zoom"' in html:
+        ways.append((PHONE, html, 'sandbox="allow-same-origin"'))  # which forbids scripts
+    for width, text, how in ways:
+        kept = text.replace("&", "&amp;").replace('"', "&quot;")
+        name = f"{kind} at {width}" + (" without scripts" if "sandbox" in how else "")
+        yield (
+            f'<iframe title="{name}" width="{width}" height="800" {how} '
+            f'style="border: 0" srcdoc="{kept}"></iframe>'
+        )
 
 
 def measured(chromium, pages, folder):
     """Faults of pages by their name and width, and their heights; all of them in one browser."""
-    frames = []
-    for kind, html in pages.items():
-        printed = html
-        for there, here in ON_PAPER:
-            printed = printed.replace(there, here)
-        for width, text in ((PHONE, html), (WINDOW, html), (PAPER, printed)):
-            kept = text.replace("&", "&amp;").replace('"', "&quot;")
-            style = "paper" if width == PAPER else ""
-            frames.append(
-                f'<iframe title="{kind} at {width}" width="{width}" height="800" class="{style}" '
-                f'style="border: 0" srcdoc="{kept}"></iframe>'
-            )
+    frames = [frame for kind, html in pages.items() for frame in frames_of(kind, html)]
     whole = folder / "all.html"
     script = f"<script>{MEASURE}</script>"
     whole.write_text("<!DOCTYPE html><meta charset=utf-8>" + script + "\n".join(frames))
@@ -221,7 +327,7 @@ def measured(chromium, pages, folder):
 
 def test_pages_are_read_on_a_phone_in_a_window_and_on_paper(chromium, looks, tmp_path):
     found = measured(chromium, looks, tmp_path)
-    assert len(found) == 3 * len(looks)
+    assert len(found) == 3 * len(looks) + sum("-zoom" in kind or kind == "zoom" for kind in looks)
     assert {name: each["faults"] for name, each in found.items() if each["faults"]} == {}
 
 
@@ -244,13 +350,44 @@ def test_the_measure_finds_what_is_wrong(chromium, tmp_path):
     assert "not shown: gone" in told["lost"]
 
 
-@pytest.mark.parametrize("kind", ["align", "card"])
+def test_the_measure_finds_what_is_wrong_with_curves(chromium, looks, tmp_path):
+    pytest.importorskip("bokeh")
+    page, title = looks["trend-zoom"], '"text": "the machine"'
+    long = title.replace("machine", "machine with a name that is longer than a phone is wide")
+    wrong = {
+        "small": page.replace('"label_text_font_size": "11px"', '"label_text_font_size": "7px"'),
+        "long": page.replace(title, long).replace(
+            '"toolbar_sticky": false', '"toolbar_sticky": true'
+        ),
+        "lost": page.replace("@media screen { .zoomed", "@media all { .zoomed"),
+        "printed": page.replace(".zoom, .zoom-help { display: none; }", ""),
+        "dead": page.replace("Bokeh.embed.embed_item(", "nothing("),
+        "bare": re.sub(
+            r'(<div class="pictures)', r"<style>.picture { display: none }</style>\1", page
+        ),
+    }
+    assert page not in wrong.values()
+    found = measured(chromium, wrong, tmp_path)
+    told = {name: " ".join(each["faults"]) for name, each in found.items()}
+    assert "small 7px: Legend" in told[f"small at {WINDOW}"]
+    assert "title cut: the machine with" in told[f"long at {PHONE}"]
+    assert "tools hidden: the machine with" in told[f"long at {PHONE}"]
+    assert "no picture" in told[f"lost at {PAPER}"]
+    assert "curves shown on paper" in told[f"printed at {PAPER}"]
+    assert "no curves" in told[f"dead at {PHONE}"]
+    assert "no picture" in told[f"bare at {PHONE} without scripts"]
+
+
+@pytest.mark.parametrize("kind", ["align", "card", "trend", "trend-zoom"])
 def test_printed_pages_end_full(chromium, looks, kind, tmp_path):
     """Gaps before what may not be parted are less than two fifths of the paper."""
+    if kind not in looks:
+        pytest.skip("no Bokeh here")
     page, printed = tmp_path / "x.html", tmp_path / "x.pdf"
     margins = "<style>@page { size: A4; margin: 12mm; }</style></head>"
     page.write_text(looks[kind].replace("</head>", margins, 1))
-    browse(chromium, "--no-pdf-header-footer", f"--print-to-pdf={printed}", page.as_uri())
+    options = ["--no-pdf-header-footer", "--virtual-time-budget=5000"]
+    browse(chromium, *options, f"--print-to-pdf={printed}", page.as_uri())
     sheets = len(re.findall(rb"/Type\s*/Page\b", printed.read_bytes()))
     height = measured(chromium, {kind: looks[kind]}, tmp_path)[f"{kind} at {PAPER}"]["height"]
     paper = (297 - 24) * 96 / 25.4  # px

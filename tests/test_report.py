@@ -675,7 +675,7 @@ def test_a_trend_to_zoom_in_names_its_recordings(model_file, tmp_path):
     blocks = item[item.index('["block"') :]
     told = re.findall(r'"recording: life\.h5\[(\d)\]\\ntime: (\d+) h\\nestimate: ', blocks)
     assert sorted(told) == [(str(i), str(100 * i)) for i in range(6)]
-    assert re.search(r'(?s)<div class="pictures still">.*data:image/png', html)
+    assert re.search(r'(?s)<div class="pictures still-pictures">.*data:image/png', html)
     dates.write_text("file,hours\n1,100\n2,200\n")  # by record_id: no name of a recording
     refused = run(*judge, "--dates", dates, "-o", tmp_path / "no.html", code=2).stderr
     assert "'life.h5[0]'" in refused

@@ -174,17 +174,21 @@ def _height(text: Any) -> float:
 
 def plain_numbers(axis: Any) -> None:
     """On a logarithmic axis 0.01 rather than a power of ten, whose exponent nobody can read."""
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+    from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
     if axis.get_scale() != "log":
         return
     low, high = axis.get_view_interval()
-    narrow = high < _NARROW * low
-    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if narrow else (1.0,)))
+    if high < _FEW * low:
+        axis.set_major_locator(MaxNLocator(4))  # the other would take up to nine, which touch
+    else:
+        narrow = high < _NARROW * low
+        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if narrow else (1.0,)))
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axis.set_minor_formatter(NullFormatter())
 
 
+_FEW = 5.0  # of an axis, last over first: up to here 1, 2, 5 may be a single number
 _NARROW = 200.0  # of an axis, last over first: so few decades need numbers between
 
 

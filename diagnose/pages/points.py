@@ -117,6 +117,8 @@ class PointAxes:
         Name and height of a limit; empty without one.
     band : tuple of (x, low, high)
         Round a line; empty without one.
+    band_name : str
+        Of the band, in the legend.
     x_kind, y_kind : str
         ``linear`` or ``log``; of x also ``datetime``.
     """
@@ -128,6 +130,7 @@ class PointAxes:
     lines: tuple[DrawnLine, ...] = ()
     level: tuple[str, float] | tuple[()] = ()
     band: tuple[tuple[float, ...], ...] = ()
+    band_name: str = ""
     x_kind: Literal["linear", "log", "datetime"] = "linear"
     y_kind: Literal["linear", "log"] = "linear"
 
@@ -227,6 +230,8 @@ def _axes(panel: PointAxes) -> Any:
         height=_HEIGHT,
         sizing_mode="stretch_width",
         toolbar_location="above",
+        min_border_right=18,  # half of the last number
+        toolbar_sticky=False,  # in a row of its own: beside a long title a phone shows no tool
         tools=[zoom, wheel, PanTool(), ResetTool(), TapTool()],
         active_drag=zoom,
         active_scroll=wheel,
@@ -242,7 +247,8 @@ def _axes(panel: PointAxes) -> Any:
 def _draw_lines(plot: Any, panel: PointAxes) -> None:
     if panel.band:
         x, low, high = panel.band
-        plot.varea(x=list(x), y1=list(low), y2=list(high), fill_color="#1f5a94", fill_alpha=0.2)
+        ways = {"fill_color": "#1f5a94", "fill_alpha": 0.2, "legend_label": panel.band_name}
+        plot.varea(x=list(x), y1=list(low), y2=list(high), **ways)
     for line in panel.lines:
         ways = {"line_color": line.colour, "line_width": 1.4, "line_dash": line.dash}
         draw = plot.step if line.steps else plot.line
@@ -294,5 +300,8 @@ def _tell_limits(plot: Any, panel: PointAxes) -> None:
     if plot.legend:
         plot.legend.orientation = "horizontal"
         plot.legend.ncols = 2
+        plot.legend.location = "top_left"
+        plot.legend.margin, plot.legend.padding, plot.legend.border_line_color = 0, 2, None
+        plot.legend.glyph_width = 14  # two columns fit a phone
         plot.legend.label_text_font_size = "11px"
         plot.add_layout(plot.legend[0], "below")

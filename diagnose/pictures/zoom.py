@@ -249,6 +249,8 @@ def _figure(curve: ZoomCurve, x_range: Any, across: Any, colour: str) -> Any:
         match_aspect=around,
         sizing_mode="stretch_width",
         toolbar_location="above",
+        min_border_right=18,  # half of the last number
+        toolbar_sticky=False,  # in a row of its own: beside a long title a phone shows no tool
         tools=[zoom, wheel, PanTool(), ResetTool(), CrosshairTool(overlay=(across, along))],
         active_drag=zoom,
         active_scroll=wheel,

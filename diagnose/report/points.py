@@ -51,6 +51,7 @@ def trend_points(batch: Batch, machine: str, heading: str) -> PointAxes:
         ),
         lines=lines,
         band=_band(trend, ahead) if ahead else (),
+        band_name=f"{100 * trend.coverage:.3g} % band of the trend",
         level=(f"condemning limit {limit:.3g} mm", limit),
     )
 

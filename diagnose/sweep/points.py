@@ -37,7 +37,7 @@ def _points(sweep: Sweep, rows: list[Row]) -> PointAxes:
     unit = f" [{shown.unit}]" if shown.unit else ""
     drawn = list(_series(sweep, rows))
     return PointAxes(
-        title=short_name(shown.words, 60) + ("" if shown.seen else " *"),
+        title=short_name(shown.words or shown.name, 60) + ("" if shown.seen else " *"),
         x_name=f"{last.words} [{last.unit or last.si_unit or '-'}]",
         y_name=f"{short_name(shown.name)}{unit}",
         series=tuple(drawn),
