@@ -12,9 +12,10 @@ import pytest
 from wearstate.datasets.file.record import Channel, DataSet
 from wearstate.diagnose.evaluation.evaluate import evaluate_model, score
 from wearstate.diagnose.learning.grades import accuracy_bound, grades_of
+from wearstate.diagnose.learning.heads import Head
 from wearstate.diagnose.learning.regressions import CANDIDATES, Blend, Linear
 from wearstate.diagnose.wear_model import train as training
-from wearstate.diagnose.wear_model.estimate import Head, ModelError
+from wearstate.diagnose.wear_model.estimate import ModelError
 from wearstate.diagnose.wear_model.file import load_model, save_model
 from wearstate.diagnose.wear_model.train import TrainingRows, learn, train_model
 from wearstate.sim.output.recording import DataError, Recording

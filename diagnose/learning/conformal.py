@@ -53,7 +53,12 @@ class Scale:
         return np.asarray(np.exp(standard @ self.weight + self.offset))
 
 
-def scale_inputs(estimate: ArrayLike, distance: ArrayLike, disagreement: ArrayLike) -> Float:
+def scale_inputs(
+    estimate: ArrayLike,
+    distance: ArrayLike,
+    disagreement: ArrayLike,
+    shares: Float | None = None,
+) -> Float:
     """What the expected size of an error is told from.
 
     Parameters
@@ -64,21 +69,23 @@ def scale_inputs(estimate: ArrayLike, distance: ArrayLike, disagreement: ArrayLi
         From the cloud of familiar recordings [-].
     disagreement : array_like [shape=(n,)]
         Of the parts of the blend, as a logarithm.
+    shares : numpy.ndarray [shape=(n, n_regimes)], optional
+        Probability of each regime: in some of them wear shows less. No regimes by default.
 
     Returns
     -------
-    numpy.ndarray [shape=(n, 4)]
-        Log estimate and its square, log distance, log disagreement.
+    numpy.ndarray [shape=(n, 4 + n_regimes)]
+        Log estimate and its square, log distance, log disagreement, shares.
 
     Examples
     --------
-    >>> scale_inputs([1.0], [1.0], [1.0]).tolist()
-    [[0.0, 0.0, 0.0, 0.0]]
+    >>> scale_inputs([1.0], [1.0], [1.0], np.array([[0.5]])).tolist()
+    [[0.0, 0.0, 0.0, 0.0, 0.5]]
     """
     log = np.log(np.asarray(estimate, dtype=float))
     far = np.log(np.maximum(np.asarray(distance, dtype=float), _LEAST_SCALE))
     apart = np.log(np.maximum(np.asarray(disagreement, dtype=float), _LEAST_APART))
-    return np.column_stack([log, log**2, far, apart])
+    return np.column_stack([log, log**2, far, apart, *([] if shares is None else [shares])])
 
 
 def fit_scale(inputs: Float, log_error: Float) -> Scale:

@@ -7,7 +7,7 @@ model file holds numbers only, and a prediction needs no library but numpy.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import accumulate, pairwise
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +26,7 @@ _LEAST_WEIGHT = 0.02  # of a blend: a part that says less is left out, and its t
 _TIE = 0.01  # of the error: a blend that is no better than this is not worth its time
 _SLACK = 0.1  # of a feature's range: as far beyond it a line may go on
 _ENDLESS = 1e6  # spreads of a feature: no bound, and still a number that a file may hold
-_USUAL = 0.99  # share of held-out records whose parts are no farther apart than the tube
+USUAL = 0.99  # share of held-out records whose parts are no farther apart than the tube
 _FAR = 2.0  # estimates end this factor beyond the trained severities
 
 
@@ -169,6 +169,15 @@ class Blend:
     def _sides(self, rows: Float) -> tuple[Float, Float]:
         found = np.stack([part.predict(rows) for part in self.parts], axis=1)
         return sides(np.clip(found, self.low, self.high), self.weights, self._smooth)
+
+    @property
+    def members(self) -> dict[str, float]:
+        """Weight of each part."""
+        return dict(zip(self.names, self.weights.tolist(), strict=True))
+
+    def shares(self, rows: Float) -> Float:
+        """Of no regimes [shape=(n, 0)]: one blend is for all."""
+        return np.empty((len(rows), 0))
 
     @property
     def _smooth(self) -> Float:
@@ -418,13 +427,16 @@ class RegressionOption:
     on_front: bool = False
 
 
+Kind = TypeVar("Kind")
+
+
 @dataclass(frozen=True, kw_only=True)
-class Fitted:
+class Fitted(Generic[Kind]):
     """A chosen blend with its behaviour on groups that it had not seen.
 
     Attributes
     ----------
-    blend : Blend
+    blend : Blend, or a blend for each regime
         Fitted on all records.
     estimate : numpy.ndarray [shape=(n,)]
         Estimates of every record by parts, weights and choice that its group had no part in.
@@ -438,7 +450,7 @@ class Fitted:
         Name of the option.
     """
 
-    blend: Blend
+    blend: Kind
     estimate: Float
     disagreement: Float
     shifted_estimate: Float
@@ -447,9 +459,13 @@ class Fitted:
     chosen: str
 
     @property
-    def members(self) -> dict[str, float]:
-        """Weight of each candidate of the blend."""
-        return dict(zip(self.blend.names, self.blend.weights.tolist(), strict=True))
+    def cost_ms(self) -> float:
+        """Of one prediction [ms]."""
+        return next(option.cost_ms for option in self.options if option.name == self.chosen)
+
+    def knowing(self, options: tuple[RegressionOption, ...]) -> "Fitted[Kind]":
+        """The same among more options than it was chosen from."""
+        return replace(self, options=options)
 
 
 def fit_blend(
@@ -461,7 +477,8 @@ def fit_blend(
     budget_ms: float | None = None,
     candidates: Sequence[RegressionCandidate] = CANDIDATES,
     shifted: Float | None = None,
-) -> Fitted:
+    learnt_from: Index | None = None,
+) -> Fitted[Blend]:
     """Fit every affordable candidate and keep the best of them, or a blend.
 
     Parameters
@@ -479,6 +496,8 @@ def fit_blend(
         From fast to strong.
     shifted : numpy.ndarray [shape=(n, n_features)], optional
         The same records on other machines than those trained on; as they are unless given.
+    learnt_from : numpy.ndarray, optional
+        Records that parts, weights and choice may learn from; all others are estimated only.
 
     Returns
     -------
@@ -513,18 +532,21 @@ def fit_blend(
     'ridge 3'
     """
     limit = BUDGET_MS if budget_ms is None else budget_ms
-    enough = [item for item in candidates if item.fewest <= len(target)]
+    everyone = np.arange(len(target)) if learnt_from is None else learnt_from
+    folds = [(np.intersect1d(train, everyone), test) for train, test in folds]
+    enough = [item for item in candidates if item.fewest <= len(everyone)]
     usable = [item for item in enough if item.cost_ms <= limit]
     if not usable:
         cheapest = min(candidate.cost_ms for candidate in candidates)
         raise ValueError(
             f"budget_ms = {limit:g} ms must be >= {cheapest:g} ms, the cheapest model; raise it"
         )
-    bounds = (float(target.min()) / _FAR, float(target.max()) * _FAR)
+    bounds = (float(target[everyone].min()) / _FAR, float(target[everyone].max()) * _FAR)
     asked = (rows, rows if shifted is None else shifted)
     both = [_out_of_fold(item, asked, target, folds, seed) for item in usable]
     tables = np.clip(np.stack(both, axis=2), *bounds)
-    return _chosen(usable, tables, asked, target, folds, seed=seed, limit=limit, bounds=bounds)
+    ways: dict[str, Any] = {"seed": seed, "limit": limit, "bounds": bounds, "everyone": everyone}
+    return _chosen(usable, tables, asked, target, folds, **ways)
 
 
 def fit_line(
@@ -578,27 +600,32 @@ def _chosen(
     seed: int,
     limit: float,
     bounds: tuple[float, float],
-) -> Fitted:
+    everyone: Index,
+) -> Fitted[Blend]:
     table = tables[0]
     names = _option_members(usable)
     crossed = {name: _crossed(table[:, m], target, folds) for name, m in names.items()}
-    everyone = np.arange(len(target))
     options = _options(usable, names, crossed, target, everyone)
-    best = _best(options, limit)
+    best = cheapest_good(options, limit)
     estimate = np.empty(len(target))
     for train, test in folds:
-        pick = _best(_options(usable, names, crossed, target, train), limit)
+        pick = cheapest_good(_options(usable, names, crossed, target, train), limit)
         estimate[test] = crossed[pick.name][test]
     weights = _with_a_line(
-        usable, options, best, blend_weights(table[:, list(best.members)], target)
+        usable,
+        options,
+        best,
+        blend_weights(table[everyone][:, list(best.members)], target[everyone]),
     )
     kept = np.flatnonzero(weights).tolist()
     members = [usable[i] for i in kept]
-    parts = tuple(item.fit(*asked, target, seed) for item in members)
+    parts = tuple(
+        item.fit(asked[0][everyone], asked[1][everyone], target[everyone], seed) for item in members
+    )
     smooth = np.array([is_smooth(part) for part in parts], dtype=np.float64)
     held, trees = sides(tables[:, :, kept], weights[kept], smooth)
     apart, strange = np.abs(np.log(held / trees))
-    tube = float(np.quantile(apart, _USUAL))
+    tube = float(np.quantile(apart[everyone], USUAL))
     blend = Blend(
         names=tuple(item.name for item in members),
         parts=parts,
@@ -614,7 +641,7 @@ def _chosen(
         disagreement=apart,
         shifted_estimate=elsewhere,
         shifted_disagreement=strange,
-        options=_front(options),
+        options=front(options),
         chosen=best.name,
     )
 
@@ -672,15 +699,16 @@ def _options(
     ]
 
 
-def _best(options: Sequence[RegressionOption], limit: float) -> RegressionOption:
-    """Cheapest within the tie of the least error; of equally cheap ones the better."""
+def cheapest_good(options: Sequence[RegressionOption], limit: float) -> RegressionOption:
+    """Of those within a limit of time [ms] the cheapest near the least error, then the better."""
     within = [option for option in options if option.cost_ms <= limit]
     least = min(option.error for option in within)
     close = [option for option in within if option.error <= (1 + _TIE) * least]
     return min(close, key=lambda option: (option.cost_ms, option.error))
 
 
-def _front(options: Sequence[RegressionOption]) -> tuple[RegressionOption, ...]:
+def front(options: Sequence[RegressionOption]) -> tuple[RegressionOption, ...]:
+    """The same, marked where no other one is as cheap and better."""
     return tuple(
         replace(
             one,

@@ -19,6 +19,7 @@ from .conformal import (
     scale_inputs,
     tails,
 )
+from .experts import Experts
 from .grades import GRADE_NAMES, grades_of
 from .regressions import Blend, Linear
 
@@ -31,7 +32,7 @@ class Estimator:
 
     Attributes
     ----------
-    severity : Blend
+    severity : Blend or Experts
         Inputs to severity [m].
     witness : Linear
         The best straight line among the candidates: it goes on beyond the trained severities,
@@ -45,7 +46,7 @@ class Estimator:
         count on.
     """
 
-    severity: Blend
+    severity: Blend | Experts
     witness: Linear
     scale: Scale
     calibration: IntervalCalibration
@@ -84,7 +85,8 @@ class Estimator:
         known = self.known(cautious=cautious)
         ends, limits = self._limits(tuple(edges), cautious)
         apart = self.severity.disagreement(inputs)
-        scale = float(self.scale.predict(scale_inputs([severity], [distance], apart))[0])
+        sizes = scale_inputs([severity], [distance], apart, self.severity.shares(inputs))
+        scale = float(self.scale.predict(sizes)[0])
         low, high = interval(severity, scale, ends)
         grade = int(grades_of(severity, edges))
         share = grade_probabilities(severity, scale, known, edges)

@@ -35,7 +35,7 @@ from ..feature_rows.quality import (
 )
 from ..feature_rows.transfer_reference import told_against
 from ..learning.conformal import COVERAGE
-from ..learning.regressions import Blend
+from ..learning.heads import Head
 from ..learning.severity import Estimator
 from .noise_floor import noisiest
 from .novelty import Familiarity, free_distance, novelty_p_value
@@ -107,32 +107,6 @@ def unseen_words(name: str, visible_from_m: float | None) -> str:
         f"wear below {1e3 * visible_from_m:.2g} mm cannot be seen on a {regime_words(name)} of "
         "this kind"
     )
-
-
-@dataclass(frozen=True, kw_only=True)
-class Head:
-    """Tells the presence of one fault beside the wear.
-
-    Attributes
-    ----------
-    name : str
-    blend : Blend
-        Features to 1 (absent) … 2 (present).
-    slope, offset : float
-        ``probability = 1 / (1 + exp(-(offset + slope * value)))``
-    threshold : float
-        Probability above which it is called present.
-    """
-
-    name: str
-    blend: Blend
-    slope: float
-    offset: float
-    threshold: float
-
-    def probability(self, rows: Float) -> Float:
-        """Probability [shape=(n,)] of feature rows [shape=(n, n_features)]."""
-        return np.asarray(1 / (1 + np.exp(-(self.offset + self.slope * self.blend.predict(rows)))))
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)

@@ -1,7 +1,7 @@
 """The file of a wear model: what is in it, and whether its parts fit each other."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
@@ -14,8 +14,10 @@ from ..feature_rows.noted import NOTED, noted_names
 from ..feature_rows.physical import level_channels, physical_rows, shape_rows
 from ..feature_rows.quality import Levels
 from ..learning.conformal import IntervalCalibration, Scale, scale_inputs
+from ..learning.experts import Experts
 from ..learning.grades import GRADE_NAMES
-from ..learning.regressions import Linear
+from ..learning.heads import Head
+from ..learning.regressions import Blend, Linear
 from ..learning.severity import Estimator
 from .arrays import (
     BlendStructure,
@@ -40,7 +42,7 @@ from .arrays import (
     spreads_fit,
 )
 from .bundle import Bundle, checked, load_bundle, save_bundle
-from .estimate import Head, ModelError, WearModel
+from .estimate import ModelError, WearModel
 from .novelty import Familiarity
 
 _KIND = "wear model"
@@ -134,18 +136,35 @@ class _HeadStructure(Strict):
     blend: BlendStructure
 
 
+class _ExpertsStructure(Strict):
+    """Blends of an estimate by regimes, and the heads that tell these."""
+
+    gates: list[str] = Field(min_length=2, max_length=100)
+    blends: list[BlendStructure] = Field(min_length=2, max_length=100)
+    first: int = Field(ge=0)
+    tube: float = Field(ge=0)
+
+    @model_validator(mode="after")
+    def _pairs(self) -> Self:
+        if len(self.gates) != len(self.blends):
+            raise ValueError("gates and blends must be as many")
+        return self
+
+
 class _Structure(Strict):
     """Which parts a model has; their numbers are in the arrays."""
 
-    blind: BlendStructure
-    informed: BlendStructure | None
+    blind: BlendStructure | _ExpertsStructure
+    informed: BlendStructure | _ExpertsStructure | None
     heads: list[_HeadStructure] = Field(max_length=100)
 
 
 def _structure_of(model: WearModel) -> dict[str, Any]:
     return {
-        "blind": blend_structure(model.blind.severity),
-        "informed": None if model.informed is None else blend_structure(model.informed.severity),
+        "blind": _severity_structure(model.blind.severity),
+        "informed": None
+        if model.informed is None
+        else _severity_structure(model.informed.severity),
         "heads": [
             {
                 "name": head.name,
@@ -159,13 +178,52 @@ def _structure_of(model: WearModel) -> dict[str, Any]:
     }
 
 
+def _severity_structure(severity: Blend | Experts) -> dict[str, Any]:
+    if isinstance(severity, Blend):
+        return blend_structure(severity)
+    return {
+        "gates": [gate.name for gate in severity.gates],
+        "blends": [blend_structure(blend) for blend in severity.blends],
+        "first": severity.first,
+        "tube": severity.tube,
+    }
+
+
+def _severity_arrays(severity: Blend | Experts, place: str) -> dict[str, Any]:
+    if isinstance(severity, Blend):
+        return blend_arrays(severity, place)
+    each = [blend_arrays(blend, f"{place}.{i}") for i, blend in enumerate(severity.blends)]
+    return {name: array for arrays in each for name, array in arrays.items()}
+
+
+def _severity_of(
+    structure: BlendStructure | _ExpertsStructure,
+    arrays: Mapping[str, NDArray[Any]],
+    place: str,
+    heads: Sequence[Head],
+    features: int,
+) -> Blend | Experts:
+    if isinstance(structure, BlendStructure):
+        return blend_of(structure, arrays, place)
+    known = {head.name: head for head in heads}
+    return Experts(
+        gates=tuple(known[name] for name in structure.gates),
+        blends=tuple(
+            blend_of(blend, arrays, f"{place}.{i}") for i, blend in enumerate(structure.blends)
+        ),
+        first=structure.first,
+        features=features,
+        tube=structure.tube,
+    )
+
+
 def _arrays_of(model: WearModel) -> dict[str, NDArray[Any]]:
     """Every number of a model by a dotted name."""
     found: dict[str, Any] = {}
     for part in _ARRAY_PARTS:
         found |= part_arrays(getattr(model, part), part)
     for place, estimator in _estimators(model).items():
-        found |= blend_arrays(estimator.severity, f"{place}.severity")
+        found |= _severity_arrays(estimator.severity, f"{place}.severity")
         for part in _ESTIMATOR_PARTS:
             found |= part_arrays(getattr(estimator, part), f"{place}.{part}")
     for i, head in enumerate(model.heads):
@@ -180,33 +238,40 @@ def _estimators(model: WearModel) -> dict[str, Estimator]:
 
 
 def _estimator_of(
-    structure: BlendStructure, arrays: Mapping[str, NDArray[Any]], place: str
+    structure: BlendStructure | _ExpertsStructure,
+    arrays: Mapping[str, NDArray[Any]],
+    place: str,
+    heads: Sequence[Head],
+    features: int,
 ) -> Estimator:
     parts = {
         part: kind(**part_of(arrays, f"{place}.{part}", kind))
         for part, kind in _ESTIMATOR_PARTS.items()
     }
-    return Estimator(severity=blend_of(structure, arrays, f"{place}.severity"), **parts)
+    severity = _severity_of(structure, arrays, f"{place}.severity", heads, features)
+    return Estimator(severity=severity, **parts)
 
 
 def _model_of(
     structure: _Structure, arrays: Mapping[str, NDArray[Any]], card: dict[str, Any]
 ) -> WearModel:
+    heads = tuple(
+        Head(
+            name=head.name,
+            blend=blend_of(head.blend, arrays, f"heads.{i}"),
+            slope=head.slope,
+            offset=head.offset,
+            threshold=head.threshold,
+        )
+        for i, head in enumerate(structure.heads)
+    )
+    features = len(card["features"])
     model = WearModel(
-        blind=_estimator_of(structure.blind, arrays, "blind"),
+        blind=_estimator_of(structure.blind, arrays, "blind", heads, features),
         informed=None
         if structure.informed is None
-        else _estimator_of(structure.informed, arrays, "informed"),
-        heads=tuple(
-            Head(
-                name=head.name,
-                blend=blend_of(head.blend, arrays, f"heads.{i}"),
-                slope=head.slope,
-                offset=head.offset,
-                threshold=head.threshold,
-            )
-            for i, head in enumerate(structure.heads)
-        ),
+        else _estimator_of(structure.informed, arrays, "informed", heads, features),
+        heads=heads,
         card=card,
         **{part: kind(**part_of(arrays, part, kind)) for part, kind in _ARRAY_PARTS.items()},
     )
@@ -241,17 +306,29 @@ def _check_structure(model: WearModel, path: str | Path) -> None:
 
 def _estimator_fits(estimator: Estimator, n: int) -> bool:
     return (
-        blend_fits(estimator.severity, n)
+        _severity_fits(estimator.severity, n)
         and estimator.severity.low > 0
         and linear_fits(estimator.witness, n)
-        and _scale_fits(estimator.scale)
+        and _scale_fits(estimator.scale, _regimes(estimator.severity))
         and _calibration_fits(estimator.calibration)
         and _calibration_fits(estimator.shifted)
     )
 
 
-def _scale_fits(scale: Scale) -> bool:
-    n = scale_inputs([1.0], [1.0], [1.0]).shape[1]
+def _severity_fits(severity: Blend | Experts, n: int) -> bool:
+    if isinstance(severity, Blend):
+        return blend_fits(severity, n)
+    return severity.first + severity.features <= n and all(
+        blend_fits(blend, n) for blend in severity.blends
+    )
+
+
+def _regimes(severity: Blend | Experts) -> int:
+    return 0 if isinstance(severity, Blend) else len(severity.gates)
+
+
+def _scale_fits(scale: Scale, regimes: int) -> bool:
+    n = scale_inputs([1.0], [1.0], [1.0], np.zeros((1, regimes))).shape[1]
     return (
         shapes_of(scale.centre, scale.spread, scale.weight) == {(n,)}
         and isinstance(scale.offset, float)

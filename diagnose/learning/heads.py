@@ -1,0 +1,112 @@
+"""Whether a fault beside the wear is there, or a regime in which wear sounds different."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .regressions import CANDIDATES, Blend, Fitted, Folds, RegressionCandidate, fit_blend
+
+Float = NDArray[np.float64]
+
+PRESENT = 0.5
+"""Probability from which on it is likelier there than not."""
+
+_LOGISTIC_C = 10.0  # weak: one slope on hundreds of records
+
+
+@dataclass(frozen=True, kw_only=True)
+class Head:
+    """Tells the presence of one fault beside the wear.
+
+    Attributes
+    ----------
+    name : str
+    blend : Blend
+        Features to 1 (absent) … 2 (present).
+    slope, offset : float
+        ``probability = 1 / (1 + exp(-(offset + slope * value)))``
+    threshold : float
+        Probability above which it is called present.
+    """
+
+    name: str
+    blend: Blend
+    slope: float
+    offset: float
+    threshold: float
+
+    def probability(self, rows: Float) -> Float:
+        """Probability [shape=(n,)] of feature rows [shape=(n, n_features)]."""
+        return np.asarray(1 / (1 + np.exp(-(self.offset + self.slope * self.blend.predict(rows)))))
+
+
+@dataclass(frozen=True, kw_only=True)
+class FittedHead:
+    """A head with its behaviour on groups that it had not seen.
+
+    Attributes
+    ----------
+    head : Head
+    members : dict of str to float
+        Weight of each part of its blend.
+    probability, shifted : numpy.ndarray [shape=(n,)]
+        Of every record, and of the same on other machines.
+    """
+
+    head: Head
+    members: dict[str, float]
+    probability: Float
+    shifted: Float
+
+
+def fit_head(
+    name: str,
+    rows: Float,
+    here: NDArray[np.bool_],
+    folds: Folds,
+    *,
+    seed: int = 0,
+    candidates: Sequence[RegressionCandidate] = CANDIDATES,
+    shifted: Float | None = None,
+) -> FittedHead:
+    """Regress presence as 1 or 2, and turn out-of-fold values to a probability.
+
+    Parameters
+    ----------
+    name : str
+    rows : numpy.ndarray [shape=(n, n_features)]
+    here : numpy.ndarray [shape=(n,)]
+        Whether each record has it.
+    folds, seed, candidates, shifted
+        As of :func:`~.regressions.fit_blend`.
+
+    Returns
+    -------
+    FittedHead
+    """
+    from sklearn.linear_model import LogisticRegression
+
+    fitted: Fitted[Blend] = fit_blend(
+        rows,
+        1.0 + here.astype(np.float64),
+        folds,
+        seed=seed,
+        candidates=candidates,
+        shifted=shifted,
+    )
+    logistic = LogisticRegression(C=_LOGISTIC_C).fit(fitted.estimate[:, None], here)
+    head = Head(
+        name=name,
+        blend=fitted.blend,
+        slope=float(logistic.coef_[0, 0]),
+        offset=float(logistic.intercept_[0]),
+        threshold=PRESENT,
+    )
+    return FittedHead(
+        head=head,
+        members=fitted.blend.members,
+        probability=logistic.predict_proba(fitted.estimate[:, None])[:, 1],
+        shifted=logistic.predict_proba(fitted.shifted_estimate[:, None])[:, 1],
+    )
