@@ -2,9 +2,8 @@
 
 import hashlib
 import json
-import math
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -35,45 +34,22 @@ from ..feature_rows.feature_table import (
     Progress,
     confounders_in,
     feature_table,
-    is_regime,
     regimes_in,
 )
-from ..feature_rows.healthy import referenced_rows, references, refuse_strangers
-from ..feature_rows.noted import NOTED, doubted, noted_values, notes_of, strayed
-from ..feature_rows.physical import moved_rows, physical_rows
-from ..feature_rows.quality import Levels, fit_levels
+from ..feature_rows.healthy import references, refuse_strangers
+from ..feature_rows.noted import NOTED, notes_of
+from ..feature_rows.physical import physical_rows
 from ..feature_rows.transfer_reference import healthy_transfer
-from ..learning.conformal import IntervalCalibration, fit_scale, scale_inputs
-from ..learning.detection import visible_from
-from ..learning.experts import FEWEST_RECORDS, Experts, better_of, fit_experts, regime_shares
 from ..learning.grades import grades_of
-from ..learning.heads import PRESENT, FittedHead, Head, fit_head
 from ..learning.regressions import (
     BUDGET_MS,
-    CANDIDATES,
-    WITNESSES,
-    Blend,
-    Fitted,
-    Folds,
-    RegressionCandidate,
-    fit_blend,
-    fit_line,
 )
-from ..learning.severity import Estimator
 from .estimate import WearModel
-from .noise_floor import usual_excess
-from .novelty import REACH, Familiarity, fit_familiarity
-from .quietness import CAUTIONED_SHARE, REFUSED_SHARE, most_lacking
+from .learn import FOLDS, Learnt, TrainingRows, learn, refuse_no_wear
 
 Float = NDArray[np.float64]
 
-_FOLDS = 5
 _FEWEST_GROUPS = 10  # two a fold, so that a fold's error is no accident
-_FEWEST_FAULTS = 20  # records with and without a fault, for an error rate to within a tenth
-_RARE = 0.99  # of the records: as far, or with as many features out of range, as 1 in 100 is
-_WORTH = 0.1  # of the error: conditions that bring less are not worth a person's asking
-
-SeverityFit = Fitted[Blend] | Fitted[Experts]
 
 
 def train_model(
@@ -278,10 +254,10 @@ def fit_model(
 def _selection(candidate_rows: Sequence["TrainingRows"], seed: int) -> Selection:
     """Of one set there is nothing to choose."""
     if len(candidate_rows) == 1:
-        return Selection(chosen=0, errors=(), by_fold=(0,) * _FOLDS)
+        return Selection(chosen=0, errors=(), by_fold=(0,) * FOLDS)
     first = candidate_rows[0]
-    _refuse_no_wear(first.severity)
-    folds = group_folds(first.groups, n=_FOLDS, seed=seed)
+    refuse_no_wear(first.severity)
+    folds = group_folds(first.groups, n=FOLDS, seed=seed)
     inputs = [training.inputs for training in candidate_rows]
     return select_set(inputs, first.severity, first.groups, folds, seed=seed)
 
@@ -299,13 +275,6 @@ def _refuse_undefined(training: "TrainingRows", path: str | Path) -> None:
         raise DataError(
             f"{path}: its {len(training.names)} features are levels alone, which tell no familiar "
             "machine from a strange one; add others: wearstate train --features"
-        )
-
-
-def _refuse_no_wear(severity: Float) -> None:
-    if not (severity > 0).all():
-        raise DataError(
-            f"severity = {severity.min():g} m must be > 0 in every record; label them all"
         )
 
 
@@ -387,370 +356,11 @@ def _check_held_out(draws: int, held_out: float, path: str | Path) -> None:
 
 
 def _check_kept(kept: int, draws: int, what: str, path: str | Path) -> None:
-    if kept < _FOLDS:
+    if kept < FOLDS:
         raise DataError(
             f"{path}: {what} leaves {kept} of {draws} usable machine draws to train on, must be "
-            f">= {_FOLDS}; hold out less or generate more records"
+            f">= {FOLDS}; hold out less or generate more records"
         )
-
-
-@dataclass(frozen=True, kw_only=True)
-class TrainingRows:
-    """What a model learns from.
-
-    Attributes
-    ----------
-    names : tuple of str
-        Of the features.
-    rows : numpy.ndarray [shape=(n, n_features)]
-    baseline : numpy.ndarray [shape=(n, n_features)] or None
-        Healthy rows of the same machines.
-    severity : numpy.ndarray [shape=(n,)]
-        [m], > 0.
-    groups : numpy.ndarray [shape=(n,)]
-        Machine draw of each record.
-    conditions : tuple of str
-        Noted conditions that vary.
-    notes : sequence of mapping
-        What was noted beside each record; of no matter without conditions.
-    faults : dict
-        Name -> presence [shape=(n,)] of each fault beside the wear.
-    """
-
-    names: tuple[str, ...]
-    rows: Float
-    baseline: Float | None
-    severity: Float
-    groups: NDArray[np.intp]
-    conditions: tuple[str, ...] = ()
-    notes: Sequence[Mapping[str, Any]] = ()
-    faults: dict[str, NDArray[np.bool_]] = field(default_factory=dict)
-
-    @property
-    def inputs(self) -> Float:
-        """What the severity is told from."""
-        return self.rows if self.baseline is None else referenced_rows(self.rows, self.baseline)
-
-    @property
-    def first_feature(self) -> int:
-        """Column of the inputs at which the features as they are begin."""
-        return 0 if self.baseline is None else len(self.names)
-
-    def moved(self, seed: int) -> "TrainingRows":
-        """The same records of machines whose resonances stand anywhere within the reach.
-
-        Each machine has its own factor, which its healthy rows share.
-        """
-        machines, place = np.unique(self.groups, return_inverse=True)
-        steps = np.random.default_rng(seed).uniform(-1, 1, len(machines))[place]
-        factor = np.exp(steps * math.log(REACH))
-
-        def there(rows: Float) -> Float:
-            return moved_rows(self.names, rows, factor, cells=True)
-
-        healthy = None if self.baseline is None else there(self.baseline)
-        return replace(self, rows=there(self.rows), baseline=healthy)
-
-    def part(self, columns: NDArray[np.intp]) -> "TrainingRows":
-        """The same records with some of the features."""
-        return replace(
-            self,
-            names=tuple(self.names[i] for i in columns),
-            rows=self.rows[:, columns],
-            baseline=None if self.baseline is None else self.baseline[:, columns],
-        )
-
-
-@dataclass(frozen=True, kw_only=True)
-class Learnt:
-    """All that is fitted, with its behaviour on groups that it had not seen.
-
-    Attributes
-    ----------
-    severity : Fitted
-        By the features alone.
-    blind : Estimator
-        The same, with its uncertainty.
-    informed : Estimator or None
-        By the features and the noted conditions; None where these tell no more.
-    familiarity : Familiarity
-    levels : Levels
-    heads : tuple of (Head, dict)
-        With their error rates, for the card.
-    """
-
-    severity: SeverityFit
-    blind: Estimator
-    informed: Estimator | None
-    familiarity: Familiarity
-    levels: Levels
-    heads: tuple[tuple[Head, dict[str, Any]], ...]
-
-
-def learn(
-    training: TrainingRows,
-    *,
-    seed: int = 0,
-    budget_ms: float | None = None,
-    selection: Selection | None = None,
-    among: Sequence[TrainingRows] = (),
-    as_new: float | None = None,
-) -> Learnt:
-    """Fit everything, by folds of whole groups.
-
-    Parameters
-    ----------
-    training : TrainingRows
-    seed : int
-        Of the folds and the trees.
-    budget_ms : float, optional
-        Of :func:`wearstate.diagnose.learning.regressions.fit_blend`.
-    selection : Selection, optional
-        How the features were chosen: the estimates of a fold are then those of the set that its
-        training records ask for, so that the calibration knows what the choice costs.
-    among : sequence of TrainingRows
-        The sets that it was chosen from.
-    as_new : float, optional
-        Severity up to which a machine counts as new [m], to tell from which wear on each regime
-        shows it.
-
-    Returns
-    -------
-    Learnt
-
-    Raises
-    ------
-    DataError
-        A severity is not positive, or no model is within the budget.
-    """
-    _refuse_no_wear(training.severity)
-    folds = group_folds(training.groups, n=_FOLDS, seed=seed)
-    other = training.moved(seed)
-    heads = _heads(training, other, folds, seed)
-    try:
-        severity = _severity(training, training.inputs, other.inputs, folds, heads, seed, budget_ms)
-        others: dict[int, Fitted[Blend]] = {}
-        if selection is not None:
-            others = _fits_of_others(selection, among, folds, seed, budget_ms)
-    except ValueError as error:
-        raise DataError(str(error)) from error
-    if selection is not None:
-        estimate = severity.estimate.copy()
-        for place, (_, left) in zip(selection.by_fold, folds, strict=True):
-            if place in others:
-                estimate[left] = others[place].estimate[left]
-        severity = replace(severity, estimate=estimate)
-    (distance, far), limits = _out_of_fold_distances(training, other, folds)
-    apart = distance, far
-    return Learnt(
-        severity=severity,
-        blind=_estimator(training, training.inputs, severity, apart, heads, seed),
-        informed=_informed(training, other, severity, folds, apart, heads, seed),
-        familiarity=fit_familiarity(training.names, training.rows, training.groups, **limits),
-        levels=fit_levels(training.names, training.rows, folds),
-        heads=tuple((one.head, _rates(one, training, severity.estimate, as_new)) for one in heads),
-    )
-
-
-def _heads(
-    training: TrainingRows, other: TrainingRows, folds: Folds, seed: int
-) -> list[FittedHead]:
-    """What tells each fault and regime that enough records have, and enough have not.
-
-    A line tells a regime from hundreds of features as well as trees do: 96 % of 2,000 pumps.
-    """
-    lines = [each for each in CANDIDATES if each.name in WITNESSES]
-    return [
-        fit_head(
-            name,
-            training.rows,
-            here,
-            folds,
-            seed=seed,
-            candidates=lines if is_regime(name) else CANDIDATES,
-            shifted=other.rows,
-        )
-        for name, here in training.faults.items()
-        if min(here.sum(), (~here).sum()) >= _FEWEST_FAULTS
-    ]
-
-
-def _severity(
-    training: TrainingRows,
-    inputs: Float,
-    moved: Float,
-    folds: Folds,
-    heads: Sequence[FittedHead],
-    seed: int,
-    budget_ms: float | None,
-    candidates: Sequence[RegressionCandidate] = CANDIDATES,
-) -> SeverityFit:
-    """One fit for all records, or one for each regime where that errs less."""
-    limit = BUDGET_MS if budget_ms is None else budget_ms
-
-    def fit(records: NDArray[np.intp] | None, parts: int) -> Fitted[Blend]:
-        return fit_blend(
-            inputs,
-            training.severity,
-            folds,
-            seed=seed,
-            budget_ms=limit / parts,
-            candidates=candidates,
-            shifted=moved,
-            learnt_from=records,
-        )
-
-    one = fit(None, 1)
-    gates = _gates(training, heads)
-    if not gates or limit / len(gates) < min(each.cost_ms for each in candidates):
-        return one
-    present = [training.faults[gate.head.name] for gate in gates]
-    first, features = training.first_feature, len(training.names)
-    experts = fit_experts(gates, present, training.severity, fit, first=first, features=features)
-    return better_of(one, experts, limit)
-
-
-def _gates(training: TrainingRows, heads: Sequence[FittedHead]) -> list[FittedHead]:
-    """Heads that tell the regimes, where each has records enough; else none."""
-    gates = [one for one in heads if is_regime(one.head.name)]
-    records = [int(here.sum()) for name, here in training.faults.items() if is_regime(name)]
-    return gates if records and min(records) >= FEWEST_RECORDS else []
-
-
-def _estimator(
-    training: TrainingRows,
-    inputs: Float,
-    fitted: SeverityFit,
-    apart: tuple[Float, Float],
-    heads: Sequence[FittedHead],
-    seed: int,
-) -> Estimator:
-    """A fit with its uncertainty, from how it did on machines that it had not seen."""
-    distance, far = apart
-    gates = _gates(training, heads) if isinstance(fitted.blend, Experts) else []
-    usual, there = np.empty((2, len(training.rows), 0))
-    if gates:
-        usual = regime_shares([gate.probability for gate in gates])
-        there = regime_shares([gate.shifted for gate in gates])
-    sizes = scale_inputs(fitted.estimate, distance, fitted.disagreement, usual)
-    strange = scale_inputs(fitted.shifted_estimate, far, fitted.shifted_disagreement, there)
-    scale = fit_scale(sizes, np.log(training.severity / fitted.estimate))
-
-    def calibration(estimate: Float, sizes: Float, distance: Float) -> IntervalCalibration:
-        return IntervalCalibration(
-            estimate=estimate,
-            truth=training.severity,
-            scale=scale.predict(sizes),
-            distance=distance,
-            group=training.groups,
-        )
-
-    return Estimator(
-        severity=fitted.blend,
-        witness=fit_line(inputs, training.severity, fitted.options, seed=seed),
-        scale=scale,
-        calibration=calibration(fitted.estimate, sizes, distance),
-        shifted=calibration(fitted.shifted_estimate, strange, far),
-    )
-
-
-def _informed(
-    training: TrainingRows,
-    other: TrainingRows,
-    blind: SeverityFit,
-    folds: Folds,
-    apart: tuple[Float, Float],
-    heads: Sequence[FittedHead],
-    seed: int,
-) -> Estimator | None:
-    """The kinds of parts that do well without the conditions, fitted again with them.
-
-    They are as uncertain as people know them. None where they are not worth the asking.
-    """
-    if not training.conditions:
-        return None
-    noted = noted_values(training.conditions, training.notes)
-    if not np.isfinite(noted).all():
-        return None
-    noted = doubted(training.conditions, noted, seed)
-    inputs = np.hstack([training.inputs, noted])
-    moved = np.hstack([other.inputs, strayed(training.conditions, noted, seed, REACH)])
-    kept = {*blind.blend.names, *WITNESSES}
-    kinds = [each for each in CANDIDATES if each.name in kept]
-    fitted = _severity(training, inputs, moved, folds, heads, seed, None, kinds)
-    errors = [np.abs(each.estimate - training.severity).mean() for each in (fitted, blind)]
-    if errors[0] > (1 - _WORTH) * errors[1]:
-        return None
-    return _estimator(training, inputs, fitted, apart, heads, seed)
-
-
-def _fits_of_others(
-    selection: Selection,
-    among: Sequence[TrainingRows],
-    folds: Folds,
-    seed: int,
-    budget_ms: float | None,
-) -> dict[int, Fitted[Blend]]:
-    """Fits on the sets that some fold asks for and all records do not."""
-    places = sorted(set(selection.by_fold) - {selection.chosen})
-    return {
-        place: fit_blend(
-            among[place].inputs, among[place].severity, folds, seed=seed, budget_ms=budget_ms
-        )
-        for place in places
-    }
-
-
-def _out_of_fold_distances(
-    training: TrainingRows, other: TrainingRows, folds: Folds
-) -> tuple[Float, dict[str, float]]:
-    """Novelty distances of records, as they are and moved, from clouds without their machine draw.
-
-    And the weight of the share outside the ranges, which makes its rare values as far as those of
-    the distance itself: of both together no more are refused than of one. And how far peaks may
-    be below the usual ones, and noise floors above them.
-    """
-    names = training.names
-    apart, outside = np.empty((2, 2, len(training.rows)))
-    lacking, noise = np.empty((2, len(training.rows)))
-    for train, test in folds:
-        cloud = fit_familiarity(names, training.rows[train], training.groups[train])
-        for i, each in enumerate((training, other)):
-            apart[i, test] = cloud.distance(names, each.rows[test])
-            outside[i, test] = cloud.outside(each.rows[test])
-        lacking[test] = cloud.lacking(names, training.rows[test])
-        noise[test] = cloud.noise(names, training.rows[test])
-    rare = max(float(np.quantile(outside[0], _RARE)), 1 / len(names))
-    weight = float(np.quantile(apart[0], _RARE)) / rare
-    limits = {
-        "weight": weight,
-        "most_lacking": most_lacking(lacking, REFUSED_SHARE),
-        "seldom_lacking": most_lacking(lacking, CAUTIONED_SHARE),
-        "most_noise": usual_excess(noise),
-    }
-    return np.maximum(apart, weight * outside), limits
-
-
-def _rates(
-    one: FittedHead, training: TrainingRows, estimate: Float, as_new: float | None
-) -> dict[str, Any]:
-    """How often a head is right, and how the severity is told with and without what it finds."""
-    name, found = one.head.name, one.probability > PRESENT
-    here = training.faults[name]
-    error = np.abs(estimate - training.severity)
-    visible = None
-    if as_new is not None and is_regime(name):
-        visible = visible_from(training.severity[here], estimate[here], as_new)
-    return {
-        "name": name,
-        "share": float(here.mean()),
-        "detection_rate": float(found[here].mean()),
-        "false_alarm_rate": float(found[~here].mean()),
-        "members": one.members,
-        "mae_with_m": float(error[here].mean()),
-        "mae_without_m": float(error[~here].mean()),
-        "visible_from_m": visible,
-    }
 
 
 def _model(learnt: Learnt, card: dict[str, Any]) -> WearModel:

@@ -22,8 +22,8 @@ from wearstate.diagnose.learning.conformal import (
     tails,
 )
 from wearstate.diagnose.learning.grades import grades_of
+from wearstate.diagnose.wear_model.learn import TrainingRows, learn
 from wearstate.diagnose.wear_model.novelty import novelty_p_value
-from wearstate.diagnose.wear_model.train import TrainingRows, learn
 
 
 @dataclass(frozen=True, kw_only=True)
