@@ -32,7 +32,6 @@ docs: $(STAMP)
 	  __import__("sphinx-mathjax-offline")' 2> /dev/null \
 	  || $(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[docs]'
 	OMP_NUM_THREADS=1 $(BIN)/python docs/pictures.py $(JOBS)
-	OMP_NUM_THREADS=1 $(BIN)/python docs/screenshots.py
 	OMP_NUM_THREADS=1 $(BIN)/sphinx-build -q -W -n --keep-going -b html \
 	  -d docs/_build/doctrees docs docs/_build/html
 

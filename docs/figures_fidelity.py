@@ -1,21 +1,23 @@
-"""Charts and atlases of the built-in scenes: ``python docs/figures_fidelity.py [NAME …]``.
+"""Pictures of the page on fidelity: ``python docs/figures_fidelity.py [FOLDER]``, all simulated.
 
-All simulated. A chart is speed against accuracy of every rung and step (``wearstate chart``), an
-atlas shows where each method fails (``wearstate stability``). Up to ten minutes a scene on one
-core; the text of every chart goes to stdout. Atlases have no budget: they come out the same on
-every machine.
+Small ones of a few scenes, half a minute on one core: a chart is speed against accuracy of every
+rung and step (``wearstate chart``), a map shows where each method fails (``wearstate stability``).
+``--scenes NAME ...`` writes the whole ones of these scenes instead, in up to ten minutes each; the
+text of every chart goes to stdout. Atlases have no budget: they come out the same on every machine.
 """
 
-import sys
-from collections.abc import Sequence
+import argparse
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+from matplotlib.figure import Figure
 from wearstate.diagnose.charts.chart import Chart, chart_text
+from wearstate.diagnose.charts.figure import chart_figure
 from wearstate.diagnose.charts.of_scene import scene_chart
 from wearstate.diagnose.charts.page import save_chart
 from wearstate.diagnose.stability.atlas import atlas
-from wearstate.diagnose.stability.figure import save_figure
+from wearstate.diagnose.stability.figure import atlas_figure, save_figure
 from wearstate.sim.scene.load import load_scene, scene_names
 
 BUDGET = 300.0
@@ -46,9 +48,27 @@ def chart(name: str, budget: float | None = BUDGET, jobs: int = JOBS) -> Chart:
     return scene_chart(load_scene(name, changes), budget=budget, jobs=jobs)
 
 
-def main(names: Sequence[str], folder: Path) -> None:
-    folder.mkdir(parents=True, exist_ok=True)
-    for name in names or scene_names():
+def small_chart() -> Figure:
+    """Chart of a journal bearing over ten revolutions, every combination of it."""
+    return chart_figure(scene_chart(load_scene("journal-bearing", {"duration": "0.2 s"}), jobs=1))
+
+
+def small_map(name: str, plan: str, size: int) -> Figure:
+    """One map of a scene, so many cells along either axis."""
+    scene = load_scene(name)
+    return atlas_figure(scene, atlas(scene, name=plan, size=size))
+
+
+FIGURES: dict[str, Callable[[], Figure]] = {
+    "fidelity-chart": small_chart,
+    "fidelity-contact": lambda: small_map("bilge-pump", "step-stiffness", 7),
+    "fidelity-squeeze": lambda: small_map("journal-bearing", "step-squeeze", 8),
+}
+
+
+def whole(names: Sequence[str], folder: Path) -> None:
+    """Write chart and atlas of scenes, and print what the charts say."""
+    for name in names:
         found = chart(name)
         save_chart(found, folder / f"chart-{name}.png")
         print(chart_text(found), end="\n\n", flush=True)
@@ -58,5 +78,19 @@ def main(names: Sequence[str], folder: Path) -> None:
             save_figure(scene, maps, folder / f"atlas-{name}.png")
 
 
+def main(folder: Path) -> None:
+    for name, draw in FIGURES.items():
+        draw().savefig(folder / f"{name}.png", dpi=80)
+        print(folder / f"{name}.png", flush=True)
+
+
 if __name__ == "__main__":
-    main(sys.argv[1:], Path(__file__).parent / "img")
+    parser = argparse.ArgumentParser(description="Pictures of the page on fidelity.")
+    parser.add_argument("folder", nargs="?", type=Path, default=Path(__file__).parent / "img")
+    parser.add_argument("--scenes", nargs="+", choices=scene_names(), metavar="NAME")
+    given = parser.parse_args()
+    given.folder.mkdir(parents=True, exist_ok=True)
+    if given.scenes:
+        whole(given.scenes, given.folder)
+    else:
+        main(given.folder)

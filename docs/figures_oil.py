@@ -1,10 +1,13 @@
-"""Figure and table of the page on lubrication: ``python docs/figures_oil.py [FOLDER]``, simulated.
+"""Figure of the page on lubrication: ``python docs/figures_oil.py [FOLDER]``, simulated.
 
 What oil in the crank pin does to the vibration of a bilge pump, by clearance, speed, viscosity and
-how much of the gap the oil fills.
+how much of the gap the oil fills. The figure draws the table of the page; ``--table`` computes and
+prints that, some minutes.
 """
 
+import re
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +31,8 @@ REGIMES: dict[str, dict[str, Any]] = {
     "flooded, 0.1 Pa s": {"viscosity": "0.1 Pa s"},
 }
 """Name -> oil of the crank pin."""
+
+PAGE = Path(__file__).parent / "lubrication.md"
 
 COLOURS = ("#1f5a94", "#b3541e", "#d08a3e", "#4f7d3a", "#7fae6a")
 
@@ -64,12 +69,23 @@ def table() -> dict[tuple[int, str], list[tuple[float, float, float]]]:
     }
 
 
-def picture(found: dict[tuple[int, str], list[tuple[float, float, float]]]) -> Figure:
+def stated() -> dict[tuple[int, str], list[float]]:
+    """Speed and regime -> vibration at each clearance [m/s^2], as the page's table has it."""
+    text = PAGE.read_text(encoding="utf-8")
+    rows = re.findall(r"^\| (\d+) \| ([^|]+) \| (.+) \| [^|]* \|$", text, re.MULTILINE)
+    return {
+        (int(speed), regime.replace("µm", "um")): [float(level) for level in levels.split(" | ")]
+        for speed, regime, levels in rows
+    }
+
+
+def picture() -> Figure:
+    found = stated()
     figure = Figure(figsize=(9, 3.8), layout="constrained")
     figure.suptitle("Bilge pump: vibration by the oil in its crank pin (simulated)", fontsize=11)
     for axes, speed in zip(figure.subplots(1, 2, sharey=True), SPEEDS, strict=True):
         for regime, colour in zip(REGIMES, COLOURS, strict=True):
-            level = [row[0] for row in found[speed, regime]]
+            level = found[speed, regime]
             axes.plot(1e3 * np.array(CLEARANCES), level, "o-", ms=4, color=colour, label=regime)
         axes.set(yscale="log", xlabel="diametral clearance [mm]", title=f"{speed} rpm")
         axes.grid(alpha=0.3)
@@ -78,19 +94,29 @@ def picture(found: dict[tuple[int, str], list[tuple[float, float, float]]]) -> F
     return figure
 
 
-def main(folder: Path) -> None:
-    """Write the figure and print the table."""
-    found = table()
-    picture(found).savefig(folder / "pump-oil.png", dpi=120)
+FIGURES: dict[str, Callable[[], Figure]] = {"pump-oil": picture}
+
+
+def print_table() -> None:
+    """Compute the table and print it as it stands on the page."""
     heads = " | ".join(f"{1e3 * clearance:g} mm" for clearance in CLEARANCES)
     print(f"| speed | oil | {heads} | least film |")
     print("|---" * (len(CLEARANCES) + 3) + "|")
-    for (speed, regime), rows in found.items():
+    for (speed, regime), rows in table().items():
         levels = " | ".join(f"{row[0]:.3g}" for row in rows)
         films = [1e6 * row[1] for row in rows if np.isfinite(row[1])]
         least = f"{min(films):.2g} µm" if films else ""
-        print(f"| {speed} | {regime} | {levels} | {least} |")
+        print(f"| {speed} | {regime.replace('um', 'µm')} | {levels} | {least} |")
+
+
+def main(folder: Path) -> None:
+    for name, draw in FIGURES.items():
+        draw().savefig(folder / f"{name}.png", dpi=90)
+        print(folder / f"{name}.png")
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent / "img")
+    if sys.argv[1:] == ["--table"]:
+        print_table()
+    else:
+        main(Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent / "img")

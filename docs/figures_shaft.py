@@ -16,12 +16,14 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from scipy.signal import find_peaks
+from wearstate.diagnose.machines.registry import presentation_of
 from wearstate.diagnose.shaft_tests.next_test import rank_tests, usual_responses
 from wearstate.diagnose.shaft_tests.rig_test import ShakerTest, calibrated_test, rig_figure
 from wearstate.diagnose.shaft_tests.sag_model import Prior
 from wearstate.sim.alignment.alignment import AlignmentLine, influence, reactions
 from wearstate.sim.alignment.calibration import Calibration, calibrate
 from wearstate.sim.beam.rotor import Rotor, campbell
+from wearstate.sim.machine.simulate import simulate
 from wearstate.sim.scene.load import load_scene
 from wearstate.sim.scene.shaft import ShaftScene
 from wearstate.sim.shaft.changed import free_line, line_model, rest, unit_change
@@ -474,6 +476,15 @@ def detectability() -> Figure:
     return figure
 
 
+def recording() -> Figure:
+    """What the sensors of a line with a worn stern bearing record, and what they do not see."""
+    worn = load_scene("propulsion-shaft", {"bearings.0.wear_down": "0.9 mm"})
+    figure = Figure(figsize=(11, 7), layout="constrained")
+    figure.suptitle(f"{worn.name} (simulated)")
+    presentation_of(worn).draw(figure, worn, simulate(worn, seed=1, truth=True))
+    return figure
+
+
 FIGURES: dict[str, Callable[[], Figure]] = {
     "shaft-model": model,
     "shaft-influence": influence_lines,
@@ -483,6 +494,7 @@ FIGURES: dict[str, Callable[[], Figure]] = {
     "shaft-rig": rig,
     "shaft-contradiction": contradiction,
     "shaft-detectability": detectability,
+    "shaft-recording": recording,
 }
 
 

@@ -1,6 +1,7 @@
-"""Pictures of the results page, made where one is missing or the program has changed since.
+"""Pictures of the pages, made where one is missing or the program has changed since.
 
-``python docs/pictures.py [JOBS]``, which ``make docs`` calls; up to 90 s on two cores.
+``python docs/pictures.py [JOBS]``, which ``make docs`` calls; one to two minutes on two cores, with
+the screenshots of pages (``screenshots.py``) beside them.
 """
 
 import hashlib
@@ -12,7 +13,9 @@ from pathlib import Path
 
 DOCS = Path(__file__).parent
 FOLDER = DOCS / "img"
-SCRIPTS = ("figures_journal.py", "figures_pump.py", "figures_shaft.py")  # the longest first
+SCRIPTS = tuple(  # the longest first
+    f"figures_{part}.py" for part in ("fidelity", "shaft", "pump", "journal", "oil")
+)
 FLOORS = ("sim", "features", "datasets", "diagnose")
 
 
@@ -52,9 +55,12 @@ def run(script: str) -> None:
 
 
 def main(jobs: int) -> None:
-    """Run what is stale."""
+    """Run what is stale; the screenshots know by themselves."""
     with ThreadPoolExecutor(jobs) as pool:
+        command = [sys.executable, str(DOCS / "screenshots.py")]
+        pages = pool.submit(subprocess.run, command, check=True)
         list(pool.map(run, [script for script in SCRIPTS if stale(script)]))
+        pages.result()
 
 
 if __name__ == "__main__":

@@ -1,7 +1,8 @@
 """Pages as a phone and a window show them; said in words where Chromium is missing.
 
-``python docs/screenshots.py``, which ``make docs`` calls; one to four minutes, nothing where the
-program is as before. Writes ``docs/_build/screens.md``, which ``docs/pages.md`` takes in.
+``python docs/screenshots.py``, which ``make docs`` calls through ``pictures.py``; a minute or so,
+nothing where the program is as before. Writes ``docs/_build/screens.md``, which ``docs/pages.md``
+takes in.
 """
 
 import shutil
@@ -25,9 +26,9 @@ PAGES = {
         "info demo/data.h5 --record 5 --interactive --plot",
     ),
     "card": ("A data set", "info demo/data.h5 --card"),
-    "evaluate": ("A model judged", "evaluate demo/model.wsm demo/data.h5 --quick -o"),
+    "evaluate": ("A model judged", "evaluate demo/model.wsm demo/data.h5 --quick -j 1 -o"),
     "align": ("A shaft line", "align propulsion-shaft --set bearings.2.sag=1.6mm -o"),
-    "chart": ("How much model", "chart journal-bearing --set duration=0.3 --budget 10 -o"),
+    "chart": ("How much model", "chart journal-bearing --set duration=0.3 --budget 10 -j 1 -o"),
     "atlas": (
         "Where methods fail",
         "stability journal-bearing --map eccentricity-mesh --size 6 -o",
@@ -71,7 +72,9 @@ def main() -> None:
     known = current(Path(__file__).name)
     if STAMP.is_file() and STAMP.read_text() == known and WORDS.is_file():
         return
-    wearstate("demo --folder demo")
+    (BUILD / "demo").mkdir(exist_ok=True)
+    wearstate("generate bilge-pump-small -n 60 -j 1 -o demo/data.h5 --force")
+    wearstate("train demo/data.h5 -j 1 -o demo/model.wsm --force")
     parts = []
     for kind, (heading, command) in PAGES.items():
         shoot(browser, kind, command)
