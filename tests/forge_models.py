@@ -339,7 +339,7 @@ def child(model: str) -> None:
     """Read the files named on stdin; answer with one line each."""
     from wearstate.diagnose.wear_model.file import load_model
 
-    row = np.array(load_model(model).card["healthy_features"]["mean"])
+    row = np.array(load_model(model).card.healthy_features.mean)
     wanted = answer(load_model(model), row)
     seen: list[str] = []
     sys.addaudithook(

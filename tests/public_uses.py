@@ -29,6 +29,8 @@ table = wearstate.features.SignalFeatures(only=["rms"]).fit_transform([recording
 bearing = wearstate.film.JournalBearing(diameter=0.1, length=0.05, clearance=1e-4, viscosity=0.02)
 ratio: float = wearstate.film.operate(bearing, speed=50.0, load=(0.0, -1e3)).eccentricity_ratio
 model: wearstate.WearModel = wearstate.train("data.h5", seed=1)
+limit: float = model.card.condemning_limit_m
+records: int = model.card.trained_on.records
 page: str = wearstate.report(recording, model).html()
 text: str = wearstate.evaluate(model, "data.h5", quick=True).text
 verdict: str = wearstate.align.align(scene).verdict
@@ -42,3 +44,7 @@ wearstate.load_scene("bilge-pump").duration = 2.0  # error: misc
 wearstate.features.spectrums(recording)  # error: attr-defined
 wearstate.film.operate(bearing, speed="50")  # error: arg-type
 grade: str = estimate.grade  # error: assignment
+print(model.card.limit)  # error: attr-defined
+print(model.card["severity"])  # error: index
+print(model.card.trained_on.recipee)  # error: attr-defined
+model.card.mode = "cold"  # error: misc

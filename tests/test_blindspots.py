@@ -28,15 +28,15 @@ from wearstate.sim.scene.parts import SceneError, channels_of
 PUMP = load_recipe("bilge-pump-narrow", {"duration": "0.4 s"})
 LIMIT = 3.1e-4
 
-CARD = {
-    "mode": "cold",
-    "views": {},
-    "trained_on": {"recipe": "bilge-pump-narrow", "scene": "bilge-pump"},
-    "severity": "diametral_clearance_crankpin_m",
-    "condemning_limit_m": LIMIT,
-    "sample_rate_hz": 25600.0,
-    "channels": [{"name": c.name, "unit": c.unit} for c in channels_of(PUMP.scene)],
-}
+CARD = SimpleNamespace(
+    mode="cold",
+    views={},
+    trained_on=SimpleNamespace(recipe="bilge-pump-narrow", scene="bilge-pump"),
+    severity="diametral_clearance_crankpin_m",
+    condemning_limit_m=LIMIT,
+    sample_rate_hz=25600.0,
+    channels=channels_of(PUMP.scene),
+)
 
 
 def loudness(recording, baseline=None, conditions=None, told=()):
@@ -406,19 +406,25 @@ def test_page_text_and_json():
 
 
 def card(**changes):
-    return SimpleNamespace(card={**CARD, **changes}, noted=(), estimate=loudness)
+    return SimpleNamespace(
+        card=SimpleNamespace(**{**vars(CARD), **changes}), noted=(), estimate=loudness
+    )
 
 
 @pytest.mark.parametrize(
     ("model", "name", "words"),
     [
-        (card(trained_on={"recipe": "own"}), None, "recipe = 'own' is not built in.*--recipe"),
-        (card(trained_on={"recipe": ""}), None, "trained on no recipe.*--recipe"),
+        (
+            card(trained_on=SimpleNamespace(recipe="own")),
+            None,
+            "recipe = 'own' is not built in.*--recipe",
+        ),
+        (card(trained_on=SimpleNamespace(recipe="")), None, "trained on no recipe.*--recipe"),
         (card(mode="referenced"), None, "must be 'cold'; train one without --baseline"),
         (card(views={"running": {}}), None, "running must be none; train one without --join"),
         (MODEL, "journal-bearing-small", "another severity.*diametral_clearance_crankpin_m.*--rec"),
         (card(sample_rate_hz=1.0), None, "another sample_rate"),
-        (card(channels=[{"name": "a", "unit": "V"}]), None, "another channels"),
+        (card(channels=[SimpleNamespace(name="a", unit="V")]), None, "another channels"),
         (MODEL, "no-such-recipe", "no-such-recipe"),
     ],
 )
@@ -430,7 +436,8 @@ def test_a_recipe_that_does_not_fit_is_refused(model, name, words):
 def test_the_recipe_of_the_card():
     assert recipe_of(MODEL).name == "bilge-pump-narrow"
     assert (
-        recipe_of(card(trained_on={"recipe": "own"}), "bilge-pump-small").name == "bilge-pump-small"
+        recipe_of(card(trained_on=SimpleNamespace(recipe="own")), "bilge-pump-small").name
+        == "bilge-pump-small"
     )
 
 

@@ -284,12 +284,17 @@ def test_the_training_set_serves_the_baselines(trained, small_set):
     assert_allclose(told["mae_m"], score(model, table, test)["mae_m"])
 
 
+def trained_on_others(model, **changes):
+    """The model, as if it had been trained on other records."""
+    trained = model.card.trained_on.model_copy(update=changes)
+    return replace(model, card=model.card.model_copy(update={"trained_on": trained}))
+
+
 def test_another_set_is_no_training_set(trained, small_set, monkeypatch):
     monkeypatch.setattr(judging, "feature_table", lambda path, **_: trained[1])
-    stranger = replace(trained[0], card=json.loads(json.dumps(trained[0].card)))
-    told = evaluate_model(stranger, small_set, trained_on=small_set, quick=True)
+    told = evaluate_model(trained[0], small_set, trained_on=small_set, quick=True)
     assert not told["baselines"]["majority"]["flattered"]
-    stranger.card["trained_on"]["training_signals"] = [1]
+    stranger = trained_on_others(trained[0], training_signals=[1])
     with pytest.raises(DataError, match="0 records that the model was trained on"):
         evaluate_model(stranger, small_set, trained_on=small_set, quick=True)
 
@@ -337,10 +342,10 @@ def test_a_model_learns_from_its_split_alone(odd, split_set):
     with DataSet(split_set) as data:
         signals = data.manifest["signal_crc32"][data.manifest["group"] % 2 == 0]
         digest = usable_sides(data, "odd").sha256
-    trained = model.card["trained_on"]
-    assert trained["training_signals"] == sorted(set(signals))
-    assert (trained["split"], trained["split_sha256"]) == ("odd", digest)
-    assert trained["held_out_share"] == 0.5
+    trained = model.card.trained_on
+    assert trained.training_signals == sorted(set(signals))
+    assert (trained.split, trained.split_sha256) == ("odd", digest)
+    assert trained.held_out_share == 0.5
     told = evaluate_model(model, split_set, split="odd", quick=True)
     assert told["split"] == {
         "name": "odd",
@@ -357,7 +362,7 @@ def test_a_model_learns_from_its_split_alone(odd, split_set):
 
 def test_a_model_that_knows_what_a_split_tests_is_refused(trained, odd, split_set):
     # 45 of 60 machines, of two records each, were trained on; which of them are odd is chance
-    known = set(trained[0].card["trained_on"]["training_groups"])
+    known = set(trained[0].card.trained_on.training_groups)
     leaked = sum(group % 2 for group in known)
     message = rf"split odd tests {2 * leaked} records of {leaked} machines that the model was"
     with pytest.raises(DataError, match=message):
@@ -377,9 +382,8 @@ def test_the_same_machines_later_are_judged_where_a_split_says_so(split_set, kno
 
 def test_a_stranger_is_judged_on_all_that_a_split_tests(odd, split_set):
     """Its baselines learn from the training side: no record of either is the model's."""
-    stranger = replace(odd[0], card=json.loads(json.dumps(odd[0].card)))
-    stranger.card["trained_on"] |= {"training_signals": [1], "draw_identity": "", "split": ""}
-    stranger.card["trained_on"]["split_sha256"] = ""
+    none = {"draw_identity": "", "split": "", "split_sha256": ""}
+    stranger = trained_on_others(odd[0], training_signals=[1], **none)
     told = evaluate_model(stranger, split_set, split="odd", quick=True)
     assert not told["split"]["trained_with_it"]
     assert not told["baselines"]["single_rms"]["flattered"]
@@ -407,7 +411,7 @@ def test_the_command_line_trains_and_judges_by_a_split(split_set, tmp_path):
     )
     assert done.exit_code == 0, done.output
     trained = json.loads(done.stdout)
-    assert trained["trained_on"]["split"] == load_model(model).card["trained_on"]["split"] == "odd"
+    assert trained["trained_on"]["split"] == load_model(model).card.trained_on.split == "odd"
     done = CliRunner().invoke(cli, ["evaluate", str(model), str(split_set), "--quick", *ways])
     assert done.exit_code == 0, done.output
     told = json.loads(done.stdout)
@@ -504,7 +508,7 @@ def test_a_finished_model_has_a_page_too(trained, small_set):
 def test_the_command_judges_by_splits(trained, small_set, tmp_path):
     model, page = tmp_path / "model.wsm", tmp_path / "page.html"
     save_model(trained[0], model)
-    assert load_model(model).card["budget_ms"] == CHEAP_MS
+    assert load_model(model).card.budget_ms == CHEAP_MS
     arguments = ["evaluate", str(model), str(small_set), "--retrain", "speed", "--quick", "-j", "1"]
     done = CliRunner().invoke(cli, [*arguments, "--json", "-o", str(page)])
     assert done.exit_code == 0, done.output

@@ -7,6 +7,7 @@ import zipfile
 
 import numpy as np
 import pytest
+from wearstate.diagnose.feature_rows.model_card import ConfounderRates
 from wearstate.diagnose.learning.experts import Experts, regime_shares
 from wearstate.diagnose.learning.heads import Head
 from wearstate.diagnose.learning.regressions import CANDIDATES, Blend
@@ -91,7 +92,7 @@ def test_shares_are_of_one():
 def expert(small_trained):
     """The trained model with its blend twice, weighted by two made-up regimes."""
     model, table, _ = small_trained
-    inputs, truth = table.values, table.manifest[model.card["severity"]].to_numpy(dtype=float)
+    inputs, truth = table.values, table.manifest[model.card.severity].to_numpy(dtype=float)
     line = CANDIDATES[0].fit(inputs, inputs, 1.0 + (truth > np.median(truth)), 0)
     sign = Blend(names=("ridge 3",), parts=(line,), weights=np.ones(1), low=0.5, high=4.0)
     heads = tuple(
@@ -112,7 +113,8 @@ def expert(small_trained):
     }
     rates = {"share": 0.5, "detection_rate": 0.9, "false_alarm_rate": 0.1, "mae_with_m": 1e-5}
     rates |= {"mae_without_m": 1e-5, "members": {"ridge 3": 1.0}, "visible_from_m": None}
-    card = {**model.card, "confounders": [{"name": head.name, **rates} for head in heads]}
+    found = [ConfounderRates(name=head.name, **rates) for head in heads]
+    card = model.card.model_copy(update={"confounders": found})
     blind = dataclasses.replace(
         model.blind, severity=experts, scale=dataclasses.replace(scale, **longer)
     )

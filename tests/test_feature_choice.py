@@ -22,7 +22,9 @@ from wearstate.diagnose.feature_rows.feature_table import (
     recording_features,
 )
 from wearstate.diagnose.feature_rows.healthy import Baselines
+from wearstate.diagnose.feature_rows.model_card import FeatureChoice, ModelCard
 from wearstate.diagnose.feature_rows.transfer_reference import HealthyTransfer
+from wearstate.diagnose.wear_model.bundle import load_bundle
 from wearstate.diagnose.wear_model.estimate import ModelError
 from wearstate.diagnose.wear_model.file import load_model, save_model
 from wearstate.diagnose.wear_model.train import train_model
@@ -131,7 +133,7 @@ def test_a_model_keeps_its_features(data, tmp_path):
     assert told["features"]["only"] == ["frf_profile", "antiresonances"]
     assert told["features"]["ms_per_record"][0] > 0
     model = load_model(path)
-    choice = choice_in(model.card)
+    choice = choice_in(model.card.feature_choice)
     assert len(model.names) == 2 * (72 + 6)
     with DataSet(data) as records:
         recording = records[3]
@@ -150,12 +152,16 @@ def test_a_model_keeps_its_features(data, tmp_path):
 
 def test_an_older_model_has_the_standard_set(data, tmp_path):
     model, table, _ = train_model(data, budget_ms=0.1)
-    assert model.card["feature_choice"] == {"set": "standard", "only": [], "candidates": []}
-    older = {key: value for key, value in model.card.items() if key != "feature_choice"}
-    save_model(replace(model, card=older), tmp_path / "old.wsm")
+    assert model.card.feature_choice.table() == {
+        "set": "standard", "only": [], "candidates": [],
+    }  # fmt: skip
+    older = {key: value for key, value in model.card.table().items() if key != "feature_choice"}
+    save_model(replace(model, card=ModelCard.model_validate(older)), tmp_path / "old.wsm")
+    assert load_bundle(tmp_path / "old.wsm", "wear model").card == older  # nothing is added
     with DataSet(data) as records:
         assert load_model(tmp_path / "old.wsm").estimate(records[0]).severity is not None
-    other = replace(model, card={**model.card, "feature_choice": {"set": "core", "only": []}})
+    core = model.card.model_copy(update={"feature_choice": FeatureChoice(set="core")})
+    other = replace(model, card=core)
     with DataSet(data) as records, pytest.raises(ModelError, match="features are not"):
         other.estimate(records[0])
     assert len(table.names) == len(model.names)
@@ -167,10 +173,10 @@ def test_an_older_model_has_the_standard_set(data, tmp_path):
 def test_folds_choose_the_set_that_tells(data):
     choices = choices_of(["skewness,kurtosis", "frf_profile"])
     model, table, test = train_model(data, choices=choices, budget_ms=0.1)
-    kept = model.card["feature_choice"]
-    assert kept["only"] == ["frf_profile"]
+    kept = model.card.feature_choice
+    assert kept.only == ["frf_profile"]
     assert set(table.names) == set(model.names)
-    poor, good = (each["line_mae_m"] for each in kept["candidates"])
+    poor, good = (each.line_mae_m for each in kept.candidates)
     assert good < 0.3 * poor
     error = np.abs(model.predict(table.values[test]) - table.manifest[COLUMN].to_numpy()[test])
     assert error.mean() < 0.04 * LIMIT

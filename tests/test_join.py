@@ -125,8 +125,8 @@ def trained(sets):
 
 def test_a_model_of_two_views_keeps_what_it_reads(trained):
     model = load_model(trained[0])
-    assert list(model.card["views"]) == ["running"]
-    assert not [c for c in model.card["views"]["running"]["channels"] if c["quantity"] == "force"]
+    assert list(model.card.views) == ["running"]
+    assert not [c for c in model.card.views["running"].channels if c.quantity == "force"]
     owners = {name.partition(".")[0] for name in model.names}
     assert "running:acc_third" in owners
     assert "acc_third" in owners

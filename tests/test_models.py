@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from wearstate.datasets.file.record import Channel, DataSet
 from wearstate.diagnose.evaluation.evaluate import evaluate_model, score
+from wearstate.diagnose.feature_rows.model_card import LayoutCard, ModelCard
 from wearstate.diagnose.learning.grades import accuracy_bound, grades_of
 from wearstate.diagnose.learning.heads import Head
 from wearstate.diagnose.learning.regressions import CANDIDATES, Blend, Linear
@@ -52,7 +53,7 @@ def test_accuracy_bound_against_a_simulated_estimator():
 
 def test_no_machine_draw_is_on_both_sides(trained):
     model, table, test = trained
-    seen = set(model.card["trained_on"]["training_groups"])
+    seen = set(model.card.trained_on.training_groups)
     assert seen.isdisjoint(table.manifest["group"].iloc[test])
     assert seen | set(table.manifest["group"].iloc[test]) == set(table.manifest["group"])
 
@@ -214,13 +215,19 @@ def test_a_recording_of_something_else_is_unfamiliar(trained, small_set, kind):
     assert estimate.p_value <= model.p_limit <= 0.012
 
 
+def with_card(model, **changes):
+    """The model with a card in which some tables are others."""
+    card = ModelCard.model_validate({**model.card.table(), **changes})
+    return dataclasses.replace(model, card=card)
+
+
 def test_a_condition_outside_the_trained_range_is_named(trained, small_set):
     model = trained[0]
     conditions = [
         {"name": "shaft.speed_hz", "feature": "shaft.speed_hz", "unit": "Hz", "low": 1, "high": 2},
         {"name": "discharge_pressure_pa", "feature": "", "unit": "Pa", "low": 1.0, "high": 2.0},
     ]
-    model = dataclasses.replace(model, card={**model.card, "conditions": conditions})
+    model = with_card(model, conditions=conditions)
     with DataSet(small_set) as data:
         whole = data[0]
     row = trained[1].values[0]
@@ -242,8 +249,7 @@ def with_a_fault(model, *, slope, mae_with_m):
     rates = {"name": "stuck_valve", "share": 0.1, "detection_rate": 0.9, "false_alarm_rate": 0.1}
     rates |= {"mae_with_m": mae_with_m, "mae_without_m": 1e-5, "members": {"flat": 1.0}}
     rates |= {"visible_from_m": None}
-    card = {**model.card, "confounders": [rates]}
-    return dataclasses.replace(model, heads=(head,), card=card)
+    return dataclasses.replace(with_card(model, confounders=[rates]), heads=(head,))
 
 
 @pytest.mark.parametrize(
@@ -271,8 +277,8 @@ def test_what_was_noted_beside_the_recordings_is_a_condition(trained, small_set)
     model, table, test = trained
     train = np.setdiff1d(np.arange(len(table.values)), test)
     pressure = table.manifest["discharge_pressure_pa"].to_numpy()[train]
-    [found] = [c for c in model.card["conditions"] if c["name"] == "discharge_pressure_pa"]
-    assert (found["low"], found["high"]) == (pressure.min(), pressure.max())
+    [found] = [c for c in model.card.conditions if c.name == "discharge_pressure_pa"]
+    assert (found.low, found.high) == (pressure.min(), pressure.max())
 
 
 def test_a_recording_shorter_than_a_revolution_is_unusable(trained, small_set):
@@ -342,7 +348,7 @@ def test_a_model_of_another_version_is_refused_with_the_cure(trained, tmp_path):
 def both(trained):
     """The model with a line and trees in its blend, whichever was chosen."""
     model, table, _ = trained
-    severity = table.manifest[model.card["severity"]].to_numpy(dtype=float)
+    severity = table.manifest[model.card.severity].to_numpy(dtype=float)
     rows = {candidate.name: candidate for candidate in CANDIDATES}
     blend = Blend(
         names=("ridge 30", "trees"),
@@ -421,17 +427,19 @@ def test_every_flipped_or_missing_byte_is_noticed_or_harmless(trained, tmp_path)
             load_model(bad)
 
 
+def layout_of(units):
+    """What a model needs whose channels have these units, without a tacho, at 100 Hz."""
+    channels = [{"name": name, "unit": unit, "quantity": ""} for name, unit in units.items()]
+    rest = {"sample_rate_hz": 100.0, "tacho": None, "pulses_per_revolution": 1}
+    return LayoutCard.model_validate({"channels": channels, **rest})
+
+
 def test_units_are_compared_channel_by_channel():
     """A force in m/s^2 and an acceleration in N: both units are the model's, neither is right."""
     from wearstate.diagnose.wear_model.estimate import input_faults
 
     units = {"acc": "m/s^2", "push": "N"}
-    card = {
-        "channels": [{"name": name, "unit": unit} for name, unit in units.items()],
-        "tacho": None,
-        "pulses_per_revolution": 1,
-        "sample_rate_hz": 100.0,
-    }
+    card = layout_of(units)
     channels = (
         Channel(name="acc", unit="N", quantity="force"),
         Channel(name="push", unit="m/s^2", quantity="acceleration"),
@@ -447,12 +455,7 @@ def test_unknown_channel_unit_reads_well():
     channel = Channel(name="a", unit="", quantity="acceleration")
     from wearstate.diagnose.wear_model.estimate import input_faults
 
-    card = {
-        "channels": [{"name": "a", "unit": "m/s^2"}],
-        "tacho": None,
-        "pulses_per_revolution": 1,
-        "sample_rate_hz": 100.0,
-    }
+    card = layout_of({"a": "m/s^2"})
     recording = Recording(signal=np.zeros((1, 8)), sample_rate=100.0, channels=(channel,))
     assert input_faults(recording, card) == [
         "channel a is in an unknown unit, the model needs m/s^2"
@@ -480,7 +483,7 @@ def test_a_copied_recipe_is_no_new_machine(trained, tmp_path, change):
     (tmp_path / "copy.toml").write_text(text.replace(*change))
     generate(str(tmp_path / "copy.toml"), 16, tmp_path / "copy.h5", seed=0)
     model = trained[0]
-    seen = set(model.card["trained_on"]["training_groups"])
+    seen = set(model.card.trained_on.training_groups)
     try:
         judged = evaluate_model(model, tmp_path / "copy.h5")
     except DataError as error:
@@ -509,7 +512,7 @@ def test_a_training_signal_under_another_name_is_noticed(trained, small_set, tmp
             }
             for i in rows
         ]
-        seen = data.manifest["group"].isin(trained[0].card["trained_on"]["training_groups"])
+        seen = data.manifest["group"].isin(trained[0].card.trained_on.training_groups)
     copy = tmp_path / "copy.h5"
     with DataSetWriter(
         copy, head, n_records=6, n_samples=signals[0].shape[1], columns=columns
@@ -599,7 +602,8 @@ def test_a_card_that_does_not_fit_is_refused(trained, tmp_path):
         rewritten(tmp_path / "good.wsm", tmp_path / "forged.wsm", changes)
         with pytest.raises(ModelError, match=r"card.json: .*retrain it"):
             load_model(tmp_path / "forged.wsm")
-    bad = dataclasses.replace(trained[0], card={**trained[0].card, "sample_rate_hz": 8e98})
+    card = trained[0].card.model_copy(update={"sample_rate_hz": 8e98})  # which checks nothing
+    bad = dataclasses.replace(trained[0], card=card)
     with pytest.raises(ModelError, match="sample_rate_hz"):
         save_model(bad, tmp_path / "bad.wsm")
     assert not (tmp_path / "bad.wsm").exists()
@@ -607,7 +611,7 @@ def test_a_card_that_does_not_fit_is_refused(trained, tmp_path):
 
 def test_the_notice_does_not_hang_on_a_text_in_the_file(trained):
     model = trained[0]
-    assert "notice" not in model.card
+    assert "notice" not in model.card.table()
     assert model.notice.startswith("trained on simulation")
 
 

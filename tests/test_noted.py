@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from wearstate.diagnose.feature_rows.model_card import TrainedCondition
 from wearstate.diagnose.feature_rows.noted import NOTED, doubted, noted_values, strayed
 from wearstate.diagnose.wear_model.bundle import load_bundle
 from wearstate.diagnose.wear_model.estimate import ModelError
@@ -74,9 +75,9 @@ def test_strays_reach_a_fifth():
 def model(small_trained):
     """The small pump model, as if its straight line leant on the viscosity too."""
     trained, table, _ = small_trained
-    noted = {"name": "viscosity_pa_s", "feature": "", "unit": "Pa s", "low": 0.01, "high": 0.04}
-    kept = [c for c in trained.card["conditions"] if c["feature"]]
-    card = {**trained.card, "conditions": [*kept, noted]}
+    noted = TrainedCondition(name="viscosity_pa_s", feature="", unit="Pa s", low=0.01, high=0.04)
+    kept = [c for c in trained.card.conditions if c.feature]
+    card = trained.card.model_copy(update={"conditions": [*kept, noted]})
     line = trained.blind.witness
     more = {"centre": -4.0, "spread": 1.0, "weight": 0.5, "low": -5.0, "high": -3.0}
     line = replace(line, **{key: np.append(getattr(line, key), end) for key, end in more.items()})
@@ -117,6 +118,7 @@ def test_an_informed_model_comes_back_from_its_file(model, tmp_path):
 
 def test_an_informed_part_without_its_conditions_is_refused(model, tmp_path):
     asked, _ = model
-    kept = [c for c in asked.card["conditions"] if c["feature"]]
+    kept = [c for c in asked.card.conditions if c.feature]
+    card = asked.card.model_copy(update={"conditions": kept})
     with pytest.raises(ModelError, match="informed do not fit"):
-        save_model(replace(asked, card={**asked.card, "conditions": kept}), tmp_path / "a.wsm")
+        save_model(replace(asked, card=card), tmp_path / "a.wsm")

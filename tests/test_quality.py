@@ -32,7 +32,7 @@ def model(small_model):
 @pytest.fixture(scope="module")
 def familiar(model, small_set):
     """Held-out recordings that the model grades as they are."""
-    seen = model.card["trained_on"]["training_groups"]
+    seen = model.card.trained_on.training_groups
     with DataSet(small_set) as data:
         rows = np.flatnonzero(~data.manifest["group"].isin(seen).to_numpy())
         found = [data[int(row)] for row in rows[:8]]

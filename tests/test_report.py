@@ -356,7 +356,7 @@ def test_the_map_of_what_moved_is_level_against_healthy(model):
     assert np.nanmax(level[1]) > 6  # four times as new: 12 dB where it knocks
     name = "acc.angle_000_010.band_"
     cells = [i for i, n in enumerate(model.names) if n.startswith(name)]
-    mean = np.array(model.card["healthy_features"]["mean"])
+    mean = np.array(model.card.healthy_features.mean)
     np.testing.assert_allclose(level[1][:, 0], (own - mean)[cells])
     assert "the machine's healthy" in still.caption
     assert [p.caption.split(":")[0] for p in report_pictures(found, model, graded=True)] == [
@@ -410,7 +410,7 @@ def referenced(tmp_path_factory):
     path = folder / "model.wsm"
     model = train_model(data, held_out=0.0, baseline=healthy)[0]
     save_model(model, path)
-    row = np.array(model.card["healthy_features"]["mean"])
+    row = np.array(model.card.healthy_features.mean)
     assert load_model(path).judge(row + 1, row) == model.judge(row + 1, row)
     return path, healthy
 

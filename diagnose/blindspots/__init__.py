@@ -2,5 +2,6 @@
 
 It may import ``sim.output``, ``sim.scene``, ``sim.machine``, ``datasets.file``,
 ``datasets.source``, ``datasets.recipe``, ``datasets.measured``, ``diagnose.pages``,
-``diagnose.machines``, ``diagnose.learning``, ``diagnose.wear_model``, ``diagnose.nameplate``.
+``diagnose.machines``, ``diagnose.learning``, ``diagnose.feature_rows``, ``diagnose.wear_model``,
+``diagnose.nameplate``.
 """

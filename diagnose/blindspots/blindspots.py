@@ -22,6 +22,7 @@ from ...datasets.recipe.text import recipe_names
 from ...sim.machine.simulate import simulate_many
 from ...sim.output.recording import DataError, Recording
 from ...sim.scene.parts import Scene, SceneError, channels_of
+from ..feature_rows.model_card import ModelCard
 from ..machines.registry import presentation_of
 from ..nameplate.cautions import known_beside
 from ..nameplate.nameplate import Nameplate
@@ -43,7 +44,7 @@ class Model(Protocol):
     """What is asked of a model."""
 
     @property
-    def card(self) -> Mapping[str, Any]:
+    def card(self) -> ModelCard:
         """What it was trained on."""
 
     @property
@@ -103,11 +104,11 @@ def recipe_of(model: Model, name: str | None = None) -> Recipe:
     """
     card = model.card
     faults = []
-    if card.get("mode", "cold") != "cold":
+    if card.mode != "cold":
         faults.append("mode = 'referenced' must be 'cold'; train one without --baseline")
-    if card.get("views"):
-        faults.append(f"views = {', '.join(card['views'])} must be none; train one without --join")
-    known = card["trained_on"]["recipe"]
+    if card.views:
+        faults.append(f"views = {', '.join(card.views)} must be none; train one without --join")
+    known = card.trained_on.recipe
     if name is None and known not in recipe_names():
         what = f"recipe = '{known}' is not built in" if known else "it was trained on no recipe"
         faults.append(f"{what}; name its file: --recipe RECIPE.toml")
@@ -120,17 +121,17 @@ def recipe_of(model: Model, name: str | None = None) -> Recipe:
     return recipe
 
 
-def _refuse_other_inputs(recipe: Recipe, card: Mapping[str, Any]) -> None:
+def _refuse_other_inputs(recipe: Recipe, card: ModelCard) -> None:
     made = {
-        "severity": (card["severity"], card["severity"] in recipe.severity_columns),
+        "severity": (card.severity, card.severity in recipe.severity_columns),
         "sample_rate": (
-            card["sample_rate_hz"],
-            recipe.scene.sample_rate == card["sample_rate_hz"],
+            card.sample_rate_hz,
+            recipe.scene.sample_rate == card.sample_rate_hz,
         ),
         "channels": (
-            ", ".join(channel["name"] for channel in card["channels"]),
+            ", ".join(channel.name for channel in card.channels),
             [(c.name, c.unit) for c in channels_of(recipe.scene)]
-            == [(c["name"], c["unit"]) for c in card["channels"]],
+            == [(c.name, c.unit) for c in card.channels],
         ),
     }
     faults = [
@@ -154,7 +155,7 @@ class _Machines:
 
     @cached_property
     def column(self) -> str:
-        return str(self.model.card["severity"])
+        return self.model.card.severity
 
     @cached_property
     def recordings(self) -> dict[int, Recording]:

@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+from ..feature_rows.model_card import ModelCard
 from ..learning.scores import ScoreFigure
 from .blindspots import BlindSpots
 from .scores import FIGURES, ShiftRow, ranked, row_figures
@@ -14,13 +15,13 @@ FEW = 20
 """Machines below which intervals over machines are too narrow."""
 
 
-def blind_spots_table(found: BlindSpots, card: Mapping[str, Any]) -> Table:
+def blind_spots_table(found: BlindSpots, card: ModelCard) -> Table:
     """A list of blind spots, ready for JSON.
 
     Parameters
     ----------
     found : BlindSpots
-    card : mapping
+    card : ModelCard
         Of the model.
 
     Returns
@@ -31,10 +32,10 @@ def blind_spots_table(found: BlindSpots, card: Mapping[str, Any]) -> Table:
         where no machine tells), what was said of every machine, and the faults of those that could
         not be simulated; ``left`` names rows that time did not suffice for.
     """
-    limit = float(card["condemning_limit_m"])
+    limit = float(card.condemning_limit_m)
     return {
         "recipe": found.recipe,
-        "severity": card["severity"],
+        "severity": card.severity,
         "condemning_limit_m": limit,
         "machines": len(found.baseline.said),
         "baseline": _row_table(found.baseline, limit),

@@ -1,24 +1,21 @@
 """The file of a model of named conditions: what is in it, and whether its parts fit each other."""
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Literal, Self
+from typing import Any
 
 import numpy as np
-from pydantic import Field, model_validator
+from numpy.typing import NDArray
+from pydantic import Field
 
+from ..feature_rows.model_card import ClassCard, Strict
 from ..feature_rows.physical import physical_rows
 from ..wear_model.arrays import (
     BlendStructure,
-    ChannelCard,
-    FeatureChoice,
-    Pulses,
-    RateHz,
-    Strict,
     blend_arrays,
     blend_fits,
     blend_of,
     blend_structure,
-    check_channels,
     familiarity_fits,
     numbers_fit,
     part_arrays,
@@ -39,29 +36,6 @@ _ROUNDING = 1e-9
 
 class _Structure(Strict):
     blends: list[BlendStructure] = Field(min_length=2, max_length=100)
-
-
-class _Card(Strict):
-    created_by: str
-    origin: Literal["simulated", "measured"]
-    target: str
-    classes: list[str] = Field(min_length=2, max_length=100)
-    records: int = Field(ge=1)
-    split_seed: int
-    training_signals: list[int]
-    sample_rate_hz: RateHz
-    channels: list[ChannelCard] = Field(min_length=1)
-    tacho: str | None
-    pulses_per_revolution: Pulses
-    features: list[str] = Field(min_length=1)
-    feature_choice: FeatureChoice = FeatureChoice()
-
-    @model_validator(mode="after")
-    def _fits_itself(self) -> Self:
-        if self.classes != sorted(set(self.classes)):
-            raise ValueError("classes must be different, in alphabetical order")
-        check_channels(self.channels, self.tacho)
-        return self
 
 
 def save_class_model(model: ClassModel, path: str | Path, *, force: bool = False) -> None:
@@ -92,7 +66,7 @@ def save_class_model(model: ClassModel, path: str | Path, *, force: bool = False
     _check(model, path)
     structure = {"blends": [blend_structure(blend) for blend in model.blends]}
     bundle = Bundle(
-        kind=CLASS_MODEL, card=model.card, structure=structure, arrays=_arrays_of(model)
+        kind=CLASS_MODEL, card=model.card.table(), structure=structure, arrays=_arrays_of(model)
     )
     save_bundle(bundle, path, force=force)
 
@@ -124,10 +98,10 @@ def load_class_model(path: str | Path) -> ClassModel:
     wearstate.diagnose.wear_model.estimate.ModelError: pump.wsm is a wear model
     """
     bundle = load_bundle(path, CLASS_MODEL)
-    checked(_Card, bundle.card, path, "card.json")
+    card = checked(ClassCard, bundle.card, path, "card.json")
     structure = checked(_Structure, bundle.structure, path, "structure.json")
     try:
-        model = _model_of(structure, bundle)
+        model = _model_of(structure, bundle.arrays, card)
     except (KeyError, TypeError, ValueError) as error:
         raise ModelError(f"{path}: arrays.npz cannot be read ({error}); retrain it") from error
     _check(model, path)
@@ -144,8 +118,9 @@ def _arrays_of(model: ClassModel) -> dict[str, Any]:
     return {name: np.asarray(value) for name, value in found.items()}
 
 
-def _model_of(structure: _Structure, bundle: Bundle) -> ClassModel:
-    arrays = bundle.arrays
+def _model_of(
+    structure: _Structure, arrays: Mapping[str, NDArray[Any]], card: ClassCard
+) -> ClassModel:
     model = ClassModel(
         blends=tuple(
             blend_of(one, arrays, f"blends.{i}") for i, one in enumerate(structure.blends)
@@ -155,7 +130,7 @@ def _model_of(structure: _Structure, bundle: Bundle) -> ClassModel:
             Familiarity(**part_of(arrays, f"familiarity.{i}", Familiarity))
             for i in range(len(structure.blends))
         ),
-        card=bundle.card,
+        card=card,
     )
     refuse_more(arrays, _arrays_of(model))
     return model

@@ -4,9 +4,10 @@ There is no clearance in metres here and no grade: a recording is of one of the 
 with a set of those that cannot be excluded, or of none that is known.
 """
 
+import json
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
@@ -28,6 +29,7 @@ from ..feature_rows.feature_table import (
     feature_table,
     recording_features,
 )
+from ..feature_rows.model_card import ClassCard
 from ..feature_rows.quality import layout_faults, sample_faults
 from ..learning.conformal import COVERAGE, record_weights, weighted_quantile
 from ..learning.regressions import CANDIDATES, Blend, Folds, fit_blend
@@ -191,24 +193,24 @@ class ClassModel:
     familiarity : tuple of Familiarity
         The cloud of the training recordings of each class: between two classes lies neither. Of a
         class of too few recordings, that of all.
-    card : dict
+    card : ClassCard
         What it was trained on, its inputs and classes.
     """
 
     blends: tuple[Blend, ...]
     votes: Votes
     familiarity: tuple[Familiarity, ...]
-    card: dict[str, Any]
+    card: ClassCard
 
     @property
     def classes(self) -> tuple[str, ...]:
         """Names of the classes, in alphabetical order."""
-        return tuple(self.card["classes"])
+        return tuple(self.card.classes)
 
     @cached_property
     def names(self) -> tuple[str, ...]:
         """Names of the features of a row."""
-        return tuple(self.card["features"])
+        return tuple(self.card.features)
 
     @cached_property
     def scores(self) -> dict[str, Any]:
@@ -217,9 +219,7 @@ class ClassModel:
 
     def __repr__(self) -> str:
         recordings = len(np.unique(self.votes.group))
-        return (
-            f"<ClassModel of {self.card['target']}: {', '.join(self.classes)}; {recordings} groups>"
-        )
+        return f"<ClassModel of {self.card.target}: {', '.join(self.classes)}; {recordings} groups>"
 
     @property
     def notice(self) -> str:
@@ -269,7 +269,7 @@ class ClassModel:
         reasons = tuple(fault.text for fault in faults if fault.bars)
         if reasons:
             return Naming(verdict="unusable", reasons=reasons, shares={})
-        names, row = recording_features(recording, choice_in(self.card))
+        names, row = recording_features(recording, choice_in(self.card.feature_choice))
         if names != self.names:
             raise ModelError(
                 f"the model's {len(self.names)} features are not the recording's {len(names)}; "
@@ -396,7 +396,8 @@ def train_classes(
     labels = _labels_of(table.manifest, target, path)
     blows = blow_table(path, len(labels), jobs=jobs)
     model = fit_classes(table, labels, blows, head, target=target, seed=seed)
-    model.card["feature_choice"] = choice_card(choice)
+    card = model.card.model_copy(update={"feature_choice": choice_card(choice)})
+    model = replace(model, card=card)
     return model, score_votes(model.votes, model.classes, seed=seed)
 
 
@@ -517,9 +518,9 @@ def _nearest_distance(clouds: Sequence[Familiarity], names: Sequence[str], rows:
 
 def _card(
     head: Attributes, table: FeatureTable, classes: list[str], target: str, seed: int
-) -> dict[str, Any]:
+) -> ClassCard:
     manifest = table.manifest
-    return {
+    card = {
         "created_by": f"wearstate {__version__}",
         "origin": head.origin,
         "target": target,
@@ -533,6 +534,7 @@ def _card(
         "pulses_per_revolution": head.pulses_per_revolution,
         "features": list(table.names),
     }
+    return ClassCard.model_validate_json(json.dumps(card))
 
 
 # --- judging
@@ -571,8 +573,10 @@ def evaluate_classes(
         The label is missing or has no value that the model knows, the features are others, or
         every recording has a part in the training.
     """
-    table = feature_table(path, choice=choice_in(model.card), jobs=jobs, progress=progress)
-    target = model.card["target"]
+    table = feature_table(
+        path, choice=choice_in(model.card.feature_choice), jobs=jobs, progress=progress
+    )
+    target = model.card.target
     if target not in table.manifest or table.names != model.names:
         raise DataError(
             f"{path}: must have the label {target} and the model's {len(model.names)} features, "
@@ -580,7 +584,7 @@ def evaluate_classes(
         )
     labels = table.manifest[target].to_numpy().astype(str)
     groups = table.manifest["group"].to_numpy()
-    seen = table.manifest["signal_crc32"].isin(model.card["training_signals"]).to_numpy()
+    seen = table.manifest["signal_crc32"].isin(model.card.training_signals).to_numpy()
     rows = np.flatnonzero(~np.isin(groups, groups[seen]) & np.isin(labels, model.classes))
     if rows.size == 0:
         raise DataError(

@@ -218,14 +218,14 @@ def train(
                 table,
                 data,
                 healthy,
-                choice=choice_in(model.card),
+                choice=choice_in(model.card.feature_choice),
                 jobs=worker_count(jobs),
                 progress=progress,
             )
     save_model(model, output, force=force)
     result = score(model, table, test, references=reference) if len(test) else {}
-    trained = model.card["trained_on"]
-    head = f"{output}: trained on {trained['records']} records of {trained['draws']} machine draws"
+    trained = model.card.trained_on
+    head = f"{output}: trained on {trained.records} records of {trained.draws} machine draws"
     costs = costs_ms(data, choices, healthy_transfer(healthy, choices))
     left_out = [f"  left out: {text}" for text in table.lacking_words]
     lines = [
@@ -236,8 +236,13 @@ def train(
     ]
     if model.notice:
         lines.append(f"Notice: {model.notice}.")
-    chosen = {**model.card["feature_choice"], "ms_per_record": costs}
-    value = {"path": str(output), "trained_on": trained, "features": chosen, "held_out": result}
+    chosen = {**model.card.feature_choice.table(), "ms_per_record": costs}
+    value = {
+        "path": str(output),
+        "trained_on": trained.table(),
+        "features": chosen,
+        "held_out": result,
+    }
     emit(value, as_json, "\n".join(lines))
 
 
@@ -261,7 +266,7 @@ def _train_classes(
         )
     save_class_model(model, output, force=force)
     head = (
-        f"{output}: trained on {model.card['records']} records of {result['recordings']} "
+        f"{output}: trained on {model.card.records} records of {result['recordings']} "
         f"recordings, to tell {', '.join(model.classes)}"
     )
     notice = [f"Notice: {model.notice}."] if model.notice else []
@@ -565,7 +570,7 @@ def report(
         _check_interactive(output, many and not (given["trend"] or given["dates"]))
     if views and source.is_dir():
         raise click.UsageError("--join completes a recording or a data set: name one, not a folder")
-    usual = model.card["trained_on"]["scene"]
+    usual = model.card.trained_on.scene
     values = overrides_of(pairs)
     if scene is not None:
         tell_bare(scene, values)
@@ -689,7 +694,7 @@ def _opinion(told: _ReportTask, heard: Any) -> Any:
 
     if not told.given["twin"]:
         return None
-    wear, seed = told.model.card["severity"], told.given["seed"]
+    wear, seed = told.model.card.severity, told.given["seed"]
     with progress_bar("simulating") as progress:
         return second_opinion(told.given["twin"], heard, wear=wear, seed=seed, progress=progress)
 

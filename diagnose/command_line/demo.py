@@ -104,9 +104,9 @@ def _report_on_unseen(files: dict[str, Path], unseen: list[str]) -> dict[str, An
     model = load_model(files["model"])
     with DataSet(files["data"]) as data:
         manifest = data.manifest
-        severity = manifest[model.card["severity"]].to_numpy()
+        severity = manifest[model.card.severity].to_numpy()
         rows = np.flatnonzero(manifest["record_id"].isin(unseen).to_numpy())
-        number = _most_worn(rows, severity, model.card["condemning_limit_m"])
+        number = _most_worn(rows, severity, model.card.condemning_limit_m)
         recording = data[number]
     table = report_table(recording, model, model.estimate(recording))
     save_page(report_html(table, recording, model), files["report"])

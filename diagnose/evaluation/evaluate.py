@@ -142,11 +142,18 @@ def evaluate_model(
     reference = None
     if healthy is not None:
         reference, _ = references(
-            table, path, healthy, choice=choice_in(model.card), jobs=jobs, progress=progress
+            table,
+            path,
+            healthy,
+            choice=choice_in(model.card.feature_choice),
+            jobs=jobs,
+            progress=progress,
         )
     home, home_table = (path, table) if trained_on is None else (trained_on, None)
     if home_table is None:
-        home_table = feature_table(home, choice=choice_in(model.card), jobs=jobs, progress=progress)
+        home_table = feature_table(
+            home, choice=choice_in(model.card.feature_choice), jobs=jobs, progress=progress
+        )
     train = trained_rows(model, home_table)
     if trained_on is not None and train.size == 0:
         raise DataError(
@@ -161,7 +168,7 @@ def evaluate_model(
     )
     known = rows_of.rows(Path(home), home_table) if train.size else None
     background = Background(
-        train=side_of(home_table, model.card["severity"], train, known) if train.size else None,
+        train=side_of(home_table, model.card.severity, train, known) if train.size else None,
         foreign=rows_of.rows(Path(path), table),
     )
     result = score(model, table, rows, references=reference, background=background, seed=seed)
@@ -178,13 +185,13 @@ def _split_card(model: WearModel, sides: Sides) -> dict[str, Any]:
         "name": sides.name,
         "text": sides.text,
         "sha256": sides.sha256,
-        "trained_with_it": model.card["trained_on"].get("split_sha256") == sides.sha256,
+        "trained_with_it": model.card.trained_on.split_sha256 == sides.sha256,
     }
 
 
 def trained_rows(model: WearModel, table: FeatureTable) -> Index:
     """Rows of a table whose signals are, byte for byte, training signals of a model."""
-    known = table.manifest["signal_crc32"].isin(model.card["trained_on"]["training_signals"])
+    known = table.manifest["signal_crc32"].isin(model.card.trained_on.training_signals)
     return np.flatnonzero(known)
 
 
@@ -211,7 +218,7 @@ def judged_rows(
         head = data.attributes
     refuse_other_severity(model, head, path)
     known = healthy_transfer(healthy, [FeatureSelection(only=model.names)])
-    choice = replace(choice_in(model.card), views=_views_of(model, views, path))
+    choice = replace(choice_in(model.card.feature_choice), views=_views_of(model, views, path))
     table = feature_table(path, choice=choice, healthy=known, jobs=jobs, progress=progress)
     identity = draw_identity(head)
     rows = (
@@ -230,7 +237,7 @@ def _views_of(
 ) -> tuple[CompletingView, ...]:
     """Views in the order of the model; they must be its own."""
     known = {view.name: view for view in views}
-    wanted = model.card.get("views", {})
+    wanted = model.card.views
     if set(known) != set(wanted):
         raise DataError(
             f"{path}: joined views = {', '.join(known) or 'none'}, the model needs "
@@ -297,7 +304,7 @@ def refuse_other_severity(model: WearModel, head: Attributes, path: str | Path) 
     DataError
         Names both.
     """
-    wanted = model.card["severity"]
+    wanted = model.card.severity
     if wanted not in head.severities:
         raise DataError(
             f"{path}: severities = {', '.join(head.severities) or 'none'}, must hold that of the "
@@ -307,20 +314,20 @@ def refuse_other_severity(model: WearModel, head: Attributes, path: str | Path) 
 
 
 def _check_features(model: WearModel, table: FeatureTable, path: str | Path) -> None:
-    if list(table.names) != model.card["features"]:
+    if list(table.names) != model.card.features:
         raise DataError(
             f"{path}: its {len(table.names)} features are not the model's "
-            f"{len(model.card['features'])}; use recordings with the model's channels and rate"
+            f"{len(model.card.features)}; use recordings with the model's channels and rate"
         )
 
 
 def _seen_machines(model: WearModel, table: FeatureTable, identity: str) -> NDArray[np.bool_]:
     """Records of machines that the model was trained on."""
-    trained = model.card["trained_on"]
+    trained = model.card.trained_on
     groups = table.manifest["group"].to_numpy()
     seen = np.isin(groups, groups[trained_rows(model, table)])
-    if identity and identity == trained["draw_identity"]:
-        seen |= np.isin(groups, trained["training_groups"])
+    if identity and identity == trained.draw_identity:
+        seen |= np.isin(groups, trained.training_groups)
     return seen
 
 
@@ -360,13 +367,13 @@ def score(
         :func:`wearstate.diagnose.evaluation.baselines.contest`, ``by_confounder`` as
         :func:`by_confounder`, ``by_choice`` as :func:`by_choice`.
     """
-    edges, limit = model.card["grade_edges_m"], model.card["condemning_limit_m"]
+    edges, limit = model.card.grade_edges_m, model.card.condemning_limit_m
     judged, estimates = judge_rows(model, table, rows, references)
     draws = resampled(judged.groups, seed=seed)
     found = figures(judged, edges, limit, draws)
     mine = judged.graded
     true = grades_of(judged.truth, edges)
-    column, foreign = model.card["severity"], background.foreign
+    column, foreign = model.card.severity, background.foreign
     others = np.setdiff1d(np.arange(len(table.values)), rows)
     train = background.train or (side_of(table, column, others, foreign) if others.size else None)
     test = side_of(table, column, rows, foreign)
@@ -421,12 +428,12 @@ def judge_rows(
         for i, (row, noted) in enumerate(zip(table.values[rows], notes, strict=True))
     ]
     found = model.predict(table.values[rows], healthy, notes)
-    n_grades = len(card["grade_edges_m"]) + 1
+    n_grades = len(card.grade_edges_m) + 1
     judged = Judged(
         groups=manifest["group"].to_numpy(),
-        truth=manifest[card["severity"]].to_numpy(dtype=float),
+        truth=manifest[card.severity].to_numpy(dtype=float),
         found=found,
-        grade=grades_of(found, card["grade_edges_m"]),
+        grade=grades_of(found, card.grade_edges_m),
         graded=np.array([each.graded for each in estimates]),
         cautious=np.array([each.verdict == "caution" for each in estimates]),
         low=_numbers(each.low for each in estimates),
@@ -472,7 +479,7 @@ def _held(
     known: IntervalCalibration, judged: Judged, here: Mask, model: WearModel, nominal: float
 ) -> Mask:
     """Whether interval and set hold the truth, of graded records here [shape=(2, n)]."""
-    edges = model.card["grade_edges_m"]
+    edges = model.card.grade_edges_m
     held = np.zeros((2, len(judged.truth)), dtype=bool)
     given, ends = tails(known), tails(known, nominal)
     limits = grade_limits(known, edges, nominal)

@@ -223,9 +223,9 @@ def case_of(
             f"{path}: the model is {model.mode}, and healthy recordings are "
             f"{'not ' if healthy is None else ''}given; give --baseline for a referenced model only"
         )
-    choice = choice_in(card)
+    choice = choice_in(card.feature_choice)
     ways: dict[str, Any] = {"choice": choice, "jobs": jobs, "progress": progress}
-    known = healthy_transfer(healthy, [FeatureSelection(only=tuple(card["features"]))])
+    known = healthy_transfer(healthy, [FeatureSelection(only=tuple(card.features))])
     table = feature_table(path, healthy=known, **ways)
     reference = None
     if healthy is not None:
@@ -240,10 +240,10 @@ def case_of(
             table,
             rows,
             head,
-            target=card["severity"],
+            target=card.severity,
             references=reference,
             seed=seed,
-            budget_ms=card["budget_ms"],
+            budget_ms=card.budget_ms,
             choice=choice,
             path=path,
         )
@@ -252,9 +252,9 @@ def case_of(
         path=Path(path),
         table=table,
         head=head,
-        severity=card["severity"],
-        edges=tuple(card["grade_edges_m"]),
-        limit=card["condemning_limit_m"],
+        severity=card.severity,
+        edges=tuple(card.grade_edges_m),
+        limit=card.condemning_limit_m,
         choice=choice,
         healthy=known,
         fit=fit,
@@ -431,14 +431,16 @@ def one_split(
     """
     with DataSet(path) as data:
         origin = data.attributes.origin
-    keys = ("severity", "grade_edges_m", "condemning_limit_m")
+    card = model.card
     return {
         "schema_version": EVALUATION_SCHEMA,
         "data": Path(path).name,
         "origin": origin,
         "records": result["records"],
         "draws": result["draws"],
-        **{key: model.card[key] for key in keys},
+        "severity": card.severity,
+        "grade_edges_m": card.grade_edges_m,
+        "condemning_limit_m": card.condemning_limit_m,
         "seed": seed,
         "splits": [
             {

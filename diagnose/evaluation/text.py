@@ -5,6 +5,7 @@ from typing import Any
 
 from ..feature_rows.feature_choice import choice_in, words_of
 from ..feature_rows.feature_table import FeatureSelection
+from ..feature_rows.model_card import ModelCard
 from ..learning.scores import LEVEL
 from ..pages.words import severity_word
 
@@ -12,47 +13,47 @@ _FEW_RECORDS = 30
 
 
 def features_text(
-    card: Mapping[str, Any], choices: Sequence[FeatureSelection], costs: Sequence[float]
+    card: ModelCard, choices: Sequence[FeatureSelection], costs: Sequence[float]
 ) -> list[str]:
     """Features of a model, what else there was to choose from, and the time of each.
 
     Parameters
     ----------
-    card : mapping
+    card : ModelCard
         Of the model.
     choices : sequence of FeatureSelection
         What it was trained with.
     costs : sequence of float
         Time of the features of one recording, of each choice [ms].
     """
-    mine = choice_in(card)
-    tried = {each["name"]: each for each in card["feature_choice"]["candidates"]}
+    mine = choice_in(card.feature_choice)
+    tried = {each.name: each for each in card.feature_choice.candidates}
     lines = []
     for choice, cost in zip(choices, costs, strict=True):
         name = words_of(choice)
         if not tried:
-            count = len(card["features"])
+            count = len(card.features)
             lines.append(f"Features: {name}, {count} values of a recording in {cost:.3g} ms")
             continue
         about = tried[name]
         lines.append(
-            f"{'Features:' if choice == mine else '      not'} {name}, {about['values']} values in "
-            f"{cost:.3g} ms; cross-validated linear error {1e6 * about['line_mae_m']:.3g} um"
+            f"{'Features:' if choice == mine else '      not'} {name}, {about.values} values in "
+            f"{cost:.3g} ms; cross-validated linear error {1e6 * about.line_mae_m:.3g} um"
         )
     if tried:
-        nested = 1e6 * card["model"]["nested_mae_m"]
+        nested = 1e6 * card.model.nested_mae_m
         lines.append(f"  error with the set chosen again in every fold: {nested:.3g} um")
     return lines
 
 
-def score_lines(result: Mapping[str, Any], card: Mapping[str, Any]) -> list[str]:
+def score_lines(result: Mapping[str, Any], card: ModelCard) -> list[str]:
     """A judgement as lines for a terminal.
 
     Parameters
     ----------
     result : mapping
         Of :func:`wearstate.diagnose.evaluation.evaluate.score`; may be empty.
-    card : mapping
+    card : ModelCard
         Of the model.
 
     Returns
@@ -72,10 +73,10 @@ def score_lines(result: Mapping[str, Any], card: Mapping[str, Any]) -> list[str]
         return [*lines, "  none is familiar: no figure can be given for this machine"]
     return [
         *lines,
-        f"  {severity_word(card['severity'])} error".ljust(20)
+        f"  {severity_word(card.severity)} error".ljust(20)
         + f"{1e6 * result['mae_m']:.1f} um mean, "
         f"{_percent(result, 'mae_share_of_limit')} of the condemning limit "
-        f"{1e3 * card['condemning_limit_m']:.3g} mm "
+        f"{1e3 * card.condemning_limit_m:.3g} mm "
         f"({1e6 * result['mae_all_m']:.1f} um including unfamiliar records)",
         f"  interval coverage {_number(result, 'coverage')} (nominal "
         f"{result['nominal_coverage']:.2f}), mean width "

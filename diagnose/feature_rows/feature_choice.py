@@ -1,6 +1,6 @@
 """Which features a model is trained on: told in words, chosen by folds, kept in its card."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
@@ -23,6 +23,7 @@ from .feature_table import (
     held_against,
     recording_features,
 )
+from .model_card import FeatureChoice
 
 Float = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -103,28 +104,25 @@ def words_of(choice: FeatureSelection) -> str:
     return choice.feature_set if choice.only is None else ", ".join(choice.only)
 
 
-def choice_in(card: Mapping[str, Any]) -> FeatureSelection:
+def choice_in(kept: FeatureChoice) -> FeatureSelection:
     """The features that a model was trained on.
 
     Parameters
     ----------
-    card : mapping
-        Of the model; without a word about it, of the standard set.
+    kept : FeatureChoice
+        Of the model's card.
 
     Examples
     --------
-    >>> choice_in({"feature_choice": {"set": "core", "only": []}}).feature_set
+    >>> choice_in(FeatureChoice(set="core")).feature_set
     'core'
     """
-    kept = card.get("feature_choice")
-    if kept is None:
-        return USUAL
-    return FeatureSelection(feature_set=kept["set"], only=tuple(kept["only"]) or None)
+    return FeatureSelection(feature_set=kept.set, only=tuple(kept.only) or None)
 
 
-def choice_card(choice: FeatureSelection) -> dict[str, Any]:
+def choice_card(choice: FeatureSelection) -> FeatureChoice:
     """What a card keeps of a choice."""
-    return {"set": choice.feature_set, "only": list(choice.only or ())}
+    return FeatureChoice(set=choice.feature_set, only=list(choice.only or ()))
 
 
 # --- candidates of one data set

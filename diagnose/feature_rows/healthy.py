@@ -1,9 +1,8 @@
 """Healthy recordings of the machine in question: the reference that the trade works with."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -22,6 +21,7 @@ from .feature_table import (
     held_against,
     recording_features,
 )
+from .model_card import ModelCard
 from .probe_means import ProbeMeans, probe_means
 from .quality import layout_faults, sample_faults
 from .transfer_reference import (
@@ -207,14 +207,14 @@ def _few(numbers: Sequence[object]) -> str:
 
 
 def baseline_of(
-    recordings: Iterable[Recording], card: Mapping[str, Any], source: str = "baseline"
+    recordings: Iterable[Recording], card: ModelCard, source: str = "baseline"
 ) -> Baseline:
     """Healthy recordings of one machine, as a model takes them.
 
     Parameters
     ----------
     recordings : iterable of Recording
-    card : mapping
+    card : ModelCard
         Of the model.
     source : str
         Where they are from, for messages.
@@ -247,15 +247,15 @@ def baseline_of(
         raise DataError("\n".join(told))
     if not sound:
         raise DataError(f"{source}: 0 healthy recordings, must be >= 1; record some")
-    named = FeatureSelection(only=tuple(card["features"]))
+    named = FeatureSelection(only=tuple(card.features))
     reference = None
     if told_against(named):
         reference = transfer_reference(sound, modes=told_against_modes(named))
-    choice = held_against(choice_in(card), reference)
+    choice = held_against(choice_in(card.feature_choice), reference)
     rows = [recording_features(recording, choice)[1] for recording in sound]
-    if {len(row) for row in rows} != {len(card["features"])}:
+    if {len(row) for row in rows} != {len(card.features)}:
         raise DataError(
-            f"{source}: its {len(rows[0])} features are not the model's {len(card['features'])}; "
+            f"{source}: its {len(rows[0])} features are not the model's {len(card.features)}; "
             "use recordings with the model's channels and rate"
         )
     mean = np.mean(rows, axis=0)
@@ -278,7 +278,7 @@ class Baselines:
         Data set. Machines go by :attr:`wearstate.datasets.file.record.DataSet.machines`, never by
         number; a set of one machine, or of files without names, is taken to be of the machine of
         a recording that does not tell its own.
-    card : mapping
+    card : ModelCard
         Of the model.
 
     Raises
@@ -287,7 +287,7 @@ class Baselines:
         It is no data set, cannot be read, or a recording in it is not healthy.
     """
 
-    def __init__(self, path: str | Path, card: Mapping[str, Any]) -> None:
+    def __init__(self, path: str | Path, card: ModelCard) -> None:
         if Path(path).suffix.lower() not in (".h5", ".hdf5"):
             raise DataError(
                 f"baseline = {path} must be a data set (.h5); make one of the healthy recordings: "

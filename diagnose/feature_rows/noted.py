@@ -51,11 +51,6 @@ NOTED = {
 temperature is known to a kelvin, thrust from the shaft's torque."""
 
 
-def noted_names(card: Mapping[str, Any]) -> tuple[str, ...]:
-    """Conditions that varied where a model was trained and that its signals do not tell."""
-    return tuple(c["name"] for c in card["conditions"] if not c["feature"])
-
-
 def noted_values(names: Sequence[str], rows: Sequence[Mapping[str, Any]]) -> Float:
     """Conditions as inputs of a model.
 

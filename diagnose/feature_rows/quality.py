@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import combinations
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ from ...datasets.file.views import MARK
 from ...features.rotation.order import pulse_times, shaft_phase
 from ...sim.output.recording import Recording
 from ...sim.output.sensor import Channel
+from .model_card import LayoutCard, ModelCard
 from .physical import level_channels, level_rows, shape_rows
 
 Float = NDArray[np.float64]
@@ -78,13 +79,13 @@ class QualityFault:
 # --- what the samples and the header show
 
 
-def recording_faults(recording: Recording, card: Mapping[str, Any]) -> tuple[QualityFault, ...]:
+def recording_faults(recording: Recording, card: ModelCard) -> tuple[QualityFault, ...]:
     """What is wrong with a recording and its views as inputs of a model, all of it.
 
     Parameters
     ----------
     recording : Recording
-    card : mapping
+    card : ModelCard
         Of the model.
 
     Returns
@@ -93,7 +94,7 @@ def recording_faults(recording: Recording, card: Mapping[str, Any]) -> tuple[Qua
         Of layout where that does not fit, else of the samples; a view that is missing is one.
     """
     faults = [*(layout_faults(recording, card) or sample_faults(recording))]
-    views = card.get("views", {})
+    views = card.views
     for view, layout in views.items():
         if view not in recording.joined:
             text = f"view {view} is missing, which the model needs; give --join {view}=FILE"
@@ -110,14 +111,14 @@ def recording_faults(recording: Recording, card: Mapping[str, Any]) -> tuple[Qua
     return tuple(faults)
 
 
-def layout_faults(recording: Recording, card: Mapping[str, Any]) -> tuple[QualityFault, ...]:
+def layout_faults(recording: Recording, card: LayoutCard) -> tuple[QualityFault, ...]:
     """What a recording lacks of a model's inputs; empty where it fits.
 
     Parameters
     ----------
     recording : Recording
-    card : mapping
-        Of the model: ``channels``, ``tacho``, ``pulses_per_revolution``, ``sample_rate_hz``.
+    card : LayoutCard
+        What the model needs.
 
     Returns
     -------
@@ -127,23 +128,23 @@ def layout_faults(recording: Recording, card: Mapping[str, Any]) -> tuple[Qualit
     return (
         *_channel_faults(recording.vibration_channels, card),
         *_tacho_layout_faults(recording, card),
-        *_rate_faults(recording.sample_rate, card["sample_rate_hz"]),
+        *_rate_faults(recording.sample_rate, card.sample_rate_hz),
     )
 
 
-def _channel_faults(found: Sequence[Channel], card: Mapping[str, Any]) -> list[QualityFault]:
-    wanted = [c for c in card["channels"] if c["name"] != card["tacho"]]
-    units = {c["name"]: c["unit"] for c in wanted}
-    names = ", ".join(c["name"] for c in wanted)
+def _channel_faults(found: Sequence[Channel], card: LayoutCard) -> list[QualityFault]:
+    wanted = [c for c in card.channels if c.name != card.tacho]
+    units = {c.name: c.unit for c in wanted}
+    names = ", ".join(c.name for c in wanted)
     faults = []
     if len(found) != len(wanted):
         text = f"it has {len(found)} vibration channel(s), the model needs {len(wanted)}: {names}"
-        text += _mapping([c.name for c in found], [c["name"] for c in wanted])
+        text += _mapping([c.name for c in found], [c.name for c in wanted])
         faults.append(QualityFault(kind="layout", channel="", text=text))
-    elif [c.name for c in found] != [c["name"] for c in wanted]:
+    elif [c.name for c in found] != [c.name for c in wanted]:
         here = ", ".join(c.name for c in found)
         text = f"its channels are {here}, the model needs {names}, in this order"
-        text += _mapping([c.name for c in found], [c["name"] for c in wanted])
+        text += _mapping([c.name for c in found], [c.name for c in wanted])
         faults.append(QualityFault(kind="layout", channel="", text=text))
     for c in found:
         # under a name that the model does not know, any unit of the model's may be right
@@ -176,15 +177,15 @@ def _mapping(found: Sequence[str], wanted: Sequence[str]) -> str:
     return f"{told}: if {', '.join(stand.values())} are these, give --channels {names}"
 
 
-def _tacho_layout_faults(recording: Recording, card: Mapping[str, Any]) -> list[QualityFault]:
-    if (recording.tacho is None) != (card["tacho"] is None):
+def _tacho_layout_faults(recording: Recording, card: LayoutCard) -> list[QualityFault]:
+    if (recording.tacho is None) != (card.tacho is None):
         needs = "it has no tacho, the model needs one; record one, or name its channel"
-        text = needs if card["tacho"] else "it has a tacho, the model was trained without"
-        return [QualityFault(kind="tacho" if card["tacho"] else "layout", channel="", text=text)]
-    if recording.pulses_per_revolution != card["pulses_per_revolution"]:
+        text = needs if card.tacho else "it has a tacho, the model was trained without"
+        return [QualityFault(kind="tacho" if card.tacho else "layout", channel="", text=text)]
+    if recording.pulses_per_revolution != card.pulses_per_revolution:
         text = (
             f"its tacho gives {recording.pulses_per_revolution} pulses per revolution, the model "
-            f"needs {card['pulses_per_revolution']}"
+            f"needs {card.pulses_per_revolution}"
         )
         return [QualityFault(kind="layout", channel=recording.tacho or "", text=text)]
     return []

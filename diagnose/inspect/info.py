@@ -144,15 +144,15 @@ def _describe_class_model(path: Path) -> dict[str, Any]:
     card = model.card
     return {
         "kind": CLASS_MODEL,
-        "created_by": card["created_by"],
-        "origin": card["origin"],
-        "trained_on": {"records": card["records"]},
+        "created_by": card.created_by,
+        "origin": card.origin,
+        "trained_on": {"records": card.records},
         "recordings": dict(zip(model.classes, model.votes.groups_of, strict=True)),
-        "target": card["target"],
-        "channels": card["channels"],
-        "tacho": card["tacho"],
-        "sample_rate_hz": card["sample_rate_hz"],
-        "features": len(card["features"]),
+        "target": card.target,
+        "channels": [channel.table() for channel in card.channels],
+        "tacho": card.tacho,
+        "sample_rate_hz": card.sample_rate_hz,
+        "features": len(card.features),
         "members": {
             name: " + ".join(blend.names)
             for name, blend in zip(model.classes, model.blends, strict=True)
@@ -166,24 +166,24 @@ def _describe_model(path: Path) -> dict[str, Any]:
         return _describe_class_model(path)
     model = load_model(path)
     card = model.card
-    trained = card["trained_on"]
+    trained = card.trained_on
     return {
         "kind": "wear model",
-        "created_by": card["created_by"],
-        "origin": card["origin"],
-        "trained_on": {"records": trained["records"], "draws": trained["draws"]},
-        "scene": trained["scene"],
-        "recipe": trained["recipe"],
-        "channels": card["channels"],
-        "tacho": card["tacho"],
-        "sample_rate_hz": card["sample_rate_hz"],
-        "features": len(card["features"]),
-        "mode": card["mode"],
-        "members": card["model"]["members"],
-        "severity": card["severity"],
-        "severity_range_m": list(card["severity_range_m"]),
-        "grade_edges_m": list(card["grade_edges_m"]),
-        "limit_source": card["limit_source"],
+        "created_by": card.created_by,
+        "origin": card.origin,
+        "trained_on": {"records": trained.records, "draws": trained.draws},
+        "scene": trained.scene,
+        "recipe": trained.recipe,
+        "channels": [channel.table() for channel in card.channels],
+        "tacho": card.tacho,
+        "sample_rate_hz": card.sample_rate_hz,
+        "features": len(card.features),
+        "mode": card.mode,
+        "members": card.model.members,
+        "severity": card.severity,
+        "severity_range_m": list(card.severity_range_m),
+        "grade_edges_m": list(card.grade_edges_m),
+        "limit_source": card.limit_source,
         "notice": model.notice,
     }
 

@@ -11,6 +11,7 @@ from ...sim.output.recording import Recording
 from ...sim.scene.load import load_scene, scene_names
 from ...sim.scene.parts import si_unit
 from ..feature_rows.healthy import Baseline
+from ..feature_rows.model_card import ModelCard
 from ..machines.registry import presentation_of
 from ..pages.si_text import si_text
 from .nameplate import Nameplate, day_of
@@ -21,7 +22,7 @@ _SAME = 0.02  # over the trained value: nameplates are rounded
 def known_beside(
     plate: Nameplate | None,
     recording: Recording,
-    card: Mapping[str, Any],
+    card: ModelCard,
     baseline: Baseline | None = None,
 ) -> dict[str, Any]:
     """What a model should be told of a recording beside its signals.
@@ -30,7 +31,7 @@ def known_beside(
     ----------
     plate : Nameplate or None
     recording : Recording
-    card : mapping
+    card : ModelCard
         Of the model.
     baseline : Baseline, optional
         Healthy recordings of the same machine.
@@ -66,7 +67,7 @@ def _gap_cautions(
 
 
 def nameplate_cautions(
-    plate: Nameplate | None, row: Mapping[str, Any], card: Mapping[str, Any]
+    plate: Nameplate | None, row: Mapping[str, Any], card: ModelCard
 ) -> tuple[str, ...]:
     """What a person should know before trusting a model on a machine.
 
@@ -75,7 +76,7 @@ def nameplate_cautions(
     plate : Nameplate or None
     row : mapping
         What was noted beside the recording.
-    card : mapping
+    card : ModelCard
         Of the model.
 
     Returns
@@ -84,11 +85,11 @@ def nameplate_cautions(
         Of each size that is not that of the machines that the model was trained on, or of all of
         them where nobody gave a nameplate.
     """
-    trained = card["trained_on"]["scene"]
+    trained = card.trained_on.scene
     if trained not in scene_names():
         return ()
     usual: Any = load_scene(trained)
-    drawn = _drawn_by(card["trained_on"].get("recipe", ""))
+    drawn = _drawn_by(card.trained_on.recipe)
     if plate is None:
         return tuple(_taken_for_granted(usual, drawn, frozenset()))
     day: Any = plate.on_the_day(row, None)

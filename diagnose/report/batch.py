@@ -444,7 +444,7 @@ def _judged(
     try:
         recording = item.load()
         baseline = None if baselines is None else baselines.of(recording)
-        film = film_estimate(recording, model.card["severity"], plate, baseline)
+        film = film_estimate(recording, model.card.severity, plate, baseline)
         beside = known_beside(plate, recording, model.card, baseline)
         estimate = model.estimate(recording, baseline, **beside)
         return with_film(estimate, film), film
@@ -529,7 +529,7 @@ def _trends(
     return {
         machine: fit_trend(
             *np.transpose(points),
-            limit=model.card["condemning_limit_m"],
+            limit=model.card.condemning_limit_m,
             clock="operating" if operating else "calendar",
             growth=growth,
             seed=seed,
@@ -574,7 +574,7 @@ def _hastened(row: BatchRow, trend: Trend | None, model: WearModel) -> BatchRow:
 
 def _advice(estimate: Estimate, model: WearModel, outlook: Outlook | None = None) -> Advice:
     card = model.card
-    return advise(estimate, quantity_name(card["severity"]), card["grade_edges_m"], outlook)
+    return advise(estimate, quantity_name(card.severity), card.grade_edges_m, outlook)
 
 
 def machine_heading(machine: str) -> str:

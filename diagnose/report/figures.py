@@ -133,12 +133,12 @@ def moved_panel(
     found = {i: match.groups() for i, match in cells if match is not None}
     if not found:
         return None
-    names, row = recording_features(recording, choice_in(model.card))
+    names, row = recording_features(recording, choice_in(model.card.feature_choice))
     if names != model.names:
         return None
     reference = healthy
     if reference is None:
-        reference = np.array(model.card["healthy_features"]["mean"])
+        reference = np.array(model.card.healthy_features.mean)
     channels = list(dict.fromkeys(parts[0] for parts in found.values()))
     maps = [
         _moved(channel, found, row - reference, model.names, evidence)

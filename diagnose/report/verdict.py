@@ -14,6 +14,7 @@ from ...features.signal import iso
 from ...sim.output.recording import DataError, Recording
 from ..feature_rows.feature_choice import choice_in, words_of
 from ..feature_rows.healthy import Baseline
+from ..feature_rows.model_card import ModelCard
 from ..learning.grades import GRADE_NAMES
 from ..nameplate.nameplate import Nameplate
 from ..pages.words import quantity_name
@@ -98,8 +99,8 @@ def report_table(
         There is no such kind of machine.
     """
     card = model.card
-    quantity = quantity_name(card["severity"])
-    film = film_estimate(recording, card["severity"], plate, baseline)
+    quantity = quantity_name(card.severity)
+    film = film_estimate(recording, card.severity, plate, baseline)
     trained, estimate = estimate, with_twin(with_film(estimate, film), twin)
     return {
         "schema_version": REPORT_SCHEMA,
@@ -109,8 +110,8 @@ def report_table(
         "film": film_table(film, plate, recording.row),
         "twin": twin_table(twin, trained),
         "disagreements": new_cautions(trained, estimate),
-        "grades_text": possible_words(estimate, card["grade_edges_m"]),
-        "advice": asdict(advise(estimate, quantity, card["grade_edges_m"], outlook)),
+        "grades_text": possible_words(estimate, card.grade_edges_m),
+        "advice": asdict(advise(estimate, quantity, card.grade_edges_m, outlook)),
         "limits": limits_table(card),
         "iso": iso_table(recording, machine),
         "outlook": None if outlook is None else asdict(outlook),
@@ -170,7 +171,7 @@ def headline(estimate: Estimate) -> str:
     return f"{words}, with caution" if estimate.verdict == "caution" else words
 
 
-def _recording_table(recording: Recording, card: Mapping[str, Any]) -> dict[str, Any]:
+def _recording_table(recording: Recording, card: ModelCard) -> dict[str, Any]:
     return {
         "source": recording.source,
         "origin": recording.origin,
@@ -197,33 +198,35 @@ def _recording_line(recording: Recording) -> str:
     )
 
 
-def limits_table(card: Mapping[str, Any]) -> dict[str, Any]:
+def limits_table(card: ModelCard) -> dict[str, Any]:
     """Limits of a model's severity, with their source."""
     return {
-        "severity": card["severity"],
-        "quantity": quantity_name(card["severity"]),
-        "grade_edges_m": card["grade_edges_m"],
+        "severity": card.severity,
+        "quantity": quantity_name(card.severity),
+        "grade_edges_m": card.grade_edges_m,
         "grade_names": list(GRADE_NAMES),
-        "condemning_limit_m": card["condemning_limit_m"],
-        "source": card["limit_source"],
+        "condemning_limit_m": card.condemning_limit_m,
+        "source": card.limit_source,
     }
 
 
 def model_table(model: WearModel, path: Path | None = None) -> dict[str, Any]:
     """Where a model is from, and how it was judged when it was made."""
-    card, trained = model.card, model.card["trained_on"]
+    card, trained = model.card, model.card.trained_on
     return {
         "file_sha256": _file_hash(path),
-        "created_by": card["created_by"],
-        "origin": card["origin"],
-        "mode": card["mode"],
-        "features": words_of(choice_in(card)),
-        "chosen": card["model"]["chosen"],
-        "nested_mae_m": card["model"]["nested_mae_m"],
-        **{
-            key: trained[key]
-            for key in ("scene", "recipe", "records", "draws", "draw_identity", "split_seed")
-        },
+        "created_by": card.created_by,
+        "origin": card.origin,
+        "mode": card.mode,
+        "features": words_of(choice_in(card.feature_choice)),
+        "chosen": card.model.chosen,
+        "nested_mae_m": card.model.nested_mae_m,
+        "scene": trained.scene,
+        "recipe": trained.recipe,
+        "records": trained.records,
+        "draws": trained.draws,
+        "draw_identity": trained.draw_identity,
+        "split_seed": trained.split_seed,
     }
 
 

@@ -2,14 +2,13 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
-from typing import Annotated, Any, Literal, Self
+from typing import Any, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
-from ...features.catalogue.catalogue import SetName
-from ...sim.output.sensor import RATE_LEAST, RATE_MOST
+from ..feature_rows.model_card import Strict
 from ..learning.nets import Nets
 from ..learning.regressions import Blend, Forest, Linear, Part
 from .noise_floor import floors_in
@@ -22,24 +21,6 @@ _DEEPEST = 256  # steps down a tree: four times what 10^5 records grow
 
 _PART_KINDS: dict[str, Any] = {"linear": Linear, "forest": Forest, "nets": Nets}
 """Kinds of the parts of a blend."""
-
-
-_MOST_PULSES = 10**6  # of a tacho in a revolution: an encoder of 20 bit
-
-RateHz = Annotated[float, Field(ge=RATE_LEAST, le=RATE_MOST)]
-"""Sample rate that a recording can have [Hz]."""
-
-Pulses = Annotated[int, Field(ge=1, le=_MOST_PULSES)]
-"""Pulses of a tacho in a revolution."""
-
-Portion = Annotated[float, Field(ge=0, le=1)]
-"""A share, rate or probability."""
-
-
-class Strict(BaseModel):
-    """A table that holds what it must and nothing else; no number in it is infinite or none."""
-
-    model_config = ConfigDict(extra="forbid", allow_inf_nan=False, strict=True)
 
 
 class BlendStructure(Strict):
@@ -56,49 +37,6 @@ class BlendStructure(Strict):
         if len(self.names) != len(self.kinds):
             raise ValueError("names and kinds must be as many")
         return self
-
-
-class SetCard(Strict):
-    """One set of features that was looked at."""
-
-    name: str
-    values: int = Field(ge=1)
-    line_mae_m: float = Field(ge=0)
-
-
-class FeatureChoice(Strict):
-    """Features that a model was trained on, and the sets that they were chosen among."""
-
-    set: SetName = "standard"
-    only: list[str] = Field(default=[], max_length=100_000)
-    candidates: list[SetCard] = Field(default=[], max_length=100)
-
-
-class ChannelCard(Strict):
-    """A channel that a model needs, as :class:`wearstate.sim.output.sensor.Channel`."""
-
-    name: str
-    unit: str
-    quantity: str
-    place: str = ""
-    direction: str = ""
-    unit_in_file: str = ""
-
-
-def check_channels(channels: Sequence[ChannelCard], tacho: str | None) -> None:
-    """Refuse channels that are not told apart by name, or a tacho that is none of them.
-
-    Raises
-    ------
-    ValueError
-    """
-    names = [channel.name for channel in channels]
-    if len(set(names)) < len(names):
-        raise ValueError("channels must have different names")
-    if tacho is not None and tacho not in names:
-        raise ValueError("tacho must be one of the channels")
-    if all(name == tacho for name in names):
-        raise ValueError("channels must hold a vibration")
 
 
 def blend_structure(blend: Blend) -> dict[str, Any]:

@@ -22,7 +22,8 @@ from ..feature_rows.feature_table import (
 )
 from ..feature_rows.healthy import Baseline, referenced_rows
 from ..feature_rows.hum import hum_faults
-from ..feature_rows.noted import NOTED, noted_names, noted_values
+from ..feature_rows.model_card import ModelCard
+from ..feature_rows.noted import NOTED, noted_values
 from ..feature_rows.physical import level_channels, levelled_rows
 from ..feature_rows.quality import (
     Levels,
@@ -217,7 +218,7 @@ class WearModel:
         Level to expect of each channel.
     heads : tuple of Head
         Faults beside the wear.
-    card : dict
+    card : ModelCard
         What it was trained on, its inputs, limits and ranges.
     """
 
@@ -226,40 +227,40 @@ class WearModel:
     familiarity: Familiarity
     levels: Levels
     heads: tuple[Head, ...] = ()
-    card: dict[str, Any]
+    card: ModelCard
 
     def __repr__(self) -> str:
         """What it estimates, from what, and what it was trained on."""
-        return f"<WearModel of {self.card['severity']}, {'; '.join(self._facts)}>"
+        return f"<WearModel of {self.card.severity}, {'; '.join(self._facts)}>"
 
     def _repr_html_(self) -> str:
         """For notebooks: the same as a table, with the notice."""
         rows = [(fact,) for fact in (*self._facts, self.notice) if fact]
-        return html_table(f"wear model of {self.card['severity']}", ("model",), rows)
+        return html_table(f"wear model of {self.card.severity}", ("model",), rows)
 
     @property
     def _facts(self) -> tuple[str, ...]:
-        trained, origin = self.card["trained_on"], self.card["origin"]
+        trained, origin = self.card.trained_on, self.card.origin
         return (
             f"{len(self.names)} features",
-            f"{trained['records']} {origin} records of {trained['draws']} machine draws",
+            f"{trained.records} {origin} records of {trained.draws} machine draws",
             self.mode,
         )
 
     @property
     def notice(self) -> str:
         """What every report of this model must say; from its origin, not from a text in a file."""
-        return SIMULATION_NOTICE if self.card["origin"] == "simulated" else ""
+        return SIMULATION_NOTICE if self.card.origin == "simulated" else ""
 
     @property
     def mode(self) -> Mode:
         """Whether it needs healthy recordings of the machine."""
-        return "referenced" if self.card["mode"] == "referenced" else "cold"
+        return "referenced" if self.card.mode == "referenced" else "cold"
 
     @cached_property
     def names(self) -> tuple[str, ...]:
         """Names of the features of a row."""
-        return tuple(self.card["features"])
+        return tuple(self.card.features)
 
     @cached_property
     def p_limit(self) -> float:
@@ -277,7 +278,7 @@ class WearModel:
     @cached_property
     def noted(self) -> tuple[str, ...]:
         """Conditions that the informed estimate needs; none where there is no such estimate."""
-        return () if self.informed is None else noted_names(self.card)
+        return () if self.informed is None else self.card.noted_names
 
     @cached_property
     def _columns(self) -> dict[str, int]:
@@ -286,8 +287,8 @@ class WearModel:
     @cached_property
     def _healthy(self) -> tuple[Float, Float]:
         """Mean and spread of healthy features."""
-        known = self.card["healthy_features"]
-        return np.array(known["mean"]), np.array(known["spread"])
+        known = self.card.healthy_features
+        return np.array(known.mean), np.array(known.spread)
 
     def predict(
         self,
@@ -300,7 +301,7 @@ class WearModel:
         Parameters
         ----------
         rows : numpy.ndarray [shape=(n, n_features)]
-            In the order of ``card["features"]``.
+            In the order of ``card.features``.
         baseline : numpy.ndarray [shape=(n, n_features)] or [shape=(n_features,)], optional
             Healthy rows of the same machines, of a referenced model.
         conditions : sequence of mapping, optional
@@ -410,8 +411,8 @@ class WearModel:
         return Estimate(verdict="unusable", faults=faults, reasons=reasons, mode=self.mode)
 
     def _row(self, recording: Recording, reference: FrfReference | None) -> Float:
-        choice = held_against(choice_in(self.card), reference)
-        order = self.card.get("views", {})
+        choice = held_against(choice_in(self.card.feature_choice), reference)
+        order = self.card.views
         joined = {view: recording.joined[view] for view in order}
         names, values = recording_features(replace(recording, joined=joined), choice)
         if names != self.names:
@@ -445,9 +446,9 @@ class WearModel:
 
     def _speeds(self) -> tuple[float, float] | None:
         """Trained speeds [Hz]."""
-        for condition in self.card["conditions"]:
-            if condition["feature"] == _SPEED_FEATURE:
-                return condition["low"], condition["high"]
+        for condition in self.card.conditions:
+            if condition.feature == _SPEED_FEATURE:
+                return condition.low, condition.high
         return None
 
     def judge(
@@ -463,7 +464,7 @@ class WearModel:
         Parameters
         ----------
         row : numpy.ndarray [shape=(n_features,)]
-            In the order of ``card["features"]``.
+            In the order of ``card.features``.
         baseline : numpy.ndarray [shape=(n_features,)], optional
             Healthy row of the same machine.
         conditions : mapping, optional
@@ -522,7 +523,7 @@ class WearModel:
             evidence=self._evidence(row, baseline),
             **known,
             **asked.grading(
-                inputs, look.distance, self.card["grade_edges_m"], cautious=bool(cautions)
+                inputs, look.distance, self.card.grade_edges_m, cautious=bool(cautions)
             ),
         )
 
@@ -534,7 +535,7 @@ class WearModel:
         oil = "flooded pins, which do not knock, are not in this model: train one on a recipe that "
         oil = f"{oil}draws them, or " if self._knows_no_oil else ""
         return (
-            f"it is quieter than any {self.card['trained_on']['scene'] or 'machine'} trained on: "
+            f"it is quieter than any {self.card.trained_on.scene or 'machine'} trained on: "
             f"its peaks are {lack:.1f} dB below those usual at its speed, must be at most "
             f"{most:.1f} dB below; {oil}check the sensitivity of the sensors",
         )
@@ -570,14 +571,12 @@ class WearModel:
 
     @property
     def _knows_no_oil(self) -> bool:
-        return knows_no_oil(
-            self.card["severity"], [rates["name"] for rates in self.card["confounders"]]
-        )
+        return knows_no_oil(self.card.severity, [rates.name for rates in self.card.confounders])
 
     def _nearest(self, row: Float) -> str:
         group, distance = self.familiarity.nearest(self.names, row)
-        trained = self.card["trained_on"]
-        kind = trained["recipe"] or trained["scene"] or "the training set"
+        trained = self.card.trained_on
+        kind = trained.recipe or trained.scene or "the training set"
         return f"machine {group} of {kind}, {distance:.2g} away"
 
     def _missing_cautions(self, conditions: Mapping[str, Any]) -> list[str]:
@@ -587,7 +586,7 @@ class WearModel:
         noted = noted_values(self.noted, [conditions])[0]
         missing = [name for name, value in zip(self.noted, noted, strict=True) if np.isnan(value)]
         settings = " ".join(f"--set {NOTED[name].setting}" for name in missing)
-        limit = self.card["condemning_limit_m"]
+        limit = self.card.condemning_limit_m
         without, told = (100 * each.error / limit for each in (self.blind, self.informed))
         return [
             f"{', '.join(missing)} {'is' if len(missing) == 1 else 'are'} not known: with "
@@ -597,7 +596,7 @@ class WearModel:
 
     def _range_cautions(self, asked: Estimator, inputs: Float) -> list[str]:
         """Beyond the trained severities an estimate is a bound, and a poor one."""
-        low, high = self.card["severity_range_m"]
+        low, high = self.card.severity_range_m
         severity = float(asked.severity.predict(inputs)[0])
         straight = float(asked.witness.predict(inputs)[0])
         outside = [value for value in (severity, straight) if not low <= value <= high]
@@ -613,15 +612,15 @@ class WearModel:
     def _condition_cautions(self, row: Float, recorded: Mapping[str, Any]) -> list[str]:
         """Conditions outside the trained range: from the signal, or as noted beside it."""
         cautions = []
-        for condition in self.card["conditions"]:
-            name, feature = condition["name"], condition["feature"]
+        for condition in self.card.conditions:
+            name, feature = condition.name, condition.feature
             value = row[self._columns[feature]] if feature else recorded.get(name)
-            low, high = condition["low"], condition["high"]
+            low, high = condition.low, condition.high
             if value is None or not math.isfinite(value) or low <= value <= high:
                 continue
             cautions.append(
-                f"{name} = {value:.4g} {condition['unit']} is outside the trained range "
-                f"{low:.4g} to {high:.4g} {condition['unit']}: extrapolating"
+                f"{name} = {value:.4g} {condition.unit} is outside the trained range "
+                f"{low:.4g} to {high:.4g} {condition.unit}: extrapolating"
             )
         return cautions
 
@@ -636,8 +635,8 @@ class WearModel:
     def _finding_cautions(self, findings: tuple[FaultFinding, ...]) -> list[str]:
         """Faults that the intervals, which are for all machines alike, do not allow for."""
         cautions = []
-        for finding, rates in zip(findings, self.card["confounders"], strict=True):
-            worse, usual = rates["mae_with_m"], rates["mae_without_m"]
+        for finding, rates in zip(findings, self.card.confounders, strict=True):
+            worse, usual = rates.mae_with_m, rates.mae_without_m
             if finding.present and worse > _MUCH_WORSE * usual:
                 name = finding.name.replace("_", " ")
                 cure = "mend it and record again"
@@ -651,16 +650,16 @@ class WearModel:
 
     def _findings(self, row: Float) -> tuple[FaultFinding, ...]:
         findings = []
-        for head, rates in zip(self.heads, self.card["confounders"], strict=True):
+        for head, rates in zip(self.heads, self.card.confounders, strict=True):
             probability = float(head.probability(row[None, :])[0])
             findings.append(
                 FaultFinding(
                     name=head.name,
                     probability=probability,
                     present=probability > head.threshold,
-                    detection_rate=rates["detection_rate"],
-                    false_alarm_rate=rates["false_alarm_rate"],
-                    visible_from_m=rates["visible_from_m"],
+                    detection_rate=rates.detection_rate,
+                    false_alarm_rate=rates.false_alarm_rate,
+                    visible_from_m=rates.visible_from_m,
                 )
             )
         return tuple(findings)
@@ -706,6 +705,6 @@ def _strangeness(distance: float, calibration: Float) -> str:
     )
 
 
-def input_faults(recording: Recording, card: Mapping[str, Any]) -> list[str]:
+def input_faults(recording: Recording, card: ModelCard) -> list[str]:
     """What a recording lacks of a model's inputs, as sentences; empty where it fits."""
     return [fault.text for fault in layout_faults(recording, card)]

@@ -2,36 +2,27 @@
 
 import json
 from collections.abc import Mapping, Sequence
-from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from ..feature_rows.noted import NOTED, noted_names
+from ..feature_rows.model_card import ModelCard, Portion, Strict
 from ..feature_rows.physical import level_channels, physical_rows, shape_rows
 from ..feature_rows.quality import Levels
 from ..learning.conformal import IntervalCalibration, Scale, scale_inputs
 from ..learning.experts import Experts
-from ..learning.grades import GRADE_NAMES
 from ..learning.heads import Head
 from ..learning.regressions import Blend, Linear
 from ..learning.severity import Estimator
 from .arrays import (
     BlendStructure,
-    ChannelCard,
-    FeatureChoice,
-    Portion,
-    Pulses,
-    RateHz,
-    Strict,
     blend_arrays,
     blend_fits,
     blend_of,
     blend_structure,
-    check_channels,
     familiarity_fits,
     linear_fits,
     numbers_fit,
@@ -73,10 +64,11 @@ def save_model(model: WearModel, path: str | Path, *, force: bool = False) -> No
     --------
     >>> save_model(load_model("pump.wsm"), "copy.wsm")
     """
-    checked(_Card, json.loads(json.dumps(model.card)), path, "card.json")  # as it will be read
+    table = model.card.table()
+    checked(ModelCard, json.loads(json.dumps(table)), path, "card.json")  # as it will be read
     _check_structure(model, path)
     bundle = Bundle(
-        kind=_KIND, card=model.card, structure=_structure_of(model), arrays=_arrays_of(model)
+        kind=_KIND, card=table, structure=_structure_of(model), arrays=_arrays_of(model)
     )
     save_bundle(bundle, path, force=force)
 
@@ -106,10 +98,10 @@ def load_model(path: str | Path) -> WearModel:
     'cold'
     """
     bundle = load_bundle(path, _KIND)
-    checked(_Card, bundle.card, path, "card.json")
+    card = checked(ModelCard, bundle.card, path, "card.json")
     structure = checked(_Structure, bundle.structure, path, "structure.json")
     try:
-        model = _model_of(structure, bundle.arrays, bundle.card)
+        model = _model_of(structure, bundle.arrays, card)
     except (KeyError, TypeError, ValueError) as error:
         raise ModelError(f"{path}: arrays.npz cannot be read ({error}); retrain it") from error
     _check_structure(model, path)
@@ -253,7 +245,7 @@ def _estimator_of(
 
 
 def _model_of(
-    structure: _Structure, arrays: Mapping[str, NDArray[Any]], card: dict[str, Any]
+    structure: _Structure, arrays: Mapping[str, NDArray[Any]], card: ModelCard
 ) -> WearModel:
     heads = tuple(
         Head(
@@ -265,7 +257,7 @@ def _model_of(
         )
         for i, head in enumerate(structure.heads)
     )
-    features = len(card["features"])
+    features = len(card.features)
     model = WearModel(
         blind=_estimator_of(structure.blind, arrays, "blind", heads, features),
         informed=None
@@ -281,9 +273,9 @@ def _model_of(
 
 def _check_structure(model: WearModel, path: str | Path) -> None:
     """Shapes that fit each other, so that a forged file fails here and not in a prediction."""
-    n = len(model.card.get("features", []))
+    n = len(model.card.features)
     inputs = 2 * n if model.mode == "referenced" else n
-    more = len(noted_names(model.card))
+    more = len(model.card.noted_names)
     names = model.names
     try:
         physical, shapes = (f(names, np.zeros((1, n))) for f in (physical_rows, shape_rows))
@@ -294,7 +286,7 @@ def _check_structure(model: WearModel, path: str | Path) -> None:
         "informed": model.informed is None
         or (more > 0 and _estimator_fits(model.informed, inputs + more)),
         "heads": all(blend_fits(head.blend, n) for head in model.heads)
-        and [h.name for h in model.heads] == [c["name"] for c in model.card["confounders"]],
+        and [h.name for h in model.heads] == [each.name for each in model.card.confounders],
         "familiarity": familiarity_fits(model.familiarity, names, physical.shape[1]),
         "levels": _levels_fit(model.levels, len(level_channels(names)), shapes.shape[1]),
         "numbers": numbers_fit(_arrays_of(model)),
@@ -355,133 +347,3 @@ def _levels_fit(levels: Levels, channels: int, n: int) -> bool:
         and shapes_of(levels.offset, levels.size, levels.least) == {(channels,)}
         and spreads_fit(levels.spread)
     )
-
-
-_MOST_WEAR_M = 10.0  # clearance, wear-down or offset beyond any machine
-
-_Wear = Annotated[float, Field(gt=0, le=_MOST_WEAR_M)]
-_Worn = Annotated[float, Field(ge=0, le=_MOST_WEAR_M)]
-
-
-class _TrainedOn(Strict):
-    records: int = Field(ge=1)
-    draws: int = Field(ge=1)
-    draw_identity: str
-    held_out_share: Portion
-    split_seed: int
-    split: str = ""
-    split_sha256: str = ""
-    training_groups: list[int]
-    training_signals: list[int]
-    scene: str
-    recipe: str
-
-
-class _Healthy(Strict):
-    mean: list[float]
-    spread: list[float]
-
-
-class _Condition(Strict):
-    name: str
-    feature: str
-    unit: str
-    low: float
-    high: float
-
-
-class _Tried(Strict):
-    name: str
-    cost_ms: float
-    mae_m: float
-    on_front: bool
-
-
-class _Chosen(Strict):
-    chosen: str
-    members: dict[str, float]
-    nested_mae_m: float
-    informed_mae_m: float | None = None
-    candidates: list[_Tried]
-
-
-class _Rates(Strict):
-    name: str
-    share: Portion
-    detection_rate: Portion
-    false_alarm_rate: Portion
-    mae_with_m: float = Field(ge=0)
-    mae_without_m: float = Field(ge=0)
-    visible_from_m: float | None = Field(gt=0)
-    members: dict[str, float]
-
-
-class _ViewCard(Strict):
-    """What the recording of a view must have."""
-
-    channels: list[ChannelCard] = Field(min_length=1)
-    sample_rate_hz: RateHz
-    tacho: str | None
-    pulses_per_revolution: Pulses
-
-    @model_validator(mode="after")
-    def _fits_itself(self) -> Self:
-        check_channels(self.channels, self.tacho)
-        return self
-
-
-class _Card(Strict):
-    """What a card must hold, so that nothing that reads it can fail."""
-
-    created_by: str
-    origin: Literal["simulated", "measured"]
-    trained_on: _TrainedOn
-    severity: str = Field(pattern=r"^\w+_\w+_m$")
-    severity_range_m: list[_Worn] = Field(min_length=2, max_length=2)
-    grade_edges_m: list[_Wear] = Field(
-        min_length=len(GRADE_NAMES) - 1, max_length=len(GRADE_NAMES) - 1
-    )
-    condemning_limit_m: _Wear
-    limit_source: str
-    sample_rate_hz: RateHz
-    channels: list[ChannelCard] = Field(min_length=1)
-    tacho: str | None
-    pulses_per_revolution: Pulses
-    views: dict[str, _ViewCard] = Field(default_factory=dict)
-    features: list[str] = Field(min_length=1)
-    feature_choice: FeatureChoice = FeatureChoice()
-    conditions: list[_Condition]
-    healthy_features: _Healthy
-    mode: Literal["cold", "referenced"]
-    baseline_records: int = Field(ge=0)
-    budget_ms: float = Field(gt=0)
-    model: _Chosen
-    confounders: list[_Rates]
-
-    @model_validator(mode="after")
-    def _fits_itself(self) -> Self:
-        n = len(self.features)
-        if len(self.healthy_features.mean) != n or len(self.healthy_features.spread) != n:
-            raise ValueError("healthy_features must have one number per feature")
-        edges, limit = self.grade_edges_m, self.condemning_limit_m
-        if not all(low < high for low, high in pairwise(edges)):
-            raise ValueError(f"grade_edges_m = {edges} m must rise, each above the one before")
-        if limit < edges[-1]:
-            raise ValueError(f"condemning_limit_m = {limit:g} m must be >= the last grade edge")
-        for name, (low, high) in self._ranges():
-            if low > high:
-                raise ValueError(f"{name} = {low:g} to {high:g} must rise")
-        if not {c.feature for c in self.conditions} <= {"", *self.features}:
-            raise ValueError("conditions must name features")
-        if not {c.name for c in self.conditions if not c.feature} <= set(NOTED):
-            raise ValueError(f"conditions that are noted must be of {', '.join(NOTED)}")
-        check_channels(self.channels, self.tacho)
-        return self
-
-    def _ranges(self) -> list[tuple[str, tuple[float, float]]]:
-        """What has a low and a high end."""
-        low, high = self.severity_range_m
-        return [
-            ("severity_range_m", (low, high)),
-            *((f"condition {one.name}", (one.low, one.high)) for one in self.conditions),
-        ]

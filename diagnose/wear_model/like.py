@@ -8,7 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from ...datasets.source.channel_units import known_unit
 from ...datasets.source.part import Profile
 from ...sim.output.recording import DataError, missing_file
-from .arrays import Pulses, RateHz
+from ..feature_rows.model_card import Pulses, RateHz
 from .bundle import kind_of, load_bundle
 
 _LARGEST = 2**24  # byte

@@ -3,7 +3,7 @@
 import hashlib
 import json
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -37,6 +37,7 @@ from ..feature_rows.feature_table import (
     regimes_in,
 )
 from ..feature_rows.healthy import references, refuse_strangers
+from ..feature_rows.model_card import LayoutCard, ModelCard
 from ..feature_rows.noted import NOTED, notes_of
 from ..feature_rows.physical import physical_rows
 from ..feature_rows.transfer_reference import healthy_transfer
@@ -44,6 +45,7 @@ from ..learning.grades import grades_of
 from ..learning.regressions import (
     BUDGET_MS,
 )
+from .bundle import checked
 from .estimate import WearModel
 from .learn import FOLDS, Learnt, TrainingRows, learn, refuse_no_wear
 
@@ -152,12 +154,17 @@ def train_model(
         candidates=candidates,
         path=path,
     )
+    more: dict[str, Any] = {}
     if sides is not None:
-        model.card["trained_on"].update(split=sides.name, split_sha256=sides.sha256)
+        side = {"split": sides.name, "split_sha256": sides.sha256}
+        more["trained_on"] = model.card.trained_on.model_copy(update=side)
     if healthy is not None:
-        model.card.update(baseline_records=count)
+        more["baseline_records"] = count
     with JoinedSet(Path(path), views) as data:
-        model.card["views"] = {name: layout_card(one) for name, one in data.layouts.items()}
+        more["views"] = {
+            name: LayoutCard.model_validate(layout_card(one)) for name, one in data.layouts.items()
+        }
+    model = replace(model, card=model.card.model_copy(update=more))
     return model, table.named(model.names), test
 
 
@@ -238,7 +245,7 @@ def fit_model(
     mine = candidates.part(table, selection.chosen)
     card = _card(head, aim, mine, train, held_out, seed) | _model_card(learnt, budget_ms)
     card["healthy_features"] = _healthy(training, grades_of(training.severity, aim.edges))
-    card["feature_choice"] = choice_card(candidates.choices[selection.chosen]) | {
+    card["feature_choice"] = choice_card(candidates.choices[selection.chosen]).table() | {
         "candidates": [
             {"name": words_of(each), "values": len(columns), "line_mae_m": error}
             for each, columns, error in zip(
@@ -248,7 +255,7 @@ def fit_model(
     }
     if references is not None:
         card["mode"] = "referenced"
-    return _model(learnt, card)
+    return _model(learnt, checked(ModelCard, json.loads(json.dumps(card)), path, "card.json"))
 
 
 def _selection(candidate_rows: Sequence["TrainingRows"], seed: int) -> Selection:
@@ -363,7 +370,7 @@ def _check_kept(kept: int, draws: int, what: str, path: str | Path) -> None:
         )
 
 
-def _model(learnt: Learnt, card: dict[str, Any]) -> WearModel:
+def _model(learnt: Learnt, card: ModelCard) -> WearModel:
     return WearModel(
         blind=learnt.blind,
         informed=learnt.informed,

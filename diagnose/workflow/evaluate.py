@@ -67,7 +67,7 @@ class Evaluation:
         return self.text
 
     def __repr__(self) -> str:
-        return f"<Evaluation of {self.model.card['severity']} on {self.data.name}>"
+        return f"<Evaluation of {self.model.card.severity} on {self.data.name}>"
 
     def _repr_html_(self) -> str:
         return html_table(

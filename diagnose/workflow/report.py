@@ -169,7 +169,7 @@ def report(
     known = model if isinstance(model, WearModel) else load_model(model)
     source = None if isinstance(recording, Recording) else Path(recording)
     read = recording if isinstance(recording, Recording) else read_recording(recording)
-    usual = known.card["trained_on"]["scene"]
+    usual = known.card.trained_on.scene
     return judged(
         read,
         known,
@@ -178,7 +178,7 @@ def report(
         machine=machine,
         twin=None
         if twin is None
-        else second_opinion(twin, read, wear=known.card["severity"], seed=seed),
+        else second_opinion(twin, read, wear=known.card.severity, seed=seed),
         files={"recording": source} if source else None,
     )
 

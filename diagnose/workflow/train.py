@@ -73,7 +73,7 @@ def train(
     --------
     >>> import wearstate
     >>> model = wearstate.train("pump.h5", features=["core"])
-    >>> model.card["severity"], model.mode, model.card["trained_on"]["records"]
+    >>> model.card.severity, model.mode, model.card.trained_on.records
     ('diametral_clearance_crankpin_m', 'cold', 18)
     """
     _refuse_recordings(data)

@@ -95,7 +95,7 @@ def judged_set(model: WearModel, path: Path, healthy: Path | None) -> tuple[Judg
     table, rows = judged_rows(model, path, healthy=healthy)
     reference, known = None, None
     if healthy is not None:
-        reference = references(table, path, healthy, choice=choice_in(model.card))[0]
+        reference = references(table, path, healthy, choice=choice_in(model.card.feature_choice))[0]
         known = Baselines(healthy, model.card)
     found, _ = judge_rows(model, table, rows, reference)
     with DataSet(path) as data:
@@ -144,7 +144,7 @@ def row_of(case: Case, path: Path, healthy: Path | None, what: str) -> dict[str,
     """Figures of one model on one data set, ready for JSON."""
     found, told = judged_set(case.model, path, healthy if case.referenced else None)
     card = case.model.card
-    result = figures(found, card["condemning_limit_m"], card["grade_edges_m"][-1])
+    result = figures(found, card.condemning_limit_m, card.grade_edges_m[-1])
     return {
         "model": case.name,
         "records_of": what,

@@ -161,7 +161,7 @@ def main():
     else:
         model, _, _ = train_model(given.data)
     with DataSet(given.data) as data:
-        seen = data.manifest["group"].isin(model.card["trained_on"]["training_groups"])
+        seen = data.manifest["group"].isin(model.card.trained_on.training_groups)
         rows = np.flatnonzero(~seen.to_numpy())[: given.n]
         shares = campaign(model, (data[int(row)] for row in rows))
     for name, (told, plain) in shares.items():

@@ -109,7 +109,7 @@ def main():
     model = load_model(given.model)
     with DataSet(given.own) as data:
         own, speeds = data[0], np.sort(data.manifest["speed_hz"].to_numpy())
-        seen = data.manifest["group"].isin(model.card["trained_on"]["training_groups"])
+        seen = data.manifest["group"].isin(model.card.trained_on.training_groups)
         fresh = np.flatnonzero(~seen.to_numpy())[: given.n]
         familiar = campaign(model, (("its own, held out", data[int(row)]) for row in fresh))
     rng = np.random.default_rng(0)
