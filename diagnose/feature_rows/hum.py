@@ -3,7 +3,7 @@
 import numpy as np
 
 from ...features.rotation.order import pulse_times
-from ...features.signal.hum import MAINS_HZ, hum_power
+from ...features.signal.hum import hum_power
 from ...sim.output.recording import Recording
 from .quality import QualityFault
 
@@ -13,31 +13,33 @@ simulated pumps err as without any hum, at -10 dB nearly twice as much, and of p
 shafts as trained at most one in a hundred has as much at these lines."""
 
 
-def hum_faults(recording: Recording) -> tuple[QualityFault, ...]:
+def hum_faults(recording: Recording, speed_hz: float | None = None) -> tuple[QualityFault, ...]:
     """Channels whose hum is loud beside the machine; none where no tacho tells its own lines.
 
     Parameters
     ----------
     recording : Recording
         Of a tacho whose pulses are sound.
+    speed_hz : float, optional
+        Mean shaft speed [Hz]; from the pulses unless given.
 
     Returns
     -------
     tuple of QualityFault
         None of them bars a verdict.
     """
-    if recording.tacho_signal is None:
+    tacho = recording.tacho_signal
+    if tacho is None:
         return ()
-    pulses = pulse_times(recording.tacho_signal, recording.sample_rate)
-    turns = (len(pulses) - 1) / recording.pulses_per_revolution
-    speed = turns / float(pulses[-1] - pulses[0])
+    if speed_hz is None:
+        pulses = pulse_times(tacho, recording.sample_rate)
+        turns = (len(pulses) - 1) / recording.pulses_per_revolution
+        speed_hz = turns / float(pulses[-1] - pulses[0])
     found = []
     for channel, row in zip(recording.vibration_channels, recording.vibration, strict=True):
         power = float(np.var(row, dtype=np.float64))
-        hum, mains = max(
-            (hum_power(row, recording.sample_rate, mains, speed_hz=speed), mains)
-            for mains in MAINS_HZ
-        )
+        found_at = hum_power(row, recording.sample_rate, speed_hz=speed_hz)
+        mains, hum = max(found_at.items(), key=lambda each: each[1])
         if hum > MOST_HUM * power:
             text = (
                 f"{hum / power:.0%} of the mean square of channel {channel.name} is at multiples "

@@ -387,12 +387,13 @@ class WearModel:
         faults = recording_faults(recording, self.card)
         if any(fault.bars for fault in faults):
             return self._unusable(faults)
-        faults += hum_faults(recording)
         known = None if baseline is None else baseline.transfer
         if known is None and told_against(FeatureSelection(only=self.names)):
             return Estimate(verdict="unusable", reasons=(NO_BASELINE,), mode=self.mode)
         row = self._row(recording, known)
         look = self._look(row)
+        place = self._columns.get(_SPEED_FEATURE)
+        faults += hum_faults(recording, None if place is None else float(row[place]))
 
         def see(mended: Recording) -> Observation:
             return self._look(self._row(mended, known))
