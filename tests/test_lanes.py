@@ -1,6 +1,7 @@
 """Records side by side: the bytes of each alone, whatever lies beside it."""
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -21,7 +22,7 @@ N = 40  # of the standard set's unknowns: contact laws, chamber, play, motor, al
 @pytest.fixture(scope="module")
 def drawn():
     recipe = load_recipe("bilge-pump-standard", SHORT)
-    samples = sample_records(recipe, N, seed=7, skip=np.zeros(N, bool))
+    samples = sample_records(recipe, N, seed=16, skip=np.zeros(N, bool))
     return [(sample.scene, sample.seed) for sample in samples]
 
 
@@ -41,9 +42,8 @@ def same(one, other):
 
 def test_the_drawn_records_are_of_every_kind(drawn):
     """Else the tests below would compare less than they say."""
-    assert {lane_kind(scene) for scene, _ in drawn} == {
-        (play, breathes) for play in (False, True) for breathes in (False, True)
-    }
+    kinds = {lane_kind(scene) for scene, _ in drawn}
+    assert {tuple(kind) for kind in kinds} == set(product((False, True), repeat=3))
     pins = [scene.joint.crankpin for scene, _ in drawn]
     assert {"kelvin-voigt", "hunt-crossley", "exact"} <= {pin.law for pin in pins}
     assert {pin.elasticity for pin in pins} >= {"linear", "hertz"}

@@ -48,11 +48,12 @@ from .oiled_joint import oiled_joint
 from .throw_motion import (
     PinLoad,
     Pose,
+    corner_margin,
     crank_load,
     crank_offset,
     dry_pin,
     free_motion,
-    guide_corner,
+    guide_end,
     held_back,
     held_wrist,
     link_drag,
@@ -256,8 +257,7 @@ def _contact_margin(k: int, j: int, w: Any, row: int, t: Any) -> Any:
     touching, impact = w.held[k].touching[j] != 0, w.held[k].impact[j]
     if j > WRISTPIN:
         along, side = _corner_place(j - GUIDE)
-        _, _, _, touch = guide_corner(p, q, along, side, touching, impact, t.contacts[k, GUIDE])
-        return touch.margin
+        return corner_margin(p, q, along, side, touching, impact, t.contacts[k, GUIDE])
     sin_b, cos_b = sine_cosine(p.beta)
     if j == CRANKPIN:
         sin_a, cos_a = sine_cosine(w.crank[row, ANGLE] + q.phase)
@@ -345,15 +345,23 @@ def _pin_load(
 def _guide(p: Any, q: Any, b: Any, held: Any, c: Any) -> Any:
     """Force of a guide with clearance on the piston (x, y, turning), peak normal force, overlap."""
     f_x, f_y, moment, peak, deepest = 0.0, 0.0, 0.0, 0.0, 0.0
-    for number in range(4):
-        j = GUIDE + number
-        along, side = _corner_place(number)
-        drag, push, turn, touch = guide_corner(
-            p, q, along, side, held.touching[j] != 0, held.impact[j], c
+    for end in range(2):
+        i, j = GUIDE + end, GUIDE + 2 + end  # upper and lower corner
+        drag, push, turn, upper, lower = guide_end(
+            p,
+            q,
+            2.0 * end - 1.0,
+            held.touching[i] != 0,
+            held.impact[i],
+            held.touching[j] != 0,
+            held.impact[j],
+            c,
         )
-        b.margin[j], b.approach[j] = touch.margin, touch.approach
+        b.margin[i], b.approach[i] = upper.margin, upper.approach
+        b.margin[j], b.approach[j] = lower.margin, lower.approach
         f_x, f_y, moment = f_x + drag, f_y + push, moment + turn
-        peak, deepest = max(peak, touch.normal), max(deepest, touch.overlap)
+        peak = max(peak, upper.normal)
+        deepest = max(max(deepest, upper.overlap), lower.overlap)
     return f_x, f_y, moment, peak, deepest
 
 

@@ -185,18 +185,54 @@ def corner(p: Any, q: Any, along: float, side: float, clearance: float) -> Any:
 
 
 @kernel
-def guide_corner(
+def corner_margin(
     p: Any, q: Any, along: float, side: float, touching: bool, impact: float, c: Any
+) -> float:
+    """Margin of one corner in its guide, see :func:`margin` [N]."""
+    overlap, speed, _, _ = corner(p, q, along, side, c.clearance)
+    found: float = margin(overlap, normal_force(overlap, speed, impact, c), touching, c)
+    return found
+
+
+@kernel
+def guide_end(
+    p: Any,
+    q: Any,
+    along: float,
+    upper_touches: bool,
+    upper_impact: float,
+    lower_touches: bool,
+    lower_impact: float,
+    c: Any,
 ) -> Any:
-    """Force of a guide on one corner (x, y), its moment on the piston, and the contact's state."""
-    overlap, speed, r_x, r_y = corner(p, q, along, side, c.clearance)
-    force = normal_force(overlap, speed, impact, c)
+    """Force of a guide on one end of the piston (x, y), its moment on it, and its two contacts.
+
+    A guide with clearance holds an end at its upper or its lower corner, never at both. So force
+    and friction are those of one corner: the one that touches, or of none the deeper one.
+    """
+    at_upper, speed_u, x_u, y_u = corner(p, q, along, 1.0, c.clearance)
+    at_lower, speed_l, x_l, y_l = corner(p, q, along, -1.0, c.clearance)
+    lower = lower_touches or (at_lower > at_upper and not upper_touches)
+    overlap, speed = at_lower if lower else at_upper, speed_l if lower else speed_u
+    touching = lower_touches or upper_touches
+    force = normal_force(overlap, speed, lower_impact if lower else upper_impact, c)
     law = force if touching else 0.0
-    push = -side * law
+    push = law if lower else -law
+    r_x, r_y = x_l if lower else x_u, y_l if lower else y_u
     sliding = friction_force(p.piston_x_rate - p.tilt_rate * r_y, law, c)
     drag = -sliding if touching else 0.0
-    touch = Touch(law, overlap, margin(overlap, force, touching, c), speed)
-    return drag, push, r_x * push - r_y * drag, touch
+    own = margin(overlap, force, touching, c)
+    away, leaving = at_upper if lower else at_lower, speed_u if lower else speed_l
+    apart = c.stiffness * away + c.damping * leaving if c.law == LAW_KELVIN_VOIGT else 0.0
+    other = margin(away, apart, False, c)
+    upper = Touch(law, at_upper, other if lower else own, speed_u)
+    return (
+        drag,
+        push,
+        r_x * push - r_y * drag,
+        upper,
+        Touch(law, at_lower, own if lower else other, speed_l),
+    )
 
 
 @kernel

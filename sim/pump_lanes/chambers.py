@@ -11,7 +11,7 @@ from ..pump.hydraulics import (
     valve_shares,
 )
 from ..pump.slider_crank import WITH_VAPOUR, breathe
-from .rates import CHAMBER_COLUMNS, LANES, ChamberLane
+from .rates import CHAMBER_COLUMNS, LANES, PISTON_X, ChamberLane
 
 
 @kernel
@@ -79,14 +79,14 @@ def _air(p: Any, s: Any) -> None:
 
 @kernel
 def _side_by_side(p: Any, s: Any) -> None:
-    before, y = s.chamber0, s.y
+    before = s.chamber0
     for lane in range(LANES):
         for c in range(CHAMBER_COLUMNS):
             before[c, lane] = s.chamber[c, lane]
         for c in range(2):
             s.pressure0[c, lane] = s.pressure[c, lane]
     for lane in range(LANES):
-        x, v = y[3, lane], y[9, lane]
+        x, v = s.x[PISTON_X, lane], s.v[PISTON_X, lane]
         now = (
             before[0, lane],
             before[1, lane],
@@ -122,7 +122,7 @@ def breathe_alone(lane: int, p: Any, s: Any, a: Any) -> None:
         chamber[c] = s.chamber0[c, lane]
     h, substeps = p.step[lane], a.throws[lane, 0].substeps
     fault, before, after = breathe(
-        chamber, one, a.liquid[lane, 0], h, s.y[3, lane], s.y[9, lane], substeps
+        chamber, one, a.liquid[lane, 0], h, s.x[PISTON_X, lane], s.v[PISTON_X, lane], substeps
     )
     for c in range(CHAMBER_COLUMNS):
         s.chamber[c, lane] = chamber[c]

@@ -31,7 +31,6 @@ from ..pump.slider_crank import (
     JOINT_COMPLIANT,
     JOINT_IDEAL,
     NOT_LOCATED,
-    PER_THROW,
     WITH_VAPOUR,
     CrankTally,
     Tables,
@@ -40,8 +39,11 @@ from ..scene.pump import PumpScene
 from ..scene.pump_hydraulics import PIPED_RUNGS
 from .march import Stretch, alone, enter_lane, march
 from .rates import (
+    CRANK,
+    LANE_FORCES,
     LANES,
     NEVER,
+    PLACES,
     PLAN,
     STATE,
     ChamberLane,
@@ -52,10 +54,13 @@ from .rates import (
 
 Float = NDArray[np.float64]
 
-_ALWAYS = ("pin_x", "pin_y", "guide_y", "piston_x", "seal_x")
-_WITH_PLAY = ("guide_x",)
-_BREATHING = ("suction_valve", "discharge_valve")
-"""Forces of a throw on its casing: what is kept of every run, of those with play, of chambers."""
+
+class LaneKind(NamedTuple):
+    """What lanes that run together have beside play in their crank pins."""
+
+    wrist: bool  # play in wrist pins
+    guide: bool  # play in guides
+    breathing: bool  # chambers with valves
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,11 +73,8 @@ class LaneJob:
     n_steps: int
 
 
-def lane_kind(scene: PumpScene) -> tuple[bool, bool] | None:
-    """Play beside the crank pin's, and whether a chamber breathes: lanes of one kind run together.
-
-    None of a mechanism that lanes do not know.
-    """
+def lane_kind(scene: PumpScene) -> LaneKind | None:
+    """What the lane of a scene must have; None of a mechanism that lanes do not know."""
     crankpin, wristpin, guide = joint_rungs(scene, 0)
     rung = scene.pressures(0).rung
     known = (
@@ -82,7 +84,7 @@ def lane_kind(scene: PumpScene) -> tuple[bool, bool] | None:
     )
     if not known:
         return None
-    return JOINT_COMPLIANT in (wristpin, guide), rung == "chamber"
+    return LaneKind(wristpin == JOINT_COMPLIANT, guide == JOINT_COMPLIANT, rung == "chamber")
 
 
 _STRETCH = 64  # steps: what they leave fits the innermost but one of a processor's caches
@@ -96,15 +98,24 @@ class Steps(Protocol):
         """As :meth:`.recording.Gathering.add`, with forces of :func:`lane_columns`."""
 
 
-def lane_columns(kind: tuple[bool, bool]) -> tuple[int, ...]:
-    """Of all forces of a run: those that lanes of a kind keep, on the casing and on the piston."""
-    play, breathing = kind
-    names = (*_ALWAYS, *_WITH_PLAY * play, *_BREATHING * breathing)
-    return tuple(1 + FORCES.index(name) for name in names)
+_VALVES = ("suction_valve", "discharge_valve")
+
+
+def _kept_rows(kind: LaneKind) -> tuple[int, ...]:
+    """Rows of a stretch's forces that are kept of lanes of a kind: on the casing and the piston."""
+    always = len(LANE_FORCES) - 1  # friction in the guide is the last
+    friction = (always,) * kind.guide
+    return (*range(always), *friction, *(always + 1, always + 2) * kind.breathing)
+
+
+def lane_columns(kind: LaneKind) -> tuple[int, ...]:
+    """Of all forces of a run: those that lanes of a kind keep."""
+    names = (*LANE_FORCES, *_VALVES)
+    return tuple(1 + FORCES.index(names[row]) for row in _kept_rows(kind))
 
 
 def run_lanes(
-    jobs: Sequence[LaneJob], kind: tuple[bool, bool], steps: Callable[[int], Steps]
+    jobs: Sequence[LaneJob], kind: LaneKind, steps: Callable[[int], Steps]
 ) -> Iterator[tuple[int, CrankTally]]:
     """Run mechanisms of one kind side by side.
 
@@ -112,8 +123,9 @@ def run_lanes(
     ----------
     jobs : sequence of LaneJob
         Taken as lanes become free.
-    kind : tuple of bool
-        Of all of them, see :func:`lane_kind`.
+    kind : LaneKind
+        All that any of them has; what one of them lacks costs it time only. Either all of them
+        breathe or none.
     steps : callable
         Called with the number of a job that begins: who is told of its steps.
 
@@ -137,9 +149,9 @@ class _Lanes:
     """All lanes, what their runs are at, and their last steps that were not handed on yet."""
 
     def __init__(
-        self, kind: tuple[bool, bool], jobs: Sequence[LaneJob], steps: Callable[[int], Steps]
+        self, kind: LaneKind, jobs: Sequence[LaneJob], steps: Callable[[int], Steps]
     ) -> None:
-        self._play, self._breathing = kind
+        self._kind, self._breathing = kind, kind.breathing
         self._jobs, self._steps = jobs, steps
         self._told: dict[int, Steps] = {}  # by lane
         self._plan = np.zeros(1, PLAN)
@@ -148,10 +160,10 @@ class _Lanes:
         self._at = np.zeros(LANES, np.int64)  # steps taken of it and not handed on
         self._left = np.zeros(LANES, np.int64)
         self._alone = alone(jobs[0].tables)
-        self._columns = np.array(lane_columns(kind)) - 1
+        self._columns = np.array(_kept_rows(kind))
         self._kept = Stretch(
             turns=np.zeros((_STRETCH, 2, LANES)),
-            forces=np.zeros((_STRETCH, len(FORCES), LANES)),
+            forces=np.zeros((_STRETCH, len(LANE_FORCES) + len(_VALVES), LANES)),
             chambers=np.zeros((_STRETCH, len(GATHERED), LANES)),
             code=np.ones(LANES, np.int64),
             done=np.zeros(LANES, np.int64),
@@ -197,8 +209,8 @@ class _Lanes:
         plan["weight"][lane] = job.step / (6.0 * job.step)
         for name in state.dtype.names:
             state[name][..., lane] = 0.0
-        state["y0"][:PER_THROW, lane] = start.bodies[0]
-        state["y0"][PER_THROW:, lane] = start.angle, start.speed
+        state["x0"][PLACES, lane], state["v0"][PLACES, lane] = start.bodies[0].reshape(2, -1)
+        state["x0"][CRANK, lane], state["v0"][CRANK, lane] = start.angle, start.speed
         enter_lane(lane, plan, state, a)
         self._past.turns[lane, 0] = start.angle, start.speed
         self._past.chambers[lane, 0] = start.chambers[:, list(GATHERED)]
@@ -209,8 +221,7 @@ class _Lanes:
     def go_on(self) -> None:
         """March until the first run ends, or a lane has no room left."""
         march_on(
-            self._play,
-            self._breathing,
+            self._kind,
             self._plan[0],
             self._state[0],
             self._alone,
@@ -270,8 +281,7 @@ class _Past(NamedTuple):
 
 @subroutine
 def march_on(
-    play: bool,
-    breathing: bool,
+    kind: Any,
     p: Any,
     s: Any,
     a: Any,
@@ -294,8 +304,8 @@ def march_on(
             return
         for lane in range(LANES):
             k.done[lane] = n if k.code[lane] == 0 else 0
-        march(play, breathing, n, p, s, a, k)
-        _take(k, columns, at, past, breathing)
+        march(kind, n, p, s, a, k)
+        _take(k, columns, at, past, kind[2])
         failed = False
         for lane in range(LANES):
             at[lane] += k.done[lane]

@@ -19,7 +19,7 @@ from ..pump.recording import (
 from ..pump.setup import begun, needs_integration
 from ..scene.parts import Scene, SceneError
 from ..scene.pump import PumpScene
-from .lanes import LaneJob, lane_columns, lane_kind, run_lanes
+from .lanes import LaneJob, LaneKind, lane_columns, lane_kind, run_lanes
 
 _FEWEST = 5
 """Records of a kind: fewer are as fast one after the other."""
@@ -49,7 +49,7 @@ def simulate_pumps(
         As of :func:`.recording.simulate_pump` with `raise_on_failure` false; why a scene is
         refused.
     """
-    kinds: dict[tuple[bool, bool], list[_Job]] = {}
+    kinds: dict[LaneKind, list[_Job]] = {}
     for number, (scene, seed) in enumerate(jobs):
         pump = cast(PumpScene, scene)
         try:
@@ -65,15 +65,31 @@ def simulate_pumps(
             yield number, _alone(pump, seed)
             continue
         kinds.setdefault(kind, []).append(_Job(number, seed, plan))
-    for kind, group in kinds.items():
+    for kind, group in _pooled(kinds):
         yield from _together(group, kind)
 
 
-def pumps_alike(scene: Scene) -> tuple[bool, bool] | None:
+def pumps_alike(scene: Scene) -> LaneKind | None:
     """What records side by side must have in common; None of a scene that runs alone."""
     pump = cast(PumpScene, scene)
     simple = pump.running and len(pump.throws) == 1
     return lane_kind(pump) if simple and needs_integration(pump) else None
+
+
+def _pooled(kinds: dict[LaneKind, list[_Job]]) -> list[tuple[LaneKind, list[_Job]]]:
+    """Groups of a kind; those of few records together, as they would each run alone else."""
+    large = [(kind, group) for kind, group in kinds.items() if len(group) >= _FEWEST]
+    small = [(kind, group) for kind, group in kinds.items() if len(group) < _FEWEST]
+    for breathing in (False, True):
+        pool = [(kind, group) for kind, group in small if kind.breathing == breathing]
+        if pool:
+            kind = LaneKind(
+                wrist=any(kind.wrist for kind, _ in pool),
+                guide=any(kind.guide for kind, _ in pool),
+                breathing=breathing,
+            )
+            large.append((kind, [job for _, group in pool for job in group]))
+    return large
 
 
 def _alone(scene: PumpScene, seed: int) -> Recording | SceneError:
@@ -83,9 +99,7 @@ def _alone(scene: PumpScene, seed: int) -> Recording | SceneError:
         return error
 
 
-def _together(
-    group: list[_Job], kind: tuple[bool, bool]
-) -> Iterator[tuple[int, Recording | SceneError]]:
+def _together(group: list[_Job], kind: LaneKind) -> Iterator[tuple[int, Recording | SceneError]]:
     if len(group) < _FEWEST:
         for job in group:
             yield job.number, _alone(job.plan.scene, job.seed)

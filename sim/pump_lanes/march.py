@@ -13,7 +13,6 @@ from ..pump.slider_crank import (
     HELD,
     NO_CHANGE,
     OVERLAP_LIMIT,
-    PER_THROW,
     STAGE,
     Tables,
     Tally,
@@ -25,9 +24,13 @@ from ..pump.slider_crank import (
 )
 from .chambers import breathe_alone, count_vapour, enter_chamber, lanes_breathe
 from .rates import (
-    COORDINATES,
-    FORCES_IN_LANES,
+    ALL_MOVING,
+    BETA,
+    CRANK,
+    LANE_FORCES,
     LANES,
+    MOVING,
+    PLACES,
     machine_of_lane,
     overlap_of_lane,
     rates,
@@ -53,7 +56,7 @@ class Stretch(NamedTuple):
     """What a stretch of steps leaves behind."""
 
     turns: NDArray[np.float64]  # (n, 2, LANES): at the ends of the steps
-    forces: NDArray[np.float64]  # (n, len(FORCES), LANES)
+    forces: NDArray[np.float64]  # (n, len(LANE_FORCES) + 2, LANES): the valves' last
     chambers: NDArray[np.float64]  # (n, len(GATHERED), LANES)
     code: NDArray[np.int64]  # (LANES,): of the first step that failed
     done: NDArray[np.int64]  # (LANES,): steps up to it
@@ -70,16 +73,13 @@ def _tables_of(lane: int, p: Any, a: Any) -> Any:
 def _to_record(lane: int, s: Any, w: Any) -> None:
     """Copy the beginning of a lane's step into row 0 of the march of one record."""
     b, one = w.stage[0, 0], w.held[0]
-    for c in range(PER_THROW):
-        b.y[c], b.rate[c] = s.y0[c, lane], s.rate0[c, lane]
-    w.crank[0, 0], w.crank[0, 1] = s.y0[12, lane], s.y0[13, lane]
-    w.crank[0, 2], w.crank[0, 3], w.crank[0, 4] = (
-        s.rate0[12, lane],
-        s.rate0[13, lane],
-        s.force0[FORCES_IN_LANES - 1, lane],
-    )
-    for n in range(FORCES_IN_LANES - 1):
-        b.force[n] = s.force0[n, lane]
+    for c in range(len(PLACES)):
+        b.y[c], b.y[len(PLACES) + c] = s.x0[PLACES[c], lane], s.v0[PLACES[c], lane]
+        b.rate[c], b.rate[len(PLACES) + c] = s.v0[PLACES[c], lane], s.a0[PLACES[c], lane]
+    w.crank[0, 0], w.crank[0, 1] = s.x0[CRANK, lane], s.v0[CRANK, lane]
+    w.crank[0, 2], w.crank[0, 3], w.crank[0, 4] = s.v0[CRANK, lane], s.a0[CRANK, lane], 0.0
+    for n in range(len(LANE_FORCES)):
+        b.force[_FORCE[n]] = s.force0[n, lane]
     for j in range(CONTACTS):
         b.margin[j], b.approach[j] = s.margin0[j, lane], s.approach0[j, lane]
         one.touching[j], one.impact[j] = int(s.touching[j, lane]), s.impact[j, lane]
@@ -91,21 +91,21 @@ def _to_record(lane: int, s: Any, w: Any) -> None:
 def _from_record(lane: int, s: Any, w: Any, i: int) -> None:
     """Copy row i of the march of one record into a lane, as the stage looked at last."""
     b, one = w.stage[i, 0], w.held[0]
-    for c in range(PER_THROW):
-        s.y[c, lane], s.rate[c, lane] = b.y[c], b.rate[c]
-    s.y[12, lane], s.y[13, lane] = w.crank[i, 0], w.crank[i, 1]
-    s.rate[12, lane], s.rate[13, lane], s.force[FORCES_IN_LANES - 1, lane] = (
-        w.crank[i, 2],
-        w.crank[i, 3],
-        w.crank[i, 4],
-    )
-    for n in range(FORCES_IN_LANES - 1):
-        s.force[n, lane] = b.force[n]
+    for c in range(len(PLACES)):
+        s.x[PLACES[c], lane], s.v[PLACES[c], lane] = b.y[c], b.y[len(PLACES) + c]
+        s.a[PLACES[c], lane] = b.rate[len(PLACES) + c]
+    s.x[CRANK, lane], s.v[CRANK, lane] = w.crank[i, 0], w.crank[i, 1]
+    s.a[CRANK, lane] = w.crank[i, 3]
+    for n in range(len(LANE_FORCES)):
+        s.force[n, lane] = b.force[_FORCE[n]]
     for j in range(CONTACTS):
         s.margin[j, lane], s.approach[j, lane] = b.margin[j], b.approach[j]
         s.touching[j, lane], s.impact[j, lane] = float(one.touching[j]), one.impact[j]
     s.normal[lane] = b.normal
     s.pressure[0, lane], s.pressure[1, lane] = one.pressure[0], one.pressure[1]
+
+
+_FORCE = tuple(FORCES.index(name) for name in LANE_FORCES)
 
 
 @subroutine
@@ -125,8 +125,8 @@ def _step_alone(lane: int, p: Any, s: Any, a: Any, k: Any, n: int) -> float:
     if not fresh:
         derivative_of_record(w, end, 0.0, t)
     _from_record(lane, s, w, end)
-    for c in range(len(FORCES)):
-        k.forces[n, c, lane] = a.forces[0, 1 + c]
+    for c in range(len(LANE_FORCES)):
+        k.forces[n, c, lane] = a.forces[0, 1 + _FORCE[c]]
     overlap: float = w.stage[end, 0].overlap
     return overlap
 
@@ -146,20 +146,61 @@ def enter_lane(lane: int, p: Any, s: Any, a: Any) -> None:
     a.peak[lane, 0] = 0.0
 
 
-# Columns within lanes, though lanes lie side by side: the compiler lays the outer loop into
-# vectors, and would unroll an inner one of so few turns instead.
+# Rows within lanes, though lanes lie side by side: the compiler lays the outer loop into vectors,
+# and would unroll an inner one of so few turns instead.
 
 
-@subroutine
-def _to_second_stage(p: Any, s: Any) -> None:
+@kernel
+def _begin(p: Any, s: Any, first: int, rows: int) -> None:
     """Keep where the step begins; its first rates lead to the second stage."""
     for lane in range(LANES):
         h = 0.5 * p.step[lane]
-        for c in range(COORDINATES):
-            y, rate = s.y[c, lane], s.rate[c, lane]
-            s.y0[c, lane], s.rate0[c, lane] = y, rate
-            s.y[c, lane] = y + h * rate
-        for c in range(FORCES_IN_LANES):
+        for c in range(first, rows):
+            x, v, a = s.x[c, lane], s.v[c, lane], s.a[c, lane]
+            s.x0[c, lane], s.v0[c, lane], s.a0[c, lane] = x, v, a
+            s.x[c, lane], s.v[c, lane] = x + h * v, v + h * a
+
+
+@kernel
+def _to_third(p: Any, s: Any, first: int, rows: int) -> None:
+    for lane in range(LANES):
+        h = 0.5 * p.step[lane]
+        for c in range(first, rows):
+            v, a = s.v[c, lane], s.a[c, lane]
+            s.middle_v[c, lane], s.middle_a[c, lane] = v, a
+            s.x[c, lane], s.v[c, lane] = s.x0[c, lane] + h * v, s.v0[c, lane] + h * a
+
+
+@kernel
+def _to_last(p: Any, s: Any, first: int, rows: int) -> None:
+    for lane in range(LANES):
+        h = p.step[lane]
+        for c in range(first, rows):
+            v, a = s.v[c, lane], s.a[c, lane]
+            s.middle_v[c, lane] += v
+            s.middle_a[c, lane] += a
+            s.x[c, lane], s.v[c, lane] = s.x0[c, lane] + h * v, s.v0[c, lane] + h * a
+
+
+@kernel
+def _end(p: Any, s: Any, first: int, rows: int) -> None:
+    for lane in range(LANES):
+        sixth = p.sixth[lane]
+        for c in range(first, rows):
+            v = mean_of_stages(s.v0[c, lane], s.middle_v[c, lane], s.v[c, lane])
+            a = mean_of_stages(s.a0[c, lane], s.middle_a[c, lane], s.a[c, lane])
+            s.x[c, lane] = s.x0[c, lane] + sixth * v
+            s.v[c, lane] = s.v0[c, lane] + sixth * a
+
+
+@subroutine
+def _to_second_stage(p: Any, s: Any, across: bool) -> None:
+    """Keep where the step begins; its first rates lead to the second stage."""
+    _begin(p, s, 0, MOVING)
+    if across:
+        _begin(p, s, MOVING, ALL_MOVING)
+    for lane in range(LANES):
+        for c in range(len(LANE_FORCES)):
             s.force0[c, lane] = s.force[c, lane]
         for j in range(CONTACTS):
             s.margin0[j, lane], s.approach0[j, lane] = s.margin[j, lane], s.approach[j, lane]
@@ -167,61 +208,51 @@ def _to_second_stage(p: Any, s: Any) -> None:
 
 
 @subroutine
-def _to_third_stage(p: Any, s: Any) -> None:
+def _to_third_stage(p: Any, s: Any, across: bool) -> None:
+    _to_third(p, s, 0, MOVING)
+    if across:
+        _to_third(p, s, MOVING, ALL_MOVING)
     for lane in range(LANES):
-        h = 0.5 * p.step[lane]
-        for c in range(COORDINATES):
-            rate = s.rate[c, lane]
-            s.middle_rate[c, lane] = rate
-            s.y[c, lane] = s.y0[c, lane] + h * rate
-        for c in range(FORCES_IN_LANES):
+        for c in range(len(LANE_FORCES)):
             s.middle_force[c, lane] = s.force[c, lane]
         s.high[lane] = max(s.normal0[lane], s.normal[lane])
 
 
 @subroutine
-def _to_last_stage(p: Any, s: Any) -> None:
+def _to_last_stage(p: Any, s: Any, across: bool) -> None:
+    _to_last(p, s, 0, MOVING)
+    if across:
+        _to_last(p, s, MOVING, ALL_MOVING)
     for lane in range(LANES):
-        h = p.step[lane]
-        for c in range(COORDINATES):
-            rate = s.rate[c, lane]
-            s.middle_rate[c, lane] += rate
-            s.y[c, lane] = s.y0[c, lane] + h * rate
-        for c in range(FORCES_IN_LANES):
+        for c in range(len(LANE_FORCES)):
             s.middle_force[c, lane] += s.force[c, lane]
         s.high[lane] = max(s.high[lane], s.normal[lane])
 
 
 @subroutine
-def _to_end(p: Any, s: Any) -> None:
-    """State at the end of the step, and the mean forces over it in place of the middle ones."""
+def _to_end(p: Any, s: Any, a: Any, k: Any, n: int, across: bool) -> None:
+    """State at the end of step n, and the mean forces over it."""
+    _end(p, s, 0, MOVING)
+    if across:
+        _end(p, s, MOVING, ALL_MOVING)
     for lane in range(LANES):
-        sixth, weight = p.sixth[lane], p.weight[lane]
-        for c in range(COORDINATES):
-            mean = mean_of_stages(s.rate0[c, lane], s.middle_rate[c, lane], s.rate[c, lane])
-            s.y[c, lane] = s.y0[c, lane] + sixth * mean
-        for c in range(FORCES_IN_LANES):
-            s.middle_force[c, lane] = weight * mean_of_stages(
+        weight = p.weight[lane]
+        for c in range(len(LANE_FORCES)):
+            k.forces[n, c, lane] = weight * mean_of_stages(
                 s.force0[c, lane], s.middle_force[c, lane], s.force[c, lane]
             )
-
-
-@subroutine
-def _keep(s: Any, a: Any, k: Any, n: int) -> None:
-    for lane in range(LANES):
-        for c in range(FORCES_IN_LANES - 1):
-            k.forces[n, c, lane] = s.middle_force[c, lane]
         a.peak[lane, 0] = max(a.peak[lane, 0], s.high[lane])
 
 
 @kernel
-def _failed(y: Any, overlap: float, lane: int) -> float:
+def _failed(s: Any, overlap: float, lane: int) -> float:
     """Status code of the end of a step, as the march of one record judges it."""
-    total = y[12, lane] + y[13, lane]
-    total += y[0, lane] + y[1, lane] + y[2, lane] + y[3, lane] + y[4, lane] + y[5, lane]
-    total += y[6, lane] + y[7, lane] + y[8, lane] + y[9, lane] + y[10, lane] + y[11, lane]
+    x, v = s.x, s.v
+    total = x[0, lane] + x[1, lane] + x[2, lane] + x[3, lane] + x[4, lane] + x[5, lane] + x[6, lane]
+    total += v[0, lane] + v[1, lane] + v[2, lane] + v[3, lane] + v[4, lane] + v[5, lane]
+    total += v[6, lane]
     lost = 0.0 if total - total == 0.0 else 1.0
-    turned = 3.0 if abs(y[2, lane]) > 1.5 else lost  # rad
+    turned = 3.0 if abs(x[BETA, lane]) > 1.5 else lost  # rad
     return 2.0 if overlap > OVERLAP_LIMIT else turned
 
 
@@ -235,7 +266,7 @@ def _judge(p: Any, s: Any) -> int:
             min(m[4, lane], m[5, lane]),
         )
         s.asks[lane] = 1.0 if least < 0.0 else 0.0
-        failed = _failed(s.y, overlap_of_lane(p, s, lane), lane)
+        failed = _failed(s, overlap_of_lane(p, s, lane), lane)
         s.bad[lane] = _CHOKED if s.choked[lane] != 0.0 else failed
     for lane in range(LANES):
         found += s.asks[lane] != 0.0 or s.bad[lane] != 0.0
@@ -254,7 +285,7 @@ def _mend(breathing: bool, p: Any, s: Any, a: Any, k: Any, step: int) -> int:
             continue
         if s.asks[lane] != 0.0:
             again += 1
-            s.bad[lane] = _failed(s.y, _step_alone(lane, p, s, a, k, step), lane)
+            s.bad[lane] = _failed(s, _step_alone(lane, p, s, a, k, step), lane)
             if breathing:
                 breathe_alone(lane, p, s, a)
                 s.bad[lane] = _CHOKED if s.choked[lane] != 0.0 else s.bad[lane]
@@ -269,47 +300,47 @@ _CHOKED = 4.0  # status code of a chamber that has failed
 @kernel
 def _keep_chambers(p: Any, s: Any, k: Any, n: int) -> None:
     for lane in range(LANES):
-        k.forces[n, _VALVES, lane] = s.flow[0, lane] / p.step[lane]
-        k.forces[n, _VALVES + 1, lane] = s.flow[1, lane] / p.step[lane]
+        k.forces[n, _SUCTION, lane] = s.flow[0, lane] / p.step[lane]
+        k.forces[n, _SUCTION + 1, lane] = s.flow[1, lane] / p.step[lane]
         k.chambers[n, 0, lane] = s.chamber[_VAPOUR, lane]
         k.chambers[n, 1, lane] = s.chamber[_SUCTION_LIFT, lane]
         k.chambers[n, 2, lane] = s.chamber[_DISCHARGE_LIFT, lane]
 
 
-_VALVES = FORCES.index("suction_valve")
+_SUCTION = len(LANE_FORCES)
 _VAPOUR, _SUCTION_LIFT, _DISCHARGE_LIFT = GATHERED
 
 
 @subroutine
-def march(play: bool, breathing: bool, n: int, p: Any, s: Any, a: Any, k: Any) -> None:
+def march(kind: Any, n: int, p: Any, s: Any, a: Any, k: Any) -> None:
     """Take n steps of all lanes, of one kind.
 
     Chambers are stepped before the rates at the end of a step are made, which so feel the pressure
     that is found, not the extrapolated one. What asks for a cut does not depend on it.
     """
-    rates(p, s, 0.0, play)
+    _, across, breathing = kind
+    rates(p, s, 0.0, kind)
     for step in range(n):
-        _to_second_stage(p, s)
-        rates(p, s, 0.5, play)
-        _to_third_stage(p, s)
-        rates(p, s, 0.5, play)
-        _to_last_stage(p, s)
-        rates(p, s, 1.0, play)
-        _to_end(p, s)
+        _to_second_stage(p, s, across)
+        rates(p, s, 0.5, kind)
+        _to_third_stage(p, s, across)
+        rates(p, s, 0.5, kind)
+        _to_last_stage(p, s, across)
+        rates(p, s, 1.0, kind)
+        _to_end(p, s, a, k, step, across)
         with_care = lanes_breathe(p, s, a, k.code) if breathing else 0
-        rates(p, s, 0.0, play)
-        _keep(s, a, k, step)
+        rates(p, s, 0.0, kind)
         if _judge(p, s) > 0:
             again = _mend(breathing, p, s, a, k, step)
             if breathing and again > 0:
                 with_care += again
-                rates(p, s, 0.0, play)
+                rates(p, s, 0.0, kind)
         if breathing:
             _keep_chambers(p, s, k, step)
             if with_care > 0:
                 count_vapour(s, a)
         for lane in range(LANES):
-            k.turns[step, 0, lane], k.turns[step, 1, lane] = s.y[12, lane], s.y[13, lane]
+            k.turns[step, 0, lane], k.turns[step, 1, lane] = s.x[CRANK, lane], s.v[CRANK, lane]
 
 
 def alone(t: Tables) -> Alone:

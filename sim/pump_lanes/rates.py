@@ -1,7 +1,9 @@
-"""Rates, forces and margins of all lanes: the equations of one throw, a lane each.
+"""Accelerations, forces and margins of all lanes: the equations of one throw, a lane each.
 
-What has no play in a record's wrist pin or guide is told by numbers, not by branches, so that
-different machines lie side by side.
+Joint by joint, each in a loop of its own over the lanes: what no lane has is passed over, and a
+short loop leaves the processor room to begin the next lanes while the first wait for a square root.
+What only some of the lanes have is told by numbers, not by branches, so that different machines lie
+side by side.
 """
 
 from typing import Any, NamedTuple
@@ -10,7 +12,6 @@ import numpy as np
 
 from ..jit import kernel, sine_cosine, subroutine
 from ..pump.hydraulics import (
-    PRESSURE_CHAMBER,
     PRESSURE_CONSTANT,
     PRESSURE_TWO_LEVEL,
     ValveSide,
@@ -24,7 +25,7 @@ from ..pump.throw_motion import (
     crank_offset,
     dry_pin,
     free_motion,
-    guide_corner,
+    guide_end,
     held_wrist,
     motor_moment,
     seal_drag,
@@ -34,11 +35,19 @@ from ..pump.throw_motion import (
 LANES = 16
 """Records side by side; the compiler does not lay fewer into vectors."""
 
-COORDINATES = 14
-"""Columns of a state: those of a throw, then crank angle and speed."""
+MOVING, ALL_MOVING = 5, 7
+"""Rows of a motion, see :data:`PLACES`: those that move in an ideal guide, and all."""
 
-FORCES_IN_LANES = 9
-"""Columns of the forces: those of a throw without its valves, then the drive moment."""
+ROD_X, ROD_Y, BETA, PISTON_X, CRANK, PISTON_Y, TILT = range(ALL_MOVING)
+"""Rows of positions, velocities and accelerations; those come last that an ideal guide holds."""
+
+PLACES = (ROD_X, ROD_Y, BETA, PISTON_X, PISTON_Y, TILT)
+"""Rows of the coordinates of ``BODY``."""
+
+LANE_FORCES = ("pin_x", "pin_y", "guide_y", "piston_x", "seal_x", "guide_x")
+"""Rows of the forces: of ``FORCES`` those that the casing feels, but for the valves'."""
+
+_PIN_X, _PIN_Y, _GUIDE_Y, _FACE, _SEAL, _GUIDE_X = range(len(LANE_FORCES))
 
 CHAMBER_COLUMNS = 8
 """Of a chamber: ``CHAMBER_STATE``, then position and velocity of its piston."""
@@ -138,21 +147,29 @@ PLAN = np.dtype(
 
 STATE = np.dtype(
     [
-        ("y0", "f8", (COORDINATES, LANES)),  # where the step began
-        ("rate0", "f8", (COORDINATES, LANES)),
-        ("force0", "f8", (FORCES_IN_LANES, LANES)),
+        ("x0", "f8", (ALL_MOVING, LANES)),  # where the step began
+        ("v0", "f8", (ALL_MOVING, LANES)),
+        ("a0", "f8", (ALL_MOVING, LANES)),
+        ("force0", "f8", (len(LANE_FORCES), LANES)),
         ("margin0", "f8", (CONTACTS, LANES)),
         ("approach0", "f8", (CONTACTS, LANES)),
         ("normal0", "f8", LANES),
-        ("y", "f8", (COORDINATES, LANES)),  # the stage that was looked at last
-        ("rate", "f8", (COORDINATES, LANES)),
-        ("force", "f8", (FORCES_IN_LANES, LANES)),
+        ("x", "f8", (ALL_MOVING, LANES)),  # the stage that was looked at last
+        ("v", "f8", (ALL_MOVING, LANES)),
+        ("a", "f8", (ALL_MOVING, LANES)),
+        ("force", "f8", (len(LANE_FORCES), LANES)),
         ("margin", "f8", (CONTACTS, LANES)),
         ("approach", "f8", (CONTACTS, LANES)),
         ("normal", "f8", LANES),
         ("overlap", "f8", (3, LANES)),  # of crank pin, wrist pin and guide [m]
-        ("middle_rate", "f8", (COORDINATES, LANES)),  # of the stages in the middle, added
-        ("middle_force", "f8", (FORCES_IN_LANES, LANES)),
+        ("turned", "f8", (4, LANES)),  # sine and cosine of the crank, then of the rod
+        ("pressed", "f8", LANES),  # pressure on the piston
+        ("pin", "f8", (4, LANES)),  # ``PinLoad`` of the crank pin
+        ("wrist", "f8", (4, LANES)),  # and of a wrist pin with play
+        ("guide", "f8", (3, LANES)),  # force of a guide with play (x, y), and its moment
+        ("middle_v", "f8", (ALL_MOVING, LANES)),  # of the stages in the middle, added
+        ("middle_a", "f8", (ALL_MOVING, LANES)),
+        ("middle_force", "f8", (len(LANE_FORCES), LANES)),
         ("high", "f8", LANES),  # largest normal force of the step
         ("touching", "f8", (CONTACTS, LANES)),  # 0 or 1
         ("impact", "f8", (CONTACTS, LANES)),
@@ -246,74 +263,22 @@ def _liquid_of(p: Any, lane: int) -> Any:
 
 
 @kernel
-def _pose_of(y: Any, lane: int) -> Any:
+def _pose_of(s: Any, lane: int) -> Any:
+    x, v = s.x, s.v
     return Pose(
-        y[0, lane],
-        y[1, lane],
-        y[2, lane],
-        y[3, lane],
-        y[4, lane],
-        y[5, lane],
-        y[6, lane],
-        y[7, lane],
-        y[8, lane],
-        y[9, lane],
-        y[10, lane],
-        y[11, lane],
+        x[ROD_X, lane],
+        x[ROD_Y, lane],
+        x[BETA, lane],
+        x[PISTON_X, lane],
+        x[PISTON_Y, lane],
+        x[TILT, lane],
+        v[ROD_X, lane],
+        v[ROD_Y, lane],
+        v[BETA, lane],
+        v[PISTON_X, lane],
+        v[PISTON_Y, lane],
+        v[TILT, lane],
     )
-
-
-@kernel
-def _pressure(angle: float, h: Any, before: float, after: float, share: float) -> float:
-    """Pressure on the piston of any rung that lanes know [Pa]."""
-    level = two_level_pressure(angle, h.suction, h.discharge, h)
-    level = level if h.rung == PRESSURE_TWO_LEVEL else 0.0
-    level = h.discharge if h.rung == PRESSURE_CONSTANT else level
-    return before + share * (after - before) if h.rung == PRESSURE_CHAMBER else level
-
-
-@kernel
-def _wrist_load(pose: Any, q: Any, p: Any, s: Any, sin_b: float, cos_b: float, lane: int) -> Any:
-    """Load of the wrist pin, and the state of its contact; a tight one never touches."""
-    c, radius = _contact_of(p, 1, lane), q.wristpin_radius
-    d_x, d_y, v_x, v_y = wrist_offset(pose, q, sin_b, cos_b)
-    spin = pose.tilt_rate * radius + pose.beta_rate * (radius + c.clearance)
-    load, touch = dry_pin(
-        d_x, d_y, v_x, v_y, spin, radius, s.touching[1, lane] != 0.0, s.impact[1, lane], c
-    )
-    s.margin[1, lane], s.approach[1, lane] = touch.margin, touch.approach
-    return load, touch
-
-
-@kernel
-def _guide_load(pose: Any, q: Any, p: Any, s: Any, lane: int) -> Any:
-    """Force of the guide (x, y, turning), what presses, and the overlap."""
-    c = _contact_of(p, 2, lane)
-    # written out: the compiler lays no loop within its loop of lanes into vectors
-    one = _at_corner(pose, q, c, s, GUIDE, -1.0, 1.0, lane)
-    two = _at_corner(pose, q, c, s, GUIDE + 1, 1.0, 1.0, lane)
-    three = _at_corner(pose, q, c, s, GUIDE + 2, -1.0, -1.0, lane)
-    four = _at_corner(pose, q, c, s, GUIDE + 3, 1.0, -1.0, lane)
-    normal = max(max(max(0.0, one[3]), two[3]), max(three[3], four[3]))
-    deepest = max(max(max(0.0, one[4]), two[4]), max(three[4], four[4]))
-    return (
-        one[0] + two[0] + three[0] + four[0],
-        one[1] + two[1] + three[1] + four[1],
-        one[2] + two[2] + three[2] + four[2],
-        normal,
-        deepest,
-    )
-
-
-@kernel
-def _at_corner(
-    pose: Any, q: Any, c: Any, s: Any, j: int, along: float, side: float, lane: int
-) -> Any:
-    drag, push, turn, touch = guide_corner(
-        pose, q, along, side, s.touching[j, lane] != 0.0, s.impact[j, lane], c
-    )
-    s.margin[j, lane], s.approach[j, lane] = touch.margin, touch.approach
-    return drag, push, turn, touch.normal, touch.overlap
 
 
 @kernel
@@ -325,98 +290,154 @@ def overlap_of_lane(p: Any, s: Any, lane: int) -> float:
     return largest
 
 
-@kernel
-def rates(p: Any, s: Any, share: float, play: bool) -> None:
-    """Rates, forces and margins of all lanes at their state; `share` of the step has passed.
-
-    `play` beside the crank pin's: without any, half the work.
-    """
-    if play:
-        _rates_with_play(p, s, share)
-    else:
-        _rates_without(p, s, share)
-
-
 @subroutine
-def _rates_with_play(p: Any, s: Any, share: float) -> None:
-    _rates(p, s, share, True)
-
-
-@subroutine
-def _rates_without(p: Any, s: Any, share: float) -> None:
-    _rates(p, s, share, False)
-
-
-@kernel
-def _rates(p: Any, s: Any, share: float, play: bool) -> None:
-    y, rate, force = s.y, s.rate, s.force
+def _turn(p: Any, s: Any) -> None:
     for lane in range(LANES):
-        q, m, c = _throw_of(p, lane), machine_of_lane(p, lane), _contact_of(p, 0, lane)
-        pose, angle, omega = _pose_of(y, lane), y[12, lane], y[13, lane]
-        sin_a, cos_a = sine_cosine(angle + q.phase)
-        sin_b, cos_b = sine_cosine(pose.beta)
-        pressure = _pressure(
-            angle + q.phase,
-            _liquid_of(p, lane),
-            s.pressure[0, lane],
-            s.pressure[1, lane],
-            share,
+        s.turned[0, lane], s.turned[1, lane] = sine_cosine(s.x[CRANK, lane] + p.throw[0, lane])
+        s.turned[2, lane], s.turned[3, lane] = sine_cosine(s.x[BETA, lane])
+
+
+@subroutine
+def _press(p: Any, s: Any) -> None:
+    """Pressures that follow from the crank angle."""
+    for lane in range(LANES):
+        h = _liquid_of(p, lane)
+        level = two_level_pressure(s.x[CRANK, lane] + p.throw[0, lane], h.suction, h.discharge, h)
+        level = level if h.rung == PRESSURE_TWO_LEVEL else 0.0
+        s.pressed[lane] = h.discharge if h.rung == PRESSURE_CONSTANT else level
+
+
+@subroutine
+def _press_chambers(s: Any, share: float) -> None:
+    for lane in range(LANES):
+        before, after = s.pressure[0, lane], s.pressure[1, lane]
+        s.pressed[lane] = before + share * (after - before)
+
+
+@subroutine
+def _at_crankpin(p: Any, s: Any) -> None:
+    for lane in range(LANES):
+        q, c, pose, omega = (
+            _throw_of(p, lane),
+            _contact_of(p, 0, lane),
+            _pose_of(s, lane),
+            s.v[CRANK, lane],
         )
-        on_face, inv_px = -q.piston_area * pressure, q.inverse_piston_along
-        d_x, d_y, v_x, v_y = crank_offset(pose, omega, q, sin_a, cos_a, sin_b, cos_b)
         radius = q.crankpin_radius
+        d_x, d_y, v_x, v_y = crank_offset(
+            pose,
+            omega,
+            q,
+            s.turned[0, lane],
+            s.turned[1, lane],
+            s.turned[2, lane],
+            s.turned[3, lane],
+        )
         spin = omega * radius + pose.beta_rate * (radius + c.clearance)
         pin, touch = dry_pin(
-            d_x,
-            d_y,
-            v_x,
-            v_y,
-            spin,
-            radius,
-            s.touching[0, lane] != 0.0,
-            s.impact[0, lane],
-            c,
+            d_x, d_y, v_x, v_y, spin, radius, s.touching[0, lane] != 0.0, s.impact[0, lane], c
         )
         s.margin[0, lane], s.approach[0, lane] = touch.margin, touch.approach
-        s.overlap[0, lane], peak = touch.overlap, touch.normal
-        wrist, guide_x, guide_y, guide_moment = PinLoad(0.0, 0.0, 0.0, 0.0), 0.0, 0.0, 0.0
-        if play:
-            wrist, touch = _wrist_load(pose, q, p, s, sin_b, cos_b, lane)
-            s.overlap[1, lane], peak = touch.overlap, max(peak, touch.normal)
-            guide_x, guide_y, guide_moment, normal, overlap = _guide_load(pose, q, p, s, lane)
-            s.overlap[2, lane], peak = overlap, max(peak, normal)
-        seal = seal_drag(pose.piston_x_rate, pressure, q)
+        s.overlap[0, lane], s.normal[lane] = touch.overlap, touch.normal
+        s.pin[0, lane], s.pin[1, lane], s.pin[2, lane], s.pin[3, lane] = pin
+
+
+@subroutine
+def _at_wristpin(p: Any, s: Any) -> None:
+    """A tight one never touches."""
+    for lane in range(LANES):
+        q, c, pose = _throw_of(p, lane), _contact_of(p, 1, lane), _pose_of(s, lane)
+        radius = q.wristpin_radius
+        d_x, d_y, v_x, v_y = wrist_offset(pose, q, s.turned[2, lane], s.turned[3, lane])
+        spin = pose.tilt_rate * radius + pose.beta_rate * (radius + c.clearance)
+        pin, touch = dry_pin(
+            d_x, d_y, v_x, v_y, spin, radius, s.touching[1, lane] != 0.0, s.impact[1, lane], c
+        )
+        s.margin[1, lane], s.approach[1, lane] = touch.margin, touch.approach
+        s.overlap[1, lane], s.normal[lane] = touch.overlap, max(s.normal[lane], touch.normal)
+        s.wrist[0, lane], s.wrist[1, lane], s.wrist[2, lane], s.wrist[3, lane] = pin
+
+
+@subroutine
+def _in_guide(p: Any, s: Any) -> None:
+    """An ideal one never touches."""
+    for lane in range(LANES):
+        # written out: the compiler lays no loop within its loop of lanes into vectors
+        x_0, y_0, turn_0, normal_0, overlap_0 = _at_end(p, s, -1.0, GUIDE, lane)
+        x_1, y_1, turn_1, normal_1, overlap_1 = _at_end(p, s, 1.0, GUIDE + 1, lane)
+        s.guide[0, lane], s.guide[1, lane] = 0.0 + x_0 + x_1, 0.0 + y_0 + y_1
+        s.guide[2, lane] = 0.0 + turn_0 + turn_1
+        s.normal[lane] = max(s.normal[lane], max(max(0.0, normal_0), normal_1))
+        s.overlap[2, lane] = max(max(0.0, overlap_0), overlap_1)
+
+
+@kernel
+def _at_end(p: Any, s: Any, along: float, j: int, lane: int) -> Any:
+    """One end of the piston, whose upper corner is contact j."""
+    drag, push, turn, upper, lower = guide_end(
+        _pose_of(s, lane),
+        _throw_of(p, lane),
+        along,
+        s.touching[j, lane] != 0.0,
+        s.impact[j, lane],
+        s.touching[j + 2, lane] != 0.0,
+        s.impact[j + 2, lane],
+        _contact_of(p, 2, lane),
+    )
+    s.margin[j, lane], s.approach[j, lane] = upper.margin, upper.approach
+    s.margin[j + 2, lane], s.approach[j + 2, lane] = lower.margin, lower.approach
+    return drag, push, turn, upper.normal, max(upper.overlap, lower.overlap)
+
+
+@subroutine
+def _accelerate(p: Any, s: Any) -> None:
+    """Rods and pistons, and the forces on the casing."""
+    a, force = s.a, s.force
+    for lane in range(LANES):
+        q, m, pose = _throw_of(p, lane), machine_of_lane(p, lane), _pose_of(s, lane)
+        sin_b, cos_b, inv_px = s.turned[2, lane], s.turned[3, lane], q.inverse_piston_along
+        pin = PinLoad(s.pin[0, lane], s.pin[1, lane], s.pin[2, lane], s.pin[3, lane])
+        wrist = PinLoad(s.wrist[0, lane], s.wrist[1, lane], s.wrist[2, lane], s.wrist[3, lane])
+        guide_x, guide_y, guide_turn = s.guide[0, lane], s.guide[1, lane], s.guide[2, lane]
+        on_face = -q.piston_area * s.pressed[lane]
+        seal = seal_drag(pose.piston_x_rate, s.pressed[lane], q)
         free = free_motion(
-            q, m, on_face + seal, inv_px, pin, wrist, guide_x, guide_y, guide_moment, sin_b, cos_b
+            q, m, on_face + seal, inv_px, pin, wrist, guide_x, guide_y, guide_turn, sin_b, cos_b
         )
         # a factor of 1 or 0 changes no bit of what it keeps, and is no branch
-        rates, wrist_x, wrist_y = held_wrist(q, m, pose, free, inv_px, sin_b, cos_b, q.tight_wrist)
-        wrist_x, wrist_y = wrist.x + wrist_x, wrist.y + wrist_y
-        guide_y += q.tight_guide * (wrist_y + m.gravity_y * q.piston_mass)
-        rate[0, lane], rate[1, lane], rate[2, lane] = (
-            pose.rod_x_rate,
-            pose.rod_y_rate,
-            pose.beta_rate,
-        )
-        rate[3, lane], rate[4, lane] = pose.piston_x_rate, pose.piston_y_rate
-        rate[5, lane] = pose.tilt_rate
-        rate[6, lane], rate[7, lane], rate[8, lane] = rates.rod_x, rates.rod_y, rates.beta
-        rate[9, lane], rate[10, lane], rate[11, lane] = (
-            rates.piston_x,
-            rates.piston_y,
-            rates.tilt,
-        )
-        force[0, lane], force[1, lane], force[2, lane], force[3, lane] = (
-            pin.x,
-            pin.y,
-            wrist_x,
-            wrist_y,
-        )
-        force[4, lane], force[5, lane], force[6, lane] = guide_x, guide_y, on_face
-        force[7, lane] = seal
-        s.normal[lane] = peak
-        moment = pin.on_pin + q.crank_radius * (pin.x * sin_a - pin.y * cos_a)
+        found, _, wrist_y = held_wrist(q, m, pose, free, inv_px, sin_b, cos_b, q.tight_wrist)
+        a[ROD_X, lane], a[ROD_Y, lane], a[BETA, lane] = found.rod_x, found.rod_y, found.beta
+        a[PISTON_X, lane], a[PISTON_Y, lane] = found.piston_x, found.piston_y
+        a[TILT, lane] = found.tilt
+        held_up = wrist.y + wrist_y + m.gravity_y * q.piston_mass
+        force[_PIN_X, lane], force[_PIN_Y, lane] = pin.x, pin.y
+        force[_GUIDE_X, lane], force[_GUIDE_Y, lane] = guide_x, guide_y + q.tight_guide * held_up
+        force[_FACE, lane], force[_SEAL, lane] = on_face, seal
+
+
+@subroutine
+def _turn_crank(p: Any, s: Any) -> None:
+    for lane in range(LANES):
+        m, pin = machine_of_lane(p, lane), s.pin
+        sin_a, cos_a = s.turned[0, lane], s.turned[1, lane]
+        moment = pin[2, lane] + p.throw[1, lane] * (pin[0, lane] * sin_a - pin[1, lane] * cos_a)
         load = crank_load(moment, sin_a, cos_a, m)
-        drive = motor_moment(omega, m)
-        rate[12, lane], rate[13, lane] = omega, m.inverse_inertia * (drive + load)
-        force[FORCES_IN_LANES - 1, lane] = -load if m.inverse_inertia == 0.0 else drive
+        s.a[CRANK, lane] = m.inverse_inertia * (motor_moment(s.v[CRANK, lane], m) + load)
+
+
+@kernel
+def rates(p: Any, s: Any, share: float, kind: Any) -> None:
+    """Accelerations, forces and margins of all lanes; `share` of the step has passed."""
+    wrist, guide, breathing = kind
+    _turn(p, s)
+    if breathing:
+        _press_chambers(s, share)
+    else:
+        _press(p, s)
+    _at_crankpin(p, s)
+    if wrist:
+        _at_wristpin(p, s)
+    if guide:
+        _in_guide(p, s)
+    _accelerate(p, s)
+    _turn_crank(p, s)
