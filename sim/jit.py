@@ -237,6 +237,25 @@ def _compiled(function: Function, options: dict[str, Any]) -> Function:
     return compiled  # type: ignore[no-any-return]
 
 
+NEAR = 0.785
+"""Angle up to which :func:`near_sine_cosine` is :func:`sine_cosine`, less than pi/4 [rad]."""
+
+
+@kernel
+def near_sine_cosine(r: float) -> tuple[float, float]:
+    """Sine and cosine of an angle of pi/4 at most [rad]."""
+    z = r * r
+    s = 1.58969099521155010221e-10 * z - 2.50507602534068634195e-08
+    s = (s * z + 2.75573137070700676789e-06) * z - 1.98412698298579493134e-04
+    s = (s * z + 8.33333333332248946124e-03) * z - 1.66666666666666324348e-01
+    sine = r + r * z * s
+    c = -1.13596475577881948265e-11 * z + 2.08757232129817482790e-09
+    c = (c * z - 2.75573143513906633035e-07) * z + 2.48015872894767294178e-05
+    c = (c * z - 1.38888888888741095749e-03) * z + 4.16666666666666019037e-02
+    cosine = 1.0 - 0.5 * z + z * z * c
+    return sine, cosine
+
+
 @kernel
 def sine_cosine(angle: float) -> tuple[float, float]:
     """Sine and cosine of one angle together [rad], for the inner loops.
@@ -247,15 +266,7 @@ def sine_cosine(angle: float) -> tuple[float, float]:
     quarter = math.floor(angle * 0.6366197723675814 + 0.5)
     r = angle - quarter * 1.5707963267341256
     r -= quarter * 6.077100506506192e-11
-    z = r * r
-    s = 1.58969099521155010221e-10 * z - 2.50507602534068634195e-08
-    s = (s * z + 2.75573137070700676789e-06) * z - 1.98412698298579493134e-04
-    s = (s * z + 8.33333333332248946124e-03) * z - 1.66666666666666324348e-01
-    sine = r + r * z * s
-    c = -1.13596475577881948265e-11 * z + 2.08757232129817482790e-09
-    c = (c * z - 2.75573143513906633035e-07) * z + 2.48015872894767294178e-05
-    c = (c * z - 1.38888888888741095749e-03) * z + 4.16666666666666019037e-02
-    cosine = 1.0 - 0.5 * z + z * z * c
+    sine, cosine = near_sine_cosine(r)
     turn = quarter - 4.0 * math.floor(0.25 * quarter)  # 0 to 3, chosen rather than branched upon
     odd = turn == 1.0 or turn == 3.0
     first, second = cosine if odd else sine, sine if odd else cosine

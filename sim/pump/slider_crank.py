@@ -345,12 +345,15 @@ def _pin_load(
 def _guide(p: Any, q: Any, b: Any, held: Any, c: Any) -> Any:
     """Force of a guide with clearance on the piston (x, y, turning), peak normal force, overlap."""
     f_x, f_y, moment, peak, deepest = 0.0, 0.0, 0.0, 0.0, 0.0
+    sin_t, cos_t = sine_cosine(p.tilt)
     for end in range(2):
         i, j = GUIDE + end, GUIDE + 2 + end  # upper and lower corner
         drag, push, turn, upper, lower = guide_end(
             p,
             q,
             2.0 * end - 1.0,
+            sin_t,
+            cos_t,
             held.touching[i] != 0,
             held.impact[i],
             held.touching[j] != 0,
@@ -813,16 +816,18 @@ def _record_forces(w: Any, i: int, weight: float, forces: Any, step: int, tally:
 
 @kernel
 def step_of_record(
-    w: Any, i: int, h: float, fresh: bool, t: Any, forces: Any, step: int, tally: Any
+    w: Any, i: int, h: float, fresh: bool, tried: bool, t: Any, forces: Any, step: int, tally: Any
 ) -> Any:
     """One whole step, cut wherever a contact closes or opens.
 
+    A step that was `tried` without a cut stands in the other row, and a contact asks for one.
     Returns the row it ended in, and whether that row's derivative is fresh.
     """
     left, taken, cuts, k, j = h, h, 0, -1, 0
     while left > 0.0:
-        _stages(w, i, taken, h - left, h, fresh, t)
-        fresh = True
+        if not tried:
+            _stages(w, i, taken, h - left, h, fresh, t)
+        fresh, tried = True, False
         if k < 0:  # not yet cut
             locate = cuts < _MOST_CUTS * t.throws.shape[0]
             share, k, j = _first_change(w, i, taken, locate, t)
@@ -1007,7 +1012,7 @@ def _integrate(h: float, t: Any, w: Any, chamber: Any, shared: Any, r: Any, tall
     lines = shared.lines
     _keep(w, i, chamber, lines.states, r, 0)
     for step in range(r.forces.shape[0]):
-        i, fresh = step_of_record(w, i, h, fresh, t, r.forces, step, tally)
+        i, fresh = step_of_record(w, i, h, fresh, False, t, r.forces, step, tally)
         code = _fault(w, i)
         if breathing:
             if lines.pipes.shape[0] > 0:

@@ -171,13 +171,14 @@ _REST = 1e-30  # [m^2/s^2]: a record of zeros has no seal, and no division by ze
 
 
 @kernel
-def corner(p: Any, q: Any, along: float, side: float, clearance: float) -> Any:
+def corner(
+    p: Any, q: Any, along: float, side: float, sin_t: float, cos_t: float, clearance: float
+) -> Any:
     """Overlap of a piston's corner with its guide, its rate, and the corner from the wrist pin.
 
     `along` and `side` are -1 or 1: rear or front, lower or upper.
     """
     reach, across = along * q.guide_half_length, side * q.guide_half_height
-    sin_t, cos_t = sine_cosine(p.tilt)
     r_x = reach * cos_t - across * sin_t
     r_y = reach * sin_t + across * cos_t
     overlap = side * (p.piston_y + r_y) - q.guide_half_height - clearance
@@ -189,7 +190,8 @@ def corner_margin(
     p: Any, q: Any, along: float, side: float, touching: bool, impact: float, c: Any
 ) -> float:
     """Margin of one corner in its guide, see :func:`margin` [N]."""
-    overlap, speed, _, _ = corner(p, q, along, side, c.clearance)
+    sin_t, cos_t = sine_cosine(p.tilt)
+    overlap, speed, _, _ = corner(p, q, along, side, sin_t, cos_t, c.clearance)
     found: float = margin(overlap, normal_force(overlap, speed, impact, c), touching, c)
     return found
 
@@ -199,6 +201,8 @@ def guide_end(
     p: Any,
     q: Any,
     along: float,
+    sin_t: float,
+    cos_t: float,
     upper_touches: bool,
     upper_impact: float,
     lower_touches: bool,
@@ -210,8 +214,8 @@ def guide_end(
     A guide with clearance holds an end at its upper or its lower corner, never at both. So force
     and friction are those of one corner: the one that touches, or of none the deeper one.
     """
-    at_upper, speed_u, x_u, y_u = corner(p, q, along, 1.0, c.clearance)
-    at_lower, speed_l, x_l, y_l = corner(p, q, along, -1.0, c.clearance)
+    at_upper, speed_u, x_u, y_u = corner(p, q, along, 1.0, sin_t, cos_t, c.clearance)
+    at_lower, speed_l, x_l, y_l = corner(p, q, along, -1.0, sin_t, cos_t, c.clearance)
     lower = lower_touches or (at_lower > at_upper and not upper_touches)
     overlap, speed = at_lower if lower else at_upper, speed_l if lower else speed_u
     touching = lower_touches or upper_touches

@@ -88,6 +88,7 @@ def lane_kind(scene: PumpScene) -> LaneKind | None:
 
 
 _STRETCH = 64  # steps: what they leave fits the innermost but one of a processor's caches
+# One more is left free, or the columns of a step would lie where the processor confuses them.
 _ROOM = 8192  # steps of a lane that are handed on together
 
 
@@ -162,9 +163,9 @@ class _Lanes:
         self._alone = alone(jobs[0].tables)
         self._columns = np.array(_kept_rows(kind))
         self._kept = Stretch(
-            turns=np.zeros((_STRETCH, 2, LANES)),
-            forces=np.zeros((_STRETCH, len(LANE_FORCES) + len(_VALVES), LANES)),
-            chambers=np.zeros((_STRETCH, len(GATHERED), LANES)),
+            turns=np.zeros((2, _STRETCH + 1, LANES)),
+            forces=np.zeros((len(LANE_FORCES) + len(_VALVES), _STRETCH + 1, LANES)),
+            chambers=np.zeros((len(GATHERED), _STRETCH + 1, LANES)),
             code=np.ones(LANES, np.int64),
             done=np.zeros(LANES, np.int64),
         )
@@ -317,18 +318,21 @@ def march_on(
 
 @subroutine
 def _take(k: Any, columns: Any, at: Any, past: Any, breathing: bool) -> None:
-    """Add the last steps of every lane to its past."""
+    """Add the last steps of every lane to its past; a column's block fits the innermost cache."""
+    for j in range(columns.size):
+        column = columns[j]
+        for lane in range(LANES):
+            begin = np.uint64(at[lane])  # unsigned: no index counts from the end
+            for i in range(np.uint64(k.done[lane])):
+                past.forces[lane, j, begin + i] = k.forces[column, i, lane]
     for lane in range(LANES):
-        begin, steps = at[lane], k.done[lane]
-        for j in range(columns.size):
-            for i in range(steps):
-                past.forces[lane, j, begin + i] = k.forces[i, columns[j], lane]
-        for i in range(steps):
-            past.turns[lane, begin + 1 + i, 0] = k.turns[i, 0, lane]
-            past.turns[lane, begin + 1 + i, 1] = k.turns[i, 1, lane]
+        begin = np.uint64(at[lane] + 1)
+        for i in range(np.uint64(k.done[lane])):
+            past.turns[lane, begin + i, 0] = k.turns[0, i, lane]
+            past.turns[lane, begin + i, 1] = k.turns[1, i, lane]
             if breathing:
                 for c in range(len(GATHERED)):
-                    past.chambers[lane, begin + 1 + i, 0, c] = k.chambers[i, c, lane]
+                    past.chambers[lane, begin + i, 0, c] = k.chambers[c, i, lane]
 
 
 def _numbers(record: Any, names: Sequence[str]) -> list[float]:

@@ -10,6 +10,7 @@ from ..pump.hydraulics import GATHERED
 from ..pump.slider_crank import (
     CONTACTS,
     FORCES,
+    GUIDE,
     HELD,
     NO_CHANGE,
     OVERLAP_LIMIT,
@@ -31,8 +32,8 @@ from .rates import (
     LANES,
     MOVING,
     PLACES,
+    beyond_limit,
     machine_of_lane,
-    overlap_of_lane,
     rates,
 )
 
@@ -55,9 +56,9 @@ class Alone(NamedTuple):
 class Stretch(NamedTuple):
     """What a stretch of steps leaves behind."""
 
-    turns: NDArray[np.float64]  # (n, 2, LANES): at the ends of the steps
-    forces: NDArray[np.float64]  # (n, len(LANE_FORCES) + 2, LANES): the valves' last
-    chambers: NDArray[np.float64]  # (n, len(GATHERED), LANES)
+    turns: NDArray[np.float64]  # (2, n, LANES): at the ends of the steps
+    forces: NDArray[np.float64]  # (len(LANE_FORCES) + 2, n, LANES): the valves' last
+    chambers: NDArray[np.float64]  # (len(GATHERED), n, LANES)
     code: NDArray[np.int64]  # (LANES,): of the first step that failed
     done: NDArray[np.int64]  # (LANES,): steps up to it
 
@@ -71,17 +72,24 @@ def _tables_of(lane: int, p: Any, a: Any) -> Any:
 
 @kernel
 def _to_record(lane: int, s: Any, w: Any) -> None:
-    """Copy the beginning of a lane's step into row 0 of the march of one record."""
+    """Copy a lane's step into the march of one record: its beginning into row 0, its end into 1."""
     b, one = w.stage[0, 0], w.held[0]
     for c in range(len(PLACES)):
         b.y[c], b.y[len(PLACES) + c] = s.x0[PLACES[c], lane], s.v0[PLACES[c], lane]
         b.rate[c], b.rate[len(PLACES) + c] = s.v0[PLACES[c], lane], s.a0[PLACES[c], lane]
     w.crank[0, 0], w.crank[0, 1] = s.x0[CRANK, lane], s.v0[CRANK, lane]
     w.crank[0, 2], w.crank[0, 3], w.crank[0, 4] = s.v0[CRANK, lane], s.a0[CRANK, lane], 0.0
+    end = w.stage[1, 0]  # of the step as it was tried
+    for c in range(len(PLACES)):
+        end.y[c], end.y[len(PLACES) + c] = s.x[PLACES[c], lane], s.v[PLACES[c], lane]
+        end.rate[c], end.rate[len(PLACES) + c] = s.v[PLACES[c], lane], s.a[PLACES[c], lane]
+    w.crank[1, 0], w.crank[1, 1] = s.x[CRANK, lane], s.v[CRANK, lane]
+    w.crank[1, 2], w.crank[1, 3] = s.v[CRANK, lane], s.a[CRANK, lane]
     for n in range(len(LANE_FORCES)):
         b.force[_FORCE[n]] = s.force0[n, lane]
     for j in range(CONTACTS):
         b.margin[j], b.approach[j] = s.margin0[j, lane], s.approach0[j, lane]
+        end.margin[j] = s.margin[j, lane]
         one.touching[j], one.impact[j] = int(s.touching[j, lane]), s.impact[j, lane]
     b.normal = s.normal0[lane]
     one.pressure[0], one.pressure[1] = s.pressure0[0, lane], s.pressure0[1, lane]
@@ -109,26 +117,28 @@ _FORCE = tuple(FORCES.index(name) for name in LANE_FORCES)
 
 
 @subroutine
-def _step_alone(lane: int, p: Any, s: Any, a: Any, k: Any, n: int) -> float:
+def _step_alone(lane: int, p: Any, s: Any, a: Any, k: Any, n: int, breathing: bool) -> bool:
     """Take step n of one lane by the march of one record, which cuts it at its contacts.
 
-    Returns the overlap at its end over the pin's radius.
+    It begins with what lanes have tried, but for chambers: theirs ended under the pressure found.
+    Returns whether a contact is beyond its law at the end.
     """
     w, h, t = a.work, p.step[lane], _tables_of(lane, p, a)
     for row in range(1, 5):  # another lane may have touched where this one cannot
         for j in range(CONTACTS):
             w.stage[row, 0].margin[j] = NO_CHANGE
     _to_record(lane, s, w)
+    tally = Tally(a.counts[lane], a.peak[lane])
     for c in range(a.forces.shape[1]):
         a.forces[0, c] = 0.0
-    end, fresh = step_of_record(w, 0, h, True, t, a.forces, 0, Tally(a.counts[lane], a.peak[lane]))
+    end, fresh = step_of_record(w, 0, h, True, not breathing, t, a.forces, 0, tally)
     if not fresh:
         derivative_of_record(w, end, 0.0, t)
     _from_record(lane, s, w, end)
     for c in range(len(LANE_FORCES)):
-        k.forces[n, c, lane] = a.forces[0, 1 + _FORCE[c]]
-    overlap: float = w.stage[end, 0].overlap
-    return overlap
+        k.forces[c, n, lane] = a.forces[0, 1 + _FORCE[c]]
+    beyond: bool = w.stage[end, 0].overlap > OVERLAP_LIMIT
+    return beyond
 
 
 @subroutine
@@ -138,7 +148,7 @@ def enter_lane(lane: int, p: Any, s: Any, a: Any) -> None:
     _to_record(lane, s, w)
     begin(w, t, a.chambers[lane])
     for j in range(CONTACTS):
-        w.stage[0, 0].margin[j] = NO_CHANGE
+        w.stage[0, 0].margin[j] = s.margin0[j, lane] = NO_CHANGE
     _from_record(lane, s, w, 0)
     enter_chamber(lane, p, s, a)
     for c in range(5):
@@ -194,17 +204,27 @@ def _end(p: Any, s: Any, first: int, rows: int) -> None:
 
 
 @subroutine
-def _to_second_stage(p: Any, s: Any, across: bool) -> None:
+def _to_second_stage(p: Any, s: Any, kind: Any) -> None:
     """Keep where the step begins; its first rates lead to the second stage."""
+    wrist, guide, _ = kind
     _begin(p, s, 0, MOVING)
-    if across:
+    _keep_contacts(s, 0, 1)
+    if wrist:
+        _keep_contacts(s, 1, GUIDE)
+    if guide:
         _begin(p, s, MOVING, ALL_MOVING)
+        _keep_contacts(s, GUIDE, CONTACTS)
     for lane in range(LANES):
         for c in range(len(LANE_FORCES)):
             s.force0[c, lane] = s.force[c, lane]
-        for j in range(CONTACTS):
-            s.margin0[j, lane], s.approach0[j, lane] = s.margin[j, lane], s.approach[j, lane]
         s.normal0[lane] = s.normal[lane]
+
+
+@kernel
+def _keep_contacts(s: Any, first: int, end: int) -> None:
+    for lane in range(LANES):
+        for j in range(first, end):
+            s.margin0[j, lane], s.approach0[j, lane] = s.margin[j, lane], s.approach[j, lane]
 
 
 @subroutine
@@ -238,14 +258,14 @@ def _to_end(p: Any, s: Any, a: Any, k: Any, n: int, across: bool) -> None:
     for lane in range(LANES):
         weight = p.weight[lane]
         for c in range(len(LANE_FORCES)):
-            k.forces[n, c, lane] = weight * mean_of_stages(
+            k.forces[c, n, lane] = weight * mean_of_stages(
                 s.force0[c, lane], s.middle_force[c, lane], s.force[c, lane]
             )
         a.peak[lane, 0] = max(a.peak[lane, 0], s.high[lane])
 
 
 @kernel
-def _failed(s: Any, overlap: float, lane: int) -> float:
+def _failed(s: Any, beyond: bool, lane: int) -> float:
     """Status code of the end of a step, as the march of one record judges it."""
     x, v = s.x, s.v
     total = x[0, lane] + x[1, lane] + x[2, lane] + x[3, lane] + x[4, lane] + x[5, lane] + x[6, lane]
@@ -253,7 +273,7 @@ def _failed(s: Any, overlap: float, lane: int) -> float:
     total += v[6, lane]
     lost = 0.0 if total - total == 0.0 else 1.0
     turned = 3.0 if abs(x[BETA, lane]) > 1.5 else lost  # rad
-    return 2.0 if overlap > OVERLAP_LIMIT else turned
+    return 2.0 if beyond else turned
 
 
 @subroutine
@@ -266,7 +286,7 @@ def _judge(p: Any, s: Any) -> int:
             min(m[4, lane], m[5, lane]),
         )
         s.asks[lane] = 1.0 if least < 0.0 else 0.0
-        failed = _failed(s, overlap_of_lane(p, s, lane), lane)
+        failed = _failed(s, beyond_limit(p, s, lane), lane)
         s.bad[lane] = _CHOKED if s.choked[lane] != 0.0 else failed
     for lane in range(LANES):
         found += s.asks[lane] != 0.0 or s.bad[lane] != 0.0
@@ -285,7 +305,7 @@ def _mend(breathing: bool, p: Any, s: Any, a: Any, k: Any, step: int) -> int:
             continue
         if s.asks[lane] != 0.0:
             again += 1
-            s.bad[lane] = _failed(s, _step_alone(lane, p, s, a, k, step), lane)
+            s.bad[lane] = _failed(s, _step_alone(lane, p, s, a, k, step, breathing), lane)
             if breathing:
                 breathe_alone(lane, p, s, a)
                 s.bad[lane] = _CHOKED if s.choked[lane] != 0.0 else s.bad[lane]
@@ -300,11 +320,11 @@ _CHOKED = 4.0  # status code of a chamber that has failed
 @kernel
 def _keep_chambers(p: Any, s: Any, k: Any, n: int) -> None:
     for lane in range(LANES):
-        k.forces[n, _SUCTION, lane] = s.flow[0, lane] / p.step[lane]
-        k.forces[n, _SUCTION + 1, lane] = s.flow[1, lane] / p.step[lane]
-        k.chambers[n, 0, lane] = s.chamber[_VAPOUR, lane]
-        k.chambers[n, 1, lane] = s.chamber[_SUCTION_LIFT, lane]
-        k.chambers[n, 2, lane] = s.chamber[_DISCHARGE_LIFT, lane]
+        k.forces[_SUCTION, n, lane] = s.flow[0, lane] / p.step[lane]
+        k.forces[_SUCTION + 1, n, lane] = s.flow[1, lane] / p.step[lane]
+        k.chambers[0, n, lane] = s.chamber[_VAPOUR, lane]
+        k.chambers[1, n, lane] = s.chamber[_SUCTION_LIFT, lane]
+        k.chambers[2, n, lane] = s.chamber[_DISCHARGE_LIFT, lane]
 
 
 _SUCTION = len(LANE_FORCES)
@@ -321,7 +341,7 @@ def march(kind: Any, n: int, p: Any, s: Any, a: Any, k: Any) -> None:
     _, across, breathing = kind
     rates(p, s, 0.0, kind)
     for step in range(n):
-        _to_second_stage(p, s, across)
+        _to_second_stage(p, s, kind)
         rates(p, s, 0.5, kind)
         _to_third_stage(p, s, across)
         rates(p, s, 0.5, kind)
@@ -340,7 +360,7 @@ def march(kind: Any, n: int, p: Any, s: Any, a: Any, k: Any) -> None:
             if with_care > 0:
                 count_vapour(s, a)
         for lane in range(LANES):
-            k.turns[step, 0, lane], k.turns[step, 1, lane] = s.x[CRANK, lane], s.v[CRANK, lane]
+            k.turns[0, step, lane], k.turns[1, step, lane] = s.x[CRANK, lane], s.v[CRANK, lane]
 
 
 def alone(t: Tables) -> Alone:

@@ -10,14 +10,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..jit import kernel, sine_cosine, subroutine
+from ..jit import NEAR, kernel, near_sine_cosine, sine_cosine, subroutine
 from ..pump.hydraulics import (
     PRESSURE_CONSTANT,
     PRESSURE_TWO_LEVEL,
     ValveSide,
     two_level_pressure,
 )
-from ..pump.slider_crank import CONTACTS, GUIDE, Machine
+from ..pump.slider_crank import CONTACTS, GUIDE, OVERLAP_LIMIT, Machine
 from ..pump.throw_motion import (
     PinLoad,
     Pose,
@@ -163,6 +163,7 @@ STATE = np.dtype(
         ("normal", "f8", LANES),
         ("overlap", "f8", (3, LANES)),  # of crank pin, wrist pin and guide [m]
         ("turned", "f8", (4, LANES)),  # sine and cosine of the crank, then of the rod
+        ("tilted", "f8", (2, LANES)),  # sine and cosine of a piston in a guide with play
         ("pressed", "f8", LANES),  # pressure on the piston
         ("pin", "f8", (4, LANES)),  # ``PinLoad`` of the crank pin
         ("wrist", "f8", (4, LANES)),  # and of a wrist pin with play
@@ -282,19 +283,30 @@ def _pose_of(s: Any, lane: int) -> Any:
 
 
 @kernel
-def overlap_of_lane(p: Any, s: Any, lane: int) -> float:
-    """Largest overlap of a lane, over the radius of its pin or half the height of its guide."""
+def beyond_limit(p: Any, s: Any, lane: int) -> bool:
+    """Whether a lane's contacts have sunk in further than their laws hold."""
     q, o = _throw_of(p, lane), s.overlap
-    pins = max(o[0, lane] / q.crankpin_radius, o[1, lane] / q.wristpin_radius)
-    largest: float = max(pins, o[2, lane] / q.guide_half_height)
-    return largest
+    pins = max(
+        o[0, lane] - OVERLAP_LIMIT * q.crankpin_radius,
+        o[1, lane] - OVERLAP_LIMIT * q.wristpin_radius,
+    )
+    most: float = max(pins, o[2, lane] - OVERLAP_LIMIT * q.guide_half_height)
+    return most > 0.0
 
 
 @subroutine
 def _turn(p: Any, s: Any) -> None:
+    wide = 0
     for lane in range(LANES):
         s.turned[0, lane], s.turned[1, lane] = sine_cosine(s.x[CRANK, lane] + p.throw[0, lane])
-        s.turned[2, lane], s.turned[3, lane] = sine_cosine(s.x[BETA, lane])
+    for lane in range(LANES):
+        wide += not abs(s.x[BETA, lane]) <= NEAR
+    if wide == 0:  # rods swing less than this but for cranks nearly as long
+        for lane in range(LANES):
+            s.turned[2, lane], s.turned[3, lane] = near_sine_cosine(s.x[BETA, lane])
+    else:
+        for lane in range(LANES):
+            s.turned[2, lane], s.turned[3, lane] = sine_cosine(s.x[BETA, lane])
 
 
 @subroutine
@@ -359,34 +371,46 @@ def _at_wristpin(p: Any, s: Any) -> None:
 
 
 @subroutine
-def _in_guide(p: Any, s: Any) -> None:
-    """An ideal one never touches."""
+def _tilt(s: Any) -> None:
+    """Pistons in guides with play, before their ends are looked at."""
     for lane in range(LANES):
-        # written out: the compiler lays no loop within its loop of lanes into vectors
-        x_0, y_0, turn_0, normal_0, overlap_0 = _at_end(p, s, -1.0, GUIDE, lane)
-        x_1, y_1, turn_1, normal_1, overlap_1 = _at_end(p, s, 1.0, GUIDE + 1, lane)
-        s.guide[0, lane], s.guide[1, lane] = 0.0 + x_0 + x_1, 0.0 + y_0 + y_1
-        s.guide[2, lane] = 0.0 + turn_0 + turn_1
-        s.normal[lane] = max(s.normal[lane], max(max(0.0, normal_0), normal_1))
-        s.overlap[2, lane] = max(max(0.0, overlap_0), overlap_1)
+        s.tilted[0, lane], s.tilted[1, lane] = sine_cosine(s.x[TILT, lane])
+        s.guide[0, lane] = s.guide[1, lane] = s.guide[2, lane] = s.overlap[2, lane] = 0.0
 
 
 @kernel
-def _at_end(p: Any, s: Any, along: float, j: int, lane: int) -> Any:
-    """One end of the piston, whose upper corner is contact j."""
-    drag, push, turn, upper, lower = guide_end(
-        _pose_of(s, lane),
-        _throw_of(p, lane),
-        along,
-        s.touching[j, lane] != 0.0,
-        s.impact[j, lane],
-        s.touching[j + 2, lane] != 0.0,
-        s.impact[j + 2, lane],
-        _contact_of(p, 2, lane),
-    )
-    s.margin[j, lane], s.approach[j, lane] = upper.margin, upper.approach
-    s.margin[j + 2, lane], s.approach[j + 2, lane] = lower.margin, lower.approach
-    return drag, push, turn, upper.normal, max(upper.overlap, lower.overlap)
+def _in_guide(p: Any, s: Any, along: float, j: int) -> None:
+    """One end of the pistons, whose upper corner is contact j; an ideal guide never touches."""
+    for lane in range(LANES):
+        drag, push, turn, upper, lower = guide_end(
+            _pose_of(s, lane),
+            _throw_of(p, lane),
+            along,
+            s.tilted[0, lane],
+            s.tilted[1, lane],
+            s.touching[j, lane] != 0.0,
+            s.impact[j, lane],
+            s.touching[j + 2, lane] != 0.0,
+            s.impact[j + 2, lane],
+            _contact_of(p, 2, lane),
+        )
+        s.margin[j, lane], s.approach[j, lane] = upper.margin, upper.approach
+        s.margin[j + 2, lane], s.approach[j + 2, lane] = lower.margin, lower.approach
+        s.guide[0, lane] += drag
+        s.guide[1, lane] += push
+        s.guide[2, lane] += turn
+        s.normal[lane] = max(s.normal[lane], upper.normal)
+        s.overlap[2, lane] = max(s.overlap[2, lane], max(upper.overlap, lower.overlap))
+
+
+@subroutine
+def _rear(p: Any, s: Any) -> None:
+    _in_guide(p, s, -1.0, GUIDE)
+
+
+@subroutine
+def _front(p: Any, s: Any) -> None:
+    _in_guide(p, s, 1.0, GUIDE + 1)
 
 
 @subroutine
@@ -438,6 +462,8 @@ def rates(p: Any, s: Any, share: float, kind: Any) -> None:
     if wrist:
         _at_wristpin(p, s)
     if guide:
-        _in_guide(p, s)
+        _tilt(s)
+        _rear(p, s)
+        _front(p, s)
     _accelerate(p, s)
     _turn_crank(p, s)
