@@ -9,6 +9,7 @@ import sys
 import types
 from pathlib import Path
 
+import click
 import matplotlib as mpl
 import numpy as np
 import pytest
@@ -174,7 +175,7 @@ def torch_stand_in():
         def __init__(self, data, rows):
             self.data, self.rows = data, rows
 
-    def load(subset, *, batch_size, shuffle, collate_fn):
+    def load(subset, *, batch_size, shuffle, collate_fn, num_workers=0):
         assert shuffle
         for first in range(0, len(subset.rows), batch_size):
             yield collate_fn([subset.data[i] for i in subset.rows[first : first + batch_size]])
@@ -215,3 +216,75 @@ def test_the_reader_of_guides_sees_an_error():
     assert blocks("a\n```python\n1 / 0\n```\n") == [("python", "1 / 0\n")]
     with pytest.raises(AssertionError, match="scene check missing"):
         run_shell("wearstate scene check missing.toml")
+
+
+# --- code elsewhere: commands that take minutes are read, Python runs
+
+
+WRITTEN = {"README": DOCS.parent / "README.md", **{name: DOCS / f"{name}.md" for name in pages()}}
+ELSEWHERE = ("README", "datasets", "theory/force-map")
+"""Pages with blocks of Python that are no guides."""
+
+
+def command_lines(text):
+    """Commands of this program in blocks of a page, as words."""
+    for kind, block in re.findall(r"^```([^`\n]*)\n(.*?)^```$", text, re.S | re.M):
+        if not kind.startswith("{"):
+            for line in block.replace("\\\n", " ").splitlines():
+                if line.startswith("wearstate "):
+                    yield shlex.split(line, comments=True)[1:]
+
+
+def understand(words):
+    """Read a command as the program would, without running it."""
+    command, context = cli, None
+    while isinstance(command, click.Group):
+        context = command.make_context(command.name, list(words), parent=context)
+        _, command, words = command.resolve_command(
+            context, [*context._protected_args, *context.args]
+        )
+    command.make_context(command.name, list(words), parent=context)
+
+
+@pytest.mark.parametrize("name", sorted(WRITTEN))
+def test_every_command_of_a_page_is_understood(name, tmp_path, monkeypatch):
+    (tmp_path / "folder").mkdir()  # that some command names
+    monkeypatch.chdir(tmp_path)
+    for words in command_lines(WRITTEN[name].read_text(encoding="utf-8")):
+        try:
+            understand(words)
+        except click.ClickException as error:
+            pytest.fail(f"wearstate {' '.join(words)}: {error.format_message()}")
+
+
+def test_the_reader_of_commands_sees_a_fault():
+    text = "```\nwearstate info x.h5 \\\n  --verfy  # all\n```\n```{include} a\nwearstate no\n```\n"
+    [words] = command_lines(text)
+    assert words == ["info", "x.h5", "--verfy"]
+    with pytest.raises(click.NoSuchOption, match="--verfy"):
+        understand(words)
+    read = [name for name, page in WRITTEN.items() if [*command_lines(page.read_text("utf-8"))]]
+    assert {"README", "evaluation", "fidelity", "results"} <= {*read}
+
+
+@pytest.mark.parametrize("name", ELSEWHERE)
+def test_the_python_of_a_page_runs(name, tmp_path, monkeypatch, request):
+    text = WRITTEN[name].read_text(encoding="utf-8")
+    if "import torch" in text and importlib.util.find_spec("torch") is None:
+        for module, stand_in in torch_stand_in().items():
+            monkeypatch.setitem(sys.modules, module, stand_in)
+    for file, fixture in (("data.h5", "small_set"), ("pump.wsm", "small_model")):
+        if file in text:
+            (tmp_path / file).symlink_to(request.getfixturevalue(fixture))
+    monkeypatch.chdir(tmp_path)
+    names = {"__name__": "page", "wearstate": wearstate}
+    for code in re.findall(r"^```python\n(.*?)^```$", text, re.S | re.M):
+        compiled = compile(code, name, "exec")
+        if "from datasets import" not in code:  # Hugging Face's own library is not installed here
+            exec(compiled, names)
+
+
+def test_python_stands_on_no_other_page():
+    guides = {page.relative_to(DOCS).with_suffix("").as_posix() for page in GUIDES}
+    having = {name for name, page in WRITTEN.items() if "```python" in page.read_text("utf-8")}
+    assert having - guides == {*ELSEWHERE}
