@@ -145,10 +145,6 @@ def row_figures(row: ShiftRow, limit: float, *, seed: int = 0) -> dict[str, Scor
     }
 
 
-def _holds(said: ShiftVerdict) -> bool:
-    return said.low is not None and said.high is not None and said.low <= said.truth <= said.high
-
-
 def _numbers(pairs: Iterable[tuple[float | None, float]]) -> Any:
     return np.array([math.nan if found is None else found - truth for found, truth in pairs])
 

@@ -45,22 +45,6 @@ class Shown:
         return f"{self.name} ({self.words})" if self.words else self.name
 
 
-def features_of(solution: Recording) -> dict[str, Shown]:
-    """Values of the feature catalogue that a recording has, and rows that hold several.
-
-    Parameters
-    ----------
-    solution : Recording
-        Its channels, rate and length count.
-
-    Returns
-    -------
-    dict of str to Shown
-        By name, in the order of the catalogue.
-    """
-    return {name: shown for _, name, shown in _feature_rows(solution)}
-
-
 def _feature_rows(solution: Recording) -> Iterator[tuple[str, str, Shown]]:
     """Row of the catalogue, name of a value, what is shown of it."""
     units = solution.units
