@@ -805,7 +805,10 @@ def test_a_regime_is_found_like_a_fault_and_not_to_be_mended(trained):
     assert regimes_in(manifest[["grade"]]) == {}
     model, _, _ = trained
     rates = SimpleNamespace(mae_with_m=6e-5, mae_without_m=2e-5)
-    for name, cure in (("lubrication_flooded", "wear shows less"), ("stuck_valve", "mend it")):
+    for name, found, cure in (
+        ("lubrication_flooded", "this sounds like a flooded pin", "wear shows less"),
+        ("stuck_valve", "stuck valve looks present", "mend it"),
+    ):
         finding = FaultFinding(
             name=name, probability=0.9, present=True, detection_rate=0.9, false_alarm_rate=0.1
         )
@@ -813,7 +816,7 @@ def test_a_regime_is_found_like_a_fault_and_not_to_be_mended(trained):
             model, card=model.card.model_copy(update={"confounders": [rates]})
         )
         [caution] = told._finding_cautions((finding,))
-        assert caution.startswith(name.replace("_", " "))
+        assert caution.startswith(found)
         assert "0.06 mm instead of 0.02 mm" in caution
         assert cure in caution
 

@@ -101,8 +101,8 @@ _RULES: dict[tuple[int | None, Confidence], _Rule] = {
     ),
     (1, "caution"): _Rule(
         action="confirm",
-        sentence="Fix what the cautions name and record again; measure at the next stop if it "
-        "stays so.",
+        sentence="Attend to what the cautions name and record again; measure at the next stop if "
+        "it stays so.",
         days=14,
     ),
     (2, "sure"): _Rule(
@@ -123,7 +123,8 @@ _RULES: dict[tuple[int | None, Confidence], _Rule] = {
     ),
     (2, "caution"): _Rule(
         action="confirm",
-        sentence="Fix what the cautions name and record again; measure before {work} is ordered.",
+        sentence="Attend to what the cautions name and record again; measure before {work} is "
+        "ordered.",
         days=7,
     ),
     (3, "sure"): _Rule(

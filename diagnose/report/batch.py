@@ -20,7 +20,7 @@ from ...datasets.file.views import CompletingView, JoinedSet
 from ...datasets.measured.recording import read_recording
 from ...datasets.readers.open import READERS, SourceOptions
 from ...sim.output.recording import DataError, Recording
-from ..feature_rows.feature_table import Progress
+from ..feature_rows.feature_table import Progress, is_regime, regime_words
 from ..feature_rows.healthy import Baselines
 from ..film_clearance.clearance import FilmEstimate
 from ..learning.grades import GRADE_NAMES, WARNING_GRADE
@@ -464,7 +464,11 @@ def _row(
     number: int, item: Item, time: float | None, estimate: Estimate, advice: Advice
 ) -> BatchRow:
     notes = (*estimate.reasons, *estimate.cautions)
-    present = [f"{f.name.replace('_', ' ')} present" for f in estimate.confounders if f.present]
+    present = [
+        regime_words(f.name) if is_regime(f.name) else f"{f.name.replace('_', ' ')} present"
+        for f in estimate.confounders
+        if f.present
+    ]
     return BatchRow(
         number=number,
         name=item.name,

@@ -13,6 +13,7 @@ from ... import __version__
 from ...features.signal import iso
 from ...sim.output.recording import DataError, Recording
 from ..feature_rows.feature_choice import choice_in, words_of
+from ..feature_rows.feature_table import is_regime, regime_words
 from ..feature_rows.healthy import Baseline
 from ..feature_rows.model_card import ModelCard
 from ..learning.grades import GRADE_NAMES
@@ -524,13 +525,19 @@ def finding_words(finding: Mapping[str, Any]) -> str:
     >>> rates = {"detection_rate": 0.88, "false_alarm_rate": 0.02}
     >>> finding_words({"name": "cavitation", "present": True, "probability": 0.93, **rates})
     'cavitation: present (93 %; of 100 such records 88 are found, of 100 others 2 are called so)'
+    >>> finding_words({"name": "lubrication_dry", "present": True, "probability": 0.93, **rates})
+    'sounds like a dry pin (93 %; of 100 such records 88 are found, of 100 others 2 are called so)'
     """
-    state = "present" if finding["present"] else "not found"
-    unseen = unseen_words(finding["name"], finding.get("visible_from_m"))
-    hidden = f"; {unseen}" if finding["present"] and unseen else ""
+    name, present = finding["name"], finding["present"]
+    if is_regime(name):
+        found = f"{'sounds' if present else 'does not sound'} like a {regime_words(name)}"
+    else:
+        found = f"{name.replace('_', ' ')}: {'present' if present else 'not found'}"
+    unseen = unseen_words(name, finding.get("visible_from_m"))
+    hidden = f"; {unseen}" if present and unseen else ""
     return (
-        f"{finding['name'].replace('_', ' ')}: {state} ({100 * finding['probability']:.0f} %; of "
-        f"100 such records {100 * finding['detection_rate']:.0f} are found, of 100 others "
+        f"{found} ({100 * finding['probability']:.0f} %; of 100 such records "
+        f"{100 * finding['detection_rate']:.0f} are found, of 100 others "
         f"{100 * finding['false_alarm_rate']:.0f} are called so){hidden}"
     )
 

@@ -639,13 +639,14 @@ class WearModel:
         for finding, rates in zip(findings, self.card.confounders, strict=True):
             worse, usual = rates.mae_with_m, rates.mae_without_m
             if finding.present and worse > _MUCH_WORSE * usual:
-                name = finding.name.replace("_", " ")
+                found = f"{finding.name.replace('_', ' ')} looks present, and with it"
                 cure = "mend it and record again"
                 if is_regime(finding.name):
+                    found = f"this sounds like a {regime_words(finding.name)}, and on such"
                     cure = finding.unseen or "wear shows less in this regime"
                 cautions.append(
-                    f"{name} looks present, and with it estimates erred by {1e3 * worse:.2g} mm "
-                    f"instead of {1e3 * usual:.2g} mm: {cure}"
+                    f"{found} estimates erred by {1e3 * worse:.2g} mm instead of "
+                    f"{1e3 * usual:.2g} mm: {cure}"
                 )
         return cautions
 
