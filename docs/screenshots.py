@@ -12,12 +12,14 @@ from html import escape
 from pathlib import Path
 
 from pictures import DOCS, FOLDER, current
+from PIL import Image
 
 BUILD = DOCS / "_build"
 WORDS = BUILD / "screens.md"
 STAMP = BUILD / ".screens.made"
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 PHONE, WINDOW, HEIGHT = 390, 1280, 1100  # px
+SPARE = 100  # px at the foot, which a busy browser may leave unpainted
 
 PAGES = {
     "report": ("One recording", "report demo/data.h5 --record 5 --model demo/model.wsm -o"),
@@ -56,10 +58,12 @@ def shoot(browser: str, kind: str, command: str) -> None:
     sheet = BUILD / f"{kind}.both.html"
     sheet.write_text(SIDE_BY_SIDE.format(page=escape(html), **sizes), encoding="utf-8")
     options = ["--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars"]
-    options += [f"--window-size={PHONE + 20 + WINDOW},{HEIGHT}", "--virtual-time-budget=20000"]
+    width = PHONE + 20 + WINDOW
+    options += [f"--window-size={width},{HEIGHT + SPARE}", "--virtual-time-budget=20000"]
     picture = FOLDER / f"screen-{kind}.png"
     command_line = [browser, *options, f"--screenshot={picture}", sheet.as_uri()]
     subprocess.run(command_line, check=True, capture_output=True, timeout=120)
+    Image.open(picture).crop((0, 0, width, HEIGHT)).save(picture)
 
 
 def main() -> None:

@@ -320,14 +320,20 @@ class ShadedCell:
     ink: str
 
 
-def question_images(chart: Chart) -> list[PageImage]:
-    """A picture of points for each question; a point tells its name under the pointer."""
+def question_figure(chart: Chart, question: str) -> Any:
+    """The points of one question alone, as a :class:`matplotlib.figure.Figure` for a page."""
     from matplotlib.figure import Figure
 
+    figure = Figure(figsize=(PAGE_WIDTH, _POINTS - 0.8), layout="constrained")
+    _draw_points(figure.subplots(), chart, question, columns=2)
+    return figure
+
+
+def question_images(chart: Chart) -> list[PageImage]:
+    """A picture of points for each question; a point tells its name under the pointer."""
     images = []
     for question in chart.questions or ("",):
-        figure = Figure(figsize=(PAGE_WIDTH, _POINTS - 0.8), layout="constrained")
-        _draw_points(figure.subplots(), chart, question, columns=2)
+        figure = question_figure(chart, question)
         svg = picture_bytes(figure, ".svg").decode()
         images.append(
             PageImage(
