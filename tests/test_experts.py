@@ -74,6 +74,41 @@ def test_one_fit_is_kept_where_regimes_bring_nothing(slopes, machines, budget_ms
     assert isinstance(found.severity.blend, Blend)
 
 
+def test_a_referenced_model_tells_regimes_from_the_rows_as_they_are():
+    """What changed since the machine was healthy comes first among its inputs."""
+    training = rows_of((1.0, -1.0))
+    still = np.column_stack([np.zeros(300), training.rows[:, 1], np.ones(300)])
+    found = learn(dataclasses.replace(training, baseline=still), budget_ms=2 * LINES_MS)
+    experts = found.severity.blend
+    assert isinstance(experts, Experts)
+    assert (experts.first, experts.features) == (3, 3)
+    inputs = np.hstack([training.rows - still, training.rows])
+    told = experts.shares(inputs).argmax(axis=1)
+    assert (told == training.faults["lubrication_1"]).mean() > 0.98
+    assert np.abs(np.log(experts.predict(inputs) / training.severity)).mean() < 0.06
+
+
+def test_what_is_noted_beside_informs_each_regime():
+    """The level leans on the viscosity, by a slope of its own in each regime."""
+    training = rows_of((1.0, -1.0))
+    rng = np.random.default_rng(5)
+    lean = rng.uniform(np.log(0.01), np.log(0.04), 300)
+    rows = training.rows.copy()
+    rows[:, 0] += np.where(training.faults["lubrication_0"], lean, -lean)
+    noted = dataclasses.replace(
+        training,
+        rows=rows,
+        conditions=("viscosity_pa_s",),
+        notes=[{"viscosity_pa_s": value} for value in np.exp(lean)],
+    )
+    found = learn(noted, budget_ms=2 * LINES_MS)
+    assert isinstance(found.informed.severity, Experts)
+    assert found.informed.error < 0.5 * found.blind.error
+    asked = found.informed.severity.predict(np.column_stack([rows, lean]))
+    # the viscosity itself is learnt as known to 5 %
+    assert np.abs(np.log(asked / training.severity)).mean() < 0.1
+
+
 def test_intervals_of_a_regime_are_as_wide_as_it_needs():
     """The second regime tells a tenth as much of the wear: its errors are ten times as large."""
     training = rows_of((1.0, 0.1), machines=300)
