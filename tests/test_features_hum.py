@@ -56,6 +56,14 @@ def test_lines_of_the_shaft_are_no_hum(speed: float) -> None:
     assert share < 0.01
 
 
+@pytest.mark.parametrize(("speed", "order"), [(50.0, 1), (49.6, 1), (25.0, 2), (12.5, 4)])
+def test_a_lone_order_where_hum_would_be_is_no_hum(speed: float, order: int) -> None:
+    """An unbalance at 3000 rpm stands out as hum does."""
+    noise = 0.1 * np.random.default_rng(0).standard_normal(TIME.size)
+    signal = np.sin(math.tau * order * speed * TIME) + noise
+    assert hum_power(signal, FS, speed_hz=speed)[50.0] < 0.01
+
+
 def test_noise_and_blows_are_no_hum() -> None:
     blows = np.zeros(TIME.size)
     blows[:: int(FS / 7.3)] = 50.0
