@@ -37,7 +37,7 @@ from ..pump.slider_crank import (
 )
 from ..scene.pump import PumpScene
 from ..scene.pump_hydraulics import PIPED_RUNGS
-from .march import Stretch, alone, enter_lane, march
+from .march import LEFT, STRETCH, Stretch, alone, enter_lane, march
 from .rates import (
     CRANK,
     LANE_FORCES,
@@ -87,8 +87,6 @@ def lane_kind(scene: PumpScene) -> LaneKind | None:
     return LaneKind(wristpin == JOINT_COMPLIANT, guide == JOINT_COMPLIANT, rung == "chamber")
 
 
-_STRETCH = 64  # steps: what they leave fits the innermost but one of a processor's caches
-# One more is left free, or the columns of a step would lie where the processor confuses them.
 _ROOM = 8192  # steps of a lane that are handed on together
 
 
@@ -163,9 +161,7 @@ class _Lanes:
         self._alone = alone(jobs[0].tables)
         self._columns = np.array(_kept_rows(kind))
         self._kept = Stretch(
-            turns=np.zeros((2, _STRETCH + 1, LANES)),
-            forces=np.zeros((len(LANE_FORCES) + len(_VALVES), _STRETCH + 1, LANES)),
-            chambers=np.zeros((len(GATHERED), _STRETCH + 1, LANES)),
+            left=np.zeros(1, LEFT),
             code=np.ones(LANES, np.int64),
             done=np.zeros(LANES, np.int64),
         )
@@ -260,10 +256,11 @@ class _Lanes:
     def _tally(self, lane: int) -> CrankTally:
         counts = self._alone.counts[lane]
         job = self._jobs[int(self._number[lane])]
+        peak = max(self._alone.peak[lane, 0], self._state["peak"][0, lane])
         return CrankTally(
             steps=job.n_steps - int(self._left[lane]),
             step=float(self._plan["step"][0, lane]),
-            peak_normal_force=float(self._alone.peak[lane, 0]),
+            peak_normal_force=float(peak),
             status=Status(int(self._kept.code[lane])),
             contact_changes=int(counts[CHANGES]),
             cuts_refused=int(counts[NOT_LOCATED]),
@@ -297,7 +294,7 @@ def march_on(
     Compiled as a whole: handing these tables over costs as much as a hundred steps.
     """
     while True:
-        n = _STRETCH
+        n = STRETCH
         for lane in range(LANES):
             if k.code[lane] == 0:
                 n = min(n, left[lane], _ROOM - at[lane])
@@ -319,20 +316,21 @@ def march_on(
 @subroutine
 def _take(k: Any, columns: Any, at: Any, past: Any, breathing: bool) -> None:
     """Add the last steps of every lane to its past; a column's block fits the innermost cache."""
+    left = k.left[0]
     for j in range(columns.size):
         column = columns[j]
         for lane in range(LANES):
             begin = np.uint64(at[lane])  # unsigned: no index counts from the end
             for i in range(np.uint64(k.done[lane])):
-                past.forces[lane, j, begin + i] = k.forces[column, i, lane]
+                past.forces[lane, j, begin + i] = left.forces[column, i, lane]
     for lane in range(LANES):
         begin = np.uint64(at[lane] + 1)
         for i in range(np.uint64(k.done[lane])):
-            past.turns[lane, begin + i, 0] = k.turns[0, i, lane]
-            past.turns[lane, begin + i, 1] = k.turns[1, i, lane]
+            past.turns[lane, begin + i, 0] = left.turns[0, i, lane]
+            past.turns[lane, begin + i, 1] = left.turns[1, i, lane]
             if breathing:
                 for c in range(len(GATHERED)):
-                    past.chambers[lane, begin + i, 0, c] = k.chambers[c, i, lane]
+                    past.chambers[lane, begin + i, 0, c] = left.chambers[c, i, lane]
 
 
 def _numbers(record: Any, names: Sequence[str]) -> list[float]:

@@ -53,12 +53,24 @@ class Alone(NamedTuple):
     peak: NDArray[np.float64]  # (LANES, 1)
 
 
-class Stretch(NamedTuple):
-    """What a stretch of steps leaves behind."""
+STRETCH = 64
+"""Steps that are taken at once: what they leave fits a processor's second cache."""
 
-    turns: NDArray[np.float64]  # (2, n, LANES): at the ends of the steps
-    forces: NDArray[np.float64]  # (len(LANE_FORCES) + 2, n, LANES): the valves' last
-    chambers: NDArray[np.float64]  # (len(GATHERED), n, LANES)
+# one step more, or the columns would lie where the processor confuses them, multiples of 4096
+LEFT = np.dtype(
+    [
+        ("turns", "f8", (2, STRETCH + 1, LANES)),  # angle and speed at the ends of the steps
+        ("forces", "f8", (len(LANE_FORCES) + 2, STRETCH + 1, LANES)),  # the valves' last
+        ("chambers", "f8", (len(GATHERED), STRETCH + 1, LANES)),
+    ]
+)
+"""What a stretch of steps leaves behind; one record, as ``STATE`` is."""
+
+
+class Stretch(NamedTuple):
+    """What a stretch of steps leaves behind, and how it ended."""
+
+    left: NDArray[Any]  # (1,) of LEFT
     code: NDArray[np.int64]  # (LANES,): of the first step that failed
     done: NDArray[np.int64]  # (LANES,): steps up to it
 
@@ -123,7 +135,7 @@ def _step_alone(lane: int, p: Any, s: Any, a: Any, k: Any, n: int, breathing: bo
     It begins with what lanes have tried, but for chambers: theirs ended under the pressure found.
     Returns whether a contact is beyond its law at the end.
     """
-    w, h, t = a.work, p.step[lane], _tables_of(lane, p, a)
+    w, h, t, left = a.work, p.step[lane], _tables_of(lane, p, a), k.left[0]
     for row in range(1, 5):  # another lane may have touched where this one cannot
         for j in range(CONTACTS):
             w.stage[row, 0].margin[j] = NO_CHANGE
@@ -136,7 +148,7 @@ def _step_alone(lane: int, p: Any, s: Any, a: Any, k: Any, n: int, breathing: bo
         derivative_of_record(w, end, 0.0, t)
     _from_record(lane, s, w, end)
     for c in range(len(LANE_FORCES)):
-        k.forces[c, n, lane] = a.forces[0, 1 + _FORCE[c]]
+        left.forces[c, n, lane] = a.forces[0, 1 + _FORCE[c]]
     beyond: bool = w.stage[end, 0].overlap > OVERLAP_LIMIT
     return beyond
 
@@ -250,7 +262,7 @@ def _to_last_stage(p: Any, s: Any, across: bool) -> None:
 
 
 @subroutine
-def _to_end(p: Any, s: Any, a: Any, k: Any, n: int, across: bool) -> None:
+def _to_end(p: Any, s: Any, left: Any, n: int, across: bool) -> None:
     """State at the end of step n, and the mean forces over it."""
     _end(p, s, 0, MOVING)
     if across:
@@ -258,10 +270,10 @@ def _to_end(p: Any, s: Any, a: Any, k: Any, n: int, across: bool) -> None:
     for lane in range(LANES):
         weight = p.weight[lane]
         for c in range(len(LANE_FORCES)):
-            k.forces[c, n, lane] = weight * mean_of_stages(
+            left.forces[c, n, lane] = weight * mean_of_stages(
                 s.force0[c, lane], s.middle_force[c, lane], s.force[c, lane]
             )
-        a.peak[lane, 0] = max(a.peak[lane, 0], s.high[lane])
+        s.peak[lane] = max(s.peak[lane], s.high[lane])
 
 
 @kernel
@@ -317,18 +329,24 @@ def _mend(breathing: bool, p: Any, s: Any, a: Any, k: Any, step: int) -> int:
 _CHOKED = 4.0  # status code of a chamber that has failed
 
 
-@kernel
-def _keep_chambers(p: Any, s: Any, k: Any, n: int) -> None:
+@subroutine
+def _keep_chambers(p: Any, s: Any, left: Any, n: int) -> None:
     for lane in range(LANES):
-        k.forces[_SUCTION, n, lane] = s.flow[0, lane] / p.step[lane]
-        k.forces[_SUCTION + 1, n, lane] = s.flow[1, lane] / p.step[lane]
-        k.chambers[0, n, lane] = s.chamber[_VAPOUR, lane]
-        k.chambers[1, n, lane] = s.chamber[_SUCTION_LIFT, lane]
-        k.chambers[2, n, lane] = s.chamber[_DISCHARGE_LIFT, lane]
+        left.forces[_SUCTION, n, lane] = s.flow[0, lane] / p.step[lane]
+        left.forces[_SUCTION + 1, n, lane] = s.flow[1, lane] / p.step[lane]
+        left.chambers[0, n, lane] = s.chamber[_VAPOUR, lane]
+        left.chambers[1, n, lane] = s.chamber[_SUCTION_LIFT, lane]
+        left.chambers[2, n, lane] = s.chamber[_DISCHARGE_LIFT, lane]
 
 
 _SUCTION = len(LANE_FORCES)
 _VAPOUR, _SUCTION_LIFT, _DISCHARGE_LIFT = GATHERED
+
+
+@subroutine
+def _keep_turns(s: Any, left: Any, n: int) -> None:
+    for lane in range(LANES):
+        left.turns[0, n, lane], left.turns[1, n, lane] = s.x[CRANK, lane], s.v[CRANK, lane]
 
 
 @subroutine
@@ -339,6 +357,7 @@ def march(kind: Any, n: int, p: Any, s: Any, a: Any, k: Any) -> None:
     that is found, not the extrapolated one. What asks for a cut does not depend on it.
     """
     _, across, breathing = kind
+    left = k.left[0]
     rates(p, s, 0.0, kind)
     for step in range(n):
         _to_second_stage(p, s, kind)
@@ -347,7 +366,7 @@ def march(kind: Any, n: int, p: Any, s: Any, a: Any, k: Any) -> None:
         rates(p, s, 0.5, kind)
         _to_last_stage(p, s, across)
         rates(p, s, 1.0, kind)
-        _to_end(p, s, a, k, step, across)
+        _to_end(p, s, left, step, across)
         with_care = lanes_breathe(p, s, a, k.code) if breathing else 0
         rates(p, s, 0.0, kind)
         if _judge(p, s) > 0:
@@ -356,11 +375,10 @@ def march(kind: Any, n: int, p: Any, s: Any, a: Any, k: Any) -> None:
                 with_care += again
                 rates(p, s, 0.0, kind)
         if breathing:
-            _keep_chambers(p, s, k, step)
+            _keep_chambers(p, s, left, step)
             if with_care > 0:
                 count_vapour(s, a)
-        for lane in range(LANES):
-            k.turns[0, step, lane], k.turns[1, step, lane] = s.x[CRANK, lane], s.v[CRANK, lane]
+        _keep_turns(s, left, step)
 
 
 def alone(t: Tables) -> Alone:

@@ -172,6 +172,7 @@ STATE = np.dtype(
         ("middle_a", "f8", (ALL_MOVING, LANES)),
         ("middle_force", "f8", (len(LANE_FORCES), LANES)),
         ("high", "f8", LANES),  # largest normal force of the step
+        ("peak", "f8", LANES),  # of all steps
         ("touching", "f8", (CONTACTS, LANES)),  # 0 or 1
         ("impact", "f8", (CONTACTS, LANES)),
         ("pressure0", "f8", (2, LANES)),  # on the piston at both ends of the step, of a chamber
