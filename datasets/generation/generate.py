@@ -415,7 +415,7 @@ def _batch_size(scene: Scene, todo: int, jobs: int) -> int:
 
 
 def _batches(samples: Iterable[Sample], size: int) -> Iterator[tuple[RecordJob, ...]]:
-    """Records to simulate together: of one kind, that none runs beside empty lanes."""
+    """Records to simulate together: of one kind, but for what is left of every kind at the end."""
     waiting: dict[Hashable, list[RecordJob]] = {}
     for each in samples:
         kind = alike(each.scene) if size > 1 else None
@@ -423,7 +423,12 @@ def _batches(samples: Iterable[Sample], size: int) -> Iterator[tuple[RecordJob, 
         same.append(RecordJob(each.index, each.seed, each.row, each.scene))
         if len(same) == size:
             yield tuple(waiting.pop(kind))
-    yield from map(tuple, sorted(waiting.values(), key=len, reverse=True))
+    left = [job for _, same in sorted(waiting.items(), key=_name_of) for job in same]
+    yield from (tuple(left[first : first + size]) for first in range(0, len(left), size))
+
+
+def _name_of(waiting: tuple[Hashable, list[RecordJob]]) -> str:
+    return str(waiting[0])
 
 
 class _Tally:

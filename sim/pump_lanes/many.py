@@ -20,6 +20,7 @@ from ..pump.setup import begun, needs_integration
 from ..scene.parts import Scene, SceneError
 from ..scene.pump import PumpScene
 from .lanes import LaneJob, LaneKind, lane_columns, lane_kind, run_lanes
+from .rates import LANES
 
 _FEWEST = 5
 """Records of a kind: fewer are as fast one after the other."""
@@ -77,9 +78,9 @@ def pumps_alike(scene: Scene) -> LaneKind | None:
 
 
 def _pooled(kinds: dict[LaneKind, list[_Job]]) -> list[tuple[LaneKind, list[_Job]]]:
-    """Groups of a kind; those of few records together, as they would each run alone else."""
-    large = [(kind, group) for kind, group in kinds.items() if len(group) >= _FEWEST]
-    small = [(kind, group) for kind, group in kinds.items() if len(group) < _FEWEST]
+    """Groups of a kind; those that would leave lanes empty together, with all that any has."""
+    large = [(kind, group) for kind, group in kinds.items() if len(group) >= LANES]
+    small = [(kind, group) for kind, group in kinds.items() if len(group) < LANES]
     for breathing in (False, True):
         pool = [(kind, group) for kind, group in small if kind.breathing == breathing]
         if pool:

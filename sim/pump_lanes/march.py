@@ -273,7 +273,6 @@ def _to_end(p: Any, s: Any, left: Any, n: int, across: bool) -> None:
             left.forces[c, n, lane] = weight * mean_of_stages(
                 s.force0[c, lane], s.middle_force[c, lane], s.force[c, lane]
             )
-        s.peak[lane] = max(s.peak[lane], s.high[lane])
 
 
 @kernel
@@ -298,6 +297,8 @@ def _judge(p: Any, s: Any) -> int:
             min(m[4, lane], m[5, lane]),
         )
         s.asks[lane] = 1.0 if least < 0.0 else 0.0
+        # what a step that is cut would have come to is no force of the run
+        s.peak[lane] = max(s.peak[lane], 0.0 if least < 0.0 else s.high[lane])
         failed = _failed(s, beyond_limit(p, s, lane), lane)
         s.bad[lane] = _CHOKED if s.choked[lane] != 0.0 else failed
     for lane in range(LANES):
