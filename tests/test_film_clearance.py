@@ -11,6 +11,7 @@ from wearstate.datasets.generation.generate import save_solution
 from wearstate.datasets.recipe.recipe import load_recipe
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.feature_rows.healthy import Baseline
+from wearstate.diagnose.feature_rows.model_card import ModelCard, TrainedCondition, TrainedOn
 from wearstate.diagnose.feature_rows.probe_means import probe_means
 from wearstate.diagnose.film_clearance.clearance import (
     Doubts,
@@ -226,14 +227,23 @@ def test_nothing_known_is_no_nameplate(tmp_path):
     assert nameplate_of(tmp_path / "a.wav", None, {}) is None
 
 
-CARD = {
-    "trained_on": {"scene": "journal-bearing"},
-    "conditions": [
-        {"name": "shaft.speed_hz", "feature": "shaft.speed_hz", "unit": "Hz", "low": 1, "high": 2},
-        {"name": "static_load_n", "feature": "", "unit": "N", "low": 4e3, "high": 6e3},
-        {"name": "viscosity_pa_s", "feature": "", "unit": "Pa s", "low": 0.024, "high": 0.036},
+def card_of(scene, recipe="", conditions=()):
+    """What these cautions read of a card."""
+    trained = TrainedOn.model_construct(scene=scene, recipe=recipe)
+    return ModelCard.model_construct(trained_on=trained, conditions=list(conditions))
+
+
+SPEED = {"name": "shaft.speed_hz", "feature": "shaft.speed_hz", "unit": "Hz"}
+LOAD = {"name": "static_load_n", "feature": "", "unit": "N"}
+VISCOSITY = {"name": "viscosity_pa_s", "feature": "", "unit": "Pa s"}
+CARD = card_of(
+    "journal-bearing",
+    conditions=[
+        TrainedCondition(**SPEED, low=1.0, high=2.0),
+        TrainedCondition(**LOAD, low=4e3, high=6e3),
+        TrainedCondition(**VISCOSITY, low=0.024, high=0.036),
     ],
-}
+)
 
 
 @pytest.mark.parametrize(
@@ -273,10 +283,10 @@ def test_probes_without_healthy_recordings_are_a_caution(tmp_path):
 def test_a_nameplate_of_another_machine_is_a_caution():
     plate = nameplate_of(None, "bilge-pump", {})
     assert "is of a reciprocating-pump" in nameplate_cautions(plate, {}, CARD)[0]
-    assert nameplate_cautions(None, {}, {"trained_on": {"scene": "of another program"}}) == ()
+    assert nameplate_cautions(None, {}, card_of("of another program")) == ()
 
 
-PUMP_CARD = {"trained_on": {"scene": "bilge-pump", "recipe": "bilge-pump-standard"}}
+PUMP_CARD = card_of("bilge-pump", "bilge-pump-standard")
 
 
 def test_sizes_that_nobody_gave_are_a_caution():
