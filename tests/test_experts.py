@@ -120,7 +120,9 @@ def test_intervals_of_a_regime_are_as_wide_as_it_needs():
 
 def test_shares_are_of_one():
     shares = regime_shares([np.array([0.2, 1.0]), np.array([0.2, 0.0])])
-    np.testing.assert_array_equal(shares, [[0.5, 0.5], [1.0, 0.0]])
+    np.testing.assert_allclose(shares, [[0.5, 0.5], [1.0, 0.0]], atol=1e-300)
+    # no regime is likely at all: no estimate that is no number
+    np.testing.assert_array_equal(regime_shares([np.zeros(1), np.zeros(1)]), [[0.5, 0.5]])
 
 
 @pytest.fixture(scope="module")

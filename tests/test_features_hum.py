@@ -72,6 +72,11 @@ def test_noise_and_blows_are_no_hum() -> None:
     assert hum_power(noise, FS, speed_hz=7.3)[50.0] < 0.01
 
 
+@pytest.mark.parametrize("samples", [0, 1, 5, 40])
+def test_a_few_samples_have_none(samples: int) -> None:
+    assert hum_power(np.ones(samples), 48_000.0, speed_hz=50.0) == {50.0: 0.0, 60.0: 0.0}
+
+
 def test_a_signal_too_short_to_tell_has_none() -> None:
     assert hum_power(hum(50.0)[:2000], FS, speed_hz=3.0) == {50.0: 0.0, 60.0: 0.0}
 

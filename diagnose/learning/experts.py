@@ -88,7 +88,8 @@ def regime_shares(probabilities: Sequence[Float]) -> Float:
     >>> regime_shares([np.array([0.9]), np.array([0.3])]).round(2).tolist()
     [[0.75, 0.25]]
     """
-    table = np.stack(probabilities, axis=1)
+    # of no regime at all: each as likely, and no division by zero
+    table = np.maximum(np.stack(probabilities, axis=1), np.finfo(np.float64).tiny)
     return np.asarray(table / table.sum(axis=1, keepdims=True))
 
 
@@ -149,6 +150,8 @@ def fit_experts(
         disagreement=apart,
         shifted_estimate=mixed(strange, [one.shifted_estimate for one in fits]),
         shifted_disagreement=mixed(strange, [one.shifted_disagreement for one in fits]),
+        shares=usual,
+        shifted_shares=strange,
         options=(option,),
         chosen=option.name,
     )

@@ -444,6 +444,8 @@ class Fitted(Generic[Kind]):
         Of the blend's parts, on groups they had no part in; see :meth:`Blend.disagreement`.
     shifted_estimate, shifted_disagreement : numpy.ndarray [shape=(n,)]
         The same of the records on other machines, by the weights of the blend.
+    shares, shifted_shares : numpy.ndarray [shape=(n, n_regimes)]
+        Probability of each regime that has a blend of its own; of no regimes where one is for all.
     options : tuple of RegressionOption
         All that was looked at, within the budget or not.
     chosen : str
@@ -455,6 +457,8 @@ class Fitted(Generic[Kind]):
     disagreement: Float
     shifted_estimate: Float
     shifted_disagreement: Float
+    shares: Float
+    shifted_shares: Float
     options: tuple[RegressionOption, ...]
     chosen: str
 
@@ -641,6 +645,8 @@ def _chosen(
         disagreement=apart,
         shifted_estimate=elsewhere,
         shifted_disagreement=strange,
+        shares=blend.shares(asked[0]),
+        shifted_shares=blend.shares(asked[1]),
         options=front(options),
         chosen=best.name,
     )

@@ -18,7 +18,7 @@ from ..feature_rows.physical import moved_rows
 from ..feature_rows.quality import Levels, fit_levels
 from ..learning.conformal import IntervalCalibration, fit_scale, scale_inputs
 from ..learning.detection import visible_from
-from ..learning.experts import FEWEST_RECORDS, Experts, better_of, fit_experts, regime_shares
+from ..learning.experts import FEWEST_RECORDS, Experts, better_of, fit_experts
 from ..learning.heads import PRESENT, FittedHead, Head, fit_head
 from ..learning.regressions import (
     BUDGET_MS,
@@ -198,7 +198,7 @@ def learn(
     apart = distance, far
     return Learnt(
         severity=severity,
-        blind=_estimator(training, training.inputs, severity, apart, heads, seed),
+        blind=_estimator(training, training.inputs, severity, apart, seed),
         informed=_informed(training, other, severity, folds, apart, heads, seed),
         familiarity=fit_familiarity(training.names, training.rows, training.groups, **limits),
         levels=fit_levels(training.names, training.rows, folds),
@@ -276,18 +276,14 @@ def _estimator(
     inputs: Float,
     fitted: SeverityFit,
     apart: tuple[Float, Float],
-    heads: Sequence[FittedHead],
     seed: int,
 ) -> Estimator:
     """A fit with its uncertainty, from how it did on machines that it had not seen."""
     distance, far = apart
-    gates = _gates(training, heads) if isinstance(fitted.blend, Experts) else []
-    usual, there = np.empty((2, len(training.rows), 0))
-    if gates:
-        usual = regime_shares([gate.probability for gate in gates])
-        there = regime_shares([gate.shifted for gate in gates])
-    sizes = scale_inputs(fitted.estimate, distance, fitted.disagreement, usual)
-    strange = scale_inputs(fitted.shifted_estimate, far, fitted.shifted_disagreement, there)
+    sizes = scale_inputs(fitted.estimate, distance, fitted.disagreement, fitted.shares)
+    strange = scale_inputs(
+        fitted.shifted_estimate, far, fitted.shifted_disagreement, fitted.shifted_shares
+    )
     scale = fit_scale(sizes, np.log(training.severity / fitted.estimate))
 
     def calibration(estimate: Float, sizes: Float, distance: Float) -> IntervalCalibration:
@@ -335,7 +331,7 @@ def _informed(
     errors = [np.abs(each.estimate - training.severity).mean() for each in (fitted, blind)]
     if errors[0] > (1 - _WORTH) * errors[1]:
         return None
-    return _estimator(training, inputs, fitted, apart, heads, seed)
+    return _estimator(training, inputs, fitted, apart, seed)
 
 
 def _fits_of_others(

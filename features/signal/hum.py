@@ -67,14 +67,16 @@ def hum_power(x: ArrayLike, fs: float, *, speed_hz: float) -> dict[float, float]
     samples = np.asarray(x, dtype=np.result_type(np.asarray(x), np.float32))
     blocks = samples[: samples.size // block * block].reshape(-1, block)
     signal = np.asarray(blocks @ np.full(block, 1 / block, blocks.dtype), dtype=np.float64)
-    signal, fs = signal[: fast_length_within(signal.size)], fs / block
-    step = fs / signal.size
+    fs /= block
     reach = max(_REACH_HZ, _REACH_ORDERS * speed_hz)
-    if 2 * _LOBE * step > min(0.5 * speed_hz, _REACH_HZ):
+    if 2 * _LOBE * fs > signal.size * min(0.5 * speed_hz, _REACH_HZ):
         return dict.fromkeys(MAINS_HZ, 0.0)
+    signal = signal[: fast_length_within(signal.size)]
+    step = fs / signal.size
     window = 0.5 - 0.5 * np.cos(math.tau * np.arange(signal.size) / signal.size)
     lines = np.abs(rfft((signal - signal.mean()) * window)) ** 2
-    lines /= _kept_by_blocks(np.arange(lines.size) / signal.size, block) ** 2
+    cycles = np.arange(lines.size) / signal.size  # per block: its mean leaves sinc over sinc
+    lines *= (np.sinc(cycles / block) / np.sinc(cycles)) ** 2
     summed = np.append(0.0, np.cumsum(lines)) * (2 / (signal.size * float(window @ window)))
     return {
         mains: sum(
@@ -85,14 +87,6 @@ def hum_power(x: ArrayLike, fs: float, *, speed_hz: float) -> dict[float, float]
         )
         for mains in MAINS_HZ
     }
-
-
-def _kept_by_blocks(cycles: Float, block: int) -> Float:
-    """Amplitude that the mean over a block leaves of lines [cycles per block]."""
-    if block == 1:
-        return np.ones_like(cycles)
-    below = block * np.sin(np.pi * np.maximum(cycles, 1e-9) / block)
-    return np.asarray(np.sin(np.pi * np.maximum(cycles, 1e-9)) / below)
 
 
 def _half(frequency: float, step: float) -> int:
