@@ -19,6 +19,7 @@ from wearstate.diagnose.feature_rows.quality import (
 )
 from wearstate.diagnose.wear_model.file import load_model
 from wearstate.sim.output.recording import Recording
+from wearstate.sim.output.sensor import mains_hum
 
 CAMPAIGN = runpy.run_path(str(Path(__file__).parent / "benchmarks" / "quality_faults.py"))
 PLANTED = CAMPAIGN["PLANTED"]
@@ -125,6 +126,28 @@ def test_a_graded_but_saturated_recording_says_so(model, familiar):
     estimate = model.estimate(replace(recording, signal=signal))
     assert estimate.verdict in ("caution", "unfamiliar")
     assert [fault.kind for fault in estimate.faults] == ["saturated"]
+
+
+def test_a_verdict_under_loud_hum_is_one_with_caution(model, familiar):
+    """At -13 dB it begins: nothing is said at -20 dB, and at -10 dB there is a caution."""
+
+    def judged(db):
+        recording = familiar[0]
+        signal = recording.signal.astype(float)
+        rng = np.random.default_rng(0)
+        for i, name in enumerate(recording.names):
+            if name != recording.tacho:
+                rms = 10 ** (db / 20) * signal[i].std()
+                signal[i] += mains_hum(
+                    signal.shape[1], recording.sample_rate, rms=rms, frequency=60.0, rng=rng
+                )
+        return model.estimate(replace(recording, signal=signal.astype(np.float32)))
+
+    assert not any("60 Hz" in caution for caution in judged(-20).cautions)
+    loud = judged(-10)
+    assert any(fault.kind == "hum" and not fault.bars for fault in loud.faults)
+    assert loud.verdict == "caution"
+    assert any("multiples of 60 Hz" in caution for caution in loud.cautions)
 
 
 def test_a_header_that_does_not_fit_is_named_whole(model, familiar):
