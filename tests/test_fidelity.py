@@ -1,18 +1,22 @@
 """The choice of rungs and numerics, on machines whose errors are known in closed form, and real."""
 
 import math
+import time
+from functools import partial
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from wearstate.datasets.generation.machines import known_of
 from wearstate.datasets.generation.quantities import resolved, with_estimate
+from wearstate.datasets.workers.local import in_order
 from wearstate.diagnose.charts.of_scene import chart_of
 from wearstate.diagnose.charts.words import percent
 from wearstate.sim.fidelity import pilot as pilot_runs
 from wearstate.sim.fidelity.choose import resolve, resolved_scene
 from wearstate.sim.fidelity.ladder import cost_of, effects_of
 from wearstate.sim.fidelity.pilot import (
+    TIMED,
     Candidate,
     Difference,
     Outcome,
@@ -22,7 +26,7 @@ from wearstate.sim.fidelity.pilot import (
     surely_within,
 )
 from wearstate.sim.fidelity.study import Search, study
-from wearstate.sim.machine.simulate import recorder, simulate
+from wearstate.sim.machine.simulate import recorder, simulate, simulate_many
 from wearstate.sim.output.status import SimulationError
 from wearstate.sim.scene.load import load_scene, scene_names
 from wearstate.sim.scene.parts import SceneError
@@ -700,6 +704,51 @@ def test_starts_of_a_pilot_are_recordings_of_their_own(name, monkeypatch):
         ).signal
         assert_allclose(one, own, rtol=0, atol=0)
         assert_allclose(other, own, rtol=0, atol=0)
+
+
+COMBINATIONS = (
+    {},
+    {"pressure.rung": "chamber", "joint.wristpin.rung": "compliant"},
+    {"joint.crankpin.rung": "ideal"},  # no lane knows it
+    {"joint.crankpin.rung": "link"},  # in tension: a fault
+    {"pressure.rung": "chamber", "joint.crankpin.stiffness": "2 MN/m"},  # too soft: refused
+)
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_starts_side_by_side_have_the_outcomes_of_each_alone(jobs, monkeypatch):
+    """To the last bit, by any number of workers; timed ones run alone."""
+    scene = load_scene("bilge-pump", {"duration": "0.4 s"})
+    known = known_of(scene)
+    lying = []
+    monkeypatch.setattr(
+        pilot_runs,
+        "simulate_many",
+        lambda runs, truth: lying.append(len(runs)) or simulate_many(runs, truth=truth),
+    )
+
+    def kept(**options):
+        outcomes = {}
+        pilot = Pilot(scene, known.quantities, seed=2, kept=outcomes, **options)
+        pilot.fill(COMBINATIONS, 12)
+        return outcomes
+
+    alone = kept()
+    assert not lying
+    assert sum(bool(each.fault) for each in alone.values()) == 2
+    told = {"truth": known.truth, "spread": partial(in_order, jobs=jobs), "at_once": jobs}
+    together = kept(**told)
+    assert {name: repr(together[name]) for name in alone} == {
+        name: repr(each) for name, each in alone.items()
+    }
+    assert jobs > 1 or lying == [16, 16, 4]  # the refused ones too: three combinations of twelve
+    lying.clear()
+    monkeypatch.setattr(pilot_runs, "_warm", {scene.machine})
+    timed = kept(**told, clock=time.perf_counter)
+    assert jobs > 1 or sum(lying) == 2 * (12 - TIMED)
+    assert all(timed[name].quantities == each.quantities for name, each in alone.items())
+    told = [name for name, each in timed.items() if math.isfinite(each.seconds)]
+    assert {int(name.split()[-1]) for name in told} == set(range(TIMED))
 
 
 def test_motions_that_are_damped_alike_do_not_make_the_resonance_jump():

@@ -9,7 +9,7 @@ from wearstate.datasets.generation.generate import generate
 from wearstate.datasets.recipe.recipe import load_recipe, sample_records
 from wearstate.sim.machine.simulate import simulate, simulate_many, simulates_together
 from wearstate.sim.output.status import Status
-from wearstate.sim.pump.recording import planned
+from wearstate.sim.pump.recording import GATHERED_TRUTH, planned
 from wearstate.sim.pump_lanes.lanes import lane_kind, run_lanes
 from wearstate.sim.pump_lanes.many import lane_job
 from wearstate.sim.scene.load import load_scene
@@ -53,6 +53,24 @@ def test_the_drawn_records_are_of_every_kind(drawn):
 def test_bytes_are_those_of_each_alone(drawn, alone):
     found = dict(simulate_many(drawn))
     assert [n for n in range(N) if not same(found[n], alone[n])] == []
+
+
+def test_the_truth_of_lanes_is_that_of_each_alone(drawn):
+    some = [drawn[n] for n in range(0, N, 2)]
+    found = dict(simulate_many(some, truth=GATHERED_TRUTH))
+    for n, (scene, seed) in enumerate(some):
+        own = simulate(scene, seed=seed, truth=True, raise_on_failure=False)
+        assert same(found[n], own)
+        if own.status.ok:
+            assert set(found[n].truth) == set(GATHERED_TRUTH)  # in a lane, not alone
+            assert all(np.array_equal(found[n].truth[k], own.truth[k]) for k in GATHERED_TRUTH)
+
+
+def test_truth_that_lanes_do_not_know_comes_of_a_record_alone():
+    jobs = [(load_scene("bilge-pump", SHORT), seed) for seed in range(6)]
+    found = dict(simulate_many(jobs, truth=("wrist_force_n",)))
+    own = simulate(*jobs[5][:1], seed=5, truth=True).truth
+    assert np.array_equal(found[5].truth["wrist_force_n"], own["wrist_force_n"])
 
 
 @pytest.mark.parametrize("some", [slice(0, 7), slice(5, 22), slice(None, None, -1)])

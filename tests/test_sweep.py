@@ -3,6 +3,7 @@
 import csv
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,7 +15,9 @@ from wearstate.diagnose.sweep.axes import SweepError, parse_axis
 from wearstate.diagnose.sweep.detect import detect
 from wearstate.diagnose.sweep.sweep import kept_runs, measure, sweep_of, sweep_plan
 from wearstate.diagnose.sweep.text import conclusion, sweep_table
+from wearstate.sim.fidelity import pilot as pilot_runs
 from wearstate.sim.fidelity.pilot import Outcome
+from wearstate.sim.machine.simulate import simulate_many
 
 CLEARANCE = "joint.crankpin.diametral_clearance"
 OVER = ("drive.speed=300..400rpm/2", f"{CLEARANCE}=.1,.3mm")
@@ -168,6 +171,36 @@ def test_workers_change_nothing_and_a_sweep_goes_on(tmp_path):
     assert sweep_table(sweep_of(plan, again)) == whole
     with pytest.raises(ValueError, match="axes, seed or quantities"):
         kept_runs(part, tiny(seed=1))
+
+
+@pytest.mark.parametrize(("show", "beside"), [(SHOW, 20), ((*SHOW, "wrist.peak"), 0)])
+def test_runs_side_by_side_have_the_values_of_each_alone(show, beside, monkeypatch):
+    """Where what is shown needs no truth that only a run alone has."""
+    lying = []
+    monkeypatch.setattr(
+        pilot_runs,
+        "simulate_many",
+        lambda runs, truth: lying.append(len(runs)) or simulate_many(runs, truth=truth),
+    )
+    plan = sweep_plan("bilge-pump", OVER, given=TINY, show=show, starts=5)
+    found, alone = {}, {}
+    measure(plan, Kept(found))
+    assert sum(lying) == beside
+    measure(replace(plan, truth=None), Kept(alone))
+    assert sum(lying) == beside
+    assert len(found) == 20
+    assert found == alone
+
+
+class Kept(dict):
+    """Runs that no file keeps."""
+
+    def __init__(self, runs):
+        super().__init__()
+        self.runs = runs
+
+    def save(self):
+        self.runs |= self
 
 
 def test_the_command_goes_on_after_an_interrupt(tmp_path, monkeypatch):

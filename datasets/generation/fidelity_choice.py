@@ -178,8 +178,8 @@ def choose(
     samples = list(islice(sample_records(recipe, _SAMPLED, seed=seed), _SAMPLED))
     found = []
     for sample in _pilots(recipe, samples):
-        scene = sample.scene
-        found.append(resolve(scene, known_of(scene).quantities, accuracy, pinned))
+        known = known_of(sample.scene)
+        found.append(resolve(sample.scene, known.quantities, accuracy, pinned, truth=known.truth))
         if say is not None:
             say(f"pilot, record {sample.index}: {found[-1].text}")
     effects = [e for e in effects_of(recipe.scene) if e.name not in pinned]

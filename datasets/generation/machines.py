@@ -301,6 +301,8 @@ class Known:
         Recording with its truth, scene -> quantities of interest by name.
     words : mapping of str to tuple of str
         Quantity, without the throw or the bearing -> words and unit.
+    truth : tuple of str or None
+        Names of the truth that the quantities read, of one part where there are many; None: any.
     truths : callable
         Recording with its truth, scene -> further numbers by name.
     fewest_turns : int or None
@@ -310,6 +312,7 @@ class Known:
 
     quantities: Quantities = band_quantities
     words: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    truth: tuple[str, ...] | None = None
     truths: Callable[[Recording, Scene], Iterator[tuple[str, Truth]]] = no_truths
     fewest_turns: int | None = None
 
@@ -317,6 +320,7 @@ class Known:
 KNOWN: dict[type[Scene], Known] = {
     PumpScene: Known(
         quantities=pump_quantities,
+        truth=("state_alpha", "pin_force_n", "guide_force_n", "piston_pressure_force_n"),
         words={
             "pin_rms": ("rms crank pin force", "N"),
             "pin_peak": ("mean peak of the crank pin force", "N"),

@@ -85,7 +85,8 @@ def resolved(scene: Scene) -> tuple[Scene, Resolution | None]:
     """
     if scene.fidelity == "given":
         return scene, None
-    found = resolve(scene, known_of(scene).quantities)
+    known = known_of(scene)
+    found = resolve(scene, known.quantities, truth=known.truth)
     return resolved_scene(scene, found), found
 
 

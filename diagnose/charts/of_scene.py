@@ -110,6 +110,7 @@ def scene_search(
     pilot = Pilot(
         scene,
         known.quantities,
+        truth=known.truth,
         clock=clock,
         kept=kept,
         spread=partial(in_order, jobs=jobs),

@@ -3,7 +3,7 @@
 import hashlib
 import json
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -14,13 +14,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ... import __version__
-from ...datasets.generation.machines import Truth
+from ...datasets.generation.machines import Truth, known_of
 from ...datasets.generation.quantities import resolved
 from ...datasets.generation.truths import truths_of
 from ...datasets.workers.local import in_order
 from ...features.catalogue.row import feature_row
 from ...sim.fidelity.choose import resolved_scene
-from ...sim.fidelity.pilot import Outcome, Quantity, Task, outcome_of
+from ...sim.fidelity.pilot import (
+    Outcome,
+    Quantity,
+    QuantityError,
+    Task,
+    grouped,
+    kind_of,
+    outcomes_of,
+)
 from ...sim.machine.simulate import simulate
 from ...sim.output.recording import Recording
 from ...sim.output.status import SimulationError
@@ -55,6 +63,8 @@ class Plan:
     seed : int
     confidence : float
         As of :func:`.sweep.detect.detect`.
+    truth : tuple of str or None
+        Names of the truth that suffices for what is shown; None: any of it.
     """
 
     name: str
@@ -64,6 +74,7 @@ class Plan:
     starts: int
     seed: int
     confidence: float
+    truth: tuple[str, ...] | None = None
 
     @property
     def runs(self) -> list[tuple[Point, int]]:
@@ -199,7 +210,18 @@ def sweep_plan(
         starts=starts,
         seed=seed,
         confidence=confidence,
+        truth=_enough(probe, next(iter(scenes.values())), shown),
     )
+
+
+def _enough(probe: Recording, scene: Scene, shown: Sequence[Shown]) -> tuple[str, ...] | None:
+    """The truth that the quantities of interest read, where all that is shown follows from it."""
+    names = known_of(scene).truth
+    if names is None:
+        return None
+    part = {name: value for name, value in probe.truth.items() if name in names}
+    known = truths_of(replace(probe, truth=part), scene)
+    return names if all(each.feature or each.name in known for each in shown) else None
 
 
 def _axes_of(
@@ -258,7 +280,7 @@ def values_of(solution: Recording, scene: Scene, names: Sequence[str]) -> dict[s
 
     Raises
     ------
-    ValueError
+    QuantityError
         The recording cannot have a feature.
     """
     features = [name[1:] for name in names if name.startswith("+")]
@@ -270,16 +292,11 @@ def values_of(solution: Recording, scene: Scene, names: Sequence[str]) -> dict[s
 
 
 def _features(solution: Recording, names: Sequence[str]) -> dict[str, float]:
-    labels, values = feature_row(solution, only=tuple(names))
-    return dict(zip(labels, map(float, values), strict=True))
-
-
-def made(task: Task) -> Outcome:
-    """Make a run; what a feature cannot be had of is its fault."""
     try:
-        return outcome_of(task)
+        labels, values = feature_row(solution, only=tuple(names))
     except ValueError as error:
-        return Outcome({}, str(error).splitlines()[0])
+        raise QuantityError(str(error).splitlines()[0]) from None
+    return dict(zip(labels, map(float, values), strict=True))
 
 
 def kept_runs(path: Path | None, plan: Plan) -> Kept[Outcome]:
@@ -341,21 +358,43 @@ def measure(
     runs = plan.runs
     missing = [run for run in runs if _name(*run) not in kept]
     done = len(runs) - len(missing)
+    groups = _groups(plan, missing)
     try:
         with closing(
-            in_order(made, _tasks(plan, missing), jobs=min(jobs, len(missing) or 1))
+            in_order(
+                outcomes_of,
+                (tuple(task for _, task in group) for group in groups),
+                jobs=min(jobs, len(groups) or 1),
+            )
         ) as found:
-            for run, outcome in zip(missing, found, strict=True):
-                kept[_name(*run)] = outcome
-                done += 1
-                if progress is not None:
-                    progress(done, len(runs))
+            for group, outcomes in zip(groups, found, strict=True):
+                for (run, _), outcome in zip(group, outcomes, strict=True):
+                    kept[_name(*run)] = outcome
+                    done += 1
+                    if progress is not None:
+                        progress(done, len(runs))
     finally:
         kept.save()
 
 
 def _name(point: Point, start: int) -> str:
     return f"{','.join(map(str, point))} {start}"
+
+
+_Run = tuple[tuple[Point, int], Task]  # point and start, and what is to do
+
+
+def _groups(plan: Plan, runs: Sequence[tuple[Point, int]]) -> list[tuple[_Run, ...]]:
+    """Runs that a worker makes together."""
+    kinds: dict[Point, Hashable | None] = {}
+
+    def kind(run: _Run) -> Hashable | None:
+        (point, _), task = run
+        if point not in kinds:
+            kinds[point] = kind_of(task)
+        return kinds[point]
+
+    return grouped(zip(runs, _tasks(plan, runs), strict=True), kind)
 
 
 def _tasks(plan: Plan, runs: Sequence[tuple[Point, int]]) -> Iterator[Task]:
@@ -369,6 +408,7 @@ def _tasks(plan: Plan, runs: Sequence[tuple[Point, int]]) -> Iterator[Task]:
             shared=f"sweep {key} {point}",
             number=plan.number(start),
             clock=None,
+            truth=plan.truth,
         )
 
 

@@ -5,7 +5,7 @@ that the choice is the same on every machine.
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from typing import Any, NamedTuple
@@ -127,6 +127,7 @@ def resolve(
     *,
     starts: int | None = None,
     seed: int = 0,
+    truth: Collection[str] | None = None,
     pilot: Pilot | None = None,
 ) -> Resolution:
     """Choose the cheapest rungs and numerics whose error is within the accuracy asked.
@@ -146,6 +147,8 @@ def resolve(
         whose reference costs so little that they take no more than 128 s by the tables.
     seed : int
         Of the starts.
+    truth : collection of str, optional
+        As of :class:`Pilot`.
     pilot : Pilot, optional
         Runs already made of the same scene.
 
@@ -172,7 +175,7 @@ def resolve(
     names = {*pinned, *scene.pinned}
     effects = free_effects(scene, sorted(names))
     comparison = Comparison(
-        pilot or Pilot(scene, quantities, seed=seed),
+        pilot or Pilot(scene, quantities, seed=seed, truth=truth),
         {effect.name: admissible(effect, scene) for effect in effects},
         asked,
         STARTS if starts is None else starts,

@@ -2,23 +2,31 @@
 
 Errors are those of quantities of interest, which reach this file as a callable from above. Contact
 with clearance is chaotic: differences are means over starts, and a difference below their scatter
-is none. What was measured can be kept and taken up again; runs may be spread over workers. Neither
-changes a result.
+is none. What was measured can be kept and taken up again; runs may be spread over workers, and lie
+side by side where that is faster. None of it changes a result.
 """
 
 import hashlib
 import json
 import math
 import pickle
-from collections.abc import Callable, Iterable, Mapping, MutableMapping, Sequence
+from collections.abc import (
+    Callable,
+    Collection,
+    Hashable,
+    Iterable,
+    Mapping,
+    MutableMapping,
+    Sequence,
+)
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtrit
 
-from ..machine.simulate import recorder, simulate
+from ..machine.simulate import alike, recorder, simulate, simulate_many
 from ..output.recording import Recorder, Recording
 from ..scene.parts import Scene, SceneError
 from ..scene.rungs import Rung, with_values
@@ -148,25 +156,103 @@ class Task(NamedTuple):
     """Same for runs that differ in their start alone."""
     number: int
     clock: Callable[[], float] | None
+    truth: tuple[str, ...] | None = None
+    """Names of the truth that the quantities read; None: any of it."""
 
 
-Spread = Callable[[Callable[[Task], Outcome], Iterable[Task]], Iterable[Outcome]]
-"""Applies a function to tasks and gives the results in order; by workers, say."""
+class QuantityError(ValueError):
+    """A run has no such quantity, which is its fault."""
 
 
-def outcome_of(task: Task) -> Outcome:
-    """Make a run.
+Group = tuple[Task, ...]
+"""Tasks that a worker makes together."""
+
+Spread = Callable[[Callable[[Group], list[Outcome]], Iterable[Group]], Iterable[list[Outcome]]]
+"""Applies a function to groups and gives the results in order; by workers, say."""
+
+
+def outcomes_of(tasks: Group) -> list[Outcome]:
+    """Make runs, side by side where that is faster.
 
     Parameters
     ----------
-    task : Task
-        With a clock the run does all that a recording takes; without, what its like have done
-        before in this process is taken over.
+    tasks : tuple of Task
+        With a clock a run does all that a recording takes, by itself; without, what its like have
+        done before in this process is taken over.
 
     Returns
     -------
-    Outcome
+    list of Outcome
+        In the order of the tasks, with the quantities of each run alone.
     """
+    beside = [task for task in tasks if task.clock is None and kind_of(task) is not None]
+    if len(beside) < 2:
+        return [_outcome_of(task) for task in tasks]
+    scenes = [with_values(task.scene, task.values) for task in beside]
+    runs = [(scene, task.number) for scene, task in zip(scenes, beside, strict=True)]
+    truth = {name for task in beside for name in task.truth or ()}
+    found = {
+        id(beside[n]): Outcome({}, run.faults[0])
+        if isinstance(run, SceneError)
+        else _told(beside[n], scenes[n], run)
+        for n, run in simulate_many(runs, truth=truth)
+    }
+    return [found[id(task)] if id(task) in found else _outcome_of(task) for task in tasks]
+
+
+def kind_of(task: Task) -> Hashable:
+    """What tasks must have in common to be made faster together; None of one that runs alone."""
+    if task.truth is None:
+        return None
+    try:
+        return alike(with_values(task.scene, task.values))
+    except SceneError:
+        return None
+
+
+Item = TypeVar("Item")
+
+
+def grouped(
+    items: Iterable[Item], kind: Callable[[Item], Hashable | None]
+) -> list[tuple[Item, ...]]:
+    """Runs in groups to be made together.
+
+    Parameters
+    ----------
+    items : iterable
+        Runs in any form.
+    kind : callable
+        What those must have in common that are faster together; None of one that runs alone.
+
+    Returns
+    -------
+    list of tuple
+        What runs alone first. Then groups of a kind, then what is left of all of them.
+
+    Examples
+    --------
+    >>> [len(group) for group in grouped(range(41), lambda n: n % 2 or None)]
+    [1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 16, 4]
+    """
+    kinds: dict[Hashable, list[Item]] = {}
+    for item in items:
+        kinds.setdefault(kind(item), []).append(item)
+    alone, left, groups = kinds.pop(None, []), [], []
+    for same in kinds.values():
+        whole = len(same) // TOGETHER * TOGETHER
+        groups += [tuple(same[n : n + TOGETHER]) for n in range(0, whole, TOGETHER)]
+        left += same[whole:]
+    groups += [tuple(left[n : n + TOGETHER]) for n in range(0, len(left), TOGETHER)]
+    return [*((item,) for item in alone), *groups]
+
+
+TOGETHER = 16
+"""Runs of a group."""
+
+
+def _outcome_of(task: Task) -> Outcome:
+    """Make a run by itself."""
     seconds = math.nan
     try:
         scene = with_values(task.scene, task.values)
@@ -176,8 +262,17 @@ def outcome_of(task: Task) -> Outcome:
             solution, seconds = _timed(scene, task.number, task.clock)
     except SceneError as error:
         return Outcome({}, error.faults[0])
+    return _told(task, scene, solution, seconds)
+
+
+def _told(task: Task, scene: Scene, solution: Recording, seconds: float = math.nan) -> Outcome:
     fault = _fault(solution)
-    return Outcome({} if fault else task.quantities(solution, scene), fault, seconds)
+    if fault:
+        return Outcome({}, fault, seconds)
+    try:
+        return Outcome(task.quantities(solution, scene), "", seconds)
+    except QuantityError as error:
+        return Outcome({}, str(error), seconds)
 
 
 def _timed(scene: Scene, number: int, clock: Callable[[], float]) -> tuple[Recording, float]:
@@ -210,6 +305,9 @@ def _recorder_of(shared: str, scene: Scene) -> Recorder:
     return _recorders[shared]
 
 
+_Start = tuple[Mapping[str, Any], int]  # values of a combination, and the number of a start
+
+
 class Pilot:
     """Runs of one scene in any combination of rungs, each start once.
 
@@ -220,6 +318,9 @@ class Pilot:
         Of :data:`Quantities`.
     seed : int
         Other starts for another one.
+    truth : collection of str, optional
+        Names of the truth that the quantities read, so that starts may run side by side; by default
+        any of it, which takes a run of its own.
     clock : callable, optional
         Seconds; only what is reported as measured depends on it.
     kept : mapping, optional
@@ -235,12 +336,14 @@ class Pilot:
         quantities: Quantities,
         *,
         seed: int = 0,
+        truth: Collection[str] | None = None,
         clock: Callable[[], float] | None = None,
         kept: MutableMapping[str, Outcome] | None = None,
         spread: Spread = map,
         at_once: int = 1,
     ) -> None:
         self.scene, self.quantities, self.seed, self.clock = scene, quantities, seed, clock
+        self._truth = None if truth is None else tuple(sorted(truth))
         self.runs = 0
         self.late: Callable[[float], bool] = lambda _expected: False
         self._spread, self.at_once = spread, at_once
@@ -248,6 +351,7 @@ class Pilot:
         self._kept: MutableMapping[str, Outcome] = {} if kept is None else kept
         self._outcomes: dict[str, list[Outcome]] = {}
         self._tabulated: dict[str, float] = {}
+        self._kinds: dict[str, Hashable | None] = {}
         self._own = hashlib.sha256(pickle.dumps(scene)).hexdigest()
 
     def outcomes(self, values: Mapping[str, Any], starts: int) -> list[Outcome]:
@@ -274,11 +378,14 @@ class Pilot:
             for values in {_key(values): values for values in combinations}.values()
         ]
         while missing := [each for each in wanted if not self._has(*each)]:
-            batch = missing[: self._batch(missing[0][0])]
+            batch = self._batch(missing)
             if self.late(self._expected(batch)):
-                raise OutOfTimeError
-            for (values, start), found in zip(batch, self._made(batch), strict=True):
-                self._add(values, start, found)
+                batch = [each[:1] for each in batch[: self.at_once]]
+                if self.late(self._expected(batch)):
+                    raise OutOfTimeError
+            for runs, outcomes in zip(batch, self._made(batch), strict=True):
+                for (values, start), found in zip(runs, outcomes, strict=True):
+                    self._add(values, start, found)
 
     def seconds(self, values: Mapping[str, Any]) -> float:
         """Least time of a run so far [s]; NaN without a clock."""
@@ -305,22 +412,42 @@ class Pilot:
     def _name(self, values: Mapping[str, Any]) -> str:
         return _key({**values, **self.common})
 
-    def _batch(self, values: Mapping[str, Any]) -> int:
-        """Runs that are handed out together: a second's for each worker, and one at least."""
-        seconds = self.seconds(values)
-        each = max(1, int(1.0 / seconds)) if seconds > 0 else 1
-        return self.at_once * min(each, _MOST_AT_ONCE) if self.at_once > 1 else 1
+    def _batch(self, missing: Sequence[_Start]) -> list[tuple[_Start, ...]]:
+        """What is handed out together: a group for each worker, or runs alone for a second."""
+        groups = grouped(missing, self._kind)
+        seconds = self.seconds(groups[0][0][0])
+        each = max(1, min(int(1.0 / seconds), _MOST_AT_ONCE)) if seconds > 0 else 1
+        alone = self.at_once * (each if self.at_once > 1 else 1)
+        batch: list[tuple[_Start, ...]] = []
+        for group in groups:
+            if len(batch) >= (alone if len(group) == 1 else self.at_once):
+                break
+            batch.append(group)
+        return batch
 
-    def _expected(self, batch: Sequence[tuple[Mapping[str, Any], int]]) -> float:
+    def _kind(self, run: _Start) -> Hashable | None:
+        """As :func:`kind_of`; None of a run that is timed."""
+        task = self._task(*run)
+        if task.clock is not None:
+            return None
+        if task.shared not in self._kinds:
+            self._kinds[task.shared] = kind_of(task)
+        return self._kinds[task.shared]
+
+    def _expected(self, batch: Sequence[Sequence[_Start]]) -> float:
         """Time that a batch is expected to take [s]; 0 where nothing is known."""
         if self.clock is None:
             return 0.0
         scale = self._scale()
-        told = {_key(values): self.seconds(values) for values, _ in batch}
-        for values, _ in batch:
+        told = {_key(values): self.seconds(values) for runs in batch for values, _ in runs}
+        for values in (values for runs in batch for values, _ in runs):
             if not math.isfinite(told[_key(values)]):
                 told[_key(values)] = scale * self._cost(values)
-        return sum(told[_key(values)] for values, _ in batch) / self.at_once
+        each = (
+            sum(told[_key(values)] for values, _ in runs) * (_FASTER if len(runs) > 1 else 1.0)
+            for runs in batch
+        )
+        return sum(each) / self.at_once
 
     def _scale(self) -> float:
         """Measured time for a tabulated second, as the combinations that ran tell; 0 of none."""
@@ -343,16 +470,25 @@ class Pilot:
             self._tabulated[key] = cost
         return self._tabulated[key]
 
-    def _made(self, batch: Sequence[tuple[Mapping[str, Any], int]]) -> Iterable[Outcome]:
+    def _made(self, batch: Sequence[tuple[_Start, ...]]) -> Iterable[list[Outcome]]:
         if self.at_once == 1:
-            return [self._run(values, start) for values, start in batch]
-        self.runs += len(batch)
-        return self._spread(outcome_of, [self._task(values, start) for values, start in batch])
+            return [self._together(runs) for runs in batch]
+        self.runs += sum(map(len, batch))
+        return self._spread(outcomes_of, [self._tasks(runs) for runs in batch])
+
+    def _together(self, runs: tuple[_Start, ...]) -> list[Outcome]:
+        if len(runs) == 1:
+            return [self._run(*runs[0])]
+        self.runs += len(runs)
+        return outcomes_of(self._tasks(runs))
+
+    def _tasks(self, runs: tuple[_Start, ...]) -> Group:
+        return tuple(self._task(values, start) for values, start in runs)
 
     def _run(self, values: Mapping[str, Any], start: int) -> Outcome:
         self.runs += 1
         _warm.add(self.scene.machine)  # the next start is of this process too, and warm
-        return outcome_of(self._task(values, start))
+        return outcomes_of((self._task(values, start),))[0]
 
     def _task(self, values: Mapping[str, Any], start: int) -> Task:
         number = start + self.seed * 65_537
@@ -364,10 +500,12 @@ class Pilot:
             shared=f"{self._own} {self._name(values)}",
             number=number,
             clock=self.clock if start < TIMED else None,
+            truth=self._truth,
         )
 
 
 _MOST_AT_ONCE = 8
+_FASTER = 0.5  # at least: share of the time that runs side by side take
 
 
 def _key(values: Mapping[str, Any]) -> str:

@@ -1,6 +1,6 @@
 """What a machine registers beside its scene, and where any other code asks for it."""
 
-from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import import_module
 from typing import cast
@@ -13,7 +13,9 @@ from ..output.transfer import SceneTransfer
 from ..scene.parts import Scene, SceneError
 from ..scene.rungs import Effect, Rung
 
-Many = Callable[[Sequence[tuple[Scene, int]]], Iterator[tuple[int, Recording | SceneError]]]
+Many = Callable[
+    [Sequence[tuple[Scene, int]], Collection[str]], Iterator[tuple[int, Recording | SceneError]]
+]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,8 +35,9 @@ class MachinePhysics:
     recorder : callable, optional
         Scene -> a `simulate` that has done what all starts of the scene share.
     many : callable, optional
-        Sequence of (scene, seed) -> (number, recording without truth or SceneError) of each, in
-        any order: as `simulate` one by one, but faster.
+        Sequence of (scene, seed), names of truth -> (number, recording with no truth but that, or
+        SceneError) of each, in any order: as `simulate` one by one, but faster. One that knows more
+        may say so.
     alike : callable, optional
         Scene -> what scenes have in common that `many` makes faster together than mixed; needed
         beside `many`.

@@ -1,6 +1,6 @@
 """From a scene to a recording: only the physics that the scene needs."""
 
-from collections.abc import Hashable, Iterator, Sequence
+from collections.abc import Collection, Hashable, Iterator, Sequence
 from dataclasses import replace
 
 from ..output.recording import Recorder, Recording
@@ -53,7 +53,7 @@ def simulate(
 
 
 def simulate_many(
-    jobs: Sequence[tuple[Scene, int]],
+    jobs: Sequence[tuple[Scene, int]], *, truth: Collection[str] = ()
 ) -> Iterator[tuple[int, Recording | SceneError]]:
     """Simulate recordings of many scenes of one machine, side by side where it can.
 
@@ -61,13 +61,15 @@ def simulate_many(
     ----------
     jobs : sequence of (Scene, int)
         Scene and seed of each, all of the same machine.
+    truth : collection of str
+        Names of the truth that is needed. A recording has these at least; fewer may be had faster.
 
     Yields
     ------
     number : int
         Of the job. Every job comes once, in any order.
     recording : Recording or SceneError
-        The bytes of :func:`simulate` without truth, whatever is beside it; a failed run with its
+        The bytes of :func:`simulate`, whatever is beside it; a failed run with its
         status and a signal of zeros. Or the faults of a scene that is refused.
 
     Examples
@@ -81,7 +83,7 @@ def simulate_many(
     if not jobs:
         return
     many = machine_of(jobs[0][0]).many or _one_by_one
-    for number, found in many(jobs):
+    for number, found in many(jobs, truth):
         yield (
             number,
             found if isinstance(found, SceneError) else _with_doubts(jobs[number][0], found),
@@ -114,11 +116,11 @@ def alike(scene: Scene) -> Hashable:
 
 
 def _one_by_one(
-    jobs: Sequence[tuple[Scene, int]],
+    jobs: Sequence[tuple[Scene, int]], truth: Collection[str]
 ) -> Iterator[tuple[int, Recording | SceneError]]:
     for number, (scene, seed) in enumerate(jobs):
         try:
-            yield number, machine_of(scene).simulate(scene, seed, False, False)
+            yield number, machine_of(scene).simulate(scene, seed, bool(truth), False)
         except SceneError as error:
             yield number, error
 

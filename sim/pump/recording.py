@@ -180,7 +180,7 @@ def recording_of(
     return recorded(
         pump,
         signal,
-        truth=_truth(truth, plan) | _test_truth(plan, pushes) if truth else {},
+        truth=_truth(truth, plan) | _test_truth(plan, pushes) if truth else gathered.truth(),
         status=status,
         numerics=numerics,
         warnings=(
@@ -398,6 +398,8 @@ class Gathering:
         Of the recording.
     columns : tuple of int or None
         Of all forces: the rows of those that will be added; None for all.
+    truth : bool
+        Keep what :data:`GATHERED_TRUTH` names as well.
 
     Attributes
     ----------
@@ -421,7 +423,14 @@ class Gathering:
         Of the crank over all steps [rad/s].
     """
 
-    def __init__(self, plan: "RunPlan", seed: int, columns: tuple[int, ...] | None) -> None:
+    def __init__(
+        self,
+        plan: "RunPlan",
+        seed: int,
+        columns: tuple[int, ...] | None,
+        *,
+        truth: bool = False,
+    ) -> None:
         scene = plan.scene
         n_throws = len(scene.throws)
         self.plan, self.seed = plan, seed
@@ -437,6 +446,12 @@ class Gathering:
             (self._pistons[throw], Decimation(1, plan.n_steps, plan.factor))
             for throw, _ in scene.pressure_sensors
         ]
+        self._known = [
+            _row_of(name, throw, columns)
+            for throw in range(n_throws if truth else 0)
+            for name in _GATHERED_FORCES
+        ]
+        self._knowing = Decimation(len(self._known), plan.n_steps, plan.factor) if truth else None
         self._steps = self._samples = 0
         breathing = _breathes(scene)
         turning = breathing or scene.drive.rung != "constant-speed"
@@ -482,6 +497,8 @@ class Gathering:
         self._note_pull(forces, first)
         for row, low in self._sensors:
             low.add(cylinder_pressure(self.plan.scene, forces[row : row + 1]))
+        if self._knowing is not None:
+            self._knowing.add(forces[self._known])
         self.casing.add(self._on_casing(turns, forces, first))
 
     def _note_pull(self, forces: NDArray[np.float64], first: int) -> None:
@@ -528,9 +545,29 @@ class Gathering:
         angle = self.turns[self.plan.kept, :, 0]
         return self.plan.turned(0.5 * (angle[:, 0] + angle[:, 1]))
 
+    def truth(self) -> dict[str, NDArray[np.float64]]:
+        """Of :func:`_truth` what :data:`GATHERED_TRUTH` names; empty where it was not asked for."""
+        if self._knowing is None:
+            return {}
+        found = {"state_alpha": self.turned()}
+        forces = self._knowing.finish()[:, self.plan.kept].T
+        for throw in range(len(self.plan.scene.throws)):
+            suffix = f"_{throw + 1}" if throw else ""
+            own = forces[:, len(_GATHERED_FORCES) * throw :]
+            found[f"pin_force_n{suffix}"] = own[:, 0:2]
+            found[f"guide_force_n{suffix}"] = own[:, 2]
+            found[f"piston_pressure_force_n{suffix}"] = -own[:, 3]
+        return found
+
     def pressures(self) -> list[NDArray[np.float64]]:
         """Pressure on the piston of every sensor's throw at all samples [Pa], band-limited."""
         return [low.finish()[0] for _, low in self._sensors]
+
+
+_GATHERED_FORCES = ("pin_x", "pin_y", "guide_y", "piston_x")
+
+GATHERED_TRUTH = ("state_alpha", "pin_force_n", "guide_force_n", "piston_pressure_force_n")
+"""Of a run's truth: what is at hand without its states, by throw as there."""
 
 
 def _row_of(force: str, throw: int, columns: tuple[int, ...] | None) -> int:

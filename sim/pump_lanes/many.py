@@ -3,11 +3,12 @@
 A recording has the same bytes either way, so only time decides.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from typing import NamedTuple, cast
 
 from ..output.recording import Recording
 from ..pump.recording import (
+    GATHERED_TRUTH,
     Gathering,
     LimitError,
     RunPlan,
@@ -33,14 +34,17 @@ class _Job(NamedTuple):
 
 
 def simulate_pumps(
-    jobs: Sequence[tuple[Scene, int]],
+    jobs: Sequence[tuple[Scene, int]], truth: Collection[str] = ()
 ) -> Iterator[tuple[int, Recording | SceneError]]:
-    """Simulate recordings of pumps, without truth.
+    """Simulate recordings of pumps.
 
     Parameters
     ----------
     jobs : sequence of (Scene, int)
         Scene and seed of each.
+    truth : collection of str
+        Names of the truth that is asked for. Whatever is not of :data:`GATHERED_TRUTH` is known
+        of a record alone.
 
     Yields
     ------
@@ -51,10 +55,11 @@ def simulate_pumps(
         refused.
     """
     kinds: dict[LaneKind, list[_Job]] = {}
+    told = not set(truth) - set(GATHERED_TRUTH)
     for number, (scene, seed) in enumerate(jobs):
         pump = cast(PumpScene, scene)
         try:
-            kind = pumps_alike(pump)
+            kind = pumps_alike(pump) if told else None
             plan = planned(pump) if kind else None
         except LimitError as error:
             yield number, refused_run(pump, error)
@@ -63,11 +68,11 @@ def simulate_pumps(
             yield number, error
             continue
         if kind is None or plan is None:
-            yield number, _alone(pump, seed)
+            yield number, _alone(pump, seed, bool(truth))
             continue
         kinds.setdefault(kind, []).append(_Job(number, seed, plan))
     for kind, group in _pooled(kinds):
-        yield from _together(group, kind)
+        yield from _together(group, kind, bool(truth))
 
 
 def pumps_alike(scene: Scene) -> LaneKind | None:
@@ -93,22 +98,24 @@ def _pooled(kinds: dict[LaneKind, list[_Job]]) -> list[tuple[LaneKind, list[_Job
     return large
 
 
-def _alone(scene: PumpScene, seed: int) -> Recording | SceneError:
+def _alone(scene: PumpScene, seed: int, truth: bool) -> Recording | SceneError:
     try:
-        return simulate_pump(scene, seed, truth=False, raise_on_failure=False)
+        return simulate_pump(scene, seed, truth=truth, raise_on_failure=False)
     except SceneError as error:
         return error
 
 
-def _together(group: list[_Job], kind: LaneKind) -> Iterator[tuple[int, Recording | SceneError]]:
+def _together(
+    group: list[_Job], kind: LaneKind, truth: bool
+) -> Iterator[tuple[int, Recording | SceneError]]:
     if len(group) < _FEWEST:
         for job in group:
-            yield job.number, _alone(job.plan.scene, job.seed)
+            yield job.number, _alone(job.plan.scene, job.seed, truth)
         return
     columns, begun = lane_columns(kind), {}
 
     def gathering(n: int) -> Gathering:
-        begun[n] = Gathering(group[n].plan, group[n].seed, columns)
+        begun[n] = Gathering(group[n].plan, group[n].seed, columns, truth=truth)
         return begun[n]
 
     for n, run in run_lanes([lane_job(job.plan) for job in group], kind, gathering):
