@@ -14,7 +14,8 @@ from wearstate.diagnose.learning.regressions import CANDIDATES, Blend
 from wearstate.diagnose.wear_model.bundle import Bundle, save_bundle
 from wearstate.diagnose.wear_model.estimate import ModelError
 from wearstate.diagnose.wear_model.file import load_model, save_model
-from wearstate.diagnose.wear_model.learn import TrainingRows, learn
+from wearstate.diagnose.wear_model.learn import learn
+from wearstate.diagnose.wear_model.training_rows import TrainingRows
 
 NAMES = ("a.shape_1", "a.kurtosis", "a.rms")
 LINES_MS = 0.12  # a budget that lines alone keep

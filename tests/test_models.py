@@ -18,8 +18,9 @@ from wearstate.diagnose.learning.regressions import CANDIDATES, Blend, Linear
 from wearstate.diagnose.wear_model import train as training
 from wearstate.diagnose.wear_model.estimate import ModelError
 from wearstate.diagnose.wear_model.file import load_model, save_model
-from wearstate.diagnose.wear_model.learn import TrainingRows, learn
+from wearstate.diagnose.wear_model.learn import learn
 from wearstate.diagnose.wear_model.train import train_model
+from wearstate.diagnose.wear_model.training_rows import TrainingRows
 from wearstate.sim.output.recording import DataError, Recording
 from wearstate.sim.wear.archard import grade
 

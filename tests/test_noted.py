@@ -9,7 +9,8 @@ from wearstate.diagnose.feature_rows.noted import NOTED, doubted, noted_values, 
 from wearstate.diagnose.wear_model.bundle import load_bundle
 from wearstate.diagnose.wear_model.estimate import ModelError
 from wearstate.diagnose.wear_model.file import load_model, save_model
-from wearstate.diagnose.wear_model.learn import TrainingRows, learn
+from wearstate.diagnose.wear_model.learn import learn
+from wearstate.diagnose.wear_model.training_rows import TrainingRows
 
 NAMES = tuple(f"acc_x.order_{i}.level_db" for i in range(1, 9))
 N = 120

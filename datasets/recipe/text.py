@@ -1,6 +1,7 @@
 """The text of a recipe: built-in or a file, with what it takes over from another recipe."""
 
 import json
+import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -251,6 +252,20 @@ def _refuse_without(own: Mapping[str, Any], base: Mapping[str, Any], place: Path
     ]
     if faults:
         raise RecipeError(place.stem, faults)
+
+
+def name_in(toml_text: str) -> str:
+    """What a recipe or scene calls itself; empty where its text does not say.
+
+    Examples
+    --------
+    >>> name_in('name = "bilge-pump"'), name_in("")
+    ('bilge-pump', '')
+    """
+    try:
+        return str(tomllib.loads(toml_text).get("name", ""))
+    except (ValueError, RecursionError):  # ValueError: no TOML, or a number too long
+        return ""
 
 
 def beside(folder: Path, name: str) -> str | Path:

@@ -132,6 +132,12 @@ def calibrate(
     help="Healthy records of DATA's machines: a model that is told how each was when new.",
 )
 @click.option(
+    "--refuse",
+    multiple=True,
+    type=DATA,
+    help="Data set that the model must refuse: pins in oil, another fault or machine; repeatable.",
+)
+@click.option(
     "--features",
     multiple=True,
     metavar="SET|NAMES|FILE",
@@ -156,6 +162,7 @@ def train(
     held_out: float,
     split: str | None,
     healthy: Path | None,
+    refuse: Sequence[Path],
     features: Sequence[str],
     budget_ms: float | None,
     joined: Sequence[str],
@@ -173,7 +180,7 @@ def train(
     from ...datasets.file.views import views_of
     from ..class_model.train import names_classes
     from ..evaluation.evaluate import score
-    from ..evaluation.text import features_text, score_lines
+    from ..evaluation.text import features_text, refusal_lines, score_lines
     from ..feature_rows.feature_choice import choice_in, choices_of, costs_ms
     from ..feature_rows.healthy import references
     from ..feature_rows.transfer_reference import healthy_transfer
@@ -181,7 +188,7 @@ def train(
     from ..wear_model.train import train_model
 
     views = views_of(joined)
-    inputs = [data, *(view.path for view in views), *([healthy] if healthy else [])]
+    inputs = [data, *refuse, *(view.path for view in views), *([healthy] if healthy else [])]
     check_outputs(inputs, [(output, MODEL_SUFFIXES)], force)
     source = click.get_current_context().get_parameter_source("held_out")
     shared = source is not click.core.ParameterSource.DEFAULT
@@ -191,11 +198,10 @@ def train(
     if target is not None and names_classes(data, target):
         if len(choices) > 1:
             raise click.UsageError("--features must name one set for a model of named conditions")
-        if healthy or budget_ms or shared or split or views:
+        if healthy or budget_ms or shared or split or views or refuse:
             raise click.UsageError(
-                f"--baseline, --budget-ms, --held-out, --join and --split are for a severity; "
-                f"{target} "
-                "names conditions, and every recording is left out in turn"
+                f"--baseline, --budget-ms, --held-out, --join, --refuse and --split are for a "
+                f"severity; {target} names conditions, and every recording is left out in turn"
             )
         _train_classes(data, output, target, choices[0], seed, worker_count(jobs), force, as_json)
         return
@@ -209,6 +215,7 @@ def train(
             jobs=worker_count(jobs),
             budget_ms=budget_ms,
             baseline=healthy,
+            refuse=refuse,
             choices=choices,
             progress=progress,
         )
@@ -232,6 +239,7 @@ def train(
         head,
         *left_out,
         *features_text(model.card, choices, costs),
+        *refusal_lines(model.card),
         *score_lines(result, model.card),
     ]
     if model.notice:
@@ -241,6 +249,7 @@ def train(
         "path": str(output),
         "trained_on": trained.table(),
         "features": chosen,
+        "strangers": [rates.table() for rates in model.card.strangers],
         "held_out": result,
     }
     emit(value, as_json, "\n".join(lines))

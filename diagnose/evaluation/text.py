@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ..feature_rows.feature_choice import choice_in, words_of
-from ..feature_rows.feature_table import FeatureSelection
+from ..feature_rows.feature_table import FeatureSelection, kind_words
 from ..feature_rows.model_card import ModelCard
 from ..learning.scores import LEVEL
 from ..pages.words import severity_word
@@ -44,6 +44,21 @@ def features_text(
         nested = 1e6 * card.model.nested_mae_m
         lines.append(f"  error with the set chosen again in every fold: {nested:.3g} um")
     return lines
+
+
+def refusal_lines(card: ModelCard) -> list[str]:
+    """What a model was trained to refuse, as lines for a terminal; none where that is nothing.
+
+    Parameters
+    ----------
+    card : ModelCard
+        Of the model.
+    """
+    return [
+        f"Refuses {kind_words(rates.name)}: {rates.detection_rate:.1%} of {rates.records}, and "
+        f"{rates.false_alarm_rate:.1%} of the familiar ones, on machines left out"
+        for rates in card.strangers
+    ]
 
 
 def score_lines(result: Mapping[str, Any], card: ModelCard) -> list[str]:

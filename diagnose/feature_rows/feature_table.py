@@ -159,6 +159,17 @@ def regime_words(name: str) -> str:
     return f"{name.removeprefix(f'{choice}_')} {REGIMES[choice]}"
 
 
+def kind_words(name: str) -> str:
+    """A kind of recordings that a model refuses.
+
+    Examples
+    --------
+    >>> kind_words("lubrication_starved"), kind_words("leaking-pumps")
+    ('a starved pin', 'the recordings of leaking-pumps')
+    """
+    return f"a {regime_words(name)}" if is_regime(name) else f"the recordings of {name}"
+
+
 def knows_no_oil(severity: str, findings: Sequence[str]) -> bool:
     """Whether a model of the clearance of a pin was trained without regimes of lubrication.
 

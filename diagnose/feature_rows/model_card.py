@@ -150,6 +150,18 @@ class ConfounderRates(Strict):
     members: dict[str, float]
 
 
+class StrangerRates(Strict):
+    """How recordings of a kind that a model must refuse are told from familiar ones.
+
+    Rates are of machines without part in the fit: of this kind refused, and of familiar ones.
+    """
+
+    name: str
+    records: int = Field(ge=1)
+    detection_rate: Portion
+    false_alarm_rate: Portion
+
+
 class LayoutCard(Strict):
     """What a recording must have to be an input of a model, or one of its views."""
 
@@ -187,6 +199,7 @@ class ModelCard(LayoutCard):
     budget_ms: float = Field(gt=0)
     model: ChosenModel
     confounders: list[ConfounderRates]
+    strangers: list[StrangerRates] = Field(default_factory=list)
 
     @model_validator(mode="after")
     def _fits_itself(self) -> Self:

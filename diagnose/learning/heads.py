@@ -1,7 +1,7 @@
 """Whether a fault beside the wear is there, or a regime in which wear sounds different."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,6 +59,35 @@ class FittedHead:
     members: dict[str, float]
     probability: Float
     shifted: Float
+
+
+def told_apart(fitted: FittedHead, here: NDArray[np.bool_], share: float) -> Head:
+    """A head that calls no more than a share of the records without it present.
+
+    Parameters
+    ----------
+    fitted : FittedHead
+    here : numpy.ndarray [shape=(n,)]
+        Whether each record has it.
+    share : float
+        Of the records without.
+
+    Returns
+    -------
+    Head
+        Its threshold is never below the share of the records that have it: those below are
+        likelier without it, however rare that is.
+
+    Examples
+    --------
+    >>> fitted = FittedHead(
+    ...     head=Head(name="oil", blend=None, slope=1.0, offset=0.0, threshold=0.5), members={},
+    ...     probability=np.r_[np.linspace(0.0, 0.4, 101), 0.9], shifted=np.zeros(102))
+    >>> told_apart(fitted, np.arange(102) > 100, 0.1).threshold
+    0.36
+    """
+    usual = float(np.quantile(fitted.probability[~here], 1.0 - share))
+    return replace(fitted.head, threshold=max(usual, float(here.mean())))
 
 
 def fit_head(

@@ -16,6 +16,7 @@ from ..feature_rows.feature_table import (
     FeatureSelection,
     held_against,
     is_regime,
+    kind_words,
     knows_no_oil,
     recording_features,
     regime_words,
@@ -218,6 +219,8 @@ class WearModel:
         Level to expect of each channel.
     heads : tuple of Head
         Faults beside the wear.
+    strangers : tuple of Head
+        Kinds of recordings that it was shown to refuse.
     card : ModelCard
         What it was trained on, its inputs, limits and ranges.
     """
@@ -227,6 +230,7 @@ class WearModel:
     familiarity: Familiarity
     levels: Levels
     heads: tuple[Head, ...] = ()
+    strangers: tuple[Head, ...] = ()
     card: ModelCard
 
     def __repr__(self) -> str:
@@ -497,11 +501,11 @@ class WearModel:
             "p_limit": self.p_limit,
             "nearest": self._nearest(row),
         }
+        reasons = (*self._refused(row), *self._too_quiet(row))
         if known["p_value"] <= self.p_limit:
-            reason = _strangeness(look.distance, self.blind.calibration.distance)
-            return Estimate(verdict="unfamiliar", reasons=(*self._too_quiet(row), reason), **known)
-        if too_quiet := self._too_quiet(row):
-            return Estimate(verdict="unfamiliar", reasons=too_quiet, **known)
+            reasons += (_strangeness(look.distance, self.blind.calibration.distance),)
+        if reasons:
+            return Estimate(verdict="unfamiliar", reasons=reasons, **known)
         asked, inputs = self._asked(row, baseline, conditions)
         findings = self._findings(row)
         cautions = (
@@ -526,6 +530,16 @@ class WearModel:
             **asked.grading(
                 inputs, look.distance, self.card.grade_edges_m, cautious=bool(cautions)
             ),
+        )
+
+    def _refused(self, row: Float) -> tuple[str, ...]:
+        """That a recording sounds like one of a kind that the model was shown to refuse."""
+        return tuple(
+            f"it sounds like {kind_words(rates.name)}, which this model was trained to refuse "
+            f"(it refused {rates.detection_rate:.1%} of those from machines that it had not seen); "
+            "to have it graded, train on a data set that holds such machines"
+            for head, rates in zip(self.strangers, self.card.strangers, strict=True)
+            if head.probability(row[None, :])[0] > head.threshold
         )
 
     def _too_quiet(self, row: Float) -> tuple[str, ...]:
@@ -572,7 +586,9 @@ class WearModel:
 
     @property
     def _knows_no_oil(self) -> bool:
-        return knows_no_oil(self.card.severity, [rates.name for rates in self.card.confounders])
+        known = [rates.name for rates in self.card.confounders]
+        known += [rates.name for rates in self.card.strangers]
+        return knows_no_oil(self.card.severity, known)
 
     def _nearest(self, row: Float) -> str:
         group, distance = self.familiarity.nearest(self.names, row)

@@ -149,25 +149,48 @@ class _Structure(Strict):
     blind: BlendStructure | _ExpertsStructure
     informed: BlendStructure | _ExpertsStructure | None
     heads: list[_HeadStructure] = Field(max_length=100)
+    strangers: list[_HeadStructure] = Field(default_factory=list, max_length=100)
 
 
 def _structure_of(model: WearModel) -> dict[str, Any]:
-    return {
+    informed = model.informed
+    structure = {
         "blind": _severity_structure(model.blind.severity),
-        "informed": None
-        if model.informed is None
-        else _severity_structure(model.informed.severity),
-        "heads": [
-            {
-                "name": head.name,
-                "slope": head.slope,
-                "offset": head.offset,
-                "threshold": head.threshold,
-                "blend": blend_structure(head.blend),
-            }
-            for head in model.heads
-        ],
+        "informed": None if informed is None else _severity_structure(informed.severity),
+        "heads": [_head_structure(head) for head in model.heads],
     }
+    if model.strangers:
+        structure["strangers"] = [_head_structure(head) for head in model.strangers]
+    return structure
+
+
+_HEAD_PARTS = ("heads", "strangers")
+"""Parts of a model that are heads."""
+
+
+def _head_structure(head: Head) -> dict[str, Any]:
+    return {
+        "name": head.name,
+        "slope": head.slope,
+        "offset": head.offset,
+        "threshold": head.threshold,
+        "blend": blend_structure(head.blend),
+    }
+
+
+def _heads_of(
+    structures: Sequence[_HeadStructure], arrays: Mapping[str, NDArray[Any]], part: str
+) -> tuple[Head, ...]:
+    return tuple(
+        Head(
+            name=head.name,
+            blend=blend_of(head.blend, arrays, f"{part}.{i}"),
+            slope=head.slope,
+            offset=head.offset,
+            threshold=head.threshold,
+        )
+        for i, head in enumerate(structures)
+    )
 
 
 def _severity_structure(severity: Blend | Experts) -> dict[str, Any]:
@@ -218,8 +241,9 @@ def _arrays_of(model: WearModel) -> dict[str, NDArray[Any]]:
         found |= _severity_arrays(estimator.severity, f"{place}.severity")
         for part in _ESTIMATOR_PARTS:
             found |= part_arrays(getattr(estimator, part), f"{place}.{part}")
-    for i, head in enumerate(model.heads):
-        found |= blend_arrays(head.blend, f"heads.{i}")
+    for part in _HEAD_PARTS:
+        for i, head in enumerate(getattr(model, part)):
+            found |= blend_arrays(head.blend, f"{part}.{i}")
     return {name: np.asarray(value) for name, value in found.items()}
 
 
@@ -247,16 +271,7 @@ def _estimator_of(
 def _model_of(
     structure: _Structure, arrays: Mapping[str, NDArray[Any]], card: ModelCard
 ) -> WearModel:
-    heads = tuple(
-        Head(
-            name=head.name,
-            blend=blend_of(head.blend, arrays, f"heads.{i}"),
-            slope=head.slope,
-            offset=head.offset,
-            threshold=head.threshold,
-        )
-        for i, head in enumerate(structure.heads)
-    )
+    heads = _heads_of(structure.heads, arrays, "heads")
     features = len(card.features)
     model = WearModel(
         blind=_estimator_of(structure.blind, arrays, "blind", heads, features),
@@ -264,6 +279,7 @@ def _model_of(
         if structure.informed is None
         else _estimator_of(structure.informed, arrays, "informed", heads, features),
         heads=heads,
+        strangers=_heads_of(structure.strangers, arrays, "strangers"),
         card=card,
         **{part: kind(**part_of(arrays, part, kind)) for part, kind in _ARRAY_PARTS.items()},
     )
@@ -285,8 +301,8 @@ def _check_structure(model: WearModel, path: str | Path) -> None:
         "blind": _estimator_fits(model.blind, inputs),
         "informed": model.informed is None
         or (more > 0 and _estimator_fits(model.informed, inputs + more)),
-        "heads": all(blend_fits(head.blend, n) for head in model.heads)
-        and [h.name for h in model.heads] == [each.name for each in model.card.confounders],
+        "heads": _heads_fit(model.heads, [each.name for each in model.card.confounders], n),
+        "strangers": _heads_fit(model.strangers, [each.name for each in model.card.strangers], n),
         "familiarity": familiarity_fits(model.familiarity, names, physical.shape[1]),
         "levels": _levels_fit(model.levels, len(level_channels(names)), shapes.shape[1]),
         "numbers": numbers_fit(_arrays_of(model)),
@@ -294,6 +310,12 @@ def _check_structure(model: WearModel, path: str | Path) -> None:
     bad = [name for name, good in fits.items() if not good]
     if bad:
         raise ModelError(f"{path}: {', '.join(bad)} do not fit {n} features; retrain it")
+
+
+def _heads_fit(heads: Sequence[Head], names: Sequence[str], n: int) -> bool:
+    return [head.name for head in heads] == names and all(
+        blend_fits(head.blend, n) for head in heads
+    )
 
 
 def _estimator_fits(estimator: Estimator, n: int) -> bool:

@@ -1,8 +1,7 @@
 """Fit everything that a wear model holds, by folds of whole machines."""
 
-import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -12,9 +11,8 @@ from ...datasets.split.rules import group_folds
 from ...sim.output.recording import DataError
 from ..feature_rows.feature_choice import Selection
 from ..feature_rows.feature_table import is_regime
-from ..feature_rows.healthy import referenced_rows
+from ..feature_rows.model_card import StrangerRates
 from ..feature_rows.noted import doubted, noted_values, strayed
-from ..feature_rows.physical import moved_rows
 from ..feature_rows.quality import Levels, fit_levels
 from ..learning.conformal import IntervalCalibration, fit_scale, scale_inputs
 from ..learning.detection import visible_from
@@ -35,84 +33,16 @@ from ..learning.severity import Estimator
 from .noise_floor import usual_excess
 from .novelty import REACH, Familiarity, fit_familiarity
 from .quietness import CAUTIONED_SHARE, REFUSED_SHARE, most_lacking
+from .strangers import fit_strangers
+from .training_rows import FOLDS, TrainingRows
 
 Float = NDArray[np.float64]
-
-FOLDS = 5
-"""Of whole machines, for every out-of-fold estimate."""
 
 _FEWEST_FAULTS = 20  # records with and without a fault, for an error rate to within a tenth
 _RARE = 0.99  # of the records: as far, or with as many features out of range, as 1 in 100 is
 _WORTH = 0.1  # of the error: conditions that bring less are not worth a person's asking
 
 SeverityFit = Fitted[Blend] | Fitted[Experts]
-
-
-@dataclass(frozen=True, kw_only=True)
-class TrainingRows:
-    """What a model learns from.
-
-    Attributes
-    ----------
-    names : tuple of str
-        Of the features.
-    rows : numpy.ndarray [shape=(n, n_features)]
-    baseline : numpy.ndarray [shape=(n, n_features)] or None
-        Healthy rows of the same machines.
-    severity : numpy.ndarray [shape=(n,)]
-        [m], > 0.
-    groups : numpy.ndarray [shape=(n,)]
-        Machine draw of each record.
-    conditions : tuple of str
-        Noted conditions that vary.
-    notes : sequence of mapping
-        What was noted beside each record; of no matter without conditions.
-    faults : dict
-        Name -> presence [shape=(n,)] of each fault beside the wear.
-    """
-
-    names: tuple[str, ...]
-    rows: Float
-    baseline: Float | None
-    severity: Float
-    groups: NDArray[np.intp]
-    conditions: tuple[str, ...] = ()
-    notes: Sequence[Mapping[str, Any]] = ()
-    faults: dict[str, NDArray[np.bool_]] = field(default_factory=dict)
-
-    @property
-    def inputs(self) -> Float:
-        """What the severity is told from."""
-        return self.rows if self.baseline is None else referenced_rows(self.rows, self.baseline)
-
-    @property
-    def first_feature(self) -> int:
-        """Column of the inputs at which the features as they are begin."""
-        return 0 if self.baseline is None else len(self.names)
-
-    def moved(self, seed: int) -> "TrainingRows":
-        """The same records of machines whose resonances stand anywhere within the reach.
-
-        Each machine has its own factor, which its healthy rows share.
-        """
-        machines, place = np.unique(self.groups, return_inverse=True)
-        steps = np.random.default_rng(seed).uniform(-1, 1, len(machines))[place]
-        factor = np.exp(steps * math.log(REACH))
-
-        def there(rows: Float) -> Float:
-            return moved_rows(self.names, rows, factor, cells=True)
-
-        healthy = None if self.baseline is None else there(self.baseline)
-        return replace(self, rows=there(self.rows), baseline=healthy)
-
-    def part(self, columns: NDArray[np.intp]) -> "TrainingRows":
-        """The same records with some of the features."""
-        return replace(
-            self,
-            names=tuple(self.names[i] for i in columns),
-            rows=self.rows[:, columns],
-            baseline=None if self.baseline is None else self.baseline[:, columns],
-        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -131,6 +61,8 @@ class Learnt:
     levels : Levels
     heads : tuple of (Head, dict)
         With their error rates, for the card.
+    strangers : tuple of (Head, StrangerRates)
+        What tells the recordings to refuse.
     """
 
     severity: SeverityFit
@@ -139,6 +71,7 @@ class Learnt:
     familiarity: Familiarity
     levels: Levels
     heads: tuple[tuple[Head, dict[str, Any]], ...]
+    strangers: tuple[tuple[Head, StrangerRates], ...] = ()
 
 
 def learn(
@@ -175,9 +108,11 @@ def learn(
     Raises
     ------
     DataError
-        A severity is not positive, or no model is within the budget.
+        A severity is not positive, no model is within the budget, or what is to be refused is
+        not told from the rest.
     """
     refuse_no_wear(training.severity)
+    strangers = fit_strangers(training, seed)
     folds = group_folds(training.groups, n=FOLDS, seed=seed)
     other = training.moved(seed)
     heads = _heads(training, other, folds, seed)
@@ -203,6 +138,7 @@ def learn(
         familiarity=fit_familiarity(training.names, training.rows, training.groups, **limits),
         levels=fit_levels(training.names, training.rows, folds),
         heads=tuple((one.head, _rates(one, training, severity.estimate, as_new)) for one in heads),
+        strangers=strangers,
     )
 
 

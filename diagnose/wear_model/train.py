@@ -16,6 +16,7 @@ from ...datasets.file.machines import machine_origin
 from ...datasets.file.record import Attributes, DataSet
 from ...datasets.file.views import MARK, JoinedSet, layout_card
 from ...datasets.recipe.recipe import recorded_scene, wear_limits
+from ...datasets.recipe.text import name_in
 from ...datasets.split.rules import check_no_leak, group_folds, group_split
 from ...datasets.split.stored import usable_sides
 from ...sim.output.recording import DataError
@@ -47,7 +48,9 @@ from ..learning.regressions import (
 )
 from .bundle import checked
 from .estimate import WearModel
-from .learn import FOLDS, Learnt, TrainingRows, learn, refuse_no_wear
+from .learn import Learnt, learn, refuse_no_wear
+from .strangers import strangers_in
+from .training_rows import FOLDS, Strangers, TrainingRows
 
 Float = NDArray[np.float64]
 
@@ -64,6 +67,7 @@ def train_model(
     jobs: int = 1,
     budget_ms: float | None = None,
     baseline: str | Path | None = None,
+    refuse: Sequence[str | Path] = (),
     choices: Sequence[FeatureSelection] = (USUAL,),
     progress: Progress | None = None,
 ) -> tuple[WearModel, FeatureTable, NDArray[np.intp]]:
@@ -91,6 +95,9 @@ def train_model(
         Data set of healthy records of the same machines, by identity (recipe, seed and number, or
         declared name): the model is then referenced, and needs healthy recordings of every machine
         it is asked about.
+    refuse : sequence of str or Path
+        Data sets of the same channels that the model must refuse: regimes of lubrication, faults
+        or machines that it does not learn to grade.
     choices : sequence of FeatureSelection
         Sets of features to choose from, all of the same views; records that lack a view are left
         out.
@@ -110,7 +117,8 @@ def train_model(
     ------
     DataError
         No such severity column or split, no limits, too few machine draws, machines unknown or
-        without a healthy record, or a budget that no model keeps.
+        without a healthy record, a budget that no model keeps, or recordings to refuse that have
+        other channels or are not told from the rest.
     """
     with DataSet(path) as data:
         head, draws = data.attributes, data.manifest["group"].nunique()
@@ -125,6 +133,11 @@ def train_model(
             raise DataError("join and baseline must not both be given; train cold to join views")
         refuse_strangers(path, baseline)
     known = healthy_transfer(baseline, choices)
+    if refuse and (views or known is not None):
+        raise DataError(
+            "refuse needs features of one recording by itself: give no join, and no features held "
+            "against a healthy transfer function"
+        )
     candidates = candidates_of(path, choices, known)
     ways: dict[str, Any] = {"choice": candidates.whole, "jobs": jobs, "progress": progress}
     table = feature_table(path, healthy=known, **ways)
@@ -140,6 +153,9 @@ def train_model(
         train, test = sides.train, sides.test  # leaks are refused where it was read
         held_out = len(np.unique(groups[test])) / len(np.unique(groups))
         _check_kept(len(np.unique(groups[train])), draws, f"split {sides.name}", path)
+    strangers = strangers_in(
+        refuse, head, candidates.whole, table.names, jobs=jobs, progress=progress
+    )
     train, test = np.intersect1d(train, whole), np.intersect1d(test, whole)
     _check_kept(len(np.unique(groups[train])), draws, "what lacks no view", path)
     model = fit_model(
@@ -152,6 +168,7 @@ def train_model(
         seed=seed,
         budget_ms=budget_ms,
         candidates=candidates,
+        strangers=strangers,
         path=path,
     )
     more: dict[str, Any] = {}
@@ -180,6 +197,7 @@ def fit_model(
     budget_ms: float | None = None,
     choice: FeatureSelection = USUAL,
     candidates: Candidates | None = None,
+    strangers: tuple[Strangers, ...] = (),
     path: str | Path = "the data set",
 ) -> WearModel:
     """Fit a wear model on some rows of a feature table.
@@ -199,6 +217,8 @@ def fit_model(
         What the table is made of.
     candidates : Candidates, optional
         Sets among the columns of the table, of which one is chosen; all of `choice` by default.
+    strangers : tuple of Strangers
+        Recordings to refuse, with the columns of the table.
     path : str or Path
         Of the data set, for messages.
 
@@ -228,6 +248,7 @@ def fit_model(
             name: here[train]
             for name, here in (confounders_in(table.manifest) | regimes_in(table.manifest)).items()
         },
+        strangers=strangers,
     )
     candidate_rows = [whole.part(columns) for columns in candidates.columns]
     for each in candidate_rows:
@@ -377,6 +398,7 @@ def _model(learnt: Learnt, card: ModelCard) -> WearModel:
         familiarity=learnt.familiarity,
         levels=learnt.levels,
         heads=tuple(head for head, _ in learnt.heads),
+        strangers=tuple(head for head, _ in learnt.strangers),
         card=card,
     )
 
@@ -416,8 +438,8 @@ def _card(
             "split_sha256": "",
             "training_groups": sorted({int(g) for g in manifest["group"]}),
             "training_signals": sorted({int(crc) for crc in manifest["signal_crc32"]}),
-            "scene": _name_in(head.scene),
-            "recipe": _name_in(head.recipe),
+            "scene": name_in(head.scene),
+            "recipe": name_in(head.recipe),
         },
         "severity": aim.column,
         "severity_range_m": [float(severity.min()), float(severity.max())],
@@ -481,7 +503,9 @@ def _model_card(learnt: Learnt, budget_ms: float | None) -> dict[str, Any]:
             ],
         },
         "confounders": [rates for _, rates in learnt.heads],
-    }
+    } | (
+        {"strangers": [rates.table() for _, rates in learnt.strangers]} if learnt.strangers else {}
+    )
 
 
 def _healthy(training: TrainingRows, grade: NDArray[Any]) -> dict[str, list[float]]:
@@ -493,12 +517,3 @@ def _healthy(training: TrainingRows, grade: NDArray[Any]) -> dict[str, list[floa
     rows = training.rows[kept]
     apart = rows if training.baseline is None else rows - training.baseline[kept]
     return {"mean": rows.mean(axis=0).tolist(), "spread": apart.std(axis=0).tolist()}
-
-
-def _name_in(toml_text: str) -> str:
-    import tomllib
-
-    try:
-        return str(tomllib.loads(toml_text).get("name", ""))
-    except (ValueError, RecursionError):  # ValueError: no TOML, or a number too long
-        return ""

@@ -21,6 +21,7 @@ def train(
     held_out: float = 0.25,
     split: str | None = None,
     baseline: str | Path | None = None,
+    refuse: Sequence[str | Path] = (),
     features: Sequence[str] = (),
     budget_ms: float | None = None,
     joined: Sequence[str] = (),
@@ -44,6 +45,10 @@ def train(
     baseline : str or Path, optional
         Data set of healthy records of the same machines: the model is then told how each was when
         new, and needs that of every machine it is asked about.
+    refuse : sequence of str or Path
+        Data sets that the model must refuse, as `data` but without its kind of machine: another
+        regime of lubrication, another fault, another machine. One kind each, or one for each regime
+        that a set draws; at least 20 recordings of a kind.
     features : sequence of str
         Sets of features (standard, core, complete) or names; of several, folds choose. The
         standard set by default.
@@ -67,7 +72,8 @@ def train(
     ------
     DataError
         No such column or split, no limits, too few machine draws, machines unknown or without a
-        healthy record, or a budget that no model keeps.
+        healthy record, a budget that no model keeps, or recordings to refuse that have other
+        channels or are not told from the rest.
 
     Examples
     --------
@@ -87,6 +93,7 @@ def train(
         jobs=jobs,
         budget_ms=budget_ms,
         baseline=baseline,
+        refuse=refuse,
         choices=tuple(replace(choice, views=views) for choice in choices_of(features)),
         progress=progress,
     )

@@ -22,8 +22,9 @@ from wearstate.diagnose.learning.conformal import (
     tails,
 )
 from wearstate.diagnose.learning.grades import grades_of
-from wearstate.diagnose.wear_model.learn import TrainingRows, learn
+from wearstate.diagnose.wear_model.learn import learn
 from wearstate.diagnose.wear_model.novelty import novelty_p_value
+from wearstate.diagnose.wear_model.training_rows import TrainingRows
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -28,7 +28,7 @@ from wearstate.datasets.recipe.recipe import load_recipe
 from wearstate.diagnose.feature_rows.feature_table import feature_table, recording_features
 from wearstate.diagnose.learning.regressions import CANDIDATES, Blend
 from wearstate.diagnose.learning.scores import resampled, share
-from wearstate.diagnose.wear_model.learn import TrainingRows
+from wearstate.diagnose.wear_model.training_rows import TrainingRows
 from wearstate.sim.output.recording import Recording
 
 SEED = 0
