@@ -129,6 +129,23 @@ def test_what_has_no_room_is_left_out_or_refused(bokeh):
         point_block([axes("all", 2000)])
 
 
+def test_moments_stand_upright_and_are_named(bokeh):
+    mark = Mark(x=1.0, y=1.0, told="", block="")
+    series = Series(name="", marks=(mark,), colour="#111111")
+    axes = PointAxes(
+        title="life",
+        x_name="",
+        y_name="",
+        series=(series,),
+        moments=(3.25, 7.5),
+        moments_name="maintenance",
+    )
+    item = point_block([axes]).item
+    assert "VSpan" in item
+    assert "[3.25,7.5]" in item.replace(" ", "")
+    assert '"maintenance"' in item
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

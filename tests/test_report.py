@@ -24,6 +24,7 @@ from wearstate.diagnose.pages.embed import MOST_BYTES
 from wearstate.diagnose.report.batch import judge_all, recordings_in, times_of
 from wearstate.diagnose.report.figures import moved_panel, report_pictures
 from wearstate.diagnose.report.page import batch_html, report_html
+from wearstate.diagnose.report.points import trend_points
 from wearstate.diagnose.report.text import batch_text, report_text
 from wearstate.diagnose.report.verdict import (
     evidence_words,
@@ -658,8 +659,9 @@ def test_with_times_only_the_latest_counts(model, tmp_path):
     assert timed.current[0].grade == 0
     assert timed.rows[0] == timed.current[0]
     assert timed.trends[""].starts == (0, 3)
-    assert "6 recordings, the latest 1: 1 as new" in shown(page)
+    assert "6 recordings; now: 1 as new" in shown(page)
     assert "3 usable recordings since the last maintenance" in shown(page)
+    assert trend_points(timed, "", "the machine").moments == (1250.0,)  # between 1,000 and 1,500
 
 
 def test_a_trend_to_zoom_in_names_its_recordings(model_file, tmp_path):

@@ -119,6 +119,10 @@ class PointAxes:
         Round a line; empty without one.
     band_name : str
         Of the band, in the legend.
+    moments : tuple of float
+        Upright lines, as x.
+    moments_name : str
+        Of these, in the legend.
     x_kind, y_kind : str
         ``linear`` or ``log``; of x also ``datetime``.
     """
@@ -131,6 +135,8 @@ class PointAxes:
     level: tuple[str, float] | tuple[()] = ()
     band: tuple[tuple[float, ...], ...] = ()
     band_name: str = ""
+    moments: tuple[float, ...] = ()
+    moments_name: str = ""
     x_kind: Literal["linear", "log", "datetime"] = "linear"
     y_kind: Literal["linear", "log"] = "linear"
 
@@ -258,6 +264,9 @@ def _draw_lines(plot: Any, panel: PointAxes) -> None:
     if panel.level:
         name, height = panel.level
         plot.hspan(y=[height], line_color="#b3261e", line_dash="dashed", legend_label=visible(name))
+    if panel.moments:
+        ways = {"line_color": "#666666", "line_dash": "dashed"}
+        plot.vspan(x=list(panel.moments), legend_label=visible(panel.moments_name), **ways)
 
 
 def _draw_series(plot: Any, series: Sequence[Series]) -> Iterator[Any]:

@@ -178,7 +178,7 @@ class Batch:
         whole = f"{len(self.rows)} recordings"
         if all(row.grade is None for row in self.current):
             whole = f"no grade is given, {whole}"
-        return f"{whole}, the latest {len(self.current)}: {told}" if past else f"{whole}: {told}"
+        return f"{whole}; now: {told}" if past else f"{whole}: {told}"
 
 
 # --- which recordings

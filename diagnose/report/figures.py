@@ -287,8 +287,7 @@ def _draw_trend(axes: Any, trend: Trend, limits: Mapping[str, Any]) -> None:
         axes.plot(ahead, 1e3 * trend.line, color=_LINE_COLOUR, label="line")
     limit = 1e3 * limits["condemning_limit_m"]
     axes.axhline(limit, color="#c03a2b", lw=1.5, label=f"condemning limit {limit:.3g} mm")
-    for i in trend.starts[1:]:
-        between = _moments(trend, (trend.time_h[i - 1 : i] + trend.time_h[i : i + 1]) / 2)[0]
+    for between in _moments(trend, trend.maintenances_h):
         axes.axvline(between, color="0.4", ls="--", lw=1)
         axes.annotate(
             "maintenance",

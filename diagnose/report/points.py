@@ -53,6 +53,8 @@ def trend_points(batch: Batch, machine: str, heading: str) -> PointAxes:
         band=_band(trend, ahead) if ahead else (),
         band_name=f"{100 * trend.coverage:.3g} % band of the trend",
         level=(f"condemning limit {limit:.3g} mm", limit),
+        moments=tuple((factor * trend.maintenances_h).tolist()),
+        moments_name="maintenance",
     )
 
 

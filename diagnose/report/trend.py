@@ -112,6 +112,13 @@ class Trend:
     clock: Clock
     coverage: float
 
+    @property
+    def maintenances_h(self) -> Float:
+        """Times of maintenance [h]: halfway between the recordings before and after."""
+        first = list(self.starts[1:])
+        before = [i - 1 for i in first]
+        return np.asarray((self.time_h[before] + self.time_h[first]) / 2)
+
 
 def fit_trend(
     time_h: ArrayLike,

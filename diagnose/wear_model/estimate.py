@@ -534,12 +534,17 @@ class WearModel:
 
     def _refused(self, row: Float) -> tuple[str, ...]:
         """That a recording sounds like one of a kind that the model was shown to refuse."""
-        return tuple(
-            f"it sounds like {kind_words(rates.name)}, which this model was trained to refuse "
-            f"(it refused {rates.detection_rate:.1%} of those from machines that it had not seen); "
-            "to have it graded, train on a data set that holds such machines"
-            for head, rates in zip(self.strangers, self.card.strangers, strict=True)
-            if head.probability(row[None, :])[0] > head.threshold
+        called = [
+            (probability / head.threshold, head.name)
+            for head in self.strangers
+            if (probability := float(head.probability(row[None, :])[0])) > head.threshold
+        ]
+        if not called:
+            return ()
+        _, likeliest = max(called)
+        return (
+            f"it sounds like {kind_words(likeliest)}, which this model was trained to refuse; to "
+            "have it graded, train on a data set that holds such machines",
         )
 
     def _too_quiet(self, row: Float) -> tuple[str, ...]:
