@@ -219,7 +219,7 @@ def _left_words(found: Study) -> str:
     """What an unfinished search still takes; empty where that is not known."""
     if found.status != "out of budget" or not found.seconds_left > 0:
         return ""
-    return f"at least {time_words(found.seconds_left)} more of one core"
+    return f"some {time_words(found.seconds_left)} more of one core"
 
 
 def _note(scene: Scene, found: Study) -> str:

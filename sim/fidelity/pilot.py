@@ -19,12 +19,12 @@ from collections.abc import (
     MutableMapping,
     Sequence,
 )
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import stdtrit
+from scipy.special import chdtri, stdtrit
 
 from ..machine.simulate import alike, recorder, simulate, simulate_many
 from ..output.recording import Recorder, Recording
@@ -392,6 +392,13 @@ class Pilot:
         told = [each.seconds for each in self._outcomes.get(_key(values), [])[:TIMED]]
         return min((each for each in told if math.isfinite(each)), default=math.nan)
 
+    def tabulated(self, values: Mapping[str, Any], first: int, last: int) -> float:
+        """Time of the starts from `first` to before `last` by the tables [s], less side by side."""
+        timed = range(first, min(last, TIMED)) if self.clock else ()
+        others = last - first - len(timed)
+        together = others >= FIRST and self._kind((values, TIMED)) is not None
+        return self._cost(values) * (len(timed) + others * (_FASTER if together else 1.0))
+
     def measured(self, tabulated: float) -> float:
         """Time that so much by the tables takes here [s]; NaN where nothing was timed."""
         return self._scale() * tabulated if self._scale() > 0 else math.nan
@@ -624,20 +631,48 @@ _DOUBT = 0.05
 
 
 def starts_to_tell(candidate: Candidate, accuracy: float) -> int:
-    """Starts that would bring the scatter of a candidate down to what a judgement needs.
+    """Starts after which a candidate would be judged, if its errors stay as they are.
+
+    Parameters
+    ----------
+    candidate : Candidate
+        Of two starts at least.
+    accuracy : float
+        That is asked.
+
+    Returns
+    -------
+    int
+        Doubled as a comparison doubles them. The scatter of few starts is uncertain itself: it is
+        taken as large as that of all quantities
+        together is in all but one case of ten. An error at the accuracy is never told;
+        that of few starts is then no more than a guess, and so is what is returned.
 
     Examples
     --------
     >>> told = {"rms": Difference(mean=0.01, standard_error=0.02)}
     >>> one = Candidate(rungs={}, values={}, cost=1.0, differences=told, starts=4)
     >>> starts_to_tell(one, 0.03)
-    16
+    128
     """
-    ratio = candidate.standard_error / (RESOLVED * accuracy)
-    return math.ceil(candidate.starts * max(ratio, 1.0) ** 2 - _ROUNDING)
+    first, found = max(candidate.starts, _FEWEST), candidate.differences.values()
+    if not found:
+        return first
+    doubt = math.sqrt((first - 1) / float(chdtri(first - 1, 1 - _UNLIKELY / len(found))))
+    larger = [replace(d, standard_error=doubt * d.standard_error) for d in found]
+    starts = first
+    while starts < _ENDLESS * first:
+        smaller = math.sqrt(first / starts)
+        then = [replace(d, standard_error=smaller * d.standard_error) for d in larger]
+        known = {str(n): d for n, d in enumerate(then)}
+        if _judgement(known, starts, accuracy) != "more":
+            break
+        starts *= 2
+    return starts
 
 
-_ROUNDING = 1e-9
+_UNLIKELY = 0.1
+_ENDLESS = 1024  # times the starts that there are
 
 
 class Comparison:

@@ -9,6 +9,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise, product
+from statistics import median_high
 from typing import Any
 
 from ..machine.registry import machine_of
@@ -561,16 +562,20 @@ class Search:
 
     def _rest(self) -> None:
         """What is on the front beside the answers."""
-        whole = self.kept if self.best is None or self.fault else self.best
         self.tell("the rest of the front")
-        kept = self._undominated(whole)
-        for rungs in _by_cost(whole, kept):
-            whole.judge(rungs)
+        kept, self._pruned = self._undominated(self._widest)
+        for rungs in _by_cost(self._widest, kept):
+            self._widest.judge(rungs)
 
-    def _undominated(self, comparison: Comparison) -> dict[str, list[Rung]]:
-        """Rungs of each effect that no cheaper one is as good as, by their errors alone."""
+    @property
+    def _widest(self) -> Comparison:
+        """The comparison of widest choice that can be run."""
+        return self.kept if self.best is None or self.fault else self.best
+
+    def _undominated(self, comparison: Comparison) -> tuple[dict[str, list[Rung]], list[str]]:
+        """Rungs of each effect that no cheaper one is as good as, by their errors alone; others."""
         kept: dict[str, list[Rung]] = {}
-        self._pruned = []
+        pruned = []
         for name, rungs in comparison.rungs.items():
             kept[name] = [comparison.top[name]]
             ahead = [(r, comparison.judge({**comparison.top, name: r})) for r in rungs[:-1]][::-1]
@@ -578,12 +583,12 @@ class Search:
                 cheaper = [other for _, other in ahead[i + 1 :] if other.cost <= single.cost]
                 best = min((other.error for other in cheaper), default=math.inf)
                 if single.verdict == "invalid":
-                    self._pruned.append(f"{name} = {rung.name}: {single.reason}")
+                    pruned.append(f"{name} = {rung.name}: {single.reason}")
                 elif best <= single.error:
-                    self._pruned.append(f"{name} = {rung.name}: a cheaper one errs no more")
+                    pruned.append(f"{name} = {rung.name}: a cheaper one errs no more")
                 else:
                     kept[name].append(rung)
-        return kept
+        return kept, pruned
 
     def _convergences(self, comparison: Comparison) -> Iterator[Convergence]:
         """Of every numerical effect with three levels or more; rungs between two are left out."""
@@ -601,8 +606,7 @@ class Search:
         """Combinations told, or measured at all, and all that are known to be of interest."""
         told, known = 0, 0
         for each in self._all():
-            singles = [{**each.top, n: r} for n, rungs in each.rungs.items() for r in rungs]
-            singles = singles if id(each) not in self._done else []
+            singles = _singles(each) if id(each) not in self._done else []
             if each not in self.raises.values():
                 singles.append(self.written)
             wanted = {names(rungs): each.known(rungs) for rungs in singles}
@@ -612,30 +616,47 @@ class Search:
         return (known, known) if self._complete else (told, known)
 
     def remaining(self) -> float:
-        """Seconds of runs that the known combinations still take at least, by the tables.
+        """Seconds of runs that are still to be made, by the tables: an estimate.
 
-        Combinations that come up on the way, and doubts near the accuracy, take more.
+        From the combinations that are known, and from scatter and errors as they are; others may
+        come up on the way, and what a few starts tell of an error may prove wrong.
         """
-        whole = sum(self._remaining(each) for each in self._all() if id(each) not in self._done)
-        return self.share * whole
+        widest = self._widest
+        open_ = [each for each in self._all() if each is widest or id(each) not in self._done]
+        return sum(map(self._remaining, open_)) + self._front_left(widest)
+
+    def _front_left(self, comparison: Comparison) -> float:
+        """Time that combinations for the rest of the front take by the tables [s], once known."""
+        if any(comparison.known(rungs) is None for rungs in _singles(comparison)):
+            return 0.0
+        cap, comparison.cap = comparison.cap, 0.0  # nothing is run
+        ahead = _by_cost(comparison, self._undominated(comparison)[0])
+        comparison.cap = cap
+        usual = median_high(c.starts for c in comparison.judged())
+        return sum(
+            self.pilot.tabulated(comparison.values(rungs), 0, usual)
+            for rungs in ahead
+            if comparison.known(rungs) is None
+        )
 
     def _remaining(self, comparison: Comparison) -> float:
-        singles = [{**comparison.top, n: r} for n, rungs in comparison.rungs.items() for r in rungs]
-        singles = [rungs for rungs in singles if names(rungs) != names(comparison.top)]
+        singles = [r for r in _singles(comparison) if names(r) != names(comparison.top)]
         found = {names(rungs): (rungs, comparison.known(rungs)) for rungs in singles}
         open_ = [(r, c) for r, c in found.values() if c is None or not comparison.told(c)]
         done = max((c.starts for c in comparison.judged()), default=0)
         needed = [self._needed(c, comparison.starts) for _, c in open_ if c is not None]
         most, total = max([done, _FEWEST, *needed]), 0.0
         for rungs, known in open_:  # of what has not run at all, as many as of the rest
-            more = most if known is None else self._needed(known, comparison.starts) - known.starts
-            total += more * cost_of(with_values(self.scene, comparison.values(rungs)))
-        return total + (most - done) * reference_cost(comparison) if open_ else 0.0
+            first = 0 if known is None else known.starts
+            last = most if known is None else self._needed(known, comparison.starts)
+            total += self.pilot.tabulated(comparison.values(rungs), first, last)
+        top = comparison.values(comparison.top)
+        return total + self.pilot.tabulated(top, done, most) if open_ else 0.0
 
     def _needed(self, candidate: Candidate, most: int) -> int:
         """Starts that a doubt takes, which are doubled; twice as many at the least."""
-        ratio = max(starts_to_tell(candidate, self.accuracy) / candidate.starts, 2.0)
-        return max(min(most, candidate.starts << math.ceil(math.log2(ratio))), candidate.starts)
+        needed = max(starts_to_tell(candidate, self.accuracy), 2 * candidate.starts)
+        return max(min(most, needed), candidate.starts)
 
     def found(self) -> Study:
         """What has been measured so far; nothing is run."""
@@ -736,6 +757,12 @@ class Search:
 
     def _with_seconds(self, candidate: Candidate) -> Candidate:
         return replace(candidate, seconds=self.pilot.seconds(candidate.values))
+
+
+def _singles(comparison: Comparison) -> list[dict[str, Rung]]:
+    """The best rungs with each rung of one effect in turn."""
+    top = comparison.top
+    return [{**top, name: rung} for name, rungs in comparison.rungs.items() for rung in rungs]
 
 
 def unconverged(levels: Sequence[Convergence]) -> float:
