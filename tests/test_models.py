@@ -331,12 +331,12 @@ def test_a_model_of_another_version_is_refused_with_the_cure(trained, tmp_path):
         seal = json.loads(bundle.read("seal.json"))
     changes = {"seal.json": json.dumps({**seal, "schema_version": 99}).encode()}
     rewritten(tmp_path / "good.wsm", tmp_path / "other.wsm", changes)
-    with pytest.raises(ModelError, match=r"schema_version = 99 must be 5; retrain it"):
+    with pytest.raises(ModelError, match=r"schema_version = 99 must be 6; retrain it"):
         load_model(tmp_path / "other.wsm")
     with zipfile.ZipFile(tmp_path / "fewer.wsm", "w") as bundle:  # as version 1, of fewer members
         bundle.writestr("seal.json", json.dumps({**seal, "schema_version": 1}))
         bundle.writestr("card.json", "{}")
-    with pytest.raises(ModelError, match=r"schema_version = 1 must be 5; retrain it"):
+    with pytest.raises(ModelError, match=r"schema_version = 1 must be 6; retrain it"):
         load_model(tmp_path / "fewer.wsm")
     for damaged in (b"[1]", b"{", b"9" * 9_000_000):
         with zipfile.ZipFile(tmp_path / "bad.wsm", "w", zipfile.ZIP_DEFLATED) as bundle:

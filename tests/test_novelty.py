@@ -17,9 +17,16 @@ from wearstate.diagnose.feature_rows.physical import (
     physical_rows,
     shape_rows,
 )
-from wearstate.diagnose.wear_model.noise_floor import noise_floors, noisiest
+from wearstate.diagnose.wear_model.noise_floor import (
+    fit_least,
+    lifted_rows,
+    noise_floors,
+    noisiest,
+)
 from wearstate.diagnose.wear_model.novelty import fit_familiarity, free_distance, novelty_p_value
 from wearstate.features.catalogue.row import feature_names, feature_row
+from wearstate.sim.machine.simulate import simulate
+from wearstate.sim.scene.load import load_scene
 
 NAMES = tuple(f"a.shape_{i}" for i in range(40))
 """Features that the physical space takes as they are."""
@@ -369,6 +376,64 @@ def test_a_noisy_sensor_is_a_caution_that_names_it(small_trained, recording):
     said = model.estimate(replace(recording, signal=signal.astype(np.float32)))
     assert said.verdict == "caution"
     assert [text for text in said.cautions if text.startswith("the noise floor of acc_y")]
+
+
+def test_a_cleaner_sensor_than_any_known_is_as_good_as_the_cleanest(small_trained):
+    """A model that has never seen silence between knocks must not refuse it."""
+    model, _, _ = small_trained
+    noiseless = {f"sensors.{i}.noise": "0 m/s^2" for i in range(2)}
+    clean, usual = (
+        simulate(load_scene("bilge-pump", changes), seed=3) for changes in (noiseless, {})
+    )
+    said = model.estimate(clean)
+    assert said.graded
+    assert said.severity == pytest.approx(model.estimate(usual).severity, rel=0.05)
+    row = model._row(clean, None)
+    lifted = lifted_rows(model.names, row[None, :], model.familiarity.least_noise)
+    raw, filled = (model.familiarity.outside(each)[0] for each in (row[None, :], lifted))
+    assert raw > 0.2  # of the features, which many machines in training would call unfamiliar
+    assert filled < 0.05
+    assert model._look(row).distance < model.familiarity.distance(model.names, row[None, :])[0]
+
+
+def test_rows_with_noise_enough_stay_as_they_are(small_trained):
+    model, table, _ = small_trained
+    least = model.familiarity.least_noise
+    lifted = lifted_rows(model.names, table.values, least)
+    lacking = [f < w for f, w in zip(_floors(model.names, table.values), least, strict=True)]
+    assert 0.01 < np.mean(lacking) < 0.03
+    enough = ~np.any(lacking, axis=0)
+    assert enough.any()
+    assert (lifted[enough] == table.values[enough]).all()
+    assert (lifted >= table.values).all()
+    np.testing.assert_allclose(lifted_rows(model.names, lifted, least), lifted, atol=1e-5)
+
+
+def _floors(names, rows):
+    return np.hstack(list(noise_floors(names, rows).values())).T
+
+
+def test_a_channel_without_a_map_is_lifted_to_the_density_of_its_quiet_bands():
+    """White noise of 0.1 per hertz beneath one line, and the same line without noise."""
+    names = [f"a.band_{f}_{2 * f}.level_db" for f in (10, 20, 40, 80, 160)]
+    widths = np.array([10.0, 20.0, 40.0, 80.0, 160.0])
+    line = np.array([0.0, 0.0, 500.0, 0.0, 0.0])
+    noisy, clean = (10 * np.log10(line + d * widths)[None] for d in (0.1, 1e-9))
+    least = fit_least(names, noisy)
+    assert least == pytest.approx([-10.0])
+    np.testing.assert_allclose(lifted_rows(names, clean, least), noisy, atol=1e-6)
+    np.testing.assert_array_equal(lifted_rows(names, noisy, least), noisy)
+
+
+@pytest.mark.parametrize("sensitivity", [1e-3, 1.0])
+def test_noise_is_filled_up_only_after_a_wrong_sensitivity_is_seen(small_trained, sensitivity):
+    """A channel in other units is quiet as well; that is for the check of levels to find."""
+    model, _, _ = small_trained
+    usual = simulate(load_scene("bilge-pump"), seed=3)
+    signal = usual.signal * np.where(np.array(usual.names) == "acc_y", sensitivity, 1.0)[:, None]
+    said = model.estimate(replace(usual, signal=signal.astype(np.float32)))
+    assert any("acc_y" in fault.text for fault in said.faults) == (sensitivity < 1)
+    assert said.graded == (sensitivity == 1)
 
 
 def test_few_of_its_own_machines_are_too_noisy_for_a_model(small_trained):

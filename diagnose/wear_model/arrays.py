@@ -11,7 +11,7 @@ from pydantic import Field, model_validator
 from ..feature_rows.model_card import Strict
 from ..learning.nets import Nets
 from ..learning.regressions import Blend, Forest, Linear, Part
-from .noise_floor import floors_in
+from .noise_floor import floors_in, noise_levels_in
 from .novelty import Familiarity
 from .quietness import peak_channels
 
@@ -260,6 +260,7 @@ def familiarity_fits(cloud: Familiarity, names: Sequence[str], n: int) -> bool:
         and shapes_of(cloud.usual_peak, cloud.peak_slope) == {(peaks,)}
         and np.shape(cloud.floor_ceiling) == (floors,)
         and isinstance(cloud.most_noise, float)
+        and np.shape(cloud.least_noise) == (noise_levels_in(names),)
         and np.shape(cloud.whiten) == (n, n)
         and np.ndim(cloud.groups) == 1
         and np.size(cloud.groups) > 0

@@ -39,7 +39,7 @@ from ..feature_rows.transfer_reference import told_against
 from ..learning.conformal import COVERAGE
 from ..learning.heads import Head
 from ..learning.severity import Estimator
-from .noise_floor import noisiest
+from .noise_floor import lifted_rows, noisiest
 from .novelty import Familiarity, free_distance, novelty_p_value
 from .quietness import CAUTIONED_SHARE
 
@@ -348,11 +348,12 @@ class WearModel:
         return self.informed, np.hstack([inputs, noted_values(self.noted, [conditions])])
 
     def _inputs(self, rows: Float, baseline: Float | None) -> Float:
+        lifted = self._lifted(rows)
         if self.mode == "cold":
-            return rows
+            return lifted
         if baseline is None:
             raise DataError(NO_BASELINE)
-        return referenced_rows(rows, baseline)
+        return referenced_rows(lifted, self._lifted(np.atleast_2d(baseline)))
 
     def estimate(
         self,
@@ -428,15 +429,30 @@ class WearModel:
         return values
 
     def _look(self, row: Float) -> Observation:
+        """How strange a recording is: as it is, or with the least noise that is known.
+
+        What a sensor of another sensitivity shows is quieter as well, and its noise must not be
+        filled up before its level is mended: of both ways, the one that makes it familiar.
+        """
+        lifted = self._lifted(row[None, :])[0]
+        ways = [row] if np.array_equal(lifted, row) else [row, lifted]
+        return min((self._look_at(each) for each in ways), key=lambda look: look.distance)
+
+    def _look_at(self, row: Float) -> Observation:
         speed = row[self._columns[_SPEED_FEATURE]] if _SPEED_FEATURE in self._columns else None
-        apart = self.familiarity.by_kind(self.names, row[None, :])[0]
+        apart = self.familiarity.by_kind(self.names, self._lifted(row[None, :]))[0]
+        levelled = self._lifted(self._levelled(row))
         return Observation(
-            distance=float(self.familiarity.distance(self.names, self._levelled(row))[0]),
+            distance=float(self.familiarity.distance(self.names, levelled)[0]),
             limit=self.distance_limit,
             free_distance=free_distance(self.names, apart),
             excess_db=self._excess(row),
             speed_hz=None if speed is None else float(speed),
         )
+
+    def _lifted(self, rows: Float) -> Float:
+        """Rows of cleaner recordings than any known, with the least noise that is known."""
+        return lifted_rows(self.names, rows, self.familiarity.least_noise)
 
     def _levelled(self, row: Float) -> Float:
         """The row with levels that a sensitivity must have put there taken away [shape=(1, n)]."""
@@ -494,6 +510,7 @@ class WearModel:
     ) -> Estimate:
         if self.mode == "referenced" and baseline is None:
             return Estimate(verdict="unusable", reasons=(NO_BASELINE,), mode=self.mode)
+        row = self._lifted(row[None, :])[0]
         known: dict[str, Any] = {
             "faults": faults,
             "mode": self.mode,

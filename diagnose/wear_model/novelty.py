@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..feature_rows.physical import coordinates_of, moved_rows, physical_rows
-from .noise_floor import fit_ceiling, loudest_floor
+from .noise_floor import fit_ceiling, fit_least, loudest_floor
 from .quietness import UsualPeaks, fit_usual_peaks, shortfall
 
 Float = NDArray[np.float64]
@@ -63,6 +63,8 @@ class Familiarity:
         Of :func:`~.noise_floor.fit_ceiling` [dB].
     most_noise : float
         How far the noise floor of few familiar recordings is above that ceiling [dB].
+    least_noise : numpy.ndarray [shape=(n_levels,)]
+        Of :func:`~.noise_floor.fit_least` [dB].
     """
 
     centre: Float
@@ -79,6 +81,7 @@ class Familiarity:
     seldom_lacking: float
     floor_ceiling: Float
     most_noise: float
+    least_noise: Float
 
     def lacking(self, names: Sequence[str], rows: Float) -> Float:
         """How far peaks are below the usual ones [dB, shape=(n_recordings,)]."""
@@ -262,6 +265,7 @@ def fit_familiarity(
         seldom_lacking=seldom_lacking,
         floor_ceiling=fit_ceiling(names, rows),
         most_noise=most_noise,
+        least_noise=fit_least(names, rows),
     )
 
 
