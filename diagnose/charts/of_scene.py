@@ -189,7 +189,8 @@ def chart_of(scene: Scene, found: Study) -> Chart:
     points = tuple(p for name, a in answers.items() for p in _points(scene, found, a, name))
     choices = tuple(_choice(scene, found, a, name) for name, a in answers.items())
     final = [c for c in choices if c.status == "resolved"]
-    conclusion = (where_it_stands(scene, found), *(c.sentence for c in choices))
+    where = (_standing(scene, found), *filter(None, [_costly_rungs(found)]))
+    conclusion = (*where, *(c.sentence for c in choices))
     return Chart(
         name=scene.name,
         title=f"{scene.name} (simulated): how much model does this scene need?",
@@ -291,6 +292,11 @@ def where_it_stands(scene: Scene, found: Study) -> str:
     found : Study
         Finished or not.
     """
+    return " ".join(filter(None, [_standing(scene, found), _costly_rungs(found)]))
+
+
+def _standing(scene: Scene, found: Study) -> str:
+    """Error of a scene as written, as far as it is known."""
     whole = found.whole
     own = whole.written
     if own is None or (found.raised is None and found.raises):
@@ -308,7 +314,7 @@ def where_it_stands(scene: Scene, found: Study) -> str:
         else "not yet known to be within"
     )
     text = f"Your scene as written is {word} {percent(found.accuracy)} of {against}: "
-    return f"{text}{error_words(own, scene, found.accuracy)}.{_costly_rungs(found)}"
+    return f"{text}{error_words(own, scene, found.accuracy)}."
 
 
 def _costly_rungs(found: Study) -> str:
@@ -323,12 +329,12 @@ def _costly_rungs(found: Study) -> str:
             f"{effect_words(e.effect)} {e.written} instead of {e.best} {percent(e.candidate.error)}"
             for e in named
         ]
-        return f" Each rung by itself, which do not add up: {', '.join(parts)}."
+        return f"Errors of single rungs, which do not add up: {', '.join(parts)}."
     if len(known) < len(found.raises):
         return ""
     most = costly[0]
     return (
-        f" No rung of it needs to change: the one that costs most, {effect_words(most.effect)} "
+        f"No rung of it needs to change: the one that costs most, {effect_words(most.effect)} "
         f"{most.written} instead of {most.best}, costs {percent(most.candidate.error)}."
     )
 

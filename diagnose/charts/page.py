@@ -12,7 +12,7 @@ from ..pages.points import point_block
 from .chart import RECOMMENDED, Chart, Point, chart_table, convergence_text, save_rows
 from .figure import chart_figure, chart_svg, choice_of, question_images, shaded_rows
 from .points import chart_points
-from .words import percent
+from .words import percent, with_scatter
 
 _ROW_BYTES = 3_000  # of a point in the tables of a page
 
@@ -46,9 +46,25 @@ def chart_html(chart: Chart, *, interactive: bool = False) -> str:
         quantities=_quantity_rows(chart),
         convergence=[convergence_text(each, chart.labels) for each in chart.convergence],
         recommended=RECOMMENDED,
+        lines=_lines(chart),
+        unbroken=_unbroken,
+        with_scatter=with_scatter,
         finite=math.isfinite,
         percent=percent,
     )
+
+
+def _lines(chart: Chart) -> list[tuple[str, bool]]:
+    """The conclusion; whether a line says where the subject stands, or what to do about it."""
+    lines = chart.conclusion or (chart.verdict,)
+    advice = [c.sentence for c in chart.choices if c.enough and c.status in RECOMMENDED]
+    first = {lines[0], *advice[:1]}
+    return [(_unbroken(line), line in first) for line in lines]
+
+
+def _unbroken(text: str) -> str:
+    """Text whose figures are not torn from their signs at the end of a line."""
+    return text.replace(" %", "\u00a0%").replace(" ± ", "\u00a0±\u00a0")
 
 
 def _rows(chart: Chart, question: str) -> list[tuple[int | str, Point, bool]]:

@@ -18,7 +18,7 @@ from .figure import (
     shown_error,
     winner_words,
 )
-from .words import percent
+from .words import percent, with_scatter
 
 _LOOKS = {
     "on the front": (FRONT, 10.0, True),
@@ -109,9 +109,7 @@ def _mark(chart: Chart, point: Point) -> Mark:
 
 def _lines(chart: Chart, point: Point) -> list[str]:
     """Name and figures of a point."""
-    error = percent(point.error)
-    if point.standard_error > 0:
-        error += f" ± {percent(point.standard_error)}"
+    error = with_scatter(percent(point.error), point.standard_error)
     worst = chart.label(point.worst)
     cost, _, unit = chart.cost_label.partition(" [")
     return [

@@ -146,7 +146,7 @@ def error_words(candidate: Candidate, scene: Scene, accuracy: float = math.nan) 
     Returns
     -------
     str
-        Such as ``"64 % ± 3 % off in vibration level, 306 to 758 Hz"``.
+        Such as ``"64 ± 3 % off in vibration level, 306 to 758 Hz"``.
     """
     if not candidate.differences:
         return f"not valid: {candidate.reason}"
@@ -154,10 +154,28 @@ def error_words(candidate: Candidate, scene: Scene, accuracy: float = math.nan) 
     found = candidate.differences[worst]
     if found.error == 0:
         return "no error"
-    scatter = f" ± {percent(found.standard_error)}" if _scattered(found.standard_error) else ""
-    return (
-        f"{percent_beside(found.error, accuracy)}{scatter} off in {quantity_label(worst, scene)[0]}"
-    )
+    error = with_scatter(percent_beside(found.error, accuracy), found.standard_error)
+    return f"{error} off in {quantity_label(worst, scene)[0]}"
+
+
+def with_scatter(error: str, standard_error: float) -> str:
+    """An error in per cent with its standard error, where there is one.
+
+    Parameters
+    ----------
+    error : str
+        As of :func:`percent`.
+    standard_error : float
+        [-]; told with one digit, as it is uncertain itself.
+
+    Examples
+    --------
+    >>> with_scatter("63 %", 0.0097), with_scatter("0.4 %", 0.0), with_scatter("0.4 %", 0.0011)
+    ('63 ± 1 %', '0.4 %', '0.4 ± 0.1 %')
+    """
+    if not _scattered(standard_error):
+        return error
+    return f"{error.removesuffix(' %')} ± {float(f'{100 * standard_error:.1g}'):g} %"
 
 
 def _scattered(standard_error: float) -> bool:
