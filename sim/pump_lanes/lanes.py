@@ -20,7 +20,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ..jit import subroutine
+from ..jit import kernel, subroutine
 from ..output.status import Status
 from ..pump.hydraulics import GATHERED, ValveSide
 from ..pump.setup import Start, joint_rungs
@@ -33,6 +33,7 @@ from ..pump.slider_crank import (
     NOT_LOCATED,
     WITH_VAPOUR,
     CrankTally,
+    Machine,
     Tables,
 )
 from ..scene.pump import PumpScene
@@ -44,6 +45,7 @@ from .rates import (
     LANES,
     NEVER,
     PLACES,
+    PLAIN_LAWS,
     PLAN,
     STATE,
     ChamberLane,
@@ -97,6 +99,7 @@ class Steps(Protocol):
         """As :meth:`.recording.Gathering.add`, with forces of :func:`lane_columns`."""
 
 
+_INVERSE_INERTIA = Machine._fields.index("inverse_inertia")
 _VALVES = ("suction_valve", "discharge_valve")
 
 
@@ -166,9 +169,9 @@ class _Lanes:
             done=np.zeros(LANES, np.int64),
         )
         self._past = _Past(
-            turns=np.empty((LANES, _ROOM + 1, 2)),
+            turns=np.empty((LANES, 2, _ROOM + 1)),
             forces=np.empty((LANES, len(self._columns), _ROOM)),
-            chambers=np.empty((LANES, _ROOM + 1 if self._breathing else 1, 1, len(GATHERED))),
+            chambers=np.empty((LANES, len(GATHERED), _ROOM + 1 if self._breathing else 1)),
         )
 
     def fill(self, ahead: Iterator[int]) -> bool:
@@ -196,6 +199,8 @@ class _Lanes:
         for joint in map(int, np.flatnonzero(tight) + 1):
             plan["contact"][joint, :, lane] = NEVER
         plan["machine"][:, lane] = t.machine
+        plan["driven"] = plan["machine"][_INVERSE_INERTIA].any()
+        plan["plain"] = ~plan["contact"][:, PLAIN_LAWS].any(axis=(1, 2))
         liquid = t.liquid[0]
         plan["liquid"][:, lane] = _numbers(liquid, LiquidLane._fields)
         plan["chamber"][:, lane] = _numbers(liquid, ChamberLane._fields)
@@ -209,8 +214,8 @@ class _Lanes:
         state["x0"][PLACES, lane], state["v0"][PLACES, lane] = start.bodies[0].reshape(2, -1)
         state["x0"][CRANK, lane], state["v0"][CRANK, lane] = start.angle, start.speed
         enter_lane(lane, plan, state, a)
-        self._past.turns[lane, 0] = start.angle, start.speed
-        self._past.chambers[lane, 0] = start.chambers[:, list(GATHERED)]
+        self._past.turns[lane, :, 0] = start.angle, start.speed
+        self._past.chambers[lane, :, 0] = start.chambers[0, list(GATHERED)]
         self._kept.code[lane] = 0
         self._number[lane], self._at[lane], self._left[lane] = number, 0, job.n_steps
         self._told[lane] = self._steps(number)
@@ -235,11 +240,11 @@ class _Lanes:
     def _hand_on(self, lane: int) -> None:
         n, past = int(self._at[lane]), self._past
         ends = slice(n + 1)
-        chambers = past.chambers[lane, ends] if self._breathing else None
-        self._told[lane].add(past.turns[lane, ends], past.forces[lane, :, :n], chambers)
-        past.turns[lane, 0] = past.turns[lane, n]
+        chambers = past.chambers[lane, :, ends].T[:, None] if self._breathing else None
+        self._told[lane].add(past.turns[lane, :, ends].T, past.forces[lane, :, :n], chambers)
+        past.turns[lane, :, 0] = past.turns[lane, :, n]
         if self._breathing:
-            past.chambers[lane, 0] = past.chambers[lane, n]
+            past.chambers[lane, :, 0] = past.chambers[lane, :, n]
         self._at[lane] = 0
 
     def ended(self) -> Iterator[tuple[int, CrankTally]]:
@@ -272,9 +277,9 @@ class _Lanes:
 class _Past(NamedTuple):
     """What the runs in the lanes have left behind since it was handed on."""
 
-    turns: Float  # (LANES, _ROOM + 1, 2)
+    turns: Float  # (LANES, 2, _ROOM + 1)
     forces: Float  # (LANES, n_kept, _ROOM)
-    chambers: Float  # (LANES, _ROOM + 1, 1, len(GATHERED)); one row where nothing breathes
+    chambers: Float  # (LANES, len(GATHERED), _ROOM + 1); of one step where nothing breathes
 
 
 @subroutine
@@ -316,21 +321,33 @@ def march_on(
 @subroutine
 def _take(k: Any, columns: Any, at: Any, past: Any, breathing: bool) -> None:
     """Add the last steps of every lane to its past; a column's block fits the innermost cache."""
-    left = k.left[0]
-    for j in range(columns.size):
-        column = columns[j]
-        for lane in range(LANES):
-            begin = np.uint64(at[lane])  # unsigned: no index counts from the end
-            for i in range(np.uint64(k.done[lane])):
-                past.forces[lane, j, begin + i] = left.forces[column, i, lane]
+    left, n = k.left[0], 0
     for lane in range(LANES):
-        begin = np.uint64(at[lane] + 1)
-        for i in range(np.uint64(k.done[lane])):
-            past.turns[lane, begin + i, 0] = left.turns[0, i, lane]
-            past.turns[lane, begin + i, 1] = left.turns[1, i, lane]
-            if breathing:
-                for c in range(len(GATHERED)):
-                    past.chambers[lane, begin + i, 0, c] = left.chambers[c, i, lane]
+        n = max(n, k.done[lane])
+    for j in range(columns.size):
+        _lay_out(left.forces, columns[j], n, at, 0, past.forces, j)
+    for c in range(2):
+        _lay_out(left.turns, c, n, at, 1, past.turns, c)
+    if breathing:
+        for c in range(len(GATHERED)):
+            _lay_out(left.chambers, c, n, at, 1, past.chambers, c)
+
+
+@kernel
+def _lay_out(steps: Any, column: int, n: int, at: Any, begin: int, rows: Any, row: int) -> None:
+    """Write a column of n steps into a row of every lane.
+
+    Four lanes at once: what is read together for one is there for its neighbours. A lane that took
+    fewer steps, as it failed or is empty, gets more than it took, which nobody reads.
+    """
+    for lane in range(0, LANES, 4):
+        a, b = np.uint64(at[lane] + begin), np.uint64(at[lane + 1] + begin)  # none from the end
+        c, d = np.uint64(at[lane + 2] + begin), np.uint64(at[lane + 3] + begin)
+        for i in range(np.uint64(n)):
+            rows[lane, row, a + i] = steps[column, i, lane]
+            rows[lane + 1, row, b + i] = steps[column, i, lane + 1]
+            rows[lane + 2, row, c + i] = steps[column, i, lane + 2]
+            rows[lane + 3, row, d + i] = steps[column, i, lane + 3]
 
 
 def _numbers(record: Any, names: Sequence[str]) -> list[float]:

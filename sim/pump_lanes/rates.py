@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..contact.law import ELASTIC_LINEAR, FRICTION_SMOOTH, LAW_KELVIN_VOIGT
 from ..jit import NEAR, kernel, near_sine_cosine, sine_cosine, subroutine
 from ..pump.hydraulics import (
     PRESSURE_CONSTANT,
@@ -129,10 +130,18 @@ NEVER = ContactLane(*[0.0] * len(ContactLane._fields))._replace(
 )
 """Contact of a tight joint: one with so much room never touches, and asks for no change."""
 
+PLAIN_LAWS = tuple(
+    ContactLane._fields.index(name) for name in ("law", "elasticity", "friction_law")
+)
+"""Columns of a contact that are 0 where its laws are the plain ones: spring and dashpot, smooth
+friction. A loop that knows needs one root and one division where the others need three and four."""
+
 PLAN = np.dtype(
     [
         ("throw", "f8", (len(ThrowLane._fields), LANES)),
         ("contact", "f8", (3, len(ContactLane._fields), LANES)),
+        ("driven", "f8"),  # 1 where any lane's crank has a motor; of all others it turns evenly
+        ("plain", "f8", 3),  # 1 where no lane's contact in a joint has other laws than the plain
         ("machine", "f8", (len(Machine._fields), LANES)),
         ("liquid", "f8", (len(LiquidLane._fields), LANES)),
         ("chamber", "f8", (len(ChamberLane._fields), LANES)),
@@ -240,6 +249,26 @@ def _contact_of(p: Any, j: int, lane: int) -> Any:
 
 
 @kernel
+def _as_told(c: Any, plain: bool) -> Any:
+    """A contact, its laws known to the compiler where they are plain."""
+    return ContactLane(
+        float(LAW_KELVIN_VOIGT) if plain else c.law,
+        float(ELASTIC_LINEAR) if plain else c.elasticity,
+        c.stiffness,
+        c.damping,
+        c.hysteresis,
+        c.clearance,
+        c.speed_floor,
+        c.release,
+        float(FRICTION_SMOOTH) if plain else c.friction_law,
+        c.friction,
+        c.friction_speed,
+        c.friction_dead_speed,
+        c.tangential_damping,
+    )
+
+
+@kernel
 def machine_of_lane(p: Any, lane: int) -> Any:
     """What the throws of the record in a lane share."""
     a = p.machine
@@ -297,15 +326,14 @@ def beyond_limit(p: Any, s: Any, lane: int) -> bool:
 
 @subroutine
 def _turn(p: Any, s: Any) -> None:
+    """Sines and cosines in one loop: the compiler would unroll the short one of the rods alone."""
     wide = 0
     for lane in range(LANES):
-        s.turned[0, lane], s.turned[1, lane] = sine_cosine(s.x[CRANK, lane] + p.throw[0, lane])
-    for lane in range(LANES):
-        wide += not abs(s.x[BETA, lane]) <= NEAR
-    if wide == 0:  # rods swing less than this but for cranks nearly as long
-        for lane in range(LANES):
-            s.turned[2, lane], s.turned[3, lane] = near_sine_cosine(s.x[BETA, lane])
-    else:
+        angle, swing = s.x[CRANK, lane] + p.throw[0, lane], s.x[BETA, lane]
+        s.turned[0, lane], s.turned[1, lane] = sine_cosine(angle)
+        s.turned[2, lane], s.turned[3, lane] = near_sine_cosine(swing)
+        wide += not abs(swing) <= NEAR
+    if wide > 0:  # rods swing more than this only where cranks are nearly as long
         for lane in range(LANES):
             s.turned[2, lane], s.turned[3, lane] = sine_cosine(s.x[BETA, lane])
 
@@ -327,12 +355,12 @@ def _press_chambers(s: Any, share: float) -> None:
         s.pressed[lane] = before + share * (after - before)
 
 
-@subroutine
-def _at_crankpin(p: Any, s: Any) -> None:
+@kernel
+def _in_crankpin(p: Any, s: Any, plain: bool) -> None:
     for lane in range(LANES):
         q, c, pose, omega = (
             _throw_of(p, lane),
-            _contact_of(p, 0, lane),
+            _as_told(_contact_of(p, 0, lane), plain),
             _pose_of(s, lane),
             s.v[CRANK, lane],
         )
@@ -356,10 +384,21 @@ def _at_crankpin(p: Any, s: Any) -> None:
 
 
 @subroutine
-def _at_wristpin(p: Any, s: Any) -> None:
+def _at_crankpin(p: Any, s: Any) -> None:
+    _in_crankpin(p, s, False)
+
+
+@subroutine
+def _at_plain_crankpin(p: Any, s: Any) -> None:
+    _in_crankpin(p, s, True)
+
+
+@kernel
+def _in_wristpin(p: Any, s: Any, plain: bool) -> None:
     """A tight one never touches."""
     for lane in range(LANES):
-        q, c, pose = _throw_of(p, lane), _contact_of(p, 1, lane), _pose_of(s, lane)
+        q, pose = _throw_of(p, lane), _pose_of(s, lane)
+        c = _as_told(_contact_of(p, 1, lane), plain)
         radius = q.wristpin_radius
         d_x, d_y, v_x, v_y = wrist_offset(pose, q, s.turned[2, lane], s.turned[3, lane])
         spin = pose.tilt_rate * radius + pose.beta_rate * (radius + c.clearance)
@@ -372,6 +411,16 @@ def _at_wristpin(p: Any, s: Any) -> None:
 
 
 @subroutine
+def _at_wristpin(p: Any, s: Any) -> None:
+    _in_wristpin(p, s, False)
+
+
+@subroutine
+def _at_plain_wristpin(p: Any, s: Any) -> None:
+    _in_wristpin(p, s, True)
+
+
+@subroutine
 def _tilt(s: Any) -> None:
     """Pistons in guides with play, before their ends are looked at."""
     for lane in range(LANES):
@@ -380,7 +429,7 @@ def _tilt(s: Any) -> None:
 
 
 @kernel
-def _in_guide(p: Any, s: Any, along: float, j: int) -> None:
+def _in_guide(p: Any, s: Any, along: float, j: int, plain: bool) -> None:
     """One end of the pistons, whose upper corner is contact j; an ideal guide never touches."""
     for lane in range(LANES):
         drag, push, turn, upper, lower = guide_end(
@@ -393,7 +442,7 @@ def _in_guide(p: Any, s: Any, along: float, j: int) -> None:
             s.impact[j, lane],
             s.touching[j + 2, lane] != 0.0,
             s.impact[j + 2, lane],
-            _contact_of(p, 2, lane),
+            _as_told(_contact_of(p, 2, lane), plain),
         )
         s.margin[j, lane], s.approach[j, lane] = upper.margin, upper.approach
         s.margin[j + 2, lane], s.approach[j + 2, lane] = lower.margin, lower.approach
@@ -406,12 +455,22 @@ def _in_guide(p: Any, s: Any, along: float, j: int) -> None:
 
 @subroutine
 def _rear(p: Any, s: Any) -> None:
-    _in_guide(p, s, -1.0, GUIDE)
+    _in_guide(p, s, -1.0, GUIDE, False)
 
 
 @subroutine
 def _front(p: Any, s: Any) -> None:
-    _in_guide(p, s, 1.0, GUIDE + 1)
+    _in_guide(p, s, 1.0, GUIDE + 1, False)
+
+
+@subroutine
+def _plain_rear(p: Any, s: Any) -> None:
+    _in_guide(p, s, -1.0, GUIDE, True)
+
+
+@subroutine
+def _plain_front(p: Any, s: Any) -> None:
+    _in_guide(p, s, 1.0, GUIDE + 1, True)
 
 
 @subroutine
@@ -459,12 +518,22 @@ def rates(p: Any, s: Any, share: float, kind: Any) -> None:
         _press_chambers(s, share)
     else:
         _press(p, s)
-    _at_crankpin(p, s)
-    if wrist:
+    if p.plain[0] != 0.0:
+        _at_plain_crankpin(p, s)
+    else:
+        _at_crankpin(p, s)
+    if wrist and p.plain[1] != 0.0:
+        _at_plain_wristpin(p, s)
+    elif wrist:
         _at_wristpin(p, s)
     if guide:
         _tilt(s)
-        _rear(p, s)
-        _front(p, s)
+        if p.plain[2] != 0.0:
+            _plain_rear(p, s)
+            _plain_front(p, s)
+        else:
+            _rear(p, s)
+            _front(p, s)
     _accelerate(p, s)
-    _turn_crank(p, s)
+    if p.driven != 0.0:
+        _turn_crank(p, s)
