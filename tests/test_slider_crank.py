@@ -14,7 +14,7 @@ from scipy.integrate import quad
 from wearstate.diagnose.literature.verify import rebound
 from wearstate.sim.contact.closed_forms import ideal_crank, kelvin_voigt_restitution
 from wearstate.sim.contact.law import RELEASE_AT_ZERO_FORCE, RELEASE_AT_ZERO_PENETRATION
-from wearstate.sim.jit import sine_cosine
+from wearstate.sim.jit import power, sine_cosine
 from wearstate.sim.machine.simulate import simulate
 from wearstate.sim.pump import setup as cs
 from wearstate.sim.pump import slider_crank as sc
@@ -805,6 +805,18 @@ def test_contact_frequency_bounds_every_direction():
             worst = max(worst, (eye[1] - eye[0]) @ normal / 1e-6)
     # The grid misses the worst direction by at most 2.5 degrees: (1 - cos) = 1e-3.
     assert_allclose(math.sqrt(worst), cs.contact_frequency(PUMP), rtol=2e-3)
+
+
+def test_power_against_libm():
+    """The logarithm must be known beyond its last bit: its error is multiplied."""
+    dice = np.random.default_rng(4)
+    base, exponent = np.exp(dice.uniform(-13.8, 13.8, 4000)), dice.uniform(-1.0, 1.0, 4000)
+    base[:4], exponent[:4] = (1.0, 1.0, 0.5, 3.0), (0.7, 1.0, 0.0, 1.0)
+    found = np.array([power(x, k) for x, k in zip(base, exponent, strict=True)])
+    known = np.array([math.pow(x, k) for x, k in zip(base, exponent, strict=True)])
+    assert (np.abs(found - known) <= 2 * np.spacing(known)).all()
+    assert found[:4].tolist() == [1.0, 1.0, 1.0, 3.0]
+    assert np.mean(found == known) > 0.8
 
 
 def test_sine_cosine_against_libm():

@@ -26,7 +26,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..jit import kernel
+from ..jit import kernel, power, subroutine
 from ..scene.parts import STANDARD_GRAVITY
 from ..scene.pump_hydraulics import (
     BREATHING_RUNGS,
@@ -310,7 +310,7 @@ def two_level_pressure(angle: float, suction: float, discharge: float, h: Any) -
        chapters on valves and on volumetric efficiency.
     """
     turn = 2.0 * math.pi
-    phase = angle - turn * math.floor(angle * (1.0 / turn))  # off by rounding at a dead centre
+    phase = angle - turn * np.floor(angle * (1.0 / turn))  # off by rounding at a dead centre
     falls = phase < math.pi
     before, after = (discharge, suction) if falls else (suction, discharge)
     since = phase - h.fall_delay if falls else phase - math.pi - h.rise_delay
@@ -477,10 +477,8 @@ def lowest_pressure(h: Any) -> float:
 @kernel
 def air_volume(pressure: float, h: Any) -> float:
     """Volume of the air per volume of mixture at atmospheric pressure."""
-    if h.air_fraction == 0.0:
-        return 0.0
-    share: float = (
-        h.air_fraction * (STANDARD_ATMOSPHERE / (pressure + STANDARD_ATMOSPHERE)) ** h.air_power
+    share: float = h.air_fraction * power(
+        STANDARD_ATMOSPHERE / (pressure + STANDARD_ATMOSPHERE), h.air_power
     )
     return share
 
@@ -501,7 +499,14 @@ def _air_series(pressure: float, known: Any, h: Any) -> Any:
 def _air_near(pressure: float, known: Any, h: Any) -> float:
     """The same: within a hundredth of a known value a series saves the power."""
     near, good = _air_series(pressure, known, h)
-    volume: float = near if good else air_volume(pressure, h)
+    volume: float = near if good else _air_far(pressure, h)
+    return volume
+
+
+@subroutine
+def _air_far(pressure: float, h: Any) -> float:
+    """A call of its own: the compiler would take the power in any case, and then choose."""
+    volume: float = air_volume(pressure, h)
     return volume
 
 
