@@ -1,7 +1,7 @@
 """Force to housing acceleration: the casing as a set of modes, or as it was measured."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
@@ -107,9 +107,26 @@ def _add_direct(total: Any, a: float, block: Any, b: float, raised: Any) -> None
 
 
 @kernel
+def _add_modal_twice(
+    total: Any, a: float, b: float, other: Any, c: float, d: float, real: Any, imaginary: Any
+) -> None:
+    for i in range(_BLOCK):
+        x, y = real[i + _AHEAD], imaginary[i + _AHEAD]
+        total[i] += a * x + b * y
+        other[i] += c * x + d * y
+
+
+@kernel
 def _add_modal(total: Any, a: float, real: Any, b: float, imaginary: Any) -> None:
     for i in range(_BLOCK):
         total[i] += a * real[i + _AHEAD] + b * imaginary[i + _AHEAD]
+
+
+@kernel
+def _sum_four(total: Any, a: Any, first: int, x: Any, y: Any, z: Any, u: Any) -> None:
+    a0, a1, a2, a3 = a[first], a[first + 1], a[first + 2], a[first + 3]
+    for i in range(_BLOCK + 4 * _AHEAD):
+        total[i] = (a0 * x[i] + a1 * y[i]) + (a2 * z[i] + a3 * u[i])
 
 
 @kernel
@@ -189,8 +206,8 @@ def _respond(
             for k in range(len(total)):
                 _add_direct(total[k], direct[k, j], block, raised_direct[k, j], raised[j])
         for m in range(len(inputs)):
-            force[:] = 0.0
-            for j in range(0, len(raised), 2):
+            _sum_four(force, inputs[m], 0, raised[0], raised[1], raised[2], raised[3])
+            for j in range(4, len(raised), 2):
                 _add_pair(force, inputs[m, j], raised[j], inputs[m, j + 1], raised[j + 1])
             for i in range(_AHEAD):
                 balance = turns[m, 5] * force[0]
@@ -200,7 +217,11 @@ def _respond(
             _turn_eight(real, imaginary, turns[m], x, y)
             for i in range(_AHEAD):
                 states[m, 0, i], states[m, 1, i] = x[i + _BLOCK], y[i + _BLOCK]
-            for k in range(len(total)):
+            paired = len(total) // 2 * 2
+            for k in range(0, paired, 2):
+                a, b = swings[m, k], swings[m, k + 1]
+                _add_modal_twice(total[k], a.imag, a.real, total[k + 1], b.imag, b.real, x, y)
+            for k in range(paired, len(total)):
                 _add_modal(total[k], swings[m, k].imag, x, swings[m, k].real, y)
         for k in range(len(total)):
             _write(total[k], first, _BLOCK, acceleration[k])
@@ -269,7 +290,7 @@ class _ModesInMotion:
     def __init__(self, modes: CasingModes, taps: NDArray[np.float64], step_rate: float) -> None:
         share, turns, swings = _steps(modes, 1 / step_rate)
         n_inputs, n_outputs = modes.inputs.shape[1], modes.outputs.shape[1]
-        pairs = max(1, -(-n_inputs // 2))
+        pairs = max(2, -(-n_inputs // 2))
         self._window = np.empty((n_inputs, _PIECE + 2 * (_BLOCK + _REACH)))
         self._filled = 0
         self._fresh = True
@@ -289,14 +310,20 @@ class _ModesInMotion:
 
     def add(self, forces: NDArray[np.float64]) -> NDArray[np.float64]:
         """Take ``_PIECE`` steps at most; the acceleration of those that are known by now."""
-        if not self._filled:
-            self._window[:, :_REACH] = forces[:, :1]
-            self._filled = _REACH
-        return self._on(forces)
+        self.room(forces.shape[1])[:] = forces
+        return self.take(forces.shape[1])
 
-    def _on(self, forces: NDArray[np.float64]) -> NDArray[np.float64]:
-        end = self._filled + forces.shape[1]
-        self._window[:, self._filled : end] = forces
+    def room(self, n: int) -> NDArray[np.float64]:
+        """Where the next n steps' forces are to be written, ``_PIECE`` at most."""
+        first = self._filled or _REACH
+        return self._window[:, first : first + n]
+
+    def take(self, n: int) -> NDArray[np.float64]:
+        """As :meth:`add`, of n steps that have been written into :meth:`room`."""
+        if not self._filled:
+            self._window[:, :_REACH] = self._window[:, _REACH : _REACH + 1]
+            self._filled = _REACH
+        end = self._filled + n
         known = (end - 2 * _REACH) // _BLOCK * _BLOCK
         acceleration = np.empty((self._n_outputs, max(0, known)))
         if known > 0:
@@ -311,7 +338,8 @@ class _ModesInMotion:
         left = self._filled - _REACH
         last = self._window[:, self._filled - 1 : self._filled]
         more = -(-left // _BLOCK) * _BLOCK + 2 * _REACH - self._filled
-        return self._on(np.repeat(last, more, axis=1))[:, :left]
+        self.room(more)[:] = last
+        return self.take(more)[:, :left]
 
 
 def _pieces(rows: NDArray[np.float64]) -> Iterator[NDArray[np.float64]]:
@@ -405,6 +433,11 @@ class ModalCasing:
         """Take the next steps, means of the forces [shape=(n_inputs, n)] [N]."""
         for piece in _pieces(means):
             self._low.add(self._modes.add(piece))
+
+    def fill(self, n: int, write: Callable[[NDArray[np.float64]], None]) -> None:
+        """As :meth:`add`, of n steps, ``_PIECE`` at most, that are written where they are used."""
+        write(self._modes.room(n))
+        self._low.add(self._modes.take(n))
 
     def finish(self) -> NDArray[np.float64]:
         """Acceleration [shape=(n_outputs, n_steps // factor)] [m/s^2], after the last step."""
@@ -514,6 +547,12 @@ class MeasuredCasing:
         if not self._held.size:
             self._held = means[:, 0].copy()
         self._low.add(means - self._held[:, None])
+
+    def fill(self, n: int, write: Callable[[NDArray[np.float64]], None]) -> None:
+        """As :meth:`add`, of n steps that `write` puts into an array."""
+        means = np.empty((self.accelerance.values.shape[1], n))
+        write(means)
+        self.add(means)
 
     def finish(self) -> TableRun:
         """Acceleration and what was left out, after the last step."""

@@ -1,6 +1,7 @@
 """A reciprocating pump, from its scene to its recording."""
 
 import math
+from functools import partial
 from typing import Any, cast
 
 import numpy as np
@@ -499,7 +500,7 @@ class Gathering:
             low.add(cylinder_pressure(self.plan.scene, forces[row : row + 1]))
         if self._knowing is not None:
             self._knowing.add(forces[self._known])
-        self.casing.add(self._on_casing(turns, forces, first))
+        self.casing.fill(n, partial(self._on_casing, turns, forces, first))
 
     def _note_pull(self, forces: NDArray[np.float64], first: int) -> None:
         settled = max(0, self.plan.kept.start * self.plan.factor - first)
@@ -508,11 +509,14 @@ class Gathering:
             self.pull[throw] = max(self.pull[throw], found)
 
     def _on_casing(
-        self, turns: NDArray[np.float64], forces: NDArray[np.float64], first: int
-    ) -> NDArray[np.float64]:
-        """Forces on the casing [shape=(n_places, n)]: of the mechanism, and of exciters."""
+        self,
+        turns: NDArray[np.float64],
+        forces: NDArray[np.float64],
+        first: int,
+        rows: NDArray[np.float64],
+    ) -> None:
+        """Write forces on the casing [shape=(n_places, n)]: the mechanism's, and exciters'."""
         n = forces.shape[1]
-        rows = np.empty((len(self._sources) + len(self.pushes), n))
         for row, ((source, sign), *others) in zip(rows, self._sources.values(), strict=False):
             np.multiply(forces[source], sign, out=row)
             for other, its_sign in others:
@@ -521,7 +525,6 @@ class Gathering:
             rows[self._bearings] += _crank_throws(self.plan, turns)
         for row, push in zip(rows[len(self._sources) :], self.pushes, strict=True):
             row[:] = push.along[first : first + n]
-        return rows
 
     @property
     def turns(self) -> NDArray[np.float64]:
