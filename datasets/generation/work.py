@@ -83,11 +83,12 @@ def each_alone(
 
 def together(jobs: tuple[RecordJob, ...], *, error: float | None) -> list[RecordOutcome]:
     """Simulate records side by side; runs in a worker."""
+    scenes = [(each.scene, each.seed) for each in jobs]
     found = {
         number: _refused(jobs[number], str(solution))
         if isinstance(solution, SceneError)
         else outcome_of(jobs[number], solution, error)
-        for number, solution in simulate_many([(each.scene, each.seed) for each in jobs])
+        for number, solution in simulate_many(scenes, doubts=False)  # which no data set keeps
     }
     return [found[number] for number in range(len(jobs))]
 

@@ -53,7 +53,7 @@ def simulate(
 
 
 def simulate_many(
-    jobs: Sequence[tuple[Scene, int]], *, truth: Collection[str] = ()
+    jobs: Sequence[tuple[Scene, int]], *, truth: Collection[str] = (), doubts: bool = True
 ) -> Iterator[tuple[int, Recording | SceneError]]:
     """Simulate recordings of many scenes of one machine, side by side where it can.
 
@@ -63,6 +63,9 @@ def simulate_many(
         Scene and seed of each, all of the same machine.
     truth : collection of str
         Names of the truth that is needed. A recording has these at least; fewer may be had faster.
+    doubts : bool
+        False: warnings are those of the run, without doubts about scene and signal, which cost a
+        spectrum of every channel.
 
     Yields
     ------
@@ -84,10 +87,8 @@ def simulate_many(
         return
     many = machine_of(jobs[0][0]).many or _one_by_one
     for number, found in many(jobs, truth):
-        yield (
-            number,
-            found if isinstance(found, SceneError) else _with_doubts(jobs[number][0], found),
-        )
+        whole = not doubts or isinstance(found, SceneError)
+        yield number, found if whole else _with_doubts(jobs[number][0], found)
 
 
 def simulates_together(scene: Scene) -> bool:

@@ -59,7 +59,7 @@ def simulate_pumps(
     for number, (scene, seed) in enumerate(jobs):
         pump = cast(PumpScene, scene)
         try:
-            kind = pumps_alike(pump) if told else None
+            kind = _kind_of(pump) if told else None
             plan = planned(pump) if kind else None
         except LimitError as error:
             yield number, refused_run(pump, error)
@@ -75,8 +75,20 @@ def simulate_pumps(
         yield from _together(group, kind, bool(truth))
 
 
-def pumps_alike(scene: Scene) -> LaneKind | None:
-    """What records side by side must have in common; None of a scene that runs alone."""
+def pumps_alike(scene: Scene) -> tuple[LaneKind, int] | None:
+    """What records have in common that are best side by side; None of a scene that runs alone.
+
+    Lanes of a kind, and as many steps a sample: a lane that ends before the others is empty.
+    """
+    pump = cast(PumpScene, scene)
+    kind = _kind_of(pump)
+    try:
+        return None if kind is None else (kind, planned(pump).factor)
+    except SceneError:  # whoever simulates it says why
+        return None
+
+
+def _kind_of(scene: Scene) -> LaneKind | None:
     pump = cast(PumpScene, scene)
     simple = pump.running and len(pump.throws) == 1
     return lane_kind(pump) if simple and needs_integration(pump) else None
