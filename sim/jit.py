@@ -283,7 +283,7 @@ def _bits(x: float) -> Any:
 
 
 @kernel
-def _of_bits(bits: int) -> Any:
+def _of_bits(bits: Any) -> Any:
     return np.int64(bits).view(np.float64)
 
 
@@ -321,5 +321,5 @@ def power(x: float, exponent: float) -> float:
     middle = 1.0 / 720.0 + y * (1.0 / 5040.0) + (1.0 / 40320.0 + y * (1.0 / 362880.0)) * y2
     late = 1.0 / 3628800.0 + y * (1.0 / 39916800.0) + y2 * (1.0 / 479001600.0)
     grown = 1.0 + (y + y2 * (early + middle * y4 + late * (y4 * y4)))
-    power_of_two: float = _of_bits((np.int64(shift) + 1023) << 52)
-    return grown * power_of_two
+    found: float = grown * _of_bits((np.int64(shift) + 1023) << 52)
+    return found

@@ -87,8 +87,9 @@ def simulate_many(
         return
     many = machine_of(jobs[0][0]).many or _one_by_one
     for number, found in many(jobs, truth):
-        whole = not doubts or isinstance(found, SceneError)
-        yield number, found if whole else _with_doubts(jobs[number][0], found)
+        if doubts and not isinstance(found, SceneError):
+            found = _with_doubts(jobs[number][0], found)
+        yield number, found
 
 
 def simulates_together(scene: Scene) -> bool:
