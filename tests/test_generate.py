@@ -376,8 +376,8 @@ def test_scenes_the_simulation_refuses_keep_their_row(short, tmp_path, monkeypat
     middle = load_scene("bilge-pump").joint.crankpin.friction
     simulate_many = work.simulate_many
 
-    def particular(jobs):
-        for number, found in simulate_many(jobs):
+    def particular(jobs, **options):
+        for number, found in simulate_many(jobs, **options):
             scene = jobs[number][0]
             fault = SceneError(scene.name, ["joint.crankpin.friction is beyond the model"])
             yield number, fault if scene.joint.crankpin.friction > middle else found
