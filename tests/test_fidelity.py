@@ -589,6 +589,23 @@ def test_the_best_rungs_with_the_numerics_as_written_are_known_as_soon_as_the_be
     assert {**own.reference.rungs, "step": "x2"} in [dict(c.rungs) for c in own.candidates]
 
 
+@pytest.mark.parametrize(("step_error", "step"), [(1e-4, "x2"), (0.5, "x1/4")])
+def test_rungs_are_tried_with_the_cheapest_numerics_that_leave_room(step_error, step):
+    """Their errors are the same with any of those, and fine steps are dear."""
+    errors = {TWO_LEVEL: 0.6, CONSTANT: 0.7, NONE: 0.8, IDEAL_WRIST: 0.3, IDEAL_GUIDE: 0.1}
+    pilot = KnownPilot(errors, step_error=step_error)
+    found = study(pilot.scene, pilot.quantities, accuracy=0.02, pilot=pilot)
+    assert found.raised is not None
+    assert found.raised.reference.rungs["step"] == "x1/4"
+    best = dict(found.raised.reference.rungs)
+    lower = [c for c in found.candidates if {**c.rungs, "step": "x1/4"} != best]
+    alone = [c for c in lower if sum(c.rungs[n] != best[n] for n in best if n != "step") == 1]
+    none = [c for c in alone if c.rungs["pressure"] == "none"]  # which nothing else asks for
+    steps = {c.rungs["step"] for c in none}
+    assert step in steps
+    assert step == "x1/4" or "x1/4" not in steps
+
+
 @pytest.mark.parametrize("runs", [16, 60])
 def test_what_a_cut_search_still_takes_is_foretold(runs):
     """By the starts that scatter and errors seen so far ask for, which are doubled: by twos."""

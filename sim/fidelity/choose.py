@@ -262,7 +262,7 @@ def descent(comparison: Comparison) -> dict[str, list[Single]]:
             found[name].append(Single(rung, single, added))
             if single.verdict == "doubtful" or largest_sum([added]) > comparison.accuracy:
                 break
-        low = [s.rung for s in found[name] if _leaves_room(s.candidate, comparison.accuracy)]
+        low = [s.rung for s in found[name] if leaves_room(s.candidate, comparison.accuracy)]
         held[name] = low[-1] if low else comparison.top[name]
     return found
 
@@ -274,7 +274,8 @@ def _lowest_cost(comparison: Comparison, name: str) -> float:
     return min(cost_of(with_values(scene, each)) for each in values)
 
 
-def _leaves_room(candidate: Candidate, accuracy: float) -> bool:
+def leaves_room(candidate: Candidate, accuracy: float) -> bool:
+    """Whether a candidate may be held low while others are tried."""
     return candidate.verdict == "within" and candidate.error <= _ROOM * accuracy
 
 
