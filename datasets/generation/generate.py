@@ -61,8 +61,8 @@ from .work import (
     together,
 )
 
-_TOGETHER = 48
-"""Records of a batch: three for every lane, few enough to be kept in memory."""
+_TOGETHER = 32
+"""Records of a batch: two for every lane, all of as many steps; few enough to be kept in memory."""
 
 _FEWEST = 5
 """Records of a batch that is worth it."""
