@@ -26,7 +26,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtri, stdtrit
 
-from ..machine.simulate import alike, recorder, simulate, simulate_many
+from ..machine.simulate import (
+    alike,
+    recorder,
+    simulate,
+    simulate_many,
+    simulates_together,
+)
 from ..output.recording import Recorder, Recording
 from ..scene.parts import Scene, SceneError
 from ..scene.rungs import Rung, with_values
@@ -185,8 +191,8 @@ def outcomes_of(tasks: Group) -> list[Outcome]:
     list of Outcome
         In the order of the tasks, with the quantities of each run alone.
     """
-    beside = [task for task in tasks if task.clock is None and kind_of(task) is not None]
-    if len(beside) < 2:
+    beside = [task for task in tasks if _may_be_many(task)]
+    if not beside:
         return [_outcome_of(task) for task in tasks]
     scenes = [with_values(task.scene, task.values) for task in beside]
     runs = [(scene, task.number) for scene, task in zip(scenes, beside, strict=True)]
@@ -198,6 +204,17 @@ def outcomes_of(tasks: Group) -> list[Outcome]:
         for n, run in simulate_many(runs, truth=truth)
     }
     return [found[id(task)] if id(task) in found else _outcome_of(task) for task in tasks]
+
+
+def _may_be_many(task: Task) -> bool:
+    """Whether a run needs no more than one of many has; it is faster then even by itself."""
+    if task.clock is not None or task.truth is None or not simulates_together(task.scene):
+        return False
+    try:
+        with_values(task.scene, task.values)
+    except SceneError:
+        return False
+    return True
 
 
 def kind_of(task: Task) -> Hashable:

@@ -95,8 +95,13 @@ def check_pump(scene: Scene) -> None:
     measured_casing(pump)
 
 
-def simulate_pump(scene: Scene, seed: int, truth: bool, raise_on_failure: bool) -> Recording:
-    """Simulate one recording; see :func:`wearstate.sim.machine.simulate.simulate`."""
+def simulate_pump(
+    scene: Scene, seed: int, truth: bool, raise_on_failure: bool, *, gathered_truth: bool = False
+) -> Recording:
+    """Simulate one recording; see :func:`wearstate.sim.machine.simulate.simulate`.
+
+    Without its truth, that of :data:`GATHERED_TRUTH` may be had for next to nothing.
+    """
     pump = cast(PumpScene, scene)
     if not pump.running:
         return _at_rest(pump, seed, truth)
@@ -113,7 +118,7 @@ def simulate_pump(scene: Scene, seed: int, truth: bool, raise_on_failure: bool) 
         start_angle=plan.first_angle,
         keep_states=truth,
     )
-    gathered = Gathering(plan, seed, None)
+    gathered = Gathering(plan, seed, None, truth=gathered_truth)
     for first in range(0, run.steps, _AT_ONCE):
         steps = slice(first, first + _AT_ONCE)
         ends = slice(first, first + _AT_ONCE + 1)

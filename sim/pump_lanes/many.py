@@ -33,6 +33,13 @@ class _Job(NamedTuple):
     plan: RunPlan
 
 
+class _Known(NamedTuple):
+    """Which truth a recording is to have."""
+
+    whole: bool
+    gathered: bool  # that of GATHERED_TRUTH
+
+
 def simulate_pumps(
     jobs: Sequence[tuple[Scene, int]], truth: Collection[str] = ()
 ) -> Iterator[tuple[int, Recording | SceneError]]:
@@ -56,6 +63,7 @@ def simulate_pumps(
     """
     kinds: dict[LaneKind, list[_Job]] = {}
     told = not set(truth) - set(GATHERED_TRUTH)
+    known = _Known(whole=not told, gathered=told and bool(truth))
     for number, (scene, seed) in enumerate(jobs):
         pump = cast(PumpScene, scene)
         try:
@@ -68,11 +76,11 @@ def simulate_pumps(
             yield number, error
             continue
         if kind is None or plan is None:
-            yield number, _alone(pump, seed, bool(truth))
+            yield number, _alone(pump, seed, known)
             continue
         kinds.setdefault(kind, []).append(_Job(number, seed, plan))
     for kind, group in _pooled(kinds):
-        yield from _together(group, kind, bool(truth))
+        yield from _together(group, kind, known)
 
 
 def pumps_alike(scene: Scene) -> tuple[LaneKind, int] | None:
@@ -110,24 +118,24 @@ def _pooled(kinds: dict[LaneKind, list[_Job]]) -> list[tuple[LaneKind, list[_Job
     return large
 
 
-def _alone(scene: PumpScene, seed: int, truth: bool) -> Recording | SceneError:
+def _alone(scene: PumpScene, seed: int, known: _Known) -> Recording | SceneError:
     try:
-        return simulate_pump(scene, seed, truth=truth, raise_on_failure=False)
+        return simulate_pump(scene, seed, known.whole, False, gathered_truth=known.gathered)
     except SceneError as error:
         return error
 
 
 def _together(
-    group: list[_Job], kind: LaneKind, truth: bool
+    group: list[_Job], kind: LaneKind, known: _Known
 ) -> Iterator[tuple[int, Recording | SceneError]]:
     if len(group) < _FEWEST:
         for job in group:
-            yield job.number, _alone(job.plan.scene, job.seed, truth)
+            yield job.number, _alone(job.plan.scene, job.seed, known)
         return
     columns, begun = lane_columns(kind), {}
 
     def gathering(n: int) -> Gathering:
-        begun[n] = Gathering(group[n].plan, group[n].seed, columns, truth=truth)
+        begun[n] = Gathering(group[n].plan, group[n].seed, columns, truth=known.gathered)
         return begun[n]
 
     for n, run in run_lanes([lane_job(job.plan) for job in group], kind, gathering):
