@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.signal import butter, sosfilt
 from wearstate.datasets.file.record import DataSet
 from wearstate.diagnose.feature_rows.feature_table import recording_features
 from wearstate.diagnose.feature_rows.physical import (
@@ -17,6 +18,7 @@ from wearstate.diagnose.feature_rows.physical import (
     physical_rows,
     shape_rows,
 )
+from wearstate.diagnose.wear_model.bandwidth import cut_off
 from wearstate.diagnose.wear_model.noise_floor import (
     fit_least,
     lifted_rows,
@@ -434,6 +436,32 @@ def test_noise_is_filled_up_only_after_a_wrong_sensitivity_is_seen(small_trained
     said = model.estimate(replace(usual, signal=signal.astype(np.float32)))
     assert any("acc_y" in fault.text for fault in said.faults) == (sensitivity < 1)
     assert said.graded == (sensitivity == 1)
+
+
+def test_a_channel_that_lacks_its_highest_band_is_a_caution(small_trained):
+    """The same knocks through a low pass: the wear is read from what is gone as well."""
+    model, _, _ = small_trained
+    usual = simulate(load_scene("bilge-pump"), seed=3)
+    assert "limits its band" not in " ".join(model.estimate(usual).cautions)
+    own = usual.names.index("acc_x")
+    signal = usual.signal.astype(float)
+    signal[own] = sosfilt(butter(4, 4000.0, fs=usual.sample_rate, output="sos"), signal[own])
+    said = model.estimate(replace(usual, signal=signal.astype(np.float32)))
+    if said.graded:
+        told = [text for text in said.cautions if "limits its band" in text]
+        assert len(told) == 1
+        assert told[0].startswith("acc_x is ")
+    row = model._row(replace(usual, signal=signal.astype(np.float32)), None)
+    [found] = cut_off(model.names, row, model.familiarity.tops)
+    assert found.channel == "acc_x"
+    # digital, of the fourth order: 80 lg(tan(pi 8762 / 25600) / tan(pi 4000 / 25600)) at its edge
+    assert found.lacking_db == pytest.approx(43.0, abs=8.0)
+
+
+def test_few_of_its_own_machines_lack_a_band(small_trained):
+    model, table, _ = small_trained
+    cut = [bool(cut_off(model.names, row, model.familiarity.tops)) for row in table.values]
+    assert np.mean(cut) <= 0.04  # half a per cent of each channel in the fit; of 120, some more
 
 
 def test_few_of_its_own_machines_are_too_noisy_for_a_model(small_trained):

@@ -11,6 +11,7 @@ from pydantic import Field, model_validator
 from ..feature_rows.model_card import Strict
 from ..learning.nets import Nets
 from ..learning.regressions import Blend, Forest, Linear, Part
+from .bandwidth import tops_in
 from .noise_floor import floors_in, noise_levels_in
 from .novelty import Familiarity
 from .quietness import peak_channels
@@ -261,6 +262,7 @@ def familiarity_fits(cloud: Familiarity, names: Sequence[str], n: int) -> bool:
         and np.shape(cloud.floor_ceiling) == (floors,)
         and isinstance(cloud.most_noise, float)
         and np.shape(cloud.least_noise) == (noise_levels_in(names),)
+        and shapes_of(*cloud.tops) == {(tops_in(names),)}
         and np.shape(cloud.whiten) == (n, n)
         and np.ndim(cloud.groups) == 1
         and np.size(cloud.groups) > 0

@@ -39,6 +39,7 @@ from ..feature_rows.transfer_reference import told_against
 from ..learning.conformal import COVERAGE
 from ..learning.heads import Head
 from ..learning.severity import Estimator
+from .bandwidth import cut_off
 from .noise_floor import lifted_rows, noisiest
 from .novelty import Familiarity, free_distance, novelty_p_value
 from .quietness import CAUTIONED_SHARE
@@ -534,6 +535,7 @@ class WearModel:
             *self._level_cautions(look),
             *self._quiet_cautions(row),
             *self._noise_cautions(row),
+            *self._band_cautions(row),
             *_disagreement_cautions(asked, inputs),
             *self._finding_cautions(findings),
         )
@@ -600,6 +602,15 @@ class WearModel:
             f"{floor.excess_db:.1f} dB above the loudest usual one in training, must be at most "
             f"{cloud.most_noise:.1f} dB above: it hides what a sound machine shows; "
             "check sensor, cable and grounding, or what runs near by"
+        ]
+
+    def _band_cautions(self, row: Float) -> list[str]:
+        """That the upper end of a channel's band is missing."""
+        return [
+            f"{each.channel} is {each.lacking_db:.0f} dB quieter above {each.edge_hz:.0f} Hz than "
+            f"its lower bands let expect, must be at most {each.most_db:.0f} dB: a filter, the "
+            "mounting of the sensor or another sample rate on the way limits its band"
+            for each in cut_off(self.names, row, self.familiarity.tops)
         ]
 
     def _lacking(self, row: Float) -> float:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..feature_rows.physical import coordinates_of, moved_rows, physical_rows
+from .bandwidth import UsualTops, fit_tops
 from .noise_floor import fit_ceiling, fit_least, loudest_floor
 from .quietness import UsualPeaks, fit_usual_peaks, shortfall
 
@@ -65,6 +66,8 @@ class Familiarity:
         How far the noise floor of few familiar recordings is above that ceiling [dB].
     least_noise : numpy.ndarray [shape=(n_levels,)]
         Of :func:`~.noise_floor.fit_least` [dB].
+    top_offset, top_slope, least_top : numpy.ndarray [shape=(n_channels,)]
+        Of :class:`~.bandwidth.UsualTops`.
     """
 
     centre: Float
@@ -82,6 +85,14 @@ class Familiarity:
     floor_ceiling: Float
     most_noise: float
     least_noise: Float
+    top_offset: Float
+    top_slope: Float
+    least_top: Float
+
+    @property
+    def tops(self) -> UsualTops:
+        """What the highest band of a channel is to be."""
+        return UsualTops(self.top_offset, self.top_slope, self.least_top)
 
     def lacking(self, names: Sequence[str], rows: Float) -> Float:
         """How far peaks are below the usual ones [dB, shape=(n_recordings,)]."""
@@ -249,7 +260,7 @@ def fit_familiarity(
     machines, place = np.unique(groups, return_inverse=True)
     means = np.zeros((len(machines), standard.shape[1]))
     np.add.at(means, place, standard @ whiten)
-    usual = fit_usual_peaks(names, rows)
+    usual, tops = fit_usual_peaks(names, rows), fit_tops(names, rows)
     return Familiarity(
         centre=centre,
         spread=spread,
@@ -266,6 +277,9 @@ def fit_familiarity(
         floor_ceiling=fit_ceiling(names, rows),
         most_noise=most_noise,
         least_noise=fit_least(names, rows),
+        top_offset=tops.offset,
+        top_slope=tops.slope,
+        least_top=tops.least,
     )
 
 
