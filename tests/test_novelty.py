@@ -458,6 +458,27 @@ def test_a_channel_that_lacks_its_highest_band_is_a_caution(small_trained):
     assert found.lacking_db == pytest.approx(43.0, abs=8.0)
 
 
+def test_three_oddities_at_once_are_no_familiar_machine(small_trained, recording):
+    """Each by itself is a caution; no familiar recording has three."""
+    model, _, _ = small_trained
+    signal = recording.signal.astype(float)
+    own = [recording.names.index(name) for name in ("acc_x", "acc_y")]
+    low_pass = butter(4, 4000.0, fs=recording.sample_rate, output="sos")
+    signal[own[0]] = sosfilt(low_pass, signal[own[0]])
+    noise = np.random.default_rng(6).normal(0.0, 10**-0.5 * signal[own[1]].std(), signal.shape[1])
+    signal[own[1]] += noise
+    noted = {**recording.row, "discharge_pressure_pa": 9e5}
+    said = [
+        model.estimate(replace(recording, signal=changed.astype(np.float32)), conditions=row)
+        for changed in (recording.signal, signal)
+        for row in (recording.row, noted)
+    ]
+    assert [each.verdict for each in said[:3]] == ["graded", "caution", "caution"]
+    assert said[3].verdict == "unfamiliar"
+    assert said[3].reasons[0].startswith("it is unlike the training recordings in 3 ways at once")
+    assert len(said[3].reasons) == 4
+
+
 def test_few_of_its_own_machines_lack_a_band(small_trained):
     model, table, _ = small_trained
     cut = [bool(cut_off(model.names, row, model.familiarity.tops)) for row in table.values]
