@@ -398,6 +398,14 @@ def test_a_cleaner_sensor_than_any_known_is_as_good_as_the_cleanest(small_traine
     assert model._look(row).distance < model.familiarity.distance(model.names, row[None, :])[0]
 
 
+def test_evidence_is_of_the_recording_as_it_is(small_trained):
+    """Against itself, a clean recording has not moved at all."""
+    model, _, _ = small_trained
+    noiseless = {f"sensors.{i}.noise": "0 m/s^2" for i in range(2)}
+    row = model._row(simulate(load_scene("bilge-pump", noiseless), seed=3), None)
+    assert {moved for *_, moved in model.judge(row, row).evidence} == {0.0}
+
+
 def test_rows_with_noise_enough_stay_as_they_are(small_trained):
     model, table, _ = small_trained
     least = model.familiarity.least_noise

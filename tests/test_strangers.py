@@ -6,11 +6,15 @@ import json
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from wearstate.datasets.file.record import DataSet
 from wearstate.datasets.generation.generate import generate
 from wearstate.diagnose.command_line.cli import cli
+from wearstate.diagnose.feature_rows.feature_table import USUAL, feature_table_names
+from wearstate.diagnose.learning.heads import Head, logit
+from wearstate.diagnose.learning.regressions import Blend, Linear
 from wearstate.diagnose.wear_model.file import load_model, save_model
 from wearstate.diagnose.wear_model.learn import learn
-from wearstate.diagnose.wear_model.strangers import REFUSED_AS_STRANGER
+from wearstate.diagnose.wear_model.strangers import REFUSED_AS_STRANGER, strangers_in
 from wearstate.diagnose.wear_model.training_rows import Strangers, TrainingRows
 from wearstate.diagnose.workflow.train import train
 from wearstate.sim.output.recording import DataError
@@ -57,6 +61,30 @@ def test_two_kinds_are_told_from_the_familiar_though_they_lie_among_them():
     plain = learn(training, budget_ms=LINES_MS)
     assert plain.strangers == ()
     np.testing.assert_array_equal(plain.severity.estimate, found.severity.estimate)
+
+
+def test_where_two_kinds_fit_the_likelier_one_is_named(small_trained):
+    """Of a rare kind little probability suffices, which is not to make it the likelier one."""
+    model, table, _ = small_trained
+    n = len(model.names)
+    flat = Linear(
+        centre=np.zeros(n),
+        spread=np.ones(n),
+        weight=np.zeros(n),
+        low=np.full(n, -1e30),
+        high=np.full(n, 1e30),
+        offset=1.5,
+        log=False,
+    )
+    blend = Blend(names=("ridge 3",), parts=(flat,), weights=np.ones(1), low=0.5, high=4.0)
+    chances = {"lubrication_flooded": (0.3, 0.05), "lubrication_starved": (0.97, 0.3)}
+    heads = tuple(
+        Head(name=name, blend=blend, slope=0.0, offset=logit(chance), threshold=threshold)
+        for name, (chance, threshold) in chances.items()
+    )
+    said = dataclasses.replace(model, strangers=heads).judge(table.values[0])
+    assert [text for text in said.reasons if "sounds like" in text] == [said.reasons[0]]
+    assert "sounds like a starved pin" in said.reasons[0]
 
 
 def test_recordings_of_the_training_kind_cannot_be_refused():
@@ -122,6 +150,24 @@ def test_a_model_file_keeps_what_it_refuses(command, tmp_path):
     assert load_model(tmp_path / "again.wsm").strangers[0].threshold == head.threshold
 
 
+def test_what_was_shown_is_no_unseen_recording(command, flooded_set):
+    """So that an evaluation on the very recordings says so."""
+    with DataSet(flooded_set) as data:
+        shown = set(data.manifest["signal_crc32"].tolist())
+    assert shown <= set(load_model(command[0]).card.trained_on.training_signals)
+
+
+def test_the_same_set_twice_is_one(few_set, flooded_set):
+    with DataSet(few_set) as data:
+        head = data.attributes
+    names = feature_table_names(few_set)
+    [once] = strangers_in([flooded_set], head, USUAL, names)
+    again = flooded_set.with_name("again.h5")
+    again.write_bytes(flooded_set.read_bytes())
+    [twice] = strangers_in([flooded_set, again], head, USUAL, names)
+    np.testing.assert_array_equal(once.rows, twice.rows)
+
+
 def test_a_forged_model_without_its_head_is_refused(command, tmp_path):
     model = dataclasses.replace(load_model(command[0]), strangers=())
     with pytest.raises(ValueError, match="strangers do not fit"):
@@ -138,6 +184,11 @@ def test_what_cannot_be_shown_is_named(few_set, flooded_set, tmp_path):
         train(few_set, refuse=[few, other])
     with pytest.raises(DataError, match="refuse: 2 recordings of bilge-pump-small, must be >= 20"):
         train(few_set, refuse=[few])
+    one = tmp_path / "one.toml"
+    one.write_text(FLOODED.replace("[fixed]", "records_per_group = 20\n\n[fixed]"))
+    generate(one, 20, tmp_path / "one.h5", seed=0, jobs=1)
+    with pytest.raises(DataError, match="refuse: 1 machines of flooded-pumps, must be >= 5"):
+        train(few_set, refuse=[tmp_path / "one.h5"])
     with pytest.raises(DataError, match="refuse needs features of one recording by itself"):
         train(few_set, refuse=[flooded_set], joined=[f"again={few_set}"])
 

@@ -8,7 +8,6 @@ suspicion is tried: the recording is mended as suspected, and must then look fam
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from fractions import Fraction
 from itertools import combinations
 from typing import Literal
 
@@ -21,6 +20,7 @@ from ...sim.output.recording import Recording
 from ...sim.output.sensor import Channel
 from .model_card import LayoutCard, ModelCard
 from .physical import level_channels, level_rows, shape_rows
+from .resampling import resampled
 
 Float = NDArray[np.float64]
 Kind = Literal["saturated", "dead", "swapped", "unit", "rate", "tacho", "layout", "hum"]
@@ -194,7 +194,10 @@ def _tacho_layout_faults(recording: Recording, card: LayoutCard) -> list[Quality
 def _rate_faults(found: float, wanted: float) -> list[QualityFault]:
     if abs(found / wanted - 1) <= RATE_TOLERANCE:
         return []
-    text = f"it is sampled at {found:g} Hz, the model needs {wanted:g} Hz: resample"
+    text = (
+        f"it is sampled at {found:g} Hz, the model needs {wanted:g} Hz: record faster, or train a "
+        f"model on a set with sample_rate = {found:g} Hz"
+    )
     return [QualityFault(kind="rate", channel="", text=text)]
 
 
@@ -414,7 +417,11 @@ Observe = Callable[[Recording], Observation]
 
 
 def suspicions(
-    recording: Recording, look: Observation, see: Observe, speeds: tuple[float, float] | None
+    recording: Recording,
+    look: Observation,
+    see: Observe,
+    speeds: tuple[float, float] | None,
+    stated: float | None = None,
 ) -> tuple[QualityFault, ...]:
     """Faults that explain why a recording looks strange, each tried out.
 
@@ -428,6 +435,8 @@ def suspicions(
         How a mended recording looks.
     speeds : tuple of float, optional
         Trained range [Hz].
+    stated : float, optional
+        Sample rate that it came with [Hz]; its own unless given.
 
     Returns
     -------
@@ -444,7 +453,8 @@ def suspicions(
     if not found and not near and paced:  # no cable changes the speed
         found = _swapped(recording, see)
     if not found and not (near and paced) and speeds is not None:
-        found = _wrong_rate(recording, look, see, speeds)
+        rate = recording.sample_rate if stated is None else stated
+        found = _wrong_rate(recording, look, see, speeds, rate)
     return found
 
 
@@ -511,18 +521,21 @@ def _swapped(recording: Recording, see: Observe) -> tuple[QualityFault, ...]:
 
 
 def _wrong_rate(
-    recording: Recording, look: Observation, see: Observe, speeds: tuple[float, float]
+    recording: Recording,
+    look: Observation,
+    see: Observe,
+    speeds: tuple[float, float],
+    stated: float,
 ) -> tuple[QualityFault, ...]:
     if look.speed_hz is None:
         return ()
     for ratio in (*RATES, *(1 / rate for rate in RATES)):
         if not _within(look.speed_hz * ratio, speeds):
             continue
-        mended = see(_resampled(recording, ratio))
+        mended = see(resampled(recording, ratio))
         # true samples that are slower than stated hold no high bands to compare
         lacking = ratio < 1 and mended.free_distance < _FREE * mended.limit and mended.level
         if mended.familiar or lacking:
-            stated = recording.sample_rate
             text = (
                 f"speed and spectrum fit a sample rate of {stated * ratio:g} Hz, {ratio:.3g} times "
                 f"the stated {stated:g} Hz; correct the rate, or, if it is right, run the machine "
@@ -530,22 +543,6 @@ def _wrong_rate(
             )
             return (QualityFault(kind="rate", channel="", text=text, factor=ratio),)
     return ()
-
-
-def _resampled(recording: Recording, ratio: float) -> Recording:
-    """The recording as it is if its samples were taken `ratio` times as fast as stated."""
-    from scipy.signal import resample_poly
-
-    part = Fraction(ratio).limit_denominator(100)
-    signal = resample_poly(
-        recording.signal, part.denominator, part.numerator, axis=1, padtype="line"
-    )
-    if recording.tacho is not None:  # a filter would ring at its edges
-        row = recording.names.index(recording.tacho)
-        place = np.arange(signal.shape[1]) * ratio
-        old = np.arange(recording.signal.shape[1])
-        signal[row] = np.interp(place, old, recording.signal[row])
-    return replace(recording, signal=signal)
 
 
 def quiet_faults(

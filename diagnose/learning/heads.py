@@ -1,5 +1,6 @@
 """Whether a fault beside the wear is there, or a regime in which wear sounds different."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -13,6 +14,7 @@ Float = NDArray[np.float64]
 PRESENT = 0.5
 """Probability from which on it is likelier there than not."""
 
+_LEAST_CHANCE = 1e-12
 _LOGISTIC_C = 10.0  # weak: one slope on hundreds of records
 
 
@@ -61,6 +63,18 @@ class FittedHead:
     shifted: Float
 
 
+def logit(probability: float) -> float:
+    """Logarithm of the odds, which are kept finite.
+
+    Examples
+    --------
+    >>> logit(0.5), round(logit(1.0))
+    (0.0, 28)
+    """
+    kept = min(max(probability, _LEAST_CHANCE), 1.0 - _LEAST_CHANCE)
+    return math.log(kept / (1.0 - kept))
+
+
 def told_apart(fitted: FittedHead, here: NDArray[np.bool_], share: float) -> Head:
     """A head that calls no more than a share of the records without it present.
 
@@ -86,7 +100,7 @@ def told_apart(fitted: FittedHead, here: NDArray[np.bool_], share: float) -> Hea
     >>> told_apart(fitted, np.arange(102) > 100, 0.1).threshold
     0.36
     """
-    usual = float(np.quantile(fitted.probability[~here], 1.0 - share))
+    usual = float(np.quantile(fitted.probability[~here], 1.0 - share, method="higher"))
     return replace(fitted.head, threshold=max(usual, float(here.mean())))
 
 

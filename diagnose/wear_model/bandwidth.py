@@ -18,6 +18,7 @@ Float = NDArray[np.float64]
 CUT_OFF_SHARE = 0.005
 """Of familiar recordings, in each channel: that may be cautioned for it."""
 
+_STILL = 1e-6  # dB^2: a middle that varies less is constant
 _MIDDLE = (0.2, 0.4)  # of the highest frequency, which the highest band is held against
 
 
@@ -28,13 +29,13 @@ class UsualTops(NamedTuple):
     ----------
     offset, slope : numpy.ndarray [shape=(n_channels,)]
         ``top = offset + slope * middle`` [dB].
-    least : numpy.ndarray [shape=(n_channels,)]
+    most : numpy.ndarray [shape=(n_channels,)]
         How far the highest band of few familiar recordings is below that [dB].
     """
 
     offset: Float
     slope: Float
-    least: Float
+    most: Float
 
 
 class CutOff(NamedTuple):
@@ -78,15 +79,15 @@ def fit_tops(names: Sequence[str], rows: Float) -> UsualTops:
     >>> [part.round(6).tolist() for part in fit_tops(names, rows)[:2]]
     [[-5.0], [0.5]]
     """
-    offset, slope, least = np.zeros((3, len(_knocking(names))))
+    offset, slope, most = np.zeros((3, len(_knocking(names))))
     for i, columns in enumerate(_knocking(names).values()):
         middle, top = _levels(columns, rows)
         spread = middle - middle.mean()
-        slope[i] = float(spread @ top) / max(float(spread @ spread), np.finfo(float).tiny)
+        slope[i] = float(spread @ top) / max(float(spread @ spread), _STILL * len(rows))
         offset[i] = float(top.mean() - slope[i] * middle.mean())
         short = offset[i] + slope[i] * middle - top
-        least[i] = max(float(np.quantile(short, 1.0 - CUT_OFF_SHARE, method="higher")), 0.0)
-    return UsualTops(offset, slope, least)
+        most[i] = max(float(np.quantile(short, 1.0 - CUT_OFF_SHARE, method="higher")), 0.0)
+    return UsualTops(offset, slope, most)
 
 
 def cut_off(names: Sequence[str], row: Float, usual: UsualTops) -> list[CutOff]:

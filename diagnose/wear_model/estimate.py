@@ -35,9 +35,10 @@ from ..feature_rows.quality import (
     recording_faults,
     suspicions,
 )
+from ..feature_rows.resampling import at_rate
 from ..feature_rows.transfer_reference import told_against
 from ..learning.conformal import COVERAGE
-from ..learning.heads import Head
+from ..learning.heads import Head, logit
 from ..learning.severity import Estimator
 from .bandwidth import cut_off
 from .noise_floor import lifted_rows, noisiest
@@ -369,8 +370,9 @@ class WearModel:
         Parameters
         ----------
         recording : Recording
-            Any, with the views that the model reads joined to it; one that lacks the model's inputs
-            or is at fault is unusable, with the reasons.
+            Any, with the views that the model reads joined to it; one that is sampled faster is
+            brought to the model's rate, one that lacks the model's inputs or is at fault is
+            unusable, with the reasons.
         baseline : Baseline, optional
             Healthy recordings of the same machine; a referenced model needs them, a cold one only
             tells the evidence against them.
@@ -391,6 +393,8 @@ class WearModel:
         ModelError
             The program's features are not the model's.
         """
+        stated = recording.sample_rate
+        recording = at_rate(recording, self.card.sample_rate_hz)
         faults = recording_faults(recording, self.card)
         if any(fault.bars for fault in faults):
             return self._unusable(faults)
@@ -405,7 +409,7 @@ class WearModel:
         def see(mended: Recording) -> Observation:
             return self._look(self._row(mended, known))
 
-        faults += suspicions(recording, look, see, self._speeds()) or quiet_faults(
+        faults += suspicions(recording, look, see, self._speeds(), stated) or quiet_faults(
             recording, self.names, row, self.levels
         )
         if any(fault.bars for fault in faults):
@@ -512,7 +516,7 @@ class WearModel:
     ) -> Estimate:
         if self.mode == "referenced" and baseline is None:
             return Estimate(verdict="unusable", reasons=(NO_BASELINE,), mode=self.mode)
-        row = self._lifted(row[None, :])[0]
+        raw, row = row, self._lifted(row[None, :])[0]
         known: dict[str, Any] = {
             "faults": faults,
             "mode": self.mode,
@@ -528,19 +532,18 @@ class WearModel:
         asked, inputs = self._asked(row, baseline, conditions)
         findings = self._findings(row)
         odd = [
-            self._range_cautions(asked, inputs),
+            [*self._range_cautions(asked, inputs), *_disagreement_cautions(asked, inputs)],
             self._condition_cautions(row, conditions),
             self._level_cautions(look),
             self._quiet_cautions(row),
             self._noise_cautions(row),
             self._band_cautions(row),
-            _disagreement_cautions(asked, inputs),
         ]
         strange = tuple(text for texts in odd for text in texts)
         if (ways := sum(bool(texts) for texts in odd)) > _MOST_ODD:
             whole = (
                 f"it is unlike the training recordings in {ways} ways at once, must be in at most "
-                f"{_MOST_ODD}, as every familiar machine was"
+                f"{_MOST_ODD}, as all machines of its kind were that it was tried on"
             )
             return Estimate(verdict="unfamiliar", reasons=(whole, *strange), **known)
         cautions = (
@@ -555,7 +558,7 @@ class WearModel:
             noted=() if asked is self.blind else self.noted,
             cautions=cautions,
             confounders=findings,
-            evidence=self._evidence(row, baseline),
+            evidence=self._evidence(raw, baseline),
             **known,
             **asked.grading(
                 inputs, look.distance, self.card.grade_edges_m, cautious=bool(cautions)
@@ -564,10 +567,11 @@ class WearModel:
 
     def _refused(self, row: Float) -> tuple[str, ...]:
         """That a recording sounds like one of a kind that the model was shown to refuse."""
+        found = [(head, float(head.probability(row[None, :])[0])) for head in self.strangers]
         called = [
-            (probability / head.threshold, head.name)
-            for head in self.strangers
-            if (probability := float(head.probability(row[None, :])[0])) > head.threshold
+            (logit(probability) - logit(head.threshold), head.name)
+            for head, probability in found
+            if probability > head.threshold
         ]
         if not called:
             return ()

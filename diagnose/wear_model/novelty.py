@@ -66,7 +66,7 @@ class Familiarity:
         How far the noise floor of few familiar recordings is above that ceiling [dB].
     least_noise : numpy.ndarray [shape=(n_levels,)]
         Of :func:`~.noise_floor.fit_least` [dB].
-    top_offset, top_slope, least_top : numpy.ndarray [shape=(n_channels,)]
+    top_offset, top_slope, most_top_lacking : numpy.ndarray [shape=(n_channels,)]
         Of :class:`~.bandwidth.UsualTops`.
     """
 
@@ -87,12 +87,12 @@ class Familiarity:
     least_noise: Float
     top_offset: Float
     top_slope: Float
-    least_top: Float
+    most_top_lacking: Float
 
     @property
     def tops(self) -> UsualTops:
         """What the highest band of a channel is to be."""
-        return UsualTops(self.top_offset, self.top_slope, self.least_top)
+        return UsualTops(self.top_offset, self.top_slope, self.most_top_lacking)
 
     def lacking(self, names: Sequence[str], rows: Float) -> Float:
         """How far peaks are below the usual ones [dB, shape=(n_recordings,)]."""
@@ -279,7 +279,7 @@ def fit_familiarity(
         least_noise=fit_least(names, rows),
         top_offset=tops.offset,
         top_slope=tops.slope,
-        least_top=tops.least,
+        most_top_lacking=tops.most,
     )
 
 

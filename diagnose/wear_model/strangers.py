@@ -73,25 +73,38 @@ def strangers_in(
     if faults:
         raise DataError("\n".join(faults))
     found: dict[str, list[tuple[FeatureTable, NDArray[np.bool_]]]] = {}
-    for path in paths:
-        table = feature_table(path, choice=choice, jobs=jobs, progress=progress)
+    for path in dict.fromkeys(paths):
+        table = feature_table(path, choice=choice, jobs=jobs, progress=progress).named(names)
+        if not np.isfinite(table.values).all():
+            faults.append(
+                f"{path}: features are undefined in some records, must be 0; leave them out"
+            )
         for name, here in _kinds(path, table.manifest).items():
-            found.setdefault(name, []).append((table.named(names), here))
-    few = [
-        f"refuse: {int(count)} recordings of {name}, must be >= {_FEWEST}; add others"
-        for name, parts in found.items()
-        if (count := sum(here.sum() for _, here in parts)) < _FEWEST
+            found.setdefault(name, []).append((table, here))
+    kinds = tuple(_strangers(name, parts) for name, parts in found.items())
+    faults += [text for each in kinds for text in _too_few(each)]
+    if faults:
+        raise DataError("\n".join(faults))
+    return kinds
+
+
+def _too_few(kind: Strangers) -> list[str]:
+    counts = {
+        "recordings": (len(kind.rows), _FEWEST),
+        "machines": (len(np.unique(kind.groups)), FOLDS),
+    }
+    return [
+        f"refuse: {count} {what} of {kind.name}, must be >= {fewest}; add others"
+        for what, (count, fewest) in counts.items()
+        if count < fewest
     ]
-    if few:
-        raise DataError("\n".join(few))
-    return tuple(_strangers(name, parts) for name, parts in found.items())
 
 
 def _other_layout(path: str | Path, head: Attributes) -> list[str]:
     with DataSet(path) as data:
         other = data.attributes
     pairs = {
-        "channels": ([c.name for c in other.channels], [c.name for c in head.channels]),
+        "channels": (_told(other), _told(head)),
         "sample_rate": (other.sample_rate, head.sample_rate),
         "pulses_per_revolution": (other.pulses_per_revolution, head.pulses_per_revolution),
     }
@@ -101,6 +114,10 @@ def _other_layout(path: str | Path, head: Attributes) -> list[str]:
         for name, (found, wanted) in pairs.items()
         if found != wanted
     ]
+
+
+def _told(head: Attributes) -> str:
+    return ", ".join(f"{channel.name} [{channel.unit}]" for channel in head.channels)
 
 
 def _kinds(path: str | Path, manifest: pd.DataFrame) -> dict[str, NDArray[np.bool_]]:
@@ -114,13 +131,19 @@ def _kinds(path: str | Path, manifest: pd.DataFrame) -> dict[str, NDArray[np.boo
 
 
 def _strangers(name: str, parts: Sequence[tuple[FeatureTable, NDArray[np.bool_]]]) -> Strangers:
-    rows, groups, first = [], [], 0
+    rows, groups, signals, first = [], [], [], 0
     for table, here in parts:
-        own = table.manifest["group"].to_numpy()[here]
         rows.append(table.values[here])
-        groups.append(first + own)  # machines of one file are none of another
-        first += int(own.max()) + 1
-    return Strangers(name=name, rows=np.vstack(rows), groups=np.concatenate(groups))
+        groups.append(first + table.manifest["group"].to_numpy()[here])
+        signals.append(table.manifest["signal_crc32"].to_numpy()[here])
+        first += int(table.manifest["group"].max()) + 1  # machines of one file are none of another
+    signal, once = np.unique(np.concatenate(signals), return_index=True)
+    return Strangers(
+        name=name,
+        rows=np.vstack(rows)[once],
+        groups=np.concatenate(groups)[once].astype(np.intp),
+        signals=signal,
+    )
 
 
 def fit_strangers(training: TrainingRows, seed: int) -> tuple[tuple[Head, StrangerRates], ...]:

@@ -276,6 +276,10 @@ def fit_model(
     }
     if references is not None:
         card["mode"] = "referenced"
+    shown = {int(crc) for each in strangers for crc in each.signals}
+    card["trained_on"]["training_signals"] = sorted(
+        shown.union(card["trained_on"]["training_signals"])
+    )
     return _model(learnt, checked(ModelCard, json.loads(json.dumps(card)), path, "card.json"))
 
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..feature_rows.healthy import referenced_rows
 from ..feature_rows.physical import moved_rows
+from .noise_floor import fit_least, lifted_rows
 from .novelty import REACH
 
 Float = NDArray[np.float64]
@@ -29,11 +30,14 @@ class Strangers:
     rows : numpy.ndarray [shape=(n, n_features)]
     groups : numpy.ndarray [shape=(n,)]
         Machine draw of each recording, >= 0.
+    signals : numpy.ndarray [shape=(n,)]
+        Checksum of each recording's signal; empty where it is of no matter.
     """
 
     name: str
     rows: Float
     groups: NDArray[np.intp]
+    signals: NDArray[np.integer[Any]] = field(default_factory=lambda: np.zeros(0, np.int64))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,6 +99,20 @@ class TrainingRows:
 
         healthy = None if self.baseline is None else there(self.baseline)
         return replace(self, rows=there(self.rows), baseline=healthy)
+
+    def lifted(self) -> "TrainingRows":
+        """All rows as a model will see them: none cleaner than usual ones."""
+        least = fit_least(self.names, self.rows)
+
+        def seen(rows: Float) -> Float:
+            return lifted_rows(self.names, rows, least)
+
+        return replace(
+            self,
+            rows=seen(self.rows),
+            baseline=None if self.baseline is None else seen(self.baseline),
+            strangers=tuple(replace(each, rows=seen(each.rows)) for each in self.strangers),
+        )
 
     def part(self, columns: NDArray[np.intp]) -> "TrainingRows":
         """The same records with some of the features."""
