@@ -1,7 +1,7 @@
 """Whether a channel's band ends below where it did in training: by a filter, or a loose mounting.
 
 A knock is short, so it sounds in all bands. A channel whose highest band is far quieter than those
-below let expect was cut off, which no level of noise tells: a clean sensor is quiet there as well,
+below suggest was cut off, which no level of noise tells: a clean sensor is quiet there as well,
 but not during a knock.
 """
 

@@ -623,8 +623,8 @@ class WearModel:
         """That the upper end of a channel's band is missing."""
         return [
             f"{each.channel} is {each.lacking_db:.0f} dB quieter above {each.edge_hz:.0f} Hz than "
-            f"its lower bands let expect, must be at most {each.most_db:.0f} dB: a filter, the "
-            "mounting of the sensor or another sample rate on the way limits its band"
+            f"its lower bands suggest, must be at most {each.most_db:.0f} dB: a filter, the "
+            "mounting of the sensor or resampling limits its band"
             for each in cut_off(self.names, row, self.familiarity.tops)
         ]
 
