@@ -107,7 +107,7 @@ def test_the_higher_rung_of_the_pilots_is_taken(monkeypatch):
     found = iter([resolution(mesh="x1", tolerance="x1/2"), resolution(mesh="x1/2", tolerance="x4")])
     scenes = []
 
-    def resolve(scene, quantities, accuracy, pinned):
+    def resolve(scene, quantities, accuracy, pinned, **_ways):
         scenes.append((scene, pinned))
         return next(found)
 
@@ -132,7 +132,7 @@ def test_the_higher_rung_of_the_pilots_is_taken(monkeypatch):
 def test_a_step_is_the_least_of_what_the_records_ask_for(monkeypatch, level, counts):
     recipe = load_recipe("triplex-pump-small", {"duration": "0.25 s"})
     one = resolution(wristpin="ideal", drive="motor", step=level, mesh="")
-    monkeypatch.setattr(module, "resolve", lambda *_: one)
+    monkeypatch.setattr(module, "resolve", lambda *_, **__: one)
     choice = choose(recipe, seed=1)
     assert ("numerics.step" in choice.values) == bool(counts)
     if counts:
@@ -151,7 +151,7 @@ def test_a_level_that_the_recipes_own_scene_has_not_is_the_coarser_one(monkeypat
     monkeypatch.setattr(
         module,
         "resolve",
-        lambda *_: resolution(wristpin="ideal", drive="motor", step=next(levels), mesh=""),
+        lambda *_, **__: resolution(wristpin="ideal", drive="motor", step=next(levels), mesh=""),
     )
     assert choose(recipe, seed=1).rungs["step"] == "x2"
 

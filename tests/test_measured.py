@@ -44,7 +44,7 @@ def test_sample_rate_length_and_unit(mfpt, name):
 
 @pytest.mark.parametrize("name", FILES)
 def test_as_it_is_the_report_cannot_judge_it_and_says_what_it_lacks(mfpt, small_model, name):
-    """One channel, no tacho, another rate: nothing of the machine can be said."""
+    """One channel, no tacho: nothing of the machine can be said; the rate is high enough."""
     from click.testing import CliRunner
     from wearstate.diagnose.command_line.cli import cli
 
@@ -52,7 +52,7 @@ def test_as_it_is_the_report_cannot_judge_it_and_says_what_it_lacks(mfpt, small_
     done = CliRunner().invoke(cli, arguments)
     table = json.loads(done.stdout)
     assert table["estimate"]["verdict"] == "unusable"
-    assert [fault["kind"] for fault in table["estimate"]["faults"]] == ["layout", "tacho", "rate"]
+    assert [fault["kind"] for fault in table["estimate"]["faults"]] == ["layout", "tacho"]
     assert "g" in table["recording"]["channels"][0]["unit_in_file"]
     assert done.exit_code == 2
     assert CliRunner().invoke(cli, [*arguments, "--fail-on", "alarm"]).exit_code == 2

@@ -95,7 +95,7 @@ def test_a_point_tells_its_figures_and_its_settings(chart):
     assert mark.told.splitlines() == [
         "coarse",
         "wall time of a simulated second: 0.01 s/s",
-        "error: 1.5 % ± 0.15 % (force_peak)",
+        "error: 1.5 ± 0.1 % (force_peak)",
         "verdict: within",
     ]
     assert mark.block.startswith(BLOCK)

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from wearstate.diagnose.feature_rows.healthy import baseline_of
 from wearstate.diagnose.feature_rows.resampling import at_rate
 from wearstate.sim.machine.simulate import simulate
 from wearstate.sim.output.recording import Recording
@@ -54,6 +55,16 @@ def test_a_model_reads_a_faster_recording_as_its_own(small_trained):
     assert said.severity == pytest.approx(model.estimate(own).severity, rel=0.05)
     [reason] = model.estimate(slow).reasons
     assert "sampled at 20000 Hz, the model needs 25600 Hz: record faster" in reason
+
+
+def test_healthy_recordings_may_be_faster_as_well(small_trained):
+    card = small_trained[0].card
+    own, fast = (
+        baseline_of([simulate(load_scene("bilge-pump", {"sample_rate": rate}), seed=3)], card)
+        for rate in ("25.6 kHz", "51.2 kHz")
+    )
+    levels = [i for i, name in enumerate(card.features) if name.endswith(".rms")]
+    np.testing.assert_allclose(fast.features[levels], own.features[levels], rtol=0.02)
 
 
 def test_a_rate_that_is_stated_twice_too_high_is_still_found(small_trained):

@@ -382,7 +382,7 @@ def progress_bar(what: str) -> Iterator[Callable[[int, int], None] | None]:
 
         def update(done: int, total: int) -> None:
             speed = bar.tasks[task].speed  # of the last half minute
-            text = f"{speed:.3g}/s" if speed else ""
+            text = f"{float(f'{speed:.3g}'):g}/s" if speed else ""
             bar.update(task, completed=done, total=total, rate=text)
 
         yield update

@@ -24,6 +24,7 @@ from .feature_table import (
 from .model_card import ModelCard
 from .probe_means import ProbeMeans, probe_means
 from .quality import layout_faults, sample_faults
+from .resampling import at_rate
 from .transfer_reference import (
     healthy_transfer,
     told_against,
@@ -230,7 +231,8 @@ def baseline_of(
     """
     sound: list[Recording] = []
     faults: dict[str, list[str]] = {}
-    for i, recording in enumerate(recordings):
+    for i, given in enumerate(recordings):
+        recording = at_rate(given, card.sample_rate_hz)
         found = [
             fault.text
             for fault in (layout_faults(recording, card) or sample_faults(recording))
