@@ -23,7 +23,7 @@ from .physical import level_channels, level_rows, shape_rows
 from .resampling import resampled
 
 Float = NDArray[np.float64]
-Kind = Literal["saturated", "dead", "swapped", "unit", "rate", "tacho", "layout", "hum"]
+Kind = Literal["saturated", "dead", "swapped", "unit", "rate", "tacho", "layout", "hum", "coupling"]
 
 FACTORS = (9.80665, 1000.0)
 """Ratios of units that are mixed up: g for m/s^2, and milli or micro for the next unit."""
@@ -94,6 +94,7 @@ def recording_faults(recording: Recording, card: ModelCard) -> tuple[QualityFaul
         Of layout where that does not fit, else of the samples; a view that is missing is one.
     """
     faults = [*(layout_faults(recording, card) or sample_faults(recording))]
+    faults += [] if faults else coupling_faults(recording, card.features)
     views = card.views
     for view, layout in views.items():
         if view not in recording.joined:
@@ -109,6 +110,50 @@ def recording_faults(recording: Recording, card: ModelCard) -> tuple[QualityFaul
         text = f"views {', '.join(strange)} are joined, the model knows {known}: leave them out"
         faults.append(QualityFault(kind="layout", channel="", text=text))
     return tuple(faults)
+
+
+def coupling_faults(recording: Recording, features: Sequence[str]) -> tuple[QualityFault, ...]:
+    """That probes do not show where the shaft is, which a model reads.
+
+    Parameters
+    ----------
+    recording : Recording
+    features : sequence of str
+        Of the model.
+
+    Returns
+    -------
+    tuple of QualityFault
+        One where the mean of every probe is next to nothing beside its vibration: of a journal that
+        runs in the middle of its bearing no two would be, as no probe is zeroed so well.
+
+    Examples
+    --------
+    >>> wave = np.sin(np.arange(1000.0)) * 1e-5
+    >>> probes = [Channel(name=f"p{i}", unit="m", quantity="displacement") for i in (1, 2)]
+    >>> recording = Recording(
+    ...     signal=np.stack([wave, wave]), sample_rate=1e3, channels=tuple(probes))
+    >>> coupling_faults(recording, ["orbit.centreline.x"])[0].text[:36]
+    'p1, p2 show no mean position, which '
+    >>> coupling_faults(recording, ["p1.rms"])
+    ()
+    """
+    rows = [i for i, each in enumerate(recording.channels) if each.quantity == _GAP]
+    if len(rows) < _PAIR or not any(_POSITION in name for name in features):
+        return ()
+    probes = recording.signal[rows].astype(np.float64)
+    if (np.abs(probes.mean(axis=1)) > _NO_MEAN * probes.std(axis=1)).any():
+        return ()
+    names = ", ".join(recording.names[i] for i in rows)
+    text = (
+        f"{names} show no mean position, which the model reads: they are coupled for AC, or their "
+        "mean was taken away; record the gap with it"
+    )
+    return (QualityFault(kind="coupling", channel=names, text=text),)
+
+
+_GAP, _POSITION, _PAIR = "displacement", "centreline", 2
+_NO_MEAN = 0.03  # of the vibration's rms: what is left of a mean in a few revolutions
 
 
 def layout_faults(recording: Recording, card: LayoutCard) -> tuple[QualityFault, ...]:
