@@ -435,10 +435,11 @@ class WearModel:
         return values
 
     def _look(self, row: Float) -> Observation:
-        """How strange a recording is: as it is, or with the least noise that is known.
+        """How strange a recording is, with its level mended or its noise filled up first.
 
-        What a sensor of another sensitivity shows is quieter as well, and its noise must not be
-        filled up before its level is mended: of both ways, the one that makes it familiar.
+        A channel of another sensitivity is quieter as well, and must not be filled up before its
+        level is mended; the level of a very clean one cannot be told before it is filled up. Of
+        both orders, the one that makes the recording more familiar.
         """
         lifted = self._lifted(row[None, :])[0]
         ways = [row] if np.array_equal(lifted, row) else [row, lifted]

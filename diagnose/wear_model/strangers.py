@@ -77,7 +77,8 @@ def strangers_in(
         table = feature_table(path, choice=choice, jobs=jobs, progress=progress).named(names)
         if not np.isfinite(table.values).all():
             faults.append(
-                f"{path}: features are undefined in some records, must be 0; leave them out"
+                f"{path}: features are undefined in some records, must be defined in all; leave "
+                "such records out"
             )
         for name, here in _kinds(path, table.manifest).items():
             found.setdefault(name, []).append((table, here))
