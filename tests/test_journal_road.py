@@ -1,6 +1,7 @@
 """The whole road of the journal bearing: recipe, features, model, report, pictures."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -41,6 +42,25 @@ def data(tmp_path_factory):
 @pytest.fixture(scope="module")
 def trained(data):
     return train_model(data, seed=3)
+
+
+# --- probes
+
+
+def test_probes_without_a_mean_are_at_fault_where_the_model_knows_one(data, trained):
+    model = trained[0]
+    with DataSet(data) as records:
+        whole = records[0]
+    gaps = np.array([channel.quantity == "displacement" for channel in whole.channels])
+    still = whole.signal - whole.signal.mean(axis=1, keepdims=True)
+    coupled = replace(whole, signal=np.where(gaps[:, None], still, whole.signal))
+    said = model.estimate(coupled)
+    assert said.verdict == "unusable"
+    assert [fault.kind for fault in said.faults] == ["coupling"]
+    assert "probe_1, probe_2 show no mean position" in said.reasons[0]
+    assert model.estimate(whole).verdict != "unusable"
+    never = replace(model.familiarity, low=np.full(len(model.names), -1e9))  # as trained on such
+    assert replace(model, familiarity=never).estimate(coupled).verdict != "unusable"
 
 
 # --- the recipe

@@ -819,6 +819,12 @@ def test_power_against_libm():
     assert np.mean(found == known) > 0.8
 
 
+@pytest.mark.parametrize("base", [0.0, -2.0, math.inf, -math.inf, math.nan])
+def test_power_of_what_has_none_is_no_number(base):
+    """Its bits would make one of 1e215 of it, and a lost pressure would not be seen."""
+    assert math.isnan(power(base, 0.7))
+
+
 def test_sine_cosine_against_libm():
     angles = np.random.default_rng(0).uniform(-1e4, 1e4, 20_000)
     found = np.array([sine_cosine(a) for a in angles])

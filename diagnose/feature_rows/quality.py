@@ -94,7 +94,6 @@ def recording_faults(recording: Recording, card: ModelCard) -> tuple[QualityFaul
         Of layout where that does not fit, else of the samples; a view that is missing is one.
     """
     faults = [*(layout_faults(recording, card) or sample_faults(recording))]
-    faults += [] if faults else coupling_faults(recording, card.features)
     views = card.views
     for view, layout in views.items():
         if view not in recording.joined:
@@ -112,20 +111,26 @@ def recording_faults(recording: Recording, card: ModelCard) -> tuple[QualityFaul
     return tuple(faults)
 
 
-def coupling_faults(recording: Recording, features: Sequence[str]) -> tuple[QualityFault, ...]:
+def coupling_faults(
+    recording: Recording, names: Sequence[str], row: Float, least: Float
+) -> tuple[QualityFault, ...]:
     """That probes do not show where the shaft is, which a model reads.
 
     Parameters
     ----------
     recording : Recording
-    features : sequence of str
-        Of the model.
+    names : sequence of str
+        Of the features.
+    row : numpy.ndarray [shape=(n_features,)]
+    least : numpy.ndarray [shape=(n_features,)]
+        Least value of each feature in training.
 
     Returns
     -------
     tuple of QualityFault
-        One where the mean of every probe is next to nothing beside its vibration: of a journal that
-        runs in the middle of its bearing no two would be, as no probe is zeroed so well.
+        One where the shaft is nearer the middle than any in training, and the mean of every probe
+        is next to nothing beside its vibration: of a journal in the middle of its bearing no two
+        would be, as no probe is zeroed so well.
 
     Examples
     --------
@@ -133,13 +138,18 @@ def coupling_faults(recording: Recording, features: Sequence[str]) -> tuple[Qual
     >>> probes = [Channel(name=f"p{i}", unit="m", quantity="displacement") for i in (1, 2)]
     >>> recording = Recording(
     ...     signal=np.stack([wave, wave]), sample_rate=1e3, channels=tuple(probes))
-    >>> coupling_faults(recording, ["orbit.centreline.x"])[0].text[:36]
+    >>> names, row = ["orbit.centreline.radius_db"], np.array([-150.0])
+    >>> coupling_faults(recording, names, row, np.array([-90.0]))[0].text[:36]
     'p1, p2 show no mean position, which '
-    >>> coupling_faults(recording, ["p1.rms"])
+
+    A model of probes that never had one reads none:
+
+    >>> coupling_faults(recording, names, row, np.array([-160.0]))
     ()
     """
     rows = [i for i, each in enumerate(recording.channels) if each.quantity == _GAP]
-    if len(rows) < _PAIR or not any(_POSITION in name for name in features):
+    radii = [i for i, name in enumerate(names) if name.endswith(_RADIUS)]
+    if len(rows) < _PAIR or not (row[radii] < least[radii]).any():
         return ()
     probes = recording.signal[rows].astype(np.float64)
     if (np.abs(probes.mean(axis=1)) > _NO_MEAN * probes.std(axis=1)).any():
@@ -152,7 +162,7 @@ def coupling_faults(recording: Recording, features: Sequence[str]) -> tuple[Qual
     return (QualityFault(kind="coupling", channel=names, text=text),)
 
 
-_GAP, _POSITION, _PAIR = "displacement", "centreline", 2
+_GAP, _RADIUS, _PAIR = "displacement", "centreline.radius_db", 2
 _NO_MEAN = 0.03  # of the vibration's rms: what is left of a mean in a few revolutions
 
 
@@ -239,10 +249,8 @@ def _tacho_layout_faults(recording: Recording, card: LayoutCard) -> list[Quality
 def _rate_faults(found: float, wanted: float) -> list[QualityFault]:
     if abs(found / wanted - 1) <= RATE_TOLERANCE:
         return []
-    text = (
-        f"it is sampled at {found:g} Hz, the model needs {wanted:g} Hz: record faster, or train a "
-        f"model on a set with sample_rate = {found:g} Hz"
-    )
+    cure = "resample" if found > wanted else "record faster, or train a model on such recordings"
+    text = f"it is sampled at {found:g} Hz, the model needs {wanted:g} Hz: {cure}"
     return [QualityFault(kind="rate", channel="", text=text)]
 
 

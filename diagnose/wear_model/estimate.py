@@ -30,6 +30,7 @@ from ..feature_rows.quality import (
     Levels,
     Observation,
     QualityFault,
+    coupling_faults,
     layout_faults,
     quiet_faults,
     recording_faults,
@@ -394,7 +395,7 @@ class WearModel:
             The program's features are not the model's.
         """
         stated = recording.sample_rate
-        recording = at_rate(recording, self.card.sample_rate_hz)
+        recording = self._at_rate(recording)
         faults = recording_faults(recording, self.card)
         if any(fault.bars for fault in faults):
             return self._unusable(faults)
@@ -402,6 +403,9 @@ class WearModel:
         if known is None and told_against(FeatureSelection(only=self.names)):
             return Estimate(verdict="unusable", reasons=(NO_BASELINE,), mode=self.mode)
         row = self._row(recording, known)
+        faults += coupling_faults(recording, self.names, row, self.familiarity.low)
+        if any(fault.bars for fault in faults):
+            return self._unusable(faults)
         look = self._look(row)
         place = self._columns.get(_SPEED_FEATURE)
         faults += hum_faults(recording, None if place is None else float(row[place]))
@@ -417,6 +421,15 @@ class WearModel:
         features = None if baseline is None else baseline.features
         noted = recording.row if conditions is None else conditions
         return self._judge(row, look, features, noted, faults, told)
+
+    def _at_rate(self, recording: Recording) -> Recording:
+        """The recording and its views, those that are sampled faster at the model's rates."""
+        layouts = self.card.views
+        joined = {
+            view: at_rate(other, layouts[view].sample_rate_hz) if view in layouts else other
+            for view, other in recording.joined.items()
+        }
+        return at_rate(replace(recording, joined=joined), self.card.sample_rate_hz)
 
     def _unusable(self, faults: tuple[QualityFault, ...], others: tuple[str, ...] = ()) -> Estimate:
         reasons = (*(fault.text for fault in faults if fault.bars), *others)
@@ -774,4 +787,5 @@ def _strangeness(distance: float, calibration: Float) -> str:
 
 def input_faults(recording: Recording, card: ModelCard) -> list[str]:
     """What a recording lacks of a model's inputs, as sentences; empty where it fits."""
-    return [fault.text for fault in layout_faults(recording, card)]
+    seen = at_rate(recording, card.sample_rate_hz)
+    return [fault.text for fault in layout_faults(seen, card)]

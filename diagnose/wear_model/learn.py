@@ -112,7 +112,6 @@ def learn(
         not told from the rest.
     """
     refuse_no_wear(training.severity)
-    training, among = training.lifted(), [each.lifted() for each in among]
     strangers = fit_strangers(training, seed)
     folds = group_folds(training.groups, n=FOLDS, seed=seed)
     other = training.moved(seed)

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from ..feature_rows.healthy import referenced_rows
 from ..feature_rows.physical import moved_rows
-from .noise_floor import fit_least, lifted_rows
 from .novelty import REACH
 
 Float = NDArray[np.float64]
@@ -99,20 +98,6 @@ class TrainingRows:
 
         healthy = None if self.baseline is None else there(self.baseline)
         return replace(self, rows=there(self.rows), baseline=healthy)
-
-    def lifted(self) -> "TrainingRows":
-        """All rows as a model will see them: none cleaner than usual ones."""
-        least = fit_least(self.names, self.rows)
-
-        def seen(rows: Float) -> Float:
-            return lifted_rows(self.names, rows, least)
-
-        return replace(
-            self,
-            rows=seen(self.rows),
-            baseline=None if self.baseline is None else seen(self.baseline),
-            strangers=tuple(replace(each, rows=seen(each.rows)) for each in self.strangers),
-        )
 
     def part(self, columns: NDArray[np.intp]) -> "TrainingRows":
         """The same records with some of the features."""

@@ -661,9 +661,9 @@ def starts_to_tell(candidate: Candidate, accuracy: float) -> int:
     -------
     int
         Doubled as a comparison doubles them. The scatter of few starts is uncertain itself: it is
-        taken as large as that of all quantities
-        together is in all but one case of ten. An error at the accuracy is never told;
-        that of few starts is then no more than a guess, and so is what is returned.
+        taken as large as that of all quantities together is in all but one case of ten. An error
+        at the accuracy is never told; that of few starts is then no more than a guess, and so is
+        what is returned.
 
     Examples
     --------
