@@ -325,18 +325,27 @@ def test_a_tampered_model_is_refused(trained, tmp_path, member):
         load_model(tmp_path / "bad.wsm")
 
 
+def test_an_interval_with_caution_is_never_narrower(trained):
+    estimator = trained[0].blind
+    surer = dataclasses.replace(estimator.shifted, truth=estimator.shifted.estimate * 1.001)
+    for each in (estimator, dataclasses.replace(estimator, shifted=surer)):
+        plain, cautious = (each.ends(cautious=one) for one in (False, True))
+        assert cautious.low >= plain.low
+        assert cautious.high >= plain.high
+
+
 def test_a_model_of_another_version_is_refused_with_the_cure(trained, tmp_path):
     save_model(trained[0], tmp_path / "good.wsm")
     with zipfile.ZipFile(tmp_path / "good.wsm") as bundle:
         seal = json.loads(bundle.read("seal.json"))
     changes = {"seal.json": json.dumps({**seal, "schema_version": 99}).encode()}
     rewritten(tmp_path / "good.wsm", tmp_path / "other.wsm", changes)
-    with pytest.raises(ModelError, match=r"schema_version = 99 must be 6; retrain it"):
+    with pytest.raises(ModelError, match=r"schema_version = 99 must be 7; retrain it"):
         load_model(tmp_path / "other.wsm")
     with zipfile.ZipFile(tmp_path / "fewer.wsm", "w") as bundle:  # as version 1, of fewer members
         bundle.writestr("seal.json", json.dumps({**seal, "schema_version": 1}))
         bundle.writestr("card.json", "{}")
-    with pytest.raises(ModelError, match=r"schema_version = 1 must be 6; retrain it"):
+    with pytest.raises(ModelError, match=r"schema_version = 1 must be 7; retrain it"):
         load_model(tmp_path / "fewer.wsm")
     for damaged in (b"[1]", b"{", b"9" * 9_000_000):
         with zipfile.ZipFile(tmp_path / "bad.wsm", "w", zipfile.ZIP_DEFLATED) as bundle:
@@ -384,6 +393,7 @@ def both(trained):
         ("blind.calibration.scale", np.array([-1.0])),
         ("blind.calibration.group", np.array([0.5])),
         ("blind.calibration.distance", np.array(["text"], dtype=object)),
+        ("blind.calibration.widened", np.float64(0.9)),
     ],
 )
 def test_a_forged_model_with_a_right_checksum_is_refused(both, tmp_path, name, forgery):

@@ -24,7 +24,7 @@ from ..feature_rows.feature_table import (
 from ..feature_rows.healthy import references, refuse_strangers
 from ..feature_rows.noted import notes_of
 from ..feature_rows.transfer_reference import healthy_transfer
-from ..learning.conformal import IntervalCalibration, grade_limits, grade_set, interval, tails
+from ..learning.conformal import grade_limits, grade_set, interval
 from ..learning.grades import grades_of
 from ..learning.scores import (
     Judged,
@@ -37,6 +37,7 @@ from ..learning.scores import (
     resampled,
     share,
 )
+from ..learning.severity import Estimator
 from ..wear_model.estimate import Estimate, WearModel
 from ..wear_model.train import draw_identity
 from .baselines import Side, contest, side_of
@@ -468,21 +469,26 @@ def reliability(
         held = np.zeros((2, len(judged.truth)), dtype=bool)
         for estimator, here in asked:
             for cautious, those in ((False, ~judged.cautious), (True, judged.cautious)):
-                known = estimator.known(cautious=cautious)
-                held |= _held(known, judged, here & those, model, nominal)
+                held |= _held(estimator, cautious, judged, here & those, model, nominal)
         shares = [share(each.astype(np.float64), judged.graded, draws) for each in held]
         found.append({"nominal": nominal, "interval": shares[0], "set": shares[1]})
     return found
 
 
 def _held(
-    known: IntervalCalibration, judged: Judged, here: Mask, model: WearModel, nominal: float
+    estimator: Estimator,
+    cautious: bool,
+    judged: Judged,
+    here: Mask,
+    model: WearModel,
+    nominal: float,
 ) -> Mask:
     """Whether interval and set hold the truth, of graded records here [shape=(2, n)]."""
     edges = model.card.grade_edges_m
     held = np.zeros((2, len(judged.truth)), dtype=bool)
-    given, ends = tails(known), tails(known, nominal)
-    limits = grade_limits(known, edges, nominal)
+    given = estimator.ends(cautious=cautious)
+    ends = estimator.ends(cautious=cautious, coverage=nominal)
+    limits = grade_limits(estimator.known(cautious=cautious), edges, nominal)
     for row in np.flatnonzero(judged.graded & here):
         # what the interval at hand was made with tells the size of the error expected
         size = float(np.log(judged.high[row] / judged.low[row]) / (given.low + given.high))

@@ -1,7 +1,7 @@
 """The severity from inputs, with what is known of its errors: a blend, and how it did unseen."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .conformal import (
+    COVERAGE,
     IntervalCalibration,
     Scale,
     Tails,
@@ -55,6 +56,14 @@ class Estimator:
     def known(self, *, cautious: bool) -> IntervalCalibration:
         """The calibration of a verdict with or without caution."""
         return self.shifted if cautious else self.calibration
+
+    def ends(self, *, cautious: bool, coverage: float = COVERAGE) -> Tails:
+        """Tails of a verdict; with caution none is shorter than without."""
+        found = tails(self.calibration, coverage)
+        if not cautious:
+            return found
+        far = tails(self.shifted, coverage)
+        return replace(far, low=max(far.low, found.low), high=max(far.high, found.high))
 
     @property
     def error(self) -> float:
@@ -105,7 +114,8 @@ class Estimator:
         """Tails of the errors and limits of the grades, reckoned once."""
         if (edges, cautious) not in self._reckoned:
             known = self.known(cautious=cautious)
-            self._reckoned[edges, cautious] = tails(known), grade_limits(known, edges)
+            ends = self.ends(cautious=cautious)
+            self._reckoned[edges, cautious] = ends, grade_limits(known, edges)
         return self._reckoned[edges, cautious]
 
     @cached_property

@@ -26,7 +26,7 @@ from ...sim.atomic import replacing
 from ...sim.output.recording import DataError, missing_file
 from .estimate import ModelError
 
-BUNDLE_SCHEMA = 6
+BUNDLE_SCHEMA = 7
 
 _SEAL, _CARD, _STRUCTURE, _ARRAYS = "seal.json", "card.json", "structure.json", "arrays.npz"
 _LARGEST_TABLE = 2**23  # byte, of a table unpacked: the card of a million records

@@ -359,6 +359,8 @@ def _calibration_fits(known: IntervalCalibration) -> bool:
         and np.ndim(known.group) == 1
         and np.size(known.group) > 0
         and all(spreads_fit(part) for part in arrays[:3])
+        and isinstance(known.widened, float)
+        and known.widened >= 1
     )
 
 

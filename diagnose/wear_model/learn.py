@@ -14,7 +14,13 @@ from ..feature_rows.feature_table import is_regime
 from ..feature_rows.model_card import StrangerRates
 from ..feature_rows.noted import doubted, noted_values, strayed
 from ..feature_rows.quality import Levels, fit_levels
-from ..learning.conformal import IntervalCalibration, fit_scale, scale_inputs
+from ..learning.conformal import (
+    IntervalCalibration,
+    fit_scale,
+    outer_tenths,
+    scale_inputs,
+    widening,
+)
 from ..learning.detection import visible_from
 from ..learning.experts import FEWEST_RECORDS, Experts, better_of, fit_experts
 from ..learning.heads import PRESENT, FittedHead, Head, fit_head
@@ -231,13 +237,22 @@ def _estimator(
             group=training.groups,
         )
 
+    known = calibration(fitted.estimate, sizes, distance)
     return Estimator(
         severity=fitted.blend,
         witness=fit_line(inputs, training.severity, fitted.options, seed=seed),
         scale=scale,
-        calibration=calibration(fitted.estimate, sizes, distance),
+        calibration=replace(known, widened=widening(known, _parts(training))),
         shifted=calibration(fitted.shifted_estimate, strange, far),
     )
+
+
+def _parts(training: TrainingRows) -> tuple[NDArray[np.bool_], ...]:
+    """Records on which intervals must hold by themselves: ends of wear and of each condition."""
+    values = [training.severity]
+    if training.conditions:
+        values += [*noted_values(training.conditions, training.notes).T]
+    return outer_tenths(np.column_stack(values))
 
 
 def _informed(
