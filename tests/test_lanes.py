@@ -43,7 +43,9 @@ def same(one, other):
 def test_the_drawn_records_are_of_every_kind(drawn):
     """Else the tests below would compare less than they say."""
     kinds = {lane_kind(scene) for scene, _ in drawn}
-    assert {tuple(kind) for kind in kinds} == set(product((False, True), repeat=3))
+    assert {tuple(kind) for kind in kinds} == {
+        (*plays, 1) for plays in product((False, True), repeat=3)
+    }
     pins = [scene.joint.crankpin for scene, _ in drawn]
     assert {"kelvin-voigt", "hunt-crossley", "exact"} <= {pin.law for pin in pins}
     assert {pin.elasticity for pin in pins} >= {"linear", "hertz"}
@@ -118,6 +120,65 @@ def test_rungs_that_the_standard_set_does_not_draw(changes):
 @pytest.mark.parametrize(
     "changes",
     [
+        {},  # chambers
+        {"drive.rung": "motor", "joint.wristpin.rung": "compliant"},
+        {"pressure.rung": "two-level", "drive.rung": "motor", "throws.1.phase": "90 deg"},
+        {"throws.2": {"joint": {"crankpin": {"diametral_clearance": "0.2 mm"}}}},
+        {"throws": [{"phase": "0 deg"}, {"phase": "110 deg"}], "pressure.suction": "-80 kPa"},
+        {"throws": [{"phase": f"{72 * n} deg"} for n in range(5)], "pressure.rung": "two-level"},
+    ],
+)
+def test_throws_lie_in_lanes_beside_each_other(changes):
+    settings = {"duration": "0.15 s", "settling_revolutions": 1, "casing.modes": _MODES} | changes
+    jobs = [
+        (load_scene("triplex-pump", settings | {"drive.speed": f"{440 + 3 * n} rpm"}), n)
+        for n in range(9)
+    ]
+    throws = len(jobs[0][0].throws)
+    assert lane_kind(jobs[0][0]).throws == throws > 1
+    assert lane_kind(jobs[0][0]).beside < len(jobs)
+    found = dict(simulate_many(jobs))
+    for n, (scene, seed) in enumerate(jobs):
+        own = simulate(scene, seed=seed, raise_on_failure=False)
+        assert same(found[n], own)
+        assert own.status.ok
+        assert own.numerics["contact_changes"] > 9  # steps are cut for all throws at once
+
+
+_PLACES = (
+    *("bearing_x", "bearing_y", "guide_y", "cylinder_x", "suction_valve", "discharge_valve"),
+    *("head_x", "head_y", "head_z", "frame_y"),
+)
+_MODES = [  # the scene's name three throws
+    {"frequency": "640 Hz", "damping_ratio": 0.02, "shape": dict.fromkeys(_PLACES, 0.05)}
+]
+
+
+def test_truth_of_several_throws():
+    settings = {"duration": "0.15 s", "settling_revolutions": 1}
+    jobs = [(load_scene("triplex-pump", settings), n) for n in range(3)]
+    found = dict(simulate_many(jobs, truth=GATHERED_TRUTH))
+    own = simulate(jobs[2][0], seed=2, truth=True).truth
+    names = set(found[2].truth)
+    assert names == {name for name in own if name.startswith(GATHERED_TRUTH)} - _STATES
+    assert "pin_force_n_3" in names
+    assert all(np.array_equal(found[2].truth[name], own[name]) for name in names)
+
+
+_STATES = {"state_alpha_rate"}
+
+
+def test_throws_that_differ_in_what_lanes_must_know_run_alone():
+    """Some breathe, some do not; one has a link."""
+    own = load_scene("triplex-pump", {"throws.1.pressure": {"rung": "two-level"}})
+    assert lane_kind(own) is None
+    link = {"throws.1.joint": {"crankpin": {"rung": "link"}}}
+    assert lane_kind(load_scene("triplex-pump", link)) is None
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
         {"pressure.rung": "heads", "pressure.flow": "two-harmonic"},
         {"joint.crankpin.rung": "link"},
         {"joint.crankpin.rung": "ideal"},
@@ -161,16 +222,24 @@ def forces_of(jobs, kind):
     return found
 
 
-def test_a_run_that_fails_on_its_way_is_left_behind():
-    """Its state is no number from the start; its neighbours end as ever."""
-    scenes = [
-        load_scene("bilge-pump", SHORT | {"drive.speed": f"{300 + n} rpm"}) for n in range(20)
-    ]
+@pytest.mark.parametrize(
+    ("name", "settings", "throw"),
+    [
+        ("bilge-pump", SHORT, 0),
+        ("triplex-pump", {"duration": "0.15 s", "pressure.rung": "two-level"}, 0),
+        ("triplex-pump", {"duration": "0.15 s", "pressure.rung": "two-level"}, 1),
+    ],
+)
+def test_a_run_that_fails_on_its_way_is_left_behind(name, settings, throw):
+    """The state of a throw is no number from the start; its neighbours end as ever."""
+    rpm = load_scene(name).drive.speed * 60
+    scenes = [load_scene(name, settings | {"drive.speed": f"{rpm + n} rpm"}) for n in range(20)]
     jobs = [lane_job(planned(scene)) for scene in scenes]
     kind = lane_kind(scenes[0])
     whole = forces_of(jobs, kind)
-    bad = jobs[4].start._replace(bodies=np.full((1, 12), np.nan))
-    jobs[4] = replace(jobs[4], start=bad)
+    bodies = jobs[4].start.bodies.copy()
+    bodies[throw] = np.nan
+    jobs[4] = replace(jobs[4], start=jobs[4].start._replace(bodies=bodies))
     found = forces_of(jobs, kind)
     assert found[4][0] == Status(1)
     assert found[4][1].shape[1] == 1

@@ -63,12 +63,12 @@ def _valves_of(p: Any, lane: int) -> Any:
 
 @kernel
 def enter_chamber(lane: int, p: Any, s: Any, a: Any) -> None:
-    """Begin the chamber of a record in a lane."""
+    """Begin the chamber of a throw in its lane."""
     for side in range(2):
         shares = valve_shares(implicit_part(p.step[lane]), _side_of(p, side, lane))
         p.share[side, 0, lane], p.share[side, 1, lane], p.share[side, 2, lane] = shares
     for c in range(CHAMBER_COLUMNS):
-        s.chamber[c, lane] = a.chambers[lane, 0, c]
+        s.chamber[c, lane] = a.chambers[lane, c]
 
 
 @kernel
@@ -117,12 +117,12 @@ def _side_by_side(p: Any, s: Any) -> None:
 @subroutine
 def breathe_alone(lane: int, p: Any, s: Any, a: Any) -> None:
     """Step the chamber of one lane, however hard that is."""
-    chamber, one = a.chambers[lane, 0], a.work.held[0]
+    chamber, one = a.chambers[lane], a.work.held[0]
     for c in range(CHAMBER_COLUMNS):
         chamber[c] = s.chamber0[c, lane]
-    h, substeps = p.step[lane], a.throws[lane, 0].substeps
+    h, substeps = p.step[lane], a.throws[lane].substeps
     fault, before, after = breathe(
-        chamber, one, a.liquid[lane, 0], h, s.x[PISTON_X, lane], s.v[PISTON_X, lane], substeps
+        chamber, one, a.liquid[lane], h, s.x[PISTON_X, lane], s.v[PISTON_X, lane], substeps
     )
     for c in range(CHAMBER_COLUMNS):
         s.chamber[c, lane] = chamber[c]
@@ -140,7 +140,7 @@ def lanes_breathe(p: Any, s: Any, a: Any, code: Any) -> int:
     for lane in range(LANES):
         if code[lane] != 0:
             s.sure[lane] = 1.0
-        elif s.sure[lane] == 0.0 or a.throws[lane, 0].substeps > 1:
+        elif s.sure[lane] == 0.0 or a.throws[lane].substeps > 1:
             breathe_alone(lane, p, s, a)
             alone += 1
     return alone

@@ -63,6 +63,12 @@ class LaneKind(NamedTuple):
     wrist: bool  # play in wrist pins
     guide: bool  # play in guides
     breathing: bool  # chambers with valves
+    throws: int  # of each, in lanes beside each other
+
+    @property
+    def beside(self) -> int:
+        """Records that lanes hold."""
+        return LANES // self.throws
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,16 +83,24 @@ class LaneJob:
 
 def lane_kind(scene: PumpScene) -> LaneKind | None:
     """What the lane of a scene must have; None of a mechanism that lanes do not know."""
-    crankpin, wristpin, guide = joint_rungs(scene, 0)
-    rung = scene.pressures(0).rung
+    throws = range(len(scene.throws))
+    crankpins, wristpins, guides = zip(*(joint_rungs(scene, k) for k in throws), strict=True)
+    rungs = {scene.pressures(k).rung for k in throws}
     known = (
-        crankpin == JOINT_COMPLIANT
-        and wristpin in (JOINT_IDEAL, JOINT_COMPLIANT)
-        and rung not in ("heads", *PIPED_RUNGS)
+        len(throws) <= LANES
+        and set(crankpins) == {JOINT_COMPLIANT}
+        and {JOINT_IDEAL, JOINT_COMPLIANT}.issuperset(wristpins)
+        and rungs.isdisjoint(("heads", *PIPED_RUNGS))
+        and (len(rungs) == 1 or "chamber" not in rungs)  # all breathe or none
     )
     if not known:
         return None
-    return LaneKind(wristpin == JOINT_COMPLIANT, guide == JOINT_COMPLIANT, rung == "chamber")
+    return LaneKind(
+        wrist=JOINT_COMPLIANT in wristpins,
+        guide=JOINT_COMPLIANT in guides,
+        breathing="chamber" in rungs,
+        throws=len(throws),
+    )
 
 
 _ROOM = 8192  # steps of a lane that are handed on together
@@ -111,9 +125,13 @@ def _kept_rows(kind: LaneKind) -> tuple[int, ...]:
 
 
 def lane_columns(kind: LaneKind) -> tuple[int, ...]:
-    """Of all forces of a run: those that lanes of a kind keep."""
+    """Of all forces of a run: those that lanes of a kind keep, by throw."""
     names = (*LANE_FORCES, *_VALVES)
-    return tuple(1 + FORCES.index(names[row]) for row in _kept_rows(kind))
+    return tuple(
+        1 + len(FORCES) * throw + FORCES.index(names[row])
+        for throw in range(kind.throws)
+        for row in _kept_rows(kind)
+    )
 
 
 def run_lanes(
@@ -127,7 +145,7 @@ def run_lanes(
         Taken as lanes become free.
     kind : LaneKind
         All that any of them has; what one of them lacks costs it time only. Either all of them
-        breathe or none.
+        breathe or none, and all have as many throws.
     steps : callable
         Called with the number of a job that begins: who is told of its steps.
 
@@ -148,15 +166,20 @@ def run_lanes(
 
 
 class _Lanes:
-    """All lanes, what their runs are at, and their last steps that were not handed on yet."""
+    """All lanes, what their runs are at, and their last steps that were not handed on yet.
+
+    A run has a lane for each of its throws and is known by that of the first.
+    """
 
     def __init__(
         self, kind: LaneKind, jobs: Sequence[LaneJob], steps: Callable[[int], Steps]
     ) -> None:
-        self._kind, self._breathing = kind, kind.breathing
+        self._kind, self._breathing, self._throws = kind, kind.breathing, kind.throws
+        self._firsts = range(0, LANES - kind.throws + 1, kind.throws)  # lane of every run
         self._jobs, self._steps = jobs, steps
         self._told: dict[int, Steps] = {}  # by lane
         self._plan = np.zeros(1, PLAN)
+        self._plan["throws"] = kind.throws
         self._state = np.zeros(1, STATE)
         self._number = np.full(LANES, -1)  # of the job in each lane
         self._at = np.zeros(LANES, np.int64)  # steps taken of it and not handed on
@@ -176,32 +199,45 @@ class _Lanes:
 
     def fill(self, ahead: Iterator[int]) -> bool:
         """Put the next jobs into free lanes; False where all is done."""
-        for lane in np.flatnonzero(self._number < 0):
+        for lane in self._firsts:
+            if self._number[lane] >= 0:
+                continue
             number = next(ahead, None)
             if number is None:
                 break
-            self._enter(int(lane), number)
+            self._enter(lane, number)
         return bool(np.any(self._number >= 0))
 
-    def _enter(self, lane: int, number: int) -> None:
-        job = self._jobs[number]
+    def _enter(self, first: int, number: int) -> None:
+        """Begin a run in lanes from the first on."""
+        job, plan, own = self._jobs[number], self._plan[0], slice(first, first + self._throws)
+        for throw in range(self._throws):
+            self._lay(first + throw, job, throw)
+        plan["driven"] = plan["machine"][_INVERSE_INERTIA].any()
+        plan["plain"] = ~plan["contact"][:, PLAIN_LAWS].any(axis=(1, 2))
+        enter_lane(first, plan, self._state[0], self._alone)
+        self._kept.code[own], self._number[own] = 0, number
+        self._at[own], self._left[own] = 0, job.n_steps
+        self._told[first] = self._steps(number)
+
+    def _lay(self, lane: int, job: LaneJob, throw: int) -> None:
+        """Write a throw and where it begins into its lane."""
         t, a, start = job.tables, self._alone, job.start
         state, plan = self._state[0], self._plan[0]
-        a.throws[lane], a.contacts[lane], a.liquid[lane] = t.throws, t.contacts, t.liquid
-        a.chambers[lane, 0] = 0.0
-        a.chambers[lane, 0, :6] = start.chambers[0]
-        q = t.throws[0]
+        q, liquid = t.throws[throw], t.liquid[throw]
+        a.throws[lane], a.contacts[lane], a.liquid[lane] = q, t.contacts[throw], liquid
+        a.chambers[lane] = 0.0
+        a.chambers[lane, :6] = start.chambers[throw]
         tight = (q["wristpin_rung"] == JOINT_IDEAL, q["guide_rung"] == JOINT_IDEAL)
         plan["throw"][:-3, lane] = _numbers(q, ThrowLane._fields[:-3])
         plan["throw"][-3:, lane] = 1.0 / q["piston_mass"], *tight
         for joint in range(3):
-            plan["contact"][joint, :, lane] = _numbers(t.contacts[0, joint], ContactLane._fields)
+            plan["contact"][joint, :, lane] = _numbers(
+                t.contacts[throw, joint], ContactLane._fields
+            )
         for joint in map(int, np.flatnonzero(tight) + 1):
             plan["contact"][joint, :, lane] = NEVER
         plan["machine"][:, lane] = t.machine
-        plan["driven"] = plan["machine"][_INVERSE_INERTIA].any()
-        plan["plain"] = ~plan["contact"][:, PLAIN_LAWS].any(axis=(1, 2))
-        liquid = t.liquid[0]
         plan["liquid"][:, lane] = _numbers(liquid, LiquidLane._fields)
         plan["chamber"][:, lane] = _numbers(liquid, ChamberLane._fields)
         for n, side in enumerate(("suction", "discharge")):
@@ -211,14 +247,10 @@ class _Lanes:
         plan["weight"][lane] = job.step / (6.0 * job.step)
         for name in state.dtype.names:
             state[name][..., lane] = 0.0
-        state["x0"][PLACES, lane], state["v0"][PLACES, lane] = start.bodies[0].reshape(2, -1)
+        state["x0"][PLACES, lane], state["v0"][PLACES, lane] = start.bodies[throw].reshape(2, -1)
         state["x0"][CRANK, lane], state["v0"][CRANK, lane] = start.angle, start.speed
-        enter_lane(lane, plan, state, a)
         self._past.turns[lane, :, 0] = start.angle, start.speed
-        self._past.chambers[lane, :, 0] = start.chambers[0, list(GATHERED)]
-        self._kept.code[lane] = 0
-        self._number[lane], self._at[lane], self._left[lane] = number, 0, job.n_steps
-        self._told[lane] = self._steps(number)
+        self._past.chambers[lane, :, 0] = start.chambers[throw, list(GATHERED)]
 
     def go_on(self) -> None:
         """March until the first run ends, or a lane has no room left."""
@@ -234,39 +266,46 @@ class _Lanes:
             self._past,
         )
         if np.any(self._at == _ROOM):  # all at once, or one lane after the other would have none
-            for lane in map(int, np.flatnonzero(self._at)):
-                self._hand_on(lane)
+            for first in self._firsts:
+                if self._at[first]:
+                    self._hand_on(first)
 
-    def _hand_on(self, lane: int) -> None:
-        n, past = int(self._at[lane]), self._past
-        ends = slice(n + 1)
-        chambers = past.chambers[lane, :, ends].T[:, None] if self._breathing else None
-        self._told[lane].add(past.turns[lane, :, ends].T, past.forces[lane, :, :n], chambers)
-        past.turns[lane, :, 0] = past.turns[lane, :, n]
+    def _hand_on(self, first: int) -> None:
+        n, past, own = int(self._at[first]), self._past, slice(first, first + self._throws)
+        chambers = past.chambers[own, :, : n + 1].transpose(2, 0, 1) if self._breathing else None
+        columns = past.forces.shape[1]
+        rows = slice(columns * own.start, columns * own.stop)
+        forces = past.forces.reshape(-1, _ROOM)[rows, :n]  # of one throw after the other
+        self._told[first].add(past.turns[first, :, : n + 1].T, forces, chambers)
+        past.turns[own, :, 0] = past.turns[own, :, n]
         if self._breathing:
-            past.chambers[lane, :, 0] = past.chambers[lane, :, n]
-        self._at[lane] = 0
+            past.chambers[own, :, 0] = past.chambers[own, :, n]
+        self._at[own] = 0
 
     def ended(self) -> Iterator[tuple[int, CrankTally]]:
         """Runs at their end, taken out of their lanes."""
         over = (self._number >= 0) & ((self._left == 0) | (self._kept.code != 0))
         if not over.any():
             return
-        for lane in map(int, np.flatnonzero(over)):
-            if self._at[lane]:
-                self._hand_on(lane)
-            yield int(self._number[lane]), self._tally(lane)
-            self._number[lane], self._kept.code[lane] = -1, 1
+        for first in self._firsts:
+            if not over[first]:
+                continue
+            if self._at[first]:
+                self._hand_on(first)
+            yield int(self._number[first]), self._tally(first)
+            own = slice(first, first + self._throws)
+            self._number[own], self._kept.code[own] = -1, 1
 
-    def _tally(self, lane: int) -> CrankTally:
-        counts = self._alone.counts[lane]
-        job = self._jobs[int(self._number[lane])]
-        peak = max(self._alone.peak[lane, 0], self._state["peak"][0, lane])
+    def _tally(self, first: int) -> CrankTally:
+        own = slice(first, first + self._throws)
+        counts = self._alone.counts[own].sum(axis=0)
+        job = self._jobs[int(self._number[first])]
+        peak = max(self._alone.peak[first, 0], self._state["peak"][0, own].max())
         return CrankTally(
-            steps=job.n_steps - int(self._left[lane]),
-            step=float(self._plan["step"][0, lane]),
+            steps=job.n_steps - int(self._left[first]),
+            step=float(self._plan["step"][0, first]),
             peak_normal_force=float(peak),
-            status=Status(int(self._kept.code[lane])),
+            status=Status(int(self._kept.code[first])),
             contact_changes=int(counts[CHANGES]),
             cuts_refused=int(counts[NOT_LOCATED]),
             floored_closings=int(counts[FLOORED]),
@@ -308,7 +347,7 @@ def march_on(
         for lane in range(LANES):
             k.done[lane] = n if k.code[lane] == 0 else 0
         march(kind, n, p, s, a, k)
-        _take(k, columns, at, past, kind[2])
+        _take(k, columns, at, past, kind.breathing)
         failed = False
         for lane in range(LANES):
             at[lane] += k.done[lane]

@@ -21,10 +21,9 @@ from ..pump.setup import begun, needs_integration
 from ..scene.parts import Scene, SceneError
 from ..scene.pump import PumpScene
 from .lanes import LaneJob, LaneKind, lane_columns, lane_kind, run_lanes
-from .rates import LANES
 
 _FEWEST = 5
-"""Records of a kind: fewer are as fast one after the other."""
+"""Lanes that are taken: with fewer, records are as fast one after the other."""
 
 
 class _Job(NamedTuple):
@@ -98,23 +97,24 @@ def pumps_alike(scene: Scene) -> tuple[LaneKind, int] | None:
 
 def _kind_of(scene: Scene) -> LaneKind | None:
     pump = cast(PumpScene, scene)
-    simple = pump.running and len(pump.throws) == 1
-    return lane_kind(pump) if simple and needs_integration(pump) else None
+    return lane_kind(pump) if pump.running and needs_integration(pump) else None
 
 
 def _pooled(kinds: dict[LaneKind, list[_Job]]) -> list[tuple[LaneKind, list[_Job]]]:
     """Groups of a kind; those that would leave lanes empty together, with all that any has."""
-    large = [(kind, group) for kind, group in kinds.items() if len(group) >= LANES]
-    small = [(kind, group) for kind, group in kinds.items() if len(group) < LANES]
-    for breathing in (False, True):
-        pool = [(kind, group) for kind, group in small if kind.breathing == breathing]
-        if pool:
-            kind = LaneKind(
-                wrist=any(kind.wrist for kind, _ in pool),
-                guide=any(kind.guide for kind, _ in pool),
-                breathing=breathing,
-            )
-            large.append((kind, [job for _, group in pool for job in group]))
+    large = [(kind, group) for kind, group in kinds.items() if len(group) >= kind.beside]
+    small: dict[tuple[bool, int], list[tuple[LaneKind, list[_Job]]]] = {}
+    for kind, group in kinds.items():
+        if len(group) < kind.beside:
+            small.setdefault((kind.breathing, kind.throws), []).append((kind, group))
+    for (breathing, throws), pool in small.items():
+        kind = LaneKind(
+            wrist=any(kind.wrist for kind, _ in pool),
+            guide=any(kind.guide for kind, _ in pool),
+            breathing=breathing,
+            throws=throws,
+        )
+        large.append((kind, [job for _, group in pool for job in group]))
     return large
 
 
@@ -128,7 +128,7 @@ def _alone(scene: PumpScene, seed: int, known: _Known) -> Recording | SceneError
 def _together(
     group: list[_Job], kind: LaneKind, known: _Known
 ) -> Iterator[tuple[int, Recording | SceneError]]:
-    if len(group) < _FEWEST:
+    if len(group) * kind.throws < _FEWEST:
         for job in group:
             yield job.number, _alone(job.plan.scene, job.seed, known)
         return

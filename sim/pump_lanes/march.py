@@ -41,16 +41,16 @@ from .rates import (
 class Alone(NamedTuple):
     """What the march of one record is told and works on, by lane."""
 
-    throws: NDArray[Any]  # (LANES, 1) of THROW
-    contacts: NDArray[Any]  # (LANES, 1, 3) of CONTACT
-    liquid: NDArray[Any]  # (LANES, 1) of HYDRAULIC
-    oils: NDArray[Any]  # (1, 2) of OIL, of no lane
+    throws: NDArray[Any]  # (LANES,) of THROW
+    contacts: NDArray[Any]  # (LANES, 3) of CONTACT
+    liquid: NDArray[Any]  # (LANES,) of HYDRAULIC
+    oils: NDArray[Any]  # (n_throws, 2) of OIL, of no lane
     maps: NDArray[np.float64]
     work: Work
-    chambers: NDArray[np.float64]  # (LANES, 1, 8)
-    forces: NDArray[np.float64]  # (1, 1 + len(FORCES)): of one step
-    counts: NDArray[np.int64]  # (LANES, 5)
-    peak: NDArray[np.float64]  # (LANES, 1)
+    chambers: NDArray[np.float64]  # (LANES, 8)
+    forces: NDArray[np.float64]  # (1, 1 + n_throws * len(FORCES)): of one step
+    counts: NDArray[np.int64]  # (LANES, 5): but for vapour, in the lane of the first throw
+    peak: NDArray[np.float64]  # (LANES, 1): in the lane of the first throw
 
 
 STRETCH = 64
@@ -77,26 +77,34 @@ class Stretch(NamedTuple):
 
 @kernel
 def _tables_of(lane: int, p: Any, a: Any) -> Any:
+    """Of the record whose first throw is in a lane."""
+    own = slice(lane, lane + p.throws)
     return Tables(
-        a.throws[lane], a.contacts[lane], a.liquid[lane], a.oils, a.maps, machine_of_lane(p, lane)
+        a.throws[own], a.contacts[own], a.liquid[own], a.oils, a.maps, machine_of_lane(p, lane)
     )
 
 
 @kernel
 def _to_record(lane: int, s: Any, w: Any) -> None:
-    """Copy a lane's step into the march of one record: its beginning into row 0, its end into 1."""
-    b, one = w.stage[0, 0], w.held[0]
+    """Copy a record's step into the march of one: its beginning into row 0, its end into 1."""
+    w.crank[0, 0], w.crank[0, 1] = s.x0[CRANK, lane], s.v0[CRANK, lane]
+    w.crank[0, 2], w.crank[0, 3], w.crank[0, 4] = s.v0[CRANK, lane], s.a0[CRANK, lane], 0.0
+    w.crank[1, 0], w.crank[1, 1] = s.x[CRANK, lane], s.v[CRANK, lane]
+    w.crank[1, 2], w.crank[1, 3] = s.v[CRANK, lane], s.a[CRANK, lane]
+    for k in range(w.held.shape[0]):
+        _throw_to_record(lane + k, k, s, w)
+
+
+@kernel
+def _throw_to_record(lane: int, k: int, s: Any, w: Any) -> None:
+    b, one = w.stage[0, k], w.held[k]
     for c in range(len(PLACES)):
         b.y[c], b.y[len(PLACES) + c] = s.x0[PLACES[c], lane], s.v0[PLACES[c], lane]
         b.rate[c], b.rate[len(PLACES) + c] = s.v0[PLACES[c], lane], s.a0[PLACES[c], lane]
-    w.crank[0, 0], w.crank[0, 1] = s.x0[CRANK, lane], s.v0[CRANK, lane]
-    w.crank[0, 2], w.crank[0, 3], w.crank[0, 4] = s.v0[CRANK, lane], s.a0[CRANK, lane], 0.0
-    end = w.stage[1, 0]  # of the step as it was tried
+    end = w.stage[1, k]  # of the step as it was tried
     for c in range(len(PLACES)):
         end.y[c], end.y[len(PLACES) + c] = s.x[PLACES[c], lane], s.v[PLACES[c], lane]
         end.rate[c], end.rate[len(PLACES) + c] = s.v[PLACES[c], lane], s.a[PLACES[c], lane]
-    w.crank[1, 0], w.crank[1, 1] = s.x[CRANK, lane], s.v[CRANK, lane]
-    w.crank[1, 2], w.crank[1, 3] = s.v[CRANK, lane], s.a[CRANK, lane]
     for n in range(len(LANE_FORCES)):
         b.force[_FORCE[n]] = s.force0[n, lane]
     for j in range(CONTACTS):
@@ -109,13 +117,19 @@ def _to_record(lane: int, s: Any, w: Any) -> None:
 
 @kernel
 def _from_record(lane: int, s: Any, w: Any, i: int) -> None:
-    """Copy row i of the march of one record into a lane, as the stage looked at last."""
-    b, one = w.stage[i, 0], w.held[0]
+    """Copy row i of the march of one record into its lanes, as the stage looked at last."""
+    for k in range(w.held.shape[0]):
+        s.x[CRANK, lane + k], s.v[CRANK, lane + k] = w.crank[i, 0], w.crank[i, 1]
+        s.a[CRANK, lane + k] = w.crank[i, 3]
+        _throw_from_record(lane + k, k, s, w, i)
+
+
+@kernel
+def _throw_from_record(lane: int, k: int, s: Any, w: Any, i: int) -> None:
+    b, one = w.stage[i, k], w.held[k]
     for c in range(len(PLACES)):
         s.x[PLACES[c], lane], s.v[PLACES[c], lane] = b.y[c], b.y[len(PLACES) + c]
         s.a[PLACES[c], lane] = b.rate[len(PLACES) + c]
-    s.x[CRANK, lane], s.v[CRANK, lane] = w.crank[i, 0], w.crank[i, 1]
-    s.a[CRANK, lane] = w.crank[i, 3]
     for n in range(len(LANE_FORCES)):
         s.force[n, lane] = b.force[_FORCE[n]]
     for j in range(CONTACTS):
@@ -129,16 +143,16 @@ _FORCE = tuple(FORCES.index(name) for name in LANE_FORCES)
 
 
 @subroutine
-def _step_alone(lane: int, p: Any, s: Any, a: Any, k: Any, n: int, breathing: bool) -> bool:
-    """Take step n of one lane by the march of one record, which cuts it at its contacts.
+def _step_alone(lane: int, p: Any, s: Any, a: Any, left: Any, step: int, breathing: bool) -> None:
+    """Take a step of one record by the march of one, which cuts it at its contacts.
 
     It begins with what lanes have tried, but for chambers: theirs ended under the pressure found.
-    Returns whether a contact is beyond its law at the end.
     """
-    w, h, t, left = a.work, p.step[lane], _tables_of(lane, p, a), k.left[0]
-    for row in range(1, 5):  # another lane may have touched where this one cannot
-        for j in range(CONTACTS):
-            w.stage[row, 0].margin[j] = NO_CHANGE
+    w, h, t = a.work, p.step[lane], _tables_of(lane, p, a)
+    for row in range(1, 5):  # another record may have touched where this one cannot
+        for k in range(p.throws):
+            for j in range(CONTACTS):
+                w.stage[row, k].margin[j] = NO_CHANGE
     _to_record(lane, s, w)
     tally = Tally(a.counts[lane], a.peak[lane])
     for c in range(a.forces.shape[1]):
@@ -147,25 +161,28 @@ def _step_alone(lane: int, p: Any, s: Any, a: Any, k: Any, n: int, breathing: bo
     if not fresh:
         derivative_of_record(w, end, 0.0, t)
     _from_record(lane, s, w, end)
-    for c in range(len(LANE_FORCES)):
-        left.forces[c, n, lane] = a.forces[0, 1 + _FORCE[c]]
-    beyond: bool = w.stage[end, 0].overlap > OVERLAP_LIMIT
-    return beyond
+    for k in range(p.throws):
+        for c in range(len(LANE_FORCES)):
+            left.forces[c, step, lane + k] = a.forces[0, 1 + len(FORCES) * k + _FORCE[c]]
+        beyond = w.stage[end, k].overlap > OVERLAP_LIMIT
+        s.bad[lane + k] = _failed(s, beyond, lane + k)
 
 
 @subroutine
 def enter_lane(lane: int, p: Any, s: Any, a: Any) -> None:
-    """Begin a record in a lane: contacts that are closed from the start, and its chamber."""
+    """Begin a record in lanes from this one on: contacts closed from the start, and chambers."""
     w, t = a.work, _tables_of(lane, p, a)
     _to_record(lane, s, w)
-    begin(w, t, a.chambers[lane])
-    for j in range(CONTACTS):
-        w.stage[0, 0].margin[j] = s.margin0[j, lane] = NO_CHANGE
+    begin(w, t, a.chambers[lane : lane + p.throws])
+    for k in range(p.throws):
+        for j in range(CONTACTS):
+            w.stage[0, k].margin[j] = s.margin0[j, lane + k] = NO_CHANGE
+        for c in range(5):
+            a.counts[lane + k, c] = 0
+        a.peak[lane + k, 0] = 0.0
     _from_record(lane, s, w, 0)
-    enter_chamber(lane, p, s, a)
-    for c in range(5):
-        a.counts[lane, c] = 0
-    a.peak[lane, 0] = 0.0
+    for k in range(p.throws):
+        enter_chamber(lane + k, p, s, a)
 
 
 # Rows within lanes, though lanes lie side by side: the compiler lays the outer loop into vectors,
@@ -218,12 +235,11 @@ def _end(p: Any, s: Any, first: int, rows: int) -> None:
 @subroutine
 def _to_second_stage(p: Any, s: Any, kind: Any) -> None:
     """Keep where the step begins; its first rates lead to the second stage."""
-    wrist, guide, _ = kind
     _begin(p, s, 0, MOVING)
     _keep_contacts(s, 0, 1)
-    if wrist:
+    if kind.wrist:
         _keep_contacts(s, 1, GUIDE)
-    if guide:
+    if kind.guide:
         _begin(p, s, MOVING, ALL_MOVING)
         _keep_contacts(s, GUIDE, CONTACTS)
     for lane in range(LANES):
@@ -297,8 +313,11 @@ def _judge(p: Any, s: Any) -> int:
             min(m[4, lane], m[5, lane]),
         )
         s.asks[lane] = 1.0 if least < 0.0 else 0.0
+    if p.throws > 1:
+        _ask_together(p, s)
+    for lane in range(LANES):
         # what a step that is cut would have come to is no force of the run
-        s.peak[lane] = max(s.peak[lane], 0.0 if least < 0.0 else s.high[lane])
+        s.peak[lane] = max(s.peak[lane], 0.0 if s.asks[lane] != 0.0 else s.high[lane])
         failed = _failed(s, beyond_limit(p, s, lane), lane)
         s.bad[lane] = _CHOKED if s.choked[lane] != 0.0 else failed
     for lane in range(LANES):
@@ -306,28 +325,55 @@ def _judge(p: Any, s: Any) -> int:
     return found
 
 
+@kernel
+def _ask_together(p: Any, s: Any) -> None:
+    """A contact of one throw cuts the step of all throws of its record."""
+    n = p.throws
+    for first in range(0, LANES - n + 1, n):
+        asks = 0.0
+        for lane in range(first, first + n):
+            asks = max(asks, s.asks[lane])
+        for lane in range(first, first + n):
+            s.asks[lane] = asks
+
+
 @subroutine
 def _mend(breathing: bool, p: Any, s: Any, a: Any, k: Any, step: int) -> int:
-    """Take the step again in the lanes that ask for it; leave those behind that fail in it.
+    """Take the step again in the records that ask for it; leave those behind that fail in it.
 
     Returns how many have taken it again.
     """
-    again = 0
-    for lane in range(LANES):
-        if k.code[lane] != 0:
+    again, n = 0, p.throws
+    for first in range(0, LANES - n + 1, n):
+        if k.code[first] != 0:
             continue
-        if s.asks[lane] != 0.0:
+        if s.asks[first] != 0.0:
             again += 1
-            s.bad[lane] = _failed(s, _step_alone(lane, p, s, a, k, step, breathing), lane)
-            if breathing:
+            _step_alone(first, p, s, a, k.left[0], step, breathing)
+            for lane in range(first, first + n if breathing else first):
                 breathe_alone(lane, p, s, a)
                 s.bad[lane] = _CHOKED if s.choked[lane] != 0.0 else s.bad[lane]
-        if s.bad[lane] != 0.0:
-            k.code[lane], k.done[lane] = int(s.bad[lane]), step + 1
+        code = _code_of_record(first, n, s)
+        if code != 0:
+            for lane in range(first, first + n):
+                k.code[lane], k.done[lane] = code, step + 1
     return again
 
 
-_CHOKED = 4.0  # status code of a chamber that has failed
+@kernel
+def _code_of_record(first: int, n: int, s: Any) -> int:
+    """Status code of all throws, as the march of one record judges: chambers first, then bodies."""
+    code = 0
+    for lane in range(first, first + n):
+        own = int(s.bad[lane])
+        if own == int(_CHOKED):
+            return own
+        if code <= _LOST:  # the first throw that is beyond its limits
+            code = max(code, own)
+    return code
+
+
+_LOST, _CHOKED = 1, 4.0  # status codes of a state that is no number, and of a failed chamber
 
 
 @subroutine
@@ -357,7 +403,7 @@ def march(kind: Any, n: int, p: Any, s: Any, a: Any, k: Any) -> None:
     Chambers are stepped before the rates at the end of a step are made, which so feel the pressure
     that is found, not the extrapolated one. What asks for a cut does not depend on it.
     """
-    _, across, breathing = kind
+    across, breathing = kind.guide, kind.breathing
     left = k.left[0]
     rates(p, s, 0.0, kind)
     for step in range(n):
@@ -383,23 +429,24 @@ def march(kind: Any, n: int, p: Any, s: Any, a: Any, k: Any) -> None:
 
 
 def alone(t: Tables) -> Alone:
-    """Room for the march of one record, of a lane at a time."""
+    """Room for the march of one record, with the throws of these tables."""
+    n = len(t.throws)
     return Alone(
-        throws=np.zeros((LANES, 1), t.throws.dtype),
-        contacts=np.zeros((LANES, 1, 3), t.contacts.dtype),
-        liquid=np.zeros((LANES, 1), t.liquid.dtype),
-        oils=t.oils[:1].copy(),
+        throws=np.zeros(LANES, t.throws.dtype),
+        contacts=np.zeros((LANES, 3), t.contacts.dtype),
+        liquid=np.zeros(LANES, t.liquid.dtype),
+        oils=t.oils.copy(),
         maps=t.maps,
         work=Work(
             crank=np.zeros((5, 5)),
-            stage=np.zeros((5, 1), STAGE),
-            held=np.zeros(1, HELD),
+            stage=np.zeros((5, n), STAGE),
+            held=np.zeros(n, HELD),
             moment=np.zeros(2),
             matrix=np.zeros((4, 6)),
             place=np.zeros((4, 6)),
         ),
-        chambers=np.zeros((LANES, 1, 8)),
-        forces=np.zeros((1, 1 + len(FORCES))),
+        chambers=np.zeros((LANES, 8)),
+        forces=np.zeros((1, 1 + n * len(FORCES))),
         counts=np.zeros((LANES, 5), np.int64),
         peak=np.zeros((LANES, 1)),
     )

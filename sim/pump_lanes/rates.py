@@ -140,6 +140,7 @@ PLAN = np.dtype(
     [
         ("throw", "f8", (len(ThrowLane._fields), LANES)),
         ("contact", "f8", (3, len(ContactLane._fields), LANES)),
+        ("throws", "i8"),  # of every record: they lie in lanes beside each other, in their order
         ("driven", "f8"),  # 1 where any lane's crank has a motor; of all others it turns evenly
         ("plain", "f8", 3),  # 1 where no lane's contact in a joint has other laws than the plain
         ("machine", "f8", (len(Machine._fields), LANES)),
@@ -176,6 +177,8 @@ STATE = np.dtype(
         ("pressed", "f8", LANES),  # pressure on the piston
         ("pin", "f8", (4, LANES)),  # ``PinLoad`` of the crank pin
         ("wrist", "f8", (4, LANES)),  # and of a wrist pin with play
+        ("moment", "f8", LANES),  # of all throws on the crank, in the lane of each
+        ("lead", "f8", (2, LANES)),  # sine and cosine of the crank at the first throw
         ("guide", "f8", (3, LANES)),  # force of a guide with play (x, y), and its moment
         ("middle_v", "f8", (ALL_MOVING, LANES)),  # of the stages in the middle, added
         ("middle_a", "f8", (ALL_MOVING, LANES)),
@@ -502,19 +505,35 @@ def _accelerate(p: Any, s: Any) -> None:
 @subroutine
 def _turn_crank(p: Any, s: Any) -> None:
     for lane in range(LANES):
-        m, pin = machine_of_lane(p, lane), s.pin
-        sin_a, cos_a = s.turned[0, lane], s.turned[1, lane]
-        moment = pin[2, lane] + p.throw[1, lane] * (pin[0, lane] * sin_a - pin[1, lane] * cos_a)
-        load = crank_load(moment, sin_a, cos_a, m)
+        pin, sin_a, cos_a = s.pin, s.turned[0, lane], s.turned[1, lane]
+        turn = pin[0, lane] * sin_a - pin[1, lane] * cos_a
+        s.moment[lane] = pin[2, lane] + p.throw[1, lane] * turn
+        s.lead[0, lane], s.lead[1, lane] = sin_a, cos_a
+    if p.throws > 1:
+        _add_up(p, s)
+    for lane in range(LANES):
+        m = machine_of_lane(p, lane)
+        load = crank_load(s.moment[lane], s.lead[0, lane], s.lead[1, lane], m)
         s.a[CRANK, lane] = m.inverse_inertia * (motor_moment(s.v[CRANK, lane], m) + load)
+
+
+@kernel
+def _add_up(p: Any, s: Any) -> None:
+    """What all throws of a record do to its crank, told to each of them."""
+    n = p.throws
+    for first in range(0, LANES - n + 1, n):
+        total, sin_a, cos_a = s.moment[first], s.lead[0, first], s.lead[1, first]
+        for lane in range(first + 1, first + n):
+            total += s.moment[lane]
+        for lane in range(first, first + n):
+            s.moment[lane], s.lead[0, lane], s.lead[1, lane] = total, sin_a, cos_a
 
 
 @kernel
 def rates(p: Any, s: Any, share: float, kind: Any) -> None:
     """Accelerations, forces and margins of all lanes; `share` of the step has passed."""
-    wrist, guide, breathing = kind
     _turn(p, s)
-    if breathing:
+    if kind.breathing:
         _press_chambers(s, share)
     else:
         _press(p, s)
@@ -522,11 +541,11 @@ def rates(p: Any, s: Any, share: float, kind: Any) -> None:
         _at_plain_crankpin(p, s)
     else:
         _at_crankpin(p, s)
-    if wrist and p.plain[1] != 0.0:
+    if kind.wrist and p.plain[1] != 0.0:
         _at_plain_wristpin(p, s)
-    elif wrist:
+    elif kind.wrist:
         _at_wristpin(p, s)
-    if guide:
+    if kind.guide:
         _tilt(s)
         if p.plain[2] != 0.0:
             _plain_rear(p, s)
