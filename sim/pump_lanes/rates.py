@@ -502,31 +502,45 @@ def _accelerate(p: Any, s: Any) -> None:
         force[_FACE, lane], force[_SEAL, lane] = on_face, seal
 
 
-@subroutine
-def _turn_crank(p: Any, s: Any) -> None:
-    for lane in range(LANES):
-        pin, sin_a, cos_a = s.pin, s.turned[0, lane], s.turned[1, lane]
-        turn = pin[0, lane] * sin_a - pin[1, lane] * cos_a
-        s.moment[lane] = pin[2, lane] + p.throw[1, lane] * turn
-        s.lead[0, lane], s.lead[1, lane] = sin_a, cos_a
-    if p.throws > 1:
-        _add_up(p, s)
-    for lane in range(LANES):
-        m = machine_of_lane(p, lane)
-        load = crank_load(s.moment[lane], s.lead[0, lane], s.lead[1, lane], m)
-        s.a[CRANK, lane] = m.inverse_inertia * (motor_moment(s.v[CRANK, lane], m) + load)
+@kernel
+def _crank_moment(p: Any, s: Any, lane: int) -> float:
+    pin, sin_a, cos_a = s.pin, s.turned[0, lane], s.turned[1, lane]
+    turn = pin[0, lane] * sin_a - pin[1, lane] * cos_a
+    moment: float = pin[2, lane] + p.throw[1, lane] * turn
+    return moment
 
 
 @kernel
-def _add_up(p: Any, s: Any) -> None:
-    """What all throws of a record do to its crank, told to each of them."""
+def _crank_rate(p: Any, s: Any, lane: int, moment: float, sin_a: float, cos_a: float) -> float:
+    m = machine_of_lane(p, lane)
+    load = crank_load(moment, sin_a, cos_a, m)
+    rate: float = m.inverse_inertia * (motor_moment(s.v[CRANK, lane], m) + load)
+    return rate
+
+
+@subroutine
+def _turn_crank(p: Any, s: Any) -> None:
+    for lane in range(LANES):
+        moment, sin_a, cos_a = _crank_moment(p, s, lane), s.turned[0, lane], s.turned[1, lane]
+        s.a[CRANK, lane] = _crank_rate(p, s, lane, moment, sin_a, cos_a)
+
+
+@subroutine
+def _turn_crank_together(p: Any, s: Any) -> None:
+    """Cranks of several throws, each of which has a copy: moved by what all do to it."""
     n = p.throws
+    for lane in range(LANES):
+        s.moment[lane] = _crank_moment(p, s, lane)
     for first in range(0, LANES - n + 1, n):
-        total, sin_a, cos_a = s.moment[first], s.lead[0, first], s.lead[1, first]
+        total = s.moment[first]
         for lane in range(first + 1, first + n):
             total += s.moment[lane]
         for lane in range(first, first + n):
-            s.moment[lane], s.lead[0, lane], s.lead[1, lane] = total, sin_a, cos_a
+            s.moment[lane] = total
+            s.lead[0, lane], s.lead[1, lane] = s.turned[0, first], s.turned[1, first]
+    for lane in range(LANES):
+        sin_a, cos_a = s.lead[0, lane], s.lead[1, lane]
+        s.a[CRANK, lane] = _crank_rate(p, s, lane, s.moment[lane], sin_a, cos_a)
 
 
 @kernel
@@ -554,5 +568,7 @@ def rates(p: Any, s: Any, share: float, kind: Any) -> None:
             _rear(p, s)
             _front(p, s)
     _accelerate(p, s)
-    if p.driven != 0.0:
+    if p.driven != 0.0 and p.throws > 1:
+        _turn_crank_together(p, s)
+    elif p.driven != 0.0:
         _turn_crank(p, s)
