@@ -21,6 +21,7 @@ DEAR = (
     "test_stability",
     "test_evaluate",
     "test_site",
+    "test_page_commands",
     "test_looks",
     "test_generate",
     "test_cli",

@@ -113,7 +113,7 @@ def test_a_plain_effect_is_found():
 
 @pytest.fixture(scope="module")
 def found(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("across")
+    folder = tmp_path_factory.mktemp("across") / "new"
     done = CliRunner().invoke(
         cli,
         [

@@ -264,7 +264,7 @@ def test_features_are_kept_and_a_changed_signal_is_not_taken_for_them(tmp_path, 
     )
     manifest = pd.DataFrame({"signal_crc32": np.arange(20, dtype=np.uint32)})
     table = FeatureTable(names=(), values=np.zeros((20, 0)), manifest=manifest)
-    rows_of = transformed_rows(tmp_path, np.arange(20), cache=tmp_path)
+    rows_of = transformed_rows(tmp_path, np.arange(20), cache=tmp_path / "new")
     first = rows_of.rows(tmp_path, table)
     made = len(calls)
     assert made == 2 * 3  # 20 records, 8 at a time, two packages

@@ -9,7 +9,6 @@ import sys
 import types
 from pathlib import Path
 
-import click
 import matplotlib as mpl
 import numpy as np
 import pytest
@@ -218,53 +217,12 @@ def test_the_reader_of_guides_sees_an_error():
         run_shell("wearstate scene check missing.toml")
 
 
-# --- code elsewhere: commands that take minutes are read, Python runs
+# --- Python elsewhere: commands run in test_page_commands
 
 
 WRITTEN = {"README": DOCS.parent / "README.md", **{name: DOCS / f"{name}.md" for name in pages()}}
 ELSEWHERE = ("README", "datasets", "theory/force-map")
 """Pages with blocks of Python that are no guides."""
-
-
-def command_lines(text):
-    """Commands of this program in blocks of a page, as words."""
-    for kind, block in re.findall(r"^```([^`\n]*)\n(.*?)^```$", text, re.S | re.M):
-        if not kind.startswith("{"):
-            for line in block.replace("\\\n", " ").splitlines():
-                if line.startswith("wearstate "):
-                    yield shlex.split(line, comments=True)[1:]
-
-
-def understand(words):
-    """Read a command as the program would, without running it."""
-    command, context = cli, None
-    while isinstance(command, click.Group):
-        context = command.make_context(command.name, list(words), parent=context)
-        _, command, words = command.resolve_command(
-            context, [*context._protected_args, *context.args]
-        )
-    command.make_context(command.name, list(words), parent=context)
-
-
-@pytest.mark.parametrize("name", sorted(WRITTEN))
-def test_every_command_of_a_page_is_understood(name, tmp_path, monkeypatch):
-    (tmp_path / "folder").mkdir()  # that some command names
-    monkeypatch.chdir(tmp_path)
-    for words in command_lines(WRITTEN[name].read_text(encoding="utf-8")):
-        try:
-            understand(words)
-        except click.ClickException as error:
-            pytest.fail(f"wearstate {' '.join(words)}: {error.format_message()}")
-
-
-def test_the_reader_of_commands_sees_a_fault():
-    text = "```\nwearstate info x.h5 \\\n  --verfy  # all\n```\n```{include} a\nwearstate no\n```\n"
-    [words] = command_lines(text)
-    assert words == ["info", "x.h5", "--verfy"]
-    with pytest.raises(click.NoSuchOption, match="--verfy"):
-        understand(words)
-    read = [name for name, page in WRITTEN.items() if [*command_lines(page.read_text("utf-8"))]]
-    assert {"README", "evaluation", "fidelity", "results"} <= {*read}
 
 
 @pytest.mark.parametrize("name", ELSEWHERE)

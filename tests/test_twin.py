@@ -18,6 +18,7 @@ from wearstate.diagnose.twin.regression import Regressed, regressed
 from wearstate.diagnose.twin.scan import scanned
 from wearstate.diagnose.twin.unknowns import WEAR, unknowns_of
 from wearstate.sim.output.recording import DataError
+from wearstate.sim.scene.load import minimal_text
 
 RECIPE = "bilge-pump-standard"
 MODE = "casing.modes.2.frequency"
@@ -244,6 +245,14 @@ def test_a_recording_without_tacho_is_refused(recording):
     )
     with pytest.raises(DataError, match="tacho must be there"):
         levels_of(bare)
+
+
+def test_the_shortest_scene_lacks_what_the_recipe_varies(recording, tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text(minimal_text("pump"), encoding="utf-8")
+    says = "lacks .begin with that of wearstate scene show bilge-pump.*choice.5.option.1 .motor."
+    with pytest.raises(RecipeError, match=f"(?s){says}"):
+        wearstate.calibrate(path, [recording])
 
 
 def test_what_no_member_shows_is_told_with_its_place(recording):

@@ -214,6 +214,7 @@ class RungSets:
         if self.say is not None:
             self.say(", ".join(f"{effect} {rung}" for effect, rung in rungs.items()))
         if not path.exists():
+            self.folder.mkdir(parents=True, exist_ok=True)
             recipe = load_recipe(self.name, {**self.overrides, **self.values(rungs)})
             generate(recipe, self.n, path, seed=self.seed, jobs=self.jobs, fidelity="given")
         return feature_table(path, jobs=self.jobs)

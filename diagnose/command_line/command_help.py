@@ -9,17 +9,17 @@ import click
 FIRST_CONTACT = """wearstate: condition monitoring built around physics. Three ways to begin:
 
 Assess your own recording (a wear model is trained once, see below):
-  wearstate import rig.wav --unit g --tacho key -o measured.h5   bring files into one layout
-  wearstate report measured.h5 --model pump.wsm -o report.html   grade, wear, what to do
+  wearstate import rig.wav --like pump.wsm --unit g -o measured.h5  channels as the model has them
+  wearstate report measured.h5 --model pump.wsm -o report.html      grade, wear, what to do
 
 Make a labelled data set, and train on it:
-  wearstate generate bilge-pump-small -o data.h5                 simulated machines that wear
-  wearstate train data.h5 -o pump.wsm                            judged on unseen machines
+  wearstate generate bilge-pump-small -o data.h5                    simulated machines that wear
+  wearstate train data.h5 -o pump.wsm                               judged on unseen machines
 
 Simulate a machine:
-  wearstate scene new pump -o mine.toml                          the shortest scene that runs
-  wearstate simulate mine.toml --plot mine.png                   one recording of it
-  wearstate chart mine.toml -o chart.html                        which models it needs
+  wearstate scene new pump -o mine.toml                             the shortest scene that runs
+  wearstate simulate mine.toml --plot mine.png                      one recording of it
+  wearstate chart mine.toml -o chart.html                           which models it needs
 
 wearstate demo does it all in a minute; wearstate --help lists the commands, and
 wearstate COMMAND --help tells each with examples.
@@ -106,7 +106,7 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
         "wearstate generate mine.toml -n 2000 --seed 7 -j 2 -o data.h5",
     ),
     "import": (
-        "wearstate import rig.wav --unit g --tacho key --labels labels.csv -o measured.h5",
+        "wearstate import rig.wav --channels acc,key --unit g --tacho key -o measured.h5",
         "wearstate import bearing.mat --list",
     ),
     "merge": (

@@ -302,7 +302,7 @@ def _train_classes(
 @click.option("--set", "pairs", multiple=True, metavar="PATH=VALUE", help="Replace a scene value.")
 @click.option(
     "--folder",
-    type=PathType(path_type=Path, file_okay=False, exists=True),
+    type=PathType(path_type=Path, file_okay=False),
     help="Keep the data sets of --across-fidelity, and use those that are there.",
 )
 @click.option(
@@ -322,7 +322,7 @@ def _train_classes(
 @click.option("--quick", is_flag=True, help="Leave out baselines that need packages of others.")
 @click.option(
     "--cache",
-    type=PathType(path_type=Path, file_okay=False, exists=True),
+    type=PathType(path_type=Path, file_okay=False),
     help="Folder in which features of such packages are kept.",
 )
 @click.option("-o", "--output", type=PATH, help="Page, picture or JSON to write.")

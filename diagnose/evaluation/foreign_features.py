@@ -166,6 +166,7 @@ class TransformedRows:
         recordings = recordings_of(path, np.arange(count))
         rows = foreign_rows(self.transforms[source], recordings, count, self.progress)
         if place is not None:
+            place.parent.mkdir(parents=True, exist_ok=True)
             np.save(place, rows.astype(np.float32))
         return rows
 

@@ -14,7 +14,7 @@ from ...datasets.file.record import DataSet, refuse_output
 from ...datasets.measured.recording import read_recording
 from ...datasets.recipe.motor import motor_speed
 from ...datasets.recipe.recipe import Recipe, load_recipe
-from ...datasets.recipe.text import recipe_names, toml_text, twin_path
+from ...datasets.recipe.text import RecipeError, recipe_names, toml_text, twin_path
 from ...sim.atomic import write_whole
 from ...sim.output.recording import DataError, Recording
 from ...sim.scene.load import override, scene_from_table
@@ -31,6 +31,7 @@ MOST_RECORDINGS = 8
 """Of one calibration: each is simulated for every member."""
 PRIOR = "bilge-pump-standard"
 """Recipe whose draws are the prior of a pump."""
+_FULL_SCENE = "begin with that of wearstate scene show bilge-pump, or give a recipe of your own"
 DRAWS = 400
 """Of prior and posterior, for the table."""
 DIGITS = 4
@@ -371,7 +372,14 @@ def _chosen(recipe: str | Path, scene: str | Path) -> str | Path:
 
 def _prior(recipe: str | Path, scene: str | Path, first: Recording) -> Recipe:
     """The recipe around the scene, sampled as the recordings are."""
-    plan = load_recipe(recipe, {"sample_rate": first.sample_rate}, scene=scene)
+    try:
+        plan = load_recipe(recipe, {"sample_rate": first.sample_rate}, scene=scene)
+    except RecipeError as error:
+        if recipe not in recipe_names():
+            raise
+        raise RecipeError(
+            f"{recipe} varies what {scene} lacks ({_FULL_SCENE})", error.faults
+        ) from None
     if plan.scene.machine != "reciprocating-pump":
         raise DataError(
             f"machine = '{plan.scene.machine}' must be 'reciprocating-pump' to be calibrated; use "
