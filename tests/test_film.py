@@ -31,6 +31,7 @@ from wearstate.sim.film.solve import (
     solve_long,
     solve_relaxed,
     solve_short,
+    worn_arc,
 )
 from wearstate.sim.journal.ladder import FILM_LADDER
 from wearstate.sim.journal.recording import _FILMS
@@ -528,6 +529,8 @@ def test_geometry_refuses(changes, words):
         (lambda: mesh_error(bearing(n_theta=71), HALF), "n_theta = 71"),
         (lambda: mesh_error(bearing(), at(1.1)), "touches"),
         (lambda: dufrane_scar(2.0, 0.0, 72), "depth = 2.0"),
+        (lambda: worn_arc(-0.1, 0.5, 0.0, 72), "depth = -0.1"),
+        (lambda: worn_arc(0.1, 0.0, 0.0, 72), "clearance = 0.0"),
         (lambda: sommerfeld_film(1.0), "eccentricity_ratio = 1.0"),
         (lambda: ocvirk_film(0.5, 0.0), "length_to_diameter = 0.0"),
     ],
@@ -618,3 +621,31 @@ def test_vogel_recovers_its_constants():
 def test_viscosity_refuses(call, words):
     with pytest.raises(ValueError, match=words):
         call()
+
+
+def test_a_worn_arc_is_another_circle():
+    """Against the distance of two circles along a ray from the bore's middle."""
+    radius, gap, depth, own = 1.0, 1e-6, 1.3, 0.4  # gaps that are nothing beside the radius
+    lower, arc = (depth + 1 - own) * gap, radius + own * gap
+    theta = 2 * math.pi * np.arange(144) / 144
+    ray = lower * np.cos(theta) + np.sqrt(arc**2 - (lower * np.sin(theta)) ** 2)
+    expected = np.maximum(0.0, (ray - radius - gap) / gap)
+    assert_allclose(worn_arc(depth, own, 0.0, 144), expected, atol=1e-5)
+
+
+def test_dufranes_scar_is_an_arc_of_the_clearance_that_is_worn():
+    assert_allclose(worn_arc(0.4, 0.4, 0.3, 72), dufrane_scar(0.4, 0.3, 72), atol=1e-15)
+
+
+@pytest.mark.parametrize(("eccentricity", "attitude"), [(0.5, 0.7), (0.7, 0.6)])
+def test_a_deep_arc_carries_as_a_bearing_of_its_own_clearance(eccentricity, attitude):
+    """Below: at its upstream edge the arc begins where the small bearing already has pressure."""
+    own, depth = 0.5, 3.0
+    bore = worn_arc(depth, own, 0.0, 144)
+    arc = direct_film(FilmGeometry(length_to_diameter=0.9, n_theta=144, n_z=17, bore=bore))
+    small = direct_film(FilmGeometry(length_to_diameter=0.9, n_theta=144, n_z=17))
+    x, y = eccentricity * math.cos(attitude), eccentricity * math.sin(attitude)
+    down, side = direct_force(small, x, y, 0.0, 0.0)
+    found = direct_force(arc, depth + 1 - own + own * x, own * y, 0.0, 0.0)
+    assert found[0] * own**2 == pytest.approx(down, rel=0.02)
+    assert 0.5 < found[1] * own**2 / side < 1

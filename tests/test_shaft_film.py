@@ -273,6 +273,37 @@ def test_wear_down_lowers_the_bottom_and_widens_the_bore():
     assert_allclose(fed[0] * unit[0], fed[1] * unit[1], rtol=1e-12)
 
 
+@pytest.mark.parametrize("depth", [1e-4, 6e-4])
+def test_an_arc_as_wide_as_the_worn_circle_is_that_circle(depth):
+    """Depth w and clearance C + w / 2 make the gap w / 2 (1 + cos) wider, as the circle does."""
+    films = line(offsets=[0, -2e-4, 0, 0])
+    circle, arc = (
+        beam_film(shaft(), [replace(films[0], wear_down=depth, **shape), *films[1:]], SPEED)
+        for shape in ({}, {"arc_clearance": 1 + depth / 2 / films[0].bearing.clearance})
+    )
+    assert arc.status.ok
+    # a profile is linear between its nodes: 3e-5 of the load with 72 of them
+    assert_allclose(arc.reactions, circle.reactions, atol=1e-4 * 1e5)
+    places = [
+        found.positions[:, 0] + [b.centre[0] for b in found.bearings] for found in (circle, arc)
+    ]
+    assert_allclose(places[1], places[0], atol=1e-3 * films[0].bearing.clearance)
+    assert_allclose(arc.least_film, circle.least_film, rtol=1e-2)
+    assert_allclose(arc.middle_films, circle.middle_films, rtol=2e-3)  # between nodes, and at them
+
+
+def test_an_arc_leaves_the_rest_of_the_bore_as_new():
+    bearing = replace(line()[0], offset=1e-3, wear_down=4e-4, arc_clearance=0.4)
+    gap = bearing.worn.clearance * (1 + bearing.worn.geometry.bore)
+    assert bearing.worn.clearance == bearing.bearing.clearance
+    assert bearing.sunk == 0
+    assert_allclose(gap[0], bearing.bearing.clearance + 4e-4)
+    assert_allclose(gap[len(gap) // 4 : 3 * len(gap) // 4], bearing.bearing.clearance)
+    assert_allclose(bearing.centre[0] - bearing.bottom, 1e-3 - 4e-4)
+    with pytest.raises(ValueError, match=r"arc_clearance = 0.0 must be > 0"):
+        replace(bearing, arc_clearance=0.0)
+
+
 def test_moving_everything_changes_nothing():
     """Neither does a rigid turn of shaft and bores: a sum of moments would tell."""
     plain = beam_film(shaft(), line(), SPEED)

@@ -77,7 +77,12 @@ def _bores(axes: Any, state: "ShaftState", path: NDArray[Any]) -> None:
     circle = np.exp(2j * np.pi * np.linspace(0, 1, 181))
     axes.plot(circle.real, circle.imag, color="black", lw=1)
     for i, bearing in enumerate(state.film.bearings):
-        place = path[:, i] / bearing.worn.clearance
+        own = bearing.worn
+        place = path[:, i] / own.clearance
+        if (arc := own.geometry.bore) is not None:
+            angle = 2 * np.pi * np.arange(len(arc) + 1) / len(arc)
+            radius = 1 + np.append(arc, arc[0])
+            axes.plot(-radius * np.sin(angle), -radius * np.cos(angle), ":", color=f"C{i}", lw=0.8)
         name = short_name(bearing.name, 24)
         axes.plot(place[:, 1], place[:, 0], lw=0.6, color=f"C{i}", label=name)
         middle = place.mean(axis=0)
@@ -121,6 +126,8 @@ _SHIFTS = (
     set_to("hull.deflection", ("-0.8 mm", "0.8 mm"), "loaded, in ballast"),
     factor("drive.speed", 0.8, 1.25, "another operating point"),
     factor("bearings.*.diametral_clearance", 0.75, 1.3, "another maker's clearance"),
+    set_to("bearings.*.worn_shape", ("arc",), "a journal wears its own arc into the bush"),
+    set_to("bearings.*.groove_width", ("30 deg",), "axial grooves at the sides"),
     factor("bearings.*.length", 0.85, 1.15, "chamfers, grooves, another bush"),
     factor("bearings.*.rise", 0.3, 2.0, "pedestals colder or hotter"),
     add("bearings.*.offset", -1e-4, 1e-4, "datum of the alignment"),

@@ -98,8 +98,9 @@ def _numeric(name: str, scale: float = 1.0) -> Callable[[Any], dict[str, float]]
 
 
 def _gap(bearing: ShaftBearing) -> float:
-    """Radial clearance as it is now [m]."""
-    return (bearing.diametral_clearance + bearing.wear_down) / 2
+    """Radial clearance as it is now, of the circle around the journal [m]."""
+    grown = bearing.wear_down if bearing.worn_shape == "circle" else 0.0
+    return (bearing.diametral_clearance + grown) / 2
 
 
 # --- bearings
@@ -143,8 +144,7 @@ def _load_share(facts: ShaftFacts) -> NDArray[np.float64]:
 def _edge(facts: ShaftFacts) -> NDArray[np.float64]:
     """Least film over that in the middle: 1 without tilt."""
     film = facts.state.film
-    middle = (1 - film.eccentricity_ratios) * np.array([_gap(b) for b in facts.scene.bearings])
-    return np.asarray(film.least_film / middle)
+    return np.asarray(film.least_film / film.middle_films)
 
 
 def _seat_deflection(facts: ShaftFacts) -> NDArray[np.float64]:

@@ -221,6 +221,51 @@ class FilmSolution:
 # --- geometry
 
 
+def worn_arc(depth: float, clearance: float, angle: float, n_theta: int) -> Array:
+    """Extra gap of a bore with an arc worn into it that is another circle's.
+
+    Parameters
+    ----------
+    depth : float
+        Deepest wear over C, >= 0.
+    clearance : float
+        Of the journal in the arc, over C, > 0: near 0 the journal fits the arc, at 1 the arc is as
+        wide as the bore.
+    angle : float
+        Middle of the arc from the X axis [rad].
+    n_theta : int
+        Nodes round the circle.
+
+    Returns
+    -------
+    numpy.ndarray [shape=(n_theta,)]
+        ``max(0, (depth + 1 - clearance) cos(theta - angle) - (1 - clearance))`` over C: zero
+        outside of the arc.
+
+    Raises
+    ------
+    ValueError
+        A number is out of range.
+
+    Notes
+    -----
+    From the middle of the bore, the arc's circle of radius ``R + clearance C`` has its own middle
+    ``depth + 1 - clearance`` lower, for gaps that are small beside R.
+
+    Examples
+    --------
+    >>> worn_arc(2.0, 0.5, 0.0, 8).round(3)
+    array([2.   , 1.268, 0.   , 0.   , 0.   , 0.   , 0.   , 1.268])
+    """
+    if not 0 <= depth < math.inf:
+        raise ValueError(f"depth = {depth} must be >= 0 and finite; it is the wear depth over C")
+    if not 0 < clearance < math.inf:
+        raise ValueError(f"clearance = {clearance} must be > 0 and finite; it is over C")
+    theta = 2 * math.pi * np.arange(n_theta) / n_theta
+    lower = depth + 1.0 - clearance
+    return np.maximum(0.0, lower * np.cos(theta - angle) - (1.0 - clearance))
+
+
 def dufrane_scar(depth: float, angle: float, n_theta: int) -> Array:
     """Extra gap of a bore in which a shaft has worn its own circle.
 
@@ -236,7 +281,8 @@ def dufrane_scar(depth: float, angle: float, n_theta: int) -> Array:
     Returns
     -------
     numpy.ndarray [shape=(n_theta,)]
-        ``max(0, depth - 1 + cos(theta - angle))`` over C: zero outside of the scar.
+        ``max(0, depth - 1 + cos(theta - angle))`` over C: zero outside of the scar. An arc of
+        :func:`worn_arc` with the clearance `depth`.
 
     Raises
     ------

@@ -229,8 +229,8 @@ class ShaftBearing(Part):
     """A journal bearing of the line, its place and its state.
 
     ``offset`` is the height of the journal's centre where it lies at the bottom of the bore, as
-    aligned and as new. Wear-down lowers the bottom of the bore and widens it by as much; a sag
-    lowers the bearing.
+    aligned and as new. Wear-down lowers the bottom of the bore: the bore stays a circle and gets
+    wider by as much, or keeps its circle but for an arc below. A sag lowers the bearing.
     """
 
     name: _Name = Field(description="by which sensors, probes and tests refer to it")
@@ -243,6 +243,15 @@ class ShaftBearing(Part):
     slope: _Slope = Field(default=0.0, description="of the bore, dy/dx")
     side_slope: _Slope = Field(default=0.0, description="of the bore, dz/dx")
     wear_down: Length = Field(default=0.0, ge=0, le=1.0, description="of the bottom of the bore")
+    worn_shape: Literal["circle", "arc"] = Field(
+        default="circle", description="of the worn bore: a wider circle, or an arc below"
+    )
+    arc_clearance: Ratio = Field(
+        default=0.5, ge=0.05, le=1, description="of the journal in the arc, over the bore's as new"
+    )
+    groove_width: Angle = Field(
+        default=0.0, ge=0, lt=math.pi / 2, description="of an axial groove at either side; 0: none"
+    )
     sag: Length = Field(default=0.0, ge=0, le=1.0, description="downwards, from its offset")
     rise: _Height = Field(default=0.0, description="of the bearing, once it is hot")
     lift: Length = Field(

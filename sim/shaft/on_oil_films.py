@@ -51,7 +51,14 @@ from ..film.direct import DIRECT_OK, STATUS, DirectFilm, direct_tilted_force
 from ..film.impedance_map import ImpedanceMap, impedance_map, map_force
 from ..film.rungs import FILM_RUNGS
 from ..film.slopes import Coefficients, perturbation
-from ..film.solve import FilmGeometry, FilmSolution, FilmState, FilmStatus, direct_film
+from ..film.solve import (
+    FilmGeometry,
+    FilmSolution,
+    FilmState,
+    FilmStatus,
+    direct_film,
+    worn_arc,
+)
 
 Vector = NDArray[np.float64]
 
@@ -154,13 +161,16 @@ class FilmBearing:
     slope : tuple of float
         Of the bore, dy/dx and dz/dx [rad].
     wear_down : float
-        By which the bottom has sunk, >= 0: the diametral clearance grows by it and the bore's
-        centre sinks by half of it [m].
+        By which the bottom has sunk, >= 0 [m].
+    arc_clearance : float or None
+        Of the journal in the arc that it has worn, over the bore's as new, > 0. None: the bore
+        stays a circle, whose diametral clearance grows by the wear-down and whose centre sinks by
+        half of it.
 
     Raises
     ------
     ValueError
-        A number is not finite, or the wear-down is negative.
+        A number is not finite, the wear-down is negative, or the arc's clearance is not positive.
 
     Examples
     --------
@@ -177,6 +187,7 @@ class FilmBearing:
     side_offset: float = 0.0
     slope: tuple[float, float] = (0.0, 0.0)
     wear_down: float = 0.0
+    arc_clearance: float | None = None
 
     def __post_init__(self) -> None:
         """Refuse values out of range."""
@@ -194,14 +205,20 @@ class FilmBearing:
         ]
         if not 0 <= self.wear_down < math.inf:
             problems.append(f"{self.name}.wear_down = {self.wear_down} m must be >= 0 and finite")
+        if self.arc_clearance is not None and not 0 < self.arc_clearance < math.inf:
+            problems.append(
+                f"{self.name}.arc_clearance = {self.arc_clearance} must be > 0 and finite"
+            )
         if problems:
             raise ValueError("; ".join(problems))
 
     @property
     def worn(self) -> JournalBearing:
-        """The bearing with its present clearance; bore profile and feed pressure stay in SI."""
+        """The bearing with its present bore; its profile and the feed pressure stay in SI."""
         if self.wear_down == 0:
             return self.bearing
+        if self.arc_clearance is not None:
+            return self._with_arc(self.arc_clearance)
         clearance = self.bearing.clearance + self.wear_down / 2
         film, grown = self.bearing.film, clearance / self.bearing.clearance
         if film is not None:
@@ -210,10 +227,27 @@ class FilmBearing:
             film = replace(film, bore=bore, grooves=grooves)
         return replace(self.bearing, clearance=clearance, film=film)
 
+    def _with_arc(self, clearance: float) -> JournalBearing:
+        film = self.bearing.geometry
+        depth = self.wear_down / self.bearing.clearance
+        arc = worn_arc(depth, clearance, 0.0, film.n_theta)  # the film's X axis points down
+        bore = arc if film.bore is None else np.maximum(film.bore, arc)
+        return replace(self.bearing, film=replace(film, bore=bore))
+
+    @property
+    def bottom(self) -> float:
+        """Way of the journal from the middle of the present bore down to its bottom [m]."""
+        return self.bearing.clearance + self.wear_down - self.sunk
+
+    @property
+    def sunk(self) -> float:
+        """By which the middle of the bore is lower than as new [m]."""
+        return 0.0 if self.arc_clearance is not None else self.wear_down / 2
+
     @property
     def centre(self) -> tuple[float, float]:
         """Of the bore, y and z [m]."""
-        return self.offset + self.bearing.clearance - self.wear_down / 2, self.side_offset
+        return self.offset + self.bearing.clearance - self.sunk, self.side_offset
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -292,9 +326,21 @@ class BeamFilm:
 
     @property
     def eccentricity_ratios(self) -> Vector:
-        """Distance of the centres over the radial clearance, in the middle [shape=(n,)]."""
+        """What the film in the middle lacks of the radial clearance, over it [shape=(n,)].
+
+        In a round bore the distance of the centres over the clearance.
+        """
         ratios: Vector = np.hypot(*self.positions.T) / _clearances(self.bearings)
+        for n, (geometry, place) in enumerate(zip(self.geometries, self.positions, strict=True)):
+            if geometry.bore is not None:
+                middle = np.array([*(-place / self.bearings[n].worn.clearance), 0.0, 0.0])
+                ratios[n] = 1 - _room(geometry, False, middle)
         return ratios
+
+    @property
+    def middle_films(self) -> Vector:
+        """Least film in the middle of each bearing's length [m, shape=(n,)]."""
+        return np.asarray((1 - self.eccentricity_ratios) * _clearances(self.bearings))
 
     @property
     def unloaded(self) -> tuple[str, ...]:
@@ -1127,11 +1173,22 @@ def _first_places(line: _Line, laws: Sequence[_Law]) -> Vector:
     for n, (law, bearing) in enumerate(zip(laws, line.bearings, strict=True)):
         own = bearing.worn
         load = reactions[n] / own.force_unit(line.speed)
-        places[n, :2] = _short_place(law.geometry.length_to_diameter, load)
+        places[n, :2] = _first_place(law.geometry, bearing, load)
         tilt = -slopes[n] * own.length / own.clearance
-        most = 2 * _START_TILT * (1 - float(np.hypot(*places[n, :2])))
+        most = 2 * _START_TILT * _room(law.geometry, False, places[n])
         places[n, 2:] = tilt * min(1.0, most / max(float(np.hypot(*tilt)), 1e-12))
     return places
+
+
+def _first_place(geometry: FilmGeometry, bearing: FilmBearing, load: Vector) -> Vector:
+    """Of a short bearing: in the circle of the worn arc, if the bore has room for it there."""
+    ratio = geometry.length_to_diameter
+    if bearing.wear_down > 0 and (own := bearing.arc_clearance) is not None:
+        lower = bearing.wear_down / bearing.bearing.clearance + 1 - own
+        place = np.array([lower, 0.0]) + own * _short_place(ratio, load * own**2)
+        if _room(geometry, False, np.pad(place, (0, 2))) > 0:
+            return np.asarray(place)
+    return _short_place(ratio, load)
 
 
 def _short_place(length_to_diameter: float, load: Vector) -> Vector:
@@ -1149,7 +1206,7 @@ def _pinned(line: _Line) -> tuple[Vector, Vector]:
     count = len(line.bearings)
     places = np.arange(4 * count).reshape(-1, 4)
     held, free = places[:, :2].ravel(), places[:, 2:].ravel()
-    down = np.array([[-b.worn.clearance, 0.0] for b in line.bearings]).ravel()
+    down = np.array([[-b.bottom, 0.0] for b in line.bearings]).ravel()
     right = line.pull[free] - line.stiffness[np.ix_(free, held)] @ down
     slopes = np.linalg.lstsq(line.stiffness[np.ix_(free, free)], right)[0]
     reactions = line.stiffness[np.ix_(held, held)] @ down

@@ -18,7 +18,7 @@ from ..beam.beam import Beam, Disc, PointLoad, Section, assemble_beam
 from ..beam.rotor import Rotor, Support
 from ..excitation.forces import Push, read_cell
 from ..film.bearing import JournalBearing
-from ..film.solve import FilmGeometry
+from ..film.solve import FilmGeometry, Groove
 from ..output.recording import Recorder, Recording
 from ..output.sensor import digitise
 from ..output.status import SimulationError, Status
@@ -465,6 +465,7 @@ def _film_bearing(
                 n_theta=film.n_theta,
                 n_z=film.n_z,
                 condition=film.condition,
+                grooves=_side_grooves(bearing.groove_width),
             ),
         ),
         offset=(
@@ -477,7 +478,16 @@ def _film_bearing(
         side_offset=bearing.side_offset,
         slope=(bearing.slope + hull * slope, bearing.side_slope),
         wear_down=bearing.wear_down,
+        arc_clearance=bearing.arc_clearance if bearing.worn_shape == "arc" else None,
     )
+
+
+def _side_grooves(width: float) -> tuple[Groove, ...]:
+    """Two through the whole length, a quarter of a turn from the bottom, without pressure."""
+    if width == 0:
+        return ()
+    sides = (-math.pi / 2, math.pi / 2)
+    return tuple(Groove(angle=angle, width=width) for angle in sides)
 
 
 # --- coupling
@@ -1220,7 +1230,7 @@ def _reading(
     """Of a proximity probe: the journal from the middle of the bore as new, and its track."""
     i = [bearing.name for bearing in scene.bearings].index(probe.bearing)
     up, side = state.film.positions[i]
-    up -= scene.bearings[i].wear_down / 2  # the bore's own middle has sunk by so much
+    up -= state.film.bearings[i].sunk
     down = -(up + motion.offset(probe.bearing, "y"))
     port = -(side + motion.offset(probe.bearing, "z"))
     towards = down * math.cos(probe.angle) + port * math.sin(probe.angle)
@@ -1253,11 +1263,12 @@ def _warnings(scene: ShaftScene, state: ShaftState, numerics: Numerics) -> tuple
         for bearing, reaction in zip(scene.bearings, up, strict=True)
         if reaction < _LIFTED * float(np.mean(np.abs(up)))
     ]
-    middle = (1 - film.eccentricity_ratios) * np.array([b.worn.clearance for b in film.bearings])
     warnings += [
         f"bearing '{bearing.name}' runs on its edge, film {1e6 * least:.0f} um there and "
         f"{1e6 * inside:.0f} um in the middle; turn its bore towards the shaft"
-        for bearing, least, inside in zip(scene.bearings, film.least_film, middle, strict=True)
+        for bearing, least, inside in zip(
+            scene.bearings, film.least_film, film.middle_films, strict=True
+        )
         if least < _THIN_EDGE * inside
     ]
     moved = float(numerics["motion_share"])
