@@ -8,7 +8,12 @@ from scipy.interpolate import CubicSpline
 from wearstate.datasets.file.record import DataSet
 from wearstate.datasets.generation.generate import save_solution
 from wearstate.diagnose.film_clearance.clearance import Doubts
-from wearstate.diagnose.film_clearance.wear_down import SinkingRun, film_wear_down, sinking_places
+from wearstate.diagnose.film_clearance.wear_down import (
+    SinkingRun,
+    film_wear_down,
+    possible_bores,
+    sinking_places,
+)
 from wearstate.diagnose.nameplate.nameplate import nameplate_of
 from wearstate.diagnose.report.film import film_estimate
 from wearstate.sim.machine.simulate import simulate
@@ -27,7 +32,7 @@ def sunk(wear, *, offset=(0.0, 0.0), measured=None, film=80e-6):
     towards = [-(up * math.cos(a) + side * math.sin(a)) for a in ANGLES]
     return SinkingRun(
         readings=np.add(towards, offset),
-        places=CubicSpline(wears, np.array(rows)),
+        places=(CubicSpline(wears, np.array(rows)),),
         swing=5e-6,
         clearance=0.35e-3,
         measured=measured,
@@ -72,13 +77,42 @@ def test_the_line_is_solved_for_places(tmp_path):
     with DataSet(path) as data:
         recording = data[0]
     told_right = film_estimate(recording, WEAR, nameplate_of(path, None, {}))
-    assert told_right.severity == pytest.approx(0.5e-3, abs=0.02 * LIMIT)
+    # the bore may as well have an arc or grooves: that moves the estimate a little
+    assert told_right.severity == pytest.approx(0.5e-3, abs=0.04 * LIMIT)
     assert told_right.low < 0.5e-3 < told_right.high
     # a sag without probes in its bearing cannot be told so
     assert (
         "0 probes"
         in film_estimate(recording, "wear_down_bearing_2_m", nameplate_of(path, None, {})).reason
     )
+
+
+def test_a_bore_worn_to_an_arc_is_allowed_for():
+    """By a scene that has a circle: taken for one, no wear-down puts the journal there."""
+    truth = {"bearings.0.wear_down": 0.7e-3, "bearings.0.worn_shape": "arc"}
+    scene = load_scene("propulsion-shaft", {**truth, "duration": 0.5})
+    plain = load_scene("propulsion-shaft", {"duration": 0.5})
+    motion = simulate(scene, seed=1)
+    state = [motion.signal[motion.names.index(probe.name)].mean() for probe in plain.probes]
+    angles = [probe.angle for probe in plain.probes]
+    places = sinking_places(plain, 0, LIMIT)
+
+    def told_by(bores):
+        run = SinkingRun(readings=np.array(state), places=bores, swing=2e-5, clearance=0.35e-3)
+        return film_wear_down(run, angles, LIMIT, AS_NEW, Doubts(offset=15e-6))
+
+    assert "no wear-down puts the journal" in told_by(places[:1]).reason
+    found = told_by(places)
+    assert found.low < 0.7e-3 < found.high
+    # two readings do not tell an arc's clearance: that is most of the interval
+    assert max(found.budget, key=found.budget.get) == "shape of the bore"
+    half = (found.high - found.low) / 2
+    assert math.hypot(*found.budget.values()) == pytest.approx(half, rel=0.05)
+
+
+def test_a_scene_that_tells_the_bore_is_believed():
+    told = {"bearings.0.worn_shape": "arc", "bearings.0.groove_width": "20 deg"}
+    assert possible_bores(load_scene("propulsion-shaft", told).bearings[0]) == ({},)
 
 
 def test_a_line_that_no_film_carries_says_so():

@@ -107,7 +107,8 @@ class FilmEstimate:
         Recordings of the machine as new that it was told against.
     budget : dict
         What each doubt is worth: its own part of half the interval [m], by the names of
-        :class:`Doubts`; their squares add up to that of the whole.
+        :class:`Doubts`, and for a line the shape of the bore; their squares add up to that of the
+        whole.
     """
 
     reason: str = ""

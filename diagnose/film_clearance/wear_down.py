@@ -4,12 +4,16 @@ A worn bearing lets its journal sink; how deep it lies hangs on the film under i
 the line loads it with. Beam and films are solved together for some wear-downs, each with a little
 more viscosity and a little more clearance: that gives the readings of the probes as functions of
 what is not known exactly, and least squares as those of a single journal do the rest.
+
+Nobody sees the worn bore: it may have stayed a circle, or have an arc, and grooves. Each of these
+is tried, and counts by how well it explains the readings.
 """
 
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from functools import partial
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,12 +22,18 @@ from scipy.interpolate import CubicSpline
 from .clearance import CONTRADICTED, CORRECTED, DOUBTS, FLOOR, NORMAL, Doubts, FilmEstimate, fitted
 
 if TYPE_CHECKING:
-    from ...sim.scene.shaft import ShaftScene
+    from ...sim.scene.shaft import ShaftBearing, ShaftScene
 
 Float = NDArray[np.float64]
 
 _SHARES = (0.0, 0.25, 0.6, 1.0, 1.5)  # of the condemning wear-down, where the line is solved
 _HEALTHY = (0.0, 0.1, 0.25)  # the same for a healthy bearing
+_ARCS = (
+    0.25,
+    0.5,
+    0.9,
+)  # clearance in a worn arc over that of the bore, where the scene tells none
+_GROOVES = (math.radians(15.0), math.radians(32.0))  # widths at the sides, the same
 _CHANGE = 0.05  # of viscosity and clearance, for their slopes
 _BUILT = 0.09  # of a clearance as new: makers' tolerance 15 %, evenly spread
 _LOOSEST = 0.3  # standard error over the condemning wear-down, above which nothing is told
@@ -38,9 +48,10 @@ class SinkingRun:
     ----------
     readings : numpy.ndarray [shape=(n_probes,)]
         Mean motion towards each probe, zero in the middle of the bore as new [m].
-    places : CubicSpline
-        Wear-down [m] -> height and side of the journal [m], their slopes by the logarithm of the
-        viscosity, and by that of the clearance as new.
+    places : tuple of CubicSpline or None
+        For each bore of :func:`possible_bores`: wear-down [m] -> height and side of the journal
+        [m], their slopes by the logarithm of the viscosity, and by that of the clearance as new.
+        None for a bore that carries no line.
     swing : float
         rms of the motion about the mean [m].
     clearance : float
@@ -50,15 +61,43 @@ class SinkingRun:
     """
 
     readings: Float
-    places: CubicSpline
+    places: tuple[CubicSpline | None, ...]
     swing: float
     clearance: float
     measured: float | None = None
 
 
+def possible_bores(bearing: "ShaftBearing") -> tuple[dict[str, Any], ...]:
+    """What a worn bearing's bore may be: that of the scene, and others where it tells none.
+
+    Parameters
+    ----------
+    bearing : ShaftBearing
+
+    Returns
+    -------
+    tuple of dict
+        Fields of the bearing that are changed; nothing in the first.
+
+    Examples
+    --------
+    >>> from wearstate.sim.scene.load import load_scene
+    >>> bearing = load_scene("propulsion-shaft").bearings[0]
+    >>> len(possible_bores(bearing)), possible_bores(bearing)[0]
+    (12, {})
+    """
+    shapes: list[dict[str, Any]] = [{}]
+    if bearing.worn_shape == "circle":
+        shapes += [{"worn_shape": "arc", "arc_clearance": own} for own in _ARCS]
+    grooves: list[dict[str, Any]] = [{}]
+    if bearing.groove_width == 0:
+        grooves += [{"groove_width": width} for width in _GROOVES]
+    return tuple({**shape, **groove} for groove in grooves for shape in shapes)
+
+
 def sinking_places(
     scene: "ShaftScene", bearing: int, limit: float, *, healthy: bool = False
-) -> CubicSpline | str:
+) -> tuple[CubicSpline | None, ...] | str:
     """Where a journal lies, by the wear-down of its bearing.
 
     Parameters
@@ -74,8 +113,12 @@ def sinking_places(
 
     Returns
     -------
-    CubicSpline or str
-        As :class:`SinkingRun` has it; or why the line has no balance.
+    tuple of (CubicSpline or None), or str
+        As :class:`SinkingRun` has them; or why the line as the scene has it has no balance.
+
+    Notes
+    -----
+    Viscosity and clearance as new are taken to move the journal alike in every bore.
     """
     from ...sim.shaft.on_oil_films import ShaftFilmError
 
@@ -83,31 +126,42 @@ def sinking_places(
     wears = [share * limit for share in shares]
     try:
         plain, thick, wide = (
-            np.array([_place(changed, bearing, wear) for wear in wears])
+            _ways(changed, bearing, wears)
             for changed in (scene, _thicker(scene), _wider(scene, bearing))
         )
     except ShaftFilmError as error:
         return str(error)
     step = math.log1p(_CHANGE)
-    columns = [plain, (thick - plain) / step, (wide - plain) / step]
-    return CubicSpline(wears, np.hstack(columns))
+    slopes = [(thick - plain) / step, (wide - plain) / step]
+
+    def of(bore: Mapping[str, Any]) -> CubicSpline | None:
+        try:
+            own = _ways(_with_bearing(scene, bearing, bore), bearing, wears) if bore else plain
+        except ShaftFilmError:
+            return None
+        return CubicSpline(wears, np.hstack([own, *slopes]))
+
+    return tuple(of(bore) for bore in possible_bores(scene.bearings[bearing]))
 
 
-def _place(scene: "ShaftScene", bearing: int, wear: float) -> Float:
-    """Height and side over the middle of the bore as new [m]."""
+def _ways(scene: "ShaftScene", bearing: int, wears: Sequence[float]) -> Float:
+    """Heights and sides over the middle of the bore as new [m, shape=(n_wears, 2)]."""
     from ...sim.shaft.on_oil_films import beam_film
     from ...sim.shaft.recording import film_bearings, running_beam
 
-    worn = _with_bearing(scene, bearing, {"wear_down": wear})
-    found = beam_film(
-        running_beam(worn),
-        film_bearings(worn),
-        math.tau * worn.drive.speed,
-        rung=worn.film.rung,
-        pedestals=[(b.housing.stiffness_up, b.housing.stiffness_side) for b in worn.bearings],
-    )
-    up, side = found.positions[bearing]
-    return np.array([up - wear / 2, side])
+    places = []
+    for wear in wears:
+        worn = _with_bearing(scene, bearing, {"wear_down": wear})
+        found = beam_film(
+            running_beam(worn),
+            film_bearings(worn),
+            math.tau * worn.drive.speed,
+            rung=worn.film.rung,
+            pedestals=[(b.housing.stiffness_up, b.housing.stiffness_side) for b in worn.bearings],
+        )
+        up, side = found.positions[bearing]
+        places.append([up - found.bearings[bearing].sunk, side])
+    return np.array(places)
 
 
 def _with_bearing(scene: Any, bearing: int, changes: Mapping[str, float]) -> Any:
@@ -158,13 +212,11 @@ def film_wear_down(
     -----
     As :func:`.film_clearance.clearance.film_clearance`, linear in viscosity and clearance. Loads
     are those of the nameplate and of the day's thrust and hull; sags of other bearings are not
-    looked for.
+    looked for. The bores of :func:`possible_bores` are mixed by their evidence.
     """
     problem = _Problem([run, *healthy], np.asarray(angles), limit, as_new, doubts)
-    start = np.zeros(len(problem.prior))
-    found = fitted(problem.residuals, start, problem.readings.size)
-    wear = problem.middles[0] + float(found.values[0] * problem.prior[0])
-    error = found.error * problem.prior[0]
+    found = problem.explained()
+    wear, error = found.wear, found.error
     if found.left > CONTRADICTED:
         return FilmEstimate(
             healthy=len(healthy),
@@ -184,11 +236,42 @@ def film_wear_down(
         low=max(wear - NORMAL * error, 0.0),
         high=max(wear + NORMAL * error, 0.0),
         healthy=len(healthy),
-        budget={
-            name: NORMAL * problem.prior[0] * found.worth(problem.names, name)
-            for name in DOUBTS
-            if name != "load"  # of a line: by its masses, thrust and hull
-        },
+        budget={name: NORMAL * part for name, part in found.budget.items()},
+    )
+
+
+class _Explained(NamedTuple):
+    """Wear-down, its standard error and the parts of that [m], and what is left over."""
+
+    wear: float
+    error: float
+    budget: dict[str, float]
+    left: float
+
+
+def _mixed(each: Sequence[_Explained], costs: Sequence[float]) -> _Explained:
+    """Of several bores, each by how well it explains the readings.
+
+    The weight is its evidence by Laplace's method: likelihood times the range of wear it allows.
+    Before the readings that of the scene, the first, is as likely as all others together.
+    """
+    likely = -np.asarray(costs) + np.log([one.error for one in each])
+    weights = np.exp(likely - likely.max())
+    weights[0] *= max(1, len(each) - 1)
+    weights /= weights.sum()
+    wears = np.array([one.wear for one in each])
+    wear = float(weights @ wears)
+    parts = {
+        name: math.sqrt(weights @ np.array([one.budget[name] ** 2 for one in each]))
+        for name in each[0].budget
+    }
+    parts["shape of the bore"] = math.sqrt(weights @ (wears - wear) ** 2)
+    variance = weights @ np.array([one.error**2 for one in each])
+    return _Explained(
+        wear=wear,
+        error=math.sqrt(variance + parts["shape of the bore"] ** 2),
+        budget=parts,
+        left=min(one.left for one in each),
     )
 
 
@@ -233,19 +316,46 @@ class _Problem:
         ]
         self.scatter = np.array([math.hypot(FLOOR, run.swing**2 / run.clearance) for run in runs])
 
-    def predicted(self, free: Float) -> Float:
+    def explained(self) -> _Explained:
+        """By all bores that carry the line in every run."""
+        each, costs = [], []
+        for bore in range(len(self.runs[0].places)):
+            ways = [run.places[bore] for run in self.runs]
+            if None not in ways:
+                found, cost = self._by(ways)
+                each.append(found)
+                costs.append(cost)
+        return _mixed(each, costs)
+
+    def _by(self, ways: Sequence[Any]) -> tuple[_Explained, float]:
+        residuals = partial(self.residuals, ways)
+        found = fitted(residuals, np.zeros(len(self.prior)), self.readings.size)
+        unit = float(self.prior[0])
+        explained = _Explained(
+            wear=self.middles[0] + float(found.values[0]) * unit,
+            error=found.error * unit,
+            budget={
+                name: unit * found.worth(self.names, name)
+                for name in DOUBTS
+                if name != "load"  # of a line: by its masses, thrust and hull
+            },
+            left=found.left,
+        )
+        return explained, 0.5 * float(np.sum(residuals(found.values) ** 2))
+
+    def predicted(self, ways: Sequence[Any], free: Float) -> Float:
         """Readings [shape=(n, n_probes)] for deviations from what is told, in their doubts."""
         real = free * self.prior
         wide, rest = real[1], real[2:]
         probes, n = self.probes, self.n
         offsets, gains, new, oils = np.split(rest, np.cumsum([probes, probes, n]))
         wear = self.middles + np.concatenate([real[:1], new[0] + new[1:]])
-        found = np.array([run.places(w) for run, w in zip(self.runs, wear, strict=True)])
+        found = np.array([way(w) for way, w in zip(ways, wear, strict=True)])
         oil = (oils[0] + oils[1:])[:, None]
         place = found[:, :2] + found[:, 2:4] * oil + found[:, 4:] * wide
         return np.asarray((place @ self.looks + offsets) * np.exp(gains))
 
-    def residuals(self, free: Float) -> Float:
+    def residuals(self, ways: Sequence[Any], free: Float) -> Float:
         """Of readings, then of what is held, in standard deviations."""
-        apart = (self.predicted(free) - self.readings) / self.scatter[:, None]
+        apart = (self.predicted(ways, free) - self.readings) / self.scatter[:, None]
         return np.concatenate([apart.ravel(), free])
