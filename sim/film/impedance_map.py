@@ -302,25 +302,78 @@ def map_resistance(
         R_xx, R_xy, R_yx, R_yy: minus the derivative of the force by V. As the force is homogeneous,
         it is also ``-R V``.
     """
+    _, _, roots, angles = table.coefficients.shape
+    m = map_place(table, roots, angles, x, y, v_x, v_y)
+    found = map_patches(
+        table.coefficients[RADIAL, 0], table.coefficients[TANGENTIAL, 0], m.i, m.j, m.p, m.q
+    )
+    return map_tensor(m, table.per_radian, *found)
+
+
+class MapPlace(NamedTuple):
+    """Where a state lies in the map of a plain bore, and the scales of what stands there."""
+
+    n_x: float  # line of centres
+    n_y: float
+    stretch: float
+    scale: float
+    c: float  # of the stretched angle of V
+    s: float
+    side: float
+    i: float  # cell, and the share of it that lies behind
+    p: float
+    j: float
+    q: float
+
+
+@kernel
+def map_place(
+    table: Any, roots: float, angles: float, x: float, y: float, v_x: float, v_y: float
+) -> Any:
+    """See :class:`MapPlace`; `roots` and `angles` are the coefficients' numbers."""
     eccentricity = math.sqrt(x * x + y * y)
-    n_x, n_y = 1.0, 0.0
-    if eccentricity > 0.0:
-        n_x, n_y = x / eccentricity, y / eccentricity
+    apart = eccentricity > 0.0
+    distance = eccentricity if apart else 1.0
+    n_x, n_y = x / distance if apart else 1.0, y / distance
     root, stretch, scale = map_scales(table, eccentricity)
     along, across = v_x * n_x + v_y * n_y, (v_y * n_x - v_x * n_y) * stretch
     size = math.sqrt(along * along + across * across)
-    c, s = (along / size, abs(across) / size) if size > 0.0 else (1.0, 0.0)
+    over = size if size > 0.0 else 1.0
+    c, s = along / over if size > 0.0 else 1.0, abs(across) / over
     side = -1.0 if across < 0.0 else 1.0
-    shape = table.coefficients.shape
-    i, share = _cell((1.0 - root) * table.per_root, shape[2] - 3)
-    v = _weights(share)
-    j, share = _cell(stretched_angle(c, s) * table.per_radian, shape[3] - 3)
-    w, rate = _weights(share), _rates(share)
-    radial, tangential = table.coefficients[RADIAL, 0], table.coefficients[TANGENTIAL, 0]
-    f_r, f_t = _patch(radial, i, j, v, w), _patch(tangential, i, j, v, w)
-    g_r = _patch(radial, i, j, v, rate) * table.per_radian
-    g_t = _patch(tangential, i, j, v, rate) * table.per_radian
-    across_scale = side * stretch * scale
+    i, p = _cell_of((1.0 - root) * table.per_root, roots - 3.0)
+    j, q = _cell_of(stretched_angle(c, s) * table.per_radian, angles - 3.0)
+    return MapPlace(n_x, n_y, stretch, scale, c, s, side, i, p, j, q)
+
+
+@kernel
+def _cell_of(position: float, cells: float) -> Any:
+    """As :func:`_cell`, in numbers that lie in vectors; no number is in the first cell."""
+    i = min(np.floor(position if position > 0.0 else 0.0), cells - 1.0)
+    return i, position - i
+
+
+@kernel
+def map_patches(radial: Any, tangential: Any, i: float, j: float, p: float, q: float) -> Any:
+    """Both entries of the map and their derivatives by the knots of the angle."""
+    row, column, v, w, rate = int(i), int(j), _weights(p), _weights(q), _rates(q)
+    return (
+        _patch(radial, row, column, v, w),
+        _patch(tangential, row, column, v, w),
+        _patch(radial, row, column, v, rate),
+        _patch(tangential, row, column, v, rate),
+    )
+
+
+@kernel
+def map_tensor(
+    m: Any, per_radian: float, f_r: float, f_t: float, g_r: float, g_t: float
+) -> tuple[float, float, float, float]:
+    """Resistance from what stands in the map."""
+    c, s, n_x, n_y, stretch, scale = m.c, m.s, m.n_x, m.n_y, m.stretch, m.scale
+    g_r *= per_radian
+    g_t *= per_radian
+    across_scale = m.side * stretch * scale
     r_rr, r_rt = -scale * (f_r * c - g_r * s), -across_scale * (f_r * s + g_r * c)
     r_tr, r_tt = (
         -across_scale * (f_t * c - g_t * s),

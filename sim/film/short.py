@@ -3,7 +3,7 @@
 import math
 from typing import Any
 
-from ..jit import kernel
+from ..jit import half_turn_angle, kernel
 
 
 @kernel
@@ -98,81 +98,85 @@ def short_resistance(
     (-0.4444, 0.6046)
     """
     eccentricity = math.sqrt(x * x + y * y)
-    if filled <= 1.0 - eccentricity:
-        return 0.0, 0.0, 0.0
-    n_x, n_y = 1.0, 0.0
-    if eccentricity > 0.0:
-        n_x, n_y = x / eccentricity, y / eccentricity
+    apart = eccentricity > 0.0
+    distance = eccentricity if apart else 1.0
+    n_x, n_y = x / distance if apart else 1.0, y / distance
     rest = 1.0 - eccentricity * eccentricity
     root = math.sqrt(rest)
     w_r = v_x * n_x + v_y * n_y
     w_t = (v_y * n_x - v_x * n_y) * root
     size = math.sqrt(w_r * w_r + w_t * w_t)
-    c_0, s_0 = (w_r / size, abs(w_t) / size) if size > 0.0 else (1.0, 0.0)
+    over = size if size > 0.0 else 1.0
+    c_0, s_0 = w_r / over if size > 0.0 else 1.0, abs(w_t) / over
     side = -1.0 if w_t < 0.0 else 1.0
-    if filled >= 1.0 + eccentricity:
-        radial, tangential, mixed = _flooded(c_0, s_0, eccentricity)
-    else:
-        middle, half = math.atan2(s_0, c_0), math.acos(-eccentricity * c_0)
-        radial, tangential, mixed = _starved(middle - half, middle + half, eccentricity, filled)
-    radial /= rest * rest * root
-    tangential /= rest * root
-    mixed *= side / (rest * rest)
+    radial, tangential, mixed = _over_the_arc(c_0, s_0, eccentricity, rest, filled)
+    thick, thin = 1.0 / rest, 1.0 / (rest * root)
+    radial *= thick * thin
+    tangential *= thin
+    mixed *= side * thick * thick
+    oil = 1.0 if filled > 1.0 - eccentricity else 0.0
     return (
-        radial * n_x * n_x - 2.0 * mixed * n_x * n_y + tangential * n_y * n_y,
-        (radial - tangential) * n_x * n_y + mixed * (n_x * n_x - n_y * n_y),
-        radial * n_y * n_y + 2.0 * mixed * n_x * n_y + tangential * n_x * n_x,
+        oil * (radial * n_x * n_x - 2.0 * mixed * n_x * n_y + tangential * n_y * n_y),
+        oil * ((radial - tangential) * n_x * n_y + mixed * (n_x * n_x - n_y * n_y)),
+        oil * (radial * n_y * n_y + 2.0 * mixed * n_x * n_y + tangential * n_x * n_x),
     )
 
 
 @kernel
 def filled_angle(eccentricity: float, filled: float) -> float:
     """Sommerfeld's angle up to which the gap holds oil: 0 nowhere, pi everywhere."""
-    rest = 1.0 - eccentricity * eccentricity
-    if filled >= 1.0 + eccentricity:
-        return math.pi
-    if filled <= 1.0 - eccentricity:
-        return 0.0
-    return math.acos(max(-1.0, min(1.0, (rest / filled - 1.0) / eccentricity)))
+    _, _, angle = _filled_arc(eccentricity, 1.0 - eccentricity * eccentricity, filled)
+    found: float = angle
+    return found
 
 
 @kernel
-def _flooded(c_0: float, s_0: float, e: float) -> Any:
-    """Integrals of ``(e + cos g)^2``, ``sin^2 g``, ``(e + cos g) sin g`` over the whole arc.
+def _filled_arc(e: float, rest: float, filled: float) -> Any:
+    """Cosine and sine of the angle up to which the gap holds oil, and the angle."""
+    cosine = max(-1.0, min(1.0, (rest / filled - 1.0) / (e if e > 0.0 else 1.0)))
+    cosine = 1.0 if filled <= 1.0 - e else cosine
+    cosine = -1.0 if filled >= 1.0 + e else cosine
+    sine = math.sqrt((1.0 - cosine) * (1.0 + cosine))
+    return cosine, sine, half_turn_angle(cosine, sine)
 
-    Its middle has the cosine c_0 and the sine s_0, its half width the cosine ``-e c_0``.
+
+@kernel
+def _over_the_arc(c_0: float, s_0: float, e: float, rest: float, filled: float) -> Any:
+    """Integrals of ``(e + cos g)^2``, ``sin^2 g``, ``(e + cos g) sin g`` where the arc holds oil.
+
+    Its middle has the cosine c_0 and the sine s_0, its half width the cosine ``-e c_0``: it begins
+    above -pi and may pass beyond pi. Oil is up to an angle on either side of the least gap.
     """
     c_h = -e * c_0
     s_h = math.sqrt(1.0 - c_h * c_h)
-    half, double = math.acos(c_h), s_h * c_h * (2.0 * c_0 * c_0 - 1.0)
-    return (
-        (2.0 * e * e + 1.0) * half + 4.0 * e * c_0 * s_h + double,
-        half - double,
-        2.0 * s_0 * s_h * (e + c_h * c_0),
+    middle, half = half_turn_angle(c_0, s_0), half_turn_angle(c_h, s_h)
+    start, s_start, c_start = middle - half, s_0 * c_h - c_0 * s_h, c_0 * c_h + s_0 * s_h
+    end, s_end, c_end = middle + half, s_0 * c_h + c_0 * s_h, c_0 * c_h - s_0 * s_h
+    c_last, s_last, last = _filled_arc(e, rest, filled)
+    flooded = filled >= 1.0 + e
+    late, soon = flooded or start > -last, flooded or end < last
+    first, s_first, c_first = (
+        start if late else -last,
+        s_start if late else -s_last,
+        c_start if late else c_last,
     )
-
-
-@kernel
-def _starved(start: float, end: float, e: float, filled: float) -> Any:
-    """The same over that part of an arc that holds oil.
-
-    The arc begins above -pi and may pass beyond pi.
-    """
-    last = filled_angle(e, filled)
-    first = max(start, -last)
-    a, b, c = 0.0, 0.0, 0.0
-    if min(end, last) > first:
-        a, b, c = _between(first, min(end, last), e)
+    until, s_until, c_until = (
+        end if soon else last,
+        s_end if soon else s_last,
+        c_end if soon else c_last,
+    )
+    a, b, c = _between(first, s_first, c_first, until, s_until, c_until, e)
     again = 2.0 * math.pi - last
-    if end > again:
-        more = _between(max(start, again), end, e)
-        a, b, c = a + more[0], b + more[1], c + more[2]
-    return a, b, c
+    d, f, g = _between(again, -s_last, c_last, end, s_end, c_end, e)
+    own = 1.0 if until > first else 0.0
+    more = 1.0 if end > again and not flooded else 0.0
+    return own * a + more * d, own * b + more * f, own * c + more * g
 
 
 @kernel
-def _between(start: float, end: float, e: float) -> Any:
-    s_0, c_0, s_1, c_1 = math.sin(start), math.cos(start), math.sin(end), math.cos(end)
+def _between(
+    start: float, s_0: float, c_0: float, end: float, s_1: float, c_1: float, e: float
+) -> Any:
     arc, double = 0.5 * (end - start), 0.5 * (s_1 * c_1 - s_0 * c_0)
     return (
         2.0 * e * e * arc + 2.0 * e * (s_1 - s_0) + arc + double,

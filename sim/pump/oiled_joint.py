@@ -28,7 +28,7 @@ frame of the mean rotation; Childs, Moes, van Leeuwen (1977), J. Lubrication Tec
 """
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -64,7 +64,7 @@ OIL = np.dtype(
 DEEPEST = 1.0 - 1e-5
 """Eccentricity beyond which the film is that of this one: what is thinner than its finish."""
 
-_NEWTON_STEPS = 12
+NEWTON_STEPS = 12
 _SETTLED = 1e-3  # of the velocity at the last step, whose error is the square of it
 _IMPLICIT = 0.5  # of a step, over which the peaks' stiffness is taken in
 _MOST_CLOSED = 0.7  # of the gap, in one step
@@ -83,31 +83,104 @@ def _resistance(x: float, y: float, v_x: float, v_y: float, o: Any, maps: Any) -
     return o.short * xx, o.short * xy, o.short * xy, o.short * yy
 
 
+class FilmPull(NamedTuple):
+    """What a film is pulled by, where it lies, and what else resists."""
+
+    x: float  # over C, at most as near to the bore as its finish lets it
+    y: float
+    n_x: float  # line of centres
+    n_y: float
+    u_x: float  # of the pin in the film's frame [m/s]
+    u_y: float
+    spring_x: float  # of the wall [N]
+    spring_y: float
+    pull_x: float  # [N]
+    pull_y: float
+    wall_xx: float  # of the wall and the peaks [N s/m]
+    wall_xy: float
+    wall_yy: float
+
+
 @kernel
-def _film_velocity(
-    x: float,
-    y: float,
-    pull_x: float,
-    pull_y: float,
+def film_pull(
+    s_x: float,
+    s_y: float,
+    d_x: float,
+    d_y: float,
     v_x: float,
     v_y: float,
-    wall_xx: float,
-    wall_xy: float,
-    wall_yy: float,
+    mean: float,
+    peaks: float,
+    stiff: float,
+    c: Any,
     o: Any,
-    maps: Any,
 ) -> Any:
+    """See :class:`FilmPull`; `stiff` is what the peaks add to the damping [N s/m]."""
+    u_x, u_y = v_x + mean * d_y, v_y - mean * d_x
+    yield_x, yield_y = d_x - s_x, d_y - s_y
+    deep = math.sqrt(yield_x * yield_x + yield_y * yield_y)
+    spring = elastic_force(deep, c) / (deep if deep > 0.0 else 1.0)
+    wall = o.wall_damping + o.relaxing
+    pull_x, pull_y = spring * yield_x + wall * u_x, spring * yield_y + wall * u_y
+    distance = math.sqrt(s_x * s_x + s_y * s_y)
+    apart = distance > 0.0
+    over = distance if apart else 1.0
+    n_x, n_y = s_x / over if apart else 1.0, s_y / over
+    most = 1.0 - max(1.0 - DEEPEST, o.roughness / c.clearance)  # peaks keep the surfaces apart
+    share = min(1.0 / c.clearance, most / over)
+    return FilmPull(
+        s_x * share,
+        s_y * share,
+        n_x,
+        n_y,
+        u_x,
+        u_y,
+        spring * yield_x,
+        spring * yield_y,
+        pull_x - peaks * n_x,
+        pull_y - peaks * n_y,
+        wall + stiff * n_x * n_x,
+        stiff * n_x * n_y,
+        wall + stiff * n_y * n_y,
+    )
+
+
+@kernel
+def newton_step(
+    r_xx: float,
+    r_xy: float,
+    r_yx: float,
+    r_yy: float,
+    f: Any,
+    v_x: float,
+    v_y: float,
+    damped: float,
+) -> Any:
+    """Next guess of the velocity V at which the film resists what pulls; whether it has settled."""
+    a, b, c, d = r_xx + f.wall_xx, r_xy + f.wall_xy, r_yx + f.wall_xy, r_yy + f.wall_yy
+    inverse = 1.0 / (a * d - b * c)
+    new_x, new_y = (
+        (d * f.pull_x - b * f.pull_y) * inverse,
+        (a * f.pull_y - c * f.pull_x) * inverse,
+    )
+    change = abs(new_x - v_x) + abs(new_y - v_y)
+    settled = r_xx + r_yy == 0.0 or change <= _SETTLED * (abs(new_x) + abs(new_y))
+    return v_x + damped * (new_x - v_x), v_y + damped * (new_y - v_y), settled
+
+
+@kernel
+def newton_damping(step: int) -> float:
+    """Share of a step of Newton's that is taken: less where two pieces send to each other."""
+    return 1.0 if step < NEWTON_STEPS // 2 else 0.5
+
+
+@kernel
+def _film_velocity(f: Any, v_x: float, v_y: float, o: Any, maps: Any) -> Any:
     """Velocity V at which the film resists what pulls, from a guess of it."""
-    for step in range(_NEWTON_STEPS):
-        r_xx, r_xy, r_yx, r_yy = _resistance(x, y, v_x, v_y, o, maps)
-        a, b, c, d = r_xx + wall_xx, r_xy + wall_xy, r_yx + wall_xy, r_yy + wall_yy
-        inverse = 1.0 / (a * d - b * c)
-        new_x, new_y = (d * pull_x - b * pull_y) * inverse, (a * pull_y - c * pull_x) * inverse
-        change = abs(new_x - v_x) + abs(new_y - v_y)
-        damped = 1.0 if step < _NEWTON_STEPS // 2 else 0.5  # where two pieces send to each other
-        v_x += damped * (new_x - v_x)
-        v_y += damped * (new_y - v_y)
-        if r_xx + r_yy == 0.0 or change <= _SETTLED * (abs(new_x) + abs(new_y)):
+    for step in range(NEWTON_STEPS):
+        r_xx, r_xy, r_yx, r_yy = _resistance(f.x, f.y, v_x, v_y, o, maps)
+        v_x, v_y, settled = newton_step(r_xx, r_xy, r_yx, r_yy, f, v_x, v_y, newton_damping(step))
+        if settled:
             break  # without oil the first step is exact
     return v_x, v_y
 
@@ -151,51 +224,64 @@ def oiled_joint(
         [m/s]; least gap [m]; force of the peaks [N].
     """
     mean, slip = 0.5 * (pin_turn + eye_turn), pin_turn - eye_turn
-    u_x, u_y = v_x + mean * d_y, v_y - mean * d_x
-    yield_x, yield_y = d_x - s_x, d_y - s_y
-    deep = math.sqrt(yield_x * yield_x + yield_y * yield_y)
-    spring = elastic_force(deep, c) / deep if deep > 0.0 else 0.0
-    wall = o.wall_damping + o.relaxing
-    pull_x, pull_y = spring * yield_x + wall * u_x, spring * yield_y + wall * u_y
-    distance = math.sqrt(s_x * s_x + s_y * s_y)
-    n_x, n_y = (s_x / distance, s_y / distance) if distance > 0.0 else (1.0, 0.0)
-    gap = c.clearance - distance
-    peaks, stiff = asperity_force(gap, o.roughness, o.peaks)
-    stiff *= _IMPLICIT * o.step
-    most = 1.0 - max(1.0 - DEEPEST, o.roughness / c.clearance)  # peaks keep the surfaces apart
-    share = min(1.0 / c.clearance, most / distance) if distance > 0.0 else 0.0
-    x, y = s_x * share, s_y * share
-    f_x, f_y = _film_velocity(
-        x,
-        y,
-        pull_x - peaks * n_x,
-        pull_y - peaks * n_y,
-        guess[0],
-        guess[1],
-        wall + stiff * n_x * n_x,
-        stiff * n_x * n_y,
-        wall + stiff * n_y * n_y,
-        o,
-        maps,
-    )
+    gap = film_gap(s_x, s_y, c)
+    peaks, stiff = peaks_of(gap, o)
+    f = film_pull(s_x, s_y, d_x, d_y, v_x, v_y, mean, peaks, stiff, c, o)
+    f_x, f_y = _film_velocity(f, guess[0], guess[1], o, maps)
     guess[0], guess[1] = f_x, f_y
+    return film_load(s_x, s_y, d_x, d_y, mean, slip, f_x, f_y, gap, peaks, stiff, f, c, o)
+
+
+@kernel
+def film_gap(s_x: float, s_y: float, c: Any) -> float:
+    """Least gap of a film [m]."""
+    least: float = c.clearance - math.sqrt(s_x * s_x + s_y * s_y)
+    return least
+
+
+@kernel
+def peaks_of(gap: float, o: Any) -> Any:
+    """Force of touching peaks [N], and what their stiffness adds to the damping [N s/m]."""
+    peaks, stiff = asperity_force(gap, o.roughness, o.peaks)
+    return peaks, stiff * (_IMPLICIT * o.step)
+
+
+@kernel
+def film_load(
+    s_x: float,
+    s_y: float,
+    d_x: float,
+    d_y: float,
+    mean: float,
+    slip: float,
+    f_x: float,
+    f_y: float,
+    gap: float,
+    peaks: float,
+    stiff: float,
+    f: Any,
+    c: Any,
+    o: Any,
+) -> Any:
+    """What :func:`oiled_joint` returns, once the velocity of the film is known."""
+    n_x, n_y = f.n_x, f.n_y
     closing = f_x * n_x + f_y * n_y - _MOST_CLOSED * max(0.0, gap) / o.step
-    if closing > 0.0:  # no film is crossed between two looks at it
-        f_x -= closing * n_x
-        f_y -= closing * n_y
-    force_x = spring * yield_x + o.wall_damping * (u_x - f_x)
-    force_y = spring * yield_y + o.wall_damping * (u_y - f_y)
-    eccentricity = math.sqrt(x * x + y * y)
+    crossing = max(0.0, closing)  # no film is crossed between two looks at it
+    f_x -= crossing * n_x
+    f_y -= crossing * n_y
+    force_x = f.spring_x + o.wall_damping * (f.u_x - f_x)
+    force_y = f.spring_y + o.wall_damping * (f.u_y - f_y)
+    eccentricity = math.sqrt(f.x * f.x + f.y * f.y)
     angle = filled_angle(eccentricity, o.filled)
     rest = math.sqrt(1.0 - eccentricity * eccentricity)
     drag = o.shear * 2.0 * angle / rest * slip
     # as the implicit step left it: peaks that a stage ran into carry no more than the wall gives
     peaks = max(0.0, peaks + stiff * (f_x * n_x + f_y * n_y))
-    if peaks > 0.0:
-        rub = friction_force(f_y * n_x - f_x * n_y + o.radius * slip, peaks, c)
-        force_x -= rub * n_y
-        force_y += rub * n_x
-        drag += o.radius * rub
+    sliding = friction_force(f_y * n_x - f_x * n_y + o.radius * slip, peaks, c)
+    rub = sliding if peaks > 0.0 else 0.0
+    force_x -= rub * n_y
+    force_y += rub * n_x
+    drag += o.radius * rub
     couple = 0.5 * (d_x * force_y - d_y * force_x)
     return (
         force_x,
