@@ -12,6 +12,7 @@ from wearstate.sim.output.status import Status
 from wearstate.sim.pump.recording import GATHERED_TRUTH, planned
 from wearstate.sim.pump_lanes.lanes import lane_kind, run_lanes
 from wearstate.sim.pump_lanes.many import lane_job
+from wearstate.sim.pump_lanes.rates import DRY
 from wearstate.sim.scene.load import load_scene
 from wearstate.sim.scene.parts import SceneError
 
@@ -44,7 +45,7 @@ def test_the_drawn_records_are_of_every_kind(drawn):
     """Else the tests below would compare less than they say."""
     kinds = {lane_kind(scene) for scene, _ in drawn}
     assert {tuple(kind) for kind in kinds} == {
-        (*plays, 1) for plays in product((False, True), repeat=3)
+        (*plays, 1, DRY) for plays in product((False, True), repeat=3)
     }
     pins = [scene.joint.crankpin for scene, _ in drawn]
     assert {"kelvin-voigt", "hunt-crossley", "exact"} <= {pin.law for pin in pins}
@@ -207,9 +208,9 @@ def test_a_refused_and_a_failed_scene_leave_the_others_alone(stiffness):
 class Kept(list):
     """Forces of a run, stretch by stretch."""
 
-    def add(self, turns, forces, chambers):
+    def add(self, turns, forces, chambers, gaps):
         assert turns.shape == (forces.shape[1] + 1, 2)
-        assert chambers is None
+        assert chambers is gaps is None
         self.append(forces.copy())
 
 

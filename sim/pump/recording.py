@@ -126,9 +126,22 @@ def simulate_pump(
             run.turns[ends],
             run.forces[steps].T,
             None if run.chambers is None else run.chambers[ends][:, :, list(GATHERED)],
+            None if run.gaps is None else _pin_gaps(pump, run.gaps[ends]),
         )
     whole = run if truth else None
     return recording_of(gathered, run, truth=whole, raise_on_failure=raise_on_failure)
+
+
+def _pin_gaps(scene: PumpScene, gaps: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Of all films of a run: gap and force of peaks of the oiled pins [shape=(n, n_pins, 2)]."""
+    oiled = _oiled(scene)
+    return np.stack([gaps[:, :, :GUIDE][:, oiled], gaps[:, :, GUIDE:][:, oiled]], axis=2)
+
+
+def _oiled(scene: PumpScene) -> NDArray[np.bool_]:
+    """Which pins run in oil [shape=(n_throws, 2)]."""
+    rungs = [joint_rungs(scene, throw)[:GUIDE] for throw in range(len(scene.throws))]
+    return np.array(rungs) == JOINT_OILED
 
 
 def refused_run(scene: PumpScene, error: "LimitError") -> Recording:
@@ -467,12 +480,14 @@ class Gathering:
         self.vapour = np.zeros(n_throws, dtype=bool)
         self.pull = np.full(n_throws, -math.inf)
         self._ends = [0.0, 0.0]
+        self._least_gap, self._looks, self._rubs = math.inf, 0, 0
 
     def add(
         self,
         turns: NDArray[np.float64],
         forces: NDArray[np.float64],
         chambers: NDArray[np.float64] | None,
+        gaps: NDArray[np.float64] | None = None,
     ) -> None:
         """Take the next steps.
 
@@ -483,6 +498,8 @@ class Gathering:
         forces : numpy.ndarray [shape=(n_columns, n)]
         chambers : numpy.ndarray [shape=(n + 1, n_throws, 3)] or None
             Columns :data:`GATHERED` of ``CHAMBER_STATE``.
+        gaps : numpy.ndarray [shape=(n + 1, n_pins, 2)] or None
+            Of the oiled pins: least film [m], and what its touching peaks carry [N].
         """
         first, n, factor = self._steps, forces.shape[1], self.plan.factor
         if not first:
@@ -501,6 +518,8 @@ class Gathering:
                 self._lifts[found, throw, column] = chambers[early:n:factor, throw, 1 + column]
             self.vapour |= (chambers[:, :, 0] > 0).any(axis=0)
         self._note_pull(forces, first)
+        if gaps is not None:
+            self._note_films(gaps[:-1], first)
         for row, low in self._sensors:
             low.add(cylinder_pressure(self.plan.scene, forces[row : row + 1]))
         if self._knowing is not None:
@@ -512,6 +531,22 @@ class Gathering:
         for throw, row in enumerate(self._pistons):
             found = forces[row, settled:].max(initial=-math.inf)
             self.pull[throw] = max(self.pull[throw], found)
+
+    def _note_films(self, gaps: NDArray[np.float64], first: int) -> None:
+        """Least film, and how often peaks touch, where steps of the samples begin."""
+        kept, factor = self.plan.kept, self.plan.factor
+        begin = max(0, kept.start * factor - first)
+        found = gaps[begin : max(begin, kept.stop * factor - first)]
+        self._least_gap = min(self._least_gap, float(found[:, :, 0].min(initial=math.inf)))
+        self._rubs += int(np.count_nonzero((found[:, :, 1] > 0).any(axis=1)))
+        self._looks += len(found)
+
+    @property
+    def films(self) -> dict[str, float]:
+        """Least film of all oiled pins, and how long rough peaks touched; empty without either."""
+        if not self._looks:  # or a run that failed while it settled
+            return {}
+        return {"min_film_m": self._least_gap, "rubbing_share": self._rubs / self._looks}
 
     def _on_casing(
         self,
@@ -853,7 +888,7 @@ def _rung_of(part: Any) -> str:
 
 
 def _numerics(gathered: Gathering, run: CrankTally, lift: float) -> dict[str, float | int | str]:
-    plan, scene = gathered.plan, gathered.plan.scene
+    scene = gathered.plan.scene
     steps, resolved = run.steps, run.step * contact_rate(scene)
     numerics: dict[str, float | int | str] = {
         "rung_joint": scene.joint.crankpin.rung,
@@ -886,8 +921,8 @@ def _numerics(gathered: Gathering, run: CrankTally, lift: float) -> dict[str, fl
         numerics["lowest_pressure_pa"] = lowest
     if any(JOINT_LINK in row for row in rungs):
         numerics["tension_share"] = run.tension_steps / max(1, steps * len(rungs))
-    if isinstance(run, CrankRun):  # oiled pins run alone
-        numerics |= _film_numerics(run, rungs, plan)
+    if gathered.films:
+        numerics |= _film_numerics(gathered)
     if _breathes(scene):
         numerics["cavitating_share"] = run.vapour_steps / max(1, steps * len(rungs))
         numerics["lift_left"] = lift
@@ -898,25 +933,13 @@ def _numerics(gathered: Gathering, run: CrankTally, lift: float) -> dict[str, fl
     return numerics
 
 
-def _film_numerics(
-    run: CrankRun, rungs: list[tuple[int, int, int]], plan: RunPlan
-) -> dict[str, float | int | str]:
-    """Least film of all oiled pins, and how long rough peaks touched; empty without either."""
-    oiled = np.array([[code == JOINT_OILED for code in row[:GUIDE]] for row in rungs])
-    if run.gaps is None:
-        return {}
-    kept = run.gaps[plan.kept.start * plan.factor : plan.kept.stop * plan.factor]
-    if not kept.size:  # a run that failed while it settled
-        return {}
-    gaps, peaks = kept[:, :, :GUIDE][:, oiled], kept[:, :, GUIDE:][:, oiled]
-    pins = zip(*np.nonzero(oiled), strict=True)
-    warm = [film_temperature_of(plan.scene, int(throw), int(joint)) for throw, joint in pins]
+def _film_numerics(gathered: Gathering) -> dict[str, float | int | str]:
+    """How thin the films got, and how warm the warmest is where a heat balance says it."""
+    scene = gathered.plan.scene
+    pins = zip(*np.nonzero(_oiled(scene)), strict=True)
+    warm = [film_temperature_of(scene, int(throw), int(joint)) for throw, joint in pins]
     known = [each for each in warm if each is not None]
-    return {
-        **({"film_temperature_k": max(known)} if known else {}),
-        "min_film_m": float(gaps.min()),
-        "rubbing_share": float(np.mean((peaks > 0).any(axis=1))),
-    }
+    return {**({"film_temperature_k": max(known)} if known else {}), **gathered.films}
 
 
 def _has_floor(scene: PumpScene) -> bool:

@@ -562,7 +562,7 @@ def joint_maps(scene: PumpScene) -> dict[float, ImpedanceMap]:
             _land(part) / part.pin_diameter
             for throw in range(len(scene.throws))
             for part in joint_parts(scene, throw)[:2]
-            if part is not None and _runs_on_a_map(part)
+            if part is not None and runs_on_a_map(part)
         }
     )
     return {
@@ -574,7 +574,7 @@ def joint_maps(scene: PumpScene) -> dict[float, ImpedanceMap]:
 _N_THETA, _N_Z = 144, 33  # carry within half a percent of published tables up to e = 0.95
 
 
-def _runs_on_a_map(part: RevoluteJoint) -> bool:
+def runs_on_a_map(part: RevoluteJoint) -> bool:
     """Whether a film of finite length is asked for: a starved one is narrow, and short."""
     if part.oil is None:
         return False
@@ -703,7 +703,7 @@ def _oil_values(
         "peaks": peaks,
         "step": step,
     }
-    if not _runs_on_a_map(part):
+    if not runs_on_a_map(part):
         return values | {"short": lands * viscosity * radius * (land / gap) ** 3}
     ratio = land / part.pin_diameter
     table = maps[ratio].table

@@ -9,8 +9,9 @@ A step in which a contact of a lane changes is taken again for that lane by the 
 which cuts it; so is that of a chamber whose pressure or valves are not found at once. A failed lane
 is left behind.
 
-Lanes are for one throw whose crank pin has clearance without oil, whose wrist pin and guide are
-ideal or have clearance, under a pressure that follows from the crank angle, or a chamber.
+Lanes are for throws whose crank pin has clearance, dry or oiled, whose wrist pin and guide are
+ideal or have clearance, under a pressure that follows from the crank angle, or a chamber. Each has
+a lane; those of a record lie beside each other, and each turns a copy of the crank.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -23,13 +24,14 @@ from numpy.typing import NDArray
 from ..jit import kernel, subroutine
 from ..output.status import Status
 from ..pump.hydraulics import GATHERED, ValveSide
-from ..pump.setup import Start, joint_rungs
+from ..pump.setup import JOINT_CODES, Start, joint_parts, joint_rungs, runs_on_a_map
 from ..pump.slider_crank import (
     CHANGES,
     FLOORED,
     FORCES,
     JOINT_COMPLIANT,
     JOINT_IDEAL,
+    JOINT_OILED,
     NOT_LOCATED,
     WITH_VAPOUR,
     CrankTally,
@@ -41,16 +43,20 @@ from ..scene.pump_hydraulics import PIPED_RUNGS
 from .march import LEFT, STRETCH, Stretch, alone, enter_lane, march
 from .rates import (
     CRANK,
+    DRY,
     LANE_FORCES,
     LANES,
+    MAPPED_FILM,
     NEVER,
     PLACES,
     PLAIN_LAWS,
     PLAN,
+    SHORT_FILM,
     STATE,
     ChamberLane,
     ContactLane,
     LiquidLane,
+    OilLane,
     ThrowLane,
 )
 
@@ -64,6 +70,7 @@ class LaneKind(NamedTuple):
     guide: bool  # play in guides
     breathing: bool  # chambers with valves
     throws: int  # of each, in lanes beside each other
+    oil: int  # what is in the eyes of their crank pins, see ``MAPPED_FILM``
 
     @property
     def beside(self) -> int:
@@ -79,6 +86,7 @@ class LaneJob:
     start: Start
     step: float
     n_steps: int
+    films: Float
 
 
 def lane_kind(scene: PumpScene) -> LaneKind | None:
@@ -88,19 +96,27 @@ def lane_kind(scene: PumpScene) -> LaneKind | None:
     rungs = {scene.pressures(k).rung for k in throws}
     known = (
         len(throws) <= LANES
-        and set(crankpins) == {JOINT_COMPLIANT}
+        and set(crankpins) in ({JOINT_COMPLIANT}, {JOINT_OILED})
         and {JOINT_IDEAL, JOINT_COMPLIANT}.issuperset(wristpins)
         and rungs.isdisjoint(("heads", *PIPED_RUNGS))
         and (len(rungs) == 1 or "chamber" not in rungs)  # all breathe or none
     )
-    if not known:
+    oils = {_oil_of(joint_parts(scene, k)[0]) for k in throws}
+    if not known or len(oils) > 1:
         return None
     return LaneKind(
         wrist=JOINT_COMPLIANT in wristpins,
         guide=JOINT_COMPLIANT in guides,
         breathing="chamber" in rungs,
         throws=len(throws),
+        oil=oils.pop(),
     )
+
+
+def _oil_of(crankpin: Any) -> int:
+    if JOINT_CODES[crankpin.rung] != JOINT_OILED:
+        return DRY
+    return MAPPED_FILM if runs_on_a_map(crankpin) else SHORT_FILM
 
 
 _ROOM = 8192  # steps of a lane that are handed on together
@@ -109,7 +125,7 @@ _ROOM = 8192  # steps of a lane that are handed on together
 class Steps(Protocol):
     """What is told of the steps of a run, and may not keep what it is given."""
 
-    def add(self, turns: Float, forces: Float, chambers: Float | None) -> None:
+    def add(self, turns: Float, forces: Float, chambers: Float | None, gaps: Float | None) -> None:
         """As :meth:`.recording.Gathering.add`, with forces of :func:`lane_columns`."""
 
 
@@ -175,6 +191,7 @@ class _Lanes:
         self, kind: LaneKind, jobs: Sequence[LaneJob], steps: Callable[[int], Steps]
     ) -> None:
         self._kind, self._breathing, self._throws = kind, kind.breathing, kind.throws
+        self._oiled = kind.oil != DRY
         self._firsts = range(0, LANES - kind.throws + 1, kind.throws)  # lane of every run
         self._jobs, self._steps = jobs, steps
         self._told: dict[int, Steps] = {}  # by lane
@@ -184,7 +201,8 @@ class _Lanes:
         self._number = np.full(LANES, -1)  # of the job in each lane
         self._at = np.zeros(LANES, np.int64)  # steps taken of it and not handed on
         self._left = np.zeros(LANES, np.int64)
-        self._alone = alone(jobs[0].tables)
+        self._offsets, maps = _maps_of(jobs)
+        self._alone = alone(jobs[0].tables, maps)
         self._columns = np.array(_kept_rows(kind))
         self._kept = Stretch(
             left=np.zeros(1, LEFT),
@@ -195,6 +213,7 @@ class _Lanes:
             turns=np.empty((LANES, 2, _ROOM + 1)),
             forces=np.empty((LANES, len(self._columns), _ROOM)),
             chambers=np.empty((LANES, len(GATHERED), _ROOM + 1 if self._breathing else 1)),
+            gaps=np.zeros((LANES, 2, _ROOM + 1 if self._oiled else 1)),
         )
 
     def fill(self, ahead: Iterator[int]) -> bool:
@@ -215,7 +234,7 @@ class _Lanes:
             self._lay(first + throw, job, throw)
         plan["driven"] = plan["machine"][_INVERSE_INERTIA].any()
         plan["plain"] = ~plan["contact"][:, PLAIN_LAWS].any(axis=(1, 2))
-        enter_lane(first, plan, self._state[0], self._alone)
+        enter_lane(first, plan, self._state[0], self._alone, self._kind.oil != DRY)
         self._kept.code[own], self._number[own] = 0, number
         self._at[own], self._left[own] = 0, job.n_steps
         self._told[first] = self._steps(number)
@@ -249,6 +268,10 @@ class _Lanes:
             state[name][..., lane] = 0.0
         state["x0"][PLACES, lane], state["v0"][PLACES, lane] = start.bodies[throw].reshape(2, -1)
         state["x0"][CRANK, lane], state["v0"][CRANK, lane] = start.angle, start.speed
+        a.oils[lane] = t.oils[throw]
+        a.oils[lane]["offset"] += self._offsets[t.maps.tobytes()]
+        plan["oil"][:, lane] = _numbers(a.oils[lane, 0], OilLane._fields)
+        state["film0"][:, lane] = job.films[throw, :2]
         self._past.turns[lane, :, 0] = start.angle, start.speed
         self._past.chambers[lane, :, 0] = start.chambers[throw, list(GATHERED)]
 
@@ -276,10 +299,13 @@ class _Lanes:
         columns = past.forces.shape[1]
         rows = slice(columns * own.start, columns * own.stop)
         forces = past.forces.reshape(-1, _ROOM)[rows, :n]  # of one throw after the other
-        self._told[first].add(past.turns[first, :, : n + 1].T, forces, chambers)
+        gaps = past.gaps[own, :, : n + 1].transpose(2, 0, 1) if self._oiled else None
+        self._told[first].add(past.turns[first, :, : n + 1].T, forces, chambers, gaps)
         past.turns[own, :, 0] = past.turns[own, :, n]
         if self._breathing:
             past.chambers[own, :, 0] = past.chambers[own, :, n]
+        if self._oiled:
+            past.gaps[own, :, 0] = past.gaps[own, :, n]
         self._at[own] = 0
 
     def ended(self) -> Iterator[tuple[int, CrankTally]]:
@@ -319,6 +345,7 @@ class _Past(NamedTuple):
     turns: Float  # (LANES, 2, _ROOM + 1)
     forces: Float  # (LANES, n_kept, _ROOM)
     chambers: Float  # (LANES, len(GATHERED), _ROOM + 1); of one step where nothing breathes
+    gaps: Float  # (LANES, 2, _ROOM + 1) of the films, and what peaks carry; of one step without
 
 
 @subroutine
@@ -347,7 +374,7 @@ def march_on(
         for lane in range(LANES):
             k.done[lane] = n if k.code[lane] == 0 else 0
         march(kind, n, p, s, a, k)
-        _take(k, columns, at, past, kind.breathing)
+        _take(k, columns, at, past, kind)
         failed = False
         for lane in range(LANES):
             at[lane] += k.done[lane]
@@ -358,7 +385,7 @@ def march_on(
 
 
 @subroutine
-def _take(k: Any, columns: Any, at: Any, past: Any, breathing: bool) -> None:
+def _take(k: Any, columns: Any, at: Any, past: Any, kind: Any) -> None:
     """Add the last steps of every lane to its past; a column's block fits the innermost cache."""
     left, n = k.left[0], 0
     for lane in range(LANES):
@@ -367,9 +394,12 @@ def _take(k: Any, columns: Any, at: Any, past: Any, breathing: bool) -> None:
         _lay_out(left.forces, columns[j], n, at, 0, past.forces, j)
     for c in range(2):
         _lay_out(left.turns, c, n, at, 1, past.turns, c)
-    if breathing:
+    if kind.breathing:
         for c in range(len(GATHERED)):
             _lay_out(left.chambers, c, n, at, 1, past.chambers, c)
+    if kind.oil != DRY:
+        for c in range(2):
+            _lay_out(left.gaps, c, n, at, 1, past.gaps, c)
 
 
 @kernel
@@ -387,6 +417,19 @@ def _lay_out(steps: Any, column: int, n: int, at: Any, begin: int, rows: Any, ro
             rows[lane + 1, row, b + i] = steps[column, i, lane + 1]
             rows[lane + 2, row, c + i] = steps[column, i, lane + 2]
             rows[lane + 3, row, d + i] = steps[column, i, lane + 3]
+
+
+def _maps_of(jobs: Sequence[LaneJob]) -> tuple[dict[bytes, int], Float]:
+    """Maps of all films, each once, one after the other; where those of tables begin."""
+    offsets: dict[bytes, int] = {}
+    found, size = [], 0
+    for job in jobs:
+        key = job.tables.maps.tobytes()
+        if key not in offsets:
+            offsets[key] = size
+            found.append(job.tables.maps)
+            size += job.tables.maps.size
+    return offsets, np.concatenate(found)
 
 
 def _numbers(record: Any, names: Sequence[str]) -> list[float]:

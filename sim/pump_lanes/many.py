@@ -17,7 +17,7 @@ from ..pump.recording import (
     refused_run,
     simulate_pump,
 )
-from ..pump.setup import begun, needs_integration
+from ..pump.setup import begun, needs_integration, start_films
 from ..scene.parts import Scene, SceneError
 from ..scene.pump import PumpScene
 from .lanes import LaneJob, LaneKind, lane_columns, lane_kind, run_lanes
@@ -103,16 +103,17 @@ def _kind_of(scene: Scene) -> LaneKind | None:
 def _pooled(kinds: dict[LaneKind, list[_Job]]) -> list[tuple[LaneKind, list[_Job]]]:
     """Groups of a kind; those that would leave lanes empty together, with all that any has."""
     large = [(kind, group) for kind, group in kinds.items() if len(group) >= kind.beside]
-    small: dict[tuple[bool, int], list[tuple[LaneKind, list[_Job]]]] = {}
+    small: dict[tuple[bool, int, int], list[tuple[LaneKind, list[_Job]]]] = {}
     for kind, group in kinds.items():
         if len(group) < kind.beside:
-            small.setdefault((kind.breathing, kind.throws), []).append((kind, group))
-    for (breathing, throws), pool in small.items():
+            small.setdefault((kind.breathing, kind.throws, kind.oil), []).append((kind, group))
+    for (breathing, throws, oil), pool in small.items():
         kind = LaneKind(
             wrist=any(kind.wrist for kind, _ in pool),
             guide=any(kind.guide for kind, _ in pool),
             breathing=breathing,
             throws=throws,
+            oil=oil,
         )
         large.append((kind, [job for _, group in pool for job in group]))
     return large
@@ -145,4 +146,5 @@ def _together(
 def lane_job(plan: RunPlan) -> LaneJob:
     """What a lane is told of a planned recording whose :func:`.lanes.lane_kind` is not None."""
     tables, start = begun(plan.scene, plan.step, plan.first_angle)
-    return LaneJob(tables=tables, start=start, step=plan.step, n_steps=plan.n_steps)
+    films = start_films(tables, start.bodies, plan.first_angle)
+    return LaneJob(tables=tables, start=start, step=plan.step, n_steps=plan.n_steps, films=films)

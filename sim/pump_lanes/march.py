@@ -28,6 +28,7 @@ from .rates import (
     ALL_MOVING,
     BETA,
     CRANK,
+    DRY,
     LANE_FORCES,
     LANES,
     MOVING,
@@ -44,8 +45,8 @@ class Alone(NamedTuple):
     throws: NDArray[Any]  # (LANES,) of THROW
     contacts: NDArray[Any]  # (LANES, 3) of CONTACT
     liquid: NDArray[Any]  # (LANES,) of HYDRAULIC
-    oils: NDArray[Any]  # (n_throws, 2) of OIL, of no lane
-    maps: NDArray[np.float64]
+    oils: NDArray[Any]  # (LANES, 2) of OIL
+    maps: NDArray[np.float64]  # of all runs
     work: Work
     chambers: NDArray[np.float64]  # (LANES, 8)
     forces: NDArray[np.float64]  # (1, 1 + n_throws * len(FORCES)): of one step
@@ -62,6 +63,7 @@ LEFT = np.dtype(
         ("turns", "f8", (2, STRETCH + 1, LANES)),  # angle and speed at the ends of the steps
         ("forces", "f8", (len(LANE_FORCES) + 2, STRETCH + 1, LANES)),  # the valves' last
         ("chambers", "f8", (len(GATHERED), STRETCH + 1, LANES)),
+        ("gaps", "f8", (2, STRETCH + 1, LANES)),  # of the films, and what their peaks carry
     ]
 )
 """What a stretch of steps leaves behind; one record, as ``STATE`` is."""
@@ -80,7 +82,7 @@ def _tables_of(lane: int, p: Any, a: Any) -> Any:
     """Of the record whose first throw is in a lane."""
     own = slice(lane, lane + p.throws)
     return Tables(
-        a.throws[own], a.contacts[own], a.liquid[own], a.oils, a.maps, machine_of_lane(p, lane)
+        a.throws[own], a.contacts[own], a.liquid[own], a.oils[own], a.maps, machine_of_lane(p, lane)
     )
 
 
@@ -111,6 +113,9 @@ def _throw_to_record(lane: int, k: int, s: Any, w: Any) -> None:
         b.margin[j], b.approach[j] = s.margin0[j, lane], s.approach0[j, lane]
         end.margin[j] = s.margin[j, lane]
         one.touching[j], one.impact[j] = int(s.touching[j, lane]), s.impact[j, lane]
+    for c in range(2):
+        b.film[c], b.film_rate[c] = s.film0[c, lane], s.film_rate0[c, lane]
+        one.squeeze[0, c] = s.squeeze[c, lane]
     b.normal = s.normal0[lane]
     one.pressure[0], one.pressure[1] = s.pressure0[0, lane], s.pressure0[1, lane]
 
@@ -135,6 +140,9 @@ def _throw_from_record(lane: int, k: int, s: Any, w: Any, i: int) -> None:
     for j in range(CONTACTS):
         s.margin[j, lane], s.approach[j, lane] = b.margin[j], b.approach[j]
         s.touching[j, lane], s.impact[j, lane] = float(one.touching[j]), one.impact[j]
+    for c in range(2):
+        s.film[c, lane], s.film_rate[c, lane] = b.film[c], b.film_rate[c]
+        s.squeeze[c, lane] = one.squeeze[0, c]
     s.normal[lane] = b.normal
     s.pressure[0, lane], s.pressure[1, lane] = one.pressure[0], one.pressure[1]
 
@@ -153,12 +161,18 @@ def _step_alone(lane: int, p: Any, s: Any, a: Any, left: Any, step: int, breathi
         for k in range(p.throws):
             for j in range(CONTACTS):
                 w.stage[row, k].margin[j] = NO_CHANGE
+    if breathing:  # of films too the search begins where it began
+        for k in range(p.throws):
+            for c in range(2):
+                s.squeeze[c, lane + k] = s.squeeze0[c, lane + k]
     _to_record(lane, s, w)
     tally = Tally(a.counts[lane], a.peak[lane])
     for c in range(a.forces.shape[1]):
         a.forces[0, c] = 0.0
     end, fresh = step_of_record(w, 0, h, True, not breathing, t, a.forces, 0, tally)
-    if not fresh:
+    for k in range(p.throws):  # as the end of the step found them
+        s.gap[lane + k], s.carried[lane + k] = w.stage[end, k].gaps[0], w.stage[end, k].gaps[2]
+    if not fresh and not breathing:  # chambers are stepped first
         derivative_of_record(w, end, 0.0, t)
     _from_record(lane, s, w, end)
     for k in range(p.throws):
@@ -169,17 +183,19 @@ def _step_alone(lane: int, p: Any, s: Any, a: Any, left: Any, step: int, breathi
 
 
 @subroutine
-def enter_lane(lane: int, p: Any, s: Any, a: Any) -> None:
+def enter_lane(lane: int, p: Any, s: Any, a: Any, oiled: bool) -> None:
     """Begin a record in lanes from this one on: contacts closed from the start, and chambers."""
     w, t = a.work, _tables_of(lane, p, a)
     _to_record(lane, s, w)
     begin(w, t, a.chambers[lane : lane + p.throws])
     for k in range(p.throws):
         for j in range(CONTACTS):
-            w.stage[0, k].margin[j] = s.margin0[j, lane + k] = NO_CHANGE
+            s.margin0[j, lane + k] = NO_CHANGE
         for c in range(5):
             a.counts[lane + k, c] = 0
         a.peak[lane + k, 0] = 0.0
+    for _ in range(2 if oiled else 1):  # as the march of one does, which keeps the first films
+        derivative_of_record(w, 0, 0.0, t)
     _from_record(lane, s, w, 0)
     for k in range(p.throws):
         enter_chamber(lane + k, p, s, a)
@@ -232,6 +248,44 @@ def _end(p: Any, s: Any, first: int, rows: int) -> None:
             s.v[c, lane] = s.v0[c, lane] + sixth * a
 
 
+@kernel
+def _begin_films(p: Any, s: Any) -> None:
+    for lane in range(LANES):
+        h = 0.5 * p.step[lane]
+        for c in range(2):
+            x, v = s.film[c, lane], s.film_rate[c, lane]
+            s.film0[c, lane], s.film_rate0[c, lane] = x, v
+            s.squeeze0[c, lane] = s.squeeze[c, lane]
+            s.film[c, lane] = x + h * v
+
+
+@kernel
+def _films_to_third(p: Any, s: Any) -> None:
+    for lane in range(LANES):
+        h = 0.5 * p.step[lane]
+        for c in range(2):
+            s.middle_film[c, lane] = s.film_rate[c, lane]
+            s.film[c, lane] = s.film0[c, lane] + h * s.film_rate[c, lane]
+
+
+@kernel
+def _films_to_last(p: Any, s: Any) -> None:
+    for lane in range(LANES):
+        for c in range(2):
+            s.middle_film[c, lane] += s.film_rate[c, lane]
+            s.film[c, lane] = s.film0[c, lane] + p.step[lane] * s.film_rate[c, lane]
+
+
+@kernel
+def _end_films(p: Any, s: Any) -> None:
+    for lane in range(LANES):
+        for c in range(2):
+            rate = mean_of_stages(
+                s.film_rate0[c, lane], s.middle_film[c, lane], s.film_rate[c, lane]
+            )
+            s.film[c, lane] = s.film0[c, lane] + p.sixth[lane] * rate
+
+
 @subroutine
 def _to_second_stage(p: Any, s: Any, kind: Any) -> None:
     """Keep where the step begins; its first rates lead to the second stage."""
@@ -242,6 +296,8 @@ def _to_second_stage(p: Any, s: Any, kind: Any) -> None:
     if kind.guide:
         _begin(p, s, MOVING, ALL_MOVING)
         _keep_contacts(s, GUIDE, CONTACTS)
+    if kind.oil != DRY:
+        _begin_films(p, s)
     for lane in range(LANES):
         for c in range(len(LANE_FORCES)):
             s.force0[c, lane] = s.force[c, lane]
@@ -256,10 +312,12 @@ def _keep_contacts(s: Any, first: int, end: int) -> None:
 
 
 @subroutine
-def _to_third_stage(p: Any, s: Any, across: bool) -> None:
+def _to_third_stage(p: Any, s: Any, across: bool, oiled: bool) -> None:
     _to_third(p, s, 0, MOVING)
     if across:
         _to_third(p, s, MOVING, ALL_MOVING)
+    if oiled:
+        _films_to_third(p, s)
     for lane in range(LANES):
         for c in range(len(LANE_FORCES)):
             s.middle_force[c, lane] = s.force[c, lane]
@@ -267,10 +325,12 @@ def _to_third_stage(p: Any, s: Any, across: bool) -> None:
 
 
 @subroutine
-def _to_last_stage(p: Any, s: Any, across: bool) -> None:
+def _to_last_stage(p: Any, s: Any, across: bool, oiled: bool) -> None:
     _to_last(p, s, 0, MOVING)
     if across:
         _to_last(p, s, MOVING, ALL_MOVING)
+    if oiled:
+        _films_to_last(p, s)
     for lane in range(LANES):
         for c in range(len(LANE_FORCES)):
             s.middle_force[c, lane] += s.force[c, lane]
@@ -278,11 +338,13 @@ def _to_last_stage(p: Any, s: Any, across: bool) -> None:
 
 
 @subroutine
-def _to_end(p: Any, s: Any, left: Any, n: int, across: bool) -> None:
+def _to_end(p: Any, s: Any, left: Any, n: int, across: bool, oiled: bool) -> None:
     """State at the end of step n, and the mean forces over it."""
     _end(p, s, 0, MOVING)
     if across:
         _end(p, s, MOVING, ALL_MOVING)
+    if oiled:
+        _end_films(p, s)
     for lane in range(LANES):
         weight = p.weight[lane]
         for c in range(len(LANE_FORCES)):
@@ -397,6 +459,12 @@ def _keep_turns(s: Any, left: Any, n: int) -> None:
 
 
 @subroutine
+def _keep_gaps(s: Any, left: Any, n: int) -> None:
+    for lane in range(LANES):
+        left.gaps[0, n, lane], left.gaps[1, n, lane] = s.gap[lane], s.carried[lane]
+
+
+@subroutine
 def march(kind: Any, n: int, p: Any, s: Any, a: Any, k: Any) -> None:
     """Take n steps of all lanes, of one kind.
 
@@ -404,23 +472,27 @@ def march(kind: Any, n: int, p: Any, s: Any, a: Any, k: Any) -> None:
     that is found, not the extrapolated one. What asks for a cut does not depend on it.
     """
     across, breathing = kind.guide, kind.breathing
-    left = k.left[0]
-    rates(p, s, 0.0, kind)
+    left, oiled = k.left[0], kind.oil != DRY
     for step in range(n):
         _to_second_stage(p, s, kind)
-        rates(p, s, 0.5, kind)
-        _to_third_stage(p, s, across)
-        rates(p, s, 0.5, kind)
-        _to_last_stage(p, s, across)
-        rates(p, s, 1.0, kind)
-        _to_end(p, s, left, step, across)
+        rates(p, s, 0.5, kind, a.maps)
+        _to_third_stage(p, s, across, oiled)
+        rates(p, s, 0.5, kind, a.maps)
+        _to_last_stage(p, s, across, oiled)
+        rates(p, s, 1.0, kind, a.maps)
+        _to_end(p, s, left, step, across, oiled)
         with_care = lanes_breathe(p, s, a, k.code) if breathing else 0
-        rates(p, s, 0.0, kind)
+        rates(p, s, 0.0, kind, a.maps)
         if _judge(p, s) > 0:
             again = _mend(breathing, p, s, a, k, step)
             if breathing and again > 0:
                 with_care += again
-                rates(p, s, 0.0, kind)
+                if not oiled:
+                    rates(p, s, 0.0, kind, a.maps)
+        if oiled:
+            _keep_gaps(s, left, step)
+            if breathing:  # the march of one seeks its films anew under the pressure that it found
+                rates(p, s, 0.0, kind, a.maps)
         if breathing:
             _keep_chambers(p, s, left, step)
             if with_care > 0:
@@ -428,15 +500,15 @@ def march(kind: Any, n: int, p: Any, s: Any, a: Any, k: Any) -> None:
         _keep_turns(s, left, step)
 
 
-def alone(t: Tables) -> Alone:
-    """Room for the march of one record, with the throws of these tables."""
+def alone(t: Tables, maps: NDArray[np.float64]) -> Alone:
+    """Room for the march of one record, with the throws of these tables; maps of all."""
     n = len(t.throws)
     return Alone(
         throws=np.zeros(LANES, t.throws.dtype),
         contacts=np.zeros((LANES, 3), t.contacts.dtype),
         liquid=np.zeros(LANES, t.liquid.dtype),
-        oils=t.oils.copy(),
-        maps=t.maps,
+        oils=np.zeros((LANES, 2), t.oils.dtype),
+        maps=maps,
         work=Work(
             crank=np.zeros((5, 5)),
             stage=np.zeros((5, n), STAGE),

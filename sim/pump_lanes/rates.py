@@ -6,17 +6,38 @@ What only some of the lanes have is told by numbers, not by branches, so that di
 side by side.
 """
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..contact.asperities import SEPARATION
 from ..contact.law import ELASTIC_LINEAR, FRICTION_SMOOTH, LAW_KELVIN_VOIGT
+from ..film.impedance_map import (
+    RADIAL,
+    TANGENTIAL,
+    MapPlace,
+    map_patches,
+    map_place,
+    map_tensor,
+)
+from ..film.short import short_resistance
 from ..jit import NEAR, kernel, near_sine_cosine, sine_cosine, subroutine
 from ..pump.hydraulics import (
     PRESSURE_CONSTANT,
     PRESSURE_TWO_LEVEL,
     ValveSide,
     two_level_pressure,
+)
+from ..pump.oiled_joint import (
+    NEWTON_STEPS,
+    FilmPull,
+    film_gap,
+    film_load,
+    film_pull,
+    newton_damping,
+    newton_step,
+    peaks_of,
 )
 from ..pump.slider_crank import CONTACTS, GUIDE, OVERLAP_LIMIT, Machine
 from ..pump.throw_motion import (
@@ -32,6 +53,9 @@ from ..pump.throw_motion import (
     seal_drag,
     wrist_offset,
 )
+
+DRY, SHORT_FILM, MAPPED_FILM = range(3)
+"""What is in the eyes of the crank pins."""
 
 LANES = 16
 """Records side by side; the compiler does not lay fewer into vectors."""
@@ -125,6 +149,28 @@ class ChamberLane(NamedTuple):
     vapour: float
 
 
+class OilLane(NamedTuple):
+    """Numbers of the oil of a crank pin in a lane, as in ``OIL``."""
+
+    short: float
+    map: float
+    shear: float
+    filled: float
+    radius: float
+    wall_damping: float
+    relaxing: float
+    roughness: float
+    peaks: float
+    step: float
+    offset: float
+    roots: float
+    angles: float
+    gap_factor: float
+    least_root: float
+    per_root: float
+    per_radian: float
+
+
 NEVER = ContactLane(*[0.0] * len(ContactLane._fields))._replace(
     stiffness=1.0, clearance=1e9, speed_floor=1.0, friction_speed=1.0
 )
@@ -146,6 +192,7 @@ PLAN = np.dtype(
         ("machine", "f8", (len(Machine._fields), LANES)),
         ("liquid", "f8", (len(LiquidLane._fields), LANES)),
         ("chamber", "f8", (len(ChamberLane._fields), LANES)),
+        ("oil", "f8", (len(OilLane._fields), LANES)),
         ("valve", "f8", (2, len(ValveSide._fields), LANES)),  # suction, discharge
         ("share", "f8", (2, 3, LANES)),  # see valve_shares
         ("step", "f8", LANES),
@@ -195,6 +242,21 @@ STATE = np.dtype(
         ("flow", "f8", (2, LANES)),  # impulses of the valves
         ("sure", "f8", LANES),  # 1 where the chambers' step side by side is good
         ("choked", "f8", LANES),  # 1 where a chamber has failed
+        ("film0", "f8", (2, LANES)),  # where the film lets the pin be, where the step began
+        ("film_rate0", "f8", (2, LANES)),
+        ("film", "f8", (2, LANES)),
+        ("film_rate", "f8", (2, LANES)),
+        ("middle_film", "f8", (2, LANES)),  # rates of the stages in the middle, added
+        ("squeeze0", "f8", (2, LANES)),  # velocity of the film, where the next search begins
+        ("squeeze", "f8", (2, LANES)),
+        ("apart", "f8", (4, LANES)),  # see crank_offset
+        ("rough", "f8", (2, LANES)),  # see peaks_of
+        ("pull", "f8", (len(FilmPull._fields), LANES)),
+        ("place", "f8", (len(MapPlace._fields), LANES)),
+        ("patch", "f8", (4, LANES)),  # see map_patches
+        ("settled", "f8", LANES),  # 1 where the film's velocity is found
+        ("gap", "f8", LANES),  # least film
+        ("carried", "f8", LANES),  # by touching peaks
         ("asks", "f8", LANES),  # 1 where a contact asks for a change within this step
         ("bad", "f8", LANES),  # status code of this step
     ]
@@ -386,6 +448,237 @@ def _in_crankpin(p: Any, s: Any, plain: bool) -> None:
         s.pin[0, lane], s.pin[1, lane], s.pin[2, lane], s.pin[3, lane] = pin
 
 
+@kernel
+def _oil_of(p: Any, lane: int) -> Any:
+    a = p.oil
+    return OilLane(
+        a[0, lane],
+        a[1, lane],
+        a[2, lane],
+        a[3, lane],
+        a[4, lane],
+        a[5, lane],
+        a[6, lane],
+        a[7, lane],
+        a[8, lane],
+        a[9, lane],
+        a[10, lane],
+        a[11, lane],
+        a[12, lane],
+        a[13, lane],
+        a[14, lane],
+        a[15, lane],
+        a[16, lane],
+    )
+
+
+@kernel
+def _film_pull_of(s: Any, lane: int) -> Any:
+    a = s.pull
+    return FilmPull(
+        a[0, lane],
+        a[1, lane],
+        a[2, lane],
+        a[3, lane],
+        a[4, lane],
+        a[5, lane],
+        a[6, lane],
+        a[7, lane],
+        a[8, lane],
+        a[9, lane],
+        a[10, lane],
+        a[11, lane],
+        a[12, lane],
+    )
+
+
+@kernel
+def _map_place_of(s: Any, lane: int) -> Any:
+    a = s.place
+    return MapPlace(
+        a[0, lane],
+        a[1, lane],
+        a[2, lane],
+        a[3, lane],
+        a[4, lane],
+        a[5, lane],
+        a[6, lane],
+        a[7, lane],
+        a[8, lane],
+        a[9, lane],
+        a[10, lane],
+    )
+
+
+@kernel
+def _turns_of(s: Any, lane: int) -> Any:
+    """Mean of the angular velocities of crank pin and eye, and their difference [rad/s]."""
+    pin, eye = s.v[CRANK, lane], -s.v[BETA, lane]
+    return 0.5 * (pin + eye), pin - eye
+
+
+@subroutine
+def _look_into_films(p: Any, s: Any) -> None:
+    for lane in range(LANES):
+        c = _contact_of(p, 0, lane)
+        d_x, d_y, v_x, v_y = crank_offset(
+            _pose_of(s, lane),
+            s.v[CRANK, lane],
+            _throw_of(p, lane),
+            s.turned[0, lane],
+            s.turned[1, lane],
+            s.turned[2, lane],
+            s.turned[3, lane],
+        )
+        s.apart[0, lane], s.apart[1, lane], s.apart[2, lane], s.apart[3, lane] = d_x, d_y, v_x, v_y
+        s.overlap[0, lane] = math.sqrt(d_x * d_x + d_y * d_y) - c.clearance
+        s.gap[lane] = film_gap(s.film[0, lane], s.film[1, lane], c)
+        s.rough[0, lane] = s.rough[1, lane] = 0.0
+    for lane in range(LANES):  # peaks seldom touch, and take a power of the library
+        o = _oil_of(p, lane)
+        if o.roughness > 0.0 and not s.gap[lane] >= SEPARATION * o.roughness:
+            s.rough[0, lane], s.rough[1, lane] = peaks_of(s.gap[lane], o)
+
+
+@subroutine
+def _pull_films(p: Any, s: Any) -> None:
+    for lane in range(LANES):
+        mean, _ = _turns_of(s, lane)
+        found = film_pull(
+            s.film[0, lane],
+            s.film[1, lane],
+            s.apart[0, lane],
+            s.apart[1, lane],
+            s.apart[2, lane],
+            s.apart[3, lane],
+            mean,
+            s.rough[0, lane],
+            s.rough[1, lane],
+            _contact_of(p, 0, lane),
+            _oil_of(p, lane),
+        )
+        s.pull[0, lane] = found[0]
+        s.pull[1, lane] = found[1]
+        s.pull[2, lane] = found[2]
+        s.pull[3, lane] = found[3]
+        s.pull[4, lane] = found[4]
+        s.pull[5, lane] = found[5]
+        s.pull[6, lane] = found[6]
+        s.pull[7, lane] = found[7]
+        s.pull[8, lane] = found[8]
+        s.pull[9, lane] = found[9]
+        s.pull[10, lane] = found[10]
+        s.pull[11, lane] = found[11]
+        s.pull[12, lane] = found[12]
+        s.settled[lane] = 0.0
+
+
+@kernel
+def _squeeze(
+    s: Any, lane: int, r_xx: float, r_xy: float, r_yx: float, r_yy: float, damped: float
+) -> None:
+    """Take one of Newton's steps, but where it has settled; no number will not settle."""
+    v_x, v_y = s.squeeze[0, lane], s.squeeze[1, lane]
+    new_x, new_y, enough = newton_step(
+        r_xx, r_xy, r_yx, r_yy, _film_pull_of(s, lane), v_x, v_y, damped
+    )
+    done = s.settled[lane] != 0.0
+    s.squeeze[0, lane], s.squeeze[1, lane] = v_x if done else new_x, v_y if done else new_y
+    s.settled[lane] = 1.0 if done or enough or new_x - new_x != 0.0 else 0.0
+
+
+@subroutine
+def _squeeze_short(p: Any, s: Any, damped: float) -> None:
+    for lane in range(LANES):
+        f, o = _film_pull_of(s, lane), _oil_of(p, lane)
+        xx, xy, yy = short_resistance(f.x, f.y, s.squeeze[0, lane], s.squeeze[1, lane], o.filled)
+        _squeeze(s, lane, o.short * xx, o.short * xy, o.short * xy, o.short * yy, damped)
+
+
+@subroutine
+def _squeeze_mapped(p: Any, s: Any, maps: Any, damped: float) -> None:
+    """The map is looked up lane by lane: no vector can tell it from what is written."""
+    for lane in range(LANES):
+        f, o = _film_pull_of(s, lane), _oil_of(p, lane)
+        found = map_place(o, o.roots, o.angles, f.x, f.y, s.squeeze[0, lane], s.squeeze[1, lane])
+        s.place[0, lane] = found[0]
+        s.place[1, lane] = found[1]
+        s.place[2, lane] = found[2]
+        s.place[3, lane] = found[3]
+        s.place[4, lane] = found[4]
+        s.place[5, lane] = found[5]
+        s.place[6, lane] = found[6]
+        s.place[7, lane] = found[7]
+        s.place[8, lane] = found[8]
+        s.place[9, lane] = found[9]
+        s.place[10, lane] = found[10]
+    for lane in range(LANES):
+        if s.settled[lane] == 0.0 and p.oil[_MAP, lane] > 0.0:
+            o, m = _oil_of(p, lane), _map_place_of(s, lane)
+            begin, roots, angles = int(o.offset), int(o.roots), int(o.angles)
+            c = maps[begin : begin + 3 * roots * angles].reshape(3, roots, angles)
+            found = map_patches(c[RADIAL], c[TANGENTIAL], m.i, m.j, m.p, m.q)
+            s.patch[0, lane], s.patch[1, lane] = found[0], found[1]
+            s.patch[2, lane], s.patch[3, lane] = found[2], found[3]
+    for lane in range(LANES):
+        o = _oil_of(p, lane)
+        xx, xy, yx, yy = map_tensor(
+            _map_place_of(s, lane),
+            o.per_radian,
+            s.patch[0, lane],
+            s.patch[1, lane],
+            s.patch[2, lane],
+            s.patch[3, lane],
+        )
+        _squeeze(s, lane, o.map * xx, o.map * xy, o.map * yx, o.map * yy, damped)
+
+
+_MAP = OilLane._fields.index("map")
+
+
+@subroutine
+def _load_films(p: Any, s: Any) -> None:
+    for lane in range(LANES):
+        mean, slip = _turns_of(s, lane)
+        x, y, on_pin, on_eye, rate_x, rate_y, _, peaks = film_load(
+            s.film[0, lane],
+            s.film[1, lane],
+            s.apart[0, lane],
+            s.apart[1, lane],
+            mean,
+            slip,
+            s.squeeze[0, lane],
+            s.squeeze[1, lane],
+            s.gap[lane],
+            s.rough[0, lane],
+            s.rough[1, lane],
+            _film_pull_of(s, lane),
+            _contact_of(p, 0, lane),
+            _oil_of(p, lane),
+        )
+        s.pin[0, lane], s.pin[1, lane], s.pin[2, lane], s.pin[3, lane] = x, y, on_pin, on_eye
+        s.film_rate[0, lane], s.film_rate[1, lane] = rate_x, rate_y
+        s.carried[lane], s.normal[lane] = peaks, math.sqrt(x * x + y * y)
+
+
+@subroutine
+def _at_oiled_crankpin(p: Any, s: Any, maps: Any, mapped: bool) -> None:
+    """Films are sought together, until the last has found its velocity."""
+    _look_into_films(p, s)
+    _pull_films(p, s)
+    for step in range(NEWTON_STEPS):
+        if mapped:
+            _squeeze_mapped(p, s, maps, newton_damping(step))
+        else:
+            _squeeze_short(p, s, newton_damping(step))
+        found = 0.0
+        for lane in range(LANES):
+            found += s.settled[lane]
+        if found == LANES:
+            break
+    _load_films(p, s)
+
+
 @subroutine
 def _at_crankpin(p: Any, s: Any) -> None:
     _in_crankpin(p, s, False)
@@ -544,14 +837,16 @@ def _turn_crank_together(p: Any, s: Any) -> None:
 
 
 @kernel
-def rates(p: Any, s: Any, share: float, kind: Any) -> None:
+def rates(p: Any, s: Any, share: float, kind: Any, maps: Any) -> None:
     """Accelerations, forces and margins of all lanes; `share` of the step has passed."""
     _turn(p, s)
     if kind.breathing:
         _press_chambers(s, share)
     else:
         _press(p, s)
-    if p.plain[0] != 0.0:
+    if kind.oil != DRY:
+        _at_oiled_crankpin(p, s, maps, kind.oil == MAPPED_FILM)
+    elif p.plain[0] != 0.0:
         _at_plain_crankpin(p, s)
     else:
         _at_crankpin(p, s)

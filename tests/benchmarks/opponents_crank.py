@@ -121,7 +121,7 @@ class Unheard:
     def __init__(self, number):
         self.number = number
 
-    def add(self, turns, forces, chambers):
+    def add(self, turns, forces, chambers, gaps):
         """Take the next steps of a run, and leave them."""
 
 
