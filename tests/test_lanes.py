@@ -12,7 +12,7 @@ from wearstate.sim.output.status import Status
 from wearstate.sim.pump.recording import GATHERED_TRUTH, planned
 from wearstate.sim.pump_lanes.lanes import lane_kind, run_lanes
 from wearstate.sim.pump_lanes.many import lane_job
-from wearstate.sim.pump_lanes.rates import DRY
+from wearstate.sim.pump_lanes.rates import DRY, MAPPED_FILM, SHORT_FILM
 from wearstate.sim.scene.load import load_scene
 from wearstate.sim.scene.parts import SceneError
 
@@ -155,6 +155,49 @@ _MODES = [  # the scene's name three throws
 ]
 
 
+@pytest.fixture(scope="module")
+def oiled():
+    recipe = load_recipe("bilge-pump-lubricated", SHORT)
+    samples = sample_records(recipe, N, seed=2, skip=np.zeros(N, bool))
+    return [(sample.scene, sample.seed) for sample in samples]
+
+
+def test_pins_in_oil_have_the_bytes_of_each_alone(oiled):
+    """Starved films with touching peaks, flooded ones on a map; with chambers and with play."""
+    kinds = {lane_kind(scene) for scene, _ in oiled}
+    assert {kind.oil for kind in kinds} == {SHORT_FILM, MAPPED_FILM}
+    assert {kind.breathing for kind in kinds} == {kind.guide for kind in kinds} == {False, True}
+    found = dict(simulate_many(oiled))
+    own = [simulate(scene, seed=seed, raise_on_failure=False) for scene, seed in oiled]
+    assert [n for n in range(N) if not same(found[n], own[n])] == []
+    assert max(one.numerics.get("rubbing_share", 0.0) for one in own) > 0.005
+    assert all(one.numerics["min_film_m"] > 0 for one in own if one.status.ok)
+    some = dict(simulate_many(oiled[3:16], truth=GATHERED_TRUTH))
+    assert all(same(some[n], own[3 + n]) for n in range(13))
+
+
+@pytest.mark.parametrize(
+    ("name", "changes"),
+    [
+        ("bilge-pump", {"joint.crankpin.rung": "film-short"}),
+        ("bilge-pump", {"joint.crankpin.rung": "film-short", "drive.rung": "motor"}),
+        ("bilge-pump", {"joint.crankpin.rung": "mixed"}),  # peaks under a film on a map
+        ("triplex-pump", {"joint.crankpin.rung": "mixed", "joint.crankpin.oil.filled_gap": "9 um"}),
+    ],
+)
+def test_films_that_the_set_does_not_draw(name, changes):
+    oil = {"viscosity": "0.06 Pa s", "length": "40 mm"}
+    oil |= {"roughness": "0.6 um"} if changes["joint.crankpin.rung"] == "mixed" else {}
+    settings = {f"joint.crankpin.oil.{key}": value for key, value in oil.items()} | changes
+    settings |= {"duration": "0.3 s", "settling_revolutions": 1}
+    jobs = [(load_scene(name, settings), n) for n in range(6)]
+    assert lane_kind(jobs[0][0]).oil != DRY
+    found = dict(simulate_many(jobs))
+    own = simulate(jobs[5][0], seed=5)
+    assert same(found[5], own)
+    assert own.numerics["min_film_m"] > 0
+
+
 def test_truth_of_several_throws():
     settings = {"duration": "0.15 s", "settling_revolutions": 1}
     jobs = [(load_scene("triplex-pump", settings), n) for n in range(3)]
@@ -183,6 +226,10 @@ def test_throws_that_differ_in_what_lanes_must_know_run_alone():
         {"pressure.rung": "heads", "pressure.flow": "two-harmonic"},
         {"joint.crankpin.rung": "link"},
         {"joint.crankpin.rung": "ideal"},
+        {
+            "joint.wristpin.rung": "film-short",
+            "joint.wristpin.oil": {"viscosity": "0.06 Pa s", "length": "40 mm"},
+        },
         {"exciters.0.force": "500 N", "running": False},
     ],
 )

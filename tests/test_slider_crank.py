@@ -14,7 +14,7 @@ from scipy.integrate import quad
 from wearstate.diagnose.literature.verify import rebound
 from wearstate.sim.contact.closed_forms import ideal_crank, kelvin_voigt_restitution
 from wearstate.sim.contact.law import RELEASE_AT_ZERO_FORCE, RELEASE_AT_ZERO_PENETRATION
-from wearstate.sim.jit import power, sine_cosine
+from wearstate.sim.jit import half_turn_angle, power, sine_cosine
 from wearstate.sim.machine.simulate import simulate
 from wearstate.sim.pump import setup as cs
 from wearstate.sim.pump import slider_crank as sc
@@ -823,6 +823,18 @@ def test_power_against_libm():
 def test_power_of_what_has_none_is_no_number(base):
     """Its bits would make one of 1e215 of it, and a lost pressure would not be seen."""
     assert math.isnan(power(base, 0.7))
+
+
+def test_half_turn_angle_against_libm():
+    """Within 1 ulp at pi of the library's arc tangent, at every seam of the reduction too."""
+    rng = np.random.default_rng(3)
+    seams = np.arctan([0.66, 1 / 0.66])
+    angles = np.r_[rng.uniform(0, math.pi, 4000), seams, math.pi - seams, 1e-12, 0, math.pi / 2]
+    sizes = rng.uniform(0.1, 10, angles.size)
+    along, across = sizes * np.cos(angles), sizes * np.abs(np.sin(angles))
+    found = [half_turn_angle(*pair) for pair in zip(along, across, strict=True)]
+    assert np.abs(found - np.arctan2(across, along)).max() <= 4.5e-16
+    assert half_turn_angle(-1.0, 0.0) == math.pi
 
 
 def test_sine_cosine_against_libm():

@@ -141,7 +141,7 @@ def _pin_gaps(scene: PumpScene, gaps: NDArray[np.float64]) -> NDArray[np.float64
 def _oiled(scene: PumpScene) -> NDArray[np.bool_]:
     """Which pins run in oil [shape=(n_throws, 2)]."""
     rungs = [joint_rungs(scene, throw)[:GUIDE] for throw in range(len(scene.throws))]
-    return np.array(rungs) == JOINT_OILED
+    return np.asarray(np.array(rungs) == JOINT_OILED)
 
 
 def refused_run(scene: PumpScene, error: "LimitError") -> Recording:
