@@ -50,7 +50,7 @@ def run(script: str) -> None:
     known = current(script)
     command = [sys.executable, str(DOCS / script), str(FOLDER)]
     done = subprocess.run(command, check=True, capture_output=True, text=True)
-    names = [Path(line).name for line in done.stdout.splitlines()]
+    names = [Path(line).name for line in done.stdout.splitlines() if line.endswith(".png")]
     (FOLDER / f".{script}.made").write_text("\n".join([known, *names]))
 
 

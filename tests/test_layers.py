@@ -27,6 +27,7 @@ ROOMS = {
     "sim": [
         "atomic",
         "jit",
+        "short",
         "output",
         "scene",
         "contact",

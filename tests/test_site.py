@@ -118,6 +118,11 @@ def test_pictures_are_made_again_when_the_program_changes(tmp_path, monkeypatch)
     assert not pictures.stale(script)
     stamp.write_text("another state\na.png")
     assert pictures.stale(script)
+    said = f"{'what it shows ' * 30}\n{tmp_path / 'a.png'}\n"
+    done = types.SimpleNamespace(stdout=said)
+    monkeypatch.setattr(pictures.subprocess, "run", lambda *_, **__: done)
+    pictures.run(script)  # a sentence is no picture, and too long for a file's name
+    assert not pictures.stale(script)
 
 
 # --- examples

@@ -25,6 +25,7 @@ from ...sim.scene.parts import Scene
 from ...sim.scene.shaft import ShaftScene
 from ...sim.shaft.on_oil_films import ShaftFilmError
 from ...sim.shaft.recording import alignment_conditions, alignment_line
+from ...sim.short import brief
 from ..pages.page import render, save_page, short_name
 from ..pages.picture import PageImage, drawn_alone, page_image, save_picture
 from ..shaft_tests.measured_tests import LineTest
@@ -76,6 +77,8 @@ class Alignment:
     jacking: Jacking | None
     margin: float = 0.0
     quiet: QuietMoves | None = None
+
+    __repr__ = brief("name", "verdict")
 
     @property
     def name(self) -> str:

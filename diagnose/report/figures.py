@@ -234,10 +234,15 @@ def _gauge_figure(estimate: Mapping[str, Any], limits: Mapping[str, Any]) -> Any
 
     figure = Figure(figsize=(PAGE_WIDTH, 1.6))
     figure.subplots_adjust(left=0.04, right=0.96, bottom=0.32, top=0.97)
+    draw_gauge(figure.add_subplot(), estimate, limits)
+    return figure
+
+
+def draw_gauge(axes: Any, estimate: Mapping[str, Any], limits: Mapping[str, Any]) -> None:
+    """Grades as bands, the estimate with its interval, the condemning limit."""
     edges = [1e3 * edge for edge in limits["grade_edges_m"]]
     low, value, high = (1e3 * estimate[key] for key in ("low", "severity", "high"))
     right = 1.15 * max(1.5 * edges[-1], high)
-    axes = figure.add_subplot()
     bounds = [0.0, *edges, right]
     for i, name in enumerate(limits["grade_names"]):
         axes.axvspan(bounds[i], bounds[i + 1], color=GRADE_COLOURS[i], alpha=0.25, lw=0)
@@ -258,7 +263,6 @@ def _gauge_figure(estimate: Mapping[str, Any], limits: Mapping[str, Any]) -> Any
     axes.axvline(1e3 * limits["condemning_limit_m"], color="#c03a2b", lw=2)
     axes.set(xlim=(0, right), ylim=(0, 1), yticks=[])
     axes.set_xlabel(f"{limits['quantity']} [mm]")
-    return figure
 
 
 # --- trend

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ...datasets.file.record import refuse_output
 from ...datasets.measured.recording import read_recording
 from ...sim.output.recording import Recording
@@ -13,6 +15,7 @@ from ..feature_rows.healthy import Baseline, Baselines
 from ..nameplate.cautions import known_beside
 from ..nameplate.nameplate import Nameplate, nameplate_of
 from ..pages.page import save_page
+from ..report.figures import draw_gauge
 from ..report.page import report_html
 from ..report.text import report_text
 from ..report.verdict import known_machine, report_table
@@ -97,6 +100,40 @@ class Report:
         file = Path(path).absolute()
         refuse_output(file, force)
         save_page(self.html(interactive=interactive), file, force=force)
+
+    def plot(self, *, ax: Any = None) -> Any:
+        """Draw the estimate on the scale of grades, and below it every channel over time.
+
+        Parameters
+        ----------
+        ax : sequence of matplotlib.axes.Axes, optional
+            One for the estimate and one for each channel; a new figure by default.
+
+        Returns
+        -------
+        numpy.ndarray of matplotlib.axes.Axes, shape (1 + n_channels,)
+            The first is empty but for the verdict where no grade is given.
+
+        Examples
+        --------
+        >>> import wearstate
+        >>> found = wearstate.report(wearstate.simulate("bilge-pump"), "pump.wsm")
+        >>> found.plot()[0].get_title()
+        'Grade 0 of 3: as new'
+        """
+        if ax is None:
+            from matplotlib import pyplot as plt
+
+            rows = 1 + len(self.recording.channels)
+            _, ax = plt.subplots(rows, figsize=(8.0, 1.2 + 1.3 * rows), layout="constrained")
+        axes = np.ravel(ax)
+        axes[0].set_title(self.table["headline"])
+        if self.estimate.severity is None:
+            axes[0].set_axis_off()
+        else:
+            draw_gauge(axes[0], self.table["estimate"], self.table["limits"])
+        self.recording.plot(ax=axes[1:])
+        return axes
 
     def __str__(self) -> str:
         return self.text

@@ -117,6 +117,12 @@ class Modes:
     residue_deviation: Float
     fit_error: Float
 
+    def __repr__(self) -> str:
+        """Number of modes, and where they lie."""
+        told = ", ".join(f"{each:.4g}" for each in self.frequency[:6])
+        more = ", …" if len(self.frequency) > 6 else ""
+        return f"<Modes of {self.quantity}, {len(self.frequency)}: {told}{more} Hz>"
+
     @property
     def pole(self) -> Complex:
         """Poles in the upper half plane, shape (n_modes,) [rad/s]."""

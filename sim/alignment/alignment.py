@@ -25,6 +25,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import cho_solve_banded, cholesky_banded
 
 from ..beam.beam import Beam, PointLoad
+from ..short import brief
 
 Vector = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -193,6 +194,8 @@ class AlignmentLine:
     beam: Beam
     seats: tuple[Seat, ...]
 
+    __repr__ = brief("names")
+
     def __post_init__(self) -> None:
         faults = list(_line_faults(self.beam, self.seats))
         if faults:
@@ -314,6 +317,8 @@ class LineState:
     relative_slopes: Vector
     deflections: Vector
     rotations: Vector
+
+    __repr__ = brief("condition", "reactions", "lifted")
 
     @property
     def lifted(self) -> tuple[str, ...]:

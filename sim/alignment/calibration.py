@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linprog
 
+from ..short import brief
 from .alignment import (
     AS_SET,
     LIMIT_UNITS,
@@ -158,6 +159,8 @@ class Calibration:
     unmet: tuple[Check, ...]
     blocks: tuple[Block, ...]
     margin: float = 0.0
+
+    __repr__ = brief("status", "moved", "total_move")
 
     @property
     def touched(self) -> tuple[Check, ...]:

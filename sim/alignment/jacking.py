@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..beam.beam import Beam, DistributedLoad, PointLoad, assemble_beam
+from ..short import brief
 from .alignment import (
     AS_SET,
     FEWEST_POINTS,
@@ -77,6 +78,8 @@ class Jacking:
     correction_factor: float
     reaction: float
     others: tuple[str, ...]
+
+    __repr__ = brief("bearing", "reaction", "correction_factor", "free_lift", "others")
 
     @property
     def estimate(self) -> float:

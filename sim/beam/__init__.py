@@ -1,4 +1,4 @@
 """An elastic shaft: beam elements, natural frequencies, Campbell diagram, unbalance response.
 
-It may import nothing of the house.
+It may import ``sim.short``.
 """

@@ -26,6 +26,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import coo_array
 
+from ..short import brief
+
 Vector = NDArray[np.float64]
 Index = NDArray[np.int64]
 Sparse = Any  # scipy.sparse.csc_array; scipy has no types
@@ -252,6 +254,8 @@ class Beam:
     theory: str
     shear_coefficient: float | str | None
     gravity: float
+
+    __repr__ = brief("length", "weight", "n_dof", "stations", "theory")
 
     @property
     def length(self) -> float:

@@ -26,6 +26,7 @@ from scipy.optimize import brentq, linear_sum_assignment
 from scipy.sparse import block_array, coo_array, csc_array
 from scipy.sparse.linalg import LinearOperator, eigs, eigsh, splu
 
+from ..short import brief
 from .beam import Beam, Sparse
 
 Vector = NDArray[np.float64]
@@ -210,6 +211,8 @@ class Rotor:
     supports: tuple[Support, ...] = ()
     damping_ratio: float = 0.0
     damping_band: tuple[float, float] | None = None
+
+    __repr__ = brief("n_dof", "supports", "damping_ratio")
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "supports", tuple(self.supports))
@@ -397,6 +400,8 @@ class RotorModes:
     forward_share: Vector
     axis_ratio: Vector
     real_eigenvalues: Vector
+
+    __repr__ = brief("speed", "frequency_hz", "stable")
 
     @property
     def frequency_hz(self) -> Vector:
@@ -787,6 +792,8 @@ class Campbell:
     mac: Vector
     lost_at: Vector
 
+    __repr__ = brief("speeds", "frequency_hz")
+
     @property
     def frequency_hz(self) -> Vector:
         """Damped [Hz]."""
@@ -976,6 +983,8 @@ class CriticalSpeeds:
     speeds: Vector
     damping_ratio: Vector
     direction: tuple[str, ...]
+
+    __repr__ = brief()
 
 
 def critical_speeds(

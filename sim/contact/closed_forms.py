@@ -6,6 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..short import brief
+
 
 @dataclass(frozen=True, kw_only=True)
 class IdealCrank:
@@ -42,6 +44,8 @@ class IdealCrank:
     wrist_force_y: NDArray[np.float64]
     guide_force: NDArray[np.float64]
     crank_moment: NDArray[np.float64]
+
+    __repr__ = brief("piston", "pin_force_x", "pin_force_y")
 
 
 def ideal_crank(

@@ -25,6 +25,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..short import brief
 from .direct import DIRECT_OK, STATUS, DirectFilm, direct_tilted_force
 from .rungs import FILM_RUNGS
 from .slopes import Coefficients, perturbation
@@ -143,6 +144,8 @@ class Equilibrium:
     residual: float
     iterations: int
     status: BearingStatus
+
+    __repr__ = brief("eccentricity_ratio", "attitude_angle", "sommerfeld_number", "rung", "status")
 
     @property
     def eccentricity_ratio(self) -> float:
@@ -1170,6 +1173,8 @@ class Whirl:
     n_theta: int
     n_z: int
 
+    __repr__ = brief("resolved", "stiffness_error", "damping_error", "speed_error")
+
     @property
     def resolved(self) -> bool:
         """Whether it is known that there is a threshold, or that there is none."""
@@ -1403,6 +1408,10 @@ class OperatingPoint:
     whirl: Whirl
     threshold: Threshold
     critical_mass: float
+
+    __repr__ = brief(
+        "eccentricity_ratio", "attitude_angle", "sommerfeld_number", "least_film", "peak_pressure"
+    )
 
 
 def operate(

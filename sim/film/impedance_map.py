@@ -35,6 +35,7 @@ from numpy.typing import NDArray
 
 from ..atomic import sealed, unsealed, write_whole
 from ..jit import cache_folder, kernel
+from ..short import brief
 from .direct import DIRECT_OK, STATUS, DirectFilm, direct_force
 from .solve import FilmGeometry, direct_film
 
@@ -104,6 +105,8 @@ class ImpedanceMap:
     accuracy: float
     interpolation: MapError
     turned: MapError
+
+    __repr__ = brief("knots", "last_eccentricity", "accuracy")
 
     @property
     def accurate(self) -> bool:

@@ -17,6 +17,7 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
+from ..short import brief
 from .direct import (
     DIRECT_ITERATIONS,
     DIRECT_TOUCH,
@@ -216,6 +217,8 @@ class FilmSolution:
     residual: float
     iterations: int
     fill: Array | None = None
+
+    __repr__ = brief()
 
 
 # --- geometry

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from ..film.mass_conserving import EndPressure, MassStep, mass_step, oil_in_gap
 from ..film.solve import FilmGeometry, FilmSolution, FilmState
+from ..short import brief
 from .orbit import Load, OrbitStatus, load_at
 
 _SETTLED = 1e-7  # of the gap that is left: what the place at the end of a step may be off by
@@ -62,6 +63,8 @@ class MassOrbit:
     filled: NDArray[np.float64]
     status: OrbitStatus
     films: int
+
+    __repr__ = brief("tau", "position", "status")
 
     @property
     def eccentricity(self) -> NDArray[np.float64]:

@@ -748,6 +748,14 @@ class Scene(Part):
             raise ValueError("\n".join(faults))
         return self
 
+    def __repr__(self) -> str:
+        """Machine, name and what a recording of it is."""
+        rate = self.sample_rate
+        told = f"{rate / 1000:.6g} kHz" if rate >= 1000 else f"{rate:.6g} Hz"
+        return f"<{type(self).__name__} {self.name}, {self.duration:.4g} s, {told}>"
+
+    __str__ = __repr__
+
     def sensor_channels(self) -> tuple[Channel, ...]:
         """Channels of the sensors, in order; every machine has its own."""
         raise NotImplementedError(self.machine)

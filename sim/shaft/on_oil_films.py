@@ -59,6 +59,7 @@ from ..film.solve import (
     direct_film,
     worn_arc,
 )
+from ..short import brief
 
 Vector = NDArray[np.float64]
 
@@ -323,6 +324,8 @@ class BeamFilm:
     status: ShaftFilmStatus
     culprit: str
     strength: float
+
+    __repr__ = brief("bearings", "speed", "rung", "eccentricity_ratios", "status")
 
     @property
     def eccentricity_ratios(self) -> Vector:

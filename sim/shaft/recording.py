@@ -37,6 +37,7 @@ from ..scene.shaft import (
     ShaftScene,
     Turbulence,
 )
+from ..short import brief
 from .elements import element_faults
 from .on_oil_films import BeamFilm, FilmBearing, ShaftFilmStatus, beam_film
 from .push import lead_samples, peak_push, pushed_motion, pushed_stations, pushes
@@ -558,6 +559,8 @@ class ShaftState:
     beam: Beam
     film: BeamFilm
     rotor: Rotor
+
+    __repr__ = brief()
 
 
 def shaft_state(

@@ -25,6 +25,7 @@ from ..pump.slider_crank import CrankRun
 from ..scene.journal import JournalScene
 from ..scene.parts import SceneError, nearest
 from ..scene.pump import PumpScene
+from ..short import brief
 from .archard import Float, scar_shape, sliding_work
 
 _SETTLING = 3  # revolutions; contact forgets its start within one
@@ -58,6 +59,8 @@ class JointWear:
     per_revolution: Float
     eye: Float
     pin: Float
+
+    __repr__ = brief()
 
 
 def joint_wear(
