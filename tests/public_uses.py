@@ -32,6 +32,7 @@ model: wearstate.WearModel = wearstate.train("data.h5", seed=1)
 limit: float = model.card.condemning_limit_m
 records: int = model.card.trained_on.records
 page: str = wearstate.report(recording, model).html()
+wearstate.report(acceleration, model, fs=25_600.0).plot()
 text: str = wearstate.evaluate(model, "data.h5", quick=True).text
 verdict: str = wearstate.align.align(scene).verdict
 
@@ -45,6 +46,7 @@ wearstate.features.spectrums(recording)  # error: attr-defined
 wearstate.film.operate(bearing, speed="50")  # error: arg-type
 grade: str = estimate.grade  # error: assignment
 print(model.card.limit)  # error: attr-defined
+wearstate.report(acceleration, model, fs="25.6 kHz")  # error: arg-type
 print(model.card["severity"])  # error: index
 print(model.card.trained_on.recipee)  # error: attr-defined
 model.card.mode = "cold"  # error: misc

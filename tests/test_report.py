@@ -8,8 +8,11 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
+import wearstate
 from click.testing import CliRunner
+from matplotlib import pyplot
 from wearstate.datasets.file.record import (
     Attributes,
     DataSet,
@@ -797,3 +800,36 @@ def test_a_report_without_a_page_loads_neither_trainers_nor_pictures(tmp_path, m
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.splitlines()[-1] == "heavy:"
+
+
+def test_arrays_and_tables_with_a_rate_are_judged_as_recordings(small_model):
+    recording = wearstate.simulate("bilge-pump", seed=4)
+    wanted = wearstate.report(recording, small_model).estimate
+    table = pd.DataFrame({name: recording[name] for name in reversed(recording.names)})
+    for given in (recording.signal, table):
+        found = wearstate.report(given, small_model, fs=recording.sample_rate)
+        assert found.estimate == wanted
+    for given, fs, message in (
+        (recording.signal, None, "fs = None must be given"),
+        (recording.signal[:2], 25_600.0, "must be .3 channels"),
+        (table[["acc_x"]], 25_600.0, "column 'tacho' must be there"),
+        (recording, 25_600.0, "the recording has its own"),
+    ):
+        with pytest.raises(DataError, match=message):
+            wearstate.report(given, small_model, fs=fs)
+
+
+def test_a_report_is_drawn_with_and_without_a_grade(small_model):
+    recording = wearstate.simulate("bilge-pump", seed=4)
+    found = wearstate.report(recording, small_model)
+    axes = found.plot()
+    assert len(axes) == 1 + len(recording.channels)
+    assert axes[0].get_title() == found.table["headline"]
+    [marked] = [bar.lines[0].get_xdata() for bar in axes[0].containers]
+    assert marked == pytest.approx([1e3 * found.estimate.severity])
+    silent = wearstate.report(0 * recording.signal, small_model, fs=25_600.0)
+    axes = silent.plot()
+    assert silent.estimate.severity is None
+    assert axes[0].get_title() == silent.table["headline"]
+    assert not axes[0].axison
+    pyplot.close("all")

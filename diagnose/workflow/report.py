@@ -7,10 +7,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...datasets.file.record import refuse_output
 from ...datasets.measured.recording import read_recording
-from ...sim.output.recording import Recording
+from ...sim.output.recording import Recording, Table, as_recording
+from ...sim.output.sensor import Channel
 from ..feature_rows.healthy import Baseline, Baselines
 from ..nameplate.cautions import known_beside
 from ..nameplate.nameplate import Nameplate, nameplate_of
@@ -146,9 +148,10 @@ class Report:
 
 
 def report(
-    recording: Recording | str | Path,
+    recording: Recording | str | Path | NDArray[Any] | Table,
     model: WearModel | str | Path,
     *,
+    fs: float | None = None,
     baseline: str | Path | None = None,
     scene: str | None = None,
     values: Mapping[str, Any] | None = None,
@@ -160,10 +163,14 @@ def report(
 
     Parameters
     ----------
-    recording : Recording, str or Path
-        A recording, or a file that :func:`wearstate.read_recording` reads without options.
+    recording : Recording, str, Path, numpy.ndarray or pandas.DataFrame
+        A recording; a file that :func:`wearstate.read_recording` reads without options; an array
+        [shape=(n_channels, n_samples)] with the channels of the model in their order and units; or
+        a table with a column for each.
     model : WearModel, str or Path
         A model or its file.
+    fs : float, optional
+        Sample rate of an array or a table [Hz].
     baseline : str or Path, optional
         Data set of healthy recordings of the machine.
     scene : str, optional
@@ -186,7 +193,8 @@ def report(
     Raises
     ------
     DataError
-        The recording cannot be read or turned into features, or there is no such kind of machine.
+        The recording cannot be read or turned into features, an array has no rate or other channels
+        than the model, or there is no such kind of machine.
     ModelError
         The file cannot be used.
     TypeError
@@ -204,8 +212,8 @@ def report(
     if isinstance(model, Recording):
         raise TypeError("model = a recording must be a model or its file; recording comes first")
     known = model if isinstance(model, WearModel) else load_model(model)
-    source = None if isinstance(recording, Recording) else Path(recording)
-    read = recording if isinstance(recording, Recording) else read_recording(recording)
+    source = Path(recording) if isinstance(recording, str | Path) else None
+    read = _as_model(recording, fs, known) if source is None else read_recording(source)
     usual = known.card.trained_on.scene
     return judged(
         read,
@@ -218,6 +226,15 @@ def report(
         else second_opinion(twin, read, wear=known.card.severity, seed=seed),
         files={"recording": source} if source else None,
     )
+
+
+def _as_model(given: Any, fs: float | None, model: WearModel) -> Recording:
+    """A recording as it is; an array or a table with the channels of the model."""
+    if isinstance(given, Recording):
+        return as_recording(given, fs)
+    card = model.card
+    channels = [Channel(**channel.model_dump()) for channel in card.channels]
+    return as_recording(given, fs, channels, tacho=card.tacho)
 
 
 def judged(
