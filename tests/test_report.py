@@ -804,10 +804,12 @@ def test_a_report_without_a_page_loads_neither_trainers_nor_pictures(tmp_path, m
 
 def test_arrays_and_tables_with_a_rate_are_judged_as_recordings(small_model):
     recording = wearstate.simulate("bilge-pump", seed=4)
-    wanted = wearstate.report(recording, small_model).estimate
+    # an array counts as measured, of a machine that nobody has described
+    wanted = wearstate.report(recording, small_model, scene="bilge-pump").estimate
     table = pd.DataFrame({name: recording[name] for name in reversed(recording.names)})
     for given in (recording.signal, table):
-        found = wearstate.report(given, small_model, fs=recording.sample_rate)
+        rate = recording.sample_rate
+        found = wearstate.report(given, small_model, fs=rate, scene="bilge-pump")
         assert found.estimate == wanted
     for given, fs, message in (
         (recording.signal, None, "fs = None must be given"),
