@@ -8,9 +8,11 @@ import re
 import zipfile
 
 import numpy as np
+import pandas as pd
 import pytest
 from wearstate.datasets.file.record import Channel, DataSet
 from wearstate.diagnose.evaluation.evaluate import evaluate_model, score
+from wearstate.diagnose.feature_rows.feature_table import recording_features
 from wearstate.diagnose.feature_rows.model_card import LayoutCard, ModelCard
 from wearstate.diagnose.learning.grades import accuracy_bound, grades_of
 from wearstate.diagnose.learning.heads import Head
@@ -21,7 +23,9 @@ from wearstate.diagnose.wear_model.file import load_model, save_model
 from wearstate.diagnose.wear_model.learn import learn
 from wearstate.diagnose.wear_model.train import train_model
 from wearstate.diagnose.wear_model.training_rows import TrainingRows
+from wearstate.sim.machine.simulate import simulate
 from wearstate.sim.output.recording import DataError, Recording
+from wearstate.sim.scene.load import load_scene
 from wearstate.sim.wear.archard import grade
 
 
@@ -648,3 +652,18 @@ def test_within_one_grade_and_accuracy_are_those_of_the_confusion(trained):
     assert result["within_one_grade"] == pytest.approx(near / counts.sum())
     assert result["within_one_grade"] < 0.9
     assert result["accuracy"] == pytest.approx(np.trace(counts) / counts.sum())
+
+
+def test_a_model_takes_arrays_and_tables_with_a_rate_and_predicts_recordings(small_model):
+    model = load_model(small_model)
+    recordings = [simulate(load_scene("bilge-pump"), seed=seed) for seed in (4, 5)]
+    rate, first = recordings[0].sample_rate, recordings[0]
+    table = pd.DataFrame({name: first[name] for name in reversed(first.names)})
+    wanted = model.estimate(first)
+    for given in (first.signal, table):
+        assert model.estimate(given, fs=rate) == wanted
+    with pytest.raises(DataError, match="fs = None must be given"):
+        model.estimate(first.signal)
+    rows = np.array([recording_features(each)[1] for each in recordings])
+    np.testing.assert_array_equal(model.predict(recordings), model.predict(rows))
+    assert model.predict(first)[0] == model.predict(rows)[0]

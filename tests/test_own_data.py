@@ -152,6 +152,7 @@ def test_the_file_gives_the_same_answers_and_the_seed_the_same_bytes(trained, tm
     with DataSet(path) as data:
         assert read.estimate(data[0]) == model.estimate(data[0])
         assert read.estimate(data[0]).name == "cracked"
+        assert read.estimate(data[0].signal, fs=RATE) == read.estimate(data[0])
     with pytest.raises(ModelError, match="is a class model, must be a wear model"):
         load_model(tmp_path / "a.wsm")
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ... import __version__
 from ...datasets.file.record import Attributes, DataSet
 from ...datasets.split.rules import check_no_leak, group_folds
-from ...sim.output.recording import DataError, Recording
+from ...sim.output.recording import DataError, Recording, Table
 from ..feature_rows.blows import NOISE_SCORE, blow_floors, blow_scores, blow_table, lacks_blows
 from ..feature_rows.feature_choice import choice_card, choice_in
 from ..feature_rows.feature_table import (
@@ -246,13 +246,19 @@ class ClassModel:
         """Shares [shape=(n, n_classes)] of feature rows [shape=(n, n_features)]."""
         return _shares(np.stack([blend.predict(rows) for blend in self.blends], axis=1))
 
-    def estimate(self, recording: Recording) -> Naming:
+    def estimate(
+        self, recording: Recording | NDArray[Any] | Table, *, fs: float | None = None
+    ) -> Naming:
         """Tell the condition in a recording.
 
         Parameters
         ----------
-        recording : Recording
-            Any; one that lacks the model's inputs or is at fault is unusable, with the reasons.
+        recording : Recording, numpy.ndarray or pandas.DataFrame
+            Any; one that lacks the model's inputs or is at fault is unusable, with the reasons. An
+            array [shape=(n_channels, n_samples)] has the model's channels in their order and units,
+            a table a column for each.
+        fs : float, optional
+            Sample rate of an array or a table [Hz].
 
         Returns
         -------
@@ -265,6 +271,7 @@ class ClassModel:
         ModelError
             The program's features are not the model's.
         """
+        recording = self.card.recording_of(recording, fs)
         faults = layout_faults(recording, self.card) or sample_faults(recording)
         reasons = tuple(fault.text for fault in faults if fault.bars)
         if reasons:

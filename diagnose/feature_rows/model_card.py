@@ -7,10 +7,12 @@ from collections.abc import Sequence
 from itertools import pairwise
 from typing import Annotated, Any, Literal, Self
 
+from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from ...features.catalogue.catalogue import SetName
-from ...sim.output.sensor import RATE_LEAST, RATE_MOST
+from ...sim.output.recording import Recording, Table, as_recording
+from ...sim.output.sensor import RATE_LEAST, RATE_MOST, Channel
 from ..learning.grades import GRADE_NAMES
 from .noted import NOTED
 
@@ -174,6 +176,27 @@ class LayoutCard(Strict):
     def _channels_fit(self) -> Self:
         check_channels(self.channels, self.tacho)
         return self
+
+    def recording_of(self, given: Recording | NDArray[Any] | Table, fs: float | None) -> Recording:
+        """A recording as it is; an array or a table with the channels of the model.
+
+        Parameters
+        ----------
+        given : Recording, numpy.ndarray [shape=(n_channels, n_samples)] or pandas.DataFrame
+            Channels in the order and units of the model's; a table has a column for each.
+        fs : float or None
+            Sample rate of an array or a table [Hz]; a recording has its own.
+
+        Raises
+        ------
+        DataError
+            An array has no rate or other channels, or a recording is given a rate.
+        """
+        if isinstance(given, Recording):
+            return as_recording(given, fs)
+        channels = [Channel(**channel.model_dump()) for channel in self.channels]
+        pulses = self.pulses_per_revolution
+        return as_recording(given, fs, channels, tacho=self.tacho, pulses_per_revolution=pulses)
 
 
 class ModelCard(LayoutCard):

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...features.response.transfer import FrfReference
-from ...sim.output.recording import DataError, Recording, html_table
+from ...sim.output.recording import DataError, Recording, Table, html_table
 from ..feature_rows.feature_choice import choice_in
 from ..feature_rows.feature_table import (
     FeatureSelection,
@@ -300,7 +300,7 @@ class WearModel:
 
     def predict(
         self,
-        rows: Float,
+        rows: Float | Recording | Sequence[Recording],
         baseline: Float | None = None,
         conditions: Sequence[Mapping[str, Any]] | None = None,
     ) -> Float:
@@ -308,8 +308,8 @@ class WearModel:
 
         Parameters
         ----------
-        rows : numpy.ndarray [shape=(n, n_features)]
-            In the order of ``card.features``.
+        rows : numpy.ndarray [shape=(n, n_features)], Recording or sequence of Recording
+            Features in the order of ``card.features``, or what they are computed from.
         baseline : numpy.ndarray [shape=(n, n_features)] or [shape=(n_features,)], optional
             Healthy rows of the same machines, of a referenced model.
         conditions : sequence of mapping, optional
@@ -325,7 +325,7 @@ class WearModel:
         DataError
             The model is referenced and there is no baseline.
         """
-        inputs = self._inputs(rows, baseline)
+        inputs = self._inputs(self._rows(rows), baseline)
         found = self.blind.severity.predict(inputs)
         if self.informed is None or conditions is None:
             return found
@@ -351,6 +351,12 @@ class WearModel:
             return self.blind, inputs
         return self.informed, np.hstack([inputs, noted_values(self.noted, [conditions])])
 
+    def _rows(self, given: Float | Recording | Sequence[Recording]) -> Float:
+        heard = [given] if isinstance(given, Recording) else given
+        if isinstance(heard, np.ndarray):
+            return heard
+        return np.array([self._row(self._at_rate(each), None) for each in heard])
+
     def _inputs(self, rows: Float, baseline: Float | None) -> Float:
         lifted = self._lifted(rows)
         if self.mode == "cold":
@@ -361,19 +367,22 @@ class WearModel:
 
     def estimate(
         self,
-        recording: Recording,
+        recording: Recording | NDArray[Any] | Table,
         baseline: Baseline | None = None,
         conditions: Mapping[str, Any] | None = None,
         told: tuple[str, ...] = (),
+        *,
+        fs: float | None = None,
     ) -> Estimate:
         """Estimate the wear of the machine in a recording.
 
         Parameters
         ----------
-        recording : Recording
+        recording : Recording, numpy.ndarray or pandas.DataFrame
             Any, with the views that the model reads joined to it; one that is sampled faster is
             brought to the model's rate, one that lacks the model's inputs or is at fault is
-            unusable, with the reasons.
+            unusable, with the reasons. An array [shape=(n_channels, n_samples)] has the model's
+            channels in their order and units, a table a column for each.
         baseline : Baseline, optional
             Healthy recordings of the same machine; a referenced model needs them, a cold one only
             tells the evidence against them.
@@ -382,6 +391,8 @@ class WearModel:
             noted beside the recording.
         told : tuple of str
             Cautions from what is known beside the signals.
+        fs : float, optional
+            Sample rate of an array or a table [Hz].
 
         Returns
         -------
@@ -394,8 +405,8 @@ class WearModel:
         ModelError
             The program's features are not the model's.
         """
-        stated = recording.sample_rate
-        recording = self._at_rate(recording)
+        given = self.card.recording_of(recording, fs)
+        stated, recording = given.sample_rate, self._at_rate(given)
         faults = recording_faults(recording, self.card)
         if any(fault.bars for fault in faults):
             return self._unusable(faults)

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from ...datasets.file.record import refuse_output
 from ...datasets.measured.recording import read_recording
-from ...sim.output.recording import Recording, Table, as_recording
-from ...sim.output.sensor import Channel
+from ...sim.output.recording import Recording, Table
 from ..feature_rows.healthy import Baseline, Baselines
 from ..nameplate.cautions import known_beside
 from ..nameplate.nameplate import Nameplate, nameplate_of
@@ -213,7 +212,10 @@ def report(
         raise TypeError("model = a recording must be a model or its file; recording comes first")
     known = model if isinstance(model, WearModel) else load_model(model)
     source = Path(recording) if isinstance(recording, str | Path) else None
-    read = _as_model(recording, fs, known) if source is None else read_recording(source)
+    if isinstance(recording, str | Path):
+        read = read_recording(recording)
+    else:
+        read = known.card.recording_of(recording, fs)
     usual = known.card.trained_on.scene
     return judged(
         read,
@@ -226,15 +228,6 @@ def report(
         else second_opinion(twin, read, wear=known.card.severity, seed=seed),
         files={"recording": source} if source else None,
     )
-
-
-def _as_model(given: Any, fs: float | None, model: WearModel) -> Recording:
-    """A recording as it is; an array or a table with the channels of the model."""
-    if isinstance(given, Recording):
-        return as_recording(given, fs)
-    card = model.card
-    channels = [Channel(**channel.model_dump()) for channel in card.channels]
-    return as_recording(given, fs, channels, tacho=card.tacho)
 
 
 def judged(
