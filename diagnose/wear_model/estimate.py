@@ -39,6 +39,7 @@ from ..feature_rows.quality import (
 from ..feature_rows.resampling import at_rate
 from ..feature_rows.transfer_reference import told_against
 from ..learning.conformal import COVERAGE
+from ..learning.grades import GRADE_NAMES
 from ..learning.heads import Head, logit
 from ..learning.severity import Estimator
 from .bandwidth import cut_off
@@ -204,6 +205,21 @@ class Estimate:
             f"<Estimate {self.verdict}: {self.grade_name}, {1e3 * self.severity:.3g} mm, "
             f"{100 * self.coverage:.0f} % within {low:.3g} to {high:.3g} mm>"
         )
+
+    def _repr_html_(self) -> str:
+        """The same for notebooks, with what must be known of it."""
+        told = {
+            "fault": [fault.text for fault in self.faults],
+            "reason": self.reasons,
+            "caution": self.cautions,
+            "grade": [
+                f"{GRADE_NAMES[grade]}: {100 * share:.0f} %"
+                for grade, share in enumerate(self.grade_probabilities)
+                if grade in self.possible_grades
+            ],
+        }
+        rows = [(name, text) for name, texts in told.items() for text in texts]
+        return html_table(repr(self)[1:-1], ["", "text"], rows)
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
