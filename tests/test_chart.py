@@ -20,6 +20,7 @@ from wearstate.diagnose.charts.chart import (
     front_of,
     remaining_error,
 )
+from wearstate.diagnose.charts.figure import question_figure
 from wearstate.diagnose.charts.of_scene import (
     KEPT,
     RAISED,
@@ -28,6 +29,7 @@ from wearstate.diagnose.charts.of_scene import (
     scene_search,
 )
 from wearstate.diagnose.charts.page import SUFFIXES, chart_figure, chart_html, save_chart
+from wearstate.diagnose.charts.scene_edit import block_of, default_step
 from wearstate.diagnose.charts.words import HERE
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.sim.fidelity.ladder import cost_of
@@ -157,7 +159,7 @@ def test_points_are_rates_with_their_worst_quantity(chart):
         HERE: 0.04,
         "film short": 0.02,
         "film direct": 4.0,
-        "film direct, mesh 144 x 33": 8.0,
+        "film direct, mesh 144 around x 33 along": 8.0,
     }
     assert {p.worst for p in chart.points if p.error > 0 and p.errors} == {"force_peak"}
 
@@ -180,7 +182,7 @@ def test_three_sentences_say_where_one_stands_and_what_to_take(chart):
     assert here.startswith("Your scene as written is within 2 % of the best rungs: 0.1 % off in")
     assert "peak film force" in here
     assert kept.startswith("With your rungs kept: nothing must change; to run faster, take mesh")
-    assert "mesh 36 x 9 (1.2 % off in peak film force" in kept
+    assert "mesh 36 around x 9 along (1.2 % off in peak film force" in kept
     assert "1.3 times as fast as your scene" in kept
     assert "If rungs may change: change nothing (0.1 % off in peak film force)." in raised
 
@@ -203,7 +205,8 @@ def test_a_rung_of_the_scene_is_charged_in_words_and_hertz():
         "306 to 758 Hz"
     )
     assert chart.conclusion[1] == (
-        "Errors of single rungs, which do not add up: pressure two-level instead of chamber 64 %."
+        "Of its rungs one by one, the worst is pressure two-level instead of chamber: 64 % off. "
+        "Errors of single rungs may cancel each other."
     )
     assert row.text in chart_text(chart)
     page = chart_html(chart)
@@ -233,8 +236,9 @@ def test_an_unfinished_search_calls_nothing_final():
     chart = chart_from(SHORT, status="out of budget")
     assert (chart.winner, chart.status) == ("", "out of budget")
     for choice in chart.choices:
-        assert "so far this is enough: 5 of 9 combinations measured" in choice.sentence
+        assert choice.sentence.endswith(". So far this is enough.")
     page = chart_html(chart)
+    assert page.count("5 of 9") == 1
     assert "5 of 9 combinations are computed, so the advice may still change" in page
     ring = "cheapest within the accuracy"
     assert ring not in page
@@ -279,11 +283,15 @@ def test_rungs_that_are_too_coarse_are_said_whatever_comes_of_the_numerics():
         raised=answer_of(rungs_off, written=rungs_off),
     )
     kept = chart_of(load_scene("journal-bearing", {"duration": "0.5 s"}), found).choices[0].sentence
-    assert "or less accuracy would show it. Your rungs are too coarse whatever" in kept
+    assert "but your rungs are not (40 % off in peak film force, against the best rungs)" in kept
+    assert kept.endswith("or less accuracy would show it.")
     resolved = replace(found, kept=answer_of(HERE_POINT, reference=fine))
     kept = chart_of(load_scene("journal-bearing", {"duration": "0.5 s"}), resolved).choices[0]
-    assert "your numerics are fine" in kept.sentence
-    assert "but your rungs are not: their error stays, 40 %" in kept.sentence
+    assert kept.sentence == (
+        "With your rungs kept: your numerics are fine (0.1 % off in peak film force, against the "
+        "finest numerics of the same rungs), but your rungs are not (40 % off in peak film force, "
+        "against the best rungs), whatever the numerics."
+    )
     # the best rungs already: what is off is the mesh
     best = replace(found, raises=())
     kept = chart_of(load_scene("journal-bearing", {"duration": "0.5 s"}), best).choices[0].sentence
@@ -301,6 +309,119 @@ def test_a_choice_that_is_not_surely_within_is_not_called_so_for_the_references_
     sure = replace(found, raised=replace(told, chosen=HERE_POINT, status="resolved"))
     said = chart_of(load_scene("journal-bearing", {"duration": "0.5 s"}), sure).choices[-1]
     assert "the reference itself up to 0.2 %, both within 2 %" in said.sentence
+
+
+def best_rungs_already(**level):
+    """A scene whose rungs are the best, and whose mesh is too coarse."""
+    here = candidate(0.5, 0.03, "beyond", mesh="x2")
+    answer = replace(
+        answer_of(COARSE, here, written=here),
+        chosen=COARSE,
+        changes=dict(COARSE.values),
+        convergence=(convergence(**level),),
+    )
+    raised = replace(answer, candidates=(SHORT, *answer.candidates))
+    return replace(
+        study_of(), kept=answer, raised=raised, written={**WRITTEN, **FILM, "mesh": "x2"}
+    )
+
+
+def test_where_the_rungs_are_the_best_one_answer_is_told_once():
+    found = best_rungs_already()
+    scene = load_scene("journal-bearing", {"duration": "0.5 s", "film.rung": "direct"})
+    chart = chart_of(scene, found)
+    where, take = chart.conclusion
+    assert where.endswith("3 % off in peak film force. Its mesh is too coarse.")
+    assert take.startswith("Your rungs are already the best of this scene: take mesh 72 around")
+    page, text = chart_html(chart), chart_text(chart)
+    assert [page.count(f'<div class="choice {word}') for word in ("resolved", "")] == [1, 1]
+    assert page.count("</svg>") == 1
+    assert "film short" in page  # the widest choice is the one that is shown
+    for words in ("your rungs kept", "rungs may change"):
+        assert words not in page.lower()
+        assert words not in text
+    assert [each.question for each in chart.choices] == [KEPT, RAISED]  # both may be applied
+    # another answer to one of them: both are told
+    other = replace(found, raised=replace(found.raised, chosen=SHORT, changes=dict(SHORT.values)))
+    assert len(chart_of(scene, other).conclusion) == 3
+
+
+def test_an_error_of_the_reference_that_matters_is_told_beside_that_of_the_scene():
+    scene = load_scene("journal-bearing", {"duration": "0.5 s", "film.rung": "direct"})
+    chart = chart_of(scene, best_rungs_already(steps=(0.018, 0.009)))  # 0.3 % left
+    assert "3 % off in peak film force (the reference itself may be 0.3 % off)" in chart.verdict
+    assert "themselves off by up to 0.3\u00a0%" in chart_html(chart)
+
+
+def test_rungs_are_listed_before_the_settings_the_worst_first():
+    pump = load_scene("bilge-pump", {"duration": "0.4 s"})
+    cost = {"guide": 0.38, "wristpin": 0.75, "drive": math.inf, "pressure": 0.28}
+    raises = tuple(
+        Raise(
+            effect=effect,
+            written="ideal",
+            best="compliant",
+            candidate=Candidate(
+                rungs={},
+                values={},
+                cost=1.0,
+                differences={"band_3": Difference(mean=error, standard_error=0.01)}
+                if math.isfinite(error)
+                else {},
+                verdict="beyond",
+            ),
+        )
+        for effect, error in cost.items()
+    )
+    chart = chart_of(pump, replace(study_of(), raises=raises))
+    assert [each.effect for each in chart.raises] == ["wrist pin", "guide", "pressure", "drive"]
+    assert "wrist pin ideal instead of compliant: 75 % off; 2 more are over 2 %" in chart.verdict
+    page = chart_html(chart)
+    assert page.index("What each of your rungs costs") < page.index("Recommended settings")
+
+
+def test_a_card_without_settings_leaves_no_blank_beside_it(chart):
+    """Kept has settings, raised has none: each across the page."""
+    page = chart_html(chart)
+    cards = re.findall(r'<div class="(choice [^"]*)"><h3>(.*?)</h3>', page)
+    assert [("thin" in look) for look, _ in cards] == [True, True]
+    assert cards[1][1] == "Rungs may change: nothing to change"
+
+
+def test_the_name_of_the_scene_is_beside_its_star_and_on_nothing():
+    """The ring of the choice is right below it, as large a part of the panel as on real pages."""
+    scene = load_scene("journal-bearing", {"duration": "0.5 s", "film.rung": "direct"})
+    axes = question_figure(chart_of(scene, best_rungs_already()), RAISED).axes[0]
+    axes.figure.draw_without_rendering()
+    [name] = [text for text in axes.texts if text.get_text() == "your scene"]
+    box = name.get_window_extent()
+    star = axes.transData.transform((1.0, 3.0))  # 0.5 s of half a second, 3 % off
+    assert abs(box.y0 - star[1]) < box.height
+    assert min(abs(box.x0 - star[0]), abs(box.x1 - star[0])) < 1.5 * box.height
+    for text in axes.texts:
+        assert text is name or not text.get_window_extent().overlaps(box)
+
+
+def test_points_deep_in_the_error_of_the_reference_do_not_stretch_the_axis(chart):
+    scene = load_scene("journal-bearing", {"duration": "0.5 s", "film.rung": "direct"})
+    deep = chart_of(scene, best_rungs_already(steps=(0.018, 0.009)))  # 0.3 % left
+    assert chart_figure(deep).axes[0].get_ylim()[0] == pytest.approx(0.3 / 10 / 2)
+    assert "drawn at its foot" in chart_html(deep)
+
+
+@pytest.mark.parametrize(
+    ("step", "comment"),
+    [
+        (1.3e-5, "13 µs; was not set: 19.5 µs by default"),
+        (1.953125e-05, "19.5 µs; was not set: this by default, which other rungs may change"),
+    ],
+)
+def test_a_step_is_told_in_its_unit_with_what_it_was(step, comment):
+    pump = load_scene("bilge-pump")
+    block = block_of({"numerics.step": step}, {"numerics.step": None},
+                     {"numerics.step": default_step(pump)})  # fmt: skip
+    assert block == f"[numerics]\nstep = {step}  # {comment}"
+    assert tomllib.loads(block) == {"numerics": {"step": step}}
 
 
 def test_an_order_near_none_is_not_extrapolated_from():
@@ -321,7 +442,7 @@ def test_text_and_json_tell_the_same(chart):
     for words in (
         *chart.conclusion,
         "mesh x2, x1, x1/2: peak film force [N] moves by 0.40% then 0.10%, order 2.00, 0.03% left",
-        "film link, mesh 144 x 33: a link is in tension",
+        "film link, mesh 144 around x 33 along: a link is in tension",
         "mesh = x4: a cheaper one errs no more",
         "film = finite: knows no feed",
     ):
@@ -430,12 +551,12 @@ def test_a_journal_needs_its_map_only(journal):
     _, chart = journal
     by_name = {point.name: point for point in chart.of(RAISED)}
     # Ocvirk at L/D 2/3 is off by tens of per cent; the map by the error of its table, 4e-4 C
-    assert by_name["film direct, mesh 48 x 9"].error == 0
+    assert by_name["film direct, mesh 48 around x 9 along"].error == 0
     assert min(p.error for n, p in by_name.items() if "film short" in n) > 0.02
-    assert by_name["mesh 48 x 9"].error < 1e-3
+    assert by_name["mesh 48 around x 9 along"].error < 1e-3
     assert chart.status == "resolved"
     # a map is interpolated, a direct film solved at every step
-    assert by_name[HERE].seconds < by_name["film direct, mesh 48 x 9"].seconds / 3
+    assert by_name[HERE].seconds < by_name["film direct, mesh 48 around x 9 along"].seconds / 3
     assert [choice.keeps for choice in chart.choices] == [True, True]
 
 
@@ -635,9 +756,10 @@ def test_a_cut_run_is_timed_as_a_whole_one_and_said_to_be_cut():
 def test_an_unfinished_chart_says_what_is_left():
     found = replace(study_of(SHORT, status="out of budget"), seconds_left=754.0)
     chart = chart_of(load_scene("journal-bearing", {"duration": "0.5 s"}), found)
-    assert chart_table(chart)["left"] == "some 13 min more of one core"
+    assert chart_table(chart)["left"] == "some 13 min more of one processor core"
     assert "so far: 5 of 9 combinations measured; the rest takes some 13 min" in chart_text(chart)
-    assert "The rest takes some 13 min more of one core." in chart_html(chart)
+    said = "All that is left, for both questions together, takes some 13 min more of one processor"
+    assert said in chart_html(chart)
     untimed = replace(found, seconds_left=math.nan)
     assert chart_of(load_scene("journal-bearing", {"duration": "0.5 s"}), untimed).left == ""
 

@@ -572,7 +572,8 @@ def test_without_the_time_to_tell_the_least_unsure_is_said_with_its_certainty():
     [choice] = chart_of(pilot.scene, found).choices
     assert choice.status == "so far"
     sure = percent(surely_within(chosen))
-    assert f"may be enough, not certain yet: surely within {sure} (95 in 100)" in choice.sentence
+    said = f"after {chosen.starts} starts only an error under {sure} is certain (at 95 %)"
+    assert f"may be enough, but {said}" in choice.sentence
     assert "is the safe choice" in choice.sentence
 
 

@@ -9,6 +9,7 @@ import tomllib
 import pytest
 from click.testing import CliRunner
 from wearstate.diagnose.charts.chart import Chart, Point
+from wearstate.diagnose.charts.figure import BEST
 from wearstate.diagnose.charts.page import chart_html
 from wearstate.diagnose.charts.points import chart_points
 from wearstate.diagnose.command_line.cli import cli
@@ -87,9 +88,9 @@ def test_a_point_tells_its_figures_and_its_settings(chart):
     [axes] = chart_points(chart)
     drawn = {each.name: each.marks for each in axes.series}
     assert set(drawn) == {
-        "on the front", "scatter too large to tell", "cheapest within the accuracy", "your scene",
+        BEST, "scatter too large to tell", "cheapest within the accuracy", "your scene",
     }  # fmt: skip
-    [mark] = drawn["on the front"]
+    [mark] = drawn[BEST]
     assert (mark.x, mark.y) == (0.01, pytest.approx(1.5))
     assert (mark.low, mark.high) == (pytest.approx(1.35), pytest.approx(1.65))
     assert mark.told.splitlines() == [

@@ -212,6 +212,8 @@ class Chart:
         Points measured, of those of interest; 0 of 0 where nothing was left out.
     left : str
         What an unfinished search still takes, in words; empty where that is not known.
+    alike : bool
+        All questions have one answer, against one reference: the last is shown.
     subject : str
         ``scene``, or ``recipe`` where the errors are those of the verdict.
     """
@@ -237,6 +239,7 @@ class Chart:
     measured: int = 0
     planned: int = 0
     left: str = ""
+    alike: bool = False
     subject: str = "scene"
 
     @property
@@ -245,10 +248,18 @@ class Chart:
         return tuple(dict.fromkeys(point.question for point in self.points))
 
     @property
-    def good(self) -> bool:
-        """The subject as written is within the accuracy, where one is asked."""
-        own = [point for point in self.points if point.here]
-        return all(point.verdict in ("within", "reference") for point in own)
+    def shown(self) -> tuple[str, ...]:
+        """Questions that are shown: of those with one answer the last, whose points are most."""
+        return self.questions[-1:] if self.alike else self.questions
+
+    def heading(self, question: str) -> str:
+        """Of what is shown of a question."""
+        return "all choices" if self.alike else question
+
+    @property
+    def shown_choices(self) -> tuple[Choice, ...]:
+        """Choices of the questions that are shown."""
+        return self.choices[-1:] if self.alike else self.choices
 
     @property
     def unfinished(self) -> bool:
@@ -461,16 +472,14 @@ def chart_text(chart: Chart) -> str:
     str
     """
     lines = [chart.title, "", *(chart.conclusion or (chart.verdict,))]
-    for choice in (each for each in chart.choices if each.block):
-        lines += [
-            "",
-            f"{choice.question}: paste into the {chart.subject}, or {choice.options}",
-            choice.block,
-        ]
+    for choice in (each for each in chart.shown_choices if each.block):
+        what = "settings" if chart.alike else choice.question
+        head = f"{what}: paste into the {chart.subject}, or {choice.options}"
+        lines += ["", head, choice.block]
     if chart.raises:
-        lines += ["", "each rung of your scene by itself"]
+        lines += ["", "each rung of your scene by itself; errors may cancel each other"]
         lines += [f"  {each.text}" for each in chart.raises]
-    for question in chart.questions:
+    for question in chart.shown:
         lines += ["", *_question_lines(chart, question)]
     if chart.convergence:
         lines += ["", "convergence of the references"]
@@ -493,7 +502,10 @@ def _question_lines(chart: Chart, question: str) -> list[str]:
     """Points that a person chooses among: where one stands, what to take, the front."""
     wanted = {choice.name for choice in chart.choices if choice.question == question}
     shown = [p for p in chart.of(question) if p.here or p.on_front or p.name in wanted]
-    head = [f"{question or chart.cost_label}", f"{'seconds':>10}  {'error':>8}  choice"]
+    head = [
+        f"{chart.heading(question) or chart.cost_label}",
+        f"{'seconds':>10}  {'error':>8}  choice",
+    ]
     return head + [
         f"{point.seconds:10.3g}  {_share(point.error):>8}  {point.name}"
         + (f" ({chart.label(point.worst)})" if point.error > 0 and point.errors else "")

@@ -22,6 +22,8 @@ from .chart import RECOMMENDED, Chart, Choice, Point
 FRONT, OTHER, DOUBTFUL, LIMIT = "#1f5a94", "#9aa3ab", "#e07b39", "#b3261e"
 WINNER, SO_FAR, HERE_COLOUR = "#3a923a", "#e07b39", "#111111"
 FLOOR = 1e-3  # %, the least error that is drawn; the reference sits on it
+BEST, BEATEN = "nothing faster is as accurate", "another is as accurate and faster"
+UNTOLD = "scatter too large to tell"
 _MOST_ROWS = 12  # of the front, in the table of quantities
 _WIDE = 46  # characters of a name on one line
 
@@ -45,7 +47,7 @@ def chart_figure(chart: Chart) -> Any:
     figure = Figure(figsize=(13, _POINTS + high), layout="constrained")
     said = "" if chart.choices else f"\n{_wrapped(chart.verdict, 150)}"
     figure.suptitle(f"{chart.title}{said}", fontsize=11)
-    questions = chart.questions or ("",)
+    questions = chart.shown or ("",)
     names = [f"points {i}" for i in range(len(questions))]
     mosaic: Any = [names, ["quantities"] * len(names)]
     panels = figure.subplot_mosaic(mosaic, height_ratios=(_POINTS - 1, high))
@@ -64,33 +66,43 @@ def _wrapped(text: str, width: int) -> str:
     return "\n".join(textwrap.wrap(text, width))
 
 
-def shown_error(point: Point) -> float:
-    """Error in per cent, not below the floor."""
-    return max(100 * point.error, FLOOR)
+def floor_of(chart: Chart) -> float:
+    """Least error that is drawn [%]: what lies deep in the reference's own error tells nothing."""
+    if chart.accuracy is None:
+        return FLOOR
+    return max(FLOOR, 100 * min(chart.remaining, chart.accuracy) * _DEEP)
+
+
+_DEEP = 0.1  # of the reference's own error
+
+
+def shown_error(point: Point, floor: float) -> float:
+    """Error in per cent, not below a floor [%]."""
+    return max(100 * point.error, floor)
 
 
 def _draw_points(axes: Any, chart: Chart, question: str, *, columns: int = 3) -> None:
-    points = chart.of(question)
+    points, floor = chart.of(question), floor_of(chart)
     finite = [p for p in points if math.isfinite(p.error) and math.isfinite(p.seconds)]
     front = sorted((p for p in finite if p.on_front), key=lambda p: p.seconds)
     axes.step(
         [p.seconds for p in front],
-        [shown_error(p) for p in front],
+        [shown_error(p, floor) for p in front],
         where="post",
         color=FRONT,
         lw=1.2,
-        label="front",
+        label="best at their speed",
         zorder=1,
     )
     for number, point in enumerate(chart.points):
         if any(point is each for each in finite):
-            _draw_point(axes, point, number)
+            _draw_point(axes, point, number, floor)
     if chart.accuracy is not None:
         axes.axhline(100 * chart.accuracy, color=LIMIT, lw=1, ls="--", label="accuracy asked")
     if chart.remaining > 0:
         axes.axhspan(
-            FLOOR / 2,
-            max(100 * chart.remaining, FLOOR / 2),
+            floor / 2,
+            max(100 * chart.remaining, floor / 2),
             color="#dfe3e8",
             zorder=0,
             label="the reference's own error",
@@ -99,17 +111,18 @@ def _draw_points(axes: Any, chart: Chart, question: str, *, columns: int = 3) ->
         if any(kind_of(p) == label for p in finite):
             axes.plot([], [], ls="none", label=label, **style)
     _mark_choice(axes, chart, question, finite)
-    _mark_here(axes, finite, chart.subject)
     axes.set(xscale="log", xlabel=chart.cost_label, ylabel=chart.error_label)
     if question:
-        axes.set_title(question, fontsize=10)
+        axes.set_title(chart.heading(question), fontsize=10)
     if chart.accuracy is not None:
         axes.set_yscale("log")
-        axes.set_ylim(FLOOR / 2, _HEADROOM * _highest(chart))
+        axes.set_ylim(floor / 2, _HEADROOM * _highest(chart))
+    axes.margins(x=_MARGIN)
     plain_numbers(axes.xaxis)
     plain_numbers(axes.yaxis)
     axes.grid(alpha=0.3, which="both")
-    _number(axes, front)
+    _mark_here(axes, finite, chart.subject, floor)
+    _number(axes, front, floor)
     _legend_below(axes, ncols=columns)
 
 
@@ -125,7 +138,7 @@ def _mark_choice(axes: Any, chart: Chart, question: str, finite: list[Point]) ->
         label = winner_words(chart) if final else "may be enough, not certain"
         axes.scatter(
             point.seconds,
-            shown_error(point),
+            shown_error(point, floor_of(chart)),
             s=260,
             facecolors="none",
             edgecolors=style["color"],
@@ -141,9 +154,12 @@ def choice_of(chart: Chart, question: str) -> Choice | None:
     return next((each for each in chart.choices if each.question == question), None)
 
 
-def _mark_here(axes: Any, finite: list[Point], subject: str) -> None:
+def _mark_here(axes: Any, finite: list[Point], subject: str, floor: float) -> None:
+    """A star with its name beside it, on the side of the panel's middle, above lines."""
+    from matplotlib.patheffects import withStroke
+
     for point in (p for p in finite if p.here):
-        place = (point.seconds, shown_error(point))
+        place = (point.seconds, shown_error(point, floor))
         axes.plot(
             *place, "*", ms=16, mfc="#ffd23f", mec=HERE_COLOUR, label=f"your {subject}", zorder=5
         )
@@ -151,36 +167,43 @@ def _mark_here(axes: Any, finite: list[Point], subject: str) -> None:
         axes.annotate(
             f"your {subject}",
             place,
-            xytext=(-10 if right else 10, -12),
+            xytext=(-9 if right else 9, 5),
             textcoords="offset points",
             ha="right" if right else "left",
-            va="top",
+            va="bottom",
             fontsize=9,
             weight="bold",
             color=HERE_COLOUR,
+            path_effects=[withStroke(linewidth=4, foreground="white")],
             zorder=5,
         )
 
 
+_MARGIN = 0.09  # of the width at either side: numbers stay inside the frame
 _RIGHT = 0.7  # of the panel: further right words stand left of their mark
 
 
-def _number(axes: Any, front: list[Point]) -> None:
-    """Numbers above the points of the front, below where the one before is too near."""
+def _number(axes: Any, front: list[Point], floor: float) -> None:
+    """Numbers above the points of the front, below where the one before is too near.
+
+    That of the scene as written is on the other side of its star than the name.
+    """
     from matplotlib.patheffects import withStroke
 
     to_panel = axes.transData + axes.transAxes.inverted()
     before, below = np.array([-1.0, -1.0]), True
     for number, point in enumerate(front, start=1):
-        place = (point.seconds, shown_error(point))
+        place = (point.seconds, shown_error(point, floor))
         here = to_panel.transform(place)
         below = bool(np.all(np.abs(here - before) < _NEAR)) and not below
         before = here
+        left = point.here and here[0] <= _RIGHT
         axes.annotate(
             str(number),
             place,
-            xytext=(6, -6 if below else 6),
+            xytext=(-7 if left else 6, -6 if below else 6),
             textcoords="offset points",
+            ha="right" if left else "left",
             va="top" if below else "bottom",
             fontsize=9,
             weight="bold",
@@ -192,7 +215,7 @@ def _number(axes: Any, front: list[Point]) -> None:
 
 def _highest(chart: Chart) -> float:
     """Largest error that is drawn, or the accuracy asked [%]."""
-    errors = [shown_error(p) for p in chart.points if math.isfinite(p.error)]
+    errors = [shown_error(p, FLOOR) for p in chart.points if math.isfinite(p.error)]
     return max([*errors, 100 * (chart.accuracy or 0.0), FLOOR])
 
 
@@ -215,27 +238,28 @@ def winner_words(chart: Chart) -> str:
 
 
 _KINDS: dict[str, dict[str, Any]] = {
-    "on the front": {"marker": "o", "ms": 8, "color": FRONT},
-    "beaten": {"marker": "o", "ms": 5, "color": OTHER},
-    "scatter too large to tell": {"marker": "s", "ms": 6, "mfc": "none", "color": DOUBTFUL},
+    BEST: {"marker": "o", "ms": 8, "color": FRONT},
+    BEATEN: {"marker": "o", "ms": 5, "color": OTHER},
+    UNTOLD: {"marker": "s", "ms": 6, "mfc": "none", "color": DOUBTFUL},
 }
 
 
 def kind_of(point: Point) -> str:
     """How a point is drawn, in the words of the legend."""
     if point.verdict == "doubtful":
-        return "scatter too large to tell"
-    return "on the front" if point.on_front else "beaten"
+        return UNTOLD
+    return BEST if point.on_front else BEATEN
 
 
-def _draw_point(axes: Any, point: Point, number: int) -> None:
+def _draw_point(axes: Any, point: Point, number: int, floor: float) -> None:
     """One point with its standard error, under an id that the page gives a name to."""
     error = 100 * point.standard_error
     if math.isfinite(error) and error > 0:
-        low = max(shown_error(point) - error, FLOOR)
-        axes.vlines(point.seconds, low, shown_error(point) + error, color=OTHER, lw=0.8, zorder=1)
+        value = shown_error(point, floor)
+        low = max(value - error, floor)
+        axes.vlines(point.seconds, low, value + error, color=OTHER, lw=0.8, zorder=1)
     (mark,) = axes.plot(
-        point.seconds, shown_error(point), ls="none", zorder=3, **_KINDS[kind_of(point)]
+        point.seconds, shown_error(point, floor), ls="none", zorder=3, **_KINDS[kind_of(point)]
     )
     mark.set_gid(f"point-{number}")
 
@@ -273,7 +297,7 @@ def _draw_quantities(figure: Any, axes: Any, chart: Chart) -> None:
     axes.set_xticks(range(len(names)), words, rotation=35, ha="right", fontsize=8)
     labels = [_wrapped(label, _WIDE) for label, _ in points]
     axes.set_yticks(range(len(points)), labels, fontsize=8)
-    what = "" if chart.choices else " on the front"
+    what = "" if chart.choices else ", best at their speed"
     axes.set_title(f"Error of every quantity{what} [{_unit(chart)}]", fontsize=10)
     figure.colorbar(shown, ax=axes, pad=0.01).ax.tick_params(labelsize=8)
 
@@ -296,10 +320,11 @@ def _table_points(chart: Chart) -> list[tuple[str, Point]]:
         numbered = [(f"{i} {p.name}", p) for i, p in enumerate(chart.front, start=1)]
         return numbered[-_MOST_ROWS:]
     rows = []
-    for choice in chart.choices:
+    for choice in chart.shown_choices:
         for point in (p for p in chart.of(choice.question) if p.errors):
             if point.here or point.name == choice.name:
-                rows.append((f"{choice.question}: {point.name}", point))
+                where = "" if chart.alike else f"{choice.question}: "
+                rows.append((f"{where}{point.name}", point))
     return rows
 
 
@@ -332,7 +357,7 @@ def question_figure(chart: Chart, question: str) -> Any:
 def question_images(chart: Chart) -> list[PageImage]:
     """A picture of points for each question; a point tells its name under the pointer."""
     images = []
-    for question in chart.questions or ("",):
+    for question in chart.shown or ("",):
         figure = question_figure(chart, question)
         svg = picture_bytes(figure, ".svg").decode()
         images.append(

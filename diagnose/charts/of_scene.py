@@ -21,7 +21,7 @@ from ...sim.fidelity.study import Answer, Search, Study
 from ...sim.scene.parts import Scene
 from ..pages.kept import Kept
 from .chart import RECOMMENDED, Chart, Choice, Clock, Point, RungCost, front_of, remaining_error
-from .scene_edit import block_of, options_of, written_value
+from .scene_edit import block_of, default_step, options_of, written_value
 from .words import (
     HERE,
     combination_words,
@@ -39,7 +39,6 @@ KEPT, RAISED = "your rungs kept", "rungs may change"
 """The two questions: only numerics may change; rungs as well."""
 
 _PAUSE = 2.0  # s between two writings of the runs that are kept
-_WORST = 3  # rungs that the conclusion names
 _SLACK = 0.9  # of the budget: what runs may take, the rest is for the page
 
 
@@ -190,11 +189,13 @@ def chart_of(scene: Scene, found: Study) -> Chart:
     choices = tuple(_choice(scene, found, a, name) for name, a in answers.items())
     final = [c for c in choices if c.status == "resolved"]
     where = (_standing(scene, found), *filter(None, [_costly_rungs(found)]))
-    conclusion = (*where, *(c.sentence for c in choices))
+    alike = _alike(found)
+    told = [choices[-1]] if alike else choices
+    conclusion = (*where, *(c.sentence for c in told))
     return Chart(
         name=scene.name,
         title=f"{scene.name} (simulated): how much model does this scene need?",
-        cost_label="wall time of a simulated second [s/s]",
+        cost_label="time to compute one simulated second [s]",
         error_label="largest error of a quantity of interest [%]",
         accuracy=found.accuracy,
         points=points,
@@ -212,7 +213,28 @@ def chart_of(scene: Scene, found: Study) -> Chart:
         measured=found.measured,
         planned=found.planned,
         left=_left_words(found),
+        alike=alike,
         note=_note(scene, found),
+    )
+
+
+def _best_already(found: Study) -> bool:
+    """Whether the scene's rungs are the best that it can have: only numerics can be better."""
+    return found.raised is not None and _rungs_of(found.raised) == _rungs_of(found.kept)
+
+
+def _rungs_of(answer: Answer) -> dict[str, str]:
+    return dict(answer.reference.rungs)
+
+
+def _alike(found: Study) -> bool:
+    """Whether both questions have one answer: the same settings, against the same reference."""
+    raised = found.raised
+    return (
+        raised is not None
+        and _best_already(found)
+        and dict(raised.changes) == dict(found.kept.changes)
+        and _status(found, raised) == _status(found, found.kept)
     )
 
 
@@ -220,7 +242,7 @@ def _left_words(found: Study) -> str:
     """What an unfinished search still takes; empty where that is not known."""
     if found.status != "out of budget" or not found.seconds_left > 0:
         return ""
-    return f"some {time_words(found.seconds_left)} more of one core"
+    return f"some {time_words(found.seconds_left)} more of one processor core"
 
 
 def _note(scene: Scene, found: Study) -> str:
@@ -270,10 +292,12 @@ def _points(scene: Scene, found: Study, answer: Answer, question: str) -> Iterat
 
 def _point_block(scene: Scene, each: Candidate, name: str) -> str:
     """What a scene must change to be this point."""
-    before = {path: written_value(scene, path) for path in each.values}
+    before = _before(scene, each.values)
     changes = {path: value for path, value in each.values.items() if before[path] != value}
     head = f"# {scene.name}: {name}"
-    return f"{head}\n{block_of(changes, before)}" if changes else head
+    if not changes:
+        return head
+    return f"{head}\n{block_of(changes, before, {_STEP: default_step(scene)})}"
 
 
 def _reason(each: Candidate, scene: Scene) -> str:
@@ -314,7 +338,32 @@ def _standing(scene: Scene, found: Study) -> str:
         else "not yet known to be within"
     )
     text = f"Your scene as written is {word} {percent(found.accuracy)} of {against}: "
-    return f"{text}{error_words(own, scene, found.accuracy)}."
+    return f"{text}{error_words(own, scene, found.accuracy)}{_own_error(found)}{_cause(found)}."
+
+
+def _own_error(found: Study) -> str:
+    """What the reference is itself off by, where it is no small part of the accuracy."""
+    most = max(map(remaining_error, found.whole.convergence), default=0.0)
+    if not most > _NO_SMALL_PART * found.accuracy:
+        return ""
+    return f" (the reference itself may be {percent(most)} off)"
+
+
+_NO_SMALL_PART = 0.1
+
+
+def _cause(found: Study) -> str:
+    """Which numerics are to blame, where the rungs are the best and better numerics do."""
+    own, chosen = found.whole.written, found.kept.chosen
+    if own is None or own.verdict != "beyond" or not _best_already(found):
+        return ""
+    changed = [e for e, rung in chosen.rungs.items() if rung != found.written.get(e)]
+    if chosen.verdict != "within" or not changed:
+        return ""
+    *first, last = map(effect_words, changed)
+    names, verb = (f"{', '.join(first)} and {last}", "are") if first else (last, "is")
+    best = "" if _alike(found) else "rungs are the best already, but its "
+    return f". Its {best}{names} {verb} too coarse"
 
 
 def _costly_rungs(found: Study) -> str:
@@ -323,13 +372,15 @@ def _costly_rungs(found: Study) -> str:
         return ""
     known = [e for e in found.raises if math.isfinite(e.candidate.error)]
     costly = sorted(known, key=lambda each: -each.candidate.error)
-    named = [e for e in costly if found.accuracy < e.candidate.error][:_WORST]
+    named = [e for e in costly if found.accuracy < e.candidate.error]
     if named:
-        parts = [
-            f"{effect_words(e.effect)} {e.written} instead of {e.best} {percent(e.candidate.error)}"
-            for e in named
-        ]
-        return f"Errors of single rungs, which do not add up: {', '.join(parts)}."
+        worst, others = named[0], len(named) - 1
+        more = f"; {others} more {'is' if others == 1 else 'are'} over {percent(found.accuracy)}"
+        return (
+            f"Of its rungs one by one, the worst is {effect_words(worst.effect)} {worst.written} "
+            f"instead of {worst.best}: {percent(worst.candidate.error)} off"
+            f"{more if others else ''}. Errors of single rungs may cancel each other."
+        )
     if len(known) < len(found.raises):
         return ""
     most = costly[0]
@@ -398,7 +449,7 @@ def _sentence(
     scene: Scene, found: Study, answer: Answer, question: str, status: str, own: float
 ) -> str:
     """Conclusion about a question."""
-    opening, chosen = _OPENING[question], answer.chosen
+    opening, chosen = _opening(found, question), answer.chosen
     asked = percent(found.accuracy)
     if status == "not converged":
         worst = max(answer.convergence, key=remaining_error)
@@ -412,8 +463,8 @@ def _sentence(
         return (
             f"{opening}: {combination_words(chosen, found.written)} is the safe choice "
             f"({faster_words(chosen.seconds, own)}); whether anything cheaper does, there is no "
-            f"answer yet: nothing else is known to be within {asked}{nearest}, with "
-            f"{found.measured} of {found.planned} combinations measured; more --budget goes on."
+            f"answer yet: nothing else is known to be within {asked}{nearest}; more --budget "
+            "goes on."
         )
     name = combination_words(chosen, found.written)
     what = "change nothing" if name == HERE else f"take {name}"
@@ -427,18 +478,32 @@ def _sentence(
     faster = "" if name == HERE else f", {faster_words(chosen.seconds, own)}"
     certain = _certainty(scene, found, answer, status)
     if answer is found.kept and _rungs_too_coarse(found):
-        left = error_words(cast(Candidate, found.whole.written), scene)
-        if name == HERE and status == "resolved":
-            what = "your numerics are fine"
-            certain += f", but your rungs are not: their error stays, {left}"
-        else:
-            certain += f". Your rungs are too coarse whatever their numerics: {left}"
-    elif name != HERE and _enough(answer.written):
+        fine = "look fine" if status == "so far" else "are fine"
+        if not _by_default(answer):
+            errs += ", against the finest numerics of the same rungs"
+        numerics = f"your numerics {fine}" if name == HERE else f"{what}; then your numerics {fine}"
+        return (
+            f"{opening}: {numerics} ({errs}{faster}), but your rungs are not "
+            f"({_rungs_off(scene, found)}), whatever the numerics{certain}."
+        )
+    if name != HERE and _enough(answer.written):
         spare = (
             f"to run faster, {what}" if is_faster(chosen.seconds, own) else f"{name} would do too"
         )
         what = f"nothing must change; {spare}"
     return f"{opening}: {what} ({errs}{faster}){certain}."
+
+
+def _opening(found: Study, question: str) -> str:
+    if _alike(found):
+        return "Your rungs are already the best of this scene"
+    return _OPENING[question]
+
+
+def _rungs_off(scene: Scene, found: Study) -> str:
+    """Error of the scene as written, against the best rungs."""
+    own = cast(Candidate, found.whole.written)
+    return f"{error_words(own, scene, found.accuracy)}, against the best rungs"
 
 
 def _nearest(scene: Scene, found: Study, answer: Answer) -> str:
@@ -468,10 +533,9 @@ def _enough(own: Candidate | None) -> bool:
 def _certainty(scene: Scene, found: Study, answer: Answer, status: str) -> str:
     doubted = answer.doubted
     if status == "so far":
-        measured = f"{found.measured} of {found.planned} combinations measured"
         if answer.chosen.verdict != "doubtful":
-            return f"; so far this is enough: {measured}"
-        return f"; so far this {_likelihood(found, answer)}; {measured}"
+            return f". So far {_named(found, answer)[1]} enough"
+        return f". So far {_likelihood(found, answer)}"
     if status == "unresolvable" and doubted:
         name = combination_words(doubted[0], found.written)
         return (
@@ -482,16 +546,23 @@ def _certainty(scene: Scene, found: Study, answer: Answer, status: str) -> str:
     return ""
 
 
+def _named(found: Study, answer: Answer) -> tuple[str, str, str]:
+    """What is or seems enough: the choice, or its numerics where its rungs are too coarse."""
+    if answer is found.kept and _rungs_too_coarse(found):
+        return "the numerics look", "the numerics are", "the numerics may be"
+    return "this looks", "this is", "this may be"
+
+
 def _likelihood(found: Study, answer: Answer) -> str:
     """How sure it is that a choice of few starts is enough, and what it takes to know."""
     chosen = answer.chosen
-    word = "looks enough" if chosen.error <= found.accuracy else "may be enough"
+    looks, _, may = _named(found, answer)
+    word = looks if chosen.error <= found.accuracy else may
     most, needed = surely_within(chosen), starts_to_tell(chosen, found.accuracy)
-    known = f"surely within {percent(most)} (95 in 100)" if most < 1 else "nothing is sure yet"
-    text = f"{word}, not certain yet: {known} after {chosen.starts} starts"
-    seconds = (needed - chosen.starts) * (chosen.seconds + answer.reference.seconds)
-    if needed > chosen.starts and math.isfinite(seconds):
-        text += f". To tell takes some {needed} starts, {time_words(seconds)} more of one core"
+    known = f"only an error under {percent(most)}" if most < 1 else "nothing"
+    text = f"{word} enough, but after {chosen.starts} starts {known} is certain (at 95 %)"
+    if needed > chosen.starts:
+        text += f"; to be sure of {percent(found.accuracy)} takes some {needed} starts"
     if chosen.error > found.accuracy:
         safe = combination_words(answer.reference, found.written)
         own = math.nan if answer.written is None else answer.written.seconds
@@ -505,12 +576,24 @@ def _commented(scene: Scene, found: Study, answer: Answer) -> str:
         return ""
     name = combination_words(answer.chosen, found.written)
     return f"# {scene.name}: {name}; {error_words(answer.chosen, scene)} (simulated)\n" + block_of(
-        answer.changes, {path: written_value(scene, path) for path in answer.changes}
+        answer.changes, _before(scene, answer.changes), {_STEP: default_step(scene)}
     )
 
 
+def _before(scene: Scene, changes: Mapping[str, Any]) -> dict[str, Any]:
+    """What stands at the paths that change."""
+    return {path: written_value(scene, path) for path in changes}
+
+
+_STEP = "numerics.step"
+
+
 def _rung_costs(scene: Scene, found: Study) -> Iterator[RungCost]:
-    for each in found.raises:
+    """The largest error first; what could not be compared last."""
+    known = [math.isfinite(each.candidate.error) for each in found.raises]
+    order = [-e.candidate.error if k else 1.0 for e, k in zip(found.raises, known, strict=True)]
+    for i in sorted(range(len(order)), key=order.__getitem__):
+        each = found.raises[i]
         candidate = each.candidate
         worst = max(candidate.differences, key=lambda n: candidate.differences[n].error, default="")
         yield RungCost(
@@ -518,7 +601,7 @@ def _rung_costs(scene: Scene, found: Study) -> Iterator[RungCost]:
             written=each.written,
             best=each.best,
             error=candidate.error,
-            standard_error=candidate.standard_error,
+            standard_error=_scatter(candidate),
             worst=quantity_label(worst, scene)[0] if worst else "",
             starts=candidate.starts,
             text=raise_words(each, scene),

@@ -1,5 +1,6 @@
 """Page of a chart, and the forms in which it is written."""
 
+import itertools
 import math
 from collections.abc import Callable
 from pathlib import Path
@@ -9,8 +10,17 @@ from ..pages.page import render, save_page
 from ..pages.picture import save_picture
 from ..pages.plain_json import json_text
 from ..pages.points import point_block
-from .chart import RECOMMENDED, Chart, Point, chart_table, convergence_text, save_rows
-from .figure import chart_figure, chart_svg, choice_of, question_images, shaded_rows
+from .chart import RECOMMENDED, Chart, Choice, Point, chart_table, convergence_text, save_rows
+from .figure import (
+    FLOOR,
+    ShadedCell,
+    chart_figure,
+    chart_svg,
+    choice_of,
+    floor_of,
+    question_images,
+    shaded_rows,
+)
 from .points import chart_points
 from .words import percent, with_scatter
 
@@ -38,15 +48,21 @@ def chart_html(chart: Chart, *, interactive: bool = False) -> str:
     return render(
         "chart.html.j2",
         chart=chart,
-        images=images,
-        shaded=shaded_rows(chart),
+        pictures_shown=[
+            (image, _numbered(chart, question))
+            for image, question in zip(images, chart.shown or ("",), strict=True)
+        ],
+        shaded=_shaded(chart),
         block=block,
         tapped="its settings as TOML" if any(p.block for p in chart.points) else "its figures",
-        tables=[(question, _rows(chart, question)) for question in chart.questions],
+        tables=[(chart.heading(question), _rows(chart, question)) for question in chart.shown],
         quantities=_quantity_rows(chart),
         convergence=[convergence_text(each, chart.labels) for each in chart.convergence],
+        cards=_cards(chart),
         recommended=RECOMMENDED,
         lines=_lines(chart),
+        reference_error=percent(chart.remaining) if chart.remaining > 0 else "",
+        floored=floor_of(chart) > FLOOR,
         unbroken=_unbroken,
         with_scatter=with_scatter,
         finite=math.isfinite,
@@ -57,7 +73,7 @@ def chart_html(chart: Chart, *, interactive: bool = False) -> str:
 def _lines(chart: Chart) -> list[tuple[str, bool]]:
     """The conclusion; whether a line says where the subject stands, or what to do about it."""
     lines = chart.conclusion or (chart.verdict,)
-    advice = [c.sentence for c in chart.choices if c.enough and c.status in RECOMMENDED]
+    advice = [c.sentence for c in chart.shown_choices if c.enough and c.status in RECOMMENDED]
     first = {lines[0], *advice[:1]}
     return [(_unbroken(line), line in first) for line in lines]
 
@@ -65,6 +81,38 @@ def _lines(chart: Chart) -> list[tuple[str, bool]]:
 def _unbroken(text: str) -> str:
     """Text whose figures are not torn from their signs at the end of a line."""
     return text.replace(" %", "\u00a0%").replace(" ± ", "\u00a0±\u00a0")
+
+
+def _shaded(chart: Chart) -> tuple[list[str], list[tuple[str, list[ShadedCell]]]]:
+    """Errors by quantity; of a scene, whose quantities are many, a quantity a row."""
+    names, rows = shaded_rows(chart)
+    if not chart.choices or not rows:
+        return names, rows
+    columns = zip(*(cells for _, cells in rows), strict=True)
+    return [label for label, _ in rows], [
+        (name, list(cells)) for name, cells in zip(names, columns, strict=True)
+    ]
+
+
+def _cards(chart: Chart) -> list[tuple[Choice, bool, bool, bool]]:
+    """Choices; whether the one before has the same settings; its width; whether it is optional.
+
+    Settings stand beside each other where there are two, else across the page without a blank. A
+    change is optional where the subject as written is within the accuracy.
+    """
+    shown = chart.shown_choices
+    again = [
+        bool(one.block) and dict(one.changes) == dict(before.changes)
+        for before, one in itertools.pairwise(shown)
+    ]
+    repeated = [False, *again][: len(shown)]
+    settings = [bool(c.block) and not r for c, r in zip(shown, repeated, strict=True)]
+    alone = sum(settings) == 1
+    own = {p.question: p.verdict in ("within", "reference") for p in chart.points if p.here}
+    return [
+        (choice, same, alone or not has, own.get(choice.question, False))
+        for choice, same, has in zip(shown, repeated, settings, strict=True)
+    ]
 
 
 def _rows(chart: Chart, question: str) -> list[tuple[int | str, Point, bool]]:
@@ -76,9 +124,15 @@ def _rows(chart: Chart, question: str) -> list[tuple[int | str, Point, bool]]:
     return [(numbers.get(id(point), ""), point, point.name == wanted) for point in points]
 
 
+def _numbered(chart: Chart, question: str) -> list[str]:
+    """What the numbers of a picture stand for."""
+    front = [p for p in chart.of(question) if p.on_front]
+    return [point.name for point in sorted(front, key=lambda p: p.seconds)]
+
+
 def _quantity_rows(chart: Chart) -> list[tuple[str, list[Any]]]:
     """Of the scene as written: quantity in words, its difference for each question."""
-    own = [next((p for p in chart.of(q) if p.here), None) for q in chart.questions]
+    own = [next((p for p in chart.of(q) if p.here), None) for q in chart.shown]
     shown = [point for point in own if point is not None]
     return [(words, [p.errors.get(name) for p in shown]) for name, words in chart.labels.items()]
 

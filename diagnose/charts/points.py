@@ -6,14 +6,17 @@ from collections.abc import Iterator
 from ..pages.points import DrawnLine, Mark, PointAxes, Series
 from .chart import RECOMMENDED, Chart, Point
 from .figure import (
+    BEATEN,
+    BEST,
     DOUBTFUL,
-    FLOOR,
     FRONT,
     HERE_COLOUR,
     OTHER,
     SO_FAR,
+    UNTOLD,
     WINNER,
     choice_of,
+    floor_of,
     kind_of,
     shown_error,
     winner_words,
@@ -21,9 +24,9 @@ from .figure import (
 from .words import percent, with_scatter
 
 _LOOKS = {
-    "on the front": (FRONT, 10.0, True),
-    "beaten": (OTHER, 8.0, True),
-    "scatter too large to tell": (DOUBTFUL, 8.0, False),
+    BEST: (FRONT, 10.0, True),
+    BEATEN: (OTHER, 8.0, True),
+    UNTOLD: (DOUBTFUL, 8.0, False),
 }
 """Colour, size [px] and filling of each kind."""
 
@@ -40,22 +43,22 @@ def chart_points(chart: Chart) -> list[PointAxes]:
     list of PointAxes
         Without points that never ran or have no error.
     """
-    return [_points(chart, question) for question in chart.questions]
+    return [_points(chart, question) for question in chart.shown]
 
 
 def _points(chart: Chart, question: str) -> PointAxes:
     finite = [p for p in chart.of(question) if math.isfinite(p.error) and math.isfinite(p.seconds)]
     front = sorted((p for p in finite if p.on_front), key=lambda p: p.seconds)
     line = DrawnLine(
-        name="front",
+        name="best at their speed",
         x=tuple(p.seconds for p in front),
-        y=tuple(shown_error(p) for p in front),
+        y=tuple(shown_error(p, floor_of(chart)) for p in front),
         colour=FRONT,
         steps=True,
     )
     asked = chart.accuracy
     return PointAxes(
-        title=question or chart.title,
+        title=chart.heading(question) or chart.title,
         x_name=chart.cost_label,
         y_name=chart.error_label,
         x_kind="log",
@@ -93,14 +96,15 @@ def _wanted(chart: Chart, question: str) -> tuple[str, bool]:
 
 
 def _mark(chart: Chart, point: Point) -> Mark:
-    error, value = 100 * point.standard_error, shown_error(point)
+    floor = floor_of(chart)
+    error, value = 100 * point.standard_error, shown_error(point, floor)
     known = math.isfinite(error) and error > 0
     lines = _lines(chart, point)
     plain = "\n".join(f"# {line}" for text in lines[1:] for line in text.splitlines())
     return Mark(
         x=point.seconds,
         y=value,
-        low=max(value - error, FLOOR) if known else math.nan,
+        low=max(value - error, floor) if known else math.nan,
         high=value + error if known else math.nan,
         told="\n".join(lines),
         block=f"{point.block or f'# {point.name}'}\n{plain}",

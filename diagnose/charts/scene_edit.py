@@ -8,9 +8,11 @@ from typing import Any
 from ...datasets.recipe.draws import value_at
 from ...datasets.recipe.text import toml_text
 from ...sim.atomic import write_whole
+from ...sim.machine.registry import machine_of
 from ...sim.scene.load import scene_from_table, scene_table, scene_text
 from ...sim.scene.parts import Scene, SceneError, beside
 from ...sim.scene.rungs import with_values
+from .words import short_time
 
 _HEADER = re.compile(r"\s*(\[{1,2})\s*([^\[\]#]+?)\s*\]{1,2}\s*(#.*)?$")
 _VALUE = r"(\"[^\"]*\"|'[^']*'|[^#]*?)"  # of one line
@@ -24,7 +26,17 @@ def written_value(scene: Scene, path: str) -> Any:
         return None
 
 
-def block_of(changes: Mapping[str, Any], before: Mapping[str, Any] | None = None) -> str:
+def default_step(scene: Scene) -> float | None:
+    """Integration step that a scene runs with [s]; None of a machine without."""
+    step = machine_of(scene).step
+    return None if step is None else step(scene)
+
+
+def block_of(
+    changes: Mapping[str, Any],
+    before: Mapping[str, Any] | None = None,
+    defaults: Mapping[str, Any] | None = None,
+) -> str:
     """Values by dotted path as TOML tables.
 
     Parameters
@@ -33,6 +45,8 @@ def block_of(changes: Mapping[str, Any], before: Mapping[str, Any] | None = None
         Dotted path -> number or text; entries of lists by their number.
     before : mapping of str to object, optional
         The same paths -> what stands there now, for a comment behind each line.
+    defaults : mapping of str to object, optional
+        Path -> value that the program takes where nothing stands there.
 
     Returns
     -------
@@ -50,15 +64,19 @@ def block_of(changes: Mapping[str, Any], before: Mapping[str, Any] | None = None
     >>> print(block_of({"film.n_theta": 96}, {"film.n_theta": 48}))
     [film]
     n_theta = 96  # was 48
+    >>> path = "numerics.step"
+    >>> print(block_of({path: 1.3e-5}, {path: None}, {path: 9.8e-6}))
+    [numerics]
+    step = 1.3e-05  # 13 µs; was not set: 9.8 µs by default
     """
     tables: dict[str, dict[str, Any]] = {}
     for path, value in changes.items():
         table, _, key = path.rpartition(".")
         tables.setdefault(table, {})[key] = value
     blocks = [
-        _lines(values, table, before)
+        _lines(values, table, before, defaults or {})
         if not table
-        else f"[{table}]\n{_lines(values, table, before)}"
+        else f"[{table}]\n{_lines(values, table, before, defaults or {})}"
         for table, values in sorted(tables.items(), key=lambda row: bool(row[0]))
         if not re.search(r"\.\d+(\.|$)", table)
     ]
@@ -71,16 +89,37 @@ def block_of(changes: Mapping[str, Any], before: Mapping[str, Any] | None = None
     return "\n".join([*blocks, *listed]).rstrip()
 
 
-def _lines(values: Mapping[str, Any], table: str, before: Mapping[str, Any] | None) -> str:
+def _lines(
+    values: Mapping[str, Any],
+    table: str,
+    before: Mapping[str, Any] | None,
+    defaults: Mapping[str, Any],
+) -> str:
     """Lines of a table, each with what it replaces."""
     rows = []
     for key, value in values.items():
         line = toml_text({key: value}).strip()
         if before is not None:
-            old = before.get(f"{table}.{key}".lstrip("."))
-            line += "  # was not set" if old is None else f"  # was {_plain(old)}"
+            path = f"{table}.{key}".lstrip(".")
+            line += f"  # {_was(path, value, before.get(path), defaults.get(path))}"
         rows.append(f"{line}\n")
     return "".join(rows)
+
+
+_STEP = "numerics.step"  # [s], of microseconds
+
+
+def _was(path: str, value: Any, old: Any, default: Any) -> str:
+    """What a value replaces; of what was not set, what the program took."""
+    words = short_time if path == _STEP else _plain
+    said = f"{words(value)}; " if path == _STEP else ""
+    if old is not None:
+        return f"{said}was {words(old)}"
+    if default is None:
+        return f"{said}was not set"
+    if words(default) == words(value):
+        return f"{said}was not set: this by default, which other rungs may change"
+    return f"{said}was not set: {words(default)} by default"
 
 
 def _plain(value: Any) -> str:

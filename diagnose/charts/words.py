@@ -52,20 +52,27 @@ def rung_words(effect: str, rung: str, values: Mapping[str, Any]) -> str:
     >>> rung_words("step", "x2", {"numerics.step": 1.953125e-05})
     'step 19.5 µs'
     >>> rung_words("mesh", "x1", {"film.n_theta": 72, "film.n_z": 17})
-    'mesh 72 x 17'
+    'mesh 72 around x 17 along'
     """
     if effect == "step" and "numerics.step" in values:
-        return f"step {_seconds(values['numerics.step'])}"
+        return f"step {short_time(values['numerics.step'])}"
     if effect == "tolerance" and "numerics.tolerance" in values:
         return f"tolerance {values['numerics.tolerance']:.2g}"
     if effect == "mesh" and "film.n_theta" in values:
-        return f"mesh {values['film.n_theta']} x {values['film.n_z']}"
+        return f"mesh {values['film.n_theta']} around x {values['film.n_z']} along"
     if effect == "elements" and "shaft.longest_element" in values:
         return f"elements of {values['shaft.longest_element']:.3g} m"
     return f"{effect_words(effect)} {rung}"
 
 
-def _seconds(value: float) -> str:
+def short_time(value: float) -> str:
+    """A time below a second, in the unit that suits it.
+
+    Examples
+    --------
+    >>> short_time(1.953125e-05), short_time(0.004)
+    ('19.5 µs', '4 ms')
+    """
     return f"{1e6 * value:.3g} µs" if value < _MILLI else f"{1e3 * value:.3g} ms"
 
 
@@ -201,14 +208,18 @@ def faster_words(seconds: float, own: float) -> str:
 
     Examples
     --------
-    >>> faster_words(1.0, 3.0), faster_words(3.0, 1.0), faster_words(1.0, 1.02)
+    >>> faster_words(1.0, 3.0), faster_words(3.0, 1.0), faster_words(1.0, 1.001)
     ('3 times as fast as your scene', '3 times the time of your scene', 'as fast as your scene')
+    >>> faster_words(1.02, 1.0), faster_words(1.0, 1.1)
+    ('2 % slower than your scene', '9 % faster than your scene')
     """
     ratio = own / seconds
     if not math.isfinite(ratio):
         return "not timed"
     if 1 / _ALIKE < ratio < _ALIKE:
-        return "as fast as your scene"
+        change = round(100 * (1 / ratio - 1))
+        word = "slower" if change > 0 else "faster"
+        return f"{abs(change)} % {word} than your scene" if change else "as fast as your scene"
     if ratio > 1:
         return f"{ratio:.2g} times as fast as your scene"
     return f"{1 / ratio:.2g} times the time of your scene"
