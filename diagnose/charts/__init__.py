@@ -2,6 +2,6 @@
 
 It may import ``sim.atomic``, ``sim.output``, ``sim.scene``, ``sim.machine``,
 ``sim.fidelity``, ``features.catalogue``, ``datasets.file``, ``datasets.workers``,
-``datasets.recipe``, ``datasets.split``, ``datasets.generation``, ``diagnose.pages``, ``diagnose.learning``,
-``diagnose.feature_rows``.
+``datasets.recipe``, ``datasets.split``, ``datasets.generation``, ``diagnose.pages``,
+``diagnose.learning``, ``diagnose.feature_rows``.
 """
