@@ -22,7 +22,7 @@ from .chart import RECOMMENDED, Chart, Choice, Point
 FRONT, OTHER, DOUBTFUL, LIMIT = "#1f5a94", "#9aa3ab", "#e07b39", "#b3261e"
 WINNER, SO_FAR, HERE_COLOUR = "#3a923a", "#e07b39", "#111111"
 FLOOR = 1e-3  # %, the least error that is drawn; the reference sits on it
-BEST, BEATEN = "nothing faster is as accurate", "another is as accurate and faster"
+BEST, BEATEN = "best for its time", "another is better"
 UNTOLD = "scatter too large to tell"
 _MOST_ROWS = 12  # of the front, in the table of quantities
 _WIDE = 46  # characters of a name on one line
@@ -91,7 +91,7 @@ def _draw_points(axes: Any, chart: Chart, question: str, *, columns: int = 3) ->
         where="post",
         color=FRONT,
         lw=1.2,
-        label="best at their speed",
+        label="the best",
         zorder=1,
     )
     for number, point in enumerate(chart.points):
@@ -297,7 +297,7 @@ def _draw_quantities(figure: Any, axes: Any, chart: Chart) -> None:
     axes.set_xticks(range(len(names)), words, rotation=35, ha="right", fontsize=8)
     labels = [_wrapped(label, _WIDE) for label, _ in points]
     axes.set_yticks(range(len(points)), labels, fontsize=8)
-    what = "" if chart.choices else ", best at their speed"
+    what = "" if chart.choices else ", best for their time"
     axes.set_title(f"Error of every quantity{what} [{_unit(chart)}]", fontsize=10)
     figure.colorbar(shown, ax=axes, pad=0.01).ax.tick_params(labelsize=8)
 

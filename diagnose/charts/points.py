@@ -50,7 +50,7 @@ def _points(chart: Chart, question: str) -> PointAxes:
     finite = [p for p in chart.of(question) if math.isfinite(p.error) and math.isfinite(p.seconds)]
     front = sorted((p for p in finite if p.on_front), key=lambda p: p.seconds)
     line = DrawnLine(
-        name="best at their speed",
+        name="the best",
         x=tuple(p.seconds for p in front),
         y=tuple(shown_error(p, floor_of(chart)) for p in front),
         colour=FRONT,
