@@ -54,7 +54,7 @@ def chart_figure(chart: Chart) -> Any:
     for name in names[1:]:
         panels[name].sharey(panels[names[0]])
     for name, question in zip(names, questions, strict=True):
-        _draw_points(panels[name], chart, question)
+        _draw_points(panels[name], chart, question, columns=2 if len(names) > 1 else 3)
     _draw_quantities(figure, panels["quantities"], chart)
     return figure
 
@@ -81,7 +81,7 @@ def shown_error(point: Point, floor: float) -> float:
     return max(100 * point.error, floor)
 
 
-def _draw_points(axes: Any, chart: Chart, question: str, *, columns: int = 3) -> None:
+def _draw_points(axes: Any, chart: Chart, question: str, *, columns: int) -> None:
     points, floor = chart.of(question), floor_of(chart)
     finite = [p for p in points if math.isfinite(p.error) and math.isfinite(p.seconds)]
     front = sorted((p for p in finite if p.on_front), key=lambda p: p.seconds)
