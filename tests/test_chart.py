@@ -292,6 +292,13 @@ def test_rungs_that_are_too_coarse_are_said_whatever_comes_of_the_numerics():
         "finest numerics of the same rungs), but your rungs are not (40 % off in peak film force, "
         "against the best rungs), whatever the numerics."
     )
+    # numerics that are off by more than asked, for all that is known, are not called fine
+    open_ = answer_of(doubt, reference=fine, status="so far")
+    for error, said in ((0.03, "are not known to be fine (3 %"), (0.01, "look fine (1 %")):
+        chosen = candidate(0.015, error, "doubtful", film="map", mesh="x2")
+        so_far = replace(found, kept=replace(open_, chosen=chosen), status="out of budget")
+        kept = chart_of(load_scene("journal-bearing", {"duration": "0.5 s"}), so_far).choices[0]
+        assert f"then your numerics {said} off in peak film force, against" in kept.sentence
     # the best rungs already: what is off is the mesh
     best = replace(found, raises=())
     kept = chart_of(load_scene("journal-bearing", {"duration": "0.5 s"}), best).choices[0].sentence

@@ -478,12 +478,12 @@ def _sentence(
     faster = "" if name == HERE else f", {faster_words(chosen.seconds, own)}"
     certain = _certainty(scene, found, answer, status)
     if answer is found.kept and _rungs_too_coarse(found):
-        fine = "look fine" if status == "so far" else "are fine"
+        fine, but = _how_fine(found, answer, status)
         if not _by_default(answer):
             errs += ", against the finest numerics of the same rungs"
         numerics = f"your numerics {fine}" if name == HERE else f"{what}; then your numerics {fine}"
         return (
-            f"{opening}: {numerics} ({errs}{faster}), but your rungs are not "
+            f"{opening}: {numerics} ({errs}{faster}), {but} your rungs are not "
             f"({_rungs_off(scene, found)}), whatever the numerics{certain}."
         )
     if name != HERE and _enough(answer.written):
@@ -492,6 +492,15 @@ def _sentence(
         )
         what = f"nothing must change; {spare}"
     return f"{opening}: {what} ({errs}{faster}){certain}."
+
+
+def _how_fine(found: Study, answer: Answer, status: str) -> tuple[str, str]:
+    """What is known of numerics whose rungs are not fine, and the word between both."""
+    if status != "so far":
+        return "are fine", "but"
+    if answer.chosen.error <= found.accuracy:
+        return "look fine", "but"
+    return "are not known to be fine", "and"
 
 
 def _opening(found: Study, question: str) -> str:
