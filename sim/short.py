@@ -49,7 +49,9 @@ def brief(*names: str) -> Callable[[Any], str]:
 
 
 def _short(value: Any) -> str:
-    if value is None or (isinstance(value, np.ndarray | Sequence | Mapping) and len(value) == 0):
+    if value is None or (isinstance(value, Sequence | Mapping) and len(value) == 0):
+        return ""
+    if isinstance(value, np.ndarray) and value.size == 0:
         return ""
     if isinstance(value, str):
         return repr(value if len(value) <= _LONGEST else f"{value[: _LONGEST - 1]}…")

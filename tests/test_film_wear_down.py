@@ -33,6 +33,7 @@ def sunk(wear, *, offset=(0.0, 0.0), measured=None, film=80e-6):
     return SinkingRun(
         readings=np.add(towards, offset),
         places=(CubicSpline(wears, np.array(rows)),),
+        likely=(1.0,),
         swing=5e-6,
         clearance=0.35e-3,
         measured=measured,
@@ -97,8 +98,16 @@ def test_a_bore_worn_to_an_arc_is_allowed_for():
     angles = [probe.angle for probe in plain.probes]
     places = sinking_places(plain, 0, LIMIT)
 
+    likely = [before for before, _ in possible_bores(plain.bearings[0])]
+
     def told_by(bores):
-        run = SinkingRun(readings=np.array(state), places=bores, swing=2e-5, clearance=0.35e-3)
+        run = SinkingRun(
+            readings=np.array(state),
+            places=bores,
+            likely=tuple(likely[: len(bores)]),
+            swing=2e-5,
+            clearance=0.35e-3,
+        )
         return film_wear_down(run, angles, LIMIT, AS_NEW, Doubts(offset=15e-6))
 
     assert "no wear-down puts the journal" in told_by(places[:1]).reason
@@ -112,7 +121,7 @@ def test_a_bore_worn_to_an_arc_is_allowed_for():
 
 def test_a_scene_that_tells_the_bore_is_believed():
     told = {"bearings.0.worn_shape": "arc", "bearings.0.groove_width": "20 deg"}
-    assert possible_bores(load_scene("propulsion-shaft", told).bearings[0]) == ({},)
+    assert possible_bores(load_scene("propulsion-shaft", told).bearings[0]) == ((1.0, {}),)
 
 
 def test_a_line_that_no_film_carries_says_so():

@@ -12,6 +12,7 @@ from wearstate.sim.beam.beam import Disc, PointLoad, Section, assemble_beam
 from wearstate.sim.beam.rotor import Rotor, modes
 from wearstate.sim.film.bearing import JournalBearing, coefficients, operate
 from wearstate.sim.film.solve import FilmGeometry, Groove, dufrane_scar
+from wearstate.sim.scene.load import load_scene
 from wearstate.sim.shaft.on_oil_films import (
     FilmBearing,
     ShaftFilmError,
@@ -19,6 +20,7 @@ from wearstate.sim.shaft.on_oil_films import (
     beam_film,
     supports,
 )
+from wearstate.sim.shaft.recording import film_bearings, running_beam
 
 SPEED = 2 * math.pi * 2.0
 STATIONS = (1.3, 5.0, 11.0, 17.0)
@@ -290,6 +292,21 @@ def test_an_arc_as_wide_as_the_worn_circle_is_that_circle(depth):
     assert_allclose(places[1], places[0], atol=1e-3 * films[0].bearing.clearance)
     assert_allclose(arc.least_film, circle.least_film, rtol=1e-2)
     assert_allclose(arc.middle_films, circle.middle_films, rtol=2e-3)  # between nodes, and at them
+
+
+@pytest.mark.parametrize("own", [0.25, 0.5])
+def test_the_mesh_of_the_scene_is_fine_enough_for_an_arc(own):
+    """Against twice as many nodes, at the condemning wear-down; a third of them is 42 um off."""
+    worn = {"bearings.0.worn_shape": "arc", "bearings.0.arc_clearance": own}
+    heights = []
+    for nodes in (48, 96):
+        changes = {**worn, "bearings.0.wear_down": 0.9e-3, "film.n_theta": nodes}
+        scene = load_scene("propulsion-shaft", changes)
+        speed = 2 * math.pi * scene.drive.speed
+        films = film_bearings(scene)
+        assert films[0].bearing.geometry.n_theta == 3 * films[1].bearing.geometry.n_theta
+        heights.append(beam_film(running_beam(scene), films, speed).positions[0])
+    assert_allclose(heights[0], heights[1], atol=0.02 * 0.35e-3)
 
 
 def test_an_arc_leaves_the_rest_of_the_bore_as_new():

@@ -5,8 +5,8 @@ the line loads it with. Beam and films are solved together for some wear-downs, 
 more viscosity and a little more clearance: that gives the readings of the probes as functions of
 what is not known exactly, and least squares as those of a single journal do the rest.
 
-Nobody sees the worn bore: it may have stayed a circle, or have an arc, and grooves. Each of these
-is tried, and counts by how well it explains the readings.
+The shape of the worn bore is not known: it may be a circle still, or have an arc, and grooves. Each
+of these is tried, and counts by how well it explains the readings.
 """
 
 import math
@@ -28,12 +28,8 @@ Float = NDArray[np.float64]
 
 _SHARES = (0.0, 0.25, 0.6, 1.0, 1.5)  # of the condemning wear-down, where the line is solved
 _HEALTHY = (0.0, 0.1, 0.25)  # the same for a healthy bearing
-_ARCS = (
-    0.25,
-    0.5,
-    0.9,
-)  # clearance in a worn arc over that of the bore, where the scene tells none
-_GROOVES = (math.radians(15.0), math.radians(32.0))  # widths at the sides, the same
+_ARCS = (0.25, 0.5, 0.9)  # clearance in a worn arc over that of the bore
+_GROOVES = (math.radians(14.0), math.radians(32.0))  # widths at the sides, the same
 _CHANGE = 0.05  # of viscosity and clearance, for their slopes
 _BUILT = 0.09  # of a clearance as new: makers' tolerance 15 %, evenly spread
 _LOOSEST = 0.3  # standard error over the condemning wear-down, above which nothing is told
@@ -52,6 +48,8 @@ class SinkingRun:
         For each bore of :func:`possible_bores`: wear-down [m] -> height and side of the journal
         [m], their slopes by the logarithm of the viscosity, and by that of the clearance as new.
         None for a bore that carries no line.
+    likely : tuple of float
+        Probability of each bore before the readings.
     swing : float
         rms of the motion about the mean [m].
     clearance : float
@@ -62,12 +60,13 @@ class SinkingRun:
 
     readings: Float
     places: tuple[CubicSpline | None, ...]
+    likely: tuple[float, ...]
     swing: float
     clearance: float
     measured: float | None = None
 
 
-def possible_bores(bearing: "ShaftBearing") -> tuple[dict[str, Any], ...]:
+def possible_bores(bearing: "ShaftBearing") -> tuple[tuple[float, dict[str, Any]], ...]:
     """What a worn bearing's bore may be: that of the scene, and others where it tells none.
 
     Parameters
@@ -76,23 +75,33 @@ def possible_bores(bearing: "ShaftBearing") -> tuple[dict[str, Any], ...]:
 
     Returns
     -------
-    tuple of dict
-        Fields of the bearing that are changed; nothing in the first.
+    tuple of (float, dict)
+        Probability before anything is read, and fields of the bearing that are changed; nothing in
+        the first. An arc is as likely as a circle, grooves are as likely as none.
 
     Examples
     --------
     >>> from wearstate.sim.scene.load import load_scene
     >>> bearing = load_scene("propulsion-shaft").bearings[0]
     >>> len(possible_bores(bearing)), possible_bores(bearing)[0]
-    (12, {})
+    (12, (0.25, {}))
     """
-    shapes: list[dict[str, Any]] = [{}]
+    shapes: list[dict[str, Any]] = []
     if bearing.worn_shape == "circle":
-        shapes += [{"worn_shape": "arc", "arc_clearance": own} for own in _ARCS]
-    grooves: list[dict[str, Any]] = [{}]
+        shapes = [{"worn_shape": "arc", "arc_clearance": own} for own in _ARCS]
+    grooves: list[dict[str, Any]] = []
     if bearing.groove_width == 0:
-        grooves += [{"groove_width": width} for width in _GROOVES]
-    return tuple({**shape, **groove} for groove in grooves for shape in shapes)
+        grooves = [{"groove_width": width} for width in _GROOVES]
+    return tuple(
+        (a * b, {**groove, **shape}) for a, groove in _even(grooves) for b, shape in _even(shapes)
+    )
+
+
+def _even(others: Sequence[dict[str, Any]]) -> list[tuple[float, dict[str, Any]]]:
+    """As the scene has it, half of the probability, or one of the others."""
+    if not others:
+        return [(1.0, {})]
+    return [(0.5, {}), *((0.5 / len(others), other) for other in others)]
 
 
 def sinking_places(
@@ -141,7 +150,7 @@ def sinking_places(
             return None
         return CubicSpline(wears, np.hstack([own, *slopes]))
 
-    return tuple(of(bore) for bore in possible_bores(scene.bearings[bearing]))
+    return tuple(of(bore) for _, bore in possible_bores(scene.bearings[bearing]))
 
 
 def _ways(scene: "ShaftScene", bearing: int, wears: Sequence[float]) -> Float:
@@ -149,11 +158,11 @@ def _ways(scene: "ShaftScene", bearing: int, wears: Sequence[float]) -> Float:
     from ...sim.shaft.on_oil_films import beam_film
     from ...sim.shaft.recording import film_bearings, running_beam
 
-    places = []
+    beam, places = running_beam(scene), []
     for wear in wears:
         worn = _with_bearing(scene, bearing, {"wear_down": wear})
         found = beam_film(
-            running_beam(worn),
+            beam,
             film_bearings(worn),
             math.tau * worn.drive.speed,
             rung=worn.film.rung,
@@ -249,15 +258,17 @@ class _Explained(NamedTuple):
     left: float
 
 
-def _mixed(each: Sequence[_Explained], costs: Sequence[float]) -> _Explained:
+def _mixed(
+    each: Sequence[_Explained], costs: Sequence[float], likely: Sequence[float]
+) -> _Explained:
     """Of several bores, each by how well it explains the readings.
 
-    The weight is its evidence by Laplace's method: likelihood times the range of wear it allows.
-    Before the readings that of the scene, the first, is as likely as all others together.
+    The weight is its probability before, times its likelihood, times the range of wear that it
+    allows: nearly its evidence by Laplace's method.
     """
-    likely = -np.asarray(costs) + np.log([one.error for one in each])
-    weights = np.exp(likely - likely.max())
-    weights[0] *= max(1, len(each) - 1)
+    evidence = np.log([one.error * before for one, before in zip(each, likely, strict=True)])
+    evidence -= np.asarray(costs)
+    weights = np.exp(evidence - evidence.max())
     weights /= weights.sum()
     wears = np.array([one.wear for one in each])
     wear = float(weights @ wears)
@@ -318,14 +329,15 @@ class _Problem:
 
     def explained(self) -> _Explained:
         """By all bores that carry the line in every run."""
-        each, costs = [], []
-        for bore in range(len(self.runs[0].places)):
+        each, costs, likely = [], [], []
+        for bore, before in enumerate(self.runs[0].likely):
             ways = [run.places[bore] for run in self.runs]
             if None not in ways:
                 found, cost = self._by(ways)
                 each.append(found)
                 costs.append(cost)
-        return _mixed(each, costs)
+                likely.append(before)
+        return _mixed(each, costs, likely)
 
     def _by(self, ways: Sequence[Any]) -> tuple[_Explained, float]:
         residuals = partial(self.residuals, ways)

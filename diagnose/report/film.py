@@ -17,7 +17,7 @@ from ...sim.scene.shaft import ShaftScene
 from ..feature_rows.healthy import Baseline
 from ..feature_rows.probe_means import ProbeMeans, probe_means
 from ..film_clearance.clearance import FilmEstimate, JournalRun, film_clearance
-from ..film_clearance.wear_down import SinkingRun, film_wear_down, sinking_places
+from ..film_clearance.wear_down import SinkingRun, film_wear_down, possible_bores, sinking_places
 from ..nameplate.nameplate import Nameplate, told_conditions
 from ..wear_model.estimate import Estimate
 from .beside import length_words, with_second
@@ -151,6 +151,7 @@ def _sinking_run(
     return SinkingRun(
         readings=readings,
         places=places,
+        likely=tuple(likely for likely, _ in possible_bores(scene.bearings[number])),
         swing=swing,
         clearance=scene.bearings[number].diametral_clearance / 2,
         measured=_measured(means, severity, healthy),

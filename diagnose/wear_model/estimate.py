@@ -325,7 +325,8 @@ class WearModel:
         Parameters
         ----------
         rows : numpy.ndarray [shape=(n, n_features)], Recording or sequence of Recording
-            Features in the order of ``card.features``, or what they are computed from.
+            Features in the order of ``card.features``, or what they are computed from; faults of
+            a recording are not looked for, see :meth:`estimate`.
         baseline : numpy.ndarray [shape=(n, n_features)] or [shape=(n_features,)], optional
             Healthy rows of the same machines, of a referenced model.
         conditions : sequence of mapping, optional
@@ -339,7 +340,7 @@ class WearModel:
         Raises
         ------
         DataError
-            The model is referenced and there is no baseline.
+            The model is referenced and there is no baseline, or `rows` is none of these.
         """
         inputs = self._inputs(self._rows(rows), baseline)
         found = self.blind.severity.predict(inputs)
@@ -371,6 +372,10 @@ class WearModel:
         heard = [given] if isinstance(given, Recording) else given
         if isinstance(heard, np.ndarray):
             return heard
+        if not len(heard) or not all(isinstance(each, Recording) for each in heard):
+            raise DataError(
+                "rows must be an array of features, a recording, or a list of recordings"
+            )
         return np.array([self._row(self._at_rate(each), None) for each in heard])
 
     def _inputs(self, rows: Float, baseline: Float | None) -> Float:

@@ -1,6 +1,7 @@
 """The file of a wear model: what is in it, and whether its parts fit each other."""
 
 import json
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Self
@@ -360,7 +361,7 @@ def _calibration_fits(known: IntervalCalibration) -> bool:
         and np.size(known.group) > 0
         and all(spreads_fit(part) for part in arrays[:3])
         and isinstance(known.widened, float)
-        and known.widened >= 1
+        and 1 <= known.widened < math.inf
     )
 
 

@@ -98,9 +98,10 @@ def _numeric(name: str, scale: float = 1.0) -> Callable[[Any], dict[str, float]]
 
 
 def _gap(bearing: ShaftBearing) -> float:
-    """Radial clearance as it is now, of the circle around the journal [m]."""
-    grown = bearing.wear_down if bearing.worn_shape == "circle" else 0.0
-    return (bearing.diametral_clearance + grown) / 2
+    """Radial clearance of the circle that the journal lies in, as it is now [m]."""
+    if bearing.wear_down > 0 and bearing.worn_shape == "arc":
+        return bearing.arc_clearance * bearing.diametral_clearance / 2
+    return (bearing.diametral_clearance + bearing.wear_down) / 2
 
 
 # --- bearings

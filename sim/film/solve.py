@@ -243,7 +243,7 @@ def worn_arc(depth: float, clearance: float, angle: float, n_theta: int) -> Arra
     -------
     numpy.ndarray [shape=(n_theta,)]
         ``max(0, (depth + 1 - clearance) cos(theta - angle) - (1 - clearance))`` over C: zero
-        outside of the arc.
+        outside of the arc. With a clearance above 1 the arc goes all round.
 
     Raises
     ------
