@@ -27,7 +27,7 @@ ROOMS = {
     "sim": [
         "atomic",
         "jit",
-        "short",
+        "brief",
         "output",
         "scene",
         "contact",

@@ -1,8 +1,9 @@
 """Command lines that pages show are run, those of a page in their order and in one folder.
 
 What a page shows is what runs, but for two rules. A file that a page names and that no earlier line
-of it writes is a small one (`STAND_INS`); so is one that a shortened command wrote. And counts and
-budgets are cut (`CUTS`), nothing else. Guides run as they stand, in test_site.
+of it writes is a small one (`STAND_INS`); so is one that a shortened command wrote. And counts,
+sizes and budgets are cut and one process is taken (`CUTS`), nothing else. Guides run as they
+stand, in test_site.
 """
 
 import glob

@@ -1,5 +1,5 @@
 """The alignment page of a shaft line: moves, films, margins, quiet running.
 
 It may import ``sim.scene``, ``sim.film``, ``sim.alignment``, ``sim.shaft``, ``diagnose.pages``,
-``diagnose.shaft_tests``, ``sim.short``.
+``diagnose.shaft_tests``, ``sim.brief``.
 """

@@ -21,11 +21,11 @@ from ...sim.alignment.alignment import (
 )
 from ...sim.alignment.calibration import Block, Calibration, CalibrationStatus, calibrate
 from ...sim.alignment.jacking import Jacking, jacking
+from ...sim.brief import brief
 from ...sim.scene.parts import Scene
 from ...sim.scene.shaft import ShaftScene
 from ...sim.shaft.on_oil_films import ShaftFilmError
 from ...sim.shaft.recording import alignment_conditions, alignment_line
-from ...sim.short import brief
 from ..pages.page import render, save_page, short_name
 from ..pages.picture import PageImage, drawn_alone, page_image, save_picture
 from ..shaft_tests.measured_tests import LineTest

@@ -320,7 +320,8 @@ def widening(calibration: IntervalCalibration, parts: Sequence[NDArray[np.bool_]
     Returns
     -------
     float
-        At least 1. A part may lack what chance explains, one standard error of its share.
+        At least 1. A part may fall short by one standard error of its share; as the weakest part
+        counts, chance alone gives 1.02 for 6,000 machines and ten parts, 1.09 for 900.
 
     References
     ----------

@@ -25,7 +25,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import cho_solve_banded, cholesky_banded
 
 from ..beam.beam import Beam, PointLoad
-from ..short import brief
+from ..brief import brief
 
 Vector = NDArray[np.float64]
 Index = NDArray[np.int64]

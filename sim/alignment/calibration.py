@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linprog
 
-from ..short import brief
+from ..brief import brief
 from .alignment import (
     AS_SET,
     LIMIT_UNITS,

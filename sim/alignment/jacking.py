@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..beam.beam import Beam, DistributedLoad, PointLoad, assemble_beam
-from ..short import brief
+from ..brief import brief
 from .alignment import (
     AS_SET,
     FEWEST_POINTS,

@@ -1,4 +1,4 @@
 """An elastic shaft: beam elements, natural frequencies, Campbell diagram, unbalance response.
 
-It may import ``sim.short``.
+It may import ``sim.brief``.
 """

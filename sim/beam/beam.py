@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import coo_array
 
-from ..short import brief
+from ..brief import brief
 
 Vector = NDArray[np.float64]
 Index = NDArray[np.int64]

@@ -26,7 +26,7 @@ from scipy.optimize import brentq, linear_sum_assignment
 from scipy.sparse import block_array, coo_array, csc_array
 from scipy.sparse.linalg import LinearOperator, eigs, eigsh, splu
 
-from ..short import brief
+from ..brief import brief
 from .beam import Beam, Sparse
 
 Vector = NDArray[np.float64]

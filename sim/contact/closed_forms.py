@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..short import brief
+from ..brief import brief
 
 
 @dataclass(frozen=True, kw_only=True)

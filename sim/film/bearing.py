@@ -25,7 +25,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..short import brief
+from ..brief import brief
 from .direct import DIRECT_OK, STATUS, DirectFilm, direct_tilted_force
 from .rungs import FILM_RUNGS
 from .slopes import Coefficients, perturbation

@@ -34,8 +34,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..atomic import sealed, unsealed, write_whole
+from ..brief import brief
 from ..jit import cache_folder, kernel
-from ..short import brief
 from .direct import DIRECT_OK, STATUS, DirectFilm, direct_force
 from .solve import FilmGeometry, direct_film
 

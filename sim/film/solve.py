@@ -17,7 +17,7 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
-from ..short import brief
+from ..brief import brief
 from .direct import (
     DIRECT_ITERATIONS,
     DIRECT_TOUCH,

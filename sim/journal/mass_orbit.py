@@ -20,9 +20,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..brief import brief
 from ..film.mass_conserving import EndPressure, MassStep, mass_step, oil_in_gap
 from ..film.solve import FilmGeometry, FilmSolution, FilmState
-from ..short import brief
 from .orbit import Load, OrbitStatus, load_at
 
 _SETTLED = 1e-7  # of the gap that is left: what the place at the end of a step may be off by

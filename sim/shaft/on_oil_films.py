@@ -46,6 +46,7 @@ from scipy.sparse.linalg import splu
 
 from ..beam.beam import Beam
 from ..beam.rotor import Support
+from ..brief import brief
 from ..film.bearing import JournalBearing, short_attitude, short_eccentricity
 from ..film.direct import DIRECT_OK, STATUS, DirectFilm, direct_tilted_force
 from ..film.impedance_map import ImpedanceMap, impedance_map, map_force
@@ -59,7 +60,6 @@ from ..film.solve import (
     direct_film,
     worn_arc,
 )
-from ..short import brief
 
 Vector = NDArray[np.float64]
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from ..alignment.alignment import AlignmentLine, Condition, Seat, seat_stations
 from ..beam.beam import Beam, Disc, PointLoad, Section, assemble_beam
 from ..beam.rotor import Rotor, Support
+from ..brief import brief
 from ..excitation.forces import Push, read_cell
 from ..film.bearing import JournalBearing
 from ..film.solve import FilmGeometry, Groove
@@ -37,7 +38,6 @@ from ..scene.shaft import (
     ShaftScene,
     Turbulence,
 )
-from ..short import brief
 from .elements import element_faults
 from .on_oil_films import BeamFilm, FilmBearing, ShaftFilmStatus, beam_film
 from .push import lead_samples, peak_push, pushed_motion, pushed_stations, pushes

@@ -15,6 +15,7 @@ from functools import partial
 import numpy as np
 from scipy.optimize import brentq
 
+from ..brief import brief
 from ..film.bearing import BearingError, Equilibrium, equilibrium
 from ..film.solve import FilmGeometry
 from ..journal.recording import film_geometry
@@ -25,7 +26,6 @@ from ..pump.slider_crank import CrankRun
 from ..scene.journal import JournalScene
 from ..scene.parts import SceneError, nearest
 from ..scene.pump import PumpScene
-from ..short import brief
 from .archard import Float, scar_shape, sliding_work
 
 _SETTLING = 3  # revolutions; contact forgets its start within one

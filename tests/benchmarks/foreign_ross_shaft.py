@@ -7,7 +7,8 @@ tilted films; about that balance shaft and housings move by
 
 solved directly at every line of the spectrum (banded elimination, no modes). Probes, run-out,
 gains, offsets, accelerometers and tacho are as the scene `propulsion-shaft` and its recipe say;
-nothing is from `wearstate.sim`. What differs from the library, each to be switched off by name:
+nothing is from `wearstate.sim`. What differs from the library's scene, each to be switched off by
+name (its standard recipe draws grooves, and arcs of the same geometry as `scar`):
 
 grooves
     Two axial grooves at the sides of every bearing hold no pressure. Else: none.

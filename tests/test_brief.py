@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 import wearstate
-from wearstate.sim.short import brief
+from wearstate.sim.brief import brief
 
 LONGEST = 200
 """Characters: two lines of a console."""
