@@ -33,6 +33,9 @@ _GROOVES = (math.radians(14.0), math.radians(32.0))  # widths at the sides, the 
 _CHANGE = 0.05  # of viscosity and clearance, for their slopes
 _BUILT = 0.09  # of a clearance as new: makers' tolerance 15 %, evenly spread
 _LOOSEST = 0.3  # standard error over the condemning wear-down, above which nothing is told
+_OR_HEALTHY = (
+    ", or give healthy recordings (--baseline): they tell offsets from a bore of another shape"
+)
 _BEYOND = 1.5  # of the condemning wear-down: the line was not solved farther
 
 
@@ -231,7 +234,7 @@ def film_wear_down(
             healthy=len(healthy),
             reason=f"no wear-down puts the journal where the probes see it: {found.left:.1f} "
             f"standard deviations are left, must be <= {CONTRADICTED:g}; check thrust, hull, oil "
-            "and the probes",
+            f"and the probes{'' if healthy else _OR_HEALTHY}",
         )
     if error > _LOOSEST * limit or wear > _BEYOND * limit:
         return FilmEstimate(
@@ -328,7 +331,11 @@ class _Problem:
         self.scatter = np.array([math.hypot(FLOOR, run.swing**2 / run.clearance) for run in runs])
 
     def explained(self) -> _Explained:
-        """By all bores that carry the line in every run."""
+        """By all bores that carry the line in every run.
+
+        Without healthy runs a bore of another shape explains what is an offset of the probes: the
+        scene's own bore must then explain the readings.
+        """
         each, costs, likely = [], [], []
         for bore, before in enumerate(self.runs[0].likely):
             ways = [run.places[bore] for run in self.runs]
@@ -337,7 +344,8 @@ class _Problem:
                 each.append(found)
                 costs.append(cost)
                 likely.append(before)
-        return _mixed(each, costs, likely)
+        found = _mixed(each, costs, likely)
+        return found._replace(left=each[0].left) if self.n == 1 else found
 
     def _by(self, ways: Sequence[Any]) -> tuple[_Explained, float]:
         residuals = partial(self.residuals, ways)
