@@ -42,13 +42,25 @@ def brief(*names: str) -> Callable[[Any], str]:
 
     def told(self: Any) -> str:
         chosen = names or [field.name for field in fields(self) if field.repr]
-        words = [f"{name}={text}" for name in chosen if (text := _short(getattr(self, name)))]
+        words = [f"{name}={text}" for name in chosen if (text := short(getattr(self, name)))]
         return f"<{type(self).__name__} {', '.join(words)}>"
 
     return told
 
 
-def _short(value: Any) -> str:
+def short(value: Any) -> str:
+    """A value in a few words; empty where it is None or empty.
+
+    Parameters
+    ----------
+    value : object
+        A number, text, array, sequence, mapping or anything else.
+
+    Examples
+    --------
+    >>> short(12.3456), short(np.zeros((2, 60))), short(())
+    ('12.35', 'array(2, 60)', '')
+    """
     if value is None or (isinstance(value, Sequence | Mapping) and len(value) == 0):
         return ""
     if isinstance(value, np.ndarray) and value.size == 0:
@@ -70,7 +82,7 @@ def _short(value: Any) -> str:
 
 def _array(value: np.ndarray[Any, Any]) -> str:
     if value.ndim == 1 and len(value) <= _FEW:
-        return f"[{', '.join(_short(each) for each in value.tolist())}]"
+        return f"[{', '.join(short(each) for each in value.tolist())}]"
     return f"array({', '.join(map(str, value.shape))})"
 
 
@@ -78,7 +90,7 @@ def _several(value: Sequence[Any] | Mapping[Any, Any]) -> str:
     each = list(value.values()) if isinstance(value, Mapping) else list(value)
     plain = not isinstance(value, Mapping) and all(isinstance(one, Number | str) for one in each)
     if plain and len(each) <= _FEW:
-        return f"({', '.join(map(_short, each))})"
+        return f"({', '.join(map(short, each))})"
     return f"{len(each)} of {type(each[0]).__name__}"
 
 

@@ -74,3 +74,12 @@ def test_kinds_of_fields():
 
     long = Each(True, None, "x" * 99, (1.5, 2), {"a": Each, "b": 2}, np.zeros((0, 2)))
     assert repr(long) == f"<Each flag=True, text='{'x' * 39}…', numbers=(1.5, 2), table=2 of type>"
+
+
+@pytest.mark.parametrize("name", ["bilge-pump", "journal-bearing", "propulsion-shaft"])
+def test_a_scene_shows_its_parts_in_a_notebook(name):
+    shown = wearstate.load_scene(name)._repr_html_()
+    assert f"{name}, " in shown
+    assert "<tr><td>duration</td><td>" in shown
+    assert 10 < shown.count("<tr>") < 40
+    assert "None" not in shown

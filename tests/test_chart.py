@@ -181,7 +181,9 @@ def test_three_sentences_say_where_one_stands_and_what_to_take(chart):
     here, kept, raised = chart.conclusion
     assert here.startswith("Your scene as written is within 2 % of the best rungs: 0.1 % off in")
     assert "peak film force" in here
-    assert kept.startswith("With your rungs kept: nothing must change; to run faster, take mesh")
+    assert kept.startswith(
+        "With your rungs kept: nothing needs to change; to run faster, take mesh"
+    )
     assert "mesh 36 around x 9 along (1.2 % off in peak film force" in kept
     assert "1.3 times as fast as your scene" in kept
     assert "If rungs may change: change nothing (0.1 % off in peak film force)." in raised

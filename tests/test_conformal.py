@@ -146,8 +146,13 @@ def test_widened_intervals_hold_at_the_end_of_a_condition_too():
     assert 0.86 < held["wide"] < 0.92
 
 
-@pytest.mark.parametrize(("machines", "most"), [(300, 1.25), (3000, 1.06)])
+@pytest.mark.parametrize(("machines", "most"), [(300, 1.18), (3000, 1.06)])
 def test_intervals_of_equal_parts_are_widened_by_chance_alone(machines, most):
+    """The widest of ten tenths lies 1.5 standard errors above the mean, and one is allowed.
+
+    A standard error of a tenth's quantile is 0.16 of it with 300 machines, 0.05 with 3,000: half of
+    it is expected, and twice that the most.
+    """
     found = []
     for seed in range(20):
         rng = np.random.default_rng(seed)

@@ -667,3 +667,6 @@ def test_a_model_takes_arrays_and_tables_with_a_rate_and_predicts_recordings(sma
     rows = np.array([recording_features(each)[1] for each in recordings])
     np.testing.assert_array_equal(model.predict(recordings), model.predict(rows))
     assert model.predict(first)[0] == model.predict(rows)[0]
+    for given in ([], rows.tolist()):
+        with pytest.raises(DataError, match="rows = list must be an array of features"):
+            model.predict(given)

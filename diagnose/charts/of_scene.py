@@ -490,7 +490,7 @@ def _sentence(
         spare = (
             f"to run faster, {what}" if is_faster(chosen.seconds, own) else f"{name} would do too"
         )
-        what = f"nothing must change; {spare}"
+        what = f"nothing needs to change; {spare}"
     return f"{opening}: {what} ({errs}{faster}){certain}."
 
 

@@ -79,10 +79,8 @@ def _bores(axes: Any, state: "ShaftState", path: NDArray[Any]) -> None:
     for i, bearing in enumerate(state.film.bearings):
         own = bearing.worn
         place = path[:, i] / own.clearance
-        if (arc := own.geometry.bore) is not None:
-            angle = 2 * np.pi * np.arange(len(arc) + 1) / len(arc)
-            radius = 1 + np.append(arc, arc[0])
-            axes.plot(-radius * np.sin(angle), -radius * np.cos(angle), ":", color=f"C{i}", lw=0.8)
+        if (bore := own.geometry.bore) is not None:
+            axes.plot(*_touching(bore), ":", color=f"C{i}", lw=0.8)
         name = short_name(bearing.name, 24)
         axes.plot(place[:, 1], place[:, 0], lw=0.6, color=f"C{i}", label=name)
         middle = place.mean(axis=0)
@@ -90,7 +88,21 @@ def _bores(axes: Any, state: "ShaftState", path: NDArray[Any]) -> None:
     axes.set(xlabel="to starboard", ylabel="up", title="Journals over their clearances")
     axes.set_aspect("equal", adjustable="box")
     axes.grid(alpha=0.3)
-    axes.legend(fontsize=6, loc="upper right")
+    axes.legend(fontsize=6, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+
+
+def _touching(bore: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Where the middle of a journal can be at the most, seen from aft: no gap is negative there.
+
+    Of the extra gap of a bore over its clearance, as of
+    :class:`wearstate.sim.film.solve.FilmGeometry`, whose angle counts from straight down.
+    """
+    angle = 2 * np.pi * np.arange(len(bore)) / len(bore)
+    way = np.linspace(0, 2 * np.pi, 361)
+    share = np.cos(way[:, np.newaxis] - angle)
+    with np.errstate(divide="ignore"):
+        reach = np.where(share > 0, (1 + bore) / share, np.inf).min(axis=1)
+    return -reach * np.sin(way), -reach * np.cos(way)
 
 
 def _lines(truth: Truths) -> Iterator[tuple[str, str]]:

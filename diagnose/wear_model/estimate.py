@@ -374,7 +374,8 @@ class WearModel:
             return heard
         if not len(heard) or not all(isinstance(each, Recording) for each in heard):
             raise DataError(
-                "rows must be an array of features, a recording, or a list of recordings"
+                f"rows = {type(given).__name__} must be an array of features, a recording, or "
+                "several recordings; arrays of samples are for estimate"
             )
         return np.array([self._row(self._at_rate(each), None) for each in heard])
 

@@ -264,9 +264,13 @@ def worn_arc(depth: float, clearance: float, angle: float, n_theta: int) -> Arra
         raise ValueError(f"depth = {depth} must be >= 0 and finite; it is the wear depth over C")
     if not 0 < clearance < math.inf:
         raise ValueError(f"clearance = {clearance} must be > 0 and finite; it is over C")
+    return _other_circle(depth + 1.0 - clearance, 1.0 - clearance, angle, n_theta)
+
+
+def _other_circle(lower: float, smaller: float, angle: float, n_theta: int) -> Array:
+    """Gap beyond a bore of a circle whose middle is lower, and whose clearance is smaller."""
     theta = 2 * math.pi * np.arange(n_theta) / n_theta
-    lower = depth + 1.0 - clearance
-    return np.maximum(0.0, lower * np.cos(theta - angle) - (1.0 - clearance))
+    return np.maximum(0.0, lower * np.cos(theta - angle) - smaller)
 
 
 def dufrane_scar(depth: float, angle: float, n_theta: int) -> Array:
@@ -303,8 +307,7 @@ def dufrane_scar(depth: float, angle: float, n_theta: int) -> Array:
     """
     if not 0 <= depth < 2:
         raise ValueError(f"depth = {depth} must be in [0, 2); it is the wear depth over C")
-    theta = 2 * math.pi * np.arange(n_theta) / n_theta
-    return np.maximum(0.0, depth - 1.0 + np.cos(theta - angle))
+    return _other_circle(1.0, 1.0 - depth, angle, n_theta)
 
 
 def direct_film(geometry: FilmGeometry, *, tilted: bool = False) -> DirectFilm:

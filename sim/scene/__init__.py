@@ -1,4 +1,4 @@
 """What the machine is: validated parts without physics, built-in scenes, rungs, plausibility.
 
-It may import ``sim.output``.
+It may import ``sim.output``, ``sim.brief``.
 """

@@ -31,6 +31,8 @@ from pydantic import (
 )
 from pydantic_core import CoreSchema
 
+from ..brief import short
+from ..output.recording import html_table
 from ..output.sensor import SIMULATED_RATE_LEAST, SIMULATED_RATE_MOST, Channel, tacho_pulses
 from ..output.spellings import spellings
 
@@ -755,6 +757,12 @@ class Scene(Part):
         return f"<{type(self).__name__} {self.name}, {self.duration:.4g} s, {told}>"
 
     __str__ = __repr__
+
+    def _repr_html_(self) -> str:
+        """The same for notebooks, and its parts."""
+        parts = {name: short(getattr(self, name)) for name in type(self).model_fields}
+        rows = [(name, text) for name, text in parts.items() if text]
+        return html_table(repr(self)[1:-1], ["part", ""], rows)
 
     def sensor_channels(self) -> tuple[Channel, ...]:
         """Channels of the sensors, in order; every machine has its own."""
