@@ -537,7 +537,8 @@ class Gathering:
         kept, factor = self.plan.kept, self.plan.factor
         begin = max(0, kept.start * factor - first)
         found = gaps[begin : max(begin, kept.stop * factor - first)]
-        self._least_gap = min(self._least_gap, float(found[:, :, 0].min(initial=math.inf)))
+        least = found[:, :, 0].min(initial=math.inf)
+        self._least_gap = float(np.minimum(self._least_gap, least))  # NaN stays NaN
         self._rubs += int(np.count_nonzero((found[:, :, 1] > 0).any(axis=1)))
         self._looks += len(found)
 

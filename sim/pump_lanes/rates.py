@@ -577,7 +577,7 @@ def _pull_films(p: Any, s: Any) -> None:
 def _squeeze(
     s: Any, lane: int, r_xx: float, r_xy: float, r_yx: float, r_yy: float, damped: float
 ) -> None:
-    """Take one of Newton's steps, but where it has settled; no number will not settle."""
+    """Take one of Newton's steps, but where it has settled, or is no number any more."""
     v_x, v_y = s.squeeze[0, lane], s.squeeze[1, lane]
     new_x, new_y, enough = newton_step(
         r_xx, r_xy, r_yx, r_yy, _film_pull_of(s, lane), v_x, v_y, damped
