@@ -22,9 +22,11 @@ from typing import Any, TypeVar
 
 import numba
 import numpy as np
-from numba.core import serialize
+from numba.core import config, serialize
+from numba.core.caching import FunctionCache
 
 from .atomic import sealed, unsealed, write_whole
+from .compiler import Kernel
 
 # No freedom is given to the compiler, not even contraction to fused multiply-add, which it would
 # use here and not there: a record has the same bytes alone and beside others. Forced inlining
@@ -202,6 +204,38 @@ class _SealedFiles:
             return None
 
 
+class _SealedParts:
+    """Parts of one kernel, each in a file behind its SHA-256: damage is a miss, and mended."""
+
+    def __init__(self, folder: Path, stem: str, stamp: Any) -> None:
+        self._folder, self._stem, self._stamp = folder, stem, stamp
+
+    def load(self, name: str) -> Any:
+        """What was kept under a name of the same source; None where there is nothing whole."""
+        try:
+            content = unsealed(self._path(name).read_bytes())
+        except FileNotFoundError:
+            return None
+        except OSError:
+            content = None
+        if content is None:
+            _warn_damaged(self._folder)
+            return None
+        stamp, found = pickle.loads(content)
+        return found if stamp == self._stamp else None
+
+    def save(self, name: str, content: Any) -> None:
+        """Keep it, where that is possible."""
+        try:
+            self._folder.mkdir(parents=True, exist_ok=True)
+            write_whole(self._path(name), sealed(_dumps((self._stamp, content))), force=True)
+        except OSError as error:
+            _warn_unkept(str(error.strerror))
+
+    def _path(self, name: str) -> Path:
+        return self._folder / f"{self._stem}.{name}.part"
+
+
 def kernel(function: Function) -> Function:
     """Compile a function of floats, integers and arrays, cached by the sources it can see."""
     return _compiled(function, _OPTIONS)
@@ -215,24 +249,27 @@ def subroutine(function: Function) -> Function:
 def _compiled(function: Function, options: dict[str, Any]) -> Function:
     folder = cache_folder()
     if folder is None:
-        return numba.njit(**options)(function)  # type: ignore[no-any-return]
-    settings: Any = numba.config
+        return Kernel(function, targetoptions=options)
+    settings: Any = config
     before = settings.CACHE_DIR
-    settings.CACHE_DIR = str(folder)  # read by numba while it decorates, restored at once
+    settings.CACHE_DIR = str(folder)  # read by numba at once, restored at once
     try:
-        compiled: Any = numba.njit(cache=True, **options)(function)
+        files: Any = FunctionCache(function)
     finally:
         settings.CACHE_DIR = before
-    files = compiled._cache
     place = Path(files.cache_path)
     if not place.is_relative_to(folder):  # numba found it unwritable and took another
-        return numba.njit(**options)(function)  # type: ignore[no-any-return]
+        return Kernel(function, targetoptions=options)
     names = files._impl
     stamp = names.locator.get_source_stamp()
-    source, here = Path(compiled.py_func.__code__.co_filename), Path(__file__).parent
+    source, here = Path(function.__code__.co_filename), Path(__file__).parent
     if source.is_relative_to(here):
         place, stamp = folder / "sim" / source.relative_to(here).parent, None
     files._cache_file = _SealedFiles(place, names.filename_base, stamp)
+    compiled: Any = Kernel(
+        function, targetoptions=options, store=_SealedParts(place, names.filename_base, stamp)
+    )
+    compiled._cache = files
     return compiled  # type: ignore[no-any-return]
 
 

@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from wearstate.sim import jit
+from wearstate.sim import compiler, jit
 from wearstate.sim.atomic import unsealed
 
 CODE = "from wearstate.sim.jit import near_sine_cosine\nprint(near_sine_cosine(0.5)[0])"
@@ -187,6 +187,112 @@ def test_kernels_of_one_name_in_two_folders_are_kept_apart(tmp_path):
         out, err = process.communicate(timeout=300)
         assert (out.split()[1:], err) == (["2.0", "3.0"], "")
     assert len(list((tmp_path / "cache").glob("kernels-*/sim/*/law.law*.nbi"))) == 2
+
+
+LAWS = """
+from ..jit import kernel, subroutine
+
+@kernel
+def _square(x):
+    return x * x
+
+@subroutine
+def _fourth(x):
+    return _square(_square(x))
+
+@kernel
+def eighth(x):
+    return _square(_fourth(x))
+
+@kernel
+def sixteenth(x):
+    return _fourth(_fourth(x))
+"""
+
+
+@pytest.fixture(scope="module")
+def laws(tmp_path_factory):
+    """A package of kernels that call kernels; runs an expression of them and gives its words."""
+    package, folder = Path(jit.__file__).parents[1], tmp_path_factory.mktemp("laws")
+    copy = folder / "wearstate"
+    shutil.copytree(package / "sim", copy / "sim", ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copyfile(package / "__init__.py", copy / "__init__.py")
+    (copy / "sim" / "laws").mkdir()
+    (copy / "sim" / "laws" / "__init__.py").touch()
+    (copy / "sim" / "laws" / "law.py").write_text(LAWS)
+    told = f"import sys\nsys.path.insert(0, {str(folder)!r})\n{CODE}\n"
+    asked = "from wearstate.sim.laws import law\nprint("
+
+    def ask(cache, expression):
+        out, err = start(cache, f"{told}{asked}{expression})").communicate(timeout=300)
+        return out.split()[1:], err.splitlines()
+
+    return ask
+
+
+def kept(cache, ending):
+    """Functions with files of this ending."""
+    paths = cache.glob(f"kernels-*/sim/laws/*{ending}")
+    return {path.name.split(".")[1].split("-")[0] for path in paths}
+
+
+def test_a_callee_is_kept_as_a_part_for_all_that_call_it(laws, tmp_path):
+    assert laws(tmp_path, "law.eighth(2.0)") == (["256.0"], [])
+    assert kept(tmp_path, ".nbi") == {"eighth"}  # no machine code that nobody calls
+    assert kept(tmp_path, ".part") == {"_square", "_fourth"}
+    parts = {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*.part")}
+    misses = "sum(law._fourth.part._cache_misses.values())"
+    assert laws(tmp_path, f"law.sixteenth(2.0), {misses}") == (["65536.0", "0"], [])
+    assert laws(tmp_path, "law._fourth(2.0), law._fourth(3)") == (["16.0", "81"], [])
+    assert kept(tmp_path, ".nbi") == {"eighth", "sixteenth", "_fourth"}
+    assert {path: path.stat().st_mtime_ns for path in parts} == parts
+
+
+@pytest.mark.parametrize("damage", [emptied, cut, flipped])
+def test_damaged_parts_are_mended_with_one_warning(laws, tmp_path, damage):
+    assert laws(tmp_path, "law.eighth(2.0)") == (["256.0"], [])
+    contents = {path: path.read_bytes() for path in tmp_path.rglob("*.part")}
+    for path, content in contents.items():
+        path.write_bytes(damage(content))
+    values, [warning] = laws(tmp_path, "law.sixteenth(2.0)")
+    assert values == ["65536.0"]
+    assert "is damaged: kernels are compiled anew and replaced" in warning
+    for path in contents:
+        assert unsealed(path.read_bytes()) is not None
+    assert laws(tmp_path, "law._square(3.0), law._fourth(3.0)") == (["9.0", "81.0"], [])
+
+
+def test_a_part_that_is_lost_is_made_again(laws, tmp_path):
+    """A part that is kept knows what it calls by name only."""
+    assert laws(tmp_path, "law.eighth(2.0)") == (["256.0"], [])
+    [square] = tmp_path.rglob("law._square-*.part")
+    square.unlink()
+    assert laws(tmp_path, "law.sixteenth(2.0)") == (["65536.0"], [])
+    assert square.exists()
+
+
+def test_local_kernels_are_parts_too_and_what_is_not_linked_is_named(monkeypatch):
+    """Of functions that no later process finds by name, nor by chance another one of their name."""
+
+    def chain(factor):
+        @jit.kernel
+        def inner(x):
+            return factor * x
+
+        @jit.kernel
+        def middle(x):
+            return inner(x)
+
+        @jit.kernel
+        def outer(x):
+            return middle(x)
+
+        return outer
+
+    assert (chain(2.0)(1.5), chain(3.0)(1.5)) == (3.0, 4.5)
+    monkeypatch.setattr(compiler._PartLibrary, "calls", lambda self: [])
+    with pytest.raises(AssertionError, match=r"parts of .*outer are not linked: .*inner"):
+        chain(2.0)(1.5)
 
 
 def test_a_copy_that_is_imported_by_another_name_does_not_spoil_the_cache(tmp_path):

@@ -26,6 +26,7 @@ MAY_IMPORT = {
 ROOMS = {
     "sim": [
         "atomic",
+        "compiler",
         "jit",
         "brief",
         "output",
