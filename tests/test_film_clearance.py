@@ -14,6 +14,7 @@ from wearstate.diagnose.feature_rows.healthy import Baseline
 from wearstate.diagnose.feature_rows.model_card import ModelCard, TrainedCondition, TrainedOn
 from wearstate.diagnose.feature_rows.probe_means import probe_means
 from wearstate.diagnose.film_clearance.clearance import (
+    SCARS,
     Doubts,
     FilmEstimate,
     JournalRun,
@@ -37,10 +38,10 @@ AS_NEW = (0.0914e-3, 0.1905e-3)
 CLEARANCE = "diametral_clearance_bearing_m"
 
 
-def placed(clearance, *, load=(6e3, 0.0), force=7e-5, offset=(0.0, 0.0), **changes):
-    """A run of a journal at rest, by the short film."""
+def placed(clearance, *, curve=CURVE, load=(6e3, 0.0), force=7e-5, offset=(0.0, 0.0), **changes):
+    """A run of a journal at rest, by the short film unless another curve is given."""
     radial = clearance / 2
-    place = radial * CURVE.position(np.array(load) * radial**2 / force)
+    place = radial * curve.position(np.array(load) * radial**2 / force)
     towards = [place @ (math.cos(a), math.sin(a)) for a in ANGLES]
     known = {"swing": 1e-6, "load": load, "film_force": force, **changes}
     return JournalRun(readings=np.add(towards, offset), **known)
@@ -101,6 +102,31 @@ def test_healthy_recordings_take_an_offset_away():
     assert alone.severity is None or abs(alone.severity - 0.25e-3) > 20e-6
     assert told.severity == pytest.approx(0.25e-3, rel=0.02)
     assert told.healthy == 3
+
+
+def test_healthy_recordings_tell_a_scar_from_a_wider_bore():
+    """Against a bore worn to a depth and at an angle that none of those tried has."""
+    film = FilmGeometry(length_to_diameter=0.6, n_theta=72, n_z=9)
+    round_bore = rest_curve(film)
+    scarred = [rest_curve(film, scar=depth, turned=turned) for depth, turned in SCARS]
+    off = (-8e-6, 12e-6)
+    run = placed(0.2e-3, curve=rest_curve(film, scar=0.28, turned=0.1), offset=off)
+    healthy = [
+        placed(0.12e-3, curve=round_bore, offset=off, measured=0.12e-3, load=(load, 0.0))
+        for load in (4e3, 6e3, 8e3)
+    ]
+    known = {"healthy": healthy, "scarred": scarred}
+    plain = film_clearance(run, round_bore, ANGLES, AS_NEW, healthy=healthy)
+    told = film_clearance(run, round_bore, ANGLES, AS_NEW, **known)
+    assert plain.severity is None or plain.severity > 1.1 * 0.2e-3
+    assert told.severity == pytest.approx(0.2e-3, rel=0.06)
+    assert told.low < 0.2e-3 < told.high
+    assert told.budget["shape of the bore"] > 0
+    # a round bore is told as well as before, but for what the others leave open
+    fresh = placed(0.2e-3, curve=round_bore, offset=off)
+    assert film_clearance(fresh, round_bore, ANGLES, AS_NEW, **known).severity == pytest.approx(
+        0.2e-3, rel=0.03
+    )
 
 
 def test_an_unloaded_journal_tells_nothing():

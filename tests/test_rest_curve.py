@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from wearstate.sim.film.bearing import equilibrium, short_attitude, short_eccentricity
 from wearstate.sim.film.rest_curve import rest_curve
-from wearstate.sim.film.solve import FilmGeometry, Groove
+from wearstate.sim.film.solve import FilmGeometry, Groove, dufrane_scar
 
 SHORT = FilmGeometry(length_to_diameter=0.6)
 
@@ -40,6 +40,27 @@ def test_the_place_turns_with_the_load_and_goes_on_straight_below_the_table():
     # the film is linear near the middle: a tenth of the load is a tenth of the way
     light, lighter = curve.position([1e-4, 0.0]), curve.position([1e-5, 0.0])
     assert np.hypot(*light) / np.hypot(*lighter) == pytest.approx(10, rel=2e-3)
+
+
+@pytest.mark.parametrize("turned", [0.0, -0.3])
+def test_a_scar_lets_the_journal_sink_beyond_the_round_bore(turned):
+    size = {"length_to_diameter": 0.6, "n_theta": 72, "n_z": 9}
+    curve = rest_curve(FilmGeometry(**size), scar=0.3, turned=turned)
+    worn = FilmGeometry(**size, bore=dufrane_scar(0.3, turned, 72))
+    # by the begin of its run the journal crosses the middle, where an angle changes fast
+    for load, apart in ((0.05, 6e-3), (0.9, 3e-3), (20.0, 3e-3)):
+        rest = equilibrium(worn, [load, 0.0]).position
+        assert np.abs(curve.position([load, 0.0]) - rest).max() < apart
+    assert np.hypot(*curve.position([20.0, 0.0])) > 1.0
+    # the scar turns with the load that made it
+    across, along = curve.position([0.0, 0.9]), curve.position([0.9, 0.0])
+    assert np.abs(across - [-along[1], along[0]]).max() < 1e-12
+    assert np.abs(along - rest_curve(FilmGeometry(**size)).position([0.9, 0.0])).max() > 0.1
+
+
+def test_a_short_film_knows_no_scar():
+    with pytest.raises(ValueError, match="rung = 'short' knows no scar"):
+        rest_curve(SHORT, "short", scar=0.2)
 
 
 def test_grooves_are_refused():

@@ -6,12 +6,16 @@ of two probes tell the clearance, with no training at all. What is not known exa
 along with it, held by how well it is known: the readings of a centred shaft, the probes'
 sensitivities, load and viscosity. Healthy recordings of the same machine share these numbers, and
 have the clearance of a machine as new: they tell the offsets of the probes.
+
+A bore may also have a scar where the load presses, which lets the journal sink without a wider
+clearance. Scars of several depths are tried, and count by how well they explain the readings.
 """
 
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields
-from typing import TYPE_CHECKING
+from functools import partial
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +36,12 @@ _MOST_SWING = 0.35  # rms of the orbit over the radial clearance; beyond, it has
 _LOOSEST = 0.3  # standard error of the clearance's logarithm, above which nothing is told
 CONTRADICTED = 2.6  # root mean square of what is left, in standard deviations, per free number
 _WIDEST, _NARROWEST = 10.0, 0.1  # clearance looked for, over that as new
+SCARS = tuple(
+    (depth, math.radians(turned))
+    for depth in (0.06, 0.13, 0.22, 0.33, 0.48)
+    for turned in (-15.0, 0.0, 15.0)
+)
+"""Depths of scars that a bore may have, over the radial clearance; angles from the load [rad]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -107,8 +117,8 @@ class FilmEstimate:
         Recordings of the machine as new that it was told against.
     budget : dict
         What each doubt is worth: its own part of half the interval [m], by the names of
-        :class:`Doubts`, and for a line the shape of the bore; their squares add up to that of the
-        whole.
+        :class:`Doubts`, and the shape of the bore where it is not known; their squares add up to
+        that of the whole.
     """
 
     reason: str = ""
@@ -126,6 +136,7 @@ def film_clearance(
     angles: Sequence[float],
     as_new: tuple[float, float],
     *,
+    scarred: Sequence["RestCurve"] = (),
     healthy: Sequence[JournalRun] = (),
     doubts: Doubts = USUAL_DOUBTS,
 ) -> FilmEstimate:
@@ -135,13 +146,17 @@ def film_clearance(
     ----------
     run : JournalRun
     curve : RestCurve
-        Of the bearing's film.
+        Of the bearing's film in a round bore.
     angles : sequence of float
         Of the probes, from X in the direction of rotation [rad].
     as_new : tuple of float
         Least and largest diametral clearance of a healthy bearing of this kind [m].
+    scarred : sequence of RestCurve
+        Of the same film in a bore with a scar near the load, as of :data:`SCARS`; together they
+        are as likely as none.
     healthy : sequence of JournalRun
-        Of the same machine, with the clearance that was measured, else one within `as_new`.
+        Of the same machine, its bore round, with the clearance that was measured, else one within
+        `as_new`.
     doubts : Doubts
         How well it is known what is told.
 
@@ -158,8 +173,9 @@ def film_clearance(
     interval is that of the linearised problem. The mean of an orbit departs from the place of rest
     by about its mean square over the clearance, which is counted as scatter.
 
-    Laminar and isothermal, a round plain bore. A scar, a groove, a wrong direction of the load or a
-    swapped probe put the journal where no clearance explains it: that is said, not fitted.
+    Laminar and isothermal. A groove, a wrong direction of the load or a swapped probe put the
+    journal where no clearance explains it: that is said, not fitted. Without healthy recordings
+    the round bore must explain the readings: two probes do not tell a scar from their offsets.
 
     Examples
     --------
@@ -179,8 +195,16 @@ def film_clearance(
     if reason:
         return FilmEstimate(reason=reason)
     problem = _Problem(runs, curve, np.asarray(angles), as_new, doubts)
-    found = problem.solve()
-    return _judged(problem, found, run, curve, len(healthy))
+    plain = problem.solve(curve, problem.start())
+    each = [plain, *(problem.solve(bore, plain.values) for bore in scarred)]
+    likely = [1.0, *[1.0 / len(scarred) for _ in scarred]]
+    found, weights = mixed_by_evidence(
+        [problem.explained(one) for one in each], [one.cost for one in each], likely
+    )
+    if not healthy:
+        found = found._replace(left=plain.left)
+    likeliest = (curve, *scarred)[int(np.argmax(weights))]
+    return _judged(problem, found, run, likeliest, len(healthy))
 
 
 def _unloaded(runs: Sequence[JournalRun]) -> str:
@@ -237,35 +261,119 @@ class _Problem:
         swing = np.array([run.swing for run in runs])
         self.scatter = np.hypot(FLOOR, swing**2 / math.exp(self.middle))
 
-    def predicted(self, free: Float) -> Float:
-        """Readings [shape=(n, n_probes)] for deviations from what is told, in their doubts."""
+    def predicted(self, free: Float, bore: "RestCurve") -> Float:
+        """Readings [shape=(..., n, n_probes)] for deviations from what is told, in their doubts."""
         real = free * self.prior
         probes, n = self.probes, self.n
-        new, offsets, gains, factors = np.split(real[1:], np.cumsum([n, probes, probes]))
-        clearance = np.exp(self.middles + np.concatenate([real[:1], new[0] + new[1:]]))
-        loads, oils = np.split(factors, 2)
-        strength = self.film_force * np.exp(oils[0] + oils[1:]) / clearance**2
-        load = self.load * np.exp(loads[0] + loads[1:])[:, None] / strength[:, None]
-        place = clearance[:, None] * self.curve.position(load)
-        return np.asarray((place @ self.looks + offsets) * np.exp(gains))
+        new, offsets, gains, loads, oils = np.split(
+            real[..., 1:], np.cumsum([n, probes, probes, 1 + n]), axis=-1
+        )
+        apart = np.concatenate([real[..., :1], new[..., :1] + new[..., 1:]], axis=-1)
+        clearance = np.exp(self.middles + apart)
+        strength = self.film_force * np.exp(oils[..., :1] + oils[..., 1:]) / clearance**2
+        load = self.load * (np.exp(loads[..., :1] + loads[..., 1:]) / strength)[..., None]
+        rest = [bore.position(load[..., :1, :]), self.curve.position(load[..., 1:, :])]
+        place = clearance[..., None] * np.concatenate(rest, axis=-2)
+        read = place @ self.looks + offsets[..., None, :]
+        return np.asarray(read * np.exp(gains)[..., None, :])
 
-    def residuals(self, free: Float) -> Float:
-        apart = (self.predicted(free) - self.readings) / self.scatter[:, None]
-        return np.concatenate([apart.ravel(), free])
+    def residuals(self, bore: "RestCurve", free: Float) -> Float:
+        """Of readings, then of what is held, in standard deviations."""
+        apart = (self.predicted(free, bore) - self.readings) / self.scatter[:, None]
+        return np.concatenate([apart.reshape(*free.shape[:-1], -1), free], axis=-1)
 
-    def solve(self) -> "_Found":
+    def start(self) -> Float:
+        """All as told, and a clearance in which the journal has room."""
         start = np.zeros(len(self.prior))
         radius = float(np.hypot(*np.linalg.lstsq(self.looks.T, self.readings[0], rcond=None)[0]))
         guess = max(1.3 * radius, math.exp(self.middle))
         start[0] = (math.log(guess) - self.middle) / self.prior[0]
-        found = fitted(self.residuals, start, self.readings.size)
-        return _Found(
-            log_clearance=self.middle + float(found.values[0] * self.prior[0]),
-            error=float(found.error * self.prior[0]),
-            budget={name: found.worth(self.names, name) * self.prior[0] for name in DOUBTS},
+        return start
+
+    def solve(self, bore: "RestCurve", start: Float) -> "FittedClearance":
+        """Deviations by one bore of the machine as it is now."""
+        return fitted(partial(self.residuals, bore), start, self.readings.size)
+
+    def explained(self, found: "FittedClearance") -> "Explained":
+        """Logarithm of the clearance, of deviations."""
+        unit = float(self.prior[0])
+        return Explained(
+            value=self.middle + float(found.values[0]) * unit,
+            error=found.error * unit,
+            budget={name: found.worth(self.names, name) * unit for name in DOUBTS},
             left=found.left,
-            strength=float(self.film_force[0]),
         )
+
+
+class Explained(NamedTuple):
+    """How one bore explains the readings: what is asked for, and how sure that is.
+
+    Attributes
+    ----------
+    value, error : float
+        Number that is asked for, and its standard error.
+    budget : dict
+        Parts of that error, by the names of :class:`Doubts`.
+    left : float
+        As of :class:`FittedClearance`.
+    """
+
+    value: float
+    error: float
+    budget: dict[str, float]
+    left: float
+
+
+def mixed_by_evidence(
+    each: Sequence[Explained], costs: Sequence[float], likely: Sequence[float]
+) -> tuple[Explained, Float]:
+    """Of several bores, each by how well it explains the readings.
+
+    The weight is its probability before, times its likelihood, times the range of the value that
+    it allows: nearly its evidence by Laplace's method.
+
+    Parameters
+    ----------
+    each : sequence of Explained
+    costs : sequence of float
+        Half the sum of squares that each leaves.
+    likely : sequence of float
+        Probability of each before the readings, up to a factor.
+
+    Returns
+    -------
+    Explained
+        Its budget has the shape of the bore as well, where there is more than one.
+    weights : numpy.ndarray [shape=(n,)]
+
+    Examples
+    --------
+    >>> one = Explained(value=1.0, error=0.1, budget={"load": 0.1}, left=1.0)
+    >>> both, weights = mixed_by_evidence([one, one._replace(value=2.0)], [0.5, 0.5], [1.0, 1.0])
+    >>> both.value, round(both.budget["shape of the bore"], 2), weights.tolist()
+    (1.5, 0.5, [0.5, 0.5])
+    """
+    evidence = np.log([one.error * before for one, before in zip(each, likely, strict=True)])
+    evidence -= np.asarray(costs)
+    weights = np.exp(evidence - evidence.max())
+    weights /= weights.sum()
+    if len(each) == 1:
+        return each[0], weights
+    values = np.array([one.value for one in each])
+    value = float(weights @ values)
+    parts = {
+        name: math.sqrt(weights @ np.array([one.budget[name] ** 2 for one in each]))
+        for name in each[0].budget
+    }
+    parts["shape of the bore"] = math.sqrt(weights @ (values - value) ** 2)
+    variance = weights @ np.array([one.error**2 for one in each])
+    mixed = Explained(
+        value=value,
+        error=math.sqrt(variance + parts["shape of the bore"] ** 2),
+        budget=parts,
+        left=min(one.left for one in each),
+    )
+    return mixed, weights
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -278,12 +386,15 @@ class FittedClearance:
         Numbers found.
     covariance : numpy.ndarray [shape=(n,)]
         Of the first number with each.
+    cost : float
+        Half of the residuals' sum of squares.
     left : float
         Root mean square of the residuals per reading beyond the first, in standard deviations.
     """
 
     values: Float
     covariance: Float
+    cost: float
     left: float
 
     @property
@@ -307,34 +418,34 @@ def fitted(residuals: Callable[[Float], Float], start: Float, n_readings: int) -
     Parameters
     ----------
     residuals : callable
-        Numbers -> residuals of readings and of prior knowledge of each.
-    start : numpy.ndarray
+        Numbers [shape=(..., n)] -> residuals of readings and of prior knowledge of each
+        [shape=(..., n_readings + n)].
+    start : numpy.ndarray [shape=(n,)]
     n_readings : int
     """
-    found = least_squares(residuals, start, method="lm", xtol=1e-10, ftol=1e-10)
+
+    def slopes(free: Float) -> Float:
+        # all at once: one call costs as much as one of its rows
+        ends = residuals(free + _STEP * np.array([1, -1])[:, None, None] * np.eye(free.size))
+        return np.asarray((ends[0] - ends[1]).T / (2 * _STEP))
+
+    found = least_squares(residuals, start, slopes, method="lm", xtol=1e-10, ftol=1e-10)
     inverse = np.linalg.inv(found.jac.T @ found.jac)
     return FittedClearance(
         values=found.x,
         covariance=inverse[0],
+        cost=float(found.cost),
         left=math.sqrt(2 * found.cost / max(1, n_readings - 1)),
     )
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Found:
-    """Logarithm of the radial clearance, its standard error, its parts, and what is left."""
-
-    log_clearance: float
-    error: float
-    budget: dict[str, float]
-    left: float
-    strength: float
+_STEP = 1e-5  # standard deviations, of central differences
 
 
 def _judged(
-    problem: _Problem, found: _Found, run: JournalRun, curve: "RestCurve", healthy: int
+    problem: _Problem, found: Explained, run: JournalRun, curve: "RestCurve", healthy: int
 ) -> FilmEstimate:
-    clearance = math.exp(found.log_clearance)
+    clearance = math.exp(found.value)
     reason = _untold(problem, found, run, curve, clearance)
     if reason:
         return FilmEstimate(reason=reason, healthy=healthy)
@@ -349,7 +460,7 @@ def _judged(
 
 
 def _untold(
-    problem: _Problem, found: _Found, run: JournalRun, curve: "RestCurve", clearance: float
+    problem: _Problem, found: Explained, run: JournalRun, curve: "RestCurve", clearance: float
 ) -> str:
     """Why a solution is no estimate; empty where it is one."""
     ratio = clearance / math.exp(problem.middle)
@@ -357,14 +468,15 @@ def _untold(
         return (
             f"no clearance puts the journal where the probes see it: {found.left:.1f} standard "
             f"deviations are left, must be <= {CONTRADICTED:g}; check load, its direction, "
-            "viscosity and the probes, or look for a scar of the bore"
+            "viscosity and the probes, or give healthy recordings (--baseline): they tell offsets "
+            "from a scar of the bore"
         )
     if run.swing > _MOST_SWING * clearance:
         return (
             f"the orbit's rms is {run.swing / clearance:.2f} of the radial clearance, must be <= "
             f"{_MOST_SWING:g}: a whirling journal has no place of rest"
         )
-    load = math.hypot(*run.load) * clearance**2 / found.strength
+    load = math.hypot(*run.load) * clearance**2 / float(problem.film_force[0])
     if load > curve.most_load:
         return (
             f"the film would be thinner than 3 % of the clearance (load {load:.3g} of its unit, "

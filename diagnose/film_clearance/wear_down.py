@@ -13,13 +13,24 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from .clearance import CONTRADICTED, CORRECTED, DOUBTS, FLOOR, NORMAL, Doubts, FilmEstimate, fitted
+from .clearance import (
+    CONTRADICTED,
+    CORRECTED,
+    DOUBTS,
+    FLOOR,
+    NORMAL,
+    Doubts,
+    Explained,
+    FilmEstimate,
+    fitted,
+    mixed_by_evidence,
+)
 
 if TYPE_CHECKING:
     from ...sim.scene.shaft import ShaftBearing, ShaftScene
@@ -228,7 +239,7 @@ def film_wear_down(
     """
     problem = _Problem([run, *healthy], np.asarray(angles), limit, as_new, doubts)
     found = problem.explained()
-    wear, error = found.wear, found.error
+    wear, error = found.value, found.error
     if found.left > CONTRADICTED:
         return FilmEstimate(
             healthy=len(healthy),
@@ -249,43 +260,6 @@ def film_wear_down(
         high=max(wear + NORMAL * error, 0.0),
         healthy=len(healthy),
         budget={name: NORMAL * part for name, part in found.budget.items()},
-    )
-
-
-class _Explained(NamedTuple):
-    """Wear-down, its standard error and the parts of that [m], and what is left over."""
-
-    wear: float
-    error: float
-    budget: dict[str, float]
-    left: float
-
-
-def _mixed(
-    each: Sequence[_Explained], costs: Sequence[float], likely: Sequence[float]
-) -> _Explained:
-    """Of several bores, each by how well it explains the readings.
-
-    The weight is its probability before, times its likelihood, times the range of wear that it
-    allows: nearly its evidence by Laplace's method.
-    """
-    evidence = np.log([one.error * before for one, before in zip(each, likely, strict=True)])
-    evidence -= np.asarray(costs)
-    weights = np.exp(evidence - evidence.max())
-    weights /= weights.sum()
-    wears = np.array([one.wear for one in each])
-    wear = float(weights @ wears)
-    parts = {
-        name: math.sqrt(weights @ np.array([one.budget[name] ** 2 for one in each]))
-        for name in each[0].budget
-    }
-    parts["shape of the bore"] = math.sqrt(weights @ (wears - wear) ** 2)
-    variance = weights @ np.array([one.error**2 for one in each])
-    return _Explained(
-        wear=wear,
-        error=math.sqrt(variance + parts["shape of the bore"] ** 2),
-        budget=parts,
-        left=min(one.left for one in each),
     )
 
 
@@ -330,7 +304,7 @@ class _Problem:
         ]
         self.scatter = np.array([math.hypot(FLOOR, run.swing**2 / run.clearance) for run in runs])
 
-    def explained(self) -> _Explained:
+    def explained(self) -> Explained:
         """By all bores that carry the line in every run.
 
         Without healthy runs a bore of another shape explains what is an offset of the probes: the
@@ -344,15 +318,15 @@ class _Problem:
                 each.append(found)
                 costs.append(cost)
                 likely.append(before)
-        found = _mixed(each, costs, likely)
+        found, _ = mixed_by_evidence(each, costs, likely)
         return found._replace(left=each[0].left) if self.n == 1 else found
 
-    def _by(self, ways: Sequence[Any]) -> tuple[_Explained, float]:
+    def _by(self, ways: Sequence[Any]) -> tuple[Explained, float]:
         residuals = partial(self.residuals, ways)
         found = fitted(residuals, np.zeros(len(self.prior)), self.readings.size)
         unit = float(self.prior[0])
-        explained = _Explained(
-            wear=self.middles[0] + float(found.values[0]) * unit,
+        explained = Explained(
+            value=self.middles[0] + float(found.values[0]) * unit,
             error=found.error * unit,
             budget={
                 name: unit * found.worth(self.names, name)
@@ -361,21 +335,22 @@ class _Problem:
             },
             left=found.left,
         )
-        return explained, 0.5 * float(np.sum(residuals(found.values) ** 2))
+        return explained, found.cost
 
     def predicted(self, ways: Sequence[Any], free: Float) -> Float:
-        """Readings [shape=(n, n_probes)] for deviations from what is told, in their doubts."""
+        """Readings [shape=(..., n, n_probes)] for deviations from what is told, in their doubts."""
         real = free * self.prior
-        wide, rest = real[1], real[2:]
         probes, n = self.probes, self.n
-        offsets, gains, new, oils = np.split(rest, np.cumsum([probes, probes, n]))
-        wear = self.middles + np.concatenate([real[:1], new[0] + new[1:]])
-        found = np.array([way(w) for way, w in zip(ways, wear, strict=True)])
-        oil = (oils[0] + oils[1:])[:, None]
-        place = found[:, :2] + found[:, 2:4] * oil + found[:, 4:] * wide
-        return np.asarray((place @ self.looks + offsets) * np.exp(gains))
+        offsets, gains, new, oils = np.split(real[..., 2:], np.cumsum([probes, probes, n]), axis=-1)
+        apart = np.concatenate([real[..., :1], new[..., :1] + new[..., 1:]], axis=-1)
+        wear = self.middles + apart
+        found = np.stack([way(wear[..., i]) for i, way in enumerate(ways)], axis=-2)
+        oil = (oils[..., :1] + oils[..., 1:])[..., None]
+        place = found[..., :2] + found[..., 2:4] * oil + found[..., 4:] * real[..., 1:2, None]
+        read = place @ self.looks + offsets[..., None, :]
+        return np.asarray(read * np.exp(gains)[..., None, :])
 
     def residuals(self, ways: Sequence[Any], free: Float) -> Float:
         """Of readings, then of what is held, in standard deviations."""
         apart = (self.predicted(ways, free) - self.readings) / self.scatter[:, None]
-        return np.concatenate([apart.ravel(), free])
+        return np.concatenate([apart.reshape(*free.shape[:-1], -1), free], axis=-1)

@@ -16,7 +16,7 @@ from ...sim.scene.journal import JournalScene, ProximityProbe
 from ...sim.scene.shaft import ShaftScene
 from ..feature_rows.healthy import Baseline
 from ..feature_rows.probe_means import ProbeMeans, probe_means
-from ..film_clearance.clearance import FilmEstimate, JournalRun, film_clearance
+from ..film_clearance.clearance import SCARS, FilmEstimate, JournalRun, film_clearance
 from ..film_clearance.wear_down import SinkingRun, film_wear_down, possible_bores, sinking_places
 from ..nameplate.nameplate import Nameplate, told_conditions
 from ..wear_model.estimate import Estimate
@@ -77,11 +77,14 @@ def _journal(
     wear = scene.wear
     built = scene.bearing.clearance_diametral
     as_new = (wear.as_new, wear.grade_edges[0]) if wear else (built / _BUILT, built * _BUILT)
+    film, short = film_geometry(scene), scene.film.rung == "short"
     return film_clearance(
         _run(means, plate, severity),
-        rest_curve(film_geometry(scene), "short" if scene.film.rung == "short" else "direct"),
+        rest_curve(film, "short" if short else "direct"),
         [_probe(scene.sensors, name).angle for name in means.names],
         as_new,
+        # a short film knows no scars
+        scarred=() if short else [rest_curve(film, scar=d, turned=a) for d, a in SCARS],
         healthy=[_run(each, plate, severity, healthy=True) for each in usable],
         doubts=plate.doubts,
     )

@@ -2,7 +2,8 @@
 
 The load is of ``eta omega R^3 L / C^2``, lengths are over the radial clearance C, as in
 :mod:`.film.bearing`. A plain bore looks the same from all sides, so that one curve serves every
-direction of the load; what is tabulated, the logit of the eccentricity ratio and the attitude
+direction of the load, and so it does for a scar that lies where the load presses; what is
+tabulated, the logit of the eccentricity ratio over the most that the bore allows and the attitude
 angle over the logarithm of the load, is nearly straight from the lightest load to the thinnest
 film.
 """
@@ -16,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicSpline
 
 from .bearing import equilibrium
-from .solve import FilmGeometry
+from .solve import FilmGeometry, dufrane_scar
 
 Vector = NDArray[np.float64]
 
@@ -27,18 +28,22 @@ _KNOTS_PER_DECADE = 7  # of the load: position within 0.3 % of the clearance, as
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RestCurve:
-    """Static equilibria of a plain bearing.
+    """Static equilibria of a bearing that is the same for every direction of its load.
 
     Attributes
     ----------
     most_load : float
         End of the table [-]; beyond, and below its begin, it goes on straight.
     spline : CubicSpline
-        Logarithm of the load -> logit of the eccentricity ratio, attitude angle [rad].
+        Logarithm of the load -> logit of the eccentricity ratio over `farthest`, attitude angle
+        [rad].
+    farthest : float
+        Eccentricity ratio that the bore ends at: 1, and the depth of a scar.
     """
 
     most_load: float
     spline: CubicSpline
+    farthest: float = 1.0
 
     def position(self, load: ArrayLike) -> Vector:
         """Place of the journal's centre.
@@ -64,20 +69,26 @@ class RestCurve:
         place = np.log(np.hypot(load[..., 0], load[..., 1]))
         within = np.clip(place, self.spline.x[0], self.spline.x[-1])
         found = self.spline(within) + self.spline(within, 1) * (place - within)[..., None]
-        radius = 1 / (1 + np.exp(-found[..., 0]))
+        radius = self.farthest / (1 + np.exp(-found[..., 0]))
         angle = np.arctan2(load[..., 1], load[..., 0]) + found[..., 1]
         return np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=-1)
 
 
-def rest_curve(geometry: FilmGeometry, rung: str = "direct") -> RestCurve:
-    """Curve of a plain bearing, from static equilibria.
+def rest_curve(
+    geometry: FilmGeometry, rung: str = "direct", *, scar: float = 0.0, turned: float = 0.0
+) -> RestCurve:
+    """Curve of a plain bearing, or of one worn where its load presses, from static equilibria.
 
     Parameters
     ----------
     geometry : FilmGeometry
         With a round bore and without grooves.
     rung : str
-        Of :func:`.film.bearing.equilibrium`.
+        Of :func:`.film.bearing.equilibrium`; "direct" for a scar.
+    scar : float
+        Its depth over C, in [0, 1): of :func:`.film.solve.dufrane_scar`.
+    turned : float
+        Angle of its middle from the load [rad].
 
     Returns
     -------
@@ -87,7 +98,8 @@ def rest_curve(geometry: FilmGeometry, rung: str = "direct") -> RestCurve:
     Raises
     ------
     ValueError
-        The bore is not round or has grooves: its place then hangs on the direction of the load.
+        The bore is not round or has grooves: its place then hangs on the direction of the load. Or
+        there is a scar, and the rung knows none.
 
     Examples
     --------
@@ -102,26 +114,39 @@ def rest_curve(geometry: FilmGeometry, rung: str = "direct") -> RestCurve:
             "bore and grooves must be absent: a scar or a groove makes the place of the journal "
             "hang on the direction of the load; use sim.bearing.equilibrium for one load"
         )
+    if scar and rung != "direct":
+        raise ValueError(f"rung = {rung!r} knows no scar; use 'direct'")
     size = (geometry.length_to_diameter, geometry.n_theta, geometry.n_z)
-    return _curve(*size, str(geometry.condition), rung)
+    return _curve(*size, str(geometry.condition), rung, scar, turned)
 
 
-@lru_cache(maxsize=16)
+@lru_cache(maxsize=64)
 def _curve(
-    length_to_diameter: float, n_theta: int, n_z: int, condition: str, rung: str
+    length_to_diameter: float,
+    n_theta: int,
+    n_z: int,
+    condition: str,
+    rung: str,
+    scar: float,
+    turned: float,
 ) -> RestCurve:
     film = FilmGeometry(
-        length_to_diameter=length_to_diameter, n_theta=n_theta, n_z=n_z, condition=condition
+        length_to_diameter=length_to_diameter,
+        n_theta=n_theta,
+        n_z=n_z,
+        condition=condition,
+        bore=dufrane_scar(scar, turned, n_theta) if scar else None,
     )
+    farthest = 1.0 + scar
     loads, places = [], []
     load = _LEAST_LOAD
     while True:
         found = equilibrium(film, [load, 0.0], rung=rung, raise_on_failure=False)
-        eccentricity = found.eccentricity_ratio
+        eccentricity = found.eccentricity_ratio / farthest
         if not found.status.ok or eccentricity > _MOST_ECCENTRICITY:
             break
         loads.append(math.log(load))
         places.append([math.log(eccentricity / (1 - eccentricity)), found.attitude_angle])
         load *= 10 ** (1 / _KNOTS_PER_DECADE)
     spline = CubicSpline(np.array(loads), np.array(places))
-    return RestCurve(most_load=math.exp(loads[-1]), spline=spline)
+    return RestCurve(most_load=math.exp(loads[-1]), spline=spline, farthest=farthest)

@@ -54,6 +54,25 @@ ROWS = {
 }
 """Machine -> row -> what the recipe has beside the standard one."""
 
+SCAR = "scar of 3 to 28 um"
+ROWS["journal"][SCAR] = '[fixed]\n"film.rung" = "direct"\n'
+WORN = {
+    SCAR: """
+[[record]]
+path = "bearing.scar_depth"
+distribution = "uniform"
+low = "3 um"
+high = "28 um"
+[[record]]
+path = "bearing.scar_angle"
+distribution = "uniform"
+low = "-20 deg"
+high = "20 deg"
+"""
+}
+"""Row -> what its machines have that they had not when they were new."""
+NO_SHORT_FILM = (SCAR,)  # the option of the recipe: such a film knows no scar
+
 RECIPES = {"journal": "journal-bearing", "shaft": "propulsion-shaft"}
 SPLITS = {
     "journal": ("fast", "heavy_load", "thin_oil", "beyond_limit"),
@@ -68,12 +87,15 @@ def made(folder, machine, row, records):
     for kind in ("standard", "healthy"):
         name = f"{machine}-{number}-{kind}"
         head = f'name = "{name}"\nextends = "{RECIPES[machine]}-{kind}"\n'
+        without = ["film"] if row in NO_SHORT_FILM else []
         if kind == "standard":
-            head += f"without = {json.dumps(SPLITS[machine])}\n"
+            without += SPLITS[machine]
         else:
             head += f'machines_of = "{machine}-{number}-standard"\n'
+        head += f"without = {json.dumps(without)}\n"
         recipe, path = folder / f"{name}.toml", folder / f"{name}.h5"
-        recipe.write_text(head + ROWS[machine][row], encoding="utf-8")
+        worn = WORN.get(row, "") if kind == "standard" else ""
+        recipe.write_text(head + ROWS[machine][row] + worn, encoding="utf-8")
         if not path.exists():
             table = load_recipe(recipe).table
             machines = records // 2
