@@ -12,6 +12,7 @@ import pytest
 from click.testing import CliRunner
 from hypothesis import given
 from hypothesis import strategies as st
+from matplotlib.colors import to_hex
 from wearstate.datasets.generation.machines import known_of
 from wearstate.diagnose.charts.chart import (
     CSV_HEAD,
@@ -20,7 +21,14 @@ from wearstate.diagnose.charts.chart import (
     front_of,
     remaining_error,
 )
-from wearstate.diagnose.charts.figure import question_figure
+from wearstate.diagnose.charts.figure import (
+    PALE,
+    REFERENCE,
+    SO_FAR,
+    kind_of,
+    question_figure,
+    shaded_rows,
+)
 from wearstate.diagnose.charts.of_scene import (
     KEPT,
     RAISED,
@@ -157,9 +165,9 @@ def test_points_are_rates_with_their_worst_quantity(chart):
     # half a second of recording: rates are twice the seconds
     assert {p.name: p.seconds for p in chart.of(RAISED) if p.errors} == {
         HERE: 0.04,
-        "film short": 0.02,
-        "film direct": 4.0,
-        "film direct, mesh 144 around x 33 along": 8.0,
+        "film: short": 0.02,
+        "film: direct": 4.0,
+        "film: direct, mesh 144 around and 33 along": 8.0,
     }
     assert {p.worst for p in chart.points if p.error > 0 and p.errors} == {"force_peak"}
 
@@ -182,9 +190,9 @@ def test_three_sentences_say_where_one_stands_and_what_to_take(chart):
     assert here.startswith("Your scene as written is within 2 % of the best rungs: 0.1 % off in")
     assert "peak film force" in here
     assert kept.startswith(
-        "With your rungs kept: nothing needs to change; to run faster, take mesh"
+        "We recommend: with your rungs kept, nothing needs to change; to run faster, take mesh"
     )
-    assert "mesh 36 around x 9 along (1.2 % off in peak film force" in kept
+    assert "36 around (was 72) and 9 along (was 17) (1.2 % off in peak film force" in kept
     assert "1.3 times as fast as your scene" in kept
     assert "If rungs may change: change nothing (0.1 % off in peak film force)." in raised
 
@@ -203,12 +211,11 @@ def test_a_rung_of_the_scene_is_charged_in_words_and_hertz():
     chart = chart_of(pump, replace(found, raises=raises))
     [row] = chart.raises
     assert row.text == (
-        "your pressure rung (two-level, not chamber) is 64 ± 2 % off in vibration level, "
-        "306 to 758 Hz"
+        "pressure as two-level rather than chamber: 64 ± 2 % off in vibration level, 306 to 758 Hz"
     )
     assert chart.conclusion[1] == (
-        "Of its rungs one by one, the worst is pressure two-level instead of chamber: 64 % off. "
-        "Errors of single rungs may cancel each other."
+        "Modelling the pressure as two-level rather than chamber changes the result by 64 % in "
+        "vibration level, 306 to 758 Hz. Errors of single rungs may cancel each other."
     )
     assert row.text in chart_text(chart)
     page = chart_html(chart)
@@ -217,10 +224,7 @@ def test_a_rung_of_the_scene_is_charged_in_words_and_hertz():
     assert [line.split(":")[0] for line in told[:1]] == [
         chart.conclusion[0].split(":")[0].replace(" %", "\u00a0%")
     ]
-    assert [line.split(":")[0] for line in told[1:]] in (
-        ["With your rungs kept"],
-        ["If rungs may change"],
-    )
+    assert [line.split(":")[0] for line in told[1:]] == ["We recommend"]
 
 
 def test_what_to_take_comes_as_toml_and_as_options(chart):
@@ -270,7 +274,7 @@ def test_doubt_about_something_cheaper_is_said():
     doubt = candidate(0.015, 0.02, "doubtful", "peak is off by 2.00%", film="finite", mesh="x1")
     chart = chart_from(SHORT, doubt, status="unresolvable")
     assert chart.winner == ""
-    told = "scatter hides whether it is good enough: film finite (2 % off in peak film force over"
+    told = "scatter hides whether it is good enough: film: finite (2 % off in peak film force over"
     assert told in chart.conclusion[-1]
 
 
@@ -290,9 +294,9 @@ def test_rungs_that_are_too_coarse_are_said_whatever_comes_of_the_numerics():
     resolved = replace(found, kept=answer_of(HERE_POINT, reference=fine))
     kept = chart_of(load_scene("journal-bearing", {"duration": "0.5 s"}), resolved).choices[0]
     assert kept.sentence == (
-        "With your rungs kept: your numerics are fine (0.1 % off in peak film force, against the "
-        "finest numerics of the same rungs), but your rungs are not (40 % off in peak film force, "
-        "against the best rungs), whatever the numerics."
+        "With your rungs kept, no numerical setting reaches 2 %: your numerics are fine (0.1 % off "
+        "in peak film force, against the finest numerics of the same rungs), but your rungs are "
+        "not (40 % off in peak film force, against the best rungs)."
     )
     # numerics that are off by more than asked, for all that is known, are not called fine
     open_ = answer_of(doubt, reference=fine, status="so far")
@@ -341,7 +345,8 @@ def test_where_the_rungs_are_the_best_one_answer_is_told_once():
     chart = chart_of(scene, found)
     where, take = chart.conclusion
     assert where.endswith("3 % off in peak film force. Its mesh is too coarse.")
-    assert take.startswith("Your rungs are already the best of this scene: take mesh 72 around")
+    assert take.startswith("We recommend: take mesh 72 around")
+    assert take.endswith("; your rungs are the best already.")
     page, text = chart_html(chart), chart_text(chart)
     assert [page.count(f'<div class="choice {word}') for word in ("resolved", "")] == [1, 1]
     assert page.count("</svg>") == 1
@@ -351,7 +356,9 @@ def test_where_the_rungs_are_the_best_one_answer_is_told_once():
         assert words not in text
     assert [each.question for each in chart.choices] == [KEPT, RAISED]  # both may be applied
     # another answer to one of them: both are told
-    other = replace(found, raised=replace(found.raised, chosen=SHORT, changes=dict(SHORT.values)))
+    good = candidate(0.01, 0.005, film="short", mesh="x1")
+    cheaper = replace(found.raised, chosen=good, candidates=(good, *found.kept.candidates))
+    other = replace(found, raised=replace(cheaper, changes=dict(good.values)))
     assert len(chart_of(scene, other).conclusion) == 3
 
 
@@ -359,7 +366,7 @@ def test_an_error_of_the_reference_that_matters_is_told_beside_that_of_the_scene
     scene = load_scene("journal-bearing", {"duration": "0.5 s", "film.rung": "direct"})
     chart = chart_of(scene, best_rungs_already(steps=(0.018, 0.009)))  # 0.3 % left
     assert "3 % off in peak film force (the reference itself may be 0.3 % off)" in chart.verdict
-    assert "themselves off by up to 0.3\u00a0%" in chart_html(chart)
+    assert "itself off by up to 0.3\u00a0%" in chart_html(chart)
 
 
 def test_rungs_are_listed_before_the_settings_the_worst_first():
@@ -384,9 +391,10 @@ def test_rungs_are_listed_before_the_settings_the_worst_first():
     )
     chart = chart_of(pump, replace(study_of(), raises=raises))
     assert [each.effect for each in chart.raises] == ["wrist pin", "guide", "pressure", "drive"]
-    assert "wrist pin ideal instead of compliant: 75 % off; 2 more are over 2 %" in chart.verdict
+    assert "Modelling the wrist pin as ideal rather than compliant changes the" in chart.verdict
+    assert "by 75 % in vibration level, 306 to 758 Hz; 2 more of your rungs" in chart.verdict
     page = chart_html(chart)
-    assert page.index("What each of your rungs costs") < page.index("Recommended settings")
+    assert page.index("each simplified model alone") < page.index("Recommended settings")
 
 
 def test_a_card_without_settings_leaves_no_blank_beside_it(chart):
@@ -415,14 +423,17 @@ def test_points_deep_in_the_error_of_the_reference_do_not_stretch_the_axis(chart
     scene = load_scene("journal-bearing", {"duration": "0.5 s", "film.rung": "direct"})
     deep = chart_of(scene, best_rungs_already(steps=(0.018, 0.009)))  # 0.3 % left
     assert chart_figure(deep).axes[0].get_ylim()[0] == pytest.approx(0.3 / 10 / 2)
-    assert "drawn at its foot" in chart_html(deep)
+    assert "drawn at its bottom edge" in chart_html(deep)
 
 
 @pytest.mark.parametrize(
     ("step", "comment"),
     [
         (1.3e-5, "13 µs; was not set: 19.5 µs by default"),
-        (1.953125e-05, "19.5 µs; was not set: this by default, which other rungs may change"),
+        (
+            1.953125e-05,
+            "19.5 µs: the default, written out because the default depends on the rungs",
+        ),
     ],
 )
 def test_a_step_is_told_in_its_unit_with_what_it_was(step, comment):
@@ -440,6 +451,169 @@ def test_an_order_near_none_is_not_extrapolated_from():
     assert remaining_error(flat) == pytest.approx(0.001 / (math.sqrt(2) - 1))
 
 
+# -- what is too close to call, what is drawn, what is gained
+
+
+def coarse_mesh(error, *others):
+    """The best rungs, a mesh that is off by so much, and finer ones; 0.44 % left in the best."""
+    here = candidate(0.5, error, "beyond", mesh="x2")
+    answer = answer_of(*others, here, written=here, level=convergence((0.012, 0.0132)))
+    chosen = answer.chosen
+    answer = replace(answer, changes={} if chosen is here else dict(chosen.values))
+    written = {**WRITTEN, **FILM, "mesh": "x2"}
+    found = replace(study_of(), kept=answer, raised=answer, written=written)
+    return chart_of(load_scene("journal-bearing", {"duration": "0.5 s", **X2}), found)
+
+
+X2 = {"film.rung": "direct", "film.n_theta": 36, "film.n_z": 9}
+
+
+@pytest.mark.parametrize(
+    ("error", "close"), [(0.02004, True), (0.0242, True), (0.0158, True), (0.03, False)]
+)
+def test_an_error_nearer_to_the_accuracy_than_the_reference_is_known_is_not_called(error, close):
+    chart = coarse_mesh(error, candidate(1.0, 0.005, mesh="x1"))
+    assert chart.remaining == pytest.approx(0.0044)
+    where, take = chart.conclusion
+    assert where.startswith("Your scene as written is at the limit of 2 %: 2.0 %") == (
+        error == 0.02004
+    )
+    assert ("too close to call" in where) == close
+    assert ("is not within" in where) != close
+    assert ("to be on the safe side" in take) == close
+    assert "mesh 72 around (was 36) and 17 along (was 9)" in take
+
+
+def test_the_choice_is_clear_of_the_limit_where_one_is():
+    near = candidate(1.0, 0.0165, mesh="x1")
+    clear = candidate(2.0, 0.012, film="finite", mesh="x1")
+    chart = coarse_mesh(0.03, near, clear)
+    [choice] = chart.shown_choices
+    assert (choice.error, choice.clear) == (0.012, True)
+    assert choice.changes["film.n_theta"] == 72
+    [only] = coarse_mesh(0.03, near).shown_choices
+    assert (only.error, only.clear) == (0.0165, False)
+
+
+def test_points_stand_where_they_are_chosen_by_and_measured_times_are_kept():
+    """A busy computer had the dear choice look fast: the tables say what it costs."""
+    slow = replace(HERE_POINT, seconds=0.06)
+    busy = replace(COARSE, seconds=0.01)
+    found = study_of(busy)
+    found = replace(
+        found,
+        kept=answer_of(slow, written=slow),
+        raised=answer_of(slow, busy, written=slow),
+    )
+    chart = chart_of(load_scene("journal-bearing", {"duration": "0.5 s"}), found)
+    points = {p.name: p for p in chart.of(RAISED)}
+    here, other = points[HERE], points["film: direct"]
+    assert (here.seconds, here.measured_seconds) == (0.12, 0.12)
+    assert other.seconds == pytest.approx(0.12 * 2.0 / 0.02)  # by the tables
+    assert other.measured_seconds == 0.02
+    table = {row["name"]: row for row in chart_table(chart)["points"]}
+    assert table["film: direct"]["measured_seconds"] == 0.02
+    ringed = next(p for p in chart.of(RAISED) if p.name == chart.choices[-1].name)
+    assert ringed.on_front
+    assert not [p for p in chart.of(RAISED) if p.seconds < ringed.seconds and p.verdict == "within"]
+
+
+@pytest.mark.parametrize(("cost", "cards"), [(0.0142, 1), (0.010, 2)])
+def test_other_rungs_that_save_less_than_a_tenth_are_no_second_offer(cost, cards):
+    cheap = candidate(cost, 0.001, film="short", mesh="x1")
+    found = study_of()
+    kept = answer_of(HERE_POINT, COARSE_MAP, reference=candidate(0.1, 0.0, film="map"))
+    kept = replace(kept, changes=dict(COARSE_MAP.values))
+    raised = answer_of(HERE_POINT, COARSE_MAP, cheap)
+    chart = chart_of(
+        load_scene("journal-bearing", {"duration": "0.5 s"}),
+        replace(found, kept=kept, raised=raised),
+    )
+    page = chart_html(chart)
+    assert page.count('<div class="choice ') == page.count("</svg>") == cards
+    assert ("othing is gained by other rungs" in page) == (cards == 1)
+    assert [c.name for c in chart.choices][1] == ("film: short" if cards == 2 else MESH_9)
+
+
+MESH_9 = "mesh 36 around and 9 along"
+
+
+def test_each_plot_says_what_may_vary(chart):
+    assert chart.heading(KEPT) == "your rungs kept: mesh may vary"
+    assert chart.heading(RAISED) == "rungs may change: film, mesh may vary"
+
+
+def test_what_becomes_of_one_change_fewer_is_told():
+    joints = {"wristpin": "ideal", "guide": "ideal", "drive": "constant-speed"}
+    best = {"wristpin": "compliant", "guide": "compliant", "drive": "motor"}
+
+    def pump(cost, error, verdict="beyond", **rungs):
+        found = {"band_3": Difference(mean=error, standard_error=0.001)}
+        return Candidate(rungs={**joints, **rungs}, values={}, cost=cost, differences=found,
+                         starts=8, verdict=verdict, seconds=cost)  # fmt: skip
+
+    here, good = pump(0.1, 0.6), pump(0.5, 0.004, "within", **best)
+    fewer = [pump(0.2 + 0.1 * i, error, **{**best, name: joints[name]})
+             for i, (name, error) in enumerate({"guide": 0.3, "drive": 0.17}.items())]  # fmt: skip
+    two_fewer = pump(0.12, 0.02, guide="compliant")
+    finest = pump(9.0, 0.0, **best)
+    raised = answer_of(here, *fewer, two_fewer, good, written=here, reference=finest)
+    raises = (Raise(effect="guide", written="ideal", best="compliant", candidate=here),)
+    kept = answer_of(replace(here, verdict="within"), written=here, reference=pump(8.0, 0.0))
+    found = replace(study_of(), kept=kept, raised=raised, written=joints, raises=raises)
+    chart = chart_of(load_scene("bilge-pump", {"duration": "0.4 s"}), found)
+    said = chart.conclusion[-1]
+    assert said.startswith(
+        "We recommend: take wrist pin: compliant, guide: compliant, drive: motor"
+    )
+    assert said.endswith("With one change fewer (without drive: motor) the best is 17 % off.")
+
+
+def coarse_rungs():
+    """Numerics that are fine on rungs that are 40 % off."""
+    rungs_off = candidate(0.02, 0.4, "beyond", "force_peak is off by 40.00%", film="map", mesh="x1")
+    film = Raise(effect="film", written="map", best="direct", candidate=rungs_off)
+    found = study_of(SHORT, raises=(film,))
+    fine = candidate(0.1, 0.0, film="map", mesh="x1/2")
+    kept, raised = answer_of(HERE_POINT, reference=fine), answer_of(rungs_off, written=rungs_off)
+    scene = load_scene("journal-bearing", {"duration": "0.5 s"})
+    return chart_of(scene, replace(found, kept=kept, raised=raised))
+
+
+def test_rungs_that_no_numerics_can_mend_have_no_green_ring():
+    chart = coarse_rungs()
+    kept, raised = (question_figure(chart, question).axes[0] for question in chart.questions)
+    assert kept.get_ylabel() == "numerical error, against the same rungs [%]"
+    assert raised.get_ylabel() == chart.error_label
+    [ring] = kept.collections[-1:]
+    assert to_hex(ring.get_edgecolor()[0]) == SO_FAR
+    head = re.search(r'<div class="choice resolved coarse[^"]*"><h3>(.*?)</h3>', chart_html(chart))
+    assert head[1] == "No numerical setting reaches 2\u00a0% with your rungs"
+
+
+def test_the_reference_has_a_name_and_no_number(chart):
+    [reference] = [p for p in chart.of(RAISED) if p.verdict == "reference"]
+    assert kind_of(reference) == REFERENCE
+    assert reference not in chart.numbered(RAISED)
+    page = chart_html(chart)
+    [row] = re.findall(rf"<tr[^>]*><td>{reference.name}</td>.*?</tr>", page)
+    assert 'data-label="error">&ndash;</td>' in row
+    assert 'data-label="number"></td>' in row
+
+
+def test_the_table_of_quantities_shows_each_column_once_and_red_above_the_accuracy():
+    chart = coarse_mesh(0.03, candidate(1.0, 0.005, mesh="x1"))
+    heads, rows = shaded_rows(chart)
+    assert heads == ["peak film force", "rms film force"]  # the worst first, no unit
+    assert [label for label, _ in rows] == [HERE, "mesh 72 around and 17 along"]
+    colours = [[cell.ground for cell in cells] for _, cells in rows]
+    assert colours[0][1] == colours[1][0] == colours[1][1] == "#ffffff"  # 0.8, 0.5 and 0.1 %
+    assert colours[0][0] not in ("#ffffff", PALE)
+    assert [[cell.worst for cell in cells] for _, cells in rows] == [[True, False]] * 2
+    [(_, [close, _]), *_] = shaded_rows(coarse_mesh(0.02004, candidate(1.0, 0.005, mesh="x1")))[1]
+    assert close.ground == PALE
+
+
 # -- showing
 
 
@@ -450,8 +624,8 @@ def test_text_and_json_tell_the_same(chart):
     assert table["convergence"][0]["observed_order"] == 2.0
     for words in (
         *chart.conclusion,
-        "mesh x2, x1, x1/2: peak film force [N] moves by 0.40% then 0.10%, order 2.00, 0.03% left",
-        "film link, mesh 144 around x 33 along: a link is in tension",
+        "mesh x2, x1, x1/2: peak film force moves by 0.40% then 0.10%, order 2.00, 0.03% left",
+        "film: link, mesh 144 around and 33 along: a link is in tension",
         "mesh = x4: a cheaper one errs no more",
         "film = finite: knows no feed",
     ):
@@ -472,7 +646,7 @@ def test_points_of_the_picture_have_names(chart, tmp_path):
     svg = (tmp_path / "chart.svg").read_text()
     page = (tmp_path / "chart.html").read_text()
     assert svg.count("<title>") == len(chart.points) - 1  # the invalid one has no place
-    title = f"<title>{HERE}: 0.04 s, error 0.10% (peak film force [N])</title>"
+    title = f"<title>{HERE}: 0.04 s, error 0.10% (peak film force)</title>"
     assert title in svg
     assert title in page
     assert "a link is in tension" in page
@@ -484,19 +658,20 @@ def test_every_value_of_the_page_tells_what_it_is_on_a_phone(chart):
     """Where rows are stacked the head is gone: each value but the name has its own."""
     page = chart_html(chart)
     tables = re.findall(r"<table.*?</table>", page, flags=re.DOTALL)
-    assert len(tables) == 2 + len(chart.questions)
+    assert len(tables) == 1 + len(chart.questions)
     for table in tables:
         for row in re.findall(r"<tr[^>]*>(.*?)</tr>", table, flags=re.DOTALL):
             _, *values = re.findall(r"<td[^>]*>", row) or [""]
             assert all("data-label=" in value for value in values)
-    for words in ("Rung", "Reference", "Unresolvable"):
+    for words in ("Rung", "Within, beyond", "Unresolvable"):
         assert f"<dt>{words}</dt>" in page
 
 
 def test_the_highest_number_of_the_front_has_room_below_the_frame(chart):
     """A number takes 18 points above its mark: a tenth of a decade less and it meets the frame."""
-    highest = max(100 * point.error for point in chart.front)
-    assert chart_figure(chart).axes[0].get_ylim()[1] > 2 * highest  # 5 % of the decades: 1.7
+    for axes, question in zip(chart_figure(chart).axes, chart.questions, strict=False):
+        highest = max(100 * point.error for point in chart.of(question) if point.on_front)
+        assert axes.get_ylim()[1] > 2 * highest  # 5 % of the decades: 1.7
 
 
 def test_csv_has_a_row_for_every_quantity(chart, tmp_path):
@@ -517,20 +692,23 @@ def test_the_picture_says_simulated_and_numbers_its_front(chart):
     figure = chart_figure(chart)
     assert "(simulated)" in figure.get_suptitle()
     texts = [text.get_text() for axes in figure.axes for text in axes.texts]
-    assert {"1", "2", "3"} <= set(texts)
-    assert texts.count("your scene") == 2  # once a question
+    # a question has its star, its reference, and one more on its front
+    for text in ("1", "your scene", "reference"):
+        assert texts.count(text) == 2
+    assert "2" not in texts
     [x, y] = [axes.get_scale() for axes in (figure.axes[0].xaxis, figure.axes[0].yaxis)]
     assert (x, y) == ("log", "log")
 
 
 def test_numbers_of_near_points_and_the_legend_do_not_touch():
-    near = candidate(3.9, 1e-5, tolerance="x2")  # beside the reference, which takes 4 s
-    found = study_of(SHORT, near, COARSE)
+    near = candidate(3.8, 2e-4, tolerance="x2")  # beside the reference, which takes 4 s
+    beside = candidate(3.7, 4e-4, tolerance="x4")
+    found = study_of(SHORT, near, beside)
     figure = chart_figure(chart_of(load_scene("journal-bearing"), replace_written(found, near)))
     figure.draw_without_rendering()
     axes = figure.axes[1]
-    boxes = [t.get_window_extent() for t in axes.texts if t.get_text().isdecimal()]
-    assert len(boxes) == 4
+    boxes = [t.get_window_extent() for t in axes.texts]
+    assert len(boxes) == 5  # of the short film, the star, two beside the reference, and that
     assert not [pair for pair in itertools.combinations(boxes, 2) if pair[0].overlaps(pair[1])]
     assert not axes.get_legend().get_window_extent().overlaps(axes.get_window_extent())
 
@@ -560,12 +738,12 @@ def test_a_journal_needs_its_map_only(journal):
     _, chart = journal
     by_name = {point.name: point for point in chart.of(RAISED)}
     # Ocvirk at L/D 2/3 is off by tens of per cent; the map by the error of its table, 4e-4 C
-    assert by_name["film direct, mesh 48 around x 9 along"].error == 0
-    assert min(p.error for n, p in by_name.items() if "film short" in n) > 0.02
-    assert by_name["mesh 48 around x 9 along"].error < 1e-3
+    assert by_name["film: direct, mesh 48 around and 9 along"].error == 0
+    assert min(p.error for n, p in by_name.items() if "film: short" in n) > 0.02
+    assert by_name["mesh 48 around and 9 along"].error < 1e-3
     assert chart.status == "resolved"
     # a map is interpolated, a direct film solved at every step
-    assert by_name[HERE].seconds < by_name["film direct, mesh 48 around x 9 along"].seconds / 3
+    assert by_name[HERE].seconds < by_name["film: direct, mesh 48 around and 9 along"].seconds / 3
     assert [choice.keeps for choice in chart.choices] == [True, True]
 
 
@@ -732,7 +910,7 @@ def test_a_pump_with_pipes_has_an_answer_at_any_budget():
     assert [choice.question for choice in chart.choices] == [KEPT, RAISED]
     assert {choice.status for choice in chart.choices} <= {"resolved", "so far"}
     # the best of its rungs has waves
-    assert "pressure wave-lines" in chart.choices[1].reference
+    assert "pressure: wave-lines" in chart.choices[1].reference
 
 
 def test_runs_of_a_dear_pump_are_cut_and_starts_are_more(monkeypatch):

@@ -470,6 +470,18 @@ def test_rungs_are_kept_or_may_change():
     assert changed == with_values(pilot.scene, found.raised.chosen.values)
 
 
+def test_what_one_question_measures_the_other_knows_where_the_rungs_are_the_best():
+    """Numerics only: the same choice on both sides, from the same starts."""
+    pilot = KnownPilot({IDEAL_WRIST: 0.3, LINK_WRIST: 0.1}, step_error=0.004, scatter=0.002)
+    pilot.scene = load_scene("bilge-pump", {"joint.wristpin.rung": "compliant"})
+    kept = ["crankpin", "guide", "pressure", "drive"]
+    found = study(pilot.scene, pilot.quantities, accuracy=0.02, pinned=kept, pilot=pilot)
+    assert found.kept.reference == found.raised.reference
+    numerics = [c for c in found.raised.candidates if c.rungs["wristpin"] == "compliant"]
+    assert list(found.kept.candidates) == numerics
+    assert len(numerics) < len(found.raised.candidates)
+
+
 def test_a_doubt_of_few_starts_does_not_keep_a_whole_search_from_its_answer():
     """Combinations that a shortlist tried on four starts are judged on more, where cheaper."""
     pilot = KnownPilot({TWO_LEVEL: 0.6, CONSTANT: 0.7, NONE: 0.8}, scatter=0.02)

@@ -30,6 +30,8 @@ def quantity_label(name: str, scene: Scene) -> tuple[str, str]:
     ('vibration level, 306 to 758 Hz', 'dB')
     >>> quantity_label("pin_rms_2", load_scene("triplex-pump"))
     ('rms crank pin force, throw 2', 'N')
+    >>> quantity_label("orbit_second", load_scene("shaft-rig"))
+    ("rms orbit radius at bearing 'second'", 'm')
     """
     known = known_of(scene).words
     stem, _, last = name.rpartition("_")
@@ -43,7 +45,7 @@ def quantity_label(name: str, scene: Scene) -> tuple[str, str]:
         return f"{words}, throw {last}", unit
     kind, _, bearing = name.partition("_")
     words, unit = known.get(kind, ("", ""))
-    return (f"{words} {bearing}", unit) if words else (name, "")
+    return (f"{words} '{bearing}'", unit) if words else (name, "")
 
 
 def _band_words(number: int, fs: float) -> str:

@@ -37,8 +37,8 @@ class Point:
     rungs : mapping of str to str
         All of the choice, effect by effect.
     seconds : float
-        Least of the measured times, of one simulated second or one recording [s]; NaN where it
-        never ran.
+        Cost that points are drawn and chosen by, of one simulated second or one recording [s]: of
+        a scene by the cost tables, scaled so that the scene as written takes its measured time.
     errors : mapping of str to Difference
         Of every quantity [-]; empty where it is not valid.
     verdict : str
@@ -59,6 +59,8 @@ class Point:
     block : str
         TOML to paste into the scene or recipe; comment only where nothing is to be changed, empty
         where the choice is none of a scene.
+    measured_seconds : float
+        Least of the measured times of what `seconds` is of; NaN where none was taken.
     """
 
     name: str
@@ -73,6 +75,7 @@ class Point:
     question: str = ""
     here: bool = False
     block: str = ""
+    measured_seconds: float = math.nan
 
     @property
     def worst(self) -> str:
@@ -121,8 +124,14 @@ class Choice:
         The conclusion.
     keeps : bool
         Nothing is to be changed.
+    words : str
+        The name, with what the scene as written has instead.
     own_seconds : float
         Of a simulated second of the scene as written [s]; NaN where it was not timed.
+    clear : bool
+        It is within the accuracy by more than its reference may be off.
+    optional : bool
+        The scene as written is surely within the accuracy too.
     enough : bool
         False where the scene stays outside the accuracy even so, for its rungs.
     """
@@ -141,7 +150,10 @@ class Choice:
     reference: str
     sentence: str
     keeps: bool
+    words: str = ""
     own_seconds: float = math.nan
+    clear: bool = True
+    optional: bool = False
     enough: bool = True
 
 
@@ -212,8 +224,14 @@ class Chart:
         Points measured, of those of interest; 0 of 0 where nothing was left out.
     left : str
         What an unfinished search still takes, in words; empty where that is not known.
-    alike : bool
-        All questions have one answer, against one reference: the last is shown.
+    alike : str
+        Why all questions have one answer, of which the last is shown; empty where they have not.
+    varied : mapping of str to str
+        Question -> what may vary, in words.
+    error_labels : mapping of str to str
+        Question -> name of its error axis, where it is not `error_label`.
+    at_best : tuple of (str, str)
+        Effects and their rungs of the scene as written that are the best already.
     subject : str
         ``scene``, or ``recipe`` where the errors are those of the verdict.
     """
@@ -239,7 +257,10 @@ class Chart:
     measured: int = 0
     planned: int = 0
     left: str = ""
-    alike: bool = False
+    alike: str = ""
+    varied: Mapping[str, str] = field(default_factory=dict)
+    error_labels: Mapping[str, str] = field(default_factory=dict)
+    at_best: tuple[tuple[str, str], ...] = ()
     subject: str = "scene"
 
     @property
@@ -253,8 +274,13 @@ class Chart:
         return self.questions[-1:] if self.alike else self.questions
 
     def heading(self, question: str) -> str:
-        """Of what is shown of a question."""
-        return "all choices" if self.alike else question
+        """Of what is shown of a question, with what may vary."""
+        what = "all choices" if self.alike else question
+        return f"{what}: {self.varied[question]} may vary" if question in self.varied else what
+
+    def error_name(self, question: str) -> str:
+        """Name of the error axis of a question."""
+        return self.error_labels.get(question, self.error_label)
 
     @property
     def shown_choices(self) -> tuple[Choice, ...]:
@@ -269,6 +295,12 @@ class Chart:
     def of(self, question: str) -> tuple[Point, ...]:
         """Points of a question."""
         return tuple(point for point in self.points if point.question == question)
+
+    def numbered(self, question: str) -> tuple[Point, ...]:
+        """Points of its front, fastest first, without those that a picture gives a name."""
+        front = [p for p in self.of(question) if p.on_front and not p.here]
+        front = [p for p in front if p.verdict != "reference"]
+        return tuple(sorted(front, key=lambda p: p.seconds))
 
     def label(self, quantity: str) -> str:
         """A quantity in words."""
@@ -403,6 +435,7 @@ def _point_table(point: Point) -> dict[str, Any]:
         "name": point.name,
         "rungs": dict(point.rungs),
         "seconds": point.seconds,
+        "measured_seconds": point.measured_seconds,
         "error": point.error,
         "worst": point.worst,
         "verdict": point.verdict,

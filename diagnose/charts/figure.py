@@ -3,6 +3,7 @@
 import math
 import re
 import textwrap
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 from xml.sax.saxutils import escape
@@ -18,12 +19,14 @@ from ..pages.picture import (
     plain_numbers,
 )
 from .chart import RECOMMENDED, Chart, Choice, Point
+from .words import percent, with_scatter
 
 FRONT, OTHER, DOUBTFUL, LIMIT = "#1f5a94", "#9aa3ab", "#e07b39", "#b3261e"
 WINNER, SO_FAR, HERE_COLOUR = "#3a923a", "#e07b39", "#111111"
 FLOOR = 1e-3  # %, the least error that is drawn; the reference sits on it
-BEST, BEATEN = "best for its time", "another is better"
-UNTOLD = "scatter too large to tell"
+BEST, BEATEN = "nothing faster is as accurate", "beaten by another"
+UNTOLD, REFERENCE = "scatter too large to tell", "reference"
+TOO_CLOSE = "too close to call"
 _MOST_ROWS = 12  # of the front, in the table of quantities
 _WIDE = 46  # characters of a name on one line
 
@@ -51,11 +54,12 @@ def chart_figure(chart: Chart) -> Any:
     names = [f"points {i}" for i in range(len(questions))]
     mosaic: Any = [names, ["quantities"] * len(names)]
     panels = figure.subplot_mosaic(mosaic, height_ratios=(_POINTS - 1, high))
-    for name in names[1:]:
-        panels[name].sharey(panels[names[0]])
     for name, question in zip(names, questions, strict=True):
         _draw_points(panels[name], chart, question, columns=2 if len(names) > 1 else 3)
-    _draw_quantities(figure, panels["quantities"], chart)
+    _draw_quantities(panels["quantities"], chart)
+    figure.draw_without_rendering()
+    for name, question in zip(names, questions, strict=True):
+        _write_names(panels[name], chart, question)
     return figure
 
 
@@ -91,60 +95,90 @@ def _draw_points(axes: Any, chart: Chart, question: str, *, columns: int) -> Non
         where="post",
         color=FRONT,
         lw=1.2,
-        label="the best",
         zorder=1,
     )
     for number, point in enumerate(chart.points):
         if any(point is each for each in finite):
             _draw_point(axes, point, number, floor)
-    if chart.accuracy is not None:
-        axes.axhline(100 * chart.accuracy, color=LIMIT, lw=1, ls="--", label="accuracy asked")
-    if chart.remaining > 0:
-        axes.axhspan(
-            floor / 2,
-            max(100 * chart.remaining, floor / 2),
-            color="#dfe3e8",
-            zorder=0,
-            label="the reference's own error",
-        )
+    _draw_levels(axes, chart, floor)
     for label, style in _KINDS.items():
         if any(kind_of(p) == label for p in finite):
             axes.plot([], [], ls="none", label=label, **style)
-    _mark_choice(axes, chart, question, finite)
-    axes.set(xscale="log", xlabel=chart.cost_label, ylabel=chart.error_label)
+    _draw_ring(axes, chart, question, finite)
+    axes.set(xscale="log", xlabel=chart.cost_label, ylabel=chart.error_name(question))
     if question:
-        axes.set_title(chart.heading(question), fontsize=10)
+        axes.set_title(_wrapped(chart.heading(question), 60), fontsize=10)
     if chart.accuracy is not None:
         axes.set_yscale("log")
-        axes.set_ylim(floor / 2, _HEADROOM * _highest(chart))
+        axes.set_ylim(floor / 2, _HEADROOM * _highest(chart, points))
     axes.margins(x=_MARGIN)
     plain_numbers(axes.xaxis)
     plain_numbers(axes.yaxis)
     axes.grid(alpha=0.3, which="both")
-    _mark_here(axes, finite, chart.subject, floor)
-    _number(axes, front, floor)
+    for point in (p for p in finite if p.here):
+        place = (point.seconds, shown_error(point, floor))
+        label = f"your {chart.subject}"
+        axes.plot(*place, "*", ms=16, mfc="#ffd23f", mec=HERE_COLOUR, label=label, zorder=5)
     _legend_below(axes, ncols=columns)
 
 
-def _mark_choice(axes: Any, chart: Chart, question: str, finite: list[Point]) -> None:
-    """Ring round what to take: green where that is final."""
+def _draw_levels(axes: Any, chart: Chart, floor: float) -> None:
+    """The accuracy asked, and what the reference is off by: at the bottom, and round the limit."""
+    off = 100 * chart.remaining
+    if chart.accuracy is not None:
+        asked = 100 * chart.accuracy
+        axes.axhline(asked, color=LIMIT, lw=1, ls="--", label="accuracy asked")
+        if off > _VISIBLE * asked:
+            low = max(asked - off, floor / 2)
+            axes.axhspan(low, asked + off, color=PALE, lw=0, zorder=0, label=TOO_CLOSE)
+    if off > 0:
+        high = max(off, floor / 2)
+        label = "error of the reference"
+        axes.axhspan(floor / 2, high, color="#dfe3e8", zorder=0, label=label)
+
+
+_VISIBLE = 0.1  # of the accuracy
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ring:
+    """What a choice has round it: whose, its words, colour, and whether it is final."""
+
+    name: str
+    words: str
+    colour: str
+    final: bool
+
+
+def ring_of(chart: Chart, question: str) -> Ring | None:
+    """Round what to take: green where that is final and enough; None where nothing is."""
     choice = choice_of(chart, question)
-    name = chart.winner if choice is None else choice.name
-    final = choice is None or choice.status == "resolved"
-    if choice is not None and choice.status not in RECOMMENDED:
+    if choice is None:
+        return Ring(name=chart.winner, words=winner_words(chart), colour=WINNER, final=True)
+    if choice.status not in RECOMMENDED:
+        return None
+    final = choice.status == "resolved"
+    words = winner_words(chart) if final else "may be enough, not certain"
+    if not choice.enough:
+        words = "best with your rungs, not enough"
+    colour = WINNER if final and choice.enough else SO_FAR
+    return Ring(name=choice.name, words=words, colour=colour, final=final)
+
+
+def _draw_ring(axes: Any, chart: Chart, question: str, finite: list[Point]) -> None:
+    ring = ring_of(chart, question)
+    if ring is None:
         return
-    for point in (p for p in finite if p.name == name):
-        style = {"color": WINNER, "ls": "-"} if final else {"color": SO_FAR, "ls": ":"}
-        label = winner_words(chart) if final else "may be enough, not certain"
+    for point in (p for p in finite if p.name == ring.name):
         axes.scatter(
             point.seconds,
             shown_error(point, floor_of(chart)),
             s=260,
             facecolors="none",
-            edgecolors=style["color"],
-            linestyles=style["ls"],
+            edgecolors=ring.colour,
+            linestyles="-" if ring.final else ":",
             linewidths=2.2,
-            label=label,
+            label=ring.words,
             zorder=3,
         )
 
@@ -154,73 +188,79 @@ def choice_of(chart: Chart, question: str) -> Choice | None:
     return next((each for each in chart.choices if each.question == question), None)
 
 
-def _mark_here(axes: Any, finite: list[Point], subject: str, floor: float) -> None:
-    """A star with its name beside it, on the side of the panel's middle, above lines."""
-    from matplotlib.patheffects import withStroke
-
-    for point in (p for p in finite if p.here):
-        place = (point.seconds, shown_error(point, floor))
-        axes.plot(
-            *place, "*", ms=16, mfc="#ffd23f", mec=HERE_COLOUR, label=f"your {subject}", zorder=5
-        )
-        right = axes.transAxes.inverted().transform(axes.transData.transform(place))[0] > _RIGHT
-        axes.annotate(
-            f"your {subject}",
-            place,
-            xytext=(-9 if right else 9, 5),
-            textcoords="offset points",
-            ha="right" if right else "left",
-            va="bottom",
-            fontsize=9,
-            weight="bold",
-            color=HERE_COLOUR,
-            path_effects=[withStroke(linewidth=4, foreground="white")],
-            zorder=5,
-        )
-
-
 _MARGIN = 0.09  # of the width at either side: numbers stay inside the frame
-_RIGHT = 0.7  # of the panel: further right words stand left of their mark
 
 
-def _number(axes: Any, front: list[Point], floor: float) -> None:
-    """Numbers above the points of the front, below where the one before is too near.
+def _write_names(axes: Any, chart: Chart, question: str) -> None:
+    """Names beside star and reference, numbers beside the front: each where it covers least.
 
-    That of the scene as written is on the other side of its star than the name.
+    The figure is drawn by then: its layout is what it will be.
     """
+    floor = floor_of(chart)
+    finite = [p for p in chart.of(question) if math.isfinite(p.error) and math.isfinite(p.seconds)]
+    texts = [(p, f"your {chart.subject}", HERE_COLOUR) for p in finite if p.here]
+    texts += [(p, REFERENCE, FRONT) for p in finite if kind_of(p) == REFERENCE and not p.here]
+    texts += [(p, str(i), FRONT) for i, p in enumerate(chart.numbered(question), start=1)]
+    taken = [_box(axes, p, floor) for p in finite]
+    for point, text, colour in texts:
+        place = (point.seconds, shown_error(point, floor))
+        taken.append(_write(axes, place, text, colour, taken))
+
+
+_STAR, _DOT = 12.0, 4.0  # px at a hundred to the inch, of what names must not cover
+
+
+def _box(axes: Any, point: Point, floor: float) -> Any:
+    """What a point takes of the picture."""
+    from matplotlib.transforms import Bbox
+
+    centre = axes.transData.transform((point.seconds, shown_error(point, floor)))
+    half = _STAR if point.here else _DOT
+    return Bbox.from_extents(*(centre - half), *(centre + half))
+
+
+def _write(axes: Any, place: tuple[float, float], text: str, colour: str, taken: list[Any]) -> Any:
+    """Write beside a place, on the side where that covers least; the box that it takes."""
     from matplotlib.patheffects import withStroke
 
-    to_panel = axes.transData + axes.transAxes.inverted()
-    before, below = np.array([-1.0, -1.0]), True
-    for number, point in enumerate(front, start=1):
-        place = (point.seconds, shown_error(point, floor))
-        here = to_panel.transform(place)
-        below = bool(np.all(np.abs(here - before) < _NEAR)) and not below
-        before = here
-        left = point.here and here[0] <= _RIGHT
-        axes.annotate(
-            str(number),
-            place,
-            xytext=(-7 if left else 6, -6 if below else 6),
-            textcoords="offset points",
-            ha="right" if left else "left",
-            va="top" if below else "bottom",
-            fontsize=9,
-            weight="bold",
-            color=FRONT,
-            path_effects=[withStroke(linewidth=2, foreground="white")],
-            zorder=4,
-        )
+    note = axes.annotate(
+        text,
+        place,
+        xytext=(0, 0),
+        textcoords="offset points",
+        fontsize=9,
+        weight="bold",
+        color=colour,
+        path_effects=[withStroke(linewidth=3, foreground="white")],
+        zorder=6,
+    )
+    note.set_in_layout(False)
+    frame = axes.get_window_extent()
+
+    def put(side: tuple[str, str]) -> Any:
+        note.set(ha=side[0], va=side[1])
+        note.set_position((_ASIDE[side[0]], _ASIDE[side[1]]))
+        return note.get_window_extent()
+
+    def covers(side: tuple[str, str]) -> int:
+        box = put(side)
+        outside = bool(box.x0 < frame.x0 or box.x1 > frame.x1 or box.y0 < frame.y0)
+        return int(box.count_overlaps(taken)) + len(taken) * outside
+
+    return put(min(_SIDES, key=covers))
 
 
-def _highest(chart: Chart) -> float:
+_ASIDE = {"left": 8, "right": -8, "center": 0, "bottom": 5, "top": -5}  # points
+_SIDES = [(across, up) for up in ("bottom", "top") for across in ("left", "right", "center")]
+
+
+def _highest(chart: Chart, points: Sequence[Point]) -> float:
     """Largest error that is drawn, or the accuracy asked [%]."""
-    errors = [shown_error(p, FLOOR) for p in chart.points if math.isfinite(p.error)]
+    errors = [shown_error(p, FLOOR) for p in points if math.isfinite(p.error)]
     return max([*errors, 100 * (chart.accuracy or 0.0), FLOOR])
 
 
 _HEADROOM = 2.5  # of the error axis: the highest number stays inside the frame
-_NEAR = (0.03, 0.08)  # of the panel's width and height: two numbers would touch
 
 
 def _legend_below(axes: Any, ncols: int) -> None:
@@ -241,13 +281,14 @@ _KINDS: dict[str, dict[str, Any]] = {
     BEST: {"marker": "o", "ms": 8, "color": FRONT},
     BEATEN: {"marker": "o", "ms": 5, "color": OTHER},
     UNTOLD: {"marker": "s", "ms": 6, "mfc": "none", "color": DOUBTFUL},
+    REFERENCE: {"marker": "o", "ms": 8, "mfc": "white", "color": FRONT},
 }
 
 
 def kind_of(point: Point) -> str:
     """How a point is drawn, in the words of the legend."""
-    if point.verdict == "doubtful":
-        return UNTOLD
+    if point.verdict in ("doubtful", "reference"):
+        return UNTOLD if point.verdict == "doubtful" else REFERENCE
     return BEST if point.on_front else BEATEN
 
 
@@ -264,25 +305,15 @@ def _draw_point(axes: Any, point: Point, number: int, floor: float) -> None:
     mark.set_gid(f"point-{number}")
 
 
-def _draw_quantities(figure: Any, axes: Any, chart: Chart) -> None:
-    """Errors of every quantity for the points of the front, as a table of colours."""
-    from matplotlib.colors import LogNorm
-
-    points = _table_points(chart)
-    if not points:
-        axes.set_axis_off()
-        return
-    names = list(dict.fromkeys(name for _, point in points for name in point.errors))
+def _draw_quantities(axes: Any, chart: Chart) -> None:
+    """Errors of every quantity, as a table of colours."""
+    points, names = _table(chart)
     if not names:
         axes.set_axis_off()
         return
     values = _errors(points, names)
-    shown = axes.imshow(
-        np.maximum(values, FLOOR),
-        aspect="auto",
-        cmap="YlOrRd",
-        norm=LogNorm(vmin=_palest(chart, values), vmax=_reddest(values)),
-    )
+    grounds = _grounds(chart, values)
+    axes.imshow(grounds, aspect="auto")
     for (row, column), value in np.ndenumerate(values):
         axes.text(
             column,
@@ -291,23 +322,43 @@ def _draw_quantities(figure: Any, axes: Any, chart: Chart) -> None:
             ha="center",
             va="center",
             fontsize=8,
-            color=_ink_on(value),
+            color=_ink_on(grounds[row, column]),
         )
     words = [chart.label(name) for name in names]
     axes.set_xticks(range(len(names)), words, rotation=35, ha="right", fontsize=8)
     labels = [_wrapped(label, _WIDE) for label, _ in points]
     axes.set_yticks(range(len(points)), labels, fontsize=8)
     what = "" if chart.choices else ", best for their time"
-    axes.set_title(f"Error of every quantity{what} [{_unit(chart)}]", fontsize=10)
-    figure.colorbar(shown, ax=axes, pad=0.01).ax.tick_params(labelsize=8)
+    red = "" if chart.accuracy is None else f"; red: above {percent(chart.accuracy)}"
+    axes.set_title(f"Error of every quantity{what} [{_unit(chart)}]{red}", fontsize=10)
 
 
-def _palest(chart: Chart, values: Any) -> float:
-    """Of an accuracy that is asked all decades below it; else from what there is."""
-    return 10 * FLOOR if chart.accuracy is not None else max(FLOOR, float(np.nanmin(values)) / 2)
+def _grounds(chart: Chart, values: Any) -> Any:
+    """Colours of errors [%] [shape=(..., 4)]: red above an accuracy that is asked, else by size."""
+    from matplotlib import colormaps
+    from matplotlib.colors import LogNorm, to_rgba
+
+    asked, off = 100 * (chart.accuracy or 0.0), close_to(chart)
+    least = asked or max(FLOOR, float(np.nanmin(values)) / 2)
+    norm = LogNorm(vmin=least, vmax=max(100.0, float(np.nanmax(values))), clip=True)
+    depth = norm(np.maximum(np.nan_to_num(values), FLOOR))
+    if not asked:
+        return colormaps["YlOrRd"](depth)
+    red = colormaps["Reds"](_PALEST + _DEEPER * depth)
+    pale = np.where((abs(values - asked) <= off)[..., None], to_rgba(PALE), 1.0)
+    return np.where((values > asked + off)[..., None], red, pale)
 
 
-_DARK = 20.0  # %, above it a cell is dark
+def close_to(chart: Chart) -> float:
+    """Errors that near to the accuracy are too close to call [%]: what is seen of two digits."""
+    return 100 * max(chart.remaining, _LAST_DIGIT * (chart.accuracy or 0.0))
+
+
+_LAST_DIGIT = 0.01
+PALE = "#fbe8e6"  # of the band round the accuracy
+
+
+_PALEST, _DEEPER = 0.2, 0.4  # of the colours: figures stay legible in black
 
 
 def _unit(chart: Chart) -> str:
@@ -319,13 +370,24 @@ def _table_points(chart: Chart) -> list[tuple[str, Point]]:
     if not chart.choices:
         numbered = [(f"{i} {p.name}", p) for i, p in enumerate(chart.front, start=1)]
         return numbered[-_MOST_ROWS:]
-    rows = []
+    rows: list[tuple[str, Point]] = []
     for choice in chart.shown_choices:
+        against = ", against the same rungs" if choice.question in chart.error_labels else ""
         for point in (p for p in chart.of(choice.question) if p.errors):
-            if point.here or point.name == choice.name:
-                where = "" if chart.alike else f"{choice.question}: "
-                rows.append((f"{where}{point.name}", point))
+            known = any(point.rungs == p.rungs and point.errors == p.errors for _, p in rows)
+            if not known and (point.here or point.name == choice.name):
+                rows.append((f"{point.name}{against}", point))
     return rows
+
+
+def _table(chart: Chart) -> tuple[list[tuple[str, Point]], list[str]]:
+    """Points of the table, and its quantities: those of the subject as written, the worst first."""
+    points = _table_points(chart)
+    names = list(dict.fromkeys(name for _, point in points for name in point.errors))
+    own = [point for _, point in points if point.here]
+    if own:
+        names.sort(key=lambda name: -own[-1].errors[name].error if name in own[-1].errors else 0.0)
+    return points, names
 
 
 def _percent(value: float) -> str:
@@ -343,6 +405,7 @@ class ShadedCell:
     text: str
     ground: str
     ink: str
+    worst: bool
 
 
 def question_figure(chart: Chart, question: str) -> Any:
@@ -350,7 +413,10 @@ def question_figure(chart: Chart, question: str) -> Any:
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(PAGE_WIDTH, _POINTS - 0.8), layout="constrained")
-    _draw_points(figure.subplots(), chart, question, columns=2)
+    axes = figure.subplots()
+    _draw_points(axes, chart, question, columns=2)
+    figure.draw_without_rendering()
+    _write_names(axes, chart, question)
     return figure
 
 
@@ -375,44 +441,42 @@ _MOST_PX = 760  # width of points in a page
 
 def shaded_rows(chart: Chart) -> tuple[list[str], list[tuple[str, list[ShadedCell]]]]:
     """Heads and rows of the errors by quantity, in the colours of the picture."""
-    from matplotlib import colormaps
-    from matplotlib.colors import LogNorm, to_hex
+    from matplotlib.colors import to_hex
 
-    points = _table_points(chart)
-    names = list(dict.fromkeys(name for _, point in points for name in point.errors))
+    points, names = _table(chart)
     if not names:
         return [], []
-    values = _errors(points, names)
-    norm = LogNorm(vmin=_palest(chart, values), vmax=_reddest(values), clip=True)
+    grounds = _grounds(chart, _errors(points, names))
 
-    def cell(value: float) -> ShadedCell:
-        if not math.isfinite(value):
-            return ShadedCell(text="–", ground="#ffffff", ink=_INK)
-        ground = to_hex(colormaps["YlOrRd"](norm(max(value, FLOOR))))
-        return ShadedCell(text=_percent(value), ground=ground, ink=_ink_on(value))
+    def cell(point: Point, name: str, ground: Any) -> ShadedCell:
+        found, text = point.errors.get(name), "–"
+        if found is not None and math.isfinite(found.error):
+            text = with_scatter(found.error, found.standard_error, point.starts)
+        return ShadedCell(
+            text=text.replace(" %", ""),
+            ground=to_hex(ground),
+            ink=_ink_on(ground),
+            worst=bool(chart.choices) and name == point.worst,
+        )
 
     rows = [
-        (label, [cell(float(value)) for value in line])
-        for (label, _), line in zip(points, values, strict=True)
+        (label, [cell(point, *each) for each in zip(names, line, strict=True)])
+        for (label, point), line in zip(points, grounds, strict=True)
     ]
     return [chart.label(name) for name in names], rows
 
 
-_INK = "#1c232b"
+def _ink_on(ground: Any) -> str:
+    return "black" if float(np.mean(ground[:3])) > _HALF else "white"
 
 
-def _ink_on(value: float) -> str:
-    return "white" if value > _DARK else "black"
+_HALF = 0.5
 
 
 def _errors(points: list[tuple[str, Point]], names: list[str]) -> Any:
     return np.array(
         [[100 * p.errors[n].error if n in p.errors else np.nan for n in names] for _, p in points]
     )
-
-
-def _reddest(values: Any) -> float:
-    return max(100.0, float(np.nanmax(values)))
 
 
 def chart_svg(chart: Chart) -> str:

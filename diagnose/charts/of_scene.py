@@ -5,6 +5,7 @@ import json
 import math
 import time
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any, cast
@@ -16,6 +17,7 @@ from ...datasets.generation.machines import known_of
 from ...datasets.generation.quantities import quantity_label
 from ...datasets.workers.local import in_order
 from ...sim.fidelity.choose import estimated_error
+from ...sim.fidelity.ladder import effects_of
 from ...sim.fidelity.pilot import Candidate, Outcome, Pilot, starts_to_tell, surely_within
 from ...sim.fidelity.study import Answer, Search, Study
 from ...sim.scene.parts import Scene
@@ -33,6 +35,7 @@ from .words import (
     raise_words,
     rung_words,
     time_words,
+    two_digits,
 )
 
 KEPT, RAISED = "your rungs kept", "rungs may change"
@@ -184,12 +187,13 @@ def chart_of(scene: Scene, found: Study) -> Chart:
     -------
     Chart
     """
+    found = _decided(scene, found)
     answers = {KEPT: found.kept, **({RAISED: found.raised} if found.raised else {})}
     points = tuple(p for name, a in answers.items() for p in _points(scene, found, a, name))
     choices = tuple(_choice(scene, found, a, name) for name, a in answers.items())
     final = [c for c in choices if c.status == "resolved"]
-    where = (_standing(scene, found), *filter(None, [_costly_rungs(found)]))
-    alike = _alike(found)
+    where = (_standing(scene, found), *filter(None, [_costly_rungs(scene, found)]))
+    alike, best = _alike(found), _best_already(found)
     told = [choices[-1]] if alike else choices
     conclusion = (*where, *(c.sentence for c in told))
     return Chart(
@@ -207,13 +211,18 @@ def chart_of(scene: Scene, found: Study) -> Chart:
         choices=choices,
         raises=tuple(_rung_costs(scene, found)),
         labels=_labels(scene, points),
-        convergence=tuple(dict.fromkeys(e for a in answers.values() for e in a.convergence)),
+        convergence=tuple(
+            e for a in answers.values() if a is found.whole or not best for e in a.convergence
+        ),
         refused=found.refused,
         pruned=found.pruned,
         measured=found.measured,
         planned=found.planned,
         left=_left_words(found),
         alike=alike,
+        varied={name: _varied(answer) for name, answer in answers.items()},
+        error_labels=_numerical(found),
+        at_best=_at_best(scene, found),
         note=_note(scene, found),
     )
 
@@ -227,14 +236,106 @@ def _rungs_of(answer: Answer) -> dict[str, str]:
     return dict(answer.reference.rungs)
 
 
-def _alike(found: Study) -> bool:
-    """Whether both questions have one answer: the same settings, against the same reference."""
+def _decided(scene: Scene, found: Study) -> Study:
+    """A study whose choices stay within the accuracy whatever its references are off by.
+
+    Other rungs that gain next to nothing are not chosen.
+    """
+    kept = _sure(scene, found, found.kept)
+    if found.raised is None:
+        return replace(found, kept=kept)
+    raised = _sure(scene, found, found.raised)
+    wanted = _fits(found, raised, raised.chosen)
+    for own in (c for c in raised.candidates if c.rungs == kept.chosen.rungs):
+        little = raised.chosen.cost > _NO_GAIN * own.cost
+        if little and _fits(found, raised, own) >= max(wanted, 1):
+            raised = replace(raised, chosen=own, changes=kept.changes)
+    return replace(found, kept=kept, raised=raised)
+
+
+_NO_GAIN = 0.9  # of the cost: other rungs must save more
+
+
+def _sure(scene: Scene, found: Study, answer: Answer) -> Answer:
+    """The cheapest choice that is clear of the limit instead of one that is not."""
+    if answer.status != "resolved" or _by_default(answer):
+        return answer
+    clear = (c for c in answer.candidates if _fits(found, answer, c) == _CLEAR)
+    chosen = next((c for c in clear if c.rungs != answer.reference.rungs), answer.chosen)
+    before = _before(scene, chosen.values)
+    changes = {path: value for path, value in chosen.values.items() if before[path] != value}
+    same = chosen.rungs == answer.chosen.rungs
+    return answer if same else replace(answer, chosen=chosen, changes=changes)
+
+
+_CLEAR = 2
+
+
+def _fits(found: Study, answer: Answer, each: Candidate) -> int:
+    """2 where a candidate is within the accuracy by more than its reference is off; 1 if within."""
+    room = found.accuracy - _own_error(answer)
+    return 0 if each.verdict != "within" else _CLEAR if estimated_error(each) <= room else 1
+
+
+def _own_error(answer: Answer) -> float:
+    """What a reference may itself be off by [-]."""
+    return max(map(remaining_error, answer.convergence), default=0.0)
+
+
+def _at_limit(found: Study, own: Candidate) -> bool:
+    """Whether an error lies nearer to the accuracy than it is known, by two digits at the best."""
+    scatter = _scatter(own)
+    if own.verdict == "doubtful" and scatter > _FAINT * found.accuracy:
+        return False
+    apart = abs(own.error - found.accuracy)
+    unknown = _own_error(found.whole) + (scatter if math.isfinite(scatter) else 0.0)
+    return apart <= max(unknown, _TWO_DIGITS * found.accuracy)
+
+
+_FAINT = 1 / 3  # of the accuracy: a standard error with which nothing is near anything
+_TWO_DIGITS = 0.01  # of the accuracy: what is seen of an error told with two digits
+
+
+def _alike(found: Study) -> str:
+    """Why both questions have one answer, the same settings; empty where they have two."""
     raised = found.raised
-    return (
-        raised is not None
-        and _best_already(found)
-        and dict(raised.changes) == dict(found.kept.changes)
-        and _status(found, raised) == _status(found, found.kept)
+    if (
+        raised is None
+        or dict(raised.changes) != dict(found.kept.changes)
+        or _status(found, raised) != _status(found, found.kept)
+    ):
+        return ""
+    if _best_already(found):
+        return "your rungs are the best already"
+    return "" if _rungs_too_coarse(found) else "nothing is gained by other rungs"
+
+
+def _varied(answer: Answer) -> str:
+    """What differs among the candidates of an answer, in words."""
+    rungs = [each.rungs.items() for each in answer.candidates]
+    pairs = dict.fromkeys(pair for each in rungs for pair in each)
+    names = [effect for effect, _ in pairs]
+    return ", ".join(effect_words(e) for e in dict.fromkeys(names) if names.count(e) > 1)
+
+
+def _numerical(found: Study) -> dict[str, str]:
+    """The error axis of what is not against the best rungs."""
+    if found.raised is None or _best_already(found):
+        return {}
+    return {KEPT: "numerical error, against the same rungs [%]"}
+
+
+def _physical(scene: Scene) -> set[str]:
+    return {effect.name for effect in effects_of(scene) if not effect.numerical}
+
+
+def _at_best(scene: Scene, found: Study) -> tuple[tuple[str, str], ...]:
+    best = found.whole.reference.rungs
+    physical = _physical(scene)
+    return tuple(
+        (effect_words(effect), rung)
+        for effect, rung in found.written.items()
+        if effect in physical and best[effect] == rung
     )
 
 
@@ -247,18 +348,24 @@ def _left_words(found: Study) -> str:
 
 def _note(scene: Scene, found: Study) -> str:
     """How it was measured."""
-    how = "with its settling; the least time of several runs"
-    if found.duration is None:
-        return f"{scene.duration:g} s a run, {how}"
+    cut = "" if found.duration is None else f", cut from {scene.duration:g} s for more starts"
     return (
-        f"{found.duration:.3g} s a run, cut from {scene.duration:g} s for more starts, {how}, "
-        "brought to the whole length"
+        f"{found.duration or scene.duration:.3g} s a run{cut}, with its settling. Times are by "
+        "the cost tables, as is the choice, scaled so that the scene as written takes its measured "
+        "time; the measured ones, which scatter, are in the JSON"
     )
 
 
 def _rate(seconds: float, scene: Scene, found: Study) -> float:
-    """Time of a simulated second of a scene, by the time of a run [s]."""
+    """Time of a simulated second of a scene, by the measured time of a run [s]."""
     return seconds / found.share / scene.duration
+
+
+def _cost_rate(each: Candidate, scene: Scene, found: Study) -> float:
+    """The same by the tables, in measured times of the scene as written [s]."""
+    own = found.kept.written
+    scale = math.nan if own is None else own.seconds / own.cost
+    return _rate(scale * each.cost, scene, found)
 
 
 REFERENCE = "reference"
@@ -267,13 +374,14 @@ REFERENCE = "reference"
 
 def _points(scene: Scene, found: Study, answer: Answer, question: str) -> Iterator[Point]:
     """The scene as written first, then the cheapest first."""
-    rates = [_rate(each.seconds, scene, found) for each in answer.candidates]
-    places = [(rate, c.error) for rate, c in zip(rates, answer.candidates, strict=True)]
-    rows = list(zip(answer.candidates, rates, front_of(places), strict=True))
-    rows.sort(key=lambda row: dict(row[0].rungs) != dict(found.written))
+    rates = [_cost_rate(each, scene, found) for each in answer.candidates]
+    errors = [math.inf if c.verdict == "doubtful" else c.error for c in answer.candidates]
+    front = front_of(list(zip(rates, errors, strict=True)))
+    rows = list(zip(answer.candidates, rates, front, strict=True))
+    rows.sort(key=lambda row: row[0].rungs != found.written)
     for each, rate, on_front in rows:
-        best = dict(each.rungs) == dict(answer.reference.rungs)
-        here = dict(each.rungs) == dict(found.written)
+        best = each.rungs == answer.reference.rungs
+        here = each.rungs == found.written
         name = combination_words(each, found.written)
         yield Point(
             name=name,
@@ -281,13 +389,19 @@ def _points(scene: Scene, found: Study, answer: Answer, question: str) -> Iterat
             seconds=rate,
             errors=each.differences,
             verdict="reference" if best else each.verdict,
-            reason=_reason(each, scene),
+            reason=_reason(scene, found, each),
             starts=each.starts,
-            on_front=on_front,
+            on_front=on_front or (each.rungs == answer.chosen.rungs and each.verdict == "within"),
             question=question,
             here=here,
             block=f"# {scene.name}: {name}" if here else _point_block(scene, each, name),
+            measured_seconds=_rate(each.seconds, scene, found),
         )
+
+
+def _words(scene: Scene, found: Study, each: Candidate) -> str:
+    """What a candidate has other than the scene, and what the scene has."""
+    return combination_words(each, found.written, _before(scene, each.values))
 
 
 def _point_block(scene: Scene, each: Candidate, name: str) -> str:
@@ -300,11 +414,11 @@ def _point_block(scene: Scene, each: Candidate, name: str) -> str:
     return f"{head}\n{block_of(changes, before, {_STEP: default_step(scene)})}"
 
 
-def _reason(each: Candidate, scene: Scene) -> str:
+def _reason(scene: Scene, found: Study, each: Candidate) -> str:
     """Why a candidate is not within, in words."""
-    if each.verdict in ("beyond", "doubtful"):
-        return error_words(each, scene)
-    return each.reason
+    if each.verdict not in ("beyond", "doubtful"):
+        return each.reason
+    return f"{'at the limit: ' if _at_limit(found, each) else ''}{error_words(each, scene)}"
 
 
 def where_it_stands(scene: Scene, found: Study) -> str:
@@ -316,7 +430,7 @@ def where_it_stands(scene: Scene, found: Study) -> str:
     found : Study
         Finished or not.
     """
-    return " ".join(filter(None, [_standing(scene, found), _costly_rungs(found)]))
+    return " ".join(filter(None, [_standing(scene, found), _costly_rungs(scene, found)]))
 
 
 def _standing(scene: Scene, found: Study) -> str:
@@ -329,24 +443,23 @@ def _standing(scene: Scene, found: Study) -> str:
         against = "the best rungs" if found.raised else "its finest numerics"
     if own is None:
         return "Your scene as written has not been measured."
-    within = own.verdict == "within"
-    word = (
-        "within"
-        if within
-        else "not within"
-        if own.verdict == "beyond"
-        else "not yet known to be within"
+    off = _own_error(found.whole)
+    if _at_limit(found, own):
+        close = f"{error_words(own, scene, two_digits(own.error))}, against {against}"
+        if off > _NO_SMALL_PART * found.accuracy:
+            close += f", and the reference may itself be off by {percent(off)}"
+        return (
+            f"Your scene as written is at the limit of {percent(found.accuracy)}: {close}: too "
+            "close to call."
+        )
+    known = {"within": "within", "beyond": "not within"}
+    word = known.get(own.verdict, "not yet known to be within")
+    beside = f" (the reference itself may be {percent(off)} off)"
+    return (
+        f"Your scene as written is {word} {percent(found.accuracy)} of {against}: "
+        f"{error_words(own, scene)}{beside if off > _NO_SMALL_PART * found.accuracy else ''}"
+        f"{_cause(found)}."
     )
-    text = f"Your scene as written is {word} {percent(found.accuracy)} of {against}: "
-    return f"{text}{error_words(own, scene, found.accuracy)}{_own_error(found)}{_cause(found)}."
-
-
-def _own_error(found: Study) -> str:
-    """What the reference is itself off by, where it is no small part of the accuracy."""
-    most = max(map(remaining_error, found.whole.convergence), default=0.0)
-    if not most > _NO_SMALL_PART * found.accuracy:
-        return ""
-    return f" (the reference itself may be {percent(most)} off)"
 
 
 _NO_SMALL_PART = 0.1
@@ -366,53 +479,53 @@ def _cause(found: Study) -> str:
     return f". Its {best}{names} {verb} too coarse"
 
 
-def _costly_rungs(found: Study) -> str:
+def _costly_rungs(scene: Scene, found: Study) -> str:
     """Which rungs of the scene as written cost most, or that none does."""
-    if not found.raises:
-        return ""
     known = [e for e in found.raises if math.isfinite(e.candidate.error)]
     costly = sorted(known, key=lambda each: -each.candidate.error)
-    named = [e for e in costly if found.accuracy < e.candidate.error]
-    if named:
-        worst, others = named[0], len(named) - 1
-        more = f"; {others} more {'is' if others == 1 else 'are'} over {percent(found.accuracy)}"
-        return (
-            f"Of its rungs one by one, the worst is {effect_words(worst.effect)} {worst.written} "
-            f"instead of {worst.best}: {percent(worst.candidate.error)} off"
-            f"{more if others else ''}. Errors of single rungs may cancel each other."
-        )
-    if len(known) < len(found.raises):
+    over = [e for e in costly if found.accuracy < e.candidate.error]
+    if not costly or (not over and len(known) < len(found.raises)):
         return ""
-    most = costly[0]
-    return (
-        f"No rung of it needs to change: the one that costs most, {effect_words(most.effect)} "
-        f"{most.written} instead of {most.best}, costs {percent(most.candidate.error)}."
+    most, asked = costly[0], percent(found.accuracy)
+    error = most.candidate.differences
+    worst = quantity_label(max(error, key=lambda name: error[name].error), scene)[0]
+    text = (
+        f"Modelling the {effect_words(most.effect)} as {most.written} rather than {most.best} "
+        f"changes the result by {percent(most.candidate.error)} in {worst}"
     )
+    if not over:
+        return f"No rung of it needs to change. {text}, no other rung by more."
+    more = f"; {len(over) - 1} more of your rungs by over {asked} each" if over[1:] else ""
+    return f"{text}{more}. Errors of single rungs may cancel each other."
 
 
 def _choice(scene: Scene, found: Study, answer: Answer, question: str) -> Choice:
     """What to take for a question, with its certainty."""
     chosen = answer.chosen
     name = combination_words(chosen, found.written)
-    own = math.nan if answer.written is None else answer.written.seconds
     same_changes = not answer.changes
     status = _status(found, answer)
     return Choice(
         question=question,
         name=name,
+        words=_words(scene, found, chosen),
         status=status,
         error=chosen.error,
         standard_error=_scatter(chosen),
         promised=estimated_error(chosen),
         starts=chosen.starts,
-        seconds=_rate(chosen.seconds, scene, found),
+        seconds=_cost_rate(chosen, scene, found),
         changes=answer.changes,
         block=_commented(scene, found, answer) if status in RECOMMENDED else "",
         options=options_of(answer.changes) if status in RECOMMENDED else "",
         reference=_reference_words(answer),
-        sentence=_sentence(scene, found, answer, question, status, own),
+        sentence=_sentence(scene, found, answer, question, status),
         keeps=same_changes,
-        own_seconds=_rate(own, scene, found),
+        own_seconds=math.nan
+        if answer.written is None
+        else _cost_rate(answer.written, scene, found),
+        clear=_by_default(answer) or not _at_limit(found, chosen),
+        optional=answer.changes != {} and _surely_enough(found, answer.written),
         enough=not (answer is found.kept and _rungs_too_coarse(found)),
     )
 
@@ -424,8 +537,7 @@ def _scatter(chosen: Candidate) -> float:
 
 
 def _status(found: Study, answer: Answer) -> str:
-    most = max([answer.left, *map(remaining_error, answer.convergence)])
-    if most > found.accuracy:
+    if max(answer.left, _own_error(answer)) > found.accuracy:
         return "not converged"
     if answer.status == "so far" and _by_default(answer) and answer.changes:
         return "no answer yet"
@@ -445,12 +557,10 @@ def _reference_words(answer: Answer) -> str:
 _OPENING = {KEPT: "With your rungs kept", RAISED: "If rungs may change"}
 
 
-def _sentence(
-    scene: Scene, found: Study, answer: Answer, question: str, status: str, own: float
-) -> str:
+def _sentence(scene: Scene, found: Study, answer: Answer, question: str, status: str) -> str:
     """Conclusion about a question."""
-    opening, chosen = _opening(found, question), answer.chosen
-    asked = percent(found.accuracy)
+    opening, chosen, asked = _OPENING[question], answer.chosen, percent(found.accuracy)
+    alike = _alike(found)
     if status == "not converged":
         worst = max(answer.convergence, key=remaining_error)
         label = quantity_label(worst.quantity, scene)[0]
@@ -458,24 +568,22 @@ def _sentence(
             f"{opening}, nothing can be recommended: the reference itself still moves with the "
             f"{worst.effect}, by {percent(abs(worst.steps[-1]))} in {label} at the finest level."
         )
+    name, faster = _words(scene, found, chosen), _faster(answer, chosen)
     if status == "no answer yet":
-        nearest = _nearest(scene, found, answer)
         return (
-            f"{opening}: {combination_words(chosen, found.written)} is the safe choice "
-            f"({faster_words(chosen.seconds, own)}); whether anything cheaper does, there is no "
-            f"answer yet: nothing else is known to be within {asked}{nearest}; more --budget "
-            "goes on."
+            f"{opening}: {name} is the safe choice ({faster}); whether anything cheaper does, "
+            f"there is no answer yet: nothing else is known to be within {asked}"
+            f"{_nearest(scene, found, answer)}; more --budget goes on."
         )
-    name = combination_words(chosen, found.written)
     what = "change nothing" if name == HERE else f"take {name}"
-    errs = error_words(chosen, scene, found.accuracy)
+    errs = error_words(chosen, scene)
     if _by_default(answer):
         errs = f"nothing cheaper {'looks' if status == 'so far' else 'is'} within {asked}"
     if answer.left:
         both = chosen.verdict == "within" and not _by_default(answer)
         errs += f", the reference itself up to {percent(answer.left)}"
         errs += f", both within {asked}" if both else ""
-    faster = "" if name == HERE else f", {faster_words(chosen.seconds, own)}"
+    faster = "" if name == HERE else f", {faster}"
     certain = _certainty(scene, found, answer, status)
     if answer is found.kept and _rungs_too_coarse(found):
         fine, but = _how_fine(found, answer, status)
@@ -483,15 +591,57 @@ def _sentence(
             errs += ", against the finest numerics of the same rungs"
         numerics = f"your numerics {fine}" if name == HERE else f"{what}; then your numerics {fine}"
         return (
-            f"{opening}: {numerics} ({errs}{faster}), {but} your rungs are not "
-            f"({_rungs_off(scene, found)}), whatever the numerics{certain}."
+            f"{opening}, no numerical setting reaches {asked}: {numerics} ({errs}{faster}), {but} "
+            f"your rungs are not ({_rungs_off(scene, found)}){certain}."
         )
-    if name != HERE and _enough(answer.written):
-        spare = (
-            f"to run faster, {what}" if is_faster(chosen.seconds, own) else f"{name} would do too"
-        )
+    own = answer.written
+    if name != HERE and _surely_enough(found, own):
+        faster_too = is_faster(chosen.cost, cast(Candidate, own).cost)
+        spare = f"to run faster, {what}" if faster_too else f"{name} would do too"
         what = f"nothing needs to change; {spare}"
-    return f"{opening}: {what} ({errs}{faster}){certain}."
+    elif name != HERE and own is not None and _at_limit(found, own):
+        what = f"to be on the safe side, {what}"
+    lead = _lead(found, question)
+    why = f"; {alike}" if alike else ""
+    return f"{lead}{what} ({errs}{faster}){why}{certain}.{_one_fewer(scene, found, answer)}"
+
+
+def _lead(found: Study, question: str) -> str:
+    """How the sentence of a choice begins: one of them is what is recommended."""
+    if _alike(found) or (question == RAISED and _rungs_too_coarse(found)):
+        return "We recommend: "
+    if question == KEPT:
+        return "We recommend: with your rungs kept, "
+    return f"{_OPENING[question]}: "
+
+
+def _faster(answer: Answer, each: Candidate) -> str:
+    """How its time compares with that of the scene as written."""
+    return faster_words(each.cost, math.nan if answer.written is None else answer.written.cost)
+
+
+def _one_fewer(scene: Scene, found: Study, answer: Answer) -> str:
+    """What becomes of a choice of several rungs with one of them as written."""
+    changed = _changed_rungs(scene, found, answer.chosen)
+    rows = [
+        (each.error, changed - own)
+        for each in answer.candidates
+        for own in [_changed_rungs(scene, found, each)]
+        if own < changed and len(own) == len(changed) - 1 and each.verdict == "beyond"
+    ]
+    if len(changed) == 1 or not rows:
+        return ""
+    error, [(effect, rung)] = min(rows)
+    return (
+        f" With one change fewer (without {effect_words(effect)}: {rung}) the best is "
+        f"{percent(error)} off."
+    )
+
+
+def _changed_rungs(scene: Scene, found: Study, each: Candidate) -> set[tuple[str, str]]:
+    """Rungs of a candidate that the scene as written has not, without its numerics."""
+    physical = _physical(scene)
+    return {pair for pair in each.rungs.items() if pair[0] in physical} - set(found.written.items())
 
 
 def _how_fine(found: Study, answer: Answer, status: str) -> tuple[str, str]:
@@ -503,16 +653,10 @@ def _how_fine(found: Study, answer: Answer, status: str) -> tuple[str, str]:
     return "are not known to be fine", "and"
 
 
-def _opening(found: Study, question: str) -> str:
-    if _alike(found):
-        return "Your rungs are already the best of this scene"
-    return _OPENING[question]
-
-
 def _rungs_off(scene: Scene, found: Study) -> str:
     """Error of the scene as written, against the best rungs."""
     own = cast(Candidate, found.whole.written)
-    return f"{error_words(own, scene, found.accuracy)}, against the best rungs"
+    return f"{error_words(own, scene)}, against the best rungs"
 
 
 def _nearest(scene: Scene, found: Study, answer: Answer) -> str:
@@ -521,8 +665,8 @@ def _nearest(scene: Scene, found: Study, answer: Answer) -> str:
     if not cheaper:
         return ""
     least = min(cheaper, key=lambda each: each.error)
-    name = combination_words(least, found.written)
-    return f" ({name}, the nearest, is {error_words(least, scene, found.accuracy)})"
+    name = _words(scene, found, least)
+    return f" ({name}, the nearest, is {error_words(least, scene)})"
 
 
 def _rungs_too_coarse(found: Study) -> bool:
@@ -535,8 +679,8 @@ def _rungs_too_coarse(found: Study) -> bool:
     return by_itself or numerics is None or numerics.verdict != "beyond"
 
 
-def _enough(own: Candidate | None) -> bool:
-    return own is not None and own.verdict == "within"
+def _surely_enough(found: Study, own: Candidate | None) -> bool:
+    return own is not None and own.verdict == "within" and not _at_limit(found, own)
 
 
 def _certainty(scene: Scene, found: Study, answer: Answer, status: str) -> str:
@@ -544,9 +688,9 @@ def _certainty(scene: Scene, found: Study, answer: Answer, status: str) -> str:
     if status == "so far":
         if answer.chosen.verdict != "doubtful":
             return f". So far {_named(found, answer)[1]} enough"
-        return f". So far {_likelihood(found, answer)}"
+        return f". So far {_likelihood(scene, found, answer)}"
     if status == "unresolvable" and doubted:
-        name = combination_words(doubted[0], found.written)
+        name = _words(scene, found, doubted[0])
         return (
             f"; cheaper, but scatter hides whether it is good enough: {name} "
             f"({error_words(doubted[0], scene)} over {doubted[0].starts} starts); a longer "
@@ -562,7 +706,7 @@ def _named(found: Study, answer: Answer) -> tuple[str, str, str]:
     return "this looks", "this is", "this may be"
 
 
-def _likelihood(found: Study, answer: Answer) -> str:
+def _likelihood(scene: Scene, found: Study, answer: Answer) -> str:
     """How sure it is that a choice of few starts is enough, and what it takes to know."""
     chosen = answer.chosen
     looks, _, may = _named(found, answer)
@@ -573,9 +717,8 @@ def _likelihood(found: Study, answer: Answer) -> str:
     if needed > chosen.starts:
         text += f"; to be sure of {percent(found.accuracy)} takes some {needed} starts"
     if chosen.error > found.accuracy:
-        safe = combination_words(answer.reference, found.written)
-        own = math.nan if answer.written is None else answer.written.seconds
-        text += f"; {safe} is the safe choice, {faster_words(answer.reference.seconds, own)}"
+        safe = _words(scene, found, answer.reference)
+        text += f"; {safe} is the safe choice, {_faster(answer, answer.reference)}"
     return text
 
 
@@ -583,7 +726,7 @@ def _commented(scene: Scene, found: Study, answer: Answer) -> str:
     """Block to paste, with what it is above it."""
     if not answer.changes:
         return ""
-    name = combination_words(answer.chosen, found.written)
+    name = _words(scene, found, answer.chosen)
     return f"# {scene.name}: {name}; {error_words(answer.chosen, scene)} (simulated)\n" + block_of(
         answer.changes, _before(scene, answer.changes), {_STEP: default_step(scene)}
     )
@@ -619,8 +762,4 @@ def _rung_costs(scene: Scene, found: Study) -> Iterator[RungCost]:
 
 def _labels(scene: Scene, points: tuple[Point, ...]) -> Mapping[str, str]:
     names = dict.fromkeys(name for point in points for name in point.errors)
-    return {name: _with_unit(*quantity_label(name, scene)) for name in names}
-
-
-def _with_unit(words: str, unit: str) -> str:
-    return f"{words} [{unit}]" if unit else words
+    return {name: quantity_label(name, scene)[0] for name in names}

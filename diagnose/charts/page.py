@@ -4,15 +4,24 @@ import itertools
 import math
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 from ..pages.page import render, save_page
 from ..pages.picture import save_picture
 from ..pages.plain_json import json_text
 from ..pages.points import point_block
-from .chart import RECOMMENDED, Chart, Choice, Point, chart_table, convergence_text, save_rows
+from .chart import (
+    RECOMMENDED,
+    Chart,
+    Choice,
+    Point,
+    RungCost,
+    chart_table,
+    convergence_text,
+    save_rows,
+)
 from .figure import (
     FLOOR,
+    PALE,
     ShadedCell,
     chart_figure,
     chart_svg,
@@ -49,22 +58,22 @@ def chart_html(chart: Chart, *, interactive: bool = False) -> str:
         "chart.html.j2",
         chart=chart,
         pictures_shown=[
-            (image, _numbered(chart, question))
+            (image, [point.name for point in chart.numbered(question)])
             for image, question in zip(images, chart.shown or ("",), strict=True)
         ],
         shaded=_shaded(chart),
         block=block,
         tapped="its settings as TOML" if any(p.block for p in chart.points) else "its figures",
         tables=[(chart.heading(question), _rows(chart, question)) for question in chart.shown],
-        quantities=_quantity_rows(chart),
         convergence=[convergence_text(each, chart.labels) for each in chart.convergence],
         cards=_cards(chart),
         recommended=RECOMMENDED,
         lines=_lines(chart),
         reference_error=percent(chart.remaining) if chart.remaining > 0 else "",
         floored=floor_of(chart) > FLOOR,
+        pale=PALE if chart.remaining > 0 else "",
         unbroken=_unbroken,
-        with_scatter=with_scatter,
+        error_of=_error_of,
         finite=math.isfinite,
         percent=percent,
     )
@@ -74,8 +83,13 @@ def _lines(chart: Chart) -> list[tuple[str, bool]]:
     """The conclusion; whether a line says where the subject stands, or what to do about it."""
     lines = chart.conclusion or (chart.verdict,)
     advice = [c.sentence for c in chart.shown_choices if c.enough and c.status in RECOMMENDED]
-    first = {lines[0], *advice[:1]}
+    first = {lines[0], *[line for line in advice if line.startswith("We recommend")]}
     return [(_unbroken(line), line in first) for line in lines]
+
+
+def _error_of(each: Point | Choice | RungCost) -> str:
+    """Its error with what is known of the scatter."""
+    return _unbroken(with_scatter(each.error, each.standard_error, each.starts))
 
 
 def _unbroken(text: str) -> str:
@@ -94,11 +108,10 @@ def _shaded(chart: Chart) -> tuple[list[str], list[tuple[str, list[ShadedCell]]]
     ]
 
 
-def _cards(chart: Chart) -> list[tuple[Choice, bool, bool, bool]]:
-    """Choices; whether the one before has the same settings; its width; whether it is optional.
+def _cards(chart: Chart) -> list[tuple[Choice, str, bool, bool]]:
+    """Choices; the head of each; whether the one before has the same settings; its width.
 
-    Settings stand beside each other where there are two, else across the page without a blank. A
-    change is optional where the subject as written is within the accuracy.
+    Settings stand beside each other where there are two, else across the page without a blank.
     """
     shown = chart.shown_choices
     again = [
@@ -108,33 +121,35 @@ def _cards(chart: Chart) -> list[tuple[Choice, bool, bool, bool]]:
     repeated = [False, *again][: len(shown)]
     settings = [bool(c.block) and not r for c, r in zip(shown, repeated, strict=True)]
     alone = sum(settings) == 1
-    own = {p.question: p.verdict in ("within", "reference") for p in chart.points if p.here}
     return [
-        (choice, same, alone or not has, own.get(choice.question, False))
+        (choice, _unbroken(_head(chart, choice)), same, alone or not has)
         for choice, same, has in zip(shown, repeated, settings, strict=True)
     ]
 
 
+def _head(chart: Chart, choice: Choice) -> str:
+    """What to do about a question; optional where the scene as written is within the accuracy."""
+    if not choice.enough:
+        return f"No numerical setting reaches {percent(chart.accuracy or 0.0)} with your rungs"
+    name = choice.words or choice.name
+    if choice.status not in RECOMMENDED:
+        text = "no recommendation" + (" yet" if choice.status == "no answer yet" else "")
+    elif choice.keeps:
+        text = "nothing to change"
+    elif choice.optional:
+        text = f"nothing must change; {name} would do too"
+    else:
+        text = f"take {name}"
+    text = f"{text}; {chart.alike}" if chart.alike else f"{choice.question}: {text}"
+    return text[0].upper() + text[1:]
+
+
 def _rows(chart: Chart, question: str) -> list[tuple[int | str, Point, bool]]:
-    """Number on the front, point, whether it is what to take."""
-    points, choice = chart.of(question), choice_of(chart, question)
-    front = sorted((p for p in points if p.on_front), key=lambda p: p.seconds)
-    numbers: dict[int, int | str] = {id(point): i for i, point in enumerate(front, start=1)}
+    """Number in the picture, point, whether it is what to take."""
+    numbers: dict[int, int] = {id(p): i for i, p in enumerate(chart.numbered(question), start=1)}
+    choice = choice_of(chart, question)
     wanted = choice.name if choice else None
-    return [(numbers.get(id(point), ""), point, point.name == wanted) for point in points]
-
-
-def _numbered(chart: Chart, question: str) -> list[str]:
-    """What the numbers of a picture stand for."""
-    front = [p for p in chart.of(question) if p.on_front]
-    return [point.name for point in sorted(front, key=lambda p: p.seconds)]
-
-
-def _quantity_rows(chart: Chart) -> list[tuple[str, list[Any]]]:
-    """Of the scene as written: quantity in words, its difference for each question."""
-    own = [next((p for p in chart.of(q) if p.here), None) for q in chart.shown]
-    shown = [point for point in own if point is not None]
-    return [(words, [p.errors.get(name) for p in shown]) for name, words in chart.labels.items()]
+    return [(numbers.get(id(p), ""), p, p.name == wanted) for p in chart.of(question)]
 
 
 def save_chart(chart: Chart, path: Path, *, force: bool = True, interactive: bool = False) -> None:

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator
 
 from ..pages.points import DrawnLine, Mark, PointAxes, Series
-from .chart import RECOMMENDED, Chart, Point
+from .chart import Chart, Point
 from .figure import (
     BEATEN,
     BEST,
@@ -12,21 +12,20 @@ from .figure import (
     FRONT,
     HERE_COLOUR,
     OTHER,
-    SO_FAR,
+    REFERENCE,
     UNTOLD,
-    WINNER,
-    choice_of,
     floor_of,
     kind_of,
+    ring_of,
     shown_error,
-    winner_words,
 )
-from .words import percent, with_scatter
+from .words import with_scatter
 
 _LOOKS = {
     BEST: (FRONT, 10.0, True),
     BEATEN: (OTHER, 8.0, True),
     UNTOLD: (DOUBTFUL, 8.0, False),
+    REFERENCE: (FRONT, 10.0, False),
 }
 """Colour, size [px] and filling of each kind."""
 
@@ -50,7 +49,7 @@ def _points(chart: Chart, question: str) -> PointAxes:
     finite = [p for p in chart.of(question) if math.isfinite(p.error) and math.isfinite(p.seconds)]
     front = sorted((p for p in finite if p.on_front), key=lambda p: p.seconds)
     line = DrawnLine(
-        name="the best",
+        name=BEST,
         x=tuple(p.seconds for p in front),
         y=tuple(shown_error(p, floor_of(chart)) for p in front),
         colour=FRONT,
@@ -60,7 +59,7 @@ def _points(chart: Chart, question: str) -> PointAxes:
     return PointAxes(
         title=chart.heading(question) or chart.title,
         x_name=chart.cost_label,
-        y_name=chart.error_label,
+        y_name=chart.error_name(question),
         x_kind="log",
         y_kind="linear" if asked is None else "log",
         lines=(line,),
@@ -71,28 +70,18 @@ def _points(chart: Chart, question: str) -> PointAxes:
 
 def _series(chart: Chart, question: str, finite: list[Point]) -> Iterator[Series]:
     """Plain points by their kind; rings below and a star above them."""
-    wanted, final = _wanted(chart, question)
+    ring = ring_of(chart, question)
     for name, (colour, size, filled) in _LOOKS.items():
         marks = tuple(_mark(chart, p) for p in finite if kind_of(p) == name and not p.here)
         if marks:
             yield Series(name=name, marks=marks, colour=colour, size=size, filled=filled)
-    taken = tuple(_mark(chart, p) for p in finite if p.name == wanted)
-    if taken:
-        words = winner_words(chart) if final else "may be enough, not certain"
-        colour = WINNER if final else SO_FAR
-        yield Series(name=words, marks=taken, colour=colour, size=22.0, filled=False)
+    taken = tuple(_mark(chart, p) for p in finite if ring is not None and p.name == ring.name)
+    if ring is not None and taken:
+        yield Series(name=ring.words, marks=taken, colour=ring.colour, size=22.0, filled=False)
     here = tuple(_mark(chart, p) for p in finite if p.here)
     if here:
         words = f"your {chart.subject}"
         yield Series(name=words, marks=here, colour=HERE_COLOUR, marker="star", size=18.0)
-
-
-def _wanted(chart: Chart, question: str) -> tuple[str, bool]:
-    """Name of what to take, empty where nothing is; whether that is final."""
-    choice = choice_of(chart, question)
-    if choice is None:
-        return chart.winner, True
-    return (choice.name if choice.status in RECOMMENDED else ""), choice.status == "resolved"
 
 
 def _mark(chart: Chart, point: Point) -> Mark:
@@ -113,7 +102,7 @@ def _mark(chart: Chart, point: Point) -> Mark:
 
 def _lines(chart: Chart, point: Point) -> list[str]:
     """Name and figures of a point."""
-    error = with_scatter(percent(point.error), point.standard_error)
+    error = with_scatter(point.error, point.standard_error, point.starts)
     worst = chart.label(point.worst)
     cost, _, unit = chart.cost_label.partition(" [")
     return [

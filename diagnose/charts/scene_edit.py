@@ -112,13 +112,13 @@ _STEP = "numerics.step"  # [s], of microseconds
 def _was(path: str, value: Any, old: Any, default: Any) -> str:
     """What a value replaces; of what was not set, what the program took."""
     words = short_time if path == _STEP else _plain
+    if default is not None and old is None and words(default) == words(value):
+        return f"{words(value)}: the default, written out because the default depends on the rungs"
     said = f"{words(value)}; " if path == _STEP else ""
     if old is not None:
         return f"{said}was {words(old)}"
     if default is None:
         return f"{said}was not set"
-    if words(default) == words(value):
-        return f"{said}was not set: this by default, which other rungs may change"
     return f"{said}was not set: {words(default)} by default"
 
 

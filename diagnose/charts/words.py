@@ -35,7 +35,9 @@ def effect_words(effect: str) -> str:
     return EFFECTS.get(effect, effect)
 
 
-def rung_words(effect: str, rung: str, values: Mapping[str, Any]) -> str:
+def rung_words(
+    effect: str, rung: str, values: Mapping[str, Any], before: Mapping[str, Any] | None = None
+) -> str:
     """One rung of a combination in words.
 
     Parameters
@@ -44,25 +46,38 @@ def rung_words(effect: str, rung: str, values: Mapping[str, Any]) -> str:
         Names.
     values : mapping of str to object
         Dotted path -> value of the combination.
+    before : mapping of str to object, optional
+        The same of the scene as written, for a mesh to be told by what of it changes.
 
     Examples
     --------
     >>> rung_words("pressure", "chamber", {"pressure.rung": "chamber"})
-    'pressure chamber'
+    'pressure: chamber'
     >>> rung_words("step", "x2", {"numerics.step": 1.953125e-05})
     'step 19.5 µs'
-    >>> rung_words("mesh", "x1", {"film.n_theta": 72, "film.n_z": 17})
-    'mesh 72 around x 17 along'
+    >>> mesh = {"film.n_theta": 96, "film.n_z": 13}
+    >>> rung_words("mesh", "x1", mesh, {"film.n_theta": 48, "film.n_z": 13})
+    'mesh 96 around (was 48) and 13 along (unchanged)'
     """
     if effect == "step" and "numerics.step" in values:
         return f"step {short_time(values['numerics.step'])}"
     if effect == "tolerance" and "numerics.tolerance" in values:
         return f"tolerance {values['numerics.tolerance']:.2g}"
     if effect == "mesh" and "film.n_theta" in values:
-        return f"mesh {values['film.n_theta']} around x {values['film.n_z']} along"
+        around, along = (_changed(path, values, before or {}) for path in _MESH)
+        return f"mesh {around[0]} around{around[1]} and {along[0]} along{along[1]}"
     if effect == "elements" and "shaft.longest_element" in values:
         return f"elements of {values['shaft.longest_element']:.3g} m"
-    return f"{effect_words(effect)} {rung}"
+    return f"{effect_words(effect)}: {rung}"
+
+
+_MESH = ("film.n_theta", "film.n_z")
+
+
+def _changed(path: str, values: Mapping[str, Any], before: Mapping[str, Any]) -> tuple[Any, str]:
+    """A value, and how it was before; of no scene nothing."""
+    value, old = values[path], before.get(path)
+    return value, "" if old is None else " (unchanged)" if old == value else f" (was {old})"
 
 
 def short_time(value: float) -> str:
@@ -79,7 +94,9 @@ def short_time(value: float) -> str:
 _MILLI = 1e-3
 
 
-def combination_words(candidate: Candidate, written: Mapping[str, str]) -> str:
+def combination_words(
+    candidate: Candidate, written: Mapping[str, str], before: Mapping[str, Any] | None = None
+) -> str:
     """What a combination has other than the scene as written.
 
     Parameters
@@ -87,6 +104,8 @@ def combination_words(candidate: Candidate, written: Mapping[str, str]) -> str:
     candidate : Candidate
     written : mapping of str to str
         Effect -> rung of the scene as written.
+    before : mapping of str to object, optional
+        As of :func:`rung_words`.
 
     Returns
     -------
@@ -94,7 +113,7 @@ def combination_words(candidate: Candidate, written: Mapping[str, str]) -> str:
         :data:`HERE` where that is nothing.
     """
     parts = [
-        rung_words(effect, rung, candidate.values)
+        rung_words(effect, rung, candidate.values, before)
         for effect, rung in candidate.rungs.items()
         if rung != written.get(effect)
     ]
@@ -121,34 +140,26 @@ def percent(value: float) -> str:
 _SMALLEST = 1e-4
 
 
-def percent_beside(value: float, limit: float) -> str:
-    """A share in per cent, with as many digits as it takes to differ from a limit.
+def two_digits(value: float) -> str:
+    """A share in per cent with its zeros.
 
     Examples
     --------
-    >>> percent_beside(0.0203, 0.02), percent_beside(0.64, 0.02), percent_beside(0.0199997, 0.02)
-    ('2.03 %', '64 %', '2 %')
+    >>> two_digits(0.02004)
+    '2.0 %'
     """
-    asked, found = percent(limit), percent(value)
-    digits = 3
-    while found == asked and digits <= _MOST_DIGITS:
-        found = f"{float(f'{100 * value:.{digits}g}'):g} %"
-        digits += 1
-    return found
+    return f"{100 * value:#.2g} %"
 
 
-_MOST_DIGITS = 4
-
-
-def error_words(candidate: Candidate, scene: Scene, accuracy: float = math.nan) -> str:
+def error_words(candidate: Candidate, scene: Scene, error: str = "") -> str:
     """Largest error of a candidate with its scatter and its quantity.
 
     Parameters
     ----------
     candidate : Candidate
     scene : Scene
-    accuracy : float, optional
-        That the error must be seen to lie below or above [-].
+    error : str, optional
+        The error itself in other words.
 
     Returns
     -------
@@ -161,32 +172,45 @@ def error_words(candidate: Candidate, scene: Scene, accuracy: float = math.nan) 
     found = candidate.differences[worst]
     if found.error == 0:
         return "no error"
-    error = with_scatter(percent_beside(found.error, accuracy), found.standard_error)
+    error = error or with_scatter(found.error, found.standard_error, candidate.starts)
     return f"{error} off in {quantity_label(worst, scene)[0]}"
 
 
-def with_scatter(error: str, standard_error: float) -> str:
-    """An error in per cent with its standard error, where there is one.
+def with_scatter(error: float, standard_error: float, starts: int = 0) -> str:
+    """An error in per cent with what is known of its scatter.
 
     Parameters
     ----------
-    error : str
-        As of :func:`percent`.
-    standard_error : float
-        [-]; told with one digit, as it is uncertain itself.
+    error, standard_error : float
+        [-]; the latter is told with one digit, as it is uncertain itself.
+    starts : int, optional
+        Two tell no standard error that may be shown.
+
+    Returns
+    -------
+    str
+        No standard error where starts do not scatter. One as large as the error itself gives a
+        bound, two of them above the error.
 
     Examples
     --------
-    >>> with_scatter("63 %", 0.0097), with_scatter("0.4 %", 0.0), with_scatter("0.4 %", 0.0011)
-    ('63 ± 1 %', '0.4 %', '0.4 ± 0.1 %')
+    >>> with_scatter(0.63, 0.0097, 16), with_scatter(0.004, 0.0), with_scatter(0.75, 0.01, 2)
+    ('63 ± 1 %', '0.4 %', '75 % (2 starts)')
+    >>> with_scatter(0.0019, 0.0046, 32)
+    'less than about 1.2 %'
     """
-    if not _scattered(standard_error):
-        return error
-    return f"{error.removesuffix(' %')} ± {float(f'{100 * standard_error:.1g}'):g} %"
+    if not (math.isfinite(standard_error) and standard_error > _SMALLEST):
+        return percent(error)
+    if starts == _FEWEST:
+        return f"{percent(error)} ({starts} starts)"
+    if standard_error >= error:
+        bound = 100 * (error + 2 * standard_error)
+        digit = 10.0 ** (math.floor(math.log10(bound)) - 1)
+        return f"less than about {digit * math.ceil(bound / digit):.3g} %"
+    return f"{percent(error).removesuffix(' %')} ± {float(f'{100 * standard_error:.1g}'):g} %"
 
 
-def _scattered(standard_error: float) -> bool:
-    return math.isfinite(standard_error) and standard_error > _SMALLEST
+_FEWEST = 2  # starts that have a scatter at all
 
 
 def raise_words(each: Raise, scene: Scene) -> str:
@@ -195,12 +219,12 @@ def raise_words(each: Raise, scene: Scene) -> str:
     Returns
     -------
     str
-        Such as ``"your pressure rung (two-level, not chamber) is 64 % off in vibration …"``.
+        Such as ``"pressure as two-level rather than chamber: 64 ± 2 % off in vibration …"``.
     """
-    what = f"your {effect_words(each.effect)} rung ({each.written}, not {each.best})"
+    what = f"{effect_words(each.effect)} as {each.written} rather than {each.best}"
     if not each.candidate.differences:
         return f"{what} could not be compared: {each.candidate.reason}"
-    return f"{what} is {error_words(each.candidate, scene)}"
+    return f"{what}: {error_words(each.candidate, scene)}"
 
 
 def faster_words(seconds: float, own: float) -> str:

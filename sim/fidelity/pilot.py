@@ -719,6 +719,10 @@ class Comparison:
         self.cap = math.inf  # starts of the time being
         self._kept: dict[tuple[tuple[str, str], ...], Candidate] = {}
 
+    def share(self, other: "Comparison") -> None:
+        """Judge together with another of the same reference: what one knows the other knows."""
+        self._kept = other._kept
+
     def values(self, rungs: Mapping[str, Rung]) -> dict[str, Any]:
         """Values of a combination."""
         return {path: value for rung in rungs.values() for path, value in rung.values.items()}
@@ -753,8 +757,10 @@ class Comparison:
         return self._judged(self.top)
 
     def judged(self) -> tuple[Candidate, ...]:
-        """Every combination that was judged."""
-        return tuple(self._kept.values())
+        """Every combination of its rungs that was judged."""
+        own = {name: [rung.name for rung in rungs] for name, rungs in self.rungs.items()}
+        known = self._kept.values()
+        return tuple(c for c in known if all(c.rungs[n] in rungs for n, rungs in own.items()))
 
     def doubted(self) -> list[Candidate]:
         """Combinations whose scatter stayed too large to tell, not those near the limit itself."""

@@ -391,8 +391,12 @@ class Search:
 
     def _whole(self) -> Comparison | None:
         """All rungs against the best of them; None where there is no rung to choose."""
-        physical = [n for n, r in self.ladders.items() if n not in self.numerical and len(r) > 1]
-        return self._comparison(self.ladders) if physical else None
+        if all(n in self.numerical or len(r) == 1 for n, r in self.ladders.items()):
+            return None
+        best = self._comparison(self.ladders)
+        if names(best.top) == names(self.kept.top):
+            best.share(self.kept)
+        return best
 
     def _low(self, name: str) -> bool:
         """Whether an effect has a better rung than the one that is written."""
