@@ -122,7 +122,7 @@ def test_a_bore_worn_to_an_arc_is_told_against_healthy_recordings():
     assert "bore of another shape" in alone.reason
     assert found.low < 0.7e-3 < found.high
     # two readings hardly tell an arc's clearance: that is most of the interval
-    assert max(found.budget, key=found.budget.get) == "shape of the bore"
+    assert max(found.budget, key=found.budget.get) == "film and bore"
     half = (found.high - found.low) / 2
     assert math.hypot(*found.budget.values()) == pytest.approx(half, rel=0.05)
 

@@ -7,8 +7,10 @@ along with it, held by how well it is known: the readings of a centred shaft, th
 sensitivities, load and viscosity. Healthy recordings of the same machine share these numbers, and
 have the clearance of a machine as new: they tell the offsets of the probes.
 
-A bore may also have a scar where the load presses, which lets the journal sink without a wider
-clearance. Scars of several depths are tried, and count by how well they explain the readings.
+What the film is like is not known exactly either. A scar where the load presses lets the journal
+sink without a wider clearance, and an end of the film that no theory has right lets it lie
+elsewhere. Other films are tried beside the scene's, and count by how well they explain the
+readings.
 """
 
 import math
@@ -117,8 +119,8 @@ class FilmEstimate:
         Recordings of the machine as new that it was told against.
     budget : dict
         What each doubt is worth: its own part of half the interval [m], by the names of
-        :class:`Doubts`, and the shape of the bore where it is not known; their squares add up to
-        that of the whole.
+        :class:`Doubts`, and what film and bore are like where that is not known; their squares
+        add up to that of the whole.
     """
 
     reason: str = ""
@@ -136,7 +138,7 @@ def film_clearance(
     angles: Sequence[float],
     as_new: tuple[float, float],
     *,
-    scarred: Sequence["RestCurve"] = (),
+    others: Sequence["PossibleFilm"] = (),
     healthy: Sequence[JournalRun] = (),
     doubts: Doubts = USUAL_DOUBTS,
 ) -> FilmEstimate:
@@ -146,17 +148,15 @@ def film_clearance(
     ----------
     run : JournalRun
     curve : RestCurve
-        Of the bearing's film in a round bore.
+        Of the bearing's film.
     angles : sequence of float
         Of the probes, from X in the direction of rotation [rad].
     as_new : tuple of float
         Least and largest diametral clearance of a healthy bearing of this kind [m].
-    scarred : sequence of RestCurve
-        Of the same film in a bore with a scar near the load, as of :data:`SCARS`; together they
-        are as likely as none.
+    others : sequence of PossibleFilm
+        What the film may be instead.
     healthy : sequence of JournalRun
-        Of the same machine, its bore round, with the clearance that was measured, else one within
-        `as_new`.
+        Of the same machine, with the clearance that was measured, else one within `as_new`.
     doubts : Doubts
         How well it is known what is told.
 
@@ -175,7 +175,7 @@ def film_clearance(
 
     Laminar and isothermal. A groove, a wrong direction of the load or a swapped probe put the
     journal where no clearance explains it: that is said, not fitted. Without healthy recordings
-    the round bore must explain the readings: two probes do not tell a scar from their offsets.
+    the film as told must explain the readings: two probes do not tell a scar from their offsets.
 
     Examples
     --------
@@ -194,17 +194,19 @@ def film_clearance(
     reason = _unloaded(runs)
     if reason:
         return FilmEstimate(reason=reason)
-    problem = _Problem(runs, curve, np.asarray(angles), as_new, doubts)
-    plain = problem.solve(curve, problem.start())
-    each = [plain, *(problem.solve(bore, plain.values) for bore in scarred)]
-    likely = [1.0, *[1.0 / len(scarred) for _ in scarred]]
+    problem = _Problem(runs, np.asarray(angles), as_new, doubts)
+    films = [PossibleFilm(likely=1.0, now=curve, new=curve), *others]
+    told = problem.solve(films[0], problem.start())
+    each = [told, *(problem.solve(film, told.values) for film in others)]
     found, weights = mixed_by_evidence(
-        [problem.explained(one) for one in each], [one.cost for one in each], likely
+        [problem.explained(one) for one in each],
+        [one.cost for one in each],
+        [film.likely for film in films],
     )
     if not healthy:
-        found = found._replace(left=plain.left)
-    likeliest = (curve, *scarred)[int(np.argmax(weights))]
-    return _judged(problem, found, run, likeliest, len(healthy))
+        found = found._replace(left=told.left)
+    likeliest = films[int(np.argmax(weights))]
+    return _judged(problem, found, run, likeliest.now, len(healthy))
 
 
 def _unloaded(runs: Sequence[JournalRun]) -> str:
@@ -223,13 +225,12 @@ class _Problem:
     def __init__(
         self,
         runs: Sequence[JournalRun],
-        curve: "RestCurve",
         angles: Float,
         as_new: tuple[float, float],
         doubts: Doubts,
     ) -> None:
         n, probes = len(runs), len(angles)
-        self.curve, self.n, self.probes = curve, n, probes
+        self.n, self.probes = n, probes
         self.readings = np.array([run.readings for run in runs])
         self.load = np.array([run.load for run in runs])
         self.film_force = np.array([run.film_force for run in runs])
@@ -261,7 +262,7 @@ class _Problem:
         swing = np.array([run.swing for run in runs])
         self.scatter = np.hypot(FLOOR, swing**2 / math.exp(self.middle))
 
-    def predicted(self, free: Float, bore: "RestCurve") -> Float:
+    def predicted(self, free: Float, film: "PossibleFilm") -> Float:
         """Readings [shape=(..., n, n_probes)] for deviations from what is told, in their doubts."""
         real = free * self.prior
         probes, n = self.probes, self.n
@@ -272,14 +273,14 @@ class _Problem:
         clearance = np.exp(self.middles + apart)
         strength = self.film_force * np.exp(oils[..., :1] + oils[..., 1:]) / clearance**2
         load = self.load * (np.exp(loads[..., :1] + loads[..., 1:]) / strength)[..., None]
-        rest = [bore.position(load[..., :1, :]), self.curve.position(load[..., 1:, :])]
+        rest = [film.now.position(load[..., :1, :]), film.new.position(load[..., 1:, :])]
         place = clearance[..., None] * np.concatenate(rest, axis=-2)
         read = place @ self.looks + offsets[..., None, :]
         return np.asarray(read * np.exp(gains)[..., None, :])
 
-    def residuals(self, bore: "RestCurve", free: Float) -> Float:
+    def residuals(self, film: "PossibleFilm", free: Float) -> Float:
         """Of readings, then of what is held, in standard deviations."""
-        apart = (self.predicted(free, bore) - self.readings) / self.scatter[:, None]
+        apart = (self.predicted(free, film) - self.readings) / self.scatter[:, None]
         return np.concatenate([apart.reshape(*free.shape[:-1], -1), free], axis=-1)
 
     def start(self) -> Float:
@@ -290,9 +291,9 @@ class _Problem:
         start[0] = (math.log(guess) - self.middle) / self.prior[0]
         return start
 
-    def solve(self, bore: "RestCurve", start: Float) -> "FittedClearance":
-        """Deviations by one bore of the machine as it is now."""
-        return fitted(partial(self.residuals, bore), start, self.readings.size)
+    def solve(self, film: "PossibleFilm", start: Float) -> "FittedClearance":
+        """Deviations from what is told, if the film is this one."""
+        return fitted(partial(self.residuals, film), start, self.readings.size)
 
     def explained(self, found: "FittedClearance") -> "Explained":
         """Logarithm of the clearance, of deviations."""
@@ -305,8 +306,24 @@ class _Problem:
         )
 
 
+class PossibleFilm(NamedTuple):
+    """What the film of a machine may be.
+
+    Attributes
+    ----------
+    likely : float
+        Probability before the readings, over that of the film as told.
+    now, new : RestCurve
+        Of the machine in question, and of the same when it was new.
+    """
+
+    likely: float
+    now: "RestCurve"
+    new: "RestCurve"
+
+
 class Explained(NamedTuple):
-    """How one bore explains the readings: what is asked for, and how sure that is.
+    """How one bore or film explains the readings: what is asked for, and how sure that is.
 
     Attributes
     ----------
@@ -343,14 +360,14 @@ def mixed_by_evidence(
     Returns
     -------
     Explained
-        Its budget has the shape of the bore as well, where there is more than one.
+        Its budget has film and bore as well, where there is more than one.
     weights : numpy.ndarray [shape=(n,)]
 
     Examples
     --------
     >>> one = Explained(value=1.0, error=0.1, budget={"load": 0.1}, left=1.0)
     >>> both, weights = mixed_by_evidence([one, one._replace(value=2.0)], [0.5, 0.5], [1.0, 1.0])
-    >>> both.value, round(both.budget["shape of the bore"], 2), weights.tolist()
+    >>> both.value, round(both.budget["film and bore"], 2), weights.tolist()
     (1.5, 0.5, [0.5, 0.5])
     """
     evidence = np.log([one.error * before for one, before in zip(each, likely, strict=True)])
@@ -365,11 +382,11 @@ def mixed_by_evidence(
         name: math.sqrt(weights @ np.array([one.budget[name] ** 2 for one in each]))
         for name in each[0].budget
     }
-    parts["shape of the bore"] = math.sqrt(weights @ (values - value) ** 2)
+    parts["film and bore"] = math.sqrt(weights @ (values - value) ** 2)
     variance = weights @ np.array([one.error**2 for one in each])
     mixed = Explained(
         value=value,
-        error=math.sqrt(variance + parts["shape of the bore"] ** 2),
+        error=math.sqrt(variance + parts["film and bore"] ** 2),
         budget=parts,
         left=min(one.left for one in each),
     )

@@ -6,7 +6,7 @@ What the equilibrium needs is no training but the machine's nameplate and the co
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, replace
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,11 +16,20 @@ from ...sim.scene.journal import JournalScene, ProximityProbe
 from ...sim.scene.shaft import ShaftScene
 from ..feature_rows.healthy import Baseline
 from ..feature_rows.probe_means import ProbeMeans, probe_means
-from ..film_clearance.clearance import SCARS, FilmEstimate, JournalRun, film_clearance
+from ..film_clearance.clearance import (
+    SCARS,
+    FilmEstimate,
+    JournalRun,
+    PossibleFilm,
+    film_clearance,
+)
 from ..film_clearance.wear_down import SinkingRun, film_wear_down, possible_bores, sinking_places
 from ..nameplate.nameplate import Nameplate, told_conditions
 from ..wear_model.estimate import Estimate
 from .beside import length_words, with_second
+
+if TYPE_CHECKING:
+    from ...sim.film.rest_curve import RestCurve
 
 Float = NDArray[np.float64]
 
@@ -64,11 +73,6 @@ def film_estimate(
 def _journal(
     means: ProbeMeans, plate: Nameplate, healthy: Sequence[ProbeMeans], severity: str
 ) -> FilmEstimate:
-    from ...sim.film.rest_curve import rest_curve
-    from ...sim.journal.recording import (
-        film_geometry,  # compiled code: a second that others need not wait
-    )
-
     scene = cast(JournalScene, plate.scene)
     reason = journal_fault(scene, means)
     if reason:
@@ -77,19 +81,41 @@ def _journal(
     wear = scene.wear
     built = scene.bearing.clearance_diametral
     as_new = (wear.as_new, wear.grade_edges[0]) if wear else (built / _BUILT, built * _BUILT)
-    film, short = film_geometry(scene), scene.film.rung == "short"
+    told, others = _possible_films(scene)
     return film_clearance(
         _run(means, plate, severity),
-        rest_curve(film, "short" if short else "direct"),
+        told,
         [_probe(scene.sensors, name).angle for name in means.names],
         as_new,
-        # a short film knows no scars
-        scarred=() if short else [rest_curve(film, scar=d, turned=a) for d, a in SCARS],
+        others=others,
         healthy=[_run(each, plate, severity, healthy=True) for each in usable],
         doubts=plate.doubts,
     )
 
 
+def _possible_films(scene: JournalScene) -> tuple["RestCurve", list[PossibleFilm]]:
+    """Film as the scene has it, and what it may be instead.
+
+    That is the other solution of Reynolds' equation, for the whole of the machine's life, or a
+    scar that came with the wear.
+    """
+    from ...sim.film.rest_curve import rest_curve
+    from ...sim.journal.recording import (
+        film_geometry,  # compiled code: a second that others need not wait
+    )
+
+    geometry = film_geometry(scene)
+    finite, short = (rest_curve(geometry, rung) for rung in ("direct", "short"))
+    told, other = (short, finite) if scene.film.rung == "short" else (finite, short)
+    scars = [rest_curve(geometry, scar=depth, turned=turned) for depth, turned in SCARS]
+    share = _OTHER_FILM / len(scars)
+    return told, [
+        PossibleFilm(likely=_OTHER_FILM, now=other, new=other),
+        *(PossibleFilm(likely=share, now=scar, new=finite) for scar in scars),
+    ]
+
+
+_OTHER_FILM = 0.5  # as likely as the film as told, another and all scars together
 _BUILT = 1.3  # makers' tolerances of a clearance, where no limits say what as new is
 
 
