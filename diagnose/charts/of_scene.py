@@ -601,18 +601,20 @@ def _sentence(scene: Scene, found: Study, answer: Answer, question: str, status:
         what = f"nothing needs to change; {spare}"
     elif name != HERE and own is not None and _at_limit(found, own):
         what = f"to be on the safe side, {what}"
-    lead = _lead(found, question)
+    lead = _lead(found, answer, question)
     why = f"; {alike}" if alike else ""
     return f"{lead}{what} ({errs}{faster}){why}{certain}.{_one_fewer(scene, found, answer)}"
 
 
-def _lead(found: Study, question: str) -> str:
-    """How the sentence of a choice begins: one of them is what is recommended."""
-    if _alike(found) or (question == RAISED and _rungs_too_coarse(found)):
+def _lead(found: Study, answer: Answer, question: str) -> str:
+    """How the sentence of a choice begins: one of them is what is recommended, unless in doubt."""
+    coarse = any(each.candidate.verdict == "beyond" for each in found.raises)
+    unsure = answer.status == "so far" and answer.chosen.verdict == "doubtful"
+    if not unsure and (_alike(found) or (question == RAISED and _rungs_too_coarse(found))):
         return "We recommend: "
-    if question == KEPT:
-        return "We recommend: with your rungs kept, "
-    return f"{_OPENING[question]}: "
+    if unsure or question == RAISED or (coarse and found.raised is None):
+        return f"{_OPENING[question]}: "
+    return "We recommend: with your rungs kept, "
 
 
 def _faster(answer: Answer, each: Candidate) -> str:
