@@ -21,6 +21,7 @@ from wearstate.diagnose.charts.chart import (
     front_of,
     remaining_error,
 )
+from wearstate.diagnose.charts.decision import KEPT, RAISED
 from wearstate.diagnose.charts.figure import (
     PALE,
     REFERENCE,
@@ -30,8 +31,6 @@ from wearstate.diagnose.charts.figure import (
     shaded_rows,
 )
 from wearstate.diagnose.charts.of_scene import (
-    KEPT,
-    RAISED,
     chart_of,
     scene_chart,
     scene_search,
@@ -359,7 +358,10 @@ def test_where_the_rungs_are_the_best_one_answer_is_told_once():
     good = candidate(0.01, 0.005, film="short", mesh="x1")
     cheaper = replace(found.raised, chosen=good, candidates=(good, *found.kept.candidates))
     other = replace(found, raised=replace(cheaper, changes=dict(good.values)))
-    assert len(chart_of(scene, other).conclusion) == 3
+    two = chart_of(scene, other)
+    assert len(two.conclusion) == 3
+    _, rows = shaded_rows(two)  # the scene as written is the same in both
+    assert [label for label, _ in rows].count(HERE) == 1
 
 
 def test_an_error_of_the_reference_that_matters_is_told_beside_that_of_the_scene():
@@ -417,6 +419,25 @@ def test_the_name_of_the_scene_is_beside_its_star_and_on_nothing():
     assert min(abs(box.x0 - star[0]), abs(box.x1 - star[0])) < 1.5 * box.height
     for text in axes.texts:
         assert text is name or not text.get_window_extent().overlaps(box)
+
+
+def test_numbers_stand_beside_the_star_and_the_points_not_on_them():
+    """A point right and below the star, whose number would lie on the next point."""
+    scene = load_scene("journal-bearing", {"duration": "0.5 s", "film.rung": "direct"})
+    near = [candidate(0.5 + 0.04 * i, 0.025 - 0.008 * i, mesh="x1", film=f"{i}") for i in range(3)]
+    found = best_rungs_already()
+    found = replace(found, raised=replace(found.raised, candidates=(*found.kept.candidates, *near)))
+    chart = chart_of(scene, found)
+    axes = question_figure(chart, RAISED).axes[0]
+    axes.figure.draw_without_rendering()
+    places = [(p.seconds, 100 * p.error) for p in chart.of(RAISED)]
+    numbers = [text for text in axes.texts if text.get_text().isdecimal()]
+    assert len(numbers) >= 3
+    for text in numbers:
+        box = text.get_window_extent()
+        assert not any(box.contains(*axes.transData.transform(place)) for place in places)
+        assert not any(other.get_window_extent().overlaps(box) for other in axes.texts
+                       if other is not text)  # fmt: skip
 
 
 def test_points_deep_in_the_error_of_the_reference_do_not_stretch_the_axis(chart):
@@ -578,6 +599,19 @@ def coarse_rungs():
     kept, raised = answer_of(HERE_POINT, reference=fine), answer_of(rungs_off, written=rungs_off)
     scene = load_scene("journal-bearing", {"duration": "0.5 s"})
     return chart_of(scene, replace(found, kept=kept, raised=raised))
+
+
+def test_numerics_alone_are_not_recommended_where_a_rung_is_off_and_the_rest_unmeasured():
+    off = candidate(0.02, 0.4, "beyond", film="map", mesh="x1")
+    film = Raise(effect="film", written="map", best="direct", candidate=off)
+    found = replace(study_of(raises=(film,), status="out of budget"), raised=None)
+    scene = load_scene("journal-bearing", {"duration": "0.5 s"})
+    assert "We recommend" not in chart_of(scene, found).verdict
+    assert "We recommend" in chart_of(scene, replace(found, raises=())).verdict
+    # nor what may be enough after a few starts
+    doubt = candidate(0.015, 0.01, "doubtful", film="map", mesh="x2")
+    kept = replace(found.kept, chosen=doubt)
+    assert "We recommend" not in chart_of(scene, replace(found, raises=(), kept=kept)).verdict
 
 
 def test_rungs_that_no_numerics_can_mend_have_no_green_ring():

@@ -128,13 +128,18 @@ def _draw_levels(axes: Any, chart: Chart, floor: float) -> None:
     if chart.accuracy is not None:
         asked = 100 * chart.accuracy
         axes.axhline(asked, color=LIMIT, lw=1, ls="--", label="accuracy asked")
-        if off > _VISIBLE * asked:
+        if has_band(chart):
             low = max(asked - off, floor / 2)
             axes.axhspan(low, asked + off, color=PALE, lw=0, zorder=0, label=TOO_CLOSE)
     if off > 0:
         high = max(off, floor / 2)
         label = "error of the reference"
         axes.axhspan(floor / 2, high, color="#dfe3e8", zorder=0, label=label)
+
+
+def has_band(chart: Chart) -> bool:
+    """Whether what the reference is off by is seen round the accuracy asked."""
+    return chart.accuracy is not None and chart.remaining > _VISIBLE * chart.accuracy
 
 
 _VISIBLE = 0.1  # of the accuracy

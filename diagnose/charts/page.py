@@ -27,6 +27,7 @@ from .figure import (
     chart_svg,
     choice_of,
     floor_of,
+    has_band,
     question_images,
     shaded_rows,
 )
@@ -71,7 +72,8 @@ def chart_html(chart: Chart, *, interactive: bool = False) -> str:
         lines=_lines(chart),
         reference_error=percent(chart.remaining) if chart.remaining > 0 else "",
         floored=floor_of(chart) > FLOOR,
-        pale=PALE if chart.remaining > 0 else "",
+        pale=PALE,
+        band=has_band(chart),
         unbroken=_unbroken,
         error_of=_error_of,
         finite=math.isfinite,

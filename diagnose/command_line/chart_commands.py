@@ -17,16 +17,15 @@ from ...sim.scene.load import load_scene, numbered, scene_table, scene_text
 from ...sim.scene.parts import Scene, SceneError
 from ..charts.across import RungSets
 from ..charts.chart import RECOMMENDED, Chart
+from ..charts.decision import KEPT, RAISED
 from ..charts.of_scene import (
-    KEPT,
-    RAISED,
     chart_of,
     kept_runs,
     measure,
     scene_search,
-    where_it_stands,
 )
 from ..charts.scene_edit import apply_changes
+from ..charts.sentences import where_it_stands
 from ..charts.verdict import verdict_chart
 from ..pages.kept import part_file
 from .command_options import CHART_SUFFIXES, SCENE_SUFFIXES, check_outputs, time_bar
