@@ -501,6 +501,9 @@ def test_an_error_nearer_to_the_accuracy_than_the_reference_is_known_is_not_call
     )
     assert ("too close to call" in where) == close
     assert ("is not within" in where) != close
+    page = chart_html(chart)
+    [row] = re.findall(rf"<tr[^>]*><td>{HERE}</td>(?:(?!</tr>).)*verdict.*?</tr>", page)
+    assert (">at the limit</td>" in row) == close
     assert ("to be on the safe side" in take) == close
     assert "mesh 72 around (was 36) and 17 along (was 9)" in take
 

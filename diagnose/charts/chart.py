@@ -59,6 +59,8 @@ class Point:
     block : str
         TOML to paste into the scene or recipe; comment only where nothing is to be changed, empty
         where the choice is none of a scene.
+    close : bool
+        Its error is nearer to the accuracy than the reference is known.
     measured_seconds : float
         Least of the measured times of what `seconds` is of; NaN where none was taken.
     """
@@ -75,6 +77,7 @@ class Point:
     question: str = ""
     here: bool = False
     block: str = ""
+    close: bool = False
     measured_seconds: float = math.nan
 
     @property
@@ -439,6 +442,7 @@ def _point_table(point: Point) -> dict[str, Any]:
         "error": point.error,
         "worst": point.worst,
         "verdict": point.verdict,
+        "at_the_limit": point.close,
         "reason": point.reason,
         "starts": point.starts,
         "on_front": point.on_front,

@@ -308,7 +308,8 @@ def _points(scene: Scene, found: Study, answer: Answer, question: str) -> Iterat
             seconds=rate,
             errors=each.differences,
             verdict="reference" if best else each.verdict,
-            reason=_reason(scene, found, each),
+            reason=_reason(each, scene),
+            close=not best and at_limit(found, each),
             starts=each.starts,
             on_front=on_front or (each.rungs == answer.chosen.rungs and each.verdict == "within"),
             question=question,
@@ -328,11 +329,9 @@ def _point_block(scene: Scene, each: Candidate, name: str) -> str:
     return f"{head}\n{block_of(changes, before, {_STEP: default_step(scene)})}"
 
 
-def _reason(scene: Scene, found: Study, each: Candidate) -> str:
+def _reason(each: Candidate, scene: Scene) -> str:
     """Why a candidate is not within, in words."""
-    if each.verdict not in ("beyond", "doubtful"):
-        return each.reason
-    return f"{'at the limit: ' if at_limit(found, each) else ''}{error_words(each, scene)}"
+    return error_words(each, scene) if each.verdict in ("beyond", "doubtful") else each.reason
 
 
 def _choice(scene: Scene, found: Study, answer: Answer, question: str) -> Choice:
