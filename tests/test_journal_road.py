@@ -63,6 +63,25 @@ def test_probes_without_a_mean_are_at_fault_where_the_model_knows_one(data, trai
     assert replace(model, familiarity=never).estimate(coupled).verdict != "unusable"
 
 
+def test_a_shaft_on_another_side_of_its_bearing_than_in_training_is_told(data, trained):
+    model = trained[0]
+    radius = model.names.index("orbit.centreline.radius_db")
+    with DataSet(data) as records:  # the record whose shaft lies the lowest
+        whole = max((records[i] for i in range(N)), key=lambda each: model._row(each, None)[radius])
+    first, second, *rest = whole.signal
+    away = replace(whole, signal=np.stack([-first, -second, *rest]))  # gaps instead of motion
+    said = model.estimate(away)
+    assert said.verdict == "unusable"
+    assert [(fault.kind, fault.bars) for fault in said.faults] == [("place", True)]
+    assert "multiply them by -1" in said.reasons[0]
+    # as a load to the side would have it: what the probe a quarter of a turn behind reads
+    aside = replace(whole, signal=np.stack([second, -first, *rest]))
+    (fault,) = [fault for fault in model.estimate(aside).faults if fault.kind == "place"]
+    assert not fault.bars
+    assert "direction of the load" in fault.text
+    assert not any(fault.kind == "place" for fault in model.estimate(whole).faults)
+
+
 # --- the recipe
 
 

@@ -1,6 +1,7 @@
 """Faults of the data, named before anything is said of the machine."""
 
 import math
+import re
 import runpy
 from dataclasses import replace
 from pathlib import Path
@@ -148,6 +149,26 @@ def test_a_verdict_under_loud_hum_is_one_with_caution(model, familiar):
     assert any(fault.kind == "hum" and not fault.bars for fault in loud.faults)
     assert loud.verdict == "caution"
     assert any("multiples of 60 Hz" in caution for caution in loud.cautions)
+
+
+@pytest.mark.parametrize("late", [60, -90])
+def test_a_mark_beside_the_dead_centre_is_named_with_its_angle(model, familiar, late):
+    told = []
+    for recording in familiar:
+        assert not any(fault.kind == "tacho" for fault in model.estimate(recording).faults)
+        tacho = recording.names.index(recording.tacho)
+        signal = recording.signal.copy()
+        turn = recording.sample_rate / recording.row["speed_hz"]
+        signal[tacho] = np.roll(signal[tacho], round(late / 360 * turn))
+        # what is rolled in breaks the train of pulses
+        cut = slice(*(round(place * turn) for place in (0.3, signal.shape[1] / turn - 0.3)))
+        found = model.estimate(replace(recording, signal=signal[:, cut]))
+        told += [fault.text for fault in found.faults if fault.kind == "tacho" and fault.bars]
+    # in bins of 10 degrees, and a knock comes the later the wider the clearance
+    assert len(told) > len(familiar) / 2
+    words = "late" if late > 0 else "early"
+    degrees = [int(re.search(rf"about (\d+) degrees {words}", text)[1]) for text in told]
+    assert degrees == pytest.approx([abs(late)] * len(told), abs=10)
 
 
 def test_a_header_that_does_not_fit_is_named_whole(model, familiar):

@@ -217,6 +217,36 @@ def moved_rows(
     return moved
 
 
+def turned_rows(names: Sequence[str], row: Float) -> Float:
+    """One feature row as it would be with the mark of the turn elsewhere.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Of the features.
+    row : numpy.ndarray [shape=(n_features,)]
+
+    Returns
+    -------
+    numpy.ndarray [shape=(n_angles, n_features)]
+        The crank-angle maps of all channels turned on by none, one, … of their angles, which is a
+        mark that came so much late; a single row where there is no map.
+
+    Examples
+    --------
+    >>> names = [f"a.angle_{i:03d}_{i + 90:03d}.band_50_66.level_db" for i in (0, 90, 180, 270)]
+    >>> turned_rows(names, np.array([3.0, -7.0, 9.0, 1.0]))[1].tolist()
+    [1.0, 3.0, -7.0, 9.0]
+    """
+    maps = [columns for columns in columns_of(tuple(names)).values() if columns.cells]
+    turned = np.repeat(row[None, :], max((each.angles for each in maps), default=1), axis=0)
+    for each in maps:
+        levels = row[each.cells].reshape(each.angles, -1)
+        for step in range(each.angles):
+            turned[step, each.cells] = np.roll(levels, step, axis=0).ravel()
+    return turned
+
+
 def _moved(levels: Float, edges: Sequence[tuple[float, float]], steps: Float) -> Float:
     """Spectra [shape=(n, n_bands)] moved by steps of the log frequency [shape=(n,)]."""
     middle = np.log(edges).mean(axis=1)

@@ -23,7 +23,9 @@ from .physical import level_channels, level_rows, shape_rows
 from .resampling import resampled
 
 Float = NDArray[np.float64]
-Kind = Literal["saturated", "dead", "swapped", "unit", "rate", "tacho", "layout", "hum", "coupling"]
+Kind = Literal[
+    "saturated", "dead", "swapped", "unit", "rate", "tacho", "layout", "hum", "coupling", "place"
+]
 
 FACTORS = (9.80665, 1000.0)
 """Ratios of units that are mixed up: g for m/s^2, and milli or micro for the next unit."""
@@ -58,7 +60,8 @@ class QualityFault:
     Attributes
     ----------
     kind : str
-        ``saturated``, ``dead``, ``swapped``, ``unit``, ``rate``, ``tacho``, ``layout`` or ``hum``.
+        ``saturated``, ``dead``, ``swapped``, ``unit``, ``rate``, ``tacho``, ``layout``, ``hum``,
+        ``coupling`` or ``place``.
     channel : str
         Where; empty for the whole recording.
     text : str
@@ -164,6 +167,103 @@ def coupling_faults(
 
 _GAP, _RADIUS, _PAIR = "displacement", "centreline.radius_db", 2
 _NO_MEAN = 0.03  # of the vibration's rms: what is left of a mean in a few revolutions
+
+
+def place_faults(
+    recording: Recording, names: Sequence[str], row: Float, least: Float, most: Float
+) -> tuple[QualityFault, ...]:
+    """That a shaft runs on a side of its bearing where none did in training.
+
+    Parameters
+    ----------
+    recording : Recording
+    names : sequence of str
+        Of the features.
+    row : numpy.ndarray [shape=(n_features,)]
+    least, most : numpy.ndarray [shape=(n_features,)]
+        Range of each feature in training.
+
+    Returns
+    -------
+    tuple of QualityFault
+        One for every pair of probes whose mean position is outside the trained range, by more than
+        a twentieth of its width. It bars a verdict where the opposite place is inside: a gap grows
+        where the shaft moves away from its probe, and a model reads the motion towards it.
+
+    Examples
+    --------
+    >>> probes = [Channel(name=f"p{i}", unit="m", quantity="displacement") for i in (1, 2)]
+    >>> recording = Recording(signal=np.ones((2, 8)), sample_rate=1e3, channels=tuple(probes))
+    >>> names = ["orbit.centreline.x", "orbit.centreline.y"]
+    >>> least, most = np.array([-1.4e-4, -8e-5]), np.array([5e-6, 2e-6])
+    >>> [fault] = place_faults(recording, names, np.array([4e-5, 5e-5]), least, most)
+    >>> fault.bars, fault.text[:47]
+    (True, 'p1, p2 put the shaft at (0.040, 0.050) mm, whic')
+    >>> [fault] = place_faults(recording, names, np.array([5e-5, -4e-5]), least, most)
+    >>> fault.bars
+    False
+    >>> place_faults(recording, names, np.array([-4e-5, -5e-5]), least, most)
+    ()
+    """
+    probes = ", ".join(each.name for each in recording.channels if each.quantity == _GAP)
+    found = []
+    columns = {name: i for i, name in enumerate(names)}
+    for along, i in columns.items():
+        j = columns.get(along.removesuffix(_ALONG) + _ACROSS)
+        if not along.endswith(_ALONG) or j is None:
+            continue
+        place, low, high = row[[i, j]], least[[i, j]], most[[i, j]]
+        beyond = np.maximum(low - place, place - high) > _BESIDE * (high - low)
+        if not beyond.any():
+            continue
+        opposite = bool(((low <= -place) & (-place <= high)).all())
+        x, y = 1e3 * place
+        spans = [f"{1e3 * a:.3f} to {1e3 * b:.3f}" for a, b in zip(low, high, strict=True)]
+        text = (
+            f"{probes} put the shaft at ({x:.3f}, {y:.3f}) mm, which must be within "
+            f"({', '.join(spans)}) mm, as in training: "
+        )
+        text += _AWAY if opposite else _ELSEWHERE
+        found.append(QualityFault(kind="place", channel=probes, text=text, bars=opposite))
+    return tuple(found)
+
+
+_ALONG, _ACROSS = "centreline.x", "centreline.y"
+_AWAY = (
+    "with the opposite sign it would be; gaps grow where the shaft moves away from a probe, a "
+    "model reads the motion towards it: multiply them by -1, or check the direction of the load"
+)
+_ELSEWHERE = "check names, angles and zeros of the probes, and the direction of the load"
+_BESIDE = 0.05  # of the trained width: a machine a little beyond the extremes of a thousand
+
+
+def mark_faults(recording: Recording, late_deg: float | None) -> tuple[QualityFault, ...]:
+    """That the tacho's mark is not at the dead centre where a model has it.
+
+    Parameters
+    ----------
+    recording : Recording
+    late_deg : float or None
+        By how much it comes late [deg]; None where it does not.
+
+    Examples
+    --------
+    >>> recording = Recording(signal=np.ones((1, 8)), sample_rate=1e3, tacho="key", channels=(
+    ...     Channel(name="key", unit="V", quantity="tacho"),))
+    >>> mark_faults(recording, 30.0)[0].text[:61]
+    'tacho key: its mark comes about 30 degrees late, but for whic'
+    >>> mark_faults(recording, None)
+    ()
+    """
+    if late_deg is None:
+        return ()
+    side = "late" if late_deg > 0 else "early"
+    text = (
+        f"tacho {recording.tacho}: its mark comes about {abs(late_deg):.0f} degrees {side}, but "
+        "for which the recording is familiar; must be at the top dead centre: move the mark, shift "
+        "the channel by as much, or look for a valve that does not close"
+    )
+    return (QualityFault(kind="tacho", channel=str(recording.tacho), text=text),)
 
 
 def layout_faults(recording: Recording, card: LayoutCard) -> tuple[QualityFault, ...]:

@@ -32,6 +32,8 @@ from ..feature_rows.quality import (
     QualityFault,
     coupling_faults,
     layout_faults,
+    mark_faults,
+    place_faults,
     quiet_faults,
     recording_faults,
     suspicions,
@@ -436,7 +438,12 @@ class WearModel:
         if known is None and told_against(FeatureSelection(only=self.names)):
             return Estimate(verdict="unusable", reasons=(NO_BASELINE,), mode=self.mode)
         row = self._row(recording, known)
-        faults += coupling_faults(recording, self.names, row, self.familiarity.low)
+        cloud = self.familiarity
+        faults += coupling_faults(recording, self.names, row, cloud.low)
+        if self.mode == "cold":  # healthy recordings take the zeros of the probes away
+            faults += place_faults(recording, self.names, row, cloud.low, cloud.high)
+        late = cloud.late_mark(self.names, self._lifted(row[None, :])[0], self.distance_limit)
+        faults += mark_faults(recording, late)
         if any(fault.bars for fault in faults):
             return self._unusable(faults)
         look = self._look(row)
