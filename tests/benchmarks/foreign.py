@@ -4,11 +4,11 @@
 
 Trains on the library's own records (or takes `--model`, repeatedly), and judges on records of an
 independent program of the same nominal numbers: `foreign_pump.py`, `foreign_exudyn.py`,
-`foreign_ross.py`, `foreign_ross_shaft.py` say which laws they have. With `--baseline k` a
-referenced model is judged too, with k healthy records of each foreign machine. `--peel` repeats it
-with every difference alone and with all but each. Errors are in per cent of the condemning limit,
-with 95 % intervals over machines; a refused record has an estimate and no interval. Data, models,
-JSON stay in the folder.
+`foreign_ross.py`, `foreign_journal.py`, `foreign_ross_shaft.py` say which laws they have. With
+`--baseline k` a referenced model is judged too, with k healthy records of each foreign machine.
+`--peel` repeats it with every difference alone and with all but each. Errors are in per cent of the
+condemning limit, with 95 % intervals over machines; a refused record has an estimate and no
+interval. Data, models, JSON stay in the folder.
 
 No constant of the foreign programs was chosen by these results. All is simulated.
 """
@@ -37,7 +37,7 @@ from wearstate.diagnose.wear_model.train import train_model
 
 PROGRAMS = {
     "bilge-pump": {"A": "foreign_pump.PUMP_A", "B": "foreign_exudyn.PUMP_B"},
-    "journal-bearing": {"A": "foreign_ross.JOURNAL"},
+    "journal-bearing": {"A": "foreign_ross.JOURNAL", "B": "foreign_journal.JOURNAL_B"},
     "propulsion-shaft": {"A": "foreign_ross_shaft.SHAFT"},
 }
 """Machine -> letter -> where its program is."""
