@@ -13,6 +13,7 @@ from click.testing import CliRunner
 from hypothesis import given
 from hypothesis import strategies as st
 from matplotlib.colors import to_hex
+from matplotlib.figure import Figure
 from wearstate.datasets.generation.machines import known_of
 from wearstate.diagnose.charts.chart import (
     CSV_HEAD,
@@ -26,6 +27,7 @@ from wearstate.diagnose.charts.figure import (
     PALE,
     REFERENCE,
     SO_FAR,
+    _legend_below,
     kind_of,
     question_figure,
     shaded_rows,
@@ -887,6 +889,13 @@ def test_errors_do_not_depend_on_the_number_of_workers(tmp_path):
         done = run_chart("journal-bearing", sizes, "-j", str(jobs), "-o", str(path))
         assert done.exit_code == 0, done.output
     assert without_seconds(pages[0]) == without_seconds(pages[1])
+
+
+def test_a_chart_without_points_has_no_legend():
+    """As that of a data set has where its budget ends before the first."""
+    axes = Figure().add_subplot()
+    _legend_below(axes, 2)
+    assert axes.get_legend() is None
 
 
 def test_runs_of_another_scene_are_refused(tmp_path):

@@ -789,11 +789,29 @@ COMBINATIONS = (
 )
 
 
+BRIEF_PUMP = load_scene("bilge-pump", {"duration": "0.4 s"})
+
+
+def outcomes_of_starts(**options):
+    """Outcomes of twelve starts of each combination."""
+    outcomes = {}
+    pilot = Pilot(BRIEF_PUMP, known_of(BRIEF_PUMP).quantities, seed=2, kept=outcomes, **options)
+    pilot.fill(COMBINATIONS, 12)
+    return outcomes
+
+
+@pytest.fixture(scope="module")
+def alone():
+    """Outcomes of starts that each ran alone."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(pilot_runs, "simulate_many", None)  # none lies beside another
+        return outcomes_of_starts()
+
+
 @pytest.mark.parametrize("jobs", [1, 2])
-def test_starts_side_by_side_have_the_outcomes_of_each_alone(jobs, monkeypatch):
+def test_starts_side_by_side_have_the_outcomes_of_each_alone(jobs, alone, monkeypatch):
     """To the last bit, by any number of workers; timed ones run alone."""
-    scene = load_scene("bilge-pump", {"duration": "0.4 s"})
-    known = known_of(scene)
+    known = known_of(BRIEF_PUMP)
     lying = []
     monkeypatch.setattr(
         pilot_runs,
@@ -801,24 +819,16 @@ def test_starts_side_by_side_have_the_outcomes_of_each_alone(jobs, monkeypatch):
         lambda runs, truth: lying.append(len(runs)) or simulate_many(runs, truth=truth),
     )
 
-    def kept(**options):
-        outcomes = {}
-        pilot = Pilot(scene, known.quantities, seed=2, kept=outcomes, **options)
-        pilot.fill(COMBINATIONS, 12)
-        return outcomes
-
-    alone = kept()
-    assert not lying
     assert sum(bool(each.fault) for each in alone.values()) == 2
     told = {"truth": known.truth, "spread": partial(in_order, jobs=jobs), "at_once": jobs}
-    together = kept(**told)
+    together = outcomes_of_starts(**told)
     assert {name: repr(together[name]) for name in alone} == {
         name: repr(each) for name, each in alone.items()
     }
     assert jobs > 1 or sum(n for n in lying if n > 1) >= 24  # two combinations of twelve
     lying.clear()
-    monkeypatch.setattr(pilot_runs, "_warm", {scene.machine})
-    timed = kept(**told, clock=time.perf_counter)
+    monkeypatch.setattr(pilot_runs, "_warm", {BRIEF_PUMP.machine})
+    timed = outcomes_of_starts(**told, clock=time.perf_counter)
     assert jobs > 1 or sum(n for n in lying if n > 1) == 2 * (12 - TIMED)
     assert all(timed[name].quantities == each.quantities for name, each in alone.items())
     told = [name for name, each in timed.items() if math.isfinite(each.seconds)]

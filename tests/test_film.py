@@ -303,7 +303,12 @@ def test_active_sets_solve_the_complementarity_problem(state, bore):
 # --- invariants
 
 
-rates = st.floats(-1.0, 1.0)
+def whole(least, most):
+    """Floats of all digits: with subnormal ones a film rounds by more than its tolerance."""
+    return st.floats(least, most, allow_subnormal=False)
+
+
+rates = whole(-1.0, 1.0)
 places = st.tuples(st.floats(0.0, 0.93), st.floats(0.0, 2 * math.pi))
 
 
@@ -334,9 +339,9 @@ def test_rotation_reflection_and_scale(place, u, v, lines, factor):
 
 @settings(max_examples=40, deadline=None)
 @given(
-    place=st.tuples(st.floats(0.0, 0.7), st.floats(0.0, 2 * math.pi)),
+    place=st.tuples(whole(0.0, 0.7), whole(0.0, 2 * math.pi)),
     motion=st.tuples(rates, rates),
-    tilt=st.tuples(st.floats(-0.3, 0.3), st.floats(-0.3, 0.3), rates, rates),
+    tilt=st.tuples(whole(-0.3, 0.3), whole(-0.3, 0.3), rates, rates),
     scar=st.floats(0.0, 0.5),
     groove=st.tuples(st.floats(-3, 3), st.floats(0.05, 1.0), st.floats(0.2, 1.0), st.floats(0, 2)),
     condition=st.sampled_from(["reynolds", "periodic"]),

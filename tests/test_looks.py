@@ -32,11 +32,11 @@ TEMPLATES = Path(pages_module.__file__).parent / "templates"
 COMMANDS = {
     "align": "align propulsion-shaft --set bearings.2.sag=1.6mm --jack stern_aft",
     "atlas": "stability journal-bearing --map eccentricity-mesh --size 3 --budget 5",
-    "batch": "report {data} --model {model}",
+    "batch": "report {few} --model {model}",
     "card": "info {data} --card",
     "chart": "chart journal-bearing --set duration=0.3 --budget 5 -j 1",
     "evaluate": "evaluate {model} {data} --quick -j 1",
-    "rank": "features {data} --rank -j 1",
+    "rank": "features {few} --rank -j 1",
     "report": "report {data} --record 5 --model {model}",
     "sweep": "sweep bilge-pump --set duration=0.6 --starts 2 -j 1 --over drive.speed=200,300rpm "
     "--over joint.crankpin.diametral_clearance=.1,.2mm",
@@ -93,13 +93,13 @@ def one_life(data, folder):
     return folder
 
 
-def written(data, model, folder):
+def written(data, few, model, folder):
     """A small page of every kind."""
     life = one_life(data, folder / "life")
     commands = COMMANDS | (ZOOMABLE if find_spec("bokeh") else {})
     made = {"blindspots": blind_spots()}
     for kind, command in commands.items():
-        words = command.format(data=data, model=model, life=life).split()
+        words = command.format(data=data, few=few, model=model, life=life).split()
         page = folder / f"{kind}.html"
         words += [*OUTPUT.get(kind, "-o").split(), str(page)]
         done = CliRunner().invoke(cli, words)
@@ -109,9 +109,9 @@ def written(data, model, folder):
 
 
 @pytest.fixture(scope="module")
-def looks(small_set, small_model, tmp_path_factory):
+def looks(small_set, few_set, small_model, tmp_path_factory):
     """Pages of every kind."""
-    return written(small_set, small_model, tmp_path_factory.mktemp("looks"))
+    return written(small_set, few_set, small_model, tmp_path_factory.mktemp("looks"))
 
 
 # --- without a browser

@@ -44,12 +44,15 @@ CUTS = (
     ("stability", "--size", "3"),
     ("stability", "--budget", "1"),
     ("sweep", "--starts", "1"),
+    ("sweep bilge-pump", "--set", "duration=1.2 s"),
 )
 """Beginning of a command as a pattern, option, and its value here whatever the page says."""
 
 SLOW = {
     "evaluate pump.wsm pump.h5 --retrain all -o splits.html --cache folder": "trains on seven "
     "splits: 20 s; the README's line does on two",
+    "stability journal-bearing -o atlas.svg": "all maps of a journal: 9 s; tests/test_stability.py "
+    "draws them, and a page's line those of a pump",
     "demo": "20 s; tests/run.sh runs it twice, with the wheel",
     "evaluate bilge-pump-standard --across-fidelity -n 120": "trains on every rung, each on 20 "
     "records or more: 50 s; tests/test_across.py has shorter records",

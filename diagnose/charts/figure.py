@@ -269,7 +269,9 @@ _HEADROOM = 2.5  # of the error axis: the highest number stays inside the frame
 
 
 def _legend_below(axes: Any, ncols: int) -> None:
-    """Where no point can lie under it."""
+    """Where no point can lie under it; none where time was too short for any point."""
+    if not axes.get_legend_handles_labels()[0]:
+        return
     axes.legend(
         fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=ncols, frameon=False
     )

@@ -389,12 +389,8 @@ class Pilot:
         OutOfTimeError
             ``late`` said so before a run; what was made by then is kept.
         """
-        wanted = [
-            (values, start)
-            for start in range(starts)
-            for values in {_key(values): values for values in combinations}.values()
-        ]
-        while missing := [each for each in wanted if not self._has(*each)]:
+        different = [*{_key(values): values for values in combinations}.values()]
+        while missing := self._missing(different, starts):
             batch = self._batch(missing)
             if self.late(self._expected(batch)):
                 batch = [each[:1] for each in batch[: self.at_once]]
@@ -420,18 +416,30 @@ class Pilot:
         """Time that so much by the tables takes here [s]; NaN where nothing was timed."""
         return self._scale() * tabulated if self._scale() > 0 else math.nan
 
-    def _has(self, values: Mapping[str, Any], start: int) -> bool:
+    def _missing(self, combinations: Sequence[Mapping[str, Any]], starts: int) -> list[_Start]:
+        """Starts that no outcome is known of, the first ones of all combinations first."""
+        known = [self._known(values, starts) for values in combinations]
+        return [
+            (values, start)
+            for start in range(starts)
+            for values, first in zip(combinations, known, strict=True)
+            if start >= first
+        ]
+
+    def _known(self, values: Mapping[str, Any], starts: int) -> int:
+        """How many of the first so many starts need no run: they are kept, or past a fault."""
         rows = self._outcomes.setdefault(_key(values), [])
-        while len(rows) <= start and not (rows and rows[-1].fault):
-            kept = self._kept.get(f"{self._name(values)} {len(rows)}")
+        name = self._name(values)
+        while len(rows) < starts and not (rows and rows[-1].fault):
+            kept = self._kept.get(f"{name} {len(rows)}")
             if kept is None:
-                return False
+                return len(rows)
             rows.append(kept)
-        return True
+        return starts
 
     def _add(self, values: Mapping[str, Any], start: int, found: Outcome) -> None:
         self._kept[f"{self._name(values)} {start}"] = found
-        self._has(values, start)
+        self._known(values, start + 1)
 
     def _name(self, values: Mapping[str, Any]) -> str:
         return _key({**values, **self.common})
@@ -451,12 +459,13 @@ class Pilot:
 
     def _kind(self, run: _Start) -> Hashable | None:
         """As :func:`kind_of`; None of a run that is timed."""
-        task = self._task(*run)
-        if task.clock is not None:
+        values, start = run
+        if self.clock is not None and start < TIMED:
             return None
-        if task.shared not in self._kinds:
-            self._kinds[task.shared] = kind_of(task)
-        return self._kinds[task.shared]
+        name = self._name(values)
+        if name not in self._kinds:
+            self._kinds[name] = kind_of(self._task(values, start))
+        return self._kinds[name]
 
     def _expected(self, batch: Sequence[Sequence[_Start]]) -> float:
         """Time that a batch is expected to take [s]; 0 where nothing is known."""

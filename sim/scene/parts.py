@@ -241,7 +241,10 @@ class Dimension:
 
 
 def _parser(dimension: str) -> BeforeValidator:
-    return BeforeValidator(lambda value: to_si(value, dimension))
+    def parse(value: Any) -> float:  # a hundred floats a scene: no call for what is SI already
+        return value if type(value) is float else to_si(value, dimension)
+
+    return BeforeValidator(parse)
 
 
 Length = Annotated[float, _parser("length"), Dimension("length")]
