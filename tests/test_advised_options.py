@@ -40,7 +40,7 @@ SPOKEN_BY = {
     "inspect/rank_text": {"features"},
     "blindspots/blindspots": {"blindspots"},
     "command_line/chart_commands": {"chart"},
-    "charts/of_scene": {"chart"},
+    "charts/sentences": {"chart"},
     "wear_model/estimate": {"evaluate", "report"},
     "evaluation/evaluate": {"evaluate"},
     "evaluation/splits": {"evaluate"},
