@@ -28,6 +28,7 @@ from wearstate.diagnose.charts.figure import (
     REFERENCE,
     SO_FAR,
     _legend_below,
+    apart,
     kind_of,
     question_figure,
     shaded_rows,
@@ -442,6 +443,53 @@ def test_numbers_stand_beside_the_star_and_the_points_not_on_them():
                        if other is not text)  # fmt: skip
 
 
+CROWD = [  # seconds, per cent: of a shaft line, whose front is steep beside the star
+    (0.0110, 5.51), (0.0112, 5.01), (0.0116, 5.51), (0.0119, 5.01), (0.0120, 2.00), (0.0133, 1.61),
+    (0.0140, 1.31), (0.0153, 1.31), (0.0156, 5.51), (0.0159, 5.01), (0.0167, 2.00), (0.0180, 1.31),
+    (0.0207, 1.56), (0.0214, 0.45), (0.0214, 8.89), (0.0227, 0.45), (0.126, 1.55), (0.127, 0.2),
+]  # fmt: skip
+
+
+def crowded():
+    """A chart whose front is steep right beside the scene as written."""
+    here = candidate(0.0127, 0.02, "beyond", mesh="x2")
+    others = [
+        candidate(x, y / 100, "within" if y < 2 else "beyond", mesh="x1", film=f"{i}")
+        for i, (x, y) in enumerate(CROWD)
+    ]
+    finest = replace(REFERENCE_POINT, cost=0.131, seconds=0.131)
+    answer = answer_of(here, *others, written=here, reference=finest)
+    answer = replace(answer, chosen=others[6], changes=dict(others[6].values))
+    found = replace(study_of(), kept=answer, raised=answer, written={**WRITTEN, **FILM})
+    scene = load_scene("journal-bearing", {"duration": "0.5 s", "film.rung": "direct"})
+    return chart_of(scene, replace(found, written={**found.written, "mesh": "x2"}))
+
+
+def test_a_number_in_a_crowd_is_nearest_to_its_own_point_or_has_a_line_to_it():
+    chart = crowded()
+    axes = question_figure(chart, RAISED).axes[0]
+    axes.figure.draw_without_rendering()
+    pixels = {p.name: axes.transData.transform((p.seconds, 100 * p.error)) for p in chart.of(RAISED)
+              if p.verdict != "reference"}  # fmt: skip
+    lines = [axes.transData.transform(line.get_xydata()) for line in axes.get_lines()]
+    texts = {text.get_text(): text.get_window_extent() for text in axes.texts}
+    numbered = chart.numbered(RAISED)
+    assert len(numbered) >= 6
+    for number, point in enumerate(numbered, start=1):
+        box, own = texts[str(number)], pixels[point.name]
+        led = any(len(line) == 2 and math.dist(line[0], own) < 1 and apart(box, line[1]) < 1
+                  for line in lines)  # fmt: skip
+        nearest = min(pixels, key=lambda name: apart(box, pixels[name]))
+        assert led or nearest == point.name
+    # the choice is named by its number, beside what is said of it
+    [choice] = chart.shown_choices
+    page = chart_html(chart)
+    number = numbered.index(next(p for p in numbered if p.name == choice.name)) + 1
+    told = re.search(r'<div class="choice .*?point (\d+) of the picture', page, flags=re.DOTALL)
+    assert told[1] == str(number)
+    assert f"The choice is point {number} in the picture." in page
+
+
 def test_points_deep_in_the_error_of_the_reference_do_not_stretch_the_axis(chart):
     scene = load_scene("journal-bearing", {"duration": "0.5 s", "film.rung": "direct"})
     deep = chart_of(scene, best_rungs_already(steps=(0.018, 0.009)))  # 0.3 % left
@@ -565,7 +613,9 @@ MESH_9 = "mesh 36 around and 9 along"
 
 
 def test_each_plot_says_what_may_vary(chart):
-    assert chart.heading(KEPT) == "your rungs kept: mesh may vary"
+    assert chart.heading(KEPT) == (
+        "your rungs kept: mesh may vary (numerics only, against the same rungs)"
+    )
     assert chart.heading(RAISED) == "rungs may change: film, mesh may vary"
 
 
@@ -628,6 +678,61 @@ def test_rungs_that_no_numerics_can_mend_have_no_green_ring():
     assert to_hex(ring.get_edgecolor()[0]) == SO_FAR
     head = re.search(r'<div class="choice resolved coarse[^"]*"><h3>(.*?)</h3>', chart_html(chart))
     assert head[1] == "No numerical setting reaches 2\u00a0% with your rungs"
+
+
+def test_numerics_that_are_within_on_coarse_rungs_are_called_so_and_are_not_green():
+    chart = coarse_rungs()
+    page = chart_html(chart)
+    tables = page.split("All that was computed, ")[1:]
+    assert "numerics only, against the same rungs" in tables[0].split("</h2>")[0]
+    assert "numerics only" not in tables[1]
+    row = re.search(rf"<tr class=\"([^\"]*)\"><td>{HERE}</td>.*?</tr>", tables[0])
+    assert "taken coarse" in row[1]  # not the green of what is enough
+    assert 'data-label="verdict">numerics within</td>' in row[0]
+    assert "numerics within" not in tables[1]
+    title = question_figure(chart, KEPT).axes[0].get_title().replace("\n", " ")
+    assert "numerics only, against the same rungs" in title
+
+
+def test_where_the_rungs_are_the_best_the_error_is_against_finer_numerics():
+    where = coarse_mesh(0.02004, candidate(1.0, 0.005, mesh="x1")).conclusion[0]
+    assert "against the finest mesh" in where
+    assert "rungs" not in where
+
+
+def test_a_mean_stands_beside_its_bound_and_ranks():
+    """The larger mean is marked, whatever the bound of another; two starts are always named."""
+    one, other = (
+        Difference(mean=mean, standard_error=scatter)
+        for mean, scatter in ((0.004, 0.001), (0.003, 0.005))
+    )
+    found = {"force_rms": one, "force_peak": other}
+    study = study_of()
+    here = replace(HERE_POINT, differences=found)
+    answer = answer_of(here, written=here)
+    scene = load_scene("journal-bearing", {"duration": "0.5 s"})
+    study = replace(study, kept=answer, raised=answer)
+    cells = {c.text: c.worst for c in shaded_rows(chart_of(scene, study))[1][0][1]}
+    assert cells == {"0.4 ± 0.1": True, "0.3 (surely below 1.3)": False}
+    two = replace(
+        here,
+        starts=2,
+        differences={**found, "force_mean": Difference(mean=0.002, standard_error=0.0)},
+    )
+    few = replace(answer, candidates=(two, answer.reference), chosen=two, written=two)
+    chart = chart_of(scene, replace(study, kept=few, raised=few))
+    assert all("(2 starts)" in cell.text for cell in shaded_rows(chart)[1][0][1])
+    assert "(2 starts)&rdquo; marks a mean of two runs" in chart_html(chart)
+
+
+def test_times_that_are_estimated_are_called_so_and_the_own_numerics_are_told_once(chart):
+    page = chart_html(chart)
+    for question in chart.questions:
+        label = question_figure(chart, question).axes[0].get_xlabel()
+        assert label == "estimated time to compute one simulated second [s]"
+    assert "takes an estimated 0.03 s to compute, with your scene as written 0.04 s (meas" in page
+    assert "takes 0.04 s to compute (measured)" in page
+    assert page.count("Your scene: mesh 72 around and 17 along.") == 1
 
 
 def test_the_reference_has_a_name_and_no_number(chart):
@@ -947,7 +1052,8 @@ def test_a_pump_with_pipes_has_an_answer_at_any_budget():
         search.measure(late_after(looks))
         chart = chart_of(pump, search.found())
         assert chart.unfinished
-        assert re.search(r"written is .*: [\d.]+ (± [\d.]+ )?% off in", chart.conclusion[0])
+        error = r"[\d.]+ (± [\d.]+ )?%( \(2 starts\))?"
+        assert re.search(rf"written is .*: {error} off in", chart.conclusion[0])
         for choice in chart.choices:
             if choice.status == "no answer yet":
                 assert "is the safe choice" in choice.sentence

@@ -235,6 +235,8 @@ class Chart:
         Question -> name of its error axis, where it is not `error_label`.
     at_best : tuple of (str, str)
         Effects and their rungs of the scene as written that are the best already.
+    own : str
+        Numerics of the scene as written, in words; empty where they were not run.
     subject : str
         ``scene``, or ``recipe`` where the errors are those of the verdict.
     """
@@ -264,6 +266,7 @@ class Chart:
     varied: Mapping[str, str] = field(default_factory=dict)
     error_labels: Mapping[str, str] = field(default_factory=dict)
     at_best: tuple[tuple[str, str], ...] = ()
+    own: str = ""
     subject: str = "scene"
 
     @property
@@ -279,7 +282,19 @@ class Chart:
     def heading(self, question: str) -> str:
         """Of what is shown of a question, with what may vary."""
         what = "all choices" if self.alike else question
-        return f"{what}: {self.varied[question]} may vary" if question in self.varied else what
+        if question in self.varied:
+            what = f"{what}: {self.varied[question]} may vary"
+        return f"{what} (numerics only, against the same rungs)" if self.partial(question) else what
+
+    def partial(self, question: str) -> bool:
+        """Whether errors of a question are those of the numerics, not of the rungs as well."""
+        return question in self.error_labels
+
+    def verdict_words(self, point: Point) -> str:
+        """Verdict on a point, and whether it is one on its numerics only."""
+        words = "at the limit" if point.close else point.verdict
+        judged = self.partial(point.question) and point.verdict not in ("reference", "invalid")
+        return f"numerics {words}" if judged else words
 
     def error_name(self, question: str) -> str:
         """Name of the error axis of a question."""
@@ -304,6 +319,11 @@ class Chart:
         front = [p for p in self.of(question) if p.on_front and not p.here]
         front = [p for p in front if p.verdict != "reference"]
         return tuple(sorted(front, key=lambda p: p.seconds))
+
+    def number(self, choice: Choice) -> int | None:
+        """Number of a choice in the picture of its question; None where it has none."""
+        names = [point.name for point in self.numbered(choice.question)]
+        return names.index(choice.name) + 1 if choice.name in names else None
 
     def label(self, quantity: str) -> str:
         """A quantity in words."""

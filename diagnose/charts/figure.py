@@ -19,7 +19,7 @@ from ..pages.picture import (
     plain_numbers,
 )
 from .chart import RECOMMENDED, Chart, Choice, Point
-from .words import percent, with_scatter
+from .words import few_starts, percent, with_scatter
 
 FRONT, OTHER, DOUBTFUL, LIMIT = "#1f5a94", "#9aa3ab", "#e07b39", "#b3261e"
 WINNER, SO_FAR, HERE_COLOUR = "#3a923a", "#e07b39", "#111111"
@@ -206,26 +206,47 @@ def _write_names(axes: Any, chart: Chart, question: str) -> None:
     texts = [(p, f"your {chart.subject}", HERE_COLOUR) for p in finite if p.here]
     texts += [(p, REFERENCE, FRONT) for p in finite if kind_of(p) == REFERENCE and not p.here]
     texts += [(p, str(i), FRONT) for i, p in enumerate(chart.numbered(question), start=1)]
-    taken = [_box(axes, p, floor) for p in finite]
+    ring = ring_of(chart, question)
+    large = [p.here or (ring is not None and p.name == ring.name) for p in finite]
+    marks = [
+        _box(axes, p, floor, _STAR if more else _DOT) for p, more in zip(finite, large, strict=True)
+    ]
+    taken = list(marks)
     for point, text, colour in texts:
         place = (point.seconds, shown_error(point, floor))
-        taken.append(_write(axes, place, text, colour, taken))
+        taken.append(_write(axes, place, text, colour, marks, taken))
 
 
-_STAR, _DOT = 12.0, 4.0  # px at a hundred to the inch, of what names must not cover
+_STAR, _DOT = 12.0, 4.0  # px at a hundred to the inch: half of what names must not cover
 
 
-def _box(axes: Any, point: Point, floor: float) -> Any:
+def _box(axes: Any, point: Point, floor: float, half: float) -> Any:
     """What a point takes of the picture."""
     from matplotlib.transforms import Bbox
 
     centre = axes.transData.transform((point.seconds, shown_error(point, floor)))
-    half = _STAR if point.here else _DOT
     return Bbox.from_extents(*(centre - half), *(centre + half))
 
 
-def _write(axes: Any, place: tuple[float, float], text: str, colour: str, taken: list[Any]) -> Any:
-    """Write beside a place, on the side where that covers least; the box that it takes."""
+def apart(box: Any, place: Any) -> float:
+    """Distance of a place from a box [px]."""
+    return math.dist(_nearest_to(box, place), place)
+
+
+def _write(
+    axes: Any,
+    place: tuple[float, float],
+    text: str,
+    colour: str,
+    marks: list[Any],
+    taken: list[Any],
+) -> Any:
+    """Write beside a place, where that covers least and no other mark is as near; its box.
+
+    Where there is no such side it stands farther off, at the end of a thin line.
+    """
+    from matplotlib.lines import Line2D
+    from matplotlib.path import Path
     from matplotlib.patheffects import withStroke
 
     note = axes.annotate(
@@ -240,21 +261,46 @@ def _write(axes: Any, place: tuple[float, float], text: str, colour: str, taken:
         zorder=6,
     )
     note.set_in_layout(False)
-    frame = axes.get_window_extent()
+    frame, own = axes.get_window_extent(), axes.transData.transform(place)
+    centres = [0.5 * (mark.p0 + mark.p1) for mark in marks]
+    numbered = text.isdecimal()  # other names tell by themselves what they are of
+    others = [i for i, at in enumerate(centres) if numbered and math.dist(at, own) > 1]
 
-    def put(side: tuple[str, str]) -> Any:
+    def put(side: tuple[str, str], far: float) -> Any:
         note.set(ha=side[0], va=side[1])
-        note.set_position((_ASIDE[side[0]], _ASIDE[side[1]]))
+        note.set_position((far * _ASIDE[side[0]], far * _ASIDE[side[1]]))
         return note.get_window_extent()
 
-    def covers(side: tuple[str, str]) -> int:
-        box = put(side)
+    def costs(at: tuple[tuple[str, str], float]) -> tuple[int, float]:
+        """What is covered, or taken for the name of something else; then the way."""
+        box = put(*at)
         outside = bool(box.x0 < frame.x0 or box.x1 > frame.x1 or box.y0 < frame.y0)
-        return int(box.count_overlaps(taken)) + len(taken) * outside
+        count = int(box.count_overlaps(taken)) + len(taken) * outside
+        if at[1] > 1:
+            line = Path([own, _nearest_to(box, own)])
+            crossed = [marks[i] for i in others] + taken[len(marks) :]
+            return count + sum(line.intersects_bbox(each, filled=True) for each in crossed), at[1]
+        reach = _CLEARLY * apart(box, own)
+        return count + sum(apart(box, centres[i]) < reach for i in others), at[1]
 
-    return put(min(_SIDES, key=covers))
+    side, far = min(
+        ((side, far) for far in _FAR[: None if numbered else 1] for side in _SIDES), key=costs
+    )
+    box = put(side, far)
+    if far > 1:
+        ends = axes.transData.inverted().transform([own, _nearest_to(box, own)])
+        axes.add_artist(Line2D(*ends.T, color=colour, lw=0.7, zorder=2))
+    return box
 
 
+def _nearest_to(box: Any, place: Any) -> tuple[float, float]:
+    """Where a box is nearest to a place."""
+    x, y = place
+    return min(max(x, box.x0), box.x1), min(max(y, box.y0), box.y1)
+
+
+_FAR = (1.0, 2.0, 3.0, 5.0)  # times the next place beside a point
+_CLEARLY = 1.3  # times as far from any other point as from its own
 _ASIDE = {"left": 8, "right": -8, "center": 0, "bottom": 5, "top": -5}  # points
 _SIDES = [(across, up) for up in ("bottom", "top") for across in ("left", "right", "center")]
 
@@ -509,5 +555,6 @@ _PLACE = re.compile(r'<g id="point-(\d+)">')
 
 def _pointer(chart: Chart, point: Point) -> str:
     worst = chart.label(point.worst) or "none"
-    words = f"{point.name}: {point.seconds:.3g} s, error {point.error:.2%} ({worst})"
+    few = few_starts(point.error, point.starts)
+    words = f"{point.name}: {point.seconds:.3g} s, error {point.error:.2%}{few} ({worst})"
     return f"<title>{escape(visible(words))}</title>"

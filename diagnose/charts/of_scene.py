@@ -205,7 +205,7 @@ def chart_of(scene: Scene, found: Study) -> Chart:
     return Chart(
         name=scene.name,
         title=f"{scene.name} (simulated): how much model does this scene need?",
-        cost_label="time to compute one simulated second [s]",
+        cost_label="estimated time to compute one simulated second [s]",
         error_label="largest error of a quantity of interest [%]",
         accuracy=found.accuracy,
         points=points,
@@ -229,6 +229,7 @@ def chart_of(scene: Scene, found: Study) -> Chart:
         varied={name: _varied(answer) for name, answer in answers.items()},
         error_labels=_numerical(found),
         at_best=_at_best(scene, found),
+        own=_own_words(scene, found),
         note=_note(scene, found),
     )
 
@@ -256,6 +257,15 @@ def _at_best(scene: Scene, found: Study) -> tuple[tuple[str, str], ...]:
         for effect, rung in found.written.items()
         if effect in physical and best[effect] == rung
     )
+
+
+def _own_words(scene: Scene, found: Study) -> str:
+    """Numerics of the scene as written."""
+    own, physical = found.kept.written, physical_effects(scene)
+    if own is None:
+        return ""
+    numerics = [(e, rung) for e, rung in own.rungs.items() if e not in physical]
+    return ", ".join(rung_words(e, rung, own.values) for e, rung in numerics)
 
 
 def _left_words(found: Study) -> str:

@@ -86,7 +86,12 @@ def _lines(chart: Chart) -> list[tuple[str, bool]]:
     lines = chart.conclusion or (chart.verdict,)
     advice = [c.sentence for c in chart.shown_choices if c.enough and c.status in RECOMMENDED]
     first = {lines[0], *[line for line in advice if line.startswith("We recommend")]}
-    return [(_unbroken(line), line in first) for line in lines]
+    places = {
+        choice.sentence: f" The choice is point {number} in the picture."
+        for choice in chart.shown_choices
+        if choice.sentence in first and (number := chart.number(choice))
+    }
+    return [(_unbroken(line + places.get(line, "")), line in first) for line in lines]
 
 
 def _error_of(each: Point | Choice | RungCost) -> str:
@@ -146,12 +151,13 @@ def _head(chart: Chart, choice: Choice) -> str:
     return text[0].upper() + text[1:]
 
 
-def _rows(chart: Chart, question: str) -> list[tuple[int | str, Point, bool]]:
-    """Number in the picture, point, whether it is what to take."""
+def _rows(chart: Chart, question: str) -> list[tuple[int | str, Point, str]]:
+    """Number in the picture, point, its look: taken, and coarse where that is not enough."""
     numbers: dict[int, int] = {id(p): i for i, p in enumerate(chart.numbered(question), start=1)}
     choice = choice_of(chart, question)
     wanted = choice.name if choice else None
-    return [(numbers.get(id(p), ""), p, p.name == wanted) for p in chart.of(question)]
+    look = "" if choice is None else "taken" if choice.enough else "taken coarse"
+    return [(numbers.get(id(p), ""), p, look * (p.name == wanted)) for p in chart.of(question)]
 
 
 def save_chart(chart: Chart, path: Path, *, force: bool = True, interactive: bool = False) -> None:

@@ -109,5 +109,5 @@ def _lines(chart: Chart, point: Point) -> list[str]:
         point.name,
         f"{cost}: {point.seconds:.3g} {unit.rstrip(']')}",
         f"error: {error} ({worst})",
-        f"verdict: {point.verdict}",
+        f"verdict: {chart.verdict_words(point)}",
     ]

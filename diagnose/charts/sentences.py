@@ -27,6 +27,7 @@ from .words import (
     effect_words,
     error_words,
     faster_words,
+    few_starts,
     is_faster,
     percent,
     two_digits,
@@ -57,12 +58,13 @@ def standing(scene: Scene, found: Study) -> str:
     if own is None or (found.raised is None and found.raises):
         own, against = found.kept.written, "its own finest numerics"
     else:
-        against = "the best rungs" if found.raised else "its finest numerics"
+        against = _best_words(scene, found) if found.raised else "its finest numerics"
     if own is None:
         return "Your scene as written has not been measured."
     off = reference_error(found.whole)
     if at_limit(found, own):
-        close = f"{error_words(own, scene, two_digits(own.error))}, against {against}"
+        error = f"{two_digits(own.error)}{few_starts(own.error, own.starts)}"
+        close = f"{error_words(own, scene, error)}, against {against}"
         if off > _NO_SMALL_PART * found.accuracy:
             close += f", and the reference may itself be off by {percent(off)}"
         return (
@@ -80,6 +82,19 @@ def standing(scene: Scene, found: Study) -> str:
 
 
 _NO_SMALL_PART = 0.1
+
+
+def _best_words(scene: Scene, found: Study) -> str:
+    """What the whole error is against: the best rungs, or what is finer where they are the best."""
+    physical, listed = physical_effects(scene), [each.rungs for each in found.whole.candidates]
+    finer = [
+        effect_words(effect)
+        for effect in found.whole.reference.rungs
+        if effect not in physical and len({rungs.get(effect) for rungs in listed}) > 1
+    ]
+    return (
+        f"the finest {' and '.join(finer)}" if best_already(found) and finer else "the best rungs"
+    )
 
 
 def _cause(found: Study) -> str:
@@ -108,7 +123,8 @@ def costly_rungs(scene: Scene, found: Study) -> str:
     worst = quantity_label(max(error, key=lambda name: error[name].error), scene)[0]
     text = (
         f"Modelling the {effect_words(most.effect)} as {most.written} rather than {most.best} "
-        f"changes the result by {percent(most.candidate.error)} in {worst}"
+        f"changes the result by {percent(most.candidate.error)}"
+        f"{few_starts(most.candidate.error, most.candidate.starts)} in {worst}"
     )
     if not over:
         return f"No rung of it needs to change. {text}, no other rung by more."
@@ -188,17 +204,17 @@ def _one_fewer(scene: Scene, found: Study, answer: Answer) -> str:
     """What becomes of a choice of several rungs with one of them as written."""
     changed = _changed_rungs(scene, found, answer.chosen)
     rows = [
-        (each.error, changed - own)
+        (each.error, changed - own, each.starts)
         for each in answer.candidates
         for own in [_changed_rungs(scene, found, each)]
         if own < changed and len(own) == len(changed) - 1 and each.verdict == "beyond"
     ]
     if len(changed) == 1 or not rows:
         return ""
-    error, [(effect, rung)] = min(rows)
+    error, [(effect, rung)], starts = min(rows, key=lambda row: row[0])
     return (
         f" With one change fewer (without {effect_words(effect)}: {rung}) the best is "
-        f"{percent(error)} off."
+        f"{percent(error)}{few_starts(error, starts)} off."
     )
 
 

@@ -189,28 +189,39 @@ def with_scatter(error: float, standard_error: float, starts: int = 0) -> str:
     Returns
     -------
     str
-        No standard error where starts do not scatter. One as large as the error itself gives a
-        bound, two of them above the error.
+        No standard error where starts do not scatter. One as large as the error itself gives the
+        error with a bound, two of them above it.
 
     Examples
     --------
     >>> with_scatter(0.63, 0.0097, 16), with_scatter(0.004, 0.0), with_scatter(0.75, 0.01, 2)
     ('63 ± 1 %', '0.4 %', '75 % (2 starts)')
     >>> with_scatter(0.0019, 0.0046, 32)
-    'less than about 1.2 %'
+    '0.19 % (surely below 1.2 %)'
     """
+    if starts == _FEWEST:
+        return f"{percent(error)}{few_starts(error, starts)}"
     if not (math.isfinite(standard_error) and standard_error > _SMALLEST):
         return percent(error)
-    if starts == _FEWEST:
-        return f"{percent(error)} ({starts} starts)"
     if standard_error >= error:
         bound = 100 * (error + 2 * standard_error)
         digit = 10.0 ** (math.floor(math.log10(bound)) - 1)
-        return f"less than about {digit * math.ceil(bound / digit):.3g} %"
+        return f"{percent(error)} (surely below {digit * math.ceil(bound / digit):.3g} %)"
     return f"{percent(error).removesuffix(' %')} ± {float(f'{100 * standard_error:.1g}'):g} %"
 
 
 _FEWEST = 2  # starts that have a scatter at all
+
+
+def few_starts(error: float, starts: int) -> str:
+    """What stands behind an error that is a mean of two starts only.
+
+    Examples
+    --------
+    >>> few_starts(0.75, 2), few_starts(0.75, 16), few_starts(0.0, 2)
+    (' (2 starts)', '', '')
+    """
+    return f" ({starts} starts)" if starts == _FEWEST and 0 < error < math.inf else ""
 
 
 def raise_words(each: Raise, scene: Scene) -> str:
