@@ -729,7 +729,7 @@ def test_times_that_are_estimated_are_called_so_and_the_own_numerics_are_told_on
     page = chart_html(chart)
     for question in chart.questions:
         label = question_figure(chart, question).axes[0].get_xlabel()
-        assert label == "estimated time to compute one simulated second [s]"
+        assert label == "estimated time per simulated second [s]"
     assert "takes an estimated 0.03 s to compute, with your scene as written 0.04 s (meas" in page
     assert "takes 0.04 s to compute (measured)" in page
     assert page.count("Your scene: mesh 72 around and 17 along.") == 1

@@ -205,7 +205,7 @@ def chart_of(scene: Scene, found: Study) -> Chart:
     return Chart(
         name=scene.name,
         title=f"{scene.name} (simulated): how much model does this scene need?",
-        cost_label="estimated time to compute one simulated second [s]",
+        cost_label="estimated time per simulated second [s]",
         error_label="largest error of a quantity of interest [%]",
         accuracy=found.accuracy,
         points=points,
