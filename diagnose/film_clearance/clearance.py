@@ -37,6 +37,10 @@ FLOOR = 0.2e-6  # m: mean of a record of some revolutions, and the curve's own e
 _MOST_SWING = 0.35  # rms of the orbit over the radial clearance; beyond, it has no place of rest
 _LOOSEST = 0.3  # standard error of the clearance's logarithm, above which nothing is told
 CONTRADICTED = 2.6  # root mean square of what is left, in standard deviations, per free number
+OR_HEALTHY = (
+    ", or give healthy recordings (--baseline): they tell offsets from a bore of another shape"
+)
+"""Cure of readings that nothing explains, where there are none."""
 _WIDEST, _NARROWEST = 10.0, 0.1  # clearance looked for, over that as new
 SCARS = tuple(
     (depth, math.radians(turned))
@@ -481,12 +485,11 @@ def _untold(
 ) -> str:
     """Why a solution is no estimate; empty where it is one."""
     ratio = clearance / math.exp(problem.middle)
-    if found.left > CONTRADICTED or not _NARROWEST < ratio < _WIDEST:
+    if not (found.left <= CONTRADICTED and _NARROWEST < ratio < _WIDEST):
         return (
             f"no clearance puts the journal where the probes see it: {found.left:.1f} standard "
             f"deviations are left, must be <= {CONTRADICTED:g}; check load, its direction, "
-            "viscosity and the probes, or give healthy recordings (--baseline): they tell offsets "
-            "from a scar of the bore"
+            f"viscosity and the probes{OR_HEALTHY if problem.n == 1 else ''}"
         )
     if run.swing > _MOST_SWING * clearance:
         return (

@@ -25,6 +25,7 @@ from .clearance import (
     DOUBTS,
     FLOOR,
     NORMAL,
+    OR_HEALTHY,
     Doubts,
     Explained,
     FilmEstimate,
@@ -44,9 +45,6 @@ _GROOVES = (math.radians(14.0), math.radians(32.0))  # widths at the sides, the 
 _CHANGE = 0.05  # of viscosity and clearance, for their slopes
 _BUILT = 0.09  # of a clearance as new: makers' tolerance 15 %, evenly spread
 _LOOSEST = 0.3  # standard error over the condemning wear-down, above which nothing is told
-_OR_HEALTHY = (
-    ", or give healthy recordings (--baseline): they tell offsets from a bore of another shape"
-)
 _BEYOND = 1.5  # of the condemning wear-down: the line was not solved farther
 
 
@@ -240,12 +238,12 @@ def film_wear_down(
     problem = _Problem([run, *healthy], np.asarray(angles), limit, as_new, doubts)
     found = problem.explained()
     wear, error = found.value, found.error
-    if found.left > CONTRADICTED:
+    if not found.left <= CONTRADICTED:
         return FilmEstimate(
             healthy=len(healthy),
             reason=f"no wear-down puts the journal where the probes see it: {found.left:.1f} "
             f"standard deviations are left, must be <= {CONTRADICTED:g}; check thrust, hull, oil "
-            f"and the probes{'' if healthy else _OR_HEALTHY}",
+            f"and the probes{'' if healthy else OR_HEALTHY}",
         )
     if error > _LOOSEST * limit or wear > _BEYOND * limit:
         return FilmEstimate(
