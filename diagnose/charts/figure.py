@@ -14,6 +14,7 @@ from ..pages.page import visible
 from ..pages.picture import (
     PAGE_WIDTH,
     PageImage,
+    lay_out,
     least_width,
     picture_bytes,
     plain_numbers,
@@ -57,7 +58,7 @@ def chart_figure(chart: Chart) -> Any:
     for name, question in zip(names, questions, strict=True):
         _draw_points(panels[name], chart, question, columns=2 if len(names) > 1 else 3)
     _draw_quantities(panels["quantities"], chart)
-    figure.draw_without_rendering()
+    lay_out(figure)
     for name, question in zip(names, questions, strict=True):
         _write_names(panels[name], chart, question)
     return figure
@@ -468,7 +469,7 @@ def question_figure(chart: Chart, question: str) -> Any:
     figure = Figure(figsize=(PAGE_WIDTH, _POINTS - 0.8), layout="constrained")
     axes = figure.subplots()
     _draw_points(axes, chart, question, columns=2)
-    figure.draw_without_rendering()
+    lay_out(figure)
     _write_names(axes, chart, question)
     return figure
 

@@ -3,7 +3,8 @@
 import base64
 import io
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -81,9 +82,42 @@ def picture_bytes(figure: Any, suffix: str) -> bytes:
     _take_literally(figure)
     picture = io.BytesIO()
     # the names of an SVG's parts are random without a salt
-    with mpl.rc_context({"svg.hashsalt": "wearstate"}):
+    with mpl.rc_context({"svg.hashsalt": "wearstate"}), _laid_out(figure, suffix[1:]):
         figure.savefig(picture, format=suffix[1:], dpi=DOTS_PER_INCH, metadata=undated.get(suffix))
     return picture.getvalue()
+
+
+def lay_out(figure: Any) -> None:
+    """Place the axes of a figure, as drawing it would; without drawing.
+
+    Parameters
+    ----------
+    figure : matplotlib.figure.Figure
+        With a layout.
+    """
+    figure.get_layout_engine().execute(figure)
+
+
+@contextmanager
+def _laid_out(figure: Any, form: str) -> Iterator[None]:
+    """Lay a figure out as saving would, which draws the whole of it once more for that."""
+    from matplotlib.backend_bases import get_registered_canvas_class
+
+    engine, canvas, dots = figure.get_layout_engine(), figure.canvas, figure.dpi
+    if engine is None:
+        yield
+        return
+    try:
+        get_registered_canvas_class(form)(figure)  # whose letters are measured
+        figure.dpi = DOTS_PER_INCH
+        lay_out(figure)
+        figure.dpi = dots
+        figure.set_layout_engine("none")
+        yield
+    finally:
+        figure.dpi = dots
+        figure.set_layout_engine(engine)
+        figure.set_canvas(canvas)
 
 
 def save_picture(figure: Any, path: Path, *, force: bool = True) -> None:
@@ -206,20 +240,25 @@ def _take_literally(figure: Any) -> None:
 
     What the font lacks or nobody can see becomes a replacement sign.
     """
+    for text in _words(figure):
+        text.set_parse_math(False)
+        text.set_text(_drawable(text.get_text(), text))
+
+
+def _words(artist: Any) -> Iterator[Any]:
+    """Texts of an artist; of an axis with numbers not those, each of which would be made for it."""
     from matplotlib.axis import Axis
     from matplotlib.text import Text
 
-    numbers: set[int] = set()
-    for axis in figure.findobj(Axis):
-        if _is_named(axis):
-            _name_literally(axis)
-        else:
-            ticks = [*axis.get_major_ticks(), *axis.get_minor_ticks()]
-            numbers |= {id(label) for tick in ticks for label in (tick.label1, tick.label2)}
-    for text in figure.findobj(Text):
-        if id(text) not in numbers:
-            text.set_parse_math(False)
-            text.set_text(_drawable(text.get_text(), text))
+    if isinstance(artist, Text):
+        yield artist
+    if isinstance(artist, Axis) and not _is_named(artist):
+        yield from (artist.label, artist.offsetText)
+        return
+    if isinstance(artist, Axis):
+        _name_literally(artist)
+    for part in artist.get_children():
+        yield from _words(part)
 
 
 def _is_named(axis: Any) -> bool:
