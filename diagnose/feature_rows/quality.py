@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...datasets.file.views import MARK
-from ...features.rotation.order import pulse_times, shaft_phase
+from ...features.rotation.order import check_pulses, pulse_times
 from ...sim.output.recording import Recording
 from ...sim.output.sensor import Channel
 from .model_card import LayoutCard, ModelCard
@@ -24,7 +24,18 @@ from .resampling import resampled
 
 Float = NDArray[np.float64]
 Kind = Literal[
-    "saturated", "dead", "swapped", "unit", "rate", "tacho", "layout", "hum", "coupling", "place"
+    "saturated",
+    "dead",
+    "swapped",
+    "unit",
+    "rate",
+    "tacho",
+    "layout",
+    "hum",
+    "tone",
+    "knocks",
+    "coupling",
+    "place",
 ]
 
 FACTORS = (9.80665, 1000.0)
@@ -61,7 +72,7 @@ class QualityFault:
     ----------
     kind : str
         ``saturated``, ``dead``, ``swapped``, ``unit``, ``rate``, ``tacho``, ``layout``, ``hum``,
-        ``coupling`` or ``place``.
+        ``tone``, ``knocks``, ``coupling`` or ``place``.
     channel : str
         Where; empty for the whole recording.
     text : str
@@ -422,12 +433,7 @@ def _tacho_faults(recording: Recording) -> list[QualityFault]:
         return []
     try:
         pulses = pulse_times(tacho, recording.sample_rate)
-        shaft_phase(
-            pulses,
-            tacho.size,
-            recording.sample_rate,
-            pulses_per_revolution=recording.pulses_per_revolution,
-        )
+        check_pulses(pulses, tacho.size, recording.sample_rate, recording.pulses_per_revolution)
     except ValueError as error:
         text = f"tacho {recording.tacho}: {error}"
         return [QualityFault(kind="tacho", channel=str(recording.tacho), text=text)]

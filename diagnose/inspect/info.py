@@ -20,8 +20,8 @@ from ...sim.output.sensor import Channel
 from ...sim.scene.parts import Scene
 from ..class_model.file import CLASS_MODEL, load_class_model
 from ..feature_rows.feature_table import choice_of, confounders_in
-from ..feature_rows.hum import hum_faults
 from ..feature_rows.quality import sample_faults
+from ..feature_rows.surroundings import hum_faults
 from ..pages.embed import require_bokeh
 from ..pages.page import save_page
 from ..pages.picture import page_image, save_picture

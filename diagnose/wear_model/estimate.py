@@ -22,7 +22,6 @@ from ..feature_rows.feature_table import (
     regime_words,
 )
 from ..feature_rows.healthy import Baseline, referenced_rows
-from ..feature_rows.hum import hum_faults
 from ..feature_rows.model_card import ModelCard
 from ..feature_rows.noted import NOTED, noted_values
 from ..feature_rows.physical import level_channels, levelled_rows
@@ -39,13 +38,14 @@ from ..feature_rows.quality import (
     suspicions,
 )
 from ..feature_rows.resampling import at_rate
+from ..feature_rows.surroundings import company_faults, hum_faults
 from ..feature_rows.transfer_reference import told_against
 from ..learning.conformal import COVERAGE
 from ..learning.grades import GRADE_NAMES
 from ..learning.heads import Head, logit
 from ..learning.severity import Estimator
 from .bandwidth import cut_off
-from .noise_floor import lifted_rows, noisiest
+from .noise_floor import lifted_rows, noisiest, swing_of_turn
 from .novelty import Familiarity, free_distance, novelty_p_value
 from .quietness import CAUTIONED_SHARE
 
@@ -62,6 +62,7 @@ enough to tell so small a share; else one in its number."""
 _OFF_LEVEL = 3.5  # standard deviations of a level that few familiar machines reach
 _MUCH_WORSE = 1.5  # times the error: that of twenty recordings is known to a sixth
 _MOST_ODD = 2  # kinds of oddity: of 2,000 unseen pumps seven had two and none had three
+_KNOCKING_DB = 15.0  # simulated pumps of one throw swing by 33 dB in a turn, of three by 8
 _SPEED_FEATURE = "shaft.speed_hz"
 
 
@@ -311,6 +312,11 @@ class WearModel:
         return {name: i for i, name in enumerate(self.names)}
 
     @cached_property
+    def _knocks(self) -> bool:
+        """Whether its machines knock in every turn, and are quiet between."""
+        return swing_of_turn(self.names, self._healthy[0]) > _KNOCKING_DB
+
+    @cached_property
     def _healthy(self) -> tuple[Float, Float]:
         """Mean and spread of healthy features."""
         known = self.card.healthy_features
@@ -449,6 +455,8 @@ class WearModel:
         look = self._look(row)
         place = self._columns.get(_SPEED_FEATURE)
         faults += hum_faults(recording, None if place is None else float(row[place]))
+        if self._knocks:
+            faults += company_faults(recording)
 
         def see(mended: Recording) -> Observation:
             return self._look(self._row(mended, known))

@@ -74,6 +74,32 @@ def _quiet_cells(cells: Float, angles: int) -> Float:
     return np.asarray(np.sort(levels, axis=1)[:, int(_QUIET * angles)])
 
 
+def swing_of_turn(names: Sequence[str], row: Float) -> float:
+    """By how much the level swings within a turn, as knocks make it.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Of the features.
+    row : numpy.ndarray [shape=(n_features,)]
+
+    Returns
+    -------
+    float
+        Loudest less quietest angle of a channel's crank-angle map, the median of its bands, of the
+        channel where that is most [dB]; 0 without a map.
+
+    Examples
+    --------
+    >>> names = [f"a.angle_{i:03d}_{i + 180:03d}.band_50_66.level_db" for i in (0, 180)]
+    >>> swing_of_turn(names, np.array([3.0, -27.0])), swing_of_turn(["a.rms"], np.ones(1))
+    (30.0, 0.0)
+    """
+    maps = [columns for columns in columns_of(tuple(names)).values() if columns.cells]
+    swings = [np.ptp(row[each.cells].reshape(each.angles, -1), axis=0) for each in maps]
+    return max((float(np.median(swing)) for swing in swings), default=0.0)
+
+
 def floors_in(names: Sequence[str]) -> int:
     """Number of floors of all channels and bands."""
     maps = [columns for columns in columns_of(tuple(names)).values() if columns.cells]

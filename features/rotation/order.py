@@ -113,8 +113,9 @@ def _check_tacho(volts: Float, fs: float) -> None:
 
 def _edge_samples(volts: Float, level: float, margin: float) -> NDArray[np.intp]:
     """Last sample below the level before each rise through both thresholds."""
-    state = (volts >= level + margin).astype(np.int8) - (volts <= level - margin)
-    decided = np.flatnonzero(state)
+    state = (volts >= level + margin).view(np.int8) - (volts <= level - margin).view(np.int8)
+    begins = np.flatnonzero(np.append(True, state[1:] != state[:-1]))
+    decided = begins[state[begins] != 0]
     rise = (state[decided[:-1]] < 0) & (state[decided[1:]] > 0)
     arrived = decided[1:][rise]
     crossings = np.flatnonzero((volts[:-1] < level) & (volts[1:] >= level))
@@ -169,7 +170,7 @@ def shaft_phase(
 
     check_rate(fs)
     times = np.asarray(pulses, dtype=np.float64)
-    _check_pulses(times, n_samples, fs, pulses_per_revolution)
+    check_pulses(times, n_samples, fs, pulses_per_revolution)
     turns = np.arange(times.size) / pulses_per_revolution
     curve = PchipInterpolator(times, turns)
     first, last = int(np.ceil(times[0] * fs)), int(np.floor(times[-1] * fs)) + 1
@@ -182,7 +183,29 @@ def shaft_phase(
     return phase
 
 
-def _check_pulses(times: Float, n_samples: int, fs: float, per_revolution: int) -> None:
+def check_pulses(times: Float, n_samples: int, fs: float, per_revolution: int) -> None:
+    """Refuse pulses that give no phase.
+
+    Parameters
+    ----------
+    times : ndarray, shape (n_pulses,)
+        Pulse times [s].
+    n_samples : int
+        Length of the record.
+    fs : float
+        Sample rate [Hz].
+    per_revolution : int
+        Pulses in one revolution.
+
+    Raises
+    ------
+    ValueError
+        As `shaft_phase`.
+
+    Examples
+    --------
+    >>> check_pulses(np.array([0.1, 0.2, 0.3]), 4, 10.0, 1)  # nothing to say
+    """
     if per_revolution < 1:
         raise ValueError(f"pulses_per_revolution = {per_revolution} must be >= 1; count the teeth")
     if times.ndim != 1 or times.size < 2:
