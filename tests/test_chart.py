@@ -926,15 +926,28 @@ def run_chart(name, sizes, *arguments):
     return CliRunner().invoke(cli, ["chart", name, *pairs, "-j", "1", *arguments])
 
 
+def few_rungs(name, folder, *pinned):
+    """A scene file whose chart has few points: the effects named are as they stand."""
+    path, told = folder / f"{name}.toml", f"accuracy = 0.2\npinned = {[*pinned]}"
+    path.write_text(re.sub("(?m)^accuracy = .*$", told, scene_text(name), count=1))
+    return str(path)
+
+
+BRIEF = {**SMALL, "duration": 0.05, "numerics.tolerance": 1e-4}
+
+
 @pytest.mark.parametrize(
-    ("name", "sizes", "dear"),
+    ("name", "sizes", "dear", "pinned"),
     [
-        ("journal-bearing", {**SMALL, "numerics.tolerance": 1e-4, "duration": 0.05}, 1.0),
-        # of 3 s, cut to four revolutions
-        ("bilge-pump", {"duration": 3, "sample_rate": 5120, "settling_revolutions": 1}, 0.01),
+        ("journal-bearing", BRIEF, 1.0, ["tolerance"]),
+        # of 3 s, cut to four revolutions; a chart of its step
+        ("bilge-pump", {"duration": 3, "sample_rate": 5120, "settling_revolutions": 1}, 0.01,
+         [*OTHERS, "pressure"]),
     ],
 )  # fmt: skip
-def test_an_interrupted_chart_goes_on_to_the_same_page(name, sizes, dear, tmp_path, monkeypatch):
+def test_an_interrupted_chart_goes_on_to_the_same_page(
+    name, sizes, dear, pinned, tmp_path, monkeypatch
+):
     """Ctrl-C in the middle: an answer, exit code 1, and the same command ends as if nothing was."""
     ticks = itertools.count()
     monkeypatch.setattr(
@@ -943,12 +956,7 @@ def test_an_interrupted_chart_goes_on_to_the_same_page(name, sizes, dear, tmp_pa
     monkeypatch.setattr("wearstate.sim.fidelity.study._DEAR", dear)
     (tmp_path / "pages").mkdir()
     whole, page = (tmp_path / "pages" / f"{kind}.csv" for kind in ("whole", "page"))
-    subject = name
-    if name == "bilge-pump":  # all rungs pinned: a chart of its step
-        pinned = f"accuracy = 0.2\npinned = {[*OTHERS, 'pressure']}"
-        subject = str(tmp_path / "pump.toml")
-        text = re.sub("(?m)^accuracy = .*$", pinned, scene_text(name), count=1)
-        (tmp_path / "pump.toml").write_text(text)
+    subject = few_rungs(name, tmp_path, *pinned)
     made = Pilot._run
     calls = itertools.count()
 
@@ -961,6 +969,7 @@ def test_an_interrupted_chart_goes_on_to_the_same_page(name, sizes, dear, tmp_pa
     assert done.exit_code == 0, done.output
     assert list(whole.parent.iterdir()) == [whole]  # nothing is left beside it
     needed = next(calls)
+    assert needed >= 10
     half, calls = needed // 2, itertools.count()
 
     def stopped(self, values, start):
@@ -988,10 +997,10 @@ def without_seconds(path):
 
 
 def test_errors_do_not_depend_on_the_number_of_workers(tmp_path):
-    sizes = {**SMALL, "duration": 0.05, "numerics.tolerance": 1e-4}
     pages = [tmp_path / f"{jobs}.csv" for jobs in (1, 2)]
+    subject = few_rungs("journal-bearing", tmp_path, "tolerance")
     for jobs, path in zip((1, 2), pages, strict=True):
-        done = run_chart("journal-bearing", sizes, "-j", str(jobs), "-o", str(path))
+        done = run_chart(subject, BRIEF, "-j", str(jobs), "-o", str(path))
         assert done.exit_code == 0, done.output
     assert without_seconds(pages[0]) == without_seconds(pages[1])
 

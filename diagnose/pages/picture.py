@@ -104,7 +104,7 @@ def _laid_out(figure: Any, form: str) -> Iterator[None]:
     from matplotlib.backend_bases import get_registered_canvas_class
 
     engine, canvas, dots = figure.get_layout_engine(), figure.canvas, figure.dpi
-    if engine is None:
+    if engine is None or not figure.axes:
         yield
         return
     try:
