@@ -56,8 +56,7 @@ def hum_faults(recording: Recording, speed_hz: float | None = None) -> tuple[Qua
 
 
 LEAST_SCATTER = 0.7
-"""Scatter of a tone below which it is a caution: of 500 simulated pumps the ringing scatters by
-0.73 and more."""
+"""Scatter of a tone below which it is a caution: 8 of 2,000 simulated pumps ring so steadily."""
 
 LEAST_TONE = 5e-4
 """Share of a channel's mean square from which on a tone counts: -33 dB. Of simulated pumps with a
@@ -67,7 +66,7 @@ LOWEST_TONE_HZ = 170.0
 """Where tones are looked for: a casing's lowest mode rings on from one knock to the next."""
 
 MOST_EVIDENCE = 3.5
-"""Evidence of another rate beyond which it is a caution: of 500 simulated pumps two have more."""
+"""Evidence of another rate above which it is a caution: 4 of 2,000 simulated pumps have more."""
 
 _LONGEST_S = 30.0  # that is looked at: speeds drift, and lines with them
 
