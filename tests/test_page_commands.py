@@ -34,7 +34,7 @@ for number, way in enumerate(FIRST_CONTACT.split("\n\n")[1:4], 1):
     PAGES[f"wearstate, way {number}"] = f"```\n{shown}\n```\n"
 
 CUTS = (
-    ("generate", "-n", "4"),
+    ("generate", "-n", "2"),
     ("(generate|train|calibrate|features|evaluate|sweep)", "-j", "1"),
     ("calibrate", "--budget", "1"),
     ("blindspots", "-n", "1"),
@@ -375,7 +375,7 @@ def test_the_reader_of_commands_sees_a_fault(tmp_path, monkeypatch):
 
 def test_only_counts_and_budgets_are_cut():
     words = shlex.split("generate mine -n 2000 --seed 7 -o data.h5")
-    assert cut(words) == (shlex.split("generate mine -n 4 --seed 7 -o data.h5 -j 1"), True)
+    assert cut(words) == (shlex.split("generate mine -n 2 --seed 7 -o data.h5 -j 1"), True)
     words = shlex.split("report pump.wav --model pump.wsm")
     assert cut(words) == (words, False)
 
