@@ -29,6 +29,7 @@ STILL = {
     "turbulence": [],
     "coupling": None,
     "run_out": [],
+    "dents": [],
     "discs.0.unbalance": 0.0,
     "discs.1.unbalance": 0.0,
     **{f"sensors.{i}.noise": 0.0 for i in range(4)},

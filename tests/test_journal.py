@@ -182,7 +182,7 @@ def test_whirl_grows_at_half_speed_and_dies_below_the_threshold():
 # --- probes
 
 
-QUIET = {"sensors.0.noise": 0.0, "sensors.1.noise": 0.0, "rotor.run_out": []}
+QUIET = {"sensors.0.noise": 0.0, "sensors.1.noise": 0.0, "rotor.run_out": [], "rotor.dents": []}
 
 
 def bearing(changes=None, **options):
@@ -224,6 +224,22 @@ def test_run_out_comes_to_the_second_probe_first():
         4e-6 * np.cos(3 * (angle - math.radians(at)) + math.radians(20)) for at in (225, 135)
     ]
     assert_allclose(seen, expected, rtol=0, atol=1.5 * converter_step(scene))
+
+
+def test_a_dent_passes_the_second_probe_first_once_a_turn():
+    """It lies 30 degrees behind the mark, 20 wide: half as deep a quarter of its width away."""
+    dent = {"depth": "8 um", "width": "20 deg", "angle": "30 deg"}
+    _, plain = bearing({"rotor.dents": []})
+    scene, marked = bearing({"rotor.dents": [dent]})
+    seen = marked.signal[:2].astype(float) - plain.signal[:2]
+    angle = np.degrees(marked.truth["state_angle"])
+    for row, probe in zip(seen, (225, 135), strict=True):
+        away = np.abs((angle + 30 - probe + 180) % 360 - 180)
+        assert_allclose(row[away > 10], 0, atol=1.5 * converter_step(scene))
+        deep = np.interp(np.arange(0, 10.1, 2.5), away[np.argsort(away)], -row[np.argsort(away)])
+        half = 4e-6
+        expected = [2 * half, half * (1 + math.sqrt(0.5)), half, half * (1 - math.sqrt(0.5)), 0]
+        assert_allclose(deep, expected, atol=0.15e-6)  # between samples 3.5 degrees apart
 
 
 def test_noise_is_of_the_seed_alone():

@@ -182,7 +182,7 @@ def test_no_run_of_a_built_in_scene_is_in_doubt(name):
 def test_a_balanced_shaft_records_its_noise_and_says_so():
     still = {f"discs.{i}.unbalance": 0 for i in range(2)} | {"turbulence": [], "duration": "2 s"}
     still |= {"coupling.parallel_offset": 0, "coupling.torque": 0}
-    solution = simulate(load_scene("shaft-rig", still | {"run_out": []}), seed=1)
+    solution = simulate(load_scene("shaft-rig", still | {"run_out": [], "dents": []}), seed=1)
     assert any("0 of them have an unbalance" in text for text in solution.warnings)
     held = [text for text in solution.warnings if "its own noise" in text or "throughout" in text]
     assert len(held) == 6  # four accelerometers, two probes
@@ -218,7 +218,7 @@ def test_scene_check_and_simulate_tell_it(tmp_path):
 
 
 def test_a_file_of_noise_alone_is_noted(tmp_path):
-    still = {"rotor.unbalance": 0, "rotor.run_out": [], "duration": "0.1 s"}
+    still = {"rotor.unbalance": 0, "rotor.run_out": [], "rotor.dents": [], "duration": "0.1 s"}
     scene = load_scene("journal-bearing", still)
     path = tmp_path / "still.h5"
     save_solution(scene, simulate(scene, seed=1), path, seed=1)

@@ -132,7 +132,7 @@ def test_the_normal_correlation_of_a_rank():
         ([(-1.0, "drive.speed", "load.static")], "correlation.0.rank = -1.0 must be > -1"),
         (
             [(0.5, "sensors.*.gain", "rotor.run_out.*.phase")],
-            "stand for 2, 3 values, must be as many each",
+            "stand for 2, 8 values, must be as many each",
         ),
         (
             [(0.5, "drive.speed", "load.static"), (0.1, "load.static", "drive.speed")],

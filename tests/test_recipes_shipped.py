@@ -140,6 +140,7 @@ NUISANCE = {
     "journal-bearing-standard": {
         "oil.viscosity": (0.4, 2.5),
         "rotor.unbalance": (0.5, 2.0),
+        "rotor.run_out.0.amplitude": (0.3, 5.0),
         "rotor.run_out.2.amplitude": (0.3, 2.0),
         "sensors.0.noise": (0.5, 2.0),
         "sensors.1.gain": (0.95, 1.05),
@@ -149,7 +150,7 @@ NUISANCE = {
     "propulsion-shaft-standard": {
         "discs.4.unbalance": (0.5, 2.0),
         "bearings.4.housing.damping_side": (0.6, 1.4),
-        "run_out.0.amplitude": (0.3, 2.0),
+        "run_out.0.amplitude": (0.3, 5.0),
         "probes.0.noise": (0.5, 2.0),
         "sensors.4.gain": (0.95, 1.05),
         "drive.speed": (0.85, 1.15),

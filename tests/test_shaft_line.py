@@ -32,6 +32,7 @@ QUIET = {
     "propeller.blade_rate": [],
     "turbulence": [],
     "run_out": [],
+    "dents": [],
     "coupling": None,
     "discs.0.unbalance": 0.0,
     "discs.1.unbalance": 0.0,
@@ -439,6 +440,20 @@ def test_run_out_is_seen_by_the_probes_alone():
     for probe, row in zip(scene.probes, solution.signal[5:7], strict=True):
         expected = 5e-6 * np.exp(1j * (0.3 - 3 * probe.angle))
         assert_allclose(line_of(row, scene, 3), expected, atol=1e-9)  # the converter's step
+
+
+def test_a_dent_is_seen_by_each_probe_once_a_turn():
+    dent = [{"depth": 9e-6, "width": 0.5, "angle": 0.7}]
+    scene = quiet({"dents": dent})
+    solution, still = simulate(scene, seed=1), simulate(quiet({}), seed=1)
+    assert not solution.signal[:5].any()
+    seen = solution.signal[5:7] - still.signal[5:7]
+    area = 9e-6 * 0.5 / 2 / (2 * math.pi)  # of a raised cosine, over a turn
+    for probe, row in zip(scene.probes, seen, strict=True):
+        assert row.mean() == pytest.approx(-area, rel=0.02)
+        assert row.min() == pytest.approx(-9e-6, rel=0.02)
+        turn = np.exp(1j * (0.7 - probe.angle))
+        assert np.angle(-line_of(row, scene, 1) / turn) == pytest.approx(0, abs=0.02)
 
 
 def test_turbulence_has_the_rms_that_the_transfer_functions_give():

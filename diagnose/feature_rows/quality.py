@@ -224,10 +224,9 @@ def place_faults(
         if not along.endswith(_ALONG) or j is None:
             continue
         place, low, high = row[[i, j]], least[[i, j]], most[[i, j]]
-        beyond = np.maximum(low - place, place - high) > _BESIDE * (high - low)
-        if not beyond.any():
+        if _within(place, low, high):
             continue
-        opposite = bool(((low <= -place) & (-place <= high)).all())
+        opposite = _within(-place, low, high)
         x, y = 1e3 * place
         spans = [f"{1e3 * a:.3f} to {1e3 * b:.3f}" for a, b in zip(low, high, strict=True)]
         text = (
@@ -237,6 +236,11 @@ def place_faults(
         text += _AWAY if opposite else _ELSEWHERE
         found.append(QualityFault(kind="place", channel=probes, text=text, bars=opposite))
     return tuple(found)
+
+
+def _within(place: Float, low: Float, high: Float) -> bool:
+    beyond = np.maximum(low - place, place - high) > _BESIDE * (high - low)
+    return not beyond.any()
 
 
 _ALONG, _ACROSS = "centreline.x", "centreline.y"

@@ -118,6 +118,7 @@ _SHIFTS = (
     factor("rotor.mass", 0.8, 1.25, "its share on this bearing"),
     factor("rotor.unbalance", 0.3, 3.0, "another balance quality"),
     factor("rotor.run_out.*.amplitude", 0.2, 3.0, "another track"),
+    factor("rotor.dents.*.depth", 0.2, 3.0, "another track"),
     add("sensors.*.offset", -1e-5, 1e-5, "the gap at rest in the middle is not known"),
     add("sensors.*.angle", -5 * _DEGREE, 5 * _DEGREE, "probes beside their place"),
     factor("sensors.*.gain", 0.9, 1.1, "another steel under the probe"),

@@ -154,6 +154,7 @@ _SHIFTS = (
     factor("discs.*.buoyancy", 0.5, 1.5, "propeller half out of the water"),
     factor("discs.*.unbalance", 0.3, 3.0, "another balance quality, fouling"),
     factor("run_out.*.amplitude", 0.2, 3.0, "another track"),
+    factor("dents.*.depth", 0.2, 3.0, "another track"),
     factor("turbulence.*.force", 0.3, 3.0, "sea state"),
     factor("coupling.stiffness", 0.5, 2.0, "age of the rubber"),
     factor("coupling.bending_stiffness", 0.5, 2.0, "age of the rubber"),

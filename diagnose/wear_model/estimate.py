@@ -445,8 +445,8 @@ class WearModel:
             return Estimate(verdict="unusable", reasons=(NO_BASELINE,), mode=self.mode)
         row = self._row(recording, known)
         cloud = self.familiarity
-        faults += coupling_faults(recording, self.names, row, cloud.low)
-        if self.mode == "cold":  # healthy recordings take the zeros of the probes away
+        faults += (coupled := coupling_faults(recording, self.names, row, cloud.low))
+        if self.mode == "cold" and not coupled:  # healthy recordings take zeros of probes away
             faults += place_faults(recording, self.names, row, cloud.low, cloud.high)
         late = cloud.late_mark(self.names, self._lifted(row[None, :])[0], self.distance_limit)
         faults += mark_faults(recording, late)

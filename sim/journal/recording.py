@@ -16,6 +16,7 @@ from ..film.solve import LEAST_CELLS, FilmGeometry, Groove, dufrane_scar
 from ..output.recording import Recording
 from ..output.sensor import digitise
 from ..output.status import SimulationError, Status
+from ..output.track import track_under
 from ..scene.journal import JournalLoad, JournalScene
 from ..scene.parts import Scene, SceneError
 from ..scene.recorded import failed, recorded
@@ -445,7 +446,9 @@ def _measured(
     for probe in scene.sensors:
         towards = position[:, 0] * math.cos(probe.angle) + position[:, 1] * math.sin(probe.angle)
         row, lost = digitise(
-            towards + _run_out(scene, plan.angle - probe.angle) + probe.offset,
+            towards
+            + track_under(scene.rotor.run_out, scene.rotor.dents, plan.angle - probe.angle)
+            + probe.offset,
             gain=probe.gain,
             noise=probe.noise,
             full_scale=probe.range,
@@ -457,14 +460,6 @@ def _measured(
     if scene.tacho:
         rows.append(scene.tacho.channel(plan.angle))
     return np.stack(rows), clipped
-
-
-def _run_out(scene: JournalScene, turned: Float) -> Float:
-    """What the track of the shaft adds under a probe that it has turned past so far [m]."""
-    total = np.zeros(len(turned))
-    for part in scene.rotor.run_out:
-        total += part.amplitude * np.cos(part.order * turned + part.phase)
-    return total
 
 
 def film_gap(scene: JournalScene, position: Float) -> Float:

@@ -162,6 +162,19 @@ class RunOut(Part):
     phase: _SHAFT_ANGLE = Field(default=0.0, description="of the track, at the keyphasor mark")
 
 
+class Dent(Part):
+    """A dent, scratch or keyway end of the track that the probes look at.
+
+    Below the size of a probe's tip it is read as wide as the tip, and less deep.
+    """
+
+    depth: Length = Field(ge=0, le=_GAP_MOST, description="in its middle, as a probe reads it")
+    width: Angle = Field(gt=0, le=2 * math.pi, description="from edge to edge")
+    angle: _SHAFT_ANGLE = Field(
+        default=0.0, description="from the keyphasor mark, in the direction of rotation"
+    )
+
+
 class RotorShare(Part):
     """The part of a rigid rotor that one bearing carries."""
 
@@ -173,6 +186,7 @@ class RotorShare(Part):
         default=0.0, description="from the keyphasor mark, in the direction of rotation"
     )
     run_out: tuple[RunOut, ...] = Field(default=(), max_length=_MOST_RUN_OUT)
+    dents: tuple[Dent, ...] = Field(default=(), max_length=_MOST_RUN_OUT)
 
 
 class LoadRecord(Part):

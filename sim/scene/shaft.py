@@ -14,7 +14,7 @@ from pydantic import Field, model_validator
 
 from ..output.sensor import Channel
 from .exciters import PlacedExciter, force_channel
-from .journal import Film, ProximityProbe, RunOut, ScarLimits
+from .journal import Dent, Film, ProximityProbe, RunOut, ScarLimits
 from .oil import Oil
 from .parts import (
     ANGLE_MOST,
@@ -530,6 +530,7 @@ class ShaftScene(Scene):
     exciters: tuple[ShaftExciter, ...] = Field(default=(), max_length=MOST_SENSORS)
     film: Film = Film(rung="direct")
     run_out: tuple[RunOut, ...] = Field(default=(), max_length=_MOST_PARTS)
+    dents: tuple[Dent, ...] = Field(default=(), max_length=_MOST_PARTS)
     sensors: tuple[ShaftAccelerometer, ...] = Field(default=(), max_length=MOST_SENSORS)
     probes: tuple[ShaftProbe, ...] = Field(default=(), max_length=MOST_SENSORS)
     wear_down: StateLimits | None = None

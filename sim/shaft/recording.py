@@ -23,6 +23,7 @@ from ..film.solve import FilmGeometry, Groove
 from ..output.recording import Recorder, Recording
 from ..output.sensor import digitise
 from ..output.status import SimulationError, Status
+from ..output.track import track_under
 from ..scene.exciters import exciter_faults
 from ..scene.parts import Scene, SceneError
 from ..scene.recorded import failed, recorded
@@ -1245,7 +1246,7 @@ def _reading(
     port = -(side + motion.offset(probe.bearing, "z"))
     towards = down * math.cos(probe.angle) + port * math.sin(probe.angle)
     turned = angle - probe.angle
-    track = sum(part.amplitude * np.cos(part.order * turned + part.phase) for part in scene.run_out)
+    track = track_under(scene.run_out, scene.dents, turned)
     return np.asarray(towards + track + probe.offset)
 
 
