@@ -65,9 +65,12 @@ def test_probes_without_a_mean_are_at_fault_where_the_model_knows_one(data, trai
 
 def test_a_shaft_on_another_side_of_its_bearing_than_in_training_is_told(data, trained):
     model = trained[0]
-    radius = model.names.index("orbit.centreline.radius_db")
-    with DataSet(data) as records:  # the record whose shaft lies the lowest
-        whole = max((records[i] for i in range(N)), key=lambda each: model._row(each, None)[radius])
+    place = [model.names.index(f"orbit.centreline.{axis}") for axis in "xy"]
+    low = model.familiarity.low[place]
+    with DataSet(data) as records:  # the one whose shaft lies the lowest of those as in training
+        rows = np.array([model._row(records[i], None)[place] for i in range(N)])
+        known = np.where((rows >= low).all(axis=1), np.hypot(*rows.T), 0.0)
+        whole = records[int(known.argmax())]
     first, second, *rest = whole.signal
     away = replace(whole, signal=np.stack([-first, -second, *rest]))  # gaps instead of motion
     said = model.estimate(away)

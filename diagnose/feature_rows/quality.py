@@ -224,9 +224,9 @@ def place_faults(
         if not along.endswith(_ALONG) or j is None:
             continue
         place, low, high = row[[i, j]], least[[i, j]], most[[i, j]]
-        if _within(place, low, high):
+        if _inside(place, low, high):
             continue
-        opposite = _within(-place, low, high)
+        opposite = _inside(-place, low, high)
         x, y = 1e3 * place
         spans = [f"{1e3 * a:.3f} to {1e3 * b:.3f}" for a, b in zip(low, high, strict=True)]
         text = (
@@ -238,7 +238,7 @@ def place_faults(
     return tuple(found)
 
 
-def _within(place: Float, low: Float, high: Float) -> bool:
+def _inside(place: Float, low: Float, high: Float) -> bool:
     beyond = np.maximum(low - place, place - high) > _BESIDE * (high - low)
     return not beyond.any()
 
