@@ -3,6 +3,7 @@
 import math
 import time
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -167,8 +168,20 @@ def test_a_rung_out_of_its_validity_is_never_taken():
 
 
 def test_a_reference_that_cannot_be_run_is_refused_with_a_cure():
+    """The crank pin is written as compliant, so that no lower rung may stand in for it."""
+    fault = ("joint.crankpin.rung", "compliant")
     with pytest.raises(SceneError, match=r"reference .* out of its validity; pin the effect"):
-        chosen(KnownPilot({}, faults=[("drive.rung", "motor")]), 0.02)
+        chosen(KnownPilot({}, faults=[fault]), 0.02)
+
+
+def test_errors_are_against_the_next_rung_where_the_best_one_does_not_hold():
+    found = chosen(KnownPilot({}, faults=[("drive.rung", "motor")]), 0.02)
+    assert found.rungs["drive"] == "constant-speed"
+    assert any(
+        reason.startswith("drive = motor: does not hold on this machine, ")
+        and reason.endswith("out of its validity; errors are against drive = constant-speed")
+        for reason in found.reasons
+    )
 
 
 def test_pinned_effects_stay_as_they_are_written():
@@ -934,3 +947,35 @@ def test_every_machine_has_quantities_of_interest(name):
 def test_unknown_accuracy_is_refused():
     with pytest.raises(ValueError, match="accuracy = 0 must be >= 1e-06 and < 1"):
         resolve(load_scene("bilge-pump"), known_of(load_scene("bilge-pump")).quantities, 0.0)
+
+
+# --- a best rung that does not hold
+
+
+OWN_SCENES = Path(__file__).parent / "own_scenes"
+
+
+def on_two_throws(**given):
+    scene = load_scene(str(OWN_SCENES / "mud-pump.toml"), {"duration": "0.6 s", **given})
+    return resolve(
+        scene,
+        known_of(scene).quantities,
+        0.05,
+        pinned=("crankpin", "pressure", "step", "drive", "guide"),
+        starts=2,
+    )
+
+
+def test_a_best_rung_that_does_not_hold_on_a_machine_is_left_out_with_its_reason():
+    """A massless link transmits no tension, and the rods of this pump are pulled now and then."""
+    found = on_two_throws()
+    assert found.rungs["wristpin"] == "ideal"
+    told = [reason for reason in found.reasons if "does not hold" in reason]
+    assert len(told) == 1
+    assert told[0].startswith("wristpin = link: does not hold on this machine, tension_share")
+    assert told[0].endswith("errors are against wristpin = ideal")
+
+
+def test_a_rung_that_the_scene_is_written_with_is_never_left_out():
+    with pytest.raises(SceneError, match=r"wristpin = link.* cannot be run: tension_share"):
+        on_two_throws(**{"joint.wristpin.rung": "link"})

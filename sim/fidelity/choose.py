@@ -180,6 +180,7 @@ def resolve(
         asked,
         STARTS if starts is None else starts,
     )
+    comparison, dropped = _that_holds(comparison, effects)
     refuse_bad_reference(comparison)
     if starts is None:
         comparison.starts = affordable_starts(reference_cost(comparison))
@@ -198,9 +199,46 @@ def resolve(
         cost=chosen.cost,
         cost_of_reference=cost_of_reference,
         status="unresolvable" if doubted else status,
-        reasons=(*refusals(scene, effects), *_failures(singles)),
+        reasons=(*refusals(scene, effects), *dropped, *_failures(singles)),
         accuracy=asked,
         runs=comparison.pilot.runs,
+    )
+
+
+def _that_holds(
+    comparison: Comparison, effects: Sequence[Effect]
+) -> tuple[Comparison, tuple[str, ...]]:
+    """The comparison without best rungs that do not hold on this machine, and which they are.
+
+    None is taken that the scene is written with, or a joint could lose its play without a word.
+    Where that does not cure the reference, the comparison is as it was.
+    """
+    pilot, held, told = comparison.pilot, comparison, []
+    own = {each.name: each.current(pilot.scene) for each in effects if not each.numerical}
+    while fault := pilot.fault(held.values(held.top)):
+        better = [n for n, r in held.rungs.items() if len(r) > 1 and r[-1].name != own.get(n)]
+        lower = {n: held.values({**held.top, n: held.rungs[n][-2]}) for n in better if n in own}
+        if not lower:
+            return comparison, ()
+        name = first_cured(pilot, lower)
+        *rest, bad = held.rungs[name]
+        told.append(dropped_text(name, bad, rest[-1], fault))
+        held = Comparison(pilot, {**held.rungs, name: rest}, comparison.accuracy, comparison.starts)
+    return held, tuple(told)
+
+
+def first_cured(pilot: Pilot, lowered: Mapping[str, Mapping[str, Any]]) -> str:
+    """The effect whose next lower rung lets the reference run; the first where none alone does."""
+    return next(
+        (n for n, values in lowered.items() if not pilot.fault(values)), next(iter(lowered))
+    )
+
+
+def dropped_text(name: str, bad: Rung, instead: Rung, fault: str) -> str:
+    """Sentence of a best rung that does not hold."""
+    return (
+        f"{name} = {bad.name}: does not hold on this machine, {fault}; errors are against "
+        f"{name} = {instead.name}"
     )
 
 

@@ -21,7 +21,9 @@ from .choose import (
     checked_accuracy,
     combinations,
     descent,
+    dropped_text,
     estimated_error,
+    first_cured,
     free_effects,
     largest_sum,
     leaves_room,
@@ -495,7 +497,7 @@ class Search:
             if not self.fault or not raised:
                 break
             lower = {n: best.values({**best.top, n: best.rungs[n][-2]}) for n in raised}
-            cured = next((n for n in raised if not self.pilot.fault(lower[n])), raised[0])
+            cured = first_cured(self.pilot, lower)
             self._drop(cured, f"with the other best rungs, {self.fault}")
         return bool(self.fault)
 
@@ -503,10 +505,7 @@ class Search:
         """Take the best rung of an effect off its ladder: the next below it is the reference."""
         *lower, bad = self.ladders[name]
         self.ladders = {**self.ladders, name: tuple(lower)}
-        self._dropped.append(
-            f"{name} = {bad.name}: does not hold on this machine, {fault}; errors are against "
-            f"{name} = {lower[-1].name}"
-        )
+        self._dropped.append(dropped_text(name, bad, lower[-1], fault))
         if name in self.raises:
             cap = self.raises.pop(name).cap
             if self._low(name):
