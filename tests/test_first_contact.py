@@ -219,7 +219,7 @@ def test_a_fault_that_several_draws_share_is_told_once(tmp_path):
     faults = caught.value.faults
     station = [fault for fault in faults if "coupling.station is missing" in fault]
     assert len(station) == 1
-    assert station[0].startswith("severity.2 (coupling.parallel_offset), machine.10, machine.11")
+    assert station[0].startswith("severity.2 (coupling.parallel_offset), machine.20, machine.21")
     assert not any("1.00012 m" in fault for fault in faults)  # of a bound that is not known
 
 

@@ -206,6 +206,7 @@ def check_pulses(times: Float, n_samples: int, fs: float, per_revolution: int) -
     --------
     >>> check_pulses(np.array([0.1, 0.2, 0.3]), 4, 10.0, 1)  # nothing to say
     """
+    check_rate(fs)
     if per_revolution < 1:
         raise ValueError(f"pulses_per_revolution = {per_revolution} must be >= 1; count the teeth")
     if times.ndim != 1 or times.size < 2:
