@@ -210,14 +210,15 @@ def _that_holds(
 ) -> tuple[Comparison, tuple[str, ...]]:
     """The comparison without best rungs that do not hold on this machine, and which they are.
 
-    None is taken that the scene is written with, or a joint could lose its play without a word.
+    None below the rung that the scene is written with is taken for one: a joint could lose its play
+    without a word.
     Where that does not cure the reference, the comparison is as it was.
     """
     pilot, held, told = comparison.pilot, comparison, []
     own = {each.name: each.current(pilot.scene) for each in effects if not each.numerical}
     while fault := pilot.fault(held.values(held.top)):
-        better = [n for n, r in held.rungs.items() if len(r) > 1 and r[-1].name != own.get(n)]
-        lower = {n: held.values({**held.top, n: held.rungs[n][-2]}) for n in better if n in own}
+        better = [n for n in own if own[n] in {rung.name for rung in held.rungs[n][:-1]}]
+        lower = {n: held.values({**held.top, n: held.rungs[n][-2]}) for n in better}
         if not lower:
             return comparison, ()
         name = first_cured(pilot, lower)
