@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -20,8 +21,8 @@ from wearstate.diagnose.film_clearance.clearance import (
     FilmEstimate,
     JournalRun,
     PossibleFilm,
+    _contradiction,
     _Problem,
-    _untold,
     film_clearance,
 )
 from wearstate.diagnose.nameplate.cautions import known_beside, nameplate_cautions
@@ -162,7 +163,7 @@ def test_a_whirl_and_a_contradiction_are_said():
 def test_readings_that_are_no_numbers_give_no_estimate():
     found = Explained(value=math.log(1e-4), error=0.01, budget={}, left=math.nan)
     problem = _Problem([placed(0.2e-3)], np.array(ANGLES), AS_NEW, Doubts())
-    assert "must be <= 2.6" in _untold(problem, found, placed(0.2e-3), CURVE, 1e-4)
+    assert "must be <= 2.6" in _contradiction(problem, found, 1e-4)
 
 
 # --- from a recording
@@ -407,6 +408,20 @@ def test_a_disagreement_is_said_first():
     assert with_film(trained, near) is trained
     table = film_table(untold, Nameplate(scene=load_scene("journal-bearing")), {})
     assert json.loads(json.dumps(table))["text"] == "no estimate: no load"
+
+
+def test_what_no_clearance_explains_is_a_caution_too():
+    trained = Estimate(verdict="graded", grade=0, severity=1.5e-4, low=1.4e-4, high=1.6e-4)
+    run = replace(placed(0.2e-3, load=(0.0, 6e3)), load=(6e3, 0.0))
+    said = with_film(trained, film_clearance(run, CURVE, ANGLES, AS_NEW))
+    assert said.verdict == "caution"
+    assert said.cautions[0].startswith("film equilibrium: no clearance puts the journal where")
+    refused = Estimate(verdict="unfamiliar", severity=1.5e-4)
+    assert with_film(refused, film_clearance(run, CURVE, ANGLES, AS_NEW)) is refused
+    # one that runs too light to tell contradicts nothing
+    light = film_clearance(placed(0.1e-3, load=(50.0, 0.0)), CURVE, ANGLES, AS_NEW)
+    assert light.severity is None
+    assert with_film(trained, light) is trained
 
 
 def test_conditions_in_the_labels_of_an_import_are_those_of_the_day(tmp_path):

@@ -125,6 +125,8 @@ class FilmEstimate:
         What each doubt is worth: its own part of half the interval [m], by the names of
         :class:`Doubts`, and what film and bore are like where that is not known; their squares
         add up to that of the whole.
+    contradicted : bool
+        A journal is where no clearance puts it, so that something else is not as told.
     """
 
     reason: str = ""
@@ -134,6 +136,7 @@ class FilmEstimate:
     coverage: float = COVERAGE
     healthy: int = 0
     budget: dict[str, float] = field(default_factory=dict)
+    contradicted: bool = False
 
 
 def film_clearance(
@@ -467,6 +470,9 @@ def _judged(
     problem: _Problem, found: Explained, run: JournalRun, curve: "RestCurve", healthy: int
 ) -> FilmEstimate:
     clearance = math.exp(found.value)
+    reason = _contradiction(problem, found, clearance)
+    if reason:
+        return FilmEstimate(reason=reason, healthy=healthy, contradicted=True)
     reason = _untold(problem, found, run, curve, clearance)
     if reason:
         return FilmEstimate(reason=reason, healthy=healthy)
@@ -480,17 +486,22 @@ def _judged(
     )
 
 
+def _contradiction(problem: _Problem, found: Explained, clearance: float) -> str:
+    """That nothing explains the readings; empty where something does."""
+    ratio = clearance / math.exp(problem.middle)
+    if found.left <= CONTRADICTED and _NARROWEST < ratio < _WIDEST:
+        return ""
+    return (
+        f"no clearance puts the journal where the probes see it: {found.left:.1f} standard "
+        f"deviations are left, must be <= {CONTRADICTED:g}; check load, its direction, "
+        f"viscosity and the probes{OR_HEALTHY if problem.n == 1 else ''}"
+    )
+
+
 def _untold(
     problem: _Problem, found: Explained, run: JournalRun, curve: "RestCurve", clearance: float
 ) -> str:
-    """Why a solution is no estimate; empty where it is one."""
-    ratio = clearance / math.exp(problem.middle)
-    if not (found.left <= CONTRADICTED and _NARROWEST < ratio < _WIDEST):
-        return (
-            f"no clearance puts the journal where the probes see it: {found.left:.1f} standard "
-            f"deviations are left, must be <= {CONTRADICTED:g}; check load, its direction, "
-            f"viscosity and the probes{OR_HEALTHY if problem.n == 1 else ''}"
-        )
+    """Why a solution that explains the readings is no estimate; empty where it is one."""
     if run.swing > _MOST_SWING * clearance:
         return (
             f"the orbit's rms is {run.swing / clearance:.2f} of the radial clearance, must be <= "

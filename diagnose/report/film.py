@@ -284,7 +284,7 @@ _NUMBER = re.compile(r"_[0-9]+_m$")
 
 
 def with_film(estimate: Estimate, film: FilmEstimate | None) -> Estimate:
-    """An estimate that says first where the film equilibrium contradicts it.
+    """An estimate that says first where the film equilibrium contradicts it, or what was told.
 
     Examples
     --------
@@ -297,7 +297,15 @@ def with_film(estimate: Estimate, film: FilmEstimate | None) -> Estimate:
         "check the given load, viscosity and offsets, the probes, and whether the machine is one "
         "of the model's kind"
     )
-    return estimate if film is None else with_second(estimate, film, "film equilibrium", cure)
+    if film is None:
+        return estimate
+    if film.contradicted and estimate.low is not None:
+        return replace(
+            estimate,
+            verdict="caution",
+            cautions=(f"film equilibrium: {film.reason}", *estimate.cautions),
+        )
+    return with_second(estimate, film, "film equilibrium", cure)
 
 
 _UNKNOWN = (

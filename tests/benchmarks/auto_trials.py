@@ -84,9 +84,26 @@ def drawn(name, seed):
 
 
 def reference_values(scene):
-    """Values of the highest admissible rung of every effect."""
-    tops = [admissible(each, scene)[-1] for each in effects_of(scene)]
-    return {path: value for rung in tops for path, value in rung.values.items()}
+    """Values of the highest admissible rung of every effect that holds on the machine.
+
+    Where the highest together do not hold, such as a link in tension, the first effect that is
+    written with a lower rung and cures it goes down by one.
+    """
+    effects = effects_of(scene)
+    tops = {each.name: admissible(each, scene) for each in effects}
+    pilot = Pilot(scene, known_of(scene).quantities)
+    if pilot.fault(_together(tops)):
+        for each in effects:
+            lower = {**tops, each.name: tops[each.name][:-1]}
+            written = each.current(scene)
+            above = not each.numerical and tops[each.name][-1].name != written
+            if above and lower[each.name] and not pilot.fault(_together(lower)):
+                return _together(lower)
+    return _together(tops)
+
+
+def _together(rungs):
+    return {path: value for own in rungs.values() for path, value in own[-1].values.items()}
 
 
 def starts_of(name, scene):
