@@ -27,6 +27,7 @@ from wearstate.diagnose.film_clearance.clearance import (
 )
 from wearstate.diagnose.nameplate.cautions import known_beside, nameplate_cautions
 from wearstate.diagnose.nameplate.nameplate import Nameplate, day_of, nameplate_of
+from wearstate.diagnose.nameplate.sensors import as_told, known_zeros
 from wearstate.diagnose.report import film as film_report
 from wearstate.diagnose.report.beside import disagree
 from wearstate.diagnose.report.film import film_estimate, film_table, with_film
@@ -349,9 +350,31 @@ def test_the_day_is_what_a_person_told_then_what_was_noted_then_the_nameplate():
 
 def test_probes_without_healthy_recordings_are_a_caution(tmp_path):
     recording = recorded(tmp_path / "a.h5", {})
-    assert "offsets of its probes" in " ".join(known_beside(None, recording, CARD)["told"])
-    told = nameplate_of(None, "journal-bearing", {"sensors.0.offset": "0 um +- 5 um"})
+    assert "offsets of probe_1, probe_2" in " ".join(known_beside(None, recording, CARD)["told"])
+    zeros = {f"sensors.{i}.offset": "0 um +- 5 um" for i in range(2)}
+    told = nameplate_of(None, "journal-bearing", zeros)
     assert known_beside(told, recording, CARD)["told"] == ()
+    one = nameplate_of(None, "journal-bearing", {"sensors.0.offset": "0 um"})
+    [said] = known_beside(one, recording, CARD)["told"]
+    assert "offsets of probe_2, which" in said
+
+
+def test_the_height_of_a_bearing_is_no_offset_of_a_probe():
+    plate = nameplate_of(None, "propulsion-shaft", {"bearings.0.offset": "0.1 mm"})
+    assert known_zeros(plate) == frozenset()
+
+
+def test_offset_and_sensitivity_that_a_person_told_are_taken_out(tmp_path):
+    """So that a model sees the readings that it learnt with; healthy recordings have both."""
+    off = {"sensors.0.offset": -20e-6, "sensors.1.gain": 1.25}
+    plain, seen = (recorded(tmp_path / f"{i}.h5", each) for i, each in enumerate(({}, off)))
+    told = nameplate_of(None, "journal-bearing", off)
+    np.testing.assert_allclose(as_told(seen, told).signal, plain.signal, atol=2e-7)
+    assert np.abs(seen.signal - plain.signal)[:2].max(axis=1).min() > 2e-6
+    assert as_told(seen, nameplate_of(None, "journal-bearing", {})) is seen
+    assert as_told(seen, None) is seen
+    healthy = Baseline(features=np.zeros(1), recordings=1, source="")
+    assert as_told(seen, told, healthy) is seen
 
 
 def test_a_nameplate_of_another_machine_is_a_caution():

@@ -15,6 +15,7 @@ from ..feature_rows.model_card import ModelCard
 from ..machines.registry import presentation_of
 from ..pages.si_text import si_text
 from .nameplate import Nameplate, day_of
+from .sensors import known_zeros
 
 _SAME = 0.02  # over the trained value: nameplates are rounded
 
@@ -53,16 +54,18 @@ def _gap_cautions(
     plate: Nameplate | None, recording: Recording, baseline: Baseline | None
 ) -> list[str]:
     """Where a shaft runs is read from gap voltages, whose zero nobody knows by itself."""
-    if baseline is not None or not any(
-        channel.quantity == "displacement" for channel in recording.vibration_channels
-    ):
-        return []
-    if plate is not None and any(path.endswith((".offset", ".gap")) for path in plate.told):
+    probes = [
+        channel.name
+        for channel in recording.vibration_channels
+        if channel.quantity == "displacement"
+    ]
+    unknown = [name for name in probes if name not in known_zeros(plate)]
+    if baseline is not None or not unknown:
         return []
     return [
-        "no healthy recording of this machine tells the offsets of its probes, which are taken to "
-        "be as small as where the model was trained, and its estimate leans on them: give "
-        "--baseline HEALTHY, or what is known: --set 'sensors.0.offset=0 um +- 5 um'"
+        f"no healthy recording of this machine tells the offsets of {', '.join(unknown)}, which "
+        "are taken to be as small as where the model was trained, and its estimate leans on them: "
+        "give --baseline HEALTHY, or what is known of each: --set 'sensors.0.offset=0 um +- 5 um'"
     ]
 
 

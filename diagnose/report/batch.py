@@ -26,6 +26,7 @@ from ..film_clearance.clearance import FilmEstimate
 from ..learning.grades import GRADE_NAMES, WARNING_GRADE
 from ..nameplate.cautions import known_beside
 from ..nameplate.nameplate import Nameplate
+from ..nameplate.sensors import as_told
 from ..pages.words import quantity_name
 from ..wear_model.estimate import Estimate, ModelError, WearModel
 from .advice import Advice, advise
@@ -446,7 +447,7 @@ def _judged(
         baseline = None if baselines is None else baselines.of(recording)
         film = film_estimate(recording, model.card.severity, plate, baseline)
         beside = known_beside(plate, recording, model.card, baseline)
-        estimate = model.estimate(recording, baseline, **beside)
+        estimate = model.estimate(as_told(recording, plate, baseline), baseline, **beside)
         return with_film(estimate, film), film
     except ModelError:
         raise  # would be so for each of them

@@ -300,11 +300,11 @@ def with_film(estimate: Estimate, film: FilmEstimate | None) -> Estimate:
     if film is None:
         return estimate
     if film.contradicted and estimate.low is not None:
-        return replace(
-            estimate,
-            verdict="caution",
-            cautions=(f"film equilibrium: {film.reason}", *estimate.cautions),
+        said = (
+            f"film equilibrium: {film.reason.partition(':')[0]}, so that load, its direction, "
+            "viscosity, probes or the shape of the bore are not as given"
         )
+        return replace(estimate, verdict="caution", cautions=(said, *estimate.cautions))
     return with_second(estimate, film, "film equilibrium", cure)
 
 

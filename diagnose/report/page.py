@@ -10,6 +10,7 @@ from ..feature_rows.healthy import Baseline, Baselines
 from ..learning.grades import GRADE_COLOURS, NO_GRADE_COLOUR
 from ..nameplate.cautions import known_beside
 from ..nameplate.nameplate import Nameplate
+from ..nameplate.sensors import as_told
 from ..pages.embed import require_bokeh
 from ..pages.page import render
 from ..pages.points import PointBlock, point_block
@@ -226,7 +227,7 @@ def _details(
             recording = batch.items[row.number].load()
             baseline = None if baselines is None else baselines.of(recording)
             beside = known_beside(plate, recording, model.card, baseline)
-            estimate = model.estimate(recording, baseline, **beside)
+            estimate = model.estimate(as_told(recording, plate, baseline), baseline, **beside)
         except DataError:
             continue  # it has gone since
         outlook = batch.outlook_of(row)

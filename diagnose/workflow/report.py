@@ -15,6 +15,7 @@ from ...sim.output.recording import Recording, Table
 from ..feature_rows.healthy import Baseline, Baselines
 from ..nameplate.cautions import known_beside
 from ..nameplate.nameplate import Nameplate, nameplate_of
+from ..nameplate.sensors import as_told
 from ..pages.page import save_page
 from ..report.figures import draw_gauge
 from ..report.page import report_html
@@ -243,7 +244,9 @@ def judged(
     """Report on a recording with what is known of its machine, all of it read."""
     baseline = baselines.of(recording) if baselines else None
     estimate = model.estimate(
-        recording, baseline, **known_beside(plate, recording, model.card, baseline)
+        as_told(recording, plate, baseline),
+        baseline,
+        **known_beside(plate, recording, model.card, baseline),
     )
     table = report_table(
         recording,
