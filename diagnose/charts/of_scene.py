@@ -277,9 +277,14 @@ def _left_words(found: Study) -> str:
 
 def _note(scene: Scene, found: Study) -> str:
     """How it was measured."""
-    cut = "" if found.duration is None else f", cut from {scene.duration:g} s for more starts"
+    cut = (
+        ""
+        if found.duration is None
+        else f", cut from {scene.duration:g} s for more starts: a motion that changes over seconds "
+        "may make the error of whole ones another"
+    )
     return (
-        f"{found.duration or scene.duration:.3g} s a run{cut}, with its settling. Times are by "
+        f"{found.duration or scene.duration:.3g} s a run, with its settling{cut}. Times are by "
         "the cost tables, as is the choice, scaled so that the scene as written takes its measured "
         "time; the measured ones, which scatter, are in the JSON"
     )
