@@ -277,14 +277,12 @@ def _left_words(found: Study) -> str:
 
 def _note(scene: Scene, found: Study) -> str:
     """How it was measured."""
-    cut = (
-        ""
-        if found.duration is None
-        else f", cut from {scene.duration:g} s for more starts: a motion that changes over seconds "
-        "may make the error of whole ones another"
-    )
+    cut, slow = "", ""
+    if found.duration is not None:
+        cut = f", cut from {scene.duration:g} s for more starts"
+        slow = ": a motion that changes over seconds may make the error of whole ones another"
     return (
-        f"{found.duration or scene.duration:.3g} s a run, with its settling{cut}. Times are by "
+        f"{found.duration or scene.duration:.3g} s a run{cut}, with its settling{slow}. Times are by "
         "the cost tables, as is the choice, scaled so that the scene as written takes its measured "
         "time; the measured ones, which scatter, are in the JSON"
     )
