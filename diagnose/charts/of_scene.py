@@ -282,9 +282,9 @@ def _note(scene: Scene, found: Study) -> str:
         cut = f", cut from {scene.duration:g} s for more starts"
         slow = ": a motion that changes over seconds may make the error of whole ones another"
     return (
-        f"{found.duration or scene.duration:.3g} s a run{cut}, with its settling{slow}. Times are by "
-        "the cost tables, as is the choice, scaled so that the scene as written takes its measured "
-        "time; the measured ones, which scatter, are in the JSON"
+        f"{found.duration or scene.duration:.3g} s a run{cut}, with its settling{slow}. "
+        "Times are by the cost tables, as is the choice, scaled so that the scene as written takes "
+        "its measured time; the measured ones, which scatter, are in the JSON"
     )
 
 
