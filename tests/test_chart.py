@@ -39,7 +39,7 @@ from wearstate.diagnose.charts.of_scene import (
     scene_search,
 )
 from wearstate.diagnose.charts.page import SUFFIXES, chart_figure, chart_html, save_chart
-from wearstate.diagnose.charts.scene_edit import block_of, default_step
+from wearstate.diagnose.charts.scene_edit import block_of
 from wearstate.diagnose.charts.words import HERE
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.sim.fidelity.ladder import cost_of
@@ -50,7 +50,7 @@ from wearstate.sim.fidelity.pilot import (
     Pilot,
     differences,
 )
-from wearstate.sim.fidelity.study import Answer, Convergence, Raise, Study
+from wearstate.sim.fidelity.study import Answer, Convergence, Raise, Study, default_step
 from wearstate.sim.scene.load import load_scene, scene_text
 from wearstate.sim.scene.rungs import with_values
 

@@ -10,7 +10,6 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ...sim.atomic import OutputError
 from ...sim.output.recording import DataError
 from ..file.record import (
     Attributes,
@@ -415,18 +414,12 @@ def _write(
         force=force,
         resumable=False,
     )
-    try:
-        with writer:
-            for index, (origin, row) in enumerate(zip(kept, rows, strict=True)):
-                writer.write(index, sets[origin.source][origin.index].signal, row)
-                if progress is not None:
-                    progress(index + 1, len(kept))
-            writer.finish()
-    except OutputError:
-        raise  # the data set is whole, and the text says where
-    except BaseException:
-        writer.part.unlink(missing_ok=True)  # made anew, not gone on with
-        raise
+    with writer:
+        for index, (origin, row) in enumerate(zip(kept, rows, strict=True)):
+            writer.write(index, sets[origin.source][origin.index].signal, row)
+            if progress is not None:
+                progress(index + 1, len(kept))
+        writer.finish()
 
 
 def merged_text(summary: MergeSummary) -> str:

@@ -1,10 +1,28 @@
 """Text in the cells of CSV files: a spreadsheet must not take it for a formula."""
 
+import csv
 import re
+from collections.abc import Iterable, Sequence
+from pathlib import Path
 from typing import Any
+
+from ...sim.atomic import replacing
 
 _FORMULA = re.compile(r"[=+\-@\t\r\n]")
 _ESCAPED = re.compile(r"'[=+\-@\t\r\n]")
+
+
+def save_rows(
+    path: Path, head: Sequence[str], rows: Iterable[Iterable[Any]], *, force: bool = True
+) -> None:
+    """Write a table of safe cells as CSV, whole or not at all."""
+    with (
+        replacing(path, force=force) as fresh,
+        fresh.open("w", newline="", encoding="utf-8", errors="backslashreplace") as file,
+    ):
+        writer = csv.writer(file)
+        writer.writerow(head)
+        writer.writerows(map(safe_cell, row) for row in rows)
 
 
 def safe_cell(value: Any) -> Any:

@@ -14,7 +14,6 @@ from functools import cache, cached_property
 from importlib.metadata import version
 from itertools import pairwise
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Self
 
 import h5py
@@ -23,7 +22,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from ... import __version__
-from ...sim.atomic import fresh_name, put_in_place
+from ...sim.atomic import OutputError, fresh_name, put_in_place
 from ...sim.output.recording import (
     DataError,
     Recording,
@@ -486,12 +485,7 @@ class DataSet:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def __getstate__(self) -> dict[str, Any]:
@@ -735,7 +729,8 @@ class DataSetWriter:
     force : bool
         Replace an existing file, and start an unfinished one anew.
     resumable : bool
-        False: the unfinished file has a name of its own, and one that another run left stays.
+        False: the unfinished file has a name of its own and goes where the run fails; one that
+        another run left stays.
 
     Raises
     ------
@@ -772,7 +767,7 @@ class DataSetWriter:
     ) -> None:
         self.path = Path(path).absolute()
         self.part = _part(self.path) if resumable else fresh_name(self.path)
-        self._force = force
+        self._force, self._resumable = force, resumable
         self.attributes = attributes
         self._shape = (n_records, len(attributes.channels), n_samples)
         self._dtype = np.dtype([*{**_HEAD, **(columns or {}), **_TAIL}.items()])
@@ -995,17 +990,15 @@ class DataSetWriter:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, _kind: object, error: object, _trace: object) -> None:
         try:
             self.close()
         except (OSError, RuntimeError):  # the disk is still full: the first error tells it
             if error is None:
                 raise
+        whole = error is None or isinstance(error, OutputError)  # whose text says where it is
+        if not (whole or self._resumable):
+            self.part.unlink(missing_ok=True)  # made anew, not gone on with
 
 
 def refuse_output(path: Path, force: bool) -> None:

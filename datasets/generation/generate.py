@@ -20,7 +20,6 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ...sim.atomic import OutputError
 from ...sim.machine.simulate import alike, simulates_together
 from ...sim.output.recording import DataError, Recording
 from ...sim.scene.parts import Scene, channels_of
@@ -531,12 +530,6 @@ def save_solution(
         force=force,
         resumable=False,
     )
-    try:
-        with writer:
-            writer.write(0, solution.signal, row, solution.truth if truth else None)
-            writer.finish()
-    except OutputError:
-        raise  # the recording is whole, and its text says where
-    except BaseException:
-        writer.part.unlink(missing_ok=True)  # a single recording is made anew, not gone on with
-        raise
+    with writer:
+        writer.write(0, solution.signal, row, solution.truth if truth else None)
+        writer.finish()

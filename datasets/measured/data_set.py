@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...features.rotation.order import pulse_times
-from ...sim.atomic import OutputError
 from ...sim.output.recording import DataError
 from ...sim.output.sensor import Channel
 from ...sim.scene.parts import nearest
@@ -196,17 +195,11 @@ def import_recordings(
         force=force,
         resumable=False,
     )
-    try:
-        with writer:
-            records = _all_records(reading, plan, jobs)
-            _write(writer, records, table, plan.n_records, progress)
-            _refuse_silent(writer.manifest(), tacho)
-            writer.finish()
-    except OutputError:
-        raise  # the data set is whole, and the text says where
-    except BaseException:
-        writer.part.unlink(missing_ok=True)  # made anew, not gone on with
-        raise
+    with writer:
+        records = _all_records(reading, plan, jobs)
+        _write(writer, records, table, plan.n_records, progress)
+        _refuse_silent(writer.manifest(), tacho)
+        writer.finish()
     return _summary(target, plan, known, table)
 
 

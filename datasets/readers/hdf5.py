@@ -22,6 +22,7 @@ from ..source.part import (
     FilePart,
     PartChannel,
     SourceOptions,
+    closed_on_failure,
     damaged,
     foreign,
 )
@@ -47,7 +48,7 @@ def hdf5_contents(path: Path, options: SourceOptions) -> Contents:
         be one recording, is kept in other files, or declares more than it holds.
     """
     file = _opened(path)
-    try:
+    with closed_on_failure(path, file, HDF5_FAULTS):
         if {"schema_version", "sample_rate_hz", "channels"} <= set(file.attrs):
             raise DataError(
                 f"{path} is a data set of this program already; use it as it is, without importing"
@@ -62,12 +63,6 @@ def hdf5_contents(path: Path, options: SourceOptions) -> Contents:
                 arrays.append((name, item, axes))
         texts = _texts_apart(path, [(name, item) for name, item, _ in arrays])
         parts = [_hdf5_part(path, name, item, axes, texts) for name, item, axes in arrays]
-    except DataError:
-        file.close()
-        raise
-    except HDF5_FAULTS as error:
-        file.close()
-        raise damaged(path, error) from error
     return Contents(parts=tuple(parts), others=tuple(others), close=file.close)
 
 
@@ -250,14 +245,8 @@ def mat73_contents(path: Path, options: SourceOptions) -> Contents:
         It is damaged, or the array asked for cannot be one recording.
     """
     file = _opened(path)
-    try:
+    with closed_on_failure(path, file, HDF5_FAULTS):
         contents = tree_contents(path, _Mat73(path, file).tree(), options)
-    except DataError:
-        file.close()
-        raise
-    except HDF5_FAULTS as error:
-        file.close()
-        raise damaged(path, error) from error
     return replace(contents, close=file.close)
 
 

@@ -22,6 +22,7 @@ from ..source.part import (
     FilePart,
     PartChannel,
     SourceOptions,
+    closed_on_failure,
     cut,
     damaged,
     foreign,
@@ -54,17 +55,10 @@ def tdms_contents(path: Path, options: SourceOptions) -> Contents:
     _walk_segments(path, options.partial)
     # opened here: the library would believe an index file beside it, which may be another's
     handle = _Bounded(io.FileIO(path))
-    try:
-        with _no_warning(path, options.partial):
-            file = nptdms.TdmsFile.open(handle)
-            contents = _groups(path, file, path.stat().st_size, options.partial)
-    except DataError:
-        handle.close()
-        raise
     # the library raises errors of any type on damaged bytes
-    except Exception as error:
-        handle.close()
-        raise damaged(path, error) from error
+    with closed_on_failure(path, handle, Exception), _no_warning(path, options.partial):
+        file = nptdms.TdmsFile.open(handle)
+        contents = _groups(path, file, path.stat().st_size, options.partial)
     return Contents(parts=contents.parts, others=contents.others, close=handle.close)
 
 

@@ -1,9 +1,9 @@
 """Vocabulary of the readers: what a file holds, what the caller declares, what comes of both."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Literal, Self
 
 import numpy as np
@@ -449,12 +449,7 @@ class Source:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
 
@@ -462,6 +457,21 @@ def cut(path: Path, size: int, needed: int, *, partial: bool = False) -> DataErr
     """Error about a file shorter than it says; `partial` where what is there can be read."""
     more = ", or read what is there with partial" if partial else ""
     return DataError(f"{path} has {size} byte, must be >= {needed}; take an intact copy{more}")
+
+
+@contextmanager
+def closed_on_failure(
+    path: Path, file: Any, faults: type[Exception] | tuple[type[Exception], ...]
+) -> Iterator[None]:
+    """Close a file that cannot be read; what its parser raises, of these kinds, is damage."""
+    try:
+        yield
+    except DataError:
+        file.close()
+        raise
+    except faults as error:
+        file.close()
+        raise damaged(path, error) from error
 
 
 def damaged(path: Path, error: BaseException) -> DataError:

@@ -12,8 +12,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ...datasets.file.csv_cells import safe_cell
-from ...sim.atomic import replacing
+from ...datasets.file.csv_cells import save_rows
 from ...sim.fidelity.pilot import Difference
 from ...sim.fidelity.study import Convergence
 
@@ -602,14 +601,6 @@ def _steps(each: Convergence) -> str:
     return " then ".join(f"{abs(step):.2%}" for step in each.steps)
 
 
-def save_rows(chart: Chart, path: Path, *, force: bool = True) -> None:
+def save_chart_rows(chart: Chart, path: Path, *, force: bool = True) -> None:
     """Write :func:`chart_rows` as CSV, whole or not at all."""
-    import csv
-
-    with (
-        replacing(path, force=force) as fresh,
-        fresh.open("w", newline="", encoding="utf-8") as handle,
-    ):
-        writer = csv.writer(handle)
-        writer.writerow(CSV_HEAD)
-        writer.writerows([safe_cell(cell) for cell in row] for row in chart_rows(chart))
+    save_rows(path, CSV_HEAD, chart_rows(chart), force=force)

@@ -17,7 +17,7 @@ from ...datasets.generation.quantities import quantity_label
 from ...datasets.workers.local import in_order
 from ...sim.fidelity.choose import estimated_error
 from ...sim.fidelity.pilot import Candidate, Outcome, Pilot
-from ...sim.fidelity.study import Answer, Search, Study
+from ...sim.fidelity.study import Answer, Search, Study, default_step
 from ...sim.scene.parts import Scene
 from ..pages.kept import Kept
 from .chart import RECOMMENDED, Chart, Choice, Clock, Point, RungCost, front_of
@@ -36,7 +36,7 @@ from .decision import (
     values_before,
     why_alike,
 )
-from .scene_edit import block_of, default_step, options_of
+from .scene_edit import block_of, options_of
 from .sentences import change_words, choice_sentence, costly_rungs, standing
 from .words import (
     combination_words,

@@ -17,7 +17,7 @@ from .chart import (
     RungCost,
     chart_table,
     convergence_text,
-    save_rows,
+    save_chart_rows,
 )
 from .figure import (
     FLOOR,
@@ -183,7 +183,7 @@ def save_chart(chart: Chart, path: Path, *, force: bool = True, interactive: boo
     if path.suffix == ".html":
         save_page(chart_html(chart, interactive=interactive), path, force=force)
     elif path.suffix == ".csv":
-        save_rows(chart, path, force=force)
+        save_chart_rows(chart, path, force=force)
     elif path.suffix in (".png", ".pdf"):
         save_picture(chart_figure(chart), path, force=force)
     else:

@@ -8,7 +8,6 @@ from typing import Any
 from ...datasets.recipe.draws import value_at
 from ...datasets.recipe.text import toml_text
 from ...sim.atomic import write_whole
-from ...sim.machine.registry import machine_of
 from ...sim.scene.load import scene_from_table, scene_table, scene_text
 from ...sim.scene.parts import Scene, SceneError, beside
 from ...sim.scene.rungs import with_values
@@ -24,12 +23,6 @@ def written_value(scene: Scene, path: str) -> Any:
         return value_at(scene, path)
     except (AttributeError, KeyError, IndexError, ValueError):
         return None
-
-
-def default_step(scene: Scene) -> float | None:
-    """Integration step that a scene runs with [s]; None of a machine without."""
-    step = machine_of(scene).step
-    return None if step is None else step(scene)
 
 
 def block_of(

@@ -23,7 +23,7 @@ from ..wear_model.arrays import (
     refuse_more,
     shapes_of,
 )
-from ..wear_model.bundle import Bundle, checked, load_bundle, save_bundle
+from ..wear_model.bundle import Bundle, load_parts, refuse_misfits, save_bundle
 from ..wear_model.estimate import ModelError
 from ..wear_model.novelty import Familiarity
 from .train import ClassModel, Votes
@@ -97,13 +97,7 @@ def load_class_model(path: str | Path) -> ClassModel:
     Traceback (most recent call last):
     wearstate.diagnose.wear_model.estimate.ModelError: pump.wsm is a wear model
     """
-    bundle = load_bundle(path, CLASS_MODEL)
-    card = checked(ClassCard, bundle.card, path, "card.json")
-    structure = checked(_Structure, bundle.structure, path, "structure.json")
-    try:
-        model = _model_of(structure, bundle.arrays, card)
-    except (KeyError, TypeError, ValueError) as error:
-        raise ModelError(f"{path}: arrays.npz cannot be read ({error}); retrain it") from error
+    model = load_parts(path, CLASS_MODEL, ClassCard, _Structure, _model_of)
     _check(model, path)
     return model
 
@@ -153,9 +147,7 @@ def _check(model: ClassModel, path: str | Path) -> None:
         ),
         "numbers": numbers_fit(_arrays_of(model)),
     }
-    bad = [name for name, good in fits.items() if not good]
-    if bad:
-        raise ModelError(f"{path}: {', '.join(bad)} do not fit {n} features; retrain it")
+    refuse_misfits(fits, n, path)
 
 
 def _votes_fit(votes: Votes, classes: int) -> bool:

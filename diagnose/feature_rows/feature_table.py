@@ -19,7 +19,7 @@ from ...datasets.workers.local import in_order
 from ...features.catalogue.analysis import STANDARD, Analysis, Settings
 from ...features.catalogue.catalogue import SetName
 from ...features.catalogue.needs import Layout, shortcomings, struck
-from ...features.catalogue.row import absent_features, feature_names, feature_row
+from ...features.catalogue.row import absent_features, feature_row, layout_names
 from ...features.response.transfer import FrfReference, Transfer
 from ...features.signal.envelope import BearingFrequencies, bearing_frequencies
 from ...sim.atomic import replacing
@@ -588,18 +588,7 @@ def _listed(views: Sequence[CompletingView]) -> str:
 
 def _names(layout: Layout, choice: FeatureSelection, path: str | Path) -> tuple[str, ...]:
     try:
-        return feature_names(
-            layout.channels,
-            layout.fs,
-            tacho=layout.tacho,
-            pulses_per_revolution=layout.pulses_per_revolution,
-            quantities=layout.quantities,
-            n_samples=layout.n_samples,
-            impact=layout.impact,
-            settings=layout.settings,
-            feature_set=choice.feature_set,
-            only=choice.only,
-        )
+        return layout_names(layout, choice.feature_set, choice.only)
     except ValueError as error:
         raise DataError(f"{path}: {error}") from error
 

@@ -1,6 +1,5 @@
 """A ranking of features in words, as a table, as CSV and as a page with pictures."""
 
-import csv
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
@@ -11,9 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...datasets.file.csv_cells import safe_cell
+from ...datasets.file.csv_cells import save_rows
 from ...datasets.file.record import DataSet
-from ...sim.atomic import replacing
 from ...sim.output.recording import DataError
 from ..feature_rows.feature_choice import costs_ms
 from ..feature_rows.feature_rank import LEAST_OF_MACHINE, FeatureRank, Ranking, rank_features
@@ -205,20 +203,10 @@ def rank_table(found: RankedSet) -> dict[str, Any]:
 def save_rank(found: RankedSet, path: Path, *, force: bool = True) -> None:
     """Write the ranking as page or CSV."""
     if path.suffix == ".csv":
-        _save_csv(found, path, force=force)
+        rows = rank_table(found)["features"]
+        save_rows(path, rows[0], [row.values() for row in rows], force=force)
     else:
         save_page(rank_html(found), path, force=force)
-
-
-def _save_csv(found: RankedSet, path: Path, *, force: bool) -> None:
-    rows = rank_table(found)["features"]
-    with (
-        replacing(path, force=force) as fresh,
-        fresh.open("w", newline="", encoding="utf-8", errors="backslashreplace") as file,
-    ):
-        writer = csv.writer(file)
-        writer.writerow(rows[0])
-        writer.writerows([[safe_cell(value) for value in row.values()] for row in rows])
 
 
 # --- page

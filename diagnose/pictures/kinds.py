@@ -7,7 +7,7 @@ then is anything drawn.
 import difflib
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 from ...sim.output.recording import DataError
 from .envelope import envelope_panel
@@ -95,7 +95,7 @@ def plot_recording(view: View, kind: str = AUTO) -> Picture:
     panels, left_out = [], {}
     for name in KINDS:
         try:
-            panels.append(_computed(view, name))
+            panels.append(computed(KINDS[name], view))
         except LackError as lack:
             left_out[name] = str(lack)
     if not panels:
@@ -119,17 +119,20 @@ def make_panel(view: View, kind: str) -> Panel:
         hint = f"did you mean {near[0]!r}?" if near else f"must be of {', '.join((AUTO, *KINDS))}"
         raise DataError(f"kind = {kind!r} is not known; {hint}")
     try:
-        return _computed(view, kind)
+        return computed(KINDS[kind], view)
     except LackError as lack:
         raise DataError(f"{view.recording.source}: {kind} {lack}") from None
 
 
-def _computed(view: View, kind: str) -> Panel:
-    """A panel, or a LackError; what the features refuse is a lack of the recording too."""
+Shown = TypeVar("Shown")
+
+
+def computed(kind: Callable[[View], Shown], view: View) -> Shown:
+    """What a kind shows; what the features refuse is a lack of the recording too."""
     if not view.traces:
         raise LackError("needs a channel beside the tacho, has 0; record one")
     try:
-        return KINDS[kind](view)
+        return kind(view)
     except LackError:
         raise
     except ValueError as error:

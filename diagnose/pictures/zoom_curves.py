@@ -21,7 +21,7 @@ from ...features.catalogue.curves import (
 from ...features.signal.envelope import envelope_span, kurtogram, kurtogram_levels
 from ...sim.output.recording import DataError
 from ..pages.page import short_name, visible
-from .kinds import AUTO
+from .kinds import AUTO, computed
 from .orbit import probe_pairs, shown_samples
 from .panel import LackError
 from .view import Trace, Turning, View, thinned
@@ -109,7 +109,7 @@ def zoom_curves(view: View, kind: str = AUTO) -> tuple[list[ZoomCurve], dict[str
     view, left_out = _first_channels(view)
     for name in ZOOM_KINDS if kind == AUTO else (kind,):
         try:
-            curves += _computed(view, name)
+            curves += computed(ZOOM_KINDS[name], view)
         except LackError as lack:
             left_out[name] = str(lack)
     if not curves:
@@ -125,18 +125,6 @@ def _first_channels(view: View) -> tuple[View, dict[str, str]]:
         return view, {}
     lack = f"{MOST_CHANNELS + 1} to {len(names)} have no room; name the channels to draw"
     return replace(view, channels=names[:MOST_CHANNELS]), {"channels": lack}
-
-
-def _computed(view: View, kind: str) -> list[ZoomCurve]:
-    """Curves of one kind, or a LackError."""
-    if not view.traces:
-        raise LackError("needs a channel beside the tacho, has 0; record one")
-    try:
-        return ZOOM_KINDS[kind](view)
-    except LackError:
-        raise
-    except ValueError as error:
-        raise LackError(f"cannot be computed: {error}") from error
 
 
 def _waveforms(view: View) -> list[ZoomCurve]:

@@ -1,13 +1,11 @@
 """A sweep in words, as a table for a terminal, as plain values and as CSV."""
 
-import csv
 import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from ...datasets.file.csv_cells import safe_cell
-from ...sim.atomic import replacing
+from ...datasets.file.csv_cells import save_rows
 from ..pages.si_text import plain, si_text
 from .axes import Point
 from .sweep import Row, Sweep
@@ -255,15 +253,10 @@ def save_csv(sweep: Sweep, path: Path, *, force: bool = True) -> None:
     """
     plan = sweep.plan
     names = [each.name for each in plan.shown]
-    with (
-        replacing(path, force=force) as fresh,
-        fresh.open("w", newline="", encoding="utf-8") as handle,
-    ):
-        writer = csv.writer(handle)
-        head = [axis.path for axis in plan.axes]
-        writer.writerow([*head, "start", "seed", "start_angle_rad", "fault", *names])
-        for (point, start), run in sweep.outcomes.items():
-            places = [axis.values[i] for axis, i in zip(plan.axes, point, strict=True)]
-            known = [run.quantities[n][0] if n in run.quantities else "" for n in names]
-            about = [start, plan.number(start), plan.angle(start), safe_cell(run.fault)]
-            writer.writerow([*places, *about, *known])
+    head = [*(axis.path for axis in plan.axes), "start", "seed", "start_angle_rad", "fault", *names]
+    rows: list[list[Any]] = []
+    for (point, start), run in sweep.outcomes.items():
+        places = [axis.values[i] for axis, i in zip(plan.axes, point, strict=True)]
+        known = [run.quantities[n][0] if n in run.quantities else "" for n in names]
+        rows.append([*places, start, plan.number(start), plan.angle(start), run.fault, *known])
+    save_rows(path, head, rows, force=force)

@@ -9,7 +9,7 @@ import json
 import math
 import zipfile
 import zlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -216,6 +216,45 @@ def checked(kind: type[Table], table: Mapping[str, Any], path: str | Path, name:
         first = error.errors(include_url=False, include_input=False)[0]
         place = ".".join(str(part) for part in first["loc"]) or "table"
         raise ModelError(f"{path}: {name}: {place}: {first['msg']}; retrain it") from error
+
+
+Model = TypeVar("Model")
+Structure = TypeVar("Structure", bound=BaseModel)
+
+
+def load_parts(
+    path: str | Path,
+    kind: str,
+    card_type: type[Table],
+    structure_type: type[Structure],
+    assembled: Callable[[Structure, Mapping[str, NDArray[Any]], Table], Model],
+) -> Model:
+    """Model of a file, its tables checked; whether its parts fit each other is not known yet.
+
+    Raises
+    ------
+    ModelError
+        As of :func:`load_bundle` and :func:`checked`, or a part is missing.
+    """
+    bundle = load_bundle(path, kind)
+    card = checked(card_type, bundle.card, path, _CARD)
+    structure = checked(structure_type, bundle.structure, path, _STRUCTURE)
+    try:
+        return assembled(structure, bundle.arrays, card)
+    except (KeyError, TypeError, ValueError) as error:
+        raise ModelError(f"{path}: {_ARRAYS} cannot be read ({error}); retrain it") from error
+
+
+def refuse_misfits(fits: Mapping[str, bool], features: int, path: str | Path) -> None:
+    """Refuse a model of whose parts any does not fit; its file may be forged.
+
+    Raises
+    ------
+    ModelError
+    """
+    bad = [name for name, good in fits.items() if not good]
+    if bad:
+        raise ModelError(f"{path}: {', '.join(bad)} do not fit {features} features; retrain it")
 
 
 _FAULTS = (

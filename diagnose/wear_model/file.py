@@ -33,7 +33,7 @@ from .arrays import (
     shapes_of,
     spreads_fit,
 )
-from .bundle import Bundle, checked, load_bundle, save_bundle
+from .bundle import Bundle, checked, load_parts, refuse_misfits, save_bundle
 from .estimate import ModelError, WearModel
 from .novelty import Familiarity
 
@@ -98,13 +98,7 @@ def load_model(path: str | Path) -> WearModel:
     >>> load_model("pump.wsm").mode
     'cold'
     """
-    bundle = load_bundle(path, _KIND)
-    card = checked(ModelCard, bundle.card, path, "card.json")
-    structure = checked(_Structure, bundle.structure, path, "structure.json")
-    try:
-        model = _model_of(structure, bundle.arrays, card)
-    except (KeyError, TypeError, ValueError) as error:
-        raise ModelError(f"{path}: arrays.npz cannot be read ({error}); retrain it") from error
+    model = load_parts(path, _KIND, ModelCard, _Structure, _model_of)
     _check_structure(model, path)
     return model
 
@@ -308,9 +302,7 @@ def _check_structure(model: WearModel, path: str | Path) -> None:
         "levels": _levels_fit(model.levels, len(level_channels(names)), shapes.shape[1]),
         "numbers": numbers_fit(_arrays_of(model)),
     }
-    bad = [name for name, good in fits.items() if not good]
-    if bad:
-        raise ModelError(f"{path}: {', '.join(bad)} do not fit {n} features; retrain it")
+    refuse_misfits(fits, n, path)
 
 
 def _heads_fit(heads: Sequence[Head], names: Sequence[str], n: int) -> bool:

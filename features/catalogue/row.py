@@ -173,6 +173,13 @@ def feature_names(
         impact=impact,
         settings=settings,
     )
+    return layout_names(layout, feature_set, only)
+
+
+def layout_names(
+    layout: Layout, feature_set: SetName = "complete", only: Sequence[str] | None = None
+) -> tuple[str, ...]:
+    """As :func:`feature_names`, of what a recording offers."""
     return _plan(layout, feature_set, _wanted(only)).names
 
 

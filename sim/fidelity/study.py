@@ -264,7 +264,7 @@ def written_rung(effect: Effect, scene: Scene) -> Rung:
 
 
 def _has(scene: Scene, path: str, value: Any) -> bool:
-    own = _effective_step(scene) if path == "numerics.step" else _value_at(scene, path)
+    own = default_step(scene) if path == "numerics.step" else _value_at(scene, path)
     if isinstance(value, float) and own is not None:
         return math.isclose(own, value, rel_tol=_SAME)
     return bool(own == value)
@@ -277,7 +277,7 @@ def _value_at(scene: Scene, path: str) -> Any:
     return node
 
 
-def _effective_step(scene: Scene) -> float | None:
+def default_step(scene: Scene) -> float | None:
     """Step that a scene runs with [s]; None of a machine without."""
     step = machine_of(scene).step
     return None if step is None else step(scene)

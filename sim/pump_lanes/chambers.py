@@ -11,43 +11,18 @@ from ..pump.hydraulics import (
     valve_shares,
 )
 from ..pump.slider_crank import WITH_VAPOUR, breathe
+from .fields import fields_of, put_fields
 from .rates import CHAMBER_COLUMNS, LANES, PISTON_X, ChamberLane
 
 
 @kernel
 def _chamber_of(p: Any, lane: int) -> Any:
-    a = p.chamber
-    return ChamberLane(
-        a[0, lane],
-        a[1, lane],
-        a[2, lane],
-        a[3, lane],
-        a[4, lane],
-        a[5, lane],
-        a[6, lane],
-        a[7, lane],
-        a[8, lane],
-        a[9, lane],
-    )
+    return fields_of(ChamberLane, p.chamber, lane)
 
 
 @kernel
 def _side_of(p: Any, side: int, lane: int) -> Any:
-    a = p.valve
-    return ValveSide(
-        a[side, 0, lane],
-        a[side, 1, lane],
-        a[side, 2, lane],
-        a[side, 3, lane],
-        a[side, 4, lane],
-        a[side, 5, lane],
-        a[side, 6, lane],
-        a[side, 7, lane],
-        a[side, 8, lane],
-        a[side, 9, lane],
-        a[side, 10, lane],
-        a[side, 11, lane],
-    )
+    return fields_of(ValveSide, p.valve[side], lane)
 
 
 @kernel
@@ -66,7 +41,7 @@ def enter_chamber(lane: int, p: Any, s: Any, a: Any) -> None:
     """Begin the chamber of a throw in its lane."""
     for side in range(2):
         shares = valve_shares(implicit_part(p.step[lane]), _side_of(p, side, lane))
-        p.share[side, 0, lane], p.share[side, 1, lane], p.share[side, 2, lane] = shares
+        put_fields(p.share[side], lane, shares)
     for c in range(CHAMBER_COLUMNS):
         s.chamber[c, lane] = a.chambers[lane, c]
 
@@ -106,9 +81,7 @@ def _side_by_side(p: Any, s: Any) -> None:
             x,
             v,
         )
-        s.chamber[0, lane], s.chamber[1, lane], s.chamber[2, lane] = now[0], now[1], now[2]
-        s.chamber[3, lane], s.chamber[4, lane], s.chamber[5, lane] = now[3], now[4], now[5]
-        s.chamber[6, lane], s.chamber[7, lane] = x, v
+        put_fields(s.chamber, lane, (*now, x, v))
         s.pressure[0, lane], s.pressure[1, lane] = now[0], 2.0 * now[0] - before[0, lane]
         s.flow[0, lane], s.flow[1, lane] = f_s, f_d
         s.sure[lane], s.choked[lane] = (1.0 if sure else 0.0), 0.0

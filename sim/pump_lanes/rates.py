@@ -53,6 +53,7 @@ from ..pump.throw_motion import (
     seal_drag,
     wrist_offset,
 )
+from .fields import fields_of, put_fields
 
 DRY, SHORT_FILM, MAPPED_FILM = range(3)
 """What is in the eyes of the crank pins."""
@@ -267,50 +268,12 @@ sees that what it writes is not what it reads."""
 
 @kernel
 def _throw_of(p: Any, lane: int) -> Any:
-    a = p.throw
-    return ThrowLane(
-        a[0, lane],
-        a[1, lane],
-        a[2, lane],
-        a[3, lane],
-        a[4, lane],
-        a[5, lane],
-        a[6, lane],
-        a[7, lane],
-        a[8, lane],
-        a[9, lane],
-        a[10, lane],
-        a[11, lane],
-        a[12, lane],
-        a[13, lane],
-        a[14, lane],
-        a[15, lane],
-        a[16, lane],
-        a[17, lane],
-        a[18, lane],
-        a[19, lane],
-        a[20, lane],
-    )
+    return fields_of(ThrowLane, p.throw, lane)
 
 
 @kernel
 def _contact_of(p: Any, j: int, lane: int) -> Any:
-    a = p.contact
-    return ContactLane(
-        a[j, 0, lane],
-        a[j, 1, lane],
-        a[j, 2, lane],
-        a[j, 3, lane],
-        a[j, 4, lane],
-        a[j, 5, lane],
-        a[j, 6, lane],
-        a[j, 7, lane],
-        a[j, 8, lane],
-        a[j, 9, lane],
-        a[j, 10, lane],
-        a[j, 11, lane],
-        a[j, 12, lane],
-    )
+    return fields_of(ContactLane, p.contact[j], lane)
 
 
 @kernel
@@ -336,26 +299,12 @@ def _as_told(c: Any, plain: bool) -> Any:
 @kernel
 def machine_of_lane(p: Any, lane: int) -> Any:
     """What the throws of the record in a lane share."""
-    a = p.machine
-    return Machine(
-        a[0, lane],
-        a[1, lane],
-        a[2, lane],
-        a[3, lane],
-        a[4, lane],
-        a[5, lane],
-        a[6, lane],
-        a[7, lane],
-        a[8, lane],
-    )
+    return fields_of(Machine, p.machine, lane)
 
 
 @kernel
 def _liquid_of(p: Any, lane: int) -> Any:
-    a = p.liquid
-    return LiquidLane(
-        a[0, lane], a[1, lane], a[2, lane], a[3, lane], a[4, lane], a[5, lane], a[6, lane]
-    )
+    return fields_of(LiquidLane, p.liquid, lane)
 
 
 @kernel
@@ -445,69 +394,22 @@ def _in_crankpin(p: Any, s: Any, plain: bool) -> None:
         )
         s.margin[0, lane], s.approach[0, lane] = touch.margin, touch.approach
         s.overlap[0, lane], s.normal[lane] = touch.overlap, touch.normal
-        s.pin[0, lane], s.pin[1, lane], s.pin[2, lane], s.pin[3, lane] = pin
+        put_fields(s.pin, lane, pin)
 
 
 @kernel
 def _oil_of(p: Any, lane: int) -> Any:
-    a = p.oil
-    return OilLane(
-        a[0, lane],
-        a[1, lane],
-        a[2, lane],
-        a[3, lane],
-        a[4, lane],
-        a[5, lane],
-        a[6, lane],
-        a[7, lane],
-        a[8, lane],
-        a[9, lane],
-        a[10, lane],
-        a[11, lane],
-        a[12, lane],
-        a[13, lane],
-        a[14, lane],
-        a[15, lane],
-        a[16, lane],
-    )
+    return fields_of(OilLane, p.oil, lane)
 
 
 @kernel
 def _film_pull_of(s: Any, lane: int) -> Any:
-    a = s.pull
-    return FilmPull(
-        a[0, lane],
-        a[1, lane],
-        a[2, lane],
-        a[3, lane],
-        a[4, lane],
-        a[5, lane],
-        a[6, lane],
-        a[7, lane],
-        a[8, lane],
-        a[9, lane],
-        a[10, lane],
-        a[11, lane],
-        a[12, lane],
-    )
+    return fields_of(FilmPull, s.pull, lane)
 
 
 @kernel
 def _map_place_of(s: Any, lane: int) -> Any:
-    a = s.place
-    return MapPlace(
-        a[0, lane],
-        a[1, lane],
-        a[2, lane],
-        a[3, lane],
-        a[4, lane],
-        a[5, lane],
-        a[6, lane],
-        a[7, lane],
-        a[8, lane],
-        a[9, lane],
-        a[10, lane],
-    )
+    return fields_of(MapPlace, s.place, lane)
 
 
 @kernel
@@ -530,7 +432,7 @@ def _look_into_films(p: Any, s: Any) -> None:
             s.turned[2, lane],
             s.turned[3, lane],
         )
-        s.apart[0, lane], s.apart[1, lane], s.apart[2, lane], s.apart[3, lane] = d_x, d_y, v_x, v_y
+        put_fields(s.apart, lane, (d_x, d_y, v_x, v_y))
         s.overlap[0, lane] = math.sqrt(d_x * d_x + d_y * d_y) - c.clearance
         s.gap[lane] = film_gap(s.film[0, lane], s.film[1, lane], c)
         s.rough[0, lane] = s.rough[1, lane] = 0.0
@@ -557,19 +459,7 @@ def _pull_films(p: Any, s: Any) -> None:
             _contact_of(p, 0, lane),
             _oil_of(p, lane),
         )
-        s.pull[0, lane] = found[0]
-        s.pull[1, lane] = found[1]
-        s.pull[2, lane] = found[2]
-        s.pull[3, lane] = found[3]
-        s.pull[4, lane] = found[4]
-        s.pull[5, lane] = found[5]
-        s.pull[6, lane] = found[6]
-        s.pull[7, lane] = found[7]
-        s.pull[8, lane] = found[8]
-        s.pull[9, lane] = found[9]
-        s.pull[10, lane] = found[10]
-        s.pull[11, lane] = found[11]
-        s.pull[12, lane] = found[12]
+        put_fields(s.pull, lane, found)
         s.settled[lane] = 0.0
 
 
@@ -601,25 +491,14 @@ def _squeeze_mapped(p: Any, s: Any, maps: Any, damped: float) -> None:
     for lane in range(LANES):
         f, o = _film_pull_of(s, lane), _oil_of(p, lane)
         found = map_place(o, o.roots, o.angles, f.x, f.y, s.squeeze[0, lane], s.squeeze[1, lane])
-        s.place[0, lane] = found[0]
-        s.place[1, lane] = found[1]
-        s.place[2, lane] = found[2]
-        s.place[3, lane] = found[3]
-        s.place[4, lane] = found[4]
-        s.place[5, lane] = found[5]
-        s.place[6, lane] = found[6]
-        s.place[7, lane] = found[7]
-        s.place[8, lane] = found[8]
-        s.place[9, lane] = found[9]
-        s.place[10, lane] = found[10]
+        put_fields(s.place, lane, found)
     for lane in range(LANES):
         if s.settled[lane] == 0.0 and p.oil[_MAP, lane] > 0.0:
             o, m = _oil_of(p, lane), _map_place_of(s, lane)
             begin, roots, angles = int(o.offset), int(o.roots), int(o.angles)
             c = maps[begin : begin + 3 * roots * angles].reshape(3, roots, angles)
             found = map_patches(c[RADIAL], c[TANGENTIAL], m.i, m.j, m.p, m.q)
-            s.patch[0, lane], s.patch[1, lane] = found[0], found[1]
-            s.patch[2, lane], s.patch[3, lane] = found[2], found[3]
+            put_fields(s.patch, lane, found)
     for lane in range(LANES):
         o = _oil_of(p, lane)
         xx, xy, yx, yy = map_tensor(
@@ -656,7 +535,7 @@ def _load_films(p: Any, s: Any) -> None:
             _contact_of(p, 0, lane),
             _oil_of(p, lane),
         )
-        s.pin[0, lane], s.pin[1, lane], s.pin[2, lane], s.pin[3, lane] = x, y, on_pin, on_eye
+        put_fields(s.pin, lane, (x, y, on_pin, on_eye))
         s.film_rate[0, lane], s.film_rate[1, lane] = rate_x, rate_y
         s.carried[lane], s.normal[lane] = peaks, math.sqrt(x * x + y * y)
 
@@ -703,7 +582,7 @@ def _in_wristpin(p: Any, s: Any, plain: bool) -> None:
         )
         s.margin[1, lane], s.approach[1, lane] = touch.margin, touch.approach
         s.overlap[1, lane], s.normal[lane] = touch.overlap, max(s.normal[lane], touch.normal)
-        s.wrist[0, lane], s.wrist[1, lane], s.wrist[2, lane], s.wrist[3, lane] = pin
+        put_fields(s.wrist, lane, pin)
 
 
 @subroutine
@@ -776,8 +655,8 @@ def _accelerate(p: Any, s: Any) -> None:
     for lane in range(LANES):
         q, m, pose = _throw_of(p, lane), machine_of_lane(p, lane), _pose_of(s, lane)
         sin_b, cos_b, inv_px = s.turned[2, lane], s.turned[3, lane], q.inverse_piston_along
-        pin = PinLoad(s.pin[0, lane], s.pin[1, lane], s.pin[2, lane], s.pin[3, lane])
-        wrist = PinLoad(s.wrist[0, lane], s.wrist[1, lane], s.wrist[2, lane], s.wrist[3, lane])
+        pin = fields_of(PinLoad, s.pin, lane)
+        wrist = fields_of(PinLoad, s.wrist, lane)
         guide_x, guide_y, guide_turn = s.guide[0, lane], s.guide[1, lane], s.guide[2, lane]
         on_face = -q.piston_area * s.pressed[lane]
         seal = seal_drag(pose.piston_x_rate, s.pressed[lane], q)
