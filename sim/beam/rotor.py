@@ -13,6 +13,7 @@ sparse      those nearest the shift, by Arnoldi's method on the factorised spars
 """
 
 import math
+from abc import ABC
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -372,8 +373,30 @@ class Rotor:
 # --- modes
 
 
+class _Vibrations(ABC):
+    """What complex eigenvalues tell [rad/s]."""
+
+    eigenvalues: Complex
+
+    @property
+    def frequency_hz(self) -> Vector:
+        """Damped, ``Im(lambda) / 2 pi`` [Hz]."""
+        return self.eigenvalues.imag / (2 * math.pi)
+
+    @property
+    def undamped_frequency_hz(self) -> Vector:
+        """``|lambda| / 2 pi`` [Hz]."""
+        return np.abs(self.eigenvalues) / (2 * math.pi)
+
+    @property
+    def damping_ratio(self) -> Vector:
+        """``-Re(lambda) / |lambda|``; negative where the motion grows, 0 for a rigid motion."""
+        size = np.abs(self.eigenvalues)
+        return -self.eigenvalues.real / np.where(size > 0, size, 1.0)
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
-class RotorModes:
+class RotorModes(_Vibrations):
     """Free vibrations ``q = Re(shape exp(lambda t))`` of a rotor at one speed.
 
     Attributes
@@ -402,22 +425,6 @@ class RotorModes:
     real_eigenvalues: Vector
 
     __repr__ = brief("speed", "frequency_hz", "stable")
-
-    @property
-    def frequency_hz(self) -> Vector:
-        """Damped, ``Im(lambda) / 2 pi`` [Hz]."""
-        return self.eigenvalues.imag / (2 * math.pi)
-
-    @property
-    def undamped_frequency_hz(self) -> Vector:
-        """``|lambda| / 2 pi`` [Hz]."""
-        return np.abs(self.eigenvalues) / (2 * math.pi)
-
-    @property
-    def damping_ratio(self) -> Vector:
-        """``-Re(lambda) / |lambda|``; negative where the motion grows, 0 for a rigid motion."""
-        size = np.abs(self.eigenvalues)
-        return -self.eigenvalues.real / np.where(size > 0, size, 1.0)
 
     @property
     def log_decrement(self) -> Vector:
@@ -765,7 +772,7 @@ def _forward_share(rotor: Rotor, forward: Complex, backward: Complex) -> Vector:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Campbell:
+class Campbell(_Vibrations):
     """Modes of a rotor followed over its speed.
 
     Attributes
@@ -793,22 +800,6 @@ class Campbell:
     lost_at: Vector
 
     __repr__ = brief("speeds", "frequency_hz")
-
-    @property
-    def frequency_hz(self) -> Vector:
-        """Damped [Hz]."""
-        return self.eigenvalues.imag / (2 * math.pi)
-
-    @property
-    def undamped_frequency_hz(self) -> Vector:
-        """``|lambda| / 2 pi`` [Hz]."""
-        return np.abs(self.eigenvalues) / (2 * math.pi)
-
-    @property
-    def damping_ratio(self) -> Vector:
-        """``-Re(lambda) / |lambda|``."""
-        size = np.abs(self.eigenvalues)
-        return -self.eigenvalues.real / np.where(size > 0, size, 1.0)
 
     @property
     def direction(self) -> tuple[tuple[str, ...], ...]:

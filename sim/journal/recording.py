@@ -20,6 +20,7 @@ from ..output.track import track_under
 from ..scene.journal import JournalLoad, JournalScene
 from ..scene.parts import Scene, SceneError
 from ..scene.recorded import failed, recorded
+from ..scene.sampling import duration_faults, memory_faults, tacho_faults
 from .orbit import (
     FilmTrace,
     Load,
@@ -46,7 +47,6 @@ Numerics = dict[str, float | int | str]
 _FEWEST_PER_TURN = 8
 """Samples a revolution: three orders of the orbit below half the sample rate, and a margin."""
 
-_MEMORY = 4e9  # byte, what one run may take: a data set runs one on every core
 _BYTES_PER_SAMPLE = 40 * 8  # states, forces, loads and two passes over the channels
 
 _STATUS = {
@@ -336,30 +336,16 @@ def check_journal(scene: Scene) -> None:
 
 def _sampling_faults(scene: JournalScene) -> list[str]:
     revolution = 1 / scene.drive.speed
-    faults = []
-    if scene.duration < revolution:
-        faults.append(
-            f"duration = {scene.duration:g} s must be >= one revolution = {revolution:g} s; "
-            "record longer"
-        )
+    faults = duration_faults(scene, revolution)
     if scene.sample_rate * revolution < _FEWEST_PER_TURN:
         faults.append(
             f"sample_rate = {scene.sample_rate:g} Hz must be >= "
             f"{_FEWEST_PER_TURN / revolution:g} Hz, {_FEWEST_PER_TURN} samples a revolution; raise "
             "it"
         )
-    if scene.tacho and scene.tacho.pulse_width / math.tau * revolution < 2 / scene.sample_rate:
-        faults.append(
-            f"tacho.pulse_width = {scene.tacho.pulse_width:g} rad must last >= 2 samples; "
-            "widen the pulse or raise sample_rate"
-        )
+    faults += tacho_faults(scene, revolution)
     needed = _Plan(scene).n_all * _BYTES_PER_SAMPLE
-    if needed > _MEMORY:
-        faults.append(
-            f"duration = {scene.duration:g} s at sample_rate = {scene.sample_rate:g} Hz needs "
-            f"{needed / 1e9:.3g} GB, must be <= {_MEMORY / 1e9:g} GB; shorten it or lower the rate"
-        )
-    return faults
+    return faults + memory_faults(scene, needed)
 
 
 class _Plan:

@@ -18,7 +18,7 @@ from ..output.sensor import (
     mounting_poles,
 )
 from ..output.status import SimulationError, Status
-from ..scene.exciters import exciter_faults
+from ..scene.exciters import pushing_faults
 from ..scene.parts import Accelerometer, CasingMode, Scene, SceneError, specific_key
 from ..scene.pump import (
     CRANK_PLACES,
@@ -30,6 +30,7 @@ from ..scene.pump import (
 )
 from ..scene.pump_hydraulics import BREATHING_RUNGS
 from ..scene.recorded import failed, recorded
+from ..scene.sampling import MEMORY, duration_faults, memory_faults, tacho_faults
 from .casing import (
     CasingModes,
     Decimation,
@@ -63,7 +64,6 @@ from .slider_crank import (
 from .tearing import lowest_under_pull, torn_by_pull
 from .validity import FEWEST_STEPS, MOST_STEPS, joint_faults, knock_limits, limits, pump_step
 
-_MEMORY = 4e9  # byte, what one run may take: a data set runs one on every core
 _BYTES_PER_STEP = 3 * 10 * 8  # of one throw: forces and chamber as doubles, two passes over them
 
 _AT_ONCE = 9216  # steps that are gathered at once: they stay in the processor's cache
@@ -234,28 +234,12 @@ def _at_rest(pump: PumpScene, seed: int, truth: bool) -> Recording:
 
 def _rest_faults(scene: PumpScene) -> list[str]:
     needed = scene.duration * scene.sample_rate * FEWEST_STEPS * _BYTES_PER_STEP
-    if needed <= _MEMORY:
-        return _pushing_faults(scene)
-    return [
-        f"duration = {scene.duration:g} s at sample_rate = {scene.sample_rate:g} Hz needs "
-        f"{needed / 1e9:.3g} GB, must be <= {_MEMORY / 1e9:g} GB; shorten it or lower the rate",
-        *_pushing_faults(scene),
-    ]
+    return [*memory_faults(scene, needed), *pushing_faults(scene, scene.exciters)]
 
 
 def _refuse(scene: PumpScene, faults: list[str]) -> None:
     if faults:
         raise SceneError(scene.name, faults)
-
-
-def _pushing_faults(scene: PumpScene) -> list[str]:
-    return [
-        fault
-        for i, part in enumerate(scene.exciters)
-        for fault in exciter_faults(
-            f"exciters.{i}", part, duration=scene.duration, sample_rate=scene.sample_rate
-        )
-    ]
 
 
 class RunPlan:
@@ -371,35 +355,26 @@ def _size_fault(scene: PumpScene, steps: float) -> str | None:
     time = scene.duration + scene.settling_revolutions / scene.drive.speed
     per_step = _BYTES_PER_STEP * len(scene.throws)
     needed = time * scene.sample_rate * max(steps, FEWEST_STEPS) * per_step
-    if needed <= _MEMORY:
+    if needed <= MEMORY:
         return None
     return (
         f"duration = {scene.duration:g} s at sample_rate = {scene.sample_rate:g} Hz with "
         f"{max(steps, FEWEST_STEPS):.0f} steps a sample needs {needed / 1e9:.3g} GB, must be <= "
-        f"{_MEMORY / 1e9:g} GB; shorten duration or settling_revolutions, lower sample_rate, "
+        f"{MEMORY / 1e9:g} GB; shorten duration or settling_revolutions, lower sample_rate, "
         "lengthen numerics.step, or raise a joint's speed_floor or restitution_speed"
     )
 
 
 def _sampling_faults(scene: PumpScene) -> list[str]:
     revolution = 1 / scene.drive.speed
-    faults = _pushing_faults(scene)
-    if scene.duration < revolution:
-        faults.append(
-            f"duration = {scene.duration:g} s must be >= one revolution = {revolution:g} s; "
-            "record longer"
-        )
+    faults = pushing_faults(scene, scene.exciters)
+    faults += duration_faults(scene, revolution)
     if scene.duration * scene.sample_rate < 2:
         faults.append(
             f"duration = {scene.duration:g} s must be >= 2 samples = {2 / scene.sample_rate:g} s; "
             "raise sample_rate or record longer"
         )
-    if scene.tacho and scene.tacho.pulse_width / (2 * math.pi) * revolution < 2 / scene.sample_rate:
-        faults.append(
-            f"tacho.pulse_width = {scene.tacho.pulse_width:g} rad must last >= 2 samples; "
-            "widen the pulse or raise sample_rate"
-        )
-    return faults
+    return faults + tacho_faults(scene, revolution)
 
 
 # --- casing

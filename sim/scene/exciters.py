@@ -4,7 +4,7 @@ Where it pushes is of the machine: :mod:`.scene.shaft`, :mod:`.scene.pump`. The 
 in :mod:`.excitation.forces`.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
@@ -21,6 +21,7 @@ from .parts import (
     Length,
     Part,
     Ratio,
+    Scene,
     Time,
 )
 
@@ -124,6 +125,16 @@ def force_channel(part: Exciter, place: str, direction: str) -> Channel:
     'force [N]'
     """
     return Channel(name=part.name, unit="N", quantity="force", place=place, direction=direction)
+
+
+def pushing_faults(scene: Scene, exciters: Sequence[Exciter]) -> list[str]:
+    """What of a scene's exciters does not go with its recording, as :func:`exciter_faults`."""
+    times = {"duration": scene.duration, "sample_rate": scene.sample_rate}
+    return [
+        fault
+        for i, part in enumerate(exciters)
+        for fault in exciter_faults(f"exciters.{i}", part, **times)
+    ]
 
 
 def exciter_faults(

@@ -19,7 +19,6 @@ from .parts import (
     FORCE_MOST,
     GAIN_LEAST,
     GAIN_MOST,
-    GRAVITY_MOST,
     HEAVIEST,
     LIGHTEST,
     LONGEST,
@@ -33,11 +32,11 @@ from .parts import (
     START_ANGLE,
     STIFFEST,
     VISCOSITY,
-    Acceleration,
     Angle,
     ConditionPlace,
     Damping,
     Force,
+    Gravity,
     Length,
     Mass,
     Numerics,
@@ -53,6 +52,8 @@ from .parts import (
     Velocity,
     Wear,
     WearPlace,
+    displacement_channel,
+    faults_between,
     name_faults,
 )
 
@@ -344,12 +345,7 @@ class JournalScene(Scene):
     )
 
     machine: Literal["journal-bearing"] = Field(description="journal-bearing")
-    gravity: Acceleration = Field(
-        default=STANDARD_GRAVITY,
-        ge=0,
-        le=GRAVITY_MOST,
-        description="0 where weight does not act across the shaft",
-    )
+    gravity: Gravity = STANDARD_GRAVITY
     settling_revolutions: int = Field(
         default=3, ge=0, le=1000, description="run before the recording; 0: it begins at the start"
     )
@@ -368,14 +364,7 @@ class JournalScene(Scene):
     def sensor_channels(self) -> tuple[Channel, ...]:
         """One channel of displacement for every probe."""
         return tuple(
-            Channel(
-                name=probe.name,
-                unit="m",
-                quantity="displacement",
-                place=probe.place,
-                direction=probe.direction,
-            )
-            for probe in self.sensors
+            displacement_channel(probe.name, probe.place, probe.direction) for probe in self.sensors
         )
 
     def sensor_parts(self) -> tuple[ProximityProbe, ...]:
@@ -389,12 +378,7 @@ class JournalScene(Scene):
             (_channel_faults, ("sensors", "tacho")),
             (_film_faults, ("film", "bearing")),
         )
-        return [
-            fault
-            for check, needs in checks
-            if all(need in parts for need in needs)
-            for fault in check(*(parts[need] for need in needs))
-        ]
+        return faults_between(parts, checks)
 
 
 def _channel_faults(sensors: tuple[ProximityProbe, ...], tacho: Tacho | None) -> list[str]:

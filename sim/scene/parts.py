@@ -8,7 +8,7 @@ import difflib
 import math
 import re
 import reprlib
-from collections.abc import Container, Mapping, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from contextlib import suppress
 from decimal import Decimal
 from functools import lru_cache
@@ -255,6 +255,12 @@ Frequency = Annotated[float, _parser("frequency"), Dimension("frequency")]
 Angle = Annotated[float, _parser("angle"), Dimension("angle")]
 Pressure = Annotated[float, _parser("pressure"), Dimension("pressure")]
 Acceleration = Annotated[float, _parser("acceleration"), Dimension("acceleration")]
+Gravity = Annotated[
+    float,
+    Field(ge=0, le=GRAVITY_MOST, description="0 where weight does not act across the shaft"),
+    _parser("acceleration"),
+    Dimension("acceleration"),
+]
 Velocity = Annotated[float, _parser("velocity"), Dimension("velocity")]
 Inertia = Annotated[float, _parser("inertia"), Dimension("inertia")]
 Stiffness = Annotated[float, _parser("stiffness"), Dimension("stiffness")]
@@ -824,6 +830,30 @@ def channels_of(scene: Scene) -> tuple[Channel, ...]:
     if scene.tacho is None:
         return sensors
     return (*sensors, Channel(name=scene.tacho.name, unit="V", quantity="tacho"))
+
+
+def faults_between(
+    parts: Mapping[str, Any], checks: Sequence[tuple[Callable[..., list[str]], tuple[str, ...]]]
+) -> list[str]:
+    """Faults between parts, by those checks whose parts are all there."""
+    return [
+        fault
+        for check, needs in checks
+        if all(need in parts for need in needs)
+        for fault in check(*(parts[need] for need in needs))
+    ]
+
+
+def acceleration_channel(name: str, place: str, direction: str) -> Channel:
+    """Channel of an accelerometer: where it sits, and which way it measures."""
+    return Channel(
+        name=name, unit="m/s^2", quantity="acceleration", place=place, direction=direction
+    )
+
+
+def displacement_channel(name: str, place: str, direction: str) -> Channel:
+    """Channel of a proximity probe: where it sits, and which way it measures."""
+    return Channel(name=name, unit="m", quantity="displacement", place=place, direction=direction)
 
 
 def name_faults(sensors: Sequence[str], tacho: Tacho | None) -> list[str]:

@@ -14,7 +14,6 @@ from .parts import (
     ANGLE_MOST,
     DAMPING_MOST,
     FORCE_MOST,
-    GRAVITY_MOST,
     HEAVIEST,
     INERTIA_LEAST,
     INERTIA_MOST,
@@ -27,7 +26,6 @@ from .parts import (
     STANDARD_GRAVITY,
     START_ANGLE,
     STIFFEST,
-    Acceleration,
     Accelerometer,
     Angle,
     Casing,
@@ -35,6 +33,7 @@ from .parts import (
     Damping,
     Force,
     FrfFile,
+    Gravity,
     HertzStiffness,
     Inertia,
     Length,
@@ -51,6 +50,8 @@ from .parts import (
     Velocity,
     Wear,
     WearPlace,
+    acceleration_channel,
+    faults_between,
     merged,
     name_faults,
     nearest,
@@ -521,12 +522,7 @@ class PumpScene(Scene):
     )
 
     machine: Literal["reciprocating-pump"] = Field(description="reciprocating-pump")
-    gravity: Acceleration = Field(
-        default=STANDARD_GRAVITY,
-        ge=0,
-        le=GRAVITY_MOST,
-        description="0 where weight does not act across the shaft",
-    )
+    gravity: Gravity = STANDARD_GRAVITY
     stroke_inclination: Angle = Field(
         default=0.0, ge=-math.tau, le=math.tau, description="0 horizontal, 90 deg piston up"
     )
@@ -561,13 +557,7 @@ class PumpScene(Scene):
     def sensor_channels(self) -> tuple[Channel, ...]:
         """Acceleration of every axis of every accelerometer, then test forces, then pressures."""
         accelerations = tuple(
-            Channel(
-                name=sensor.name,
-                unit="m/s^2",
-                quantity="acceleration",
-                place=sensor.place,
-                direction=sensor.direction,
-            )
+            acceleration_channel(sensor.name, sensor.place, sensor.direction)
             for sensor in self.accelerometers
         )
         forces = tuple(
@@ -617,12 +607,7 @@ class PumpScene(Scene):
             (_exciter_faults, ("casing", "sensors", "exciters")),
             (_rest_faults, ("running", "exciters", "fidelity")),
         )
-        return [
-            fault
-            for check, needs in checks
-            if all(need in parts for need in needs)
-            for fault in check(*(parts[need] for need in needs))
-        ]
+        return faults_between(parts, checks)
 
 
 def _merged_throw(scene: Mapping[str, Any], throw: Any) -> Any:

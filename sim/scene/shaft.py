@@ -22,7 +22,6 @@ from .parts import (
     FORCE_MOST,
     GAIN_LEAST,
     GAIN_MOST,
-    GRAVITY_MOST,
     HEAVIEST,
     INERTIA_MOST,
     LONGEST,
@@ -41,6 +40,7 @@ from .parts import (
     Density,
     Force,
     Frequency,
+    Gravity,
     Inertia,
     Length,
     Mass,
@@ -54,6 +54,9 @@ from .parts import (
     Tacho,
     Unbalance,
     WearPlace,
+    acceleration_channel,
+    displacement_channel,
+    faults_between,
     name_faults,
 )
 
@@ -506,12 +509,7 @@ class ShaftScene(Scene):
     )
 
     machine: Literal["propulsion-shaft"] = Field(description="propulsion-shaft")
-    gravity: Acceleration = Field(
-        default=STANDARD_GRAVITY,
-        ge=0,
-        le=GRAVITY_MOST,
-        description="0 where weight does not act across the shaft",
-    )
+    gravity: Gravity = STANDARD_GRAVITY
     settling_revolutions: int = Field(
         default=0, ge=0, le=1000, description="unused: the response is the settled one"
     )
@@ -545,22 +543,14 @@ class ShaftScene(Scene):
     def sensor_channels(self) -> tuple[Channel, ...]:
         """Accelerations of the housings, a displacement for every probe, then the test forces."""
         accelerations = tuple(
-            Channel(
-                name=sensor.name,
-                unit="m/s^2",
-                quantity="acceleration",
-                place=f"housing of {sensor.bearing}",
-                direction=DIRECTIONS[sensor.direction],
+            acceleration_channel(
+                sensor.name, f"housing of {sensor.bearing}", DIRECTIONS[sensor.direction]
             )
             for sensor in self.sensors
         )
         displacements = tuple(
-            Channel(
-                name=probe.name,
-                unit="m",
-                quantity="displacement",
-                place=probe.place or f"housing of {probe.bearing}",
-                direction=probe.direction,
+            displacement_channel(
+                probe.name, probe.place or f"housing of {probe.bearing}", probe.direction
             )
             for probe in self.probes
         )
@@ -582,12 +572,7 @@ class ShaftScene(Scene):
     @classmethod
     def cross_faults(cls, parts: Mapping[str, Any]) -> list[str]:
         """Faults between parts, of those parts that are there."""
-        return [
-            fault
-            for check, needs in _CHECKS
-            if all(need in parts for need in needs)
-            for fault in check(*(parts[need] for need in needs))
-        ]
+        return faults_between(parts, _CHECKS)
 
 
 def _channel_faults(

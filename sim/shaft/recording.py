@@ -24,9 +24,10 @@ from ..output.recording import Recorder, Recording
 from ..output.sensor import digitise
 from ..output.status import SimulationError, Status
 from ..output.track import track_under
-from ..scene.exciters import exciter_faults
+from ..scene.exciters import pushing_faults
 from ..scene.parts import Scene, SceneError
 from ..scene.recorded import failed, recorded
+from ..scene.sampling import duration_faults, memory_faults, tacho_faults
 from ..scene.shaft import (
     Coupling,
     ShaftAccelerometer,
@@ -60,7 +61,6 @@ Numerics = dict[str, float | int | str]
 _FEWEST_PER_TURN = 8
 """Samples a revolution: three orders below half the sample rate, and a margin."""
 
-_MEMORY = 4e9  # byte, what one run may take: a data set runs one on every core
 _BYTES_PER_SAMPLE = 200 * 8  # spectra of forces, states of a block, responses, channels
 
 _MOVED_WARNING = 0.3
@@ -872,7 +872,7 @@ def check_shaft(scene: Scene) -> None:
     >>> check_shaft(load_scene("propulsion-shaft"))
     """
     shaft = cast(ShaftScene, scene)
-    faults = [*_sampling_faults(shaft), *_pushing_faults(shaft)]
+    faults = [*_sampling_faults(shaft), *pushing_faults(shaft, shaft.exciters)]
     try:
         alignment_line(shaft)
         faults += element_faults(shaft)
@@ -882,24 +882,9 @@ def check_shaft(scene: Scene) -> None:
         raise SceneError(shaft.name, faults)
 
 
-def _pushing_faults(scene: ShaftScene) -> list[str]:
-    return [
-        fault
-        for i, part in enumerate(scene.exciters)
-        for fault in exciter_faults(
-            f"exciters.{i}", part, duration=scene.duration, sample_rate=scene.sample_rate
-        )
-    ]
-
-
 def _sampling_faults(scene: ShaftScene) -> list[str]:
     revolution = 1 / scene.drive.speed
-    faults = []
-    if scene.duration < revolution:
-        faults.append(
-            f"duration = {scene.duration:g} s must be >= one revolution = {revolution:g} s; "
-            "record longer"
-        )
+    faults = duration_faults(scene, revolution)
     orders = [force.order for force in _order_forces(scene)]
     fewest = max([_FEWEST_PER_TURN, *(2 * order + 1 for order in orders)])
     if scene.sample_rate * revolution < fewest:
@@ -907,18 +892,9 @@ def _sampling_faults(scene: ShaftScene) -> list[str]:
             f"sample_rate = {scene.sample_rate:g} Hz must be >= {fewest / revolution:g} Hz, "
             f"{fewest} samples a revolution for the highest order of its forces; raise it"
         )
-    if scene.tacho and scene.tacho.pulse_width / math.tau * revolution < 2 / scene.sample_rate:
-        faults.append(
-            f"tacho.pulse_width = {scene.tacho.pulse_width:g} rad must last >= 2 samples; "
-            "widen the pulse or raise sample_rate"
-        )
+    faults += tacho_faults(scene, revolution)
     needed = scene.duration * scene.sample_rate * _BYTES_PER_SAMPLE
-    if needed > _MEMORY:
-        faults.append(
-            f"duration = {scene.duration:g} s at sample_rate = {scene.sample_rate:g} Hz needs "
-            f"{needed / 1e9:.3g} GB, must be <= {_MEMORY / 1e9:g} GB; shorten it or lower the rate"
-        )
-    return faults
+    return faults + memory_faults(scene, needed)
 
 
 class _Rest(NamedTuple):
