@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from matplotlib.figure import Figure
+from sheets import write
 from wearstate.diagnose.charts.chart import Chart, chart_text
 from wearstate.diagnose.charts.figure import question_figure
 from wearstate.diagnose.charts.of_scene import scene_chart
@@ -79,12 +80,6 @@ def whole(names: Sequence[str], folder: Path) -> None:
             save_figure(scene, maps, folder / f"atlas-{name}.png")
 
 
-def main(folder: Path) -> None:
-    for name, draw in FIGURES.items():
-        draw().savefig(folder / f"{name}.png", dpi=100)
-        print(folder / f"{name}.png", flush=True)
-
-
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description="Pictures of the page on fidelity.")
     parser.add_argument("folder", nargs="?", type=Path, default=Path(__file__).parent / "img")
@@ -94,4 +89,4 @@ if __name__ == "__main__":
     if given.scenes:
         whole(given.scenes, given.folder)
     else:
-        main(given.folder)
+        write(FIGURES, given.folder, dpi=100)

@@ -4,14 +4,13 @@ The source paper's orbits and films under three load histories, the pressure fie
 pulse, the way from a spot to half-frequency whirl, the impedance map, the rungs, and a worn bore.
 """
 
-import sys
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
+from sheets import COLOURS, folder_asked, label, sheet, write
 from wearstate.sim.film.bearing import equilibrium
 from wearstate.sim.film.impedance_map import impedance_map, map_force
 from wearstate.sim.film.rungs import FILM_RUNGS
@@ -27,7 +26,6 @@ from wearstate.sim.output.recording import Recording
 from wearstate.sim.scene.journal import JournalScene
 from wearstate.sim.scene.load import load_scene
 
-COLOURS = ("#1f5a94", "#b3541e", "#4f7d3a", "#7a4fa0", "#8a8a8a", "#c2a000")
 CASES = {
     "journal-step": "step load",
     "journal-rectangular-pulse": "rectangular pulse",
@@ -46,20 +44,6 @@ def run(
     n = solution.signal.shape[1]
     tau = 2 * np.pi * scene.drive.speed * np.arange(n) / solution.sample_rate
     return scene, solution, tau, solution.truth["journal_m"] / scene.bearing.clearance_radial
-
-
-def sheet(title: str, rows: int, columns: int, size: tuple[float, float], **kw: Any) -> Any:
-    figure = Figure(figsize=size, layout="constrained")
-    figure.suptitle(title, fontsize=11)
-    return figure, figure.subplots(rows, columns, squeeze=False, **kw)
-
-
-def label(axes: Any, x: str, y: str, title: str = "", legend: str = "best") -> None:
-    axes.set(xlabel=x, ylabel=y)
-    axes.set_title(title, fontsize=10)
-    axes.grid(alpha=0.3)
-    if axes.get_legend_handles_labels()[0]:
-        axes.legend(fontsize=8, loc=legend)
 
 
 def clearance_circle(axes: Any) -> None:
@@ -248,12 +232,5 @@ FIGURES: dict[str, Callable[[], Figure]] = {
 }
 
 
-def main(folder: Path) -> None:
-    folder.mkdir(parents=True, exist_ok=True)
-    for name, draw in FIGURES.items():
-        draw().savefig(folder / f"{name}.png", dpi=90)
-        print(folder / f"{name}.png")
-
-
 if __name__ == "__main__":
-    main(Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent / "img")
+    write(FIGURES, folder_asked())

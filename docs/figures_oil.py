@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
+from sheets import folder_asked, write
 from wearstate.sim.machine.simulate import simulate
 from wearstate.sim.scene.load import load_scene
 
@@ -109,14 +110,8 @@ def print_table() -> None:
         print(f"| {speed} | {regime.replace('um', 'µm')} | {levels} | {least} |")
 
 
-def main(folder: Path) -> None:
-    for name, draw in FIGURES.items():
-        draw().savefig(folder / f"{name}.png", dpi=90)
-        print(folder / f"{name}.png")
-
-
 if __name__ == "__main__":
     if sys.argv[1:] == ["--table"]:
         print_table()
     else:
-        main(Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent / "img")
+        write(FIGURES, folder_asked())

@@ -7,12 +7,12 @@ flight and impact, what other faults look like, the triplex pump, and lives of c
 
 import sys
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
+from sheets import COLOURS, folder_asked, label, sheet, write
 from wearstate.datasets.recipe.recipe import load_recipe, sample_records
 from wearstate.sim.machine.simulate import simulate
 from wearstate.sim.machine.transfer import scene_transfer
@@ -24,7 +24,6 @@ from wearstate.sim.wear.rate import joint_wear
 
 STEP = 1 / 51_200  # s
 SETTLING = 2  # revolutions
-COLOURS = ("#1f5a94", "#b3541e", "#4f7d3a", "#7a4fa0", "#8a8a8a")
 CHAMBER = {"pressure.rung": "chamber"}
 WORN = {"joint.crankpin.diametral_clearance": "0.31 mm"}
 
@@ -61,20 +60,6 @@ def turn(scene: PumpScene, revolutions: float = 1.0) -> dict[str, NDArray[np.flo
         found["lifts"] = run.chambers[before:, 0][:, [2, 4]]
         found["chambers"] = run.chambers[before:]
     return found
-
-
-def sheet(title: str, rows: int, columns: int = 1, size: tuple[float, float] = (9, 6), **kw: Any):
-    figure = Figure(figsize=size, layout="constrained")
-    figure.suptitle(title, fontsize=11)
-    return figure, figure.subplots(rows, columns, squeeze=False, **kw)
-
-
-def label(axes: Any, x: str, y: str, title: str = "", legend: str = "best") -> None:
-    axes.set(xlabel=x, ylabel=y)
-    axes.set_title(title, fontsize=10)
-    axes.grid(alpha=0.3)
-    if axes.get_legend_handles_labels()[0]:
-        axes.legend(fontsize=8, loc=legend)
 
 
 def degrees(axes: Any) -> None:
@@ -297,7 +282,9 @@ def faults() -> Figure:
         sharex=True,
         sharey=True,
     )
-    for each, (name, change), colour in zip(axes[:, 0], FAULTS.items(), COLOURS, strict=True):
+    for each, (name, change), colour in zip(
+        axes[:, 0], FAULTS.items(), COLOURS[: len(FAULTS)], strict=True
+    ):
         scene = pump({**CHAMBER, **change, "duration": "0.6 s"})
         signal = simulate(scene, seed=1).signal[0]
         n = round(scene.sample_rate / scene.drive.speed)
@@ -367,7 +354,7 @@ def life() -> Figure:
     rows = [sample.row for sample in sample_records(recipe, MACHINES * each, seed=1)]
     figure, axes = sheet("Crank pins of bilge pumps over their lives (simulated)", 2, 2, (11, 7.5))
     worn, left, scar, rate = axes.flat
-    for group, colour in zip(range(MACHINES), [*COLOURS, "#c9a227"], strict=True):
+    for group, colour in zip(range(MACHINES), COLOURS, strict=True):
         own = rows[each * group : each * (group + 1)]
         hours = [row["operating_hours"] / 1000 for row in own]
         clearance = [1e3 * row["diametral_clearance_crankpin_m"] for row in own]
@@ -408,12 +395,5 @@ FIGURES: dict[str, Callable[[], Figure]] = {
 }
 
 
-def main(folder: Path) -> None:
-    folder.mkdir(parents=True, exist_ok=True)
-    for name, draw in FIGURES.items():
-        draw().savefig(folder / f"{name}.png", dpi=90)
-        print(folder / f"{name}.png")
-
-
 if __name__ == "__main__":
-    main(Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent / "img")
+    write(FIGURES, folder_asked())

@@ -5,17 +5,16 @@ before and after load calibration from model and rig test, and the Campbell diag
 """
 
 import math
-import sys
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from scipy.signal import find_peaks
+from sheets import COLOURS, folder_asked, label, sheet, write
 from wearstate.diagnose.machines.registry import presentation_of
 from wearstate.diagnose.shaft_tests.next_test import rank_tests, usual_responses
 from wearstate.diagnose.shaft_tests.rig_test import ShakerTest, calibrated_test, rig_figure
@@ -36,7 +35,6 @@ from wearstate.sim.shaft.recording import (
 )
 from wearstate.sim.shaft.response import accelerance
 
-COLOURS = ("#1f5a94", "#b3541e", "#4f7d3a", "#7a4fa0", "#8a8a8a", "#c2a000")
 MISALIGNED = {"bearings.2.offset": "-1.0 mm", "bearings.3.offset": "1.4 mm"}
 """The line before calibration: chocks of the two intermediate bearings badly set."""
 
@@ -71,20 +69,6 @@ def states() -> Mapping[str, ShaftState]:
 
 def words(name: str) -> str:
     return name.replace("_", " ")
-
-
-def sheet(title: str, rows: int, columns: int, size: tuple[float, float], **kw: Any) -> Any:
-    figure = Figure(figsize=size, layout="constrained")
-    figure.suptitle(title, fontsize=11)
-    return figure, figure.subplots(rows, columns, squeeze=False, **kw)
-
-
-def label(axes: Any, x: str, y: str, title: str = "", legend: str = "best") -> None:
-    axes.set(xlabel=x, ylabel=y)
-    axes.set_title(title, fontsize=10)
-    axes.grid(alpha=0.3)
-    if axes.get_legend_handles_labels()[0]:
-        axes.legend(fontsize=8, loc=legend)
 
 
 def outline(axes: Any, model: ShaftScene) -> None:
@@ -498,12 +482,5 @@ FIGURES: dict[str, Callable[[], Figure]] = {
 }
 
 
-def main(folder: Path) -> None:
-    folder.mkdir(parents=True, exist_ok=True)
-    for name, draw in FIGURES.items():
-        draw().savefig(folder / f"{name}.png", dpi=90)
-        print(folder / f"{name}.png")
-
-
 if __name__ == "__main__":
-    main(Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent / "img")
+    write(FIGURES, folder_asked())

@@ -22,7 +22,6 @@ from wearstate.diagnose.shaft_tests.sag_model import (
     SagError,
     question_of,
     slopes_at,
-    transfer_data,
     trial_at,
     unknowns_of,
 )
@@ -181,6 +180,23 @@ def test_a_film_that_is_not_the_machines_is_called_implausible(rig):
     test = rig.test(rng, rig.draw(rng, film=0.0), ("second", "y"), 60.0, model=short)
     found = estimate_sags(rig.scene, [test], prior=rig.prior, start=[0.0, 0.0])
     assert not found.plausible
+
+
+def transfer_data(frf, *, speed, force, responses):
+    """Estimated accelerances as data: ``E |e|^2 = |H|^2 (1 - c) / (c (n - 1))`` of H1."""
+    kept = np.flatnonzero((frf.frequency > 0) & (frf.coherence > 0).all(axis=0))
+    kept = kept[np.unique(np.linspace(0, kept.size - 1, min(200, kept.size)).round()).astype(int)]
+    value, shared = frf.value[:, kept].T, np.minimum(frf.coherence[:, kept].T, 1.0)
+    share = np.maximum((1 - shared) / (shared * (frf.averages - 1)), 1e-6)
+    variance = np.abs(value) ** 2 * share
+    return MeasuredTransfer(
+        frequencies=frf.frequency[kept],
+        value=np.ascontiguousarray(value),
+        covariance=np.einsum("lr,rs->lrs", variance, np.eye(len(responses))).astype(complex),
+        speed=speed,
+        force=force,
+        responses=tuple(responses),
+    )
 
 
 def test_a_simulated_test_tells_the_sag_and_its_noise_is_as_predicted(rig):

@@ -208,42 +208,11 @@ def resting(states: Sequence[LineFilms]) -> list[str]:
     ]
 
 
-def pressure_figure(states: Sequence[LineFilms]) -> Any:
-    """Film pressure over every bearing's unrolled bore, as set and after the moves.
-
-    Parameters
-    ----------
-    states : sequence of LineFilms
-        The two nearest to the scene's speed are drawn.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        A column a bearing; the bottom of the bore in the middle of each panel.
-    """
-    from matplotlib.figure import Figure
-
-    rows = [state for state in _at_one_speed(states) if state.film is not None]
-    films = [state.film for state in rows if state.film is not None]
-    count = min(len(films[0].bearings) if films else 1, _SHOWN_PANELS)
-    figure = Figure(figsize=(1 + 2.4 * count, 0.8 + 2.2 * max(len(rows), 1)), layout="constrained")
-    panels = figure.subplots(max(len(rows), 1), count, squeeze=False, sharey=True)
-    highest = [max(float(film.peak_pressure[i]) for film in films) for i in range(count)]
-    for line, state, film in zip(panels, rows, films, strict=True):
-        for i, axes in enumerate(line):
-            image = _draw_pressure(axes, film, i, highest[i])
-            title = short_name(film.bearings[i].name, 18)
-            axes.set_title(f"{title}, {'after' if state.after else 'as set'}", fontsize=9)
-            if line is panels[-1]:
-                figure.colorbar(image, ax=panels[:, i], label="MPa", location="bottom")
-        line[0].set_ylabel("angle from the bottom [deg]")
-    speed = f" at {60 * rows[0].speed_hz:.0f} 1/min" if rows else ""
-    figure.suptitle(f"Oil film pressure (computed){speed}")
-    return figure
-
-
 def pressure_images(states: Sequence[LineFilms]) -> list[PageImage]:
-    """Of :func:`pressure_figure` every bearing as a picture of a page, as set beside after."""
+    """Film pressure over every bearing's unrolled bore, as set beside after: a picture each.
+
+    The two states nearest to the scene's speed are drawn.
+    """
     rows = [state for state in _at_one_speed(states) if state.film is not None]
     films = [state.film for state in rows if state.film is not None]
     count = min(len(films[0].bearings) if films else 0, _SHOWN_PANELS)

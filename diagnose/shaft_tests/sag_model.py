@@ -16,7 +16,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...features.response.frf import Frf
 from ...sim.alignment.alignment import AlignmentLine, Condition, influence, reactions
 from ...sim.scene.shaft import ShaftScene
 from ...sim.shaft.changed import (
@@ -97,90 +96,6 @@ class MeasuredTransfer:
             faults.append(f"speed = {self.speed} rad/s must be > 0; without rotation is no film")
         if faults:
             raise SagError("\n".join(faults))
-
-
-def transfer_data(
-    frf: Frf,
-    *,
-    speed: float,
-    force: Place,
-    responses: Sequence[Place],
-    most_lines: int = 200,
-    floor: float = 1e-3,
-) -> MeasuredTransfer:
-    """Estimated frequency response functions as data, with the noise that their coherence tells.
-
-    Parameters
-    ----------
-    frf : Frf
-        Accelerances [(m/s^2)/N].
-    speed : float
-        [rad/s]
-    force : place
-    responses : sequence of place
-        One for each channel of the estimate.
-    most_lines : int
-        Lines are left out evenly until so many remain.
-    floor : float
-        Least deviation over the magnitude: nothing is measured better [-].
-
-    Returns
-    -------
-    MeasuredTransfer
-        Of the lines above zero with coherence in every channel; errors of the channels are taken
-        to be independent of each other.
-
-    Raises
-    ------
-    SagError
-        No line has coherence, there is one average only, or channels and responses differ in
-        number.
-
-    Notes
-    -----
-    ``E |e|^2 = |H|^2 (1 - c) / (c (n - 1))`` of H1 with coherence c over n averages.
-
-    References
-    ----------
-    J. S. Bendat, A. G. Piersol, "Random Data", 4th ed., Wiley 2010, chapter 9,
-    doi:10.1002/9781118032428.
-
-    Examples
-    --------
-    >>> one = np.ones((1, 4))
-    >>> frf = Frf(frequency=np.arange(4.0), value=2 * one + 0j, coherence=0.8 * one, radius=one,
-    ...           averages=26.0, estimator="h1", confidence=0.95)
-    >>> test = transfer_data(frf, speed=60.0, force=("aft", "y"),
-    ...                          responses=[("aft", "y", "housing")])
-    >>> test.frequencies.size, round(float(test.covariance[0, 0, 0].real), 6)
-    (3, 0.04)
-    """
-    if frf.value.shape[0] != len(responses):
-        raise SagError(
-            f"responses = {len(responses)} must be as many as the {frf.value.shape[0]} channels"
-        )
-    if not frf.averages > 1:
-        raise SagError(
-            f"averages = {frf.averages:g} must be > 1: without scatter nobody knows how sure a "
-            "transfer function is; use shorter blocks or more blows"
-        )
-    usable = (frf.frequency > 0) & (frf.coherence > 0).all(axis=0)
-    kept = np.flatnonzero(usable & np.isfinite(frf.value).all(axis=0))
-    if not kept.size:
-        raise SagError("lines with coherence = 0 must be >= 1; check force and response channels")
-    kept = kept[np.unique(np.linspace(0, kept.size - 1, min(most_lines, kept.size)).round())
-                .astype(int)]  # fmt: skip
-    value, shared = frf.value[:, kept].T, np.minimum(frf.coherence[:, kept].T, 1.0)
-    share = np.maximum((1 - shared) / (shared * (frf.averages - 1)), floor**2)
-    variance = np.abs(value) ** 2 * share
-    return MeasuredTransfer(
-        frequencies=frf.frequency[kept],
-        value=np.ascontiguousarray(value),
-        covariance=np.einsum("lr,rs->lrs", variance, np.eye(len(responses))).astype(complex),
-        speed=speed,
-        force=force,
-        responses=tuple(responses),
-    )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

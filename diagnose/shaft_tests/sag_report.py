@@ -290,24 +290,8 @@ def next_texts(report: SagReport) -> list[str]:
     return texts
 
 
-def sag_figure(report: SagReport) -> Any:
-    """Sag of every bearing with its interval, and what the next tests would leave.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-    """
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(10, 3.2), layout="constrained")
-    left, right = figure.subplots(1, 2)
-    _draw_sags(left, report)
-    _draw_next(right, report)
-    return figure
-
-
 def sag_images(report: SagReport) -> list[PageImage]:
-    """The panels of :func:`sag_figure` as pictures of a page."""
+    """Sag of every bearing with its interval, and what the next tests would leave."""
     return [
         drawn_alone(partial(_draw_sags, report=report), height=3.2),
         drawn_alone(partial(_draw_next, report=report), height=3.2),

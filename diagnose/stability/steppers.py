@@ -25,9 +25,7 @@ Pair = tuple[Array, Array]
 _NEWTON_STEPS = 12  # a straight force takes one, a kink up to three; what takes more cycles
 _NEWTON_TOLERANCE = 1e-9  # of the acceleration
 _GROWTH = 1e6  # of a free motion: beyond any that a stable method shows on its way down
-_SEARCH = (1e-3, 1e3)  # step times omega, where a limit is looked for
 _PATIENCE = 4.0  # times the longest contact that there is
-_POINTS, _ROUNDS = 64, 3  # of that search: a limit to 1e-4
 
 
 # --- steppers
@@ -275,51 +273,6 @@ def decays(
                 break
     # close below a limit the motion beats: it rises at most by the root of the steps watched
     return np.asarray(size < 2 * math.sqrt(n_steps))
-
-
-def measured_limit(stepper: Stepper, damping_ratio: ArrayLike, *, n_steps: int = 1000) -> Array:
-    """Largest step times omega at which a free oscillator stays bounded.
-
-    Parameters
-    ----------
-    stepper : Stepper
-    damping_ratio : array_like
-        >= 0.
-    n_steps : int
-        Steps to watch: the more, the slower a growth is seen.
-
-    Returns
-    -------
-    numpy.ndarray
-        Of the shape of `damping_ratio`. Infinity where a step of a thousand is stable, 0 where
-        one of a thousandth is not.
-
-    Raises
-    ------
-    ValueError
-        A damping ratio is negative or not finite.
-
-    Examples
-    --------
-    >>> measured_limit(STEPPERS[0], [0.0, 0.75]).round(2).tolist()
-    [2.0, 1.0]
-    """
-    zeta = np.array(damping_ratio, float).ravel()
-    if not np.all((zeta >= 0) & np.isfinite(zeta)):
-        raise ValueError(
-            f"damping_ratio = {zeta.tolist()} must be >= 0 and finite; a negative one feeds the "
-            "oscillator whatever the step"
-        )
-    low, high = (np.full(zeta.shape, end) for end in _SEARCH)
-    found = np.full(zeta.shape, math.nan)
-    for _ in range(_ROUNDS):
-        steps = np.geomspace(low, high, _POINTS)
-        unstable = ~decays(stepper, steps, 1.0, zeta, n_steps)
-        found = np.where(unstable[0], 0.0, np.where(unstable.any(axis=0), found, math.inf))
-        first, column = np.maximum(np.argmax(unstable, axis=0), 1), np.arange(zeta.size)
-        low, high = steps[first - 1, column], steps[first, column]
-    limits = np.where(np.isnan(found), np.sqrt(low * high), found)
-    return np.asarray(limits.reshape(np.shape(damping_ratio)))
 
 
 # --- a bounce

@@ -38,21 +38,6 @@ _MOST_POINTS = 100  # of one seat
 FEWEST_POINTS = 2  # points that a shaft can rest on
 
 
-WHITE_METAL_PRESSURE = 0.8e6
-"""Mean pressure [Pa] that class rules usually allow an oil-lubricated white-metal stern bearing
-shorter than two diameters; from memory, the society of the ship has the word."""
-
-SYNTHETIC_PRESSURE = 0.6e6
-"""The same for synthetic bearing materials in oil [Pa]; from memory."""
-
-RELATIVE_SLOPE = 0.3e-3
-"""Slope of the shaft against the bore [rad] beyond which class guidance usually asks for slope
-boring of the aft stern bearing; from memory."""
-
-LEAST_LOAD_SHARE = 0.2
-"""Of :func:`span_loads`: least reaction that class guidance usually asks for; from memory."""
-
-
 class AlignmentError(ValueError):
     """A line of bearings that cannot be, or a question that has no answer on it."""
 

@@ -172,12 +172,6 @@ def kelvin_voigt(
 
 
 @kernel
-def smooth_sign(speed: float, reference: float) -> float:
-    """Regularised sign ``v / sqrt(v^2 + v_s^2)``: 0.995 at ten times the reference speed."""
-    return speed / math.sqrt(speed * speed + reference * reference)
-
-
-@kernel
 def ramp_sign(speed: float, dead_speed: float, full_speed: float) -> float:
     """Sign that is zero up to the dead speed and rises in proportion from there to the full one.
 
@@ -203,11 +197,11 @@ def _ramp_parts(speed: float, dead_speed: float, full_speed: float) -> Any:
 def friction_force(sliding_speed: float, normal_force: float, contact: Any) -> float:
     """Regularised Coulomb friction plus the pump paper's viscous term ``C_t v`` [N].
 
-    Coulomb's part is ``f N s(v)`` with s the :func:`smooth_sign` at `friction_speed`, or the
-    :func:`ramp_sign` from `friction_dead_speed` to `friction_speed`; a contact that pulls has
-    none. The force has the sign of the sliding velocity, so on the body that slides, where it
-    acts in the opposite sense, it never adds energy. At rest there is no friction: a constant
-    load creeps.
+    Coulomb's part is ``f N s(v)`` with s the regularised sign ``v / sqrt(v^2 + v_s^2)`` at the
+    `friction_speed` v_s, 0.995 at ten times that, or the :func:`ramp_sign` from
+    `friction_dead_speed` to `friction_speed`; a contact that pulls has none. The force has the
+    sign of the sliding velocity, so on the body that slides, where it acts in the opposite sense,
+    it never adds energy. At rest there is no friction: a constant load creeps.
     """
     full, smooth = contact.friction_speed, contact.friction_law == FRICTION_SMOOTH
     part, whole = _ramp_parts(sliding_speed, contact.friction_dead_speed, full)
@@ -217,21 +211,6 @@ def friction_force(sliding_speed: float, normal_force: float, contact: Any) -> f
     coulomb = contact.friction * max(0.0, normal_force) * sign
     force: float = coulomb + contact.tangential_damping * sliding_speed
     return force
-
-
-@kernel
-def tangential_force(
-    sliding_speed: float,
-    normal_force: float,
-    friction: float,
-    friction_speed: float,
-    tangential_damping: float,
-) -> float:
-    """Regularised Coulomb friction plus the pump paper's viscous term C_t v_t [N]."""
-    return (
-        friction * normal_force * smooth_sign(sliding_speed, friction_speed)
-        + tangential_damping * sliding_speed
-    )
 
 
 # --- restitution of the hysteresis laws

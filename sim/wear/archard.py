@@ -19,9 +19,6 @@ from numpy.typing import ArrayLike, NDArray
 
 Float = NDArray[np.float64]
 
-SEVERITY_BEYOND_LIMIT = 1.5
-"""Data sets reach this multiple of the condemning limit, so that grade 3 has an inside."""
-
 WEAR_RATE_MOST = 1e-9
 """[m^2/N], 1 mm^3/(N m): dry metal galls at 1e-11. A number above it has another unit."""
 
