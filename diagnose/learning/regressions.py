@@ -22,6 +22,8 @@ _TREES = 100
 _ROUNDS = 200, 0.08  # of boosting, and what each adds of what is missing
 _MANY_ROUNDS = 400, 0.05
 _MANY_RECORDS = 1000
+_LEAF = 20  # records in a leaf of boosting
+_FEWEST_BOOSTED = 3 * _LEAF  # two leaves in every fold: of fewer records a tree is one number
 _LEAST_WEIGHT = 0.02  # of a blend: a part that says less is left out, and its time saved
 _TIE = 0.01  # of the error: a blend that is no better than this is not worth its time
 _SLACK = 0.1  # of a feature's range: as far beyond it a line may go on
@@ -284,6 +286,7 @@ def _fit_boosting(rows: Float, _moved: Float, target: Float, seed: int) -> Part:
         max_iter=rounds,
         learning_rate=rate,
         max_leaf_nodes=15,
+        min_samples_leaf=_LEAF,
         max_features=_share(160, rows),
         random_state=seed,
     )
@@ -386,7 +389,7 @@ CANDIDATES: tuple[RegressionCandidate, ...] = (
         for penalty in _PENALTIES
     ),
     RegressionCandidate(name="trees", cost_ms=0.4, fit=_fit_trees),
-    RegressionCandidate(name="boosting", cost_ms=0.4, fit=_fit_boosting),
+    RegressionCandidate(name="boosting", cost_ms=0.4, fit=_fit_boosting, fewest=_FEWEST_BOOSTED),
     RegressionCandidate(name="nets", cost_ms=0.4, fit=_nets, fewest=FEWEST_RECORDS),
 )
 """From fast to strong, lines of the logarithm first. The costs are tabulated, not timed at each
