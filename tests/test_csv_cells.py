@@ -2,7 +2,7 @@
 
 import pandas as pd
 import pytest
-from wearstate.datasets.file.csv_cells import plain_cell, safe_cell, safe_frame
+from wearstate.datasets.file.csv_cells import plain_cell, safe_cell, safe_frame, save_rows
 from wearstate.datasets.readers.text import split_cells
 
 
@@ -28,3 +28,13 @@ def test_thirty_thousand_quoted_names_are_split_at_once():
     cells = split_cells(",".join(f'"n, {i}"' for i in range(30_000)), ",")  # took a minute
     assert len(cells) == 30_000
     assert cells[-1] == "n, 29999"
+
+
+def test_rows_are_written_with_safe_cells_or_not_at_all(tmp_path):
+    path = tmp_path / "rows.csv"
+    save_rows(path, ["a", "b"], [["=1+2", -0.5]])
+    assert path.read_text(encoding="utf-8").splitlines() == ["a,b", "'=1+2,-0.5"]
+    with pytest.raises(TypeError):
+        save_rows(path, ["a"], [["x"], None])
+    assert path.read_text(encoding="utf-8").splitlines()[0] == "a,b"
+    assert list(tmp_path.iterdir()) == [path]
