@@ -38,6 +38,7 @@ from wearstate.sim.machine.simulate import simulate
 from wearstate.sim.output.recording import DataError
 from wearstate.sim.output.sensor import Channel
 from wearstate.sim.scene.load import load_scene
+from wearstate.sim.scene.parts import Accelerometer
 
 ANGLES = (math.radians(225), math.radians(135))
 CURVE = rest_curve(FilmGeometry(length_to_diameter=0.6), "short")
@@ -357,6 +358,18 @@ def test_probes_without_healthy_recordings_are_a_caution(tmp_path):
     one = nameplate_of(None, "journal-bearing", {"sensors.0.offset": "0 um"})
     [said] = known_beside(one, recording, CARD)["told"]
     assert "offsets of probe_2, which" in said
+    path, zero = _cure_in(said)  # of that probe
+    assert nameplate_of(None, "journal-bearing", {path: zero}).told == {"sensors.1.offset"}
+    line = nameplate_of(None, "propulsion-shaft", {"probes.probe_1.offset": "0 um"})
+    [said] = known_beside(line, recording, card_of("propulsion-shaft"))["told"]
+    assert _cure_in(said)[0] == "probes.1.offset"
+    [said] = known_beside(None, recording, card_of("propulsion-shaft"))["told"][-1:]
+    assert _cure_in(said)[0] == "probes.0.offset"
+
+
+def _cure_in(said):
+    """Path and value that a caution proposes to set."""
+    return said.partition("--set '")[2].rstrip("'").split("=")
 
 
 def test_the_height_of_a_bearing_is_no_offset_of_a_probe():
@@ -375,6 +388,26 @@ def test_offset_and_sensitivity_that_a_person_told_are_taken_out(tmp_path):
     assert as_told(seen, None) is seen
     healthy = Baseline(features=np.zeros(1), recordings=1, source="")
     assert as_told(seen, told, healthy) is seen
+    # sensors are as well known by their names
+    named = {"sensors.probe_1.offset": "-20 um", "sensors.probe_2.gain": 1.25}
+    by_name = nameplate_of(None, "journal-bearing", named)
+    np.testing.assert_allclose(as_told(seen, by_name).signal, plain.signal, atol=2e-7)
+    assert known_zeros(by_name) == {"probe_1"}
+
+
+def test_a_triaxial_sensor_has_one_sensitivity_on_all_its_channels(tmp_path):
+    scene = load_scene("bilge-pump")
+    head = Accelerometer(name="head", axes=("x", "y"), gain=2.0, range=100.0)
+    plate = Nameplate(
+        scene=scene.model_copy(update={"sensors": (head,)}), told=frozenset({"sensors.0.gain"})
+    )
+    recording = recorded(tmp_path / "a.h5", {})
+    channels = tuple(
+        Channel(name=name, unit="m/s^2", quantity="acceleration")
+        for name in ("head_x", "head_y", "head")
+    )
+    seen = replace(recording, signal=np.ones((3, 8), np.float32), channels=channels, tacho=None)
+    assert as_told(seen, plate).signal[:, 0].tolist() == [0.5, 0.5, 1.0]
 
 
 def test_a_nameplate_of_another_machine_is_a_caution():

@@ -23,7 +23,9 @@ from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.command_line.commands_wear import report_exit
 from wearstate.diagnose.feature_rows.healthy import Baseline, Baselines
 from wearstate.diagnose.feature_rows.quality import QualityFault
+from wearstate.diagnose.nameplate.nameplate import Nameplate
 from wearstate.diagnose.pages.embed import MOST_BYTES
+from wearstate.diagnose.report import page as page_module
 from wearstate.diagnose.report.batch import judge_all, recordings_in, times_of
 from wearstate.diagnose.report.figures import moved_panel, report_pictures
 from wearstate.diagnose.report.page import batch_html, report_html
@@ -40,6 +42,7 @@ from wearstate.diagnose.twin.opinion import TwinOpinion
 from wearstate.diagnose.wear_model.estimate import Estimate, FaultFinding
 from wearstate.diagnose.wear_model.file import load_model, save_model
 from wearstate.diagnose.wear_model.train import train_model
+from wearstate.diagnose.workflow.report import Report
 from wearstate.sim.output.recording import DataError, Recording
 from wearstate.sim.output.sensor import Channel
 
@@ -366,6 +369,34 @@ def test_the_map_of_what_moved_is_level_against_healthy(model):
     assert [p.caption.split(":")[0] for p in report_pictures(found, model, graded=True)] == [
         "What moved", "Spectrum",
     ]  # fmt: skip
+
+
+def test_pictures_and_zone_are_of_the_readings_that_were_judged(model, monkeypatch):
+    """Of a sensor that a person told to read twice too much: not twice, as the estimate."""
+    plain = recording_of(2.5e-4, signal=np.tile(knocking(2.5e-4, 0), 4))
+    doubled = dataclasses.replace(plain, signal=plain.signal * np.float32([[2], [1]]))
+    pump = wearstate.load_scene("bilge-pump")
+    sensor = pump.sensors[0].model_copy(update={"name": "acc", "gain": 2.0})
+    plate = Nameplate(
+        scene=pump.model_copy(update={"sensors": (sensor,)}), told=frozenset({"sensors.0.gain"})
+    )
+    table, wanted = (
+        report_table(each, model, graded(), machine="reciprocating-2", plate=known)
+        for each, known in ((doubled, plate), (plain, None))
+    )
+    assert table["iso"] == wanted["iso"]
+    assert table["iso"]["channels"]
+    drawn = []
+
+    def draw(seen, *_, **__):
+        drawn.append(seen.signal)
+        return []
+
+    monkeypatch.setattr(page_module, "report_pictures", draw)
+    parts = {"recording": doubled, "model": model, "estimate": graded(), "table": table}
+    Report(**parts, plate=plate).html()
+    [signal] = drawn
+    np.testing.assert_array_equal(signal, plain.signal)
 
 
 def test_a_force_shows_its_transfer_functions():

@@ -7,6 +7,8 @@ import pytest
 import wearstate
 from click.testing import CliRunner
 from wearstate.diagnose.command_line.cli import cli
+from wearstate.diagnose.twin.opinion import TwinOpinion
+from wearstate.diagnose.workflow.report import judged
 
 
 @pytest.fixture(scope="module")
@@ -46,6 +48,17 @@ def test_a_measured_recording_is_asked_for_its_nameplate(record, small_model):
     assert [text for text in found.estimate.cautions if "--scene bilge-pump" in text]
     told = wearstate.report(measured, small_model, scene="bilge-pump")
     assert "nameplate" not in " ".join(told.estimate.cautions)
+
+
+def test_the_estimate_of_a_report_says_what_contradicts_it(record, small_model):
+    """A program that reads its verdict learns what the text says first."""
+    model = wearstate.load_model(small_model)
+    known = {"baselines": None, "plate": None, "machine": None, "files": None}
+    far = TwinOpinion(severity=2e-3, low=1.9e-3, high=2.1e-3)
+    found = judged(record, model, twin=far, **known)
+    assert found.estimate.verdict == "caution"
+    assert found.estimate.cautions[0].startswith("twin of the machine and trained model disagree")
+    assert found.table["twin"]["agrees"] is False
 
 
 def test_the_nameplate_reaches_the_estimate(record, small_model):

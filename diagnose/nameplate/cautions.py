@@ -15,7 +15,7 @@ from ..feature_rows.model_card import ModelCard
 from ..machines.registry import presentation_of
 from ..pages.si_text import si_text
 from .nameplate import Nameplate, day_of
-from .sensors import known_zeros
+from .sensors import known_zeros, path_of_zero
 
 _SAME = 0.02  # over the trained value: nameplates are rounded
 
@@ -46,12 +46,12 @@ def known_beside(
     told = () if plate is None and simulated else nameplate_cautions(plate, recording.row, card)
     return {
         "conditions": day_of(plate, recording.row),
-        "told": (*told, *_gap_cautions(plate, recording, baseline)),
+        "told": (*told, *_gap_cautions(plate, recording, baseline, card.trained_on.scene)),
     }
 
 
 def _gap_cautions(
-    plate: Nameplate | None, recording: Recording, baseline: Baseline | None
+    plate: Nameplate | None, recording: Recording, baseline: Baseline | None, trained: str
 ) -> list[str]:
     """Where a shaft runs is read from gap voltages, whose zero nobody knows by itself."""
     probes = [
@@ -62,10 +62,12 @@ def _gap_cautions(
     unknown = [name for name in probes if name not in known_zeros(plate)]
     if baseline is not None or not unknown:
         return []
+    usual = load_scene(trained) if trained in scene_names() else None
+    path = path_of_zero(plate.scene if plate else usual, unknown[0])
     return [
         f"no healthy recording of this machine tells the offsets of {', '.join(unknown)}, which "
         "are taken to be as small as where the model was trained, and its estimate leans on them: "
-        "give --baseline HEALTHY, or what is known of each: --set 'sensors.0.offset=0 um +- 5 um'"
+        f"give --baseline HEALTHY, or what is known of each: --set '{path}=0 um +- 5 um'"
     ]
 
 

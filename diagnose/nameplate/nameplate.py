@@ -17,6 +17,7 @@ from ...datasets.recipe.recipe import condition_of, recorded_scene
 from ...sim.output.recording import DataError
 from ...sim.scene.load import (
     load_scene,
+    numbered,
     override,
     scene_from_table,
     scene_names,
@@ -42,7 +43,8 @@ class Nameplate:
     scene : Scene
         Geometry, load, oil.
     told : frozenset of str
-        Dotted paths that a person set: these go before what a manifest notes.
+        Dotted paths that a person set, entries of lists by number: these go before what a manifest
+        notes.
     doubts : Doubts
         How well all that is known.
     source : str
@@ -189,9 +191,9 @@ def nameplate_of(
         return None
     assumed = scene is None and head is None
     doubts = replace(_usual_doubts(found), **_doubts(spreads, found, plain))
-    return Nameplate(
-        scene=found, told=frozenset(plain), doubts=doubts, source=name, assumed=assumed
-    )
+    table = found.model_dump(mode="json")
+    told = frozenset(numbered(table, path) for path in plain)
+    return Nameplate(scene=found, told=told, doubts=doubts, source=name, assumed=assumed)
 
 
 def day_of(plate: Nameplate | None, row: Mapping[str, Any]) -> Mapping[str, Any]:

@@ -14,6 +14,24 @@ TABLES = ("sensors", "probes")
 """Of a scene, that hold what senses it."""
 
 
+def path_of_zero(scene: Any, name: str) -> str:
+    """Dotted path of a probe's offset; the name stands for itself where the scene has no such.
+
+    Examples
+    --------
+    >>> from wearstate import load_scene
+    >>> path_of_zero(load_scene("propulsion-shaft"), "probe_2")
+    'probes.1.offset'
+    """
+    found = (
+        f"{table}.{i}.offset"
+        for table in TABLES
+        for i, sensor in enumerate(getattr(scene, table, ()))
+        if sensor.name == name
+    )
+    return next(found, f"sensors.{name}.offset")
+
+
 def as_told(
     recording: Recording, plate: Nameplate | None, baseline: Baseline | None = None
 ) -> Recording:
@@ -74,4 +92,10 @@ def _told(plate: Nameplate | None) -> Iterator[tuple[str, dict[str, Any]]]:
                 if f"{table}.{i}.{key}" in plate.told
             }
             if told:
-                yield sensor.name, {"gain": 1.0, "offset": 0.0, "zero": "offset" in told, **told}
+                known = {"gain": 1.0, "offset": 0.0, "zero": "offset" in told, **told}
+                yield from ((name, known) for name in _channels_of(sensor))
+
+
+def _channels_of(sensor: Any) -> list[str]:
+    """Names of a sensor's channels: a triaxial accelerometer has one for each axis."""
+    return [f"{sensor.name}_{axis}" for axis in getattr(sensor, "axes", ())] or [sensor.name]

@@ -42,6 +42,7 @@ def report_html(
     model: WearModel | None = None,
     *,
     baseline: Baseline | None = None,
+    plate: Nameplate | None = None,
     interactive: bool = False,
 ) -> str:
     """The report on one recording.
@@ -56,6 +57,8 @@ def report_html(
         For the map of what moved against its healthy reference.
     baseline : Baseline, optional
         That the estimate was given.
+    plate : Nameplate, optional
+        What it tells of sensors is taken out of the signals, as it was for the estimate.
     interactive : bool
         Add the signals as curves to zoom and measure in.
 
@@ -71,8 +74,9 @@ def report_html(
     """
     estimate = table["estimate"]
     graded = estimate["severity"] is not None
+    judged = as_told(recording, plate, baseline)
     pictures = report_pictures(
-        recording,
+        judged,
         model,
         graded=graded,
         healthy=None if baseline is None else baseline.features,
@@ -83,7 +87,7 @@ def report_html(
         table=table,
         gauge=gauge(estimate, table["limits"]) if graded else None,
         pictures=pictures,
-        block=_zoom_of(recording, pictures) if interactive else None,
+        block=_zoom_of(judged, pictures) if interactive else None,
         reference="the machine's healthy recordings"
         if baseline is not None
         else "those of as-new machines in the training set",
@@ -227,7 +231,8 @@ def _details(
             recording = batch.items[row.number].load()
             baseline = None if baselines is None else baselines.of(recording)
             beside = known_beside(plate, recording, model.card, baseline)
-            estimate = model.estimate(as_told(recording, plate, baseline), baseline, **beside)
+            judged = as_told(recording, plate, baseline)
+            estimate = model.estimate(judged, baseline, **beside)
         except DataError:
             continue  # it has gone since
         outlook = batch.outlook_of(row)
@@ -240,9 +245,7 @@ def _details(
             plate=plate,
             outlook=outlook,
         )
-        found.append(
-            {"table": table, "pictures": _few(table, recording, model, estimate, baseline)}
-        )
+        found.append({"table": table, "pictures": _few(table, judged, model, estimate, baseline)})
     return found
 
 

@@ -18,6 +18,7 @@ from ..feature_rows.healthy import Baseline
 from ..feature_rows.model_card import ModelCard
 from ..learning.grades import GRADE_NAMES
 from ..nameplate.nameplate import Nameplate
+from ..nameplate.sensors import as_told
 from ..pages.words import quantity_name
 from ..pictures.view import View
 from ..twin.opinion import TwinOpinion
@@ -114,7 +115,7 @@ def report_table(
         "grades_text": possible_words(estimate, card.grade_edges_m),
         "advice": asdict(advise(estimate, quantity, card.grade_edges_m, outlook)),
         "limits": limits_table(card),
-        "iso": iso_table(recording, machine),
+        "iso": iso_table(as_told(recording, plate), machine),
         "outlook": None if outlook is None else asdict(outlook),
         "evidence_summary": _quiet_words(estimate, len(model.names))
         or evidence_summary([item[:3] for item in estimate.evidence]),

@@ -2,7 +2,7 @@
 
 import html
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -42,6 +42,8 @@ class Report:
         Everything that the report says, ready for JSON.
     baseline : Baseline or None
         Healthy recordings of the machine.
+    plate : Nameplate or None
+        What is known of the machine beside its signals.
     """
 
     recording: Recording
@@ -49,6 +51,7 @@ class Report:
     estimate: Estimate
     table: dict[str, Any]
     baseline: Baseline | None = None
+    plate: Nameplate | None = None
 
     @property
     def text(self) -> str:
@@ -78,6 +81,7 @@ class Report:
             self.recording,
             self.model,
             baseline=self.baseline,
+            plate=self.plate,
             interactive=interactive,
         )
 
@@ -259,5 +263,15 @@ def judged(
         files=files,
     )
     return Report(
-        recording=recording, model=model, estimate=estimate, table=table, baseline=baseline
+        recording=recording,
+        model=model,
+        estimate=_also_contradicted(estimate, table["estimate"]),
+        table=table,
+        baseline=baseline,
+        plate=plate,
     )
+
+
+def _also_contradicted(estimate: Estimate, said: Mapping[str, Any]) -> Estimate:
+    """The estimate with what film equilibrium and twin put before its cautions."""
+    return replace(estimate, verdict=said["verdict"], cautions=tuple(said["cautions"]))
