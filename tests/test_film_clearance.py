@@ -27,7 +27,7 @@ from wearstate.diagnose.film_clearance.clearance import (
 )
 from wearstate.diagnose.nameplate.cautions import known_beside, nameplate_cautions
 from wearstate.diagnose.nameplate.nameplate import Nameplate, day_of, nameplate_of
-from wearstate.diagnose.nameplate.sensors import as_told, known_zeros
+from wearstate.diagnose.nameplate.sensors import as_told, known_zeros, taken_out_words
 from wearstate.diagnose.report import film as film_report
 from wearstate.diagnose.report.beside import disagree
 from wearstate.diagnose.report.film import film_estimate, film_table, with_film
@@ -37,7 +37,7 @@ from wearstate.sim.film.solve import FilmGeometry
 from wearstate.sim.machine.simulate import simulate
 from wearstate.sim.output.recording import DataError
 from wearstate.sim.output.sensor import Channel
-from wearstate.sim.scene.load import load_scene
+from wearstate.sim.scene.load import load_scene, scene_text
 from wearstate.sim.scene.parts import Accelerometer
 
 ANGLES = (math.radians(225), math.radians(135))
@@ -408,6 +408,21 @@ def test_a_triaxial_sensor_has_one_sensitivity_on_all_its_channels(tmp_path):
     )
     seen = replace(recording, signal=np.ones((3, 8), np.float32), channels=channels, tacho=None)
     assert as_told(seen, plate).signal[:, 0].tolist() == [0.5, 0.5, 1.0]
+
+
+def test_sensors_of_a_scene_that_a_person_gave_are_taken_out_and_said(tmp_path):
+    off = {"sensors.0.offset": -20e-6, "sensors.1.gain": 1.25}
+    plain, seen = (recorded(tmp_path / f"{i}.h5", each) for i, each in enumerate(({}, off)))
+    text = scene_text("journal-bearing").replace(
+        'name = "probe_1"', 'name = "probe_1"\noffset = "-20 um"'
+    )
+    (tmp_path / "mine.toml").write_text(text)
+    mine = nameplate_of(None, str(tmp_path / "mine.toml"), {"sensors.1.gain": 1.25})
+    np.testing.assert_allclose(as_told(seen, mine).signal, plain.signal, atol=2e-7)
+    assert taken_out_words(seen, mine) == "offset -20 um of probe_1, gain 1.25 of probe_2"
+    # a data set's own scene has those that its records were simulated with
+    assert as_told(seen, nameplate_of(tmp_path / "1.h5", None, {})) is seen
+    assert taken_out_words(seen, nameplate_of(None, "journal-bearing", {})) == ""
 
 
 def test_a_nameplate_of_another_machine_is_a_caution():

@@ -51,6 +51,8 @@ class Nameplate:
         Where it is from, for the report.
     assumed : bool
         Nobody gave a scene: what no one told is that of the machine a model was trained on.
+    given : bool
+        A person gave the scene, with what it says of this machine's sensors.
     """
 
     scene: Scene
@@ -58,6 +60,7 @@ class Nameplate:
     doubts: Doubts = field(default_factory=Doubts)
     source: str = ""
     assumed: bool = False
+    given: bool = False
 
     def on_the_day(self, row: Mapping[str, Any], speed_hz: float | None) -> Scene:
         """The scene with a recording's conditions.
@@ -193,7 +196,14 @@ def nameplate_of(
     doubts = replace(_usual_doubts(found), **_doubts(spreads, found, plain))
     table = found.model_dump(mode="json")
     told = frozenset(numbered(table, path) for path in plain)
-    return Nameplate(scene=found, told=told, doubts=doubts, source=name, assumed=assumed)
+    return Nameplate(
+        scene=found,
+        told=told,
+        doubts=doubts,
+        source=name,
+        assumed=assumed,
+        given=scene is not None,
+    )
 
 
 def day_of(plate: Nameplate | None, row: Mapping[str, Any]) -> Mapping[str, Any]:

@@ -18,7 +18,7 @@ from ..feature_rows.healthy import Baseline
 from ..feature_rows.model_card import ModelCard
 from ..learning.grades import GRADE_NAMES
 from ..nameplate.nameplate import Nameplate
-from ..nameplate.sensors import as_told
+from ..nameplate.sensors import as_told, taken_out_words
 from ..pages.words import quantity_name
 from ..pictures.view import View
 from ..twin.opinion import TwinOpinion
@@ -107,7 +107,7 @@ def report_table(
     return {
         "schema_version": REPORT_SCHEMA,
         "headline": headline(estimate),
-        "recording": _recording_table(recording, card),
+        "recording": _recording_table(recording, card, taken_out_words(recording, plate, baseline)),
         "estimate": estimate.as_dict(),
         "film": film_table(film, plate, recording.row),
         "twin": twin_table(twin, trained),
@@ -173,12 +173,14 @@ def headline(estimate: Estimate) -> str:
     return f"{words}, with caution" if estimate.verdict == "caution" else words
 
 
-def _recording_table(recording: Recording, card: ModelCard) -> dict[str, Any]:
+def _recording_table(recording: Recording, card: ModelCard, taken_out: str) -> dict[str, Any]:
     return {
         "source": recording.source,
         "origin": recording.origin,
         "channels": [asdict(channel) for channel in recording.channels],
-        "label": _recording_line(recording),
+        "label": _recording_line(recording)
+        + (f"; taken out of the readings: {taken_out}" if taken_out else ""),
+        "taken_out": taken_out,
         "tacho": recording.tacho,
         "sample_rate_hz": recording.sample_rate,
         "duration_s": recording.duration,
