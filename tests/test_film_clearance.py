@@ -278,6 +278,8 @@ def test_uncertainties_come_with_the_values():
     )
     assert (plate.scene.load.static, plate.scene.sensors[1].offset) == (4000.0, 3e-6)
     assert plate.doubts == Doubts(load=0.12, offset=2e-6)
+    with pytest.raises(DataError, match="uncertainty '0 um' must be > 0 and < 1 m;"):
+        nameplate_of(None, "journal-bearing", {"sensors.1.offset": "3 um +- 0 um"})
     with pytest.raises(DataError, match="takes no uncertainty"):
         nameplate_of(None, "journal-bearing", {"bearing.length": "60 mm +- 1 %"})
     with pytest.raises(DataError, match="in per cent"):

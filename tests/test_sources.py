@@ -1156,8 +1156,10 @@ def test_what_a_foreign_file_is_is_said(tmp_path):
 def test_options_and_paths_at_fault(tmp_path):
     path = tmp_path / "x.npy"
     np.save(path, SIGNAL)
+    (tmp_path / "x.dat").touch()
     assert "suffix '.dat' must be one of .wav, .mat" in refusal(tmp_path / "x.dat")
     assert "no such file" in refusal(tmp_path / "y.npy")
+    assert "no such file" in refusal(tmp_path / "folder")
     assert "variable = 'a' does not fit NPY files" in refusal(path, variable="a")
     with pytest.raises(DataError) as caught:
         SourceOptions(

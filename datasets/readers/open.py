@@ -250,6 +250,8 @@ def _refuse_unread(file: Path, part: FilePart, options: SourceOptions) -> None:
 def _contents(file: Path, options: SourceOptions) -> Contents:
     reader = _RAW if options.dtype is not None else READERS.get(file.suffix.lower())
     if reader is None:
+        if not file.exists():
+            raise DataError(missing_file(file))
         raise DataError(
             f"{file}: suffix '{file.suffix}' must be one of {', '.join(READERS)}; convert the "
             "file, or give dtype and n_channels of headerless binary"

@@ -295,7 +295,8 @@ def _spread(path: str, text: str, kind: str, scene: Scene) -> float:
     else:
         raise DataError(f"{path}: uncertainty '{text}' must be in per cent; write '+- 10 %'")
     if not 0 < share < 1:
-        raise DataError(f"{path}: uncertainty '{text}' must be > 0 and < 100 %; correct it")
+        most = "1 m" if kind == "offset" else "100 %"
+        raise DataError(f"{path}: uncertainty '{text}' must be > 0 and < {most}; correct it")
     return share
 
 
