@@ -160,6 +160,7 @@ def test_errors_name_the_options(wavs, tmp_path):
     wavfile.write(tmp_path / "mono.wav", 200, RAMP.astype(np.float32))
     np.savez(tmp_path / "n.npz", u=RAMP, v=RAMP)
     np.save(tmp_path / "n.npy", RAMP)
+    (tmp_path / "a.doc").touch()
     unit, three = ("--unit", "g"), ("--channels", "x,y,key")
     for arguments, says in (
         ((wavs[0],), ["channel 'one_0': --unit must be given"]),
