@@ -106,7 +106,8 @@ def prepared_lanes(starts, release, step, n_steps):
     for start in starts:
         tables, bodies = tables_and_bodies(start, release, step)
         begin = crank_setup.Start(start[0], start[1], bodies, np.zeros((1, 6)))
-        jobs.append(LaneJob(tables=tables, start=begin, step=step, n_steps=n_steps))
+        films = crank_setup.start_films(tables, bodies, start[0])
+        jobs.append(LaneJob(tables=tables, start=begin, step=step, n_steps=n_steps, films=films))
 
     def run():
         for _, found in run_lanes(jobs, lane_kind(SCENE), Unheard):
