@@ -166,6 +166,12 @@ def test_readings_that_are_no_numbers_give_no_estimate():
     found = Explained(value=math.log(1e-4), error=0.01, budget={}, left=math.nan)
     problem = _Problem([placed(0.2e-3)], np.array(ANGLES), AS_NEW, Doubts())
     assert "must be <= 2.6" in _contradiction(problem, found, 1e-4)
+    # a clearance beyond reason is refused for what it is, not for what is left
+    far = found._replace(left=0.5)
+    said = _contradiction(problem, far, 20 * math.exp(problem.middle))
+    assert "it would be 20 times that as new, must be > 0.1 and < 10; check load" in said
+    assert "standard deviations" not in said
+    assert _contradiction(problem, far, math.exp(problem.middle)) == ""
 
 
 # --- from a recording

@@ -1,4 +1,4 @@
-"""What the comparison with other codes times is what it says: runs alone and side by side."""
+"""Runs of our crank that the comparison with other codes times."""
 
 import sys
 from pathlib import Path

@@ -82,6 +82,22 @@ def path(tmp_path):
     return tmp_path / "data.h5"
 
 
+def test_a_file_that_is_not_gone_on_with_goes_where_its_run_fails(path):
+    def fails(writer):
+        raise OSError("no space left")
+
+    def cannot_be_closed(writer):
+        writer.close()
+        writer.close = lambda: fails(writer)
+
+    for resumable in (False, True):
+        for fault in (fails, cannot_be_closed):
+            writer = begin(path, resumable=resumable, force=True)
+            with pytest.raises(OSError, match="no space left"), writer:
+                fault(writer)
+            assert writer.part.exists() == resumable
+
+
 def test_what_is_written_comes_back(path):
     with DataSet(write_all(path)) as data:
         assert len(data) == N_RECORDS

@@ -991,14 +991,16 @@ class DataSetWriter:
         return self
 
     def __exit__(self, _kind: object, error: object, _trace: object) -> None:
+        whole = error is None or isinstance(error, OutputError)  # whose text says where it is
         try:
             self.close()
         except (OSError, RuntimeError):  # the disk is still full: the first error tells it
             if error is None:
+                whole = False
                 raise
-        whole = error is None or isinstance(error, OutputError)  # whose text says where it is
-        if not (whole or self._resumable):
-            self.part.unlink(missing_ok=True)  # made anew, not gone on with
+        finally:
+            if not (whole or self._resumable):
+                self.part.unlink(missing_ok=True)  # made anew, not gone on with
 
 
 def refuse_output(path: Path, force: bool) -> None:

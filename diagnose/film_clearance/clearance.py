@@ -489,11 +489,16 @@ def _judged(
 def _contradiction(problem: _Problem, found: Explained, clearance: float) -> str:
     """That nothing explains the readings; empty where something does."""
     ratio = clearance / math.exp(problem.middle)
-    if found.left <= CONTRADICTED and _NARROWEST < ratio < _WIDEST:
+    if not found.left <= CONTRADICTED:
+        why = f"{found.left:.1f} standard deviations are left, must be <= {CONTRADICTED:g}"
+    elif not _NARROWEST < ratio < _WIDEST:
+        why = (
+            f"it would be {ratio:.3g} times that as new, must be > {_NARROWEST:g} and < {_WIDEST:g}"
+        )
+    else:
         return ""
     return (
-        f"no clearance puts the journal where the probes see it: {found.left:.1f} standard "
-        f"deviations are left, must be <= {CONTRADICTED:g}; check load, its direction, "
+        f"no clearance puts the journal where the probes see it: {why}; check load, its direction, "
         f"viscosity and the probes{OR_HEALTHY if problem.n == 1 else ''}"
     )
 

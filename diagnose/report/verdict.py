@@ -115,6 +115,7 @@ def report_table(
         "grades_text": possible_words(estimate, card.grade_edges_m),
         "advice": asdict(advise(estimate, quantity, card.grade_edges_m, outlook)),
         "limits": limits_table(card),
+        # a level, not a comparison: known faults are taken out, whatever healthy recordings have
         "iso": iso_table(as_told(recording, plate), machine),
         "outlook": None if outlook is None else asdict(outlook),
         "evidence_summary": _quiet_words(estimate, len(model.names))

@@ -14,42 +14,24 @@ import re
 import time
 from collections import defaultdict
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import wearstate
-from foreign_pump import AS_NEW
-from twin_opinion import HEALTHY, PATH, _heard
+from twin_opinion import HEALTHY, PATH, drawn_pumps, heard_of
 from wearstate.datasets.recipe.draws import value_at
-from wearstate.datasets.recipe.recipe import Sample, load_recipe, sample_records
 from wearstate.diagnose.learning.scores import resampled, share
 from wearstate.diagnose.twin.calibration import CalibratedScene
-from wearstate.sim.output.recording import Recording
 from wearstate.sim.scene.load import override, scene_from_table
+from wearstate.sim.scene.parts import Scene
 
 DRAWS = 4000
 INNER = (0.05, 0.95)
 
 
-def machines(count: int, seed: int) -> Iterator[tuple[list[Recording], Sample, dict, float]]:
-    """Healthy recordings of each pump, what was drawn of it, and the mean of its clearances."""
-    recipe = load_recipe("bilge-pump-standard", {"duration": "2.4 s"})
-    recipe = replace(recipe, table=recipe.table.model_copy(update={"records_per_group": HEALTHY}))
-    samples = list(sample_records(recipe, count * HEALTHY, seed=seed))
-    rng = np.random.default_rng(seed)
-    for number in range(count):
-        mine = samples[number * HEALTHY : (number + 1) * HEALTHY]
-        new = np.exp(rng.uniform(np.log(AS_NEW), np.log(1.2 * AS_NEW)))
-        clearances = [new * rng.uniform(1, 1.05) for _ in mine]
-        heard = [_heard(recipe.base, s, c) for s, c in zip(mine, clearances, strict=True)]
-        yield heard, mine[0], recipe.base, float(np.mean(clearances))
-
-
-def judged(found: CalibratedScene, sample: Sample, base: dict, clearance: float) -> list[dict]:
-    """One row for every number that the recordings tell something of."""
+def judged(found: CalibratedScene, scene: Scene) -> list[dict]:
+    """One row for every number that the recordings of a scene tell something of."""
     draws = found.found.posterior.draw(DRAWS, np.random.default_rng(0))
-    scene = scene_from_table(override(base, {**sample.drawn, PATH: clearance}))
     told = {number.path for number in found.numbers}
     rows = []
     for name in found.unknowns.named:
@@ -115,13 +97,18 @@ def main() -> None:
         else []
     )
     ready = {row["machine"] for row in done}
-    for number, (heard, sample, base, clearance) in enumerate(machines(given.machines, given.seed)):
+    pumps = drawn_pumps(given.machines, HEALTHY, given.seed)
+    for number, (base, mine, clearances) in enumerate(pumps):
         if number in ready:
             continue
+        heard = [heard_of(base, s, c) for s, c in zip(mine, clearances, strict=True)]
         began = time.perf_counter()
         try:
             rows = judged(
-                wearstate.calibrate("bilge-pump", heard, jobs=given.jobs), sample, base, clearance
+                wearstate.calibrate("bilge-pump", heard, jobs=given.jobs),
+                scene_from_table(
+                    override(base, {**mine[0].drawn, PATH: float(np.mean(clearances))})
+                ),
             )
         except wearstate.MisfitError as error:
             rows = [{"refused": str(error)}]

@@ -13,6 +13,7 @@ import json
 import time
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import zip_longest
 from pathlib import Path
 
 import numpy as np
@@ -30,24 +31,29 @@ COLUMN = "diametral_clearance_crankpin_m"
 PATH = "joint.crankpin.diametral_clearance"
 
 
-def own_machines(given: argparse.Namespace) -> Iterator[tuple[list[Recording], list[Recording]]]:
-    """Healthy and worn recordings of machines that the recipe draws."""
-    per = HEALTHY + given.records
+def drawn_pumps(
+    count: int, per: int, seed: int
+) -> Iterator[tuple[dict, list[Sample], list[float]]]:
+    """Scene of the recipe, `per` draws of each pump, and clearances of its healthy recordings."""
     recipe = load_recipe("bilge-pump-standard", {"duration": "2.4 s"})
     recipe = replace(recipe, table=recipe.table.model_copy(update={"records_per_group": per}))
-    samples = list(sample_records(recipe, given.machines * per, seed=given.seed))
-    rng = np.random.default_rng(given.seed)
-    for number in range(given.machines):
-        mine = samples[number * per : (number + 1) * per]
+    samples = list(sample_records(recipe, count * per, seed=seed))
+    rng = np.random.default_rng(seed)
+    for number in range(count):
         new = np.exp(rng.uniform(np.log(AS_NEW), np.log(1.2 * AS_NEW)))  # of the machine
-        heard = [
-            _heard(recipe.base, s, new * rng.uniform(1, 1.05) if i < HEALTHY else None)
-            for i, s in enumerate(mine)
-        ]
+        clearances = [float(new * rng.uniform(1, 1.05)) for _ in range(HEALTHY)]
+        yield recipe.base, samples[number * per : (number + 1) * per], clearances
+
+
+def own_machines(given: argparse.Namespace) -> Iterator[tuple[list[Recording], list[Recording]]]:
+    """Healthy and worn recordings of machines that the recipe draws."""
+    for base, mine, new in drawn_pumps(given.machines, HEALTHY + given.records, given.seed):
+        heard = [heard_of(base, s, c) for s, c in zip_longest(mine, new)]
         yield heard[:HEALTHY], heard[HEALTHY:]
 
 
-def _heard(base: dict, sample: Sample, clearance: float | None) -> Recording:
+def heard_of(base: dict, sample: Sample, clearance: float | None) -> Recording:
+    """Simulated recording of a draw, of a clearance of its own where one is given."""
     drawn = {**sample.drawn, **({} if clearance is None else {PATH: clearance})}
     found = simulate(scene_from_table(override(base, drawn)), seed=sample.seed)
     return replace(found, row={**sample.row, COLUMN: drawn[PATH]}, source=f"record {sample.index}")
