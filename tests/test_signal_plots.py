@@ -422,6 +422,24 @@ def test_pairs_of_probes_by_their_place():
     assert "probe_1_bow" in path.get_xlabel()
 
 
+@pytest.mark.parametrize("pairs", [1, 2])
+def test_names_of_probes_are_whole_on_the_narrow_picture_of_a_page(pairs):
+    """They are a second line of a label, and neither leave the picture nor cross what is below."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    one, two = ellipse(clock(1), 25.0, 30e-6, 10e-6)
+    rows = {"probe_1_aft": one, "probe_2_aft": two, "probe_1_bow": two, "probe_2_bow": one}
+    rows = dict(list(rows.items())[: 2 * pairs])
+    figure = panel_figure(make_panel(view(place="last", **rows), "orbit"))
+    FigureCanvasAgg(figure).draw()
+    labels = [axes.xaxis.label.get_window_extent() for axes in figure.axes]
+    assert len(labels) == 2 * pairs
+    assert min(label.y0 for label in labels) >= 0
+    upper, lower = figure.axes[0], figure.axes[-1]
+    if pairs > 1:
+        assert upper.xaxis.label.get_window_extent().y0 >= lower.bbox.y1
+
+
 # --- refused
 
 

@@ -15,6 +15,7 @@ from .view import Float, Trace, Turning, View
 
 _SHOWN_REVOLUTIONS = 10
 _MOST_ORDERS = 4.0  # of the full spectrum, to either side
+_SECOND_LINE = 0.15  # inch: in a narrow picture the names of the probes have a line of their own
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -43,6 +44,7 @@ def orbit_panel(view: View) -> Panel:
         caption=caption + " and full spectrum",
         height=3.6 * len(orbits),
         draw=partial(_draw_orbits, orbits=orbits),
+        below=_SECOND_LINE,
     )
 
 
@@ -98,7 +100,7 @@ def _orbit_of(view: View, first: Trace, second: Trace) -> _Orbit:
 def _draw_orbits(place: Any, *, orbits: Sequence[_Orbit]) -> None:
     panels = place.subplots(len(orbits), 2, width_ratios=(1, 1.4), squeeze=False)
     narrow = place.bbox.width / place.dpi < WIDTH
-    place.subplots_adjust(wspace=0.6 if narrow else 0.3, hspace=0.3)
+    place.subplots_adjust(wspace=0.6 if narrow else 0.3, hspace=0.5 if narrow else 0.3)
     for (path, lines), item in zip(panels, orbits, strict=True):
         path.plot(item.path.real, item.path.imag, lw=0.6, color=COLOURS[0], label="path")
         if item.first_order.size:

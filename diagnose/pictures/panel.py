@@ -59,6 +59,8 @@ class Panel:
         Margin [inch].
     above : float
         Room for titles above the axes [inch].
+    below : float
+        Room for a second line of a label below them [inch].
     """
 
     kind: str
@@ -67,6 +69,7 @@ class Panel:
     draw: Callable[[Any], None]
     right: float = _RIGHT
     above: float = 0.0
+    below: float = 0.0
 
 
 class LackError(ValueError):
@@ -151,7 +154,7 @@ def _set_margins(
     place.subplots_adjust(
         left=_LEFT / width,
         right=1 - panel.right / width,
-        bottom=_BOTTOM / height,
+        bottom=(_BOTTOM + panel.below) / height,
         top=1 - (top + panel.above) / height,
     )
 
