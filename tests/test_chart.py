@@ -1098,9 +1098,9 @@ def test_a_cut_run_is_timed_as_a_whole_one_and_said_to_be_cut():
         assert other.seconds == pytest.approx(4 * one.seconds)
     assert cut.choices[0].own_seconds == pytest.approx(4 * whole.choices[0].own_seconds)
     assert "0.5 s a run, cut from 3.2 s" in cut.note
-    assert "over seconds may make the error of whole ones another" in cut.note
+    assert "confirmed on whole ones" in cut.note
     assert "cut" not in whole.note
-    assert "over seconds" not in whole.note
+    assert "confirmed" not in whole.note
 
 
 def test_an_unfinished_chart_says_what_is_left():

@@ -734,6 +734,58 @@ class SpendingPilot(KnownPilot):
         return Outcome(each, "")
 
 
+class LastingPilot(KnownPilot):
+    """A pump whose wrist pin, where it is ideal, begins to matter after the cut recordings."""
+
+    slow = IDEAL_WRIST
+    whole = 0
+
+    def _run(self, values, start):
+        found = super()._run(values, start)
+        if "duration" in self.common:
+            return found
+        type(self).whole += 1
+        rungs = {(path, value) for path, value in values.items() if isinstance(value, str)}
+        [(size, *rest)] = found.quantities.values()
+        return Outcome({"one": (size + (15 if self.slow in rungs else 0), *rest)}, "")
+
+
+def cut_search(slow, late=None):
+    pilot = LastingPilot({IDEAL_CRANK: 1.0, LINK_CRANK: 1.0})
+    LastingPilot.slow, LastingPilot.whole = slow, 0
+    search = Search(pilot.scene, pilot.quantities, accuracy=0.02, pilot=pilot)
+    search.shorten(4)
+    assert pilot.common
+    search.measure(late)
+    return search
+
+
+def test_what_would_be_chosen_on_cut_recordings_is_confirmed_on_whole_ones():
+    asked = [cut_search(slow).found() for slow in (("", ""), IDEAL_WRIST)]
+    alike, slow = [found.raised.chosen.rungs["wristpin"] for found in asked]
+    assert alike == "ideal"
+    assert slow != "ideal"
+    assert [found.status for found in asked] == ["resolved", "resolved"]
+    found = asked[1].raised
+    cheaper = [c for c in found.candidates if c.cost < found.chosen.cost]
+    good = [c for c in cheaper if c.rungs["crankpin"] == "compliant"]
+    assert good  # on cut recordings, where nothing but the crank pin errs
+    assert [c.error for c in good] == pytest.approx([0.15] * len(good))
+
+
+def test_what_is_not_confirmed_on_whole_recordings_is_not_called_final():
+    before = cut_search(IDEAL_WRIST, lambda _expected: LastingPilot.whole > 0)
+    assert LastingPilot.whole == 1
+    found = before.found()
+    assert (found.status, found.kept.status) == ("out of budget", "so far")
+    assert before.remaining() > 0
+    told, known = before.progress()
+    assert told < known
+    before.measure()
+    assert before.remaining() == 0
+    assert before.found().raised.chosen.rungs["wristpin"] != "ideal"
+
+
 @pytest.mark.parametrize("runs", [0, 1, 5, 20, 60, 150])
 def test_at_any_budget_there_is_an_answer_that_is_not_called_final(runs):
     pilot = KnownPilot({TWO_LEVEL: 0.6, IDEAL_WRIST: 0.3}, scatter=0.01)

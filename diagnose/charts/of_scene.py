@@ -280,7 +280,7 @@ def _note(scene: Scene, found: Study) -> str:
     cut, slow = "", ""
     if found.duration is not None:
         cut = f", cut from {scene.duration:g} s for more starts"
-        slow = ": a motion that changes over seconds may make the error of whole ones another"
+        slow = "; a choice is confirmed on whole ones, as a motion may change over seconds"
     return (
         f"{found.duration or scene.duration:.3g} s a run{cut}, with its settling{slow}. "
         "Times are by the cost tables, as is the choice, scaled so that the scene as written takes "

@@ -6,6 +6,7 @@ is none. What was measured can be kept and taken up again; runs may be spread ov
 side by side where that is faster. None of it changes a result.
 """
 
+import copy
 import hashlib
 import json
 import math
@@ -370,6 +371,17 @@ class Pilot:
         self._tabulated: dict[str, float] = {}
         self._kinds: dict[str, Hashable | None] = {}
         self._own = hashlib.sha256(pickle.dumps(scene)).hexdigest()
+        self._timed_by = self
+
+    def uncut(self) -> "Pilot":
+        """The same runs without the values common to these, such as a shorter length.
+
+        They are not timed themselves: what they are expected to take is by the times of these.
+        """
+        whole = copy.copy(self)
+        whole.clock, whole.common = None, {}
+        whole._outcomes, whole._tabulated, whole._kinds = {}, {}, {}
+        return whole
 
     def outcomes(self, values: Mapping[str, Any], starts: int) -> list[Outcome]:
         """Outcomes of the first so many starts, up to one that fails."""
@@ -414,7 +426,8 @@ class Pilot:
 
     def measured(self, tabulated: float) -> float:
         """Time that so much by the tables takes here [s]; NaN where nothing was timed."""
-        return self._scale() * tabulated if self._scale() > 0 else math.nan
+        scale = self._timed_by._scale()
+        return scale * tabulated if scale > 0 else math.nan
 
     def _missing(self, combinations: Sequence[Mapping[str, Any]], starts: int) -> list[_Start]:
         """Starts that no outcome is known of, the first ones of all combinations first."""
@@ -469,9 +482,9 @@ class Pilot:
 
     def _expected(self, batch: Sequence[Sequence[_Start]]) -> float:
         """Time that a batch is expected to take [s]; 0 where nothing is known."""
-        if self.clock is None:
+        if self._timed_by.clock is None:
             return 0.0
-        scale = self._scale()
+        scale = self._timed_by._scale()
         told = {_key(values): self.seconds(values) for runs in batch for values, _ in runs}
         for values in (values for runs in batch for values, _ in runs):
             if not math.isfinite(told[_key(values)]):
@@ -727,10 +740,19 @@ class Comparison:
         self.top = {name: rungs[-1] for name, rungs in ladders.items() if rungs}
         self.cap = math.inf  # starts of the time being
         self._kept: dict[tuple[tuple[str, str], ...], Candidate] = {}
+        self._settled: dict[tuple[tuple[str, str], ...], Candidate] = {}
 
     def share(self, other: "Comparison") -> None:
         """Judge together with another of the same reference: what one knows the other knows."""
-        self._kept = other._kept
+        self._kept, self._settled = other._kept, other._settled
+
+    def settle(self, candidate: Candidate) -> None:
+        """Take over a judgement that was made on better runs than these, for good."""
+        self._settled[_names_of(candidate)] = candidate
+
+    def settled(self, candidate: Candidate) -> bool:
+        """Whether a judgement is one that was taken over."""
+        return _names_of(candidate) in self._settled
 
     def values(self, rungs: Mapping[str, Rung]) -> dict[str, Any]:
         """Values of a combination."""
@@ -753,11 +775,14 @@ class Comparison:
 
     def known(self, rungs: Mapping[str, Rung]) -> Candidate | None:
         """Candidate of a combination that has been judged."""
-        return self._kept.get(names(rungs))
+        name = names(rungs)
+        return self._settled.get(name) or self._kept.get(name)
 
     def told(self, candidate: Candidate) -> bool:
         """Whether more starts would change nothing of a verdict, or are too many."""
         if candidate.verdict != "doubtful" or 2 * candidate.starts > self.starts:
+            return True
+        if self.settled(candidate):
             return True
         return self._hopeless(candidate.differences, candidate.starts)
 
@@ -768,7 +793,7 @@ class Comparison:
     def judged(self) -> tuple[Candidate, ...]:
         """Every combination of its rungs that was judged."""
         own = {name: [rung.name for rung in rungs] for name, rungs in self.rungs.items()}
-        known = self._kept.values()
+        known = {**self._kept, **self._settled}.values()
         return tuple(c for c in known if all(c.rungs[n] in rungs for n, rungs in own.items()))
 
     def doubted(self) -> list[Candidate]:
@@ -830,6 +855,10 @@ class Comparison:
             reason=reason,
             seconds=self.pilot.seconds(values),
         )
+
+
+def _names_of(candidate: Candidate) -> tuple[tuple[str, str], ...]:
+    return tuple(sorted(candidate.rungs.items()))
 
 
 def names(rungs: Mapping[str, Rung]) -> tuple[tuple[str, str], ...]:

@@ -445,12 +445,18 @@ class Search:
             for cap in (*_CAPS, math.inf):
                 self._round(cap)
             self._rest()
+            for each in self._answers():
+                self._confirmed(each)
         except OutOfTimeError:
             return
         self._complete = True
 
     def _all(self) -> list[Comparison]:
         return [self.kept, *self.raises.values(), *([self.best] if self.best else [])]
+
+    def _answers(self) -> list[Comparison]:
+        """Comparisons that something is chosen of."""
+        return [self.kept, *([self.best] if self.best and not self.fault else [])]
 
     def _round(self, cap: float) -> None:
         for each in self._all():
@@ -523,6 +529,13 @@ class Search:
         """Search a comparison for its cheapest combination that will do."""
         if id(comparison) in self._done:
             return
+        while self._told(comparison):
+            if self._confirmed(comparison):
+                self._done.add(id(comparison))
+                return
+
+    def _told(self, comparison: Comparison) -> bool:
+        """Measure up to the cheapest that will do; whether more starts would change nothing."""
         comparison.judge(self.written)
         singles = descent(comparison)
         chosen = next(
@@ -533,8 +546,43 @@ class Search:
             if each.cost < chosen.cost and not comparison.told(each):
                 comparison.judge_again(each)
         self._convergence[id(comparison)] = list(self._convergences(comparison))
-        if all(comparison.told(e) for e in comparison.judged() if e.cost <= chosen.cost):
-            self._done.add(id(comparison))
+        return all(comparison.told(e) for e in comparison.judged() if e.cost <= chosen.cost)
+
+    def _confirmed(self, comparison: Comparison) -> bool:
+        """Judge what would be chosen on whole recordings, where those of the search are cut.
+
+        A motion may change over seconds: what agrees over four revolutions may not over forty.
+
+        Returns
+        -------
+        bool
+            Whether nothing that would have been chosen was refuted.
+        """
+        if self.duration is None:
+            return True
+        self.tell("the choice on whole recordings")
+        starts = comparison.starts >> self._more_starts()
+        whole = Comparison(self.pilot.uncut(), comparison.rungs, self.accuracy, starts)
+        if whole.pilot.fault(whole.values(whole.top)):
+            return True
+        confirmed = True
+        while (found := self._cheapest(comparison)) and not comparison.settled(found):
+            on_whole = whole.judge_again(found)
+            comparison.settle(on_whole)
+            confirmed &= on_whole.verdict == "within"
+        return confirmed
+
+    def _cheapest(self, comparison: Comparison) -> Candidate | None:
+        """What would be chosen; None where it is the reference."""
+        room = self._room(comparison)
+        top = {name: rung.name for name, rung in comparison.top.items()}
+        judged = sorted(comparison.judged(), key=lambda c: (c.cost, c.error))
+        found = next((c for c in judged if c.verdict == "within" and self._fits(c, room)), None)
+        return None if found is None or dict(found.rungs) == top else found
+
+    def _room(self, comparison: Comparison) -> float:
+        """Of the accuracy: what the reference is off by counts as well."""
+        return max(self.accuracy - unconverged(self._convergence.get(id(comparison), ())), 0.0)
 
     def _shortlist(self, best: Comparison) -> Iterator[dict[str, Rung]]:
         """Combinations that may do, as single rungs of the scene as written predict."""
@@ -672,7 +720,7 @@ class Search:
                 singles.append(self.written)
             wanted = {names(rungs): each.known(rungs) for rungs in singles}
             wanted |= {tuple(sorted(c.rungs.items())): c for c in each.judged()}
-            known += len(wanted)
+            known += len(wanted) + self._unconfirmed(each)
             told += sum(c is not None and (at_all or each.told(c)) for c in wanted.values())
         return (known, known) if self._complete else (told, known)
 
@@ -684,7 +732,24 @@ class Search:
         """
         widest = self._widest
         open_ = [each for each in self._all() if each is widest or id(each) not in self._done]
-        return sum(map(self._remaining, open_)) + self._front_left(widest)
+        known = sum(self._remaining(each) + self._confirmation_left(each) for each in open_)
+        return known + self._front_left(widest)
+
+    def _unconfirmed(self, comparison: Comparison) -> bool:
+        """Whether what would be chosen is known of cut recordings alone."""
+        if self.duration is None or comparison not in self._answers():
+            return False
+        found = self._cheapest(comparison)
+        return found is not None and not comparison.settled(found)
+
+    def _confirmation_left(self, comparison: Comparison) -> float:
+        """Time that whole recordings of what would be chosen take by the tables [s]."""
+        found = self._cheapest(comparison)
+        if found is None or not self._unconfirmed(comparison):
+            return 0.0
+        runs, starts = self.pilot.uncut(), max(FIRST, found.starts >> self._more_starts())
+        both = (found.values, comparison.values(comparison.top))
+        return sum(runs.tabulated(values, 0, starts) for values in both)
 
     def _front_left(self, comparison: Comparison) -> float:
         """Time that combinations for the rest of the front take by the tables [s], once known."""
@@ -769,7 +834,7 @@ class Search:
         left = unconverged(convergence)
         status = self._answer_status(comparison, left)
         unsure = ("within", "doubtful") if status == "so far" else ("within",)
-        room = max(self.accuracy - left, 0.0)  # what the reference is off by counts as well
+        room = self._room(comparison)
         likely = [c for c in judged if c.verdict in unsure and self._fits(c, room)]
         chosen = next(iter(likely), reference)
         if status == "so far" and dict(chosen.rungs) == top:
