@@ -11,9 +11,11 @@ from wearstate.datasets.recipe.text import RecipeError, toml_text
 from wearstate.datasets.recipe.twin import Twin, TwinTable, coordinate_names, machine_values
 from wearstate.diagnose.twin import opinion
 from wearstate.diagnose.twin.calibration import conditions_of
+from wearstate.diagnose.twin.ensemble import simulated
 from wearstate.diagnose.twin.inversion import Gaussian, corrected, rounds_of, widened
 from wearstate.diagnose.twin.levels import LevelLayout, layout_of, levels_of, speed_of
-from wearstate.diagnose.twin.misfit import misfit, refusal
+from wearstate.diagnose.twin.misfit import misfit, refusal, tail_share
+from wearstate.diagnose.twin.regimes import oiled_unknowns
 from wearstate.diagnose.twin.regression import Regressed, regressed
 from wearstate.diagnose.twin.scan import scanned
 from wearstate.diagnose.twin.unknowns import WEAR, unknowns_of
@@ -265,6 +267,7 @@ def test_what_no_member_shows_is_told_with_its_place(recording):
     assert not misfit(layout, rows[:, None], usual[None]).refused
     other = usual.copy()
     layout.map_of(other)[:] = layout.map_of(usual)[::-1]
+    layout.spectrum_of(other)[:] = layout.spectrum_of(usual)[::-1]
     swapped = misfit(layout, rows[:, None], other[None])
     assert swapped.order == ("acc_y", "acc_x")
     assert "fit far better as acc_y, acc_x" in refusal("bilge-pump", ["a.h5"], swapped)
@@ -276,6 +279,38 @@ def test_what_no_member_shows_is_told_with_its_place(recording):
     assert found.text.startswith("acc_y, ")
     assert "crank angle 30 to 60 deg" in found.text
     assert "above the nearest machine" in found.text
+    quiet = usual.copy()
+    layout.spectrum_of(quiet)[0, 40:] -= 30.0
+    found = misfit(layout, rows[:, None], quiet[None])
+    assert found.refused
+    assert found.text.startswith("acc_x, ")
+    assert "crank angle 0 to 360 deg" in found.text
+    assert "below the nearest machine" in found.text
+
+
+def test_a_share_beyond_all_members_is_that_of_their_tail():
+    """Of an exponential distribution the tail is known: exp(-x)."""
+    own = -np.log((np.arange(1000) + 0.5) / 1000)
+    for share in (0.5, 0.05, 0.001, 1e-6):
+        # a tail of 100 members tells its scale to 10 %, 12 scales beyond the edge to a factor 3
+        assert np.log(tail_share(own, -np.log(share)) / share) == pytest.approx(0, abs=1.1)
+
+
+def test_levels_of_noise_are_no_machine(recording):
+    """Noise at the levels of the pump: its spectrum has no mode, whatever its map."""
+    layout = layout_of(recording)
+    rng = np.random.default_rng(11)
+    waves = (
+        rng.standard_normal(recording.vibration.shape) * recording.vibration.std(axis=1)[:, None]
+    )
+    hiss = replace(recording, signal=np.concatenate([waves, recording.signal[2:]]).astype("f4"))
+    plan = load_recipe(RECIPE)
+    every = unknowns_of(plan, (5e-5, 1.3e-4))
+    scores = rng.standard_normal((40, len(every.names)))
+    run = conditions_of(plan, recording)
+    _, rows = simulated(every, scores, [run], seed=1)
+    assert misfit(layout, rows, levels_of(hiss)[None]).refused
+    assert not misfit(layout, rows, levels_of(recording)[None]).refused
 
 
 def test_recordings_of_swapped_channels_are_refused(recording):
@@ -286,6 +321,34 @@ def test_recordings_of_swapped_channels_are_refused(recording):
         wearstate.MisfitError, match=r"swapped\.h5.* fit far better as acc_y, acc_x"
     ):
         wearstate.calibrate("bilge-pump", [swapped], unknown=["casing.modes.*"], budget_s=1.0)
+
+
+def test_a_pin_in_oil_is_told_from_a_dry_one():
+    """What the scene has dry and the recording flooded, though laws of contact are unknown."""
+    oil = {
+        "joint.crankpin.rung": "film-map",
+        "joint.crankpin.oil.viscosity": "0.06 Pa s",
+        "joint.crankpin.oil.length": "50 mm",
+        "joint.crankpin.oil.wall_damping": "3 kN s/m",
+    }
+    flooded = wearstate.simulate(wearstate.load_scene("bilge-pump", {"duration": "1 s", **oil}))
+    unknown = ["contact_law", "sensors.*.noise"]
+    with pytest.raises(wearstate.MisfitError, match=r"not dry as in .*in oil, most like flooded"):
+        wearstate.calibrate("bilge-pump", [flooded], unknown=unknown, budget_s=1.0)
+
+
+def test_oil_is_asked_for_where_the_pin_is_dry_only():
+    dry = unknowns_of(load_recipe(RECIPE), (5e-5, 1.3e-4))
+    oiled = oiled_unknowns(dry)
+    assert set(oiled.names) > set(dry.names)
+    taken = {
+        oiled.options(row)["choice_lubrication"]
+        for row in np.random.default_rng(0).standard_normal((20, len(oiled.names)))
+    }
+    assert taken == {"flooded", "starved"}
+    assert oiled_unknowns(oiled) is None
+    ideal = load_recipe("bilge-pump-oiled")
+    assert oiled_unknowns(unknowns_of(ideal, (5e-5, 1.3e-4))) is None
 
 
 def test_channels_of_another_name_are_refused(recording):

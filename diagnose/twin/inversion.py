@@ -23,8 +23,9 @@ UNTOLD = 0.75
 """Deviation, in those of the prior, above which an unknown is drawn from the prior again."""
 LEAST_TOLD = 0.9
 """Deviation, in those of the prior, below which an unknown counts as told."""
-COST_S = 0.08
-"""Of one simulated recording on a usual core [s], to turn a budget into members."""
+COST_S = 0.1
+"""Of one simulated recording on a usual core, and its share of machines with oil [s], to turn a
+budget into members."""
 FEWEST = 120
 """Members: fewer tell nothing of a hundred unknowns."""
 STEP_LIMIT = 2.5
@@ -88,7 +89,7 @@ def rounds_of(budget_s: float | None, n_runs: int) -> tuple[int, ...]:
     Examples
     --------
     >>> rounds_of(None, 3), rounds_of(60.0, 3)
-    ((130, 90, 90), (105, 73, 73))
+    ((130, 90, 90), (83, 58, 58))
     """
     if budget_s is None:
         return ROUNDS
@@ -145,7 +146,7 @@ def inverted(
             runs,
             seed=seed + 100_000 * (number + 1),
             jobs=jobs,
-            progress=_moved(progress, done, sum(rounds)),
+            progress=moved(progress, done, sum(rounds)),
         )
         done += count
         if look is not None and number == 0:  # further ones hold fewer machines of the scene
@@ -193,9 +194,10 @@ LEAST_ANGLE = 0.5
 """Scatter of the place of a knock that is always there [deg]."""
 
 
-def _moved(
+def moved(
     progress: Callable[[int, int], None] | None, before: int, total: int
 ) -> Callable[[int, int], None] | None:
+    """Progress of a part that begins after others."""
     return None if progress is None else lambda done, _: progress(before + done, total)
 
 

@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtr
 
 from .levels import LevelLayout
 
@@ -18,12 +17,24 @@ Float = NDArray[np.float64]
 
 LEAST_SCATTER = 1.0
 """Added to the scatter of a level [dB]: models of machines agree with machines no better."""
-NUGGET = 0.05
+MAP_NUGGET = 0.05
 """Part of a level's variance that belongs to each recording alone."""
+SPECTRUM_NUGGET = 1.0
+"""The same of the spectrum: so large that a spectrum far out along what the members differ in, as
+that of noise or of a quiet machine, is far from them too."""
+VIEWS = 2
+"""Map and spectrum: the worse of two shares is as rare as twice it says."""
+TAIL = 0.1
+"""Farthest members, whose mean excess continues the distribution of distances beyond them."""
 LEAST_P = 0.02
 """Of a machine of the scene, below which recordings are refused."""
-OTHER_ORDER = 5.0
-"""Times as likely with the channels in another order: then they are."""
+FAR_BETTER = 5.0
+"""Times as likely with the channels in another order, or of another kind: then they are."""
+LEAST_REGIME_P = 0.01
+"""Of a machine of the scene, below which another lubrication is believed. Together with `LEAST_P`
+at most three of a hundred machines of the scene are refused."""
+OILED = "bilge-pump-oiled"
+"""Recipe with the lubrications of a crank pin."""
 DOUBT = 0.2
 """Of recordings that fit no worse than this the order of channels is not asked."""
 SECTORS = 12
@@ -37,7 +48,7 @@ class Misfit:
     Attributes
     ----------
     p : float
-        Share of the scene's machines that are as far from the others.
+        Share of the scene's machines that are as far from the others, by map or by spectrum.
     channel : str
         Where it is worst.
     band_hz : tuple of float
@@ -46,6 +57,10 @@ class Misfit:
         There, above what the nearest machine shows; below it where negative.
     order : tuple of str
         Channels in the order in which they would fit far better; empty where there is none.
+    regime : str
+        Lubrication of the crank pin that they sound like; empty where it is that of the scene.
+    regime_p : float
+        Share of the scene's machines that sound as much like it.
     """
 
     p: float
@@ -54,11 +69,13 @@ class Misfit:
     angle_deg: tuple[float, float]
     level_db: float
     order: tuple[str, ...] = ()
+    regime: str = ""
+    regime_p: float = 1.0
 
     @property
     def refused(self) -> bool:
         """Whether no calibration mends it."""
-        return self.p < LEAST_P or bool(self.order)
+        return self.p < LEAST_P or bool(self.order or self.regime)
 
     @property
     def text(self) -> str:
@@ -73,7 +90,7 @@ class Misfit:
 
 
 def misfit(layout: LevelLayout, rows: Float, observed: Float) -> Misfit:
-    """Distance of recordings from the span of an ensemble, against that of its own members.
+    """Distance of recordings from an ensemble, against that of its own members.
 
     Parameters
     ----------
@@ -85,35 +102,64 @@ def misfit(layout: LevelLayout, rows: Float, observed: Float) -> Misfit:
 
     Notes
     -----
-    The predictive variance of a Gaussian process with a linear kernel, left out one by one for the
-    members; their logarithms are taken as normal.
+    Of map and spectrum each the predictive variance of a Gaussian process with a linear kernel,
+    left out one by one for the members.
     """
-    members, here = layout.map_of(rows), layout.map_of(observed)
-    found = _distance(layout, members, here)
+    channels = layout.channels
+    found = _judged(layout, rows, observed, range(len(channels)))
     if found.p > DOUBT:
         return found
-    for order in itertools.permutations(range(len(layout.channels))):
-        if _distance(layout, members, here[:, list(order)]).p > OTHER_ORDER * found.p:
-            return replace(found, order=tuple(layout.channels[i] for i in order))
+    for order in itertools.permutations(range(len(channels))):
+        if far_better(_judged(layout, rows, observed, order), found):
+            return replace(found, order=tuple(channels[i] for i in order))
     return found
 
 
-def _distance(layout: LevelLayout, members: Float, here: Float) -> Misfit:
-    """Misfit of maps, with the channels as they stand."""
-    maps = np.concatenate([members, here[np.newaxis]])
-    flat = maps.reshape(len(maps), -1)
+def far_better(other: Misfit, found: Misfit) -> bool:
+    """Whether recordings fit elsewhere, and far better than where they were looked for."""
+    return other.p > max(LEAST_P, FAR_BETTER * found.p)
+
+
+def tail_share(own: Float, here: float) -> float:
+    """Share of distances that are as large; beyond the largest ones by an exponential tail.
+
+    Examples
+    --------
+    >>> own = np.arange(100.0)
+    >>> round(tail_share(own, 50.0), 2), round(tail_share(own, 110.0), 3)
+    (0.5, 0.002)
+    """
+    edge = np.quantile(own, 1 - TAIL)
+    if here <= edge:
+        return max(TAIL, float((own >= here).mean()))
+    return TAIL * float(np.exp(-(here - edge) / (own[own > edge] - edge).mean()))
+
+
+def _judged(layout: LevelLayout, rows: Float, observed: Float, order: Sequence[int]) -> Misfit:
+    """Misfit with the channels in an order, of the view that it is worse in."""
+    places = list(order)
+    map_p, map_left = _distance(layout.map_of(rows), layout.map_of(observed)[:, places], MAP_NUGGET)
+    p, left = _distance(
+        layout.spectrum_of(rows), layout.spectrum_of(observed)[:, places], SPECTRUM_NUGGET
+    )
+    of_both = min(1.0, VIEWS * min(map_p, p))
+    return _worst(layout, map_left, of_both) if map_p <= p else _line(layout, left, of_both)
+
+
+def _distance(members: Float, here: Float, part: float) -> tuple[float, Float]:
+    """Share of members as far from the others, and what is left of the recordings [dB]."""
+    flat = np.concatenate([members, here[np.newaxis]]).reshape(len(members) + 1, -1)
     scatter = np.sqrt(flat[:-1].var(axis=0) + LEAST_SCATTER**2)
     scaled = (flat - flat[:-1].mean(axis=0)) / scatter
     products = scaled @ scaled[:-1].T / scaled.shape[1]
     inner, last = products[:-1], products[-1]
-    nugget = NUGGET * np.mean(np.diag(inner))
+    nugget = part * np.mean(np.diag(inner))
     inverse = np.linalg.inv(inner + nugget * np.eye(len(inner)))
     weights = inverse @ last
     own = np.log(1 / np.diag(inverse))
     distance = np.log((scaled[-1] ** 2).mean() + nugget - last @ weights)
-    p = float(ndtr(-(distance - own.mean()) / own.std()))
     left = (scaled[-1] - weights @ scaled[:-1]) * scatter
-    return _worst(layout, left.reshape(maps.shape[1:]), p)
+    return tail_share(own, float(distance)), left.reshape(here.shape)
 
 
 def _worst(layout: LevelLayout, residual: Float, p: float) -> Misfit:
@@ -132,6 +178,24 @@ def _worst(layout: LevelLayout, residual: Float, p: float) -> Misfit:
     )
 
 
+def _line(layout: LevelLayout, residual: Float, p: float) -> Misfit:
+    """Channel and band of the map whose lines have the largest residual of all runs together."""
+    edges, points = layout.edges, layout.points
+    bands = np.searchsorted(edges, points, side="right") - 1
+    inside = [i for i in range(len(edges) - 1) if (bands == i).any()]
+    means = residual.mean(axis=0)
+    cells = np.stack([means[:, bands == i].mean(axis=-1) for i in inside], axis=-1)
+    channel, place = np.unravel_index(np.argmax(np.abs(cells)), cells.shape)
+    band = inside[int(place)]
+    return Misfit(
+        p=p,
+        channel=layout.channels[channel],
+        band_hz=(float(edges[band]), float(edges[band + 1])),
+        angle_deg=(0.0, 360.0),
+        level_db=float(cells[channel, place]),
+    )
+
+
 def refusal(scene: str, files: Sequence[str], found: Misfit) -> str:
     """Why recordings are refused."""
     who = ", ".join(files) or "recordings"
@@ -140,8 +204,14 @@ def refusal(scene: str, files: Sequence[str], found: Misfit) -> str:
             f"{who}: channels must be in the order of the scene {scene}; they fit far better as "
             f"{', '.join(found.order)} (p = {found.p:.2g} as they are); check which sensor is which"
         )
+    if found.regime:
+        return (
+            f"{who}: p = {found.regime_p:.3g} must be >= {LEAST_REGIME_P:g}, or the crank pin is "
+            f"not dry as in the scene {scene}: it sounds as if it ran in oil, most like "
+            f"{found.regime}; take recipe {OILED}, set joint.crankpin.rung, or check the pressures"
+        )
     return (
-        f"{who}: p = {found.p:.2g} must be >= {LEAST_P:g}, or no "
+        f"{who}: p = {found.p:.3g} must be >= {LEAST_P:g}, or no "
         f"machine of the scene {scene} sounds so: {found.text}; check channels and their order, "
         "throws, geometry, conditions, and whether it is this machine"
     )

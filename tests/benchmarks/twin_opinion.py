@@ -32,17 +32,17 @@ PATH = "joint.crankpin.diametral_clearance"
 
 
 def drawn_pumps(
-    count: int, per: int, seed: int
+    count: int, per: int, seed: int, recipe: str = "bilge-pump-standard"
 ) -> Iterator[tuple[dict, list[Sample], list[float]]]:
     """Scene of the recipe, `per` draws of each pump, and clearances of its healthy recordings."""
-    recipe = load_recipe("bilge-pump-standard", {"duration": "2.4 s"})
-    recipe = replace(recipe, table=recipe.table.model_copy(update={"records_per_group": per}))
-    samples = list(sample_records(recipe, count * per, seed=seed))
+    plan = load_recipe(recipe, {"duration": "2.4 s"})
+    plan = replace(plan, table=plan.table.model_copy(update={"records_per_group": per}))
+    samples = list(sample_records(plan, count * per, seed=seed))
     rng = np.random.default_rng(seed)
     for number in range(count):
         new = np.exp(rng.uniform(np.log(AS_NEW), np.log(1.2 * AS_NEW)))  # of the machine
         clearances = [float(new * rng.uniform(1, 1.05)) for _ in range(HEALTHY)]
-        yield recipe.base, samples[number * per : (number + 1) * per], clearances
+        yield plan.base, samples[number * per : (number + 1) * per], clearances
 
 
 def own_machines(given: argparse.Namespace) -> Iterator[tuple[list[Recording], list[Recording]]]:
