@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scipy.signal import butter, sosfilt
 from wearstate.datasets.file.record import DataSet
+from wearstate.diagnose.feature_rows.feature_choice import feature_words
 from wearstate.diagnose.feature_rows.feature_table import recording_features
 from wearstate.diagnose.feature_rows.physical import (
     columns_of,
@@ -25,7 +26,12 @@ from wearstate.diagnose.wear_model.noise_floor import (
     noise_floors,
     noisiest,
 )
-from wearstate.diagnose.wear_model.novelty import fit_familiarity, free_distance, novelty_p_value
+from wearstate.diagnose.wear_model.novelty import (
+    fit_familiarity,
+    free_distance,
+    novelty_p_value,
+    outside_weight,
+)
 from wearstate.features.catalogue.row import feature_names, feature_row
 from wearstate.sim.machine.simulate import simulate
 from wearstate.sim.scene.load import load_scene
@@ -309,6 +315,41 @@ def test_another_machine_made_to_match_is_refused(small_model, small_set, tmp_pa
     told = script["campaign"](load_model(small_model), strangers)
     assert told["journals, stretched"] == {"unfamiliar": 4}
     assert set(told["journals, own time"]) <= {"unfamiliar", "no features"}
+
+
+# --- outside the trained ranges
+
+
+def test_more_records_do_not_make_features_outside_the_range_count_more():
+    """A tenth of the features outside is as strange to a model of 10,000 records as of 1,000."""
+    apart, outside = np.linspace(0.0, 2.0, 1001), np.linspace(0.0, 0.02, 1001)
+    weights = [outside_weight(apart, factor * outside)[0] for factor in (5, 2, 1, 0.1, 0)]
+    far = np.quantile(apart, 0.99)
+    assert weights[0] * 0.1 * 0.99 == pytest.approx(far)
+    assert weights[1] < weights[2] == weights[3] == weights[4]
+    assert weights[4] * 0.03 == pytest.approx(far)
+
+
+def test_features_outside_their_range_are_a_caution_that_names_them(small_trained):
+    model, table, _ = small_trained
+    cloud = model.familiarity
+    row = table.values[table.manifest["grade"].to_numpy().argmin()].copy()
+    most = int(cloud.seldom_outside * len(model.names) + 1e-9)
+    cells = [i for i, name in enumerate(model.names) if ".band_" in name]
+    inside = ((row >= cloud.low) & (row <= cloud.high)).all()
+    assert inside
+    assert "are outside all that was trained on" not in " ".join(model.judge(row).cautions)
+    assert len(cells) > most
+    for place, i in enumerate(cells[: most + 1]):
+        row[i] = cloud.high[i] + (0.01 + 0.001 * place) * (cloud.high[i] - cloud.low[i])
+    found = model.judge(row)
+    said = " ".join((*found.cautions, *found.reasons))
+    assert f"{most + 1} of {len(model.names)} features are outside all that was trained on" in said
+    farthest = model.names[cells[most]]
+    assert f"at most {most}: {feature_words(farthest)} {row[cells[most]]:.3g} dB, trained " in said
+    row[cells[0]] = cloud.high[cells[0]]
+    found = model.judge(row)
+    assert "are outside all" not in " ".join((*found.cautions, *found.reasons))
 
 
 # --- too quiet

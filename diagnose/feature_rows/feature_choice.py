@@ -1,5 +1,6 @@
 """Which features a model is trained on: told in words, chosen by folds, kept in its card."""
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -308,3 +309,45 @@ def _line_error(rows: Float, target: Float, folds: Folds) -> float:
 def _first(errors: Sequence[float]) -> int:
     least = min(errors)
     return next(i for i, error in enumerate(errors) if error <= least * (1 + _TIE))
+
+
+def feature_words(name: str) -> str:
+    """Feature name for people.
+
+    Examples
+    --------
+    >>> feature_words("acc_x.angle_040_050.band_4350_5250.level_db")
+    'acc_x, 40 to 50°, 4350 to 5250 Hz, level'
+    >>> feature_words("acc_y.kurtosis")
+    'acc_y, kurtosis'
+    >>> feature_words("orbit.order_0.5.major_db")
+    'orbit, order 0.5, major'
+    >>> feature_words("pressure.rise_width_deg")
+    'pressure, rise width'
+    """
+    owner, *parts = re.split(r"\.(?![0-9])", name)  # an order may be 0.5
+    words = [owner]
+    for part in parts:
+        span = re.fullmatch(r"(angle|band)_(\d+)_(\d+)", part)
+        if span:
+            unit = "°" if span[1] == "angle" else " Hz"
+            words.append(f"{int(span[2])} to {int(span[3])}{unit}")
+        else:
+            bare = re.sub(r"_(db|hz|deg)$", "", part).replace("_", " ")
+            words.append(re.sub(r"^order 0*(?=\d)", "order ", bare))
+    return ", ".join(words)
+
+
+def value_words(name: str, value: float) -> str:
+    """Value of a feature for people.
+
+    Examples
+    --------
+    >>> value_words("acc_x.order_02.level_db", -8.04), value_words("acc_y.kurtosis", 3.0)
+    ('-8.04 dB', '3')
+    """
+    unit = _SUFFIXES.get(name.rpartition("_")[2], "")
+    return f"{value:.3g} {unit}".rstrip()
+
+
+_SUFFIXES = {"db": "dB", "hz": "Hz", "deg": "°"}

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from ...sim.output.recording import DataError, Recording
+from ..feature_rows.feature_choice import feature_words
 from ..feature_rows.healthy import Baseline, Baselines
 from ..learning.grades import GRADE_COLOURS, NO_GRADE_COLOUR
 from ..nameplate.cautions import known_beside
@@ -27,7 +28,7 @@ from .figures import (
     trend_picture,
 )
 from .points import trend_points
-from .verdict import feature_words, finding_words, millimetres, report_table, zone_words
+from .verdict import finding_words, millimetres, report_table, zone_words
 
 _MOST_ROWS = 1000  # of the table of a batch: a page for reading
 _MOST_DETAILS = 3  # recordings of a batch with pictures

@@ -4,11 +4,12 @@ import textwrap
 from collections.abc import Mapping
 from typing import Any
 
+from ..feature_rows.feature_choice import feature_words
 from ..pages.words import severity_word
 from .advice import brief_words
 from .batch import Batch, BatchRow, machine_heading
 from .beside import is_first
-from .verdict import feature_words, finding_words, millimetres, zone_words
+from .verdict import finding_words, millimetres, zone_words
 
 _WIDTH = 96  # of a line
 _INDENT = 12

@@ -334,33 +334,6 @@ def _zone_note(kind: iso.MachineKind) -> str:
 # --- words
 
 
-def feature_words(name: str) -> str:
-    """Feature name for people.
-
-    Examples
-    --------
-    >>> feature_words("acc_x.angle_040_050.band_4350_5250.level_db")
-    'acc_x, 40 to 50°, 4350 to 5250 Hz, level'
-    >>> feature_words("acc_y.kurtosis")
-    'acc_y, kurtosis'
-    >>> feature_words("orbit.order_0.5.major_db")
-    'orbit, order 0.5, major'
-    >>> feature_words("pressure.rise_width_deg")
-    'pressure, rise width'
-    """
-    owner, *parts = re.split(r"\.(?![0-9])", name)  # an order may be 0.5
-    words = [owner]
-    for part in parts:
-        span = re.fullmatch(r"(angle|band)_(\d+)_(\d+)", part)
-        if span:
-            unit = "°" if span[1] == "angle" else " Hz"
-            words.append(f"{int(span[2])} to {int(span[3])}{unit}")
-        else:
-            bare = re.sub(r"_(db|hz|deg)$", "", part).replace("_", " ")
-            words.append(re.sub(r"^order 0*(?=\d)", "order ", bare))
-    return ", ".join(words)
-
-
 def evidence_words(
     name: str, value: float, healthy: float, units: Mapping[str, str] | None = None
 ) -> str:

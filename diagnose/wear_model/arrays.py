@@ -255,6 +255,8 @@ def familiarity_fits(cloud: Familiarity, names: Sequence[str], n: int) -> bool:
         and shapes_of(cloud.low, cloud.high) == {(len(names),)}
         and isinstance(cloud.weight, float)
         and cloud.weight >= 0
+        and isinstance(cloud.seldom_outside, float)
+        and 0 <= cloud.seldom_outside <= 1
         and isinstance(cloud.most_lacking, float)
         and isinstance(cloud.seldom_lacking, float)
         and 0 <= cloud.seldom_lacking <= cloud.most_lacking

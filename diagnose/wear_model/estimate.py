@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ...features.response.transfer import FrfReference
 from ...sim.output.recording import DataError, Recording, Table, html_table
-from ..feature_rows.feature_choice import choice_in
+from ..feature_rows.feature_choice import choice_in, feature_words, value_words
 from ..feature_rows.feature_table import (
     FeatureSelection,
     held_against,
@@ -61,6 +61,8 @@ enough to tell so small a share; else one in its number."""
 
 _OFF_LEVEL = 3.5  # standard deviations of a level that few familiar machines reach
 _MUCH_WORSE = 1.5  # times the error: that of twenty recordings is known to a sixth
+_TOLD_OUTSIDE = 3  # features that a caution names
+_ROUNDING = 1e-9
 _MOST_ODD = 2  # kinds of oddity: of 2,000 unseen pumps seven had two and none had three
 _KNOCKING_DB = 15.0  # simulated pumps of one throw swing by 33 dB in a turn, of three by 8
 _SPEED_FEATURE = "shaft.speed_hz"
@@ -299,7 +301,7 @@ class WearModel:
         """Distance at which the p-value falls to its limit."""
         far = np.sort(self.blind.calibration.distance)[::-1]
         # that many calibration recordings lie at least as far
-        rank = math.floor(self.p_limit * (len(far) + 1) + 1e-9) - 1
+        rank = math.floor(self.p_limit * (len(far) + 1) + _ROUNDING) - 1
         return float(np.nextafter(far[rank], math.inf)) if rank < len(far) else 0.0
 
     @cached_property
@@ -588,7 +590,10 @@ class WearModel:
         }
         reasons = (*self._refused(row), *self._too_quiet(row))
         if known["p_value"] <= self.p_limit:
-            reasons += (_strangeness(look.distance, self.blind.calibration.distance),)
+            reasons += (
+                _strangeness(look.distance, self.blind.calibration.distance),
+                *self._outside_cautions(row),
+            )
         if reasons:
             return Estimate(verdict="unfamiliar", reasons=reasons, **known)
         asked, inputs = self._asked(row, baseline, conditions)
@@ -613,6 +618,7 @@ class WearModel:
             *(fault.text for fault in faults),
             *self._missing_cautions(conditions),
             *strange,
+            *self._outside_cautions(row),
             *self._finding_cautions(findings),
         )
         return Estimate(
@@ -750,6 +756,23 @@ class WearModel:
                 f"{low:.4g} to {high:.4g} {condition.unit}: extrapolating"
             )
         return cautions
+
+    def _outside_cautions(self, row: Float) -> list[str]:
+        """That more features are outside their trained ranges than in few familiar recordings."""
+        cloud, n = self.familiarity, len(self.names)
+        places = cloud.farthest_outside(row)
+        most = math.floor(cloud.seldom_outside * n + _ROUNDING)
+        if len(places) <= most:
+            return []
+        worst = "; ".join(
+            f"{feature_words(self.names[i])} {value_words(self.names[i], row[i])}, "
+            f"trained {cloud.low[i]:.3g} to {cloud.high[i]:.3g}"
+            for i in places[:_TOLD_OUTSIDE]
+        )
+        return [
+            f"{len(places)} of {n} features are outside all that was trained on, in all but a few "
+            f"familiar recordings at most {most}: {worst}"
+        ]
 
     def _level_cautions(self, look: Observation) -> list[str]:
         return [

@@ -37,7 +37,7 @@ from ..learning.regressions import (
 )
 from ..learning.severity import Estimator
 from .noise_floor import usual_excess
-from .novelty import REACH, Familiarity, fit_familiarity
+from .novelty import REACH, Familiarity, fit_familiarity, outside_weight
 from .quietness import CAUTIONED_SHARE, REFUSED_SHARE, most_lacking
 from .strangers import fit_strangers
 from .training_rows import FOLDS, TrainingRows
@@ -45,7 +45,6 @@ from .training_rows import FOLDS, TrainingRows
 Float = NDArray[np.float64]
 
 _FEWEST_FAULTS = 20  # records with and without a fault, for an error rate to within a tenth
-_RARE = 0.99  # of the records: as far, or with as many features out of range, as 1 in 100 is
 _WORTH = 0.1  # of the error: conditions that bring less are not worth a person's asking
 
 SeverityFit = Fitted[Blend] | Fitted[Experts]
@@ -307,9 +306,8 @@ def _out_of_fold_distances(
 ) -> tuple[Float, dict[str, float]]:
     """Novelty distances of records, as they are and moved, from clouds without their machine draw.
 
-    And the weight of the share outside the ranges, which makes its rare values as far as those of
-    the distance itself: of both together no more are refused than of one. And how far peaks may
-    be below the usual ones, and noise floors above them.
+    And what the share outside the ranges counts, how far peaks may be below the usual ones, and
+    noise floors above them.
     """
     names = training.names
     apart, outside = np.empty((2, 2, len(training.rows)))
@@ -321,10 +319,10 @@ def _out_of_fold_distances(
             outside[i, test] = cloud.outside(each.rows[test])
         lacking[test] = cloud.lacking(names, training.rows[test])
         noise[test] = cloud.noise(names, training.rows[test])
-    rare = max(float(np.quantile(outside[0], _RARE)), 1 / len(names))
-    weight = float(np.quantile(apart[0], _RARE)) / rare
+    weight, rare = outside_weight(apart[0], outside[0])
     limits = {
         "weight": weight,
+        "seldom_outside": rare,
         "most_lacking": most_lacking(lacking, REFUSED_SHARE),
         "seldom_lacking": most_lacking(lacking, CAUTIONED_SHARE),
         "most_noise": usual_excess(noise),

@@ -27,7 +27,11 @@ REACH = 1.2
 NEVER_DB = 1e4
 """No signal is so far below another."""
 
+_RARE = 0.99  # of familiar recordings
+_FEW = 0.03  # of the features: so many outside the trained range are not strange by themselves
+
 _LEAST_SPREAD = 1e-6  # of the largest: a feature that never moves says nothing
+_TINY = 1e-300
 _CLIP = 10.0  # standard deviations: one wild feature must not stand for a strange recording
 _PROFILE = "profile"
 _ODD_PROFILE, _LESS_ODD = 1.2, 0.45
@@ -58,6 +62,8 @@ class Familiarity:
     weight : float
         Distance that stands for all features outside that range: a machine may be near in all
         coordinates and still show cells of its map that no training machine ever did.
+    seldom_outside : float
+        Share of the features outside that range that few familiar recordings exceed.
     usual_peak, peak_slope : numpy.ndarray [shape=(n_channels,)]
         Of :class:`~.quietness.UsualPeaks`.
     most_lacking : float
@@ -84,6 +90,7 @@ class Familiarity:
     low: Float
     high: Float
     weight: float
+    seldom_outside: float
     usual_peak: Float
     peak_slope: Float
     most_lacking: float
@@ -111,6 +118,23 @@ class Familiarity:
     def outside(self, rows: Float) -> Float:
         """Share of the features outside what was trained on [shape=(n_recordings,)]."""
         return np.asarray(((rows < self.low) | (rows > self.high)).mean(axis=1))
+
+    def farthest_outside(self, row: Float) -> NDArray[np.intp]:
+        """Features of one recording outside the trained range, in spans of it the farthest first.
+
+        Parameters
+        ----------
+        row : numpy.ndarray [shape=(n_features,)]
+
+        Returns
+        -------
+        numpy.ndarray of int
+            Their places.
+        """
+        beyond = np.maximum(self.low - row, row - self.high)
+        span = np.maximum(self.high - self.low, _LEAST_SPREAD * np.abs(self.high) + _TINY)
+        order = np.argsort(-beyond / span, kind="stable")
+        return order[beyond[order] > 0]
 
     def distance(self, names: Sequence[str], rows: Float) -> Float:
         """Distance of recordings from the cloud: about 1 for a training recording.
@@ -241,6 +265,7 @@ def fit_familiarity(
     groups: NDArray[np.intp],
     *,
     weight: float = 0.0,
+    seldom_outside: float = 1.0,
     most_lacking: float = NEVER_DB,
     seldom_lacking: float = NEVER_DB,
     most_noise: float = NEVER_DB,
@@ -257,6 +282,8 @@ def fit_familiarity(
         Machine draw of each.
     weight : float
         Of the share of features outside the trained range; 0: it does not count.
+    seldom_outside : float
+        Share of the features outside the trained range that few familiar recordings exceed.
     most_lacking, seldom_lacking : float
         How far familiar peaks may be, and few are, below the usual ones [dB].
     most_noise : float
@@ -306,6 +333,7 @@ def fit_familiarity(
         low=rows.min(axis=0),
         high=rows.max(axis=0),
         weight=weight,
+        seldom_outside=seldom_outside,
         usual_peak=usual.level,
         peak_slope=usual.slope,
         most_lacking=most_lacking,
@@ -317,6 +345,37 @@ def fit_familiarity(
         top_slope=tops.slope,
         most_top_lacking=tops.most,
     )
+
+
+def outside_weight(apart: Float, outside: Float) -> tuple[float, float]:
+    """What features outside the trained range count beside the distance in the others.
+
+    Parameters
+    ----------
+    apart, outside : numpy.ndarray [shape=(n_recordings,)]
+        Distance, and share of the features outside, of familiar recordings whose machines had no
+        part in the cloud.
+
+    Returns
+    -------
+    weight : float
+        Of the share: where one recording in a hundred has more outside, it makes so much as far as
+        the hundredth is in distance. Three per cent of the features count no more than that: of
+        more training records familiar ones have fewer outside, while other machines of the kind
+        have as many as before, and are estimated no worse.
+    seldom : float
+        Share that one familiar recording in a hundred exceeds.
+
+    Examples
+    --------
+    >>> apart = np.linspace(0.0, 2.0, 101)
+    >>> for share in (0.06, 0.01):
+    ...     print([round(each, 3) for each in outside_weight(apart, share * apart / 1.98)])
+    [33.0, 0.06]
+    [66.0, 0.01]
+    """
+    far, seldom = (float(np.quantile(each, _RARE)) for each in (apart, outside))
+    return far / max(seldom, _FEW), seldom
 
 
 def _tolerance(names: Sequence[str], rows: Float, values: Float) -> Float:

@@ -41,7 +41,10 @@ _POUND_FORCE = 4.4482216152605  # N, exact by definition
 STANDARD_GRAVITY = 9.80665  # m/s^2, ISO 80000-3
 
 UNITS: dict[str, dict[str, float]] = {
-    "length": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "nm": 1e-9, "in": _INCH},
+    "length": {
+        **{"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "nm": 1e-9},
+        **{"in": _INCH, "mil": 1e-3 * _INCH},
+    },
     "mass": {"kg": 1.0, "g": 1e-3},
     "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0, "h": 3600.0},
     "rotation speed": {"rev/s": 1.0, "Hz": 1.0, "rpm": 1.0 / 60.0, "rad/s": 0.5 / math.pi},
