@@ -1,6 +1,8 @@
 """A twin of one machine: what is drawn from it, what the inversion tells, what it refuses."""
 
+import runpy
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -23,6 +25,7 @@ from wearstate.sim.output.recording import DataError
 from wearstate.sim.scene.load import minimal_text
 
 RECIPE = "bilge-pump-standard"
+BENCHMARKS = Path(__file__).parent / "benchmarks"
 MODE = "casing.modes.2.frequency"
 DELAY = "pressure.pressure.rise_delay"
 
@@ -432,3 +435,28 @@ def test_what_a_calibration_left_is_the_prior_of_an_opinion(mine, recording):
         place = known.names.index(name)
         assert (prior.mean[place], prior.sd[place]) == pytest.approx((mean, sd))
     assert (prior.mean[-1], prior.sd[-1]) == (0.0, 1.0)  # the wear
+
+
+# --- the campaign of misfits
+
+
+def test_the_campaign_records_what_it_says(monkeypatch):
+    """A sample of tests/benchmarks/twin_misfits.py: kinds of the same conditions, counted."""
+    monkeypatch.syspath_prepend(str(BENCHMARKS))
+    script = runpy.run_path(str(BENCHMARKS / "twin_misfits.py"))
+    (dry,) = script["pumps"](1, 905)
+    (starved,) = script["oiled_pumps"](1, 905, "starved")
+    starved = script["run_as"](starved, dry)
+    assert {draw.scene.joint.crankpin.rung for draw in starved.draws} == {"mixed"}
+    true, oiled, bare = (
+        kind.recorded(starved if kind.oil else dry)
+        for kind in script["KINDS"]
+        if kind.name in ("true", "pin starved of oil", "no pressure")
+    )
+    for one, other in zip(true, oiled, strict=True):
+        assert speed_of(one) == pytest.approx(speed_of(other), rel=script["SAME_SPEED"])
+        assert one.row["discharge_pressure_pa"] == other.row["discharge_pressure_pa"]
+    assert bare[0].vibration.std() < true[0].vibration.std()
+    rows = [{"kind": "true", "refused": each} for each in (True, False, False)]
+    # 1 of 3, exact: 0.8 to 90.6 %
+    assert list(script["table"](rows))[2:] == ["| true | 1 of 3 | 1% to 91% |"]

@@ -6,13 +6,15 @@ Pumps are drawn by the standard recipe, two healthy recordings each, and recorde
 not what the scene says; then they are calibrated with the scene as it is written. A calibration
 counts as refused when it raises MisfitError. It judges by its first ensemble, so that it is stopped
 there, and kinds of the same pump share that ensemble: their speeds differ by less than two parts in
-a thousand. Calibrations that are in the file already are not repeated. Prints a Markdown table with
-exact intervals of 95 %. All is simulated.
+a thousand. How often machines of the scene are refused is also counted on further draws of the
+recipe, short as the ensemble is. What is in the file already is not repeated. Prints a Markdown
+table with exact intervals of 95 %. All is simulated.
 """
 
 import argparse
 import json
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
@@ -27,6 +29,8 @@ from wearstate.datasets.recipe.draws import value_at
 from wearstate.datasets.recipe.recipe import Sample
 from wearstate.diagnose.twin import inversion, regimes
 from wearstate.diagnose.twin.ensemble import simulated
+from wearstate.diagnose.twin.levels import layout_of
+from wearstate.diagnose.twin.misfit import misfit
 from wearstate.diagnose.twin.unknowns import TwinUnknowns
 from wearstate.features.rotation.order import pulse_times
 from wearstate.sim.machine.simulate import simulate
@@ -218,6 +222,7 @@ class SharedEnsembles:
     def __init__(self) -> None:
         self.speeds: list[float] = []
         self.kept: dict[int, Any] = {}
+        self.asked: dict[int, tuple[TwinUnknowns, Any]] = {}
 
     def __call__(self, unknowns: TwinUnknowns, scores: Any, runs: Any, **given: Any) -> Any:
         seed, speeds = given["seed"], [run["drive.speed"] for run in runs]
@@ -227,6 +232,7 @@ class SharedEnsembles:
             self.speeds, self.kept = speeds, {}
         if seed not in self.kept:
             self.kept[seed] = simulated(unknowns, scores, runs, **given)
+            self.asked[seed] = unknowns, runs
         return self.kept[seed]
 
 
@@ -246,16 +252,44 @@ def judged(kind: Kind, pump: Pump) -> dict[str, Any]:
     raise AssertionError("a calibration has more than one round")
 
 
+def further(pump: Pump, count: int, shared: SharedEnsembles) -> Iterator[dict[str, Any]]:
+    """Whether further machines of the recipe are refused under the conditions of a pump."""
+    heard = pump.heard()
+    layout = layout_of(heard[0])
+    with suppress(PassedError, wearstate.MisfitError):
+        wearstate.calibrate("bilge-pump", heard)
+    unknowns, runs = shared.asked[FIRST_ROUND]
+    rows, wet = shared.kept[FIRST_ROUND][1], regimes.oiled_unknowns(unknowns)
+    oiled = regimes.oiled_members(wet, len(shared.kept[0][0]), runs, seed=0)
+    scores = inversion.standard(len(unknowns.names)).draw(count, np.random.default_rng(FURTHER))
+    for observed in simulated(unknowns, scores, runs, seed=FURTHER)[1]:
+        found = regimes.with_regime(misfit(layout, rows, observed), layout, rows, observed, oiled)
+        yield {"refused": found.refused, "says": found.regime or found.text}
+
+
+FURTHER = 9 * FIRST_ROUND
+"""Seed of further machines."""
+DRAWN_ALIKE = "further draws of the recipe"
+
+
 def table(rows: list[dict[str, Any]]) -> Iterator[str]:
     """A line a kind: how many were refused, with an exact interval of 95 %."""
     yield "| recorded | refused | 95 % bounds |"
     yield "|---|---|---|"
-    for kind in KINDS:
-        mine = [row["refused"] for row in rows if row["kind"] == kind.name]
+    for name in (TRUE, DRAWN_ALIKE, *(kind.name for kind in KINDS[1:])):
+        mine = [row["refused"] for row in rows if row["kind"] == name]
         if mine:
             told = binomtest(sum(mine), len(mine)).proportion_ci()
             bounds = f"{told.low:.0%} to {told.high:.0%}"
-            yield f"| {kind.name} | {sum(mine)} of {len(mine)} | {bounds} |"
+            yield f"| {name} | {sum(mine)} of {len(mine)} | {bounds} |"
+
+
+def write(path: Path, rows: list[dict[str, Any]]) -> None:
+    """Append rows to the file, and show them."""
+    lines = "".join(json.dumps(row) + "\n" for row in rows)
+    with path.open("a") as file:
+        file.write(lines)
+    print(lines, end="", flush=True)
 
 
 def main() -> None:
@@ -264,6 +298,7 @@ def main() -> None:
     )
     parser.add_argument("--each", type=int, default=8, help="pumps of every kind of misfit")
     parser.add_argument("--true", type=int, default=24, help="pumps that are as the scene says")
+    parser.add_argument("--further", type=int, default=0, help="draws for each of those pumps")
     parser.add_argument("--seed", type=int, default=7001)
     parser.add_argument("--out", type=Path, default=Path("twin_misfits.jsonl"))
     parser.add_argument("--only", nargs="*", default=[], help="kinds, all where empty")
@@ -271,10 +306,16 @@ def main() -> None:
     lines = given.out.read_text().splitlines() if given.out.exists() else []
     rows = [json.loads(line) for line in lines]
     ready = {(row["kind"], row["seed"], row["pump"]) for row in rows}
-    inversion.simulated = regimes.simulated = SharedEnsembles()
+    shared = SharedEnsembles()
+    inversion.simulated = regimes.simulated = shared
     dry = pumps(max(given.true, given.each), given.seed)
     oiled = {name: oiled_pumps(given.each, given.seed, name) for name in ("flooded", "starved")}
     for number, pump in enumerate(dry):
+        place = {"kind": DRAWN_ALIKE, "seed": given.seed, "pump": number}
+        if number < given.each and given.further and tuple(place.values()) not in ready:
+            told = [{**place, **row} for row in further(pump, given.further, shared)]
+            write(given.out, told)
+            rows += told
         for kind in KINDS:
             place = {"kind": kind.name, "seed": given.seed, "pump": number}
             count = given.true if kind.name == TRUE else given.each
@@ -283,9 +324,7 @@ def main() -> None:
                 continue
             mine = run_as(oiled[kind.oil][number], pump) if kind.oil else pump
             rows.append({**place, **judged(kind, mine)})
-            with given.out.open("a") as file:
-                file.write(json.dumps(rows[-1]) + "\n")
-            print(json.dumps(rows[-1]), flush=True)
+            write(given.out, rows[-1:])
     print(*table([row for row in rows if row["seed"] == given.seed]), sep="\n")
 
 
