@@ -50,7 +50,9 @@ from .setup import (
     film_temperature_of,
     joint_rungs,
     pin_offsets,
+    rubs_in_guide,
     run_scene,
+    throw_on_casing,
 )
 from .slider_crank import (
     FORCES,
@@ -605,35 +607,14 @@ def _sources(
     """
     found: dict[str, list[tuple[int, float]]] = {}
     for throw in range(len(scene.throws)):
-        for place, name, sign in _throw_on_casing(scene, throw):
+        for place, name, sign in throw_on_casing(scene, throw):
             row = _row_of(name, throw, columns)
             found.setdefault(_force_key(scene, place, throw + 1), []).append((row, sign))
     return found
 
 
-def _throw_on_casing(scene: PumpScene, throw: int) -> list[tuple[str, str, float]]:
-    """Places of the casing, the force of the mechanism behind each, and its sign there."""
-    reactions = [
-        ("bearing_x", "pin_x", -1.0),
-        ("bearing_y", "pin_y", -1.0),
-        ("guide_y", "guide_y", -1.0),
-        ("cylinder_x", "piston_x", -1.0),
-    ]
-    if scene.piston.seal_friction or scene.piston.seal_friction_share:
-        reactions.append(("cylinder_x", "seal_x", -1.0))
-    if _rubs(scene, throw):
-        reactions += [(place, place, -1.0) for place in GUIDE_PLACES]
-    if scene.pressures(throw).rung in BREATHING_RUNGS:
-        reactions += [(place, place, 1.0) for place in VALVE_PLACES]
-    return reactions
-
-
 def _breathes(scene: PumpScene) -> bool:
     return any(scene.pressures(k).rung in BREATHING_RUNGS for k in range(len(scene.throws)))
-
-
-def _rubs(scene: PumpScene, throw: int) -> bool:
-    return joint_rungs(scene, throw)[GUIDE] == JOINT_COMPLIANT
 
 
 def _crank_throws(plan: RunPlan, turns: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -724,7 +705,7 @@ def measured_places(scene: PumpScene) -> tuple[str, ...]:
         for throw in range(len(scene.throws))
         for place in (
             *CRANK_PLACES,
-            *(GUIDE_PLACES if _rubs(scene, throw) else ()),
+            *(GUIDE_PLACES if rubs_in_guide(scene, throw) else ()),
             *(VALVE_PLACES if scene.pressures(throw).rung in BREATHING_RUNGS else ()),
         )
     )

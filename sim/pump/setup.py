@@ -32,8 +32,16 @@ from ..film.impedance_map import ImpedanceMap, impedance_map
 from ..film.solve import FilmGeometry
 from ..jit import kernel
 from ..piping.pipe import pipe_parameters, pipe_start
-from ..scene.pump import OILED_RUNGS, Guide, PumpScene, RevoluteJoint
+from ..scene.pump import (
+    GUIDE_PLACES,
+    OILED_RUNGS,
+    VALVE_PLACES,
+    Guide,
+    PumpScene,
+    RevoluteJoint,
+)
 from ..scene.pump_hydraulics import BREATHING_RUNGS, PIPED_RUNGS, CylinderPressure
+from .casing import casing_inputs
 from .hydraulics import (
     HYDRAULIC,
     PRESSURE_CHAMBER,
@@ -44,19 +52,23 @@ from .hydraulics import (
 )
 from .oiled_joint import OIL
 from .slider_crank import (
+    AT_REST,
     CRANKPIN,
     FILM,
+    FORCES,
     GUIDE,
     JOINT_COMPLIANT,
     JOINT_IDEAL,
     JOINT_LINK,
     JOINT_OILED,
+    PUSHES,
     THROW,
     WRISTPIN,
     CrankRun,
     LinePair,
     Machine,
     Tables,
+    Yielding,
     run_mechanism,
 )
 from .throw_motion import seal_drag
@@ -160,6 +172,66 @@ def _gravity(scene: PumpScene) -> tuple[float, float]:
         scene.gravity * math.sin(scene.stroke_inclination),
         scene.gravity * math.cos(scene.stroke_inclination),
     )
+
+
+# --- what the mechanism does to the casing
+
+
+def throw_on_casing(scene: PumpScene, throw: int) -> list[tuple[str, str, float]]:
+    """Places of the casing, the force of the mechanism behind each, and its sign there."""
+    reactions = [
+        ("bearing_x", "pin_x", -1.0),
+        ("bearing_y", "pin_y", -1.0),
+        ("guide_y", "guide_y", -1.0),
+        ("cylinder_x", "piston_x", -1.0),
+    ]
+    if scene.piston.seal_friction or scene.piston.seal_friction_share:
+        reactions.append(("cylinder_x", "seal_x", -1.0))
+    if rubs_in_guide(scene, throw):
+        reactions += [(place, place, -1.0) for place in GUIDE_PLACES]
+    if scene.pressures(throw).rung in BREATHING_RUNGS:
+        reactions += [(place, place, 1.0) for place in VALVE_PLACES]
+    return reactions
+
+
+def rubs_in_guide(scene: PumpScene, throw: int) -> bool:
+    """Whether the piston of a throw rubs in a guide with clearance."""
+    return joint_rungs(scene, throw)[GUIDE] == JOINT_COMPLIANT
+
+
+def yielding_of(scene: PumpScene) -> Yielding:
+    """Casing that carries the main bearing along, of the rung `yielding`; else one at rest.
+
+    Its modes are those of the casing on its feet as they are. The unbalance of the crank itself,
+    far below the first of them, is left out.
+    """
+    modes = scene.casing.modes
+    if scene.casing.rung != "yielding":
+        return AT_REST
+    throws = range(len(scene.throws))
+    feet = 1.0 if scene.casing.feet is None else scene.casing.feet.stiffness_ratio
+    held = [mode.on_feet(feet) for mode in modes]
+    push = np.zeros((len(modes), len(throws), len(PUSHES)))
+    for throw in throws:
+        for place, name, sign in throw_on_casing(scene, throw):
+            column = PUSHES.index(FORCES.index(name))
+            push[:, throw, column] += [
+                sign * casing_inputs(m.shape, place, throw + 1) for m in modes
+            ]
+    at_bearing = [
+        [np.mean([casing_inputs(mode.shape, place, k + 1) for k in throws]) for place in _BEARING]
+        for mode in modes
+    ]
+    natural = 2 * math.pi * np.array([frequency for frequency, _ in held])
+    return Yielding(
+        push=push,
+        spring=natural**2,
+        drag=2 * np.array([ratio for _, ratio in held]) * natural,
+        give=np.array(at_bearing),
+    )
+
+
+_BEARING = ("bearing_x", "bearing_y")
 
 
 # --- the closed form
@@ -1011,6 +1083,7 @@ def run_scene(
         chambers=start.chambers,
         films=start_films(t, start.bodies, start_angle),
         lines=lines_of(scene, step),
+        casing=yielding_of(scene),
         step=step,
         n_steps=n_steps,
         keep_states=keep_states,

@@ -37,6 +37,7 @@ from ..pump.slider_crank import (
     CrankTally,
     Machine,
     Tables,
+    Yielding,
 )
 from ..scene.pump import PumpScene
 from ..scene.pump_hydraulics import PIPED_RUNGS
@@ -47,6 +48,7 @@ from .rates import (
     LANE_FORCES,
     LANES,
     MAPPED_FILM,
+    MOST_MODES,
     NEVER,
     PLACES,
     PLAIN_LAWS,
@@ -71,6 +73,7 @@ class LaneKind(NamedTuple):
     breathing: bool  # chambers with valves
     throws: int  # of each, in lanes beside each other
     oil: int  # what is in the eyes of their crank pins, see ``MAPPED_FILM``
+    yields: bool  # casings that carry their bearings along
 
     @property
     def beside(self) -> int:
@@ -87,6 +90,7 @@ class LaneJob:
     step: float
     n_steps: int
     films: Float
+    casing: Yielding
 
 
 def lane_kind(scene: PumpScene) -> LaneKind | None:
@@ -102,6 +106,10 @@ def lane_kind(scene: PumpScene) -> LaneKind | None:
         and (len(rungs) == 1 or "chamber" not in rungs)  # all breathe or none
     )
     oils = {_oil_of(joint_parts(scene, k)[0]) for k in throws}
+    yields = scene.casing.rung == "yielding"
+    # a film's search would begin from another place than alone
+    if yields and (oils != {DRY} or len(scene.casing.modes) > MOST_MODES):
+        return None
     if not known or len(oils) > 1:
         return None
     return LaneKind(
@@ -110,6 +118,7 @@ def lane_kind(scene: PumpScene) -> LaneKind | None:
         breathing="chamber" in rungs,
         throws=len(throws),
         oil=oils.pop(),
+        yields=yields,
     )
 
 
@@ -257,6 +266,8 @@ class _Lanes:
         for joint in map(int, np.flatnonzero(tight) + 1):
             plan["contact"][joint, :, lane] = NEVER
         plan["machine"][:, lane] = t.machine
+        plan["gravity"][:, lane] = t.machine.gravity_x, t.machine.gravity_y
+        self._lay_casing(lane, job.casing, throw)
         plan["liquid"][:, lane] = _numbers(liquid, LiquidLane._fields)
         plan["chamber"][:, lane] = _numbers(liquid, ChamberLane._fields)
         for n, side in enumerate(("suction", "discharge")):
@@ -274,6 +285,16 @@ class _Lanes:
         state["film0"][:, lane] = job.films[throw, :2]
         self._past.turns[lane, :, 0] = start.angle, start.speed
         self._past.chambers[lane, :, 0] = start.chambers[throw, list(GATHERED)]
+
+    def _lay_casing(self, lane: int, casing: Yielding, throw: int) -> None:
+        """Write a casing into the lane of a throw; one at rest has no mode."""
+        plan, n = self._plan[0], len(casing.spring)
+        plan["modes"] = max(plan["modes"], n)
+        for name in ("push", "spring", "drag", "give"):
+            plan[name][..., lane] = 0.0
+        plan["push"][:n, :, lane] = casing.push[:, throw] if n else 0.0
+        plan["spring"][:n, lane], plan["drag"][:n, lane] = casing.spring, casing.drag
+        plan["give"][:n, :, lane] = casing.give
 
     def go_on(self) -> None:
         """March until the first run ends, or a lane has no room left."""

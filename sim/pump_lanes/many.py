@@ -17,7 +17,7 @@ from ..pump.recording import (
     refused_run,
     simulate_pump,
 )
-from ..pump.setup import begun, needs_integration, start_films
+from ..pump.setup import begun, needs_integration, start_films, yielding_of
 from ..scene.parts import Scene, SceneError
 from ..scene.pump import PumpScene
 from .lanes import LaneJob, LaneKind, lane_columns, lane_kind, run_lanes
@@ -114,6 +114,7 @@ def _pooled(kinds: dict[LaneKind, list[_Job]]) -> list[tuple[LaneKind, list[_Job
             breathing=breathing,
             throws=throws,
             oil=oil,
+            yields=any(kind.yields for kind, _ in pool),
         )
         large.append((kind, [job for _, group in pool for job in group]))
     return large
@@ -147,4 +148,11 @@ def lane_job(plan: RunPlan) -> LaneJob:
     """What a lane is told of a planned recording whose :func:`.lanes.lane_kind` is not None."""
     tables, start = begun(plan.scene, plan.step, plan.first_angle)
     films = start_films(tables, start.bodies, plan.first_angle)
-    return LaneJob(tables=tables, start=start, step=plan.step, n_steps=plan.n_steps, films=films)
+    return LaneJob(
+        tables=tables,
+        start=start,
+        step=plan.step,
+        n_steps=plan.n_steps,
+        films=films,
+        casing=yielding_of(plan.scene),
+    )

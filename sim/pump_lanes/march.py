@@ -14,13 +14,16 @@ from ..pump.slider_crank import (
     HELD,
     NO_CHANGE,
     OVERLAP_LIMIT,
+    PUSHES,
     STAGE,
     Tables,
     Tally,
     Work,
     begin,
     derivative_of_record,
+    felt,
     mean_of_stages,
+    moved_mode,
     step_of_record,
 )
 from .chambers import breathe_alone, count_vapour, enter_chamber, lanes_breathe
@@ -452,6 +455,59 @@ _SUCTION = len(LANE_FORCES)
 _VAPOUR, _SUCTION_LIFT, _DISCHARGE_LIFT = GATHERED
 
 
+@kernel
+def _push_mode(p: Any, s: Any, left: Any, n: int, mode: int) -> None:
+    for lane in range(LANES):
+        own = 0.0
+        for c in range(len(PUSHES)):
+            own += p.push[mode, c, lane] * left.forces[c, n, lane]
+        s.pushed[lane] = 0.0 + own
+
+
+@kernel
+def _push_together(p: Any, s: Any) -> None:
+    """The throws of a record push on the same modes."""
+    n = p.throws
+    for first in range(0, LANES - n + 1, n):
+        force = 0.0
+        for lane in range(first, first + n):
+            force += s.pushed[lane]
+        for lane in range(first, first + n):
+            s.pushed[lane] = force
+
+
+@kernel
+def _move_mode(p: Any, s: Any, mode: int) -> None:
+    for lane in range(LANES):
+        a, place, speed = moved_mode(
+            s.pushed[lane],
+            s.moved[mode, 0, lane],
+            s.moved[mode, 1, lane],
+            p.spring[mode, lane],
+            p.drag[mode, lane],
+            p.step[lane],
+        )
+        s.moved[mode, 0, lane], s.moved[mode, 1, lane] = place, speed
+        s.bearing[0, lane] += p.give[mode, 0, lane] * a
+        s.bearing[1, lane] += p.give[mode, 1, lane] * a
+
+
+@subroutine
+def _move_bearings(p: Any, s: Any, left: Any, n: int) -> None:
+    """What turns is heavier in the next step by how the casing accelerates its bearing."""
+    for c in range(2):
+        for lane in range(LANES):
+            s.bearing0[c, lane], s.bearing[c, lane] = s.bearing[c, lane], 0.0
+    for mode in range(p.modes):
+        _push_mode(p, s, left, n, mode)
+        if p.throws > 1:
+            _push_together(p, s)
+        _move_mode(p, s, mode)
+    for c in range(2):
+        for lane in range(LANES):
+            p.machine[c, lane] = felt(p.gravity[c, lane], s.bearing[c, lane], s.bearing0[c, lane])
+
+
 @subroutine
 def _keep_turns(s: Any, left: Any, n: int) -> None:
     for lane in range(LANES):
@@ -498,6 +554,9 @@ def march(kind: Any, n: int, p: Any, s: Any, a: Any, k: Any) -> None:
             if with_care > 0:
                 count_vapour(s, a)
         _keep_turns(s, left, step)
+        if kind.yields:
+            _move_bearings(p, s, left, step)
+            rates(p, s, 0.0, kind, a.maps)
 
 
 def alone(t: Tables, maps: NDArray[np.float64]) -> Alone:

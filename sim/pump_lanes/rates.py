@@ -39,7 +39,7 @@ from ..pump.oiled_joint import (
     newton_step,
     peaks_of,
 )
-from ..pump.slider_crank import CONTACTS, GUIDE, OVERLAP_LIMIT, Machine
+from ..pump.slider_crank import CONTACTS, GUIDE, OVERLAP_LIMIT, PUSHES, Machine
 from ..pump.throw_motion import (
     PinLoad,
     Pose,
@@ -177,6 +177,9 @@ NEVER = ContactLane(*[0.0] * len(ContactLane._fields))._replace(
 )
 """Contact of a tight joint: one with so much room never touches, and asks for no change."""
 
+MOST_MODES = 16
+"""Of a casing that yields in lanes; one with more runs alone."""
+
 PLAIN_LAWS = tuple(
     ContactLane._fields.index(name) for name in ("law", "elasticity", "friction_law")
 )
@@ -199,6 +202,12 @@ PLAN = np.dtype(
         ("step", "f8", LANES),
         ("sixth", "f8", LANES),  # of the step
         ("weight", "f8", LANES),  # of a step's force in its mean, as the march of one weighs it
+        ("modes", "i8"),  # of the casing that has most of them
+        ("gravity", "f8", (2, LANES)),  # of a bearing at rest
+        ("push", "f8", (MOST_MODES, len(PUSHES), LANES)),  # as ``Yielding``
+        ("spring", "f8", (MOST_MODES, LANES)),
+        ("drag", "f8", (MOST_MODES, LANES)),
+        ("give", "f8", (MOST_MODES, 2, LANES)),
     ]
 )
 """Numbers of all lanes, codes as numbers too; columns as the fields of the tuples above."""
@@ -260,6 +269,10 @@ STATE = np.dtype(
         ("carried", "f8", LANES),  # by touching peaks
         ("asks", "f8", LANES),  # 1 where a contact asks for a change within this step
         ("bad", "f8", LANES),  # status code of this step
+        ("moved", "f8", (MOST_MODES, 2, LANES)),  # place and speed of the casing's modes
+        ("pushed", "f8", LANES),  # force of a throw on one of them
+        ("bearing0", "f8", (2, LANES)),  # its acceleration with the casing, a step before
+        ("bearing", "f8", (2, LANES)),
     ]
 )
 """All lanes in the middle of their step. One record: the compiler lays a loop into vectors where it

@@ -396,6 +396,11 @@ class Feet(Part):
 class Casing(Part):
     """The pump casing on its mounts: as modes, or as measured frequency response functions."""
 
+    rung: Literal["driven", "yielding"] = Field(
+        default="driven",
+        description="driven: the crank turns in a bearing at rest; yielding: in one that moves "
+        "with the casing",
+    )
     feet: Feet | None = Field(default=None, description="that may work loose; none: tight")
     modes: tuple[CasingMode, ...] = Field(default=(), max_length=_MOST_MODES)
     frf: FrfFile | None = None
@@ -407,6 +412,11 @@ class Casing(Part):
             raise ValueError(
                 f"{' and '.join(given) if given else 'neither'} given, must be exactly one of "
                 f"casing.modes and casing.frf; {'remove one' if given else 'add one'}"
+            )
+        if self.rung == "yielding" and not self.modes:
+            raise ValueError(
+                "rung = 'yielding' must have casing.modes: a measured casing has no shape at the "
+                "bearing; take 'driven', or fit modes to the measurement"
             )
         if self.feet is not None and not any(mode.foot_share for mode in self.modes):
             raise ValueError(

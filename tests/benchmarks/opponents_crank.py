@@ -20,7 +20,7 @@ from numba import njit
 from scipy.integrate import odeint, solve_ivp
 from wearstate.sim.contact.law import RELEASE_AT_ZERO_FORCE, RELEASE_AT_ZERO_PENETRATION
 from wearstate.sim.pump import setup as crank_setup
-from wearstate.sim.pump.slider_crank import CRANKPIN, run_mechanism
+from wearstate.sim.pump.slider_crank import AT_REST, CRANKPIN, run_mechanism
 from wearstate.sim.pump_lanes.lanes import LaneJob, lane_kind, run_lanes
 from wearstate.sim.pump_lanes.rates import LANES
 from wearstate.sim.scene.load import load_scene
@@ -107,7 +107,11 @@ def prepared_lanes(starts, release, step, n_steps):
         tables, bodies = tables_and_bodies(start, release, step)
         begin = crank_setup.Start(start[0], start[1], bodies, np.zeros((1, 6)))
         films = crank_setup.start_films(tables, bodies, start[0])
-        jobs.append(LaneJob(tables=tables, start=begin, step=step, n_steps=n_steps, films=films))
+        jobs.append(
+            LaneJob(
+                tables=tables, start=begin, step=step, n_steps=n_steps, films=films, casing=AT_REST
+            )
+        )
 
     def run():
         for _, found in run_lanes(jobs, lane_kind(SCENE), Unheard):

@@ -1,0 +1,226 @@
+"""A casing that carries the main bearing along: momentum, ring of a pin, limits, steps, lanes."""
+
+import math
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from wearstate.sim.machine.simulate import simulate, simulate_many
+from wearstate.sim.pump import setup
+from wearstate.sim.pump.slider_crank import AT_REST, FORCES, PUSHES, Yielding, run_mechanism
+from wearstate.sim.scene.load import load_scene
+from wearstate.sim.scene.parts import SceneError
+
+YIELDS = {"casing.rung": "yielding"}
+MASS = 20.0  # kg
+FREE = 1e-6  # of a mode without spring, which no casing has
+
+
+def free_casing(mass, *, along=1.0, across=0.0, pushed=("pin_x", "pin_y")):
+    """A casing of this mass on no spring, pushed by the crank pin alone."""
+    push = np.zeros((1, 1, len(PUSHES)))
+    for name, share in zip(pushed, (along, across), strict=True):
+        push[0, 0, PUSHES.index(FORCES.index(name))] = -share / math.sqrt(mass)
+    return Yielding(
+        push=push,
+        spring=np.array([FREE]),
+        drag=np.array([0.0]),
+        give=np.array([[along, across]]) / math.sqrt(mass),
+    )
+
+
+def tables_of(step, **changes):
+    scene = load_scene("bilge-pump", {"gravity": 0.0, "pressure.rung": "none", **changes})
+    return scene, setup.tables(scene, step)
+
+
+def run(scene, t, casing, *, step, n_steps, angle=0.3, speed=None, kick=0.0, shift=0.0):
+    """From the library's own start; of a crank that stands, shifted [m] and kicked [m/s]."""
+    bodies = setup.start_state(scene, angle, t)
+    if speed == 0.0:
+        bodies[:, 6:] = 0.0
+    bodies[:, [0, 3]] += shift
+    bodies[:, [6, 9]] += kick
+    found = run_mechanism(
+        t,
+        angle=angle,
+        speed=2 * math.pi * scene.drive.speed if speed is None else speed,
+        bodies=bodies,
+        step=step,
+        n_steps=n_steps,
+        casing=casing,
+    )
+    assert found.status.ok
+    return found
+
+
+# --- the frame of a bearing that moves
+
+
+def test_momentum_of_a_free_casing_and_what_moves_in_it():
+    """Without liquid nothing pushes along the stroke from outside: what one gains the other loses.
+
+    The kernel's bodies are seen from the bearing; their own momentum is that and their mass times
+    the casing's speed.
+    """
+    step = 5e-6
+    scene, t = tables_of(step, **{"drive.speed": "300 rpm"})
+    found = run(scene, t, free_casing(MASS), step=step, n_steps=60_000)
+    impulse = np.cumsum(found.force("pin_x")) * step  # of the pin on rod and piston
+    casing = -impulse / MASS
+    masses = np.array([scene.rod.mass, scene.piston.mass])
+    seen = found.bodies[:, 0, [6, 9]] @ masses
+    gained = seen[1:] - seen[0] + masses.sum() * casing
+    size = np.abs(impulse).max()
+    assert np.ptp(impulse) > 1.0  # N s: knocks, not a stroll
+    # the casing's acceleration is carried on over one step: a knock's edge is off by its change
+    assert_allclose(gained, impulse, rtol=0, atol=2e-3 * size)
+    # and a casing that is taken to stand still is far off
+    still = run(scene, t, AT_REST, step=step, n_steps=60_000)
+    seen = still.bodies[:, 0, [6, 9]] @ masses
+    own = np.cumsum(still.force("pin_x")) * step
+    assert_allclose(seen[1:] - seen[0], own, rtol=0, atol=1e-9 * size)
+    assert np.abs(seen[1:] - seen[0] - masses.sum() * own / MASS - own).max() > 0.1 * size
+
+
+@pytest.mark.parametrize("mass", [20.0, 60.0, 1e9])
+def test_a_pin_rings_against_rod_and_casing_together(mass):
+    """Pulled into its eye at the dead centre: the spring between both masses."""
+    step, n_steps = 2e-6, 20_000
+    scene, t = tables_of(
+        step,
+        **{
+            "pressure.rung": "constant",
+            "pressure.suction": "-60 kPa",
+            "pressure.discharge": "-50 kPa",  # a rod in compression would turn aside
+            "joint.crankpin.friction": 0.0,
+            "joint.crankpin.tangential_damping": 0.0,
+            "piston.seal_friction": 0.0,
+        },
+    )
+    contacts = t.contacts.copy()
+    contacts["damping"] = 0.0
+    t = t._replace(contacts=contacts)
+    moving = scene.rod.mass + scene.piston.mass
+    stiffness = float(t.contacts["stiffness"][0, 0])
+    at_dead_centre = {"step": step, "angle": 0.0, "speed": 0.0}
+    [pulled] = run(scene, t, free_casing(mass), n_steps=1, **at_dead_centre).force("pin_x")
+    rest = -50e3 * setup.piston_area(scene) * mass / (mass + moving)
+    shift = (pulled - rest) / stiffness  # of a start that is meant for a crank that turns
+    found = run(
+        scene, t, free_casing(mass), n_steps=n_steps, kick=1e-3, shift=shift, **at_dead_centre
+    )
+    force = found.force("pin_x") - found.force("pin_x").mean()
+    assert abs(found.force("pin_x")).min() > 0  # it never lets go
+    up = np.flatnonzero((force[:-1] < 0) & (force[1:] >= 0))
+    at = up - force[up] / (force[up + 1] - force[up])
+    heard = (len(at) - 1) / ((at[-1] - at[0]) * step)
+    expected = math.sqrt(stiffness * (1 / moving + 1 / mass)) / (2 * math.pi)
+    assert heard == pytest.approx(expected, rel=1e-3)
+
+
+def test_a_heavy_casing_is_one_at_rest():
+    scene = load_scene("bilge-pump", {**YIELDS, "duration": "0.4 s"})
+    shapes = {
+        f"casing.modes.{i}.shape.{place}": 1e-4 * value
+        for i, mode in enumerate(scene.casing.modes)
+        for place, value in mode.shape.items()
+    }
+    forces = [
+        simulate(
+            load_scene("bilge-pump", {"duration": "0.4 s", **shapes, "casing.rung": rung}),
+            seed=1,
+            truth=True,
+        ).truth["pin_force_n"]
+        for rung in ("driven", "yielding")
+    ]
+    assert_allclose(forces[1], forces[0], rtol=0, atol=1e-3 * np.abs(forces[0]).max())
+
+
+def test_it_takes_force_out_of_knocks():
+    """A pin that meets a casing of 18 kg instead of a wall is knocked less hard."""
+    peaks = [
+        simulate(load_scene("bilge-pump", {"casing.rung": rung}), seed=2).numerics[
+            "peak_normal_force_n"
+        ]
+        for rung in ("driven", "yielding")
+    ]
+    assert 0.6 < peaks[1] / peaks[0] < 0.98
+
+
+def levels(step_s, n=16):
+    """Mean square of both sensors over starts, which are the same at every step."""
+    runs = [
+        (
+            load_scene(
+                "bilge-pump",
+                {
+                    **YIELDS,
+                    "duration": "1 s",
+                    "drive.start_angle": math.tau * (i * 0.618 % 1),
+                    "joint.crankpin.diametral_clearance": "0.15 mm",
+                    "numerics.step": step_s,
+                },
+            ),
+            i,
+        )
+        for i in range(n)
+    ]
+    found = [run.vibration.astype(float) for _, run in simulate_many(runs)]
+    return 10 * np.log10(np.mean([(each**2).mean(axis=1) for each in found], axis=0))
+
+
+def test_the_default_step_is_fine_enough():
+    """Within a fifth of a decibel; held over a step, the bearing's motion was off by 0.6."""
+    usual, fine = levels(1 / 51_200), levels(1 / 204_800)
+    assert_allclose(usual, fine, rtol=0, atol=0.2)
+
+
+# --- lanes
+
+
+@pytest.mark.parametrize(
+    "more",
+    [
+        {},
+        {"joint.guide.rung": "compliant", "joint.wristpin.rung": "compliant"},
+        {"pressure.rung": "chamber", "drive.rung": "motor"},
+    ],
+)
+def test_lanes_have_the_bytes_of_a_pump_alone(more):
+    """Beside others, some of which stand still in their frames, as their casings are driven."""
+    runs = [
+        (
+            load_scene(
+                "bilge-pump",
+                {
+                    "duration": "0.4 s",
+                    **more,
+                    "casing.rung": "driven" if i % 3 == 1 else "yielding",
+                    "joint.crankpin.diametral_clearance": 6e-5 + 3e-5 * i,
+                },
+            ),
+            i,
+        )
+        for i in range(9)
+    ]
+    together = dict(simulate_many(runs))
+    for i in (0, 1, 8):
+        alone = simulate(*runs[i][:1], seed=i)
+        assert alone.signal.tobytes() == together[i].signal.tobytes()
+
+
+def test_throws_of_a_record_push_on_the_same_modes():
+    runs = [(load_scene("triplex-pump", {**YIELDS, "duration": "0.2 s"}), i) for i in range(6)]
+    together = dict(simulate_many(runs))
+    assert simulate(runs[2][0], seed=2).signal.tobytes() == together[2].signal.tobytes()
+    driven = simulate(load_scene("triplex-pump", {"duration": "0.2 s"}), seed=2)
+    assert np.abs(driven.signal - together[2].signal).max() > 0.1
+
+
+# --- scenes
+
+
+def test_a_rigid_crank_pin_is_refused():
+    with pytest.raises(SceneError, match=r"crankpin\.rung = ideal must be compliant.*driven"):
+        load_scene("bilge-pump", {**YIELDS, "joint.crankpin.rung": "ideal"})
