@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from wearstate.sim.fidelity.ladder import cost_of
 from wearstate.sim.machine.simulate import simulate, simulate_many
 from wearstate.sim.pump import setup
 from wearstate.sim.pump.slider_crank import AT_REST, FORCES, PUSHES, Yielding, run_mechanism
@@ -219,6 +220,11 @@ def test_throws_of_a_record_push_on_the_same_modes():
 
 
 # --- scenes
+
+
+def test_it_costs_as_much_more_as_it_takes():
+    costs = [cost_of(load_scene("bilge-pump", {"casing.rung": r})) for r in ("driven", "yielding")]
+    assert 1.1 < costs[1] / costs[0] < 1.5
 
 
 def test_a_rigid_crank_pin_is_refused():

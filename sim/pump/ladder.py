@@ -259,6 +259,8 @@ _MECHANISM = 60.0  # ns of a step of one throw beside its effects
 
 _MODE = 12.0  # ns of a step of one casing mode and its sensors
 
+_CARRIED = 13.0  # ns of a step of one casing mode that carries the bearing along
+
 _REACH = 6.0  # ns of a step of one reach of a pipe with waves
 
 _CASING_FIXED = 200.0  # ns of a step beside: low-pass and bookkeeping
@@ -269,6 +271,8 @@ def pump_cost(scene: Scene) -> float:
     pump = cast(PumpScene, scene)
     per_step = _CASING_FIXED + _MODE * len(pump.casing.modes) + price(DRIVE_RUNGS, pump.drive.rung)
     per_step += _REACH * _reaches(pump)
+    if pump.casing.rung == "yielding":
+        per_step += _CARRIED * len(pump.casing.modes)
     for throw in range(len(pump.throws)):
         per_step += _MECHANISM + price(PRESSURE_RUNGS, pump.pressures(throw).rung)
         for part in joint_parts(pump, throw):
