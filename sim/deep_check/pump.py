@@ -466,7 +466,8 @@ PUMP_ROWS = (
         measure=_mass_ratio,
         least=5.0,
         reason="5 to 30 and more; lightest casing mode over all pistons and rods",
-        low="lower the shapes of casing.modes: near 1 over the square root of the mass that moves",
+        low="lower the shapes of casing.modes: near 1 over the square root of the mass that moves; "
+        "a casing that light gives way to knocks: casing.rung = 'yielding'",
         doubt="light casing",
     ),
     Quantity(
