@@ -744,10 +744,10 @@ def test_a_split_that_cannot_be_made_is_bad_data():
 
 def test_records_of_a_batch_are_of_one_kind_but_for_what_is_left_and_each_comes_once():
     recipe = load_recipe("bilge-pump-standard")
-    samples = list(sample_records(recipe, 60, seed=0))
+    samples = list(sample_records(recipe, 160, seed=0))
     assert len({alike(each.scene) for each in samples}) > 2
     batches = list(generation._batches(samples, 8))
-    assert sorted(job.index for batch in batches for job in batch) == list(range(60))
+    assert sorted(job.index for batch in batches for job in batch) == list(range(160))
     kinds = [{alike(job.scene) for job in batch} for batch in batches]
     mixed = [len(kind) > 1 for kind in kinds]
     assert mixed.index(True) > 2
