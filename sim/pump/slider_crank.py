@@ -179,12 +179,23 @@ class Yielding(NamedTuple):
     give: NDArray[np.float64]  # (n_modes, 2): shape at the bearing, along and across [kg^-0.5]
 
 
-AT_REST = Yielding(np.zeros((0, 1, 8)), np.zeros(0), np.zeros(0), np.zeros((0, 2)))
-"""A bearing that does not move."""
+PUSHES = tuple(
+    FORCES.index(name)
+    for name in (
+        "pin_x",
+        "pin_y",
+        "guide_y",
+        "piston_x",
+        "seal_x",
+        "guide_x",
+        "suction_valve",
+        "discharge_valve",
+    )
+)
+"""Columns of FORCES that push on the casing, in the order in which they are added up."""
 
-PUSHES = (0, 1, 5, 6, 7, 4, 8, 9)
-"""Columns of FORCES that push on the casing, in the order in which they are added up: crank pin,
-guide across, liquid, seal, guide along, valves."""
+AT_REST = Yielding(np.zeros((0, 1, len(PUSHES))), np.zeros(0), np.zeros(0), np.zeros((0, 2)))
+"""A bearing that does not move."""
 
 
 STAGE = np.dtype(
@@ -1034,7 +1045,7 @@ def felt(weight: float, now: float, before: float) -> float:
     """Weight in the frame of a bearing over the next step [m/s^2].
 
     Its acceleration is carried on along the line through the last two steps: held as it was it
-    would lag by a step, and drive the casing (0.6 dB too much in half a band at 20 us).
+    would lag by a step, and feed the casing (0.6 dB across a bilge pump's stroke at 20 us).
     """
     return weight + (2.0 * now - before)
 
