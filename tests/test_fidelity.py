@@ -745,6 +745,8 @@ class LastingPilot(KnownPilot):
         if "duration" in self.common:
             return found
         type(self).whole += 1
+        if self.slow is None:
+            return Outcome({}, "penetration is beyond its law after 3 s")
         rungs = {(path, value) for path, value in values.items() if isinstance(value, str)}
         [(size, *rest)] = found.quantities.values()
         return Outcome({"one": (size + (15 if self.slow in rungs else 0), *rest)}, "")
@@ -771,6 +773,12 @@ def test_what_would_be_chosen_on_cut_recordings_is_confirmed_on_whole_ones():
     good = [c for c in cheaper if c.rungs["crankpin"] == "compliant"]
     assert good  # on cut recordings, where nothing but the crank pin errs
     assert [c.error for c in good] == pytest.approx([0.15] * len(good))
+
+
+def test_a_reference_that_fails_on_whole_recordings_is_told_and_no_choice_is_final():
+    found = cut_search(None).found()
+    assert (found.kept.status, found.raised.status) == ("so far", "so far")
+    assert any("whole recordings" in text and "after 3 s" in text for text in found.refused)
 
 
 def test_what_is_not_confirmed_on_whole_recordings_is_not_called_final():

@@ -31,7 +31,6 @@ _RARE = 0.99  # of familiar recordings
 _FEW = 0.03  # of the features: so many outside the trained range are not strange by themselves
 
 _LEAST_SPREAD = 1e-6  # of the largest: a feature that never moves says nothing
-_TINY = 1e-300
 _CLIP = 10.0  # standard deviations: one wild feature must not stand for a strange recording
 _PROFILE = "profile"
 _ODD_PROFILE, _LESS_ODD = 1.2, 0.45
@@ -132,7 +131,8 @@ class Familiarity:
             Their places.
         """
         beyond = np.maximum(self.low - row, row - self.high)
-        span = np.maximum(self.high - self.low, _LEAST_SPREAD * np.abs(self.high) + _TINY)
+        least = _LEAST_SPREAD * np.maximum(np.abs(self.high), 1.0)  # of one that never moves
+        span = np.maximum(self.high - self.low, least)
         order = np.argsort(-beyond / span, kind="stable")
         return order[beyond[order] > 0]
 

@@ -352,6 +352,7 @@ class Search:
         self._dropped: list[str] = []  # rungs that do not hold on this machine
         self._pruned: list[str] = []
         self._done: set[int] = set()  # comparisons whose answer is final
+        self._cut_alone: dict[int, str] = {}  # those whose best rungs fail on whole recordings: why
         self._convergence: dict[int, list[Convergence]] = {}
         self._complete = False
         self.duration: float | None = None  # of the recording of a run, where it is cut [s]
@@ -531,7 +532,8 @@ class Search:
             return
         while self._told(comparison):
             if self._confirmed(comparison):
-                self._done.add(id(comparison))
+                if id(comparison) not in self._cut_alone:
+                    self._done.add(id(comparison))
                 return
 
     def _told(self, comparison: Comparison) -> bool:
@@ -563,7 +565,9 @@ class Search:
         self.tell("the choice on whole recordings")
         starts = comparison.starts >> self._more_starts()
         whole = Comparison(self.pilot.uncut(), comparison.rungs, self.accuracy, starts)
-        if whole.pilot.fault(whole.values(whole.top)):
+        fault = whole.pilot.fault(whole.values(whole.top))
+        if fault:  # nothing can be confirmed, and nothing refuted: no answer is final
+            self._cut_alone[id(comparison)] = fault
             return True
         confirmed = True
         while (found := self._cheapest(comparison)) and not comparison.settled(found):
@@ -810,6 +814,10 @@ class Search:
     def _refused(self) -> Iterator[str]:
         yield from refusals(self.scene, self.effects)
         yield from self._dropped
+        for each in self._answers():
+            if id(each) in self._cut_alone:
+                why = self._cut_alone[id(each)]
+                yield f"whole recordings of the reference, which would confirm a choice: {why}"
         if self.fault:
             yield f"the best rungs of every effect together: {self.fault}"
 
