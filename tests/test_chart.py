@@ -865,7 +865,7 @@ def replace_written(found, *_others):
 # -- real scenes
 
 
-OTHERS = ["crankpin", "wristpin", "guide", "drive"]
+OTHERS = ["crankpin", "wristpin", "guide", "drive", "casing"]
 """Effects of a pump beside its pressure and step."""
 
 SMALL = {"duration": "0.1 s", "film.n_theta": 24, "film.n_z": 5}

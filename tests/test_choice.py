@@ -102,6 +102,9 @@ def resolution(**rungs):
     )
 
 
+TRIPLEX = {"wristpin": "ideal", "drive": "motor", "casing": "driven", "mesh": ""}
+
+
 def test_the_higher_rung_of_the_pilots_is_taken(monkeypatch):
     recipe = load_recipe("journal-bearing-small", {"duration": "0.05 s"})
     found = iter([resolution(mesh="x1", tolerance="x1/2"), resolution(mesh="x1/2", tolerance="x4")])
@@ -131,7 +134,7 @@ def test_the_higher_rung_of_the_pilots_is_taken(monkeypatch):
 @pytest.mark.parametrize(("level", "counts"), [("x1/2", {8, 10}), ("x4", {2}), ("x1", {})])
 def test_a_step_is_the_least_of_what_the_records_ask_for(monkeypatch, level, counts):
     recipe = load_recipe("triplex-pump-small", {"duration": "0.25 s"})
-    one = resolution(wristpin="ideal", drive="motor", step=level, mesh="")
+    one = resolution(**TRIPLEX, step=level)
     monkeypatch.setattr(module, "resolve", lambda *_, **__: one)
     choice = choose(recipe, seed=1)
     assert ("numerics.step" in choice.values) == bool(counts)
@@ -151,7 +154,7 @@ def test_a_level_that_the_recipes_own_scene_has_not_is_the_coarser_one(monkeypat
     monkeypatch.setattr(
         module,
         "resolve",
-        lambda *_, **__: resolution(wristpin="ideal", drive="motor", step=next(levels), mesh=""),
+        lambda *_, **__: resolution(**TRIPLEX, step=next(levels)),
     )
     assert choose(recipe, seed=1).rungs["step"] == "x2"
 

@@ -72,6 +72,8 @@ def test_pump_figures_by_hand():
     assert got["crank pin, rubbing speed"] == pytest.approx(math.pi * 0.2 * 2)
     assert got["clearance over pin, diametral"] == pytest.approx(1e3 * 0.25 / 200)
     assert got["casing mass over moving mass"] == pytest.approx(1 / 0.010**2 / (2 * 240))
+    across = 0.010**2 + 0.006**2 + 0.010**2 + 0.008**2  # kg^-1, of four modes; the second has none
+    assert got["casing at bearing over moving mass"] == pytest.approx(1 / across / 240)
     assert got["first casing mode over speed"] == pytest.approx(65 / 2)
     assert got["casing mode over half the rate"] == pytest.approx(2900 / 6400)
     assert got["revolutions recorded"] == pytest.approx(22)

@@ -60,7 +60,7 @@ def test_every_effect_of_a_machine_is_found_in_one_of_its_scenes():
 
 def test_an_absent_effect_is_absent():
     names = [each.name for each in effects_of(load_scene("slider-crank-benchmark"))]
-    assert names == ["crankpin", "step"]  # no wrist pin, no guide, no bore, no motor
+    assert names == ["crankpin", "casing", "step"]  # no wrist pin, no guide, no bore, no motor
 
 
 def test_rungs_are_tabulated_from_the_cheapest():
@@ -78,6 +78,7 @@ def test_rungs_are_tabulated_from_the_cheapest():
         ("triplex-pump", {}, "pressure", "heads", "suction_line is missing"),
         ("bilge-pump", {"joint.crankpin.diametral_clearance": 0}, "crankpin", "link", "clearance"),
         ("bilge-pump", {"drive.speed": "900 rpm"}, "pressure", "heads", "vapour"),
+        ("bilge-pump", {}, "casing", "yielding", "joint.crankpin.rung = ideal must be compliant"),
         ("propulsion-shaft", {}, "film", "map", "knows no tilted journal"),
         (
             "journal-bearing",

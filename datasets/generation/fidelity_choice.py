@@ -118,6 +118,8 @@ def pinned_by(recipe: Recipe) -> tuple[str, ...]:
     >>> from wearstate.datasets.recipe.recipe import load_recipe
     >>> pinned_by(load_recipe("bilge-pump-small"))
     ('crankpin',)
+    >>> pinned_by(load_recipe("bilge-pump-standard"))
+    ('crankpin', 'wristpin', 'guide', 'pressure', 'drive', 'casing')
     >>> pinned_by(load_recipe("journal-scar-small"))
     ('film',)
     """
@@ -125,6 +127,7 @@ def pinned_by(recipe: Recipe) -> tuple[str, ...]:
     faulty += [axis.path for fault in recipe.faults for axis in fault.axes]
     written = {*recipe.table.fixed, *recipe.overrides}
     written |= {axis.path for axis in (*recipe.machine, *recipe.record)}
+    written |= {path for each in recipe.choices for path in each.paths}
     effects = effects_of(recipe.scene)
     names = {effect for path in faulty for effect in _acted_on(path)}
     names |= {e.name for e in effects for rung in e.rungs if written & set(rung.values)}

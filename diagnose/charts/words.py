@@ -18,6 +18,7 @@ EFFECTS = {
     "guide": "guide",
     "pressure": "pressure",
     "drive": "drive",
+    "casing": "casing",
     "film": "film",
     "beam": "beam",
 }

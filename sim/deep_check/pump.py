@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..pump.setup import (
+    bearing_shapes,
     contact_frequency,
     contact_table,
     joint_loads,
@@ -276,6 +277,20 @@ def _mass_ratio(facts: PumpFacts) -> dict[str, float]:
     return {"": _weight(scene) / STANDARD_GRAVITY / moving}
 
 
+def _bearing_mass(facts: PumpFacts) -> dict[str, float]:
+    """Apparent mass of the casing at its main bearing above all its modes, over what moves there.
+
+    A force there that is shorter than any mode's period moves it as ``1 / sum(shape^2)`` would.
+    """
+    scene = facts.scene
+    if not scene.casing.modes:
+        return {}
+    moving = scene.piston.mass + scene.rod.mass
+    given_way = np.sum(bearing_shapes(scene) ** 2, axis=0)
+    ways = zip(("along the stroke", "across it"), given_way, strict=True)
+    return {way: 1 / (each * moving) for way, each in ways if each > 0}
+
+
 def _force_ratio(facts: PumpFacts) -> dict[str, float]:
     numerics = facts.trial.solution.numerics
     if not facts.scene.casing.modes or "peak_normal_force_n" not in numerics:
@@ -469,6 +484,14 @@ PUMP_ROWS = (
         low="lower the shapes of casing.modes: near 1 over the square root of the mass that moves; "
         "a casing that light gives way to knocks: casing.rung = 'yielding'",
         doubt="light casing",
+    ),
+    Quantity(
+        name="casing at bearing over moving mass",
+        unit="",
+        measure=_bearing_mass,
+        least=1.0,
+        reason="2 to 100; below 40 one that yields is quieter than one at rest, by decibels",
+        low="lower the shapes of casing.modes at bearing_x and bearing_y",
     ),
     Quantity(
         name="peak pin force over casing weight",

@@ -31,7 +31,7 @@ from .choose import (
     refusals,
     refuse_bad_reference,
 )
-from .ladder import cost_of
+from .ladder import cost_of, tabulated_cost
 from .pilot import (
     FIRST,
     RESOLVED,
@@ -255,7 +255,7 @@ def written_rung(effect: Effect, scene: Scene) -> Rung:
     >>> from wearstate.sim.scene.load import load_scene
     >>> pump = load_scene("bilge-pump")  # writes no step: its contact needs no more than x2
     >>> [written_rung(effect, pump).name for effect in effects_of(pump)][-3:]
-    ['two-level', 'constant-speed', 'x2']
+    ['constant-speed', 'driven', 'x2']
     """
     for rung in effect.rungs:
         if all(_has(scene, path, value) for path, value in rung.values.items()):
@@ -595,8 +595,9 @@ class Search:
         for combination in product(*choices):
             if largest_sum([added for _, added in combination]) <= self.accuracy:
                 rungs = dict(zip(best.rungs, (rung for rung, _ in combination), strict=True))
-                cost = cost_of(with_values(self.scene, best.values(rungs)))
-                rows.append((cost, len(rows), rungs))
+                cost = tabulated_cost(self.scene, best.values(rungs))
+                if math.isfinite(cost):
+                    rows.append((cost, len(rows), rungs))
         yield from (rungs for _, _, rungs in sorted(rows, key=lambda row: row[:2])[:_SHORTLIST])
 
     def _predicted(self, best: Comparison, name: str) -> list[tuple[Rung, dict[str, float]]]:
@@ -694,8 +695,9 @@ class Search:
                 for name, rung in rungs.items()
                 if rung is not comparison.top[name]
             ]
-            cost = cost_of(with_values(self.scene, comparison.values(rungs)))
-            rows.append((cost, largest_sum(alone), len(rows), rungs))
+            cost = tabulated_cost(self.scene, comparison.values(rungs))
+            if math.isfinite(cost):
+                rows.append((cost, largest_sum(alone), len(rows), rungs))
         front, least = [], math.inf
         for _, error, _, rungs in sorted(rows, key=lambda row: row[:3]):
             if error < least * _SPARED:

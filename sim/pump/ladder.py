@@ -144,7 +144,30 @@ DRIVE_RUNGS = (
 )
 """Rungs of the drive."""
 
-PUMP_LADDERS = {"joint": JOINT_RUNGS, "pressure": PRESSURE_RUNGS, "drive": DRIVE_RUNGS}
+CASING_RUNGS = (
+    Rung(
+        name="driven",
+        assumes="the casing hears the mechanism and does not answer: its bearing is at rest",
+        valid="casing far heavier at the bearing than what moves",
+        nanoseconds_per_step=0.0,
+    ),
+    Rung(
+        name="yielding",
+        assumes="the bearing moves with the casing's modes, each at that cost, and the crank too",
+        reference="Newton's equations in the frame of the bearing",
+        valid="modes that reach as high as the knocks do",
+        needs="a crank pin that is compliant or runs in oil",
+        nanoseconds_per_step=13.0,
+    ),
+)
+"""Rungs of the casing; what they cost is of a step of one mode."""
+
+PUMP_LADDERS = {
+    "joint": JOINT_RUNGS,
+    "pressure": PRESSURE_RUNGS,
+    "drive": DRIVE_RUNGS,
+    "casing": CASING_RUNGS,
+}
 """Effect -> its rungs. A new rung is one row, its code in the kernel, and one test."""
 
 PUMP_STEP_LEVELS = (4.0, 2.0, 4 / 3, 1.0, 0.5, 0.25)
@@ -156,6 +179,7 @@ def pump_effects(scene: Scene) -> Iterator[Effect]:
     yield from _joint_effects(scene)
     yield from _pressure_effect(scene)
     yield from _drive_effect(scene)
+    yield from _casing_effect(scene)
     yield from _step_effect(scene)
 
 
@@ -228,6 +252,12 @@ def _drive_effect(scene: Scene) -> Iterator[Effect]:
         yield effect("drive", scene, rungs, lambda one: str(one.drive.rung), beyond=_beyond)
 
 
+def _casing_effect(scene: Scene) -> Iterator[Effect]:
+    if cast(PumpScene, scene).casing.modes:
+        rungs = written(CASING_RUNGS, ["casing.rung"])
+        yield effect("casing", scene, rungs, lambda one: str(one.casing.rung), beyond=_beyond)
+
+
 def _stiffest(scene: PumpScene) -> PumpScene:
     """The scene with every contact that it can have: a step that is stable there is so anywhere."""
     for joint in _joint_effects(scene):
@@ -259,8 +289,6 @@ _MECHANISM = 60.0  # ns of a step of one throw beside its effects
 
 _MODE = 12.0  # ns of a step of one casing mode and its sensors
 
-_CARRIED = 13.0  # ns of a step of one casing mode that carries the bearing along
-
 _REACH = 6.0  # ns of a step of one reach of a pipe with waves
 
 _CASING_FIXED = 200.0  # ns of a step beside: low-pass and bookkeeping
@@ -269,10 +297,9 @@ _CASING_FIXED = 200.0  # ns of a step beside: low-pass and bookkeeping
 def pump_cost(scene: Scene) -> float:
     """Time of a run by the tables [s]."""
     pump = cast(PumpScene, scene)
-    per_step = _CASING_FIXED + _MODE * len(pump.casing.modes) + price(DRIVE_RUNGS, pump.drive.rung)
+    mode = _MODE + price(CASING_RUNGS, pump.casing.rung)
+    per_step = _CASING_FIXED + mode * len(pump.casing.modes) + price(DRIVE_RUNGS, pump.drive.rung)
     per_step += _REACH * _reaches(pump)
-    if pump.casing.rung == "yielding":
-        per_step += _CARRIED * len(pump.casing.modes)
     for throw in range(len(pump.throws)):
         per_step += _MECHANISM + price(PRESSURE_RUNGS, pump.pressures(throw).rung)
         for part in joint_parts(pump, throw):

@@ -218,16 +218,29 @@ def yielding_of(scene: PumpScene) -> Yielding:
             push[:, throw, column] += [
                 sign * casing_inputs(m.shape, place, throw + 1) for m in modes
             ]
-    at_bearing = [
-        [np.mean([casing_inputs(mode.shape, place, k + 1) for k in throws]) for place in _BEARING]
-        for mode in modes
-    ]
     natural = 2 * math.pi * np.array([frequency for frequency, _ in held])
     return Yielding(
         push=push,
         spring=natural**2,
         drag=2 * np.array([ratio for _, ratio in held]) * natural,
-        give=np.array(at_bearing),
+        give=bearing_shapes(scene),
+    )
+
+
+def bearing_shapes(scene: PumpScene) -> NDArray[np.float64]:
+    """Shapes of the casing's modes at the main bearing, the mean of all throws'.
+
+    Returns
+    -------
+    ndarray of shape (n_modes, 2)
+        Mass-normalised, along the stroke and across it [kg^-0.5].
+    """
+    throws = range(1, len(scene.throws) + 1)
+    return np.array(
+        [
+            [np.mean([casing_inputs(mode.shape, place, k) for k in throws]) for place in _BEARING]
+            for mode in scene.casing.modes
+        ]
     )
 
 

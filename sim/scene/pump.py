@@ -489,7 +489,7 @@ class PumpScene(Scene):
     """A reciprocating pump of one to many equal throws with clearance in its joints."""
 
     physics = "wearstate.sim.machine.pump"
-    effects = ("crankpin", "wristpin", "guide", "pressure", "drive", "step")
+    effects = ("crankpin", "wristpin", "guide", "pressure", "drive", "casing", "step")
     wear_places = (
         WearPlace("joint.crankpin.diametral_clearance", "crankpin", _PLAY, "wear"),
         WearPlace("joint.wristpin.diametral_clearance", "wristpin", _PLAY, "wear_wristpin"),
