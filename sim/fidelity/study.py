@@ -670,8 +670,8 @@ class Search:
                 cheaper = [other for _, other in ahead[i + 1 :] if other.cost <= single.cost]
                 best = min((other.error for other in cheaper), default=math.inf)
                 if single.verdict == "invalid":
-                    pruned.append(f"{name} = {rung.name}: {single.reason}")
-                elif best <= single.error:
+                    continue  # its reason stands among what is not valid
+                if best <= single.error:
                     pruned.append(f"{name} = {rung.name}: a cheaper one errs no more")
                 else:
                     kept[name].append(rung)
