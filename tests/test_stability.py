@@ -310,7 +310,7 @@ PIPES_WITH_WAVES = {
     ("scene", "more"),
     [
         # a run takes two revolutions: at twice the speed half as many steps
-        ("bilge-pump", PIPES_WITH_WAVES | {"drive.speed": "10 Hz"}),
+        ("bilge-pump", PIPES_WITH_WAVES | {"drive.speed": "10 Hz", "casing.rung": "yielding"}),
         ("journal-bearing", {}),
         ("propulsion-shaft", {}),
     ],
@@ -349,6 +349,20 @@ def test_the_guard_of_a_pipe_with_waves_is_where_its_frequency_is_right():
         assert plan.judges["wave-lines"](10 * step, length)[0] is Verdict.INACCURATE
         assert plan.judges["lumped-lines"](10 * step, length)[0] is Verdict.INACCURATE
         assert plan.judges["lumped-lines"](0.1 * step, length)[0] is Verdict.ACCURATE
+
+
+def test_a_casing_that_yields_runs_away_where_theory_says_and_not_for_being_light():
+    make = MAPS["reciprocating-pump"]["step-casing"]
+    assert "set casing.rung = 'yielding'" in make(load_scene("bilge-pump"), 3)
+    plan = make(load_scene("bilge-pump", {"casing.rung": "yielding"}), 7)
+    [(method, judge)] = plan.judges.items()
+    limit, guard = plan.curves[method]
+    assert plan.own.y == pytest.approx(1 / 0.0564 / 9, rel=1e-3)  # sum of shape^2 [1/kg], on 9 kg
+    assert max(guard.x) < min(limit.x)
+    for step, ratio in zip(limit.x, limit.y, strict=True):
+        assert judge(1.02 * step, ratio)[0] is Verdict.UNSTABLE
+        assert judge(0.98 * step, ratio)[0] is Verdict.INACCURATE
+        assert judge(0.1 * step, ratio)[0] is Verdict.ACCURATE
 
 
 def test_the_pump_loses_contact_by_its_clearance_and_not_by_its_step(monkeypatch):

@@ -36,6 +36,8 @@ from ...sim.piping.pipe import FEWEST_REACHES, drive_pipe, pipe_parameters, pipe
 from ...sim.pump.recording import steps_per_sample
 from ...sim.pump.setup import (
     LARGEST_STEP_PER_CONTACT_TIME,
+    bearing_shapes,
+    begun,
     contact_rate,
     contact_table,
     joint_loads,
@@ -44,12 +46,14 @@ from ...sim.pump.setup import (
     joint_rungs,
     run_scene,
     tangent_stiffness,
+    yielding_of,
 )
-from ...sim.pump.slider_crank import JOINT_COMPLIANT
+from ...sim.pump.slider_crank import JOINT_COMPLIANT, run_mechanism
+from ...sim.pump.validity import MOST_OF_A_MODE, fastest_mode
 from ...sim.scene.journal import JournalScene
 from ...sim.scene.oil import Oil
 from ...sim.scene.parts import Scene, SceneError
-from ...sim.scene.pump import PumpScene
+from ...sim.scene.pump import PumpJoints, PumpScene
 from ...sim.scene.pump_hydraulics import PIPED_RUNGS, Line, Liquid
 from ...sim.scene.shaft import ShaftScene
 from .method_map import Cell, Curve, Judge, MapAxis, MapPlan, Own, Verdict
@@ -409,12 +413,127 @@ def _ringing(line: Line, step: float, n_steps: int, rung: str) -> float:
     states, nodes = pipe_start(pipes[0], 1e-3 * line.diameter**2)  # about 1 mm/s
     pressure, entering = np.zeros(n_steps), np.zeros(n_steps)
     drive_pipe(pipes, states, nodes, np.zeros(n_steps), step, pressure, entering)
-    rest = pressure - _RINGING_AT
+    return _frequency(pressure - _RINGING_AT, step)
+
+
+def _frequency(rest: Array, step: float) -> float:
+    """Frequency of what swings about zero, from its zeros upward [Hz]; NaN of fewer than three."""
     up = np.flatnonzero((rest[:-1] < 0) & (rest[1:] >= 0))
     if len(up) < 3:
         return math.nan
     times = up - rest[up] / (rest[up + 1] - rest[up])
     return (len(times) - 1) / float((times[-1] - times[0]) * step)
+
+
+# --- pump: a casing that yields
+
+
+def step_casing(scene: Scene, size: int | None = None) -> MapPlan | str:
+    """Ring of a rigid mechanism with a casing that carries it: step by their masses.
+
+    Parameters
+    ----------
+    scene : Scene
+        A pump.
+    size : int, optional
+        Cells along either axis.
+
+    Returns
+    -------
+    Plan or str
+        Or why there is none.
+    """
+    pump = cast(PumpScene, scene)
+    mode = fastest_mode(pump)
+    if not mode:
+        return "the casing does not yield; set casing.rung = 'yielding'"
+    n, rate = size or 13, math.tau * mode
+    own = 1 / float(np.sum(bearing_shapes(pump)[:, 0] ** 2)) / _moving(pump)
+    step = 1 / (pump.sample_rate * steps_per_sample(pump))
+    x = MapAxis(name="step", unit="s", values=_spread(0.05 / rate, 20 / rate, n)).through(step)
+    y = MapAxis(
+        name="casing at the bearing over moving mass",
+        unit="",
+        values=_spread(own / 30, own * 30, n),
+    ).through(own)
+    lighter = Curve(
+        name="limit in theory",
+        x=tuple(2 / rate * math.sqrt(1 + 1 / ratio) for ratio in y.values),
+        y=y.values,
+    )
+    guard = Curve(
+        name="guard: longest step let pass", x=(MOST_OF_A_MODE / rate,) * 2, y=y.values[:: n - 1]
+    )
+    return MapPlan(
+        name="step-casing",
+        title=f"ring of a casing of {mode:.4g} Hz with what it carries, step by their masses",
+        x=x,
+        y=y,
+        judges={_YIELDING: _casing_judge(pump, mode)},
+        curves={_YIELDING: [lighter, guard]},
+        note="frequency against that of both masses on the casing's spring, within "
+        f"{scene.accuracy:.2g}; piston and rod held without play, on a crank that stands",
+        own=Own(method=_YIELDING, x=step, y=own),
+    )
+
+
+_YIELDING = "mechanism in the frame of its bearing"
+_GROWN = 1.5  # of a ring without damping, last over first: it grows
+
+
+def _moving(scene: PumpScene) -> float:
+    return scene.piston.mass + scene.rod.mass
+
+
+def _casing_judge(scene: PumpScene, mode: float) -> Judge:
+    def judge(step: float, ratio: float) -> Cell:
+        exact = mode / math.sqrt(1 + 1 / ratio)
+        force = _casing_ring(scene, mode, ratio, step, math.ceil(_RUNG_PERIODS / (exact * step)))
+        quarter = len(force) // 4
+        first, last = np.ptp(force[4 : quarter + 4]), np.ptp(force[-quarter:])
+        if not last < _GROWN * first:  # also where it is no number
+            return Verdict.UNSTABLE, "grows"
+        off = abs(_frequency(force - force.mean(), step) / exact - 1)
+        fine = off <= scene.accuracy  # not so where too few periods are told
+        return (Verdict.ACCURATE if fine else Verdict.INACCURATE), f"frequency off by {off:.2g}"
+
+    return judge
+
+
+def _casing_ring(scene: PumpScene, mode: float, ratio: float, step: float, least: int) -> Array:
+    """Force of a rigid crank pin that stands at its dead centre, after a load set in [N]."""
+    shape = {"bearing_x": 1 / math.sqrt(ratio * _moving(scene))}
+    alone = scene.casing.modes[0].model_copy(
+        update={"frequency": mode, "damping_ratio": 0.0, "shape": shape}
+    )
+    rigid = changed(
+        scene,
+        {
+            "joint": PumpJoints(crankpin=scene.joint.crankpin.model_copy(update={"rung": "ideal"})),
+            "pressure.rung": "constant",
+            "drive.rung": "constant-speed",
+            "casing": scene.casing.model_copy(update={"modes": (alone,), "feet": None}),
+            "throws": scene.throws[:1],
+        },
+    )
+    t, start = begun(rigid, step, 0.0)
+    bodies = start.bodies.copy()
+    bodies[:, 6:] = 0.0
+    with np.errstate(all="ignore"):  # what is unstable overflows: that is the answer
+        run = run_mechanism(
+            t,
+            angle=0.0,
+            speed=0.0,
+            bodies=bodies,
+            casing=yielding_of(rigid),
+            step=step,
+            n_steps=max(least, _LEAST_WATCHED),
+            keep_states=False,
+        )
+    return run.force("pin_x") if run.status.ok else np.full(_LEAST_WATCHED, np.nan)
+
+
+_LEAST_WATCHED = 200  # steps
 
 
 # --- pump: clearance by speed
@@ -1314,6 +1433,7 @@ MAPS: dict[str, dict[str, Maker]] = {
         "step-stiffness": step_stiffness,
         "clearance-speed": clearance_speed,
         "step-line": step_line,
+        "step-casing": step_casing,
     },
     "journal-bearing": {"step-squeeze": step_squeeze, "speed-load": speed_load, **_FILMS},
     "propulsion-shaft": {"speed-viscosity": speed_viscosity, **_FILMS},

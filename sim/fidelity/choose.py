@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 from ..scene.parts import Scene, SceneError, pinned_faults
 from ..scene.rungs import Effect, Rung, admissible, with_values
-from .ladder import cost_of, effects_of, tabulated_cost
+from .ladder import cost_of, effects_of
 from .pilot import Candidate, Comparison, Pilot, Quantities
 
 STARTS = 32
@@ -310,7 +310,7 @@ def _lowest_cost(comparison: Comparison, name: str) -> float:
     """Cost of the best combination with the cheapest rung of one effect."""
     scene = comparison.pilot.scene
     values = (comparison.values({**comparison.top, name: rung}) for rung in comparison.rungs[name])
-    return min(tabulated_cost(scene, each) for each in values)
+    return min(cost_of(with_values(scene, each)) for each in values)
 
 
 def leaves_room(candidate: Candidate, accuracy: float) -> bool:
@@ -340,9 +340,8 @@ def combinations(
         added = [each for _, _, each in combination if each is not None]
         if largest_sum(added) <= comparison.accuracy:
             rungs = {name: rung for name, rung, _ in combination}
-            cost = tabulated_cost(comparison.pilot.scene, comparison.values(rungs))
-            if math.isfinite(cost):
-                ranked.append((cost, len(ranked), rungs))
+            cost = cost_of(with_values(comparison.pilot.scene, comparison.values(rungs)))
+            ranked.append((cost, len(ranked), rungs))
     for _, _, rungs in sorted(ranked, key=lambda row: row[:2]):
         yield comparison.judge(rungs)
 

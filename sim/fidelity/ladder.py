@@ -1,12 +1,8 @@
 """The rungs of any scene, and what a run of it costs: both as its machine registers them."""
 
-import math
-from collections.abc import Mapping
-from typing import Any
-
 from ..machine.registry import machine_of
-from ..scene.parts import Scene, SceneError
-from ..scene.rungs import Effect, with_values
+from ..scene.parts import Scene
+from ..scene.rungs import Effect
 
 
 def effects_of(scene: Scene) -> tuple[Effect, ...]:
@@ -50,22 +46,6 @@ def cost_of(scene: Scene) -> float:
     True
     """
     return machine_of(scene).cost(scene)
-
-
-def tabulated_cost(scene: Scene, values: Mapping[str, Any]) -> float:
-    """Cost of a scene with a combination of rungs [s]; infinite where these do not go together.
-
-    Examples
-    --------
-    >>> from wearstate.sim.scene.load import load_scene
-    >>> rigid = {"joint.crankpin.rung": "ideal", "casing.rung": "yielding"}
-    >>> tabulated_cost(load_scene("bilge-pump"), rigid)
-    inf
-    """
-    try:
-        return cost_of(with_values(scene, values))
-    except SceneError:
-        return math.inf
 
 
 VALIDITY = {"tension_share": 0.0}

@@ -37,7 +37,7 @@ from ..machine.simulate import (
 from ..output.recording import Recorder, Recording
 from ..scene.parts import Scene, SceneError
 from ..scene.rungs import Rung, with_values
-from .ladder import VALIDITY, tabulated_cost
+from .ladder import VALIDITY, cost_of
 
 Quantity = tuple[float, str, float]
 """Value, kind ("dB", "relative" or "absolute") and scale: the least size a relative error is taken
@@ -509,8 +509,11 @@ class Pilot:
         """Tabulated time of a run [s]; 0 of a combination that the scene refuses."""
         key = _key(values)
         if key not in self._tabulated:
-            cost = tabulated_cost(self.scene, {**values, **self.common})
-            self._tabulated[key] = cost if math.isfinite(cost) else 0.0
+            try:
+                cost = cost_of(with_values(self.scene, {**values, **self.common}))
+            except SceneError:
+                cost = 0.0
+            self._tabulated[key] = cost
         return self._tabulated[key]
 
     def _made(self, batch: Sequence[tuple[_Start, ...]]) -> Iterable[list[Outcome]]:
@@ -838,10 +841,14 @@ class Comparison:
         reason: str,
     ) -> Candidate:
         values = self.values(rungs)
+        try:
+            cost = cost_of(with_values(self.pilot.scene, values))
+        except SceneError:
+            cost = math.inf
         return Candidate(
             rungs={name: rung.name for name, rung in rungs.items()},
             values=values,
-            cost=tabulated_cost(self.pilot.scene, values),
+            cost=cost,
             differences=found,
             starts=starts,
             verdict=verdict,

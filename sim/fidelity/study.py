@@ -31,7 +31,7 @@ from .choose import (
     refusals,
     refuse_bad_reference,
 )
-from .ladder import cost_of, tabulated_cost
+from .ladder import cost_of
 from .pilot import (
     FIRST,
     RESOLVED,
@@ -595,9 +595,8 @@ class Search:
         for combination in product(*choices):
             if largest_sum([added for _, added in combination]) <= self.accuracy:
                 rungs = dict(zip(best.rungs, (rung for rung, _ in combination), strict=True))
-                cost = tabulated_cost(self.scene, best.values(rungs))
-                if math.isfinite(cost):
-                    rows.append((cost, len(rows), rungs))
+                cost = cost_of(with_values(self.scene, best.values(rungs)))
+                rows.append((cost, len(rows), rungs))
         yield from (rungs for _, _, rungs in sorted(rows, key=lambda row: row[:2])[:_SHORTLIST])
 
     def _predicted(self, best: Comparison, name: str) -> list[tuple[Rung, dict[str, float]]]:
@@ -695,9 +694,8 @@ class Search:
                 for name, rung in rungs.items()
                 if rung is not comparison.top[name]
             ]
-            cost = tabulated_cost(self.scene, comparison.values(rungs))
-            if math.isfinite(cost):
-                rows.append((cost, largest_sum(alone), len(rows), rungs))
+            cost = cost_of(with_values(self.scene, comparison.values(rungs)))
+            rows.append((cost, largest_sum(alone), len(rows), rungs))
         front, least = [], math.inf
         for _, error, _, rungs in sorted(rows, key=lambda row: row[:3]):
             if error < least * _SPARED:

@@ -156,7 +156,7 @@ CASING_RUNGS = (
         assumes="the bearing moves with the casing's modes, each at that cost, and the crank too",
         reference="Newton's equations in the frame of the bearing",
         valid="modes that reach as high as the knocks do",
-        needs="a crank pin that is compliant or runs in oil",
+        needs="casing.modes",
         nanoseconds_per_step=13.0,
     ),
 )

@@ -210,7 +210,7 @@ def yielding_of(scene: PumpScene) -> Yielding:
         return AT_REST
     throws = range(len(scene.throws))
     feet = 1.0 if scene.casing.feet is None else scene.casing.feet.stiffness_ratio
-    held = [mode.on_feet(feet) for mode in modes]
+    on_feet = [mode.on_feet(feet) for mode in modes]
     push = np.zeros((len(modes), len(throws), len(PUSHES)))
     for throw in throws:
         for place, name, sign in throw_on_casing(scene, throw):
@@ -218,13 +218,49 @@ def yielding_of(scene: PumpScene) -> Yielding:
             push[:, throw, column] += [
                 sign * casing_inputs(m.shape, place, throw + 1) for m in modes
             ]
-    natural = 2 * math.pi * np.array([frequency for frequency, _ in held])
+    natural = 2 * math.pi * np.array([frequency for frequency, _ in on_feet])
+    give, held = bearing_shapes(scene), _held(scene)
+    gain = give.T @ held
     return Yielding(
         push=push,
         spring=natural**2,
-        drag=2 * np.array([ratio for _, ratio in held]) * natural,
-        give=bearing_shapes(scene),
+        drag=2 * np.array([ratio for _, ratio in on_feet]) * natural,
+        give=give,
+        held=held,
+        blend=np.asarray(np.linalg.solve(np.eye(2) + gain, gain), np.float64),
     )
+
+
+def _held(scene: PumpScene) -> NDArray[np.float64]:
+    """Force on each mode per acceleration of what is held to the bearing [kg^0.5], (n_modes, 2).
+
+    A rigid crank pin takes piston and rod along the stroke; across it pin and guide share them,
+    the rod as its mass lies. Past a crank pin with play the guide has the piston and what a free
+    rod leaves to it; what the pin's contact makes of it within a step is little.
+    """
+    held = np.zeros((len(scene.casing.modes), 2))
+    for k in range(len(scene.throws)):
+        at = np.array(
+            [
+                [casing_inputs(mode.shape, place, k + 1) for place in (*_BEARING, "guide_y")]
+                for mode in scene.casing.modes
+            ]
+        )
+        along, at_pin, at_guide = _held_masses(scene, k)
+        held[:, 0] += along * at[:, 0]
+        held[:, 1] += at_pin * at[:, 1] + at_guide * at[:, 2]
+    return held
+
+
+def _held_masses(scene: PumpScene, throw: int) -> tuple[float, float, float]:
+    """Masses that a bearing feels along the stroke, and across it at pin and guide [kg]."""
+    piston, rod = scene.piston.mass, scene.rod.mass
+    if joint_rungs(scene, throw)[CRANKPIN] < JOINT_COMPLIANT:
+        at_pin = rod * scene.rod.centre_of_mass / scene.rod.length
+        return piston + rod, at_pin, piston + rod - at_pin
+    lever = scene.rod.centre_of_mass
+    swung = scene.rod.inertia / (scene.rod.inertia + rod * lever**2)
+    return 0.0, 0.0, piston + rod * swung
 
 
 def bearing_shapes(scene: PumpScene) -> NDArray[np.float64]:
@@ -1035,14 +1071,15 @@ def lines_of(scene: PumpScene, step: float) -> LinePair | None:
 
 
 def needs_integration(scene: PumpScene) -> bool:
-    """False where the closed form says all: ideal joints, constant speed, pressure by angle."""
+    """False where the closed form says all: ideal joints, pressure by angle, all else driven."""
     ideal = all(
         rung == JOINT_IDEAL
         for throw in range(len(scene.throws))
         for rung in joint_rungs(scene, throw)
     )
     breathing = any(scene.pressures(k).rung in BREATHING_RUNGS for k in range(len(scene.throws)))
-    return not ideal or breathing or scene.drive.rung != "constant-speed"
+    answered = scene.drive.rung != "constant-speed" or scene.casing.rung == "yielding"
+    return not ideal or breathing or answered
 
 
 class Start(NamedTuple):

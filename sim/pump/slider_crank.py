@@ -177,6 +177,8 @@ class Yielding(NamedTuple):
     spring: NDArray[np.float64]  # (n_modes,): square of the natural frequency [1/s^2]
     drag: NDArray[np.float64]  # (n_modes,): twice the decay rate [1/s]
     give: NDArray[np.float64]  # (n_modes, 2): shape at the bearing, along and across [kg^-0.5]
+    held: NDArray[np.float64]  # (n_modes, 2): pushes back by what it carries [kg^0.5]
+    blend: NDArray[np.float64]  # (2, 2): what that makes of its acceleration, see `settled`
 
 
 PUSHES = tuple(
@@ -194,7 +196,14 @@ PUSHES = tuple(
 )
 """Columns of FORCES that push on the casing, in the order in which they are added up."""
 
-AT_REST = Yielding(np.zeros((0, 1, len(PUSHES))), np.zeros(0), np.zeros(0), np.zeros((0, 2)))
+AT_REST = Yielding(
+    push=np.zeros((0, 1, len(PUSHES))),
+    spring=np.zeros(0),
+    drag=np.zeros(0),
+    give=np.zeros((0, 2)),
+    held=np.zeros((0, 2)),
+    blend=np.zeros((2, 2)),
+)
 """A bearing that does not move."""
 
 
@@ -1031,33 +1040,62 @@ def _keep(w: Any, i: int, chamber: Any, states: Any, r: Any, row: int) -> None:
 
 
 @kernel
-def moved_mode(
-    force: float, place: float, speed: float, spring: float, drag: float, h: float
-) -> Any:
-    """Acceleration of a mode over a step [m kg^0.5/s^2], its place and speed after it."""
-    acceleration = force - drag * speed - spring * place
-    speed += h * acceleration
-    return acceleration, place + h * speed, speed
+def mode_acceleration(
+    force: float, place: float, speed: float, spring: float, drag: float
+) -> float:
+    """Of a mode over a step [m kg^0.5/s^2]."""
+    return force - drag * speed - spring * place
 
 
 @kernel
-def felt(weight: float, now: float, before: float) -> float:
-    """Weight in the frame of a bearing over the next step [m/s^2].
+def moved_mode(acceleration: float, place: float, speed: float, h: float) -> Any:
+    """Place and speed of a mode after a step."""
+    speed += h * acceleration
+    return place + h * speed, speed
 
-    Its acceleration is carried on along the line through the last two steps: held as it was it
-    would lag by a step, and feed the casing (0.6 dB across a bilge pump's stroke at 20 us).
+
+@kernel
+def settled(
+    now: float, other: float, felt_now: float, felt_other: float, own: float, cross: float
+) -> float:
+    """Acceleration of a bearing had what it carries felt just that [m/s^2].
+
+    What is held to a bearing pushes back by its mass as soon as it feels an acceleration:
+    `a = a_0 - G a_felt`, and `a = (1 + G)^-1 a_0` had it felt that. Here it is from what was felt:
+    `a + (1 + G)^-1 G (a_felt - a)`.
+
+    Parameters
+    ----------
+    now, felt_now : float
+        One way: by the forces of the step, and what the mechanism felt in it.
+    other, felt_other : float
+        The same of the other way.
+    own, cross : float
+        Entries of `(1 + G)^-1 G`.
     """
-    return weight + (2.0 * now - before)
+    return now + own * (felt_now - now) + cross * (felt_other - other)
+
+
+@kernel
+def carried_on(now: float, before: float) -> float:
+    """Acceleration over the next step, along the line through the last two [m/s^2].
+
+    Held as it was it would lag by a step, and feed the casing (0.6 dB across a bilge pump's stroke
+    at 20 us).
+    """
+    return 2.0 * now - before
 
 
 @kernel
 def _on_moving_bearing(
-    y: Any, moved: Any, felt_last: Any, forces: Any, step: int, h: float, weight: Any, t: Any
+    y: Any, moved: Any, ridden: Any, forces: Any, step: int, h: float, weight: Any, t: Any
 ) -> Any:
     """Tables for the next step: what turns is heavier by how the casing accelerates its bearing.
 
     In the frame of a bearing that moves, every mass feels its acceleration as more weight. Forces
-    are means over the step before; `weight` is that at rest, along and across.
+    are means over the step before; `weight` is that at rest, along and across; `ridden` holds the
+    bearing's acceleration in the step before, and what was felt in this one. What felt another
+    acceleration than the bearing had pushes on the modes by its mass times what it was late by.
     """
     along, across = 0.0, 0.0
     for mode in range(y.spring.size):
@@ -1067,16 +1105,23 @@ def _on_moving_bearing(
             for n in range(len(PUSHES)):
                 own += y.push[mode, k, n] * forces[step, 1 + len(FORCES) * k + PUSHES[n]]
             force += own
-        a, place, speed = moved_mode(
-            force, moved[mode, 0], moved[mode, 1], y.spring[mode], y.drag[mode], h
-        )
-        moved[mode, 0], moved[mode, 1] = place, speed
+        a = mode_acceleration(force, moved[mode, 0], moved[mode, 1], y.spring[mode], y.drag[mode])
+        moved[mode, 2] = a
         along += y.give[mode, 0] * a
         across += y.give[mode, 1] * a
+    b, last, was = y.blend, ridden[0], ridden[1]
+    now_x = settled(along, across, was[0], was[1], b[0, 0], b[0, 1])
+    now_y = settled(across, along, was[1], was[0], b[1, 1], b[1, 0])
+    late_x, late_y = was[0] - now_x, was[1] - now_y
+    for mode in range(y.spring.size):
+        a = moved[mode, 2] + y.held[mode, 0] * late_x + y.held[mode, 1] * late_y
+        moved[mode, 0], moved[mode, 1] = moved_mode(a, moved[mode, 0], moved[mode, 1], h)
+    felt_x, felt_y = carried_on(now_x, last[0]), carried_on(now_y, last[1])
+    last[0], last[1], was[0], was[1] = now_x, now_y, felt_x, felt_y
     m = t.machine
     machine = Machine(
-        felt(weight[0], along, felt_last[0]),
-        felt(weight[1], across, felt_last[1]),
+        weight[0] + felt_x,
+        weight[1] + felt_y,
         m.inverse_inertia,
         m.static_moment,
         m.drive_moment,
@@ -1085,7 +1130,6 @@ def _on_moving_bearing(
         m.breakdown_slip,
         m.baumgarte,
     )
-    felt_last[0], felt_last[1] = along, across
     return Tables(t.throws, t.contacts, t.liquid, t.oils, t.maps, machine)
 
 
@@ -1095,7 +1139,7 @@ def _integrate(
     t: Any,
     y: Any,
     moved: Any,
-    felt_last: Any,
+    ridden: Any,
     w: Any,
     chamber: Any,
     shared: Any,
@@ -1125,7 +1169,7 @@ def _integrate(
             tally.counts[IN_TENSION] += w.stage[i, k].link < 0.0
             tally.counts[WITH_VAPOUR] += chamber[k, 1] > 0.0
         if y.spring.size > 0:
-            t = _on_moving_bearing(y, moved, felt_last, r.forces, step, h, weight, t)
+            t = _on_moving_bearing(y, moved, ridden, r.forces, step, h, weight, t)
             fresh = False
         _keep(w, i, chamber, lines.states, r, step + 1)
         if code != 0:
@@ -1299,8 +1343,8 @@ def run_mechanism(
         ends=np.zeros((n_steps + 1 if lines else 1, 2)),
     )
     tally = Tally(counts=np.zeros(5, np.int64), peak=np.zeros(1))
-    moved, felt_last = np.zeros((len(casing.spring), 2)), np.zeros(2)
-    code, done = _integrate(step, t, casing, moved, felt_last, w, chamber, shared, r, tally)
+    moved, ridden = np.zeros((len(casing.spring), 3)), np.zeros((2, 2))
+    code, done = _integrate(step, t, casing, moved, ridden, w, chamber, shared, r, tally)
     return CrankRun(
         steps=done,
         turns=r.turns[: done + 1],

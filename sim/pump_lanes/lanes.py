@@ -290,11 +290,12 @@ class _Lanes:
         """Write a casing into the lane of a throw; one at rest has no mode."""
         plan, n = self._plan[0], len(casing.spring)
         plan["modes"] = max(plan["modes"], n)
-        for name in ("push", "spring", "drag", "give"):
+        for name in ("push", "spring", "drag", "give", "held"):
             plan[name][..., lane] = 0.0
         plan["push"][:n, :, lane] = casing.push[:, throw] if n else 0.0
         plan["spring"][:n, lane], plan["drag"][:n, lane] = casing.spring, casing.drag
-        plan["give"][:n, :, lane] = casing.give
+        plan["give"][:n, :, lane], plan["held"][:n, :, lane] = casing.give, casing.held
+        plan["blend"][..., lane] = casing.blend
 
     def go_on(self) -> None:
         """March until the first run ends, or a lane has no room left."""

@@ -20,10 +20,12 @@ from ..pump.slider_crank import (
     Tally,
     Work,
     begin,
+    carried_on,
     derivative_of_record,
-    felt,
     mean_of_stages,
+    mode_acceleration,
     moved_mode,
+    settled,
     step_of_record,
 )
 from .chambers import breathe_alone, count_vapour, enter_chamber, lanes_breathe
@@ -477,19 +479,43 @@ def _push_together(p: Any, s: Any) -> None:
 
 
 @kernel
-def _move_mode(p: Any, s: Any, mode: int) -> None:
+def _accelerate_mode(p: Any, s: Any, mode: int) -> None:
     for lane in range(LANES):
-        a, place, speed = moved_mode(
+        a = mode_acceleration(
             s.pushed[lane],
             s.moved[mode, 0, lane],
             s.moved[mode, 1, lane],
             p.spring[mode, lane],
             p.drag[mode, lane],
-            p.step[lane],
         )
-        s.moved[mode, 0, lane], s.moved[mode, 1, lane] = place, speed
+        s.moved[mode, 2, lane] = a
         s.bearing[0, lane] += p.give[mode, 0, lane] * a
         s.bearing[1, lane] += p.give[mode, 1, lane] * a
+
+
+@kernel
+def _move_mode(p: Any, s: Any, mode: int) -> None:
+    for lane in range(LANES):
+        late_x = s.felt[0, lane] - s.bearing[0, lane]
+        late_y = s.felt[1, lane] - s.bearing[1, lane]
+        a = s.moved[mode, 2, lane] + p.held[mode, 0, lane] * late_x + p.held[mode, 1, lane] * late_y
+        s.moved[mode, 0, lane], s.moved[mode, 1, lane] = moved_mode(
+            a, s.moved[mode, 0, lane], s.moved[mode, 1, lane], p.step[lane]
+        )
+
+
+@kernel
+def _settle(p: Any, s: Any) -> None:
+    for lane in range(LANES):
+        x, y, felt_x, felt_y = (
+            s.bearing[0, lane],
+            s.bearing[1, lane],
+            s.felt[0, lane],
+            s.felt[1, lane],
+        )
+        b = p.blend
+        s.bearing[0, lane] = settled(x, y, felt_x, felt_y, b[0, 0, lane], b[0, 1, lane])
+        s.bearing[1, lane] = settled(y, x, felt_y, felt_x, b[1, 1, lane], b[1, 0, lane])
 
 
 @subroutine
@@ -502,10 +528,14 @@ def _move_bearings(p: Any, s: Any, left: Any, n: int) -> None:
         _push_mode(p, s, left, n, mode)
         if p.throws > 1:
             _push_together(p, s)
+        _accelerate_mode(p, s, mode)
+    _settle(p, s)
+    for mode in range(p.modes):
         _move_mode(p, s, mode)
     for c in range(2):
         for lane in range(LANES):
-            p.machine[c, lane] = felt(p.gravity[c, lane], s.bearing[c, lane], s.bearing0[c, lane])
+            s.felt[c, lane] = carried_on(s.bearing[c, lane], s.bearing0[c, lane])
+            p.machine[c, lane] = p.gravity[c, lane] + s.felt[c, lane]
 
 
 @subroutine

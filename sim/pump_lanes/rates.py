@@ -208,6 +208,8 @@ PLAN = np.dtype(
         ("spring", "f8", (MOST_MODES, LANES)),
         ("drag", "f8", (MOST_MODES, LANES)),
         ("give", "f8", (MOST_MODES, 2, LANES)),
+        ("held", "f8", (MOST_MODES, 2, LANES)),
+        ("blend", "f8", (2, 2, LANES)),
     ]
 )
 """Numbers of all lanes, codes as numbers too; columns as the fields of the tuples above."""
@@ -269,10 +271,11 @@ STATE = np.dtype(
         ("carried", "f8", LANES),  # by touching peaks
         ("asks", "f8", LANES),  # 1 where a contact asks for a change within this step
         ("bad", "f8", LANES),  # status code of this step
-        ("moved", "f8", (MOST_MODES, 2, LANES)),  # place and speed of the casing's modes
+        ("moved", "f8", (MOST_MODES, 3, LANES)),  # place, speed, acceleration of the casing's modes
         ("pushed", "f8", LANES),  # force of a throw on one of them
         ("bearing0", "f8", (2, LANES)),  # its acceleration with the casing, a step before
         ("bearing", "f8", (2, LANES)),
+        ("felt", "f8", (2, LANES)),  # of it, by what turns
     ]
 )
 """All lanes in the middle of their step. One record: the compiler lays a loop into vectors where it

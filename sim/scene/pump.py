@@ -606,7 +606,6 @@ class PumpScene(Scene):
             (_shape_faults, ("casing", "sensors", "throws")),
             (_exciter_faults, ("casing", "sensors", "exciters")),
             (_rest_faults, ("running", "exciters", "fidelity")),
-            (_yield_faults, ("casing", "joint", "throws")),
         )
         return faults_between(parts, checks)
 
@@ -696,21 +695,6 @@ def _exciter_faults(
         for i, part in enumerate(exciters)
         if part.mounted and part.place not in known
     ]
-
-
-def _yield_faults(casing: Casing, joint: PumpJoints, throws: tuple[Throw, ...]) -> list[str]:
-    """Crank pins that pass on at once what the casing does, which a step of it lags behind."""
-    rigid = {(throw.joint or joint).crankpin.rung for throw in throws} - _FORCES
-    if casing.rung != "yielding" or not rigid:
-        return []
-    return [
-        f"joint.crankpin.rung = {', '.join(sorted(rigid))} must be compliant, or one with oil, "
-        "where casing.rung = 'yielding'; take one, or casing.rung = 'driven'"
-    ]
-
-
-_FORCES = {"compliant", *OILED_RUNGS}
-"""Rungs of a joint whose force follows from the motion."""
 
 
 def _rest_faults(running: bool, exciters: tuple[CasingExciter, ...], fidelity: str) -> list[str]:
