@@ -10,22 +10,20 @@ from wearstate.sim.machine.simulate import simulate, simulate_many
 from wearstate.sim.pump import setup
 from wearstate.sim.pump.slider_crank import AT_REST, FORCES, PUSHES, Yielding, run_mechanism
 from wearstate.sim.scene.load import load_scene
-from wearstate.sim.scene.parts import SceneError
 
 YIELDS = {"casing.rung": "yielding"}
 MASS = 20.0  # kg
-FREE = 1e-6  # of a mode without spring, which no casing has
 
 
-def free_casing(mass, *, along=1.0, across=0.0, pushed=("pin_x", "pin_y")):
+def free_casing(step, mass, *, along=1.0, across=0.0, pushed=("pin_x", "pin_y")):
     """A casing of this mass on no spring, pushed by the crank pin alone."""
     push = np.zeros((1, 1, len(PUSHES)))
     for name, share in zip(pushed, (along, across), strict=True):
         push[0, 0, PUSHES.index(FORCES.index(name))] = -share / math.sqrt(mass)
     return Yielding(
         push=push,
-        spring=np.array([FREE]),
-        drag=np.array([0.0]),
+        react=np.array([[1.0, 0.0, 0.0]]),
+        reach=np.array([[0.5 * step**2, 1.0, step]]),
         give=np.array([[along, across]]) / math.sqrt(mass),
         held=np.zeros((1, 2)),
         blend=np.zeros((2, 2)),
@@ -68,7 +66,7 @@ def test_momentum_of_a_free_casing_and_what_moves_in_it():
     """
     step = 5e-6
     scene, t = tables_of(step, **{"drive.speed": "300 rpm"})
-    found = run(scene, t, free_casing(MASS), step=step, n_steps=60_000)
+    found = run(scene, t, free_casing(step, MASS), step=step, n_steps=60_000)
     impulse = np.cumsum(found.force("pin_x")) * step  # of the pin on rod and piston
     casing = -impulse / MASS
     masses = np.array([scene.rod.mass, scene.piston.mass])
@@ -107,11 +105,11 @@ def test_a_pin_rings_against_rod_and_casing_together(mass):
     moving = scene.rod.mass + scene.piston.mass
     stiffness = float(t.contacts["stiffness"][0, 0])
     at_dead_centre = {"step": step, "angle": 0.0, "speed": 0.0}
-    [pulled] = run(scene, t, free_casing(mass), n_steps=1, **at_dead_centre).force("pin_x")
+    [pulled] = run(scene, t, free_casing(step, mass), n_steps=1, **at_dead_centre).force("pin_x")
     rest = -50e3 * setup.piston_area(scene) * mass / (mass + moving)
     shift = (pulled - rest) / stiffness  # of a start that is meant for a crank that turns
     found = run(
-        scene, t, free_casing(mass), n_steps=n_steps, kick=1e-3, shift=shift, **at_dead_centre
+        scene, t, free_casing(step, mass), n_steps=n_steps, kick=1e-3, shift=shift, **at_dead_centre
     )
     force = found.force("pin_x") - found.force("pin_x").mean()
     assert abs(found.force("pin_x")).min() > 0  # it never lets go
@@ -249,15 +247,16 @@ def test_a_rigid_mechanism_rings_with_its_casing_as_their_masses_together(mass):
     scene, _ = tables_of(step, **rigid, **{"pressure.discharge": "50 kPa"})
     scene = of_one_mode(scene, mode, 1 / math.sqrt(mass))
     t = setup.tables(scene, step)
-    casing = setup.yielding_of(scene)
+    casing = setup.yielding_of(scene, step)
     found = run(scene, t, casing, step=step, n_steps=20_000, angle=0.0, speed=0.0)
-    force = found.force("pin_x") - found.force("pin_x").mean()
+    force = found.force("pin_x")[100:]  # which begins without a past to be carried on
+    force -= force.mean()
     up = np.flatnonzero((force[:-1] < 0) & (force[1:] >= 0))
     at = up - force[up] / (force[up + 1] - force[up])
     heard = (len(at) - 1) / ((at[-1] - at[0]) * step)
     moving = scene.rod.mass + scene.piston.mass
     assert heard == pytest.approx(mode * math.sqrt(mass / (mass + moving)), rel=1e-3)
-    assert np.ptp(force[-4000:]) == pytest.approx(np.ptp(force[100:4100]), rel=0.02)
+    assert np.ptp(force[-4000:]) == pytest.approx(np.ptp(force[:4000]), rel=0.02)
 
 
 @pytest.mark.parametrize(("guide", "bearing"), [(4.0, 1.0), (1.0, 4.0), (2.0, 2.0)])
@@ -282,19 +281,12 @@ def test_it_costs_as_much_more_as_it_takes():
     assert 1.1 < costs[1] / costs[0] < 1.5
 
 
-@pytest.mark.parametrize("mode", ["9 kHz", "12.7 kHz", "17 kHz"])
+@pytest.mark.parametrize("mode", ["9 kHz", "17 kHz", "40 kHz"])
 def test_the_default_step_follows_every_mode(mode):
-    """One of 17 kHz turned by 2.1 rad in what was the default step, and ran away."""
+    """One above 16 kHz turned by more than 2 rad a step, and ran away."""
     short = {**YIELDS, "duration": "0.4 s", "casing.modes.7.frequency": mode}
     usual, fine = (
         heard("bilge-pump", {**short, **step}).std(axis=1)
         for step in ({}, {"numerics.step": "4 us"})
     )
     assert_allclose(usual, fine, rtol=0.1)
-
-
-def test_a_step_that_a_mode_cannot_be_followed_with_is_refused():
-    fast = {"casing.modes.7.frequency": "17 kHz", "numerics.step": "19 us", "duration": "0.2 s"}
-    assert heard("bilge-pump", fast).any()
-    with pytest.raises(SceneError, match=r"<= 1\.5e-05 s for the casing's mode of 17000 Hz"):
-        heard("bilge-pump", {**YIELDS, **fast})

@@ -22,8 +22,8 @@ MAP_NUGGET = 0.05
 SPECTRUM_NUGGET = 1.0
 """The same of the spectrum: so large that a spectrum far out along what the members differ in, as
 that of noise or of a quiet machine, is far from them too."""
-VIEWS = 2
-"""Map and spectrum: the worse of two shares is as rare as twice it says."""
+VIEWS = 3
+"""Map, spectrum and change over a turn: the worst of three shares is as rare as thrice it says."""
 TAIL = 0.1
 """Farthest members, whose mean excess continues the distribution of distances beyond them."""
 MAP_EXCESS, SPECTRUM_EXCESS = 0.9, 1.15
@@ -52,7 +52,8 @@ class Misfit:
     Attributes
     ----------
     p : float
-        Share of the scene's machines that are as far from the others, by map or by spectrum.
+        Share of the scene's machines that are as far from the others, by map or by spectrum, or
+        that change as little over a turn.
     channel : str
         Where it is worst.
     band_hz : tuple of float
@@ -65,6 +66,8 @@ class Misfit:
         Lubrication of the crank pin that they sound like; empty where it is that of the scene.
     regime_p : float
         Share of the scene's machines that sound as much like it.
+    even : bool
+        It is by how little they change over a turn, as noise does, that they are worst.
     """
 
     p: float
@@ -75,6 +78,7 @@ class Misfit:
     order: tuple[str, ...] = ()
     regime: str = ""
     regime_p: float = 1.0
+    even: bool = False
 
     @property
     def refused(self) -> bool:
@@ -84,6 +88,11 @@ class Misfit:
     @property
     def text(self) -> str:
         """Where it is worst, in words."""
+        if self.even:
+            return (
+                "levels change less over a turn of the crank than those of any machine of this "
+                f"scene, as noise does (p = {self.p:.2g})"
+            )
         low, high = (f"{each / 1000:.2g}" for each in self.band_hz)
         side = "above" if self.level_db > 0 else "below"
         return (
@@ -155,8 +164,16 @@ def _judged(layout: LevelLayout, rows: Float, observed: Float, order: Sequence[i
         SPECTRUM_NUGGET,
         SPECTRUM_EXCESS,
     )
-    of_both = min(1.0, VIEWS * min(map_p, p))
-    return _worst(layout, map_left, of_both) if map_p <= p else _line(layout, left, of_both)
+    even = tail_share(-_swing(layout.map_of(rows)), -float(_swing(layout.map_of(observed))))
+    of_all = min(1.0, VIEWS * min(map_p, p, even))
+    if min(map_p, p) <= even:
+        return _worst(layout, map_left, of_all) if map_p <= p else _line(layout, left, of_all)
+    return replace(_worst(layout, map_left, of_all), even=True)
+
+
+def _swing(levels: Float) -> Float:
+    """How much levels change over a turn: noise that knows no crank changes least [log dB]."""
+    return np.asarray(np.log(levels.std(axis=-2).mean(axis=(-3, -2, -1))))
 
 
 def _distance(members: Float, here: Float, part: float, least_excess: float) -> tuple[float, Float]:

@@ -26,6 +26,7 @@ PILOT = 128.0
 
 _LEAST_ACCURACY = 1e-6
 _ROOM = 0.5  # of the accuracy: what effects that are held low may use up
+_FAR = 3.0  # times the accuracy: beyond it no scatter makes a rung miss
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -288,7 +289,8 @@ def descent(comparison: Comparison) -> dict[str, list[Single]]:
 
     What saves most is lowered first and stays low while the others are tried, as far as it costs
     no more than half of the accuracy: the rest is then cheap to run. A doubtful rung is not gone
-    below: what is coarser still could not be told either.
+    below: what is coarser still could not be told either. One that misses by little is: of many
+    quantities that scatter one may miss by chance, and so does the next rung hardly.
     """
     found: dict[str, list[Single]] = {}
     held = dict(comparison.top)
@@ -299,7 +301,7 @@ def descent(comparison: Comparison) -> dict[str, list[Single]]:
             single = comparison.judge({**held, name: rung})
             added = added_differences(single, before)
             found[name].append(Single(rung, single, added))
-            if single.verdict == "doubtful" or largest_sum([added]) > comparison.accuracy:
+            if single.verdict == "doubtful" or largest_sum([added]) > _FAR * comparison.accuracy:
                 break
         low = [s.rung for s in found[name] if leaves_room(s.candidate, comparison.accuracy)]
         held[name] = low[-1] if low else comparison.top[name]

@@ -2,7 +2,7 @@
 
 import math
 from collections import OrderedDict
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import wraps
 from typing import Any, NamedTuple, TypeVar
 
@@ -41,7 +41,7 @@ from ..scene.pump import (
     RevoluteJoint,
 )
 from ..scene.pump_hydraulics import BREATHING_RUNGS, PIPED_RUNGS, CylinderPressure
-from .casing import casing_inputs
+from .casing import casing_inputs, exact_oscillator
 from .hydraulics import (
     HYDRAULIC,
     PRESSURE_CHAMBER,
@@ -199,18 +199,19 @@ def rubs_in_guide(scene: PumpScene, throw: int) -> bool:
     return joint_rungs(scene, throw)[GUIDE] == JOINT_COMPLIANT
 
 
-def yielding_of(scene: PumpScene) -> Yielding:
+def yielding_of(scene: PumpScene, step: float) -> Yielding:
     """Casing that carries the main bearing along, of the rung `yielding`; else one at rest.
 
-    Its modes are those of the casing on its feet as they are. The unbalance of the crank itself,
-    far below the first of them, is left out.
+    Its modes are those of the casing on its feet as they are, and exact for a force that is even
+    over a step [s]; a mode of more than half a turn in it is left out, as is the unbalance of the
+    crank itself, far below the first of them.
     """
-    modes = scene.casing.modes
     if scene.casing.rung != "yielding":
         return AT_REST
+    moving = [step * mode.frequency < 0.5 for mode in scene.casing.modes]
+    modes = [mode for mode, moves in zip(scene.casing.modes, moving, strict=True) if moves]
     throws = range(len(scene.throws))
     feet = 1.0 if scene.casing.feet is None else scene.casing.feet.stiffness_ratio
-    on_feet = [mode.on_feet(feet) for mode in modes]
     push = np.zeros((len(modes), len(throws), len(PUSHES)))
     for throw in throws:
         for place, name, sign in throw_on_casing(scene, throw):
@@ -218,17 +219,43 @@ def yielding_of(scene: PumpScene) -> Yielding:
             push[:, throw, column] += [
                 sign * casing_inputs(m.shape, place, throw + 1) for m in modes
             ]
-    natural = 2 * math.pi * np.array([frequency for frequency, _ in on_feet])
-    give, held = bearing_shapes(scene), _held(scene)
-    gain = give.T @ held
+    react, reach = step_of_modes([mode.on_feet(feet) for mode in modes], step)
+    give, held = bearing_shapes(scene)[moving], _held(scene)[moving]
+    gain = give.T @ (react[:, :1] * held)
     return Yielding(
         push=push,
-        spring=natural**2,
-        drag=2 * np.array([ratio for _, ratio in on_feet]) * natural,
+        react=react,
+        reach=reach,
         give=give,
         held=held,
         blend=np.asarray(np.linalg.solve(np.eye(2) + gain, gain), np.float64),
     )
+
+
+def step_of_modes(
+    modes: Sequence[tuple[float, float]], step: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Mean acceleration of modes over a step, and their place after it.
+
+    Parameters
+    ----------
+    modes : sequence of (float, float)
+        Frequency [Hz] and damping ratio.
+    step : float
+        [s]
+
+    Returns
+    -------
+    react, reach : ndarray of shape (n_modes, 3)
+        Per force, which is even over the step, and per place and speed before it; unit modal mass.
+    """
+    react, reach = np.empty((len(modes), 3)), np.empty((len(modes), 3))
+    for row, (frequency, damping_ratio) in enumerate(modes):
+        turned, gain = exact_oscillator(frequency, damping_ratio, step)
+        place, speed = gain.sum(axis=1)
+        react[row] = speed / step, turned[1, 0] / step, (turned[1, 1] - 1) / step
+        reach[row] = place, turned[0, 0], turned[0, 1]
+    return react, reach
 
 
 def _held(scene: PumpScene) -> NDArray[np.float64]:
@@ -1133,7 +1160,7 @@ def run_scene(
         chambers=start.chambers,
         films=start_films(t, start.bodies, start_angle),
         lines=lines_of(scene, step),
-        casing=yielding_of(scene),
+        casing=yielding_of(scene, step),
         step=step,
         n_steps=n_steps,
         keep_states=keep_states,

@@ -68,7 +68,6 @@ def limits(scene: PumpScene) -> list[tuple[Status, str]]:
         _torn,
         _too_long,
         _too_short,
-        _outrun,
     )
     return [found for check in checks for found in check(scene)]
 
@@ -173,30 +172,6 @@ def _too_short(scene: PumpScene) -> list[tuple[Status, str]]:
     ]
 
 
-def _outrun(scene: PumpScene) -> list[tuple[Status, str]]:
-    """Modes of a casing that yields which turn too far within a step that is written."""
-    told, fastest = scene.numerics.step, fastest_mode(scene)
-    if told is None or math.tau * fastest * told <= MOST_OF_A_MODE * (1 + _ROUNDING):
-        return []
-    text = (
-        f"numerics.step = {told:g} s must be <= {MOST_OF_A_MODE / (math.tau * fastest):.3g} s for "
-        f"the casing's mode of {fastest:.5g} Hz, which yields; shorten it, leave out that mode, or "
-        "set casing.rung = 'driven'"
-    )
-    return [(Status.STEP, text)]
-
-
-def fastest_mode(scene: PumpScene) -> float:
-    """Frequency of a casing that yields [Hz]; 0 of one that does not."""
-    yields = scene.casing.rung == "yielding"
-    return max((mode.frequency for mode in scene.casing.modes), default=0.0) if yields else 0.0
-
-
-MOST_OF_A_MODE = 1.6
-"""Turn of a mode of a casing that yields in a step [rad]; it runs away at 2."""
-
-_USUAL_OF_A_MODE = 1.25  # rad a step, whose frequency is then a twelfth too high
-
 _ROUNDING = 1e-9  # of a step that is a whole part of a pipe's time of travel
 
 
@@ -240,8 +215,6 @@ def pump_step(scene: PumpScene) -> float:
     """
     casing = 1 / FEWEST_STEPS / scene.sample_rate
     casing = min([casing, *(longest for _, longest in wave_steps(scene))])
-    if fastest := fastest_mode(scene):
-        casing = min(casing, _USUAL_OF_A_MODE / (math.tau * fastest))
     if scene.numerics.step is not None:
         return min(scene.numerics.step, casing)
     rate = contact_rate(scene)

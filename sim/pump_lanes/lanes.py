@@ -288,12 +288,12 @@ class _Lanes:
 
     def _lay_casing(self, lane: int, casing: Yielding, throw: int) -> None:
         """Write a casing into the lane of a throw; one at rest has no mode."""
-        plan, n = self._plan[0], len(casing.spring)
+        plan, n = self._plan[0], len(casing.react)
         plan["modes"] = max(plan["modes"], n)
-        for name in ("push", "spring", "drag", "give", "held"):
+        for name in ("push", "react", "reach", "give", "held"):
             plan[name][..., lane] = 0.0
         plan["push"][:n, :, lane] = casing.push[:, throw] if n else 0.0
-        plan["spring"][:n, lane], plan["drag"][:n, lane] = casing.spring, casing.drag
+        plan["react"][:n, :, lane], plan["reach"][:n, :, lane] = casing.react, casing.reach
         plan["give"][:n, :, lane], plan["held"][:n, :, lane] = casing.give, casing.held
         plan["blend"][..., lane] = casing.blend
 

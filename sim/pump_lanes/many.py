@@ -154,5 +154,5 @@ def lane_job(plan: RunPlan) -> LaneJob:
         step=plan.step,
         n_steps=plan.n_steps,
         films=films,
-        casing=yielding_of(plan.scene),
+        casing=yielding_of(plan.scene, plan.step),
     )

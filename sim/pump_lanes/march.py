@@ -23,8 +23,7 @@ from ..pump.slider_crank import (
     carried_on,
     derivative_of_record,
     mean_of_stages,
-    mode_acceleration,
-    moved_mode,
+    of_mode,
     settled,
     step_of_record,
 )
@@ -480,28 +479,29 @@ def _push_together(p: Any, s: Any) -> None:
 
 @kernel
 def _accelerate_mode(p: Any, s: Any, mode: int) -> None:
+    r = p.react
     for lane in range(LANES):
-        a = mode_acceleration(
-            s.pushed[lane],
-            s.moved[mode, 0, lane],
-            s.moved[mode, 1, lane],
-            p.spring[mode, lane],
-            p.drag[mode, lane],
-        )
-        s.moved[mode, 2, lane] = a
+        force, q, v = s.pushed[lane], s.moved[mode, 0, lane], s.moved[mode, 1, lane]
+        a = of_mode(force, q, v, r[mode, 0, lane], r[mode, 1, lane], r[mode, 2, lane])
+        s.moved[mode, 2, lane] = force
         s.bearing[0, lane] += p.give[mode, 0, lane] * a
         s.bearing[1, lane] += p.give[mode, 1, lane] * a
 
 
 @kernel
 def _move_mode(p: Any, s: Any, mode: int) -> None:
+    r, to = p.react, p.reach
     for lane in range(LANES):
         late_x = s.felt[0, lane] - s.bearing[0, lane]
         late_y = s.felt[1, lane] - s.bearing[1, lane]
-        a = s.moved[mode, 2, lane] + p.held[mode, 0, lane] * late_x + p.held[mode, 1, lane] * late_y
-        s.moved[mode, 0, lane], s.moved[mode, 1, lane] = moved_mode(
-            a, s.moved[mode, 0, lane], s.moved[mode, 1, lane], p.step[lane]
+        held_x, held_y = p.held[mode, 0, lane], p.held[mode, 1, lane]
+        force = s.moved[mode, 2, lane] + held_x * late_x + held_y * late_y
+        q, v = s.moved[mode, 0, lane], s.moved[mode, 1, lane]
+        a = of_mode(force, q, v, r[mode, 0, lane], r[mode, 1, lane], r[mode, 2, lane])
+        s.moved[mode, 0, lane] = of_mode(
+            force, q, v, to[mode, 0, lane], to[mode, 1, lane], to[mode, 2, lane]
         )
+        s.moved[mode, 1, lane] = v + p.step[lane] * a
 
 
 @kernel
@@ -523,7 +523,8 @@ def _move_bearings(p: Any, s: Any, left: Any, n: int) -> None:
     """What turns is heavier in the next step by how the casing accelerates its bearing."""
     for c in range(2):
         for lane in range(LANES):
-            s.bearing0[c, lane], s.bearing[c, lane] = s.bearing[c, lane], 0.0
+            s.past[1, c, lane], s.past[0, c, lane] = s.past[0, c, lane], s.bearing[c, lane]
+            s.bearing[c, lane] = 0.0
     for mode in range(p.modes):
         _push_mode(p, s, left, n, mode)
         if p.throws > 1:
@@ -534,7 +535,7 @@ def _move_bearings(p: Any, s: Any, left: Any, n: int) -> None:
         _move_mode(p, s, mode)
     for c in range(2):
         for lane in range(LANES):
-            s.felt[c, lane] = carried_on(s.bearing[c, lane], s.bearing0[c, lane])
+            s.felt[c, lane] = carried_on(s.bearing[c, lane], s.past[0, c, lane], s.past[1, c, lane])
             p.machine[c, lane] = p.gravity[c, lane] + s.felt[c, lane]
 
 

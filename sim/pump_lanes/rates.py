@@ -205,8 +205,8 @@ PLAN = np.dtype(
         ("modes", "i8"),  # of the casing that has most of them
         ("gravity", "f8", (2, LANES)),  # of a bearing at rest
         ("push", "f8", (MOST_MODES, len(PUSHES), LANES)),  # as ``Yielding``
-        ("spring", "f8", (MOST_MODES, LANES)),
-        ("drag", "f8", (MOST_MODES, LANES)),
+        ("react", "f8", (MOST_MODES, 3, LANES)),
+        ("reach", "f8", (MOST_MODES, 3, LANES)),
         ("give", "f8", (MOST_MODES, 2, LANES)),
         ("held", "f8", (MOST_MODES, 2, LANES)),
         ("blend", "f8", (2, 2, LANES)),
@@ -271,10 +271,10 @@ STATE = np.dtype(
         ("carried", "f8", LANES),  # by touching peaks
         ("asks", "f8", LANES),  # 1 where a contact asks for a change within this step
         ("bad", "f8", LANES),  # status code of this step
-        ("moved", "f8", (MOST_MODES, 3, LANES)),  # place, speed, acceleration of the casing's modes
+        ("moved", "f8", (MOST_MODES, 3, LANES)),  # place, speed and force of the casing's modes
         ("pushed", "f8", LANES),  # force of a throw on one of them
-        ("bearing0", "f8", (2, LANES)),  # its acceleration with the casing, a step before
-        ("bearing", "f8", (2, LANES)),
+        ("bearing", "f8", (2, LANES)),  # its acceleration with the casing
+        ("past", "f8", (2, 2, LANES)),  # the same, one and two steps before
         ("felt", "f8", (2, LANES)),  # of it, by what turns
     ]
 )
