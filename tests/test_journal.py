@@ -6,6 +6,7 @@ import re
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from wearstate.datasets.recipe.recipe import clearances
 from wearstate.sim.journal.recording import film_geometry, journal_scale
 from wearstate.sim.machine.simulate import check, simulate
 from wearstate.sim.output.status import SimulationError, Status
@@ -301,6 +302,47 @@ def test_a_scar_lets_the_shaft_down_where_it_is():
     assert film_geometry(plain).bore is None
 
 
+SHARE = {
+    "film.rung": "direct",
+    "bearing.diametral_clearance": "0.25 mm",
+    "bearing.unworn_clearance": "0.1 mm",
+    "bearing.scar_angle": "10 deg",
+}
+
+
+@pytest.mark.parametrize(
+    ("share", "depth"),
+    [
+        (0.4, 20e-6),  # of a fifth of the clearance: the wear, 0.15 mm, is more
+        (1.0, 50e-6),
+    ],
+)
+def test_a_share_of_the_wear_is_a_scar_in_a_bore_so_much_narrower(share, depth):
+    """The clearance is that across the scar: a scene of that bore and scar has the same orbit."""
+    shared, one = bearing({**SHARE, "bearing.scar_share": share})
+    round_bore = 0.25e-3 - depth
+    told, other = bearing(
+        {
+            "film.rung": "direct",
+            "bearing.diametral_clearance": round_bore,
+            "bearing.scar_depth": depth,
+            "bearing.scar_angle": "10 deg",
+        }
+    )
+    assert shared.bearing.scar == pytest.approx(depth)
+    assert shared.bearing.clearance_radial == pytest.approx(round_bore / 2)
+    assert clearances(shared)["diametral_clearance_bearing_m"] == 0.25e-3
+    assert_allclose(one.truth["journal_m"], other.truth["journal_m"], atol=1e-9)
+    assert told.bearing.scar == depth
+
+
+def test_a_new_bearing_has_no_scar():
+    new = {"bearing.diametral_clearance": "0.1 mm", "bearing.scar_share": 1.0}
+    scene = load_scene("journal-bearing", {**SHARE, **new})
+    assert scene.bearing.scar == 0
+    assert scene.bearing.clearance_radial == 50e-6
+
+
 def test_the_thinnest_film_of_a_scar_is_inside_its_gap():
     scene, solution = bearing(SCAR)
     gap = solution.truth["min_film_m"]
@@ -413,6 +455,11 @@ def test_a_plan_that_cannot_be_kept(changes, says):
         ({"bearing.radial_clearance": "8 mm"}, "a tenth of the bore"),
         ({"bearing.scar_depth": "0.3 mm"}, "must be < the radial clearance"),
         ({"bearing.scar_depth": "0.1 mm"}, "film.rung = 'map' knows a plain bore only"),
+        ({"bearing.scar_share": 0.5}, "scar_share = 0.5 needs unworn_clearance"),
+        (
+            {"bearing.scar_share": 0.5, "bearing.unworn_clearance": "0.1 mm"},
+            "scar_share; set film.rung = 'direct'",
+        ),
         ({"film.n_z": 16}, "must be odd"),
         ({"start.x": 0.9, "start.y": 0.9}, "eccentricity = 1.27279 must be < 1"),
         ({"load.history": "half-sine"}, "length is missing"),

@@ -8,7 +8,7 @@ sensitivities, load and viscosity. Healthy recordings of the same machine share 
 have the clearance of a machine as new: they tell the offsets of the probes.
 
 What the film is like is not known exactly either. A scar where the load presses lets the journal
-sink without a wider clearance, and an end of the film that no theory has right lets it lie
+sink without a wider bore, and an end of the film that no theory has right lets it lie
 elsewhere. Other films are tried beside the scene's, and count by how well they explain the
 readings.
 """
@@ -180,6 +180,9 @@ def film_clearance(
     interval is that of the linearised problem. The mean of an orbit departs from the place of rest
     by about its mean square over the clearance, which is counted as scatter.
 
+    Of a bore with a scar it is the clearance across the scar, which a lift of the shaft or a lead
+    wire shows.
+
     Laminar and isothermal. A groove, a wrong direction of the load or a swapped probe put the
     journal where no clearance explains it: that is said, not fitted. Without healthy recordings
     the film as told must explain the readings: two probes do not tell a scar from their offsets.
@@ -206,14 +209,14 @@ def film_clearance(
     told = problem.solve(films[0], problem.start())
     each = [told, *(problem.solve(film, told.values) for film in others)]
     found, weights = mixed_by_evidence(
-        [problem.explained(one) for one in each],
+        [film.across(problem.explained(one)) for film, one in zip(films, each, strict=True)],
         [one.cost for one in each],
         [film.likely for film in films],
     )
     if not healthy:
         found = found._replace(left=told.left)
     likeliest = films[int(np.argmax(weights))]
-    return _judged(problem, found, run, likeliest.now, len(healthy))
+    return _judged(problem, found, run, likeliest, len(healthy))
 
 
 def _unloaded(runs: Sequence[JournalRun]) -> str:
@@ -322,11 +325,18 @@ class PossibleFilm(NamedTuple):
         Probability before the readings, over that of the film as told.
     now, new : RestCurve
         Of the machine in question, and of the same when it was new.
+    scar : float
+        Depth of that scar of the machine in question, over its radial clearance.
     """
 
     likely: float
     now: "RestCurve"
     new: "RestCurve"
+    scar: float = 0.0
+
+    def across(self, found: "Explained") -> "Explained":
+        """The clearance across the scar, as a lead wire shows it, from that of the round bore."""
+        return found._replace(value=found.value + math.log1p(self.scar / 2))
 
 
 class Explained(NamedTuple):
@@ -467,13 +477,13 @@ _STEP = 1e-5  # standard deviations, of central differences
 
 
 def _judged(
-    problem: _Problem, found: Explained, run: JournalRun, curve: "RestCurve", healthy: int
+    problem: _Problem, found: Explained, run: JournalRun, film: PossibleFilm, healthy: int
 ) -> FilmEstimate:
     clearance = math.exp(found.value)
     reason = _contradiction(problem, found, clearance)
     if reason:
         return FilmEstimate(reason=reason, healthy=healthy, contradicted=True)
-    reason = _untold(problem, found, run, curve, clearance)
+    reason = _untold(problem, found, run, film, clearance)
     if reason:
         return FilmEstimate(reason=reason, healthy=healthy)
     spread = math.exp(NORMAL * found.error)
@@ -504,7 +514,7 @@ def _contradiction(problem: _Problem, found: Explained, clearance: float) -> str
 
 
 def _untold(
-    problem: _Problem, found: Explained, run: JournalRun, curve: "RestCurve", clearance: float
+    problem: _Problem, found: Explained, run: JournalRun, film: PossibleFilm, clearance: float
 ) -> str:
     """Why a solution that explains the readings is no estimate; empty where it is one."""
     if run.swing > _MOST_SWING * clearance:
@@ -512,11 +522,12 @@ def _untold(
             f"the orbit's rms is {run.swing / clearance:.2f} of the radial clearance, must be <= "
             f"{_MOST_SWING:g}: a whirling journal has no place of rest"
         )
-    load = math.hypot(*run.load) * clearance**2 / float(problem.film_force[0])
-    if load > curve.most_load:
+    round_bore = clearance / (1 + film.scar / 2)
+    load = math.hypot(*run.load) * round_bore**2 / float(problem.film_force[0])
+    if load > film.now.most_load:
         return (
             f"the film would be thinner than 3 % of the clearance (load {load:.3g} of its unit, "
-            f"must be <= {curve.most_load:.3g}): check load, viscosity and speed"
+            f"must be <= {film.now.most_load:.3g}): check load, viscosity and speed"
         )
     if found.error > _LOOSEST:
         return (

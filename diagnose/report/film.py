@@ -111,7 +111,10 @@ def _possible_films(scene: JournalScene) -> tuple["RestCurve", list[PossibleFilm
     share = _OTHER_FILM / len(scars)
     return told, [
         PossibleFilm(likely=_OTHER_FILM, now=other, new=other),
-        *(PossibleFilm(likely=share, now=scar, new=finite) for scar in scars),
+        *(
+            PossibleFilm(likely=share, now=scar, new=finite, scar=depth)
+            for scar, (depth, _) in zip(scars, SCARS, strict=True)
+        ),
     ]
 
 
@@ -192,7 +195,7 @@ def journal_fault(scene: JournalScene, means: ProbeMeans) -> str:
     shaped = [
         name
         for name, there in (
-            ("a scar", scene.bearing.scar_depth > 0),
+            ("a scar", scene.bearing.scar > 0),
             ("grooves", scene.bearing.grooves),
         )
         if there

@@ -135,8 +135,8 @@ def film_geometry(scene: JournalScene) -> FilmGeometry:
     """
     bearing, film = scene.bearing, scene.film
     bore = None
-    if bearing.scar_depth > 0:
-        depth = bearing.scar_depth / bearing.clearance_radial
+    if bearing.scar > 0:
+        depth = bearing.scar / bearing.clearance_radial
         bore = dufrane_scar(depth, bearing.scar_angle, film.n_theta)
     unit = journal_scale(scene).pressure
     return FilmGeometry(

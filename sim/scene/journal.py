@@ -60,6 +60,7 @@ from .parts import (
 _UNBALANCE_MOST = 1e6  # kg m
 _THINNEST = 1e-9  # m, of a clearance: no film is thinner than its molecules
 _GAP_LEAST, _GAP_MOST = 1e-9, 1.0  # m
+_DEEPEST_SCAR = 0.2  # of the clearance across it: half of the round bore's radial clearance
 _MOST_GROOVES = 32
 _MOST_RUN_OUT = 64
 
@@ -110,6 +111,12 @@ class Bearing(Part):
         default=0.0, ge=0, description="deepest wear of the bore, where the shaft rubs at run-up"
     )
     scar_angle: _SHAFT_ANGLE = Field(default=0.0, description="of the deepest wear")
+    scar_share: Ratio = Field(
+        default=0.0, ge=0, le=1, description="of the wear since new: in a scar, not a wider circle"
+    )
+    unworn_clearance: Length | None = Field(
+        default=None, ge=_THINNEST, description="diametral, as new; scar_share needs it"
+    )
     grooves: tuple[AxialGroove, ...] = Field(
         default=(), max_length=_MOST_GROOVES, description="axial oil grooves; none: a plain bore"
     )
@@ -135,6 +142,11 @@ class Bearing(Part):
                 f"(diameter = {self.diameter:g} m), the film theory knows no curvature; check the "
                 "unit"
             )
+        if self.scar_share > 0 and (self.unworn_clearance is None or self.scar_depth > 0):
+            raise ValueError(
+                f"scar_share = {self.scar_share:g} needs unworn_clearance, and no scar_depth "
+                "beside it; give the clearance of the new bearing and one of the two"
+            )
         if self.scar_depth >= self.clearance_radial:
             raise ValueError(
                 f"scar_depth = {self.scar_depth:g} m must be < the radial clearance = "
@@ -144,15 +156,30 @@ class Bearing(Part):
 
     @property
     def clearance_radial(self) -> float:
-        """Radial clearance [m], whichever way it was given."""
-        if self.radial_clearance is not None:
-            return self.radial_clearance
-        return (self.diametral_clearance or 0.0) / 2
+        """Radial clearance of the round part of the bore [m]."""
+        return (self.clearance_diametral - self._scar_by_share) / 2
 
     @property
     def clearance_diametral(self) -> float:
-        """Diametral clearance [m], whichever way it was given."""
-        return 2 * self.clearance_radial
+        """Diametral clearance [m], whichever way it was given.
+
+        With a ``scar_share`` it is what a lift of the shaft or a lead wire shows across the scar.
+        """
+        if self.radial_clearance is not None:
+            return 2 * self.radial_clearance
+        return self.diametral_clearance or 0.0
+
+    @property
+    def scar(self) -> float:
+        """Depth of the scar below the round bore [m], whichever way it was given."""
+        return self.scar_depth or self._scar_by_share
+
+    @property
+    def _scar_by_share(self) -> float:
+        if self.unworn_clearance is None:
+            return 0.0
+        worn = max(0.0, self.clearance_diametral - self.unworn_clearance)
+        return self.scar_share * min(worn, self.clearance_diametral * _DEEPEST_SCAR)
 
 
 class RunOut(Part):
@@ -389,7 +416,11 @@ def _film_faults(film: Film, bearing: Bearing) -> list[str]:
     """Rungs that know a plain bore only."""
     shaped = [
         name
-        for name, there in (("scar_depth", bearing.scar_depth > 0), ("grooves", bearing.grooves))
+        for name, there in (
+            ("scar_depth", bearing.scar_depth > 0),
+            ("scar_share", bearing.scar_share > 0),
+            ("grooves", bearing.grooves),
+        )
         if there
     ]
     if film.rung == "direct" or not shaped:

@@ -2,9 +2,10 @@
 
     python tests/benchmarks/conditions.py journal shaft [-n 60] [--folder DIR]
 
-Every row shifts one condition or one gap offset of the standard recipe. The scene of each data set
-is the nameplate, its manifest has the conditions of the day; what differs from machine to machine,
-offsets and sensitivities of the probes among it, is unknown. `cold`: no healthy recordings.
+Every row shifts one condition or one gap offset of the standard recipe, whose journals have round
+bores here unless a row says otherwise. The scene of each data set is the nameplate, its manifest
+has the conditions of the day; what differs from machine to machine, offsets and sensitivities of
+the probes among it, is unknown. `cold`: no healthy recordings.
 `healthy`: three of the same machine, their wear known to be that of a new one only. `measured`:
 three, with the wear that was measured then. All simulated. Errors are of those told, over the
 condemning limit; `covered` is the share of intervals of 90 % that hold the truth.
@@ -54,15 +55,17 @@ ROWS = {
 }
 """Machine -> row -> what the recipe has beside the standard one."""
 
-SCAR = "scar of 3 to 28 um"
-ROWS["journal"][SCAR] = '[fixed]\n"film.rung" = "direct"\n'
+SCAR = "scar beside the wear"
+ROWS["journal"][SCAR] = (
+    '[fixed]\n"film.rung" = "direct"\n"bearing.unworn_clearance" = "0.0914 mm"\n'
+)
 WORN = {
     SCAR: """
 [[record]]
-path = "bearing.scar_depth"
+path = "bearing.scar_share"
 distribution = "uniform"
-low = "3 um"
-high = "28 um"
+low = 0.1
+high = 1.0
 [[record]]
 path = "bearing.scar_angle"
 distribution = "uniform"
@@ -71,7 +74,21 @@ high = "20 deg"
 """
 }
 """Row -> what its machines have that they had not when they were new."""
-NO_SHORT_FILM = (SCAR,)  # the option of the recipe: such a film knows no scar
+RECIPE = "bores as the recipe has"
+ROWS["journal"][RECIPE] = ""
+ROUND = """
+[[choice]]
+name = "film"
+[[choice.option]]
+name = "finite"
+weight = 3.0
+[[choice.option]]
+name = "short"
+values = { "film.rung" = "short" }
+"""
+"""In place of the recipe's choice, which draws scars as well; a short film knows none."""
+BORES = {SCAR: "", RECIPE: None}
+"""Row -> in place of the recipe's choice of films and bores; ROUND elsewhere."""
 
 RECIPES = {"journal": "journal-bearing", "shaft": "propulsion-shaft"}
 SPLITS = {
@@ -87,7 +104,8 @@ def made(folder, machine, row, records):
     for kind in ("standard", "healthy"):
         name = f"{machine}-{number}-{kind}"
         head = f'name = "{name}"\nextends = "{RECIPES[machine]}-{kind}"\n'
-        without = ["film"] if row in NO_SHORT_FILM else []
+        bores = BORES.get(row, ROUND if machine == "journal" else None)
+        without = [] if bores is None else ["film"]
         if kind == "standard":
             without += SPLITS[machine]
         else:
@@ -95,7 +113,8 @@ def made(folder, machine, row, records):
         head += f"without = {json.dumps(without)}\n"
         recipe, path = folder / f"{name}.toml", folder / f"{name}.h5"
         worn = WORN.get(row, "") if kind == "standard" else ""
-        recipe.write_text(head + ROWS[machine][row] + worn, encoding="utf-8")
+        changed = ROWS[machine][row] + (bores or "") + worn
+        recipe.write_text(head + changed, encoding="utf-8")
         if not path.exists():
             table = load_recipe(recipe).table
             machines = records // 2
