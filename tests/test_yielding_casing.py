@@ -10,6 +10,7 @@ from wearstate.sim.machine.simulate import simulate, simulate_many
 from wearstate.sim.pump import setup
 from wearstate.sim.pump.slider_crank import AT_REST, FORCES, PUSHES, Yielding, run_mechanism
 from wearstate.sim.scene.load import load_scene
+from wearstate.sim.scene.parts import SceneError
 
 YIELDS = {"casing.rung": "yielding"}
 MASS = 20.0  # kg
@@ -290,3 +291,14 @@ def test_the_default_step_follows_every_mode(mode):
         for step in ({}, {"numerics.step": "4 us"})
     )
     assert_allclose(usual, fine, rtol=0.1)
+
+
+def test_a_guide_against_its_bearing_is_refused():
+    """What is said of it is the gain: -0.06 of the bilge pump's guide turned round, times five."""
+    modes = load_scene("bilge-pump").casing.modes
+    turned = {
+        f"casing.modes.{i}.shape.guide_y": -5 * m.shape["guide_y"] for i, m in enumerate(modes)
+    }
+    assert heard("bilge-pump", {**turned, "duration": "0.2 s"}).any()
+    with pytest.raises(SceneError, match=r"by -0\.298 of it .* >= -0\.25 .*'driven'"):
+        heard("bilge-pump", {**YIELDS, **turned, "duration": "0.2 s"})

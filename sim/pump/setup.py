@@ -279,14 +279,32 @@ def _held(scene: PumpScene) -> NDArray[np.float64]:
     return held
 
 
+def guide_gain(scene: PumpScene) -> float:
+    """Acceleration of a bearing across the stroke by what its guides carry, per that of these.
+
+    Examples
+    --------
+    >>> from ..scene.load import load_scene
+    >>> round(guide_gain(load_scene("bilge-pump")), 3)
+    0.06
+    """
+    across = bearing_shapes(scene)[:, 1]
+    guides = [
+        _held_masses(scene, k)[2]
+        * np.array([casing_inputs(m.shape, "guide_y", k + 1) for m in scene.casing.modes])
+        for k in range(len(scene.throws))
+    ]
+    return float(across @ np.sum(guides, axis=0))
+
+
 def _held_masses(scene: PumpScene, throw: int) -> tuple[float, float, float]:
     """Masses that a bearing feels along the stroke, and across it at pin and guide [kg]."""
     piston, rod = scene.piston.mass, scene.rod.mass
     if joint_rungs(scene, throw)[CRANKPIN] < JOINT_COMPLIANT:
         at_pin = rod * scene.rod.centre_of_mass / scene.rod.length
         return piston + rod, at_pin, piston + rod - at_pin
-    lever = scene.rod.centre_of_mass
-    swung = scene.rod.inertia / (scene.rod.inertia + rod * lever**2)
+    about_wrist = scene.rod.inertia + rod * scene.rod.centre_of_mass**2
+    swung = scene.rod.inertia / about_wrist if about_wrist > 0 else 1.0
     return 0.0, 0.0, piston + rod * swung
 
 

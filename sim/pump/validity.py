@@ -14,6 +14,7 @@ from .setup import (
     contact_frequency,
     contact_rate,
     contact_table,
+    guide_gain,
     joint_loads,
     joint_parts,
     joint_rungs,
@@ -24,13 +25,29 @@ from .tearing import torn_by_knocks, torn_in_motion
 
 
 def joint_faults(scene: PumpScene) -> list[str]:
-    """Joints whose rung needs a clearance and has none, with the cure."""
-    return [
+    """Joints that need a clearance and have none, guides against their bearing; with cures."""
+    tight = [
         f"{path}.rung = '{part.rung}' needs a clearance > 0 m; "
         f"set {path}.rung = 'ideal' for a joint without one"
         for throw, path, part in _joints(scene)
         if part.rung != "ideal" and part.clearance_radial == 0
     ]
+    return [*tight, *_opposed(scene)]
+
+
+def _opposed(scene: PumpScene) -> list[str]:
+    """A guide that moves against a bearing which takes it along: the one would feed the other."""
+    gain = 0.0 if scene.casing.rung != "yielding" else guide_gain(scene)
+    if gain >= _MOST_OPPOSED:
+        return []
+    return [
+        f"casing.modes: guide_y moves against bearing_y by {gain:.3g} of it under what is guided, "
+        f"must be >= {_MOST_OPPOSED:g} where casing.rung = 'yielding', whose guide moves as the "
+        "bearing does; check the signs of the shapes, or set casing.rung = 'driven'"
+    ]
+
+
+_MOST_OPPOSED = -0.25  # runs away below -0.4
 
 
 def _joints(scene: PumpScene) -> Iterator[tuple[int, str, RevoluteJoint | Guide]]:
