@@ -164,7 +164,9 @@ def _judged(layout: LevelLayout, rows: Float, observed: Float, order: Sequence[i
         SPECTRUM_NUGGET,
         SPECTRUM_EXCESS,
     )
-    even = tail_share(-_swing(layout.map_of(rows)), -float(_swing(layout.map_of(observed))))
+    even = tail_share(
+        -_swing(layout.map_of(rows)), -float(_swing(layout.map_of(observed))), MAP_EXCESS
+    )
     of_all = min(1.0, VIEWS * min(map_p, p, even))
     if min(map_p, p) <= even:
         return _worst(layout, map_left, of_all) if map_p <= p else _line(layout, left, of_all)
