@@ -809,10 +809,11 @@ def test_what_is_not_confirmed_on_whole_recordings_is_not_called_final():
     assert before.found().raised.chosen.rungs["wristpin"] != "ideal"
 
 
-@pytest.mark.parametrize("runs", [0, 1, 5, 20, 60, 130])
+@pytest.mark.parametrize("runs", [0, 1, 5, 20, 60, 150])
 def test_at_any_budget_there_is_an_answer_that_is_not_called_final(runs):
     pilot = KnownPilot({TWO_LEVEL: 0.6, IDEAL_WRIST: 0.3}, scatter=0.01)
-    found = study(pilot.scene, pilot.quantities, accuracy=0.02, pilot=pilot, late=late_after(runs))
+    options = {"accuracy": 0.02, "pinned": ["casing"], "pilot": pilot}
+    found = study(pilot.scene, pilot.quantities, late=late_after(runs), **options)
     assert found.kept.written is not None
     assert found.kept.status in ("so far", "resolved")
     assert found.raised is None or found.raised.status == "so far"

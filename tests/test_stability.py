@@ -354,6 +354,9 @@ def test_the_guard_of_a_pipe_with_waves_is_where_its_frequency_is_right():
 def test_a_casing_that_yields_runs_away_nowhere_however_light_it_is():
     make = MAPS["reciprocating-pump"]["step-casing"]
     assert "set casing.rung = 'yielding'" in make(load_scene("bilge-pump"), 3)
+    stiff = {f"casing.modes.{i}.shape.bearing_x": 0.0 for i in range(8)}
+    scene = load_scene("bilge-pump", {**stiff, "casing.rung": "yielding"})
+    assert "does not move along the stroke" in make(scene, 3)
     plan = make(load_scene("bilge-pump", {"casing.rung": "yielding"}), 7)
     [judge] = plan.judges.values()
     assert plan.own.y == pytest.approx(1 / 0.0564 / 9, rel=1e-3)  # sum of shape^2 [1/kg], on 9 kg

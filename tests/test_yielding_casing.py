@@ -290,7 +290,7 @@ def test_the_default_step_follows_every_mode(mode):
         heard("bilge-pump", {**short, **step}).std(axis=1)
         for step in ({}, {"numerics.step": "4 us"})
     )
-    assert_allclose(usual, fine, rtol=0.1)
+    assert_allclose(usual, fine, rtol=0.1)  # two revolutions of knocks; what ran away had no level
 
 
 def test_a_guide_against_its_bearing_is_refused():

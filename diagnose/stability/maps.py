@@ -36,7 +36,8 @@ from ...sim.piping.pipe import FEWEST_REACHES, drive_pipe, pipe_parameters, pipe
 from ...sim.pump.recording import steps_per_sample
 from ...sim.pump.setup import (
     LARGEST_STEP_PER_CONTACT_TIME,
-    bearing_shapes,
+    WAYS,
+    bearing_mass_ratios,
     begun,
     contact_rate,
     contact_table,
@@ -445,13 +446,15 @@ def step_casing(scene: Scene, size: int | None = None) -> MapPlan | str:
     pump = cast(PumpScene, scene)
     if pump.casing.rung != "yielding":
         return "the casing does not yield; set casing.rung = 'yielding'"
+    own = bearing_mass_ratios(pump).get(WAYS[0])
+    if own is None:
+        return "the casing does not move along the stroke; give casing.modes a shape at bearing_x"
     mode = max(each.frequency for each in pump.casing.modes)
     n, rate = size or 13, math.tau * mode
-    own = 1 / float(np.sum(bearing_shapes(pump)[:, 0] ** 2)) / _moving(pump)
     step = 1 / (pump.sample_rate * steps_per_sample(pump))
     x = MapAxis(name="step", unit="s", values=_spread(0.05 / rate, 20 / rate, n)).through(step)
     y = MapAxis(
-        name="casing at the bearing over moving mass",
+        name="casing at bearing over moving mass",
         unit="",
         values=_spread(own / 30, own * 30, n),
     ).through(own)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..pump.setup import (
-    bearing_shapes,
+    bearing_mass_ratios,
     contact_frequency,
     contact_table,
     joint_loads,
@@ -278,17 +278,7 @@ def _mass_ratio(facts: PumpFacts) -> dict[str, float]:
 
 
 def _bearing_mass(facts: PumpFacts) -> dict[str, float]:
-    """Apparent mass of the casing at its main bearing above all its modes, over what moves there.
-
-    A force there that is shorter than any mode's period moves it as ``1 / sum(shape^2)`` would.
-    """
-    scene = facts.scene
-    if not scene.casing.modes:
-        return {}
-    moving = scene.piston.mass + scene.rod.mass
-    given_way = np.sum(bearing_shapes(scene) ** 2, axis=0)
-    ways = zip(("along the stroke", "across it"), given_way, strict=True)
-    return {way: 1 / (each * moving) for way, each in ways if each > 0}
+    return bearing_mass_ratios(facts.scene)
 
 
 def _force_ratio(facts: PumpFacts) -> dict[str, float]:

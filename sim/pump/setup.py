@@ -325,6 +325,24 @@ def bearing_shapes(scene: PumpScene) -> NDArray[np.float64]:
     )
 
 
+def bearing_mass_ratios(scene: PumpScene) -> dict[str, float]:
+    """Apparent mass of the casing at its main bearing above all its modes, over one throw's masses.
+
+    A force there that is shorter than any mode's period moves it as ``1 / sum(shape^2)`` would.
+
+    Returns
+    -------
+    dict of str to float
+        Way -> ratio, of those in which the casing moves there.
+    """
+    if not scene.casing.modes:
+        return {}
+    moving = scene.piston.mass + scene.rod.mass
+    given_way = np.sum(bearing_shapes(scene) ** 2, axis=0)
+    return {way: 1 / (float(g) * moving) for way, g in zip(WAYS, given_way, strict=True) if g > 0}
+
+
+WAYS = ("along the stroke", "across it")
 _BEARING = ("bearing_x", "bearing_y")
 
 
