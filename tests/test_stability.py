@@ -14,20 +14,22 @@ from wearstate.diagnose.stability import atlas as stability_atlas
 from wearstate.diagnose.stability import method_map as stability
 from wearstate.diagnose.stability.atlas import atlas
 from wearstate.diagnose.stability.figure import save_figure
-from wearstate.diagnose.stability.maps import (
-    MAPS,
-    _orbit_case,
+from wearstate.diagnose.stability.joint_maps import (
     contact_oscillator,
     contact_restitution,
+    step_stiffness,
+)
+from wearstate.diagnose.stability.maps import MAPS
+from wearstate.diagnose.stability.method_map import Budget, MapAxis, MapPlan, Verdict, edge, measure
+from wearstate.diagnose.stability.orbit_maps import (
+    _orbit_case,
     growth,
     linear_film,
     squeeze_limit,
     step_squeeze,
-    step_stiffness,
     threshold_speed,
     whirls,
 )
-from wearstate.diagnose.stability.method_map import Budget, MapAxis, MapPlan, Verdict, edge, measure
 from wearstate.diagnose.stability.steppers import (
     STEPPERS,
     bounce,

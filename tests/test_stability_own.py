@@ -19,7 +19,8 @@ from wearstate.diagnose.stability import method_map as stability
 from wearstate.diagnose.stability.atlas import atlas
 from wearstate.diagnose.stability.edges import conclusion, with_edges
 from wearstate.diagnose.stability.figure import COLOUR, SYMBOL, atlas_figure
-from wearstate.diagnose.stability.maps import MAPS, contact_oscillator
+from wearstate.diagnose.stability.joint_maps import contact_oscillator
+from wearstate.diagnose.stability.maps import MAPS
 from wearstate.diagnose.stability.method_map import (
     Budget,
     MapAxis,

@@ -133,6 +133,11 @@ class MapAxis:
         return replace(self, values=tuple(sorted([*others, value])))
 
 
+def even_ratios(low: float, high: float, size: int) -> tuple[float, ...]:
+    """Values of a logarithmic axis."""
+    return tuple(float(value) for value in np.geomspace(low, high, size))
+
+
 @dataclass(frozen=True, kw_only=True)
 class Curve:
     """A limit drawn over a map.
@@ -148,6 +153,11 @@ class Curve:
     name: str
     x: tuple[float, ...]
     y: tuple[float, ...]
+
+
+def coordinates(points: list[tuple[float, float]], column: int) -> tuple[float, ...]:
+    """One coordinate of the points of a curve."""
+    return tuple(point[column] for point in points)
 
 
 _SAME = 1e-9  # of a value: two that differ by less are one

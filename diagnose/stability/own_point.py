@@ -1,17 +1,26 @@
-"""Where a scene lies in its maps: load, gap left, Sommerfeld number, mesh, step and method."""
+"""Where a scene lies in its maps: load, gap left, Sommerfeld number, mesh, step and method.
+
+And how it is taken to another cell: with values changed, and run there.
+"""
 
 import math
+from collections.abc import Mapping
 from functools import lru_cache
-from typing import NamedTuple, cast
+from typing import Any, NamedTuple, cast
 
 from ...sim.film.bearing import equilibrium, sommerfeld_number
 from ...sim.film.solve import FilmGeometry
 from ...sim.journal.recording import film_geometry, journal_scale
 from ...sim.journal.validity import JOURNAL_STEP
+from ...sim.machine.simulate import simulate
+from ...sim.output.recording import Recording
 from ...sim.scene.journal import JournalScene
 from ...sim.scene.parts import Scene
 from ...sim.scene.shaft import ShaftScene
 from ...sim.shaft.recording import film_bearings, shaft_state
+
+GAP_LEFT = "gap left, 1 - eccentricity ratio"
+"""Axis of the films."""
 
 
 class OwnFilm(NamedTuple):
@@ -116,3 +125,24 @@ def _aftmost(scene: ShaftScene) -> OwnFilm:
     return OwnFilm(
         gap=1 - float(film.eccentricity_ratios[0]), sommerfeld=sommerfeld_number(load), note=note
     )
+
+
+def changed(part: Any, values: Mapping[str, Any]) -> Any:
+    """A scene with values replaced by dotted path, not validated again.
+
+    Examples
+    --------
+    >>> from wearstate.sim.scene.load import load_scene
+    >>> changed(load_scene("bilge-pump"), {"drive.speed": 4.0}).drive.speed
+    4.0
+    """
+    for path, value in values.items():
+        head, _, rest = path.partition(".")
+        inner = changed(getattr(part, head), {rest: value}) if rest else value
+        part = part.model_copy(update={head: inner})
+    return part
+
+
+def outcome(scene: Scene) -> Recording:
+    """Run of a scene with its truth, whatever its status."""
+    return simulate(scene, seed=0, truth=True, raise_on_failure=False)

@@ -1,0 +1,466 @@
+"""Maps of a journal's orbit: step by squeeze stiffness of the film, whirl over speed and load."""
+
+import math
+from typing import NamedTuple, cast
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+
+from ...sim.film.bearing import BearingError, equilibrium, whirl
+from ...sim.journal.orbit import OrbitFilm, OrbitRun, OrbitStatus, film_force, load, run_orbit
+from ...sim.journal.recording import film_geometry, journal_film, journal_scale
+from ...sim.journal.validity import JOURNAL_STEP
+from ...sim.scene.journal import JournalScene
+from ...sim.scene.parts import Scene
+from .method_map import Cell, Curve, Judge, MapAxis, MapPlan, Own, Verdict, coordinates, even_ratios
+from .own_point import GAP_LEFT, changed, journal_weight, orbit_step, own_film
+from .steppers import STEPPERS, Stepper
+
+Array = NDArray[np.float64]
+
+# --- journal: step by squeeze
+
+
+def step_squeeze(scene: Scene, size: int | None = None) -> MapPlan | str:
+    """Integrators of the orbit about an equilibrium: step by how far out it lies.
+
+    Parameters
+    ----------
+    scene : Scene
+        A journal bearing.
+    size : int, optional
+        Cells along either axis.
+
+    Returns
+    -------
+    Plan or str
+        Or why there is none.
+    """
+    journal = cast(JournalScene, scene)
+    case = _orbit_case(journal)
+    n, step, gap = size or 13, orbit_step(journal), own_film(journal).gap
+    x = MapAxis(name="step", unit="rad", values=even_ratios(1e-5, 1.0, n)).through(step)
+    y = MapAxis(name=GAP_LEFT, unit="", values=even_ratios(0.01, 0.95, n)).through(gap)
+    by_name = {stepper.name: stepper for stepper in STEPPERS}
+    euler, runge = by_name["semi-implicit euler"], by_name["runge-kutta 4"]
+    limits = {
+        "euler": _squeeze_curve(case, y, euler),
+        "rk4": _squeeze_curve(case, y, runge),
+    }
+    return MapPlan(
+        name="step-squeeze",
+        title=f"orbit about an equilibrium, film '{journal.film.rung}', step by gap",
+        x=x,
+        y=y,
+        judges={
+            "euler, no guard": _bare_judge(case, euler, scene.accuracy),
+            "rk4, no guard": _bare_judge(case, runge, scene.accuracy),
+            "euler": _guarded_judge(case, "euler", scene.accuracy),
+            "rk4": _guarded_judge(case, "rk4", scene.accuracy),
+            "adaptive": _guarded_judge(
+                case, "adaptive", scene.accuracy, journal.numerics.tolerance
+            ),
+        },
+        curves={
+            **{f"{name}, no guard": [curve] for name, curve in limits.items()},
+            **{name: [curve] for name, curve in limits.items()},
+        },
+        note="a displacement of a thousandth of the gap, followed within "
+        f"{scene.accuracy:.2g} of it",
+        own=Own(
+            method=journal.numerics.integrator,
+            x=step,
+            y=gap,
+            note="The step is the longest that it may take."
+            if journal.numerics.integrator == "adaptive"
+            else "",
+        ),
+    )
+
+
+class _OrbitCase(NamedTuple):
+    film: OrbitFilm
+    alpha: float
+
+
+def _orbit_case(scene: JournalScene) -> _OrbitCase:
+    return _OrbitCase(film=journal_film(scene), alpha=journal_scale(scene).alpha)
+
+
+def _rest_load(case: _OrbitCase, x: float) -> tuple[float, float]:
+    """Load that holds the journal at (x, 0)."""
+    f_x, f_y = film_force(case.film, x, 0.0, 0.0, 0.0)
+    return -case.alpha * f_x, -case.alpha * f_y
+
+
+def linear_film(case: _OrbitCase, x: float) -> tuple[Array, Array]:
+    """Stiffness and damping over the inertia about (x, 0), by central differences."""
+    matrix = np.empty((2, 4))
+    for c in range(4):
+        shift = 1e-5 * ((1 - x) if c < 2 else 1.0)
+        ends = []
+        for sign in (1.0, -1.0):
+            state = [x, 0.0, 0.0, 0.0]
+            state[c] += sign * shift
+            ends.append(np.array(film_force(case.film, *state)))
+        matrix[:, c] = -case.alpha * (ends[0] - ends[1]) / (2 * shift)
+    return matrix[:, :2], matrix[:, 2:]
+
+
+def growth(stepper: Stepper, stiffness: Array, damping: Array, step: float) -> float:
+    """Factor by which a step of a stepper multiplies the largest motion of a linear film.
+
+    Parameters
+    ----------
+    stepper : Stepper
+        An explicit one.
+    stiffness, damping : numpy.ndarray [shape=(2, 2)]
+        Over the inertia.
+    step : float
+
+    Returns
+    -------
+    float
+        Spectral radius of the step's matrix.
+
+    Examples
+    --------
+    >>> from wearstate.diagnose.stability.steppers import STEPPERS
+    >>> round(growth(STEPPERS[0], np.eye(2), np.zeros((2, 2)), 1.0), 6)
+    1.0
+    """
+    return float(_growths(stepper, stiffness, damping, np.array([step]))[0])
+
+
+def _growths(stepper: Stepper, stiffness: Array, damping: Array, steps: Array) -> Array:
+    """Growth of each of many steps, as in :func:`growth`."""
+
+    def acceleration(x: Array, v: Array) -> Array:
+        return -(np.tensordot(stiffness, x, 1) + np.tensordot(damping, v, 1))
+
+    unit = np.broadcast_to(np.eye(4)[:, :, None], (4, 4, len(steps)))
+    x, v = stepper.step(unit[:2], unit[2:], acceleration, steps)
+    matrices = np.moveaxis(np.concatenate([x, v]), 2, 0)
+    largest: Array = np.abs(np.linalg.eigvals(matrices)).max(axis=1)
+    return largest
+
+
+def squeeze_limit(case: _OrbitCase, x: float, stepper: Stepper) -> float:
+    """Step from which on a stepper is unstable by itself on the film about (x, 0) [rad].
+
+    Where the film whirls by itself a step of any length grows; the limit is where the growth of a
+    step passes that of the motion itself by a hundredth, half a per cent beyond 2 over the damping.
+    """
+    stiffness, damping = linear_film(case, x)
+    own = np.vstack([np.hstack([np.zeros((2, 2)), np.eye(2)]), -np.hstack([stiffness, damping])])
+    rate = max(0.0, float(np.linalg.eigvals(own).real.max()))
+    for steps in np.split(np.geomspace(1e-5, 10.0, 2000), 20):  # mostly found in an early one
+        allowed = 1.01 * np.exp(rate * steps)
+        over = steps[_growths(stepper, stiffness, damping, steps) > allowed]
+        if len(over):
+            return float(over[0])
+    return math.inf
+
+
+def _squeeze_curve(case: _OrbitCase, y: MapAxis, stepper: Stepper) -> Curve:
+    gaps = np.geomspace(y.values[0] / 2, 0.999, 60)
+    limits = [squeeze_limit(case, 1 - float(gap), stepper) for gap in gaps]
+    return Curve(
+        name="limit in theory, film linear", x=tuple(limits), y=tuple(float(gap) for gap in gaps)
+    )
+
+
+_FEWEST, _MOST = 60, 400  # steps of a run beside an equilibrium
+_AWAY = 1e-3  # of the gap
+
+
+def _reference(case: _OrbitCase, step: float, gap: float) -> OrbitRun:
+    n = _steps_for(step)
+    return run_orbit(
+        case.film,
+        load(alpha=case.alpha, static=_rest_load(case, 1 - gap)),
+        duration=n * step,
+        start=(1 - gap + _AWAY * gap, 0.0),
+        step=min(step, 0.01),
+        sample_step=step,
+        tolerance=1e-9,
+    )
+
+
+def _steps_for(step: float) -> int:
+    return int(np.clip(2 * math.pi / step, _FEWEST, _MOST))
+
+
+def _bare_judge(case: _OrbitCase, stepper: Stepper, accuracy: float) -> Judge:
+    """A classical stepper on the film itself, with nothing to stop it."""
+
+    def judge(step: float, gap: float) -> Cell:
+        q_x, q_y = _rest_load(case, 1 - gap)
+
+        def acceleration(x: Array, v: Array) -> Array:
+            f_x, f_y = film_force(case.film, x[0], x[1], v[0], v[1])
+            return np.array([case.alpha * f_x + q_x, case.alpha * f_y + q_y])
+
+        x, v, h = np.array([1 - gap + _AWAY * gap, 0.0]), np.zeros(2), np.asarray(step)
+        path = [x]
+        for _ in range(_steps_for(step)):
+            x, v = stepper.step(x, v, acceleration, h)
+            path.append(x)
+            if not np.hypot(*x) < 1:
+                break
+        return _orbit_cell(np.array(path), _reference(case, step, gap), gap, accuracy)
+
+    return judge
+
+
+def _guarded_judge(
+    case: _OrbitCase, integrator: str, accuracy: float, tolerance: float = 1e-5
+) -> Judge:
+    """An integrator as a recording uses it."""
+
+    def judge(step: float, gap: float) -> Cell:
+        n = _steps_for(step)
+        run = run_orbit(
+            case.film,
+            load(alpha=case.alpha, static=_rest_load(case, 1 - gap)),
+            duration=n * step,
+            start=(1 - gap + _AWAY * gap, 0.0),
+            integrator=integrator,
+            step=step,
+            tolerance=tolerance,
+        )
+        if run.status is OrbitStatus.STEP:
+            return Verdict.REFUSED, f"step: {run.status.text}"
+        return _orbit_cell(run.position, _reference(case, step, gap), gap, accuracy, run.status)
+
+    return judge
+
+
+def _orbit_cell(
+    path: Array,
+    reference: OrbitRun,
+    gap: float,
+    accuracy: float,
+    status: OrbitStatus = OrbitStatus.OK,
+) -> Cell:
+    if not reference.status.ok:
+        return Verdict.FAILS, f"{reference.status.name.lower()}: {reference.status.text}"
+    if not status.ok or len(path) < len(reference.position):
+        return Verdict.UNSTABLE, status.name.lower() if not status.ok else "leaves the bore"
+    away = np.hypot(*(path[: len(reference.position)] - reference.position).T).max()
+    size = np.hypot(*(reference.position - [1 - gap, 0.0]).T).max()
+    if not away < 2 * size:  # two motions that both stay within the displacement part by no more
+        return Verdict.UNSTABLE, "grows"
+    verdict = Verdict.ACCURATE if away <= accuracy * size else Verdict.INACCURATE
+    return verdict, f"off by {away / size:.2g} of the displacement"
+
+
+# --- journal: speed by load
+
+
+def speed_load(scene: Scene, size: int | None = None) -> MapPlan | str:
+    """Whirl: what a displaced journal does at each speed and load, with the linear threshold.
+
+    Parameters
+    ----------
+    scene : Scene
+        A journal bearing.
+    size : int, optional
+        Cells along either axis.
+
+    Returns
+    -------
+    Plan or str
+        Or why there is none.
+    """
+    journal = cast(JournalScene, scene)
+    n, weight = size or 11, journal_weight(journal)
+    if not weight > 0:
+        return "nothing rests on the journal; set load.static, in newtons"
+    x = MapAxis(
+        name="speed",
+        unit="Hz",
+        values=even_ratios(journal.drive.speed / 4, 8 * journal.drive.speed, n),
+    ).through(journal.drive.speed)
+    y = MapAxis(name="load", unit="N", values=even_ratios(weight / 30, weight * 10, n)).through(
+        weight
+    )
+    numerics = journal.numerics
+    own = f"{numerics.integrator}, as written"
+    settings: dict[str, tuple[str, float, float]] = {
+        own: (numerics.integrator, orbit_step(journal), numerics.tolerance)
+    }
+    settings |= {name: setting for name, setting in _SETTINGS.items() if setting != settings[own]}
+    return MapPlan(
+        name="speed-load",
+        title=f"whirl over speed and load, film '{journal.film.rung}'",
+        x=x,
+        y=y,
+        judges={name: _whirl_judge(journal, *setting) for name, setting in settings.items()},
+        curves={"": [threshold_curve(journal, x, y)]},
+        note="a displacement of a hundredth of the gap dies out or grows; the adaptive integrator "
+        "at a hundredth of its tolerance decides what is right",
+        own=Own(method=own, x=journal.drive.speed, y=weight),
+    )
+
+
+_SETTINGS = {
+    "adaptive": ("adaptive", JOURNAL_STEP, 1e-5),
+    "rk4, step 0.02": ("rk4", 0.02, 1e-5),
+    "euler, step 0.02": ("euler", 0.02, 1e-5),
+    "euler, step 0.2": ("euler", 0.2, 1e-5),
+}
+"""Integrator, longest step [rad] and tolerance of the panels beside that of the scene."""
+
+
+def at_load(scene: JournalScene, speed: float, weight: float) -> JournalScene:
+    """Scene at a speed [Hz] and a steady load along X [N]."""
+    values = {"drive.speed": speed, "load.static": weight - scene.rotor.mass * scene.gravity}
+    return cast(JournalScene, changed(scene, values))
+
+
+def threshold_curve(scene: JournalScene, x: MapAxis, y: MapAxis) -> Curve:
+    """Speeds at which the equilibrium of each load loses its stability, by its coefficients."""
+    points = []
+    for weight in np.geomspace(y.values[0] / 1.2, y.values[-1] * 1.2, 40):
+        speed = threshold_speed(scene, float(weight), x.values[0] / 2, 2 * x.values[-1])
+        if math.isfinite(speed):
+            points.append((speed, float(weight)))
+    return Curve(
+        name="threshold of whirl, linear theory", x=coordinates(points, 0), y=coordinates(points, 1)
+    )
+
+
+def threshold_speed(scene: JournalScene, weight: float, low: float, high: float) -> float:
+    """Speed at which the equilibrium under a load loses its stability [Hz]; NaN where none does.
+
+    Parameters
+    ----------
+    scene : JournalScene
+    weight : float
+        Steady load along X [N].
+    low, high : float
+        Between which it is looked for [Hz].
+
+    Examples
+    --------
+    >>> from wearstate.sim.scene.load import load_scene
+    >>> scene = load_scene("journal-whirl")
+    >>> round(60 * threshold_speed(scene, 257.74 * 9.80665, 20.0, 200.0), -1)
+    4910.0
+    """
+    margins = {each: _margin(scene, weight, each) for each in (low, high)}
+    if margins[low] >= 0 or margins[high] <= 0:
+        return math.nan
+
+    def beyond(speed: float) -> float:
+        """Margin, where endless cut to a number: an end of a bracket all the same."""
+        margin = margins[speed] if speed in margins else _margin(scene, weight, speed)
+        return float(np.clip(margin, -_FAR, _FAR))
+
+    return float(brentq(beyond, low, high, xtol=1e-6 * low))
+
+
+_FAR = 5.0  # e^5 of the threshold's mass: no root is near
+
+
+def _margin(scene: JournalScene, weight: float, speed: float) -> float:
+    """Logarithm of the rotor's mass over that at the threshold: above zero it whirls."""
+    here = at_load(scene, speed, weight)
+    scale = journal_scale(here)
+    unit = scale.alpha * scale.force
+    rung = "short" if scene.film.rung == "short" else "direct"
+    try:
+        found = equilibrium(film_geometry(here), (weight / unit, 0.0), rung=rung)
+    except BearingError:
+        return -math.inf  # too slow to carry the load: the journal lies on its shell
+    limit = whirl(found).threshold.mass
+    if limit == 0:
+        return math.inf
+    return math.log(scale.force / weight / limit) if math.isfinite(limit) else -math.inf
+
+
+def _whirl_judge(
+    scene: JournalScene, integrator: str, step: float, tolerance: float = 1e-5
+) -> Judge:
+    def judge(speed: float, weight: float) -> Cell:
+        true, word = whirls(scene, speed, weight)
+        if true is None:
+            return Verdict.FAILS, word
+        told, word = whirls(
+            scene, speed, weight, integrator=integrator, step=step, tolerance=tolerance
+        )
+        if told is None:
+            status = word.partition(":")[0]
+            return (Verdict.REFUSED if status == "step" else Verdict.UNSTABLE), word
+        if told != true:
+            return Verdict.INACCURATE, f"says that it {'grows' if told else 'dies out'}"
+        return (Verdict.WHIRL if true else Verdict.ACCURATE), word
+
+    return judge
+
+
+_WATCH = 160.0  # rad; a motion at half the speed turns a dozen times
+
+
+def whirls(
+    scene: JournalScene,
+    speed: float,
+    weight: float,
+    *,
+    integrator: str = "adaptive",
+    step: float = 0.02,
+    tolerance: float = 1e-7,
+    watch: float = _WATCH,
+) -> tuple[bool | None, str]:
+    """Whether a small displacement from the equilibrium grows.
+
+    Parameters
+    ----------
+    scene : JournalScene
+    speed, weight : float
+        [Hz], steady load along X [N].
+    integrator : str
+        Of the orbit.
+    step, tolerance : float
+        Of the integrator.
+    watch : float
+        How long the motion is followed [rad].
+
+    Returns
+    -------
+    bool or None
+        None where no equilibrium was found or the run failed.
+    str
+        Status, or the ratio of the motion late in the run to that at its begin.
+    """
+    here = at_load(scene, speed, weight)
+    scale, film = journal_scale(here), journal_film(here)
+    unit = scale.alpha * scale.force
+    rung = "short" if scene.film.rung == "short" else "direct"
+    try:
+        rest = equilibrium(film_geometry(here), (weight / unit, 0.0), rung=rung)
+    except BearingError as error:
+        return None, f"{error.status.name.lower()}: {error.status.text}"
+    place = rest.position * (1 - 0.01 * (1 / rest.eccentricity_ratio - 1))
+    run = run_orbit(
+        film,
+        load(alpha=scale.alpha, static=(weight / scale.force, 0.0)),
+        duration=watch,
+        start=(float(place[0]), float(place[1])),
+        integrator=integrator,
+        step=step,
+        sample_step=0.2,
+        tolerance=tolerance,
+    )
+    if run.status in (OrbitStatus.THIN, OrbitStatus.CONTACT):  # from beside its equilibrium
+        return True, f"grows to the wall: {run.status.text}"
+    if not run.status.ok:
+        return None, f"{run.status.name.lower()}: {run.status.text}"
+    turn = round(4 * math.pi / 0.2)  # of a motion at half the speed
+    early = float(np.ptp(run.position[turn : 3 * turn], axis=0).max())
+    late = float(np.ptp(run.position[-2 * turn :], axis=0).max())
+    ratio = late / early if early > 0 else 0.0
+    # what has died out to the tolerance neither grows nor shrinks
+    return bool(ratio > 1 and late > 1e-6), f"late motion {ratio:.2g} of the early"

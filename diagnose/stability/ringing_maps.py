@@ -1,0 +1,220 @@
+"""Maps of what rings in a pump: step by length of a pipe, step by masses on a yielding casing.
+
+Either is struck once and left to itself; its frequency is held against the closed form.
+"""
+
+import math
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...sim.piping.pipe import FEWEST_REACHES, drive_pipe, pipe_parameters, pipe_start
+from ...sim.pump.recording import steps_per_sample
+from ...sim.pump.setup import WAYS, bearing_mass_ratios, begun, yielding_of
+from ...sim.pump.slider_crank import run_mechanism
+from ...sim.scene.parts import Scene
+from ...sim.scene.pump import PumpJoints, PumpScene
+from ...sim.scene.pump_hydraulics import PIPED_RUNGS, Line, Liquid
+from .method_map import Cell, Curve, Judge, MapAxis, MapPlan, Own, Verdict, even_ratios
+from .own_point import changed
+
+Array = NDArray[np.float64]
+
+# --- pump: length of a pipe by step
+
+
+def step_line(scene: Scene, size: int | None = None) -> MapPlan | str:
+    """Pulsation of the discharge pipe at its first frequency: step by length, both rungs of pipes.
+
+    Parameters
+    ----------
+    scene : Scene
+        A pump.
+    size : int, optional
+        Cells along either axis.
+
+    Returns
+    -------
+    Plan or str
+        Or why there is none.
+    """
+    pump = cast(PumpScene, scene)
+    line = pump.pressure.discharge_line
+    if pump.pressure.rung not in PIPED_RUNGS or line is None or not line.wave_speed:
+        return "the pressure has no pipes; set pressure.rung = 'wave-lines' and the wave speeds"
+    if line.length == 0:
+        return "the discharge line has no length; set pressure.discharge_line.length"
+    n, speed = size or 13, line.wave_speed
+    step = 1 / (pump.sample_rate * steps_per_sample(pump))
+    guard = line.length / (FEWEST_REACHES * speed)
+    x = MapAxis(name="step", unit="s", values=even_ratios(guard / 10, guard * 10, n)).through(step)
+    y = MapAxis(
+        name="length of the discharge line",
+        unit="m",
+        values=even_ratios(line.length / 10, line.length * 10, n),
+    ).through(line.length)
+    crossed = Curve(
+        name=f"guard: {FEWEST_REACHES} steps of travel",
+        x=tuple(length / (FEWEST_REACHES * speed) for length in y.values),
+        y=y.values,
+    )
+    return MapPlan(
+        name="step-line",
+        title="first frequency of the discharge line closed at the pump, step by length",
+        x=x,
+        y=y,
+        judges={rung: _line_pulsation(line, rung, scene.accuracy) for rung in PIPED_RUNGS},
+        curves={"wave-lines": [crossed]},
+        note=f"against wave speed over four lengths, within {scene.accuracy:.2g}",
+        own=Own(method=pump.pressure.rung, x=step, y=line.length),
+    )
+
+
+_RUNG_PERIODS = 12
+_LEAST_PER_PERIOD = 3.0  # steps, to tell a frequency
+_RINGING_AT = 1e7  # Pa, far from the vapour
+
+
+def _line_pulsation(line: Line, rung: str, accuracy: float) -> Judge:
+    def judge(step: float, length: float) -> Cell:
+        bare = {"friction_factor": 0.0, "minor_loss": 0.0, "damper": None, "relief": None}
+        smooth = line.model_copy(update={"length": length, **bare})
+        assert smooth.wave_speed is not None
+        exact = smooth.wave_speed / (4 * length)
+        if step * exact * _LEAST_PER_PERIOD > 1:
+            return Verdict.INACCURATE, "fewer than three steps a period: a rigid column"
+        found = _ringing(smooth, step, math.ceil(_RUNG_PERIODS / (exact * step)), rung)
+        off = abs(found / exact - 1)
+        fine = off <= accuracy  # not so where it rings no more
+        return (Verdict.ACCURATE if fine else Verdict.INACCURATE), f"frequency off by {off:.2g}"
+
+    return judge
+
+
+def _ringing(line: Line, step: float, n_steps: int, rung: str) -> float:
+    """Frequency of a pipe whose flow is stopped, from upward zeros [Hz]; NaN where it is still."""
+    pipes = pipe_parameters(
+        line, Liquid(), far=_RINGING_AT, relief_back=0.0, step=step, waves=rung == "wave-lines"
+    )
+    states, nodes = pipe_start(pipes[0], 1e-3 * line.diameter**2)  # about 1 mm/s
+    pressure, entering = np.zeros(n_steps), np.zeros(n_steps)
+    drive_pipe(pipes, states, nodes, np.zeros(n_steps), step, pressure, entering)
+    return _frequency(pressure - _RINGING_AT, step)
+
+
+def _frequency(rest: Array, step: float) -> float:
+    """Frequency of what swings about zero, from its zeros upward [Hz]; NaN of fewer than three."""
+    up = np.flatnonzero((rest[:-1] < 0) & (rest[1:] >= 0))
+    if len(up) < 3:
+        return math.nan
+    times = up - rest[up] / (rest[up + 1] - rest[up])
+    return (len(times) - 1) / float((times[-1] - times[0]) * step)
+
+
+# --- pump: a casing that yields
+
+
+def step_casing(scene: Scene, size: int | None = None) -> MapPlan | str:
+    """Ring of a rigid mechanism with a casing that carries it: step by their masses.
+
+    Parameters
+    ----------
+    scene : Scene
+        A pump.
+    size : int, optional
+        Cells along either axis.
+
+    Returns
+    -------
+    Plan or str
+        Or why there is none.
+    """
+    pump = cast(PumpScene, scene)
+    if pump.casing.rung != "yielding":
+        return "the casing does not yield; set casing.rung = 'yielding'"
+    own = bearing_mass_ratios(pump).get(WAYS[0])
+    if own is None:
+        return "the casing does not move along the stroke; give casing.modes a shape at bearing_x"
+    mode = max(each.frequency for each in pump.casing.modes)
+    n, rate = size or 13, math.tau * mode
+    step = 1 / (pump.sample_rate * steps_per_sample(pump))
+    x = MapAxis(name="step", unit="s", values=even_ratios(0.05 / rate, 20 / rate, n)).through(step)
+    y = MapAxis(
+        name="casing at bearing over moving mass",
+        unit="",
+        values=even_ratios(own / 30, own * 30, n),
+    ).through(own)
+    return MapPlan(
+        name="step-casing",
+        title=f"ring of a casing of {mode:.4g} Hz with what it carries, step by their masses",
+        x=x,
+        y=y,
+        judges={_YIELDING: _casing_judge(pump, mode)},
+        curves={},
+        note="frequency against that of both masses on the casing's spring, within "
+        f"{scene.accuracy:.2g}; piston and rod held without play, on a crank that stands",
+        own=Own(method=_YIELDING, x=step, y=own),
+    )
+
+
+_YIELDING = "mechanism in the frame of its bearing"
+_GROWN = 1.5  # of a ring without damping, last over first: it grows
+
+
+def _moving(scene: PumpScene) -> float:
+    return scene.piston.mass + scene.rod.mass
+
+
+def _casing_judge(scene: PumpScene, mode: float) -> Judge:
+    def judge(step: float, ratio: float) -> Cell:
+        exact = mode / math.sqrt(1 + 1 / ratio)
+        if step * mode * _LEAST_PER_PERIOD > 1:
+            return Verdict.INACCURATE, "fewer than three steps a period of the casing"
+        force = _casing_ring(scene, mode, ratio, step, math.ceil(_RUNG_PERIODS / (exact * step)))
+        quarter = len(force) // 4
+        first, last = np.ptp(force[:quarter]), np.ptp(force[-quarter:])
+        if not last < _GROWN * first:  # also where it is no number
+            return Verdict.UNSTABLE, "grows"
+        off = abs(_frequency(force - force.mean(), step) / exact - 1)
+        fine = off <= scene.accuracy  # not so where too few periods are told
+        return (Verdict.ACCURATE if fine else Verdict.INACCURATE), f"frequency off by {off:.2g}"
+
+    return judge
+
+
+def _casing_ring(scene: PumpScene, mode: float, ratio: float, step: float, least: int) -> Array:
+    """Force of a rigid crank pin that stands at its dead centre, after a load set in [N]."""
+    shape = {"bearing_x": 1 / math.sqrt(ratio * _moving(scene))}
+    alone = scene.casing.modes[0].model_copy(
+        update={"frequency": mode, "damping_ratio": 0.0, "shape": shape}
+    )
+    rigid = changed(
+        scene,
+        {
+            "joint": PumpJoints(crankpin=scene.joint.crankpin.model_copy(update={"rung": "ideal"})),
+            "pressure.rung": "constant",
+            "drive.rung": "constant-speed",
+            "casing": scene.casing.model_copy(update={"modes": (alone,), "feet": None}),
+            "throws": scene.throws[:1],
+        },
+    )
+    t, start = begun(rigid, step, 0.0)
+    bodies = start.bodies.copy()
+    bodies[:, 6:] = 0.0
+    with np.errstate(all="ignore"):  # what is unstable overflows: that is the answer
+        run = run_mechanism(
+            t,
+            angle=0.0,
+            speed=0.0,
+            bodies=bodies,
+            casing=yielding_of(rigid, step),
+            step=step,
+            n_steps=max(least, _LEAST_WATCHED),
+            keep_states=False,
+        )
+    return run.force("pin_x")[_BEGUN:] if run.status.ok else np.full(_LEAST_WATCHED, np.nan)
+
+
+_LEAST_WATCHED = 200  # steps
+_BEGUN = 8  # steps, of which the first have no past to be carried on
