@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from wearstate.datasets.measured.recording import read_recording
 from wearstate.features.catalogue import analysis as shared
-from wearstate.features.catalogue import catalogue, needs
+from wearstate.features.catalogue import catalogue, complete_rows, needs
 from wearstate.features.catalogue import row as table
 from wearstate.features.response import modal
 from wearstate.features.response.transfer import FrfReference
@@ -98,7 +98,7 @@ def test_larger_sets_begin_with_the_smaller_ones():
 
 
 def test_the_dearest_rows_are_in_the_complete_set_only():
-    dearest = {row.name for row in catalogue.COMPLETE_ROWS}
+    dearest = {row.name for row in complete_rows.COMPLETE_ROWS}
     assert dearest >= {"kurtogram", "cyclic_coherence", "modes"}
     core = {row.name for row in catalogue.SETS["core"]}
     assert core.isdisjoint(dearest)

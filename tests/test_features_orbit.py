@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from wearstate.features.catalogue import analysis as shared
-from wearstate.features.catalogue import catalogue
+from wearstate.features.catalogue import orbit_rows, standard_rows
 from wearstate.features.catalogue import row as table
 from wearstate.features.rotation import orbit, order
 
@@ -314,9 +314,9 @@ def test_without_a_tacho_the_centreline_is_left():
 def test_every_orbit_feature_is_one_function_with_a_reference():
     probes, tacho = machine()
     analysis = shared.Analysis(probes, FS, pulses=order.pulse_times(tacho, FS), probes=(0, 1))
-    every = (*catalogue.CATALOGUE, *catalogue.ORBIT_CATALOGUE)
+    every = (*standard_rows.CATALOGUE, *orbit_rows.ORBIT_CATALOGUE)
     assert len({feature.name for feature in every}) == len(every)
-    for feature in catalogue.ORBIT_CATALOGUE:
+    for feature in orbit_rows.ORBIT_CATALOGUE:
         assert np.size(feature.function(analysis)) == len(feature.labels(shared.STANDARD, FS))
         assert feature.reference
         assert feature.unit

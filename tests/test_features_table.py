@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from wearstate.features.catalogue import analysis as shared
-from wearstate.features.catalogue import catalogue
 from wearstate.features.catalogue import row as table
+from wearstate.features.catalogue import standard_rows
 from wearstate.features.rotation import order
 from wearstate.features.signal import spectrum, statistics
 
@@ -52,18 +52,18 @@ def test_names_agree_with_the_row(with_tacho):
 
 
 def test_every_feature_is_one_function_with_a_reference():
-    assert len({f.name for f in catalogue.CATALOGUE}) == len(catalogue.CATALOGUE)
+    assert len({f.name for f in standard_rows.CATALOGUE}) == len(standard_rows.CATALOGUE)
     vibration, tacho = machine()
     analysis = shared.Analysis(vibration, FS, pulses=order.pulse_times(tacho, FS))
     per_scope = {"channel": 2, "pair": 1, "shaft": 1}
-    for feature in catalogue.CATALOGUE:
+    for feature in standard_rows.CATALOGUE:
         labels = feature.labels(shared.STANDARD, FS)
         assert np.size(feature.function(analysis)) == per_scope[feature.scope] * len(labels)
         assert feature.reference
         assert feature.unit
 
 
-@pytest.mark.parametrize("name", [f.name for f in catalogue.CATALOGUE[:8]])
+@pytest.mark.parametrize("name", [f.name for f in standard_rows.CATALOGUE[:8]])
 def test_statistics_are_those_of_the_channel(name):
     vibration, _ = machine()
     found = row(vibration)

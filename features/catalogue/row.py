@@ -17,7 +17,8 @@ from ..rotation import order
 from ..signal.rate import check_rate
 from ..signal.statistics import Real
 from .analysis import ACCELERATION, FORCE, STANDARD, Analysis, Settings
-from .catalogue import SETS, Feature, Scope, SetName, smallest_set
+from .catalogue import SETS, SetName, smallest_set
+from .feature import Feature, Scope
 from .needs import NEEDS, Layout, shortcomings, struck
 
 Float = NDArray[np.float64]
