@@ -10,7 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy.integrate import quad, solve_ivp
-from wearstate.diagnose.literature.verify import LITERATURE_FOLDER, drop
+from wearstate.diagnose.literature.verify import LITERATURE_FOLDER
+from wearstate.diagnose.literature.verify_contact import drop
 from wearstate.sim.contact import law as c
 from wearstate.sim.contact.closed_forms import (
     conformal_stiffness,

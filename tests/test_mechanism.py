@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from wearstate.diagnose.literature.verify import impact
+from wearstate.diagnose.literature.verify_contact import impact
 from wearstate.sim.contact.law import CONTACT, ELASTIC_HERTZ, LAW_HYSTERESIS, hysteresis
 from wearstate.sim.machine.simulate import simulate
 from wearstate.sim.pump import setup as cs

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy.integrate import quad
-from wearstate.diagnose.literature.verify import rebound
+from wearstate.diagnose.literature.verify_contact import rebound
 from wearstate.sim.contact.closed_forms import ideal_crank, kelvin_voigt_restitution
 from wearstate.sim.contact.law import RELEASE_AT_ZERO_FORCE, RELEASE_AT_ZERO_PENETRATION
 from wearstate.sim.jit import half_turn_angle, power, sine_cosine

@@ -5,7 +5,7 @@ import math
 
 import pytest
 from numpy.testing import assert_allclose
-from wearstate.diagnose.literature import verify
+from wearstate.diagnose.literature import verify, verify_contact
 from wearstate.sim.contact.closed_forms import kelvin_voigt_restitution
 from wearstate.sim.contact.law import RELEASE_AT_ZERO_FORCE
 
@@ -98,7 +98,7 @@ def test_unusable_lines_are_refused():
 def test_rebound_converges_at_the_order_of_the_integrator():
     exact = kelvin_voigt_restitution(0.2)
     coarse, fine = (
-        abs(verify.rebound(0.2, RELEASE_AT_ZERO_FORCE, step_per_contact_time=h) - exact)
+        abs(verify_contact.rebound(0.2, RELEASE_AT_ZERO_FORCE, step_per_contact_time=h) - exact)
         for h in (0.15, 0.0375)
     )
     # Runge-Kutta 4 and a cubic dense output: order 4, that is 256 over two halvings.
@@ -107,4 +107,4 @@ def test_rebound_converges_at_the_order_of_the_integrator():
 
 def test_rebound_needs_an_underdamped_contact():
     with pytest.raises(ValueError, match=r"damping_ratio = 1.0 must be in \[0, 1\)"):
-        verify.rebound(1.0, RELEASE_AT_ZERO_FORCE)
+        verify_contact.rebound(1.0, RELEASE_AT_ZERO_FORCE)
