@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from .catalogue.row import feature_names as feature_names
     from .catalogue.row import feature_row as feature_row
     from .catalogue.transformer import SignalFeatures as SignalFeatures
-    from .response.modal import Modes as Modes
     from .response.modal import modal_fit as modal_fit
+    from .response.modal_model import Modes as Modes
     from .response.transfer import Transfer as Transfer
     from .rotation.balancing import Correction as Correction
     from .rotation.balancing import correction_masses as correction_masses
@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 
 _HOMES = {
     "Correction": ".rotation.balancing",
-    "Modes": ".response.modal",
+    "Modes": ".response.modal_model",
     "Orbit": ".catalogue.curves",
     "PulseFaults": ".rotation.tacho_faults",
     "Settings": ".catalogue.analysis",

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from wearstate.features.response import modal
+from wearstate.features.response import modal, modal_model, resonance, response_change, stable_poles
 
 BEAM_PEAKS = [52, 142, 279, 460, 687, 959]
 """Lines of the peaks of the three points together [Hz]."""
@@ -41,9 +41,9 @@ def case(realdata):
 
 def test_the_peaks_of_the_beam(beam):
     frequency, value = beam
-    assert frequency[modal.find_resonances(frequency, value)].tolist() == BEAM_PEAKS
+    assert frequency[resonance.find_resonances(frequency, value)].tolist() == BEAM_PEAKS
     for i in (1, 2):  # each of these alone shows all of them; the first has a peak at 1 Hz, too
-        assert frequency[modal.find_resonances(frequency, value[i])].tolist() == BEAM_PEAKS
+        assert frequency[resonance.find_resonances(frequency, value[i])].tolist() == BEAM_PEAKS
 
 
 def test_the_modes_of_the_beam(beam):
@@ -57,8 +57,8 @@ def test_the_modes_of_the_beam(beam):
     ratios = found.frequency / found.frequency[2]
     assert_allclose(ratios, (FREE_FREE / FREE_FREE[2]) ** 2, rtol=0.01)
     # The model says what was measured, outside the lowest lines, where the sensor drifts.
-    made = modal.synthesise(found, frequency[20:])
-    assert np.all(modal.frequency_response_assurance(made, value[:, 20:]) > 0.995)
+    made = modal_model.synthesise(found, frequency[20:])
+    assert np.all(response_change.frequency_response_assurance(made, value[:, 20:]) > 0.995)
     assert np.all(found.fit_error < 0.05)
 
 
@@ -104,9 +104,9 @@ def test_the_first_case(case):
     # by the distance to the pole, ours does not; half power rests on three lines alone, and leakage
     # is in all of them: the half-power width is 1.2 lines.
     assert_allclose(found.frequency, PUBLISHED["case1"], atol=spacing / 100)
-    circle = modal.circle_fit(frequency, value, line, quantity="accelerance", share=0.1)
+    circle = resonance.circle_fit(frequency, value, line, quantity="accelerance", share=0.1)
     assert_allclose(circle.frequency, PUBLISHED["case1"], atol=spacing / 100)
-    thumb = modal.half_power(frequency, value, line, quantity="accelerance")
+    thumb = resonance.half_power(frequency, value, line, quantity="accelerance")
     assert_allclose(thumb.frequency, PUBLISHED["case1"], atol=spacing / 30)
     ratios = [found.damping_ratio[0], circle.damping_ratio, thumb.damping_ratio]
     assert_allclose(ratios, 8.4e-4, rtol=0.08)  # the published fit has 8.1e-4
@@ -119,7 +119,7 @@ def test_the_second_case_is_no_mode(case):
     assert_allclose(frequency[line], 192.5)
     # The phase rises by 180 degrees through the peak, in a function that is mostly noise.
     assert np.angle(value[line + 1] / value[line - 2]) > 2.5
-    poles = modal.complex_frequency_poles(frequency, value, range(1, 7))
+    poles = stable_poles.complex_frequency_poles(frequency, value, range(1, 7))
     for found in poles:
         nearest = found[np.argmin(np.abs(found.imag - 2 * np.pi * frequency[line]))]
         assert_allclose(abs(nearest) / (2 * np.pi), PUBLISHED["case2"], atol=spacing / 6)
@@ -127,18 +127,18 @@ def test_the_second_case_is_no_mode(case):
     with pytest.raises(ValueError, match="must decay, but grow: the phase rises"):
         modal.modal_fit(frequency, value)
     with pytest.raises(ValueError, match=r"from a circle|rises with frequency"):
-        modal.circle_fit(frequency, value, line, quantity="accelerance", share=0.1)
+        resonance.circle_fit(frequency, value, line, quantity="accelerance", share=0.1)
     # The magnitude alone gives a number, and says that it fits nothing.
-    assert modal.half_power(frequency, value, line, quantity="accelerance").fit_error > 0.5
+    assert resonance.half_power(frequency, value, line, quantity="accelerance").fit_error > 0.5
 
 
 def test_two_points_of_a_beam_are_not_alike(beam):
     frequency, value = beam
-    assert np.all(modal.frequency_response_assurance(value, value[[1, 2, 0]]) < 0.9)
-    levels = modal.band_response_levels(frequency, value, [20.0, 200.0, 500.0, 900.0])
+    assert np.all(response_change.frequency_response_assurance(value, value[[1, 2, 0]]) < 0.9)
+    levels = response_change.band_response_levels(frequency, value, [20.0, 200.0, 500.0, 900.0])
     assert levels.shape == (3, 3)
     found = modal.modal_fit(frequency, value)
-    made = modal.synthesise(found, frequency[20:])
+    made = modal_model.synthesise(found, frequency[20:])
     # Noise fills the valleys, not the bands: half a decibel.
-    same = modal.band_response_levels(frequency[20:], made, [20.0, 200.0, 500.0, 900.0])
+    same = response_change.band_response_levels(frequency[20:], made, [20.0, 200.0, 500.0, 900.0])
     assert_allclose(same, levels, atol=0.5)

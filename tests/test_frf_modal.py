@@ -5,9 +5,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
-from wearstate.features.response import frf, modal
+from wearstate.features.response import (
+    frf,
+    modal,
+    modal_model,
+    resonance,
+    response_change,
+    stable_poles,
+)
 
-QUANTITIES = tuple(modal.DERIVATIVES)
+QUANTITIES = tuple(modal_model.DERIVATIVES)
 
 
 def one(f, f0, zeta, gain=1.0, derivative=0, decay=0.0):
@@ -39,16 +46,16 @@ F = np.arange(0.0, 200.0, 0.5)
 def test_resonances_of_all_channels_together():
     value = np.stack([several(F, [(40.2, 0.01, 1.0), (90.0, 0.01, 1.0)]), one(F, 150.0, 0.01)])
     # The first channel alone does not see the last mode, the second only that.
-    assert F[modal.find_resonances(F, value)].tolist() == [40.0, 90.0, 150.0]
-    assert F[modal.find_resonances(F, value[0])].tolist() == [40.0, 90.0]
-    assert modal.find_resonances(F, np.ones_like(F)).size == 0
+    assert F[resonance.find_resonances(F, value)].tolist() == [40.0, 90.0, 150.0]
+    assert F[resonance.find_resonances(F, value[0])].tolist() == [40.0, 90.0]
+    assert resonance.find_resonances(F, np.ones_like(F)).size == 0
 
 
 def test_noise_makes_no_resonance():
     value = one(F, 90.0, 0.01, derivative=2)
     # Ten averages at a coherence of 0.9.
     value = value * (1 + np.sqrt((1 - 0.9) / 0.9 / 10) * noise((200, F.size), 0))
-    counts = [modal.find_resonances(F, row).size for row in value]
+    counts = [resonance.find_resonances(F, row).size for row in value]
     # 0.65 dB a line: a rise and a fall of 6 dB is rare among 400 lines, and no peak is lost.
     assert min(counts) == 1
     assert np.mean(counts) < 1.05
@@ -62,8 +69,10 @@ def test_noise_makes_no_resonance():
     gain=st.floats(-3.0, 3.0).filter(lambda x: abs(x) > 0.1),
 )
 def test_half_power_is_exact_for_one_mode(f0, zeta, quantity, gain):
-    value = one(F, f0, zeta, gain, modal.DERIVATIVES[quantity])
-    found = modal.half_power(F, value, int(np.argmax(np.abs(value[1:-1]))) + 1, quantity=quantity)
+    value = one(F, f0, zeta, gain, modal_model.DERIVATIVES[quantity])
+    found = resonance.half_power(
+        F, value, int(np.argmax(np.abs(value[1:-1]))) + 1, quantity=quantity
+    )
     # 1/|H|^2 is a parabola in f^2; its lowest value is zeta^2 of its size, hence a rounding of
     # 1e-16 / zeta^2 in it, and the square root of a small difference in the crossings.
     assert_allclose(found.frequency, f0, rtol=1e-9)
@@ -77,14 +86,14 @@ def test_half_power_finds_the_peak_of_the_receptance():
     line = int(np.argmax(np.abs(value)))
     assert F[line] > 103  # where the receptance peaks at 96 Hz
     value = value * (1 + 1e-4 * noise(F.size, 0))
-    found = modal.half_power(F, value, line, quantity="accelerance")
+    found = resonance.half_power(F, value, line, quantity="accelerance")
     # Crossings scatter by 1e-4 of 40 Hz. Read from the lines at 104 Hz, the peak would be lost.
     assert_allclose([found.frequency, found.damping_ratio], [100.0, 0.2], rtol=2e-3)
 
 
 def test_half_power_is_not_the_rule_of_thumb():
     value = one(F, 100.0, 0.2)
-    found = modal.half_power(F, value, int(np.argmax(np.abs(value))))
+    found = resonance.half_power(F, value, int(np.argmax(np.abs(value))))
     size = np.abs(value)
     above = F[size >= size.max() / np.sqrt(2)]
     thumb = (above[-1] - above[0]) / 2 / F[np.argmax(size)]
@@ -100,14 +109,14 @@ def test_half_power_is_not_the_rule_of_thumb():
     angle=st.floats(-3.1, 3.1),
 )
 def test_a_circle_is_exact_with_any_constant_beside_it(f0, zeta, quantity, angle):
-    derivative = modal.DERIVATIVES[quantity]
+    derivative = modal_model.DERIVATIVES[quantity]
     f = np.arange(0.1, 200.0, 0.1)
     s = 2j * np.pi * f
     size = np.abs(one(f0, f0, zeta, derivative=1))
     constant = 0.05 * size * np.exp(1j * angle)
     value = one(f, f0, zeta, derivative=derivative) + constant * s ** (derivative - 1)
     line = int(np.argmax(np.abs(value) * (np.abs(f - f0) < f0 / 2)))
-    found = modal.circle_fit(f, value, line, quantity=quantity)
+    found = resonance.circle_fit(f, value, line, quantity=quantity)
     # A circle in the mobility, exactly; what is left is the rounding of its centre.
     assert_allclose(found.frequency, f0, rtol=1e-9)
     assert_allclose(found.damping_ratio, zeta, rtol=1e-7)
@@ -119,7 +128,9 @@ def test_a_neighbour_disturbs_the_circle_less_than_the_half_power(gain):
     f = np.arange(0.0, 200.0, 0.1)
     value = several(f, [(100.0, 0.01, 1.0), (112.0, 0.01, gain)])
     line = 900 + int(np.argmax(np.abs(value[900:1060])))
-    thumb, circle = (method(f, value, line) for method in (modal.half_power, modal.circle_fit))
+    thumb, circle = (
+        method(f, value, line) for method in (resonance.half_power, resonance.circle_fit)
+    )
     # The neighbour's constant part is in the circle's model, its slope is not.
     assert abs(circle.frequency - 100) < abs(thumb.frequency - 100) / 8
     assert abs(circle.damping_ratio / 0.01 - 1) < 0.03
@@ -153,13 +164,13 @@ def test_poles_come_nearer_with_every_order():
     orders = [4, 6, 8, 12, 24]
     errors = [
         np.max(np.abs(nearest(poles, truth) / truth - 1))
-        for poles in modal.complex_frequency_poles(f, hysteretic(f), orders)
+        for poles in stable_poles.complex_frequency_poles(f, hysteretic(f), orders)
     ]
     # The mirrored poles are not in a band of complex coefficients: high orders stand in for them,
     # at a rate set by their distance. 1e-3, 6e-5, 1e-6, … were seen.
     assert np.all(np.array(errors) < [1e-2, 5e-4, 1e-5, 1e-6, 5e-7])
     # Structural damping of eta reads as a damping ratio of eta / 2, to the square of it.
-    [poles] = modal.complex_frequency_poles(f, hysteretic(f), [24])
+    [poles] = stable_poles.complex_frequency_poles(f, hysteretic(f), [24])
     found = nearest(poles, truth)
     assert_allclose(-found.real / np.abs(found), 2.5e-3, rtol=2e-4)
 
@@ -168,7 +179,7 @@ def test_excess_poles_grow():
     f = np.arange(100.0, 500.0)
     value = several(f, [(200.0, 0.01, 1.0), (300.0, 0.01, 1.0), (400.0, 0.01, 1.0)])
     value = value + 1e-4 * np.abs(value).max() * noise(f.size, 1)
-    for poles in modal.complex_frequency_poles(f, value, range(6, 31, 6)):
+    for poles in stable_poles.complex_frequency_poles(f, value, range(6, 31, 6)):
         decaying = poles[(poles.real < 0) & (poles.real > -0.1 * np.abs(poles))]
         # Three modes; with the other end of the polynomial at 1 nearly every pole would decay.
         assert len(decaying) == 3
@@ -181,8 +192,8 @@ def test_a_band_may_start_anywhere_and_a_window_is_undone():
     decay = 12.0
     for rate in (0.0, decay):
         value = several(f, modes, 2, rate)
-        [poles] = modal.complex_frequency_poles(f, value, [12], decay=rate)
-        truth = modal.poles_of([m[0] for m in modes], [m[1] for m in modes])
+        [poles] = stable_poles.complex_frequency_poles(f, value, [12], decay=rate)
+        truth = modal_model.poles_of([m[0] for m in modes], [m[1] for m in modes])
         # What order 12 leaves of s^2 and the mirrored poles.
         assert_allclose(nearest(poles, truth), truth, rtol=1e-6)
 
@@ -194,9 +205,10 @@ def test_lines_without_weight_do_not_count():
     spoilt[80:95] += np.abs(value).max() * noise(15, 0)  # close below the resonance
     deviation = np.ones(f.size)
     deviation[80:95] = 1e6
-    truth = modal.poles_of(200.0, 0.01)
+    truth = modal_model.poles_of(200.0, 0.01)
     weighted, plain = (
-        modal.complex_frequency_poles(f, spoilt, [4], deviation=d)[0] for d in (deviation, None)
+        stable_poles.complex_frequency_poles(f, spoilt, [4], deviation=d)[0]
+        for d in (deviation, None)
     )
     # What order 4 leaves of the mirrored pole, and a tenth of the damping.
     assert abs(nearest(weighted, truth)[0] / truth - 1) < 1e-4
@@ -208,7 +220,7 @@ def test_lines_without_weight_do_not_count():
 
 def test_a_pole_keeps_its_chain_past_a_gap_and_a_neighbour():
     a, b = -2 + 300j, -2.05 + 301j
-    diagram = modal.stabilise([[a], [a, b], [b], [b, a]], [1, 2, 3, 4])
+    diagram = stable_poles.stabilise([[a], [a, b], [b], [b, a]], [1, 2, 3, 4])
     assert diagram.order.tolist() == [1, 2, 2, 3, 4, 4]
     assert diagram.chain.tolist() == [0, 0, 1, 1, 1, 0]
     assert diagram.length.tolist() == [1, 2, 1, 2, 3, 3]
@@ -217,14 +229,14 @@ def test_a_pole_keeps_its_chain_past_a_gap_and_a_neighbour():
 
 
 def test_growing_and_overdamped_poles_are_no_modes():
-    diagram = modal.stabilise([[1 + 50j, -40 + 50j, -1 + 50j]] * 5, range(1, 6))
+    diagram = stable_poles.stabilise([[1 + 50j, -40 + 50j, -1 + 50j]] * 5, range(1, 6))
     assert diagram.order.tolist() == [1, 2, 3, 4, 5]
     assert_allclose(diagram.modes()[1], 1 / np.hypot(1, 50))
 
 
 def test_a_pole_whose_damping_jumps_is_one_mode():
     poles = [[-1 + 300j]] * 6 + [[-1.4 + 300j]] * 7
-    diagram = modal.stabilise(poles, range(1, 14))
+    diagram = stable_poles.stabilise(poles, range(1, 14))
     assert np.unique(diagram.chain).tolist() == [0, 1]
     # The longer chain stands for both.
     assert_allclose(diagram.modes()[1], [1.4 / np.hypot(1.4, 300)])
@@ -256,7 +268,7 @@ def chain(f, derivative=2, decay=0.0, background=(-3.0, 2e-6 + 1e-6j)):
 @pytest.mark.parametrize("decay", [0.0, 15.0])
 @pytest.mark.parametrize("quantity", QUANTITIES)
 def test_a_fit_is_exact_in_all_its_parts(quantity, decay):
-    value = chain(BAND, modal.DERIVATIVES[quantity], decay)
+    value = chain(BAND, modal_model.DERIVATIVES[quantity], decay)
     found = modal.fit_modes(
         BAND, value, [50.0, 60.0, 119.0], [0.02] * 3, quantity=quantity, decay=decay
     )
@@ -268,7 +280,10 @@ def test_a_fit_is_exact_in_all_its_parts(quantity, decay):
     assert_allclose(found.upper, [2e-6 + 1e-6j] * 2, rtol=1e-5)
     assert np.all(found.fit_error < 1e-9)
     assert_allclose(
-        modal.synthesise(found, BAND, decay=decay), value, rtol=0, atol=1e-8 * np.abs(value).max()
+        modal_model.synthesise(found, BAND, decay=decay),
+        value,
+        rtol=0,
+        atol=1e-8 * np.abs(value).max(),
     )
 
 
@@ -349,11 +364,13 @@ def test_weights_are_worth_having():
 def test_the_linear_fit_is_biased_and_the_full_one_is_not():
     f = np.arange(150.0, 250.0, 0.5)
     clean = one(f, 200.0, 0.01)
-    truth = modal.poles_of(200.0, 0.01)
+    truth = modal_model.poles_of(200.0, 0.01)
     linear, full = [], []
     for seed in range(100):
         value = clean + 0.1 * np.abs(clean).max() * noise(f.size, seed)
-        linear.append(nearest(modal.complex_frequency_poles(f, value, [4])[0], truth)[0].real)
+        linear.append(
+            nearest(stable_poles.complex_frequency_poles(f, value, [4])[0], truth)[0].real
+        )
         modes = modal.fit_modes(f, value, [200.0], [0.01], quantity="receptance")
         full.append(modes.pole[0].real)
     scatter = np.std(full) / np.sqrt(100)
@@ -383,7 +400,7 @@ def test_close_modes_are_told_apart(apart, level):
     clean = several(f, [(f0, zeta, 1.0), (f1, zeta, 1.0)])
     value = clean + level * np.abs(clean).max() * noise(f.size, 3)
     if apart < 1:
-        assert modal.find_resonances(f, clean).size == 1  # one peak to the eye
+        assert resonance.find_resonances(f, clean).size == 1  # one peak to the eye
     found = modal.modal_fit(f, value, quantity="receptance")
     assert found.frequency.size == 2
     assert_allclose(found.frequency, [f0, f1], rtol=1e-9 + 0.5 * zeta * (level > 0))
@@ -454,8 +471,8 @@ def test_a_window_of_the_measurement_is_undone():
 def test_a_mode_that_the_data_do_not_hold_is_dropped(monkeypatch):
     clean = chain(BAND)
     value = clean + 1e-2 * np.abs(clean).max() * noise(clean.shape, 0)
-    follow = modal.stabilise
-    false = [modal.poles_of(140.0, 0.01)]
+    follow = stable_poles.stabilise
+    false = [modal_model.poles_of(140.0, 0.01)]
     monkeypatch.setattr(
         modal, "stabilise", lambda poles, orders: follow([[*p, *false] for p in poles], orders)
     )
@@ -486,14 +503,14 @@ def test_a_fit_that_does_not_settle_says_so(monkeypatch, search):
 
 def test_synthesis_in_every_quantity():
     found = modal.fit_modes(BAND, chain(BAND), [50.0, 60.0, 119.0], [0.02] * 3)
-    for quantity, derivative in modal.DERIVATIVES.items():
+    for quantity, derivative in modal_model.DERIVATIVES.items():
         wanted = chain(BAND, derivative)
-        made = modal.synthesise(found, BAND, quantity=quantity)
+        made = modal_model.synthesise(found, BAND, quantity=quantity)
         assert_allclose(made, wanted, rtol=0, atol=1e-8 * np.abs(wanted).max())
     # At rest the background of an accelerance is L, and the modes do not accelerate.
-    assert_allclose(modal.synthesise(found, [0.0])[:, 0], found.lower)
+    assert_allclose(modal_model.synthesise(found, [0.0])[:, 0], found.lower)
     with pytest.raises(ValueError, match="frequency = 0 Hz must be > 0"):
-        modal.synthesise(found, [0.0, 1.0], quantity="receptance")
+        modal_model.synthesise(found, [0.0, 1.0], quantity="receptance")
 
 
 # --- against a reference
@@ -502,7 +519,7 @@ def test_synthesis_in_every_quantity():
 def test_levels_of_bands():
     f0, zeta = 100.0, 0.02
     f = np.arange(0.0, 4000.0, 0.1)
-    [[level]] = modal.band_response_levels(f, one(f, f0, zeta), [0.0, 4000.0])
+    [[level]] = response_change.band_response_levels(f, one(f, f0, zeta), [0.0, 4000.0])
     w0 = 2 * np.pi * f0
     # The integral of |H|^2 over all w > 0 is pi / (4 zeta w0^3); beyond 4 kHz lie (w0/w)^3 4 zeta
     # / (3 pi) of it, 1e-7; the sum over lines of 1/40 of the width is exact to exp(-2 pi 20), but
@@ -514,9 +531,9 @@ def test_levels_of_bands():
 def test_levels_scale_and_split():
     value = chain(BAND)
     edges = [30.0, 60.0, 100.0, 150.0]
-    levels = modal.band_response_levels(BAND, value, edges)
+    levels = response_change.band_response_levels(BAND, value, edges)
     assert levels.shape == (2, 3)
-    assert_allclose(modal.band_response_levels(BAND, 10 * value, edges) - levels, 20.0)
+    assert_allclose(response_change.band_response_levels(BAND, 10 * value, edges) - levels, 20.0)
     kept = (BAND >= 60) & (BAND < 100)
     wanted = 10 * np.log10(np.mean(np.abs(value[:, kept]) ** 2, axis=-1))
     assert_allclose(levels[:, 1], wanted)
@@ -528,38 +545,40 @@ def test_assurance_of_two_resonances_apart(widths):
     f = np.arange(-3000.0, 3000.0, 0.05)
     one_, other = (1 / (width / 2 + 1j * (f - at)) for at in (0.0, widths * width))
     # Two Lorentzians: 1 / (1 + (d / b)^2) over all frequencies; beyond 3000 widths lie 1e-4.
-    [found] = modal.frequency_response_assurance(one_, other)
+    [found] = response_change.frequency_response_assurance(one_, other)
     assert_allclose(found, 1 / (1 + widths**2), atol=3e-4)
 
 
 def test_assurance_is_blind_to_level_and_phase_only():
     value = chain(BAND)
     other = value * np.array([[3j], [-0.1]])
-    assert_allclose(modal.frequency_response_assurance(other, value), 1.0)
+    assert_allclose(response_change.frequency_response_assurance(other, value), 1.0)
     assert_allclose(
-        modal.frequency_response_assurance(value[::-1], value[::-1] ** 2)[::-1],
-        modal.frequency_response_assurance(value, value**2),
+        response_change.frequency_response_assurance(value[::-1], value[::-1] ** 2)[::-1],
+        response_change.frequency_response_assurance(value, value**2),
     )
-    assert modal.frequency_response_assurance(value[0], value[1])[0] < 0.9
+    assert response_change.frequency_response_assurance(value[0], value[1])[0] < 0.9
 
 
 def test_signatures_line_by_line():
     value = chain(BAND)
-    assert_allclose(modal.cross_signature_assurance(2j * value, value), 1.0)
+    assert_allclose(response_change.cross_signature_assurance(2j * value, value), 1.0)
     # 2 a / (1 + a^2) for a factor a
-    assert_allclose(modal.cross_signature_scale(2j * value, value), 0.8)
+    assert_allclose(response_change.cross_signature_scale(2j * value, value), 0.8)
     turned = value * np.array([[1.0], [-1.0]])
     a, b = np.abs(value) ** 2
     likeness = np.abs(a - b) / (a + b)
-    assert_allclose(modal.cross_signature_assurance(turned, value), likeness**2, atol=1e-12)
-    assert_allclose(modal.cross_signature_scale(turned, value), likeness, atol=1e-12)
+    assert_allclose(
+        response_change.cross_signature_assurance(turned, value), likeness**2, atol=1e-12
+    )
+    assert_allclose(response_change.cross_signature_scale(turned, value), likeness, atol=1e-12)
 
 
 def set_of(frequencies, shapes, ratio=0.01, scatter=0.0):
     """Modes of given shapes, (n_channels, n_modes)."""
     f = np.asarray(frequencies, dtype=float)
     residue = np.asarray(shapes, dtype=complex)
-    return modal.Modes(
+    return modal_model.Modes(
         frequency=f,
         damping_ratio=np.full(f.shape, ratio),
         residue=residue,
@@ -577,12 +596,12 @@ def test_a_softer_spring_lowers_a_resonance():
     before, after = (
         modal.fit_modes(BAND, k * chain(BAND), [50, 60, 119], [0.02] * 3) for k in (1.0, 0.5)
     )
-    still = modal.resonance_shift(after, before)
+    still = response_change.resonance_shift(after, before)
     assert still.pairs.tolist() == [[0, 0], [1, 1], [2, 2]]
     assert_allclose(still.frequency, 0.0, atol=1e-9)
     assert_allclose(still.level, -20 * np.log10(2), atol=1e-6)
     softer = one(BAND, 52.0 * np.sqrt(0.98), 0.02)
-    moved = modal.resonance_shift(
+    moved = response_change.resonance_shift(
         modal.modal_fit(BAND, softer, quantity="receptance"),
         modal.modal_fit(BAND, one(BAND, 52.0, 0.01), quantity="receptance"),
     )
@@ -597,13 +616,13 @@ def test_modes_that_changed_places_are_told_by_shape():
     shapes = np.array([[1.0, 1.0], [1.0, -1.0]])
     before = set_of([100.0, 103.0], shapes, scatter=0.3)
     after = set_of([101.0, 102.0], shapes[:, ::-1], scatter=0.4)
-    shift = modal.resonance_shift(after, before)
+    shift = response_change.resonance_shift(after, before)
     assert shift.pairs.tolist() == [[0, 1], [1, 0]]
     assert_allclose(shift.frequency, [0.02, 101 / 103 - 1])
     deviation = 1.02 * np.hypot(0.4 / 102, 0.3 / 100)
     assert_allclose(shift.frequency_deviation[0], deviation)
     # One channel cannot tell, and takes the nearest.
-    single = modal.resonance_shift(
+    single = response_change.resonance_shift(
         set_of([101.0, 102.0], [[1, 1]]), set_of([100.0, 103.0], [[1, 1]])
     )
     assert single.pairs.tolist() == [[0, 0], [1, 1]]
@@ -612,9 +631,9 @@ def test_modes_that_changed_places_are_told_by_shape():
 def test_lost_and_new_modes_are_named():
     before = set_of([50.0, 100.0, 200.0], [[1, 1, 1]])
     after = set_of([104.0, 150.0, 201.0], [[1, 1, 1]])
-    shift = modal.resonance_shift(after, before)
+    shift = response_change.resonance_shift(after, before)
     assert (shift.pairs.tolist(), shift.lost, shift.new) == ([[1, 0], [2, 2]], (0,), (1,))
-    assert modal.resonance_shift(after, before, within=0.03).lost == (0, 1)
+    assert response_change.resonance_shift(after, before, within=0.03).lost == (0, 1)
 
 
 # --- refusals
@@ -629,51 +648,72 @@ BAD = np.where(F == 50, np.nan, NARROW)
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda: modal.find_resonances(F, NARROW[1:]), r"\(399,\), must be \(n_lines,\)"),
-        (lambda: modal.find_resonances(F, BAD), "value has 1 non-finite lines"),
+        (lambda: resonance.find_resonances(F, NARROW[1:]), r"\(399,\), must be \(n_lines,\)"),
+        (lambda: resonance.find_resonances(F, BAD), "value has 1 non-finite lines"),
         (
-            lambda: modal.find_resonances(F, [NARROW, 0 * F]),
+            lambda: resonance.find_resonances(F, [NARROW, 0 * F]),
             r"0 in channels \[1\], must at",
         ),
         (lambda: modal.modal_fit(F, 1e99 * NARROW), "leave out dead channels, use SI units"),
         (lambda: modal.fit_modes(F, F == 0, [9.0], [0.1]), "0 on every line above 0 Hz"),
-        (lambda: modal.find_resonances(F, NARROW, prominence=0), "prominence = 0 dB must be > 0"),
+        (
+            lambda: resonance.find_resonances(F, NARROW, prominence=0),
+            "prominence = 0 dB must be > 0",
+        ),
         (
             lambda: modal.modal_fit([3.0, 1.0, -2.0], [np.inf, 1.0, 2.0]),
             "n_lines = 3 must be >= 5.*increasing; sort the lines; value has 1 non-finite",
         ),
         (lambda: modal.modal_fit(F, NARROW, quantity="inertance"), "one of receptance, mobility"),
-        (lambda: modal.half_power(F, NARROW, 180, quantity="x"), "quantity = 'x' must be one of"),
-        (lambda: modal.half_power(F, DATA, 180), "value has 2 channels, must have 1"),
-        (lambda: modal.half_power(F, NARROW, 0), "line = 0 must be > 0 and < n_lines - 1 = 399"),
         (
-            lambda: modal.half_power(F, one(F, 199.0, 0.01, derivative=2), 398),
+            lambda: resonance.half_power(F, NARROW, 180, quantity="x"),
+            "quantity = 'x' must be one of",
+        ),
+        (lambda: resonance.half_power(F, DATA, 180), "value has 2 channels, must have 1"),
+        (
+            lambda: resonance.half_power(F, NARROW, 0),
+            "line = 0 must be > 0 and < n_lines - 1 = 399",
+        ),
+        (
+            lambda: resonance.half_power(F, one(F, 199.0, 0.01, derivative=2), 398),
             "must fall to half its power above",
         ),
-        (lambda: modal.half_power(F[:170], NARROW[:170], 160), "must be a peak of the magnitude"),
-        (lambda: modal.half_power(F[:182], NARROW[:182], 180), "fall to half its power above"),
         (
-            lambda: modal.half_power(F, several(F, [(90, 0.02, 1), (95, 0.02, -3)]), 180),
+            lambda: resonance.half_power(F[:170], NARROW[:170], 160),
+            "must be a peak of the magnitude",
+        ),
+        (lambda: resonance.half_power(F[:182], NARROW[:182], 180), "fall to half its power above"),
+        (
+            lambda: resonance.half_power(F, several(F, [(90, 0.02, 1), (95, 0.02, -3)]), 180),
             "must",
         ),
-        (lambda: modal.circle_fit(F, one(F, 90, 0.004), 180), "3 lines above 0.5 of its peak"),
-        (lambda: modal.circle_fit(F, NARROW, 180, share=1.0), "share = 1.0 must be > 0 and < 1"),
-        (lambda: modal.circle_fit(F, NARROW.conj(), 180, share=0.2), "phase at 90 Hz rises"),
+        (lambda: resonance.circle_fit(F, one(F, 90, 0.004), 180), "3 lines above 0.5 of its peak"),
         (
-            lambda: modal.circle_fit(F, ROUGH, int(np.argmax(np.abs(ROUGH))), share=0.1),
+            lambda: resonance.circle_fit(F, NARROW, 180, share=1.0),
+            "share = 1.0 must be > 0 and < 1",
+        ),
+        (lambda: resonance.circle_fit(F, NARROW.conj(), 180, share=0.2), "phase at 90 Hz rises"),
+        (
+            lambda: resonance.circle_fit(F, ROUGH, int(np.argmax(np.abs(ROUGH))), share=0.1),
             "of the diameter from a circle",
         ),
-        (lambda: modal.complex_frequency_poles(F, NARROW, [0, 3, 200]), r"orders \[0, 200\]"),
-        (lambda: modal.complex_frequency_poles(F, NARROW, []), r"orders \[\] must be"),
         (
-            lambda: modal.complex_frequency_poles(F, NARROW, [3], deviation=F),
+            lambda: stable_poles.complex_frequency_poles(F, NARROW, [0, 3, 200]),
+            r"orders \[0, 200\]",
+        ),
+        (lambda: stable_poles.complex_frequency_poles(F, NARROW, []), r"orders \[\] must be"),
+        (
+            lambda: stable_poles.complex_frequency_poles(F, NARROW, [3], deviation=F),
             "deviation must be > 0 and finite",
         ),
         (
-            lambda: modal.complex_frequency_poles(F, NARROW, [3], deviation=[1.0, 2.0]),
+            lambda: stable_poles.complex_frequency_poles(F, NARROW, [3], deviation=[1.0, 2.0]),
             r"deviation has shape \(2,\)",
         ),
-        (lambda: modal.stabilise([], [], damping_tolerance=0), "damping_tolerance = 0 must be > 0"),
+        (
+            lambda: stable_poles.stabilise([], [], damping_tolerance=0),
+            "damping_tolerance = 0 must be > 0",
+        ),
         (lambda: modal.fit_modes(F, NARROW, [90.0], [0.01, 0.02]), "give a pair for each mode"),
         (
             lambda: modal.fit_modes(F, NARROW, [-90.0], [0.0]),
@@ -690,19 +730,39 @@ BAD = np.where(F == 50, np.nan, NARROW)
         (lambda: modal.modal_fit(F, NARROW, n_modes=0), "n_modes = 0 must be >= 1; leave it out"),
         (lambda: modal.modal_fit(F, NARROW.conj()), "at 90.* Hz must decay, but grow"),
         (lambda: modal.modal_fit(F, noise(F.size, 0)), "no pole stays stable|must"),
-        (lambda: modal.synthesise(set_of([1.0], [[1]]), [np.inf]), "frequency must be finite"),
-        (lambda: modal.band_response_levels(F, NARROW, [1.0, 1.0]), "must be two or more"),
         (
-            lambda: modal.band_response_levels(F, NARROW, [1.1, 1.2, 8.0, 900.0, 950.0]),
+            lambda: modal_model.synthesise(set_of([1.0], [[1]]), [np.inf]),
+            "frequency must be finite",
+        ),
+        (
+            lambda: response_change.band_response_levels(F, NARROW, [1.0, 1.0]),
+            "must be two or more",
+        ),
+        (
+            lambda: response_change.band_response_levels(F, NARROW, [1.1, 1.2, 8.0, 900.0, 950.0]),
             "bands 1.1 … 1.2 Hz, 900 … 950 Hz must each hold a line",
         ),
-        (lambda: modal.frequency_response_assurance(NARROW, DATA), "bring both to the same lines"),
-        (lambda: modal.frequency_response_assurance([], []), "bring both to the same lines"),
-        (lambda: modal.frequency_response_assurance(NARROW, 0 * F), "leave out dead channels"),
-        (lambda: modal.cross_signature_assurance(NARROW, NARROW), "one is identically 1"),
-        (lambda: modal.cross_signature_scale([0, 1], [1, 1]), "0 in all channels on 1 lines"),
         (
-            lambda: modal.resonance_shift(set_of([1.0], [[1]]), set_of([1.0], [[1], [1]])),
+            lambda: response_change.frequency_response_assurance(NARROW, DATA),
+            "bring both to the same lines",
+        ),
+        (
+            lambda: response_change.frequency_response_assurance([], []),
+            "bring both to the same lines",
+        ),
+        (
+            lambda: response_change.frequency_response_assurance(NARROW, 0 * F),
+            "leave out dead channels",
+        ),
+        (lambda: response_change.cross_signature_assurance(NARROW, NARROW), "one is identically 1"),
+        (
+            lambda: response_change.cross_signature_scale([0, 1], [1, 1]),
+            "0 in all channels on 1 lines",
+        ),
+        (
+            lambda: response_change.resonance_shift(
+                set_of([1.0], [[1]]), set_of([1.0], [[1], [1]])
+            ),
             "n_channels = 1 must equal that of the reference, 2",
         ),
     ],

@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 from wearstate.features.catalogue.analysis import Analysis, Settings
 from wearstate.features.catalogue.row import feature_row
-from wearstate.features.response import frf, impact, modal, transfer
+from wearstate.features.response import frf, impact, response_change, transfer
 
 FS = 2560.0
 N = 60 * 2560
@@ -137,7 +137,7 @@ def test_a_profile_is_that_of_the_machine_whatever_the_noise(noise):
     edges = Settings().profile_edges(FS)
     found = Analysis(pushed([0], noise=noise), FS, quantities=KINDS).transfer_functions
     true = receptance(found.frequency)[:, :, 0].T
-    levels = modal.band_response_levels(found.frequency, true, edges)[0]
+    levels = response_change.band_response_levels(found.frequency, true, edges)[0]
     told, heard = (part[0] for part in transfer.profile(found, edges))
     plain = transfer.band_levels(found, edges)[0]
     weak = levels < np.max(levels) - 35

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...datasets.file.record import DataSet
 from ...features.catalogue.analysis import STANDARD, Analysis, Settings
-from ...features.response.modal import Modes
+from ...features.response.modal_model import Modes
 from ...features.response.transfer import FrfReference
 from ...sim.output.recording import Recording
 from .feature_table import FeatureSelection, recording_analysis

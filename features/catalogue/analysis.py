@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ..response import frf, modal, transfer
+from ..response import frf, modal_model, transfer
 from ..response.impact import WIDEST_LINES_HZ
 from ..rotation import angle_resample as resample
 from ..rotation import orbit, order
@@ -561,16 +561,16 @@ class Analysis:
         ]
 
     @cached_property
-    def modal_quantity(self) -> modal.Quantity:
+    def modal_quantity(self) -> modal_model.Quantity:
         """What the functions of `modal_paths` are called."""
         return MODAL_QUANTITIES.get(self._quantities[self.responses[0]], ACCELERANCE)
 
     @cached_property
-    def modes(self) -> modal.Modes | None:
+    def modes(self) -> modal_model.Modes | None:
         """Modes of `modal_paths`; None where no pole is stable."""
         return self.modes_of(self.transfer_functions)
 
-    def modes_of(self, found: transfer.Transfer) -> modal.Modes | None:
+    def modes_of(self, found: transfer.Transfer) -> modal_model.Modes | None:
         """Modes of functions of the same paths, as the mean of several tests."""
         return transfer.fit_transfer(
             found,
@@ -582,7 +582,7 @@ class Analysis:
         )
 
     @cached_property
-    def reference_modes(self) -> modal.Modes:
+    def reference_modes(self) -> modal_model.Modes:
         """Modes of the reference; ValueError where it has none."""
         known = self.settings.reference
         if known is None or known.modes is None:
@@ -591,7 +591,7 @@ class Analysis:
 
 
 ACCELERANCE: Literal["accelerance"] = "accelerance"
-MODAL_QUANTITIES: dict[str, modal.Quantity] = {
+MODAL_QUANTITIES: dict[str, modal_model.Quantity] = {
     ACCELERATION: ACCELERANCE,
     "velocity": "mobility",
     DISPLACEMENT: "receptance",

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from ..response import modal, transfer
+from ..response import response_change, transfer
 from ..signal.spectrum import decibel
 from .analysis import Analysis, Settings
 from .feature import EWINS, ROLLING_BEARING, Feature, fault_labels, named, scores, stacked
@@ -66,7 +66,7 @@ def _resonance_shift(analysis: Analysis) -> Float:
     known, found = analysis.reference_modes, analysis.modes
     if found is None or found.residue.shape[0] != known.residue.shape[0]:
         return np.zeros(2)  # a dead sensor: nothing is found again
-    shift = modal.resonance_shift(found, known)
+    shift = response_change.resonance_shift(found, known)
     count = len(shift.frequency)
     mean = float(shift.frequency.mean()) if count else 0.0
     return np.array([mean, count / max(known.frequency.size, 1)])
@@ -148,7 +148,7 @@ COMPLETE_ROWS: tuple[Feature, ...] = (
         scope="frf",
         labels=named("resonance_shift.mean", "resonance_shift.found"),
         function=_resonance_shift,
-        reference="modal.resonance_shift",
+        reference="response_change.resonance_shift",
     ),
     Feature(
         name="mode_changes",
@@ -159,7 +159,8 @@ COMPLETE_ROWS: tuple[Feature, ...] = (
             "frequency_shift", "shift_deviation", "damping_change", "level_change_db", "mac"
         ),
         function=_mode_changes,
-        reference="transfer.mode_changes, modal.resonance_shift; Allemang, IMAC I (1982) 110-116",
+        reference="transfer.mode_changes, response_change.resonance_shift; "
+        "Allemang, IMAC I (1982) 110-116",
     ),
 )
 """What `complete` has beside `core`: what costs most."""

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from ..response import frf, modal, operational, transfer
+from ..response import frf, operational, response_change, transfer
 from ..rotation import tacholess_speed as speed
 from ..signal.spectral_shape import (
     noise_floor,
@@ -177,7 +177,9 @@ def _frf_assurance(analysis: Analysis) -> Float:
     likeness = np.zeros(len(value))
     moving = np.any(value != 0, axis=-1) & np.any(other != 0, axis=-1)
     if moving.any():
-        likeness[moving] = modal.frequency_response_assurance(value[moving], other[moving])
+        likeness[moving] = response_change.frequency_response_assurance(
+            value[moving], other[moving]
+        )
     return likeness
 
 
@@ -429,7 +431,8 @@ CORE_ROWS: tuple[Feature, ...] = (
         scope="path",
         labels=named("frf.assurance"),
         function=_frf_assurance,
-        reference="modal.frequency_response_assurance; Heylen, Lammens, Swansea (1996) 48-57",
+        reference="response_change.frequency_response_assurance; "
+        "Heylen, Lammens, Swansea (1996) 48-57",
     ),
 )
 """What `core` has beside the standard row."""

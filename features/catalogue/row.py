@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from ..response.modal import Modes
+from ..response.modal_model import Modes
 from ..response.transfer import FrfReference
 from ..rotation import order
 from ..signal.rate import check_rate

@@ -15,7 +15,7 @@ from scipy.special import gammainccinv
 
 from ..signal.rate import check_rate
 from ..signal.spectrum import decibel
-from . import frf, impact, mimo, modal
+from . import frf, impact, mimo, modal, modal_model, response_change
 
 Float = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -189,7 +189,7 @@ class FrfReference:
 
     frequency: Float
     value: Complex
-    modes: modal.Modes | None = None
+    modes: modal_model.Modes | None = None
 
     def at(self, frequency: Float, n_paths: int) -> Complex:
         """The functions on the lines of a test [shape=(n_paths, n_lines)].
@@ -437,7 +437,7 @@ def band_levels(transfer: Transfer, edges: ArrayLike, *, estimator: str = "h1") 
     Raises
     ------
     ValueError
-        As :func:`wearstate.features.response.modal.band_response_levels`.
+        As :func:`wearstate.features.response.response_change.band_response_levels`.
     """
     return _levels(transfer, transfer.estimate(estimator), np.ones(transfer.value.shape), edges)
 
@@ -447,7 +447,7 @@ def _levels(transfer: Transfer, value: Complex, weight: Float, edges: ArrayLike)
     moving = np.any(value != 0, axis=-1)
     levels = np.full((len(value), np.size(edges) - 1), decibel(0.0))
     if moving.any():
-        levels[moving] = modal.band_response_levels(
+        levels[moving] = response_change.band_response_levels(
             transfer.frequency, value[moving], edges, weight=weight[moving]
         )
     return levels
@@ -608,11 +608,11 @@ def fit_transfer(
     transfer: Transfer,
     paths: list[int],
     *,
-    quantity: modal.Quantity,
+    quantity: modal_model.Quantity,
     n_modes: int,
     highest_order: int,
     most_lines: int,
-) -> modal.Modes | None:
+) -> modal_model.Modes | None:
     """Modes of some paths, on the lines that one of them is heard at.
 
     Parameters
@@ -631,7 +631,7 @@ def fit_transfer(
         None where no pole is stable, or nothing moves.
     """
     kept = transfer.heard[paths].any(axis=0)
-    if np.count_nonzero(kept) < modal.FEWEST_LINES:
+    if np.count_nonzero(kept) < modal_model.FEWEST_LINES:
         return None
     fit = modal.peak_fits if np.count_nonzero(kept) > most_lines else modal.modal_fit
     try:
@@ -647,7 +647,7 @@ def fit_transfer(
         return None
 
 
-def mode_shapes(modes: modal.Modes) -> tuple[Float, Float]:
+def mode_shapes(modes: modal_model.Modes) -> tuple[Float, Float]:
     """Shapes as the force of each path sees them, with their standard deviations.
 
     Parameters
@@ -666,7 +666,7 @@ def mode_shapes(modes: modal.Modes) -> tuple[Float, Float]:
     return np.asarray(constant.real / size), np.asarray(deviation / size)
 
 
-def static_flexibility(modes: modal.Modes) -> tuple[Float, Float]:
+def static_flexibility(modes: modal_model.Modes) -> tuple[Float, Float]:
     """Static flexibility that the modes and what lies above them add up to, and the latter alone.
 
     Parameters
@@ -690,7 +690,9 @@ def static_flexibility(modes: modal.Modes) -> tuple[Float, Float]:
     return np.asarray(modal_part + modes.upper.real), np.asarray(modes.upper.real)
 
 
-def mode_changes(modes: modal.Modes | None, reference: modal.Modes, count: int) -> Float:
+def mode_changes(
+    modes: modal_model.Modes | None, reference: modal_model.Modes, count: int
+) -> Float:
     """What has become of each mode of a reference.
 
     Parameters
@@ -712,7 +714,7 @@ def mode_changes(modes: modal.Modes | None, reference: modal.Modes, count: int) 
     table = np.zeros((count, 5))
     if modes is None or modes.residue.shape[0] != reference.residue.shape[0]:
         return table  # a dead sensor: nothing is found again
-    shift = modal.resonance_shift(modes, reference)
+    shift = response_change.resonance_shift(modes, reference)
     old, now = shift.pairs.T
     one, other = reference.residue[:, old], modes.residue[:, now]
     both = np.abs(np.sum(one.conj() * other, axis=0)) ** 2
