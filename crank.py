@@ -10,7 +10,7 @@ Examples
 """
 
 from .sim.contact.closed_forms import IdealCrank, ideal_crank
-from .sim.pump.hydraulics import (
+from .sim.hydraulics.flow_ripple import (
     FlowRipple,
     acceleration_constant,
     even_phases,

@@ -14,9 +14,9 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from sheets import COLOURS, folder_asked, label, sheet, write
 from wearstate.datasets.recipe.recipe import load_recipe, sample_records
+from wearstate.sim.hydraulics.flow_ripple import even_phases, flow_ripple
 from wearstate.sim.machine.simulate import simulate
 from wearstate.sim.machine.transfer import scene_transfer
-from wearstate.sim.pump.hydraulics import even_phases, flow_ripple
 from wearstate.sim.pump.setup import pin_offsets, run_scene
 from wearstate.sim.scene.load import load_scene
 from wearstate.sim.scene.pump import PumpScene

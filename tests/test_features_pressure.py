@@ -9,9 +9,10 @@ from scipy.optimize import brentq
 from wearstate.features.catalogue import needs
 from wearstate.features.catalogue import row as table
 from wearstate.features.rotation.pressure import mean_revolution, transitions
+from wearstate.sim.hydraulics.parameters import hydraulic_parameters
+from wearstate.sim.hydraulics.piston_pressure import two_level_pressure
 from wearstate.sim.machine.simulate import simulate
 from wearstate.sim.output.sensor import low_pass, mounting_poles
-from wearstate.sim.pump.hydraulics import hydraulic_parameters, two_level_pressure
 from wearstate.sim.scene.load import load_scene
 from wearstate.sim.scene.pump_hydraulics import CylinderPressure
 

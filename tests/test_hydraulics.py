@@ -11,8 +11,16 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, minimize_scalar
 from wearstate.sim.contact.closed_forms import kelvin_voigt_restitution
+from wearstate.sim.hydraulics import (
+    chamber,
+    chamber_run,
+    flow_ripple,
+    liquid,
+    parameters,
+    piston_pressure,
+    valves,
+)
 from wearstate.sim.jit import kernel
-from wearstate.sim.pump import hydraulics as hy
 from wearstate.sim.scene.parts import STANDARD_GRAVITY, SceneError, validate_table
 from wearstate.sim.scene.pump_hydraulics import CylinderPressure, Line, Liquid, Valve
 
@@ -36,19 +44,19 @@ RIGID = Liquid(air_fraction=0.0, bulk_modulus=1e12)
 
 def record(**fields):
     """Parameters of the bilge pump's cylinder."""
-    return hy.hydraulic_parameters(
+    return parameters.hydraulic_parameters(
         CylinderPressure(**fields), area=AREA, crank_radius=RADIUS, rod_length=ROD, speed=SPEED
     )[0]
 
 
-def chamber(**fields):
+def chamber_of(**fields):
     return record(**{**CHAMBER, **fields})
 
 
 def motion(angle):
     sine = RADIUS * np.sin(angle)
     piston = RADIUS * np.cos(angle) + np.sqrt(ROD**2 - sine**2)
-    return piston, -RADIUS * SPEED * hy.flow_shape(angle, RADIUS / ROD)
+    return piston, -RADIUS * SPEED * flow_ripple.flow_shape(angle, RADIUS / ROD)
 
 
 def acceleration(angle, h=1e-4):
@@ -58,10 +66,10 @@ def acceleration(angle, h=1e-4):
 
 def run(h, *, per_turn=10_000, turns=3.0, first=0.3, substeps=None, start=None):
     angle = first + TURN * np.arange(round(turns * per_turn) + 1) / per_turn
-    done = hy.run_chamber(
+    done = chamber_run.run_chamber(
         h, *motion(angle), step=TURN / SPEED / per_turn, substeps=substeps, start=start
     )
-    assert done.code == hy.CHAMBER_OK
+    assert done.code == chamber.CHAMBER_OK
     return angle, done.states, done.flows
 
 
@@ -75,7 +83,7 @@ def specific(p, liquid):
     return (1 - liquid.air_fraction) / (1 + p / liquid.bulk_modulus) + air
 
 
-HEALTHY = chamber()
+HEALTHY = chamber_of()
 
 
 @pytest.fixture(scope="module")
@@ -88,18 +96,32 @@ def healthy():
 
 def test_every_rung_has_a_code():
     rungs = CylinderPressure.model_fields["rung"].annotation.__args__
-    assert tuple(hy.PRESSURE_CODES) == rungs
-    assert list(hy.PRESSURE_CODES.values()) == [0, 1, 2, 3, 4, 4, 4]  # pipes on the same chamber
+    assert tuple(parameters.PRESSURE_CODES) == rungs
+    assert list(parameters.PRESSURE_CODES.values()) == [
+        0,
+        1,
+        2,
+        3,
+        4,
+        4,
+        4,
+    ]  # pipes on the same chamber
 
 
 @pytest.mark.parametrize("angle", [-1.0, 0.03, 2.0, 3.17, 5.0, 40.0])
 def test_simple_rungs(angle):
     levels = {"suction": -3e4, "discharge": 3e5, "rise_angle": 0.1}
-    assert hy.line_pressure(angle, SPEED, 1.0, record(rung="none", **levels)) == (0.0, 0.0)
-    assert hy.line_pressure(angle, SPEED, 1.0, record(rung="constant", **levels)) == (3e5, 0.0)
+    assert piston_pressure.line_pressure(angle, SPEED, 1.0, record(rung="none", **levels)) == (
+        0.0,
+        0.0,
+    )
+    assert piston_pressure.line_pressure(angle, SPEED, 1.0, record(rung="constant", **levels)) == (
+        3e5,
+        0.0,
+    )
     h = record(rung="two-level", **levels)
-    expected = hy.two_level_pressure(angle, -3e4, 3e5, h)
-    assert hy.line_pressure(angle, SPEED, 1.0, h) == (
+    expected = piston_pressure.two_level_pressure(angle, -3e4, 3e5, h)
+    assert piston_pressure.line_pressure(angle, SPEED, 1.0, h) == (
         expected,
         0.0,
     )
@@ -147,7 +169,7 @@ def test_heads_with_the_exact_flow(angle):
     delivers = angle > math.pi
     side = "discharge" if delivers else "suction"
     velocity, acc = motion(angle)[1], acceleration(angle)
-    p, mass = hy.line_pressure(angle, SPEED, float(velocity), record(**HEADS))
+    p, mass = piston_pressure.line_pressure(angle, SPEED, float(velocity), record(**HEADS))
     into_line = 1 if delivers else -1
     flow, rate = into_line * AREA * velocity, into_line * AREA * acc
     assert flow > 0
@@ -163,7 +185,7 @@ def test_heads_with_the_two_harmonic_flow():
         sign = 1 if side == "suction" else -1
         flow = sign * unit * (math.sin(angle) + ratio / 2 * math.sin(2 * angle))
         rate = sign * unit * SPEED * (math.cos(angle) + ratio * math.cos(2 * angle))
-        p, mass = hy.line_pressure(angle, SPEED, 99.0, h)  # the velocity is not asked
+        p, mass = piston_pressure.line_pressure(angle, SPEED, 99.0, h)  # the velocity is not asked
         assert mass == 0.0
         # the same formula twice: rounding
         assert_allclose(p, bernoulli(side, flow, rate, flow / AREA), rtol=1e-12)
@@ -173,11 +195,11 @@ def test_heads_with_the_two_harmonic_flow():
 def test_two_harmonic_flow_errs_with_the_cube_of_the_rod_ratio(ratio):
     angle = np.linspace(0, TURN, 20_001)
     flow = np.sin(angle) + ratio / 2 * np.sin(2 * angle)
-    error = np.abs(flow - hy.flow_shape(angle, ratio)).max()
+    error = np.abs(flow - flow_ripple.flow_shape(angle, ratio)).max()
     # lambda^3/4 max |2 sin^3 cos| = 3 sqrt(3)/32 lambda^3; the next term is 3/2 lambda^2 smaller
     assert_allclose(error, 3 * math.sqrt(3) / 32 * ratio**3, rtol=1.5 * ratio**2)
     rate = np.cos(angle) + ratio * np.cos(2 * angle)
-    slope = np.gradient(hy.flow_shape(angle, ratio), angle, edge_order=2)
+    slope = np.gradient(flow_ripple.flow_shape(angle, ratio), angle, edge_order=2)
     # at mid-stroke lambda (1 - 1/sqrt(1 - lambda^2)), exactly; 3e-8 from the difference quotient
     expected = ratio * (1 / math.sqrt(1 - ratio**2) - 1)
     assert_allclose(np.abs(rate - slope).max(), expected, atol=1e-7)
@@ -190,9 +212,9 @@ def test_heads_without_losses_at_low_speed_are_the_two_levels():
         | {"suction_valve": None, "discharge_valve": None}
     )
     for angle in np.linspace(0, TURN, 50):
-        p, mass = hy.line_pressure(angle, SPEED, 1e-6, h)
+        p, mass = piston_pressure.line_pressure(angle, SPEED, 1e-6, h)
         assert mass == 0.0
-        expected = hy.two_level_pressure(angle, -1e4, 2e5, h)
+        expected = piston_pressure.two_level_pressure(angle, -1e4, 2e5, h)
         assert_allclose(p, expected, rtol=0, atol=1e-8)  # rho u^2 = 1e-9 Pa
 
 
@@ -204,7 +226,7 @@ def test_heads_never_jump(flow):
     acc = acceleration(angle)
     p = np.array(
         [
-            np.dot(hy.line_pressure(a, SPEED, u, h), (1, b / AREA))
+            np.dot(piston_pressure.line_pressure(a, SPEED, u, h), (1, b / AREA))
             for a, u, b in zip(angle, v, acc, strict=True)
         ]
     )
@@ -217,36 +239,36 @@ def test_lowest_pressure_is_the_acceleration_head():
     h = record(rung="heads", suction_line=long, discharge_line=long, rise_angle=math.radians(0.5))
     pipe = math.pi / 4 * long.diameter**2
     mean = AREA * RADIUS * SPEED / math.pi / pipe
-    constant = hy.acceleration_constant(RADIUS / ROD, [0.0])
+    constant = flow_ripple.acceleration_constant(RADIUS / ROD, [0.0])
     head = long.length * mean * (60 * SPEED / TURN) * constant / STANDARD_GRAVITY
     # the steepest rise is at the dead centre, inside the blend of 0.5 deg: 1 - cos, and the
     # velocity head at 0.5 deg, 1e-4 of it each
     expected = -Liquid().density * STANDARD_GRAVITY * head
-    assert_allclose(hy.lowest_pressure(h), expected, rtol=5e-4)
+    assert_allclose(piston_pressure.lowest_pressure(h), expected, rtol=5e-4)
     with pytest.raises(ValueError, match=r"rung = 4 must be 3 \(heads\)"):
-        hy.lowest_pressure(HEALTHY)
+        piston_pressure.lowest_pressure(HEALTHY)
 
 
 # --- kinematic ripple
 
 RIPPLE = [  # lambda, phases, double acting, above, below, total in per cent of the mean
-    (1 / 6, hy.even_phases(1), False, 218.5, 100.0, 318.5),
-    (1 / 6, hy.even_phases(2), False, 59.25, 100.0, 159.25),
-    (1 / 6, hy.even_phases(3), False, 6.17, 16.95, 23.11),
-    (1 / 6, hy.even_phases(4), False, 11.07, 21.46, 32.53),
-    (1 / 6, hy.even_phases(6), False, 4.72, 9.31, 14.03),
-    (1 / 6, hy.even_phases(9), False, 0.56, 1.55, 2.10),
-    (1 / 6, hy.even_phases(1), True, 59.25, 100.0, 159.25),
+    (1 / 6, flow_ripple.even_phases(1), False, 218.5, 100.0, 318.5),
+    (1 / 6, flow_ripple.even_phases(2), False, 59.25, 100.0, 159.25),
+    (1 / 6, flow_ripple.even_phases(3), False, 6.17, 16.95, 23.11),
+    (1 / 6, flow_ripple.even_phases(4), False, 11.07, 21.46, 32.53),
+    (1 / 6, flow_ripple.even_phases(6), False, 4.72, 9.31, 14.03),
+    (1 / 6, flow_ripple.even_phases(9), False, 0.56, 1.55, 2.10),
+    (1 / 6, flow_ripple.even_phases(1), True, 59.25, 100.0, 159.25),
     (1 / 6, [0.0, math.pi / 2], True, 24.25, 21.46, 45.71),
-    (1 / 5, hy.even_phases(3), False, 6.80, 18.52, 25.31),
-    (1 / 5, hy.even_phases(5), False, 1.95, 5.57, 7.52),
-    (0.0, hy.even_phases(3), False, 4.72, 9.31, 14.03),
+    (1 / 5, flow_ripple.even_phases(3), False, 6.80, 18.52, 25.31),
+    (1 / 5, flow_ripple.even_phases(5), False, 1.95, 5.57, 7.52),
+    (0.0, flow_ripple.even_phases(3), False, 4.72, 9.31, 14.03),
 ]
 
 
 @pytest.mark.parametrize(("ratio", "phases", "double", "above", "below", "total"), RIPPLE)
 def test_flow_ripple_table(ratio, phases, double, above, below, total):
-    ripple = hy.flow_ripple(ratio, phases, double_acting=double)
+    ripple = flow_ripple.flow_ripple(ratio, phases, double_acting=double)
     found = [100 * ripple.above, 100 * ripple.below, 100 * ripple.total]
     # half a unit of the last printed digit, a whole one for the sum of two rounded
     assert_allclose(found, [above, below, total], rtol=0, atol=0.0501 if above > 100 else 0.0101)
@@ -254,7 +276,7 @@ def test_flow_ripple_table(ratio, phases, double, above, below, total):
 
 @pytest.mark.parametrize("cylinders", [2, 3, 4, 5, 8])
 def test_flow_ripple_of_sine_pumps(cylinders):
-    ripple = hy.flow_ripple(0.0, hy.even_phases(cylinders))
+    ripple = flow_ripple.flow_ripple(0.0, flow_ripple.even_phases(cylinders))
     # sum of sines: n even pulses n times a turn, n odd 2 n times, below a peak of 1 / sin
     half = math.pi / (cylinders if cylinders % 2 == 0 else 2 * cylinders)
     mean = cylinders / math.pi
@@ -268,19 +290,19 @@ def test_flow_ripple_of_sine_pumps(cylinders):
 def test_flow_ripple_of_uneven_cranks_against_brute_force():
     phases = np.array([0.0, 1.9, 4.4])
     angle = np.linspace(0, TURN, 400_001)
-    flow = sum(np.maximum(-hy.flow_shape(angle + phase, 0.25), 0) for phase in phases)
+    flow = sum(np.maximum(-flow_ripple.flow_shape(angle + phase, 0.25), 0) for phase in phases)
     mean = flow[:-1].mean()
-    ripple = hy.flow_ripple(0.25, phases)
+    ripple = flow_ripple.flow_ripple(0.25, phases)
     # the grid misses a kink by 8e-6 rad at slopes of about one
     assert_allclose(ripple.above, flow.max() / mean - 1, atol=2e-5)
     assert_allclose(ripple.below, 1 - flow.min() / mean, atol=2e-5)
 
 
 def test_flow_ripple_finds_a_peak_between_its_points():
-    phases = hy.even_phases(3)
+    phases = flow_ripple.even_phases(3)
 
     def delivered(angle):
-        return float(sum(max(-hy.flow_shape(angle + phase, 0.3), 0.0) for phase in phases))
+        return float(sum(max(-flow_ripple.flow_shape(angle + phase, 0.3), 0.0) for phase in phases))
 
     angles = np.linspace(0, TURN, 601)
     best = angles[np.argmax([delivered(angle) for angle in angles])]
@@ -290,25 +312,25 @@ def test_flow_ripple_finds_a_peak_between_its_points():
     )  # fmt: skip
     # a grid of 513 points an arc alone may miss it by h^2/8 = 5e-7; its parabola by h^4: 1e-11
     assert_allclose(
-        hy.flow_ripple(0.3, phases).above, -peak.fun / (3 / math.pi) - 1, rtol=0, atol=1e-9
+        flow_ripple.flow_ripple(0.3, phases).above, -peak.fun / (3 / math.pi) - 1, rtol=0, atol=1e-9
     )
 
 
 ACCELERATION = [  # phases, double acting, C of exact kinematics at lambda = 1/5
-    (hy.even_phases(1), False, 0.3948),
-    (hy.even_phases(1), True, 0.1974),
-    (hy.even_phases(2), False, 0.1974),
+    (flow_ripple.even_phases(1), False, 0.3948),
+    (flow_ripple.even_phases(1), True, 0.1974),
+    (flow_ripple.even_phases(2), False, 0.1974),
     ([0.0, math.pi / 2], True, 0.1155),
-    (hy.even_phases(3), False, 0.0658),
-    (hy.even_phases(5), False, 0.0395),
-    (hy.even_phases(7), False, 0.0282),
-    (hy.even_phases(9), False, 0.0219),
+    (flow_ripple.even_phases(3), False, 0.0658),
+    (flow_ripple.even_phases(5), False, 0.0395),
+    (flow_ripple.even_phases(7), False, 0.0282),
+    (flow_ripple.even_phases(9), False, 0.0219),
 ]
 
 
 @pytest.mark.parametrize(("phases", "double", "expected"), ACCELERATION)
 def test_acceleration_constants(phases, double, expected):
-    found = hy.acceleration_constant(0.2, phases, double_acting=double)
+    found = flow_ripple.acceleration_constant(0.2, phases, double_acting=double)
     assert_allclose(found, expected, rtol=0, atol=0.501e-4)  # half a unit of the last digit
 
 
@@ -316,10 +338,10 @@ def test_acceleration_constant_of_one_cylinder_in_closed_form():
     for ratio in (0.0, 0.2, 0.4):
         # steepest at the top dead centre: pi (1 + lambda) 2 pi / 60
         expected = math.pi * (1 + ratio) * TURN / 60
-        assert_allclose(hy.acceleration_constant(ratio, [0.7]), expected, rtol=1e-11)
+        assert_allclose(flow_ripple.acceleration_constant(ratio, [0.7]), expected, rtol=1e-11)
 
 
-@pytest.mark.parametrize("function", [hy.flow_ripple, hy.acceleration_constant])
+@pytest.mark.parametrize("function", [flow_ripple.flow_ripple, flow_ripple.acceleration_constant])
 def test_impossible_pumps(function):
     with pytest.raises(ValueError, match=r"crank_to_rod = 1 must be in \[0, 1\)"):
         function(1, [0.0])
@@ -335,7 +357,7 @@ def test_impossible_pumps(function):
 def test_specific_volume(air, p):
     liquid = Liquid(air_fraction=air)
     h = record(liquid=liquid)
-    v, slope = hy.specific_volume(p, h)
+    v, slope = liquid.specific_volume(p, h)
     assert_allclose(v, specific(p, liquid), rtol=1e-15)
     # complex step: exact to rounding
     derivative = specific(p + 1e-20j, liquid).imag / 1e-20
@@ -345,7 +367,7 @@ def test_specific_volume(air, p):
 def test_bulk_moduli_of_water_and_air_at_atmospheric_pressure():
     for air, exponent in ((0.0, 1.4), (0.01, 1.0), (0.01, 1.4), (0.2, 1.4)):
         h = record(liquid=Liquid(air_fraction=air, air_exponent=exponent))
-        v, slope = hy.specific_volume(0.0, h)
+        v, slope = liquid.specific_volume(0.0, h)
         # compliances in series by volume: (1 - a) / B + a / (n p_a)
         expected = (1 - air) / 2.18e9 + air / (exponent * ATMOSPHERE)
         assert_allclose(-slope / v, expected, rtol=1e-14)
@@ -356,14 +378,14 @@ def test_bulk_moduli_of_water_and_air_at_atmospheric_pressure():
 def test_series_for_the_air(p, e, exponent):
     h = record(liquid=Liquid(air_fraction=0.2, air_exponent=exponent))
     near = p + e * (p + ATMOSPHERE)
-    known = (p, hy.air_volume(p, h), 1 / (p + ATMOSPHERE))
+    known = (p, liquid.air_volume(p, h), 1 / (p + ATMOSPHERE))
     # five terms: the sixth is below 1e-12 of the air, and half of it at the end of the reach
-    assert_allclose(hy._air_near(near, known, h), hy.air_volume(near, h), rtol=2e-12)
+    assert_allclose(liquid.air_near(near, known, h), liquid.air_volume(near, h), rtol=2e-12)
 
 
 def shut(**fields):
     """A chamber without ways in or out; no scene may have it."""
-    h = chamber(suction_valve=Valve(stuck_lift=0.0), **fields).copy()
+    h = chamber_of(suction_valve=Valve(stuck_lift=0.0), **fields).copy()
     h["discharge_stuck"] = 0.0
     return h
 
@@ -378,7 +400,9 @@ def test_closed_chamber_follows_its_equation_of_state(liquid, squeeze):
     x = np.linspace(0.25, 0.25 + squeeze, n + 1)
     step = 2e-5
     start = np.array([-2e4, 0, 0, 0, 0, 0])
-    done = hy.run_chamber(h, x, np.full(n + 1, squeeze / (n * step)), step=step, start=start)
+    done = chamber_run.run_chamber(
+        h, x, np.full(n + 1, squeeze / (n * step)), step=step, start=start
+    )
     room = DEAD + AREA * (RADIUS + ROD - x)
     target = specific(-2e4, liquid) * room[-1] / room[0]
     expected = brentq(lambda p: specific(p, liquid) - target, -1e5, 5e9, xtol=1e-9)
@@ -403,7 +427,7 @@ BOOKS = {
 @pytest.mark.parametrize("fields", BOOKS.values(), ids=BOOKS)
 @pytest.mark.parametrize("substeps", [1, 3])
 def test_mass_books(fields, substeps):
-    h = chamber(**fields)
+    h = chamber_of(**fields)
     liquid = fields.get("liquid", Liquid())
     angle, states, flows = run(h, turns=2, substeps=substeps)
     mass = (volume(h, angle) - states[:, 1]) / specific(states[:, 0], liquid)
@@ -418,7 +442,7 @@ def test_mass_books(fields, substeps):
 def energy_gap(per_turn):
     """Piston work less line work, losses in the gaps and work on the plates, of one turn."""
     liquid = Liquid(air_fraction=0.0)
-    h = chamber(liquid=liquid)
+    h = chamber_of(liquid=liquid)
     angle, states, flows = run(h, per_turn=per_turn, turns=4)
     p, _, z_s, v_s, z_d, v_d = states[-per_turn - 1 :].T
     room = volume(h, angle[-per_turn - 1 :])
@@ -515,7 +539,7 @@ def test_chamber_against_an_independent_solver(independent):
 @pytest.mark.parametrize("liquid", [Liquid(), Liquid(air_fraction=0.0), RIGID])
 def test_observed_order(liquid):
     # free flight of the suction valve, from the balance at 60 deg: nothing opens or closes
-    h = chamber(liquid=liquid)
+    h = chamber_of(liquid=liquid)
     ends = [run(h, per_turn=n, first=1.0, turns=0.1, substeps=1)[1][-1] for n in (2000, 4000, 8000)]
     exact = run(h, per_turn=256_000, first=1.0, turns=0.1, substeps=1)[1][-1]
     for column in (0, 2, 3):
@@ -527,8 +551,8 @@ def test_observed_order(liquid):
 def test_two_substeps_are_two_steps():
     angle = 1.0 + TURN * np.arange(401) / 20_000
     x, v = motion(angle)
-    fine = hy.run_chamber(HEALTHY, x, v, step=1e-5, substeps=1)
-    coarse = hy.run_chamber(HEALTHY, x[::2], v[::2], step=2e-5, substeps=2)
+    fine = chamber_run.run_chamber(HEALTHY, x, v, step=1e-5, substeps=1)
+    coarse = chamber_run.run_chamber(HEALTHY, x[::2], v[::2], step=2e-5, substeps=2)
     # only the cubic between the ends differs: h^4 / 384 of x'''' = 1e-17 m, on B/V of 1e11 Pa/m^3
     assert_allclose(coarse.states[-1, 0], fine.states[-1, 0], rtol=0, atol=1e-3)
     assert_allclose(coarse.states[-1, 2:], fine.states[-1, 2:], rtol=0, atol=1e-9)
@@ -545,11 +569,11 @@ def test_westphal():
         mass=1e-6, stiffness=0.3, preload_lift=drop * seat / 0.3, damping=0.0,
         seat_stiffness=9e5, seat_damping=0.0,
     )  # fmt: skip
-    h = chamber(suction=0.0, suction_valve=valve, discharge_valve=valve, liquid=RIGID)
+    h = chamber_of(suction=0.0, suction_valve=valve, discharge_valve=valve, liquid=RIGID)
     per_turn = 40_000
     angle = 0.5 + TURN * np.arange(round(1.2 * per_turn)) / per_turn
     x, v = 0.25 + RADIUS * np.cos(angle), -RADIUS * SPEED * np.sin(angle)
-    done = hy.run_chamber(h, x, v, step=0.2 / per_turn, substeps=1)
+    done = chamber_run.run_chamber(h, x, v, step=0.2 / per_turn, substeps=1)
     lift = done.states[:, 4]
     # C_d pi D v z = A r w sin - A_v z', z = Z sin(a - pi - phi) in the discharge stroke
     gap = 4 * math.pi * 0.045 * 0.65 * math.sqrt(2 * drop / RIGID.density)
@@ -583,7 +607,7 @@ def bounce(ratio, lift, rate, step, n):
     h = lone_valve(ratio)
     still = np.full(n + 1, 0.27)
     start = np.array([0.0, 0.0, lift, rate, 0.0, 0.0])
-    return hy.run_chamber(h, still, 0 * still, step=step, substeps=1, start=start)
+    return chamber_run.run_chamber(h, still, 0 * still, step=step, substeps=1, start=start)
 
 
 @pytest.mark.parametrize("ratio", [0.0, 0.1, 0.3])
@@ -601,13 +625,13 @@ def test_seat_and_stop_rebound_as_a_spring_with_damper(ratio, stop):
 
 
 def test_a_closed_valve_presses_on_its_seat():
-    h = chamber()
+    h = chamber_of()
     p = 1e5
     still = np.full(3001, 0.27)
     h = h.copy()
     h["discharge_stuck"] = 0.0
     start = np.array([p, 0, 0.0, 0, 0, 0])
-    done = hy.run_chamber(h, still, 0 * still, step=2e-5, start=start)
+    done = chamber_run.run_chamber(h, still, 0 * still, step=2e-5, start=start)
     pressure = done.states[-1, 0]
     force = 4 * (Valve().stiffness * Valve().preload_lift) + h["suction_area"] * (pressure + 3e4)
     # at rest after 60 ms; the spring in the seat's dent takes 1e-4 of it
@@ -625,7 +649,7 @@ def test_start_is_close_to_the_settled_cycle(healthy):
     angle, states, _ = healthy
     for first in (1.5, 4.7):
         x, v = motion(first)
-        start = hy.chamber_start(HEALTHY, float(x), float(v))
+        start = chamber_run.chamber_start(HEALTHY, float(x), float(v))
         settled = states[np.argmin(np.abs(angle - first - TURN))]
         # valves in motion are not quite in balance
         assert_allclose(start[0], settled[0], rtol=0, atol=1.5e3)
@@ -643,7 +667,7 @@ def test_healthy_pump(healthy):
     delivered = flows[last, 1].sum() / SWEPT
     assert 0.97 < delivered < 1.0
     for side, column in (("suction", 2), ("discharge", 4)):
-        assert_array_equal(hy.lift_left(angle, states[:, column], side, 8e-3), 0.0)
+        assert_array_equal(valves.lift_left(angle, states[:, column], side, 8e-3), 0.0)
 
 
 # --- faults and limits
@@ -655,7 +679,7 @@ def test_cavitation_with_the_suction_valve_stuck_shut():
     angle = 0.1 + TURN * np.arange(10_001) / 10_000
     x, v = motion(angle)
     start = np.array([0.0, 0, 0, 0, 0, 0])
-    done = hy.run_chamber(h, x, v, step=2e-5, start=start)
+    done = chamber_run.run_chamber(h, x, v, step=2e-5, start=start)
     room = volume(h, angle)
     mass = room[0] / specific(0.0, liquid)
     bubble = room - mass * specific(float(h["vapour"]), liquid)
@@ -668,7 +692,7 @@ def test_cavitation_with_the_suction_valve_stuck_shut():
 
 
 def test_starved_suction_collapses_with_a_blow(healthy):
-    angle, states, flows = run(chamber(suction=-9.0e4))
+    angle, states, flows = run(chamber_of(suction=-9.0e4))
     vapour = states[:, 1] > 0
     assert 0.5 < vapour[-10_000:].mean() < 0.8
     assert states[:, 0].max() > 1.5 * healthy[1][:, 0].max()
@@ -681,7 +705,7 @@ def test_starved_suction_collapses_with_a_blow(healthy):
 
 @pytest.mark.parametrize("leak", [2e-6, 2e-5])
 def test_leaking_discharge_valve_follows_the_orifice_formula(healthy, leak):
-    flows = run(chamber(discharge_valve=Valve(leak_area=leak)))[2]
+    flows = run(chamber_of(discharge_valve=Valve(leak_area=leak)))[2]
     lost = healthy[2][-10_000:, 1].sum() - flows[-10_000:, 1].sum()
     suction = 1.6e4 + 3e4  # mean of the suction stroke, gauge below zero
     speed = Valve().discharge_coefficient * math.sqrt(2 * (3e5 + suction) / Liquid().density)
@@ -690,11 +714,11 @@ def test_leaking_discharge_valve_follows_the_orifice_formula(healthy, leak):
 
 
 def test_stuck_valves():
-    _, states, flows = run(chamber(suction_valve=Valve(stuck_lift=4e-3)))
+    _, states, flows = run(chamber_of(suction_valve=Valve(stuck_lift=4e-3)))
     assert states[:, 0].max() < 0.1 * 3e5  # no pressure
     assert abs(flows[-10_000:, 1].sum()) < 1e-9 * SWEPT  # no delivery
     assert np.all(states[:, 2] == 4e-3)
-    _, states, flows = run(chamber(discharge_valve=Valve(stuck_lift=4e-3)))
+    _, states, flows = run(chamber_of(discharge_valve=Valve(stuck_lift=4e-3)))
     assert states[-10_000:, 0].min() > 2e5
     assert abs(flows[-10_000:, 0].sum()) < 1e-9 * SWEPT
 
@@ -702,7 +726,7 @@ def test_stuck_valves():
 def quick(scale):
     """Rigid liquid; valves that open at `scale` times 2 kPa and pass the flow with no lift."""
     valve = Valve(stiffness=0.0, damping=0.0, mass=0.01 * scale)
-    h = chamber(suction_valve=valve, discharge_valve=valve, liquid=RIGID).copy()
+    h = chamber_of(suction_valve=valve, discharge_valve=valve, liquid=RIGID).copy()
     for side in ("suction", "discharge"):
         h[f"{side}_preload"] = 2e3 * scale * h[f"{side}_area"]
         h[f"{side}_gap_conductance"] *= 10 / scale**2
@@ -717,7 +741,9 @@ def test_quick_valves_and_rigid_liquid_approach_the_two_levels():
         stroke = angle[last] % math.pi
         away = (stroke > 0.25) & (stroke < 3.0)
         sharp = record(rung="two-level", rise_angle=0.01)
-        levels = np.array([hy.two_level_pressure(a, -3e4, 3e5, sharp) for a in angle[last]])
+        levels = np.array(
+            [piston_pressure.two_level_pressure(a, -3e4, 3e5, sharp) for a in angle[last]]
+        )
         errors.append(np.abs(states[last, 0] - levels)[away].mean())
     # what is left is what opens the valves
     assert_allclose(errors, [2e3, 1e3, 0.5e3], rtol=0.05)
@@ -726,9 +752,9 @@ def test_quick_valves_and_rigid_liquid_approach_the_two_levels():
 @pytest.mark.parametrize(("stiffness", "closes"), [(3.3e3, True), (1e3, True), (300.0, False)])
 def test_soft_spring_is_noticed(stiffness, closes):
     valve = Valve(stiffness=stiffness)
-    angle, states, _ = run(chamber(suction_valve=valve, discharge_valve=valve))
+    angle, states, _ = run(chamber_of(suction_valve=valve, discharge_valve=valve))
     for side, column in (("suction", 2), ("discharge", 4)):
-        left = hy.lift_left(angle, states[:, column], side, valve.max_lift)
+        left = valves.lift_left(angle, states[:, column], side, valve.max_lift)
         assert len(left) == 3
         assert np.all(left < 0.03) if closes else np.all(left[1:] > 0.2)
 
@@ -736,28 +762,28 @@ def test_soft_spring_is_noticed(stiffness, closes):
 def test_lift_left_counts_the_right_dead_centres():
     angle = np.linspace(1.0, 14.0, 20_000)
     lift = np.where(np.abs(angle - 3 * math.pi) < 0.01, 4e-3, 0.0)  # open there alone
-    assert_array_equal(hy.lift_left(angle, lift, "suction", 8e-3, after=0.0), [0.0, 0.5])
-    assert_array_equal(hy.lift_left(angle, lift, "discharge", 8e-3, after=math.pi), [0.0, 0.5])
-    assert_array_equal(hy.lift_left(angle, lift, "discharge", 8e-3, after=0.0), [0.0, 0.0])
+    assert_array_equal(valves.lift_left(angle, lift, "suction", 8e-3, after=0.0), [0.0, 0.5])
+    assert_array_equal(valves.lift_left(angle, lift, "discharge", 8e-3, after=math.pi), [0.0, 0.5])
+    assert_array_equal(valves.lift_left(angle, lift, "discharge", 8e-3, after=0.0), [0.0, 0.0])
     with pytest.raises(ValueError, match="side = 'inlet' must be 'suction' or 'discharge'"):
-        hy.lift_left(angle, lift, "inlet", 8e-3)
+        valves.lift_left(angle, lift, "inlet", 8e-3)
 
 
 def test_status_instead_of_nonsense():
     x, v = motion(1.0)
-    start = hy.chamber_start(HEALTHY, float(x), float(v))
+    start = chamber_run.chamber_start(HEALTHY, float(x), float(v))
     for state, end, code in (
-        (start, 0.3 + 1.1 * DEAD / AREA, hy.CHAMBER_NO_VOLUME),
-        (np.array([math.nan, 0, 0, 0, 0, 0]), float(x), hy.CHAMBER_NOT_FINITE),
-        (np.array([0, 0, 0, math.nan, 0, 0]), float(x), hy.CHAMBER_NOT_FINITE),
-        (np.array([0, 0, 0, 0, 0, math.inf]), float(x), hy.CHAMBER_NOT_FINITE),
+        (start, 0.3 + 1.1 * DEAD / AREA, chamber.CHAMBER_NO_VOLUME),
+        (np.array([math.nan, 0, 0, 0, 0, 0]), float(x), chamber.CHAMBER_NOT_FINITE),
+        (np.array([0, 0, 0, math.nan, 0, 0]), float(x), chamber.CHAMBER_NOT_FINITE),
+        (np.array([0, 0, 0, 0, 0, math.inf]), float(x), chamber.CHAMBER_NOT_FINITE),
     ):
         after, flows = state.copy(), np.full(4, 7.0)
-        found = hy.chamber_step(after, flows, HEALTHY, 2e-5, float(x), float(v), end, 0.0, 1)
+        found = chamber.chamber_step(after, flows, HEALTHY, 2e-5, float(x), float(v), end, 0.0, 1)
         assert found == code
         assert_array_equal(after, state)  # as it was
         assert_array_equal(flows, 7.0)
-    assert set(hy.CHAMBER_TEXT) == {0, 1, 2}
+    assert set(chamber.CHAMBER_TEXT) == {0, 1, 2}
 
 
 @settings(max_examples=60, deadline=None)
@@ -777,7 +803,7 @@ def test_any_pump_gives_numbers_or_a_status(
     speed, mass, stiffness, air, modulus, suction, rise, dead, per_turn, leak
 ):
     valve = Valve(mass=mass, stiffness=stiffness, leak_area=leak)
-    h = chamber(
+    h = chamber_of(
         suction=suction,
         discharge=suction + rise,
         suction_valve=valve,
@@ -787,11 +813,11 @@ def test_any_pump_gives_numbers_or_a_status(
     )
     angle = TURN * np.arange(3 * per_turn) / per_turn
     x, v = motion(angle)
-    done = hy.run_chamber(h, x, v * speed / 5, step=1 / speed / per_turn, substeps=1)
-    assert done.code in (hy.CHAMBER_OK, hy.CHAMBER_NOT_FINITE)
+    done = chamber_run.run_chamber(h, x, v * speed / 5, step=1 / speed / per_turn, substeps=1)
+    assert done.code in (chamber.CHAMBER_OK, chamber.CHAMBER_NOT_FINITE)
     assert np.all(np.isfinite(done.states))
     assert np.all(np.isfinite(done.flows))
-    if done.code == hy.CHAMBER_OK:
+    if done.code == chamber.CHAMBER_OK:
         room = dead + AREA * (RADIUS + ROD - x)
         held = (room - done.states[:, 1]) / specific(
             done.states[:, 0], Liquid(air_fraction=air, bulk_modulus=modulus)
@@ -803,16 +829,16 @@ def test_any_pump_gives_numbers_or_a_status(
 @kernel
 def _twice(records, state, flows, x, v, step):
     h = records[0]
-    code = hy.chamber_step(state, flows, h, step, x, v, x, v, 1)
-    pressure, mass = hy.line_pressure(1.0, 30.0, v, h)
-    return code + hy.chamber_step(state, flows, h, step, x, v, x, v, 1), pressure, mass
+    code = chamber.chamber_step(state, flows, h, step, x, v, x, v, 1)
+    pressure, mass = piston_pressure.line_pressure(1.0, 30.0, v, h)
+    return code + chamber.chamber_step(state, flows, h, step, x, v, x, v, 1), pressure, mass
 
 
 def test_records_pass_inside_kernels():
-    records = hy.hydraulic_parameters(
+    records = parameters.hydraulic_parameters(
         CylinderPressure(**CHAMBER), area=AREA, crank_radius=RADIUS, rod_length=ROD, speed=SPEED
     )
-    state, flows = hy.chamber_start(records[0], 0.25, 0.0), np.zeros(4)
+    state, flows = chamber_run.chamber_start(records[0], 0.25, 0.0), np.zeros(4)
     assert _twice(records, state, flows, 0.25, 0.0, 2e-5) == (0, 0.0, 0.0)
 
 
@@ -880,11 +906,11 @@ def test_scenes_of_the_first_rungs_stay_valid():
 
 
 def test_valve_groups_add_up():
-    four = chamber()
+    four = chamber_of()
     alone = Valve().model_dump() | {"count": 1}
-    one = chamber(suction_valve=Valve(**alone))
+    one = chamber_of(suction_valve=Valve(**alone))
     for name in ("gap_conductance", "area", "mass", "stiffness", "preload", "seat_stiffness"):
         assert_allclose(four[f"suction_{name}"], 4 * one[f"suction_{name}"], rtol=1e-15)
-    assert hy.chamber_substeps(four, 2e-5) == hy.chamber_substeps(one, 2e-5) == 1
+    assert chamber_run.chamber_substeps(four, 2e-5) == chamber_run.chamber_substeps(one, 2e-5) == 1
     # sqrt(50e6 / 0.1) = 22361 rad/s, half a radian each
-    assert hy.chamber_substeps(four, 1e-3) == 45
+    assert chamber_run.chamber_substeps(four, 1e-3) == 45

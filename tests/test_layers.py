@@ -36,6 +36,7 @@ ROOMS = {
         "excitation",
         "beam",
         "alignment",
+        "hydraulics",
         "piping",
         "pump",
         "pump_lanes",

@@ -14,11 +14,12 @@ from scipy.integrate import quad
 from wearstate.diagnose.literature.verify_contact import rebound
 from wearstate.sim.contact.closed_forms import ideal_crank, kelvin_voigt_restitution
 from wearstate.sim.contact.law import RELEASE_AT_ZERO_FORCE, RELEASE_AT_ZERO_PENETRATION
+from wearstate.sim.hydraulics.parameters import hydraulic_parameters
+from wearstate.sim.hydraulics.piston_pressure import two_level_pressure
 from wearstate.sim.jit import half_turn_angle, power, sine_cosine
 from wearstate.sim.machine.simulate import simulate
 from wearstate.sim.pump import setup as cs
 from wearstate.sim.pump import slider_crank as sc
-from wearstate.sim.pump.hydraulics import hydraulic_parameters, two_level_pressure
 from wearstate.sim.scene.load import load_scene
 from wearstate.sim.scene.pump_hydraulics import CylinderPressure
 

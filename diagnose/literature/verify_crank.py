@@ -8,7 +8,7 @@ import numpy as np
 
 from ...sim.contact.closed_forms import IdealCrank
 from ...sim.contact.law import CONTACT
-from ...sim.pump.hydraulics import HYDRAULIC
+from ...sim.hydraulics.parameters import HYDRAULIC
 from ...sim.pump.oiled_joint import OIL
 from ...sim.pump.setup import ideal_motion
 from ...sim.pump.slider_crank import (

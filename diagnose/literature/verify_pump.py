@@ -6,14 +6,10 @@ from functools import cache, partial
 
 import numpy as np
 
+from ...sim.hydraulics.chamber_run import run_chamber
+from ...sim.hydraulics.flow_ripple import acceleration_constant, even_phases, flow_ripple
+from ...sim.hydraulics.parameters import hydraulic_parameters
 from ...sim.piping.pipe import drive_pipe, pipe_parameters, pipe_start
-from ...sim.pump.hydraulics import (
-    acceleration_constant,
-    even_phases,
-    flow_ripple,
-    hydraulic_parameters,
-    run_chamber,
-)
 from ...sim.scene.pump_hydraulics import CylinderPressure, Damper, Line, Liquid, Valve
 
 

@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..excitation.forces import Push
+from ..hydraulics.chamber import GATHERED
+from ..hydraulics.valves import lift_left
 from ..output.recording import Recording
 from ..output.sensor import (
     anti_alias_poles,
@@ -41,7 +43,6 @@ from .casing import (
     edge_samples,
 )
 from .casing_frf import Accelerance, load_accelerance
-from .hydraulics import GATHERED, lift_left
 from .pressure_sensors import cylinder_pressure, pressures_at_rest, read_pressures
 from .push import casing_pushes, pushed_places, read_cells
 from .setup import (

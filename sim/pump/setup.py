@@ -30,6 +30,9 @@ from ..contact.law import (
 from ..film.heat import film_temperature, friction_power
 from ..film.impedance_map import ImpedanceMap, impedance_map
 from ..film.solve import FilmGeometry
+from ..hydraulics.chamber_run import chamber_start, chamber_substeps
+from ..hydraulics.parameters import HYDRAULIC, PRESSURE_CHAMBER, hydraulic_parameters
+from ..hydraulics.piston_pressure import line_pressure
 from ..jit import kernel
 from ..piping.pipe import pipe_parameters, pipe_start
 from ..scene.pump import (
@@ -42,14 +45,6 @@ from ..scene.pump import (
 )
 from ..scene.pump_hydraulics import BREATHING_RUNGS, PIPED_RUNGS, CylinderPressure
 from .casing import casing_inputs, exact_oscillator
-from .hydraulics import (
-    HYDRAULIC,
-    PRESSURE_CHAMBER,
-    chamber_start,
-    chamber_substeps,
-    hydraulic_parameters,
-    line_pressure,
-)
 from .oiled_joint import OIL
 from .slider_crank import (
     AT_REST,

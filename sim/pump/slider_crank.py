@@ -39,11 +39,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..contact.law import LAW_CONSTANT_LOSS, friction_force
+from ..hydraulics.chamber import chamber_step
+from ..hydraulics.parameters import PRESSURE_CHAMBER
+from ..hydraulics.piston_pressure import line_pressure
 from ..jit import kernel, sine_cosine, subroutine
 from ..output.status import Status
 from ..piping.coupling import PAIR, begin_pair, seek_pair
 from ..piping.pipe import PIPE, PIPE_STATE, advance_pipe
-from .hydraulics import PRESSURE_CHAMBER, chamber_step, line_pressure
 from .oiled_joint import oiled_joint
 from .throw_motion import (
     PinLoad,

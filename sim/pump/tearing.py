@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..hydraulics.piston_pressure import lowest_pressure
 from ..scene.pump import PumpScene
-from .hydraulics import lowest_pressure
 from .setup import hydraulics_of, piston_area, run_scene
 
 _TRIAL_TURNS = 2.0

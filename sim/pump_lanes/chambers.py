@@ -2,14 +2,10 @@
 
 from typing import Any
 
+from ..hydraulics.chamber import chamber_at_once, implicit_part
+from ..hydraulics.liquid import air_volume
+from ..hydraulics.valves import ValveSide, valve_shares
 from ..jit import kernel, subroutine
-from ..pump.hydraulics import (
-    ValveSide,
-    air_volume,
-    chamber_at_once,
-    implicit_part,
-    valve_shares,
-)
 from ..pump.slider_crank import WITH_VAPOUR, breathe
 from .fields import fields_of, put_fields
 from .rates import CHAMBER_COLUMNS, LANES, PISTON_X, ChamberLane

@@ -21,9 +21,10 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from ..hydraulics.chamber import GATHERED
+from ..hydraulics.valves import ValveSide
 from ..jit import kernel, subroutine
 from ..output.status import Status
-from ..pump.hydraulics import GATHERED, ValveSide
 from ..pump.setup import JOINT_CODES, Start, joint_parts, joint_rungs, runs_on_a_map
 from ..pump.slider_crank import (
     CHANGES,

@@ -5,8 +5,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..hydraulics.chamber import GATHERED
 from ..jit import kernel, subroutine
-from ..pump.hydraulics import GATHERED
 from ..pump.slider_crank import (
     CONTACTS,
     FORCES,

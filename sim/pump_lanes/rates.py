@@ -22,13 +22,10 @@ from ..film.impedance_map import (
     map_tensor,
 )
 from ..film.short import short_resistance
+from ..hydraulics.parameters import PRESSURE_CONSTANT, PRESSURE_TWO_LEVEL
+from ..hydraulics.piston_pressure import two_level_pressure
+from ..hydraulics.valves import ValveSide
 from ..jit import NEAR, kernel, near_sine_cosine, sine_cosine, subroutine
-from ..pump.hydraulics import (
-    PRESSURE_CONSTANT,
-    PRESSURE_TWO_LEVEL,
-    ValveSide,
-    two_level_pressure,
-)
 from ..pump.oiled_joint import (
     NEWTON_STEPS,
     FilmPull,
