@@ -38,6 +38,7 @@ ROOMS = {
         "alignment",
         "hydraulics",
         "piping",
+        "mechanism",
         "pump",
         "pump_lanes",
         "journal",

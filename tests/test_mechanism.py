@@ -9,8 +9,8 @@ from numpy.testing import assert_allclose
 from wearstate.diagnose.literature.verify_contact import impact
 from wearstate.sim.contact.law import CONTACT, ELASTIC_HERTZ, LAW_HYSTERESIS, hysteresis
 from wearstate.sim.machine.simulate import simulate
+from wearstate.sim.mechanism import crank_run, layout, throw_motion
 from wearstate.sim.pump import setup as cs
-from wearstate.sim.pump import slider_crank as sc
 from wearstate.sim.scene.load import load_scene
 
 IDEAL, LINK, COMPLIANT = "ideal", "link", "compliant"
@@ -70,7 +70,7 @@ def run(scene, t, *, step, duration, angle=0.3, speed=None, kick=0.0):
     """Run from the library's own start; a kick [m/s] sends rods and pistons along the stroke."""
     bodies = cs.start_state(scene, angle, t)
     bodies[:, [6, 9]] += kick
-    found = sc.run_mechanism(
+    found = crank_run.run_mechanism(
         t,
         angle=angle,
         speed=2 * math.pi * scene.drive.speed if speed is None else speed,
@@ -134,10 +134,12 @@ def mechanical_energy(scene, t, found):
     energy += m.static_moment * (m.gravity_x * np.cos(angle) + m.gravity_y * np.sin(angle))
     pushed = []
     for joint, (offset, _) in enumerate(offsets(scene, found)):
-        if cs.joint_rungs(scene, 0)[joint] == sc.JOINT_COMPLIANT:
+        if cs.joint_rungs(scene, 0)[joint] == layout.JOINT_COMPLIANT:
             pushed.append((joint, np.abs(offset) - contacts[joint]["clearance"]))
-    if cs.joint_rungs(scene, 0)[sc.GUIDE] == sc.JOINT_COMPLIANT:
-        pushed += [(sc.GUIDE, o) for o, _, _ in corners(found, contacts[sc.GUIDE]["clearance"])]
+    if cs.joint_rungs(scene, 0)[layout.GUIDE] == layout.JOINT_COMPLIANT:
+        pushed += [
+            (layout.GUIDE, o) for o, _, _ in corners(found, contacts[layout.GUIDE]["clearance"])
+        ]
     for joint, overlap in pushed:
         energy += 0.5 * contacts[joint]["stiffness"] * np.maximum(overlap, 0.0) ** 2
     return energy
@@ -250,14 +252,14 @@ def joint_losses(scene, t, found):
     spins = speed, found.bodies[:, 0, 11]
     lost = np.zeros(len(found.turns))
     for joint, (offset, rate) in enumerate(offsets(scene, found)):
-        if cs.joint_rungs(scene, 0)[joint] != sc.JOINT_COMPLIANT:
+        if cs.joint_rungs(scene, 0)[joint] != layout.JOINT_COMPLIANT:
             continue
         c = t.contacts[0, joint]
         along = np.conj(offset / abs(offset)) * rate
         slide = along.imag + radii[joint] * spins[joint] + (radii[joint] + c["clearance"]) * dbeta
         lost += contact_loss(c, abs(offset) - c["clearance"], along.real, slide)
-    if cs.joint_rungs(scene, 0)[sc.GUIDE] == sc.JOINT_COMPLIANT:
-        c = t.contacts[0, sc.GUIDE]
+    if cs.joint_rungs(scene, 0)[layout.GUIDE] == layout.JOINT_COMPLIANT:
+        c = t.contacts[0, layout.GUIDE]
         lost += sum(contact_loss(c, *corner) for corner in corners(found, c["clearance"]))
     return middle(lost)
 
@@ -423,7 +425,7 @@ def test_motor_settles_on_its_curve(load):
     # The ripple of 1 mg in the flywheel of half a kg m^2, and exp(-4 s over time constant).
     assert_allclose(found.turns[-1, 1], expected, rtol=1e-6)
     assert abs(found.turns[0, 1] / expected - 1) > 0.01
-    assert_allclose(sc.motor_moment(expected, t.machine), 0.0, atol=1e-9 * load)
+    assert_allclose(throw_motion.motor_moment(expected, t.machine), 0.0, atol=1e-9 * load)
 
 
 @pytest.mark.parametrize("rungs", [(IDEAL, IDEAL, IDEAL), (LINK, IDEAL, COMPLIANT)], ids="-".join)
@@ -465,7 +467,7 @@ def test_triplex_at_constant_speed_is_three_simplexes(rungs, pressure):
     for throw in range(3):
         scene = pump(rungs, throws=[THREE[throw]], **changes)
         alone = run(scene, cs.tables(scene, step), step=step, duration=0.2)
-        own = slice(1 + len(sc.FORCES) * throw, 1 + len(sc.FORCES) * (throw + 1))
+        own = slice(1 + len(layout.FORCES) * throw, 1 + len(layout.FORCES) * (throw + 1))
         # A change of contact cuts the step of all throws: equal but for the integrator.
         tolerance = 1e-3 if together.contact_changes else 1e-12
         size = abs(alone.forces[:, 1:]).max()
@@ -592,7 +594,7 @@ def test_turning_backwards_mirrors_the_motion(rungs):
     bodies = cs.start_state(scene, 0.3, t)
     turn = 2 * math.pi * scene.drive.speed
     there, back = (
-        sc.run_mechanism(
+        crank_run.run_mechanism(
             t, angle=sign * 0.3, speed=sign * turn, bodies=start, step=step, n_steps=5000
         )
         for sign, start in ((1, bodies), (-1, mirror * bodies))
@@ -621,7 +623,9 @@ def test_both_corners_of_a_straight_piston_touch_at_once():
         bodies[0, 0] = bodies[0, 3] - scene.rod.centre_of_mass
         bodies[0, 10] = speed
         n_steps = round(4e-3 / step)
-        found = sc.run_mechanism(t, angle=0, speed=0, bodies=bodies, step=step, n_steps=n_steps)
+        found = crank_run.run_mechanism(
+            t, angle=0, speed=0, bodies=bodies, step=step, n_steps=n_steps
+        )
         assert found.contact_changes > 20
         assert found.contact_changes % 2 == 0
         assert abs(found.bodies[:, 0, 5]).max() < 1e-20  # straight it stays
@@ -694,10 +698,10 @@ def test_a_throw_has_the_mobility_of_its_own_guide():
     long = {"guide": {"length": "300 mm"}}
     free = pump((COMPLIANT, COMPLIANT, COMPLIANT), throws=[{}, {"phase": "90 deg", "joint": long}])
     alone = pump((COMPLIANT, COMPLIANT, COMPLIANT), joint__guide__length="300 mm")
-    shorter, longer = (cs.joint_mobility(free, throw, sc.GUIDE) for throw in (0, 1))
+    shorter, longer = (cs.joint_mobility(free, throw, layout.GUIDE) for throw in (0, 1))
     # Both corners together or against each other: 2/m, or 2 a^2/J about the wrist pin.
     assert_allclose(longer, 2 * 0.15**2 / TILT_INERTIA, rtol=1e-12)
-    assert shorter < longer == cs.joint_mobility(alone, 0, sc.GUIDE)
+    assert shorter < longer == cs.joint_mobility(alone, 0, layout.GUIDE)
 
 
 @pytest.mark.parametrize("hertz", [False, True], ids=["linear", "hertz"])

@@ -16,7 +16,7 @@ from wearstate.sim.film.impedance_map import impedance_map, map_force, map_resis
 from wearstate.sim.film.short import short_force, short_resistance
 from wearstate.sim.film.solve import FilmGeometry
 from wearstate.sim.machine.simulate import simulate
-from wearstate.sim.pump.oiled_joint import OIL, oiled_joint
+from wearstate.sim.mechanism.oiled_joint import OIL, oiled_joint
 from wearstate.sim.pump.setup import run_scene
 from wearstate.sim.scene.load import load_scene
 from wearstate.sim.scene.parts import SceneError

@@ -10,12 +10,12 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from wearstate.sim.hydraulics.liquid import specific_volume
 from wearstate.sim.machine.simulate import simulate
+from wearstate.sim.mechanism.crank_run import run_mechanism
 from wearstate.sim.output.status import Status
 from wearstate.sim.piping import coupling
 from wearstate.sim.piping import pipe as pp
 from wearstate.sim.pump.ladder import pressure_rungs, pump_cost
 from wearstate.sim.pump.setup import begun, hydraulics_of, lines_of, run_scene
-from wearstate.sim.pump.slider_crank import run_mechanism
 from wearstate.sim.pump.validity import limits, pump_step
 from wearstate.sim.pump_lanes.lanes import lane_kind
 from wearstate.sim.scene.load import load_scene

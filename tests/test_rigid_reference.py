@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from wearstate.sim.mechanism.crank_run import run_mechanism
 from wearstate.sim.pump import setup as crank_setup
-from wearstate.sim.pump.slider_crank import run_mechanism
 from wearstate.sim.scene.load import load_scene
 
 _SPEC = importlib.util.spec_from_file_location(

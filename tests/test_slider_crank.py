@@ -18,8 +18,8 @@ from wearstate.sim.hydraulics.parameters import hydraulic_parameters
 from wearstate.sim.hydraulics.piston_pressure import two_level_pressure
 from wearstate.sim.jit import half_turn_angle, power, sine_cosine
 from wearstate.sim.machine.simulate import simulate
+from wearstate.sim.mechanism import crank_run, equations, layout, throw_motion
 from wearstate.sim.pump import setup as cs
-from wearstate.sim.pump import slider_crank as sc
 from wearstate.sim.scene.load import load_scene
 from wearstate.sim.scene.pump_hydraulics import CylinderPressure
 
@@ -310,7 +310,7 @@ class Lumped(NamedTuple):
 
 def lumped(scene, t):
     """Of a scene and its tables with changes."""
-    rod, pin = scene.rod, t.contacts[0, sc.CRANKPIN]
+    rod, pin = scene.rod, t.contacts[0, layout.CRANKPIN]
     radius = scene.joint.crankpin.pin_diameter / 2
     return Lumped(
         crank_radius=scene.crank.radius,
@@ -333,7 +333,7 @@ def with_pin(t, **changes):
     """Tables with a changed contact of the crank pin."""
     contacts = t.contacts.copy()
     for name, value in changes.items():
-        contacts[name][0, sc.CRANKPIN] = value
+        contacts[name][0, layout.CRANKPIN] = value
     return t._replace(contacts=contacts)
 
 
@@ -366,7 +366,7 @@ def states_of(run):
 
 def run_from(t, state, *, step, n_steps, scene=FREE):
     """Run from a state in the coordinates of `states_of`."""
-    return sc.run_mechanism(
+    return crank_run.run_mechanism(
         t,
         angle=state[0],
         speed=state[1],
@@ -378,7 +378,7 @@ def run_from(t, state, *, step, n_steps, scene=FREE):
 
 def run_worn(scene, t, *, step, n_steps, angle=0.3):
     """Run from the library's own start."""
-    return sc.run_mechanism(
+    return crank_run.run_mechanism(
         t,
         angle=angle,
         speed=2 * np.pi * scene.drive.speed,
@@ -390,10 +390,10 @@ def run_worn(scene, t, *, step, n_steps, angle=0.3):
 
 def scratch(state, contact):
     """Scratch of the kernels with a state in its row 0."""
-    w = sc.Work(
+    w = layout.Work(
         crank=np.zeros((5, 5)),
-        stage=np.zeros((5, 1), sc.STAGE),
-        held=np.zeros(1, sc.HELD),
+        stage=np.zeros((5, 1), layout.STAGE),
+        held=np.zeros(1, layout.HELD),
         moment=np.zeros(2),
         matrix=np.zeros((4, 6)),
         place=np.zeros((4, 6)),
@@ -401,14 +401,14 @@ def scratch(state, contact):
     w.crank[0, :2] = state[:2]
     w.stage["y"][0] = bodies_of(state)
     w.stage["margin"] = 1.0  # a contact that is none asks for no change
-    w.held["touching"][0, sc.CRANKPIN] = contact
+    w.held["touching"][0, layout.CRANKPIN] = contact
     return w
 
 
 def rate_of(state, contact, t):
     """Rates of a state in the coordinates of `states_of`."""
     w = scratch(state, contact)
-    sc.derivative_of_record(w, 0, 0.0, t)
+    equations.derivative_of_record(w, 0, 0.0, t)
     rate = w.stage["rate"][0, 0]
     return np.array([*w.crank[0, 2:4], *rate[[3, 9, 2, 8]]])
 
@@ -469,7 +469,7 @@ def energy_error_without_location(t, step, angle, n_steps):
     """As the solver, but a contact change waits for the end of its step."""
     w, i = scratch(thrown(angle, t), False), 0
     for _ in range(n_steps):
-        sc._stages(w, i, step, 0.0, step, False, t)
+        step._stages(w, i, step, 0.0, step, False, t)
         i = 1 - i
         if w.stage["margin"][i, 0, 0] < 0:
             w.held["touching"][0, 0] = 1 - w.held["touching"][0, 0]
@@ -681,7 +681,7 @@ def test_recorded_impulse_is_the_change_of_momentum():
 
 
 def test_a_centred_pin_has_a_finite_normal():
-    assert sc.polar(0.0, 0.0, 3.0, 4.0) == (0.0, 3.0, 1.0, 0.0)
+    assert throw_motion.polar(0.0, 0.0, 3.0, 4.0) == (0.0, 3.0, 1.0, 0.0)
     t = free_crank()
     state = (0.0, 31.4, FREE.crank.radius + FREE.rod.length, 0.1, 0.0, 2.0)
     for contact in (False, True):

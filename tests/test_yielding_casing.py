@@ -7,8 +7,9 @@ import pytest
 from numpy.testing import assert_allclose
 from wearstate.sim.fidelity.ladder import cost_of
 from wearstate.sim.machine.simulate import simulate, simulate_many
+from wearstate.sim.mechanism.crank_run import run_mechanism
+from wearstate.sim.mechanism.layout import AT_REST, FORCES, PUSHES, Yielding
 from wearstate.sim.pump import setup
-from wearstate.sim.pump.slider_crank import AT_REST, FORCES, PUSHES, Yielding, run_mechanism
 from wearstate.sim.scene.load import load_scene
 from wearstate.sim.scene.parts import SceneError
 

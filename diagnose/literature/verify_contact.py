@@ -19,7 +19,8 @@ from ...sim.contact.law import (
     normal_force,
 )
 from ...sim.jit import kernel
-from ...sim.pump.slider_crank import BODY, CRANKPIN, JOINT_COMPLIANT, CrankRun, run_mechanism
+from ...sim.mechanism.crank_run import CrankRun, run_mechanism
+from ...sim.mechanism.layout import BODY, CRANKPIN, JOINT_COMPLIANT
 from .verify_crank import one_throw
 
 _APPROACH_SPEED = 0.3  # m/s, an impact speed of a worn pump; the law is linear, any would do

@@ -9,18 +9,10 @@ import numpy as np
 from ...sim.contact.closed_forms import IdealCrank
 from ...sim.contact.law import CONTACT
 from ...sim.hydraulics.parameters import HYDRAULIC
-from ...sim.pump.oiled_joint import OIL
+from ...sim.mechanism.crank_run import CrankRun, run_mechanism
+from ...sim.mechanism.layout import BODY, GUIDE, JOINT_COMPLIANT, THROW, Machine, Tables
+from ...sim.mechanism.oiled_joint import OIL
 from ...sim.pump.setup import ideal_motion
-from ...sim.pump.slider_crank import (
-    BODY,
-    GUIDE,
-    JOINT_COMPLIANT,
-    THROW,
-    CrankRun,
-    Machine,
-    Tables,
-    run_mechanism,
-)
 from ...sim.scene.load import load_scene
 from ...sim.scene.pump import PumpScene
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ...sim.contact.closed_forms import kelvin_voigt_restitution
 from ...sim.journal.orbit import OrbitStatus
+from ...sim.mechanism.layout import JOINT_COMPLIANT
 from ...sim.output.recording import Recording
 from ...sim.output.status import Status
 from ...sim.pump.recording import steps_per_sample
@@ -27,7 +28,6 @@ from ...sim.pump.setup import (
     run_scene,
     tangent_stiffness,
 )
-from ...sim.pump.slider_crank import JOINT_COMPLIANT
 from ...sim.scene.parts import Scene, SceneError
 from ...sim.scene.pump import PumpScene
 from .method_map import Cell, Curve, Judge, MapAxis, MapPlan, Own, Verdict, coordinates, even_ratios

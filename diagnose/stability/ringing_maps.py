@@ -9,10 +9,10 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
+from ...sim.mechanism.crank_run import run_mechanism
 from ...sim.piping.pipe import FEWEST_REACHES, drive_pipe, pipe_parameters, pipe_start
 from ...sim.pump.recording import steps_per_sample
 from ...sim.pump.setup import WAYS, bearing_mass_ratios, begun, yielding_of
-from ...sim.pump.slider_crank import run_mechanism
 from ...sim.scene.parts import Scene
 from ...sim.scene.pump import PumpJoints, PumpScene
 from ...sim.scene.pump_hydraulics import PIPED_RUNGS, Line, Liquid

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..mechanism.layout import JOINT_COMPLIANT
 from ..pump.setup import (
     bearing_mass_ratios,
     contact_frequency,
@@ -17,7 +18,6 @@ from ..pump.setup import (
     joint_rungs,
     penetration_under,
 )
-from ..pump.slider_crank import JOINT_COMPLIANT
 from ..pump.validity import pump_step
 from ..scene.parts import STANDARD_GRAVITY
 from ..scene.plausibility import largest_deflection, modal_mass

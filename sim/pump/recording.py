@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from ..excitation.forces import Push
 from ..hydraulics.chamber import GATHERED
 from ..hydraulics.valves import lift_left
+from ..mechanism.crank_run import CrankRun, CrankTally
+from ..mechanism.layout import FORCES, GUIDE, JOINT_COMPLIANT, JOINT_LINK, JOINT_OILED
 from ..output.recording import Recording
 from ..output.sensor import (
     anti_alias_poles,
@@ -54,15 +56,6 @@ from .setup import (
     rubs_in_guide,
     run_scene,
     throw_on_casing,
-)
-from .slider_crank import (
-    FORCES,
-    GUIDE,
-    JOINT_COMPLIANT,
-    JOINT_LINK,
-    JOINT_OILED,
-    CrankRun,
-    CrankTally,
 )
 from .tearing import lowest_under_pull, torn_by_pull
 from .validity import FEWEST_STEPS, MOST_STEPS, joint_faults, knock_limits, limits, pump_step

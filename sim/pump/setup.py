@@ -34,19 +34,8 @@ from ..hydraulics.chamber_run import chamber_start, chamber_substeps
 from ..hydraulics.parameters import HYDRAULIC, PRESSURE_CHAMBER, hydraulic_parameters
 from ..hydraulics.piston_pressure import line_pressure
 from ..jit import kernel
-from ..piping.pipe import pipe_parameters, pipe_start
-from ..scene.pump import (
-    GUIDE_PLACES,
-    OILED_RUNGS,
-    VALVE_PLACES,
-    Guide,
-    PumpScene,
-    RevoluteJoint,
-)
-from ..scene.pump_hydraulics import BREATHING_RUNGS, PIPED_RUNGS, CylinderPressure
-from .casing import casing_inputs, exact_oscillator
-from .oiled_joint import OIL
-from .slider_crank import (
+from ..mechanism.crank_run import CrankRun, run_mechanism
+from ..mechanism.layout import (
     AT_REST,
     CRANKPIN,
     FILM,
@@ -59,14 +48,24 @@ from .slider_crank import (
     PUSHES,
     THROW,
     WRISTPIN,
-    CrankRun,
     LinePair,
     Machine,
     Tables,
     Yielding,
-    run_mechanism,
 )
-from .throw_motion import seal_drag
+from ..mechanism.oiled_joint import OIL
+from ..mechanism.throw_motion import seal_drag
+from ..piping.pipe import pipe_parameters, pipe_start
+from ..scene.pump import (
+    GUIDE_PLACES,
+    OILED_RUNGS,
+    VALVE_PLACES,
+    Guide,
+    PumpScene,
+    RevoluteJoint,
+)
+from ..scene.pump_hydraulics import BREATHING_RUNGS, PIPED_RUNGS, CylinderPressure
+from .casing import casing_inputs, exact_oscillator
 
 STEP_PER_CONTACT_TIME = 0.3
 """Default step times the contact's fastest angular frequency: 21 steps a contact period."""

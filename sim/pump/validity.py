@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Iterator
 
+from ..mechanism.layout import JOINT_COMPLIANT, OVERLAP_LIMIT
 from ..output.status import Status
 from ..piping.pipe import FEWEST_REACHES
 from ..scene.pump import OILED_RUNGS, Guide, PumpScene, RevoluteJoint
@@ -20,7 +21,6 @@ from .setup import (
     joint_rungs,
     penetration_under,
 )
-from .slider_crank import JOINT_COMPLIANT, OVERLAP_LIMIT
 from .tearing import torn_by_knocks, torn_in_motion
 
 

@@ -6,7 +6,8 @@ from ..hydraulics.chamber import chamber_at_once, implicit_part
 from ..hydraulics.liquid import air_volume
 from ..hydraulics.valves import ValveSide, valve_shares
 from ..jit import kernel, subroutine
-from ..pump.slider_crank import WITH_VAPOUR, breathe
+from ..mechanism.layout import WITH_VAPOUR
+from ..mechanism.march import breathe
 from .fields import fields_of, put_fields
 from .rates import CHAMBER_COLUMNS, LANES, PISTON_X, ChamberLane
 

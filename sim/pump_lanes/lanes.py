@@ -24,9 +24,8 @@ from numpy.typing import NDArray
 from ..hydraulics.chamber import GATHERED
 from ..hydraulics.valves import ValveSide
 from ..jit import kernel, subroutine
-from ..output.status import Status
-from ..pump.setup import JOINT_CODES, Start, joint_parts, joint_rungs, runs_on_a_map
-from ..pump.slider_crank import (
+from ..mechanism.crank_run import CrankTally
+from ..mechanism.layout import (
     CHANGES,
     FLOORED,
     FORCES,
@@ -35,11 +34,12 @@ from ..pump.slider_crank import (
     JOINT_OILED,
     NOT_LOCATED,
     WITH_VAPOUR,
-    CrankTally,
     Machine,
     Tables,
     Yielding,
 )
+from ..output.status import Status
+from ..pump.setup import JOINT_CODES, Start, joint_parts, joint_rungs, runs_on_a_map
 from ..scene.pump import PumpScene
 from ..scene.pump_hydraulics import PIPED_RUNGS
 from .march import LEFT, STRETCH, Stretch, alone, enter_lane, march

@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 
 from ..hydraulics.chamber import GATHERED
 from ..jit import kernel, subroutine
-from ..pump.slider_crank import (
+from ..mechanism.equations import derivative_of_record
+from ..mechanism.layout import (
     CONTACTS,
     FORCES,
     GUIDE,
@@ -17,16 +18,10 @@ from ..pump.slider_crank import (
     PUSHES,
     STAGE,
     Tables,
-    Tally,
     Work,
-    begin,
-    carried_on,
-    derivative_of_record,
-    mean_of_stages,
-    of_mode,
-    settled,
-    step_of_record,
 )
+from ..mechanism.march import Tally, begin, carried_on, of_mode, settled
+from ..mechanism.step import mean_of_stages, step_of_record
 from .chambers import breathe_alone, count_vapour, enter_chamber, lanes_breathe
 from .rates import (
     ALL_MOVING,

@@ -26,7 +26,8 @@ from ..hydraulics.parameters import PRESSURE_CONSTANT, PRESSURE_TWO_LEVEL
 from ..hydraulics.piston_pressure import two_level_pressure
 from ..hydraulics.valves import ValveSide
 from ..jit import NEAR, kernel, near_sine_cosine, sine_cosine, subroutine
-from ..pump.oiled_joint import (
+from ..mechanism.layout import CONTACTS, GUIDE, OVERLAP_LIMIT, PUSHES, Machine
+from ..mechanism.oiled_joint import (
     NEWTON_STEPS,
     FilmPull,
     film_gap,
@@ -36,8 +37,7 @@ from ..pump.oiled_joint import (
     newton_step,
     peaks_of,
 )
-from ..pump.slider_crank import CONTACTS, GUIDE, OVERLAP_LIMIT, PUSHES, Machine
-from ..pump.throw_motion import (
+from ..mechanism.throw_motion import (
     PinLoad,
     Pose,
     crank_load,

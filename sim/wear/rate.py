@@ -19,10 +19,10 @@ from ..brief import brief
 from ..film.bearing import BearingError, Equilibrium, equilibrium
 from ..film.solve import FilmGeometry
 from ..journal.recording import film_geometry
+from ..mechanism.crank_run import CrankRun
 from ..output.status import SimulationError
 from ..pump.recording import steps_per_sample
 from ..pump.setup import pin_offsets, run_scene
-from ..pump.slider_crank import CrankRun
 from ..scene.journal import JournalScene
 from ..scene.parts import SceneError, nearest
 from ..scene.pump import PumpScene

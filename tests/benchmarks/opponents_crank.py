@@ -19,8 +19,9 @@ import numpy as np
 from numba import njit
 from scipy.integrate import odeint, solve_ivp
 from wearstate.sim.contact.law import RELEASE_AT_ZERO_FORCE, RELEASE_AT_ZERO_PENETRATION
+from wearstate.sim.mechanism.crank_run import run_mechanism
+from wearstate.sim.mechanism.layout import AT_REST, CRANKPIN
 from wearstate.sim.pump import setup as crank_setup
-from wearstate.sim.pump.slider_crank import AT_REST, CRANKPIN, run_mechanism
 from wearstate.sim.pump_lanes.lanes import LaneJob, lane_kind, run_lanes
 from wearstate.sim.pump_lanes.rates import LANES
 from wearstate.sim.scene.load import load_scene

@@ -1,0 +1,222 @@
+"""A run of the crank mechanism: from tables and start to states, forces and status."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..hydraulics.parameters import PRESSURE_CHAMBER
+from ..output.status import Status
+from ..piping.coupling import PAIR
+from ..piping.pipe import PIPE, PIPE_STATE
+from .layout import (
+    ANGLE,
+    AT_REST,
+    CHANGES,
+    FLOORED,
+    FORCES,
+    GAPS,
+    HELD,
+    IN_TENSION,
+    JOINT_OILED,
+    NOT_LOCATED,
+    PER_THROW,
+    SPEED,
+    STAGE,
+    WITH_VAPOUR,
+    LinePair,
+    SharedLines,
+    Tables,
+    Work,
+    Yielding,
+)
+from .march import MarchRecord, Tally, integrate
+
+
+@dataclass(frozen=True, kw_only=True)
+class CrankTally:
+    """How a run of the mechanism went.
+
+    Attributes
+    ----------
+    steps : int
+        That were taken.
+    step : float
+        [s]
+    status : Status
+        How the run ended.
+    peak_normal_force : float
+        Largest contact force met inside the steps [N].
+    contact_changes, cuts_refused : int
+        Closings plus openings; steps with more than could be located.
+    floored_closings : int
+        Contacts that closed more slowly than the speed floor of their law.
+    tension_steps : int
+        Steps at whose end a massless link was in tension: contact would be lost.
+    vapour_steps : int
+        Steps, summed over throws, at whose end a chamber held vapour.
+    parted_steps, unsettled_steps : tuple of int
+        Steps in which suction and discharge line held vapour; steps in which no pressure was found
+        at which they give what the pump draws, and the rest was booked.
+    """
+
+    steps: int
+    step: float
+    peak_normal_force: float
+    status: Status = Status.OK
+    contact_changes: int = 0
+    cuts_refused: int = 0
+    floored_closings: int = 0
+    tension_steps: int = 0
+    vapour_steps: int = 0
+    parted_steps: tuple[int, ...] = ()
+    unsettled_steps: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class CrankRun(CrankTally):
+    """A run of the mechanism with all its steps.
+
+    Attributes
+    ----------
+    turns : numpy.ndarray [shape=(n_steps + 1, 2)]
+        Crank angle [rad] and speed [rad/s] at the ends of the steps.
+    forces : numpy.ndarray [shape=(n_steps, 1 + 9 n_throws)]
+        Drive moment [N m], then per throw the columns of :data:`FORCES` [N], means over each step.
+    bodies : numpy.ndarray [shape=(n_steps + 1, n_throws, 12)] or None
+        Columns as :data:`BODY`, then their rates, at the ends of the steps; the state in the
+        middle of a step, to which its forces belong, is the mean of two rows. None where not kept.
+    chambers : numpy.ndarray [shape=(n_steps + 1, n_throws, 6)] or None
+        Columns as ``CHAMBER_STATE``; None where nothing breathes.
+    gaps : numpy.ndarray [shape=(n_steps + 1, n_throws, 4)] or None
+        Columns as :data:`GAPS`, at the starts of the steps' last stage; None where no pin is oiled.
+    ends : numpy.ndarray [shape=(n_steps + 1, 2)] or None
+        Pressure [Pa] of suction and discharge line at the pump, means over the steps before; None
+        where no line is modelled.
+    """
+
+    turns: NDArray[np.float64]
+    forces: NDArray[np.float64]
+    bodies: NDArray[np.float64] | None
+    chambers: NDArray[np.float64] | None
+    gaps: NDArray[np.float64] | None = None
+    ends: NDArray[np.float64] | None = None
+
+    def force(self, name: str, throw: int = 0) -> NDArray[np.float64]:
+        """One column of the forces, by its name in :data:`FORCES` [N]."""
+        return self.forces[:, 1 + len(FORCES) * throw + FORCES.index(name)]
+
+
+_NO_LINES = LinePair(
+    pipes=np.zeros(0, PIPE),
+    states=np.zeros(0, PIPE_STATE),
+    suction_nodes=np.zeros((4, 1)),
+    discharge_nodes=np.zeros((4, 1)),
+)
+
+
+def run_mechanism(
+    t: Tables,
+    *,
+    angle: float,
+    speed: float,
+    bodies: NDArray[np.float64],
+    step: float,
+    n_steps: int,
+    chambers: NDArray[np.float64] | None = None,
+    films: NDArray[np.float64] | None = None,
+    lines: LinePair | None = None,
+    casing: Yielding = AT_REST,
+    keep_states: bool = True,
+) -> CrankRun:
+    """Integrate the mechanism with contact in its clearances.
+
+    Parameters
+    ----------
+    t : Tables
+        Validated by the scene; a kernel trusts it.
+    angle, speed : float
+        Of the crank at the start [rad], [rad/s].
+    bodies : numpy.ndarray [shape=(n_throws, 12)]
+        Columns as :data:`BODY`, then their rates. What ideal joints and links hold together must
+        be together.
+    step : float
+        [s]
+    n_steps : int
+        Steps to take.
+    chambers : numpy.ndarray [shape=(n_throws, 6)], optional
+        State of the chambers at the start.
+    films : numpy.ndarray [shape=(n_throws, 4)], optional
+        Columns as :data:`FILM`, at the start; inside the clearances.
+    lines : LinePair, optional
+        Shared by the chambers of all throws, each of which then breathes; replaced by their state
+        at the end.
+    casing : Yielding
+        On which the main bearing moves; bodies are seen from there.
+    keep_states : bool
+        Keep the bodies at the ends of all steps.
+
+    Returns
+    -------
+    CrankRun
+        Cut off at the step in which it failed where the status is not OK.
+    """
+    n = len(t.throws)
+    rows = n_steps + 1 if keep_states else 1
+    breathing = bool(np.any(t.throws["pressure_rung"] == PRESSURE_CHAMBER))
+    oiled = bool(
+        np.any(t.throws["crankpin_rung"] == JOINT_OILED)
+        or np.any(t.throws["wristpin_rung"] == JOINT_OILED)
+    )
+    w = Work(
+        crank=np.zeros((5, 5)),
+        stage=np.zeros((5, n), STAGE),
+        held=np.zeros(n, HELD),
+        moment=np.zeros(2),
+        matrix=np.zeros((4, 6)),
+        place=np.zeros((4, 6)),
+    )
+    shared = SharedLines(
+        lines=_NO_LINES if lines is None else lines,
+        pairs=np.zeros(1, PAIR),
+        trials=np.zeros((n, 6)),
+    )
+    if lines is not None:  # the pressures before and after the valves are those of the lines
+        t = t._replace(liquid=t.liquid.copy())
+    w.crank[0, ANGLE], w.crank[0, SPEED] = angle, speed
+    w.stage["y"][0] = bodies
+    if films is not None:
+        w.stage["film"][0] = films
+    chamber = np.zeros((n, 8))
+    if chambers is not None:
+        chamber[:, :6] = chambers
+    r = MarchRecord(
+        turns=np.empty((n_steps + 1, 2)),
+        forces=np.zeros((n_steps, 1 + n * len(FORCES))),
+        states=np.empty((rows, n, PER_THROW)),
+        chambers=np.empty((n_steps + 1 if breathing else 1, n, 8)),
+        gaps=np.zeros((n_steps + 1 if oiled else 1, n, len(GAPS))),
+        ends=np.zeros((n_steps + 1 if lines else 1, 2)),
+    )
+    tally = Tally(counts=np.zeros(5, np.int64), peak=np.zeros(1))
+    moved, ridden = np.zeros((len(casing.react), 3)), np.zeros((3, 2))
+    code, done = integrate(step, t, casing, moved, ridden, w, chamber, shared, r, tally)
+    return CrankRun(
+        steps=done,
+        turns=r.turns[: done + 1],
+        forces=r.forces[:done],
+        bodies=r.states[: done + 1] if keep_states else None,
+        chambers=r.chambers[: done + 1, :, :6] if breathing else None,
+        gaps=r.gaps[: done + 1] if oiled else None,
+        ends=r.ends[: done + 1] if lines else None,
+        step=step,
+        status=Status(code),
+        peak_normal_force=float(tally.peak[0]),
+        contact_changes=int(tally.counts[CHANGES]),
+        cuts_refused=int(tally.counts[NOT_LOCATED]),
+        floored_closings=int(tally.counts[FLOORED]),
+        tension_steps=int(tally.counts[IN_TENSION]),
+        vapour_steps=int(tally.counts[WITH_VAPOUR]),
+        parted_steps=tuple(int(steps) for steps in shared.lines.states["parted"]),
+        unsettled_steps=tuple(int(steps) for steps in shared.lines.states["unsettled"]),
+    )

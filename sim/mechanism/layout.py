@@ -1,0 +1,242 @@
+"""Tables, states and scratch of the crank mechanism: what the kernels are told and remember."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..jit import kernel
+from .throw_motion import Pose
+
+JOINT_IDEAL, JOINT_LINK, JOINT_COMPLIANT, JOINT_OILED = 0, 1, 2, 3
+"""From `JOINT_COMPLIANT` on a joint is a force that follows from the motion."""
+
+THROW = np.dtype(
+    [
+        ("phase", "f8"),  # crank angle of this throw over that of the crank [rad]
+        ("crank_radius", "f8"),
+        ("rod_centre", "f8"),  # wrist pin to centre of mass [m]
+        ("rod_arm", "f8"),  # centre of mass to crank-pin eye [m]
+        ("rod_mass", "f8"),
+        ("inverse_rod_mass", "f8"),
+        ("inverse_rod_inertia", "f8"),  # about its centre of mass [1/(kg m^2)]
+        ("piston_mass", "f8"),
+        ("inverse_piston_across", "f8"),  # 0 in an ideal guide [1/kg]
+        ("inverse_piston_tilt", "f8"),  # about the wrist pin; 0 in an ideal guide [1/(kg m^2)]
+        ("piston_area", "f8"),
+        ("seal_friction", "f8"),  # by the seal's tension [N]
+        ("seal_friction_area", "f8"),  # more of it per pressure [N/Pa]
+        ("seal_friction_speed", "f8"),  # that regularises its sign [m/s]
+        ("crankpin_rung", "i8"),
+        ("wristpin_rung", "i8"),
+        ("guide_rung", "i8"),
+        ("crankpin_radius", "f8"),
+        ("wristpin_radius", "f8"),
+        ("guide_half_length", "f8"),
+        ("guide_half_height", "f8"),
+        ("pressure_rung", "i8"),
+        ("substeps", "i8"),  # of the chamber
+    ]
+)
+"""One throw, in SI."""
+
+CRANKPIN, WRISTPIN, GUIDE = 0, 1, 2
+"""Columns of the contact table, one row per throw."""
+
+CONTACTS = 6
+"""Places of contact per throw: crank pin, wrist pin, and the guide's corners, rear and front,
+upper then lower."""
+
+
+class Machine(NamedTuple):
+    """What the throws share, in SI."""
+
+    gravity_x: float
+    gravity_y: float
+    inverse_inertia: float  # of everything that turns; 0 is constant speed
+    static_moment: float  # unbalance of the crank along the first throw [kg m]
+    drive_moment: float  # constant part [N m]
+    synchronous_speed: float  # of the motor, at the crank [rad/s]
+    breakdown_moment: float  # largest moment of the motor [N m]; 0 is none
+    breakdown_slip: float
+    baumgarte: float  # decay rate of constraint drift [1/s]
+
+
+BODY = ("rod_x", "rod_y", "beta", "piston_x", "piston_y", "tilt")
+"""Coordinates of a throw [m, rad]; the state holds these, then their rates."""
+
+PER_THROW = 2 * len(BODY)
+
+ROD_X, ROD_Y, BETA, PISTON_X, PISTON_Y, TILT = range(len(BODY))
+ROD_X_RATE, ROD_Y_RATE, BETA_RATE, PISTON_X_RATE, PISTON_Y_RATE, TILT_RATE = range(
+    len(BODY), PER_THROW
+)
+"""Columns of a throw's state."""
+
+FORCES = (
+    "pin_x",
+    "pin_y",
+    "wrist_x",
+    "wrist_y",
+    "guide_x",
+    "guide_y",
+    "piston_x",
+    "seal_x",
+    "suction_valve",
+    "discharge_valve",
+)
+"""Mean forces of a throw over a step [N]: crank pin on rod, wrist pin on rod, guide on piston
+(friction along x, push along y), liquid on piston, seal on piston, each valve on the casing along
+the stroke.
+Before them stands the drive moment [N m]."""
+
+PIN_FORCE, WRIST_FORCE, GUIDE_FORCE, FACE_FORCE, SEAL_FORCE, VALVE_FORCES = (
+    0,
+    2,
+    4,
+    6,
+    7,
+    8,
+)  # first columns of FORCES
+
+FILM = ("crankpin_x", "crankpin_y", "wristpin_x", "wristpin_y")
+"""Where the films of a throw let its pins be, from the centres of their eyes [m]."""
+
+GAPS = ("crankpin_gap", "wristpin_gap", "crankpin_peaks", "wristpin_peaks")
+"""Least gap of each film [m], and what its touching peaks carry [N]; a joint without oil has 0."""
+
+OVERLAP_LIMIT = 0.1  # of the pin radius: small-penetration contact laws end there
+
+NO_CHANGE = 1.0  # margin of a contact that cannot change [N]
+
+
+class Tables(NamedTuple):
+    """Everything that the kernel is told."""
+
+    throws: NDArray[Any]  # (n_throws,) of THROW
+    contacts: NDArray[Any]  # (n_throws, 3) of CONTACT
+    liquid: NDArray[Any]  # (n_throws,) of HYDRAULIC
+    oils: NDArray[Any]  # (n_throws, 2) of OIL
+    maps: NDArray[np.float64]  # coefficients of all films that are maps, one after the other
+    machine: Machine
+
+
+class Yielding(NamedTuple):
+    """A casing whose modes carry the main bearing along; without any mode it is at rest."""
+
+    push: NDArray[np.float64]  # (n_modes, n_throws, len(PUSHES)): modal force per force
+    react: NDArray[np.float64]  # (n_modes, 3): mean acceleration over a step, per force in it and
+    reach: NDArray[np.float64]  # (n_modes, 3): place after it, per place and speed before it
+    give: NDArray[np.float64]  # (n_modes, 2): shape at the bearing, along and across [kg^-0.5]
+    held: NDArray[np.float64]  # (n_modes, 2): pushes back by what it carries [kg^0.5]
+    blend: NDArray[np.float64]  # (2, 2): what that makes of its acceleration, see `settled`
+
+
+PUSHES = tuple(
+    FORCES.index(name)
+    for name in (
+        "pin_x",
+        "pin_y",
+        "guide_y",
+        "piston_x",
+        "seal_x",
+        "guide_x",
+        "suction_valve",
+        "discharge_valve",
+    )
+)
+"""Columns of FORCES that push on the casing, in the order in which they are added up."""
+
+AT_REST = Yielding(
+    push=np.zeros((0, 1, len(PUSHES))),
+    react=np.zeros((0, 3)),
+    reach=np.zeros((0, 3)),
+    give=np.zeros((0, 2)),
+    held=np.zeros((0, 2)),
+    blend=np.zeros((2, 2)),
+)
+"""A bearing that does not move."""
+
+STAGE = np.dtype(
+    [
+        ("y", "f8", PER_THROW),
+        ("rate", "f8", PER_THROW),
+        ("force", "f8", len(FORCES)),
+        ("margin", "f8", CONTACTS),
+        ("approach", "f8", CONTACTS),
+        ("normal", "f8"),  # largest normal force
+        ("overlap", "f8"),  # largest overlap over the pin radius
+        ("link", "f8"),  # least force in a link: negative is tension
+        ("rate_per_turn", "f8", PER_THROW),  # per crank acceleration
+        ("force_per_turn", "f8", len(FORCES)),
+        ("film", "f8", len(FILM)),
+        ("film_rate", "f8", len(FILM)),
+        ("gaps", "f8", len(GAPS)),
+    ]
+)
+"""One throw at one stage of a step."""
+
+HELD = np.dtype(
+    [
+        ("touching", "i8", CONTACTS),  # 0 or 1
+        ("impact", "f8", CONTACTS),  # speed at which each contact closed
+        ("pressure", "f8", 2),  # of the chamber, at both ends of the step
+        ("flow", "f8", 4),  # of the chamber's valves, see chamber_step
+        ("squeeze", "f8", (2, 2)),  # last velocity of each film, where the next search begins
+    ]
+)
+"""What one throw remembers from step to step."""
+
+ANGLE, SPEED, ANGLE_RATE, SPEED_RATE, MOMENT = range(5)
+"""Columns of the crank's stages."""
+
+AT_JOINT, ALONG_X, ALONG_Y, RUBBING, NORMAL_X, NORMAL_Y = range(6)
+"""Columns of the place of a constraint force: its joint, its direction with the share that rubs
+across it, and the normal along which its equation stands."""
+
+SIZE, SIZE_PER_TURN = 4, 5
+"""Right sides of the constraint equations, and after elimination the constraint forces: at constant
+crank speed, and per crank acceleration."""
+
+
+class Work(NamedTuple):
+    """Scratch of the march; nothing is allocated in its loop.
+
+    Rows 0 and 1 are the ends of the step in turn, rows 2 to 4 the stages between them.
+    """
+
+    crank: NDArray[np.float64]  # (5, 5)
+    stage: NDArray[Any]  # (5, n_throws) of STAGE
+    held: NDArray[Any]  # (n_throws,) of HELD
+    moment: NDArray[np.float64]  # (2,): on the crank, and per crank acceleration
+    matrix: NDArray[np.float64]  # (4, 6): constraint equations with two right sides, see SIZE
+    place: NDArray[np.float64]  # (4, 6): of each constraint force, see AT_JOINT
+
+
+class LinePair(NamedTuple):
+    """Suction and discharge line of all throws, in this order; without any row there are none."""
+
+    pipes: NDArray[np.void]  # (2,) of PIPE
+    states: NDArray[np.void]  # (2,) of PIPE_STATE
+    suction_nodes: NDArray[np.float64]
+    discharge_nodes: NDArray[np.float64]
+
+
+class SharedLines(NamedTuple):
+    """The lines with the scratch of their coupling."""
+
+    lines: Any  # of LinePair
+    pairs: NDArray[np.void]  # (1,) of PAIR
+    trials: NDArray[np.float64]  # (n_throws, 6): chambers at the end of a step that is tried
+
+
+@kernel
+def pose_of(b: Any) -> Any:
+    """State of a throw at a stage by the names of its columns."""
+    y = b.y
+    return Pose(y[0], y[1], y[2], y[3], y[4], y[5], y[6], y[7], y[8], y[9], y[10], y[11])
+
+
+CHANGES, NOT_LOCATED, FLOORED, IN_TENSION, WITH_VAPOUR = range(5)
+"""What a run counts: contacts that closed or opened; steps with more than could be located;
+closings below the law's speed floor; steps with a link in tension; steps with vapour."""

@@ -1,0 +1,326 @@
+"""The march over the steps: mechanism, chambers, lines and a yielding casing in turn."""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..hydraulics.chamber import chamber_step
+from ..hydraulics.parameters import PRESSURE_CHAMBER
+from ..jit import kernel, subroutine
+from ..piping.coupling import begin_pair, seek_pair
+from ..piping.pipe import advance_pipe
+from .equations import derivative_of_record
+from .layout import (
+    ANGLE,
+    BETA,
+    CONTACTS,
+    CRANKPIN,
+    FORCES,
+    GAPS,
+    IN_TENSION,
+    JOINT_COMPLIANT,
+    NO_CHANGE,
+    OVERLAP_LIMIT,
+    PER_THROW,
+    PISTON_X,
+    PISTON_X_RATE,
+    PUSHES,
+    SPEED,
+    VALVE_FORCES,
+    WITH_VAPOUR,
+    WRISTPIN,
+    Machine,
+    Tables,
+)
+from .step import contact_margin, step_of_record
+
+
+@kernel
+def breathe(
+    chamber: Any, held: Any, liquid: Any, h: float, x: float, v: float, substeps: int
+) -> Any:
+    """Step one chamber along its piston's path: fault, and its pressure at both ends of the next.
+
+    The pressure [Pa] is extrapolated: the mechanism steps first.
+    """
+    last = chamber[0]
+    fault = chamber_step(chamber, held.flow, liquid, h, chamber[6], chamber[7], x, v, substeps)
+    chamber[6], chamber[7] = x, v
+    return fault, chamber[0], 2.0 * chamber[0] - last
+
+
+@kernel
+def _breathe(w: Any, i: int, h: float, t: Any, chamber: Any, forces: Any, step: int) -> int:
+    """Step every chamber along its piston's path; its pressure for the next step."""
+    fault = 0
+    for k in range(t.throws.shape[0]):
+        q, b, held = t.throws[k], w.stage[i, k], w.held[k]
+        if q.pressure_rung != PRESSURE_CHAMBER:
+            continue
+        x, v = b.y[PISTON_X], b.y[PISTON_X_RATE]
+        own, before, after = breathe(chamber[k], held, t.liquid[k], h, x, v, q.substeps)
+        fault += own
+        held.pressure[0], held.pressure[1] = before, after
+        f = 1 + len(FORCES) * k
+        forces[step, f + VALVE_FORCES] = held.flow[2] / h
+        forces[step, f + VALVE_FORCES + 1] = held.flow[3] / h
+    return fault
+
+
+@kernel
+def _try_chambers(w: Any, i: int, h: float, t: Any, chamber: Any, shared: Any) -> Any:
+    """Step every chamber under the lines' pressures that are tried: fault, and both volumes.
+
+    The trials hold the outcome; volumes [m^3] as of ``CHAMBER_FLOWS``, of all throws.
+    """
+    fault, suction, discharge = 0, 0.0, 0.0
+    for k in range(t.throws.shape[0]):
+        b, liquid, trial, flow = w.stage[i, k], t.liquid[k], shared.trials[k], w.held[k].flow
+        liquid.suction = shared.pairs[0].pressure[0]
+        liquid.discharge = shared.pairs[0].pressure[1]
+        for c in range(6):
+            trial[c] = chamber[k, c]
+        x, v, substeps = b.y[PISTON_X], b.y[PISTON_X_RATE], t.throws[k].substeps
+        fault += chamber_step(trial, flow, liquid, h, chamber[k, 6], chamber[k, 7], x, v, substeps)
+        suction += flow[0]
+        discharge += flow[1]
+    return fault, suction, discharge
+
+
+@subroutine
+def _breathe_on_lines(
+    w: Any, i: int, h: float, t: Any, chamber: Any, shared: Any, forces: Any, step: int
+) -> int:
+    """Step all chambers and both lines together; pressures for the next step."""
+    lines, pair = shared.lines, shared.pairs[0]
+    pipes, states = lines.pipes, lines.states
+    nodes = (lines.suction_nodes, lines.discharge_nodes)
+    begin_pair(pair, pipes, states)
+    fault, drawn, pushed, found = 0, 0.0, 0.0, False
+    while not found and fault == 0:
+        fault, drawn, pushed = _try_chambers(w, i, h, t, chamber, shared)
+        found = seek_pair(pair, drawn / h, -pushed / h, pipes, states, nodes, h)
+    advance_pipe(pair.pressure[0], drawn / h, pipes[0], states[0], nodes[0], h)
+    advance_pipe(pair.pressure[1], -pushed / h, pipes[1], states[1], nodes[1], h)
+    for k in range(t.throws.shape[0]):
+        held, b, f = w.held[k], w.stage[i, k], 1 + len(FORCES) * k
+        last, now = chamber[k, 0], shared.trials[k, 0]
+        held.pressure[0], held.pressure[1] = now, 2.0 * now - last
+        for c in range(6):
+            chamber[k, c] = shared.trials[k, c]
+        chamber[k, 6], chamber[k, 7] = b.y[PISTON_X], b.y[PISTON_X_RATE]
+        forces[step, f + VALVE_FORCES] = held.flow[2] / h
+        forces[step, f + VALVE_FORCES + 1] = held.flow[3] / h
+    return fault
+
+
+@kernel
+def _fault(w: Any, i: int) -> int:
+    total = w.crank[i, ANGLE] + w.crank[i, SPEED]
+    for k in range(w.stage.shape[1]):
+        b = w.stage[i, k]
+        for c in range(PER_THROW):
+            total += b.y[c]
+        if b.overlap > OVERLAP_LIMIT:
+            return 2
+        if abs(b.y[BETA]) > 1.5:  # rad
+            return 3
+    return 0 if math.isfinite(total) else 1
+
+
+class MarchRecord(NamedTuple):
+    """What a run leaves behind; the last four have one row where they are not needed."""
+
+    turns: NDArray[np.float64]  # (n_steps + 1, 2): crank angle and speed
+    forces: NDArray[np.float64]  # (n_steps, 1 + n_throws * len(FORCES))
+    states: NDArray[np.float64]  # (n_steps + 1, n_throws, PER_THROW)
+    chambers: NDArray[np.float64]  # (n_steps + 1, n_throws, 8)
+    gaps: NDArray[np.float64]  # (n_steps + 1, n_throws, len(GAPS))
+    ends: NDArray[np.float64]  # (n_steps + 1, 2): pressures of the lines at the pump
+
+
+class Tally(NamedTuple):
+    """What a run counts, see :data:`CHANGES`."""
+
+    counts: NDArray[np.int64]  # (5,)
+    peak: NDArray[np.float64]  # (1,): largest normal force
+
+
+@kernel
+def _is_compliant(q: Any, j: int) -> Any:
+    rung = q.crankpin_rung if j == CRANKPIN else q.wristpin_rung if j == WRISTPIN else q.guide_rung
+    return rung == JOINT_COMPLIANT
+
+
+@kernel
+def begin(w: Any, t: Any, chamber: Any) -> bool:
+    """Contacts closed from the start, chambers; true where any chamber breathes."""
+    breathing = False
+    for k in range(t.throws.shape[0]):
+        q, b, held = t.throws[k], w.stage[0, k], w.held[k]
+        breathing |= q.pressure_rung == PRESSURE_CHAMBER
+        chamber[k, 6], chamber[k, 7] = b.y[PISTON_X], b.y[PISTON_X_RATE]
+        held.pressure[0] = held.pressure[1] = chamber[k, 0]
+        for j in range(CONTACTS):
+            for row in range(5):
+                w.stage[row, k].margin[j] = NO_CHANGE
+            if _is_compliant(q, j):  # closed is what would close if it were open
+                held.touching[j] = 1 if contact_margin(k, j, w, 0, t) < 0.0 else 0
+    return breathing
+
+
+@kernel
+def _keep(w: Any, i: int, chamber: Any, states: Any, r: Any, row: int) -> None:
+    for side in range(states.shape[0]):
+        r.ends[row, side] = states[side].mean
+    r.turns[row, 0], r.turns[row, 1] = w.crank[i, ANGLE], w.crank[i, SPEED]
+    for k in range(chamber.shape[0]):
+        if r.states.shape[0] > 1:
+            for c in range(PER_THROW):
+                r.states[row, k, c] = w.stage[i, k].y[c]
+        if r.chambers.shape[0] > 1:
+            for c in range(chamber.shape[1]):
+                r.chambers[row, k, c] = chamber[k, c]
+        if r.gaps.shape[0] > 1:
+            for c in range(len(GAPS)):
+                r.gaps[row, k, c] = w.stage[i, k].gaps[c]
+
+
+@kernel
+def of_mode(
+    force: float, place: float, speed: float, per_force: float, per_place: float, per_speed: float
+) -> float:
+    """Mean acceleration of a mode over a step, or its place after it.
+
+    Both are exact for a force that is even over the step, however far the mode turns in it.
+    """
+    return per_force * force + per_place * place + per_speed * speed
+
+
+@kernel
+def settled(
+    now: float, other: float, felt_now: float, felt_other: float, own: float, cross: float
+) -> float:
+    """Acceleration of a bearing had what it carries felt just that [m/s^2].
+
+    What is held to a bearing pushes back by its mass as soon as it feels an acceleration:
+    `a = a_0 - G a_felt`, and `a = (1 + G)^-1 a_0` had it felt that. Here it is from what was felt:
+    `a + (1 + G)^-1 G (a_felt - a)`.
+
+    Parameters
+    ----------
+    now, felt_now : float
+        One way: by the forces of the step, and what the mechanism felt in it.
+    other, felt_other : float
+        The same of the other way.
+    own, cross : float
+        Entries of `(1 + G)^-1 G`.
+    """
+    return now + own * (felt_now - now) + cross * (felt_other - other)
+
+
+@kernel
+def carried_on(now: float, before: float, earlier: float) -> float:
+    """Acceleration over the next step, along the parabola through the last three [m/s^2].
+
+    Held as it was it would lag by a step, and feed the casing (0.6 dB across a bilge pump's stroke
+    at 20 us); along a line it leaves twice as much in the bands of the knocks as it does.
+    """
+    return 3.0 * (now - before) + earlier
+
+
+@kernel
+def _on_moving_bearing(
+    y: Any, moved: Any, ridden: Any, forces: Any, step: int, h: float, weight: Any, t: Any
+) -> Any:
+    """Tables for the next step: what turns is heavier by how the casing accelerates its bearing.
+
+    In the frame of a bearing that moves, every mass feels its acceleration as more weight. Forces
+    are means over the step before; `weight` is that at rest, along and across; `ridden` holds what
+    was felt in it, and the bearing's acceleration in the two steps before that. What felt another
+    acceleration than the bearing had pushes on the modes by its mass times what it was late by.
+    """
+    along, across = 0.0, 0.0
+    for mode in range(y.react.shape[0]):
+        force = 0.0
+        for k in range(y.push.shape[1]):
+            own = 0.0
+            for n in range(len(PUSHES)):
+                own += y.push[mode, k, n] * forces[step, 1 + len(FORCES) * k + PUSHES[n]]
+            force += own
+        r = y.react[mode]
+        a = of_mode(force, moved[mode, 0], moved[mode, 1], r[0], r[1], r[2])
+        moved[mode, 2] = force
+        along += y.give[mode, 0] * a
+        across += y.give[mode, 1] * a
+    b, was, last, older = y.blend, ridden[0], ridden[1], ridden[2]
+    now_x = settled(along, across, was[0], was[1], b[0, 0], b[0, 1])
+    now_y = settled(across, along, was[1], was[0], b[1, 1], b[1, 0])
+    late_x, late_y = was[0] - now_x, was[1] - now_y
+    for mode in range(y.react.shape[0]):
+        r, to, q, v = y.react[mode], y.reach[mode], moved[mode, 0], moved[mode, 1]
+        force = moved[mode, 2] + y.held[mode, 0] * late_x + y.held[mode, 1] * late_y
+        moved[mode, 0] = of_mode(force, q, v, to[0], to[1], to[2])
+        moved[mode, 1] = v + h * of_mode(force, q, v, r[0], r[1], r[2])
+    felt_x, felt_y = carried_on(now_x, last[0], older[0]), carried_on(now_y, last[1], older[1])
+    older[0], older[1] = last[0], last[1]
+    last[0], last[1], was[0], was[1] = now_x, now_y, felt_x, felt_y
+    m = t.machine
+    machine = Machine(
+        weight[0] + felt_x,
+        weight[1] + felt_y,
+        m.inverse_inertia,
+        m.static_moment,
+        m.drive_moment,
+        m.synchronous_speed,
+        m.breakdown_moment,
+        m.breakdown_slip,
+        m.baumgarte,
+    )
+    return Tables(t.throws, t.contacts, t.liquid, t.oils, t.maps, machine)
+
+
+@kernel
+def integrate(
+    h: float,
+    t: Any,
+    y: Any,
+    moved: Any,
+    ridden: Any,
+    w: Any,
+    chamber: Any,
+    shared: Any,
+    r: Any,
+    tally: Any,
+) -> Any:
+    """March from row 0 of the scratch; returns status code and steps done."""
+    weight = (t.machine.gravity_x, t.machine.gravity_y)
+    breathing = begin(w, t, chamber)
+    i, fresh = 0, False
+    if r.gaps.shape[0] > 1:  # the films of the start are those of its derivative
+        derivative_of_record(w, i, 0.0, t)
+    lines = shared.lines
+    _keep(w, i, chamber, lines.states, r, 0)
+    for step in range(r.forces.shape[0]):
+        i, fresh = step_of_record(w, i, h, fresh, False, t, r.forces, step, tally)
+        code = _fault(w, i)
+        if breathing:
+            if lines.pipes.shape[0] > 0:
+                choked = _breathe_on_lines(w, i, h, t, chamber, shared, r.forces, step)
+            else:
+                choked = _breathe(w, i, h, t, chamber, r.forces, step)
+            if choked != 0:
+                code = 4
+            fresh = False  # the step felt an extrapolated pressure, the next one knows better
+        for k in range(t.throws.shape[0]):
+            tally.counts[IN_TENSION] += w.stage[i, k].link < 0.0
+            tally.counts[WITH_VAPOUR] += chamber[k, 1] > 0.0
+        if y.react.shape[0] > 0:
+            t = _on_moving_bearing(y, moved, ridden, r.forces, step, h, weight, t)
+            fresh = False
+        _keep(w, i, chamber, lines.states, r, step + 1)
+        if code != 0:
+            return code, step + 1
+    return 0, r.forces.shape[0]
