@@ -6,14 +6,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy import signal
-from wearstate.sim.pump.casing import (
-    PASS_BAND,
+from wearstate.sim.casing.decimation import PASS_BAND, decimate, decimation_filter, edge_samples
+from wearstate.sim.casing.modes import (
     CasingModes,
     band_limited_acceleration,
     casing_inputs,
-    decimate,
-    decimation_filter,
-    edge_samples,
     exact_oscillator,
     housing_acceleration,
 )

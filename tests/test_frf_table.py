@@ -8,20 +8,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
-from wearstate.sim.machine.simulate import check, simulate
-from wearstate.sim.pump.casing import (
-    CasingModes,
-    band_limited_acceleration,
-    edge_samples,
-    table_acceleration,
-)
-from wearstate.sim.pump.casing_frf import (
+from wearstate.sim.casing.casing_frf import (
     FEWEST_LINES,
     Accelerance,
     find_file,
     load_accelerance,
     read_frf_table,
 )
+from wearstate.sim.casing.decimation import edge_samples
+from wearstate.sim.casing.measured_casing import table_acceleration
+from wearstate.sim.casing.modes import CasingModes, band_limited_acceleration
+from wearstate.sim.machine.simulate import check, simulate
 from wearstate.sim.scene.load import load_scene, scene_from_table, scene_table, scene_text
 from wearstate.sim.scene.parts import FrfFile, SceneError, beside
 

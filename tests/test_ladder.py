@@ -6,6 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from wearstate.sim.casing.decimation import edge_samples
 from wearstate.sim.fidelity.ladder import cost_of, effects_of
 from wearstate.sim.journal.ladder import journal_calls
 from wearstate.sim.journal.orbit import load, run_orbit, short_film
@@ -13,7 +14,6 @@ from wearstate.sim.journal.recording import journal_film, squeeze_rate
 from wearstate.sim.journal.validity import orbit_faults
 from wearstate.sim.machine.registry import machine_of
 from wearstate.sim.machine.simulate import simulate
-from wearstate.sim.pump.casing import edge_samples
 from wearstate.sim.pump.validity import pump_step, pump_steps
 from wearstate.sim.scene.load import MACHINES, load_scene, scene_names
 from wearstate.sim.scene.parts import SceneError

@@ -39,6 +39,7 @@ ROOMS = {
         "hydraulics",
         "piping",
         "mechanism",
+        "casing",
         "pump",
         "pump_lanes",
         "journal",

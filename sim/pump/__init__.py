@@ -1,5 +1,5 @@
-"""The reciprocating pump: crank mechanism, liquid, casing, and its recording.
+"""The reciprocating pump: from its scene to tables and start, its checks, its recording.
 
 It may import ``sim.jit``, ``sim.output``, ``sim.scene``, ``sim.contact``, ``sim.film``,
-``sim.excitation``, ``sim.hydraulics``, ``sim.piping``, ``sim.mechanism``.
+``sim.excitation``, ``sim.hydraulics``, ``sim.piping``, ``sim.mechanism``, ``sim.casing``.
 """

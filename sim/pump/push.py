@@ -7,9 +7,9 @@ force cell reads them through the filter that the accelerations pass.
 import numpy as np
 from numpy.typing import NDArray
 
+from ..casing.decimation import decimate
 from ..excitation.forces import Push, exciter_push, read_cell
 from ..scene.pump import FORCE_PLACES, PumpScene
-from .casing import decimate
 
 Float = NDArray[np.float64]
 

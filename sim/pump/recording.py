@@ -7,6 +7,10 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from ..casing.casing_frf import Accelerance, load_accelerance
+from ..casing.decimation import Decimation, decimate, edge_samples
+from ..casing.measured_casing import MeasuredCasing
+from ..casing.modes import CasingModes, ModalCasing, casing_inputs
 from ..excitation.forces import Push
 from ..hydraulics.chamber import GATHERED
 from ..hydraulics.valves import lift_left
@@ -35,16 +39,6 @@ from ..scene.pump import (
 from ..scene.pump_hydraulics import BREATHING_RUNGS
 from ..scene.recorded import failed, recorded
 from ..scene.sampling import MEMORY, duration_faults, memory_faults, tacho_faults
-from .casing import (
-    CasingModes,
-    Decimation,
-    MeasuredCasing,
-    ModalCasing,
-    casing_inputs,
-    decimate,
-    edge_samples,
-)
-from .casing_frf import Accelerance, load_accelerance
 from .pressure_sensors import cylinder_pressure, pressures_at_rest, read_pressures
 from .push import casing_pushes, pushed_places, read_cells
 from .setup import (

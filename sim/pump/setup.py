@@ -9,6 +9,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from ..casing.modes import casing_inputs, exact_oscillator
 from ..contact.asperities import asperity_scale
 from ..contact.closed_forms import IdealCrank, conformal_stiffness, ideal_crank
 from ..contact.law import (
@@ -65,7 +66,6 @@ from ..scene.pump import (
     RevoluteJoint,
 )
 from ..scene.pump_hydraulics import BREATHING_RUNGS, PIPED_RUNGS, CylinderPressure
-from .casing import casing_inputs, exact_oscillator
 
 STEP_PER_CONTACT_TIME = 0.3
 """Default step times the contact's fastest angular frequency: 21 steps a contact period."""

@@ -346,7 +346,7 @@ class CasingMode(Part):
 
 
 class FrfFile(Part):
-    """Measured accelerance of the casing, in a file; see :mod:`wearstate.sim.pump.casing_frf`.
+    """Measured accelerance of the casing, in a file; see :mod:`wearstate.sim.casing.casing_frf`.
 
     ``folder`` is where a relative file is looked for first; :func:`beside` sets it to that of the
     scene file. It is no part of the scene's dump, which must not name a machine's folders.

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy import signal
+from wearstate.sim.casing.decimation import decimate, decimation_filter, edge_samples
 from wearstate.sim.machine.simulate import simulate, simulate_many
 from wearstate.sim.output.status import Status
-from wearstate.sim.pump.casing import decimate, decimation_filter, edge_samples
 from wearstate.sim.scene.load import load_scene
 
 

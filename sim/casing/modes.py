@@ -1,24 +1,17 @@
-"""Force to housing acceleration: the casing as a set of modes, or as it was measured."""
+"""The casing as a set of modes: acceleration of the housing under forces at the step rate."""
 
 import math
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import fft, signal
 
 from ..jit import kernel
-from ..output.sensor import padded_spectrum
 from ..scene.parts import specific_key
-from .casing_frf import Accelerance
-
-PASS_BAND = 0.45
-"""Upper edge of the flat band over the sample rate; 11.5 kHz at 25.6 kHz."""
-
-_STOP_ATTENUATION_DB = 80.0
+from .decimation import BLOCK, PIECE, Decimation, pieces, write_rows
 
 _REACH = 3  # steps that the taps of line_inverse look ahead and back
 
@@ -26,11 +19,7 @@ _REACH = 3  # steps that the taps of line_inverse look ahead and back
 # number of steps that the compiler knows. Rows are longer than a block by what is looked ahead, and
 # their addresses differ by more than the processor confuses, a multiple of 4096.
 _AHEAD = 8  # steps that a mode takes at once, the widest vector of doubles
-_BLOCK = 576  # steps
 _ROW = 640
-_KEPT = 512  # samples of a block of the decimation
-_PIECE = 16 * _BLOCK  # steps that are driven at once: what is on its way stays near the processor
-_AT_ONCE = 8  # taps
 
 
 def exact_oscillator(
@@ -83,7 +72,7 @@ def exact_oscillator(
 @kernel
 def _read(row: Any, first: int, block: Any) -> None:
     """A block of forces with those about it."""
-    for i in range(_BLOCK + 2 * _REACH):
+    for i in range(BLOCK + 2 * _REACH):
         block[i] = row[np.uint64(first + i)]  # unsigned: no index counts from the end
 
 
@@ -91,7 +80,7 @@ def _read(row: Any, first: int, block: Any) -> None:
 def _raise(block: Any, taps: Any, raised: Any) -> None:
     """Forces through the symmetric taps."""
     t0, t1, t2, t3 = taps[3], taps[4], taps[5], taps[6]
-    for i in range(_BLOCK):
+    for i in range(BLOCK):
         raised[i + _AHEAD] = (
             t0 * block[i + 3]
             + t1 * (block[i + 2] + block[i + 4])
@@ -102,7 +91,7 @@ def _raise(block: Any, taps: Any, raised: Any) -> None:
 
 @kernel
 def _add_direct(total: Any, a: float, block: Any, b: float, raised: Any) -> None:
-    for i in range(_BLOCK):
+    for i in range(BLOCK):
         total[i] += a * block[i + _REACH] + b * raised[i + _AHEAD]
 
 
@@ -110,7 +99,7 @@ def _add_direct(total: Any, a: float, block: Any, b: float, raised: Any) -> None
 def _add_modal_twice(
     total: Any, a: float, b: float, other: Any, c: float, d: float, real: Any, imaginary: Any
 ) -> None:
-    for i in range(_BLOCK):
+    for i in range(BLOCK):
         x, y = real[i + _AHEAD], imaginary[i + _AHEAD]
         total[i] += a * x + b * y
         other[i] += c * x + d * y
@@ -118,20 +107,20 @@ def _add_modal_twice(
 
 @kernel
 def _add_modal(total: Any, a: float, real: Any, b: float, imaginary: Any) -> None:
-    for i in range(_BLOCK):
+    for i in range(BLOCK):
         total[i] += a * real[i + _AHEAD] + b * imaginary[i + _AHEAD]
 
 
 @kernel
 def _sum_four(total: Any, a: Any, first: int, x: Any, y: Any, z: Any, u: Any) -> None:
     a0, a1, a2, a3 = a[first], a[first + 1], a[first + 2], a[first + 3]
-    for i in range(_BLOCK + 4 * _AHEAD):
+    for i in range(BLOCK + 4 * _AHEAD):
         total[i] = (a0 * x[i] + a1 * y[i]) + (a2 * z[i] + a3 * u[i])
 
 
 @kernel
 def _add_pair(total: Any, a: float, x: Any, b: float, y: Any) -> None:
-    for i in range(_BLOCK + 4 * _AHEAD):
+    for i in range(BLOCK + 4 * _AHEAD):
         total[i] += a * x[i] + b * y[i]
 
 
@@ -140,7 +129,7 @@ def _gather_four(force: Any, turn: Any, real: Any, imaginary: Any) -> None:
     """Sum of four steps' forces, each turned on by a mode until the last of them."""
     a1, a2, a3 = turn[0].real, turn[1].real, turn[2].real
     b1, b2, b3 = turn[0].imag, turn[1].imag, turn[2].imag
-    for i in range(_BLOCK + 4 * _AHEAD):
+    for i in range(BLOCK + 4 * _AHEAD):
         real[i] = force[i + 3] + a1 * force[i + 2] + a2 * force[i + 1] + a3 * force[i]
         imaginary[i] = b1 * force[i + 2] + b2 * force[i + 1] + b3 * force[i]
 
@@ -149,18 +138,12 @@ def _gather_four(force: Any, turn: Any, real: Any, imaginary: Any) -> None:
 def _turn_eight(real: Any, imaginary: Any, turn: Any, x: Any, y: Any) -> None:
     """Every state eight steps on, from sums of four."""
     a4, b4, a8, b8 = turn[3].real, turn[3].imag, turn[4].real, turn[4].imag
-    for i in range(_BLOCK):
+    for i in range(BLOCK):
         pushed_x = real[i + 4] + a4 * real[i] - b4 * imaginary[i]
         pushed_y = imaginary[i + 4] + b4 * real[i] + a4 * imaginary[i]
         x_now, y_now = x[i], y[i]
         x[i + _AHEAD] = a8 * x_now - b8 * y_now + pushed_x
         y[i + _AHEAD] = b8 * x_now + a8 * y_now + pushed_y
-
-
-@kernel
-def _write(total: Any, first: int, n: int, row: Any) -> None:
-    for i in range(n):
-        row[np.uint64(first + i)] = total[i]
 
 
 @kernel
@@ -192,12 +175,12 @@ def _respond(
     follows are scratch, rows of ``_ROW``, of which `raised` and `states` [shape=(n_modes, 2, 8)],
     the last eight states of every mode, go on from one call to the next.
     """
-    for first in range(0, acceleration.shape[1], _BLOCK):
+    for first in range(0, acceleration.shape[1], BLOCK):
         begins = fresh and first == 0
         total[:] = 0.0
         for j in range(len(forces)):
             for i in range(_AHEAD):
-                raised[j, i] = raised[j, i + _BLOCK]
+                raised[j, i] = raised[j, i + BLOCK]
             _read(forces[j], first, block)
             _raise(block, taps, raised[j])
             if begins:
@@ -216,7 +199,7 @@ def _respond(
             _gather_four(force, turns[m], real, imaginary)
             _turn_eight(real, imaginary, turns[m], x, y)
             for i in range(_AHEAD):
-                states[m, 0, i], states[m, 1, i] = x[i + _BLOCK], y[i + _BLOCK]
+                states[m, 0, i], states[m, 1, i] = x[i + BLOCK], y[i + BLOCK]
             paired = len(total) // 2 * 2
             for k in range(0, paired, 2):
                 a, b = swings[m, k], swings[m, k + 1]
@@ -224,7 +207,7 @@ def _respond(
             for k in range(paired, len(total)):
                 _add_modal(total[k], swings[m, k].imag, x, swings[m, k].real, y)
         for k in range(len(total)):
-            _write(total[k], first, _BLOCK, acceleration[k])
+            write_rows(total[k], first, BLOCK, acceleration[k])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -291,7 +274,7 @@ class _ModesInMotion:
         share, turns, swings = _steps(modes, 1 / step_rate)
         n_inputs, n_outputs = modes.inputs.shape[1], modes.outputs.shape[1]
         pairs = max(2, -(-n_inputs // 2))
-        self._window = np.empty((n_inputs, _PIECE + 2 * (_BLOCK + _REACH)))
+        self._window = np.empty((n_inputs, PIECE + 2 * (BLOCK + _REACH)))
         self._filled = 0
         self._fresh = True
         self._n_outputs = n_outputs
@@ -309,12 +292,12 @@ class _ModesInMotion:
         )
 
     def add(self, forces: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Take ``_PIECE`` steps at most; the acceleration of those that are known by now."""
+        """Take ``PIECE`` steps at most; the acceleration of those that are known by now."""
         self.room(forces.shape[1])[:] = forces
         return self.take(forces.shape[1])
 
     def room(self, n: int) -> NDArray[np.float64]:
-        """Where the next n steps' forces are to be written, ``_PIECE`` at most."""
+        """Where the next n steps' forces are to be written, ``PIECE`` at most."""
         first = self._filled or _REACH
         return self._window[:, first : first + n]
 
@@ -324,7 +307,7 @@ class _ModesInMotion:
             self._window[:, :_REACH] = self._window[:, _REACH : _REACH + 1]
             self._filled = _REACH
         end = self._filled + n
-        known = (end - 2 * _REACH) // _BLOCK * _BLOCK
+        known = (end - 2 * _REACH) // BLOCK * BLOCK
         acceleration = np.empty((self._n_outputs, max(0, known)))
         if known > 0:
             _respond(self._window, self._fresh, acceleration, *self._told)
@@ -337,14 +320,9 @@ class _ModesInMotion:
         """Acceleration of what is left; the last forces stand."""
         left = self._filled - _REACH
         last = self._window[:, self._filled - 1 : self._filled]
-        more = -(-left // _BLOCK) * _BLOCK + 2 * _REACH - self._filled
+        more = -(-left // BLOCK) * BLOCK + 2 * _REACH - self._filled
         self.room(more)[:] = last
         return self.take(more)[:, :left]
-
-
-def _pieces(rows: NDArray[np.float64]) -> Iterator[NDArray[np.float64]]:
-    for first in range(0, rows.shape[1], _PIECE):
-        yield rows[:, first : first + _PIECE]
 
 
 def housing_acceleration(
@@ -374,7 +352,7 @@ def housing_acceleration(
     :func:`band_limited_acceleration` has no such loss.
     """
     casing = _ModesInMotion(modes, _AS_THEY_ARE, sample_rate)
-    found = [casing.add(piece) for piece in _pieces(forces.T)]
+    found = [casing.add(piece) for piece in pieces(forces.T)]
     return np.hstack([*found, casing.finish()])
 
 
@@ -431,11 +409,11 @@ class ModalCasing:
 
     def add(self, means: NDArray[np.float64]) -> None:
         """Take the next steps, means of the forces [shape=(n_inputs, n)] [N]."""
-        for piece in _pieces(means):
+        for piece in pieces(means):
             self._low.add(self._modes.add(piece))
 
     def fill(self, n: int, write: Callable[[NDArray[np.float64]], None]) -> None:
-        """As :meth:`add`, of n steps, ``_PIECE`` at most, that are written where they are used."""
+        """As :meth:`add`, of n steps, ``PIECE`` at most, that are written where they are used."""
         write(self._modes.room(n))
         self._low.add(self._modes.take(n))
 
@@ -474,123 +452,6 @@ def casing_inputs(shape: Mapping[str, float], place: str, throw: int) -> float:
     return 0.0 if key is None else shape[key]
 
 
-@dataclass(frozen=True, kw_only=True)
-class TableRun:
-    """Acceleration from measured frequency response functions, and what they left out.
-
-    Attributes
-    ----------
-    acceleration : numpy.ndarray [shape=(n_outputs, n_samples)]
-        [m/s^2]
-    force_share_above : float
-        Share of the forces' energy, their means apart, above the table's last line.
-    """
-
-    acceleration: NDArray[np.float64]
-    force_share_above: float
-
-
-def table_acceleration(
-    means: NDArray[np.float64], step_rate: float, factor: int, accelerance: Accelerance
-) -> TableRun:
-    """Acceleration of the housing at the sample rate, through measured responses.
-
-    Parameters
-    ----------
-    means : numpy.ndarray [shape=(n_steps, n_inputs)]
-        Means of the forces on the casing over each step [N].
-    step_rate : float
-        Steps per second, `factor` times the sample rate.
-    factor : int
-        Steps per sample, >= 1.
-    accelerance : Accelerance
-        From every force to every sensor.
-
-    Returns
-    -------
-    TableRun
-        Acceleration with the times and the spoilt edges of :func:`band_limited_acceleration`.
-
-    Notes
-    -----
-    The forces are decimated, their spectrum is multiplied by the accelerance between the lines,
-    :meth:`~wearstate.sim.pump.casing_frf.Accelerance.at`, and brought back. The record is padded by
-    the length of the response, one over the line spacing, so that its end does not wrap round to
-    its beginning. The casing starts in balance with the first forces, as the modes do: they have
-    stood there for ever and meet the accelerance at zero frequency.
-    """
-    casing = MeasuredCasing(accelerance, step_rate, factor, len(means))
-    casing.add(means.T)
-    return casing.finish()
-
-
-class MeasuredCasing:
-    """:func:`table_acceleration` of forces that come piece by piece.
-
-    Parameters
-    ----------
-    accelerance, step_rate, factor
-        As there.
-    n_steps : int
-        Of all pieces together.
-    """
-
-    def __init__(
-        self, accelerance: Accelerance, step_rate: float, factor: int, n_steps: int
-    ) -> None:
-        self.accelerance, self._rate, self._factor = accelerance, step_rate / factor, factor
-        self._low = Decimation(accelerance.values.shape[1], n_steps, factor)
-        self._held = np.empty(0)
-
-    def add(self, means: NDArray[np.float64]) -> None:
-        """Take the next steps, means of the forces [shape=(n_inputs, n)] [N]."""
-        if not self._held.size:
-            self._held = means[:, 0].copy()
-        self._low.add(means - self._held[:, None])
-
-    def fill(self, n: int, write: Callable[[NDArray[np.float64]], None]) -> None:
-        """As :meth:`add`, of n steps that `write` puts into an array."""
-        means = np.empty((self.accelerance.values.shape[1], n))
-        write(means)
-        self.add(means)
-
-    def finish(self) -> TableRun:
-        """Acceleration and what was left out, after the last step."""
-        return _through_table(
-            self._low.finish(), self._held, self._rate, self._factor, self.accelerance
-        )
-
-
-def _through_table(
-    forces: NDArray[np.float64],
-    held: NDArray[np.float64],
-    rate: float,
-    factor: int,
-    accelerance: Accelerance,
-) -> TableRun:
-    """Forces at the sample rate, less those `held` from ever, times the accelerance."""
-    pad = math.ceil(rate / accelerance.spacing)
-    edge = edge_samples(factor)
-    # the last rows run into zeros: they are led there more gently
-    inside = forces[:, : max(1, forces.shape[1] - edge)]
-    spectrum, length = padded_spectrum(inside, pad + edge)
-    frequency = fft.rfftfreq(length, 1 / rate)
-    rows = []
-    for values in accelerance.values:  # one sensor at a time: all at once may not fit the memory
-        response = replace(accelerance, values=values[None]).at(frequency)[0]
-        rows.append(
-            fft.irfft(np.sum(response * spectrum, axis=0), length)[: forces.shape[1]]
-            + response[:, 0].real @ held
-        )
-    energy = np.sum((inside - inside.mean(axis=1, keepdims=True)) ** 2)
-    beyond = spectrum[:, frequency > accelerance.frequency[-1]]
-    above = 2 * np.sum(np.abs(beyond) ** 2) / length  # Parseval; one side of two
-    return TableRun(
-        acceleration=np.stack(rows),
-        force_share_above=float(min(above / energy, 1.0)) if energy > 0 else 0.0,
-    )
-
-
 @lru_cache(maxsize=1)
 def line_inverse() -> NDArray[np.float64]:
     """Seven symmetric taps that approximate ``1 / sinc^2`` of the frequency over the rate.
@@ -611,148 +472,3 @@ def line_inverse() -> NDArray[np.float64]:
     )
     side = np.linalg.solve(matrix, wanted)
     return np.concatenate([side[:0:-1], side])
-
-
-@lru_cache(maxsize=8)
-def decimation_filter(factor: int) -> NDArray[np.float64]:
-    """Linear-phase low-pass at the step rate, before one sample in `factor` is kept.
-
-    The mean over a step is a low-pass of its own (a sinc); the filter takes its droop back, so
-    that the result is flat to :data:`PASS_BAND` of the final rate. Half its length is a whole
-    number of kept samples.
-    """
-    width = (1 - 2 * PASS_BAND) * 2 / factor  # of the fine Nyquist: 0.45 to 0.55 of the rate
-    taps, beta = signal.kaiserord(_STOP_ATTENUATION_DB, width)
-    half = factor * math.ceil(taps / 2 / factor)
-    edge = 1.0 / factor
-    grid = np.linspace(0, edge, 129)
-    return np.asarray(
-        signal.firwin2(
-            2 * half + 1,
-            np.concatenate([grid, [edge, 1.0]] if factor > 1 else [grid]),
-            np.concatenate([1 / np.sinc(grid / 2), [0.0, 0.0] if factor > 1 else []]),
-            nfreqs=2**15 + 1,
-            window=("kaiser", beta),
-        )
-    )
-
-
-def decimate(means: NDArray[np.float64], factor: int) -> NDArray[np.float64]:
-    """Low-pass what was sampled once a step and keep one in `factor`, without delay.
-
-    Parameters
-    ----------
-    means : numpy.ndarray [shape=(n_steps, n_columns)]
-        Means over steps, or what the casing made of them.
-    factor : int
-        Steps per sample, >= 1.
-
-    Returns
-    -------
-    numpy.ndarray [shape=(n_steps // factor, n_columns)]
-        Row k belongs to the middle of step ``k * factor``. Within :func:`edge_samples` of either
-        end the filter runs into zeros.
-    """
-    low = Decimation(means.shape[1], len(means), factor)
-    low.add(means.T)
-    return np.ascontiguousarray(low.finish().T)
-
-
-class Decimation:
-    """:func:`decimate` of rows that come piece by piece; the same bytes.
-
-    Parameters
-    ----------
-    n_rows, n_steps : int
-        Shape of all pieces together.
-    factor : int
-        Steps per sample, >= 1.
-    """
-
-    def __init__(self, n_rows: int, n_steps: int, factor: int) -> None:
-        self._phases = _filter_phases(factor)
-        self._kept = np.empty((n_rows, n_steps // factor))
-        self._done = 0
-        self._advance = _KEPT * factor
-        self._span = self._phases.size + self._advance  # steps that a block of samples looks at
-        self._window = np.zeros((n_rows, self._span + max(_PIECE, self._advance)))
-        self._filled = edge_samples(factor) * factor  # zeros before the first step
-        self._scratch = np.empty(_KEPT + self._phases.shape[1]), np.empty(_KEPT)
-
-    def add(self, rows: NDArray[np.float64]) -> None:
-        """Take the next steps [shape=(n_rows, n)]."""
-        for piece in _pieces(rows):
-            end = self._filled + piece.shape[1]
-            self._window[:, self._filled : end] = piece
-            self._filled = end
-            self._keep()
-
-    def _keep(self) -> None:
-        blocks = max(0, (self._filled - self._span) // self._advance + 1)
-        if not blocks:
-            return
-        begin, end = self._done, min(self._done + blocks * _KEPT, self._kept.shape[1])
-        _low_pass(self._window, self._phases, *self._scratch, self._kept[:, begin:end])
-        self._done, gone = end, blocks * self._advance
-        self._filled -= gone
-        self._window[:, : self._filled] = self._window[:, gone : gone + self._filled]
-
-    def finish(self) -> NDArray[np.float64]:
-        """Kept values [shape=(n_rows, n_steps // factor)], after the last step."""
-        while self._done < self._kept.shape[1]:
-            self._window[:, self._filled : self._span] = 0.0
-            self._filled = max(self._filled, self._span)
-            self._keep()
-        return self._kept
-
-
-@lru_cache(maxsize=8)
-def _filter_phases(factor: int) -> NDArray[np.float64]:
-    """Every factor-th tap of the filter, from each of the first ones on, and zeros."""
-    taps = decimation_filter(factor)
-    columns = _AT_ONCE * math.ceil(len(taps) / factor / _AT_ONCE)
-    padded = np.zeros(columns * factor)
-    padded[: len(taps)] = taps
-    return np.ascontiguousarray(padded.reshape(columns, factor).T)
-
-
-@kernel
-def _pick(row: Any, first: int, factor: int, picked: Any) -> None:
-    """Every factor-th value."""
-    for i in range(picked.size):
-        picked[i] = row[np.uint64(first + i * factor)]
-
-
-@kernel
-def _add_taps(total: Any, taps: Any, first: int, x: Any) -> None:
-    """Eight taps from the first on."""
-    t0, t1, t2, t3 = taps[first], taps[first + 1], taps[first + 2], taps[first + 3]
-    t4, t5, t6, t7 = taps[first + 4], taps[first + 5], taps[first + 6], taps[first + 7]
-    for i in range(_KEPT):
-        k = np.uint64(first + i)
-        early = (t0 * x[k] + t1 * x[k + _ONE]) + (t2 * x[k + _TWO] + t3 * x[k + _THREE])
-        late = (t4 * x[k + _FOUR] + t5 * x[k + _FIVE]) + (t6 * x[k + _SIX] + t7 * x[k + _SEVEN])
-        total[i] += early + late
-
-
-_ONE, _TWO, _THREE, _FOUR, _FIVE, _SIX, _SEVEN = (np.uint64(i) for i in range(1, 8))
-
-
-@kernel
-def _low_pass(rows: Any, phases: Any, picked: Any, total: Any, kept: Any) -> None:
-    """Filter and keep one in so many: of each phase of the filter, one phase of the rows."""
-    factor, columns = phases.shape
-    n_kept = kept.shape[1]
-    for c in range(len(rows)):
-        for first in range(0, n_kept, _KEPT):
-            total[:] = 0.0
-            for phase in range(factor):
-                _pick(rows[c], first * factor + phase, factor, picked)
-                for tap in range(0, columns, _AT_ONCE):
-                    _add_taps(total, phases[phase], tap, picked)
-            _write(total, first, min(_KEPT, n_kept - first), kept[c])
-
-
-def edge_samples(factor: int) -> int:
-    """Samples at either end of a decimated record that the filter's length spoils."""
-    return (len(decimation_filter(factor)) // 2) // factor
