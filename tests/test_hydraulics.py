@@ -15,11 +15,11 @@ from wearstate.sim.hydraulics import (
     chamber,
     chamber_run,
     flow_ripple,
-    liquid,
     parameters,
     piston_pressure,
     valves,
 )
+from wearstate.sim.hydraulics.liquid import air_near, air_volume, specific_volume
 from wearstate.sim.jit import kernel
 from wearstate.sim.scene.parts import STANDARD_GRAVITY, SceneError, validate_table
 from wearstate.sim.scene.pump_hydraulics import CylinderPressure, Line, Liquid, Valve
@@ -357,7 +357,7 @@ def test_impossible_pumps(function):
 def test_specific_volume(air, p):
     liquid = Liquid(air_fraction=air)
     h = record(liquid=liquid)
-    v, slope = liquid.specific_volume(p, h)
+    v, slope = specific_volume(p, h)
     assert_allclose(v, specific(p, liquid), rtol=1e-15)
     # complex step: exact to rounding
     derivative = specific(p + 1e-20j, liquid).imag / 1e-20
@@ -367,7 +367,7 @@ def test_specific_volume(air, p):
 def test_bulk_moduli_of_water_and_air_at_atmospheric_pressure():
     for air, exponent in ((0.0, 1.4), (0.01, 1.0), (0.01, 1.4), (0.2, 1.4)):
         h = record(liquid=Liquid(air_fraction=air, air_exponent=exponent))
-        v, slope = liquid.specific_volume(0.0, h)
+        v, slope = specific_volume(0.0, h)
         # compliances in series by volume: (1 - a) / B + a / (n p_a)
         expected = (1 - air) / 2.18e9 + air / (exponent * ATMOSPHERE)
         assert_allclose(-slope / v, expected, rtol=1e-14)
@@ -378,9 +378,9 @@ def test_bulk_moduli_of_water_and_air_at_atmospheric_pressure():
 def test_series_for_the_air(p, e, exponent):
     h = record(liquid=Liquid(air_fraction=0.2, air_exponent=exponent))
     near = p + e * (p + ATMOSPHERE)
-    known = (p, liquid.air_volume(p, h), 1 / (p + ATMOSPHERE))
+    known = (p, air_volume(p, h), 1 / (p + ATMOSPHERE))
     # five terms: the sixth is below 1e-12 of the air, and half of it at the end of the reach
-    assert_allclose(liquid.air_near(near, known, h), liquid.air_volume(near, h), rtol=2e-12)
+    assert_allclose(air_near(near, known, h), air_volume(near, h), rtol=2e-12)
 
 
 def shut(**fields):
