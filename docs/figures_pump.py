@@ -17,7 +17,7 @@ from wearstate.datasets.recipe.recipe import load_recipe, sample_records
 from wearstate.sim.hydraulics.flow_ripple import even_phases, flow_ripple
 from wearstate.sim.machine.simulate import simulate
 from wearstate.sim.machine.transfer import scene_transfer
-from wearstate.sim.pump.setup import pin_offsets, run_scene
+from wearstate.sim.pump.scene_run import pin_offsets, run_scene
 from wearstate.sim.scene.load import load_scene
 from wearstate.sim.scene.pump import PumpScene
 from wearstate.sim.wear.rate import joint_wear

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from wearstate.sim.machine.simulate import check, simulate
 from wearstate.sim.output.status import SimulationError, Status
 from wearstate.sim.pump.recording import steps_per_sample
-from wearstate.sim.pump.setup import contact_frequency
+from wearstate.sim.pump_setup.contacts import contact_frequency
 from wearstate.sim.scene.load import load_scene
 from wearstate.sim.scene.parts import SceneError, channels_of
 

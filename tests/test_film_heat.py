@@ -9,7 +9,7 @@ from scipy.integrate import quad
 from wearstate.sim.film.bearing import short_load
 from wearstate.sim.film.heat import film_temperature, friction_power
 from wearstate.sim.machine.simulate import simulate
-from wearstate.sim.pump.setup import film_temperature_of
+from wearstate.sim.pump_setup.films import film_temperature_of
 from wearstate.sim.scene.load import load_scene
 from wearstate.sim.scene.parts import SceneError
 

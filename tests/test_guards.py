@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 from wearstate.sim.film.solve import FilmGeometry, FilmState, FilmStatus, solve_relaxed
 from wearstate.sim.machine.simulate import simulate
-from wearstate.sim.pump.setup import contact_rate, joint_loads
+from wearstate.sim.pump_setup.contacts import contact_rate
+from wearstate.sim.pump_setup.ideal_motion import joint_loads
 from wearstate.sim.scene.load import load_scene
 from wearstate.sim.scene.parts import SceneError
 

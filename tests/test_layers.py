@@ -40,6 +40,7 @@ ROOMS = {
         "piping",
         "mechanism",
         "casing",
+        "pump_setup",
         "pump",
         "pump_lanes",
         "journal",

@@ -10,7 +10,8 @@ from wearstate.diagnose.literature.verify_contact import impact
 from wearstate.sim.contact.law import CONTACT, ELASTIC_HERTZ, LAW_HYSTERESIS, hysteresis
 from wearstate.sim.machine.simulate import simulate
 from wearstate.sim.mechanism import crank_run, layout, throw_motion
-from wearstate.sim.pump import setup as cs
+from wearstate.sim.pump import scene_run, validity
+from wearstate.sim.pump_setup import contacts, ideal_motion, joints, tables
 from wearstate.sim.scene.load import load_scene
 
 IDEAL, LINK, COMPLIANT = "ideal", "link", "compliant"
@@ -68,7 +69,7 @@ def turning(t, inertia=FLYWHEEL, **machine):
 
 def run(scene, t, *, step, duration, angle=0.3, speed=None, kick=0.0):
     """Run from the library's own start; a kick [m/s] sends rods and pistons along the stroke."""
-    bodies = cs.start_state(scene, angle, t)
+    bodies = tables.start_state(scene, angle, t)
     bodies[:, [6, 9]] += kick
     found = crank_run.run_mechanism(
         t,
@@ -134,9 +135,9 @@ def mechanical_energy(scene, t, found):
     energy += m.static_moment * (m.gravity_x * np.cos(angle) + m.gravity_y * np.sin(angle))
     pushed = []
     for joint, (offset, _) in enumerate(offsets(scene, found)):
-        if cs.joint_rungs(scene, 0)[joint] == layout.JOINT_COMPLIANT:
+        if joints.joint_rungs(scene, 0)[joint] == layout.JOINT_COMPLIANT:
             pushed.append((joint, np.abs(offset) - contacts[joint]["clearance"]))
-    if cs.joint_rungs(scene, 0)[layout.GUIDE] == layout.JOINT_COMPLIANT:
+    if joints.joint_rungs(scene, 0)[layout.GUIDE] == layout.JOINT_COMPLIANT:
         pushed += [
             (layout.GUIDE, o) for o, _, _ in corners(found, contacts[layout.GUIDE]["clearance"])
         ]
@@ -158,7 +159,7 @@ def test_energy_of_the_free_crank(rungs):
     scene = pump(rungs, pressure__rung="none", crank__unbalance=0.3, drive__speed=12)
     errors = []
     for step, stretch in ((1e-5, 3e-8), (2.5e-6, 5e-10)):
-        t = turning(without(cs.tables(scene, step), *LOSSES))
+        t = turning(without(tables.tables(scene, step), *LOSSES))
         worst = []
         for angle in (0.3, 2.0):
             kick = 0.2 if rungs[0] == COMPLIANT else 0.0
@@ -186,7 +187,7 @@ def test_energy_of_the_free_crank(rungs):
 def test_impulses_are_the_changes_of_momentum(rungs):
     scene = pump(rungs, piston__seal_friction=60.0, piston__seal_friction_share=0.02)
     step = 1e-5
-    t = turning(cs.tables(scene, step), drive_moment=20.0)
+    t = turning(tables.tables(scene, step), drive_moment=20.0)
     found = run(scene, t, step=step, duration=0.2)
     assert abs(found.force("seal_x")).max() > 60.0
     rod, piston, m = scene.rod.mass, scene.piston.mass, t.machine
@@ -217,7 +218,7 @@ def test_moments_turn_rod_and_crank(rungs):
     scene = pump(rungs, crank__unbalance=0.3)
     errors = []
     for step in (2e-5, 5e-6):
-        t = turning(without(cs.tables(scene, step), *LOSSES[1:]), drive_moment=20.0)
+        t = turning(without(tables.tables(scene, step), *LOSSES[1:]), drive_moment=20.0)
         found = run(scene, t, step=step, duration=0.1)
         m, rod = t.machine, scene.rod
         pin, wrist = (
@@ -252,13 +253,13 @@ def joint_losses(scene, t, found):
     spins = speed, found.bodies[:, 0, 11]
     lost = np.zeros(len(found.turns))
     for joint, (offset, rate) in enumerate(offsets(scene, found)):
-        if cs.joint_rungs(scene, 0)[joint] != layout.JOINT_COMPLIANT:
+        if joints.joint_rungs(scene, 0)[joint] != layout.JOINT_COMPLIANT:
             continue
         c = t.contacts[0, joint]
         along = np.conj(offset / abs(offset)) * rate
         slide = along.imag + radii[joint] * spins[joint] + (radii[joint] + c["clearance"]) * dbeta
         lost += contact_loss(c, abs(offset) - c["clearance"], along.real, slide)
-    if cs.joint_rungs(scene, 0)[layout.GUIDE] == layout.JOINT_COMPLIANT:
+    if joints.joint_rungs(scene, 0)[layout.GUIDE] == layout.JOINT_COMPLIANT:
         c = t.contacts[0, layout.GUIDE]
         lost += sum(contact_loss(c, *corner) for corner in corners(found, c["clearance"]))
     return middle(lost)
@@ -276,7 +277,7 @@ def contact_loss(c, overlap, approach, slide):
 def test_work_is_energy_and_loss(rungs):
     scene = pump(rungs, drive__motor=MOTOR, drive__rung="motor")
     step = 2.5e-6
-    t = cs.tables(scene, step)
+    t = tables.tables(scene, step)
     found = run(scene, t, step=step, duration=0.1)
     work = found.forces[:, 0] * middle(found.turns[:, 1])
     work += found.force("piston_x") * middle(found.bodies[:, 0, 9])
@@ -312,7 +313,7 @@ def test_friction_of_two_links_takes_energy_out_of_both():
     scene = pump((LINK, LINK, IDEAL), pressure__rung="none", **changes)
     step = 1e-5
     for drags in ((), ("damping", "tangential_damping")):
-        t = without(cs.tables(scene, step), *drags)
+        t = without(tables.tables(scene, step), *drags)
         found = run(scene, t, step=step, duration=0.4)
         assert found.tension_steps > 400
         work = found.forces[:, 0] * 2 * math.pi * scene.drive.speed * step
@@ -359,14 +360,14 @@ def test_ideal_joints_in_the_kernel_are_the_closed_form(pressure):
     if pressure == "heads":
         changes |= {"pressure__suction_line": {}, "pressure__discharge_line": {}}
     scene = pump((IDEAL, IDEAL, IDEAL), pressure__rise_angle="60 deg", **changes)
-    assert not cs.needs_integration(scene)
+    assert not scene_run.needs_integration(scene)
     omega, errors = 2 * math.pi * scene.drive.speed, []
     nodes, weights = np.polynomial.legendre.leggauss(4)
     for step in (4e-5, 1e-5):
-        found = run(scene, cs.tables(scene, step), step=step, duration=0.4)
+        found = run(scene, tables.tables(scene, step), step=step, duration=0.4)
         # the mean over every step by Gauss's rule
         angle = 0.3 + omega * step * (np.arange(len(found.forces))[:, None] + 0.5 * (1 + nodes))
-        ideal = cs.ideal_motion(scene, angle)
+        ideal = ideal_motion.ideal_motion(scene, angle)
         g, unbalance = scene.gravity, scene.crank.unbalance
         tilted = angle + scene.stroke_inclination
         expected = {
@@ -391,10 +392,10 @@ def test_ideal_joints_in_the_kernel_are_the_closed_form(pressure):
 def test_motor_of_great_inertia_is_constant_speed():
     scene = pump((COMPLIANT, COMPLIANT, IDEAL), pressure__rung="constant")
     step = 2e-5
-    steady = run(scene, cs.tables(scene, step), step=step, duration=0.2)
+    steady = run(scene, tables.tables(scene, step), step=step, duration=0.2)
     errors = []
     for inertia in (1e3, 1e4):
-        found = run(scene, turning(cs.tables(scene, step), inertia), step=step, duration=0.2)
+        found = run(scene, turning(tables.tables(scene, step), inertia), step=step, duration=0.2)
         errors.append(abs(found.force("pin_x") - steady.force("pin_x")).max())
         assert abs(found.turns[:, 1] / steady.turns[:, 1] - 1).max() < 1.0 / inertia
     # What the speed gives way goes with the inverse inertia; contact is kept, nothing is chaotic.
@@ -413,7 +414,7 @@ def test_motor_settles_on_its_curve(load):
         gravity=0,
     )
     step = 1e-4
-    t = cs.tables(scene, step)
+    t = tables.tables(scene, step)
     light = t.throws.copy()
     light["rod_mass"] = light["piston_mass"] = 1e-6
     light["inverse_rod_mass"], light["inverse_rod_inertia"] = 1e6, 1e8
@@ -434,7 +435,7 @@ def test_unbalance_weighs_on_the_drive(rungs):
     runs = []
     for unbalance in (0.0, 0.7):
         scene = pump(rungs, crank__unbalance=unbalance)
-        runs.append(run(scene, cs.tables(scene, step), step=step, duration=0.2))
+        runs.append(run(scene, tables.tables(scene, step), step=step, duration=0.2))
     angle, g = runs[0].turns[:, 0], scene.gravity
     inclination, omega = scene.stroke_inclination, 2 * math.pi * scene.drive.speed
     lever = np.diff(np.sin(angle + inclination)) / (omega * step)  # mean of the cosine
@@ -462,11 +463,11 @@ def test_triplex_at_constant_speed_is_three_simplexes(rungs, pressure):
     step = 1e-5
     changes = {"pressure__rung": pressure, "joint__guide__diametral_clearance": 1e-6}
     triplex = pump(rungs, throws=THREE, **changes)
-    together = run(triplex, cs.tables(triplex, step), step=step, duration=0.2)
+    together = run(triplex, tables.tables(triplex, step), step=step, duration=0.2)
     moment = np.zeros(len(together.forces))
     for throw in range(3):
         scene = pump(rungs, throws=[THREE[throw]], **changes)
-        alone = run(scene, cs.tables(scene, step), step=step, duration=0.2)
+        alone = run(scene, tables.tables(scene, step), step=step, duration=0.2)
         own = slice(1 + len(layout.FORCES) * throw, 1 + len(layout.FORCES) * (throw + 1))
         # A change of contact cuts the step of all throws: equal but for the integrator.
         tolerance = 1e-3 if together.contact_changes else 1e-12
@@ -483,7 +484,7 @@ def test_triplex_on_a_motor_runs_more_evenly():
         pump((IDEAL, IDEAL, IDEAL), throws=THREE, **motor),
         pump((IDEAL, IDEAL, IDEAL), throws=THREE[:1], **motor),
     ]
-    runs = [run(s, cs.tables(s, step), step=step, duration=3.0) for s in scenes]
+    runs = [run(s, tables.tables(s, step), step=step, duration=3.0) for s in scenes]
     last = slice(-round(0.6 / step), None)  # three revolutions, the start has died out
     three, one = (np.ptp(found.turns[last, 1]) / found.turns[last, 1].mean() for found in runs)
     print(f"\nspeed ripple {three:.4f} of three throws, {one:.4f} of one")
@@ -505,7 +506,7 @@ def test_tension_tells_where_contact_is_lost(joint, pressure):
     for rung in (LINK, COMPLIANT):
         rungs = (rung, IDEAL, IDEAL) if joint == "crankpin" else (IDEAL, rung, IDEAL)
         scene = pump(rungs, pressure__rung=pressure, stroke_inclination=0)
-        found[rung] = run(scene, cs.tables(scene, step), step=step, duration=0.4)
+        found[rung] = run(scene, tables.tables(scene, step), step=step, duration=0.4)
     parted = pressure == "two-level"
     assert (found[LINK].tension_steps > 100) == parted
     assert (found[COMPLIANT].contact_changes > 4) == parted
@@ -520,10 +521,10 @@ def pressed(rungs, **changes):
     """
     viscous = {f"joint__{pin}__tangential_damping": 300.0 for pin in ("crankpin", "wristpin")}
     scene = pump(rungs, pressure__rung="constant", **viscous, **changes)
-    frequency = cs.contact_frequency(scene) or 1e4
+    frequency = contacts.contact_frequency(scene) or 1e4
     per_revolution = 2 ** math.ceil(math.log2(0.2 * frequency / 0.3))
     step = 0.2 / per_revolution
-    t = without(cs.tables(scene, step), "friction")
+    t = without(tables.tables(scene, step), "friction")
     found = run(scene, t, step=step, duration=0.4)
     assert found.contact_changes == found.tension_steps == 0
     every = per_revolution // 1024
@@ -587,11 +588,11 @@ def test_link_approaches_the_ideal_joint(joint):
 def test_turning_backwards_mirrors_the_motion(rungs):
     scene = pump(rungs, pressure__rung="none", drive__speed=12)
     step = 1e-5
-    t = cs.tables(scene, step)
+    t = tables.tables(scene, step)
     t = turning(t._replace(machine=t.machine._replace(gravity_y=0.0)), drive_moment=0.0)
     # ... across the stroke: y, rod angle and tilt with their rates
     mirror = np.array([1, -1, -1, 1, -1, -1] * 2)
-    bodies = cs.start_state(scene, 0.3, t)
+    bodies = tables.start_state(scene, 0.3, t)
     turn = 2 * math.pi * scene.drive.speed
     there, back = (
         crank_run.run_mechanism(
@@ -617,7 +618,7 @@ def test_both_corners_of_a_straight_piston_touch_at_once():
     )
     speed, errors = 0.3, []
     for step in (1e-5, 5e-6, 2.5e-6):
-        t = without(cs.tables(scene, step), *LOSSES)
+        t = without(tables.tables(scene, step), *LOSSES)
         bodies = np.zeros((1, 12))
         bodies[0, 3] = scene.crank.radius + scene.rod.length
         bodies[0, 0] = bodies[0, 3] - scene.rod.centre_of_mass
@@ -663,14 +664,14 @@ def test_every_contact_law_runs_in_the_pump(law, elasticity):
     pin = {"law": law, "elasticity": elasticity, **LAWS[law], **ELASTICITIES[elasticity]}
     scene = load_scene("bilge-pump", {f"joint.crankpin.{k}": v for k, v in pin.items()})
     step = min(
-        cs.STEP_PER_CONTACT_TIME / cs.contact_frequency(scene),
-        cs.STEP_PER_CONTACT_DECAY / cs.contact_rate(scene),
+        validity.STEP_PER_CONTACT_TIME / contacts.contact_frequency(scene),
+        validity.STEP_PER_CONTACT_DECAY / contacts.contact_rate(scene),
     )
     assert step > 1e-6
-    found = cs.run_scene(scene, step=step, n_steps=round(0.6 / step), start_angle=0.0)
+    found = scene_run.run_scene(scene, step=step, n_steps=round(0.6 / step), start_angle=0.0)
     assert found.status.ok
     assert found.contact_changes > 0
-    ideal = cs.ideal_motion(scene, np.linspace(0, 2 * math.pi, 361))
+    ideal = ideal_motion.ideal_motion(scene, np.linspace(0, 2 * math.pi, 361))
     largest = np.hypot(ideal.pin_force_x, ideal.pin_force_y).max()
     # Sustained contact is damped by a bounded amount: knocks, but no explosion.
     assert 0.9 * largest < found.peak_normal_force < 4 * largest
@@ -682,7 +683,9 @@ def test_every_contact_law_runs_in_the_pump(law, elasticity):
 def test_contacts_of_a_scene_are_made_once(monkeypatch):
     made = []
     monkeypatch.setattr(
-        cs, "contact_record", lambda *a, own=cs.contact_record: made.append(a) or own(*a)
+        contacts,
+        "contact_record",
+        lambda *a, own=contacts.contact_record: made.append(a) or own(*a),
     )
     # A stiffness that no other test has: nothing of this scene is known yet.
     simulate(
@@ -691,17 +694,17 @@ def test_contacts_of_a_scene_are_made_once(monkeypatch):
     )
     assert len(made) == 1
     with pytest.raises(ValueError, match="read-only"):
-        cs.contact_table(load_scene("bilge-pump"), 0)["damping"] = 0.0
+        contacts.contact_table(load_scene("bilge-pump"), 0)["damping"] = 0.0
 
 
 def test_a_throw_has_the_mobility_of_its_own_guide():
     long = {"guide": {"length": "300 mm"}}
     free = pump((COMPLIANT, COMPLIANT, COMPLIANT), throws=[{}, {"phase": "90 deg", "joint": long}])
     alone = pump((COMPLIANT, COMPLIANT, COMPLIANT), joint__guide__length="300 mm")
-    shorter, longer = (cs.joint_mobility(free, throw, layout.GUIDE) for throw in (0, 1))
+    shorter, longer = (contacts.joint_mobility(free, throw, layout.GUIDE) for throw in (0, 1))
     # Both corners together or against each other: 2/m, or 2 a^2/J about the wrist pin.
     assert_allclose(longer, 2 * 0.15**2 / TILT_INERTIA, rtol=1e-12)
-    assert shorter < longer == cs.joint_mobility(alone, 0, layout.GUIDE)
+    assert shorter < longer == contacts.joint_mobility(alone, 0, layout.GUIDE)
 
 
 @pytest.mark.parametrize("hertz", [False, True], ids=["linear", "hertz"])
@@ -723,7 +726,7 @@ def test_slow_closings_are_counted():
     for floor in ("1e-6 m/s", "10 m/s"):
         table = {f"joint.crankpin.{k}": v for k, v in {**pin, "speed_floor": floor}.items()}
         scene = load_scene("bilge-pump", table | {"pressure.rung": "none"})
-        found = cs.run_scene(scene, step=5e-6, n_steps=40_000, start_angle=0.0)
+        found = scene_run.run_scene(scene, step=5e-6, n_steps=40_000, start_angle=0.0)
         counts[floor] = found.floored_closings, found.contact_changes
     assert counts["1e-6 m/s"][0] == 0
     floored, changes = counts["10 m/s"]
@@ -758,7 +761,7 @@ def test_the_seal_takes_its_friction_over_both_strokes():
     step = 1 / (4000 * free.drive.speed)
     work = []
     for scene in (free, dragged):
-        found = run(scene, cs.tables(scene, step), step=step, duration=2 / scene.drive.speed)
+        found = run(scene, tables.tables(scene, step), step=step, duration=2 / scene.drive.speed)
         moment = found.forces[4000:, 0]  # the second revolution
         work.append(2 * math.pi * moment.mean())
     area, stroke = math.pi * free.piston.diameter**2 / 4, 2 * free.crank.radius
@@ -771,8 +774,8 @@ def test_the_closed_form_has_the_seal_of_the_march():
     changes = {"piston__seal_friction": 60.0, "piston__seal_friction_share": 0.02}
     scene = pump((IDEAL, IDEAL, IDEAL), **changes)
     step = 1 / (4000 * scene.drive.speed)
-    marched = run(scene, cs.tables(scene, step), step=step, duration=1 / scene.drive.speed)
-    closed = cs.run_scene(scene, step=step, n_steps=4000, start_angle=0.3)
+    marched = run(scene, tables.tables(scene, step), step=step, duration=1 / scene.drive.speed)
+    closed = scene_run.run_scene(scene, step=step, n_steps=4000, start_angle=0.3)
     for name in ("seal_x", "piston_x", "pin_x"):
         size = abs(closed.force(name)).max()
         # the middle of a step against its mean, where the sign turns within ten steps

@@ -17,7 +17,7 @@ from wearstate.sim.film.short import short_force, short_resistance
 from wearstate.sim.film.solve import FilmGeometry
 from wearstate.sim.machine.simulate import simulate
 from wearstate.sim.mechanism.oiled_joint import OIL, oiled_joint
-from wearstate.sim.pump.setup import run_scene
+from wearstate.sim.pump.scene_run import run_scene
 from wearstate.sim.scene.load import load_scene
 from wearstate.sim.scene.parts import SceneError
 

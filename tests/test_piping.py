@@ -15,9 +15,11 @@ from wearstate.sim.output.status import Status
 from wearstate.sim.piping import coupling
 from wearstate.sim.piping import pipe as pp
 from wearstate.sim.pump.ladder import pressure_rungs, pump_cost
-from wearstate.sim.pump.setup import begun, hydraulics_of, lines_of, run_scene
+from wearstate.sim.pump.scene_run import run_scene
 from wearstate.sim.pump.validity import limits, pump_step
 from wearstate.sim.pump_lanes.lanes import lane_kind
+from wearstate.sim.pump_setup.joints import hydraulics_of
+from wearstate.sim.pump_setup.tables import begun, lines_of
 from wearstate.sim.scene.load import load_scene
 from wearstate.sim.scene.parts import SceneError
 from wearstate.sim.scene.pump_hydraulics import (

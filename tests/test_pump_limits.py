@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from wearstate.sim.machine.simulate import check, simulate
 from wearstate.sim.output.status import SimulationError, Status
-from wearstate.sim.pump.setup import contact_rate
+from wearstate.sim.pump_setup.contacts import contact_rate
 from wearstate.sim.scene.load import load_scene
 from wearstate.sim.scene.parts import SceneError
 

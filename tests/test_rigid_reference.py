@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from wearstate.sim.mechanism.crank_run import run_mechanism
-from wearstate.sim.pump import setup as crank_setup
+from wearstate.sim.pump_setup import tables
 from wearstate.sim.scene.load import load_scene
 
 _SPEC = importlib.util.spec_from_file_location(
@@ -123,7 +123,7 @@ def compliant_run(start, *, stiffness, law, horizon, step):
     rod = [x - centre * cosine, centre * sine]
     rod_velocity = [u + centre * sine * w, centre * cosine * w]
     run = run_mechanism(
-        crank_setup.tables(scene, step),
+        tables.tables(scene, step),
         angle=angle,
         speed=2 * math.pi * scene.drive.speed,
         bodies=np.array([[*rod, b, x, 0.0, 0.0, *rod_velocity, w, u, 0.0, 0.0]]),

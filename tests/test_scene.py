@@ -16,7 +16,8 @@ from pydantic import ValidationError
 from wearstate.sim.contact.closed_forms import kelvin_voigt_restitution
 from wearstate.sim.machine.simulate import simulate
 from wearstate.sim.output.spellings import spellings
-from wearstate.sim.pump.setup import contact_frequency, ideal_motion
+from wearstate.sim.pump_setup.contacts import contact_frequency
+from wearstate.sim.pump_setup.ideal_motion import ideal_motion
 from wearstate.sim.scene.load import (
     SCENE_FOLDER,
     load_scene,

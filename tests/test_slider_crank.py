@@ -18,8 +18,9 @@ from wearstate.sim.hydraulics.parameters import hydraulic_parameters
 from wearstate.sim.hydraulics.piston_pressure import two_level_pressure
 from wearstate.sim.jit import half_turn_angle, power, sine_cosine
 from wearstate.sim.machine.simulate import simulate
-from wearstate.sim.mechanism import crank_run, equations, layout, throw_motion
-from wearstate.sim.pump import setup as cs
+from wearstate.sim.mechanism import crank_run, crank_step, equations, layout, throw_motion
+from wearstate.sim.pump import scene_run, validity
+from wearstate.sim.pump_setup import contacts, ideal_motion, tables
 from wearstate.sim.scene.load import load_scene
 from wearstate.sim.scene.pump_hydraulics import CylinderPressure
 
@@ -97,7 +98,7 @@ def pushes(scene, angle):
 
 @pytest.mark.parametrize("scene", [PUMP, BENCHMARK, TILTED], ids=lambda s: s.name)
 def test_ideal_crank_against_newton_and_euler(scene):
-    ideal = cs.ideal_motion(scene, REVOLUTION)
+    ideal = ideal_motion.ideal_motion(scene, REVOLUTION)
     push = pushes(scene, REVOLUTION)
     for name, expected in crank_by_newton_euler(scene, REVOLUTION, push).items():
         # Two algebraically equal forms: rounding, on the scale of the largest value.
@@ -112,8 +113,8 @@ def test_ideal_crank_rates_are_derivatives():
     # of 1e-16 / h; the harmonics of a rod ratio 5/12 keep derivatives within 1e3 of the value.
     weights = np.array([-1, 9, -45, 0, 45, -9, 1]) / (60 * h)
     omega = 2 * np.pi * BENCHMARK.drive.speed
-    around = cs.ideal_motion(BENCHMARK, REVOLUTION[:, None] + h * np.arange(-3, 4))
-    here = cs.ideal_motion(BENCHMARK, REVOLUTION)
+    around = ideal_motion.ideal_motion(BENCHMARK, REVOLUTION[:, None] + h * np.arange(-3, 4))
+    here = ideal_motion.ideal_motion(BENCHMARK, REVOLUTION)
     for value, rate in (
         ("piston", "piston_velocity"),
         ("piston_velocity", "piston_acceleration"),
@@ -128,7 +129,7 @@ def test_ideal_crank_rates_are_derivatives():
 @pytest.mark.parametrize("scene", [BENCHMARK, TILTED], ids=lambda s: s.name)
 def test_drive_does_no_work_over_a_revolution_without_pressure(scene):
     free = load_scene(scene.name, {"pressure.rung": "none", "stroke_inclination": 0.6})
-    moment = cs.ideal_motion(free, REVOLUTION[:-1]).crank_moment
+    moment = ideal_motion.ideal_motion(free, REVOLUTION[:-1]).crank_moment
     # The mean over a period of an analytic function: the trapezoidal rule is exact to rounding.
     assert abs(moment.mean()) < 1e-13 * abs(moment).max()
 
@@ -172,7 +173,7 @@ def test_drive_does_the_work_of_the_pressure(rise, fall):
     work = area * span * (2 * radius - late(0.0, *fall) - late(math.pi, *rise))
 
     def moment(a):
-        return float(cs.ideal_motion(scene, np.array([a])).crank_moment[0])
+        return float(ideal_motion.ideal_motion(scene, np.array([a])).crank_moment[0])
 
     pieces = [0.0, fall[0], fall.sum(), math.pi, math.pi + rise[0], math.pi + rise.sum()]
     ends = pairwise([*pieces, 2 * math.pi])
@@ -187,7 +188,7 @@ def test_ideal_run_records_the_ideal_forces_in_mid_step():
         "bilge-pump",
         {"stroke_inclination": "35 deg", "joint.crankpin.rung": "ideal", "crank.unbalance": 0.3},
     )
-    run = cs.run_scene(scene, step=step, n_steps=3000, start_angle=start)
+    run = scene_run.run_scene(scene, step=step, n_steps=3000, start_angle=start)
     omega = 2 * np.pi * scene.drive.speed
     middle = start + omega * step * (np.arange(3000) + 0.5)
     push = pushes(scene, middle)
@@ -281,7 +282,7 @@ def test_delays_are_those_of_the_valves(rpm):
 def test_restitution_of_the_mechanism(ratio, release, expected):
     closed = kelvin_voigt_restitution(ratio, release_at_zero_force=release == RELEASE_AT_ZERO_FORCE)
     assert_allclose(closed, expected, atol=5e-7)  # half of the last printed digit
-    default = rebound(ratio, release, step_per_contact_time=cs.STEP_PER_CONTACT_TIME)
+    default = rebound(ratio, release, step_per_contact_time=validity.STEP_PER_CONTACT_TIME)
     assert_allclose(default, closed, atol=1e-4)  # what the default step is chosen for
     # Order 4: a tenth of the step leaves 1e-4 of that error, and rounding.
     assert_allclose(rebound(ratio, release), closed, atol=2e-8)
@@ -343,7 +344,7 @@ FREE = load_scene("bilge-pump", {"stroke_inclination": "35 deg", "pressure.rung"
 def free_crank(step=1e-5, **changes):
     """Tables without drive and losses: the crank has an inertia, nothing takes energy out."""
     t = with_pin(
-        cs.tables(FREE, step),
+        tables.tables(FREE, step),
         **{"friction": 0.0, "tangential_damping": 0.0, "damping": 0.0, **changes},
     )
     return t._replace(machine=t.machine._replace(inverse_inertia=1 / 0.5))  # a flywheel [kg m^2]
@@ -382,7 +383,7 @@ def run_worn(scene, t, *, step, n_steps, angle=0.3):
         t,
         angle=angle,
         speed=2 * np.pi * scene.drive.speed,
-        bodies=cs.start_state(scene, angle, t),
+        bodies=tables.start_state(scene, angle, t),
         step=step,
         n_steps=n_steps,
     )
@@ -433,8 +434,8 @@ def mechanical_energy(state, p):
 
 def thrown(angle, t):
     """A start in free flight: the pin is kicked off its side of the eye."""
-    x, _, beta = (float(cs.start_state(FREE, angle, t)[0, column]) for column in (3, 9, 2))
-    ideal = cs.ideal_motion(FREE, np.array([angle]))
+    x, _, beta = (float(tables.start_state(FREE, angle, t)[0, column]) for column in (3, 9, 2))
+    ideal = ideal_motion.ideal_motion(FREE, np.array([angle]))
     x += 0.5 * float(t.contacts[0, 0]["clearance"])
     speed = 2 * np.pi * FREE.drive.speed
     return (angle, speed, x, float(ideal.piston_velocity[0]), beta, float(ideal.beta_rate[0]))
@@ -449,7 +450,7 @@ def worst_energy_error(step, angle):
 
 
 def test_undamped_contact_keeps_the_energy():
-    default = cs.STEP_PER_CONTACT_TIME / cs.contact_frequency(PUMP)
+    default = validity.STEP_PER_CONTACT_TIME / contacts.contact_frequency(PUMP)
     angles = 0.7 + np.arange(8)
     rms = []
     for part in (1, 2, 4):
@@ -469,7 +470,7 @@ def energy_error_without_location(t, step, angle, n_steps):
     """As the solver, but a contact change waits for the end of its step."""
     w, i = scratch(thrown(angle, t), False), 0
     for _ in range(n_steps):
-        step._stages(w, i, step, 0.0, step, False, t)
+        crank_step._stages(w, i, step, 0.0, step, False, t)
         i = 1 - i
         if w.stage["margin"][i, 0, 0] < 0:
             w.held["touching"][0, 0] = 1 - w.held["touching"][0, 0]
@@ -479,7 +480,7 @@ def energy_error_without_location(t, step, angle, n_steps):
 
 
 def test_energy_needs_the_contact_located():
-    step = 0.25 * cs.STEP_PER_CONTACT_TIME / cs.contact_frequency(PUMP)
+    step = 0.25 * validity.STEP_PER_CONTACT_TIME / contacts.contact_frequency(PUMP)
     t = free_crank(step)
     n_steps = math.ceil(0.05 / step)
     cut, uncut = [], []
@@ -559,7 +560,7 @@ def test_friction_takes_its_power_out(numbers, friction, viscous):
 
 
 def test_energy_of_a_run_with_friction_only_falls():
-    step = 0.3 / cs.contact_frequency(PUMP)
+    step = 0.3 / contacts.contact_frequency(PUMP)
     t = free_crank(step, friction=0.05, tangential_damping=12.0)
     run = run_from(t, thrown(0.7, t), step=step, n_steps=math.ceil(0.5 / step))
     energy = mechanical_energy(states_of(run).T, lumped(FREE, t))
@@ -577,8 +578,8 @@ def fine_run():
     """Worn pump at a twentieth of the contact time, without friction, in least coordinates."""
     worn = {"joint.crankpin.diametral_clearance": "0.31 mm", "stroke_inclination": "35 deg"}
     scene = load_scene("bilge-pump", worn)
-    step = 0.05 / cs.contact_frequency(scene)
-    t = with_pin(cs.tables(scene, step), friction=0.0, tangential_damping=0.0)
+    step = 0.05 / contacts.contact_frequency(scene)
+    t = with_pin(tables.tables(scene, step), friction=0.0, tangential_damping=0.0)
     run = run_worn(scene, t, step=step, n_steps=math.ceil(0.5 / step))
     assert run.contact_changes > 10
     return scene, lumped(scene, t), run
@@ -661,8 +662,8 @@ def test_recorded_impulse_is_the_change_of_momentum():
     # coordinates the coupling sin(b) b' is differentiated in between, at order 4: 256 times less
     # at a quarter. In those of the bodies momentum is a sum, and only rounding is left.
     for part, tolerance in ((1, 1e-9), (4, 4e-12)):
-        step = 0.3 / part / cs.contact_frequency(scene)
-        t = cs.tables(scene, step)
+        step = 0.3 / part / contacts.contact_frequency(scene)
+        t = tables.tables(scene, step)
         run = run_worn(scene, t, step=step, n_steps=math.ceil(0.4 / step))
         p = lumped(scene, t)
         _, _, _, u, beta, b = states_of(run).T
@@ -695,15 +696,15 @@ def outward_push(scene, run):
     """Mean force of every step along the direction of the pin in its eye [N]."""
     angle = 0.5 * (run.turns[1:, 0] + run.turns[:-1, 0])
     middle = 0.5 * (run.bodies[1:, 0] + run.bodies[:-1, 0])
-    offset = cs.pin_offsets(scene, angle, middle)[:, :2]
+    offset = scene_run.pin_offsets(scene, angle, middle)[:, :2]
     outward = offset / np.hypot(*offset.T)[:, None]
     return run.force("pin_x") * outward[:, 0] + run.force("pin_y") * outward[:, 1]
 
 
 def test_the_contact_never_pulls():
     scene = load_scene("bilge-pump", {"joint.crankpin.diametral_clearance": "0.31 mm"})
-    step = 0.1 / cs.contact_frequency(scene)
-    t = with_pin(cs.tables(scene, step), friction=0.0, tangential_damping=0.0)
+    step = 0.1 / contacts.contact_frequency(scene)
+    t = with_pin(tables.tables(scene, step), friction=0.0, tangential_damping=0.0)
     run = run_worn(scene, t, step=step, n_steps=40_000)
     push = outward_push(scene, run)
     # Without friction the mean force of a step is along the normal, which turns by 1e-3 within it.
@@ -736,13 +737,15 @@ def shrinking():
             },
         )
         per_revolution = 2 ** math.ceil(
-            math.log2(0.2 * cs.contact_frequency(scene) / cs.STEP_PER_CONTACT_TIME)
+            math.log2(0.2 * contacts.contact_frequency(scene) / validity.STEP_PER_CONTACT_TIME)
         )
         step = 1 / (scene.drive.speed * per_revolution)
         n_steps = 5 * per_revolution
-        run = cs.run_scene(scene, step=step, n_steps=n_steps, start_angle=0.0, keep_states=True)
+        run = scene_run.run_scene(
+            scene, step=step, n_steps=n_steps, start_angle=0.0, keep_states=True
+        )
         rigid = load_scene("bilge-pump", {"joint.crankpin.rung": "ideal"})
-        ideal = cs.run_scene(rigid, step=step, n_steps=n_steps, start_angle=0.0)
+        ideal = scene_run.run_scene(rigid, step=step, n_steps=n_steps, start_angle=0.0)
         last = slice(per_revolution, None)  # the first revolution settles
         error = np.abs(run.bodies[last, 0, 3] - ideal.bodies[last, 0, 3]).max()
         real, wanted = (
@@ -805,7 +808,7 @@ def test_contact_frequency_bounds_every_direction():
             ]
             worst = max(worst, (eye[1] - eye[0]) @ normal / 1e-6)
     # The grid misses the worst direction by at most 2.5 degrees: (1 - cos) = 1e-3.
-    assert_allclose(math.sqrt(worst), cs.contact_frequency(PUMP), rtol=2e-3)
+    assert_allclose(math.sqrt(worst), contacts.contact_frequency(PUMP), rtol=2e-3)
 
 
 def test_power_against_libm():

@@ -40,7 +40,7 @@ from wearstate.sim.contact.closed_forms import kelvin_voigt_restitution
 from wearstate.sim.film.bearing import BearingStatus, equilibrium
 from wearstate.sim.film.solve import FilmGeometry, FilmState, FilmStatus, solve_relaxed
 from wearstate.sim.output.recording import DataError
-from wearstate.sim.pump.setup import contact_frequency, joint_mobility
+from wearstate.sim.pump_setup.contacts import contact_frequency, joint_mobility
 from wearstate.sim.scene.load import load_scene
 from wearstate.sim.scene.parts import SceneError
 

@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 from wearstate.sim.film.bearing import JournalBearing, operate
 from wearstate.sim.film.solve import dufrane_scar
 from wearstate.sim.journal.recording import film_geometry
-from wearstate.sim.pump.setup import ideal_motion
+from wearstate.sim.pump_setup.ideal_motion import ideal_motion
 from wearstate.sim.scene.load import load_scene
 from wearstate.sim.scene.parts import SceneError
 from wearstate.sim.wear.archard import (

@@ -9,7 +9,7 @@ from wearstate.sim.fidelity.ladder import cost_of
 from wearstate.sim.machine.simulate import simulate, simulate_many
 from wearstate.sim.mechanism.crank_run import run_mechanism
 from wearstate.sim.mechanism.layout import AT_REST, FORCES, PUSHES, Yielding
-from wearstate.sim.pump import setup
+from wearstate.sim.pump_setup import joints, tables, yielding
 from wearstate.sim.scene.load import load_scene
 from wearstate.sim.scene.parts import SceneError
 
@@ -34,12 +34,12 @@ def free_casing(step, mass, *, along=1.0, across=0.0, pushed=("pin_x", "pin_y"))
 
 def tables_of(step, **changes):
     scene = load_scene("bilge-pump", {"gravity": 0.0, "pressure.rung": "none", **changes})
-    return scene, setup.tables(scene, step)
+    return scene, tables.tables(scene, step)
 
 
 def run(scene, t, casing, *, step, n_steps, angle=0.3, speed=None, kick=0.0, shift=0.0):
     """From the library's own start; of a crank that stands, shifted [m] and kicked [m/s]."""
-    bodies = setup.start_state(scene, angle, t)
+    bodies = tables.start_state(scene, angle, t)
     if speed == 0.0:
         bodies[:, 6:] = 0.0
     bodies[:, [0, 3]] += shift
@@ -108,7 +108,7 @@ def test_a_pin_rings_against_rod_and_casing_together(mass):
     stiffness = float(t.contacts["stiffness"][0, 0])
     at_dead_centre = {"step": step, "angle": 0.0, "speed": 0.0}
     [pulled] = run(scene, t, free_casing(step, mass), n_steps=1, **at_dead_centre).force("pin_x")
-    rest = -50e3 * setup.piston_area(scene) * mass / (mass + moving)
+    rest = -50e3 * joints.piston_area(scene) * mass / (mass + moving)
     shift = (pulled - rest) / stiffness  # of a start that is meant for a crank that turns
     found = run(
         scene, t, free_casing(step, mass), n_steps=n_steps, kick=1e-3, shift=shift, **at_dead_centre
@@ -248,8 +248,8 @@ def test_a_rigid_mechanism_rings_with_its_casing_as_their_masses_together(mass):
     rigid = {"joint.crankpin.rung": "ideal", "pressure.rung": "constant"}
     scene, _ = tables_of(step, **rigid, **{"pressure.discharge": "50 kPa"})
     scene = of_one_mode(scene, mode, 1 / math.sqrt(mass))
-    t = setup.tables(scene, step)
-    casing = setup.yielding_of(scene, step)
+    t = tables.tables(scene, step)
+    casing = yielding.yielding_of(scene, step)
     found = run(scene, t, casing, step=step, n_steps=20_000, angle=0.0, speed=0.0)
     force = found.force("pin_x")[100:]  # which begins without a past to be carried on
     force -= force.mean()

@@ -12,7 +12,7 @@ from ...sim.hydraulics.parameters import HYDRAULIC
 from ...sim.mechanism.crank_run import CrankRun, run_mechanism
 from ...sim.mechanism.layout import BODY, GUIDE, JOINT_COMPLIANT, THROW, Machine, Tables
 from ...sim.mechanism.oiled_joint import OIL
-from ...sim.pump.setup import ideal_motion
+from ...sim.pump_setup.ideal_motion import ideal_motion
 from ...sim.scene.load import load_scene
 from ...sim.scene.pump import PumpScene
 

@@ -17,17 +17,16 @@ from ...sim.mechanism.layout import JOINT_COMPLIANT
 from ...sim.output.recording import Recording
 from ...sim.output.status import Status
 from ...sim.pump.recording import steps_per_sample
-from ...sim.pump.setup import (
-    LARGEST_STEP_PER_CONTACT_TIME,
+from ...sim.pump.scene_run import run_scene
+from ...sim.pump.validity import LARGEST_STEP_PER_CONTACT_TIME
+from ...sim.pump_setup.contacts import (
     contact_rate,
     contact_table,
-    joint_loads,
     joint_mobility,
-    joint_parts,
-    joint_rungs,
-    run_scene,
     tangent_stiffness,
 )
+from ...sim.pump_setup.ideal_motion import joint_loads
+from ...sim.pump_setup.joints import joint_parts, joint_rungs
 from ...sim.scene.parts import Scene, SceneError
 from ...sim.scene.pump import PumpScene
 from .method_map import Cell, Curve, Judge, MapAxis, MapPlan, Own, Verdict, coordinates, even_ratios

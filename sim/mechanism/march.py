@@ -11,6 +11,7 @@ from ..hydraulics.parameters import PRESSURE_CHAMBER
 from ..jit import kernel, subroutine
 from ..piping.coupling import begin_pair, seek_pair
 from ..piping.pipe import advance_pipe
+from .crank_step import contact_margin, step_of_record
 from .equations import derivative_of_record
 from .layout import (
     ANGLE,
@@ -34,7 +35,6 @@ from .layout import (
     Machine,
     Tables,
 )
-from .step import contact_margin, step_of_record
 
 
 @kernel

@@ -1,7 +1,7 @@
 """Joint forces and accelerations of one throw, from numbers alone.
 
 Nothing here reads or writes a table of states: a march hands in the numbers of one throw at one
-instant and gets numbers back, so that the march of one record (:mod:`.slider_crank`) and that of
+instant and gets numbers back, so that the march of one record (:mod:`.mechanism.march`) and that of
 many side by side (``sim.pump_lanes``) are driven by the same equations and reach the same bytes.
 Conditions are chosen between values rather than branched upon where many records need it.
 """

@@ -1,5 +1,6 @@
-"""The reciprocating pump: from its scene to tables and start, its checks, its recording.
+"""The reciprocating pump: run of a scene, validity, sensors, recording.
 
 It may import ``sim.jit``, ``sim.output``, ``sim.scene``, ``sim.contact``, ``sim.film``,
-``sim.excitation``, ``sim.hydraulics``, ``sim.piping``, ``sim.mechanism``, ``sim.casing``.
+``sim.excitation``, ``sim.hydraulics``, ``sim.piping``, ``sim.mechanism``, ``sim.casing``,
+``sim.pump_setup``.
 """

@@ -5,6 +5,8 @@ from collections.abc import Iterator
 from functools import partial
 from typing import cast
 
+from ..pump_setup.joints import joint_parts
+from ..pump_setup.tables import lines_of
 from ..scene.parts import Scene
 from ..scene.pump import OILED_RUNGS, PumpScene, RevoluteJoint
 from ..scene.pump_hydraulics import PIPED_RUNGS
@@ -19,7 +21,6 @@ from ..scene.rungs import (
     with_values,
     written,
 )
-from .setup import joint_parts, lines_of
 from .validity import FEWEST_STEPS, joint_faults, knock_limits, limits, pump_step, pump_steps
 
 JOINT_RUNGS = (

@@ -26,6 +26,10 @@ from ..output.sensor import (
     mounting_poles,
 )
 from ..output.status import SimulationError, Status
+from ..pump_setup.contacts import contact_rate, contact_table
+from ..pump_setup.films import film_temperature_of
+from ..pump_setup.joints import joint_rungs
+from ..pump_setup.yielding import rubs_in_guide, throw_on_casing
 from ..scene.exciters import pushing_faults
 from ..scene.parts import Accelerometer, CasingMode, Scene, SceneError, specific_key
 from ..scene.pump import (
@@ -41,16 +45,7 @@ from ..scene.recorded import failed, recorded
 from ..scene.sampling import MEMORY, duration_faults, memory_faults, tacho_faults
 from .pressure_sensors import cylinder_pressure, pressures_at_rest, read_pressures
 from .push import casing_pushes, pushed_places, read_cells
-from .setup import (
-    contact_rate,
-    contact_table,
-    film_temperature_of,
-    joint_rungs,
-    pin_offsets,
-    rubs_in_guide,
-    run_scene,
-    throw_on_casing,
-)
+from .scene_run import pin_offsets, run_scene
 from .tearing import lowest_under_pull, torn_by_pull
 from .validity import FEWEST_STEPS, MOST_STEPS, joint_faults, knock_limits, limits, pump_step
 

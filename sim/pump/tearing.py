@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..hydraulics.piston_pressure import lowest_pressure
+from ..pump_setup.joints import hydraulics_of, piston_area
 from ..scene.pump import PumpScene
-from .setup import hydraulics_of, piston_area, run_scene
+from .scene_run import run_scene
 
 _TRIAL_TURNS = 2.0
 """Revolutions of a trial after settling: what knocks, knocks in each of them."""

@@ -6,22 +6,30 @@ from collections.abc import Callable, Iterator
 from ..mechanism.layout import JOINT_COMPLIANT, OVERLAP_LIMIT
 from ..output.status import Status
 from ..piping.pipe import FEWEST_REACHES
-from ..scene.pump import OILED_RUNGS, Guide, PumpScene, RevoluteJoint
-from .setup import (
-    LARGEST_STEP_PER_CONTACT_TIME,
-    STEP_PER_CONTACT_DECAY,
-    STEP_PER_CONTACT_TIME,
-    STEP_PER_STARVED_CONTACT_TIME,
+from ..pump_setup.contacts import (
     contact_frequency,
     contact_rate,
     contact_table,
-    guide_gain,
-    joint_loads,
-    joint_parts,
-    joint_rungs,
     penetration_under,
 )
+from ..pump_setup.ideal_motion import joint_loads
+from ..pump_setup.joints import joint_parts, joint_rungs
+from ..pump_setup.yielding import guide_gain
+from ..scene.pump import OILED_RUNGS, Guide, PumpScene, RevoluteJoint
 from .tearing import torn_by_knocks, torn_in_motion
+
+STEP_PER_CONTACT_TIME = 0.3
+"""Default step times the contact's fastest angular frequency: 21 steps a contact period."""
+
+STEP_PER_STARVED_CONTACT_TIME = 0.15
+"""The same where a pin flies into a thin film, which no event locates."""
+
+STEP_PER_CONTACT_DECAY = 0.7
+"""Default step times the contact's fastest decay, where damping is beyond critical."""
+
+LARGEST_STEP_PER_CONTACT_TIME = 1.0
+"""A step longer than this over the contact's rate is refused: Runge-Kutta 4 stays stable to 2.8
+but is no longer accurate."""
 
 
 def joint_faults(scene: PumpScene) -> list[str]:

@@ -39,7 +39,9 @@ from ..mechanism.layout import (
     Yielding,
 )
 from ..output.status import Status
-from ..pump.setup import JOINT_CODES, Start, joint_parts, joint_rungs, runs_on_a_map
+from ..pump_setup.films import runs_on_a_map
+from ..pump_setup.joints import JOINT_CODES, joint_parts, joint_rungs
+from ..pump_setup.tables import Start
 from ..scene.pump import PumpScene
 from ..scene.pump_hydraulics import PIPED_RUNGS
 from .march import LEFT, STRETCH, Stretch, alone, enter_lane, march

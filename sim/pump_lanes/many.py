@@ -17,7 +17,10 @@ from ..pump.recording import (
     refused_run,
     simulate_pump,
 )
-from ..pump.setup import begun, needs_integration, start_films, yielding_of
+from ..pump.scene_run import needs_integration
+from ..pump_setup.films import start_films
+from ..pump_setup.tables import begun
+from ..pump_setup.yielding import yielding_of
 from ..scene.parts import Scene, SceneError
 from ..scene.pump import PumpScene
 from .lanes import LaneJob, LaneKind, lane_columns, lane_kind, run_lanes

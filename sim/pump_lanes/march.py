@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from ..hydraulics.chamber import GATHERED
 from ..jit import kernel, subroutine
+from ..mechanism.crank_step import mean_of_stages, step_of_record
 from ..mechanism.equations import derivative_of_record
 from ..mechanism.layout import (
     CONTACTS,
@@ -21,7 +22,6 @@ from ..mechanism.layout import (
     Work,
 )
 from ..mechanism.march import Tally, begin, carried_on, of_mode, settled
-from ..mechanism.step import mean_of_stages, step_of_record
 from .chambers import breathe_alone, count_vapour, enter_chamber, lanes_breathe
 from .rates import (
     ALL_MOVING,

@@ -21,9 +21,11 @@ from scipy.integrate import odeint, solve_ivp
 from wearstate.sim.contact.law import RELEASE_AT_ZERO_FORCE, RELEASE_AT_ZERO_PENETRATION
 from wearstate.sim.mechanism.crank_run import run_mechanism
 from wearstate.sim.mechanism.layout import AT_REST, CRANKPIN
-from wearstate.sim.pump import setup as crank_setup
 from wearstate.sim.pump_lanes.lanes import LaneJob, lane_kind, run_lanes
 from wearstate.sim.pump_lanes.rates import LANES
+from wearstate.sim.pump_setup.films import start_films
+from wearstate.sim.pump_setup.tables import Start, tables
+from wearstate.sim.pump_setup.tables import start_state as bodies_at
 from wearstate.sim.scene.load import load_scene
 
 SAMPLES_PER_REVOLUTION = 256  # three a contact period; every fixed step divides it
@@ -70,28 +72,28 @@ def start_state(angle):
 
     The pin rests in its eye under the force that an ideal joint would carry.
     """
-    bodies = crank_setup.start_state(SCENE, angle, crank_setup.tables(SCENE, 1e-6))[0]
+    bodies = bodies_at(SCENE, angle, tables(SCENE, 1e-6))[0]
     speed = 2 * np.pi * SCENE.drive.speed
     return (angle, speed, *(float(bodies[column]) for column in STATE_COLUMNS))
 
 
 def tables_and_bodies(start, release, step):
     """What the mechanism is told of its numbers, and where its bodies begin."""
-    tables = crank_setup.tables(SCENE, step)
-    tables.contacts[0, CRANKPIN]["release"] = RELEASES[release]
+    told = tables(SCENE, step)
+    told.contacts[0, CRANKPIN]["release"] = RELEASES[release]
     _, _, x, u, beta, b = start
     centre, sine, cosine = SCENE.rod.centre_of_mass, np.sin(beta), np.cos(beta)
     rod = [x - centre * cosine, centre * sine]
     rod_velocity = [u + centre * sine * b, centre * cosine * b]
-    return tables, np.array([[*rod, beta, x, 0.0, 0.0, *rod_velocity, b, u, 0.0, 0.0]])
+    return told, np.array([[*rod, beta, x, 0.0, 0.0, *rod_velocity, b, u, 0.0, 0.0]])
 
 
 def prepared_run(start, release, step, n_steps, *, keep_states):
     """The run as a function without arguments; tables and start are made beforehand."""
-    tables, bodies = tables_and_bodies(start, release, step)
+    told, bodies = tables_and_bodies(start, release, step)
     return partial(
         run_mechanism,
-        tables,
+        told,
         angle=start[0],
         speed=start[1],
         bodies=bodies,
@@ -105,12 +107,12 @@ def prepared_lanes(starts, release, step, n_steps):
     """Runs side by side as a function without arguments; they have the states of each alone."""
     jobs = []
     for start in starts:
-        tables, bodies = tables_and_bodies(start, release, step)
-        begin = crank_setup.Start(start[0], start[1], bodies, np.zeros((1, 6)))
-        films = crank_setup.start_films(tables, bodies, start[0])
+        told, bodies = tables_and_bodies(start, release, step)
+        begin = Start(start[0], start[1], bodies, np.zeros((1, 6)))
+        films = start_films(told, bodies, start[0])
         jobs.append(
             LaneJob(
-                tables=tables, start=begin, step=step, n_steps=n_steps, films=films, casing=AT_REST
+                tables=told, start=begin, step=step, n_steps=n_steps, films=films, casing=AT_REST
             )
         )
 

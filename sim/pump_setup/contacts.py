@@ -1,0 +1,296 @@
+"""Contacts of the joints: stiffness, damping, what mass they feel, how fast they ring."""
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..contact.closed_forms import conformal_stiffness
+from ..contact.law import (
+    CONTACT,
+    ELASTIC_CONFORMAL,
+    ELASTIC_HERTZ,
+    ELASTIC_LINEAR,
+    FRICTION_RAMP,
+    FRICTION_SMOOTH,
+    LAW_CONSTANT_LOSS,
+    LAW_HYSTERESIS,
+    LAW_KELVIN_VOIGT,
+    RELEASE_AT_ZERO_FORCE,
+    RELEASE_AT_ZERO_PENETRATION,
+    elastic_force,
+    elastic_stiffness,
+    hysteresis,
+)
+from ..jit import kernel
+from ..mechanism.layout import CRANKPIN, GUIDE, JOINT_COMPLIANT, JOINT_IDEAL, JOINT_LINK, WRISTPIN
+from ..scene.pump import OILED_RUNGS, Guide, PumpScene, RevoluteJoint
+from .ideal_motion import joint_loads
+from .joints import joint_parts, joint_rungs, kept_by_scene
+
+
+def contact_record(
+    part: RevoluteJoint | Guide, clearance: float, load: float, mobility: float
+) -> NDArray[np.void]:
+    """Kernel record of one contact.
+
+    Parameters
+    ----------
+    part : RevoluteJoint or Guide
+        Of the scene, not ideal.
+    clearance : float
+        Radial, or on either side of a guide [m].
+    load : float
+        Largest force of the ideal joint [N], which places the floor of the impact speed.
+    mobility : float
+        Largest acceleration of the contact per unit force [1/kg].
+
+    Returns
+    -------
+    numpy.ndarray [shape=(1,), dtype=CONTACT]
+        Where the scene sets no ``speed_floor``, a hysteresis law gets the speed at which the
+        damping of sustained contact under `load`, ``a F / v``, is twice the critical one: slower
+        impacts are swallowed whatever the law says, and without a floor the damping has no bound.
+        The swing of a massless link is damped by half the critical damping under `load`: what a
+        pin loses that slides along its eye to the other side.
+    """
+    record = np.zeros(1, dtype=CONTACT)
+    kelvin_voigt = part.law == "kelvin-voigt"
+    hysteretic = LAW_HYSTERESIS if part.restitution_speed is None else LAW_CONSTANT_LOSS
+    code, stiffness = {
+        "linear": (ELASTIC_LINEAR, part.stiffness),
+        "hertz": (ELASTIC_HERTZ, part.hertz_stiffness),
+        "conformal": (
+            ELASTIC_CONFORMAL,
+            conformal_stiffness(part.effective_modulus or 0.0, part.contact_length or 0.0)
+            if part.elasticity == "conformal"
+            else None,
+        ),
+    }[part.elasticity]
+    values = {
+        "law": LAW_KELVIN_VOIGT if kelvin_voigt else hysteretic,
+        "elasticity": code,
+        "stiffness": stiffness or 0.0,
+        "damping": part.damping,
+        "hysteresis": 0.0 if kelvin_voigt else hysteresis(part.law, part.restitution or 0.0),
+        "clearance": clearance,
+        "release": RELEASE_AT_ZERO_FORCE if kelvin_voigt else RELEASE_AT_ZERO_PENETRATION,
+        "friction_law": FRICTION_RAMP if part.friction_law == "ramp" else FRICTION_SMOOTH,
+        "friction": part.friction,
+        "friction_speed": part.friction_speed,
+        "friction_dead_speed": part.friction_dead_speed,
+        "tangential_damping": part.tangential_damping,
+        "speed_floor": part.restitution_speed or part.speed_floor or 1.0,
+    }
+    for name, value in values.items():
+        record[name] = value
+    if isinstance(part, RevoluteJoint) and part.oil is not None and part.rung in OILED_RUNGS:
+        # the film drags by itself, and squeezed oil is no part of the wall
+        record["tangential_damping"] = 0.0
+        told = part.oil.wall_damping
+        spring = tangent_stiffness(record[0], load) if stiffness else 0.0
+        record["damping"] = _WALL_DAMPING * math.sqrt(spring / mobility) if told is None else told
+        record["hysteresis"] = 0.0
+    elif part.rung == "link":
+        record["damping"] = _LINK_DAMPING * 2 * math.sqrt(load / max(clearance, 1e-12) / mobility)
+    elif record["law"] == LAW_HYSTERESIS and part.speed_floor is None and stiffness:
+        spring = tangent_stiffness(record[0], load)
+        most = _MOST_DAMPING * 2 * math.sqrt(spring / mobility)
+        record["speed_floor"] = max(float(record["hysteresis"][0]) * load / most, 1e-9)
+    return record
+
+
+@kernel
+def penetration_under(contact: Any, force: float) -> float:
+    """Penetration at which the elastic force of a contact record is `force` [m].
+
+    Bisection on the law, so that a further elasticity needs nothing here.
+    """
+    high = 1e-9
+    while elastic_force(high, contact) < force and high < 1.0:
+        high *= 2.0
+    low = 0.0
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        if elastic_force(middle, contact) < force:
+            low = middle
+        else:
+            high = middle
+    return high
+
+
+def tangent_stiffness(contact: Any, force: float) -> float:
+    """Stiffness of a contact record at a given force [N/m]."""
+    return float(elastic_stiffness(penetration_under(contact, force), contact))
+
+
+_MOST_DAMPING = 2.0  # of the critical one, where a hysteresis law would have no bound
+_LINK_DAMPING = 0.5  # of the critical one
+_WALL_DAMPING = 0.1  # of sqrt(K m): bush, bolts and rod end in a row
+
+PEAK_OVER_LOAD = 3.0  # what a knock may add to the ideal load, where the elasticity is not linear
+
+
+def _rod_jacobian(scene: PumpScene, throw: int, beta: float) -> NDArray[np.float64]:
+    """Relative motion of pin and eye at crank pin (x, y), wrist pin (x, y), guide (y, two ends).
+
+    Columns: rod x, y, beta; piston x, y, tilt.
+    """
+    arm, centre = scene.rod.length - scene.rod.centre_of_mass, scene.rod.centre_of_mass
+    s, c = math.sin(beta), math.cos(beta)
+    guide = scene.joints(throw).guide
+    reach = guide.length / 2 if guide else 0.0
+    return np.array(
+        [
+            [-1.0, 0.0, -arm * s, 0.0, 0.0, 0.0],
+            [0.0, -1.0, -arm * c, 0.0, 0.0, 0.0],
+            [-1.0, 0.0, centre * s, 1.0, 0.0, 0.0],
+            [0.0, -1.0, centre * c, 0.0, 1.0, 0.0],
+            [0.0, 0.0, 0.0, 0.0, 1.0, reach],
+            [0.0, 0.0, 0.0, 0.0, 1.0, -reach],
+        ]
+    )
+
+
+_JOINT_ROWS = (slice(0, 2), slice(2, 4), slice(4, 6))
+
+
+@kept_by_scene
+def _compliances(scene: PumpScene, throw: int) -> NDArray[np.float64]:
+    """Acceleration of every row of the jacobian per force along every other [1/kg].
+
+    At five swings of the rod, from none to its largest: shape (5, 6, 6).
+    """
+    rod, piston = scene.rod, scene.piston
+    rungs = joint_rungs(scene, throw)
+    free = rungs[GUIDE] == JOINT_COMPLIANT
+    inverse: NDArray[np.float64] = np.diag(
+        [
+            1 / rod.mass,
+            1 / rod.mass,
+            1 / rod.inertia,
+            1 / piston.mass,
+            1 / piston.mass if free else 0.0,
+            1 / piston.inertia if free and piston.inertia else 0.0,
+        ]
+    )
+    jacobian = np.array([_rod_jacobian(scene, throw, beta) for beta in _betas(scene)])
+    ideal = [_JOINT_ROWS[j] for j in (CRANKPIN, WRISTPIN) if rungs[j] == JOINT_IDEAL]
+    if ideal:
+        held = np.concatenate([jacobian[:, rows] for rows in ideal], axis=1)
+        through = inverse @ _transposed(held)
+        inverse = inverse - through @ np.linalg.pinv(held @ through) @ _transposed(through)
+    compliances = jacobian @ inverse @ _transposed(jacobian)
+    compliances.flags.writeable = False
+    return compliances
+
+
+def _transposed(matrices: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.swapaxes(matrices, -1, -2)
+
+
+def _betas(scene: PumpScene) -> NDArray[np.float64]:
+    largest = math.asin(min(1.0, scene.crank.radius / scene.rod.length))
+    return np.linspace(0.0, largest, 5)
+
+
+def joint_mobility(scene: PumpScene, throw: int, joint: int) -> float:
+    """Largest acceleration of a joint per unit force in it, over a revolution [1/kg]."""
+    rows = _JOINT_ROWS[joint]
+    return float(np.linalg.eigvalsh(_compliances(scene, throw)[:, rows, rows]).max())
+
+
+def _largest(scene: PumpScene, throw: int, weights: tuple[float, ...]) -> float:
+    """Largest eigenvalue of the mechanism on springs (or dampers) in its joints."""
+    root = np.sqrt(np.repeat(weights, 2))
+    return float(np.linalg.eigvalsh(root[:, None] * _compliances(scene, throw) * root).max())
+
+
+@kept_by_scene
+def _springs_and_dampers(
+    scene: PumpScene, throw: int
+) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Tangent stiffness and damping of every joint: a link's own stiffness is load over length."""
+    springs, dampers = [], []
+    records = contact_table(scene, throw)
+    loads = joint_loads(scene, throw)
+    rungs = joint_rungs(scene, throw)
+    for joint, (record, load, rung) in enumerate(zip(records, loads, rungs, strict=True)):
+        peak = PEAK_OVER_LOAD * load
+        if rung >= JOINT_COMPLIANT:
+            linear = record["elasticity"] == ELASTIC_LINEAR
+            springs.append(
+                float(record["stiffness"]) if linear else tangent_stiffness(record, peak)
+            )
+            loss = record["hysteresis"] * load / max(record["speed_floor"], 1e-12)
+            dampers.append(float(max(record["damping"], loss)))
+        elif rung == JOINT_LINK and joint != GUIDE:
+            springs.append(load / max(float(record["clearance"]), 1e-12))
+            dampers.append(float(record["damping"]))
+        else:
+            springs.append(0.0)
+            dampers.append(0.0)
+    return tuple(springs), tuple(dampers)
+
+
+def contact_frequency(scene: PumpScene) -> float:
+    """Largest angular frequency of the mechanism on its undamped contact springs [rad/s].
+
+    The mass felt at a joint depends on the direction; its least value over a revolution sets the
+    fastest contact, and so the step. 0 where every joint is ideal.
+    """
+    return max(
+        math.sqrt(_largest(scene, throw, _springs_and_dampers(scene, throw)[0]))
+        for throw in _different_throws(scene)
+    )
+
+
+@kept_by_scene
+def contact_rate(scene: PumpScene) -> float:
+    """Fastest rate of the damped contacts [1/s]: largest root of ``s^2 + C/m s + K/m``.
+
+    The contact's angular frequency while it oscillates; beyond critical damping the faster of
+    its two decays, which is what limits an explicit step.
+    """
+    return max(_rate(scene, throw) for throw in _different_throws(scene))
+
+
+def _rate(scene: PumpScene, throw: int) -> float:
+    springs, dampers = _springs_and_dampers(scene, throw)
+    half, square = _largest(scene, throw, dampers) / 2, _largest(scene, throw, springs)
+    return half + math.sqrt(half**2 - square) if half**2 > square else math.sqrt(square)
+
+
+def _different_throws(scene: PumpScene) -> list[int]:
+    """Throws that differ in their joints from those before: equal ones have equal rates."""
+    seen: list[Any] = []
+    found = []
+    for throw in range(len(scene.throws)):
+        key = (scene.joints(throw), scene.pressures(throw))
+        if key not in seen:
+            seen.append(key)
+            found.append(throw)
+    return found
+
+
+@kept_by_scene
+def contact_table(scene: PumpScene, throw: int) -> NDArray[np.void]:
+    """Contact records of one throw: crank pin, wrist pin, guide; an ideal joint's is empty.
+
+    Returns
+    -------
+    numpy.ndarray [shape=(3,), dtype=CONTACT]
+        Read-only.
+    """
+    table = np.zeros(3, dtype=CONTACT)
+    table["friction_speed"] = table["speed_floor"] = 1.0  # an unused record divides by neither
+    loads = joint_loads(scene, throw)
+    for joint, part in enumerate(joint_parts(scene, throw)):
+        if part is None or part.rung == "ideal":
+            continue
+        clearance = part.clearance_radial
+        mobility = joint_mobility(scene, throw, joint)
+        table[joint] = contact_record(part, clearance, loads[joint], mobility)[0]
+    table.flags.writeable = False
+    return table
