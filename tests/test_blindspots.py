@@ -314,6 +314,18 @@ def test_a_run_is_gone_on_with(found, tmp_path, monkeypatch):
     assert find_blind_spots(MODEL, PUMP, **ways, kept=kept_rows(path, "key")) == found
 
 
+def test_rows_that_one_asks_for_are_those_of_the_whole_run(found):
+    rows = shifts_of("piston.mass", 1.0, 1.25)
+    ways = {"machines": 2, "scenes": rows, "signals": gains()}
+    chosen = find_blind_spots(MODEL, PUMP, **ways, only=["mass x 1.25"])
+    assert chosen.baseline == found.baseline
+    assert [row.key for row in chosen.rows] == ["fixed: piston.mass x 1.25"]
+    assert chosen.rows[0] in found.rows
+    assert chosen.left == ()
+    with pytest.raises(DataError, match=r"only = moss: no row .* there are gain, piston\.mass"):
+        find_blind_spots(MODEL, PUMP, **ways, only=["mass", "moss"])
+
+
 def test_rows_of_another_run_are_refused(tmp_path):
     path = tmp_path / "page.part.json"
     path.write_text('{"key": "other", "rows": []}')
@@ -497,6 +509,9 @@ def test_the_command_refuses_what_does_not_fit(stub, tmp_path):
     assert wrong.exit_code == 2
     assert "another severity" in wrong.stderr
     assert run(stub, "-o", tmp_path / "a.txt").exit_code == 2
+    none = run(stub, "--only", "wheel", "-o", tmp_path / "a.html")
+    assert none.exit_code == 2
+    assert "only = wheel: no row is called so; there are" in none.stderr
     assert [path.name for path in tmp_path.iterdir()] == ["model.wsm"]
 
 

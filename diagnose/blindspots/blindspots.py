@@ -259,6 +259,16 @@ def _tasks(scenes: Sequence[SceneRow], signals: Sequence[SignalRow]) -> list[_Ta
     return tasks
 
 
+def _chosen(tasks: Sequence[_Task], only: Sequence[str]) -> list[_Task]:
+    """The baseline, and the rows of which one of the texts is a part; all without a text."""
+    baseline, *others = tasks
+    wanted = [text for text in only if not any(text in task.row.key for task in others)]
+    if wanted:
+        names = ", ".join(dict.fromkeys(task.row.name for task in others))
+        raise DataError(f"only = {', '.join(wanted)}: no row is called so; there are {names}")
+    return [baseline, *(t for t in others if not only or any(text in t.row.key for text in only))]
+
+
 def kept_rows(path: Path | None, key: str) -> Kept[ShiftRow]:
     """Finished rows in a file beside the output.
 
@@ -305,6 +315,7 @@ def find_blind_spots(
     budget: float | None = None,
     scenes: Sequence[SceneRow] | None = None,
     signals: Sequence[SignalRow] | None = None,
+    only: Sequence[str] = (),
     kept: Kept[ShiftRow] | None = None,
     progress: Progress | None = None,
 ) -> BlindSpots:
@@ -323,6 +334,8 @@ def find_blind_spots(
         Seconds after which no further row is begun; the baseline always is.
     scenes, signals : sequences of rows, optional
         Of the scene and of the signal; all by default.
+    only : sequence of str, optional
+        Parts of the rows' keys, "kind: name shift"; without it all rows are made.
     kept : Kept, optional
         Rows of an earlier run; finished ones are added.
     progress : callable, optional
@@ -335,16 +348,17 @@ def find_blind_spots(
     Raises
     ------
     DataError
-        No machine could be simulated as trained.
+        No machine could be simulated as trained, or no row is called so.
     """
     end = None if budget is None else time.monotonic() + budget
     store = kept_rows(None, "") if kept is None else kept
     samples = _samples(recipe, machines, seed)
     fleet = _Machines(recipe=recipe, model=model, samples=samples, seed=seed)
-    tasks = _tasks(
+    every = _tasks(
         scene_rows(recipe) if scenes is None else scenes,
         signal_rows() if signals is None else signals,
     )
+    tasks = _chosen(every, only)
     for done, task in enumerate(tasks, start=1):
         late = end is not None and time.monotonic() >= end and task is not tasks[0]
         if task.row.key not in store and not late:

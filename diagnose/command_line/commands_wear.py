@@ -800,6 +800,12 @@ def report_exit(verdicts: Sequence[_Verdict], fail_on: str | None) -> int:
     type=PATH,
     help="Recording of the surroundings, added at three levels; its unit does not matter.",
 )
+@click.option(
+    "--only",
+    metavar="TEXT",
+    multiple=True,
+    help="Rows whose name or shift contains TEXT, to look closer with more machines; repeatable.",
+)
 @click.option("-o", "--output", type=PATH, help="HTML page to write.")
 @seed_option
 @force_option
@@ -810,6 +816,7 @@ def blindspots(
     machines: int,
     budget: float | None,
     background: Path | None,
+    only: tuple[str, ...],
     output: Path | None,
     seed: int,
     force: bool,
@@ -851,6 +858,7 @@ def blindspots(
             seed=seed,
             budget=budget,
             signals=signal_rows(background),
+            only=only,
             kept=kept,
             progress=progress,
         )
