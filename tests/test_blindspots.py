@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -185,6 +186,34 @@ def test_a_shift_that_no_machine_takes_is_told():
     table = blind_spots_table(made, CARD)
     assert "Not simulated: rod.length = 1 mm: rod: centre_of_mass" in blind_spots_text(table)
     assert "rod.length = 1 mm" in blind_spots_html(table)
+
+
+def test_what_the_rung_of_the_pressure_does_not_read_is_not_simulated():
+    valves = {"pressure.rung": "chamber", "pressure.dead_volume": "4e-4 m^3"}
+    empty = {"pressure.suction_valve": {}, "pressure.discharge_valve": {}}
+    chamber = load_recipe("bilge-pump-narrow", {**valves, **empty})
+    angles = r"pressure.(rise|fall)_(delay|angle)"
+    for recipe, readable in ((PUMP, True), (chamber, False)):
+        machine = next(sample_records(recipe, 1))
+        rows = [row for row in scene_rows(recipe) if re.fullmatch(angles, row.name)]
+        assert len(rows) == 8
+        for row in rows:
+            if readable:
+                assert row.applied(recipe, machine) != machine.scene
+            else:
+                with pytest.raises(SceneError, match="pressure.rung = 'two-level' alone"):
+                    row.applied(recipe, machine)
+
+
+def test_a_page_without_a_verdict_that_has_no_caution_has_no_picture():
+    def careful(*given, **named):
+        return replace(loudness(*given, **named), verdict="caution")
+
+    model = SimpleNamespace(**{**vars(MODEL), "estimate": careful})
+    made = find_blind_spots(model, PUMP, machines=1, scenes=[], signals=gains())
+    page = blind_spots_html(blind_spots_table(made, CARD))
+    assert "<img" not in page
+    assert "gain" in page
 
 
 # --- rows of the signal ---------------------------------------------------------------------------

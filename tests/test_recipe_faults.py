@@ -273,6 +273,19 @@ def test_throws_are_counted_from_one_in_columns_only():
     assert recipes.wear_limits(scene, "diametral_clearance_guide_3_m") is None
 
 
+def test_entries_of_a_list_go_by_number(tmp_path):
+    text = 'name = "m"\nscene = "propulsion-shaft"\nrecords = 1\n'
+    worn = '[severity]\npath = "bearings.{}.wear_down"\nlow = "0.1 mm"\nhigh = "2 mm"\n'
+    drawn_by_name = '[[machine]]\npath = "discs.propeller.mass"\ndistribution = "factor"\n'
+    file = tmp_path / "m.toml"
+    file.write_text(f"{text}{worn.format('*')}{drawn_by_name}low = 0.9\nhigh = 1.1\n")
+    faults = faults_of(file)
+    assert any(fault.endswith("with a number from 0 for each *") for fault in faults)
+    assert any(
+        fault.endswith("a recipe counts the entries of a list: discs.0.mass") for fault in faults
+    )
+
+
 def test_severities_at_fault(tmp_path, second):
     again = WORN.replace(SECOND, CRANKPIN).replace("120 mm", "0.1 mm").replace("200 mm", "0.2 mm")
     text = 'name = "m"\nscene = "bilge-pump"\nrecords = 1\n'

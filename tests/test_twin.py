@@ -244,6 +244,38 @@ def test_levels_hold_map_spectrum_and_knocks(recording):
     assert -20 <= layout.knocks_of(row).min() < layout.knocks_of(row).max() <= 70
 
 
+@pytest.mark.parametrize("rate", [5000.0, 12800.0, 20000.0])
+def test_levels_of_a_slow_recording_end_below_half_its_rate(rate):
+    slow = wearstate.simulate(
+        wearstate.load_scene("bilge-pump", {"duration": "1 s", "sample_rate": rate})
+    )
+    layout, row = layout_of(slow), levels_of(slow)
+    assert np.isfinite(row).all()
+    assert layout.knock_edges[-1] < rate / 2
+    assert np.all(np.diff(layout.knock_edges) > 0)
+    sizes = [layout.map_of(row).size, layout.spectrum_of(row).size, layout.knocks_of(row).size]
+    assert sum(sizes) == row.size
+
+
+def test_a_recording_too_slow_for_the_map_is_refused():
+    slow = wearstate.simulate(
+        wearstate.load_scene("bilge-pump", {"duration": "1 s", "sample_rate": 4000.0})
+    )
+    with pytest.raises(DataError, match="sample rate = 4000 Hz must be >= 5000; record faster"):
+        levels_of(slow)
+
+
+def test_knocks_are_placed_in_the_same_bands_at_every_fast_rate():
+    for rate in (25_600.0, 51_200.0):
+        layout = LevelLayout(channels=("acc",), sample_rate=rate)
+        assert layout.knock_edges == (200.0, 1000.0, 3000.0, 9500.0)
+
+
+def test_another_machine_is_told_by_its_name_and_not_by_the_keys_it_lacks(recording):
+    with pytest.raises(DataError, match="machine = 'propulsion-shaft' must be 'recipr"):
+        wearstate.calibrate("propulsion-shaft", [recording])
+
+
 def test_a_recording_without_tacho_is_refused(recording):
     bare = replace(
         recording, signal=recording.vibration, channels=recording.channels[:2], tacho=None

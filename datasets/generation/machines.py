@@ -152,7 +152,7 @@ def _pressures(
     scene: PumpScene, truth: dict[str, Float], suffix: str, about: str
 ) -> Iterator[tuple[str, Truth]]:
     """Range of the gauge pressure in a cylinder, and the ratio of its absolute ends."""
-    if scene.pressure.rung == "none":
+    if scene.pressure.rung == "none" or not scene.piston.diameter:
         return
     area = math.pi / 4 * scene.piston.diameter**2
     pressure = truth.get(

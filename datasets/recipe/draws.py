@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field, model_validator
 from scipy.special import ndtri
 
-from ...sim.scene.load import override, scene_from_table
+from ...sim.scene.load import numbered, override, scene_from_table
 from ...sim.scene.parts import Part, Ratio, Scene, SceneError
 
 Bound = float | str
@@ -273,7 +273,13 @@ def _scene_value(base: Mapping[str, Any], path: str) -> Any:
     scene = scene_from_table(base)
     if not has_value(scene, path):
         scene_from_table(override(base, {path: 0.0}))  # names the nearest key
-        raise SceneError(path, [f"{path} does not lead to a value; see the scene's own tables"])
+        by_number = numbered(base, path)
+        cure = (
+            "see the scene's own tables"
+            if by_number == path
+            else f"a recipe counts the entries of a list: {by_number}"
+        )
+        raise SceneError(path, [f"{path} does not lead to a value; {cure}"])
     return value_at(scene, path)
 
 

@@ -770,7 +770,8 @@ def _of(axes: Mapping[str, list[Axis]], name: str) -> list[Axis]:
 def _severity_faults(severities: Sequence[Severity]) -> list[str]:
     known = ", ".join(all_wear_places())
     return [
-        f"severity.{i}.path = {severity.path!r} is no known severity; choose one of {known}"
+        f"severity.{i}.path = {severity.path!r} is no known severity; choose one of {known}, "
+        "with a number from 0 for each *"
         for i, severity in enumerate(severities)
         if severity_column(severity.path) is None
     ]

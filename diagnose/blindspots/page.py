@@ -46,7 +46,7 @@ def blind_spots_html(table: Table, *, notice: str = "") -> str:
         notice=notice,
         percent=percent,
         with_ends=with_ends,
-        picture=page_image(blind_spots_figure(table)),
+        picture=page_image(blind_spots_figure(table)) if _shown(table) else "",
     )
 
 
@@ -59,7 +59,7 @@ def blind_spots_figure(table: Table) -> Any:
     """
     from matplotlib.figure import Figure
 
-    rows = [row for row in table["rows"] if row["clear_error"]["value"] is not None][:_MOST]
+    rows = _shown(table)
     height = _MARGIN + _PER_ROW * max(len(rows), 4)
     figure = Figure(figsize=(PAGE_WIDTH, height), layout="constrained")
     axes = figure.add_subplot()
@@ -74,8 +74,14 @@ def blind_spots_figure(table: Table) -> Any:
     axes.set_xlim(left=0)
     axes.set_xlabel("error without a caution [% of the condemning limit]", fontsize=8)
     axes.grid(axis="x", alpha=0.3)
-    axes.legend(fontsize=8, loc="lower right")
+    if axes.get_legend_handles_labels()[1]:  # none where every verdict has a caution
+        axes.legend(fontsize=8, loc="lower right")
     return figure
+
+
+def _shown(table: Table) -> list[Table]:
+    """Rows of the picture: the worst of those with a verdict without a caution."""
+    return [row for row in table["rows"] if row["clear_error"]["value"] is not None][:_MOST]
 
 
 def _in_two_lines(name: str) -> str:

@@ -8,7 +8,7 @@ angles drawn all round, are left alone.
 import math
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain
 from typing import Any, Literal
 
@@ -165,8 +165,7 @@ def _expanded(shift: Shift, recipe: Recipe) -> Iterator[Shift]:
         path = prefix + shift.path
         if _paths(path, recipe.scene, recipe.base):
             beside = {prefix + key: value for key, value in shift.beside.items()}
-            amounts, why = shift.amounts, shift.why
-            yield Shift(path=path, kind=shift.kind, amounts=amounts, why=why, beside=beside)
+            yield replace(shift, path=path, beside=beside)
 
 
 def _paths(pattern: str, scene: Scene, table: Mapping[str, Any]) -> list[str]:
@@ -212,6 +211,7 @@ def _words(shift: Shift, amount: Any) -> str:
 
 def _changer(shift: Shift, amount: Any, recipe: Recipe) -> Callable[[Scene], Mapping[str, Any]]:
     def changes(scene: Scene) -> Mapping[str, Any]:
+        _refuse_unread(shift, scene)
         found = {}
         for path in _paths(shift.path, scene, recipe.base):
             value = value_at(scene, path)
@@ -227,6 +227,14 @@ def _changer(shift: Shift, amount: Any, recipe: Recipe) -> Callable[[Scene], Map
         return {**beside, **found} if found else {}
 
     return changes
+
+
+def _refuse_unread(shift: Shift, scene: Scene) -> None:
+    for path, needed in shift.under.items():
+        value = value_at(scene, path)
+        if value != needed:
+            fault = f"{shift.path} counts where {path} = {needed!r} alone, and it is {value!r}"
+            raise SceneError(scene.name, [fault])
 
 
 # --- drawn values ---------------------------------------------------------------------------------

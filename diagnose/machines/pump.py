@@ -139,14 +139,19 @@ _OIL = {  # an eye 50 mm long in oil of a warm gearbox
     f"{_PIN}.oil.roughness": "0.6 um",
 }
 _STARVED = _OIL | {f"{_PIN}.oil.filled_gap": "10 um"}
+_LEVELS = {"pressure.rung": "two-level"}  # other rungs find these angles themselves
 _WRIST = {"joint.wristpin.rung": "compliant"}
 _GUIDE = {"joint.guide.rung": "compliant"}
 
 _SHIFTS = (
-    set_to("pressure.rise_delay", ("6 deg", "12 deg"), "the delivery valve opens late"),
-    set_to("pressure.fall_delay", ("6 deg", "12 deg"), "the suction valve opens late"),
-    set_to("pressure.rise_angle", ("2 deg", "12 deg"), "stiff liquid, or air in it"),
-    set_to("pressure.fall_angle", ("2 deg", "12 deg"), "stiff liquid, or air in it"),
+    set_to(
+        "pressure.rise_delay", ("6 deg", "12 deg"), "the delivery valve opens late", under=_LEVELS
+    ),
+    set_to(
+        "pressure.fall_delay", ("6 deg", "12 deg"), "the suction valve opens late", under=_LEVELS
+    ),
+    set_to("pressure.rise_angle", ("2 deg", "12 deg"), "stiff liquid, or air in it", under=_LEVELS),
+    set_to("pressure.fall_angle", ("2 deg", "12 deg"), "stiff liquid, or air in it", under=_LEVELS),
     set_to("pressure.rung", ("heads", "chamber"), "valves that move, instead of two levels"),
     factor("pressure.suction", 0.5, 1.5, "level of the bilge"),
     factor("pressure.discharge", 0.7, 1.4, "head of the line"),

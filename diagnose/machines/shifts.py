@@ -29,6 +29,8 @@ class Shift:
         How such a difference comes about.
     beside : mapping
         What has to be set with it, by dotted path.
+    under : mapping
+        What the scene must say for the value to count, by dotted path: a rung that reads it.
     """
 
     path: str
@@ -36,6 +38,7 @@ class Shift:
     amounts: tuple[Any, ...]
     why: str
     beside: Mapping[str, Any] = field(default_factory=dict)
+    under: Mapping[str, Any] = field(default_factory=dict)
 
 
 def factor(path: str, low: float, high: float, why: str) -> Shift:
@@ -48,6 +51,14 @@ def add(path: str, low: float, high: float, why: str) -> Shift:
     return Shift(path=path, kind="add", amounts=(low, high), why=why)
 
 
-def set_to(path: str, amounts: tuple[Any, ...], why: str, **beside: Any) -> Shift:
+def set_to(
+    path: str,
+    amounts: tuple[Any, ...],
+    why: str,
+    *,
+    beside: Mapping[str, Any] | None = None,
+    under: Mapping[str, Any] | None = None,
+) -> Shift:
     """A value replaced."""
-    return Shift(path=path, kind="set", amounts=amounts, why=why, beside=beside.get("beside", {}))
+    with_it: dict[str, Mapping[str, Any]] = {"beside": beside or {}, "under": under or {}}
+    return Shift(path=path, kind="set", amounts=amounts, why=why, **with_it)

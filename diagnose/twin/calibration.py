@@ -17,7 +17,7 @@ from ...datasets.recipe.recipe import Recipe, load_recipe
 from ...datasets.recipe.text import RecipeError, recipe_names, toml_text, twin_path
 from ...sim.atomic import write_whole
 from ...sim.output.recording import DataError, Recording
-from ...sim.scene.load import override, scene_from_table
+from ...sim.scene.load import load_scene, override, scene_from_table
 from ...sim.scene.parts import si_unit
 from ..pages.si_text import si_text
 from .inversion import LEAST_TOLD, Inverted, inverted, moved, rounds_of, standard
@@ -388,20 +388,20 @@ def _chosen(recipe: str | Path, scene: str | Path) -> str | Path:
 
 def _prior(recipe: str | Path, scene: str | Path, first: Recording) -> Recipe:
     """The recipe around the scene, sampled as the recordings are."""
+    machine = load_scene(scene).machine
+    if machine != "reciprocating-pump":
+        raise DataError(
+            f"machine = '{machine}' must be 'reciprocating-pump' to be calibrated; use "
+            "wearstate align or a film's clearance for others"
+        )
     try:
-        plan = load_recipe(recipe, {"sample_rate": first.sample_rate}, scene=scene)
+        return load_recipe(recipe, {"sample_rate": first.sample_rate}, scene=scene)
     except RecipeError as error:
         if recipe not in recipe_names():
             raise
         raise RecipeError(
             f"{recipe} varies what {scene} lacks ({_FULL_SCENE})", error.faults
         ) from None
-    if plan.scene.machine != "reciprocating-pump":
-        raise DataError(
-            f"machine = '{plan.scene.machine}' must be 'reciprocating-pump' to be calibrated; use "
-            "wearstate align or a film's clearance for others"
-        )
-    return plan
 
 
 def _as_new(plan: Recipe) -> tuple[float, float]:

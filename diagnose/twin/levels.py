@@ -17,13 +17,17 @@ SETTINGS = Settings()
 LINE_STEP = 0.012
 """Ratio between two points of the spectrum, less one: a mode of one per cent damping is two of them
 wide."""
+LEAST_RATE = 5000.0
+"""Of a recording [Hz]: slower ones have fewer lines than the map has bands."""
 LOWEST, HIGHEST = 90.0, 9500.0
 """Ends of the spectrum [Hz]: below, orders of the crank alone; above, the converter's filter."""
 LINES = 8192
 """Samples of a window of the spectrum."""
 
 KNOCK_EDGES = (200.0, 1000.0, 3000.0, 9500.0)
-"""Of the bands in which knocks are placed [Hz]."""
+"""Of the bands in which knocks are placed [Hz], as far as the sample rate reaches."""
+KNOCK_TOP = 0.4
+"""Of the sample rate: the bands of knocks end there, below the converter's filter."""
 KNOCK_BINS, KNOCK_WINDOW = 120, 128
 """Angle bins in a revolution, and samples of the window: 3 degrees, and 2 ms at half its height."""
 DEAD_CENTRES = (0, 180)
@@ -51,6 +55,12 @@ class LevelLayout:
     def edges(self) -> Float:
         """Of the bands of the map [Hz]."""
         return SETTINGS.map_edges(self.sample_rate)
+
+    @property
+    def knock_edges(self) -> tuple[float, ...]:
+        """Of the bands in which knocks are placed [Hz]."""
+        top = min(KNOCK_EDGES[-1], KNOCK_TOP * self.sample_rate)
+        return (*(edge for edge in KNOCK_EDGES[:-1] if 1.5 * edge <= top), top)
 
     @property
     def points(self) -> Float:
@@ -82,7 +92,7 @@ class LevelLayout:
     @property
     def n_knocks(self) -> int:
         """Crank angles of each row."""
-        bands = len(KNOCK_EDGES) - 1
+        bands = len(self.knock_edges) - 1
         return len(self.channels) * bands * len(DEAD_CENTRES) * len(SHARES)
 
 
@@ -97,17 +107,21 @@ def levels_of(recording: Recording) -> Float:
     Raises
     ------
     DataError
-        It has no tacho of one pulse per revolution, or is shorter than two revolutions.
+        It has no tacho of one pulse per revolution, is shorter than two revolutions, or is sampled
+        more slowly than `LEAST_RATE`.
     """
     pulses = pulses_of(recording)
     signals, fs = recording.vibration, recording.sample_rate
+    if fs < LEAST_RATE:
+        who = recording.source or "recording"
+        raise DataError(f"{who}: sample rate = {fs:g} Hz must be >= {LEAST_RATE:g}; record faster")
     phase = order.shaft_phase(pulses, signals.shape[-1], fs)
     layout = layout_of(recording)
     energy = order.crank_angle_map(
         signals, fs, phase, edges=layout.edges, angle_bins=SETTINGS.angle_bins
     )
     fine = order.crank_angle_map(
-        signals, fs, phase, edges=KNOCK_EDGES, angle_bins=KNOCK_BINS, nperseg=KNOCK_WINDOW
+        signals, fs, phase, edges=layout.knock_edges, angle_bins=KNOCK_BINS, nperseg=KNOCK_WINDOW
     )
     parts = decibel(energy), _spectrum(signals, layout), _knocks(fine)
     return np.concatenate([part.ravel() for part in parts])
