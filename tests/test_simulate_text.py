@@ -24,6 +24,12 @@ def value(summary, name):
     return summary["truth"][name]["value"]
 
 
+def test_a_piston_without_area_has_no_pressure():
+    told = summary_of("bilge-pump", "--set", "duration=0.6", "--set", "piston.diameter=0")["truth"]
+    assert "pressure_highest" not in told
+    assert told["pressure_rms"]["value"] == 0
+
+
 def test_a_pump_tells_forces_pressures_and_levels():
     summary = summary_of("bilge-pump", "--set", "duration=0.6")
     # the two levels of the scene, low-passed: within a per cent of 330 kPa
