@@ -269,6 +269,10 @@ def test_what_bars_an_estimate_is_named(tmp_path):
         None, "journal-bearing", {"bearing.scar_depth": 1e-5, "film.rung": "direct"}
     )
     assert "the bore has a scar" in film_estimate(recording, CLEARANCE, scarred).reason
+    starved = nameplate_of(
+        None, "journal-bearing", {"bearing.inlet_fill": 0.5, "film.rung": "direct"}
+    )
+    assert "inlet_fill = 0.5 must be 1" in film_estimate(recording, CLEARANCE, starved).reason
     plate = Nameplate(scene=load_scene("journal-bearing"))
     probe = Channel(name="gap", unit="m", quantity="displacement")
     strange = recording.__class__(

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from wearstate.datasets.recipe.recipe import clearances
+from wearstate.sim.film.bearing import equilibrium
 from wearstate.sim.journal.recording import film_geometry, journal_scale
 from wearstate.sim.machine.simulate import check, simulate
 from wearstate.sim.output.status import SimulationError, Status
@@ -336,6 +337,21 @@ def test_a_share_of_the_wear_is_a_scar_in_a_bore_so_much_narrower(share, depth):
     assert told.bearing.scar == depth
 
 
+def test_a_starved_inlet_lets_the_shaft_down_towards_its_load():
+    """The orbit lies about the equilibrium of its film; a full inlet changes nothing."""
+    (full, ever), (_, same), (starved, low) = (
+        bearing({"film.rung": "direct", **changes})
+        for changes in ({}, {"bearing.inlet_fill": 1.0}, {"bearing.inlet_fill": 0.6})
+    )
+    assert_array_equal(ever.signal, same.signal)
+    middle = place(starved, low).mean(axis=0)
+    scale = journal_scale(starved)
+    weight = starved.rotor.mass * starved.gravity + starved.load.static
+    rest = equilibrium(film_geometry(starved), [weight / scale.force / scale.alpha, 0.0])
+    assert_allclose(middle, rest.position, atol=5e-3)  # the mean of an orbit of a few per cent
+    assert middle[0] > place(full, ever).mean(axis=0)[0] + 0.1
+
+
 def test_a_new_bearing_has_no_scar():
     new = {"bearing.diametral_clearance": "0.1 mm", "bearing.scar_share": 1.0}
     scene = load_scene("journal-bearing", {**SHARE, **new})
@@ -459,6 +475,20 @@ def test_a_plan_that_cannot_be_kept(changes, says):
         (
             {"bearing.scar_share": 0.5, "bearing.unworn_clearance": "0.1 mm"},
             "scar_share; set film.rung = 'direct'",
+        ),
+        ({"bearing.inlet_fill": 0.5}, "inlet_fill; set film.rung = 'direct'"),
+        ({"bearing.inlet_fill": 0.0}, "inlet_fill"),
+        (
+            {"bearing.inlet_fill": 0.5, "film.rung": "direct", "film.condition": "guembel"},
+            "must be 1 with film.condition = 'guembel'",
+        ),
+        (
+            {
+                "bearing.inlet_fill": 0.5,
+                "film.rung": "direct",
+                "bearing.grooves": [{"angle": 0.0, "width": 0.1}],
+            },
+            "must be 1 with grooves",
         ),
         ({"film.n_z": 16}, "must be odd"),
         ({"start.x": 0.9, "start.y": 0.9}, "eccentricity = 1.27279 must be < 1"),

@@ -200,6 +200,11 @@ def journal_fault(scene: JournalScene, means: ProbeMeans) -> str:
         )
         if there
     ]
+    if scene.bearing.inlet_fill < 1:
+        return (
+            f"inlet_fill = {scene.bearing.inlet_fill:g} must be 1: how well the inlet is filled "
+            "changes from run to run, and the journal position with it"
+        )
     if shaped:
         return (
             f"the bore has {' and '.join(shaped)}, must be round and plain: otherwise the "

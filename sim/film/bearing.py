@@ -36,7 +36,9 @@ from .solve import (
     FilmStatus,
     direct_film,
     film_gap,
+    starved_film,
 )
+from .starved import starved_force
 
 Vector = NDArray[np.float64]
 
@@ -424,6 +426,7 @@ def equilibrium(
     if rung not in _RUNGS:
         raise ValueError(f"rung = '{rung}' must be one of {', '.join(_RUNGS)}")
     plain = geometry.bore is None and not geometry.grooves and tilt == (0.0, 0.0)
+    plain = plain and geometry.inlet_fill == 1
     turned = plain and geometry.condition == "reynolds" and rung == "direct"
     force = _force_of(geometry, rung, tilt, turned)
     room = _room(geometry, tilt)
@@ -507,6 +510,8 @@ def _force_of(
     """Force and stiffness by the position of the journal."""
     if rung != "direct":
         return partial(_any_force, geometry, rung, tilt)
+    if geometry.inlet_fill < 1:
+        return partial(_starved_force, starved_film(geometry, tilted=any(tilt)))
     work = direct_film(geometry, tilted=tilt != (0.0, 0.0))
     return partial(_turned_force if turned else _direct_force, work, tilt)
 
@@ -529,6 +534,20 @@ def _direct_force(work: DirectFilm, tilt: tuple[float, float], position: Vector)
         return _Force(force, np.zeros((2, 2)), False)
     stiffness = perturbation(work, _at_rest(position, tilt)).stiffness
     return _Force(force, stiffness[:2, :2], True)
+
+
+def _starved_force(work: DirectFilm, position: Vector) -> _Force:
+    """With the stiffness by central differences: the front moves with the journal."""
+
+    def at(place: Vector) -> Vector:
+        return np.array(starved_force(work, float(place[0]), float(place[1]), 0.0, 0.0))
+
+    columns = [
+        (at(position - aside) - at(position + aside)) / (2 * _DISPLACEMENT)
+        for aside in _DISPLACEMENT * np.eye(2)
+    ]
+    force = at(position)
+    return _Force(force, np.array(columns).T, bool(work.outcome[STATUS] == DIRECT_OK))
 
 
 def _turned_force(work: DirectFilm, tilt: tuple[float, float], position: Vector) -> _Force:
@@ -881,6 +900,11 @@ def coefficients(
     """
     if method not in _METHODS:
         raise ValueError(f"method = '{method}' must be one of {', '.join(_METHODS)}")
+    if method != "displacement" and found.geometry.inlet_fill < 1:
+        raise ValueError(
+            f"method = '{method}' of inlet_fill = {found.geometry.inlet_fill} must be "
+            "'displacement'; the front of a starved film moves with the journal"
+        )
     if method != "displacement" and found.rung != "direct":
         raise ValueError(
             f"method = '{method}' of rung '{found.rung}' must be 'displacement'; only the rung "
@@ -1221,8 +1245,8 @@ def whirl(found: Equilibrium, *, tolerance: float = WHIRL_TOLERANCE) -> Whirl:
     """
     _checked_positive("tolerance", tolerance, "of the speed")
     load = float(np.hypot(*found.load))
-    rung = "analytic" if found.rung == "direct" else "displacement"
-    own = coefficients(found, method=rung).per_load(load)
+    exact = found.rung == "direct" and found.geometry.inlet_fill == 1
+    own = coefficients(found, method="analytic" if exact else "displacement").per_load(load)
     geometry = found.geometry
     told = Whirl(
         threshold=stability(own),
@@ -1234,7 +1258,7 @@ def whirl(found: Equilibrium, *, tolerance: float = WHIRL_TOLERANCE) -> Whirl:
         n_z=geometry.n_z,
     )
     place = found.position
-    while found.rung == "direct" and not told.speed_error <= tolerance:
+    while exact and not told.speed_error <= tolerance:
         geometry = doubled(geometry)
         finer = equilibrium(
             geometry, found.load, tilt=found.tilt, start=place, raise_on_failure=False

@@ -83,6 +83,11 @@ class DirectFilm(NamedTuple):
     row: NDArray[np.int64]  # first row of each line, -1 where it has no unknown (n,)
     unknowns: NDArray[np.int64]  # pressurised nodes of each line (n,)
     line: NDArray[np.float64]  # the film of one dimension, see solve_line (n, 8)
+    inlet_fill: float  # of the widest gap; below 1 the film is that of :mod:`.film.starved`
+    inlet: NDArray[
+        np.float64
+    ]  # its front [rad from the widest gap], slope, line and share that is cut (4,)
+    inlet_rows: NDArray[np.float64]  # equations of that line before it was cut (4, m + 1)
     outcome: NDArray[np.int64]  # status, iterations, warm, break line
     measure: NDArray[np.float64]  # least gap, cavitated share, residual, moment x, moment y
 
@@ -95,6 +100,7 @@ def empty_direct_film(
     *,
     condition: int,
     mirrored: bool,
+    inlet_fill: float = 1.0,
 ) -> DirectFilm:
     """Workspace of a mesh, cold.
 
@@ -112,6 +118,8 @@ def empty_direct_film(
         One of :data:`CONDITION_CODES`.
     mirrored : bool
         Whether both halves of the length are alike: no tilt, grooves in the middle.
+    inlet_fill : float
+        Share of the widest gap that the oil brought in fills, in (0, 1].
     """
     n, k = fixed.shape
     m = (k - 1) // 2 if mirrored else k - 2
@@ -150,6 +158,9 @@ def empty_direct_film(
         row=np.zeros(n, dtype=np.int64),
         unknowns=np.zeros(n, dtype=np.int64),
         line=np.zeros((n, 8)),
+        inlet_fill=inlet_fill,
+        inlet=np.zeros(4),
+        inlet_rows=np.zeros((4, m + 1)),
         outcome=np.zeros(6, dtype=np.int64),
         measure=np.zeros(5),
     )
@@ -217,15 +228,43 @@ def direct_tilted_force(
         work.measure[2] = residual(work)
         clip_pressure(work)
     else:
-        work.outcome[STATUS] = DIRECT_ITERATIONS
-        for iteration in range(MOST_SETS):
-            _solve_set(work)
-            work.outcome[ITERATIONS] = iteration + 1
-            if _update_set(work) == 0:
-                work.outcome[STATUS] = DIRECT_OK
-                break
+        solve_sets(work)
     work.outcome[WARM] = 1
     return integrate_pressure(work)
+
+
+@kernel
+def solve_sets(work: DirectFilm) -> None:
+    """Pressure and its set for the equations at hand; solves are added to the iterations."""
+    work.outcome[STATUS] = DIRECT_ITERATIONS
+    for _ in range(MOST_SETS):
+        _solve_set(work)
+        work.outcome[ITERATIONS] += 1
+        if _update_set(work) == 0:
+            work.outcome[STATUS] = DIRECT_OK
+            break
+
+
+@kernel
+def hold_lines(work: DirectFilm, first: int, last: int) -> None:
+    """Hold the lines from one to another at zero pressure; others that were held are free again.
+
+    Of a film without grooves. A cold film is taken as filled wherever wedge and squeeze fill it.
+    """
+    n, m = work.state.shape
+    for i in range(n):
+        held = (i - first) % n <= (last - first) % n
+        for j in range(m):
+            if held:
+                work.state[i, j] = FIXED
+                work.pressure[i, j + 1] = 0.0
+            elif work.outcome[WARM] == 0 or work.state[i, j] == FIXED:
+                work.state[i, j] = PRESSURISED if work.source[i, j] > 0.0 else CAVITATED
+                work.pressure[i, j + 1] = 0.0
+    work.outcome[WARM] = 1
+    work.outcome[START] = first
+    work.outcome[CHANGED] = 0
+    _settle(work)
 
 
 @kernel

@@ -639,6 +639,11 @@ def _check(geometry: FilmGeometry, last_eccentricity: float, accuracy: float) ->
             f"bore spans {np.ptp(geometry.bore):g} of the clearance and must be round for a map: "
             "the wedge of a worn bore drags oil at any velocity; use the direct film"
         )
+    if geometry.inlet_fill < 1:
+        wrong.append(
+            f"inlet_fill = {geometry.inlet_fill:g} must be 1 for a map, as the front of a starved "
+            "film hangs on the velocity; use the direct film"
+        )
     if not 0 < last_eccentricity < 1:
         wrong.append(
             f"last_eccentricity = {last_eccentricity:g} must be in (0, 1); the force has no bound "

@@ -417,6 +417,11 @@ _Held = tuple[NDArray[np.int8], NDArray[np.float64]]
 
 def _held(geometry: FilmGeometry, state: FilmState, end_pressure: EndPressure) -> _Held:
     """Cells that are kept full, and their pressure: ends, grooves, or a line at the widest gap."""
+    if geometry.inlet_fill < 1:
+        raise ValueError(
+            f"inlet_fill = {geometry.inlet_fill} is of the direct film; give this one the oil by "
+            "grooves, ends or a state of its own"
+        )
     held, pressure = groove_nodes(geometry)
     if geometry.condition == "reynolds" and not geometry.grooves:
         turn = math.atan2(state.y, state.x) / (2 * math.pi) + 0.5

@@ -117,7 +117,7 @@ def rest_curve(
     if scar and rung != "direct":
         raise ValueError(f"rung = {rung!r} knows no scar; use 'direct'")
     size = (geometry.length_to_diameter, geometry.n_theta, geometry.n_z)
-    return _curve(*size, str(geometry.condition), rung, scar, turned)
+    return _curve(*size, str(geometry.condition), rung, scar, turned, geometry.inlet_fill)
 
 
 @lru_cache(maxsize=64)
@@ -129,6 +129,7 @@ def _curve(
     rung: str,
     scar: float,
     turned: float,
+    inlet_fill: float,
 ) -> RestCurve:
     film = FilmGeometry(
         length_to_diameter=length_to_diameter,
@@ -136,6 +137,7 @@ def _curve(
         n_z=n_z,
         condition=condition,
         bore=dufrane_scar(scar, turned, n_theta) if scar else None,
+        inlet_fill=inlet_fill,
     )
     farthest = 1.0 + scar
     loads, places = [], []

@@ -84,7 +84,7 @@ FILM_RUNGS: tuple[FilmRung, ...] = (
     ),
     FilmRung(
         name="direct",
-        assumes="Reynolds' equation with cavitation, oil supplied wherever it can be taken",
+        assumes="Reynolds' equation with cavitation, oil wherever it can be taken or by an inlet",
         valid="laminar, isothermal; any L/D, bore, grooves and tilt that the mesh resolves",
         reference="Reynolds (1886), Philosophical Transactions 177, 157-234; active sets",
         nanoseconds=17_000.0,

@@ -39,6 +39,7 @@ from .over_relaxed import (
     relaxed_force,
 )
 from .short import short_force
+from .starved import starved_force
 
 Array = NDArray[np.float64]
 
@@ -120,6 +121,9 @@ class FilmGeometry:
         Extra gap at the nodes over C, positive where the bore is worn, of any profile
         (:func:`dufrane_scar`); between nodes it is linear.
     grooves : tuple of Groove
+    inlet_fill : float
+        Share of the widest gap that the oil brought in fills, in (0, 1]; below 1 the film of an
+        aligned journal begins where that oil fills the narrowing gap (:mod:`.film.starved`).
 
     Raises
     ------
@@ -141,12 +145,14 @@ line of nodes lies in the middle
     condition: str = "periodic"
     bore: Array | None = None
     grooves: tuple[Groove, ...] = ()
+    inlet_fill: float = 1.0
 
     def __post_init__(self) -> None:
         """Refuse values out of range."""
         problems = [*_mesh_problems(self), *_bore_problems(self)]
         for place, groove in enumerate(self.grooves):
             problems += _groove_problems(f"grooves[{place}]", groove)
+        problems += _inlet_problems(self)
         if problems:
             raise ValueError("; ".join(problems))
 
@@ -336,7 +342,24 @@ def direct_film(geometry: FilmGeometry, *, tilted: bool = False) -> DirectFilm:
         pressure,
         condition=CONDITION_CODES[geometry.condition],
         mirrored=not tilted,
+        inlet_fill=geometry.inlet_fill,
     )
+
+
+def starved_film(geometry: FilmGeometry, *, tilted: bool) -> DirectFilm:
+    """Workspace of :func:`.film.starved.starved_force`, cold.
+
+    Raises
+    ------
+    ValueError
+        The journal is tilted: the front of a starved film is straight.
+    """
+    if tilted:
+        raise ValueError(
+            f"inlet_fill = {geometry.inlet_fill} knows no tilt, the front of the film being "
+            "straight; set the tilt to 0 or the fill to 1"
+        )
+    return direct_film(geometry)
 
 
 def groove_nodes(geometry: FilmGeometry) -> tuple[NDArray[np.int8], Array]:
@@ -549,6 +572,8 @@ def solve_direct(
     >>> film.status.value, film.min_thickness, round(film.cavitated_share, 2)
     ('done', 0.5, 0.35)
     """
+    if geometry.inlet_fill < 1:
+        return _solve_starved(geometry, state)
     work = direct_film(geometry, tilted=state.tilted)
     if start is not None:
         _require_mesh(geometry, start)
@@ -564,6 +589,12 @@ def solve_direct(
         state.tilt_x_rate,
         state.tilt_y_rate,
     )
+    return _mesh_solution(geometry, state, work, force)
+
+
+def _solve_starved(geometry: FilmGeometry, state: FilmState) -> FilmSolution:
+    work = starved_film(geometry, tilted=state.tilted)
+    force = starved_force(work, state.x, state.y, state.x_rate, state.y_rate)
     return _mesh_solution(geometry, state, work, force)
 
 
@@ -737,6 +768,25 @@ def _groove_problems(name: str, groove: Groove) -> list[str]:
     return problems
 
 
+def _inlet_problems(geometry: FilmGeometry) -> list[str]:
+    fill = geometry.inlet_fill
+    if not 0 < fill <= 1:
+        return [f"inlet_fill = {fill} must be in (0, 1]; at 1 the film takes all that it needs"]
+    if fill == 1:
+        return []
+    problems = []
+    if geometry.grooves:
+        problems.append(
+            f"inlet_fill = {fill} knows no grooves, which are full; remove them or the fill"
+        )
+    if geometry.condition == "guembel":
+        problems.append(
+            f"inlet_fill = {fill} has no condition 'guembel', whose film is full all round; set "
+            "condition = 'periodic'"
+        )
+    return problems
+
+
 def _require(name: str, geometry: FilmGeometry, state: FilmState, *, plain: bool) -> None:
     problems = []
     if state.tilted:
@@ -745,6 +795,8 @@ def _require(name: str, geometry: FilmGeometry, state: FilmState, *, plain: bool
         problems.append("bore profile")
     if plain and geometry.grooves:
         problems.append("grooves")
+    if geometry.inlet_fill < 1:
+        problems.append("starved inlet")
     if problems:
         raise ValueError(f"film '{name}' has no {' or '.join(problems)}; use the film 'direct'")
 

@@ -29,10 +29,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..contact.law import CONTACT, friction_force, normal_force
-from ..film.direct import DIRECT_OK, STATUS, DirectFilm, direct_force
+from ..film.direct import DIRECT_OK, STATUS, DirectFilm
 from ..film.impedance_map import ImpedanceMap, MapTable, map_force, map_peak
 from ..film.short import short_force
 from ..film.solve import FilmGeometry, direct_film
+from ..film.starved import solved_force
 from ..jit import kernel, sine_cosine
 
 FILM_NONE, FILM_SHORT, FILM_MAP, FILM_DIRECT = range(4)
@@ -319,7 +320,7 @@ def film_force(
     elif film.code == FILM_SHORT:
         f_x, f_y = short_force(film.length_to_diameter, x, y, x_rate, y_rate)
     elif film.code == FILM_DIRECT:
-        f_x, f_y = direct_force(film.work, x, y, x_rate, y_rate)
+        f_x, f_y = solved_force(film.work, x, y, x_rate, y_rate)
     return f_x, f_y
 
 

@@ -145,6 +145,7 @@ def film_geometry(scene: JournalScene) -> FilmGeometry:
         n_z=film.n_z,
         condition=film.condition,
         bore=bore,
+        inlet_fill=bearing.inlet_fill,
         grooves=tuple(
             Groove(
                 angle=groove.angle,

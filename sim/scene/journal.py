@@ -120,6 +120,12 @@ class Bearing(Part):
     grooves: tuple[AxialGroove, ...] = Field(
         default=(), max_length=_MOST_GROOVES, description="axial oil grooves; none: a plain bore"
     )
+    inlet_fill: Ratio = Field(
+        default=1.0,
+        gt=0,
+        le=1,
+        description="share of the widest gap that the oil brought in fills; 1: all the film needs",
+    )
     wall: ShellContact | None = Field(
         default=None, description="contact law; none: a touch ends the run"
     )
@@ -420,12 +426,28 @@ def _film_faults(film: Film, bearing: Bearing) -> list[str]:
             ("scar_depth", bearing.scar_depth > 0),
             ("scar_share", bearing.scar_share > 0),
             ("grooves", bearing.grooves),
+            ("inlet_fill", bearing.inlet_fill < 1),
         )
         if there
     ]
     if film.rung == "direct" or not shaped:
-        return []
+        return _inlet_faults(film, bearing)
     return [
         f"film.rung = '{film.rung}' knows a plain bore only, bearing has {' and '.join(shaped)}; "
         "set film.rung = 'direct'"
     ]
+
+
+def _inlet_faults(film: Film, bearing: Bearing) -> list[str]:
+    """What a film with a starved inlet does not know."""
+    if bearing.inlet_fill == 1:
+        return []
+    faults, fill = [], f"bearing.inlet_fill = {bearing.inlet_fill:g}"
+    if bearing.grooves:
+        faults.append(f"{fill} must be 1 with grooves, which are full; remove one of them")
+    if film.condition == "guembel":
+        faults.append(
+            f"{fill} must be 1 with film.condition = 'guembel', whose film is full all round; set "
+            "film.condition = 'periodic'"
+        )
+    return faults
