@@ -8,7 +8,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from wearstate.sim.machine.simulate import check, simulate
 from wearstate.sim.output.status import SimulationError, Status
-from wearstate.sim.pump.recording import steps_per_sample
+from wearstate.sim.pump.run_plan import steps_per_sample
 from wearstate.sim.pump_setup.contacts import contact_frequency
 from wearstate.sim.scene.load import load_scene
 from wearstate.sim.scene.parts import SceneError, channels_of
@@ -233,7 +233,7 @@ def unchecked(changes):
 def test_failure_is_a_status(monkeypatch, changes, status):
     scene = unchecked(changes)
     # the check sees them coming: here the solver must
-    monkeypatch.setattr("wearstate.sim.pump.recording.limits", lambda scene: [])
+    monkeypatch.setattr("wearstate.sim.pump.run_plan.limits", lambda scene: [])
     with pytest.raises(SimulationError, match=f"bilge-pump: {status.name.lower()}: ") as caught:
         simulate(scene, seed=1)
     assert caught.value.status is status

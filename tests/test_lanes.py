@@ -9,7 +9,8 @@ from wearstate.datasets.generation.generate import generate
 from wearstate.datasets.recipe.recipe import load_recipe, sample_records
 from wearstate.sim.machine.simulate import simulate, simulate_many, simulates_together
 from wearstate.sim.output.status import Status
-from wearstate.sim.pump.recording import GATHERED_TRUTH, planned
+from wearstate.sim.pump.gathering import GATHERED_TRUTH
+from wearstate.sim.pump.run_plan import planned
 from wearstate.sim.pump_lanes.lanes import lane_kind, run_lanes
 from wearstate.sim.pump_lanes.many import lane_job
 from wearstate.sim.pump_lanes.rates import DRY, MAPPED_FILM, SHORT_FILM

@@ -383,7 +383,7 @@ def test_the_pump_loses_contact_by_its_clearance_and_not_by_its_step(monkeypatch
     )
     judge = next(iter(MAPS["reciprocating-pump"]["clearance-speed"](soft, 3).judges.values()))
     assert judge(5.0, 5e-3)[0] is Verdict.REFUSED  # the check sees it coming
-    monkeypatch.setattr("wearstate.sim.pump.recording.limits", lambda scene: [])
+    monkeypatch.setattr("wearstate.sim.pump.run_plan.limits", lambda scene: [])
     verdict, word = judge(5.0, 5e-3)
     assert verdict is Verdict.FAILS  # at a quarter of the step as well
     assert word.startswith("overlap")

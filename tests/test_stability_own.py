@@ -34,7 +34,7 @@ from wearstate.diagnose.stability.own_point import own_film
 from wearstate.diagnose.stability.page import atlas_html
 from wearstate.diagnose.stability.text import stability_table
 from wearstate.sim.machine.simulate import simulate
-from wearstate.sim.pump.recording import steps_per_sample
+from wearstate.sim.pump.run_plan import steps_per_sample
 from wearstate.sim.scene.load import load_scene
 
 DECADE = (0.1, 0.3, 1.0, 3.0, 10.0)

@@ -16,7 +16,7 @@ from ...sim.journal.orbit import OrbitStatus
 from ...sim.mechanism.layout import JOINT_COMPLIANT
 from ...sim.output.recording import Recording
 from ...sim.output.status import Status
-from ...sim.pump.recording import steps_per_sample
+from ...sim.pump.run_plan import steps_per_sample
 from ...sim.pump.scene_run import run_scene
 from ...sim.pump.validity import LARGEST_STEP_PER_CONTACT_TIME
 from ...sim.pump_setup.contacts import (

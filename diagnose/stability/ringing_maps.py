@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ...sim.mechanism.crank_run import run_mechanism
 from ...sim.piping.pipe import FEWEST_REACHES, drive_pipe, pipe_parameters, pipe_start
-from ...sim.pump.recording import steps_per_sample
+from ...sim.pump.run_plan import steps_per_sample
 from ...sim.pump_setup.tables import begun
 from ...sim.pump_setup.yielding import WAYS, bearing_mass_ratios, yielding_of
 from ...sim.scene.parts import Scene

@@ -7,14 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..output.transfer import SceneTransfer
+from ..pump.gathering import casing_modes, measured_casing, measured_places
 from ..pump.ladder import PUMP_LADDERS, pump_cost, pump_effects, sample_step
-from ..pump.recording import (
-    casing_modes,
-    check_pump,
-    measured_casing,
-    measured_places,
-    simulate_pump,
-)
+from ..pump.recording import check_pump, simulate_pump
 from ..pump_lanes.many import pumps_alike, simulate_pumps
 from ..scene.parts import Scene
 from ..scene.pump import FORCE_PLACES, PumpScene

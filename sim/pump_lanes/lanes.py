@@ -138,7 +138,7 @@ class Steps(Protocol):
     """What is told of the steps of a run, and may not keep what it is given."""
 
     def add(self, turns: Float, forces: Float, chambers: Float | None, gaps: Float | None) -> None:
-        """As :meth:`.recording.Gathering.add`, with forces of :func:`lane_columns`."""
+        """As :meth:`.Gathering.add`, with forces of :func:`lane_columns`."""
 
 
 _INVERSE_INERTIA = Machine._fields.index("inverse_inertia")

@@ -7,16 +7,9 @@ from collections.abc import Collection, Iterator, Sequence
 from typing import NamedTuple, cast
 
 from ..output.recording import Recording
-from ..pump.recording import (
-    GATHERED_TRUTH,
-    Gathering,
-    LimitError,
-    RunPlan,
-    planned,
-    recording_of,
-    refused_run,
-    simulate_pump,
-)
+from ..pump.gathering import GATHERED_TRUTH, Gathering
+from ..pump.recording import recording_of, refused_run, simulate_pump
+from ..pump.run_plan import LimitError, RunPlan, planned
 from ..pump.scene_run import needs_integration
 from ..pump_setup.films import start_films
 from ..pump_setup.tables import begun

@@ -21,7 +21,7 @@ from ..film.solve import FilmGeometry
 from ..journal.recording import film_geometry
 from ..mechanism.crank_run import CrankRun
 from ..output.status import SimulationError
-from ..pump.recording import steps_per_sample
+from ..pump.run_plan import steps_per_sample
 from ..pump.scene_run import pin_offsets, run_scene
 from ..scene.journal import JournalScene
 from ..scene.parts import SceneError, nearest
