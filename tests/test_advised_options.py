@@ -25,11 +25,15 @@ NAMED = {"import": "import", "train": "train", "retrain": "train", "generate": "
 """Word before an option -> command that it tells to run."""
 OWN_RULE = {
     "command_help.py",
-    "command_sweep.py",
-    "commands_data.py",
-    "commands_machine.py",
-    "commands_wear.py",
     "command_options.py",
+    "commands_chart.py",
+    "commands_data.py",
+    "commands_evaluate.py",
+    "commands_files.py",
+    "commands_machine.py",
+    "commands_report.py",
+    "commands_wear.py",
+    "source_options.py",
 }
 """Files that hold many commands or declare options: see the test of usage errors."""
 SPOKEN_BY = {

@@ -11,9 +11,9 @@ import pytest
 from click.testing import CliRunner
 from wearstate.datasets.file.record import DataSet
 from wearstate.datasets.recipe.text import recipe_text
-from wearstate.diagnose.command_line import demo
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.pages.plain_json import json_text
+from wearstate.diagnose.workflow import demo
 from wearstate.sim.output.recording import DataError
 
 
@@ -460,7 +460,7 @@ def test_the_bounds_of_the_options_are_those_of_the_library():
         ("charts.of_models.model_chart", ("chart", "x.h5", "-j", 1)),
         ("shaft_tests.rig_test.calibrated_test", ("align", "propulsion-shaft", "--test", "hammer")),
         ("wear_model.train.train_model", ("train", "SET", "-o", "m.wsm", "-j", 1)),
-        ("command_line.demo.run_demo", ("demo", "-j", 1)),
+        ("workflow.demo.run_demo", ("demo", "-j", 1)),
     ],
 )
 def test_seed_reaches_whatever_draws(function, arguments, small_set, tmp_path, monkeypatch):

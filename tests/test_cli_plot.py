@@ -11,7 +11,7 @@ from wearstate.datasets.file.record import (
     DataSetWriter,
 )
 from wearstate.diagnose.command_line.cli import cli
-from wearstate.diagnose.command_line.commands_data import _KINDS
+from wearstate.diagnose.command_line.commands_files import _KINDS
 from wearstate.diagnose.inspect.info import plot_file
 from wearstate.diagnose.pictures.kinds import AUTO, KINDS
 from wearstate.diagnose.report.figures import report_pictures

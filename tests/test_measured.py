@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import resample_poly
 from wearstate.datasets.file.record import Channel
 from wearstate.datasets.measured.recording import read_recording
-from wearstate.diagnose.command_line.commands_wear import report_exit
+from wearstate.diagnose.command_line.commands_report import report_exit
 from wearstate.diagnose.wear_model.file import load_model
 from wearstate.sim.output.recording import Recording
 from wearstate.sim.output.sensor import tacho_pulses

@@ -1,4 +1,4 @@
-"""The commands, their options, and the demonstration.
+"""The commands and their options.
 
 It may import ``sim.atomic``, ``sim.output``, ``sim.scene``, ``sim.machine``, ``sim.fidelity``,
 ``sim.deep_check``, ``features.catalogue``, ``datasets.file``, ``datasets.workers``,

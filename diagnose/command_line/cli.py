@@ -20,20 +20,13 @@ from ... import __version__
 from ..pages.plain_json import json_text
 from .command_help import FIRST_CONTACT, HelpfulGroup, command
 from .command_options import EXIT_BAD_INPUT, EXIT_FAILED, as_options
-from .command_sweep import sweep
-from .commands_data import (
-    audit,
-    export,
-    features,
-    generate,
-    import_files,
-    info,
-    merge,
-    recipe,
-    splits,
-)
-from .commands_machine import align, chart, frf, scene, simulate, stability, verify
-from .commands_wear import blindspots, calibrate, demo, evaluate, report, train
+from .commands_chart import chart, stability, sweep
+from .commands_data import audit, export, generate, merge, recipe, splits
+from .commands_evaluate import blindspots, evaluate
+from .commands_files import features, import_files, info
+from .commands_machine import align, frf, scene, simulate, verify
+from .commands_report import report
+from .commands_wear import calibrate, demo, train
 
 # files are written under another name first, which says nothing to the caller
 _UNFINISHED = re.compile(r"\.part\b|\.[0-9a-f]{8}\.tmp\b")

@@ -1,0 +1,358 @@
+"""Commands that vary a scene and show what comes of it: stability, chart, sweep."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import click
+
+from .command_help import command
+from .command_names import SCENE, built_in
+from .command_options import (
+    CHART_SUFFIXES,
+    DATA_SUFFIXES,
+    EXIT_FAILED,
+    PAGE_SUFFIXES,
+    PATH,
+    PICTURE_SUFFIXES,
+    Accuracy,
+    Share,
+    check_interactive,
+    check_outputs,
+    emit,
+    force_option,
+    jobs_option,
+    json_option,
+    overrides_of,
+    points_option,
+    progress_bar,
+    scene_of,
+    seed_option,
+    tell_bare,
+    worker_count,
+)
+
+
+@command()
+@click.argument("scene_name", metavar="SCENE", type=SCENE)
+@click.option("--set", "pairs", multiple=True, metavar="PATH=VALUE", help="Replace a scene value.")
+@click.option("--map", "map_name", help="One map only; all that the machine has by default.")
+@click.option("--size", type=click.IntRange(3, 60), help="Cells along either axis.")
+@click.option(
+    "--budget",
+    type=Share(min=1.0, max=86_400.0),
+    help="Seconds, none by default: the scene's own methods first, the rest is drawn as not run.",
+)
+@click.option(
+    "-o", "--output", type=PATH, help="Page or picture to write (.html, .png, .svg or .pdf)."
+)
+@force_option
+@json_option
+def stability(
+    scene_name: str,
+    pairs: Sequence[str],
+    map_name: str | None,
+    size: int | None,
+    budget: float | None,
+    output: Path | None,
+    force: bool,
+    as_json: bool,
+) -> None:
+    """Where each method fails on SCENE, and how far the scene is from that.
+
+    Accurate, inaccurate or unstable, with a numerical or a physical cause; the scene is marked in
+    every map.
+    """
+    from ..stability.atlas import atlas
+    from ..stability.text import stability_table, stability_text
+
+    check_outputs([scene_name], [(output, (*PAGE_SUFFIXES, *PICTURE_SUFFIXES))], force)
+    machine = scene_of(scene_name, pairs)
+    with progress_bar("running cells") as progress:
+        maps = atlas(machine, name=map_name, budget=budget, size=size, progress=progress)
+    files = [str(output)] if output is not None else []
+    if output is not None:
+        from ..stability.page import save_atlas
+
+        save_atlas(machine, maps, output, force=force)
+    text = "\n".join([stability_text(machine, maps), *files])
+    emit({**stability_table(machine, maps), "files": files}, as_json, text)
+
+
+@command()
+@click.argument("subject", metavar="SCENE|DATA|RECIPE")
+@click.option("--set", "pairs", multiple=True, metavar="PATH=VALUE", help="Replace a scene value.")
+@click.option(
+    "--accuracy",
+    type=Accuracy(1e-6, 0.5),
+    default=None,
+    help="Error that every quantity may carry; the scene's own by default. Of a recipe: "
+    "verdict=2%, rise of the error of the wear estimate, in % of the limit.",
+)
+@click.option(
+    "-n",
+    "--records",
+    type=click.IntRange(20, 10_000),
+    default=None,
+    help="Of a recipe: records on every choice of rungs; 120 by default.",
+)
+@click.option("--effect", "effects", multiple=True, help="Of a recipe: only this one.")
+@click.option("--folder", type=PATH, help="Of a recipe: keep its data sets, and go on from them.")
+@click.option(
+    "--budget",
+    type=Share(1.0, 1e6),
+    default=None,
+    help="Seconds; 90 of a scene, of a data set none. The same command with -o goes on.",
+)
+@click.option("-o", "--output", type=PATH, help="Chart (.html, .svg, .png, .pdf, .json, .csv).")
+@click.option(
+    "--apply", "applied", type=PATH, help="Scene or recipe to write (.toml): what is recommended."
+)
+@click.option(
+    "--choice",
+    type=click.Choice(["kept", "raised"]),
+    default="kept",
+    show_default=True,
+    help="Of --apply: with the rungs of the scene kept, or with rungs that may change.",
+)
+@points_option
+@seed_option
+@jobs_option
+@force_option
+@json_option
+def chart(
+    subject: str,
+    pairs: Sequence[str],
+    accuracy: tuple[bool, float] | None,
+    records: int | None,
+    effects: Sequence[str],
+    folder: Path | None,
+    budget: float | None,
+    output: Path | None,
+    applied: Path | None,
+    choice: str,
+    interactive: bool,
+    seed: int,
+    jobs: int | None,
+    force: bool,
+    as_json: bool,
+) -> None:
+    """How much model SCENE needs: its own error, and what would be enough; or diagnosis on DATA.
+
+    Of a scene: the error of its rungs and steps as they are written, the cheapest numerics that do
+    where its rungs stay, and the cheapest rungs where they may change. Cheap information comes
+    first, and a budget or Ctrl-C ends it with what is known by then; with -o the same command goes
+    on from there. Of a data set (.h5): features and models, cost against error. Of a recipe, with
+    --accuracy verdict=2%: which rungs may be cheaper while training on them keeps the verdict.
+    """
+    check_interactive(interactive, output)
+    of_data = subject.endswith(DATA_SUFFIXES)
+    of_verdict, share = accuracy if accuracy is not None else (False, None)
+    if of_verdict and not of_data:
+        if budget is not None or choice != "kept":
+            raise click.UsageError("--budget and --choice are for a scene, not for a recipe")
+        from .chart_commands import verdict_chart_command
+
+        assert share is not None
+        found = verdict_chart_command(
+            subject,
+            overrides_of(pairs),
+            accuracy=share,
+            records=records or _VERDICT_RECORDS,
+            effects=effects,
+            folder=folder,
+            output=output,
+            applied=applied,
+            seed=seed,
+            jobs=worker_count(jobs),
+            force=force,
+            interactive=interactive,
+        )
+        _emit_chart(found, [output, applied], as_json)
+        return
+    if records is not None or effects or folder is not None:
+        raise click.UsageError("-n, --effect and --folder need --accuracy verdict=SHARE")
+    if of_data and (pairs or accuracy is not None or applied):
+        raise click.UsageError("--set, --accuracy and --apply are for a scene, not for a data set")
+    if seed and not of_data:
+        raise click.UsageError("--seed is of the models on a data set; a scene's chart draws none")
+    if of_data:
+        found = _data_chart(subject, budget, output, seed, jobs, force, interactive)
+        _emit_chart(found, [output], as_json)
+        return
+    if subject in built_in("recipe"):
+        raise click.UsageError(
+            f"{subject} is a recipe: its chart takes --accuracy verdict=2%; or name its scene"
+        )
+    from .chart_commands import scene_chart_command
+
+    values = overrides_of(pairs)
+    tell_bare(subject, values)
+    found, interrupted = scene_chart_command(
+        subject,
+        values,
+        accuracy=share,
+        budget=_CHART_BUDGET if budget is None else budget,
+        output=output,
+        applied=applied,
+        choice=choice,
+        jobs=worker_count(jobs),
+        force=force,
+        interactive=interactive,
+    )
+    _emit_chart(found, [output, applied], as_json)
+    if interrupted:
+        going_on = "; the same command goes on from there" if output else ""
+        click.echo(f"interrupted: what was measured is shown{going_on}", err=True)
+        raise click.exceptions.Exit(EXIT_FAILED)
+
+
+_CHART_BUDGET = 90.0  # s of a scene
+_VERDICT_RECORDS = 120  # on every choice of rungs of a recipe
+
+
+def _data_chart(
+    subject: str,
+    budget: float | None,
+    output: Path | None,
+    seed: int,
+    jobs: int | None,
+    force: bool,
+    interactive: bool,
+) -> Any:
+    from ..charts.of_models import model_chart
+    from ..charts.page import save_chart
+
+    check_outputs([subject], [(output, CHART_SUFFIXES)], force)
+    with progress_bar("measuring") as progress:
+        found = model_chart(
+            subject, seed=seed, budget=budget, jobs=worker_count(jobs), progress=progress
+        )
+    if output is not None:
+        save_chart(found, output, force=force, interactive=interactive)
+    return found
+
+
+def _emit_chart(found: Any, files: Sequence[Path | None], as_json: bool) -> None:
+    from ..charts.chart import chart_table, chart_text
+
+    written = [str(path) for path in files if path is not None]
+    text = "\n".join([chart_text(found), *written])
+    emit({**chart_table(found), "files": written}, as_json, text)
+
+
+_SUFFIXES = (*CHART_SUFFIXES, ".htm")
+
+
+@command()
+@click.argument("scene_name", metavar="SCENE", type=SCENE)
+@click.option(
+    "--over",
+    multiple=True,
+    required=True,
+    metavar="PATH=VALUES",
+    help="A..B, A..B/N or A,B,C with a unit at the end; repeat it, the change looked for last.",
+)
+@click.option("--set", "pairs", multiple=True, metavar="PATH=VALUE", help="Replace a scene value.")
+@click.option(
+    "--show",
+    multiple=True,
+    metavar="NAME,…",
+    help="Features, or what the simulator knows; * and ? as in a shell.",
+)
+@click.option(
+    "--points",
+    type=click.IntRange(2, 1000),
+    default=5,
+    show_default=True,
+    help="Of a range that does not say how many.",
+)
+@click.option(
+    "--starts",
+    type=click.IntRange(1, 1000),
+    default=5,
+    show_default=True,
+    help="Recordings at each point: other start angle, noise and random forces.",
+)
+@click.option(
+    "--confidence",
+    type=Share(0.5, 0.9999),
+    default=0.95,
+    show_default=True,
+    help="Of telling a change, and of not telling one where there is none.",
+)
+@click.option(
+    "-o", "--output", type=PATH, help="Page, table or picture (.html, .csv, .json, .png, .svg)."
+)
+@points_option
+@seed_option
+@jobs_option
+@force_option
+@json_option
+def sweep(
+    scene_name: str,
+    over: Sequence[str],
+    pairs: Sequence[str],
+    show: Sequence[str],
+    points: int,
+    starts: int,
+    confidence: float,
+    output: Path | None,
+    interactive: bool,
+    seed: int,
+    jobs: int | None,
+    force: bool,
+    as_json: bool,
+) -> None:
+    """Vary numbers of SCENE: what shows a change, from which size on, and where first.
+
+    The last --over is the change that is looked for, such as a clearance; those before it are
+    conditions, such as the speed. With -o, runs are kept beside the output until all are done:
+    after Ctrl-C the same command goes on. The CSV has one row for each point and start, SI.
+    """
+    from ..pages.kept import part_file
+    from ..sweep.axes import SweepError
+    from ..sweep.page import save_sweep
+    from ..sweep.sweep import kept_runs, measure, sweep_of, sweep_plan
+    from ..sweep.text import sweep_table, sweep_text
+
+    check_interactive(interactive, output)
+    part = part_file(output)
+    going_on = part is not None and part.exists() and not force
+    check_outputs([scene_name], [(output, _SUFFIXES)], force or going_on)
+    values = overrides_of(pairs)
+    tell_bare(scene_name, values)
+    plan = sweep_plan(
+        scene_name,
+        over,
+        given=values,
+        show=[name for text in show for name in text.split(",") if name.strip()],
+        points=points,
+        starts=starts,
+        seed=seed,
+        confidence=confidence,
+    )
+    if part is not None and force:
+        part.unlink(missing_ok=True)
+    kept = kept_runs(part, plan)
+    interrupted = False
+    try:
+        with progress_bar("simulating") as progress:
+            measure(plan, kept, jobs=worker_count(jobs), progress=progress)
+    except KeyboardInterrupt:
+        interrupted = True
+    found = sweep_of(plan, kept)
+    if found.finished and all(run.fault for run in found.outcomes.values()):
+        kept.drop()
+        raise SweepError([f"no run succeeded: {fault}" for fault in found.faults])
+    if output is not None and found.outcomes:
+        save_sweep(found, output, force=force or going_on, interactive=interactive)
+        if found.finished:
+            kept.drop()
+    files = [str(output)] if output is not None and found.outcomes else []
+    text = "\n".join([sweep_text(found), *files])
+    emit({**sweep_table(found), "files": files}, as_json, text)
+    if interrupted:
+        on = "; the same command goes on from there" if output else ""
+        click.echo(f"interrupted: what was simulated is shown{on}", err=True)
+        raise click.exceptions.Exit(EXIT_FAILED)

@@ -1,0 +1,302 @@
+"""Commands that tell how far a model can be trusted: evaluate, blindspots."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import click
+
+from .command_help import command
+from .command_names import DATA, MODEL
+from .command_options import (
+    MOST_RECORDS,
+    PAGE_SUFFIXES,
+    PATH,
+    PathType,
+    check_outputs,
+    emit,
+    force_option,
+    jobs_option,
+    join_option,
+    json_option,
+    overrides_of,
+    progress_bar,
+    seed_option,
+    worker_count,
+)
+
+
+@command()
+@click.argument("model_file", metavar="MODEL", type=MODEL)
+@click.argument("data", type=DATA, required=False)
+@click.option(
+    "--across-fidelity",
+    is_flag=True,
+    help="MODEL is a recipe: train on each of its rungs, judge on the best.",
+)
+@click.option(
+    "-n",
+    "--records",
+    type=click.IntRange(20, MOST_RECORDS),
+    default=None,
+    help="Of every rung, with --across-fidelity; 120 by default.",
+)
+@click.option("--effect", "effects", multiple=True, help="With --across-fidelity: only this one.")
+@click.option("--set", "pairs", multiple=True, metavar="PATH=VALUE", help="Replace a scene value.")
+@click.option(
+    "--folder",
+    type=PathType(path_type=Path, file_okay=False),
+    help="Keep the data sets of --across-fidelity, and use those that are there.",
+)
+@click.option(
+    "--split",
+    metavar="NAME",
+    help="Split that DATA holds (wearstate splits): judge on all of its test side.",
+)
+@click.option(
+    "--retrain",
+    multiple=True,
+    metavar="NAME|all",
+    help="Train and judge anew with this part of DATA held out; may be repeated.",
+)
+@join_option
+@click.option("--trained-on", type=PATH, help="MODEL's training set, for the baselines.")
+@click.option("--baseline", "healthy", type=PATH, help="Healthy records of DATA's machines.")
+@click.option("--quick", is_flag=True, help="Leave out baselines that need packages of others.")
+@click.option(
+    "--cache",
+    type=PathType(path_type=Path, file_okay=False),
+    help="Folder in which features of such packages are kept.",
+)
+@click.option("-o", "--output", type=PATH, help="Page, picture or JSON to write.")
+@seed_option
+@force_option
+@jobs_option
+@json_option
+def evaluate(
+    model_file: Path,
+    data: Path | None,
+    across_fidelity: bool,
+    records: int | None,
+    effects: Sequence[str],
+    pairs: Sequence[str],
+    folder: Path | None,
+    output: Path | None,
+    seed: int,
+    force: bool,
+    jobs: int | None,
+    as_json: bool,
+    **given: Any,
+) -> None:
+    """Judge MODEL on the machine draws of DATA that it has not seen.
+
+    With --split: on what this split of DATA tests. With --retrain: train as MODEL was trained, with
+    other parts of DATA held out, and judge on these. With --across-fidelity: what training on a
+    cheaper model of the machine costs.
+    """
+    from ..class_model.file import CLASS_MODEL
+    from ..wear_model.bundle import kind_of
+
+    keys = ("split", "retrain", "joined", "trained_on", "healthy", "quick", "cache")
+    named = [key for key in keys if given[key]]
+    if across_fidelity:
+        if data is not None:
+            raise click.UsageError("--across-fidelity makes its own data: name a recipe only")
+        if named or output:
+            raise click.UsageError("--across-fidelity takes no option of a judgement on DATA")
+        _judge_across(model_file, records or _ACROSS, effects, pairs, folder, seed, jobs, as_json)
+        return
+    if data is None:
+        raise click.UsageError("Missing argument 'DATA'.")
+    if records or effects or pairs or folder:
+        raise click.UsageError("-n, --effect, --set and --folder need --across-fidelity")
+    if given["retrain"] and (given["trained_on"] or given["split"]):
+        raise click.UsageError(
+            "--retrain trains on DATA, by splits of its own: --trained-on and --split have no "
+            "meaning with it"
+        )
+    if given["retrain"] and given["joined"]:
+        raise click.UsageError("--retrain knows no joined views: leave --join or --retrain out")
+    check_outputs([model_file, data], [(output, _EVALUATION)], force)
+    if kind_of(model_file) == CLASS_MODEL:
+        if named or output:
+            raise click.UsageError("a model of named conditions takes no such option")
+        _judge_classes(model_file, data, seed, worker_count(jobs), as_json)
+        return
+    _judge(model_file, data, output, seed, worker_count(jobs), force, as_json, given)
+
+
+_EVALUATION = (".html", ".png", ".svg", ".pdf", ".json")
+
+
+def _judge_classes(model_file: Path, data: Path, seed: int, jobs: int, as_json: bool) -> None:
+    """Of a model of named conditions."""
+    from ..class_model.file import load_class_model
+    from ..class_model.train import classes_text, evaluate_classes
+
+    model = load_class_model(model_file)
+    with progress_bar("features") as progress:
+        result = evaluate_classes(model, data, seed=seed, jobs=jobs, progress=progress)
+    emit(result, as_json, "\n".join(classes_text(result)))
+
+
+def _judge(
+    model_file: Path,
+    data: Path,
+    output: Path | None,
+    seed: int,
+    jobs: int,
+    force: bool,
+    as_json: bool,
+    given: Mapping[str, Any],
+) -> None:
+    """Of a finished model, or by splits; text or JSON, and a file if asked for."""
+    from ..evaluation.figure import save_evaluation
+    from ..evaluation.splits import ALL_SPLITS, case_of, evaluate_splits
+    from ..evaluation.text import splits_text
+    from ..wear_model.file import load_model
+    from ..workflow.evaluate import evaluate as judge
+
+    model = load_model(model_file)
+    with progress_bar("features") as progress:
+        ways: dict[str, Any] = {"quick": given["quick"], "cache": given["cache"]}
+        ways |= {"seed": seed, "jobs": jobs, "progress": progress}
+        if given["retrain"]:
+            names = ALL_SPLITS if "all" in given["retrain"] else given["retrain"]
+            case = case_of(model, data, healthy=given["healthy"], **ways)
+            result = evaluate_splits(case, names, say=lambda text: click.echo(text, err=True))
+            if output is not None:
+                save_evaluation(result, output, notice=model.notice, force=force)
+            emit(result, as_json, splits_text(result))
+            return
+        ways |= {key: given[key] for key in ("trained_on", "split", "joined")}
+        found = judge(model, data, baseline=given["healthy"], **ways)
+    if output is not None:
+        found.save(output, force=force)
+    emit(found.result, as_json, found.text)
+
+
+_ACROSS = 120  # records
+
+
+def _judge_across(
+    recipe: Path,
+    records: int,
+    effects: Sequence[str],
+    pairs: Sequence[str],
+    folder: Path | None,
+    seed: int,
+    jobs: int | None,
+    as_json: bool,
+) -> None:
+    """Losses of training on cheaper rungs; the data sets vanish unless a folder is given."""
+    from tempfile import TemporaryDirectory
+
+    from ..charts.across import across_fidelity, across_table, across_text
+
+    with TemporaryDirectory() as passing:
+        found = across_fidelity(
+            str(recipe),
+            records,
+            folder or Path(passing),
+            effects=effects,
+            overrides=overrides_of(pairs),
+            seed=seed,
+            jobs=worker_count(jobs),
+            say=lambda text: click.echo(text, err=True),
+        )
+    emit(across_table(found), as_json, across_text(found))
+
+
+@command()
+@click.argument("model_file", metavar="MODEL", type=MODEL)
+@click.option("--recipe", metavar="RECIPE", help="Draws the machines; the model's own by default.")
+@click.option(
+    "-n",
+    "--machines",
+    type=click.IntRange(1, 300),
+    default=12,
+    show_default=True,
+    help="Simulated for every row.",
+)
+@click.option(
+    "--budget",
+    type=click.FloatRange(0, min_open=True),
+    help="Seconds after which no further row is begun; repeat the command to go on.",
+)
+@click.option(
+    "--background",
+    type=PATH,
+    help="Recording of the surroundings, added at three levels; its unit does not matter.",
+)
+@click.option(
+    "--only",
+    metavar="TEXT",
+    multiple=True,
+    help="Rows whose name or shift contains TEXT, to look closer with more machines; repeatable.",
+)
+@click.option("-o", "--output", type=PATH, help="HTML page to write.")
+@seed_option
+@force_option
+@json_option
+def blindspots(
+    model_file: Path,
+    recipe: str | None,
+    machines: int,
+    budget: float | None,
+    background: Path | None,
+    only: tuple[str, ...],
+    output: Path | None,
+    seed: int,
+    force: bool,
+    as_json: bool,
+) -> None:
+    """What MODEL takes for granted: its error where one thing differs from its recipe.
+
+    The same simulated machines, which it was not trained on, are judged again with each value that
+    the recipe holds fixed shifted, each drawn one beyond its range, and the signal disturbed. The
+    worst is first: the largest error without a caution. With -o, finished rows are kept beside the
+    page until all are done.
+    """
+    from ..blindspots.blindspots import file_hash, find_blind_spots, kept_rows, recipe_of, run_key
+    from ..blindspots.signals import signal_rows
+    from ..blindspots.text import blind_spots_table, blind_spots_text
+    from ..class_model.file import CLASS_MODEL
+    from ..pages.kept import part_file
+    from ..pages.page import save_page
+    from ..wear_model.bundle import kind_of
+    from ..wear_model.file import load_model
+
+    part = part_file(output)
+    going_on = part is not None and part.exists() and not force
+    inputs = [model_file, *([background] if background else [])]
+    check_outputs(inputs, [(output, PAGE_SUFFIXES)], force or going_on)
+    if kind_of(model_file) == CLASS_MODEL:
+        raise click.UsageError(f"{model_file} names conditions, no wear; name a wear model")
+    model = load_model(model_file)
+    plan = recipe_of(model, recipe)
+    if part is not None and force:
+        part.unlink(missing_ok=True)
+    heard = file_hash(background) if background else ""
+    kept = kept_rows(part, run_key(file_hash(model_file), plan, machines, seed, heard))
+    with progress_bar("rows") as progress:
+        found = find_blind_spots(
+            model,
+            plan,
+            machines=machines,
+            seed=seed,
+            budget=budget,
+            signals=signal_rows(background),
+            only=only,
+            kept=kept,
+            progress=progress,
+        )
+    table = blind_spots_table(found, model.card)
+    if output is not None:
+        from ..blindspots.page import blind_spots_html
+
+        page = blind_spots_html(table, notice=model.notice)
+        save_page(page, output, force=force or going_on)
+        if not found.left:
+            kept.drop()
+    emit(table, as_json, blind_spots_text(table))

@@ -1,0 +1,428 @@
+"""Commands about measured files: import them, show what is in them, their features."""
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import click
+
+from .command_help import command
+from .command_names import DATA, FILE
+from .command_options import (
+    DATA_SUFFIXES,
+    EXIT_FAILED,
+    NUMBER,
+    PAGE_SUFFIXES,
+    PATH,
+    PICTURE_SUFFIXES,
+    TABLE_SUFFIXES,
+    Share,
+    as_options,
+    check_outputs,
+    emit,
+    force_option,
+    jobs_option,
+    join_option,
+    json_option,
+    progress_bar,
+    worker_count,
+)
+from .source_options import (
+    Numbers,
+    bearing_option,
+    declared_source,
+    exponential_option,
+    source_options,
+    speed_option,
+    told_of_channels,
+)
+
+_CARD = (*PAGE_SUFFIXES, ".md")
+
+
+class _Segment(click.ParamType):  # type: ignore[type-arg]  # generic from click 8.3 on
+    """A time with or without its unit, or ``whole``, which is None."""
+
+    name = "segment"
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> float | None:
+        from ...sim.scene.parts import to_si
+
+        text = str(value).strip()
+        if text == "whole":
+            return None
+        try:
+            return to_si(f"{text} s" if NUMBER.fullmatch(text) else text, "time")
+        except ValueError as error:
+            self.fail(f"{value!r} {error}; or write whole", param, ctx)
+
+
+@command("import")
+@click.argument("files", metavar="FILES…", nargs=-1, required=True, type=PATH)
+@click.option("-o", "--output", type=PATH, help="Data set to write (.h5).")
+@click.option("--list", "only_list", is_flag=True, help="Show what is in FILES; write nothing.")
+@source_options
+@click.option("--labels", type=PATH, help="CSV with a column 'file' and one for every label.")
+@click.option(
+    "--label", "pairs", multiple=True, metavar="NAME=VALUE", help="The same label for all files."
+)
+@click.option("--speed", help="Shaft speed of all files, like '1500 rpm'.")
+@click.option(
+    "--severity", multiple=True, metavar="LABEL", help="Label [m] that says how worn it is."
+)
+@click.option(
+    "--limits", metavar="SCENE|LENGTHS", help="Grades: of a scene, or '0.1 mm, 0.2 mm, 0.3 mm'."
+)
+@click.option(
+    "--group-by",
+    type=click.Choice(["file", "folder", "column"]),
+    help="What is one machine: column 'group' of the labels if it is there, else the file.",
+)
+@click.option(
+    "--segment",
+    type=_Segment(),
+    default="whole",
+    metavar="SECONDS|whole",
+    help="Cut the files into records of this length.",
+)
+@click.option(
+    "--overlap", type=Share(0, 0.99), default=0.0, help="Part of a record the next one repeats."
+)
+@click.option("--place", multiple=True, metavar="CHANNEL=TEXT", help="Where a channel is.")
+@click.option(
+    "--direction", multiple=True, metavar="CHANNEL=TEXT", help="Which way it points or pushes."
+)
+@jobs_option
+@force_option
+@json_option
+def import_files(
+    files: Sequence[Path],
+    output: Path | None,
+    only_list: bool,
+    limits: str | None,
+    jobs: int | None,
+    as_json: bool,
+    **given: Any,
+) -> None:
+    """Bring measured FILES into one data set: WAV, MATLAB, CSV, HDF5, NPY, UFF58, TDMS, binary.
+
+    Rate and units are declared, by the files or here, or refused: they are never guessed.
+    """
+    from ...datasets.measured.data_set import import_recordings
+    from ...datasets.measured.labels import read_limits
+    from ...datasets.measured.recording import list_contents
+    from ..inspect.import_text import contents_text, empty_text, imported_table, imported_text
+
+    if only_list:
+        found = list_contents(files, declared_source(given))
+        emit({"files": found}, as_json, contents_text(found))
+        return
+    if output is None:
+        raise click.UsageError("-o/--output must name the data set to write; or ask for --list")
+    check_outputs(
+        [*files, *filter(None, [given["labels"]])], [(output, DATA_SUFFIXES)], given["force"]
+    )
+    labels = _labels(given)
+    with progress_bar("importing") as progress:
+        summary = import_recordings(
+            files,
+            output,
+            options=declared_source(given),
+            labels=labels,
+            limits=read_limits(limits, labels.severities) if limits else None,
+            places=told_of_channels(given["place"], "--place"),
+            directions=told_of_channels(given["direction"], "--direction"),
+            jobs=worker_count(jobs),
+            progress=progress,
+            **{name: given[name] for name in _IMPORT_OPTIONS},
+        )
+    if left_out := empty_text(summary):
+        click.echo(f"left out, nothing but NaN: {left_out}", err=True)
+    emit(imported_table(summary), as_json, imported_text(summary))
+
+
+_IMPORT_OPTIONS = (
+    *("tacho", "pulses_per_revolution", "group_by"),
+    *("segment", "overlap", "force"),
+)
+
+
+def _labels(given: Mapping[str, Any]) -> Any:
+    """Labels of a table and of words."""
+    from ...datasets.measured.labels import read_labels
+
+    constants: dict[str, str] = {}
+    speed = [f"speed_hz={given['speed']}"] if given["speed"] else []
+    for pair in (*given["pairs"], *speed):
+        name, sign, value = (part.strip() for part in pair.partition("="))
+        if not sign or not name or name in constants:
+            raise click.BadParameter(
+                f"'{pair}' must read NAME=VALUE, once for a name", param_hint="--label"
+            )
+        constants[name] = value
+    return read_labels(given["labels"], constants, given["severity"])
+
+
+_KINDS = (  # as wearstate.diagnose.pictures.kinds, which is too heavy to import for --help
+    *("auto", "waveform", "spectrum", "waterfall", "orders"),
+    *("angle", "envelope", "frf", "orbit"),
+)
+
+_PLOT_OPTIONS = ("draw", "force_channel", "speed_hz", "bearing")
+
+
+@command()
+@click.argument("file", type=FILE, required=False)
+@click.option("--fft", "of_fft", is_flag=True, help="Who computes Fourier transforms, timed here.")
+@click.option(
+    "--verify", "check", is_flag=True, help="Check every record of a data set; exit 1 on a fault."
+)
+@click.option("--card", type=PATH, help="Page about a data set to write (.html or .md).")
+@click.option("--licence", default="not stated", show_default=True, help="Of the data, for --card.")
+@click.option("--plot", type=PATH, help="Picture of a recording to write (.png, .svg or .pdf).")
+@click.option(
+    "--interactive", is_flag=True, help="Write --plot as a page (.html) to zoom and measure in."
+)
+@click.option("--kind", type=click.Choice(_KINDS), help="What to plot; by default all it supports.")
+@click.option("--draw", multiple=True, metavar="NAME", help="Channel to plot; all by default.")
+@click.option("--force-channel", metavar="NAME", help="Force of a transfer function to plot.")
+@speed_option
+@bearing_option
+@exponential_option
+@source_options
+@force_option
+@json_option
+def info(
+    file: Path | None,
+    of_fft: bool,
+    check: bool,
+    card: Path | None,
+    licence: str,
+    plot: Path | None,
+    interactive: bool,
+    kind: str | None,
+    tacho: str | None,
+    pulses_per_revolution: int,
+    force: bool,
+    as_json: bool,
+    **given: Any,
+) -> None:
+    """What a data set, recording or model is, checked; and pictures of a recording."""
+    from ..inspect.info import (
+        describe,
+        describe_fft,
+        description_text,
+        fft_text,
+        picture_text,
+        plot_file,
+    )
+
+    wanted = {name: given.pop(name) for name in _PLOT_OPTIONS}
+    exponential = given.pop("exponential")
+    if of_fft == (file is not None):
+        raise click.UsageError("give either a FILE or --fft")
+    if file is not None and (check or card is not None):
+        _about_set(file, check, card, licence, force, as_json)
+        return
+    if plot is None and (kind or interactive or any(wanted.values())):
+        raise click.UsageError("what to plot is given, but no --plot to write it to")
+    if file is None:
+        facts = describe_fft()
+        emit(facts, as_json, fft_text(facts))
+        return
+    check_outputs([file], [(plot, PAGE_SUFFIXES if interactive else PICTURE_SUFFIXES)], force)
+    read: dict[str, Any] = {"tacho": tacho, "pulses_per_revolution": pulses_per_revolution}
+    described = describe(file, declared_source(given), **read)
+    text = description_text(described)
+    if plot is not None:
+        described["plot"] = plot_file(
+            file,
+            plot,
+            declared_source(given),
+            kind=kind or _KINDS[0],
+            exponential=exponential,
+            interactive=interactive,
+            force=force,
+            **read,
+            **wanted,
+        )
+        text += f"\n{picture_text(described['plot'])}"
+    emit(described, as_json, text)
+
+
+def _about_set(
+    file: Path, check: bool, card: Path | None, licence: str, force: bool, as_json: bool
+) -> None:
+    """Check a data set, write its card, or both; a card of an unsound one is not written."""
+    from ...datasets.audit.integrity import check_set, checked_table, checked_text
+
+    check_outputs([file], [(card, _CARD)], force)
+    found: dict[str, Any] = {}
+    words = []
+    if check:
+        with progress_bar("checking") as progress:
+            found = checked_table(check_set(file, progress=progress))
+        words.append(checked_text(found))
+    if card is not None and found.get("sound", True):
+        from ..inspect.card import write_card
+
+        write_card(file, card, licence=licence, force=force)
+        found["card"] = str(card)
+        words.append(str(card))
+    emit(found, as_json, "\n".join(words))
+    raise click.exceptions.Exit(0 if found.get("sound", True) else EXIT_FAILED)
+
+
+_FEATURE_SETS = (
+    "standard",
+    "core",
+    "complete",
+)  # as wearstate.features.catalogue.catalogue.SetName
+
+
+@command()
+@click.argument("data", type=DATA, required=False)
+@click.option("-o", "--output", type=PATH, help="Table (.parquet, .csv, .h5).")
+@click.option("--list", "listing", is_flag=True, help="What there is: unit, needs, reference.")
+@click.option(
+    "--set",
+    "feature_set",
+    type=click.Choice(_FEATURE_SETS),
+    help="What models are trained on (default); all but the dearest; everything.",
+)
+@click.option("--only", multiple=True, metavar="NAMES", help="Only these, parted by commas.")
+@click.option(
+    "--rank", is_flag=True, help="Which features tell the wear; -o is a page or a table (.csv)."
+)
+@click.option(
+    "--target",
+    metavar="COLUMN",
+    help="Of --rank: severity or label to be told; the first severity by default.",
+)
+@join_option
+@click.option("--machine", metavar="KIND", help="Kind of machine, for its ISO zone.")
+@speed_option
+@bearing_option
+@exponential_option
+@click.option(
+    "--band", "bands", type=Numbers(), multiple=True, metavar="LOW,HIGH", help="Band level [Hz]."
+)
+@click.option(
+    "--envelope-band", type=Numbers(), metavar="LOW,HIGH", help="Band of the envelope [Hz]."
+)
+@click.option(
+    "--speed-band",
+    "speed_band_hz",
+    type=Numbers(),
+    metavar="LOW,HIGH",
+    help="Where the speed is looked for without a tacho [Hz].",
+)
+@jobs_option
+@force_option
+@json_option
+def features(
+    data: Path | None,
+    output: Path | None,
+    listing: bool,
+    feature_set: str | None,
+    only: Sequence[str],
+    rank: bool,
+    target: str | None,
+    joined: Sequence[str],
+    jobs: int | None,
+    force: bool,
+    as_json: bool,
+    **about: Any,
+) -> None:
+    """Feature table of the data set DATA (.parquet, .csv or .h5), manifest beside it.
+
+    With --rank: which features separate the grades or follow the severity, alone and within each
+    machine, and what they cost.
+    """
+    if target and not rank:
+        raise click.UsageError("--target is of --rank")
+    if listing:
+        if data is not None or output is not None or rank:
+            raise click.UsageError("--list stands alone: it reads and writes no file")
+        _emit_catalogue(feature_set or _FEATURE_SETS[-1], as_json)
+        return
+    if data is None or (output is None and not rank):
+        raise click.UsageError("give DATA and --output, DATA and --rank, or --list")
+    if only and feature_set:
+        raise click.UsageError("give either --set or --only: names are looked for in every set")
+    from ...datasets.file.views import views_of
+    from ..feature_rows.feature_table import (
+        absent_in,
+        choice_of,
+        excitation_notes,
+        feature_table,
+        save_table,
+    )
+
+    views = views_of(joined)
+    sources = [data, *(view.path for view in views)]
+    check_outputs(sources, [(output, _RANKED if rank else TABLE_SUFFIXES)], force)
+    names = [name.strip() for part in only for name in part.split(",")]
+    wanted: Any = feature_set or _FEATURE_SETS[0]
+    choice = replace(choice_of(wanted, names, **about), views=views)
+    command = click.get_current_context().command
+    absent = {name: as_options(why, command) for name, why in absent_in(data, choice).items()}
+    if feature_set and absent:
+        click.echo(f"absent, as --json explains: {', '.join(absent)}", err=True)
+    elif slow := [name for name, why in absent.items() if why.startswith("fs = ")]:
+        click.echo(f"absent: {', '.join(slow)}: {absent[slow[0]]}", err=True)
+    with progress_bar("features") as progress:
+        table = feature_table(data, choice=choice, jobs=worker_count(jobs), progress=progress)
+    if rank:
+        _emit_rank(data, table, choice, target, output, force, as_json)
+        return
+    assert output is not None  # asked for above
+    save_table(table, output, force=force)
+    for text in table.lacking_words:
+        click.echo(f"{text}: its values are empty there", err=True)
+    size = {"path": str(output), "records": len(table.values), "features": len(table.names)}
+    text = f"{output}: {size['records']} records, {size['features']} features"
+    tests = sources if any("frf" in name for name in table.names) else []
+    told = dict(sum((Counter(excitation_notes(one, choice.settings)) for one in tests), Counter()))
+    for note, count in told.items():
+        click.echo(f"{count} records: {note}", err=True)
+    emit({**size, "absent": absent, "tests": told}, as_json, text)
+
+
+_RANKED = (*PAGE_SUFFIXES, ".csv")
+
+
+def _emit_rank(
+    data: Path,
+    table: Any,
+    choice: Any,
+    target: str | None,
+    output: Path | None,
+    force: bool,
+    as_json: bool,
+) -> None:
+    """What the features of a set tell, printed and, if so wished, written."""
+    from ..inspect.rank_text import rank_set, rank_table, rank_text, save_rank
+
+    found = rank_set(data, table, choice, target=target)
+    if output is not None:
+        save_rank(found, output, force=force)
+    files = [str(output)] if output is not None else []
+    emit({**rank_table(found), "files": files}, as_json, "\n".join([rank_text(found), *files]))
+
+
+def _emit_catalogue(feature_set: Any, as_json: bool) -> None:
+    """The catalogue, one line a feature."""
+    from ...features.catalogue.row import catalogue
+
+    rows = catalogue(feature_set)
+    columns = ("name", "unit", "set", "needs", "reference")
+    widths = [max(len(row[c]) for row in rows) for c in columns[:-1]]
+    lines = [columns, *(tuple(row[c] for c in columns) for row in rows)]
+    text = "\n".join(
+        "  ".join([*(cell.ljust(w) for cell, w in zip(line, widths, strict=False)), line[-1]])
+        for line in lines
+    )
+    emit({"features": list(rows)}, as_json, text)

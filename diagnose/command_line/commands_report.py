@@ -1,0 +1,345 @@
+"""The command `report`: verdict on one recording or many, and the exit code."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import click
+
+from ..pages.plain_json import json_text
+from .command_help import command
+from .command_names import DATA, MODEL
+from .command_options import (
+    EXIT_ALARM,
+    EXIT_BAD_INPUT,
+    EXIT_UNFAMILIAR,
+    EXIT_WARNING,
+    PAGE_SUFFIXES,
+    PATH,
+    check_outputs,
+    emit,
+    force_option,
+    join_option,
+    json_option,
+    overrides_of,
+    progress_bar,
+    seed_option,
+    tell_bare,
+)
+from .source_options import declared_source, source_options
+
+_FAIL_ON_HELP = "Exit 3 at a warning, 4 at an alarm, 5 when unfamiliar; alarm: only 4 and 5."
+
+
+@command()
+@click.argument("source", metavar="RECORDING|FOLDER", type=DATA)
+@click.option("--model", "model_file", type=MODEL, required=True, help="Wear model (.wsm).")
+@click.option("--baseline", "healthy", type=PATH, help="Healthy recordings of the machine (.h5).")
+@join_option
+@click.option("-o", "--output", type=PATH, help="HTML page to write.")
+@click.option(
+    "--interactive",
+    is_flag=True,
+    help="Of one recording: curves to zoom and measure in the page; of many: their trends.",
+)
+@click.option("--machine", metavar="KIND", help="Kind of machine, for its ISO zone.")
+@click.option(
+    "--scene",
+    metavar="SCENE|TOML",
+    help="The machine's nameplate: geometry, load, oil. A data set's own by default.",
+)
+@click.option(
+    "--set",
+    "pairs",
+    multiple=True,
+    metavar="PATH=VALUE",
+    help="Replace a value of the nameplate, as load.static='4 kN +- 5 %'.",
+)
+@click.option(
+    "--twin",
+    type=PATH,
+    metavar="SCENE",
+    help="Calibrated scene of this machine (wearstate calibrate): estimates the wear as well.",
+)
+@click.option("--trend", is_flag=True, help="Of many recordings: severity over time, life left.")
+@click.option(
+    "--dates",
+    metavar="names|mtime|CSV|COLUMN",
+    help="Times for --trend: in file names, of files, a table file,date or file,hours, or a column "
+    "of hours in the data set (operating_hours).",
+)
+@click.option(
+    "--growth",
+    type=click.Choice(["linear", "log"]),
+    default="linear",
+    show_default=True,
+    help="Of the wear over time: abrasive, or damage that feeds itself.",
+)
+@seed_option
+@source_options
+@click.option("--fail-on", type=click.Choice(["warning", "alarm"]), help=_FAIL_ON_HELP)
+@force_option
+@json_option
+def report(
+    source: Path,
+    model_file: Path,
+    healthy: Path | None,
+    output: Path | None,
+    machine: str | None,
+    scene: str | None,
+    pairs: Sequence[str],
+    fail_on: str | None,
+    force: bool,
+    as_json: bool,
+    **given: Any,
+) -> None:
+    """The verdict on RECORDING: wear grade and severity with interval, or why there is none.
+
+    Of a FOLDER, or a data set without --record: a table of all recordings, the most urgent first;
+    with --json one object a line. Exit 2 if nothing could be judged; with --fail-on, of many
+    recordings, the code of the worst: alarm, warning, bad input, unfamiliar. With times, only the
+    latest of a machine counts.
+    """
+    from ...datasets.file.views import views_of
+    from ..class_model.file import CLASS_MODEL
+    from ..feature_rows.healthy import Baselines
+    from ..nameplate.nameplate import nameplate_of
+    from ..report.verdict import known_machine
+    from ..wear_model.bundle import kind_of
+    from ..wear_model.file import load_model
+
+    views = views_of(given["joined"])
+    inputs = [source, model_file, *(view.path for view in views), *([healthy] if healthy else [])]
+    check_outputs(inputs, [(output, PAGE_SUFFIXES)], force)
+    known_machine(machine)
+    if kind_of(model_file) == CLASS_MODEL:
+        wear = {
+            "--baseline": healthy,
+            "-o": output,
+            "--interactive": given["interactive"],
+            "--machine": machine,
+            "--scene": scene,
+            "--set": pairs,
+            "--fail-on": fail_on,
+            "--join": given["joined"],
+            "--twin": given["twin"],
+            "--trend": given["trend"],
+            "--dates": given["dates"],
+        }
+        wrong = [option for option, value in wear.items() if value]
+        if wrong:
+            raise click.UsageError(
+                f"{model_file} names conditions and knows no wear: leave {', '.join(wrong)} out, "
+                "or name a wear model"
+            )
+        _report_class(source, model_file, given, as_json)
+        return
+    model = load_model(model_file)
+    baselines = Baselines(healthy, model.card) if healthy else None
+    many = _holds_many(source)
+    if not many and (given["trend"] or given["dates"]):
+        raise click.UsageError("--trend and --dates are for a folder or a data set of many records")
+    if many and given["twin"]:
+        raise click.UsageError("--twin is for one recording: name one, or choose a --record")
+    if given["interactive"]:
+        _check_interactive(output, many and not (given["trend"] or given["dates"]))
+    if views and source.is_dir():
+        raise click.UsageError("--join completes a recording or a data set: name one, not a folder")
+    usual = model.card.trained_on.scene
+    values = overrides_of(pairs)
+    if scene is not None:
+        tell_bare(scene, values)
+    plate = nameplate_of(source, scene, values, usual=usual)
+    ways = (output, machine, as_json, force, given, views)
+    told = _ReportTask(source, model_file, model, baselines, plate, *ways)
+    verdicts = _report_many(told) if many else _report_one(told)
+    raise click.exceptions.Exit(report_exit(verdicts, fail_on))
+
+
+def _check_interactive(output: Path | None, untimed: bool) -> None:
+    """Refuse curves where there is no page, many recordings without trend, or nothing to draw."""
+    from ..pages.embed import require_bokeh
+
+    if output is None:
+        raise click.UsageError("--interactive adds curves to the page: name one with -o")
+    if untimed:
+        raise click.UsageError(
+            "--interactive is for one recording or a trend: name one, choose a --record, or add "
+            "--trend"
+        )
+    require_bokeh()
+
+
+def _holds_many(source: Path) -> bool:
+    """Whether a folder, or a data set of which no record is chosen."""
+    from ..report.batch import record_count
+
+    asked = click.get_current_context().get_parameter_source("record")
+    chosen = asked is not click.core.ParameterSource.DEFAULT
+    return source.is_dir() or (not chosen and record_count(source) > 1)
+
+
+def _report_class(source: Path, model_file: Path, given: Mapping[str, Any], as_json: bool) -> None:
+    """The condition in recordings; of JSON each as soon as it is told. Exit 2 where none can be."""
+    from ...datasets.measured.recording import read_recording
+    from ..class_model.file import load_class_model
+    from ..class_model.train import name_all, naming_text, namings_summary
+    from ..report.batch import recordings_in
+
+    model = load_class_model(model_file)
+    tacho = {key: given[key] for key in ("tacho", "pulses_per_revolution")}
+    if not _holds_many(source):
+        naming = model.estimate(read_recording(source, declared_source(given), **tacho))
+        notice = f"\nNotice: {model.notice}." if model.notice else ""
+        emit({**naming.as_dict(), "notice": model.notice}, as_json, naming_text(naming) + notice)
+        verdicts = {naming.verdict}
+    else:
+        verdicts, lines = set(), []
+        namings = []
+        with recordings_in(
+            source, declared_source(given), **tacho, leave_out=[model_file]
+        ) as items:
+            for name, naming in name_all(items, model):
+                verdicts.add(naming.verdict)
+                namings.append(naming)
+                lines.append(f"{name}: {naming_text(naming)}")
+                if as_json:
+                    emit({"recording": name, **naming.as_dict()}, as_json, "")
+        if not as_json:
+            click.echo("\n".join([f"{source.name}: {namings_summary(namings)}", *lines]))
+        if model.notice:
+            click.echo(f"Notice: {model.notice}.", err=as_json)
+    if verdicts == {"unusable"}:
+        raise click.exceptions.Exit(EXIT_BAD_INPUT)
+
+
+class _ReportTask(NamedTuple):
+    """What both kinds of report are given."""
+
+    source: Path
+    model_file: Path
+    model: Any
+    baselines: Any
+    plate: Any
+    output: Path | None
+    machine: str | None
+    as_json: bool
+    force: bool
+    given: Mapping[str, Any]
+    views: Sequence[Any]
+
+
+_Verdict = tuple[str, int | None]
+"""Verdict and grade."""
+
+
+def _report_one(told: _ReportTask) -> list[_Verdict]:
+    """Report on one recording."""
+    from ...datasets.measured.recording import read_recording, with_views
+    from ..workflow.report import judged
+
+    recording = read_recording(
+        told.source,
+        declared_source(told.given),
+        tacho=told.given["tacho"],
+        pulses_per_revolution=told.given["pulses_per_revolution"],
+    )
+    heard = with_views(recording, told.source, told.given["record"], told.views)
+    found = judged(
+        heard,
+        told.model,
+        baselines=told.baselines,
+        plate=told.plate,
+        machine=told.machine,
+        twin=_opinion(told, heard),
+        files={"recording": told.source, "model": told.model_file},
+    )
+    table, text = found.table, found.text
+    if told.output is not None:
+        found.save(told.output, force=told.force, interactive=told.given["interactive"])
+        table["html"] = str(told.output)
+        text += f"\nPage        {told.output}"
+    click.echo(json_text(table) if told.as_json else text)
+    return [(table["estimate"]["verdict"], found.estimate.grade)]
+
+
+def _opinion(told: _ReportTask, heard: Any) -> Any:
+    """What the twin says of a recording, if one was named."""
+    from ..twin.opinion import second_opinion
+
+    if not told.given["twin"]:
+        return None
+    wear, seed = told.model.card.severity, told.given["seed"]
+    with progress_bar("simulating") as progress:
+        return second_opinion(told.given["twin"], heard, wear=wear, seed=seed, progress=progress)
+
+
+def _report_many(told: _ReportTask) -> list[_Verdict]:
+    """Report on a folder or data set; of JSON one line each, as soon as it is judged."""
+    from ..pages.page import save_page
+    from ..report.batch import HOURS, judge_all, recordings_in
+    from ..report.text import batch_text
+
+    given = told.given
+    dates = given["dates"]
+    if given["trend"] and dates is None:
+        dates = "names" if told.source.is_dir() else HOURS
+    healthy = told.baselines and Path(told.baselines.source)
+    others = [path for path in (told.output, told.model_file, Path(dates or ""), healthy) if path]
+    with (
+        recordings_in(
+            told.source,
+            declared_source(given),
+            tacho=given["tacho"],
+            pulses_per_revolution=given["pulses_per_revolution"],
+            leave_out=others,
+            views=told.views,
+        ) as items,
+        progress_bar("judging") as progress,
+    ):
+        batch = judge_all(
+            told.source,
+            items,
+            told.model,
+            model_file=told.model_file,
+            baselines=told.baselines,
+            plate=told.plate,
+            dates=dates,
+            growth=given["growth"],
+            seed=given["seed"],
+            tell=(lambda line: click.echo(json_text(line))) if told.as_json else None,
+            progress=progress,
+        )
+        if told.output is not None:
+            from ..report.page import batch_html
+
+            page = batch_html(
+                batch,
+                told.model,
+                machine=told.machine,
+                baselines=told.baselines,
+                plate=told.plate,
+                interactive=given["interactive"],
+            )
+            save_page(page, told.output, force=told.force)
+    if not told.as_json:
+        click.echo(batch_text(batch) + (f"\nPage        {told.output}" if told.output else ""))
+    return [(row.verdict, row.grade) for row in batch.current]
+
+
+def report_exit(verdicts: Sequence[_Verdict], fail_on: str | None) -> int:
+    """Nothing judged is bad input, asked or not; else only what --fail-on asks for."""
+    from ..learning.grades import ALARM_GRADE, WARNING_GRADE
+
+    if all(verdict == "unusable" for verdict, _ in verdicts):
+        return EXIT_BAD_INPUT
+    if fail_on is None:
+        return 0
+    worst = max((grade for _, grade in verdicts if grade is not None), default=0)
+    if worst >= ALARM_GRADE:
+        return EXIT_ALARM
+    if fail_on == "warning" and worst >= WARNING_GRADE:
+        return EXIT_WARNING
+    if any(verdict == "unusable" for verdict, _ in verdicts):
+        return EXIT_BAD_INPUT
+    return EXIT_UNFAMILIAR if any(verdict == "unfamiliar" for verdict, _ in verdicts) else 0

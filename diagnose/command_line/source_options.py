@@ -1,0 +1,236 @@
+"""Options that say what a measured file holds: channels, rates, speed, bearing, window."""
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import wraps
+from pathlib import Path
+from typing import Any
+
+import click
+
+from .command_options import NUMBER, PATH, Share
+
+
+def source_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Options about a measured file, the same for every command that reads one."""
+
+    @wraps(command)
+    def with_profile(*args: Any, like: Path | None = None, **given: Any) -> Any:
+        return command(*args, **_filled(like, given))
+
+    found: Callable[..., Any] = with_profile
+    for option in reversed(_SOURCE_OPTIONS):
+        found = option(found)
+    return found
+
+
+def _filled(like: Path | None, given: dict[str, Any]) -> dict[str, Any]:
+    """Options about a file with what a profile says; what the caller says stands."""
+    if like is None:
+        return {**given, "like": None}
+    from ..wear_model.like import read_profile
+
+    profile, tacho, pulses = read_profile(like)
+    told = dict(given)
+    if told["tacho"] is None:
+        told["tacho"] = tacho
+    asked = click.get_current_context().get_parameter_source("pulses_per_revolution")
+    if asked is click.core.ParameterSource.DEFAULT and told["tacho"] is not None:
+        told["pulses_per_revolution"] = pulses
+    return {**told, "like": profile}
+
+
+_SOURCE_OPTIONS = (
+    click.option(
+        "--like",
+        type=PATH,
+        metavar="MODEL|JSON",
+        help="Channels, units, rate and tacho as of a model, or of what `info --json` printed.",
+    ),
+    click.option("--fs", type=float, help="Sample rate [Hz], where the file has none."),
+    click.option(
+        "--unit",
+        multiple=True,
+        metavar="[CHANNEL=]UNIT",
+        help="Unit of a channel, or of all others, where the file declares none.",
+    ),
+    click.option(
+        "--sensitivity",
+        multiple=True,
+        metavar="[CHANNEL=]TEXT",
+        help="Of the sensor on a channel in volts: '100 mV/g'.",
+    ),
+    click.option(
+        "--full-scale",
+        multiple=True,
+        metavar="[CHANNEL=]TEXT",
+        help="What the largest integer of a WAV file is worth: '10 V'.",
+    ),
+    click.option(
+        "--channels",
+        multiple=True,
+        metavar="NAME,…",
+        help="Channels wanted, in order, NEW=OLD to rename; where the file names none, all names.",
+    ),
+    click.option(
+        "--variable", multiple=True, help="Array, data set or group, where the file holds several."
+    ),
+    click.option("--tacho", help="Name of the tacho channel."),
+    click.option(
+        "--pulses-per-revolution",
+        type=click.IntRange(1),
+        default=1,
+        show_default=True,
+        help="Of the tacho.",
+    ),
+    click.option("--record", type=click.IntRange(0), default=0, help="Of several, counted from 0."),
+    click.option(
+        "--rows",
+        type=click.Choice(["records"]),
+        help="Every row of an array or a text file is a record of one channel.",
+    ),
+    click.option("--delimiter", help="Of a text file: ',', ';', tab, space."),
+    click.option("--decimal", type=click.Choice([".", ","]), help="Of a text file."),
+    click.option(
+        "--header", type=click.IntRange(0), help="Lines above the numbers of a text file."
+    ),
+    click.option("--time-column", help="Name or number (from 1) of the times; 0: there is none."),
+    click.option("--dtype", help="Of headerless binary: '<int16', '>float32'."),
+    click.option("--n-channels", type=click.IntRange(1), help="Of headerless binary."),
+    click.option(
+        "--offset", type=click.IntRange(0), default=0, help="Bytes to skip in headerless binary."
+    ),
+    click.option(
+        "--order",
+        type=click.Choice(["interleaved", "blocks"]),
+        help="Of binary and arrays: sample by sample, or channel by channel.",
+    ),
+    click.option(
+        "--partial", is_flag=True, help="Of a WAV, TDMS or binary file cut short: what is there."
+    ),
+    click.option(
+        "--resample-to", type=float, metavar="HZ", help="Bring measured files to this rate."
+    ),
+)
+
+
+def declared_source(given: Mapping[str, Any]) -> Any:
+    """Options about a measured file, as the library takes them."""
+    from ...datasets.readers.open import SourceOptions
+
+    column = given["time_column"]
+    return SourceOptions(
+        variable=given["variable"] or None,
+        channels=tuple(name for text in given["channels"] for name in text.split(",")),
+        unit=_each_channel(given["unit"], "--unit"),
+        sensitivity=_each_channel(given["sensitivity"], "--sensitivity"),
+        full_scale=_each_channel(given["full_scale"], "--full-scale"),
+        time_column=int(column) if column is not None and column.isdecimal() else column,
+        **{name: given[name] for name in _PLAIN_OPTIONS},
+    )
+
+
+_PLAIN_OPTIONS = (
+    *("fs", "record", "rows", "delimiter", "decimal", "header"),
+    *("dtype", "n_channels", "offset", "order", "resample_to", "partial", "like"),
+)
+
+
+def _each_channel(texts: Sequence[str], option: str) -> Any:
+    """``channel=value`` for one channel, ``value`` for the others; None without any."""
+    from ...datasets.measured.plan import EachChannel
+
+    named: dict[str, str] = {}
+    others: list[str] = []
+    for text in texts:
+        name, sign, value = text.rpartition("=")
+        if not value.strip() or (sign and not name) or name in named:
+            raise click.BadParameter(
+                f"'{text}' must read [CHANNEL=]VALUE, once for a channel", param_hint=option
+            )
+        if sign:
+            named[name] = value
+        else:
+            others.append(value)
+    if len(others) > 1:
+        raise click.BadParameter(
+            f"{', '.join(map(repr, others))} cannot all be for every channel; write CHANNEL=VALUE",
+            param_hint=option,
+        )
+    return EachChannel(named, others=others[0] if others else None) if texts else None
+
+
+def told_of_channels(texts: Sequence[str], option: str) -> dict[str, str]:
+    """``channel=text``, once for a channel."""
+    told: dict[str, str] = {}
+    for text in texts:
+        name, _, value = text.partition("=")
+        if not name.strip() or not value.strip() or name in told:
+            raise click.BadParameter(
+                f"'{text}' must read CHANNEL=TEXT, once for a channel", param_hint=option
+            )
+        told[name] = value
+    return told
+
+
+class Numbers(click.ParamType):  # type: ignore[type-arg]
+    """Numbers parted by commas."""
+
+    name = "numbers"
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> Any:
+        """Text to a tuple of floats."""
+        if not isinstance(value, str):
+            return value
+        try:
+            return tuple(float(part) for part in value.split(","))
+        except ValueError:
+            self.fail(f"{value!r} must be numbers parted by commas", param, ctx)
+
+
+speed_option = click.option(
+    "--speed-hz",
+    type=float,
+    help="Shaft speed [Hz] where there is no tacho; by default the one stored in the file.",
+)
+
+
+class BearingNumbers(Numbers):
+    """Rollers, two lengths and an angle, each with or without its unit."""
+
+    name = "bearing"
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> Any:
+        """Text to numbers: lengths in metres, the angle in degrees."""
+        from ...sim.scene.parts import to_si
+
+        if not isinstance(value, str):
+            return value
+        parts = [part.strip() for part in value.split(",")]
+        with_unit = [not NUMBER.fullmatch(part) for part in parts[1:3]]
+        if any(with_unit) and not all(with_unit):
+            self.fail(f"{value!r} must give both diameters with their unit, or neither", param, ctx)
+        try:
+            parts[1:3] = [
+                str(to_si(part, "length")) if unit else part
+                for part, unit in zip(parts[1:3], with_unit, strict=True)
+            ]
+        except ValueError as error:
+            self.fail(f"{value!r} {error}", param, ctx)
+        if len(parts) > 3:
+            parts[3] = parts[3].removesuffix("deg").removesuffix("°")
+        return super().convert(",".join(parts), param, ctx)
+
+
+bearing_option = click.option(
+    "--bearing",
+    type=BearingNumbers(),
+    metavar="N,d,D[,DEG]",
+    help="Rollers, their diameter, pitch diameter, contact angle: for its fault lines.",
+)
+
+exponential_option = click.option(
+    "--exponential",
+    type=Share(1e-6, 1.0),
+    default=1.0,
+    help="Impact test: window sunk to this at the end of a block, 1: none; damping is corrected.",
+)
