@@ -13,7 +13,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from sheets import COLOURS, folder_asked, label, sheet, write
-from wearstate.datasets.recipe.recipe import load_recipe, sample_records
+from wearstate.datasets.recipe.load import load_recipe
+from wearstate.datasets.recipe.records import sample_records
 from wearstate.sim.hydraulics.flow_ripple import even_phases, flow_ripple
 from wearstate.sim.machine.simulate import simulate
 from wearstate.sim.machine.transfer import scene_transfer

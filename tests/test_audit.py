@@ -24,7 +24,7 @@ from wearstate.datasets.file.record import (
     DataSetWriter,
 )
 from wearstate.datasets.generation.generate import generate
-from wearstate.datasets.recipe.recipe import load_recipe
+from wearstate.datasets.recipe.load import load_recipe
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.inspect.audit_text import audit_text
 from wearstate.sim.output.recording import DataError

@@ -9,7 +9,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from wearstate.datasets.recipe.recipe import load_recipe, sample_records
+from wearstate.datasets.recipe.load import load_recipe
+from wearstate.datasets.recipe.records import sample_records
 from wearstate.diagnose.blindspots import blindspots
 from wearstate.diagnose.blindspots.blindspots import find_blind_spots, kept_rows, recipe_of
 from wearstate.diagnose.blindspots.page import blind_spots_html

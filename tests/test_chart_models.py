@@ -13,7 +13,7 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 from wearstate.datasets.file.record import Attributes, DataSetWriter
 from wearstate.datasets.generation.generate import generate
-from wearstate.datasets.recipe.recipe import load_recipe
+from wearstate.datasets.recipe.load import load_recipe
 from wearstate.datasets.split.rules import group_folds
 from wearstate.diagnose.charts.of_models import FEATURE_GROUPS, MEAN, MODELS, model_chart
 from wearstate.diagnose.command_line.cli import cli

@@ -5,7 +5,7 @@ import tomllib
 
 import pytest
 from click.testing import CliRunner
-from wearstate.datasets.recipe.recipe import load_recipe
+from wearstate.datasets.recipe.load import load_recipe
 from wearstate.diagnose.charts import verdict as module
 from wearstate.diagnose.charts.across import Loss
 from wearstate.diagnose.charts.verdict import LOSS, verdict_chart

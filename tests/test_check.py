@@ -22,7 +22,7 @@ from wearstate.datasets.file.record import (
 )
 from wearstate.datasets.generation.generate import generate
 from wearstate.datasets.generation.work import NUMERICS
-from wearstate.datasets.recipe.recipe import load_recipe
+from wearstate.datasets.recipe.load import load_recipe
 from wearstate.datasets.recipe.text import recipe_names
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.sim.output.recording import DataError

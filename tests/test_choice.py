@@ -13,7 +13,8 @@ from wearstate.datasets.generation.fidelity_choice import (
     with_choice,
 )
 from wearstate.datasets.generation.generate import generate
-from wearstate.datasets.recipe.recipe import load_recipe, recorded_scene, sample_records
+from wearstate.datasets.recipe.load import load_recipe, recorded_scene
+from wearstate.datasets.recipe.records import sample_records
 from wearstate.datasets.recipe.text import recipe_names
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.sim.fidelity.choose import Resolution

@@ -13,7 +13,7 @@ import h5py
 import pytest
 from click.testing import CliRunner
 from wearstate.datasets.generation.generate import generate
-from wearstate.datasets.recipe.recipe import load_recipe
+from wearstate.datasets.recipe.load import load_recipe
 from wearstate.datasets.workers import cluster
 from wearstate.datasets.workers.local import in_order
 from wearstate.datasets.workers.pool import WorkersError

@@ -9,7 +9,7 @@ import pytest
 from click.testing import CliRunner
 from wearstate.datasets.file.record import DataSet
 from wearstate.datasets.generation.generate import save_solution
-from wearstate.datasets.recipe.recipe import load_recipe
+from wearstate.datasets.recipe.load import load_recipe
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.feature_rows.healthy import Baseline
 from wearstate.diagnose.feature_rows.model_card import ModelCard, TrainedCondition, TrainedOn

@@ -8,7 +8,7 @@ import sys
 import click
 import pytest
 from click.testing import CliRunner
-from wearstate.datasets.recipe.recipe import load_recipe
+from wearstate.datasets.recipe.load import load_recipe
 from wearstate.datasets.recipe.text import RecipeError, recipe_names
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.command_line.command_help import _GROUPS, EXAMPLES

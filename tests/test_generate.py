@@ -23,14 +23,10 @@ from wearstate.datasets.file.record import (
 from wearstate.datasets.generation import generate as generation
 from wearstate.datasets.generation import work
 from wearstate.datasets.generation.generate import Stopped, generate, save_solution
-from wearstate.datasets.recipe.recipe import (
-    LARGEST_SEED,
-    MOST_RECORDS,
-    STRATA,
-    load_recipe,
-    sample_records,
-    wear_limits,
-)
+from wearstate.datasets.recipe.load import load_recipe
+from wearstate.datasets.recipe.records import LARGEST_SEED, STRATA, sample_records
+from wearstate.datasets.recipe.severities import wear_limits
+from wearstate.datasets.recipe.table import MOST_RECORDS
 from wearstate.datasets.recipe.text import RecipeError, recipe_names
 from wearstate.datasets.split.rules import group_split
 from wearstate.datasets.workers.local import in_order
@@ -198,7 +194,7 @@ def read_terminal(terminal):
 KILLED = """
 import os, signal, sys
 from wearstate.datasets.generation.generate import generate
-from wearstate.datasets.recipe.recipe import load_recipe
+from wearstate.datasets.recipe.load import load_recipe
 recipe = load_recipe("bilge-pump-small", {overrides})
 kill = lambda done, total: os.kill(os.getpid(), signal.SIGKILL) if done == 4 else None
 generate(recipe, {n}, sys.argv[1], seed=5, progress=kill, jobs=int(sys.argv[2]))
@@ -283,7 +279,7 @@ RIVAL = """
 import sys, time
 from pathlib import Path
 from wearstate.datasets.generation.generate import generate
-from wearstate.datasets.recipe.recipe import load_recipe
+from wearstate.datasets.recipe.load import load_recipe
 from wearstate.sim.output.recording import DataError
 
 folder, me, other, rounds = Path(sys.argv[1]), sys.argv[2], sys.argv[3], int(sys.argv[4])

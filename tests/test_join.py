@@ -9,7 +9,7 @@ from click.testing import CliRunner
 from wearstate.datasets.file.record import DataSet
 from wearstate.datasets.file.views import CompletingView, JoinedSet, views_of
 from wearstate.datasets.generation.generate import generate
-from wearstate.datasets.recipe.recipe import load_recipe
+from wearstate.datasets.recipe.load import load_recipe
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.evaluation.evaluate import evaluate_model
 from wearstate.diagnose.feature_rows.feature_table import FeatureSelection, feature_table

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 import wearstate
 from jsonschema import Draft7Validator
-from wearstate.datasets.recipe.recipe import RecipeTable
+from wearstate.datasets.recipe.table import RecipeTable
 from wearstate.diagnose.inspect.keys import (
     explained,
     found_keys,

@@ -6,7 +6,8 @@ from itertools import product
 import numpy as np
 import pytest
 from wearstate.datasets.generation.generate import generate
-from wearstate.datasets.recipe.recipe import load_recipe, sample_records
+from wearstate.datasets.recipe.load import load_recipe
+from wearstate.datasets.recipe.records import sample_records
 from wearstate.sim.machine.simulate import simulate, simulate_many, simulates_together
 from wearstate.sim.output.status import Status
 from wearstate.sim.pump.gathering import GATHERED_TRUTH

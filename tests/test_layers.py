@@ -61,6 +61,7 @@ ROOMS = {
         "workers",
         "source",
         "readers",
+        "draws",
         "recipe",
         "split",
         "measured",

@@ -14,7 +14,8 @@ from scipy.integrate import simpson
 from wearstate.datasets.file.record import DataSet
 from wearstate.datasets.generation.generate import generate
 from wearstate.datasets.recipe.life import LIFE_COLUMNS
-from wearstate.datasets.recipe.recipe import load_recipe, sample_records
+from wearstate.datasets.recipe.load import load_recipe
+from wearstate.datasets.recipe.records import sample_records
 from wearstate.datasets.recipe.text import RecipeError, recipe_text
 from wearstate.sim.scene.load import load_scene
 from wearstate.sim.wear.archard import grade

@@ -13,7 +13,7 @@ import pytest
 from click.testing import CliRunner
 from matplotlib.figure import Figure
 from wearstate.datasets.file.record import DataSet, DataSetWriter
-from wearstate.datasets.recipe.recipe import load_recipe
+from wearstate.datasets.recipe.load import load_recipe
 from wearstate.diagnose.blindspots.page import blind_spots_html
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.inspect.recipe_preview import preview, preview_figure

@@ -143,7 +143,7 @@ def test_the_training_set_is_judged_on_its_held_out_draws_only(few_trained, few_
 
 def test_too_few_machines_are_refused(tmp_path):
     from wearstate.datasets.generation.generate import generate
-    from wearstate.datasets.recipe.recipe import load_recipe
+    from wearstate.datasets.recipe.load import load_recipe
 
     generate(load_recipe("bilge-pump-small", {"duration": "0.3 s"}), 4, tmp_path / "few.h5")
     with pytest.raises(DataError, match="2 machine draws, must be >= 10"):

@@ -20,7 +20,7 @@ import wearstate
 from click.testing import CliRunner
 from scipy.io import savemat, wavfile
 from wearstate.datasets.generation.generate import generate
-from wearstate.datasets.recipe.recipe import load_recipe
+from wearstate.datasets.recipe.load import load_recipe
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.command_line.command_help import FIRST_CONTACT
 from wearstate.sim.scene.load import minimal_text, scene_text

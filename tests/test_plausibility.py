@@ -10,7 +10,8 @@ from wearstate.datasets.audit.integrity import check_set
 from wearstate.datasets.audit.plausibility import recording_doubts, scene_in
 from wearstate.datasets.file.record import DataSet
 from wearstate.datasets.generation.generate import save_solution
-from wearstate.datasets.recipe.recipe import load_recipe, sample_records
+from wearstate.datasets.recipe.load import load_recipe
+from wearstate.datasets.recipe.records import sample_records
 from wearstate.datasets.recipe.text import recipe_names
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.sim.machine.simulate import simulate

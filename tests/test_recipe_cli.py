@@ -7,14 +7,9 @@ import pytest
 from click.testing import CliRunner
 from numpy.testing import assert_allclose
 from wearstate.datasets.generation.generate import generate
-from wearstate.datasets.recipe.recipe import (
-    load_recipe,
-    overrides_text,
-    recorded_recipe,
-    recorded_scene,
-    sample_records,
-    wear_limits,
-)
+from wearstate.datasets.recipe.load import load_recipe, recorded_recipe, recorded_scene
+from wearstate.datasets.recipe.records import overrides_text, sample_records
+from wearstate.datasets.recipe.severities import wear_limits
 from wearstate.datasets.recipe.text import recipe_names, recipe_text
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.inspect.recipe_preview import MOST_DRAWN, preview, preview_text

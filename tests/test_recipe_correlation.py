@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.stats import kstest, spearmanr
-from wearstate.datasets.recipe import recipe as recipes
-from wearstate.datasets.recipe.correlation import pearson
-from wearstate.datasets.recipe.recipe import load_recipe, sample_records
+from wearstate.datasets.draws.correlation import pearson
+from wearstate.datasets.recipe import records
+from wearstate.datasets.recipe.load import load_recipe
+from wearstate.datasets.recipe.records import sample_records
 from wearstate.datasets.recipe.text import RecipeError
 
 BASE = """
@@ -38,7 +39,7 @@ def faults_of(tmp_path, text):
 
 def drawn(recipe, n, seed=0):
     """Every number by path, without building a scene of each."""
-    sources = recipes._sources(recipe, seed)
+    sources = records._sources(recipe, seed)
     rows = [
         {path: v for source in sources.values() for path, v in source.values(i).items()}
         for i in range(n)

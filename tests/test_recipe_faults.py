@@ -18,8 +18,9 @@ from numpy.testing import assert_array_equal
 from scipy.stats import rankdata
 from wearstate.datasets.file.record import DataSet
 from wearstate.datasets.generation.generate import generate
-from wearstate.datasets.recipe import recipe as recipes
-from wearstate.datasets.recipe.recipe import STRATA, load_recipe, sample_records
+from wearstate.datasets.recipe import load, records, severities
+from wearstate.datasets.recipe.load import load_recipe
+from wearstate.datasets.recipe.records import STRATA, sample_records
 from wearstate.datasets.recipe.text import (
     LONGEST_CHAIN,
     RecipeError,
@@ -249,7 +250,7 @@ def test_the_clearances_of_a_scene_by_column(tmp_path):
     del radial["diametral_clearance"]
     throws = [{"phase": 0.0}, {"phase": 1.0, "joint": {"crankpin": {"radial_clearance": "0.2 mm"}}}]
     pump_file(tmp_path, {"joint.wristpin": radial, "throws": throws})
-    found = recipes.clearances(load_scene(tmp_path / "pump.toml"))
+    found = severities.clearances(load_scene(tmp_path / "pump.toml"))
     pins = {name: value for name, value in found.items() if "pin" in name}
     assert pins == pytest.approx(
         {
@@ -261,7 +262,7 @@ def test_the_clearances_of_a_scene_by_column(tmp_path):
 
 
 def test_throws_are_counted_from_one_in_columns_only():
-    column = recipes.severity_column
+    column = severities.severity_column
     assert column("throws.0.joint.crankpin.diametral_clearance").endswith("_crankpin_1_m")
     assert column("throws.11.joint.wristpin.diametral_clearance").endswith("_wristpin_12_m")
     assert column(CRANKPIN) == "diametral_clearance_crankpin_m"
@@ -269,8 +270,8 @@ def test_throws_are_counted_from_one_in_columns_only():
     assert column("throws.*.joint.crankpin.diametral_clearance") is None
     assert column("throws.0.joint.crankpin.friction") is None
     scene = load_scene("bilge-pump")
-    assert recipes.wear_limits(scene, "diametral_clearance_crankpin_3_m") is scene.wear
-    assert recipes.wear_limits(scene, "diametral_clearance_guide_3_m") is None
+    assert severities.wear_limits(scene, "diametral_clearance_crankpin_3_m") is scene.wear
+    assert severities.wear_limits(scene, "diametral_clearance_guide_3_m") is None
 
 
 def test_entries_of_a_list_go_by_number(tmp_path):
@@ -837,8 +838,8 @@ def test_a_regime_is_found_like_a_fault_and_not_to_be_mended(trained):
 def test_the_scene_of_a_file_is_that_of_the_recipe_with_all_its_changes():
     """Built again from the three texts that a data set file holds."""
     recipe = load_recipe("bilge-pump-shifted", {"rod.mass": "4 kg", "sensors.*.bits": 16})
-    texts = (recipe.scene_text, recipe.text, recipes.overrides_text(recipe))
-    scene = recipes.recorded_scene(*texts)
+    texts = (recipe.scene_text, recipe.text, records.overrides_text(recipe))
+    scene = load.recorded_scene(*texts)
     assert scene == recipe.scene
     assert (scene.rod.mass, scene.sensors[1].bits, scene.duration) == (4.0, 16, 5.8)
 

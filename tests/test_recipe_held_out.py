@@ -4,13 +4,9 @@ import math
 
 import numpy as np
 import pytest
-from wearstate.datasets.recipe.held_out import DIMENSIONS
-from wearstate.datasets.recipe.recipe import (
-    load_recipe,
-    overrides_text,
-    recorded_recipe,
-    sample_records,
-)
+from wearstate.datasets.draws.held_out import DIMENSIONS
+from wearstate.datasets.recipe.load import load_recipe, recorded_recipe
+from wearstate.datasets.recipe.records import overrides_text, sample_records
 from wearstate.datasets.recipe.text import RecipeError
 from wearstate.sim.scene.load import all_condition_places, all_wear_places
 from wearstate.sim.scene.parts import UNITS

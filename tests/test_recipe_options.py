@@ -5,7 +5,8 @@ import pytest
 from numpy.testing import assert_allclose
 from wearstate.datasets.file.record import DataSet
 from wearstate.datasets.generation.generate import generate
-from wearstate.datasets.recipe.recipe import load_recipe, sample_records
+from wearstate.datasets.recipe.load import load_recipe
+from wearstate.datasets.recipe.records import sample_records
 from wearstate.datasets.recipe.text import RecipeError
 
 RECIPE = """

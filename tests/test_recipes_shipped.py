@@ -6,14 +6,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.stats import norm, rankdata
-from wearstate.datasets.recipe import recipe as recipes
-from wearstate.datasets.recipe.draws import value_at
-from wearstate.datasets.recipe.recipe import (
-    load_recipe,
-    overrides_text,
-    recorded_recipe,
-    sample_records,
-)
+from wearstate.datasets.draws.draws import value_at
+from wearstate.datasets.recipe import records
+from wearstate.datasets.recipe.load import load_recipe, recorded_recipe
+from wearstate.datasets.recipe.records import overrides_text, sample_records
 from wearstate.datasets.recipe.text import RecipeError, recipe_names
 from wearstate.features.rotation.order import pulse_times
 from wearstate.sim.machine.simulate import simulate, simulate_many
@@ -34,7 +30,7 @@ BRIEF = {
 
 def drawn(recipe, n=N, seed=0):
     """Every number by path and table entry, without building a scene of each."""
-    sources = recipes._sources(recipe, seed)
+    sources = records._sources(recipe, seed)
     size = recipe.table.records_per_group
     columns = {}
     for i in range(n):
@@ -201,7 +197,7 @@ def drawn_by_options(recipe, seed=0):
     """What the options draw that a thousand machines take."""
     columns = {}
     for i in range(N // 2):
-        for _, values in recipes._choices(recipe, i, 2 * i, seed, {}).values():
+        for _, values in records._choices(recipe, i, 2 * i, seed, {}).values():
             for path, value in values.items():
                 if value:  # 0 where another law has no such number
                     columns.setdefault(path, []).append(value)
@@ -243,7 +239,7 @@ def test_records_in_a_row_know_no_label(standard):
     # deviation of the difference of two means of 1000: 0.013; less, as both are even
     assert abs(level[::2].mean() - level[1::2].mean()) < 4 * 0.013
     within = np.corrcoef(level[::2], level[1::2])[0, 1]
-    assert abs(within + 1 / (recipes.STRATA - 1)) < 4 / np.sqrt(1000)
+    assert abs(within + 1 / (records.STRATA - 1)) < 4 / np.sqrt(1000)
 
 
 def test_no_condition_tells_the_severity(standard):

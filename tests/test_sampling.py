@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 from scipy.stats import kstest, qmc
-from wearstate.datasets.recipe import sampling
-from wearstate.datasets.recipe.sampling import BLOCK, SET, CubeAxis, Points
+from wearstate.datasets.draws import sampling
+from wearstate.datasets.draws.sampling import BLOCK, SET, CubeAxis, Points
 
 METHODS = ("sobol", "latin-hypercube", "random")
 EVEN = METHODS[:2]

@@ -7,7 +7,9 @@ import pytest
 from click.testing import CliRunner
 from numpy.testing import assert_allclose, assert_array_equal
 from wearstate.datasets.file.record import DataSet
-from wearstate.datasets.recipe.recipe import load_recipe, sample_records, wear_limits
+from wearstate.datasets.recipe.load import load_recipe
+from wearstate.datasets.recipe.records import sample_records
+from wearstate.datasets.recipe.severities import wear_limits
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.features.response.frf import block_spectra, estimate_frf, find_blows, force_window
 from wearstate.sim.machine.simulate import check, simulate

@@ -8,7 +8,9 @@ from click.testing import CliRunner
 from numpy.testing import assert_array_equal
 from wearstate.datasets.file.record import DataSet
 from wearstate.datasets.generation.generate import generate, save_solution
-from wearstate.datasets.recipe.recipe import clearances, load_recipe, sample_records, wear_limits
+from wearstate.datasets.recipe.load import load_recipe
+from wearstate.datasets.recipe.records import sample_records
+from wearstate.datasets.recipe.severities import clearances, wear_limits
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.evaluation.evaluate import score
 from wearstate.diagnose.feature_rows.feature_table import recording_features

@@ -18,7 +18,8 @@ from wearstate.datasets.file.record import (
     DataSetWriter,
 )
 from wearstate.datasets.generation.generate import generate
-from wearstate.datasets.recipe.recipe import load_recipe, overrides_text, sample_records
+from wearstate.datasets.recipe.load import load_recipe
+from wearstate.datasets.recipe.records import overrides_text, sample_records
 from wearstate.datasets.split import stored as split_file
 from wearstate.datasets.split.rules import (
     check_no_leak,

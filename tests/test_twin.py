@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 import wearstate
 from scipy.special import ndtri
-from wearstate.datasets.recipe.recipe import load_recipe, sample_records
+from wearstate.datasets.draws.twin import Twin, TwinTable, coordinate_names, machine_values
+from wearstate.datasets.recipe.load import load_recipe
+from wearstate.datasets.recipe.records import sample_records
 from wearstate.datasets.recipe.text import RecipeError, toml_text
-from wearstate.datasets.recipe.twin import Twin, TwinTable, coordinate_names, machine_values
 from wearstate.diagnose.twin import opinion
 from wearstate.diagnose.twin.calibration import conditions_of
 from wearstate.diagnose.twin.ensemble import simulated
@@ -63,7 +64,7 @@ def test_records_of_a_twin_stand_beside_those_of_the_recipe(twin_file):
 def test_the_scene_of_a_twin_names_the_file_beside_it(twin_file):
     recipe = load_recipe(RECIPE, twin=twin_file.with_name("mine.toml"))
     assert recipe.table.twin.names == (MODE, "pressure", DELAY)
-    again = wearstate.datasets.recipe.recipe.recorded_recipe(recipe.scene_text, recipe.text, "{}")
+    again = wearstate.datasets.recipe.load.recorded_recipe(recipe.scene_text, recipe.text, "{}")
     assert [s.drawn for s in sample_records(again, 4)] == [
         s.drawn for s in sample_records(recipe, 4)
     ]

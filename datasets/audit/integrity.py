@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 
 from ...sim.output.recording import DataError, missing_file
 from ...sim.wear.archard import grade
+from ..draws.draws import Range
 from ..file.record import DataSet, signal_checksum
-from ..recipe.draws import Range
-from ..recipe.recipe import Recipe, recorded_recipe
+from ..recipe.load import recorded_recipe
+from ..recipe.recipe import Recipe
 from ..split.rules import check_no_leak
 from .plausibility import doubts_of, scene_in
 
@@ -105,7 +106,7 @@ def check_set(path: str | Path, *, progress: Callable[[int, int], None] | None =
     --------
     >>> import tempfile
     >>> from wearstate.datasets.generation.generate import generate
-    >>> from wearstate.datasets.recipe.recipe import load_recipe
+    >>> from wearstate.datasets.recipe.load import load_recipe
     >>> recipe = load_recipe("journal-bearing-small", {"duration": "0.05 s"})
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     made = generate(recipe, 2, Path(folder) / "data.h5")

@@ -16,7 +16,7 @@ from ...sim.scene.plausibility import (
     sensor_limits,
 )
 from ..file.record import Attributes
-from ..recipe.recipe import recorded_scene
+from ..recipe.load import recorded_scene
 
 
 def scene_in(head: Attributes) -> Scene | None:

@@ -125,7 +125,7 @@ def export_set(
     --------
     >>> import tempfile
     >>> from wearstate.datasets.generation.generate import generate
-    >>> from wearstate.datasets.recipe.recipe import load_recipe
+    >>> from wearstate.datasets.recipe.load import load_recipe
     >>> recipe = load_recipe("journal-bearing-small", {"duration": "0.05 s"})
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     made = generate(recipe, 2, Path(folder) / "data.h5")

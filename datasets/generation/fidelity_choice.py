@@ -15,7 +15,8 @@ from ...sim.fidelity.ladder import cost_of, effects_of
 from ...sim.scene.load import override, scene_from_table
 from ...sim.scene.parts import Scene
 from ...sim.scene.rungs import Effect, with_values
-from ..recipe.recipe import STRATA, Recipe, Sample, sample_records
+from ..recipe.recipe import Recipe
+from ..recipe.records import STRATA, Sample, sample_records
 from .machines import known_of
 
 ACTS_ON = {
@@ -115,7 +116,7 @@ def pinned_by(recipe: Recipe) -> tuple[str, ...]:
 
     Examples
     --------
-    >>> from wearstate.datasets.recipe.recipe import load_recipe
+    >>> from wearstate.datasets.recipe.load import load_recipe
     >>> pinned_by(load_recipe("bilge-pump-small"))
     ('crankpin',)
     >>> pinned_by(load_recipe("bilge-pump-standard"))

@@ -33,18 +33,11 @@ from ..file.record import (
     refuse_output,
     unfinished_attributes,
 )
-from ..recipe.recipe import (
-    LARGEST_SEED,
-    MOST_RECORDS,
-    Recipe,
-    Sample,
-    clearances,
-    condition_of,
-    load_recipe,
-    overrides_text,
-    sample_records,
-    wear_limits,
-)
+from ..recipe.load import load_recipe
+from ..recipe.recipe import Recipe, condition_of
+from ..recipe.records import LARGEST_SEED, Sample, overrides_text, sample_records
+from ..recipe.severities import clearances, wear_limits
+from ..recipe.table import MOST_RECORDS
 from ..recipe.text import RecipeError
 from ..split.stored import Drawn, default_splits, split_names
 from ..workers.local import in_order
@@ -134,7 +127,7 @@ def generate(
         File to write; ``<path>.part`` until finished. An unfinished file of the same call is
         gone on with.
     view : str
-        As of :func:`~.recipe.recipe.load_recipe`: record `i` of every view is of the same machine
+        As of :func:`~.recipe.load.load_recipe`: record `i` of every view is of the same machine
         state.
     seed : int
         Of the data set, >= 0. Record `i` depends on recipe, seed and `i` alone.

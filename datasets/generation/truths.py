@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from ...sim.output.recording import Recording
 from ...sim.scene.parts import Scene
 from ..file.columns import describe_columns
-from ..recipe.recipe import clearances
+from ..recipe.severities import clearances
 from .machines import Truth, known_of
 from .quantities import quantity_label
 

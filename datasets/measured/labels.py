@@ -16,7 +16,7 @@ from ...sim.scene.load import all_wear_places, load_scene
 from ...sim.scene.parts import UNITS, nearest, to_si
 from ..file.csv_cells import plain_cell
 from ..file.machines import FILE
-from ..recipe.recipe import clearances, wear_limits
+from ..recipe.severities import clearances, wear_limits
 
 Value = float | int | bool | str
 """A label: NaN, -1 or empty where it is not known."""

@@ -6,7 +6,7 @@ where the scene's own value lies outside of what is drawn, it hardly does.
 
 from collections.abc import Mapping
 
-from .draws import Range, has_value, value_at
+from ..draws.draws import Range, has_value, value_at
 from .recipe import Recipe
 
 
@@ -27,7 +27,7 @@ def draw_doubts(recipe: Recipe, inherited: Mapping[str, str]) -> list[str]:
 
     Examples
     --------
-    >>> from wearstate.datasets.recipe.recipe import load_recipe
+    >>> from wearstate.datasets.recipe.load import load_recipe
     >>> draw_doubts(load_recipe("bilge-pump-small"), {})
     []
     """

@@ -9,7 +9,7 @@ from typing import Any
 
 from ...sim.scene.load import scene_table, unread_text
 from ...sim.scene.parts import SceneError
-from .wear_bounds import foreign_bounds
+from ..draws.wear_bounds import foreign_bounds
 
 RECIPE_FOLDER = Path(__file__).parent / "built_in"
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from ...sim.atomic import replacing
 from ...sim.output.recording import DataError
+from ..draws.draws import Range
 from ..file.lock import holding
 from ..file.record import (
     Attributes,
@@ -23,8 +24,9 @@ from ..file.record import (
     fill_split,
     lay_out_split,
 )
-from ..recipe.draws import Range
-from ..recipe.recipe import Recipe, Sample, recorded_recipe, sample_records
+from ..recipe.load import recorded_recipe
+from ..recipe.recipe import Recipe
+from ..recipe.records import Sample, sample_records
 from ..recipe.text import RecipeError
 from .rules import Index, check_no_leak, group_split, region_split, time_split
 
@@ -340,7 +342,7 @@ def split_names(recipe: Recipe) -> tuple[str, ...]:
 
     Examples
     --------
-    >>> from wearstate.datasets.recipe.recipe import load_recipe
+    >>> from wearstate.datasets.recipe.load import load_recipe
     >>> "machine" in split_names(load_recipe("bilge-pump-small"))
     True
     """

@@ -17,7 +17,9 @@ from typing import Any, Protocol
 import numpy as np
 
 from ... import __version__
-from ...datasets.recipe.recipe import Recipe, Sample, condition_of, load_recipe, sample_records
+from ...datasets.recipe.load import load_recipe
+from ...datasets.recipe.recipe import Recipe, condition_of
+from ...datasets.recipe.records import Sample, sample_records
 from ...datasets.recipe.text import recipe_names
 from ...sim.machine.simulate import simulate_many
 from ...sim.output.recording import DataError, Recording

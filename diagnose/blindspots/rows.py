@@ -12,9 +12,10 @@ from dataclasses import dataclass, replace
 from itertools import chain
 from typing import Any, Literal
 
-from ...datasets.recipe.draws import Axis, Vector, has_value, matches, value_at
-from ...datasets.recipe.options import Alternatives, Taken
-from ...datasets.recipe.recipe import Recipe, Sample
+from ...datasets.draws.draws import Axis, Vector, has_value, matches, value_at
+from ...datasets.draws.options import Alternatives, Taken
+from ...datasets.recipe.recipe import Recipe
+from ...datasets.recipe.records import Sample
 from ...sim.scene.load import override, scene_from_table
 from ...sim.scene.parts import Scene, SceneError
 from ..machines.registry import presentation_of
@@ -104,7 +105,7 @@ def scene_rows(recipe: Recipe, shifts: Sequence[Shift] | None = None) -> list[Sc
 
     Examples
     --------
-    >>> from wearstate.datasets.recipe.recipe import load_recipe
+    >>> from wearstate.datasets.recipe.load import load_recipe
     >>> rows = scene_rows(load_recipe("bilge-pump-narrow"))
     >>> [(row.kind, row.shift) for row in rows if row.name == "pressure.rise_delay"]
     [('fixed', '= 6 deg'), ('fixed', '= 12 deg')]

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...datasets.generation.generate import generate
-from ...datasets.recipe.recipe import load_recipe, wear_limits
+from ...datasets.recipe.load import load_recipe
+from ...datasets.recipe.severities import wear_limits
 from ...datasets.split.rules import group_folds
 from ...sim.fidelity.ladder import cost_of, effects_of
 from ...sim.fidelity.pilot import Difference

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from ...datasets.recipe.draws import value_at
+from ...datasets.draws.draws import value_at
 from ...datasets.recipe.text import toml_text
 from ...sim.atomic import write_whole
 from ...sim.scene.load import scene_from_table, scene_table, scene_text

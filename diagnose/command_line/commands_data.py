@@ -63,7 +63,9 @@ def recipe_show(name: str, whole: bool) -> None:
 def recipe_check(file: str, as_json: bool) -> None:
     """Check a recipe against its scene; every fault, and warnings of what is hardly meant."""
     from ...datasets.recipe.foreign_draws import draw_doubts
-    from ...datasets.recipe.recipe import STRATA, limit_faults, load_recipe, sample_records
+    from ...datasets.recipe.load import load_recipe
+    from ...datasets.recipe.records import STRATA, sample_records
+    from ...datasets.recipe.severities import limit_faults
     from ...datasets.recipe.text import RecipeError, read_recipe
     from ...sim.machine.simulate import check
     from ...sim.scene.plausibility import scene_doubts
@@ -123,7 +125,7 @@ def recipe_preview(
     as_json: bool,
 ) -> None:
     """What RECIPE (a built-in name or a TOML file) would make: draws, labels, time and size."""
-    from ...datasets.recipe.recipe import load_recipe
+    from ...datasets.recipe.load import load_recipe
     from ..inspect.recipe_preview import preview, preview_figure, preview_text
 
     check_outputs([name], [(plot, PICTURE_SUFFIXES)], force)
@@ -186,7 +188,7 @@ def generate(
     from dataclasses import asdict
 
     from ...datasets.generation.generate import generate as run
-    from ...datasets.recipe.recipe import load_recipe
+    from ...datasets.recipe.load import load_recipe
 
     if scheduler is not None and jobs is not None:
         raise click.UsageError("--jobs is for this machine, not for the workers of --scheduler")

@@ -15,7 +15,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 from pydantic.json_schema import GenerateJsonSchema
 
-from ...datasets.recipe.recipe import RecipeTable
+from ...datasets.recipe.table import RecipeTable
 from ...sim.scene.load import MACHINES, load_scene, scene_names, short_name
 from ...sim.scene.parts import Dimension, Scene, SceneError, metadata_of, model_inside
 from ...sim.scene.rungs import Rung

@@ -7,9 +7,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...datasets.draws.draws import Draw, Range, matches
 from ...datasets.generation.work import NUMERICS
-from ...datasets.recipe.draws import Draw, Range, matches
-from ...datasets.recipe.recipe import Recipe, Sample, limit_faults, sample_records
+from ...datasets.recipe.recipe import Recipe
+from ...datasets.recipe.records import Sample, sample_records
+from ...datasets.recipe.severities import limit_faults
 from ...sim.fidelity.ladder import cost_of, effects_of
 from ...sim.scene.parts import channels_of, si_unit
 from ..learning.grades import GRADE_COLOURS, GRADE_NAMES, NO_GRADE_COLOUR
@@ -51,7 +53,7 @@ def preview(recipe: Recipe, n: int | None = None, *, seed: int = 0, cores: int =
 
     Examples
     --------
-    >>> from wearstate.datasets.recipe.recipe import load_recipe
+    >>> from wearstate.datasets.recipe.load import load_recipe
     >>> found = preview(load_recipe("journal-bearing-small"), 16, cores=2)
     >>> found.table["machines"], sum(found.table["labels"]["grade"].values())
     (8, 16)

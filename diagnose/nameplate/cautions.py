@@ -4,8 +4,8 @@ from collections.abc import Iterator, Mapping
 from functools import cache
 from typing import Any
 
-from ...datasets.recipe.draws import Vector
-from ...datasets.recipe.recipe import load_recipe
+from ...datasets.draws.draws import Vector
+from ...datasets.recipe.load import load_recipe
 from ...datasets.recipe.text import recipe_names
 from ...sim.output.recording import Recording
 from ...sim.scene.load import load_scene, scene_names

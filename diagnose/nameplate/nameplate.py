@@ -11,9 +11,10 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from ...datasets.draws.draws import has_value
 from ...datasets.file.record import Attributes, DataSet
-from ...datasets.recipe.draws import has_value
-from ...datasets.recipe.recipe import condition_of, recorded_scene
+from ...datasets.recipe.load import recorded_scene
+from ...datasets.recipe.recipe import condition_of
 from ...sim.output.recording import DataError
 from ...sim.scene.load import (
     load_scene,

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ...datasets.recipe.draws import value_at
+from ...datasets.draws.draws import value_at
 from ...sim.scene.load import load_scene, numbered, scene_table, scene_text
 from ...sim.scene.parts import Scene, SceneError, si_unit
 from ..charts.words import effect_words

@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...datasets.draws.motor import motor_speed
 from ...datasets.file.record import DataSet, refuse_output
 from ...datasets.measured.recording import read_recording
-from ...datasets.recipe.motor import motor_speed
-from ...datasets.recipe.recipe import Recipe, load_recipe
+from ...datasets.recipe.load import load_recipe
+from ...datasets.recipe.recipe import Recipe
 from ...datasets.recipe.text import RecipeError, recipe_names, toml_text, twin_path
 from ...sim.atomic import write_whole
 from ...sim.output.recording import DataError, Recording

@@ -13,9 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...datasets.recipe.recipe import Recipe, load_recipe
+from ...datasets.draws.twin import Twin, TwinTable
+from ...datasets.recipe.load import load_recipe
+from ...datasets.recipe.recipe import Recipe
 from ...datasets.recipe.text import RecipeError, beside, twin_path
-from ...datasets.recipe.twin import Twin, TwinTable
 from ...sim.output.recording import DataError, Recording
 from ...sim.scene.load import scene_table
 from ...sim.scene.parts import SceneError, validate_table

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ...datasets.recipe.options import Alternatives
-from ...datasets.recipe.recipe import load_recipe
+from ...datasets.draws.options import Alternatives
+from ...datasets.recipe.load import load_recipe
 from ...sim.scene.pump import PumpScene
 from .ensemble import simulated
 from .inversion import standard

@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
-from ...datasets.recipe.draws import KINDS, Axis, Range, has_value, value_at
-from ...datasets.recipe.options import Alternatives
+from ...datasets.draws.draws import KINDS, Axis, Range, has_value, value_at
+from ...datasets.draws.options import Alternatives
+from ...datasets.draws.twin import coordinate_names, inside, machine_values
 from ...datasets.recipe.recipe import Recipe
-from ...datasets.recipe.twin import coordinate_names, inside, machine_values
 from ...sim.output.recording import DataError
 from ...sim.scene.load import override, scene_from_table
 from ...sim.scene.parts import Scene

@@ -15,7 +15,8 @@ from ... import __version__
 from ...datasets.file.machines import machine_origin
 from ...datasets.file.record import Attributes, DataSet
 from ...datasets.file.views import MARK, JoinedSet, layout_card
-from ...datasets.recipe.recipe import recorded_scene, wear_limits
+from ...datasets.recipe.load import recorded_scene
+from ...datasets.recipe.severities import wear_limits
 from ...datasets.recipe.text import name_in
 from ...datasets.split.rules import check_no_leak, group_folds, group_split
 from ...datasets.split.stored import usable_sides

@@ -9,7 +9,7 @@ import argparse
 from pathlib import Path
 
 from wearstate.datasets.generation.generate import generate
-from wearstate.datasets.recipe.recipe import load_recipe
+from wearstate.datasets.recipe.load import load_recipe
 from wearstate.diagnose.evaluation.evaluate import evaluate_model
 from wearstate.diagnose.wear_model.train import train_model
 

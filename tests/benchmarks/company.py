@@ -16,7 +16,9 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from wearstate.datasets.recipe.recipe import Recipe, Sample, load_recipe, sample_records
+from wearstate.datasets.recipe.load import load_recipe
+from wearstate.datasets.recipe.recipe import Recipe
+from wearstate.datasets.recipe.records import Sample, sample_records
 from wearstate.diagnose.wear_model.estimate import Estimate, WearModel
 from wearstate.diagnose.wear_model.file import load_model
 from wearstate.features.rotation.order import pulse_times, shaft_phase

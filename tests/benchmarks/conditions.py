@@ -22,7 +22,7 @@ from time import perf_counter
 import numpy as np
 from wearstate.datasets.file.record import DataSet
 from wearstate.datasets.generation.generate import generate
-from wearstate.datasets.recipe.recipe import load_recipe
+from wearstate.datasets.recipe.load import load_recipe
 from wearstate.diagnose.feature_rows.healthy import Baseline
 from wearstate.diagnose.feature_rows.probe_means import probe_means
 from wearstate.diagnose.nameplate.nameplate import nameplate_of

@@ -26,7 +26,9 @@ from typing import Any
 from wearstate.datasets.file.record import DataSet, DataSetWriter
 from wearstate.datasets.generation import generate as generation
 from wearstate.datasets.generation.work import together
-from wearstate.datasets.recipe.recipe import Recipe, load_recipe, sample_records
+from wearstate.datasets.recipe.load import load_recipe
+from wearstate.datasets.recipe.recipe import Recipe
+from wearstate.datasets.recipe.records import sample_records
 from wearstate.datasets.workers.local import in_order
 
 RECIPE, SHORT = "bilge-pump-narrow", "journal-bearing-small"

@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 import wearstate
 from twin_opinion import HEALTHY, PATH, drawn_pumps, heard_of
-from wearstate.datasets.recipe.draws import value_at
+from wearstate.datasets.draws.draws import value_at
 from wearstate.diagnose.learning.scores import resampled, share
 from wearstate.diagnose.twin.calibration import CalibratedScene
 from wearstate.sim.scene.load import override, scene_from_table

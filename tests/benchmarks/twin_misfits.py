@@ -25,8 +25,8 @@ import wearstate
 from scipy.stats import binomtest
 from strangers import matched, resampled
 from twin_opinion import drawn_pumps, heard_of
-from wearstate.datasets.recipe.draws import value_at
-from wearstate.datasets.recipe.recipe import Sample
+from wearstate.datasets.draws.draws import value_at
+from wearstate.datasets.recipe.records import Sample
 from wearstate.diagnose.twin import inversion, regimes
 from wearstate.diagnose.twin.ensemble import simulated
 from wearstate.diagnose.twin.levels import layout_of

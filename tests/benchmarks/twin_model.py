@@ -24,7 +24,7 @@ from foreign_pump import CONDEMNING
 from numpy.typing import NDArray
 from twin_opinion import COLUMN, foreign_machines
 from wearstate.datasets.generation.generate import generate
-from wearstate.datasets.recipe.recipe import load_recipe
+from wearstate.datasets.recipe.load import load_recipe
 from wearstate.diagnose.feature_rows.feature_table import feature_table, recording_features
 from wearstate.diagnose.learning.regressions import CANDIDATES, Blend
 from wearstate.diagnose.learning.scores import resampled, share

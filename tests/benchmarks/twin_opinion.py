@@ -20,7 +20,8 @@ import numpy as np
 import wearstate
 from foreign_pump import AS_NEW, CONDEMNING, PUMP_A
 from foreign_records import Job
-from wearstate.datasets.recipe.recipe import Sample, load_recipe, sample_records
+from wearstate.datasets.recipe.load import load_recipe
+from wearstate.datasets.recipe.records import Sample, sample_records
 from wearstate.diagnose.twin.opinion import second_opinion
 from wearstate.sim.machine.simulate import simulate
 from wearstate.sim.output.recording import Recording
