@@ -16,8 +16,10 @@ from matplotlib.patches import Rectangle
 from scipy.signal import find_peaks
 from sheets import COLOURS, folder_asked, label, sheet, write
 from wearstate.diagnose.machines.registry import presentation_of
+from wearstate.diagnose.shaft_tests.before_after import calibrated_test
 from wearstate.diagnose.shaft_tests.next_test import rank_tests, usual_responses
-from wearstate.diagnose.shaft_tests.rig_test import ShakerTest, calibrated_test, rig_figure
+from wearstate.diagnose.shaft_tests.rig_figure import rig_figure
+from wearstate.diagnose.shaft_tests.rig_setup import ShakerTest
 from wearstate.diagnose.shaft_tests.sag_model import Prior
 from wearstate.sim.alignment.alignment import AlignmentLine, influence, reactions
 from wearstate.sim.alignment.calibration import Calibration, calibrate

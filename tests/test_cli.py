@@ -458,7 +458,10 @@ def test_the_bounds_of_the_options_are_those_of_the_library():
     ("function", "arguments"),
     [
         ("charts.of_models.model_chart", ("chart", "x.h5", "-j", 1)),
-        ("shaft_tests.rig_test.calibrated_test", ("align", "propulsion-shaft", "--test", "hammer")),
+        (
+            "shaft_tests.before_after.calibrated_test",
+            ("align", "propulsion-shaft", "--test", "hammer"),
+        ),
         ("wear_model.train.train_model", ("train", "SET", "-o", "m.wsm", "-j", 1)),
         ("workflow.demo.run_demo", ("demo", "-j", 1)),
     ],

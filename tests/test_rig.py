@@ -10,6 +10,7 @@ import scipy.stats
 from click.testing import CliRunner
 from numpy.testing import assert_allclose, assert_array_equal
 from wearstate.diagnose.command_line.cli import cli
+from wearstate.diagnose.shaft_tests import before_after, peak_changes, rig_figure, rig_setup
 from wearstate.diagnose.shaft_tests import rig_test as rig
 from wearstate.features.response.frf import Frf
 from wearstate.sim.alignment.calibration import calibrate
@@ -22,8 +23,8 @@ from wearstate.sim.shaft.response import Broadband, Harmonic
 RATE = 1024.0
 SPEED = 2 * np.pi * 12.0
 BEARINGS = {"aft": 0.2, "middle": 1.1, "forward": 2.0}
-BLOWS = rig.HammerTest(blows=12, block=1.0, peak_force=300.0, quiet=5.0, force_noise=0.0)
-BURSTS = rig.ShakerTest(bursts=12, block=2.0, force=30.0, quiet=5.0, force_noise=0.0)
+BLOWS = rig_setup.HammerTest(blows=12, block=1.0, peak_force=300.0, quiet=5.0, force_noise=0.0)
+BURSTS = rig_setup.ShakerTest(bursts=12, block=2.0, force=30.0, quiet=5.0, force_noise=0.0)
 
 
 def small_rotor(damping=1.0, pedestal_damping=2e3):
@@ -101,10 +102,12 @@ def test_the_confidence_disc_holds_the_model(setup):
 def test_the_force_window_takes_the_cells_noise():
     setup = replace(BLOWS, force_noise=1.0)
     errors = []
-    for window in (rig._KINDS[rig.HammerTest].window, lambda _: None):
-        kinds = {rig.HammerTest: replace(rig._KINDS[rig.HammerTest], window=window)}
+    for window in (rig_setup.TEST_KINDS[rig_setup.HammerTest].window, lambda _: None):
+        kinds = {
+            rig_setup.HammerTest: replace(rig_setup.TEST_KINDS[rig_setup.HammerTest], window=window)
+        }
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(rig, "_KINDS", kinds)
+            patch.setattr(rig, "TEST_KINDS", kinds)
             result = rig.run_test(QUIET_PLANT, setup, seed=1)
         errors.append(np.mean(np.abs(result.frf.value - result.model)))
     # 23 of 1024 samples keep their noise: a factor of 6.7 in amplitude, less the bias above.
@@ -160,7 +163,7 @@ def test_peaks_stand_at_natural_frequencies():
     quiet = rig.run_test(plant(rotor, noise=1e-4), replace(BLOWS, block=4.0, quiet=1.0), seed=0)
     modes = natural_frequencies(rotor, SPEED, 24)
     apart = []
-    for lines, model in zip(rig.find_frf_peaks(quiet.frf), quiet.model, strict=True):
+    for lines, model in zip(peak_changes.find_frf_peaks(quiet.frf), quiet.model, strict=True):
         level = 20 * np.log10(np.abs(model))
         theirs, outstanding = scipy.signal.find_peaks(level, prominence=1.0)
         # The test is quiet: a peak stands at one of the model's, give or take two of the five
@@ -192,7 +195,7 @@ def flat_frf(seed, averages, share):
 
 @pytest.mark.parametrize("share", [0.05, 0.3, 0.6, 0.95])
 def test_noise_makes_no_peaks(share):
-    found = [rig.find_frf_peaks(flat_frf(seed, 30, share))[0].size for seed in range(20)]
+    found = [peak_changes.find_frf_peaks(flat_frf(seed, 30, share))[0].size for seed in range(20)]
     # 20 x 1600 lines.
     assert sum(found) == 0
 
@@ -201,7 +204,7 @@ def test_nothing_changed_is_not_called_a_change():
     changes = []
     for seed in range(20):
         first, second = (rig.run_test(NOISY_PLANT, BLOWS, seed=2 * seed + k) for k in (0, 1))
-        changes.append(rig.peak_changes(first, second))
+        changes.append(peak_changes.peak_changes(first, second))
     assert np.mean([len(found) for found in changes]) > 5
     wrong = [any(peak.verdict != "unchanged" for peak in found) for found in changes]
     # At most 5 % of the tests by Holm's bound: of 20, four or more have a probability of 2 %.
@@ -217,7 +220,7 @@ def test_a_change_is_found_with_its_size():
     for seed in range(12):
         before = rig.run_test(NOISY_PLANT, BLOWS, seed=500 + 2 * seed)
         after = rig.run_test(damped, BLOWS, seed=501 + 2 * seed)
-        for peak in rig.peak_changes(before, after):
+        for peak in peak_changes.peak_changes(before, after):
             low, high = peak.interval
             held.append(low <= peak.model_change <= high)
             if peak.verdict != "unchanged":
@@ -235,14 +238,14 @@ def test_pairs_take_the_nearest_once():
     frequency = np.arange(0.0, 400.0)
     lines = np.array([100, 109, 200, 300])
     later = np.array([104, 107, 150, 230, 301, 350])
-    pairs = rig._pairs(frequency, lines, later, new=np.array([107, 150, 301]))
+    pairs = peak_changes._pairs(frequency, lines, later, new=np.array([107, 150, 301]))
     # 200 has gone, 150 has come, 350 is too low to have come.
     assert pairs == [(100, 104), (109, 107), (150, 150), (200, 200), (300, 301)]
 
 
 def test_intervals_and_p_values_against_scipy():
     change, errors, freedom = -1.3, (0.5, 0.3), (58.0, 22.0)
-    (low, high), p_value = rig._welch(change, errors, freedom, 0.9)
+    (low, high), p_value = peak_changes._welch(change, errors, freedom, 0.9)
     sizes = [f + 1 for f in freedom]
     spreads = [e * np.sqrt(n) for e, n in zip(errors, sizes, strict=True)]
     theirs = scipy.stats.ttest_ind_from_stats(
@@ -274,7 +277,7 @@ def test_a_change_rests_on_the_scatter_of_both_tests(ship):
 def test_holm_against_its_definition():
     rng = np.random.default_rng(0)
     p_values = rng.uniform(size=9) ** 3
-    adjusted = rig.holm(p_values)
+    adjusted = peak_changes.holm(p_values)
     for level in rng.uniform(0, 0.5, 50):
         # Step down: reject while the k-th smallest of the n left is below level / (n - k).
         rejected = set()
@@ -283,13 +286,13 @@ def test_holm_against_its_definition():
                 break
             rejected.add(int(at))
         assert {i for i, p in enumerate(adjusted) if p <= level} == rejected
-    assert rig.holm([]) == []
+    assert peak_changes.holm([]) == []
 
 
 # --- a scene
 
 
-SHIP = rig.ShakerTest(force=5e4, bursts=8, quiet=4.0, block=2.5)
+SHIP = rig_setup.ShakerTest(force=5e4, bursts=8, quiet=4.0, block=2.5)
 FORCE = ("stern_forward", "y")
 
 
@@ -297,7 +300,7 @@ FORCE = ("stern_forward", "y")
 def ship():
     scene = load_scene("propulsion-shaft", {"bearings.2.sag": "1.4 mm"})
     moves = {"intermediate_aft": 1.4e-3}
-    return rig.before_after(scene, moves, force=FORCE, setup=SHIP, seed=1)
+    return before_after.before_after(scene, moves, force=FORCE, setup=SHIP, seed=1)
 
 
 def test_a_scene_before_and_after(ship):
@@ -323,7 +326,7 @@ def laboratory():
     """The rig with its third bearing 0.45 mm too low, calibrated, and pushed beside it."""
     scene = load_scene("shaft-rig", {"bearings.2.sag": "0.2 mm"})
     found = calibrate(alignment_line(scene), tuple(alignment_conditions(scene).values()))
-    return rig.calibrated_test(scene, found, "shaker", push="forward", seed=2)
+    return before_after.calibrated_test(scene, found, "shaker", push="forward", seed=2)
 
 
 def test_calibration_suppresses_some_peaks(laboratory):
@@ -360,21 +363,21 @@ def test_the_summary_says_what_the_test_found(ship):
 
 def test_turns_go_into_the_scene():
     scene = load_scene("propulsion-shaft")
-    turned = rig.turned_scene(scene, {"stern_aft": -2e-4})
+    turned = before_after.turned_scene(scene, {"stern_aft": -2e-4})
     assert turned.bearings[0].slope == scene.bearings[0].slope - 2e-4
     assert turned.bearings[1:] == scene.bearings[1:]
     with pytest.raises(ValueError, match="turns: 'stern' is no bearing; choose one of stern_aft"):
-        rig.turned_scene(scene, {"stern": 1e-4})
+        before_after.turned_scene(scene, {"stern": 1e-4})
 
 
 def test_the_picture(ship, tmp_path):
-    figure = rig.rig_figure(ship, channels=["stern_aft", "thrust_block"])
+    figure = rig_figure.rig_figure(ship, channels=["stern_aft", "thrust_block"])
     assert len(figure.axes) == 4
     curves = {line.get_label() for line in figure.axes[0].lines}
     assert {"before, test", "after, test", "before, model", "after, model"} <= curves
     figure.savefig(tmp_path / "rig.png", dpi=40)
     with pytest.raises(ValueError, match="channels = aft must be of stern_aft"):
-        rig.rig_figure(ship, channels=["aft"])
+        rig_figure.rig_figure(ship, channels=["aft"])
 
 
 def ask(*arguments):
@@ -403,12 +406,12 @@ def test_the_command_line_has_nothing_to_test():
 
 
 def test_words_of_a_test(ship):
-    lines = rig.rig_text(ship).splitlines()
+    lines = before_after.rig_text(ship).splitlines()
     assert lines[0] == "simulated shaker test, pushing stern_forward up, 8 blocks before and after"
     assert len(lines) == 3 + len(ship.changes)
-    assert rig._in_words((1.5, "z")) == "the shaft at 1.5 m sideways"
-    assert rig._in_words(("aft", "y", "housing")) == "the housing of aft up"
-    table = rig.rig_table(ship)
+    assert before_after._in_words((1.5, "z")) == "the shaft at 1.5 m sideways"
+    assert before_after._in_words(("aft", "y", "housing")) == "the housing of aft up"
+    table = before_after.rig_table(ship)
     assert json.loads(json.dumps(table)) == {
         **table,
         "peaks": [{**peak, "interval": list(peak["interval"])} for peak in table["peaks"]],
@@ -439,12 +442,21 @@ def test_the_command_line_refuses(arguments, message):
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda: rig.HammerTest(blows=1, scatter=2.0), "blows = 1(.|\n)*scatter = 2.0"),
-        (lambda: rig.HammerTest(contact_time=1e-3), "contact_time = 0.001 s must be >= 0.00195"),
-        (lambda: rig.HammerTest(high=500.0), "high = 500.0 Hz must be .* raise sample_rate"),
-        (lambda: rig.HammerTest(block=0.0, peak_force=0.01, force_noise=-1), "block = 0.0 s"),
-        (lambda: rig.ShakerTest(kind="sine"), "kind = 'sine' must be one of burst-random, sweep"),
-        (lambda: rig.ShakerTest(share=1.0, bursts=1, force=-1.0), "force = -1.0 N(.|\n)*share"),
+        (lambda: rig_setup.HammerTest(blows=1, scatter=2.0), "blows = 1(.|\n)*scatter = 2.0"),
+        (
+            lambda: rig_setup.HammerTest(contact_time=1e-3),
+            "contact_time = 0.001 s must be >= 0.00195",
+        ),
+        (lambda: rig_setup.HammerTest(high=500.0), "high = 500.0 Hz must be .* raise sample_rate"),
+        (lambda: rig_setup.HammerTest(block=0.0, peak_force=0.01, force_noise=-1), "block = 0.0 s"),
+        (
+            lambda: rig_setup.ShakerTest(kind="sine"),
+            "kind = 'sine' must be one of burst-random, sweep",
+        ),
+        (
+            lambda: rig_setup.ShakerTest(share=1.0, bursts=1, force=-1.0),
+            "force = -1.0 N(.|\n)*share",
+        ),
         (lambda: rig.run_test(QUIET_PLANT, replace(BLOWS, block=0.1)), "lengthen the block"),
         (lambda: rig.run_test(plant(small_rotor(-1.0)), BLOWS), "growth rate = .* must be < 0"),
         (
@@ -454,7 +466,7 @@ def test_the_command_line_refuses(arguments, message):
             "place = 3 must be named",
         ),
         (
-            lambda: rig.peak_changes(
+            lambda: peak_changes.peak_changes(
                 rig.run_test(QUIET_PLANT, BLOWS), rig.run_test(QUIET_PLANT, replace(BLOWS, low=9.0))
             ),
             "run both with one setup",
@@ -462,5 +474,5 @@ def test_the_command_line_refuses(arguments, message):
     ],
 )
 def test_refusals(call, message):
-    with pytest.raises(rig.RigError, match=message):
+    with pytest.raises(rig_setup.RigError, match=message):
         call()

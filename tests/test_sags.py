@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.stats import binom
+from wearstate.diagnose.shaft_tests.before_after import scene_plant
 from wearstate.diagnose.shaft_tests.next_test import (
     candidate_places,
     force_density,
@@ -14,7 +15,8 @@ from wearstate.diagnose.shaft_tests.next_test import (
     transfer_covariance,
     usual_responses,
 )
-from wearstate.diagnose.shaft_tests.rig_test import HammerTest, ShakerTest, run_test, scene_plant
+from wearstate.diagnose.shaft_tests.rig_setup import HammerTest, ShakerTest
+from wearstate.diagnose.shaft_tests.rig_test import run_test
 from wearstate.diagnose.shaft_tests.sag_model import (
     MeasuredReactions,
     MeasuredTransfer,

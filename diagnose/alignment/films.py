@@ -22,8 +22,8 @@ from ...sim.shaft.on_oil_films import BeamFilm, ShaftFilmError
 from ...sim.shaft.response import Place
 from ..pages.page import short_name
 from ..pages.picture import PAGE_WIDTH, PageImage, page_image
+from ..shaft_tests.before_after import turned_scene
 from ..shaft_tests.measured_tests import LineTest
-from ..shaft_tests.rig_test import turned_scene
 
 Vector = NDArray[np.float64]
 Complex = NDArray[np.complex128]

@@ -28,8 +28,9 @@ from ...sim.shaft.on_oil_films import ShaftFilmError
 from ...sim.shaft.recording import alignment_conditions, alignment_line
 from ..pages.page import render, save_page, short_name
 from ..pages.picture import PageImage, drawn_alone, page_image, save_picture
+from ..shaft_tests.before_after import EXPECTED, BeforeAfter, rig_text
 from ..shaft_tests.measured_tests import LineTest
-from ..shaft_tests.rig_test import EXPECTED, BeforeAfter, rig_figure, rig_text
+from ..shaft_tests.rig_figure import rig_figure
 from ..shaft_tests.sag_report import SagReport, next_texts, sag_images, sag_rows
 from .films import (
     FILM_HEAD,
@@ -695,7 +696,7 @@ def align_html(
     ----------
     found : Alignment
     tested : BeforeAfter, optional
-        Of :func:`wearstate.diagnose.shaft_tests.rig_test.calibrated_test`.
+        Of :func:`wearstate.diagnose.shaft_tests.before_after.calibrated_test`.
     measured : SagReport, optional
         What measured tests say; `found` is then of the line where they put it.
     note : str

@@ -432,7 +432,8 @@ def _tested(
     if kind is None:
         return None, None, []
     from ..pages.picture import save_picture
-    from ..shaft_tests.rig_test import calibrated_test, rig_figure, rig_table, rig_text
+    from ..shaft_tests.before_after import calibrated_test, rig_table, rig_text
+    from ..shaft_tests.rig_figure import rig_figure
 
     result = calibrated_test(scene, calibration, kind, push=push, seed=seed)
     if result is None:

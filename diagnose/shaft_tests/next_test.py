@@ -32,7 +32,7 @@ from ...sim.shaft.changed import (
 from ...sim.shaft.on_oil_films import BeamFilm
 from ...sim.shaft.recording import alignment_conditions, alignment_line, random_forces, shaft_beam
 from ...sim.shaft.response import Place
-from .rig_test import HammerTest, ShakerTest
+from .rig_setup import HammerTest, ShakerTest
 from .sag_model import (
     MeasuredReactions,
     Prior,
