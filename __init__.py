@@ -52,8 +52,8 @@ if TYPE_CHECKING:
     from .sim.output.status import SimulationError as SimulationError
     from .sim.scene.load import load_scene as load_scene
     from .sim.scene.load import scene_names as scene_names
-    from .sim.scene.parts import Scene as Scene
-    from .sim.scene.parts import SceneError as SceneError
+    from .sim.scene.scene import Scene as Scene
+    from .sim.scene.scene import SceneError as SceneError
 
 __version__ = "0.1.0"
 
@@ -72,8 +72,8 @@ _HOMES = {
     "ModelError": ".diagnose.wear_model.estimate",
     "Recording": ".sim.output.recording",
     "Report": ".diagnose.workflow.report",
-    "Scene": ".sim.scene.parts",
-    "SceneError": ".sim.scene.parts",
+    "Scene": ".sim.scene.scene",
+    "SceneError": ".sim.scene.scene",
     "SimulationError": ".sim.output.status",
     "SourceOptions": ".datasets.source.part",
     "WearModel": ".diagnose.wear_model.estimate",

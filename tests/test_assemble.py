@@ -11,7 +11,7 @@ from wearstate.sim.output.status import SimulationError, Status
 from wearstate.sim.pump.run_plan import steps_per_sample
 from wearstate.sim.pump_setup.contacts import contact_frequency
 from wearstate.sim.scene.load import load_scene
-from wearstate.sim.scene.parts import SceneError, channels_of
+from wearstate.sim.scene.scene import SceneError, channels_of
 
 SHORT = {"duration": "0.4 s"}  # two revolutions
 RATE = 25_600.0

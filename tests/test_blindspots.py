@@ -25,7 +25,7 @@ from wearstate.diagnose.wear_model.estimate import Estimate
 from wearstate.features.rotation.order import pulse_times
 from wearstate.sim.output.recording import DataError, Recording
 from wearstate.sim.output.sensor import Channel, tacho_pulses
-from wearstate.sim.scene.parts import SceneError, channels_of
+from wearstate.sim.scene.scene import SceneError, channels_of
 
 PUMP = load_recipe("bilge-pump-narrow", {"duration": "0.4 s"})
 LIMIT = 3.1e-4

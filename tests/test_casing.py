@@ -15,8 +15,8 @@ from wearstate.sim.casing.modes import (
     housing_acceleration,
 )
 from wearstate.sim.scene.load import load_scene
-from wearstate.sim.scene.parts import SceneError
 from wearstate.sim.scene.pump import FORCE_PLACES
+from wearstate.sim.scene.scene import SceneError
 
 FS = 25_600.0
 FACTORS = [1, 2, 3, 5, 8]

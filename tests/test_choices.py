@@ -12,7 +12,7 @@ from pydantic import BaseModel
 from wearstate.sim.machine.simulate import check, simulate
 from wearstate.sim.output.status import SimulationError
 from wearstate.sim.scene.load import load_scene, scene_names
-from wearstate.sim.scene.parts import SceneError
+from wearstate.sim.scene.scene import SceneError
 
 SHORT = {
     "bilge-pump": {"duration": "0.21 s", "settling_revolutions": 1},

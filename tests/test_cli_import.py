@@ -11,7 +11,7 @@ from scipy.io import wavfile
 from wearstate.datasets.file.record import DataSet
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.command_line.command_options import as_options
-from wearstate.sim.scene.parts import STANDARD_GRAVITY
+from wearstate.sim.parts.units import STANDARD_GRAVITY
 
 RAMP = np.arange(400.0)
 

@@ -19,7 +19,7 @@ from wearstate.sim.machine.simulate import check, simulate
 from wearstate.sim.output.status import SimulationError, Status
 from wearstate.sim.scene.exciters import Exciter, PlacedExciter
 from wearstate.sim.scene.load import load_scene
-from wearstate.sim.scene.parts import SceneError, channels_of
+from wearstate.sim.scene.scene import SceneError, channels_of
 from wearstate.sim.shaft.push import exciter_places
 from wearstate.sim.shaft.recording import peak_motion, reduced_rotor, shaft_state
 from wearstate.sim.shaft.response import Harmonic, accelerance, harmonic_response

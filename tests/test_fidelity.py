@@ -30,8 +30,8 @@ from wearstate.sim.fidelity.study import Search, study
 from wearstate.sim.machine.simulate import recorder, simulate, simulate_many
 from wearstate.sim.output.status import SimulationError
 from wearstate.sim.scene.load import load_scene, scene_names
-from wearstate.sim.scene.parts import SceneError
 from wearstate.sim.scene.rungs import with_values
+from wearstate.sim.scene.scene import SceneError
 from wearstate.sim.shaft.recording import shaft_state
 from wearstate.sim.shaft.response import receptance
 

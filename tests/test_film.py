@@ -35,8 +35,8 @@ from wearstate.sim.film.solve import (
 )
 from wearstate.sim.journal.ladder import FILM_LADDER
 from wearstate.sim.journal.recording import _FILMS
+from wearstate.sim.parts.oil_viscosity import vogel_viscosity, walther_viscosity
 from wearstate.sim.scene.journal import Film
-from wearstate.sim.scene.oil_viscosity import vogel_viscosity, walther_viscosity
 
 FINE = {"n_theta": 144, "n_z": 33}
 HALF = FilmState(x=0.5, y=0.0)

@@ -37,8 +37,8 @@ from wearstate.sim.film.solve import FilmGeometry
 from wearstate.sim.machine.simulate import simulate
 from wearstate.sim.output.recording import DataError
 from wearstate.sim.output.sensor import Channel
+from wearstate.sim.parts.sensors import Accelerometer
 from wearstate.sim.scene.load import load_scene, scene_text
-from wearstate.sim.scene.parts import Accelerometer
 
 ANGLES = (math.radians(225), math.radians(135))
 CURVE = rest_curve(FilmGeometry(length_to_diameter=0.6), "short")

@@ -11,7 +11,7 @@ from wearstate.sim.film.heat import film_temperature, friction_power
 from wearstate.sim.machine.simulate import simulate
 from wearstate.sim.pump_setup.films import film_temperature_of
 from wearstate.sim.scene.load import load_scene
-from wearstate.sim.scene.parts import SceneError
+from wearstate.sim.scene.scene import SceneError
 
 PIN = "joint.crankpin"
 WARM = {  # ISO VG 68 in a flooded pin

@@ -13,8 +13,8 @@ from wearstate.datasets.recipe.text import RecipeError, recipe_names
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.command_line.command_help import _GROUPS, EXAMPLES
 from wearstate.diagnose.command_line.command_names import built_in
+from wearstate.sim.parts.units import UNITS, to_si
 from wearstate.sim.scene.load import minimal_text, scene_names
-from wearstate.sim.scene.parts import UNITS, to_si
 
 from .test_cli import refused, run, strict
 

@@ -19,8 +19,9 @@ from wearstate.sim.casing.decimation import edge_samples
 from wearstate.sim.casing.measured_casing import table_acceleration
 from wearstate.sim.casing.modes import CasingModes, band_limited_acceleration
 from wearstate.sim.machine.simulate import check, simulate
+from wearstate.sim.parts.casing import FrfFile, beside
 from wearstate.sim.scene.load import load_scene, scene_from_table, scene_table, scene_text
-from wearstate.sim.scene.parts import FrfFile, SceneError, beside
+from wearstate.sim.scene.scene import SceneError
 
 FS = 25_600.0
 FACTOR = 2

@@ -34,7 +34,7 @@ from wearstate.sim.atomic import OutputError
 from wearstate.sim.machine.simulate import alike, simulate
 from wearstate.sim.output.recording import DataError
 from wearstate.sim.scene.load import load_scene
-from wearstate.sim.scene.parts import SceneError
+from wearstate.sim.scene.scene import SceneError
 
 SHORT = {"duration": "0.25 s", "settling_revolutions": 1}
 """One revolution and a bit of the slowest machine: about 20 ms to simulate."""

@@ -14,7 +14,7 @@ from wearstate.sim.machine.simulate import simulate
 from wearstate.sim.pump_setup.contacts import contact_rate
 from wearstate.sim.pump_setup.ideal_motion import joint_loads
 from wearstate.sim.scene.load import load_scene
-from wearstate.sim.scene.parts import SceneError
+from wearstate.sim.scene.scene import SceneError
 
 PUMP = {"duration": "0.4 s", "settling_revolutions": 1}
 CHAMBER = {**PUMP, "pressure.rung": "chamber"}

@@ -21,8 +21,9 @@ from wearstate.sim.hydraulics import (
 )
 from wearstate.sim.hydraulics.liquid import air_near, air_volume, specific_volume
 from wearstate.sim.jit import kernel
-from wearstate.sim.scene.parts import STANDARD_GRAVITY, SceneError, validate_table
+from wearstate.sim.parts.units import STANDARD_GRAVITY
 from wearstate.sim.scene.pump_hydraulics import CylinderPressure, Line, Liquid, Valve
+from wearstate.sim.scene.scene import SceneError, validate_table
 
 # The built-in bilge pump
 RADIUS, ROD, SPEED = 0.05, 0.25, 2 * math.pi * 5

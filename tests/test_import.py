@@ -19,7 +19,7 @@ from wearstate.datasets.measured.data_set import NO_PULSES, import_recordings
 from wearstate.datasets.measured.labels import read_labels, read_limits
 from wearstate.datasets.readers.open import SourceOptions
 from wearstate.sim.output.recording import DataError
-from wearstate.sim.scene.parts import STANDARD_GRAVITY
+from wearstate.sim.parts.units import STANDARD_GRAVITY
 
 RATE = 100
 NAMES = ("acc", "key")

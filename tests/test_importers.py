@@ -12,7 +12,7 @@ from wearstate.datasets.measured.recording import list_contents, read_recording
 from wearstate.datasets.readers.open import SourceOptions
 from wearstate.sim.output.recording import DataError
 from wearstate.sim.output.sensor import Channel
-from wearstate.sim.scene.parts import STANDARD_GRAVITY
+from wearstate.sim.parts.units import STANDARD_GRAVITY
 
 SIGNAL = np.random.default_rng(0).standard_normal(50)
 

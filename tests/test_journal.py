@@ -13,7 +13,7 @@ from wearstate.sim.machine.simulate import check, simulate
 from wearstate.sim.output.status import SimulationError, Status
 from wearstate.sim.scene.journal import JournalScene
 from wearstate.sim.scene.load import load_scene, override, scene_from_table, scene_table, scene_text
-from wearstate.sim.scene.parts import SceneError, channels_of
+from wearstate.sim.scene.scene import SceneError, channels_of
 
 PAPER = ("journal-step", "journal-rectangular-pulse", "journal-half-sine")
 STEP_TIME = 0.16  # s, tau = 16 pi at 3000 rpm

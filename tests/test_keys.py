@@ -18,6 +18,7 @@ from wearstate.diagnose.inspect.keys import (
     keys_page,
     scene_schema,
 )
+from wearstate.sim.parts.units import UNITS
 from wearstate.sim.scene.load import (
     MACHINES,
     load_scene,
@@ -29,8 +30,8 @@ from wearstate.sim.scene.load import (
     scene_text,
     short_name,
 )
-from wearstate.sim.scene.parts import UNITS, SceneError
 from wearstate.sim.scene.pump import PumpScene
+from wearstate.sim.scene.scene import SceneError
 
 from .test_cli import refused, run, strict
 

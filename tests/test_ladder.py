@@ -16,8 +16,8 @@ from wearstate.sim.machine.registry import machine_of
 from wearstate.sim.machine.simulate import simulate
 from wearstate.sim.pump.validity import pump_step, pump_steps
 from wearstate.sim.scene.load import MACHINES, load_scene, scene_names
-from wearstate.sim.scene.parts import SceneError
 from wearstate.sim.scene.rungs import admissible, with_values
+from wearstate.sim.scene.scene import SceneError
 from wearstate.sim.shaft.elements import element_faults, element_lengths
 from wearstate.sim.shaft.ladder import shaft_states
 from wearstate.sim.shaft.recording import reduced_rotor, shaft_beam, shaft_state

@@ -16,7 +16,7 @@ from wearstate.sim.pump_lanes.lanes import lane_kind, run_lanes
 from wearstate.sim.pump_lanes.many import lane_job
 from wearstate.sim.pump_lanes.rates import DRY, MAPPED_FILM, SHORT_FILM
 from wearstate.sim.scene.load import load_scene
-from wearstate.sim.scene.parts import SceneError
+from wearstate.sim.scene.scene import SceneError
 
 SHORT = {"duration": "0.3 s"}
 N = 40  # of the standard set's unknowns: contact laws, chamber, play, motor, all of them drawn

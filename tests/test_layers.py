@@ -30,6 +30,7 @@ ROOMS = {
         "jit",
         "brief",
         "output",
+        "parts",
         "scene",
         "contact",
         "film",

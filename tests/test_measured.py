@@ -11,7 +11,7 @@ from wearstate.diagnose.command_line.commands_report import report_exit
 from wearstate.diagnose.wear_model.file import load_model
 from wearstate.sim.output.recording import Recording
 from wearstate.sim.output.sensor import tacho_pulses
-from wearstate.sim.scene.parts import STANDARD_GRAVITY
+from wearstate.sim.parts.units import STANDARD_GRAVITY
 
 FILES = [
     *(f"InnerRaceFault_vload_{n}.mat" for n in (1, 3, 5, 7)),

@@ -19,7 +19,7 @@ from wearstate.sim.machine.simulate import simulate
 from wearstate.sim.mechanism.oiled_joint import OIL, oiled_joint
 from wearstate.sim.pump.scene_run import run_scene
 from wearstate.sim.scene.load import load_scene
-from wearstate.sim.scene.parts import SceneError
+from wearstate.sim.scene.scene import SceneError
 
 CLEARANCE = 1e-4
 VISCOSITY, RADIUS, LENGTH = 0.1, 0.03, 0.015

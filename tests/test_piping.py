@@ -21,7 +21,6 @@ from wearstate.sim.pump_lanes.lanes import lane_kind
 from wearstate.sim.pump_setup.joints import hydraulics_of
 from wearstate.sim.pump_setup.tables import begun, lines_of
 from wearstate.sim.scene.load import load_scene
-from wearstate.sim.scene.parts import SceneError
 from wearstate.sim.scene.pump_hydraulics import (
     STANDARD_ATMOSPHERE,
     Damper,
@@ -29,6 +28,7 @@ from wearstate.sim.scene.pump_hydraulics import (
     Liquid,
     ReliefValve,
 )
+from wearstate.sim.scene.scene import SceneError
 
 RHO, SPEED, LENGTH, BORE = 998.2, 1200.0, 12.0, 0.08
 AREA = math.pi / 4 * BORE**2

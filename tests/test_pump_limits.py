@@ -9,7 +9,7 @@ from wearstate.sim.machine.simulate import check, simulate
 from wearstate.sim.output.status import SimulationError, Status
 from wearstate.sim.pump_setup.contacts import contact_rate
 from wearstate.sim.scene.load import load_scene
-from wearstate.sim.scene.parts import SceneError
+from wearstate.sim.scene.scene import SceneError
 
 SHORT = {"duration": "0.4 s", "settling_revolutions": 1}
 CHAMBER = {

@@ -12,8 +12,8 @@ from wearstate.sim.machine.simulate import simulate
 from wearstate.sim.output.recording import Recording
 from wearstate.sim.pump.pressure_sensors import read_pressure
 from wearstate.sim.scene.load import load_scene
-from wearstate.sim.scene.parts import SceneError
 from wearstate.sim.scene.pump_hydraulics import PressureSensor
+from wearstate.sim.scene.scene import SceneError
 
 SENSOR = {"pressure.sensor.range": "10 bar"}
 BRIEF = {"duration": "0.6 s", "settling_revolutions": 1}

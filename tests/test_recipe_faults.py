@@ -37,8 +37,8 @@ from wearstate.diagnose.wear_model.train import train_model
 from wearstate.sim.output.recording import DataError
 from wearstate.sim.output.status import Status
 from wearstate.sim.scene.load import load_scene, override, scene_table, scene_text
-from wearstate.sim.scene.parts import WearPlace
 from wearstate.sim.scene.pump import PumpScene
+from wearstate.sim.scene.scene import WearPlace
 
 CRANKPIN = "joint.crankpin.diametral_clearance"
 SECOND = "rod.centre_of_mass"

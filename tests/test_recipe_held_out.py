@@ -8,8 +8,8 @@ from wearstate.datasets.draws.held_out import DIMENSIONS
 from wearstate.datasets.recipe.load import load_recipe, recorded_recipe
 from wearstate.datasets.recipe.records import overrides_text, sample_records
 from wearstate.datasets.recipe.text import RecipeError
+from wearstate.sim.parts.units import UNITS
 from wearstate.sim.scene.load import all_condition_places, all_wear_places
-from wearstate.sim.scene.parts import UNITS
 
 SPEED = (42.5, 57.5)  # Hz, drawn by the recipe below
 

@@ -14,7 +14,7 @@ from wearstate.datasets.recipe.text import RecipeError, recipe_names
 from wearstate.features.rotation.order import pulse_times
 from wearstate.sim.machine.simulate import simulate, simulate_many
 from wearstate.sim.scene.load import load_scene
-from wearstate.sim.scene.parts import channels_of
+from wearstate.sim.scene.scene import channels_of
 
 MACHINES = ("bilge-pump", "journal-bearing", "propulsion-shaft")
 TESTS = ("shaft-rig", "propulsion-shaft-test", "bilge-pump-casing")

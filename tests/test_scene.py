@@ -16,6 +16,9 @@ from pydantic import ValidationError
 from wearstate.sim.contact.closed_forms import kelvin_voigt_restitution
 from wearstate.sim.machine.simulate import simulate
 from wearstate.sim.output.spellings import spellings
+from wearstate.sim.parts.dimensions import Dimension
+from wearstate.sim.parts.part import FixedTable
+from wearstate.sim.parts.units import UNITS, listed_unit, to_si
 from wearstate.sim.pump_setup.contacts import contact_frequency
 from wearstate.sim.pump_setup.ideal_motion import ideal_motion
 from wearstate.sim.scene.load import (
@@ -26,15 +29,7 @@ from wearstate.sim.scene.load import (
     scene_table,
     scene_text,
 )
-from wearstate.sim.scene.parts import (
-    MOST_FAULTS,
-    UNITS,
-    Dimension,
-    FixedTable,
-    SceneError,
-    listed_unit,
-    to_si,
-)
+from wearstate.sim.scene.scene import MOST_FAULTS, SceneError
 
 EVERY_UNIT = [(dimension, unit) for dimension, units in UNITS.items() for unit in units]
 CRANKPIN = "joint.crankpin"

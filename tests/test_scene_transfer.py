@@ -14,9 +14,10 @@ from wearstate.diagnose.command_line.cli import cli
 from wearstate.features.response.frf import block_spectra, estimate_frf, find_blows, force_window
 from wearstate.sim.machine.simulate import check, simulate
 from wearstate.sim.machine.transfer import scene_transfer
+from wearstate.sim.parts.casing import Feet
 from wearstate.sim.pump.gathering import casing_modes
 from wearstate.sim.scene.load import load_scene, scene_text
-from wearstate.sim.scene.parts import Feet, SceneError
+from wearstate.sim.scene.scene import SceneError
 
 FS = 25_600.0
 TESTED = {

@@ -17,7 +17,7 @@ from wearstate.sim.output.sensor import (
     tacho_pulses,
 )
 from wearstate.sim.scene.load import load_scene, override, scene_from_table, scene_table, scene_text
-from wearstate.sim.scene.parts import SceneError, channels_of
+from wearstate.sim.scene.scene import SceneError, channels_of
 
 
 def clean(x, **changes):

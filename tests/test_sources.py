@@ -30,7 +30,7 @@ from wearstate.datasets.source.channel_units import (
 from wearstate.datasets.source.part import LARGEST_INFLATED
 from wearstate.sim.output.recording import DataError
 from wearstate.sim.output.sensor import Channel
-from wearstate.sim.scene.parts import STANDARD_GRAVITY
+from wearstate.sim.parts.units import STANDARD_GRAVITY
 
 _SPEC = importlib.util.spec_from_file_location(
     "fuzz_readers", Path(__file__).with_name("fuzz_readers.py")

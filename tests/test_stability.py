@@ -42,7 +42,7 @@ from wearstate.sim.film.solve import FilmGeometry, FilmState, FilmStatus, solve_
 from wearstate.sim.output.recording import DataError
 from wearstate.sim.pump_setup.contacts import contact_frequency, joint_mobility
 from wearstate.sim.scene.load import load_scene
-from wearstate.sim.scene.parts import SceneError
+from wearstate.sim.scene.scene import SceneError
 
 BY_NAME = {stepper.name: stepper for stepper in STEPPERS}
 FIVE_PER_CENT = 0.05  # what a measured limit may be off by from theory

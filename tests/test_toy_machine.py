@@ -14,20 +14,13 @@ from wearstate.diagnose.command_line.cli import cli
 from wearstate.sim.machine.registry import MachinePhysics
 from wearstate.sim.machine.simulate import simulate
 from wearstate.sim.output.sensor import Channel, digitise
+from wearstate.sim.parts.dimensions import Length, Mass, Ratio, RotationSpeed
+from wearstate.sim.parts.part import Part
+from wearstate.sim.parts.sensors import Accelerometer
 from wearstate.sim.scene.journal import ScarLimits
 from wearstate.sim.scene.load import MACHINES, load_scene
-from wearstate.sim.scene.parts import (
-    Accelerometer,
-    Length,
-    Mass,
-    Part,
-    Ratio,
-    RotationSpeed,
-    Scene,
-    SceneError,
-    WearPlace,
-)
 from wearstate.sim.scene.recorded import recorded
+from wearstate.sim.scene.scene import Scene, SceneError, WearPlace
 
 # --- the machine: an unbalanced motor on a spring whose wire wears
 

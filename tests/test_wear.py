@@ -12,7 +12,7 @@ from wearstate.sim.film.solve import dufrane_scar
 from wearstate.sim.journal.recording import film_geometry
 from wearstate.sim.pump_setup.ideal_motion import ideal_motion
 from wearstate.sim.scene.load import load_scene
-from wearstate.sim.scene.parts import SceneError
+from wearstate.sim.scene.scene import SceneError
 from wearstate.sim.wear.archard import (
     dufrane_depth,
     dufrane_volume,

@@ -11,7 +11,7 @@ from wearstate.sim.mechanism.crank_run import run_mechanism
 from wearstate.sim.mechanism.layout import AT_REST, FORCES, PUSHES, Yielding
 from wearstate.sim.pump_setup import joints, tables, yielding
 from wearstate.sim.scene.load import load_scene
-from wearstate.sim.scene.parts import SceneError
+from wearstate.sim.scene.scene import SceneError
 
 YIELDS = {"casing.rung": "yielding"}
 MASS = 20.0  # kg

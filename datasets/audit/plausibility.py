@@ -6,7 +6,6 @@ import math
 from ...features.rotation.order import pulse_times
 from ...sim.output.recording import Recording
 from ...sim.scene.load import scene_from_table
-from ...sim.scene.parts import Scene
 from ...sim.scene.plausibility import (
     Doubt,
     Seen,
@@ -15,6 +14,7 @@ from ...sim.scene.plausibility import (
     scene_doubts,
     sensor_limits,
 )
+from ...sim.scene.scene import Scene
 from ..file.record import Attributes
 from ..recipe.load import recorded_scene
 

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from pydantic import Field
 from scipy.special import ndtr, ndtri
 
-from ...sim.scene.parts import Part, SceneError
+from ...sim.parts.part import Part
+from ...sim.scene.scene import SceneError
 from .draws import Axis, Draw, Range
 
 Float = NDArray[np.float64]

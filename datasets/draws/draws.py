@@ -9,8 +9,10 @@ import numpy as np
 from pydantic import Field, model_validator
 from scipy.special import ndtri
 
+from ...sim.parts.dimensions import Ratio
+from ...sim.parts.part import Part
 from ...sim.scene.load import numbered, override, scene_from_table
-from ...sim.scene.parts import Part, Ratio, Scene, SceneError
+from ...sim.scene.scene import Scene, SceneError
 
 Bound = float | str
 """A number in SI, or a text with a unit."""

@@ -7,8 +7,10 @@ from typing import Any, Self
 
 from pydantic import Field, model_validator
 
+from ...sim.parts.part import Part
+from ...sim.parts.units import to_si
 from ...sim.scene.load import override, scene_from_table
-from ...sim.scene.parts import Part, SceneError, to_si
+from ...sim.scene.scene import SceneError
 from .draws import Axis, Bound, Range, value_at
 
 DIMENSIONS = {

@@ -9,7 +9,7 @@ from contextlib import suppress
 from typing import Any
 
 from ...sim.scene.load import override, scene_from_table
-from ...sim.scene.parts import Scene, SceneError
+from ...sim.scene.scene import Scene, SceneError
 from .draws import Axis
 from .options import Alternatives
 

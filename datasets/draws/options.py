@@ -6,8 +6,10 @@ from typing import Any, Literal, Self
 
 from pydantic import Field, model_validator
 
+from ...sim.parts.dimensions import Ratio
+from ...sim.parts.part import Part
 from ...sim.scene.load import override, scene_from_table
-from ...sim.scene.parts import Part, Ratio, SceneError
+from ...sim.scene.scene import SceneError
 from .draws import Axis, Bound, Draw, axes_of, matches
 
 _WORD = "^[a-z][a-z0-9_-]*$"

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 from scipy.special import ndtr
 
-from ...sim.scene.parts import Part, Ratio
+from ...sim.parts.dimensions import Ratio
+from ...sim.parts.part import Part
 from .draws import Axis
 from .options import Alternatives
 

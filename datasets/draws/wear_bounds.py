@@ -4,7 +4,7 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any, Protocol
 
-from ...sim.scene.parts import to_si
+from ...sim.parts.units import to_si
 from .draws import Bound
 
 AS_NEW = "as new"

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...sim.scene.load import scene_table
-from ...sim.scene.parts import SceneError
+from ...sim.scene.scene import SceneError
 
 FILE, GROUP_NAME = "file", "group_name"
 """Manifest columns of an imported record: its file, and the name of its machine."""

@@ -13,8 +13,8 @@ from typing import Any
 from ...sim.fidelity.choose import Resolution, resolve
 from ...sim.fidelity.ladder import cost_of, effects_of
 from ...sim.scene.load import override, scene_from_table
-from ...sim.scene.parts import Scene
 from ...sim.scene.rungs import Effect, with_values
+from ...sim.scene.scene import Scene
 from ..recipe.recipe import Recipe
 from ..recipe.records import STRATA, Sample, sample_records
 from .machines import known_of

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from ...sim.machine.simulate import alike, simulates_together
 from ...sim.output.recording import DataError, Recording
-from ...sim.scene.parts import Scene, channels_of
+from ...sim.scene.scene import Scene, channels_of
 from ...sim.wear.archard import grade
 from ..file.lock import holding
 from ..file.record import (

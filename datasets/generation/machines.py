@@ -19,9 +19,9 @@ from ...features.signal.spectrum import band_edges, band_levels, decibel
 from ...sim.fidelity.pilot import Quantities, Quantity
 from ...sim.output.recording import Recording
 from ...sim.scene.journal import JournalScene
-from ...sim.scene.parts import Scene
 from ...sim.scene.pump import PumpScene
 from ...sim.scene.pump_hydraulics import STANDARD_ATMOSPHERE
+from ...sim.scene.scene import Scene
 from ...sim.scene.shaft import ShaftScene
 
 Float = NDArray[np.float64]

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from ...sim.fidelity.choose import Resolution, resolve, resolved_scene
 from ...sim.output.recording import Recording
-from ...sim.scene.parts import Scene
+from ...sim.scene.scene import Scene
 from .machines import edges_of_bands, known_of
 
 

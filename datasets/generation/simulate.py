@@ -8,7 +8,7 @@ from typing import Any
 from ...sim.machine import simulate as machine
 from ...sim.output.recording import Recording
 from ...sim.scene.load import load_scene, scene_from_table
-from ...sim.scene.parts import Scene, SceneError
+from ...sim.scene.scene import Scene, SceneError
 from .quantities import resolved, with_estimate
 
 

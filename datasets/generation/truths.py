@@ -7,7 +7,7 @@ those judge rungs.
 from collections.abc import Iterator
 
 from ...sim.output.recording import Recording
-from ...sim.scene.parts import Scene
+from ...sim.scene.scene import Scene
 from ..file.columns import describe_columns
 from ..recipe.severities import clearances
 from .machines import Truth, known_of

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ...sim.machine.simulate import simulate, simulate_many
 from ...sim.output.recording import Recording
-from ...sim.scene.parts import Scene, SceneError, channels_of
+from ...sim.scene.scene import Scene, SceneError, channels_of
 
 NUMERICS = {
     "rung_joint": "S16",

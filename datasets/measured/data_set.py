@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ...features.rotation.order import pulse_times
 from ...sim.output.recording import DataError
 from ...sim.output.sensor import Channel
-from ...sim.scene.parts import nearest
+from ...sim.parts.wording import nearest
 from ..file.machines import FILE, GROUP_NAME
 from ..file.record import (
     Attributes,

@@ -12,8 +12,9 @@ from itertools import pairwise
 from pathlib import Path, PurePosixPath
 
 from ...sim.output.recording import DataError, missing_file
+from ...sim.parts.units import UNITS, to_si
+from ...sim.parts.wording import nearest
 from ...sim.scene.load import all_wear_places, load_scene
-from ...sim.scene.parts import UNITS, nearest, to_si
 from ..file.csv_cells import plain_cell
 from ..file.machines import FILE
 from ..recipe.severities import clearances, wear_limits

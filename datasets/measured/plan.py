@@ -9,7 +9,7 @@ from pathlib import Path
 
 from ...sim.output.recording import DataError
 from ...sim.output.sensor import Channel
-from ...sim.scene.parts import nearest
+from ...sim.parts.wording import nearest
 from ..file.record import LARGEST_RECORD
 from ..readers.flat import numbered
 from ..readers.open import open_source

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...sim.output.recording import DataError
-from ...sim.scene.parts import to_si
+from ...sim.parts.units import to_si
 from ..file.hdf5_values import HDF5_FAULTS, Place, is_loose_text, plain_value, texts_apart
 from ..source.part import (
     LARGEST_INFLATED,

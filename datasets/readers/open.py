@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ...sim.output.recording import DataError, missing_file
 from ...sim.output.sensor import rate_fault
-from ...sim.scene.parts import nearest
+from ...sim.parts.wording import nearest
 from ..source.channel_units import FULL_SCALE, ChannelUnit, parse_sensitivity, parse_unit
 from ..source.empty import without_empty
 from ..source.part import (

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...sim.output.recording import DataError
-from ...sim.scene.parts import UNITS, nearest
+from ...sim.parts.units import UNITS
+from ...sim.parts.wording import nearest
 from ..file.csv_cells import plain_cell
 from ..source.channel_units import known_unit
 from ..source.clock import is_stamp, is_stamp_pattern, months_first, stamp_resolution, stamp_seconds

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from ...sim.scene.load import scene_from_table
-from ...sim.scene.parts import SceneError, validate_table
+from ...sim.scene.scene import SceneError, validate_table
 from ..draws.draws import Axis, Range
 from ..draws.options import Alternatives
 from ..draws.twin import coordinate_names

@@ -13,10 +13,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Self, cast
 import numpy as np
 from pydantic import Field, model_validator
 
+from ...sim.parts.dimensions import Length, Ratio, RotationSpeed, Time
+from ...sim.parts.limits import LONGEST
+from ...sim.parts.part import Part
 from ...sim.scene.journal import JournalScene
 from ...sim.scene.load import override, scene_from_table
-from ...sim.scene.parts import LONGEST, Length, Part, Ratio, RotationSpeed, Scene, Time
 from ...sim.scene.pump import PumpScene
+from ...sim.scene.scene import Scene
 from ...sim.wear.archard import WEAR_RATE_MOST, dufrane_depth, dufrane_volume, widening
 from ...sim.wear.life import LifeHistory, Maintenance, RunningIn, WearLaw, life_history
 from .text import RecipeError

@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from ...sim.parts.casing import beside as files_beside
 from ...sim.scene.load import (
     MACHINES,
     all_wear_places,
@@ -16,8 +17,7 @@ from ...sim.scene.load import (
     scene_table,
     scene_text,
 )
-from ...sim.scene.parts import Scene, SceneError, validate_table
-from ...sim.scene.parts import beside as files_beside
+from ...sim.scene.scene import Scene, SceneError, validate_table
 from ..draws.correlation import copula_of
 from ..draws.draws import Axis, Draw, Range, axes_of, matches
 from ..draws.held_out import HeldOut, regions_of

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...sim.scene.load import all_condition_places, scene_from_table
-from ...sim.scene.parts import Scene
+from ...sim.scene.scene import Scene
 from ..draws.correlation import Copula
 from ..draws.draws import Axis, Range, has_value, value_at
 from ..draws.held_out import HeldOut

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...sim.scene.load import override, scene_from_table
-from ...sim.scene.parts import Scene
+from ...sim.scene.scene import Scene
 from ...sim.wear.archard import grade
 from ..draws.correlation import Copula
 from ..draws.draws import Axis

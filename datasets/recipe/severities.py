@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 from ...sim.scene.journal import ScarLimits
 from ...sim.scene.load import all_wear_places
-from ...sim.scene.parts import Scene, Wear
+from ...sim.scene.scene import Scene, Wear
 from ..draws.draws import Axis, Bound, Range, has_value, value_at
 from ..draws.wear_bounds import bound_of_limits
 from .recipe import Recipe, Wearing
@@ -188,7 +188,7 @@ def wear_limits(scene: Scene, column: str) -> Wear | ScarLimits | None:
     scene : Scene
         Of any machine.
     column : str
-        Manifest column of the severity, see :class:`wearstate.sim.scene.parts.WearPlace`.
+        Manifest column of the severity, see :class:`wearstate.sim.scene.scene.WearPlace`.
 
     Examples
     --------

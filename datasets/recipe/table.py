@@ -4,7 +4,8 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from ...sim.scene.parts import Part, Ratio
+from ...sim.parts.dimensions import Ratio
+from ...sim.parts.part import Part
 from ..draws.correlation import Correlation
 from ..draws.draws import Bound, Draw
 from ..draws.held_out import Region

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ...sim.scene.load import scene_table, unread_text
-from ...sim.scene.parts import SceneError
+from ...sim.scene.scene import SceneError
 from ..draws.wear_bounds import foreign_bounds
 
 RECIPE_FOLDER = Path(__file__).parent / "built_in"

@@ -1,4 +1,5 @@
 """What all readers share: parts of a file, units, time stamps, resampling.
 
-It may import ``sim.output``, ``sim.scene``, ``features.rotation``, ``datasets.file``.
+It may import ``sim.output``, ``sim.parts``, ``sim.scene``, ``features.rotation``,
+``datasets.file``.
 """

@@ -5,7 +5,7 @@ import math
 import re
 from dataclasses import dataclass
 
-from ...sim.scene.parts import UNITS, listed_unit, to_si
+from ...sim.parts.units import UNITS, listed_unit, to_si
 
 FULL_SCALE = "FS"
 """Unit of a converter's numbers, 1 at its largest; nothing physical, but a declaration."""

@@ -22,7 +22,7 @@ from ...sim.alignment.alignment import (
 from ...sim.alignment.calibration import Block, Calibration, CalibrationStatus, calibrate
 from ...sim.alignment.jacking import Jacking, jacking
 from ...sim.brief import brief
-from ...sim.scene.parts import Scene
+from ...sim.scene.scene import Scene
 from ...sim.scene.shaft import ShaftScene
 from ...sim.shaft.on_oil_films import ShaftFilmError
 from ...sim.shaft.recording import alignment_conditions, alignment_line

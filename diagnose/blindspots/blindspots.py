@@ -23,7 +23,7 @@ from ...datasets.recipe.records import Sample, sample_records
 from ...datasets.recipe.text import recipe_names
 from ...sim.machine.simulate import simulate_many
 from ...sim.output.recording import DataError, Recording
-from ...sim.scene.parts import Scene, SceneError, channels_of
+from ...sim.scene.scene import Scene, SceneError, channels_of
 from ..feature_rows.model_card import ModelCard
 from ..machines.registry import presentation_of
 from ..nameplate.cautions import known_beside

@@ -17,7 +17,7 @@ from ...datasets.draws.options import Alternatives, Taken
 from ...datasets.recipe.recipe import Recipe
 from ...datasets.recipe.records import Sample
 from ...sim.scene.load import override, scene_from_table
-from ...sim.scene.parts import Scene, SceneError
+from ...sim.scene.scene import Scene, SceneError
 from ..machines.registry import presentation_of
 from ..machines.shifts import Shift
 

@@ -1,7 +1,7 @@
 """Speed against accuracy: of a scene's rungs, and of features and models.
 
-It may import ``sim.atomic``, ``sim.output``, ``sim.scene``, ``sim.machine``, ``sim.fidelity``,
-``features.catalogue``, ``datasets.file``, ``datasets.workers``, ``datasets.draws``,
-``datasets.recipe``, ``datasets.split``, ``datasets.generation``, ``diagnose.pages``,
-``diagnose.learning``, ``diagnose.feature_rows``.
+It may import ``sim.atomic``, ``sim.output``, ``sim.parts``, ``sim.scene``, ``sim.machine``,
+``sim.fidelity``, ``features.catalogue``, ``datasets.file``, ``datasets.workers``,
+``datasets.draws``, ``datasets.recipe``, ``datasets.split``, ``datasets.generation``,
+``diagnose.pages``, ``diagnose.learning``, ``diagnose.feature_rows``.
 """

@@ -20,8 +20,9 @@ from ...datasets.split.rules import group_folds
 from ...sim.fidelity.ladder import cost_of, effects_of
 from ...sim.fidelity.pilot import Difference
 from ...sim.output.recording import DataError
-from ...sim.scene.parts import Scene, nearest
+from ...sim.parts.wording import nearest
 from ...sim.scene.rungs import Effect, admissible, with_values
+from ...sim.scene.scene import Scene
 from ..feature_rows.feature_table import FeatureTable, feature_table
 from ..learning.regressions import CANDIDATES, fit_blend
 

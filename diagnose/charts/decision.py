@@ -9,7 +9,7 @@ from ...sim.fidelity.choose import estimated_error
 from ...sim.fidelity.ladder import effects_of
 from ...sim.fidelity.pilot import Candidate
 from ...sim.fidelity.study import Answer, Study
-from ...sim.scene.parts import Scene
+from ...sim.scene.scene import Scene
 from .chart import remaining_error
 from .scene_edit import written_value
 

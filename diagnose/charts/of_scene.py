@@ -18,7 +18,7 @@ from ...datasets.workers.local import in_order
 from ...sim.fidelity.choose import estimated_error
 from ...sim.fidelity.pilot import Candidate, Outcome, Pilot
 from ...sim.fidelity.study import Answer, Search, Study, default_step
-from ...sim.scene.parts import Scene
+from ...sim.scene.scene import Scene
 from ..pages.kept import Kept
 from .chart import RECOMMENDED, Chart, Choice, Clock, Point, RungCost, front_of
 from .decision import (

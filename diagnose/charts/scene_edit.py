@@ -8,9 +8,10 @@ from typing import Any
 from ...datasets.draws.draws import value_at
 from ...datasets.recipe.text import toml_text
 from ...sim.atomic import write_whole
+from ...sim.parts.casing import beside
 from ...sim.scene.load import scene_from_table, scene_table, scene_text
-from ...sim.scene.parts import Scene, SceneError, beside
 from ...sim.scene.rungs import with_values
+from ...sim.scene.scene import Scene, SceneError
 from .words import short_time
 
 _HEADER = re.compile(r"\s*(\[{1,2})\s*([^\[\]#]+?)\s*\]{1,2}\s*(#.*)?$")

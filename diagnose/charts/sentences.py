@@ -6,7 +6,7 @@ from typing import cast
 from ...datasets.generation.quantities import quantity_label
 from ...sim.fidelity.pilot import Candidate, starts_to_tell, surely_within
 from ...sim.fidelity.study import Answer, Study
-from ...sim.scene.parts import Scene
+from ...sim.scene.scene import Scene
 from .chart import remaining_error
 from .decision import (
     KEPT,

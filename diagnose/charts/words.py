@@ -7,7 +7,7 @@ from typing import Any
 from ...datasets.generation.quantities import quantity_label
 from ...sim.fidelity.pilot import Candidate
 from ...sim.fidelity.study import Raise
-from ...sim.scene.parts import Scene
+from ...sim.scene.scene import Scene
 
 HERE = "your scene as written"
 """Name of the point where only what the user wrote is."""

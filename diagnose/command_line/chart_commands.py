@@ -14,7 +14,7 @@ from ...datasets.recipe.text import recipe_names, toml_text
 from ...sim.atomic import write_whole
 from ...sim.fidelity.study import Search
 from ...sim.scene.load import load_scene, numbered, scene_table, scene_text
-from ...sim.scene.parts import Scene, SceneError
+from ...sim.scene.scene import Scene, SceneError
 from ..charts.across import RungSets
 from ..charts.chart import RECOMMENDED, Chart
 from ..charts.decision import KEPT, RAISED

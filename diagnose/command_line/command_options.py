@@ -264,8 +264,9 @@ def scene_of(name: str, pairs: Sequence[str]) -> Any:
 
 def tell_bare(name: str, values: Mapping[str, Any]) -> None:
     """Tell on stderr as what numbers without a unit are taken."""
+    from ...sim.parts.wording import si_unit
     from ...sim.scene.load import MACHINES, numbered, scene_table, scene_text
-    from ...sim.scene.parts import Scene, si_unit
+    from ...sim.scene.scene import Scene
 
     bare = {path: value for path, value in values.items() if not isinstance(value, str) and value}
     if not bare:

@@ -48,7 +48,7 @@ class _Segment(click.ParamType):  # type: ignore[type-arg]  # generic from click
     name = "segment"
 
     def convert(self, value: Any, param: Any, ctx: Any) -> float | None:
-        from ...sim.scene.parts import to_si
+        from ...sim.parts.units import to_si
 
         text = str(value).strip()
         if text == "whole":

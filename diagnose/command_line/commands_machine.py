@@ -53,7 +53,7 @@ def scene_list(as_json: bool) -> None:
 def scene_show(name: str) -> None:
     """TOML text of a scene: copy it, change it, check it."""
     from ...sim.scene.load import scene_table, scene_text
-    from ...sim.scene.parts import SceneError
+    from ...sim.scene.scene import SceneError
 
     text = scene_text(name)
     if not isinstance(scene_table(text, name).get("machine"), str):

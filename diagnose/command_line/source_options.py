@@ -201,7 +201,7 @@ class BearingNumbers(Numbers):
 
     def convert(self, value: Any, param: Any, ctx: Any) -> Any:
         """Text to numbers: lengths in metres, the angle in degrees."""
-        from ...sim.scene.parts import to_si
+        from ...sim.parts.units import to_si
 
         if not isinstance(value, str):
             return value

@@ -15,7 +15,7 @@ from ...datasets.file.record import DataSet, manifest_hash
 from ...datasets.generation.fidelity_choice import FidelityChoice
 from ...sim.output.recording import DataError
 from ...sim.scene.load import scene_table
-from ...sim.scene.parts import SceneError
+from ...sim.scene.scene import SceneError
 from ..feature_rows.feature_table import confounders_in
 from ..learning.grades import GRADE_NAMES
 from ..pages.page import render, save_page

@@ -17,7 +17,7 @@ from ...datasets.source.part import SourceOptions
 from ...features.signal import fft
 from ...sim.output.recording import DataError, Recording, missing_file
 from ...sim.output.sensor import Channel
-from ...sim.scene.parts import Scene
+from ...sim.scene.scene import Scene
 from ..class_model.file import CLASS_MODEL, load_class_model
 from ..feature_rows.feature_table import choice_of, confounders_in
 from ..feature_rows.quality import sample_faults

@@ -16,9 +16,11 @@ from pydantic.fields import FieldInfo
 from pydantic.json_schema import GenerateJsonSchema
 
 from ...datasets.recipe.table import RecipeTable
+from ...sim.parts.dimensions import Dimension
+from ...sim.parts.wording import metadata_of, model_inside
 from ...sim.scene.load import MACHINES, load_scene, scene_names, short_name
-from ...sim.scene.parts import Dimension, Scene, SceneError, metadata_of, model_inside
 from ...sim.scene.rungs import Rung
+from ...sim.scene.scene import Scene, SceneError
 from ..pages.si_text import plain, si_text
 
 _WIDTH = 100  # characters of a line
@@ -88,7 +90,7 @@ def keys_of(model: type[BaseModel]) -> list[Key]:
 
     Examples
     --------
-    >>> from wearstate.sim.scene.parts import Tacho
+    >>> from wearstate.sim.parts.sensors import Tacho
     >>> width = keys_of(Tacho)[1]
     >>> width.path, width.unit, width.bounds, width.default
     ('pulse_width', 'rad', '> 0, <= 180 deg', '10 deg')

@@ -13,7 +13,8 @@ from ...datasets.recipe.recipe import Recipe
 from ...datasets.recipe.records import Sample, sample_records
 from ...datasets.recipe.severities import limit_faults
 from ...sim.fidelity.ladder import cost_of, effects_of
-from ...sim.scene.parts import channels_of, si_unit
+from ...sim.parts.wording import si_unit
+from ...sim.scene.scene import channels_of
 from ..learning.grades import GRADE_COLOURS, GRADE_NAMES, NO_GRADE_COLOUR
 from ..pages.page import short_name
 from ..pages.picture import PAGE_WIDTH

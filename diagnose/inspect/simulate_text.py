@@ -8,7 +8,7 @@ import numpy as np
 from ...datasets.generation.machines import Truth
 from ...datasets.generation.truths import truths_of
 from ...sim.output.recording import Recording
-from ...sim.scene.parts import Scene
+from ...sim.scene.scene import Scene
 from ..machines.registry import presentation_of
 from ..pages.si_text import si_text
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ...features.rotation.orbit import full_spectrum
 from ...sim.output.recording import Recording
 from ...sim.scene.journal import JournalScene
-from ...sim.scene.parts import Scene
+from ...sim.scene.scene import Scene
 from ..pages.si_text import plain
 from ..pictures.panel import COLOURS
 from .presentation import Presentation, Truths, label, told

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from ...sim.output.recording import Recording
-from ...sim.scene.parts import Scene
+from ...sim.scene.scene import Scene
 from ..pages.page import short_name
 from ..pages.picture import save_picture
 from .registry import presentation_of

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ...datasets.generation.machines import Truth
 from ...features.signal.spectrum import decibel, power_spectral_density
 from ...sim.output.recording import Recording
-from ...sim.scene.parts import Scene
+from ...sim.scene.scene import Scene
 from ..pages.page import short_name
 from ..pages.si_text import si_text
 from ..pictures.panel import COLOURS

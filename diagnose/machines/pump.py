@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...sim.output.recording import Recording
-from ...sim.scene.parts import Scene
 from ...sim.scene.pump import PumpScene
+from ...sim.scene.scene import Scene
 from ..pages.page import short_name
 from ..pages.si_text import plain
 from ..pictures.panel import COLOURS

@@ -1,8 +1,8 @@
 """How the machine of a scene is shown."""
 
 from ...sim.scene.journal import JournalScene
-from ...sim.scene.parts import Scene
 from ...sim.scene.pump import PumpScene
+from ...sim.scene.scene import Scene
 from ...sim.scene.shaft import ShaftScene
 from . import journal, pump, shaft
 from .presentation import Presentation

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...sim.output.recording import Recording
-from ...sim.scene.parts import Scene
+from ...sim.scene.scene import Scene
 from ...sim.scene.shaft import ShaftScene
 from ..pages.page import short_name
 from ..pages.si_text import plain, si_text

@@ -8,8 +8,8 @@ from ...datasets.draws.draws import Vector
 from ...datasets.recipe.load import load_recipe
 from ...datasets.recipe.text import recipe_names
 from ...sim.output.recording import Recording
+from ...sim.parts.wording import si_unit
 from ...sim.scene.load import load_scene, scene_names
-from ...sim.scene.parts import si_unit
 from ..feature_rows.healthy import Baseline
 from ..feature_rows.model_card import ModelCard
 from ..machines.registry import presentation_of

@@ -16,6 +16,8 @@ from ...datasets.file.record import Attributes, DataSet
 from ...datasets.recipe.load import recorded_scene
 from ...datasets.recipe.recipe import condition_of
 from ...sim.output.recording import DataError
+from ...sim.parts.oil import Oil
+from ...sim.parts.units import to_si
 from ...sim.scene.load import (
     load_scene,
     numbered,
@@ -25,8 +27,7 @@ from ...sim.scene.load import (
     scene_table,
     scene_text,
 )
-from ...sim.scene.oil import Oil
-from ...sim.scene.parts import Scene, SceneError, to_si
+from ...sim.scene.scene import Scene, SceneError
 from ..feature_rows.noted import NOTED
 from ..film_clearance.clearance import Doubts
 

@@ -9,7 +9,7 @@ from scipy.signal import find_peaks
 from ...sim.atomic import write_whole
 from ...sim.machine.transfer import scene_transfer
 from ...sim.output.transfer import SceneTransfer
-from ...sim.scene.parts import Scene
+from ...sim.scene.scene import Scene
 from ..pages.page import short_name
 from ..pages.picture import save_picture
 

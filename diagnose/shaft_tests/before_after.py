@@ -9,7 +9,7 @@ import numpy as np
 
 from ...features.response.frf import Estimator
 from ...sim.alignment.calibration import Calibration
-from ...sim.scene.parts import Scene
+from ...sim.scene.scene import Scene
 from ...sim.scene.shaft import ShaftScene
 from ...sim.shaft.recording import harmonic_forces, random_forces, shaft_beam, shaft_state
 from ...sim.shaft.response import Place

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ...sim.scene.parts import Scene
+from ...sim.scene.scene import Scene
 from ...sim.scene.shaft import ShaftScene
 from ..pages.page import short_name
 from ..pages.picture import PageImage, drawn_alone

@@ -8,7 +8,8 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from ...sim.scene.parts import Scene, SceneError, nearest
+from ...sim.parts.wording import nearest
+from ...sim.scene.scene import Scene, SceneError
 from .edges import with_edges
 from .maps import MAPS
 from .method_map import Budget, MapPlan, StabilityMap, Verdict, measure, unmeasured

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...sim.scene.parts import Scene
+from ...sim.scene.scene import Scene
 from ..pages.page import short_name
 from ..pages.picture import PAGE_WIDTH, PageImage, page_image, save_picture
 from .method_map import MapAxis, MapPlan, StabilityMap, Verdict

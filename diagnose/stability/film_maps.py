@@ -20,9 +20,9 @@ from ...sim.film.solve import (
     solve_relaxed,
 )
 from ...sim.output.status import Status
+from ...sim.parts.oil import Oil
 from ...sim.scene.journal import JournalScene
-from ...sim.scene.oil import Oil
-from ...sim.scene.parts import Scene, SceneError
+from ...sim.scene.scene import Scene, SceneError
 from ...sim.scene.shaft import ShaftScene
 from .method_map import Cell, Curve, Judge, MapAxis, MapPlan, Own, Verdict, even_ratios
 from .own_point import GAP_LEFT, changed, outcome, own_film, plain_film

@@ -27,8 +27,8 @@ from ...sim.pump_setup.contacts import (
 )
 from ...sim.pump_setup.ideal_motion import joint_loads
 from ...sim.pump_setup.joints import joint_parts, joint_rungs
-from ...sim.scene.parts import Scene, SceneError
 from ...sim.scene.pump import PumpScene
+from ...sim.scene.scene import Scene, SceneError
 from .method_map import Cell, Curve, Judge, MapAxis, MapPlan, Own, Verdict, coordinates, even_ratios
 from .own_point import changed, outcome
 from .steppers import STEPPERS, Stepper, bounce, decays

@@ -6,7 +6,7 @@ one row of :data:`MAPS`.
 
 from collections.abc import Callable
 
-from ...sim.scene.parts import Scene
+from ...sim.scene.scene import Scene
 from .film_maps import eccentricity_mesh, length_load, relaxation_mesh, speed_viscosity
 from .joint_maps import clearance_speed, step_stiffness
 from .method_map import MapPlan

@@ -12,7 +12,7 @@ from ...sim.journal.orbit import OrbitFilm, OrbitRun, OrbitStatus, film_force, l
 from ...sim.journal.recording import film_geometry, journal_film, journal_scale
 from ...sim.journal.validity import JOURNAL_STEP
 from ...sim.scene.journal import JournalScene
-from ...sim.scene.parts import Scene
+from ...sim.scene.scene import Scene
 from .method_map import Cell, Curve, Judge, MapAxis, MapPlan, Own, Verdict, coordinates, even_ratios
 from .own_point import GAP_LEFT, changed, journal_weight, orbit_step, own_film
 from .steppers import STEPPERS, Stepper

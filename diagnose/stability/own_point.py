@@ -15,7 +15,7 @@ from ...sim.journal.validity import JOURNAL_STEP
 from ...sim.machine.simulate import simulate
 from ...sim.output.recording import Recording
 from ...sim.scene.journal import JournalScene
-from ...sim.scene.parts import Scene
+from ...sim.scene.scene import Scene
 from ...sim.scene.shaft import ShaftScene
 from ...sim.shaft.recording import film_bearings, shaft_state
 

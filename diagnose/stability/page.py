@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from ...sim.scene.parts import Scene
+from ...sim.scene.scene import Scene
 from ..pages.page import render, save_page
 from .edges import conclusion
 from .figure import map_images, save_figure

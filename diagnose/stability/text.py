@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from ...sim.scene.parts import Scene
+from ...sim.scene.scene import Scene
 from .edges import conclusion, factor_of
 from .method_map import Edge, StabilityMap, Verdict
 

@@ -1,6 +1,7 @@
 """Runs of a scene over a range of values: what each makes of the machine.
 
-It may import ``sim.atomic``, ``sim.output``, ``sim.scene``, ``sim.machine``, ``sim.fidelity``,
-``features.catalogue``, ``datasets.file``, ``datasets.workers``, ``datasets.draws``,
-``datasets.recipe``, ``datasets.generation``, ``diagnose.pages``, ``diagnose.charts``.
+It may import ``sim.atomic``, ``sim.output``, ``sim.parts``, ``sim.scene``, ``sim.machine``,
+``sim.fidelity``, ``features.catalogue``, ``datasets.file``, ``datasets.workers``,
+``datasets.draws``, ``datasets.recipe``, ``datasets.generation``, ``diagnose.pages``,
+``diagnose.charts``.
 """

@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from ...datasets.draws.draws import value_at
+from ...sim.parts.wording import si_unit
 from ...sim.scene.load import load_scene, numbered, scene_table, scene_text
-from ...sim.scene.parts import Scene, SceneError, si_unit
+from ...sim.scene.scene import Scene, SceneError
 from ..charts.words import effect_words
 from ..pages.si_text import plain
 

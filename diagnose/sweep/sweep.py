@@ -32,7 +32,7 @@ from ...sim.fidelity.pilot import (
 from ...sim.machine.simulate import simulate
 from ...sim.output.recording import Recording
 from ...sim.output.status import SimulationError
-from ...sim.scene.parts import Scene, SceneError
+from ...sim.scene.scene import Scene, SceneError
 from ..pages.kept import Kept
 from .axes import Axis, Point, SweepError, read_axes
 from .detect import Detection, detect

@@ -18,8 +18,8 @@ from ...datasets.recipe.recipe import Recipe
 from ...datasets.recipe.text import RecipeError, recipe_names, toml_text, twin_path
 from ...sim.atomic import write_whole
 from ...sim.output.recording import DataError, Recording
+from ...sim.parts.wording import si_unit
 from ...sim.scene.load import load_scene, override, scene_from_table
-from ...sim.scene.parts import si_unit
 from ..pages.si_text import si_text
 from .inversion import LEAST_TOLD, Inverted, inverted, moved, rounds_of, standard
 from .levels import layout_of, levels_of, speed_of

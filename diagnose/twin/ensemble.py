@@ -13,7 +13,7 @@ from ...datasets.workers.local import in_order
 from ...sim.machine.simulate import simulate_many
 from ...sim.output.recording import Recording
 from ...sim.output.status import Status
-from ...sim.scene.parts import Scene, SceneError
+from ...sim.scene.scene import Scene, SceneError
 from .levels import levels_of
 from .unknowns import TwinUnknowns
 

@@ -19,7 +19,7 @@ from ...datasets.recipe.recipe import Recipe
 from ...datasets.recipe.text import RecipeError, beside, twin_path
 from ...sim.output.recording import DataError, Recording
 from ...sim.scene.load import scene_table
-from ...sim.scene.parts import SceneError, validate_table
+from ...sim.scene.scene import SceneError, validate_table
 from .calibration import conditions_of, refuse_channels
 from .inversion import Gaussian, inverted
 from .levels import layout_of, levels_of

@@ -17,7 +17,7 @@ from ...datasets.draws.twin import coordinate_names, inside, machine_values
 from ...datasets.recipe.recipe import Recipe
 from ...sim.output.recording import DataError
 from ...sim.scene.load import override, scene_from_table
-from ...sim.scene.parts import Scene
+from ...sim.scene.scene import Scene
 
 Float = NDArray[np.float64]
 

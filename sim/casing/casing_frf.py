@@ -28,7 +28,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft, interpolate, signal
 
-from ..scene.parts import STANDARD_GRAVITY, FrfFile, SceneError, nearest, specific_key
+from ..parts.casing import FrfFile, specific_key
+from ..parts.units import STANDARD_GRAVITY
+from ..parts.wording import nearest
+from ..scene.scene import SceneError
 
 FEWEST_LINES = 16
 """A table of fewer lines is a list of points, not a spectrum."""
@@ -330,7 +333,7 @@ def read_frf_table(path: str | Path) -> FrfTable:
     --------
     >>> read_frf_table("none.csv")
     Traceback (most recent call last):
-    wearstate.sim.scene.parts.SceneError: none.csv: 1 fault(s)
+    wearstate.sim.scene.scene.SceneError: none.csv: 1 fault(s)
     casing.frf.file = 'none.csv' cannot be read (No such file or directory); check the path
     """
     file = Path(path)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..jit import kernel
-from ..scene.parts import specific_key
+from ..parts.casing import specific_key
 from .decimation import BLOCK, PIECE, Decimation, pieces, write_rows
 
 _REACH = 3  # steps that the taps of line_inverse look ahead and back

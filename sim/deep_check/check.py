@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..scene.journal import JournalScene
-from ..scene.parts import Scene
 from ..scene.plausibility import Doubt, scene_doubts
 from ..scene.pump import PumpScene
+from ..scene.scene import Scene
 from ..scene.shaft import ShaftScene
 from .journal import JOURNAL_ROWS, journal_facts
 from .pump import PUMP_ROWS, pump_facts

@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..mechanism.layout import JOINT_COMPLIANT
+from ..parts.units import STANDARD_GRAVITY
 from ..pump.validity import pump_step
 from ..pump_setup.contacts import contact_frequency, contact_table, penetration_under
 from ..pump_setup.ideal_motion import joint_loads
 from ..pump_setup.joints import joint_parts, joint_rungs
 from ..pump_setup.yielding import bearing_mass_ratios
-from ..scene.parts import STANDARD_GRAVITY
 from ..scene.plausibility import largest_deflection, modal_mass
 from ..scene.pump import PumpScene
 from ..scene.pump_hydraulics import STANDARD_ATMOSPHERE

@@ -16,7 +16,6 @@ import numpy as np
 from ..fidelity.ladder import cost_of
 from ..machine.simulate import simulate
 from ..output.recording import Recording
-from ..scene.parts import Scene, channels_of
 from ..scene.plausibility import (
     FEWEST_TURNS,
     LEAST_LEVEL,
@@ -26,6 +25,7 @@ from ..scene.plausibility import (
     solution_doubts,
 )
 from ..scene.rungs import with_values
+from ..scene.scene import Scene, channels_of
 
 _BYTES = 4  # of a sample: float32
 _TURNS = 6.0  # of a plain run

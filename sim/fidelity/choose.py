@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from itertools import product
 from typing import Any, NamedTuple
 
-from ..scene.parts import Scene, SceneError, pinned_faults
 from ..scene.rungs import Effect, Rung, admissible, with_values
+from ..scene.scene import Scene, SceneError, pinned_faults
 from .ladder import cost_of, effects_of
 from .pilot import Candidate, Comparison, Pilot, Quantities
 

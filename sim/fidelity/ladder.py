@@ -1,8 +1,8 @@
 """The rungs of any scene, and what a run of it costs: both as its machine registers them."""
 
 from ..machine.registry import machine_of
-from ..scene.parts import Scene
 from ..scene.rungs import Effect
+from ..scene.scene import Scene
 
 
 def effects_of(scene: Scene) -> tuple[Effect, ...]:

@@ -35,8 +35,8 @@ from ..machine.simulate import (
     simulates_together,
 )
 from ..output.recording import Recorder, Recording
-from ..scene.parts import Scene, SceneError
 from ..scene.rungs import Rung, with_values
+from ..scene.scene import Scene, SceneError
 from .ladder import VALIDITY, cost_of
 
 Quantity = tuple[float, str, float]

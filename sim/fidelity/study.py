@@ -13,8 +13,8 @@ from statistics import median_high
 from typing import Any
 
 from ..machine.registry import machine_of
-from ..scene.parts import Scene
 from ..scene.rungs import STEP_LEVELS, Effect, Rung, admissible, level_name, with_values
+from ..scene.scene import Scene
 from .choose import (
     added_differences,
     affordable_starts,

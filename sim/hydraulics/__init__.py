@@ -19,5 +19,5 @@ The first four are functions of the piston's motion (:mod:`.hydraulics.piston_pr
 chamber has a state of its own (:mod:`.hydraulics.chamber`), and so have pipes
 (:mod:`wearstate.sim.piping.pipe`).
 
-It may import ``sim.jit``, ``sim.scene``.
+It may import ``sim.jit``, ``sim.parts``, ``sim.scene``.
 """

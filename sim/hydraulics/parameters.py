@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from ..scene.parts import STANDARD_GRAVITY
+from ..parts.units import STANDARD_GRAVITY
 from ..scene.pump_hydraulics import (
     BREATHING_RUNGS,
     PIPED_RUNGS,

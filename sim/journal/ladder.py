@@ -7,7 +7,6 @@ from typing import Any, cast
 
 from ..film.rungs import FILM_RUNGS
 from ..scene.journal import Film, JournalScene
-from ..scene.parts import Scene
 from ..scene.rungs import (
     STEP_LEVELS,
     Beyond,
@@ -20,6 +19,7 @@ from ..scene.rungs import (
     whole_steps,
     written,
 )
+from ..scene.scene import Scene
 from .validity import journal_step, orbit_faults
 
 FILM_LADDER = tuple(

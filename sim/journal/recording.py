@@ -18,9 +18,9 @@ from ..output.sensor import digitise
 from ..output.status import SimulationError, Status
 from ..output.track import track_under
 from ..scene.journal import JournalLoad, JournalScene
-from ..scene.parts import Scene, SceneError
 from ..scene.recorded import failed, recorded
 from ..scene.sampling import duration_faults, memory_faults, tacho_faults
+from ..scene.scene import Scene, SceneError
 from .orbit import (
     FilmTrace,
     Load,

@@ -4,7 +4,7 @@ import math
 from typing import cast
 
 from ..scene.journal import JournalScene
-from ..scene.parts import Scene
+from ..scene.scene import Scene
 
 JOURNAL_STEP = 0.02
 """Shaft angle of a step that the scene does not give, the source paper's [rad]."""

@@ -6,7 +6,7 @@ from ..journal.ladder import FILM_LADDER, journal_cost, journal_effects
 from ..journal.recording import check_journal, simulate_journal
 from ..journal.validity import journal_step
 from ..scene.journal import JournalScene
-from ..scene.parts import Scene
+from ..scene.scene import Scene
 from .registry import MachinePhysics
 
 

@@ -11,8 +11,8 @@ from ..pump.gathering import casing_modes, measured_casing, measured_places
 from ..pump.ladder import PUMP_LADDERS, pump_cost, pump_effects, sample_step
 from ..pump.recording import check_pump, simulate_pump
 from ..pump_lanes.many import pumps_alike, simulate_pumps
-from ..scene.parts import Scene
 from ..scene.pump import FORCE_PLACES, PumpScene
+from ..scene.scene import Scene
 from .registry import MachinePhysics
 
 Float = NDArray[np.float64]

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from ..output.recording import Recorder, Recording
 from ..output.transfer import SceneTransfer
-from ..scene.parts import Scene, SceneError
 from ..scene.rungs import Effect, Rung
+from ..scene.scene import Scene, SceneError
 
 Many = Callable[
     [Sequence[tuple[Scene, int]], Collection[str]], Iterator[tuple[int, Recording | SceneError]]

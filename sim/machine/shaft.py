@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from ..journal.ladder import FILM_LADDER
 from ..output.transfer import SceneTransfer
-from ..scene.parts import Scene, SceneError
+from ..scene.scene import Scene, SceneError
 from ..scene.shaft import ShaftExciter, ShaftScene
 from ..shaft.ladder import BEAM_RUNGS, shaft_cost, shaft_effects
 from ..shaft.push import exciter_place

@@ -4,8 +4,8 @@ from collections.abc import Collection, Hashable, Iterator, Sequence
 from dataclasses import replace
 
 from ..output.recording import Recorder, Recording
-from ..scene.parts import Scene, SceneError
 from ..scene.plausibility import solution_doubts
+from ..scene.scene import Scene, SceneError
 from .registry import machine_of
 
 

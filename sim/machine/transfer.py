@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..output.transfer import SceneTransfer
-from ..scene.parts import Scene, SceneError
+from ..scene.scene import Scene, SceneError
 from .registry import machine_of
 
 

@@ -11,10 +11,11 @@ from ..casing.decimation import Decimation
 from ..casing.measured_casing import MeasuredCasing
 from ..casing.modes import CasingModes, ModalCasing, casing_inputs
 from ..mechanism.layout import FORCES
+from ..parts.casing import CasingMode, specific_key
 from ..pump_setup.yielding import rubs_in_guide, throw_on_casing
-from ..scene.parts import CasingMode, SceneError, specific_key
 from ..scene.pump import CRANK_PLACES, FORCE_PLACES, GUIDE_PLACES, VALVE_PLACES, PumpScene
 from ..scene.pump_hydraulics import BREATHING_RUNGS
+from ..scene.scene import SceneError
 from .pressure_sensors import cylinder_pressure
 from .push import pushed_places
 from .run_plan import RunPlan

@@ -7,7 +7,6 @@ from typing import cast
 
 from ..pump_setup.joints import joint_parts
 from ..pump_setup.tables import lines_of
-from ..scene.parts import Scene
 from ..scene.pump import OILED_RUNGS, PumpScene, RevoluteJoint
 from ..scene.pump_hydraulics import PIPED_RUNGS
 from ..scene.rungs import (
@@ -21,6 +20,7 @@ from ..scene.rungs import (
     with_values,
     written,
 )
+from ..scene.scene import Scene
 from .validity import FEWEST_STEPS, joint_faults, knock_limits, limits, pump_step, pump_steps
 
 JOINT_RUNGS = (

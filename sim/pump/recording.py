@@ -19,9 +19,10 @@ from ..output.sensor import (
     mounting_poles,
 )
 from ..output.status import SimulationError, Status
-from ..scene.parts import Accelerometer, Scene
+from ..parts.sensors import Accelerometer
 from ..scene.pump import PumpScene
 from ..scene.recorded import failed, recorded
+from ..scene.scene import Scene
 from .findings import (
     exciter_truth,
     film_warnings,

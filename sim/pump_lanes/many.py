@@ -14,8 +14,8 @@ from ..pump.scene_run import needs_integration
 from ..pump_setup.films import start_films
 from ..pump_setup.tables import begun
 from ..pump_setup.yielding import yielding_of
-from ..scene.parts import Scene, SceneError
 from ..scene.pump import PumpScene
+from ..scene.scene import Scene, SceneError
 from .lanes import LaneJob, LaneKind, lane_columns, lane_kind, run_lanes
 
 _FEWEST = 5

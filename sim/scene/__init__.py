@@ -1,4 +1,4 @@
-"""What the machine is: validated parts without physics, built-in scenes, rungs, plausibility.
+"""What the machine is: validated scenes without physics, built-in scenes, rungs, plausibility.
 
-It may import ``sim.output``, ``sim.brief``.
+It may import ``sim.brief``, ``sim.output``, ``sim.parts``.
 """

@@ -10,20 +10,10 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from ..output.sensor import Channel
-from .parts import (
-    FORCE_MOST,
-    GAIN_LEAST,
-    GAIN_MOST,
-    NAME_LONGEST,
-    Angle,
-    Force,
-    Frequency,
-    Length,
-    Part,
-    Ratio,
-    Scene,
-    Time,
-)
+from ..parts.dimensions import Angle, Force, Frequency, Length, Ratio, Time
+from ..parts.limits import FORCE_MOST, GAIN_LEAST, GAIN_MOST, NAME_LONGEST
+from ..parts.part import Part
+from .scene import Scene
 
 _RANGE_LEAST = 1e-6  # N
 _FREQUENCY_MOST = 1e6  # Hz

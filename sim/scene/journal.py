@@ -12,8 +12,22 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, model_validator
 
 from ..output.sensor import Channel
-from .oil import Oil
-from .parts import (
+from ..parts.dimensions import (
+    Angle,
+    Damping,
+    Force,
+    Gravity,
+    Length,
+    Mass,
+    Pressure,
+    Ratio,
+    RotationSpeed,
+    Stiffness,
+    Time,
+    Unbalance,
+    Velocity,
+)
+from ..parts.limits import (
     ANGLE_MOST,
     DAMPING_MOST,
     FORCE_MOST,
@@ -27,32 +41,21 @@ from .parts import (
     PRESSURE_MOST,
     SLIDING_LEAST,
     SLIDING_MOST,
-    SPEED,
-    STANDARD_GRAVITY,
-    START_ANGLE,
     STIFFEST,
+)
+from ..parts.oil import Oil
+from ..parts.part import Part
+from ..parts.sensors import Tacho, displacement_channel
+from ..parts.units import STANDARD_GRAVITY
+from .scene import (
+    SPEED,
+    START_ANGLE,
     VISCOSITY,
-    Angle,
     ConditionPlace,
-    Damping,
-    Force,
-    Gravity,
-    Length,
-    Mass,
     Numerics,
-    Part,
-    Pressure,
-    Ratio,
-    RotationSpeed,
     Scene,
-    Stiffness,
-    Tacho,
-    Time,
-    Unbalance,
-    Velocity,
     Wear,
     WearPlace,
-    displacement_channel,
     faults_between,
     name_faults,
 )

@@ -12,20 +12,20 @@ from pathlib import Path
 from typing import Any
 
 from ..output.recording import missing_file
+from ..parts.casing import beside
+from ..parts.part import without_twin
+from ..parts.wording import nearest
 from .journal import JournalScene
-from .parts import (
+from .pump import PumpScene
+from .scene import (
     MOST_FAULTS,
     ConditionPlace,
     Scene,
     SceneError,
     WearPlace,
-    beside,
     machine_name,
-    nearest,
     validate_table,
-    without_twin,
 )
-from .pump import PumpScene
 from .shaft import ShaftScene
 
 SCENE_FOLDER = Path(__file__).parent / "built_in"

@@ -16,10 +16,11 @@ from numpy.typing import NDArray
 
 from ..output.recording import Recording
 from ..output.sensor import Channel
+from ..parts.casing import CasingMode
 from .journal import JournalScene
-from .parts import CasingMode, Scene
 from .pump import FORCE_PLACES, PumpScene
 from .pump_hydraulics import PIPED_RUNGS
+from .scene import Scene
 from .shaft import ShaftScene
 
 Signal = NDArray[np.float32]

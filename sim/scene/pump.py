@@ -7,10 +7,25 @@ from typing import Any, Literal, Self
 from pydantic import Field, model_validator
 
 from ..output.sensor import Channel
-from .exciters import CasingExciter, force_channel
-from .journal import ScarLimits
-from .oil import JointOil
-from .parts import (
+from ..parts.casing import Casing, FrfFile
+from ..parts.dimensions import (
+    Angle,
+    Damping,
+    Force,
+    Gravity,
+    HertzStiffness,
+    Inertia,
+    Length,
+    Mass,
+    Moment,
+    Pressure,
+    Ratio,
+    RotationSpeed,
+    Stiffness,
+    Unbalance,
+    Velocity,
+)
+from ..parts.limits import (
     ANGLE_MOST,
     DAMPING_MOST,
     FORCE_MOST,
@@ -22,42 +37,26 @@ from .parts import (
     MOST_SENSORS,
     SLIDING_LEAST,
     SLIDING_MOST,
-    SPEED,
-    STANDARD_GRAVITY,
-    START_ANGLE,
     STIFFEST,
-    Accelerometer,
-    Angle,
-    Casing,
+)
+from ..parts.oil import JointOil
+from ..parts.part import Part, merged
+from ..parts.sensors import Accelerometer, Tacho, acceleration_channel, single_axis
+from ..parts.units import STANDARD_GRAVITY
+from ..parts.wording import nearest
+from .exciters import CasingExciter, force_channel
+from .journal import ScarLimits
+from .pump_hydraulics import PIPED_RUNGS, CylinderPressure, PressureSensor
+from .scene import (
+    SPEED,
+    START_ANGLE,
     ConditionPlace,
-    Damping,
-    Force,
-    FrfFile,
-    Gravity,
-    HertzStiffness,
-    Inertia,
-    Length,
-    Mass,
-    Moment,
-    Part,
-    Pressure,
-    Ratio,
-    RotationSpeed,
     Scene,
-    Stiffness,
-    Tacho,
-    Unbalance,
-    Velocity,
     Wear,
     WearPlace,
-    acceleration_channel,
     faults_between,
-    merged,
     name_faults,
-    nearest,
-    single_axis,
 )
-from .pump_hydraulics import PIPED_RUNGS, CylinderPressure, PressureSensor
 
 _MOMENT_MOST = 1e9  # N m
 _UNBALANCE_MOST = 1e6  # kg m

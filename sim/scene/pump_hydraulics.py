@@ -5,7 +5,22 @@ from typing import Any, Literal, Self
 
 from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
-from .parts import (
+from ..parts.dimensions import (
+    Angle,
+    Area,
+    Damping,
+    Density,
+    Frequency,
+    Length,
+    Mass,
+    Pressure,
+    Ratio,
+    Stiffness,
+    Time,
+    Velocity,
+    Volume,
+)
+from ..parts.limits import (
     DAMPING_MOST,
     GAIN_LEAST,
     GAIN_MOST,
@@ -14,23 +29,10 @@ from .parts import (
     LONGEST,
     NAME_LONGEST,
     PRESSURE_MOST,
-    STANDARD_GRAVITY,
     STIFFEST,
-    Angle,
-    Area,
-    Damping,
-    Density,
-    Frequency,
-    Length,
-    Mass,
-    Part,
-    Pressure,
-    Ratio,
-    Stiffness,
-    Time,
-    Velocity,
-    Volume,
 )
+from ..parts.part import Part
+from ..parts.units import STANDARD_GRAVITY
 
 STANDARD_ATMOSPHERE = 101325.0  # Pa, ISO 2533; gauge pressures count from it
 

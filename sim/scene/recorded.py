@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from ..output.recording import Recording
 from ..output.status import Status
-from .parts import Scene, channels_of
+from .scene import Scene, channels_of
 
 
 def recorded(scene: Scene, signal: NDArray[np.float32], **about: Any) -> Recording:

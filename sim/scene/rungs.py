@@ -16,7 +16,7 @@ from typing import Any, TypeVar, cast
 
 from pydantic import BaseModel
 
-from .parts import Scene, SceneError, validate_table
+from .scene import Scene, SceneError, validate_table
 
 AnyScene = TypeVar("AnyScene", bound=Scene)
 

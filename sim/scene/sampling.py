@@ -2,7 +2,7 @@
 
 import math
 
-from .parts import Scene
+from .scene import Scene
 
 MEMORY = 4e9  # byte, what one run may take: a data set runs one on every core
 

@@ -13,10 +13,25 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, model_validator
 
 from ..output.sensor import Channel
-from .exciters import PlacedExciter, force_channel
-from .journal import Dent, Film, ProximityProbe, RunOut, ScarLimits
-from .oil import Oil
-from .parts import (
+from ..parts.dimensions import (
+    Acceleration,
+    Angle,
+    Damping,
+    Density,
+    Force,
+    Frequency,
+    Gravity,
+    Inertia,
+    Length,
+    Mass,
+    Moment,
+    Pressure,
+    Ratio,
+    RotationSpeed,
+    Stiffness,
+    Unbalance,
+)
+from ..parts.limits import (
     ANGLE_MOST,
     DAMPING_MOST,
     FORCE_MOST,
@@ -28,34 +43,21 @@ from .parts import (
     MOST_SENSORS,
     NAME_LONGEST,
     PRESSURE_MOST,
-    SPEED,
-    STANDARD_GRAVITY,
-    START_ANGLE,
     STIFFEST,
+)
+from ..parts.oil import Oil
+from ..parts.part import Part
+from ..parts.sensors import Tacho, acceleration_channel, displacement_channel
+from ..parts.units import STANDARD_GRAVITY
+from .exciters import PlacedExciter, force_channel
+from .journal import Dent, Film, ProximityProbe, RunOut, ScarLimits
+from .scene import (
+    SPEED,
+    START_ANGLE,
     VISCOSITY,
-    Acceleration,
-    Angle,
     ConditionPlace,
-    Damping,
-    Density,
-    Force,
-    Frequency,
-    Gravity,
-    Inertia,
-    Length,
-    Mass,
-    Moment,
-    Part,
-    Pressure,
-    Ratio,
-    RotationSpeed,
     Scene,
-    Stiffness,
-    Tacho,
-    Unbalance,
     WearPlace,
-    acceleration_channel,
-    displacement_channel,
     faults_between,
     name_faults,
 )

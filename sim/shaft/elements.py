@@ -5,7 +5,7 @@ from itertools import accumulate, pairwise
 from typing import cast
 
 from ..alignment.alignment import Seat, seat_stations
-from ..scene.parts import Scene
+from ..scene.scene import Scene
 from ..scene.shaft import ShaftScene
 
 

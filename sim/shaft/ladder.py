@@ -7,7 +7,6 @@ from typing import cast
 
 from ..journal.ladder import FILM_LADDER, film_effect, mesh_values, solve_time
 from ..scene.journal import Film
-from ..scene.parts import Scene
 from ..scene.rungs import (
     STEP_LEVELS,
     Effect,
@@ -19,6 +18,7 @@ from ..scene.rungs import (
     price,
     written,
 )
+from ..scene.scene import Scene
 from ..scene.shaft import ShaftScene
 from .elements import element_faults, element_lengths, half_wave
 

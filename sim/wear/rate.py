@@ -21,11 +21,12 @@ from ..film.solve import FilmGeometry
 from ..journal.recording import film_geometry
 from ..mechanism.crank_run import CrankRun
 from ..output.status import SimulationError
+from ..parts.wording import nearest
 from ..pump.run_plan import steps_per_sample
 from ..pump.scene_run import pin_offsets, run_scene
 from ..scene.journal import JournalScene
-from ..scene.parts import SceneError, nearest
 from ..scene.pump import PumpScene
+from ..scene.scene import SceneError
 from .archard import Float, scar_shape, sliding_work
 
 _SETTLING = 3  # revolutions; contact forgets its start within one

@@ -25,8 +25,8 @@ from wearstate.sim.fidelity.ladder import cost_of, effects_of
 from wearstate.sim.fidelity.pilot import Pilot, differences
 from wearstate.sim.machine.simulate import simulate
 from wearstate.sim.scene.load import load_scene, scene_names
-from wearstate.sim.scene.parts import SceneError
 from wearstate.sim.scene.rungs import admissible, with_values
+from wearstate.sim.scene.scene import SceneError
 
 ACCURACIES = (0.10, 0.05, 0.02, 0.01)
 DEAREST = 1.5  # of the cheapest combination that would have done

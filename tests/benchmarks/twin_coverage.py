@@ -23,7 +23,7 @@ from wearstate.datasets.draws.draws import value_at
 from wearstate.diagnose.learning.scores import resampled, share
 from wearstate.diagnose.twin.calibration import CalibratedScene
 from wearstate.sim.scene.load import override, scene_from_table
-from wearstate.sim.scene.parts import Scene
+from wearstate.sim.scene.scene import Scene
 
 DRAWS = 4000
 INNER = (0.05, 0.95)

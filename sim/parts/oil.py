@@ -4,23 +4,21 @@ from typing import Self
 
 from pydantic import Field, model_validator
 
-from .oil_viscosity import walther_viscosity
-from .parts import (
-    DAMPING_MOST,
-    LONGEST,
-    PRESSURE_MOST,
+from .dimensions import (
     Damping,
     Density,
     HeatConductance,
     KinematicViscosity,
     Length,
-    Part,
     Pressure,
     SpecificHeat,
     Temperature,
     Viscosity,
     VolumeFlow,
 )
+from .limits import DAMPING_MOST, LONGEST, PRESSURE_MOST
+from .oil_viscosity import walther_viscosity
+from .part import Part
 
 _VISCOSITY_LEAST, _VISCOSITY_MOST = 1e-6, 1e4  # Pa s, from air to pitch
 _CONDUCTANCE_MOST = 1e4  # W/K, a water-cooled housing has hundreds

@@ -1,0 +1,187 @@
+"""Accelerometer and tacho: what they measure, their noise, range and filters."""
+
+import math
+from collections.abc import Sequence
+from typing import Literal, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
+
+from ..output.sensor import Channel, tacho_pulses
+from .dimensions import Acceleration, Angle, Frequency, Ratio, Voltage
+from .limits import GAIN_LEAST, GAIN_MOST, MODE_FASTEST, NAME_LONGEST
+from .part import Part
+
+_ACCELERATION_LEAST, _ACCELERATION_MOST = 1e-9, 1e7  # m/s^2, a shock sensor ends at 1e6
+
+_LEVEL_LEAST, _LEVEL_MOST = 1e-3, 1e4  # V
+
+_FILTER_SLOWEST = 1.0  # Hz, of mounting and anti-alias filter: below it no signal is left
+_FILTER_STEEPEST = 10  # order; eight is usual
+
+_DAMPING_LEAST = 1e-3  # glued steel has some 0.01
+
+AXES = {"x": "along the stroke", "y": "across the stroke", "z": "along the shaft"}
+"""Axes of a triaxial accelerometer, in the frame of the machine."""
+
+
+class Accelerometer(Part):
+    """An accelerometer with its mounting, its filter and its converter.
+
+    With ``axes`` it is a triaxial one: channels ``name_x``, ``name_y``, …, see
+    :func:`single_axis`.
+    """
+
+    name: str = Field(min_length=1, max_length=NAME_LONGEST, description="of its channel")
+    axes: tuple[Literal["x", "y", "z"], ...] = Field(
+        default=(), max_length=3, description="one channel for each; none: a single axis"
+    )
+    place: str = Field(default="", description="where it sits, for the report")
+    direction: str = Field(default="", description="which way it points, for the report")
+    gain: Ratio = Field(
+        default=1.0, ge=GAIN_LEAST, le=GAIN_MOST, description="true sensitivity over nominal"
+    )
+    noise: Acceleration = Field(
+        default=0.0, ge=0, le=_ACCELERATION_MOST, description="rms of the sensor's own noise"
+    )
+    noise_slope: Ratio = Field(
+        default=0.0,
+        ge=0,
+        le=2,
+        description="its power falls as 1 / f to this power: 0 white, 1 pink, 2 red",
+    )
+    mains: Acceleration = Field(
+        default=0.0, ge=0, le=_ACCELERATION_MOST, description="rms of hum, harmonics and all"
+    )
+    mains_frequency: Frequency = Field(default=50.0, ge=15, le=400, description="of the hum")
+    range: Acceleration = Field(
+        ge=_ACCELERATION_LEAST, le=_ACCELERATION_MOST, description="full scale, plus and minus"
+    )
+    bits: int = Field(default=24, ge=8, le=32, description="of its converter")
+    mounting_resonance: Frequency | None = Field(
+        default=None, ge=_FILTER_SLOWEST, le=MODE_FASTEST, description="of sensor on its mount"
+    )
+    mounting_damping: Ratio | None = Field(
+        default=None, ge=_DAMPING_LEAST, lt=1, description="ratio to the critical one"
+    )
+    anti_alias: Literal["none", "butterworth", "bessel"] = Field(
+        default="none", description="none: what decimation does, flat to 0.45 of the rate"
+    )
+    anti_alias_cutoff: Frequency | None = Field(
+        default=None, ge=_FILTER_SLOWEST, le=MODE_FASTEST, description="where 3 dB are lost"
+    )
+    anti_alias_order: int | None = Field(
+        default=None,
+        ge=1,
+        le=_FILTER_STEEPEST,
+        description="of the filter; falls by 6 dB an octave for each",
+    )
+
+    @model_validator(mode="after")
+    def _whole_and_once(self) -> Self:
+        faults = [*self._axis_faults(), *self._mounting_faults(), *self._filter_faults()]
+        if faults:
+            raise ValueError("\n".join(faults))
+        return self
+
+    def _axis_faults(self) -> list[str]:
+        faults = []
+        if len(set(self.axes)) < len(self.axes):
+            faults.append(f"axes = {list(self.axes)} must be different; remove one")
+        if self.axes and self.direction:
+            faults.append(
+                f"direction = {self.direction!r} must be empty beside axes, which have their own; "
+                "remove it"
+            )
+        if self.axes and len(self.name) > NAME_LONGEST - 2:
+            faults.append(
+                f"name has {len(self.name)} characters, must have <= {NAME_LONGEST - 2} for the "
+                "axis to follow; shorten it"
+            )
+        return faults
+
+    def _mounting_faults(self) -> list[str]:
+        given = (self.mounting_resonance is not None, self.mounting_damping is not None)
+        if given[0] == given[1]:
+            return []
+        lone, other = ("resonance", "damping") if given[0] else ("damping", "resonance")
+        value = getattr(self, f"mounting_{lone}")
+        return [
+            f"mounting_{lone} = {value:g} needs mounting_{other} beside it; add it or remove both"
+        ]
+
+    def _filter_faults(self) -> list[str]:
+        fields = ("anti_alias_cutoff", "anti_alias_order")
+        if self.anti_alias == "none":
+            return [
+                f"{name} = {getattr(self, name):g} needs anti_alias = 'butterworth' or 'bessel'; "
+                "add it or remove this"
+                for name in fields
+                if getattr(self, name) is not None
+            ]
+        return [
+            f"anti_alias = {self.anti_alias!r} needs {name} beside it; add it"
+            for name in fields
+            if getattr(self, name) is None
+        ]
+
+
+def single_axis(sensors: Sequence[Accelerometer]) -> tuple[Accelerometer, ...]:
+    """Accelerometers with one axis each: a triaxial one becomes three, named ``name_axis``.
+
+    Examples
+    --------
+    >>> head = Accelerometer(name="head", axes=("x", "z"), range=100.0)
+    >>> [(one.name, one.direction) for one in single_axis([head])]
+    [('head_x', 'along the stroke'), ('head_z', 'along the shaft')]
+    """
+    return tuple(
+        sensor.model_copy(
+            update={"name": f"{sensor.name}_{axis}", "direction": AXES[axis], "axes": ()}
+        )
+        if axis
+        else sensor
+        for sensor in sensors
+        for axis in (sensor.axes or ("",))
+    )
+
+
+class Tacho(Part):
+    """A rectangular pulse per revolution, rising at shaft angle zero or `late` after it."""
+
+    name: str = Field(
+        default="tacho", min_length=1, max_length=NAME_LONGEST, description="of its channel"
+    )
+    pulse_width: Angle = Field(
+        default=math.radians(10.0),
+        gt=0,
+        le=math.pi,
+        description="shaft angle for which the pulse is high",
+    )
+    level: Voltage = Field(
+        default=5.0, ge=_LEVEL_LEAST, le=_LEVEL_MOST, description="of the pulse, above 0 V"
+    )
+    late: Angle = Field(
+        default=0.0, ge=-math.pi, le=math.pi, description="shaft angle at which the pulse rises"
+    )
+
+    def channel(self, angle: NDArray[np.float64]) -> NDArray[np.float32]:
+        """Pulses [V, shape=(n,)] of a shaft at these rising angles [rad, shape=(n,)]."""
+        return tacho_pulses(
+            (angle - self.late) / math.tau,
+            pulse_width=self.pulse_width / math.tau,
+            level=self.level,
+        )
+
+
+def acceleration_channel(name: str, place: str, direction: str) -> Channel:
+    """Channel of an accelerometer: where it sits, and which way it measures."""
+    return Channel(
+        name=name, unit="m/s^2", quantity="acceleration", place=place, direction=direction
+    )
+
+
+def displacement_channel(name: str, place: str, direction: str) -> Channel:
+    """Channel of a proximity probe: where it sits, and which way it measures."""
+    return Channel(name=name, unit="m", quantity="displacement", place=place, direction=direction)

@@ -1,0 +1,348 @@
+"""What every scene is: places of wear and conditions, channels, validation of a whole table.
+
+Validation reports every fault at once as a dotted path with value, bound and cure, and names the
+nearest match of an unknown key. Kernels trust what passes.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from itertools import pairwise
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self, TypeVar
+
+from pydantic import BaseModel, Field, TypeAdapter, ValidationError, model_validator
+
+from ..brief import short
+from ..output.recording import html_table
+from ..output.sensor import SIMULATED_RATE_LEAST, SIMULATED_RATE_MOST, Channel
+from ..parts.dimensions import Frequency, Length, Ratio, Time
+from ..parts.limits import LONGEST
+from ..parts.part import Part
+from ..parts.sensors import Tacho
+from ..parts.wording import fault_lines, nearest
+
+Table = TypeVar("Table", bound=BaseModel)
+
+_RECORDING_LONGEST = 3600.0  # s
+_STEP_LEAST = 1e-12  # s
+_SETTLING_MOST = 1000
+
+
+class SceneError(ValueError):
+    """Every fault of one scene, one line each, as dotted path, value, bound and cure."""
+
+    def __init__(self, name: str, faults: list[str]) -> None:
+        self.faults = faults
+        super().__init__("\n".join([f"{name}: {len(faults)} fault(s)", *faults]))
+
+
+class Wear(Part):
+    """Limits of a clearance, all diametral, with their source."""
+
+    as_new_diametral: Length = Field(
+        gt=0, le=LONGEST, description="smallest clearance of a new joint"
+    )
+    condemning_diametral: Length = Field(
+        gt=0, le=LONGEST, description="the joint must be renewed above it"
+    )
+    grade_edges_diametral: tuple[Length, Length, Length] = Field(
+        description="clearance at which grades 1, 2 and 3 begin"
+    )
+    source: str = Field(
+        min_length=1, description="standard, maker or judgement that the limits come from"
+    )
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        values = (self.as_new_diametral, *self.grade_edges_diametral)
+        if any(low >= high for low, high in pairwise(values)):
+            raise ValueError(
+                "as_new_diametral and grade_edges_diametral = "
+                f"{', '.join(f'{v:g} m' for v in values)} must rise strictly; reorder them"
+            )
+        if self.grade_edges_diametral[-1] != self.condemning_diametral:
+            raise ValueError(
+                f"grade_edges_diametral[2] = {self.grade_edges_diametral[-1]:g} m must equal "
+                f"condemning_diametral = {self.condemning_diametral:g} m; grade 3 is condemned"
+            )
+        return self
+
+    @property
+    def as_new(self) -> float:
+        """Smallest clearance of a new joint [m]."""
+        return self.as_new_diametral
+
+    @property
+    def grade_edges(self) -> tuple[float, float, float]:
+        """Clearance at which grades 1, 2 and 3 begin [m]."""
+        return self.grade_edges_diametral
+
+    @property
+    def condemning(self) -> float:
+        """Clearance above which the joint must be renewed [m]."""
+        return self.condemning_diametral
+
+
+class Numerics(Part):
+    """What the solver may be told; every field has a default that the scene decides."""
+
+    step: Time | None = Field(default=None, ge=_STEP_LEAST, description="largest integration step")
+
+
+class WearPlace(NamedTuple):
+    """A value of a scene that says how worn the machine is [m]."""
+
+    path: str
+    """Dotted; ``*`` stands for the number of a list entry, counted from 0."""
+    place: str
+    """What is worn; ``{}`` stands for that number counted from 1, as people count throws."""
+    words: str
+    limits: str = ""
+    """Table of the scene with its limits; a severity without any has no grade."""
+
+    @property
+    def kind(self) -> str:
+        """What its columns begin with: the value's own name."""
+        return self.path.rpartition(".")[2]
+
+    @property
+    def column(self) -> str:
+        """Manifest column."""
+        return f"{self.kind}_{self.place}_m"
+
+
+class ConditionPlace(NamedTuple):
+    """A value of a scene that is an operating condition [SI]."""
+
+    path: str
+    column: str
+    """Manifest column; ends in its unit."""
+    words: str
+
+
+SPEED = ConditionPlace("drive.speed", "speed_hz", "shaft speed, as set")
+"""Condition that every machine has."""
+
+START_ANGLE = ConditionPlace(
+    "drive.start_angle", "start_angle_rad", "shaft angle at the first sample"
+)
+
+VISCOSITY = ConditionPlace(
+    "oil.dynamic_viscosity", "viscosity_pa_s", "dynamic viscosity of the oil"
+)
+
+
+class Scene(Part):
+    """What every machine's scene holds.
+
+    With ``fidelity = "auto"`` the rungs and the numerics written in a scene are replaced by the
+    cheapest that keep to ``accuracy``, but for the effects that ``pinned`` names.
+
+    A machine's scene is a subclass, one row of :data:`.scene.load.MACHINES`. Its class variables
+    are what the program must know of the machine without its physics.
+
+    Attributes
+    ----------
+    physics : str
+        Module with ``MACHINE``, a :class:`wearstate.sim.machine.registry.MachinePhysics`. It is
+        named, so that a scene is read without kernels.
+    effects : tuple of str
+        As ``pinned`` names them.
+    wear_places : tuple of WearPlace
+    condition_places : tuple of ConditionPlace
+    """
+
+    physics: ClassVar[str]
+    effects: ClassVar[tuple[str, ...]] = ()
+    wear_places: ClassVar[tuple[WearPlace, ...]] = ()
+    condition_places: ClassVar[tuple[ConditionPlace, ...]] = (SPEED,)
+
+    name: str = Field(min_length=1, description="of the scene, kept with every recording")
+    machine: str
+    description: str = Field(default="", description="one sentence for lists")
+    duration: Time = Field(
+        gt=0, le=_RECORDING_LONGEST, description="length of the recording, after settling"
+    )
+    sample_rate: Frequency = Field(
+        ge=SIMULATED_RATE_LEAST, le=SIMULATED_RATE_MOST, description="of every channel"
+    )
+    settling_revolutions: int = Field(
+        default=3, ge=1, le=_SETTLING_MOST, description="run before the recording"
+    )
+    accuracy: Ratio = Field(default=0.02, gt=0, lt=1, description="error the features may carry")
+    fidelity: Literal["given", "auto"] = Field(
+        default="given", description="rungs and numerics as written, or as the accuracy needs"
+    )
+    pinned: tuple[str, ...] = Field(
+        default=(), description="effects that stay as they are written whatever the fidelity"
+    )
+    tacho: Tacho | None = Tacho()
+    numerics: Numerics = Numerics()
+
+    @model_validator(mode="after")
+    def _cross_checks(self) -> Self:
+        faults = self.cross_faults({name: getattr(self, name) for name in type(self).model_fields})
+        faults += pinned_faults(type(self), self.pinned)
+        if faults:
+            raise ValueError("\n".join(faults))
+        return self
+
+    def __repr__(self) -> str:
+        """Machine, name and what a recording of it is."""
+        rate = self.sample_rate
+        told = f"{rate / 1000:.6g} kHz" if rate >= 1000 else f"{rate:.6g} Hz"
+        return f"<{type(self).__name__} {self.name}, {self.duration:.4g} s, {told}>"
+
+    __str__ = __repr__
+
+    def _repr_html_(self) -> str:
+        """The same for notebooks, and its parts."""
+        parts = {name: short(getattr(self, name)) for name in type(self).model_fields}
+        rows = [(name, text) for name, text in parts.items() if text]
+        return html_table(repr(self)[1:-1], ["part", ""], rows)
+
+    def sensor_channels(self) -> tuple[Channel, ...]:
+        """Channels of the sensors, in order; every machine has its own."""
+        raise NotImplementedError(self.machine)
+
+    def sensor_parts(self) -> tuple[Any, ...]:
+        """Sensors that have a range and a noise, one for each of their channels, in order."""
+        raise NotImplementedError(self.machine)
+
+    @classmethod
+    def cross_faults(cls, parts: Mapping[str, Any]) -> list[str]:
+        """Faults between parts, of those parts that are there; each machine has its own."""
+        del parts
+        return []
+
+
+def machine_name(kind: type[Scene]) -> str:
+    """What the scenes of a type write as their machine.
+
+    Examples
+    --------
+    >>> from wearstate.sim.scene.pump import PumpScene
+    >>> machine_name(PumpScene)
+    'reciprocating-pump'
+    """
+    return str(kind.model_fields["machine"].annotation.__args__[0])  # type: ignore[union-attr]
+
+
+def pinned_faults(kind: type[Scene], pinned: Sequence[str]) -> list[str]:
+    """Names that are no effects of a type of scene, as sentences.
+
+    Examples
+    --------
+    >>> from wearstate.sim.scene.pump import PumpScene
+    >>> pinned_faults(PumpScene, ["presure"])
+    ["pinned: 'presure' is no effect of a reciprocating-pump; did you mean 'pressure'?"]
+    """
+    return [
+        f"pinned: '{name}' is no effect of a {machine_name(kind)}"
+        + (nearest(name, kind.effects) if kind.effects else ", which has none; leave it out")
+        for name in pinned
+        if name not in kind.effects
+    ]
+
+
+def channels_of(scene: Scene) -> tuple[Channel, ...]:
+    """Channels of a recording of this scene, sensors first, then the tacho.
+
+    Examples
+    --------
+    >>> from wearstate.sim.scene.load import load_scene
+    >>> [channel.name for channel in channels_of(load_scene("bilge-pump"))]
+    ['acc_x', 'acc_y', 'tacho']
+    """
+    sensors = scene.sensor_channels()
+    if scene.tacho is None:
+        return sensors
+    return (*sensors, Channel(name=scene.tacho.name, unit="V", quantity="tacho"))
+
+
+def faults_between(
+    parts: Mapping[str, Any], checks: Sequence[tuple[Callable[..., list[str]], tuple[str, ...]]]
+) -> list[str]:
+    """Faults between parts, by those checks whose parts are all there."""
+    return [
+        fault
+        for check, needs in checks
+        if all(need in parts for need in needs)
+        for fault in check(*(parts[need] for need in needs))
+    ]
+
+
+def name_faults(sensors: Sequence[str], tacho: Tacho | None) -> list[str]:
+    """Channel names that are given more than once, as sentences.
+
+    Examples
+    --------
+    >>> name_faults(["acc", "acc"], None)
+    ["sensors: name 'acc' is given 2 times, must be unique; rename one"]
+    """
+    names = [*sensors, *([tacho.name] if tacho else [])]
+    return [
+        f"sensors: name '{name}' is given {names.count(name)} times, must be unique; rename one"
+        for name in sorted(set(names))
+        if names.count(name) > 1
+    ]
+
+
+MOST_FAULTS = 200
+"""Faults of one input that are told one by one."""
+
+
+def validate_table(model: type[Table], table: Mapping[str, Any], name: str) -> Table:
+    """Validate a plain table into any model, with every fault in the words of this program.
+
+    Raises
+    ------
+    SceneError
+        Every fault at once, each as dotted path, value, bound and cure.
+
+    Examples
+    --------
+    >>> validate_table(Tacho, {"level": "5000 mV"}, "tacho").level
+    5.0
+    """
+    try:
+        return model.model_validate(dict(table))
+    except ValidationError as error:
+        found = [entry for entry in error.errors() if not _other_choice(entry)]
+        entries = found[:MOST_FAULTS]
+        places = [entry["loc"] for entry in entries]
+        faults = [
+            line
+            for entry in entries
+            # a list all of whose entries are at fault is called too short as well
+            if not any(place[:-1][: len(entry["loc"])] == entry["loc"] for place in places)
+            or entry["type"] != "too_short"
+            for line in fault_lines(model, entry)
+        ]
+        if len(found) > len(entries):
+            faults.append(f"and {len(found) - len(entries)} more; mend these first")
+        if issubclass(model, Scene) and () not in places:
+            parts = _valid_parts(model, table)
+            faults += model.cross_faults(parts)
+            faults += pinned_faults(model, parts.get("pinned", ()))
+        raise SceneError(name, faults) from None
+
+
+def _other_choice(entry: Any) -> bool:
+    """The text or boolean member of a union: its number has been reported already."""
+    return entry["loc"][-1:] in (("str",), ("bool",)) and entry["type"].startswith(
+        ("string_", "bool_")
+    )
+
+
+def _valid_parts(model: type[BaseModel], table: Mapping[str, Any]) -> dict[str, Any]:
+    """Parts of a faulty table that are valid on their own, defaults included."""
+    parts = {}
+    for name, field in model.model_fields.items():
+        if name not in table:
+            if not field.is_required():
+                parts[name] = field.get_default(call_default_factory=True)
+            continue
+        with suppress(ValidationError):
+            kind: Any = Annotated[field.annotation, field]
+            parts[name] = TypeAdapter(kind).validate_python(table[name])
+    return parts
