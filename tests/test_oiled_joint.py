@@ -449,7 +449,7 @@ def test_a_motor_that_thick_oil_stalls_is_told():
 
 
 def test_a_run_that_fails_while_it_settles_says_so(monkeypatch):
-    monkeypatch.setattr("wearstate.sim.scene.pump._ROUGHNESSES", 0.01)
+    monkeypatch.setattr("wearstate.sim.scene.pump_joints._ROUGHNESSES", 0.01)
     scene = pump("mixed", duration="0.4 s", **{"joint.crankpin.oil.roughness": "100 um"})
     failed = simulate(scene, seed=0, raise_on_failure=False)
     assert "shorten numerics.step" in str(failed.status)

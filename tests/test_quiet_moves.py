@@ -7,7 +7,7 @@ from wearstate.diagnose.alignment.quiet_moves import quiet_moves, running_line, 
 from wearstate.sim.alignment.alignment import AlignmentError, check
 from wearstate.sim.alignment.calibration import calibrate
 from wearstate.sim.scene.load import load_scene
-from wearstate.sim.scene.shaft import AlignmentLimits
+from wearstate.sim.scene.shaft_parts import AlignmentLimits
 from wearstate.sim.shaft.recording import alignment_conditions, alignment_line, shaft_recorder
 
 

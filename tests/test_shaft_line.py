@@ -10,7 +10,7 @@ from wearstate.sim.machine.simulate import check, simulate
 from wearstate.sim.output.status import SimulationError, Status
 from wearstate.sim.scene.load import load_scene
 from wearstate.sim.scene.scene import SceneError, channels_of
-from wearstate.sim.scene.shaft import Coupling, Turbulence
+from wearstate.sim.scene.shaft_parts import Coupling, Turbulence
 from wearstate.sim.shaft.recording import (
     alignment_conditions,
     alignment_line,

@@ -34,7 +34,8 @@ from .clearance import (
 )
 
 if TYPE_CHECKING:
-    from ...sim.scene.shaft import ShaftBearing, ShaftScene
+    from ...sim.scene.shaft import ShaftScene
+    from ...sim.scene.shaft_parts import ShaftBearing
 
 Float = NDArray[np.float64]
 

@@ -14,8 +14,9 @@ from ...sim.piping.pipe import FEWEST_REACHES, drive_pipe, pipe_parameters, pipe
 from ...sim.pump.run_plan import steps_per_sample
 from ...sim.pump_setup.tables import begun
 from ...sim.pump_setup.yielding import WAYS, bearing_mass_ratios, yielding_of
-from ...sim.scene.pump import PumpJoints, PumpScene
+from ...sim.scene.pump import PumpScene
 from ...sim.scene.pump_hydraulics import PIPED_RUNGS, Line, Liquid
+from ...sim.scene.pump_joints import PumpJoints
 from ...sim.scene.scene import Scene
 from .method_map import Cell, Curve, Judge, MapAxis, MapPlan, Own, Verdict, even_ratios
 from .own_point import changed

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from ..alignment.alignment import AlignmentError, LineState, check, reactions
 from ..beam.rotor import Rotor, Support, modes, natural_frequencies
-from ..scene.shaft import ShaftBearing, ShaftScene
+from ..scene.shaft import ShaftScene
+from ..scene.shaft_parts import ShaftBearing
 from ..shaft.elements import element_lengths, half_wave
 from ..shaft.recording import (
     ShaftState,

@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 from ..journal.ladder import FILM_LADDER
 from ..output.transfer import SceneTransfer
 from ..scene.scene import Scene, SceneError
-from ..scene.shaft import ShaftExciter, ShaftScene
+from ..scene.shaft import ShaftScene
+from ..scene.shaft_parts import ShaftExciter
 from ..shaft.ladder import BEAM_RUNGS, shaft_cost, shaft_effects
 from ..shaft.push import exciter_place
 from ..shaft.recording import check_shaft, shaft_recorder, shaft_state, simulate_shaft

@@ -15,7 +15,8 @@ from ..output.status import Status
 from ..pump_setup.contacts import contact_rate, contact_table
 from ..pump_setup.films import film_temperature_of
 from ..pump_setup.joints import joint_rungs
-from ..scene.pump import OILED_RUNGS, PumpScene
+from ..scene.pump import PumpScene
+from ..scene.pump_joints import OILED_RUNGS
 from .gathering import Gathering, breathes
 from .run_plan import RunPlan
 from .scene_run import pin_offsets

@@ -7,8 +7,9 @@ from typing import cast
 
 from ..pump_setup.joints import joint_parts
 from ..pump_setup.tables import lines_of
-from ..scene.pump import OILED_RUNGS, PumpScene, RevoluteJoint
+from ..scene.pump import PumpScene
 from ..scene.pump_hydraulics import PIPED_RUNGS
+from ..scene.pump_joints import OILED_RUNGS, RevoluteJoint
 from ..scene.rungs import (
     Effect,
     Rung,

@@ -15,7 +15,8 @@ from ..pump_setup.contacts import (
 from ..pump_setup.ideal_motion import joint_loads
 from ..pump_setup.joints import joint_parts, joint_rungs
 from ..pump_setup.yielding import guide_gain
-from ..scene.pump import OILED_RUNGS, Guide, PumpScene, RevoluteJoint
+from ..scene.pump import PumpScene
+from ..scene.pump_joints import OILED_RUNGS, Guide, RevoluteJoint
 from .tearing import torn_by_knocks, torn_in_motion
 
 STEP_PER_CONTACT_TIME = 0.3

@@ -25,7 +25,8 @@ from ..contact.law import (
 )
 from ..jit import kernel
 from ..mechanism.layout import CRANKPIN, GUIDE, JOINT_COMPLIANT, JOINT_IDEAL, JOINT_LINK, WRISTPIN
-from ..scene.pump import OILED_RUNGS, Guide, PumpScene, RevoluteJoint
+from ..scene.pump import PumpScene
+from ..scene.pump_joints import OILED_RUNGS, Guide, RevoluteJoint
 from .ideal_motion import joint_loads
 from .joints import joint_parts, joint_rungs, kept_by_scene
 

@@ -12,7 +12,8 @@ from ..film.impedance_map import ImpedanceMap, impedance_map
 from ..film.solve import FilmGeometry
 from ..mechanism.layout import FILM, JOINT_OILED, Tables
 from ..mechanism.oiled_joint import OIL
-from ..scene.pump import OILED_RUNGS, PumpScene, RevoluteJoint
+from ..scene.pump import PumpScene
+from ..scene.pump_joints import OILED_RUNGS, RevoluteJoint
 from .contacts import PEAK_OVER_LOAD, tangent_stiffness
 from .ideal_motion import LOAD_ANGLES, ideal_motion, joint_loads
 from .joints import joint_parts, kept_by_scene

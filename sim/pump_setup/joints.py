@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from ..hydraulics.parameters import hydraulic_parameters
 from ..mechanism.layout import JOINT_COMPLIANT, JOINT_IDEAL, JOINT_LINK, JOINT_OILED
-from ..scene.pump import OILED_RUNGS, Guide, PumpScene, RevoluteJoint
+from ..scene.pump import PumpScene
 from ..scene.pump_hydraulics import CylinderPressure
+from ..scene.pump_joints import OILED_RUNGS, Guide, RevoluteJoint
 
 JOINT_CODES = {
     "ideal": JOINT_IDEAL,

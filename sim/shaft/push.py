@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..excitation.forces import Push, exciter_push, half_sine
-from ..scene.shaft import ShaftExciter, ShaftScene
+from ..scene.shaft import ShaftScene
+from ..scene.shaft_parts import ShaftExciter
 from .response import Place, ReducedRotor, Transient, time_response
 
 Float = NDArray[np.float64]

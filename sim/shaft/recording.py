@@ -28,7 +28,8 @@ from ..scene.exciters import pushing_faults
 from ..scene.recorded import failed, recorded
 from ..scene.sampling import duration_faults, memory_faults, tacho_faults
 from ..scene.scene import Scene, SceneError
-from ..scene.shaft import (
+from ..scene.shaft import ShaftScene
+from ..scene.shaft_parts import (
     Coupling,
     ShaftAccelerometer,
     ShaftBearing,
@@ -37,7 +38,6 @@ from ..scene.shaft import (
     ShaftLoad,
     ShaftMaterial,
     ShaftProbe,
-    ShaftScene,
     Turbulence,
 )
 from .elements import element_faults

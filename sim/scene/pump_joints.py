@@ -1,0 +1,283 @@
+"""Joints of a pump: crank pin, wrist pin and guide, their contact laws, rungs and wear."""
+
+from typing import Literal, Self
+
+from pydantic import Field, model_validator
+
+from ..parts.dimensions import (
+    Angle,
+    Damping,
+    HertzStiffness,
+    Length,
+    Pressure,
+    Ratio,
+    Stiffness,
+    Velocity,
+)
+from ..parts.limits import ANGLE_MOST, DAMPING_MOST, LONGEST, SLIDING_LEAST, SLIDING_MOST, STIFFEST
+from ..parts.oil import JointOil
+from ..parts.part import Part
+from .pump_hydraulics import CylinderPressure
+
+_HERTZ_MOST = 1e18  # N/m^1.5, a metre of steel has 1e11
+
+_ELASTICITY = {
+    "linear": ("stiffness",),
+    "hertz": ("hertz_stiffness",),
+    "conformal": ("effective_modulus", "contact_length"),
+}
+"""Elasticity of a contact -> what describes it."""
+
+
+class Contact(Part):
+    """How two surfaces of a joint push and rub; alternatives, which no order ranks."""
+
+    law: Literal[
+        "kelvin-voigt",
+        "hunt-crossley",
+        "lankarani-nikravesh",
+        "flores",
+        "hu-guo",
+        "carvalho-martins",
+        "exact",
+    ] = Field(
+        default="kelvin-voigt",
+        description="how the impact loses energy; kelvin-voigt: spring and damper",
+    )
+    elasticity: Literal["linear", "hertz", "conformal"] = Field(
+        default="linear",
+        description="normal force against overlap: linear, point contact, or pin in a close bore",
+    )
+    stiffness: Stiffness | None = Field(
+        default=None, gt=0, le=STIFFEST, description="contact force per penetration"
+    )
+    hertz_stiffness: HertzStiffness | None = Field(
+        default=None, gt=0, le=_HERTZ_MOST, description="force per penetration to the power 1.5"
+    )
+    effective_modulus: Pressure | None = Field(
+        default=None, gt=0, le=1e13, description="E* of the conformal pair"
+    )
+    contact_length: Length | None = Field(
+        default=None, gt=0, le=LONGEST, description="along the pin, of the conformal pair"
+    )
+    damping: Damping = Field(
+        default=0.0, ge=0, le=DAMPING_MOST, description="C_n of the law kelvin-voigt"
+    )
+    restitution: Ratio | None = Field(
+        default=None, gt=0, le=1, description="of the hysteresis laws"
+    )
+    restitution_speed: Velocity | None = Field(
+        default=None,
+        ge=SLIDING_LEAST,
+        le=SLIDING_MOST,
+        description="impact speed of the restitution; faster impacts lose more; none: all alike",
+    )
+    speed_floor: Velocity | None = Field(
+        default=None,
+        ge=SLIDING_LEAST,
+        le=SLIDING_MOST,
+        description="least impact speed a hysteresis law is given; none: damping at most critical",
+    )
+    friction_law: Literal["smooth", "ramp"] = Field(
+        default="smooth", description="how friction turns with the sliding velocity, near zero"
+    )
+    friction: Ratio = Field(default=0.0, ge=0, le=1, description="Coulomb coefficient")
+    friction_speed: Velocity = Field(
+        default=0.01,
+        ge=SLIDING_LEAST,
+        le=SLIDING_MOST,
+        description="sliding speed that regularises the Coulomb sign; full friction of the ramp",
+    )
+    friction_dead_speed: Velocity = Field(
+        default=0.0, ge=0, le=SLIDING_MOST, description="the ramp has no friction below it"
+    )
+    tangential_damping: Damping = Field(
+        default=0.0, ge=0, le=DAMPING_MOST, description="C_t of the source paper"
+    )
+
+    @model_validator(mode="after")
+    def _law_complete(self) -> Self:
+        faults = []
+        if self.law == "kelvin-voigt" and self.restitution is not None:
+            faults.append(
+                f"restitution = {self.restitution:g} is for the hysteresis laws; remove it and "
+                "set damping, or choose another law"
+            )
+        if self.law != "kelvin-voigt" and self.restitution is None:
+            faults.append(f"restitution is missing; the law '{self.law}' needs it")
+        if self.law != "kelvin-voigt" and self.damping > 0:
+            faults.append(
+                f"damping = {self.damping:g} N s/m is for the law kelvin-voigt; remove it, the law "
+                f"'{self.law}' takes its loss from restitution"
+            )
+        if self.law == "kelvin-voigt" and self.restitution_speed is not None:
+            faults.append(
+                f"restitution_speed = {self.restitution_speed:g} m/s is for the hysteresis laws; "
+                "remove it, or choose another law"
+            )
+        if self.restitution_speed is not None and self.speed_floor is not None:
+            faults.append(
+                f"speed_floor = {self.speed_floor:g} m/s has no use with restitution_speed, which "
+                "is the law's speed at every impact; remove one of them"
+            )
+        if self.law == "carvalho-martins" and (self.restitution or 1) < 1 / 3:
+            faults.append(
+                f"restitution = {self.restitution:g} must be >= 1/3 for the law carvalho-martins; "
+                "choose the law 'exact'"
+            )
+        if self.friction_dead_speed >= self.friction_speed:
+            faults.append(
+                f"friction_dead_speed = {self.friction_dead_speed:g} m/s must be < friction_speed "
+                f"= {self.friction_speed:g} m/s; the ramp lies between them"
+            )
+        if faults:
+            raise ValueError("\n".join(faults))
+        return self
+
+    def elastic_faults(self) -> list[str]:
+        """What the elasticity lacks; asked by the rungs that need one."""
+        return [
+            f"{name} is missing; the elasticity '{self.elasticity}' needs it"
+            for name in _ELASTICITY[self.elasticity]
+            if getattr(self, name) is None
+        ]
+
+
+_ROUGHNESSES = 8.0
+"""In a radial clearance at the least: see :mod:`wearstate.sim.contact.asperities`."""
+
+OILED_RUNGS = ("film-short", "film-map", "mixed")
+"""Rungs of a joint that run in oil."""
+
+
+class RevoluteJoint(Contact):
+    """A pin in an eye with clearance. Give exactly one of the two clearances.
+
+    The rungs *ideal* (no clearance), *link* (always in contact), *compliant* (dry impact), and in
+    oil *film-short*, *film-map* (finite length) and *mixed* (a film and the peaks of rough
+    surfaces). In oil, elasticity and stiffness are those of the parts behind the film, and
+    friction is that of the touching peaks.
+    """
+
+    rung: Literal["ideal", "link", "compliant", "film-short", "film-map", "mixed"] = Field(
+        default="compliant",
+        description="ideal: no clearance; link: massless link as long as it; compliant: contact; "
+        "film-short, film-map: oil; mixed: oil and touching peaks",
+    )
+    oil: JointOil | None = Field(default=None, description="between pin and eye")
+    pin_diameter: Length = Field(gt=0, le=LONGEST, description="nominal")
+    diametral_clearance: Length | None = Field(
+        default=None, ge=0, description="eye diameter minus pin diameter"
+    )
+    radial_clearance: Length | None = Field(
+        default=None, ge=0, description="eye radius minus pin radius"
+    )
+
+    @model_validator(mode="after")
+    def _one_clearance_that_fits(self) -> Self:
+        given = [
+            name
+            for name in ("diametral_clearance", "radial_clearance")
+            if getattr(self, name) is not None
+        ]
+        faults = self.elastic_faults() if self.rung not in ("ideal", "link") else []
+        faults += self._oil_faults()
+        if len(given) > 1 or (not given and self.rung != "ideal"):
+            faults.append(
+                f"{' and '.join(given) if given else 'no clearance'} given, must be exactly one of "
+                "diametral_clearance and radial_clearance; keep the one you measured"
+            )
+        elif self.clearance_radial >= self.pin_diameter / 2:
+            faults.append(
+                f"{given[0]} = {getattr(self, given[0]):g} m must be smaller than the pin "
+                f"(pin_diameter = {self.pin_diameter:g} m); check the unit"
+            )
+        if faults:
+            raise ValueError("\n".join(faults))
+        return self
+
+    def _oil_faults(self) -> list[str]:
+        """What the oil of an oiled rung lacks."""
+        if self.rung not in OILED_RUNGS:
+            return []
+        if self.oil is None:
+            least = ["oil.viscosity", "oil.length", *["oil.roughness"] * (self.rung == "mixed")]
+            return [f"oil is missing; the rung '{self.rung}' needs it: add {', '.join(least)}"]
+        faults = self._roughness_faults(self.oil.roughness) if self.rung == "mixed" else []
+        if self.rung == "film-map" and self.oil.filled_gap is not None:
+            faults.append(
+                f"oil.filled_gap = {self.oil.filled_gap:g} m is for the rungs 'film-short' and "
+                "'mixed'; a map is of a flooded film, remove it or choose another rung"
+            )
+        return faults
+
+    def _roughness_faults(self, roughness: float | None) -> list[str]:
+        """Roughness that is missing, or with which peaks would touch over half the bore."""
+        if roughness is None:
+            return ["oil.roughness is missing; the rung 'mixed' needs it"]
+        most = self.clearance_radial / _ROUGHNESSES
+        if 0 < most <= roughness:
+            return [
+                f"oil.roughness = {roughness:g} m must be < {most:g} m, the radial clearance over "
+                f"{_ROUGHNESSES:g}, for peaks to touch near the least gap only; check both values"
+            ]
+        return []
+
+    @property
+    def clearance_radial(self) -> float:
+        """Radial clearance [m], whichever way it was given; 0 where none was."""
+        if self.radial_clearance is not None:
+            return self.radial_clearance
+        return (self.diametral_clearance or 0.0) / 2
+
+    @property
+    def clearance_diametral(self) -> float:
+        """Diametral clearance [m], whichever way it was given; 0 where none was."""
+        return 2 * self.clearance_radial
+
+
+class Guide(Contact):
+    """The guide of piston or crosshead, across the stroke in the plane of the crank."""
+
+    rung: Literal["ideal", "compliant"] = Field(
+        default="compliant", description="ideal: no clearance; compliant: contact at four corners"
+    )
+    length: Length = Field(gt=0, le=LONGEST, description="of the guided part")
+    height: Length = Field(gt=0, le=LONGEST, description="of the guided part, across the stroke")
+    diametral_clearance: Length = Field(
+        ge=0, le=LONGEST, description="height of the guide minus that of the guided part"
+    )
+
+    @property
+    def clearance_radial(self) -> float:
+        """Clearance on either side of the centred part [m]."""
+        return self.diametral_clearance / 2
+
+    @model_validator(mode="after")
+    def _surfaces(self) -> Self:
+        faults = self.elastic_faults() if self.rung == "compliant" else []
+        if faults:
+            raise ValueError("\n".join(faults))
+        return self
+
+
+class PumpJoints(Part):
+    """The joints of the crank mechanism that may have clearance; an absent one is ideal."""
+
+    crankpin: RevoluteJoint
+    wristpin: RevoluteJoint | None = None
+    guide: Guide | None = None
+
+
+class Throw(Part):
+    """One throw of the crank: its place, and where it differs from what the scene says of all.
+
+    ``joint`` and ``pressure`` are merged over the scene's own tables, so that one worn joint or
+    one leaking valve takes one line; a schema takes them as ``partial``, with nothing required.
+    """
+
+    phase: Angle = Field(
+        default=0.0, ge=-ANGLE_MOST, le=ANGLE_MOST, description="crank angle over the first"
+    )
+    joint: PumpJoints | None = Field(default=None, json_schema_extra={"partial": True})
+    pressure: CylinderPressure | None = Field(default=None, json_schema_extra={"partial": True})
