@@ -19,8 +19,9 @@ from ...sim.alignment.alignment import (
     influence,
     reactions,
 )
-from ...sim.alignment.calibration import Block, Calibration, CalibrationStatus, calibrate
+from ...sim.alignment.calibration import Calibration, CalibrationStatus, calibrate
 from ...sim.alignment.jacking import Jacking, jacking
+from ...sim.alignment.move_programme import Block
 from ...sim.brief import brief
 from ...sim.scene.scene import Scene
 from ...sim.scene.shaft import ShaftScene
