@@ -35,8 +35,8 @@ if TYPE_CHECKING:
     from .rotation.tacholess_speed import tacholess_speed as tacholess_speed
     from .signal.cepstrum import cepstrum as cepstrum
     from .signal.envelope import bearing_frequencies as bearing_frequencies
-    from .signal.envelope import kurtogram as kurtogram
     from .signal.iso import velocity_rms as velocity_rms
+    from .signal.kurtogram import kurtogram as kurtogram
 
 _HOMES = {
     "Correction": ".rotation.balancing",
@@ -56,7 +56,7 @@ _HOMES = {
     "frf": ".catalogue.curves",
     "full_spectrum": ".rotation.orbit",
     "influence_coefficients": ".rotation.balancing",
-    "kurtogram": ".signal.envelope",
+    "kurtogram": ".signal.kurtogram",
     "mend_pulses": ".rotation.tacho_faults",
     "modal_fit": ".response.modal",
     "orbit": ".catalogue.curves",

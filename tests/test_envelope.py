@@ -7,7 +7,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
+from wearstate.features.signal.cyclic_coherence import coherence_threshold, cyclic_coherence
 from wearstate.features.signal.envelope import (
+    baseband,
+    bearing_frequencies,
+    envelope,
+    envelope_span,
+    envelope_spectrum,
+    fault_line,
+)
+from wearstate.features.signal.kurtogram import (
     LONE_SHARE,
     LONE_SHARE_OF_FEW,
     MANY_FRAMES,
@@ -16,14 +25,6 @@ from wearstate.features.signal.envelope import (
     _moments,
     _pooled,
     _without_lone,
-    baseband,
-    bearing_frequencies,
-    coherence_threshold,
-    cyclic_coherence,
-    envelope,
-    envelope_span,
-    envelope_spectrum,
-    fault_line,
     kurtogram,
     kurtogram_levels,
     spectral_kurtosis,

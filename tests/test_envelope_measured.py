@@ -3,14 +3,9 @@
 import numpy as np
 import pytest
 from wearstate.datasets.measured.recording import read_recording
-from wearstate.features.signal.envelope import (
-    bearing_frequencies,
-    coherence_threshold,
-    cyclic_coherence,
-    envelope_spectrum,
-    fault_line,
-    kurtogram,
-)
+from wearstate.features.signal.cyclic_coherence import coherence_threshold, cyclic_coherence
+from wearstate.features.signal.envelope import bearing_frequencies, envelope_spectrum, fault_line
+from wearstate.features.signal.kurtogram import kurtogram
 
 MFPT = bearing_frequencies(8, 0.235, 1.245, speed_hz=25.0)  # rollers, inches; 25 Hz in every file
 RACES = {"outer": (80.0, 80.75), "inner": (117.65, 118.05)}

@@ -16,7 +16,7 @@ from sklearn.utils import get_tags
 from wearstate.features.catalogue.analysis import Settings
 from wearstate.features.catalogue.row import feature_row
 from wearstate.features.catalogue.transformer import SignalFeatures
-from wearstate.features.signal import envelope
+from wearstate.features.signal import envelope, kurtogram
 
 FS = 8192.0
 N = 8192
@@ -65,7 +65,7 @@ def test_only_what_a_model_uses_is_computed(monkeypatch):
     def refuse(*_a, **_k):
         raise AssertionError("nobody asked for it")
 
-    monkeypatch.setattr(envelope, "kurtogram", refuse)
+    monkeypatch.setattr(kurtogram, "kurtogram", refuse)
     found = narrow.transform(signals)
     assert list(found.columns) == wanted
     assert_array_equal(found.to_numpy(), expected.to_numpy())

@@ -44,8 +44,8 @@ def blow_scores(recording: Recording) -> Float:
     Returns
     -------
     numpy.ndarray [shape=(n_channels,)]
-        :attr:`wearstate.features.signal.envelope.Kurtogram.score` [-]; empty where the recording is
-        too short for it.
+        :attr:`wearstate.features.signal.kurtogram.Kurtogram.score` [-]; empty where the
+        recording is too short for it.
 
     Raises
     ------

@@ -7,15 +7,8 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from ...features.signal.envelope import (
-    FaultLine,
-    Kurtogram,
-    envelope_span,
-    envelope_spectrum,
-    fault_line,
-    kurtogram,
-    kurtogram_levels,
-)
+from ...features.signal.envelope import FaultLine, envelope_span, envelope_spectrum, fault_line
+from ...features.signal.kurtogram import Kurtogram, kurtogram, kurtogram_levels
 from .panel import (
     COLOURS,
     MOST_POINTS,

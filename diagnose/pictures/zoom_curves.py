@@ -18,7 +18,8 @@ from ...features.catalogue.curves import (
     order_spectrum,
     spectrum,
 )
-from ...features.signal.envelope import envelope_span, kurtogram, kurtogram_levels
+from ...features.signal.envelope import envelope_span
+from ...features.signal.kurtogram import kurtogram, kurtogram_levels
 from ...sim.output.recording import DataError
 from ..pages.page import short_name, visible
 from .kinds import AUTO, computed

@@ -13,7 +13,7 @@ from ..response.impact import WIDEST_LINES_HZ
 from ..rotation import angle_resample as resample
 from ..rotation import orbit, order
 from ..rotation import pressure as cylinder
-from ..signal import cepstrum, envelope, iso, spectrum
+from ..signal import cepstrum, cyclic_coherence, envelope, iso, kurtogram, spectrum
 from ..signal.fft import fast_length, irfft, rfft
 from ..signal.statistics import Amplitude, Real
 from ..signal.third_octave import third_octave_centres
@@ -322,7 +322,7 @@ class Analysis:
     @cached_property
     def spectral_kurtosis(self) -> tuple[Float, Real]:
         """Frequencies [Hz] and kurtosis of the lines [-, shape=(n_channels, n_lines)]."""
-        return envelope.spectral_kurtosis(self.vibration, self.fs)
+        return kurtogram.spectral_kurtosis(self.vibration, self.fs)
 
     @cached_property
     def harmonic_spacing(self) -> tuple[Float, Float]:
@@ -476,12 +476,12 @@ class Analysis:
         return [self._lines_of_faults(frequency, row) for row in amplitude]
 
     @cached_property
-    def kurtograms(self) -> list[envelope.Kurtogram]:
+    def kurtograms(self) -> list[kurtogram.Kurtogram]:
         """Of every channel."""
         known = self._pulses is not None or self.settings.speed_hz is not None
         span = envelope.envelope_span(self.speed_hz if known else None, self.settings.bearing)
-        levels = envelope.kurtogram_levels(self.vibration.shape[-1], self.fs, span)
-        return [envelope.kurtogram(row, self.fs, levels=levels) for row in self.vibration]
+        levels = kurtogram.kurtogram_levels(self.vibration.shape[-1], self.fs, span)
+        return [kurtogram.kurtogram(row, self.fs, levels=levels) for row in self.vibration]
 
     @cached_property
     def kurtogram_fault_lines(self) -> list[list[envelope.FaultLine | None]]:
@@ -498,7 +498,7 @@ class Analysis:
             places = {i: line.frequency for i, line in enumerate(lines) if line is not None}
             known = {i: f for i, f in places.items() if self._has_cycle(f)}
             if known:
-                _, coherence = envelope.cyclic_coherence(row, self.fs, list(known.values()))
+                _, coherence = cyclic_coherence.cyclic_coherence(row, self.fs, list(known.values()))
                 means[list(known)] = coherence.mean(axis=-1)
         return result
 

@@ -87,7 +87,7 @@ COMPLETE_ROWS: tuple[Feature, ...] = (
             "kurtogram.score",
         ),
         function=_kurtogram,
-        reference="envelope.kurtogram; Antoni, Mech. Syst. Signal Process. 21 (2007) 108-124",
+        reference="kurtogram.kurtogram; Antoni, Mech. Syst. Signal Process. 21 (2007) 108-124",
     ),
     Feature(
         name="kurtogram_bearing_lines",
@@ -95,7 +95,7 @@ COMPLETE_ROWS: tuple[Feature, ...] = (
         needs=("frames", "bearing", "speed"),
         labels=fault_labels("kurtogram_bearing", "score"),
         function=lambda a: scores(a.kurtogram_fault_lines),
-        reference=f"envelope.kurtogram, envelope.fault_line; {ROLLING_BEARING}",
+        reference=f"kurtogram.kurtogram, envelope.fault_line; {ROLLING_BEARING}",
     ),
     Feature(
         name="cyclic_coherence",
@@ -103,7 +103,8 @@ COMPLETE_ROWS: tuple[Feature, ...] = (
         needs=("cycles", "envelope", "bearing", "speed"),
         labels=fault_labels("cyclic", "coherence"),
         function=lambda a: a.cyclic_coherences,
-        reference="envelope.cyclic_coherence; Antoni, Mech. Syst. Signal Process. 21 (2007) 597",
+        reference="cyclic_coherence.cyclic_coherence; "
+        "Antoni, Mech. Syst. Signal Process. 21 (2007) 597",
     ),
     Feature(
         name="modes",

@@ -306,7 +306,7 @@ CORE_ROWS: tuple[Feature, ...] = (
         needs=("frames",),
         labels=named("spectral_kurtosis.highest", "spectral_kurtosis.frequency_hz"),
         function=_highest_kurtosis,
-        reference="envelope.spectral_kurtosis; Antoni, Mech. Syst. Signal Process. 20 (2006) 282",
+        reference="kurtogram.spectral_kurtosis; Antoni, Mech. Syst. Signal Process. 20 (2006) 282",
     ),
     Feature(
         name="harmonic_spacing",

@@ -4,13 +4,9 @@ import time
 
 import numpy as np
 import pytest
-from wearstate.features.signal.envelope import (
-    cyclic_coherence,
-    envelope_spectrum,
-    fault_line,
-    kurtogram,
-    spectral_kurtosis,
-)
+from wearstate.features.signal.cyclic_coherence import cyclic_coherence
+from wearstate.features.signal.envelope import envelope_spectrum, fault_line
+from wearstate.features.signal.kurtogram import kurtogram, spectral_kurtosis
 
 FS = 25_600.0
 N = 120_000
