@@ -11,7 +11,7 @@ Examples
 ('within', 'stern_aft')
 """
 
-from .diagnose.alignment.page import Alignment, align
+from .diagnose.alignment.align import Alignment, align
 from .sim.alignment.alignment import (
     AlignmentError,
     AlignmentLine,

@@ -39,7 +39,7 @@ OWN_RULE = {
 SPOKEN_BY = {
     "charts/across": {"evaluate"},
     "report/advice": {"report"},
-    "alignment/page": {"align"},
+    "alignment/text": {"align"},
     "inspect/audit_text": {"splits"},
     "inspect/rank_text": {"features"},
     "blindspots/blindspots": {"blindspots"},

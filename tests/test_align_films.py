@@ -6,6 +6,7 @@ import math
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from wearstate.diagnose.alignment.align import align
 from wearstate.diagnose.alignment.films import (
     FILM_HEAD,
     film_cells,
@@ -17,7 +18,8 @@ from wearstate.diagnose.alignment.films import (
 )
 from wearstate.diagnose.alignment.films import _pressure_unit as pressure_unit
 from wearstate.diagnose.alignment.margins import jack_rows, margin_of, margin_rows
-from wearstate.diagnose.alignment.page import align, align_html, align_table
+from wearstate.diagnose.alignment.page import align_html
+from wearstate.diagnose.alignment.table import align_table
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.sim.alignment.alignment import Check, check, reactions
 from wearstate.sim.scene.load import load_scene

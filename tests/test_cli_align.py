@@ -4,7 +4,9 @@ import json
 
 import pytest
 from click.testing import CliRunner
-from wearstate.diagnose.alignment.page import align, align_figure, align_text
+from wearstate.diagnose.alignment.align import align
+from wearstate.diagnose.alignment.figure import align_figure
+from wearstate.diagnose.alignment.text import align_text
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.sim.alignment.alignment import reactions
 from wearstate.sim.scene.load import load_scene

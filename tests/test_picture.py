@@ -12,7 +12,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 from wearstate.datasets.file.record import Channel
-from wearstate.diagnose.alignment.page import align, align_figure, align_html
+from wearstate.diagnose.alignment.align import align
+from wearstate.diagnose.alignment.figure import align_figure
+from wearstate.diagnose.alignment.page import align_html
 from wearstate.diagnose.machines.picture import plot_simulation
 from wearstate.diagnose.pages.page import render, short_name, visible
 from wearstate.diagnose.pages.picture import FORMATS, page_image, picture_bytes, save_picture

@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
-from wearstate.diagnose.alignment.page import align, align_table, align_text
+from wearstate.diagnose.alignment.align import align
 from wearstate.diagnose.alignment.quiet_moves import quiet_moves, running_line, running_rms
+from wearstate.diagnose.alignment.table import align_table
+from wearstate.diagnose.alignment.text import align_text
 from wearstate.sim.alignment.alignment import AlignmentError, check
 from wearstate.sim.alignment.calibration import calibrate
 from wearstate.sim.scene.load import load_scene

@@ -1,4 +1,4 @@
-"""The alignment page of a shaft line: moves, films, margins, quiet running.
+"""The alignment of a shaft line: table, text, pictures, page, moves, films, margins, quiet running.
 
 It may import ``sim.scene``, ``sim.film``, ``sim.alignment``, ``sim.shaft``, ``diagnose.pages``,
 ``diagnose.shaft_tests``, ``sim.brief``.

@@ -363,8 +363,11 @@ def align(
     With --from-test, --reactions or --jacking the line is first taken to where these put its
     bearings.
     """
-    from ..alignment.page import align as judge
-    from ..alignment.page import align_table, align_text, save_figure, save_html
+    from ..alignment.align import align as judge
+    from ..alignment.figure import save_figure
+    from ..alignment.page import save_html
+    from ..alignment.table import align_table
+    from ..alignment.text import align_text
     from ..shaft_tests.sag_report import sag_table, sag_text
 
     if rig_test is None and (push or test_plot or seed):

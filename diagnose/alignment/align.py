@@ -1,0 +1,176 @@
+"""The alignment of a shaft line in its conditions: limits, calibration, jacking."""
+
+from dataclasses import dataclass
+
+from ...sim.alignment.alignment import (
+    AlignmentError,
+    AlignmentLine,
+    Check,
+    Condition,
+    LineState,
+    check,
+    reactions,
+)
+from ...sim.alignment.calibration import Calibration, calibrate
+from ...sim.alignment.jacking import Jacking, jacking
+from ...sim.brief import brief
+from ...sim.scene.scene import Scene
+from ...sim.scene.shaft import ShaftScene
+from ...sim.shaft.recording import alignment_conditions, alignment_line
+from .quiet_moves import QuietMoves, quiet_moves
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Alignment:
+    """What `wearstate align` found, before it is put in words.
+
+    Attributes
+    ----------
+    scene : ShaftScene
+    line : AlignmentLine
+    states : tuple of LineState
+        One for each condition, as the line is set.
+    calibration : Calibration or None
+    jacking : Jacking or None
+        In the first condition.
+    margin : float
+        Share of each limit that was asked for as a distance from it.
+    quiet : QuietMoves or None
+        What the moves do to the vibration, where that was the target.
+    """
+
+    scene: ShaftScene
+    line: AlignmentLine
+    states: tuple[LineState, ...]
+    calibration: Calibration | None
+    jacking: Jacking | None
+    margin: float = 0.0
+    quiet: QuietMoves | None = None
+
+    __repr__ = brief("name", "verdict")
+
+    @property
+    def name(self) -> str:
+        """Of the scene."""
+        return self.scene.name
+
+    @property
+    def proposed(self) -> tuple[dict[str, float], dict[str, float]]:
+        """Moves [m] and turns [rad] by bearing; empty where none are proposed."""
+        found = self.calibration
+        if found is None or not found.moved:
+            return {}, {}
+        names = found.line.names
+        moves, turns = (
+            dict(zip(names, map(float, values), strict=True))
+            for values in (found.moves, found.turns)
+        )
+        return moves, turns
+
+    @property
+    def unmet(self) -> tuple[Check, ...]:
+        """Limits that the line, as it is set, does not keep."""
+        return tuple(limit for state in self.states for limit in check(state) if not limit.met)
+
+    @property
+    def verdict(self) -> str:
+        """``within``; ``alarm`` where a bearing lifts or no moves help; else ``warning``."""
+        stuck = self.calibration is not None and not self.calibration.status.ok
+        if stuck or any(state.lifted for state in self.states):
+            return "alarm"
+        return "warning" if self.unmet else "within"
+
+
+def align(
+    scene: Scene,
+    *,
+    condition: str = "all",
+    mend: bool = True,
+    prefer: str = "least",
+    target: str = "limits",
+    margin: float = 0.0,
+    jack: str | None = None,
+) -> Alignment:
+    """Judge the alignment of a scene, and find the moves that mend it.
+
+    Parameters
+    ----------
+    scene : Scene
+        Of the machine propulsion-shaft.
+    condition : str
+        A name of the scene's conditions, or "all".
+    mend : bool
+        Look for moves.
+    prefer, target : str
+        As of :func:`wearstate.sim.alignment.calibration.calibrate`; the target "vibration" is that
+        of :func:`wearstate.diagnose.alignment.quiet_moves.quiet_moves`.
+    margin : float
+        As of :func:`wearstate.sim.alignment.calibration.calibrate`.
+    jack : str, optional
+        Bearing to jack.
+
+    Returns
+    -------
+    Alignment
+        States, moves and verdict.
+
+    Raises
+    ------
+    AlignmentError
+        The scene is no shaft line, its line cannot rest, or a name is unknown.
+
+    Examples
+    --------
+    >>> from wearstate.sim.scene.load import load_scene
+    >>> align(load_scene("propulsion-shaft")).verdict
+    'within'
+    """
+    if not isinstance(scene, Scene):
+        raise AlignmentError(f"scene = {scene!r} must be a scene; wearstate.load_scene reads one")
+    if not isinstance(scene, ShaftScene):
+        raise AlignmentError(
+            f"machine of scene '{scene.name}' = '{scene.machine}' must be 'propulsion-shaft'; "
+            "only a shaft line has an alignment"
+        )
+    line, conditions = _line_of(scene), _conditions_of(scene, condition)
+    states = tuple(reactions(line, one) for one in conditions)
+    calibration = quiet = None
+    if mend:
+        aim = "limits" if target == "vibration" else target
+        calibration = calibrate(line, conditions, prefer=prefer, target=aim, margin=margin)
+    if calibration is not None and target == "vibration":
+        quiet = quiet_moves(scene, calibration, margin=margin)
+        calibration = quiet.calibration
+    return Alignment(
+        scene=scene,
+        line=line,
+        states=states,
+        calibration=calibration,
+        jacking=jacking(line, jack, conditions[0]) if jack is not None else None,
+        margin=margin,
+        quiet=quiet,
+    )
+
+
+def _line_of(scene: ShaftScene) -> AlignmentLine:
+    try:
+        return alignment_line(scene)
+    except ValueError as error:  # of the beam: stations that do not go together
+        raise AlignmentError(f"scene '{scene.name}': {error}") from None
+
+
+def _conditions_of(scene: ShaftScene, name: str) -> list[Condition]:
+    found = alignment_conditions(scene)
+    if name == "all":
+        return list(found.values())
+    if name not in found:
+        raise AlignmentError(
+            f"condition = '{name}' must be 'all' or one of {', '.join(found)}; choose one of them"
+        )
+    return [found[name]]
+
+
+def states_after(found: Alignment) -> tuple[LineState, ...]:
+    """Conditions after the moves; none where nothing was moved."""
+    moved = found.calibration is not None and found.calibration.moved
+    return found.calibration.after if found.calibration is not None and moved else ()
