@@ -10,14 +10,9 @@ import pytest
 import wearstate
 from jsonschema import Draft7Validator
 from wearstate.datasets.recipe.table import RecipeTable
-from wearstate.diagnose.inspect.keys import (
-    explained,
-    found_keys,
-    found_recipe_keys,
-    keys_of,
-    keys_page,
-    scene_schema,
-)
+from wearstate.diagnose.inspect.keys import found_keys, found_recipe_keys, keys_of
+from wearstate.diagnose.inspect.keys_text import explained, keys_page
+from wearstate.diagnose.inspect.schema import scene_schema
 from wearstate.sim.parts.units import UNITS
 from wearstate.sim.scene.load import (
     MACHINES,
@@ -154,7 +149,7 @@ def test_explain_alone_says_how_to_ask():
 def test_the_page_is_up_to_date():
     page = Path(wearstate.__file__).parent / "docs" / "keys.md"
     assert page.read_text(encoding="utf-8") == keys_page(), (
-        "run python -m wearstate.diagnose.inspect.keys > docs/keys.md"
+        "run python -m wearstate.diagnose.inspect.keys_text > docs/keys.md"
     )
 
 

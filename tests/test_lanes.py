@@ -12,9 +12,9 @@ from wearstate.sim.machine.simulate import simulate, simulate_many, simulates_to
 from wearstate.sim.output.status import Status
 from wearstate.sim.pump.gathering import GATHERED_TRUTH
 from wearstate.sim.pump.run_plan import planned
+from wearstate.sim.pump_lanes.lane_layout import DRY, MAPPED_FILM, SHORT_FILM
 from wearstate.sim.pump_lanes.lanes import lane_kind, run_lanes
 from wearstate.sim.pump_lanes.many import lane_job
-from wearstate.sim.pump_lanes.rates import DRY, MAPPED_FILM, SHORT_FILM
 from wearstate.sim.scene.load import load_scene
 from wearstate.sim.scene.scene import SceneError
 

@@ -92,7 +92,8 @@ def recipe_check(file: str, as_json: bool) -> None:
 @json_option
 def recipe_explain(key: str, as_json: bool) -> None:
     """What every key of a recipe means: unit, range, default; KEY as severity.low."""
-    from ..inspect.keys import explained, found_recipe_keys, keys_table
+    from ..inspect.keys import found_recipe_keys
+    from ..inspect.keys_text import explained, keys_table
 
     found = found_recipe_keys(key)
     emit(keys_table([found]), as_json, explained(found))

@@ -109,7 +109,8 @@ def scene_explain(subject: str, key: str, as_json: bool) -> None:
     path, a table or the end of a path: `scene explain pump pressure.rung`, for short
     `scene explain pump.pressure.rung`.
     """
-    from ..inspect.keys import explained, found_keys, keys_table, subjects_text
+    from ..inspect.keys import found_keys
+    from ..inspect.keys_text import explained, keys_table, subjects_text
 
     if not subject:
         emit({"subjects": []}, as_json, subjects_text())
@@ -131,7 +132,7 @@ def scene_schema(machine: str, output: Path | None, force: bool) -> None:
     Name it in the first line of a scene: `#:schema ./pump.json` (taplo, Even Better TOML).
     """
     from ...sim.scene.load import machine_type
-    from ..inspect.keys import scene_schema as schema_of
+    from ..inspect.schema import scene_schema as schema_of
     from ..pages.page import save_page
 
     check_outputs([], [(output, (".json",))], force)

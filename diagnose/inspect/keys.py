@@ -1,19 +1,14 @@
-"""Every key of a scene or a recipe: meaning, unit, range, default, rungs; and schemas for editors.
-
-``python -m wearstate.diagnose.inspect.keys`` prints ``docs/keys.md``.
-"""
+"""Every key of a scene or a recipe: meaning, unit, range, default, rungs; and which are meant."""
 
 import difflib
-import textwrap
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
 from typing import Any, Literal, get_args, get_origin
 
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
-from pydantic.json_schema import GenerateJsonSchema
 
 from ...datasets.recipe.table import RecipeTable
 from ...sim.parts.dimensions import Dimension
@@ -23,10 +18,8 @@ from ...sim.scene.rungs import Rung
 from ...sim.scene.scene import Scene, SceneError
 from ..pages.si_text import plain, si_text
 
-_WIDTH = 100  # characters of a line
-_NO_BREAK = "\N{NO-BREAK SPACE}"
-_TABLE, _TABLES, _NAMED_TABLES = "table", "list of tables", "table of named tables"
-_TABLE_KINDS = (_TABLE, _TABLES, _NAMED_TABLES)
+_TABLE, TABLES, NAMED_TABLES = "table", "list of tables", "table of named tables"
+_TABLE_KINDS = (_TABLE, TABLES, NAMED_TABLES)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -101,9 +94,8 @@ def keys_of(model: type[BaseModel]) -> list[Key]:
     return list(_rows(model, "", None, tuple(ladders.values())))
 
 
-_DIFFERING = "what differs"
+DIFFERING = "what differs"
 """Default of a table that is merged over the scene's own table of that name."""
-
 
 _Ladders = tuple[tuple[Rung, ...], ...]
 
@@ -124,7 +116,7 @@ def _rows(model: type[BaseModel], prefix: str, given: Any, ladders: _Ladders) ->
         default = "required" if field.is_required() else "" if value else "optional"
         rows = _rows(inner, f"{path}.", value if isinstance(value, inner) else None, ladders)
         if _is_partial(field):
-            default = _DIFFERING
+            default = DIFFERING
             rows = (replace(row, default=f"as in [{name}]") for row in rows)
         yield Key(path=path, words=_table_words(field, inner), kind=kind, default=default)
         yield from rows
@@ -145,7 +137,7 @@ def _value(field: FieldInfo, name: str, given: Any) -> Any:
 def _table_kind(annotation: Any) -> str:
     arguments = (annotation, *get_args(annotation))
     origins = {get_origin(each) for each in arguments}
-    return _TABLES if tuple in origins else _NAMED_TABLES if dict in origins else _TABLE
+    return TABLES if tuple in origins else NAMED_TABLES if dict in origins else _TABLE
 
 
 def _table_words(field: FieldInfo, inner: type[BaseModel]) -> str:
@@ -244,9 +236,6 @@ def _shown(value: Any, unit: str) -> str:
     return str(value) or "empty"
 
 
-# --- which keys are meant
-
-
 @dataclass(frozen=True, kw_only=True)
 class FoundKeys:
     """Keys that were asked for.
@@ -305,7 +294,7 @@ def found_keys(subject: str = "", key: str = "") -> list[FoundKeys]:
     kinds = {short_name(kind): kind for kind in MACHINES.values()} | MACHINES
     first, _, rest = subject.partition(".")
     if first in kinds and subject not in scene_names():
-        return [_found(kinds[first], ".".join(filter(None, (rest, key))))]
+        return [keys_found(kinds[first], ".".join(filter(None, (rest, key))))]
     if key or subject in scene_names() or Path(subject).exists():
         return [_of_scene(load_scene(subject), subject, key)]
     every = {short_name(kind): keys_of(kind) for kind in MACHINES.values()}
@@ -313,7 +302,7 @@ def found_keys(subject: str = "", key: str = "") -> list[FoundKeys]:
     if not hits:
         names = [*every, *scene_names(), *(key.path for keys in every.values() for key in keys)]
         raise SceneError(subject, [f"{subject} is no machine, scene or key{_near(subject, names)}"])
-    return [_found(kinds[name], subject) for name in hits]
+    return [keys_found(kinds[name], subject) for name in hits]
 
 
 def found_recipe_keys(key: str = "") -> FoundKeys:
@@ -335,10 +324,11 @@ _EXTENDING = (
 
 
 def _of_scene(scene: Scene, name: str, key: str) -> FoundKeys:
-    return replace(_found(type(scene), key, scene), scene=name)
+    return replace(keys_found(type(scene), key, scene), scene=name)
 
 
-def _found(kind: type[Scene], key: str, scene: Scene | None = None) -> FoundKeys:
+def keys_found(kind: type[Scene], key: str, scene: Scene | None = None) -> FoundKeys:
+    """Keys of a machine that are meant, with the values of a scene where there is one."""
     rows = keys_of(kind)
     values = {} if scene is None else {row.path: _written(scene, row) for row in rows}
     about = (kind.__doc__ or "").partition("\n")[0]
@@ -412,326 +402,3 @@ def _reached(node: Any, path: list[str]) -> list[Any]:
         return [value for entry in entries for value in _reached(entry, path[1:])]
     inner = getattr(node, path[0], None)
     return [] if inner is None else _reached(inner, path[1:])
-
-
-# --- in words
-
-
-def subjects_text() -> str:
-    """The machines, and how to ask for their keys."""
-    names = {
-        short_name(kind): (kind.__doc__ or "").partition("\n")[0] for kind in MACHINES.values()
-    }
-    lines = [f"{name:8} {words}" for name, words in names.items()]
-    return "\n".join(
-        [
-            *lines,
-            "",
-            "wearstate scene explain pump                  every key of a pump's scene",
-            "wearstate scene explain pump pressure         the keys of one table",
-            "wearstate scene explain pump pressure.rung    one key with its rungs",
-            "wearstate scene explain bilge-pump            with the values of that scene",
-        ]
-    )
-
-
-def explained(found: FoundKeys) -> str:
-    """Keys as text: one with all that is known of it, several as one line each.
-
-    Parameters
-    ----------
-    found : FoundKeys
-
-    Returns
-    -------
-    str
-    """
-    if found.single:
-        return "\n\n".join(_whole(key, found) for key in found.keys)
-    head = f"{found.subject}: {found.words}"
-    lines = [head, *_listed(found)]
-    if any(key.rungs for key in found.keys):
-        lines += ["", "A rung is a model of one effect; name its key to see what each assumes."]
-    return "\n".join(lines)
-
-
-def _listed(found: FoundKeys) -> Iterator[str]:
-    rows = _once(found.keys)
-    width = max((len(row.name) for row, _ in rows if not row.table), default=0)
-    for row, twin in rows:
-        if row.table:
-            need = f" ({row.default})" if row.default else ""
-            same = f" Keys as in {_header(twin)}." if twin else ""
-            yield ""
-            yield from _wrapped(f"{_header(row)}{need} {row.words}{same}", 0)
-            continue
-        text = f"{row.words} [{_spec(row, found.values)}]"
-        yield from _wrapped(f"  {row.name:{width}}  {text}", width + 4)
-
-
-def _wrapped(text: str, indent: int) -> list[str]:
-    """Lines of a text; a number stays with its unit (`_NO_BREAK`)."""
-    lines = textwrap.wrap(text, _WIDTH, subsequent_indent=" " * indent, break_on_hyphens=False)
-    return [line.replace(_NO_BREAK, " ") for line in lines]
-
-
-def _once(keys: Iterable[Key]) -> list[tuple[Key, Key | None]]:
-    """Keys, a table whose keys have all been told by those of another table without them."""
-    rows = list(keys)
-    own = {row.path: row for row in rows}
-    told: dict[str, Key] = {}  # a rung cannot be hashed
-    result: list[tuple[Key, Key | None]] = []
-    skipped = "\0"
-    for row in rows:
-        if row.path.startswith(skipped):
-            continue
-        inside = [
-            replace(each, path=each.path.removeprefix(row.path))
-            for each in rows
-            if row.table and each.path.startswith(f"{row.path}.")
-        ]
-        twin = told.setdefault(repr(inside), row) if inside else row
-        if row.default == _DIFFERING:
-            twin = own.get(row.name, row)
-        result.append((row, None if twin is row else twin))
-        if twin is not row:
-            skipped = f"{row.path}."
-    return result
-
-
-def _header(key: Key) -> str:
-    """As in TOML; a table of a list entry by the names alone."""
-    inside = key.path.removesuffix(".*")
-    name = inside.replace(".*", "")
-    if key.kind == _TABLES:
-        return f"[[{name}]]"
-    return f"[{name}.NAME]" if key.kind == _NAMED_TABLES else f"[{name}]"
-
-
-def _spec(key: Key, values: Mapping[str, str]) -> str:
-    """Kind, unit, range, choices and default."""
-    kind = key.unit if key.kind == "number" and key.unit else key.kind
-    if key.kind != "number" and key.unit:
-        kind += f" in {key.unit}"
-    if key.choices:
-        kind = " | ".join(key.choices)
-    default = key.default if key.default == "required" else f"default {key.default}"
-    here = [f"here {values[key.path]}"] if key.path in values else []
-    numbers = [key.bounds, default, *here]
-    return "; ".join(filter(None, [kind, *(text.replace(" ", _NO_BREAK) for text in numbers)]))
-
-
-def _whole(key: Key, found: FoundKeys) -> str:
-    """Everything about one key."""
-    here = found.values.get(key.path, "not given")
-    rows = [
-        ("", key.words),
-        ("written as", key.kind + (f", bare in {key.unit}" if key.unit else "")),
-        ("units", ", ".join(key.units)),
-        ("one of", "" if key.rungs else ", ".join(key.choices)),
-        ("range", key.bounds),
-        ("default", key.default),
-        ("here", f"{here}, in {found.scene}" if found.scene else ""),
-    ]
-    lines = [f"{key.path}  ({found.subject})"]
-    for name, text in rows:
-        if text:
-            lines += _wrapped(f"  {name:11} {text}" if name else f"  {text}", 14 if name else 2)
-    if key.rungs:
-        lines.append(f"  rungs, cheapest first ({_COST}):")
-        for rung in key.rungs:
-            lines += _rung_lines(rung)
-    return "\n".join(lines)
-
-
-_COST = "cost: tabulated time of a step of one throw or of one solve of a film, to rank them"
-
-
-def _rung_rows(rung: Rung) -> list[tuple[str, str]]:
-    """What is told of a rung."""
-    cost = si_text(1e-9 * rung.nanoseconds_per_step, "s") if rung.nanoseconds_per_step else "none"
-    rows = [
-        ("assumes", rung.assumes),
-        ("valid", rung.valid),
-        ("needs", rung.needs),
-        ("cost", cost),
-        ("reference", rung.reference),
-    ]
-    return [(name, text) for name, text in rows if text]
-
-
-def _rung_lines(rung: Rung) -> Iterator[str]:
-    yield f"    {rung.name}"
-    for name, text in _rung_rows(rung):
-        yield from _wrapped(f"      {name:10} {text}", 17)
-
-
-def keys_table(found: Iterable[FoundKeys]) -> dict[str, Any]:
-    """Keys as plain values, for JSON."""
-    return {
-        "subjects": [
-            {
-                "subject": each.subject,
-                "scene": each.scene,
-                "keys": [{**asdict(key), "value": each.values.get(key.path)} for key in each.keys],
-            }
-            for each in found
-        ]
-    }
-
-
-def keys_page() -> str:
-    """``docs/keys.md``: every key of every machine and of a recipe."""
-    parts = [_PAGE_HEAD]
-    for kind in MACHINES.values():
-        parts.append(_section(_found(kind, "")))
-    parts.append(_section(found_recipe_keys()))
-    return "\n\n".join(parts) + "\n"
-
-
-_PAGE_HEAD = """# Keys of scenes and recipes
-
-Written by `python -m wearstate.diagnose.inspect.keys`. The same on the command line:
-`wearstate scene explain pump`, `wearstate scene explain pump.pressure.rung`,
-`wearstate recipe explain`.
-
-A bare number is SI; a text carries its unit, such as `"0.25 mm"`. On the command line a key is its
-dotted path, with entries of lists by number (from 0) or by name:
-`wearstate simulate shaft-rig --set bearings.aft.sag="1 mm"`. Rungs stand cheapest first; their cost
-is the tabulated time of a step of one throw or of one film solve."""
-
-
-def _section(found: FoundKeys) -> str:
-    lines = [f"## {found.subject}", "", found.words, *_page_rows(found)]
-    return "\n".join(lines)
-
-
-def _page_rows(found: FoundKeys) -> Iterator[str]:
-    open_table = False
-    for row, twin in _once(found.keys):
-        if row.table:
-            need = f" ({row.default})" if row.default else ""
-            yield from ("", f"### `{_header(row)}`{need}", "", row.words)
-            yield from ("", f"Keys as in `{_header(twin)}`.") if twin else ()
-            open_table = False
-            continue
-        if not open_table:
-            yield from ("", "| key | meaning | value |", "|---|---|---|")
-            open_table = True
-        spec = _spec(row, {}).replace(_NO_BREAK, " ")
-        yield f"| `{row.name}` | {_cell(row.words)} | {_cell(spec)} |"
-    for row, twin in _once(found.keys):
-        if row.rungs and twin is None:
-            yield from ("", f"### Rungs of `{row.path}`", "", *_RUNG_HEAD)
-            yield from map(_rung_row, row.rungs)
-
-
-def _rung_row(rung: Rung) -> str:
-    told = dict(_rung_rows(rung))
-    names = ("assumes", "valid", "needs", "cost", "reference")
-    return f"| {rung.name} | " + " | ".join(_cell(told.get(name, "")) for name in names) + " |"
-
-
-_RUNG_HEAD = ("| rung | assumes | valid | needs | cost | reference |", "|---|---|---|---|---|---|")
-
-
-def _cell(text: str) -> str:
-    return text.replace("|", "\\|")
-
-
-# --- for editors
-
-
-def scene_schema(machine: type[Scene]) -> dict[str, Any]:
-    """JSON schema of a machine's scenes, for editors of TOML.
-
-    Numbers with a dimension take a text with a unit as well. What holds between keys (one of two
-    clearances, a rung that needs a table) is left to ``scene check``.
-
-    Parameters
-    ----------
-    machine : type
-        Scene type.
-
-    Returns
-    -------
-    dict
-
-    Examples
-    --------
-    >>> from wearstate.sim.scene.pump import PumpScene
-    >>> scene_schema(PumpScene)["$defs"]["Crank"]["properties"]["radius"]["description"]
-    'half the stroke [m]'
-    """
-    schema = _tidy(machine.model_json_schema(schema_generator=_Generator))
-    inside = schema["$defs"]
-    partial = {
-        name: _renamed({k: v for k, v in table.items() if k != "required"})
-        for name, table in inside.items()
-    }
-    inside |= {f"{name}{_PARTIAL}": table for name, table in partial.items()}
-    for table in inside.values():
-        for name, field in table.get("properties", {}).items():
-            if field.pop("partial", False):
-                table["properties"][name] = _renamed(field)
-    title = f"Scene of a {machine.__doc__ or ''}".partition("\n")[0]
-    return {"$schema": "http://json-schema.org/draft-07/schema#", **schema, "title": title}
-
-
-class _Generator(GenerateJsonSchema):
-    """A default that is a frozen table is left out, silently."""
-
-    def emit_warning(self, kind: Any, detail: str) -> None:
-        """As of pydantic, without that one."""
-        if kind != "non-serializable-default":
-            super().emit_warning(kind, detail)
-
-
-_PARTIAL = "Partial"  # ends the names of tables in which nothing is required
-_SIGNS = {"gt": "exclusiveMinimum", "ge": "minimum", "lt": "exclusiveMaximum", "le": "maximum"}
-
-
-def _renamed(node: Any) -> Any:
-    """References to tables as references to their partial twins."""
-    if isinstance(node, Mapping):
-        return {
-            key: f"{value}{_PARTIAL}" if key == "$ref" else _renamed(value)
-            for key, value in node.items()
-        }
-    return [_renamed(each) for each in node] if isinstance(node, list) else node
-
-
-def _tidy(node: Any) -> Any:
-    """A schema without nulls, which TOML lacks, with bounds by their names and units in words."""
-    if isinstance(node, list):
-        return [_tidy(each) for each in node]
-    if not isinstance(node, Mapping):
-        return node
-    found = {_SIGNS.get(str(key), str(key)): _tidy(value) for key, value in node.items()}
-    if found.get("default", 0) is None or isinstance(found.get("default"), dict):
-        del found["default"]
-    if isinstance(found.get("anyOf"), list):
-        found["anyOf"] = [each for each in found["anyOf"] if each != {"type": "null"}]
-    return _with_unit(found) if "description" in found else found
-
-
-def _with_unit(field: dict[str, Any]) -> dict[str, Any]:
-    if not isinstance(field["description"], str):
-        return field  # a key of that name
-    unit = next(_units(field), "")
-    return {**field, "description": f"{field['description']} [{unit}]"} if unit else field
-
-
-def _units(node: Any) -> Iterator[str]:
-    if isinstance(node, Mapping):
-        if isinstance(node.get("unit"), str) and node["unit"]:
-            yield node["unit"]
-        for value in node.values():
-            yield from _units(value)
-    elif isinstance(node, list):
-        for each in node:
-            yield from _units(each)
-
-
-if __name__ == "__main__":
-    print(keys_page(), end="")

@@ -9,7 +9,7 @@ from ..jit import kernel, subroutine
 from ..mechanism.layout import WITH_VAPOUR
 from ..mechanism.march import breathe
 from .fields import fields_of, put_fields
-from .rates import CHAMBER_COLUMNS, LANES, PISTON_X, ChamberLane
+from .lane_layout import CHAMBER_COLUMNS, LANES, PISTON_X, ChamberLane
 
 
 @kernel

@@ -44,8 +44,7 @@ from ..pump_setup.joints import JOINT_CODES, joint_parts, joint_rungs
 from ..pump_setup.tables import Start
 from ..scene.pump import PumpScene
 from ..scene.pump_hydraulics import PIPED_RUNGS
-from .march import LEFT, STRETCH, Stretch, alone, enter_lane, march
-from .rates import (
+from .lane_layout import (
     CRANK,
     DRY,
     LANE_FORCES,
@@ -64,6 +63,7 @@ from .rates import (
     OilLane,
     ThrowLane,
 )
+from .march import LEFT, STRETCH, Stretch, alone, enter_lane, march
 
 Float = NDArray[np.float64]
 

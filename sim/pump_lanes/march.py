@@ -23,19 +23,8 @@ from ..mechanism.layout import (
 )
 from ..mechanism.march import Tally, begin, carried_on, of_mode, settled
 from .chambers import breathe_alone, count_vapour, enter_chamber, lanes_breathe
-from .rates import (
-    ALL_MOVING,
-    BETA,
-    CRANK,
-    DRY,
-    LANE_FORCES,
-    LANES,
-    MOVING,
-    PLACES,
-    beyond_limit,
-    machine_of_lane,
-    rates,
-)
+from .lane_layout import ALL_MOVING, BETA, CRANK, DRY, LANE_FORCES, LANES, MOVING, PLACES
+from .rates import beyond_limit, machine_of_lane, rates
 
 
 class Alone(NamedTuple):

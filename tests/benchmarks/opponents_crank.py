@@ -21,8 +21,8 @@ from scipy.integrate import odeint, solve_ivp
 from wearstate.sim.contact.law import RELEASE_AT_ZERO_FORCE, RELEASE_AT_ZERO_PENETRATION
 from wearstate.sim.mechanism.crank_run import run_mechanism
 from wearstate.sim.mechanism.layout import AT_REST, CRANKPIN
+from wearstate.sim.pump_lanes.lane_layout import LANES
 from wearstate.sim.pump_lanes.lanes import LaneJob, lane_kind, run_lanes
-from wearstate.sim.pump_lanes.rates import LANES
 from wearstate.sim.pump_setup.films import start_films
 from wearstate.sim.pump_setup.tables import Start, tables
 from wearstate.sim.pump_setup.tables import start_state as bodies_at

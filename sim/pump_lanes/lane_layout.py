@@ -1,0 +1,279 @@
+"""Numbers and states of lanes side by side: what the kernels of lanes are told and remember."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..film.impedance_map import MapPlace
+from ..hydraulics.valves import ValveSide
+from ..jit import kernel
+from ..mechanism.layout import CONTACTS, PUSHES, Machine
+from ..mechanism.oiled_joint import FilmPull
+from ..mechanism.throw_motion import Pose
+from .fields import fields_of
+
+DRY, SHORT_FILM, MAPPED_FILM = range(3)
+"""What is in the eyes of the crank pins."""
+
+LANES = 16
+"""Records side by side; the compiler does not lay fewer into vectors."""
+
+MOVING, ALL_MOVING = 5, 7
+"""Rows of a motion, see :data:`PLACES`: those that move in an ideal guide, and all."""
+
+ROD_X, ROD_Y, BETA, PISTON_X, CRANK, PISTON_Y, TILT = range(ALL_MOVING)
+"""Rows of positions, velocities and accelerations; those come last that an ideal guide holds."""
+
+PLACES = (ROD_X, ROD_Y, BETA, PISTON_X, PISTON_Y, TILT)
+"""Rows of the coordinates of ``BODY``."""
+
+LANE_FORCES = ("pin_x", "pin_y", "guide_y", "piston_x", "seal_x", "guide_x")
+"""Rows of the forces: of ``FORCES`` those that the casing feels, but for the valves'."""
+
+PIN_X_FORCE, PIN_Y_FORCE, GUIDE_Y_FORCE, FACE_FORCE, SEAL_FORCE, GUIDE_X_FORCE = range(
+    len(LANE_FORCES)
+)
+
+CHAMBER_COLUMNS = 8
+"""Of a chamber: ``CHAMBER_STATE``, then position and velocity of its piston."""
+
+
+class ThrowLane(NamedTuple):
+    """Numbers of a throw in a lane, as in ``THROW``."""
+
+    phase: float
+    crank_radius: float
+    rod_centre: float
+    rod_arm: float
+    rod_mass: float
+    inverse_rod_mass: float
+    inverse_rod_inertia: float
+    piston_mass: float
+    inverse_piston_across: float
+    inverse_piston_tilt: float
+    piston_area: float
+    seal_friction: float
+    seal_friction_area: float
+    seal_friction_speed: float
+    crankpin_radius: float
+    wristpin_radius: float
+    guide_half_length: float
+    guide_half_height: float
+    inverse_piston_along: float  # [1/kg]
+    tight_wrist: float  # 1 where an ideal wrist pin holds rod and piston together, else 0
+    tight_guide: float  # 1 where an ideal guide holds the piston up, else 0
+
+
+class ContactLane(NamedTuple):
+    """Numbers of a contact in a lane, as in ``CONTACT``."""
+
+    law: float
+    elasticity: float
+    stiffness: float
+    damping: float
+    hysteresis: float
+    clearance: float
+    speed_floor: float
+    release: float
+    friction_law: float
+    friction: float
+    friction_speed: float
+    friction_dead_speed: float
+    tangential_damping: float
+
+
+class LiquidLane(NamedTuple):
+    """Numbers of a pressure in a lane, as in ``HYDRAULIC``."""
+
+    rung: float
+    suction: float
+    discharge: float
+    fall_delay: float
+    fall_angle: float
+    rise_delay: float
+    rise_angle: float
+
+
+class ChamberLane(NamedTuple):
+    """Numbers of a chamber in a lane, as in ``HYDRAULIC``; its valves are ``ValveSide``."""
+
+    suction: float
+    discharge: float
+    area: float
+    crank_radius: float
+    rod_length: float
+    dead_volume: float
+    bulk_modulus: float
+    air_fraction: float
+    air_power: float
+    vapour: float
+
+
+class OilLane(NamedTuple):
+    """Numbers of the oil of a crank pin in a lane, as in ``OIL``."""
+
+    short: float
+    map: float
+    shear: float
+    filled: float
+    radius: float
+    wall_damping: float
+    relaxing: float
+    roughness: float
+    peaks: float
+    step: float
+    offset: float
+    roots: float
+    angles: float
+    gap_factor: float
+    least_root: float
+    per_root: float
+    per_radian: float
+
+
+NEVER = ContactLane(*[0.0] * len(ContactLane._fields))._replace(
+    stiffness=1.0, clearance=1e9, speed_floor=1.0, friction_speed=1.0
+)
+"""Contact of a tight joint: one with so much room never touches, and asks for no change."""
+
+MOST_MODES = 16
+"""Of a casing that yields in lanes; one with more runs alone."""
+
+PLAIN_LAWS = tuple(
+    ContactLane._fields.index(name) for name in ("law", "elasticity", "friction_law")
+)
+"""Columns of a contact that are 0 where its laws are the plain ones: spring and dashpot, smooth
+friction. A loop that knows needs one root and one division where the others need three and four."""
+
+PLAN = np.dtype(
+    [
+        ("throw", "f8", (len(ThrowLane._fields), LANES)),
+        ("contact", "f8", (3, len(ContactLane._fields), LANES)),
+        ("throws", "i8"),  # of every record: they lie in lanes beside each other, in their order
+        ("driven", "f8"),  # 1 where any lane's crank has a motor; of all others it turns evenly
+        ("plain", "f8", 3),  # 1 where no lane's contact in a joint has other laws than the plain
+        ("machine", "f8", (len(Machine._fields), LANES)),
+        ("liquid", "f8", (len(LiquidLane._fields), LANES)),
+        ("chamber", "f8", (len(ChamberLane._fields), LANES)),
+        ("oil", "f8", (len(OilLane._fields), LANES)),
+        ("valve", "f8", (2, len(ValveSide._fields), LANES)),  # suction, discharge
+        ("share", "f8", (2, 3, LANES)),  # see valve_shares
+        ("step", "f8", LANES),
+        ("sixth", "f8", LANES),  # of the step
+        ("weight", "f8", LANES),  # of a step's force in its mean, as the march of one weighs it
+        ("modes", "i8"),  # of the casing that has most of them
+        ("gravity", "f8", (2, LANES)),  # of a bearing at rest
+        ("push", "f8", (MOST_MODES, len(PUSHES), LANES)),  # as ``Yielding``
+        ("react", "f8", (MOST_MODES, 3, LANES)),
+        ("reach", "f8", (MOST_MODES, 3, LANES)),
+        ("give", "f8", (MOST_MODES, 2, LANES)),
+        ("held", "f8", (MOST_MODES, 2, LANES)),
+        ("blend", "f8", (2, 2, LANES)),
+    ]
+)
+"""Numbers of all lanes, codes as numbers too; columns as the fields of the tuples above."""
+
+STATE = np.dtype(
+    [
+        ("x0", "f8", (ALL_MOVING, LANES)),  # where the step began
+        ("v0", "f8", (ALL_MOVING, LANES)),
+        ("a0", "f8", (ALL_MOVING, LANES)),
+        ("force0", "f8", (len(LANE_FORCES), LANES)),
+        ("margin0", "f8", (CONTACTS, LANES)),
+        ("approach0", "f8", (CONTACTS, LANES)),
+        ("normal0", "f8", LANES),
+        ("x", "f8", (ALL_MOVING, LANES)),  # the stage that was looked at last
+        ("v", "f8", (ALL_MOVING, LANES)),
+        ("a", "f8", (ALL_MOVING, LANES)),
+        ("force", "f8", (len(LANE_FORCES), LANES)),
+        ("margin", "f8", (CONTACTS, LANES)),
+        ("approach", "f8", (CONTACTS, LANES)),
+        ("normal", "f8", LANES),
+        ("overlap", "f8", (3, LANES)),  # of crank pin, wrist pin and guide [m]
+        ("turned", "f8", (4, LANES)),  # sine and cosine of the crank, then of the rod
+        ("tilted", "f8", (2, LANES)),  # sine and cosine of a piston in a guide with play
+        ("pressed", "f8", LANES),  # pressure on the piston
+        ("pin", "f8", (4, LANES)),  # ``PinLoad`` of the crank pin
+        ("wrist", "f8", (4, LANES)),  # and of a wrist pin with play
+        ("moment", "f8", LANES),  # of all throws on the crank, in the lane of each
+        ("lead", "f8", (2, LANES)),  # sine and cosine of the crank at the first throw
+        ("guide", "f8", (3, LANES)),  # force of a guide with play (x, y), and its moment
+        ("middle_v", "f8", (ALL_MOVING, LANES)),  # of the stages in the middle, added
+        ("middle_a", "f8", (ALL_MOVING, LANES)),
+        ("middle_force", "f8", (len(LANE_FORCES), LANES)),
+        ("high", "f8", LANES),  # largest normal force of the step
+        ("peak", "f8", LANES),  # of all steps
+        ("touching", "f8", (CONTACTS, LANES)),  # 0 or 1
+        ("impact", "f8", (CONTACTS, LANES)),
+        ("pressure0", "f8", (2, LANES)),  # on the piston at both ends of the step, of a chamber
+        ("pressure", "f8", (2, LANES)),  # the same, of the step that is being looked at
+        ("chamber0", "f8", (CHAMBER_COLUMNS, LANES)),  # where the step began
+        ("chamber", "f8", (CHAMBER_COLUMNS, LANES)),
+        ("air", "f8", LANES),  # of the chamber where the step began
+        ("flow", "f8", (2, LANES)),  # impulses of the valves
+        ("sure", "f8", LANES),  # 1 where the chambers' step side by side is good
+        ("choked", "f8", LANES),  # 1 where a chamber has failed
+        ("film0", "f8", (2, LANES)),  # where the film lets the pin be, where the step began
+        ("film_rate0", "f8", (2, LANES)),
+        ("film", "f8", (2, LANES)),
+        ("film_rate", "f8", (2, LANES)),
+        ("middle_film", "f8", (2, LANES)),  # rates of the stages in the middle, added
+        ("squeeze0", "f8", (2, LANES)),  # velocity of the film, where the next search begins
+        ("squeeze", "f8", (2, LANES)),
+        ("apart", "f8", (4, LANES)),  # see crank_offset
+        ("rough", "f8", (2, LANES)),  # see peaks_of
+        ("pull", "f8", (len(FilmPull._fields), LANES)),
+        ("place", "f8", (len(MapPlace._fields), LANES)),
+        ("patch", "f8", (4, LANES)),  # see map_patches
+        ("settled", "f8", LANES),  # 1 where the film's velocity is found
+        ("gap", "f8", LANES),  # least film
+        ("carried", "f8", LANES),  # by touching peaks
+        ("asks", "f8", LANES),  # 1 where a contact asks for a change within this step
+        ("bad", "f8", LANES),  # status code of this step
+        ("moved", "f8", (MOST_MODES, 3, LANES)),  # place, speed and force of the casing's modes
+        ("pushed", "f8", LANES),  # force of a throw on one of them
+        ("bearing", "f8", (2, LANES)),  # its acceleration with the casing
+        ("past", "f8", (2, 2, LANES)),  # the same, one and two steps before
+        ("felt", "f8", (2, LANES)),  # of it, by what turns
+    ]
+)
+"""All lanes in the middle of their step. One record: the compiler lays a loop into vectors where it
+sees that what it writes is not what it reads."""
+
+
+@kernel
+def throw_of(p: Any, lane: int) -> Any:
+    """Numbers of the throw of a lane."""
+    return fields_of(ThrowLane, p.throw, lane)
+
+
+@kernel
+def contact_of(p: Any, j: int, lane: int) -> Any:
+    """Numbers of one contact of a lane."""
+    return fields_of(ContactLane, p.contact[j], lane)
+
+
+@kernel
+def lane_pose(s: Any, lane: int) -> Any:
+    """Coordinates and rates of a lane."""
+    x, v = s.x, s.v
+    return Pose(
+        x[ROD_X, lane],
+        x[ROD_Y, lane],
+        x[BETA, lane],
+        x[PISTON_X, lane],
+        x[PISTON_Y, lane],
+        x[TILT, lane],
+        v[ROD_X, lane],
+        v[ROD_Y, lane],
+        v[BETA, lane],
+        v[PISTON_X, lane],
+        v[PISTON_Y, lane],
+        v[TILT, lane],
+    )
+
+
+@kernel
+def oil_of(p: Any, lane: int) -> Any:
+    """Numbers of the oil in the crank pin of a lane."""
+    return fields_of(OilLane, p.oil, lane)
