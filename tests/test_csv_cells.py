@@ -3,7 +3,7 @@
 import pandas as pd
 import pytest
 from wearstate.datasets.file.csv_cells import plain_cell, safe_cell, safe_frame, save_rows
-from wearstate.datasets.readers.text import split_cells
+from wearstate.datasets.readers.text_dialect import split_cells
 
 
 @pytest.mark.parametrize("first", list("=+-@\t\r\n"))

@@ -19,6 +19,7 @@ from wearstate.datasets.file.record import Attributes, DataSetWriter
 from wearstate.datasets.readers import flat as source_flat
 from wearstate.datasets.readers import mat5 as source_mat5
 from wearstate.datasets.readers import text as source_text
+from wearstate.datasets.readers import text_lines
 from wearstate.datasets.readers.open import READERS, SourceOptions, list_sources, open_source
 from wearstate.datasets.source import time_column as source_time
 from wearstate.datasets.source.channel_units import (
@@ -820,7 +821,7 @@ def test_text_at_fault_far_down_is_found_on_reading(tmp_path, monkeypatch):
 def test_text_is_read_in_pieces(tmp_path, monkeypatch):
     count = 40_000
     path = written(tmp_path / "x.csv", "".join(f"{i};{-i}\n" for i in range(count)))
-    monkeypatch.setattr(source_text, "_PIECE", 1000)  # lines lie across pieces
+    monkeypatch.setattr(text_lines, "_PIECE", 1000)  # lines lie across pieces
     monkeypatch.setattr(source_text, "_HEAD", 4096)
     with opened(path) as source:
         assert source.n_samples == count

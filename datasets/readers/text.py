@@ -1,6 +1,5 @@
 """CSV, TSV and other columns of numbers, read in pieces by an index of their lines."""
 
-import csv
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -18,193 +17,28 @@ from ..file.csv_cells import plain_cell
 from ..source.channel_units import known_unit
 from ..source.clock import is_stamp, is_stamp_pattern, months_first, stamp_resolution, stamp_seconds
 from ..source.number_notation import unknown_notation
-from ..source.part import (
-    MOST_CHANNELS,
-    MOST_ROWS,
-    Contents,
-    FilePart,
-    PartChannel,
-    SourceOptions,
-    foreign,
-)
+from ..source.part import MOST_CHANNELS, MOST_ROWS, Contents, FilePart, PartChannel, SourceOptions
 from ..source.time_column import even_rate, printed_resolution
 from .flat import numbered, stem_of
-
-BLOCK = 4096
-"""Lines between two places of the index."""
+from .text_dialect import (
+    BYTES,
+    NUMBER_TEXT,
+    SAMPLE_LINES,
+    Dialect,
+    byte_order_mark,
+    dialect_of,
+    head_of,
+    header_words,
+    split_cells,
+)
+from .text_lines import LONGEST_ROW, Lines, index_lines
 
 _HEAD = 2**18  # byte, looked at to find header and separators
-_LONGEST_LINE = 2**16  # byte
-_LONGEST_ROW = 2**23  # byte, where a line is a record
-_FEWEST_ROWS = 3  # that are looked at, header or not
-_SAMPLE = 64  # lines of numbers that must agree on the layout
-_MOST_HEADER = 200  # lines
-_PIECE = 2**22  # byte, read at once
 
-_NUMBER = re.compile(
-    r"\s*[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?\s*"
-    r"|\s*[-+]?(?:nan|inf|infinity)\s*",
-    re.IGNORECASE,
-)
-_COMMA_NUMBER = re.compile(
-    r"\s*[-+]?(?:[0-9]+(?:,[0-9]+)?|,[0-9]+)(?:[eE][-+]?[0-9]+)?\s*"
-    r"|\s*[-+]?(?:nan|inf|infinity)\s*",
-    re.IGNORECASE,
-)
-_DELIMITERS = {
-    "comma": ",",
-    "semicolon": ";",
-    "tab": "\t",
-    "\\t": "\t",
-    "pipe": "|",
-    "space": " ",
-    "whitespace": " ",
-}
+_FEWEST_ROWS = 3  # that are looked at, header or not
+
 _TIME_NAME = re.compile(r"(?:time|t|zeit|timestamp)(?:_(s|ms|us))?", re.IGNORECASE)
 _UNIT_BEHIND = re.compile(r"(.*?)\s*(?:\[([^\[\]]*)\]|\(([^()]*)\))\s*")
-
-
-@dataclass(frozen=True, kw_only=True)
-class Dialect:
-    """How a line is cut into numbers.
-
-    Attributes
-    ----------
-    delimiter : str
-        One character; a space stands for any run of blanks.
-    decimal : str
-        ``.`` or ``,``.
-    n_columns : int
-        Cells of every line.
-    numeric : tuple of int
-        Columns that hold numbers.
-    first : int
-        Index of the first line of numbers.
-    """
-
-    delimiter: str
-    decimal: str
-    n_columns: int
-    numeric: tuple[int, ...]
-    first: int
-
-
-@dataclass(frozen=True, kw_only=True)
-class Lines:
-    """Places of every :data:`BLOCK`-th line of numbers in a file.
-
-    Attributes
-    ----------
-    path : Path
-        The file.
-    places : numpy.ndarray
-        Of line 0, BLOCK, … and of the end [byte].
-    count : int
-        Lines.
-    before : int
-        Lines of the file that precede, for messages.
-    block : int
-        Lines between two places.
-    """
-
-    path: Path
-    places: NDArray[np.int64]
-    count: int
-    before: int
-    block: int = BLOCK
-
-    def read(self, start: int, stop: int) -> list[bytes]:
-        """Lines [start, stop), fewer where the file has shrunk."""
-        first = start // self.block
-        last = min(-(-stop // self.block), len(self.places) - 1)
-        with self.path.open("rb") as handle:
-            handle.seek(int(self.places[first]))
-            raw = handle.read(int(self.places[last] - self.places[first]))
-        return raw.split(b"\n")[start - first * self.block : stop - first * self.block]
-
-
-def index_lines(
-    path: Path, begin: int, before: int, end: int | None = None, *, records: bool = False
-) -> Lines:
-    """Index the lines of a file from a place on; blank ones at its end are left out.
-
-    Where lines are `records` they are long, and each has its place.
-
-    Raises
-    ------
-    DataError
-        A line is longer than any table's.
-    """
-    stop = _end_of_text(path, begin) if end is None else end
-    block, longest = (1, _LONGEST_ROW) if records else (BLOCK, _LONGEST_LINE)
-    places, count, place, last = [begin], 0, begin, begin
-    with path.open("rb") as handle:
-        handle.seek(begin)
-        while place < stop:
-            raw = handle.read(min(_PIECE, stop - place))
-            if not raw:
-                break
-            ends = place + 1 + np.flatnonzero(np.frombuffer(raw, dtype=np.uint8) == 10)
-            lengths = np.diff(np.concatenate([[last], ends, [place + len(raw)]]))
-            _refuse_long(path, before + count, lengths, longest)
-            # line k begins where line k - 1 ends
-            skip = -(count + 1) % block
-            places.extend(ends[skip::block].tolist())
-            count += len(ends)
-            last = int(ends[-1]) if len(ends) else last
-            place += len(raw)
-    if last < stop:
-        count += 1  # the last line has no end
-    if places[-1] == stop and len(places) > 1:
-        places.pop()
-    return Lines(
-        path=path, places=np.array([*places, stop]), count=count, before=before, block=block
-    )
-
-
-def _refuse_long(path: Path, number: int, lengths: NDArray[np.int64], longest: int) -> None:
-    if lengths.max(initial=0) > longest:
-        raise DataError(
-            f"{path}: a line behind line {number} has more than {longest} byte, the longest "
-            "believed; is it text with line feeds, or are its rows records (rows)?"
-        )
-
-
-def _end_of_text(path: Path, begin: int) -> int:
-    """Behind the last line that is neither blank nor a comment."""
-    end = _end_of_ink(path, begin, path.stat().st_size)
-    for _ in range(_MOST_HEADER):
-        start = _start_of_comment(path, begin, end)
-        if start is None:
-            break
-        end = _end_of_ink(path, begin, start)
-    return end
-
-
-_COMMENTS = (b"#", b"%")
-
-
-def _start_of_comment(path: Path, begin: int, end: int) -> int | None:
-    """Place of the last line where it is a comment and not the only one."""
-    with path.open("rb") as handle:
-        place = max(begin, end - _LONGEST_LINE)
-        handle.seek(place)
-        rest, feed, line = handle.read(end - place).rpartition(b"\n")
-    comment = feed and line.lstrip(b" \t").startswith(_COMMENTS)
-    return place + len(rest) + 1 if comment else None
-
-
-def _end_of_ink(path: Path, begin: int, end: int) -> int:
-    """Behind the last line before an end that is not blank."""
-    with path.open("rb") as handle:
-        while end > begin:
-            size = min(_PIECE, end - begin)
-            handle.seek(end - size)
-            kept = len(handle.read(size).rstrip(b" \t\r\n\x1a"))
-            if kept:
-                return end - size + kept
-            end -= size
-    return begin
 
 
 def text_contents(path: Path, options: SourceOptions) -> Contents:
@@ -221,15 +55,15 @@ def text_contents(path: Path, options: SourceOptions) -> Contents:
         no number, or times that are not even.
     """
     records = options.rows is not None
-    head = _head(path, _LONGEST_ROW if records else _HEAD)
+    head = head_of(path, LONGEST_ROW if records else _HEAD)
     lines = head.split("\n")
     if records:  # long ones: a few tell the layout
         fits = np.cumsum([len(line) for line in lines]) <= _HEAD
         lines = lines[: max(_FEWEST_ROWS, int(np.count_nonzero(fits)))]
-    dialect = _dialect(path, lines, options)
+    dialect = dialect_of(path, lines, options)
     columns = _columns(path, lines, dialect, options)
-    begin = len("\n".join(lines[: dialect.first]).encode(_BYTES)) + (dialect.first > 0)
-    begin += _bom(path)
+    begin = len("\n".join(lines[: dialect.first]).encode(BYTES)) + (dialect.first > 0)
+    begin += byte_order_mark(path)
     index = index_lines(path, begin, dialect.first, records=records)
     table = TextTable(lines=index, dialect=dialect)
     if records:
@@ -261,7 +95,7 @@ def text_contents(path: Path, options: SourceOptions) -> Contents:
 
 def _unread(table: "TextTable", columns: Sequence["_Column"], time: int | None) -> dict[str, str]:
     """Columns whose last cells are numbers in a notation that is not read, and what to do."""
-    first = max(0, table.lines.count - _SAMPLE)
+    first = max(0, table.lines.count - SAMPLE_LINES)
     found = {}
     for index, column in enumerate(columns):
         if index in table.dialect.numeric or index == time:
@@ -302,269 +136,6 @@ def _line_records(path: Path, table: "TextTable", options: SourceOptions) -> Con
     return Contents(parts=(part,))
 
 
-# --- the head
-
-
-_BYTES = "latin-1"  # every byte is a character: nothing is lost, nothing fails
-
-
-_BOMS = re.compile("(?:\xef\xbb\xbf){0,8}")  # some programs put another one before it
-
-
-def _bom(path: Path) -> int:
-    with path.open("rb") as handle:
-        return _boms(handle.read(24).decode(_BYTES))
-
-
-def _boms(text: str) -> int:
-    """Byte of the marks that a text begins with."""
-    match = _BOMS.match(text)
-    return match.end() if match else 0
-
-
-def _head(path: Path, size: int) -> str:
-    """First lines, one character a byte; the last one is whole or left out."""
-    with path.open("rb") as handle:
-        raw = handle.read(size)
-        whole = not handle.read(1)
-    if raw[:2] in (b"\xff\xfe", b"\xfe\xff"):
-        code = "UTF-32" if raw[2:4] == b"\0\0" else "UTF-16"
-        raise DataError(f"{path} is {code}, must be UTF-8 or ASCII; save it as CSV UTF-8")
-    if re.search(rb"\r[^\n]", raw):
-        raise DataError(
-            f"{path} ends lines by CR alone, must be LF or CR LF; save it with other line ends"
-        )
-    if b"\0" in raw or _looks_binary(raw):
-        raise foreign(path, "text")
-    text = raw.decode(_BYTES)
-    text = text[_boms(text) :]
-    if not whole:
-        text = text.rpartition("\n")[0]
-    if not text.strip():
-        raise DataError(f"{path} has no line that ends within {size} byte, must have; check it")
-    return _without_comments(text)
-
-
-def _without_comments(text: str) -> str:
-    """Lines up to the last one that is neither blank nor a comment."""
-    for _ in range(_MOST_HEADER):
-        text = text.rstrip(" \t\r\n\x1a")
-        above, feed, line = text.rpartition("\n")
-        if not feed or not line.encode(_BYTES).lstrip(b" \t").startswith(_COMMENTS):
-            break
-        text = above
-    return text
-
-
-def _looks_binary(raw: bytes) -> bool:
-    controls = sum(raw[:4096].count(code) for code in range(32) if code not in (9, 10, 13, 26, 12))
-    return controls > 0
-
-
-def _words(text: str) -> str:
-    """A header in the encoding it is in: UTF-8, else that of old Windows programs."""
-    raw = text.encode(_BYTES)
-    try:
-        return raw.decode("utf-8")
-    except UnicodeDecodeError:
-        return raw.decode("cp1252", errors="replace")
-
-
-def split_cells(line: str, delimiter: str) -> list[str]:
-    """Cells of a line, without quotation marks."""
-    line = line.rstrip("\r")
-    cells = line.split() if delimiter == " " else line.split(delimiter)
-    if '"' in line and delimiter != " ":
-        cells = _quoted(line, delimiter)
-    return [cell.strip().strip('"') for cell in cells]
-
-
-def _quoted(line: str, delimiter: str) -> list[str]:
-    """Cells of a line whose quotation marks may hold the delimiter."""
-    try:
-        return next(csv.reader([line], delimiter=delimiter, skipinitialspace=True), [])
-    except csv.Error:  # a cell longer than any name
-        return line.split(delimiter)
-
-
-def _dialect(path: Path, lines: list[str], options: SourceOptions) -> Dialect:
-    found, broken = [], []
-    for delimiter in _delimiters(path, lines, options):
-        for decimal in (options.decimal,) if options.decimal else (".", ","):
-            try:
-                dialect = _tried(path, lines, delimiter, decimal, options)
-            except DataError as error:  # of this reading; another may fit
-                broken.append(error)
-                continue
-            if decimal != delimiter and dialect is not None:
-                found.append(dialect)
-    if not found and broken:
-        raise broken[0]
-    clean = [d for d in found if len(d.numeric) == d.n_columns] or found
-    clean = [d for d in clean if _may_be(lines, d, options)]
-    top = min((d.first for d in clean), default=0)
-    clean = _distinct(lines, [d for d in clean if d.first == top])
-    if len(clean) > 1:
-        clean = [d for d in clean if _fits_header(lines, d)] or clean
-    if not clean:
-        raise DataError(
-            f"{path} has no columns of numbers that all of its lines share; give delimiter, "
-            "decimal and header, or mend it"
-        )
-    if len(clean) > 1:
-        ways = " or ".join(
-            f"{d.n_columns} column(s) by {d.delimiter!r} with decimal {d.decimal!r}" for d in clean
-        )
-        raise DataError(f"{path} can be read as {ways}; give delimiter or decimal")
-    _refuse_broken(path, lines, clean[0], options)
-    _refuse_numbered(path, lines, clean[0], options)
-    return clean[0]
-
-
-def _may_be(lines: list[str], dialect: Dialect, options: SourceOptions) -> bool:
-    """One column with decimal commas may as well be two, unless a header of one name is there."""
-    if options.decimal is not None or dialect.decimal == "." or dialect.n_columns > 1:
-        return True
-    comma = any("," in line for line in lines[dialect.first :])
-    return not comma or (_fits_header(lines, dialect) or _all_pairs(lines[dialect.first :]))
-
-
-def _all_pairs(lines: list[str]) -> bool:
-    """Every line can be read both ways: the error that follows names them."""
-    return all(line.count(",") == 1 for line in lines)
-
-
-def _distinct(lines: list[str], dialects: Sequence[Dialect]) -> list[Dialect]:
-    """Readings of which no two give the same numbers."""
-    found: dict[str, Dialect] = {}
-    for d in dialects:
-        cells = [split_cells(line, d.delimiter) for line in lines[d.first :][-_SAMPLE:]]
-        numbers = str([[_plain(row[c], d.decimal) for c in d.numeric] for row in cells])
-        found.setdefault(numbers, d)
-    return list(found.values())
-
-
-def _plain(cell: str, decimal: str) -> float:
-    return float(cell.replace(",", ".") if decimal == "," else cell)
-
-
-def _fits_header(lines: list[str], dialect: Dialect) -> bool:
-    """Whether the line above the numbers has a name for every column, and none left over."""
-    above = next((line for line in reversed(lines[: dialect.first]) if line.strip()), "")
-    # a comma between names says what commas are for
-    clear = not (dialect.decimal == "," and dialect.delimiter == " " and "," in above)
-    return clear and len(split_cells(above, dialect.delimiter)) == dialect.n_columns
-
-
-def _refuse_broken(path: Path, lines: list[str], dialect: Dialect, options: SourceOptions) -> None:
-    """A line of numbers that is broken must not pass as the end of the header."""
-    if options.header is not None:
-        return
-    for number, line in enumerate(lines[: dialect.first], start=1):
-        if line.lstrip().startswith(("#", "%")):
-            continue
-        cells = [cell for cell in split_cells(line, dialect.delimiter) if cell]
-        count = sum(_is_number(cell, dialect.decimal) for cell in cells)
-        if count and 2 * count >= len(cells):
-            raise DataError(
-                f"{path}: line {number} holds numbers but reads unlike those below line "
-                f"{dialect.first}; mend it, or give header, the lines before the numbers"
-            )
-    for number, line in enumerate(lines[dialect.first :], start=dialect.first + 1):
-        cells = split_cells(line, dialect.delimiter)
-        for column, cell in enumerate(cells):
-            if column not in dialect.numeric and _is_number(cell, dialect.decimal):
-                raise DataError(
-                    f"{path}: column {column + 1} is {cell!r} in line {number} and no number in "
-                    f"line {len(lines)}, must be one kind; mend it"
-                )
-
-
-def _refuse_numbered(
-    path: Path, lines: list[str], dialect: Dialect, options: SourceOptions
-) -> None:
-    """A first line that counts the columns may name them, or be the first sample."""
-    if options.header is not None or options.rows or dialect.first or dialect.n_columns < 2:
-        return
-    cells = [split_cells(line, dialect.delimiter) for line in lines[:_SAMPLE]]
-    counted = [[str(i + k) for i in range(dialect.n_columns)] for k in (0, 1)]
-    if cells[0] not in counted or len(cells) < 4:
-        return
-    if all(re.fullmatch(r"[-+]?\d+", cell) for cell in cells[1]):
-        return  # whole numbers like those below
-    steps = np.diff([_plain(row[0], dialect.decimal) for row in cells[:4]])
-    if steps[0] > 0 and np.allclose(steps, steps[0], rtol=1e-3):
-        return  # times that go on from the first line
-    told = dialect.delimiter.join(cells[0])[:40]
-    raise DataError(
-        f"{path}: line 1, {told!r}, may name the columns by number or be a sample; give header, "
-        "the lines before the numbers: 1 or 0"
-    )
-
-
-def _delimiters(path: Path, lines: list[str], options: SourceOptions) -> Sequence[str]:
-    if options.delimiter is not None:
-        delimiter = _DELIMITERS.get(options.delimiter, options.delimiter)
-        if len(delimiter) != 1 or delimiter in '"\n\r.+-0123456789eE':
-            raise DataError(
-                f"{path}: delimiter = {options.delimiter!r} must be one character or one of "
-                f"{', '.join(_DELIMITERS)}; correct it"
-            )
-        return (delimiter,)
-    tail = "\n".join(lines[-_SAMPLE:])
-    # blanks separate only where nothing clearer does
-    return [d for d in (";", "\t", "|", ",") if d in tail] + [" "] * (
-        not any(d in tail for d in ";\t|")
-    )
-
-
-def _is_number(cell: str, decimal: str) -> bool:
-    return (_NUMBER if decimal == "." else _COMMA_NUMBER).fullmatch(cell) is not None
-
-
-def _tried(
-    path: Path, lines: list[str], delimiter: str, decimal: str, options: SourceOptions
-) -> Dialect | None:
-    """One reading, where the last lines of the head share it."""
-    begin = 0 if options.header is None else options.header
-    if begin >= len(lines):
-        raise DataError(
-            f"{path}: header = {begin} lines must be < {len(lines)}, its lines; correct it"
-        )
-    tail = [split_cells(line, delimiter) for line in lines[max(begin, len(lines) - _SAMPLE) :]]
-    width = len(tail[-1])
-    same = [cells for cells in tail if len(cells) == width]
-    flags = np.array([[_is_number(cell, decimal) for cell in cells] for cells in same])
-    # words may be a header that is still within the sample; the last line decides
-    numeric = tuple(np.flatnonzero(flags[-1]).tolist())
-    if not numeric:
-        return None
-    first = begin
-    if options.header is None:
-        first = _first_line(path, lines, delimiter, decimal, width, numeric)
-    return Dialect(
-        delimiter=delimiter, decimal=decimal, n_columns=width, numeric=numeric, first=first
-    )
-
-
-def _first_line(
-    path: Path, lines: list[str], delimiter: str, decimal: str, width: int, numeric: Sequence[int]
-) -> int:
-    """Index of the first line of numbers, upwards from the last one of the head."""
-    first = len(lines)
-    while first > 0:
-        cells = split_cells(lines[first - 1], delimiter)
-        if len(cells) != width or not all(_is_number(cells[c], decimal) for c in numeric):
-            break
-        first -= 1
-    if first > _MOST_HEADER:
-        raise DataError(
-            f"{path}: line {first} does not read like those below it, and {first} lines are no "
-            f"header, must be <= {_MOST_HEADER}; mend the line, or give header"
-        )
-    return first
-
-
 # --- names and units
 
 
@@ -584,7 +155,7 @@ def _columns(
     alone = dialect.n_columns == 1  # then a blank belongs to the name
     rows = [
         [
-            plain_cell(_words(cell).strip())
+            plain_cell(header_words(cell).strip())
             for cell in split_cells(lines[i].lstrip("#%"), "\n" if alone else dialect.delimiter)
         ]
         for i in above[-2:]
@@ -681,7 +252,7 @@ def _rate(
     column = columns[time]
     if time not in table.dialect.numeric:
         return *_stamped_rate(path, table, column, time, options), ""
-    tail = table.cells(max(0, table.lines.count - _SAMPLE), table.lines.count, time)
+    tail = table.cells(max(0, table.lines.count - SAMPLE_LINES), table.lines.count, time)
     clock = even_rate(
         path,
         column.name,
@@ -739,7 +310,7 @@ def _stamped_rate(
         column.name,
         stamp_seconds(cells, refuse, month_first),
         count,
-        stamp_resolution(cells(max(0, count - _SAMPLE), count)),
+        stamp_resolution(cells(max(0, count - SAMPLE_LINES), count)),
         place=partial(_place, table, time),
     )
     return 1.0 / clock.step, clock.doubt
@@ -785,7 +356,7 @@ class TextTable:
         """
         rows = self.lines.read(start, stop)
         decimal_comma = self.dialect.decimal == ","
-        text = [(row.replace(b",", b".") if decimal_comma else row).decode(_BYTES) for row in rows]
+        text = [(row.replace(b",", b".") if decimal_comma else row).decode(BYTES) for row in rows]
         try:
             _refuse_widths(text, self.dialect)
             numbers = np.loadtxt(
@@ -810,7 +381,7 @@ class TextTable:
         DataError
             A line has another number of cells.
         """
-        text = [row.decode(_BYTES) for row in self.lines.read(start, stop)]
+        text = [row.decode(BYTES) for row in self.lines.read(start, stop)]
         rows = [split_cells(line, self.dialect.delimiter) for line in text]
         if len(rows) != stop - start or any(len(row) != self.dialect.n_columns for row in rows):
             raise self._fault(text, start, ())
@@ -825,7 +396,7 @@ class TextTable:
                     f"{path}: line {number} has {len(cells)} cell(s), must have {width}; mend it"
                 )
             for column in columns:
-                if not _NUMBER.fullmatch(cells[column]):
+                if not NUMBER_TEXT.fullmatch(cells[column]):
                     return DataError(
                         f"{path}: column {column + 1} of line {number} is {cells[column][:40]!r}, "
                         "must be a number; mend it"

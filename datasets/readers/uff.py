@@ -19,7 +19,7 @@ from ...sim.output.recording import DataError
 from ..source.part import Contents, FilePart, PartChannel, SourceOptions, cut, foreign
 from ..source.time_column import even_rate, printed_resolution
 from .flat import Flat
-from .text import Lines, index_lines
+from .text_lines import Lines, index_lines
 
 _MARK = b"    -1"
 _LONGEST_LINE = 1024  # byte; 80 by the standard

@@ -1,0 +1,321 @@
+"""How a text of columns is written: encoding, header, delimiter, decimal comma."""
+
+import csv
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ...sim.output.recording import DataError
+from ..source.part import SourceOptions, foreign
+from .text_lines import COMMENT_MARKS, MOST_HEADER
+
+SAMPLE_LINES = 64  # lines of numbers that must agree on the layout
+
+NUMBER_TEXT = re.compile(
+    r"\s*[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?\s*"
+    r"|\s*[-+]?(?:nan|inf|infinity)\s*",
+    re.IGNORECASE,
+)
+_COMMA_NUMBER = re.compile(
+    r"\s*[-+]?(?:[0-9]+(?:,[0-9]+)?|,[0-9]+)(?:[eE][-+]?[0-9]+)?\s*"
+    r"|\s*[-+]?(?:nan|inf|infinity)\s*",
+    re.IGNORECASE,
+)
+_DELIMITERS = {
+    "comma": ",",
+    "semicolon": ";",
+    "tab": "\t",
+    "\\t": "\t",
+    "pipe": "|",
+    "space": " ",
+    "whitespace": " ",
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Dialect:
+    """How a line is cut into numbers.
+
+    Attributes
+    ----------
+    delimiter : str
+        One character; a space stands for any run of blanks.
+    decimal : str
+        ``.`` or ``,``.
+    n_columns : int
+        Cells of every line.
+    numeric : tuple of int
+        Columns that hold numbers.
+    first : int
+        Index of the first line of numbers.
+    """
+
+    delimiter: str
+    decimal: str
+    n_columns: int
+    numeric: tuple[int, ...]
+    first: int
+
+
+BYTES = "latin-1"  # every byte is a character: nothing is lost, nothing fails
+
+_BOMS = re.compile("(?:\xef\xbb\xbf){0,8}")  # some programs put another one before it
+
+
+def byte_order_mark(path: Path) -> int:
+    """Bytes of the mark of an encoding at the beginning of a file."""
+    with path.open("rb") as handle:
+        return _boms(handle.read(24).decode(BYTES))
+
+
+def _boms(text: str) -> int:
+    """Byte of the marks that a text begins with."""
+    match = _BOMS.match(text)
+    return match.end() if match else 0
+
+
+def head_of(path: Path, size: int) -> str:
+    """First lines, one character a byte; the last one is whole or left out."""
+    with path.open("rb") as handle:
+        raw = handle.read(size)
+        whole = not handle.read(1)
+    if raw[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        code = "UTF-32" if raw[2:4] == b"\0\0" else "UTF-16"
+        raise DataError(f"{path} is {code}, must be UTF-8 or ASCII; save it as CSV UTF-8")
+    if re.search(rb"\r[^\n]", raw):
+        raise DataError(
+            f"{path} ends lines by CR alone, must be LF or CR LF; save it with other line ends"
+        )
+    if b"\0" in raw or _looks_binary(raw):
+        raise foreign(path, "text")
+    text = raw.decode(BYTES)
+    text = text[_boms(text) :]
+    if not whole:
+        text = text.rpartition("\n")[0]
+    if not text.strip():
+        raise DataError(f"{path} has no line that ends within {size} byte, must have; check it")
+    return _without_comments(text)
+
+
+def _without_comments(text: str) -> str:
+    """Lines up to the last one that is neither blank nor a comment."""
+    for _ in range(MOST_HEADER):
+        text = text.rstrip(" \t\r\n\x1a")
+        above, feed, line = text.rpartition("\n")
+        if not feed or not line.encode(BYTES).lstrip(b" \t").startswith(COMMENT_MARKS):
+            break
+        text = above
+    return text
+
+
+def _looks_binary(raw: bytes) -> bool:
+    controls = sum(raw[:4096].count(code) for code in range(32) if code not in (9, 10, 13, 26, 12))
+    return controls > 0
+
+
+def header_words(text: str) -> str:
+    """A header in the encoding it is in: UTF-8, else that of old Windows programs."""
+    raw = text.encode(BYTES)
+    try:
+        return raw.decode("utf-8")
+    except UnicodeDecodeError:
+        return raw.decode("cp1252", errors="replace")
+
+
+def split_cells(line: str, delimiter: str) -> list[str]:
+    """Cells of a line, without quotation marks."""
+    line = line.rstrip("\r")
+    cells = line.split() if delimiter == " " else line.split(delimiter)
+    if '"' in line and delimiter != " ":
+        cells = _quoted(line, delimiter)
+    return [cell.strip().strip('"') for cell in cells]
+
+
+def _quoted(line: str, delimiter: str) -> list[str]:
+    """Cells of a line whose quotation marks may hold the delimiter."""
+    try:
+        return next(csv.reader([line], delimiter=delimiter, skipinitialspace=True), [])
+    except csv.Error:  # a cell longer than any name
+        return line.split(delimiter)
+
+
+def dialect_of(path: Path, lines: list[str], options: SourceOptions) -> Dialect:
+    """Delimiter, decimal mark and first row of a text, or why these cannot be told."""
+    found, broken = [], []
+    for delimiter in _delimiters(path, lines, options):
+        for decimal in (options.decimal,) if options.decimal else (".", ","):
+            try:
+                dialect = _tried(path, lines, delimiter, decimal, options)
+            except DataError as error:  # of this reading; another may fit
+                broken.append(error)
+                continue
+            if decimal != delimiter and dialect is not None:
+                found.append(dialect)
+    if not found and broken:
+        raise broken[0]
+    clean = [d for d in found if len(d.numeric) == d.n_columns] or found
+    clean = [d for d in clean if _may_be(lines, d, options)]
+    top = min((d.first for d in clean), default=0)
+    clean = _distinct(lines, [d for d in clean if d.first == top])
+    if len(clean) > 1:
+        clean = [d for d in clean if _fits_header(lines, d)] or clean
+    if not clean:
+        raise DataError(
+            f"{path} has no columns of numbers that all of its lines share; give delimiter, "
+            "decimal and header, or mend it"
+        )
+    if len(clean) > 1:
+        ways = " or ".join(
+            f"{d.n_columns} column(s) by {d.delimiter!r} with decimal {d.decimal!r}" for d in clean
+        )
+        raise DataError(f"{path} can be read as {ways}; give delimiter or decimal")
+    _refuse_broken(path, lines, clean[0], options)
+    _refuse_numbered(path, lines, clean[0], options)
+    return clean[0]
+
+
+def _may_be(lines: list[str], dialect: Dialect, options: SourceOptions) -> bool:
+    """One column with decimal commas may as well be two, unless a header of one name is there."""
+    if options.decimal is not None or dialect.decimal == "." or dialect.n_columns > 1:
+        return True
+    comma = any("," in line for line in lines[dialect.first :])
+    return not comma or (_fits_header(lines, dialect) or _all_pairs(lines[dialect.first :]))
+
+
+def _all_pairs(lines: list[str]) -> bool:
+    """Every line can be read both ways: the error that follows names them."""
+    return all(line.count(",") == 1 for line in lines)
+
+
+def _distinct(lines: list[str], dialects: Sequence[Dialect]) -> list[Dialect]:
+    """Readings of which no two give the same numbers."""
+    found: dict[str, Dialect] = {}
+    for d in dialects:
+        cells = [split_cells(line, d.delimiter) for line in lines[d.first :][-SAMPLE_LINES:]]
+        numbers = str([[_plain(row[c], d.decimal) for c in d.numeric] for row in cells])
+        found.setdefault(numbers, d)
+    return list(found.values())
+
+
+def _plain(cell: str, decimal: str) -> float:
+    return float(cell.replace(",", ".") if decimal == "," else cell)
+
+
+def _fits_header(lines: list[str], dialect: Dialect) -> bool:
+    """Whether the line above the numbers has a name for every column, and none left over."""
+    above = next((line for line in reversed(lines[: dialect.first]) if line.strip()), "")
+    # a comma between names says what commas are for
+    clear = not (dialect.decimal == "," and dialect.delimiter == " " and "," in above)
+    return clear and len(split_cells(above, dialect.delimiter)) == dialect.n_columns
+
+
+def _refuse_broken(path: Path, lines: list[str], dialect: Dialect, options: SourceOptions) -> None:
+    """A line of numbers that is broken must not pass as the end of the header."""
+    if options.header is not None:
+        return
+    for number, line in enumerate(lines[: dialect.first], start=1):
+        if line.lstrip().startswith(("#", "%")):
+            continue
+        cells = [cell for cell in split_cells(line, dialect.delimiter) if cell]
+        count = sum(_is_number(cell, dialect.decimal) for cell in cells)
+        if count and 2 * count >= len(cells):
+            raise DataError(
+                f"{path}: line {number} holds numbers but reads unlike those below line "
+                f"{dialect.first}; mend it, or give header, the lines before the numbers"
+            )
+    for number, line in enumerate(lines[dialect.first :], start=dialect.first + 1):
+        cells = split_cells(line, dialect.delimiter)
+        for column, cell in enumerate(cells):
+            if column not in dialect.numeric and _is_number(cell, dialect.decimal):
+                raise DataError(
+                    f"{path}: column {column + 1} is {cell!r} in line {number} and no number in "
+                    f"line {len(lines)}, must be one kind; mend it"
+                )
+
+
+def _refuse_numbered(
+    path: Path, lines: list[str], dialect: Dialect, options: SourceOptions
+) -> None:
+    """A first line that counts the columns may name them, or be the first sample."""
+    if options.header is not None or options.rows or dialect.first or dialect.n_columns < 2:
+        return
+    cells = [split_cells(line, dialect.delimiter) for line in lines[:SAMPLE_LINES]]
+    counted = [[str(i + k) for i in range(dialect.n_columns)] for k in (0, 1)]
+    if cells[0] not in counted or len(cells) < 4:
+        return
+    if all(re.fullmatch(r"[-+]?\d+", cell) for cell in cells[1]):
+        return  # whole numbers like those below
+    steps = np.diff([_plain(row[0], dialect.decimal) for row in cells[:4]])
+    if steps[0] > 0 and np.allclose(steps, steps[0], rtol=1e-3):
+        return  # times that go on from the first line
+    told = dialect.delimiter.join(cells[0])[:40]
+    raise DataError(
+        f"{path}: line 1, {told!r}, may name the columns by number or be a sample; give header, "
+        "the lines before the numbers: 1 or 0"
+    )
+
+
+def _delimiters(path: Path, lines: list[str], options: SourceOptions) -> Sequence[str]:
+    if options.delimiter is not None:
+        delimiter = _DELIMITERS.get(options.delimiter, options.delimiter)
+        if len(delimiter) != 1 or delimiter in '"\n\r.+-0123456789eE':
+            raise DataError(
+                f"{path}: delimiter = {options.delimiter!r} must be one character or one of "
+                f"{', '.join(_DELIMITERS)}; correct it"
+            )
+        return (delimiter,)
+    tail = "\n".join(lines[-SAMPLE_LINES:])
+    # blanks separate only where nothing clearer does
+    return [d for d in (";", "\t", "|", ",") if d in tail] + [" "] * (
+        not any(d in tail for d in ";\t|")
+    )
+
+
+def _is_number(cell: str, decimal: str) -> bool:
+    return (NUMBER_TEXT if decimal == "." else _COMMA_NUMBER).fullmatch(cell) is not None
+
+
+def _tried(
+    path: Path, lines: list[str], delimiter: str, decimal: str, options: SourceOptions
+) -> Dialect | None:
+    """One reading, where the last lines of the head share it."""
+    begin = 0 if options.header is None else options.header
+    if begin >= len(lines):
+        raise DataError(
+            f"{path}: header = {begin} lines must be < {len(lines)}, its lines; correct it"
+        )
+    tail = [split_cells(line, delimiter) for line in lines[max(begin, len(lines) - SAMPLE_LINES) :]]
+    width = len(tail[-1])
+    same = [cells for cells in tail if len(cells) == width]
+    flags = np.array([[_is_number(cell, decimal) for cell in cells] for cells in same])
+    # words may be a header that is still within the sample; the last line decides
+    numeric = tuple(np.flatnonzero(flags[-1]).tolist())
+    if not numeric:
+        return None
+    first = begin
+    if options.header is None:
+        first = _first_line(path, lines, delimiter, decimal, width, numeric)
+    return Dialect(
+        delimiter=delimiter, decimal=decimal, n_columns=width, numeric=numeric, first=first
+    )
+
+
+def _first_line(
+    path: Path, lines: list[str], delimiter: str, decimal: str, width: int, numeric: Sequence[int]
+) -> int:
+    """Index of the first line of numbers, upwards from the last one of the head."""
+    first = len(lines)
+    while first > 0:
+        cells = split_cells(lines[first - 1], delimiter)
+        if len(cells) != width or not all(_is_number(cells[c], decimal) for c in numeric):
+            break
+        first -= 1
+    if first > MOST_HEADER:
+        raise DataError(
+            f"{path}: line {first} does not read like those below it, and {first} lines are no "
+            f"header, must be <= {MOST_HEADER}; mend the line, or give header"
+        )
+    return first
