@@ -25,7 +25,7 @@ from wearstate.datasets.file.record import (
     DataSetWriter,
 )
 from wearstate.datasets.generation.generate import generate
-from wearstate.datasets.measured.labels import RESERVED
+from wearstate.datasets.measured.label_columns import RESERVED
 from wearstate.datasets.recipe.load import load_recipe
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.feature_rows.feature_table import recording_features

@@ -13,7 +13,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.io import savemat, wavfile
 from wearstate.datasets.file.record import DataSet
 from wearstate.datasets.measured import data_set as import_set
-from wearstate.datasets.measured import labels
+from wearstate.datasets.measured import label_table
 from wearstate.datasets.measured import plan as import_plan
 from wearstate.datasets.measured.data_set import NO_PULSES, import_recordings
 from wearstate.datasets.measured.labels import read_labels, read_limits
@@ -435,7 +435,7 @@ def test_labels_of_other_kinds_at_fault(tmp_path, monkeypatch):
     (tmp_path / "latin.csv").write_bytes("file,a\nx,\xb5\n".encode("latin-1"))
     with pytest.raises(DataError, match="is not UTF-8 at byte 9"):
         read_labels(tmp_path / "latin.csv")
-    monkeypatch.setattr(labels, "LARGEST_TABLE", 10)
+    monkeypatch.setattr(label_table, "LARGEST_TABLE", 10)
     with pytest.raises(DataError, match="has 11 byte, must be <= 10"):
         read_labels(tmp_path / "l.csv")
 

@@ -16,16 +16,15 @@ from wearstate.datasets.measured.labels import read_labels
 from wearstate.datasets.readers.open import SourceOptions, open_source
 from wearstate.datasets.split.rules import group_folds
 from wearstate.diagnose.class_model.file import load_class_model, save_class_model
+from wearstate.diagnose.class_model.text import namings_summary
 from wearstate.diagnose.class_model.train import (
-    Votes,
     _clouds,
     _left_out_distances,
     _nearest_distance,
     evaluate_classes,
-    namings_summary,
-    set_of,
     train_classes,
 )
+from wearstate.diagnose.class_model.votes import Votes, set_of
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.feature_rows.blows import NOISE_SCORE, blow_scores
 from wearstate.diagnose.feature_rows.feature_table import feature_table, recording_features

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ...sim.output.recording import DataError, missing_file
 from ..file.hdf5_values import HDF5_FAULTS, is_plain
 from ..file.record import DataSet
-from ..measured.labels import listed
+from ..measured.label_table import listed
 
 Float = NDArray[np.float64]
 Severity = Literal["alarm", "warning", "note"]

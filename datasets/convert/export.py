@@ -25,7 +25,7 @@ from ..file.record import (
     refuse_output,
     stamped,
 )
-from ..measured.labels import GRADE, RESERVED
+from ..measured.label_columns import GRADE, RESERVED
 from ..source.channel_units import known_unit
 
 ABOUT = "export.json"

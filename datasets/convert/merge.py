@@ -18,7 +18,7 @@ from ..file.record import (
     manifest_hash,
     refuse_output,
 )
-from ..measured.labels import listed, refusal
+from ..measured.label_table import listed, refusal
 from ..measured.plan import RATE_TOLERANCE
 
 SOURCE, SOURCE_GROUP, SOURCE_ID = "source", "source_group", "source_record_id"

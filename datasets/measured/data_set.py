@@ -26,7 +26,9 @@ from ..file.record import (
 from ..readers.open import open_records
 from ..source.part import SourceOptions
 from ..workers.local import in_order
-from .labels import ROW, LabelLimits, Labels, refusal
+from .label_columns import ROW
+from .label_table import refusal
+from .labels import LabelLimits, Labels
 from .plan import Header, ImportPlan, plan_records, read_headers, sparing_tacho, worth_workers
 from .recording import read_window
 from .rows import MEAN_SPEED, START, FileRows, GroupBy, file_rows

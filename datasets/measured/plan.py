@@ -15,7 +15,7 @@ from ..readers.flat import numbered
 from ..readers.open import open_source
 from ..source.part import Source, SourceOptions
 from ..workers.local import in_order
-from .labels import listed, refusal
+from .label_table import listed, refusal
 
 RATE_TOLERANCE = 1e-5
 """Relative difference of sample rates that count as one: rates from a printed column of times

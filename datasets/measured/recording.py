@@ -16,7 +16,7 @@ from ..file.record import LARGEST_RECORD, DataSet
 from ..file.views import CompletingView, JoinedSet, joined_recordings
 from ..readers.open import list_sources, open_source
 from ..source.part import Source, SourceOptions
-from .labels import refusal
+from .label_table import refusal
 from .plan import channels_of_source, sparing_tacho
 
 _LOG = logging.getLogger(__name__)

@@ -8,7 +8,9 @@ from typing import Any, Literal
 
 from ...sim.wear.archard import grade
 from ..file.machines import FILE, GROUP_NAME
-from .labels import GRADE, GROUP, ROW, LabelLimits, Labels, Value, refusal
+from .label_columns import GRADE, GROUP, ROW, Value
+from .label_table import refusal
+from .labels import LabelLimits, Labels
 from .plan import Header
 
 GroupBy = Literal["file", "folder", "column"]

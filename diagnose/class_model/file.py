@@ -26,7 +26,8 @@ from ..wear_model.arrays import (
 from ..wear_model.bundle import Bundle, load_parts, refuse_misfits, save_bundle
 from ..wear_model.estimate import ModelError
 from ..wear_model.novelty import Familiarity
-from .train import ClassModel, Votes
+from .train import ClassModel
+from .votes import Votes
 
 CLASS_MODEL = "class model"
 """Word of such a file for its kind."""

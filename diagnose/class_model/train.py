@@ -5,7 +5,6 @@ with a set of those that cannot be excluded, or of none that is known.
 """
 
 import json
-from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
@@ -19,7 +18,7 @@ from ... import __version__
 from ...datasets.file.record import Attributes, DataSet
 from ...datasets.split.rules import check_no_leak, group_folds
 from ...sim.output.recording import DataError, Recording, Table
-from ..feature_rows.blows import NOISE_SCORE, blow_floors, blow_scores, blow_table, lacks_blows
+from ..feature_rows.blows import NOISE_SCORE, blow_scores, blow_table
 from ..feature_rows.feature_choice import choice_card, choice_in
 from ..feature_rows.feature_table import (
     USUAL,
@@ -31,17 +30,15 @@ from ..feature_rows.feature_table import (
 )
 from ..feature_rows.model_card import ClassCard
 from ..feature_rows.quality import layout_faults, sample_faults
-from ..learning.conformal import COVERAGE, record_weights, weighted_quantile
 from ..learning.regressions import CANDIDATES, Blend, Folds, fit_blend
-from ..learning.scores import ScoreFigure, resampled, share
 from ..report.batch import Item, fault_of
-from ..wear_model.estimate import UNFAMILIAR_SHARE, ModelError
+from ..wear_model.estimate import ModelError
 from ..wear_model.novelty import Familiarity, fit_familiarity
+from .votes import FEWEST, Votes, score_votes, set_of
 
 Float = NDArray[np.float64]
 Index = NDArray[np.intp]
 
-_FEWEST = 3  # recordings of a class that is judged: one out, two to learn from
 _MOST_CLASSES = 20
 _MOST_FOLDS = 10  # of whole recordings; each by itself up to so many
 _FEWEST_TO_KNOW = 10  # recordings of the training; with fewer, most strangers pass for known
@@ -81,103 +78,6 @@ class Naming:
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
         return asdict(self)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Votes:
-    """Votes on the training records, of models that their recording had no part in.
-
-    Attributes
-    ----------
-    shares : numpy.ndarray [shape=(n_records, n_classes)]
-        Rows of sum 1.
-    label : numpy.ndarray [shape=(n_records,)]
-        Number of the class that is labelled.
-    group : numpy.ndarray [shape=(n_records,)]
-        Recording, or machine, of each record.
-    distance : numpy.ndarray [shape=(n_records,)]
-        From the nearest of the classes' clouds, those of the other recordings.
-    blows : numpy.ndarray [shape=(n_records, n_channels)]
-        Score of the blows in each channel; without columns where records are too short for it.
-    """
-
-    shares: Float
-    label: Index
-    group: Index
-    distance: Float
-    blows: Float
-
-    @cached_property
-    def groups_of(self) -> tuple[int, ...]:
-        """Recordings of each class."""
-        return tuple(
-            len(np.unique(self.group[self.label == c])) for c in range(self.shares.shape[1])
-        )
-
-    @cached_property
-    def p_limit(self) -> float:
-        """A recording with this p-value or a smaller one is called unfamiliar."""
-        return max(UNFAMILIAR_SHARE, 1 / (len(np.unique(self.group)) + 1))
-
-    def p_value(self, distance: float) -> float:
-        """Conformal p-value of "this recording is of a trained class", recordings as the units.
-
-        Windows of one recording are no cases of their own: together they count as one, by the
-        share of them that lies as far.
-
-        Examples
-        --------
-        >>> label = np.zeros(4, dtype=int)
-        >>> votes = Votes(
-        ...     shares=np.ones((4, 1)),
-        ...     label=label,
-        ...     group=np.array([0, 0, 0, 1]),
-        ...     distance=np.array([1.0, 1.0, 1.0, 3.0]),
-        ...     blows=np.zeros((4, 1)),
-        ... )
-        >>> round(votes.p_value(2.0), 3), round(votes.p_value(4.0), 3)
-        (0.667, 0.333)
-        """
-        groups, place = np.unique(self.group, return_inverse=True)
-        farther = np.bincount(place, weights=self.distance >= distance)
-        return float((1 + (farther / np.bincount(place)).sum()) / (len(groups) + 1))
-
-    @cached_property
-    def coverages(self) -> tuple[float, ...]:
-        """Coverage that the sets promise for each class: less where recordings are few.
-
-        With m recordings of a class no method promises more than ``m / (m + 1)`` and excludes
-        anything; a class of too few to be judged is never excluded.
-        """
-        return tuple(min(COVERAGE, m / (m + 1)) if m >= _FEWEST else 1.0 for m in self.groups_of)
-
-    @cached_property
-    def limits(self) -> Float:
-        """Least share with which each class is kept in a set [shape=(n_classes,)]."""
-        return np.array([self._limit(c) for c in range(self.shares.shape[1])])
-
-    @cached_property
-    def blow_floors(self) -> Float:
-        """Least score of the blows in each class's recordings [shape=(n_classes, n_channels)]."""
-        mine = [self.label == c for c in range(self.shares.shape[1])]
-        return np.stack([blow_floors(self.blows[here], self.group[here]) for here in mine])
-
-    def lacking(self, blows: Float) -> tuple[int, ...]:
-        """Classes whose every recording has blows, where a recording of these scores has none."""
-        return tuple(c for c, floors in enumerate(self.blow_floors) if lacks_blows(blows, floors))
-
-    def strange(self, shares: Float, distance: float, blows: Float) -> bool:
-        """Whether a recording is of none of the classes: too far, or without their blows."""
-        kept = set_of(shares, self.limits)
-        return self.p_value(distance) <= self.p_limit or set(kept) <= set(self.lacking(blows))
-
-    def _limit(self, c: int) -> float:
-        if self.groups_of[c] < _FEWEST:
-            return 0.0
-        mine = self.label == c
-        lack = 1 - self.shares[mine, c]
-        found = weighted_quantile(lack, record_weights(self.group[mine]), self.coverages[c])
-        return max(1 - found, 0.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -227,7 +127,7 @@ class ClassModel:
         few = [
             f"{name}: {count} recording(s), can be neither evaluated nor excluded"
             for name, count in zip(self.classes, self.votes.groups_of, strict=True)
-            if count < _FEWEST
+            if count < FEWEST
         ]
         recordings = len(np.unique(self.votes.group))
         if recordings < _FEWEST_TO_KNOW:
@@ -329,22 +229,6 @@ class ClassModel:
         )
 
 
-def set_of(shares: Float, limits: Float) -> tuple[int, ...]:
-    """Classes that cannot be excluded, the likeliest always among them.
-
-    Parameters
-    ----------
-    shares, limits : numpy.ndarray [shape=(n_classes,)]
-
-    Examples
-    --------
-    >>> set_of(np.array([0.7, 0.2, 0.1]), np.array([0.8, 0.15, 0.15]))
-    (0, 1)
-    """
-    kept = {int(shares.argmax()), *np.flatnonzero(shares >= limits).tolist()}
-    return tuple(sorted(kept))
-
-
 def _shares(values: Float) -> Float:
     """Votes of 1 (no) to 2 (yes) as shares of sum 1; all alike where nobody votes."""
     votes = np.clip(values - 1, 0, 1)
@@ -436,12 +320,12 @@ def _labels_of(manifest: Any, target: str, path: str | Path) -> NDArray[np.str_]
 
 def _class_faults(found: Mapping[str, int], target: str) -> list[str]:
     counts = ", ".join(f"{count} of {name}" for name, count in list(found.items())[:_MOST_CLASSES])
-    enough = sum(count >= _FEWEST for count in found.values())
+    enough = sum(count >= FEWEST for count in found.values())
     if len(found) > _MOST_CLASSES:
         return [f"{target} has {len(found)} values, must have <= {_MOST_CLASSES}; name classes"]
     if enough < 2:
         return [
-            f"{target}: {enough} classes of >= {_FEWEST} recordings ({counts}), must be >= 2; "
+            f"{target}: {enough} classes of >= {FEWEST} recordings ({counts}), must be >= 2; "
             "record more"
         ]
     return []
@@ -513,7 +397,7 @@ def _clouds(
     """Cloud of each class by some rows; by all of them where a class has too few recordings."""
     clouds = []
     for c in np.unique(truth):
-        few = len(np.unique(groups[truth == c])) < _FEWEST
+        few = len(np.unique(groups[truth == c])) < FEWEST
         here = rows if few else rows[truth[rows] == c]
         clouds.append(fit_familiarity(table.names, table.values[here], groups[here]))
     return tuple(clouds)
@@ -608,120 +492,6 @@ def evaluate_classes(
     return score_votes(votes, model.classes, trained=model.votes, seed=seed)
 
 
-def score_votes(
-    votes: Votes,
-    classes: tuple[str, ...],
-    *,
-    trained: Votes | None = None,
-    seed: int = 0,
-) -> dict[str, Any]:
-    """Errors and coverage of votes on unseen recordings.
-
-    Parameters
-    ----------
-    votes : Votes
-    classes : tuple of str
-    trained : Votes, optional
-        Of the training, by which sets and strangers are told; for each recording those of the
-        others unless given.
-    seed : int
-        Of the resamples.
-
-    Returns
-    -------
-    dict
-        Ready for JSON: ``records``, ``recordings``, ``judged`` (classes with enough recordings),
-        ``accuracy``, ``coverage`` of the sets and ``mean_set_size`` over records of the judged
-        classes, ``called_unfamiliar``, the share of them that is refused as of none of the classes,
-        under ``intervals`` their 95 % intervals over recordings; ``recordings_right`` of
-        ``recordings_judged`` by majority of their records with the exact 95 % interval
-        ``recordings_interval``; ``confusion`` (true class by row, of all records),
-        ``nominal_coverage`` by class, ``majority`` (share of the largest class).
-    """
-    enough = np.array(votes.groups_of) >= (_FEWEST if trained is None else 1)
-    judged = enough[votes.label]
-    found = votes.shares.argmax(axis=1)
-    kept, strange = _told(votes, trained)
-    draws = resampled(votes.group[judged], seed=seed)
-    ones = np.ones(int(judged.sum()))
-    inside = kept[np.arange(len(found)), votes.label]
-    figures = {
-        "accuracy": share((found == votes.label)[judged], ones, draws),
-        "coverage": share(inside[judged], ones, draws),
-        "mean_set_size": share(kept[judged].sum(axis=1), ones, draws),
-        "called_unfamiliar": share(strange[judged], ones, draws),
-    }
-    right, of = _recordings_right(votes, judged)
-    matrix = np.zeros((len(classes), len(classes)), dtype=int)
-    np.add.at(matrix, (votes.label, found), 1)
-    return {
-        "records": len(found),
-        "recordings": len(np.unique(votes.group)),
-        "judged": [name for name, here in zip(classes, enough, strict=True) if here],
-        **{name: figure.value for name, figure in figures.items()},
-        "intervals": {name: _ends(figure) for name, figure in figures.items()},
-        "recordings_right": right,
-        "recordings_judged": of,
-        "recordings_interval": _exact_interval(right, of),
-        "classes": list(classes),
-        "confusion": matrix.tolist(),
-        "nominal_coverage": dict(zip(classes, votes.coverages, strict=True)),
-        "majority": float(np.bincount(votes.label[judged]).max() / max(int(judged.sum()), 1)),
-    }
-
-
-def _ends(figure: ScoreFigure) -> list[float]:
-    return [figure.low, figure.high]
-
-
-def _told(votes: Votes, trained: Votes | None) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Sets [shape=(n_records, n_classes)] and strangers [shape=(n_records,)].
-
-    Without votes of a training, a recording is told by those of the others.
-    """
-    kept = np.zeros(votes.shares.shape, dtype=bool)
-    strange = np.zeros(len(kept), dtype=bool)
-    for group in np.unique(votes.group):
-        mine = votes.group == group
-        by = _without(votes, mine) if trained is None else trained
-        for i in np.flatnonzero(mine):
-            kept[i, list(set_of(votes.shares[i], by.limits))] = True
-            strange[i] = by.strange(votes.shares[i], votes.distance[i], votes.blows[i])
-    return kept, strange
-
-
-def _without(votes: Votes, mine: NDArray[np.bool_]) -> Votes:
-    return Votes(
-        shares=votes.shares[~mine],
-        label=votes.label[~mine],
-        group=votes.group[~mine],
-        distance=votes.distance[~mine],
-        blows=votes.blows[~mine],
-    )
-
-
-def _recordings_right(votes: Votes, judged: NDArray[np.bool_]) -> tuple[int, int]:
-    """Recordings whose mean votes name their class, of how many."""
-    groups = np.unique(votes.group[judged])
-    means = np.array([votes.shares[votes.group == g].mean(axis=0) for g in groups])
-    truth = np.array([votes.label[votes.group == g][0] for g in groups])
-    return int((means.argmax(axis=1) == truth).sum()), len(groups)
-
-
-def _exact_interval(right: int, of: int, level: float = 0.95) -> list[float]:
-    """Clopper-Pearson interval of a share.
-
-    Examples
-    --------
-    >>> [round(end, 3) for end in _exact_interval(8, 8)]
-    [0.631, 1.0]
-    """
-    from scipy.stats import binomtest
-
-    told = binomtest(right, of).proportion_ci(level)
-    return [float(told.low), float(told.high)]
-
-
 # --- words
 
 
@@ -740,42 +510,6 @@ def names_classes(path: str | Path, target: str) -> bool:
             and target not in data.attributes.severities
             and (column.to_numpy().dtype.kind != "f")
         )
-
-
-def classes_text(result: Mapping[str, Any]) -> list[str]:
-    """A judgement as lines for a terminal.
-
-    Parameters
-    ----------
-    result : mapping
-        Of :func:`score_votes`.
-
-    Returns
-    -------
-    list of str
-    """
-    right, of = result["recordings_right"], result["recordings_judged"]
-    low, high = (100 * end for end in result["recordings_interval"])
-    promised = ", ".join(f"{v:.2f} {name}" for name, v in result["nominal_coverage"].items())
-    lines = [
-        f"Evaluated on recordings left out of the fit: {right} of {of} named correctly "
-        f"(95 % interval {low:.0f} to {high:.0f} %)",
-        f"  record accuracy  {_between(result, 'accuracy')}; the largest class alone is "
-        f"{result['majority']:.2f}",
-        f"  set coverage     {_between(result, 'coverage')} (promised {promised})",
-        f"  set size         {_between(result, 'mean_set_size')}",
-        f"  refused          {_between(result, 'called_unfamiliar')} of them, as unfamiliar",
-        "  named            " + " ".join(f"{name:>10}" for name in result["classes"]),
-    ]
-    for name, row in zip(result["classes"], result["confusion"], strict=True):
-        judged = "" if name in result["judged"] else "  (too few recordings to evaluate)"
-        lines.append(f"    {name:15}" + " ".join(f"{count:10d}" for count in row) + judged)
-    return [*lines, "  brackets         95 % intervals over recordings"]
-
-
-def _between(result: Mapping[str, Any], name: str) -> str:
-    low, high = result["intervals"][name]
-    return f"{result[name]:.2f} [{low:.2f}, {high:.2f}]"
 
 
 def name_all(items: Sequence[Item], model: ClassModel) -> Iterator[tuple[str, Naming]]:
@@ -804,48 +538,3 @@ def name_all(items: Sequence[Item], model: ClassModel) -> Iterator[tuple[str, Na
         except (ValueError, OSError) as error:
             naming = Naming(verdict="unusable", reasons=(fault_of(item, error),), shares={})
         yield item.name, naming
-
-
-def namings_summary(namings: Sequence[Naming]) -> str:
-    """How many recordings there are, and what was found in them.
-
-    Parameters
-    ----------
-    namings : sequence of Naming
-
-    Examples
-    --------
-    >>> strange = Naming(verdict="unfamiliar", shares={})
-    >>> namings_summary([strange, strange])
-    'no condition is named, 2 recordings: 2 unfamiliar'
-    """
-    words = Counter(naming.name or naming.verdict for naming in namings)
-    told = ", ".join(f"{count} {word}" for word, count in words.most_common())
-    none = "" if any(naming.name for naming in namings) else "no condition is named, "
-    return f"{none}{len(namings)} recordings: {told}"
-
-
-def naming_text(naming: Naming) -> str:
-    """What a model says of one recording, in lines.
-
-    Parameters
-    ----------
-    naming : Naming
-
-    Examples
-    --------
-    >>> told = Naming(verdict="named", name="a", possible=("a", "b"), shares={"a": 0.8, "b": 0.2})
-    >>> print(naming_text(told))
-    a; cannot be excluded: a, b
-      votes  a 0.80, b 0.20
-    """
-    if naming.verdict != "named":
-        return f"{naming.verdict}: {'; '.join(naming.reasons)}"
-    votes = ", ".join(f"{name} {share:.2f}" for name, share in naming.shares.items())
-    known = ""
-    if naming.p_value is not None and naming.p_limit is not None:
-        known = (
-            f"\n  familiar: p = {naming.p_value:.2g} (unfamiliar at {naming.p_limit:.2g} or less)"
-        )
-    possible = ", ".join(naming.possible)
-    return f"{naming.name}; cannot be excluded: {possible}\n  votes  {votes}{known}"

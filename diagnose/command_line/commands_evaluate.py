@@ -132,7 +132,8 @@ _EVALUATION = (".html", ".png", ".svg", ".pdf", ".json")
 def _judge_classes(model_file: Path, data: Path, seed: int, jobs: int, as_json: bool) -> None:
     """Of a model of named conditions."""
     from ..class_model.file import load_class_model
-    from ..class_model.train import classes_text, evaluate_classes
+    from ..class_model.text import classes_text
+    from ..class_model.train import evaluate_classes
 
     model = load_class_model(model_file)
     with progress_bar("features") as progress:

@@ -183,7 +183,8 @@ def _report_class(source: Path, model_file: Path, given: Mapping[str, Any], as_j
     """The condition in recordings; of JSON each as soon as it is told. Exit 2 where none can be."""
     from ...datasets.measured.recording import read_recording
     from ..class_model.file import load_class_model
-    from ..class_model.train import name_all, naming_text, namings_summary
+    from ..class_model.text import naming_text, namings_summary
+    from ..class_model.train import name_all
     from ..report.batch import recordings_in
 
     model = load_class_model(model_file)

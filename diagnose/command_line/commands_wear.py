@@ -254,7 +254,8 @@ def _train_classes(
 ) -> None:
     """A model of named conditions, judged with whole recordings left out."""
     from ..class_model.file import save_class_model
-    from ..class_model.train import classes_text, train_classes
+    from ..class_model.text import classes_text
+    from ..class_model.train import train_classes
 
     with progress_bar("features") as progress:
         model, result = train_classes(

@@ -1,0 +1,221 @@
+"""Columns of labels: what a heading means, and the values under it in SI."""
+
+import math
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
+
+from ...sim.parts.units import UNITS, to_si
+from ...sim.parts.wording import nearest
+from ...sim.scene.load import all_wear_places
+from ..file.machines import FILE
+from .label_table import listed
+
+Value = float | int | bool | str
+"""A label: NaN, -1 or empty where it is not known."""
+
+GROUP, GRADE, ROW = "group", "grade", "row_in_file"
+CONFOUNDER = "confounder_"
+
+RESERVED = (
+    "record_id",
+    "seed",
+    "done",
+    "status",
+    "signal_crc32",
+    "group_name",
+    "start_s",
+    "mean_speed_hz",
+)
+"""Manifest columns that an import writes by itself."""
+
+ENDINGS = {
+    "m": "length",
+    "hz": "rotation speed",
+    "n": "force",
+    "pa": "pressure",
+    "rad": "angle",
+    "s": "time",
+    "k": "temperature",
+    "pa_s": "viscosity",
+    "kg_m": "unbalance",
+}
+"""Ending of the name of a column in SI -> dimension, a key of the table of units."""
+
+Place = Callable[[int], str]
+"""Where a row of a table is, for messages."""
+
+_LONGEST_TEXT = 200  # byte
+HIGHEST_GRADE = 3
+_NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
+_WITH_UNIT = re.compile(rf"{_NUMBER.pattern}\s*([^\s0-9].*)")
+_HEADING = re.compile(r"(.*?)\s*\[([^\[\]]*)\]")
+_SEVERITY = re.compile(r"[a-z][a-z0-9]*(?:_[a-z0-9]+)+_m")
+
+
+def columns_of(
+    cells: Mapping[str, Sequence[str]], comma: bool, place: Place, faults: list[str]
+) -> dict[str, tuple[Value, ...]]:
+    """Values by name in SI; a heading may say a unit."""
+    found: dict[str, tuple[Value, ...]] = {}
+    for heading, column in cells.items():
+        try:
+            name, unit = _heading(heading)
+        except ValueError as error:
+            faults.append(f"label '{heading}' {error}")
+            continue
+        if name in (*RESERVED, FILE):
+            faults.append(f"label {name} is a name of the import's own; choose another")
+        elif name in found:
+            faults.append(f"label {name} is there twice, must be once; rename one")
+        else:
+            parse = _parser(name, unit, column, comma)
+            found[name] = tuple(_parsed(name, column, parse, place, faults))
+    return found
+
+
+def _heading(heading: str) -> tuple[str, str]:
+    """Name with its SI ending, and the unit that the heading declares."""
+    if not heading:
+        raise ValueError("has no name; give it one")
+    match = _HEADING.fullmatch(heading)
+    if match is None:
+        return heading, ""
+    name, unit = match.group(1), match.group(2).strip()
+    endings = [end for end, dimension in ENDINGS.items() if unit in UNITS[dimension]]
+    if not endings or not name:
+        known = ", ".join(unit for dimension in ENDINGS.values() for unit in UNITS[dimension])
+        raise ValueError(f"has unit {unit!r} behind {name!r}, must be a name and one of {known}")
+    own = _ending(name)
+    if own is not None and own not in endings:
+        raise ValueError(f"has unit {unit!r}, must be one of {ENDINGS[own]}; rename or convert it")
+    return (name if own is not None else f"{name}_{endings[0]}"), unit
+
+
+def _ending(name: str) -> str | None:
+    """Longest of the known endings that a name has."""
+    return max((end for end in ENDINGS if name.endswith(f"_{end}")), key=len, default=None)
+
+
+def _parsed(
+    name: str,
+    column: Sequence[str],
+    parse: Callable[[str], Value],
+    place: Place,
+    faults: list[str],
+) -> Iterator[Value]:
+    for row, cell in enumerate(column):
+        try:
+            yield parse(cell)
+        except ValueError as error:
+            faults.append(f"{place(row)}: {name} = {cell!r} {error}")
+            yield ""
+
+
+def _parser(name: str, unit: str, column: Sequence[str], comma: bool) -> Callable[[str], Value]:
+    """How the cells of a column are read."""
+    if name == GRADE:
+        return _grade
+    if name == GROUP:
+        return _group
+    if name.startswith(CONFOUNDER):
+        return _flag
+    ending = _ending(name)
+    told = [cell for cell in column if cell]
+    if ending is None and not (told and all(_NUMBER.fullmatch(_dot(c, comma)) for c in told)):
+        return _text
+    return partial(_number, ending=ending, unit=unit, comma=comma)
+
+
+def _dot(cell: str, comma: bool) -> str:
+    return cell.replace(",", ".") if comma else cell
+
+
+def _number(cell: str, *, ending: str | None, unit: str, comma: bool) -> float:
+    if not cell:
+        return math.nan
+    text = _dot(cell, comma)
+    if _NUMBER.fullmatch(text) and not unit:
+        value = float(text)
+    elif _NUMBER.fullmatch(text) or not unit:
+        value = to_si(f"{text} {unit}".rstrip(), ENDINGS[str(ending)])
+    else:
+        raise ValueError(f"must be a number, the heading says {unit}; leave the unit out")
+    if not math.isfinite(value):
+        raise ValueError("must be finite; leave the cell empty where it is not known")
+    return value
+
+
+def _grade(cell: str) -> int:
+    if cell not in ("", *map(str, range(HIGHEST_GRADE + 1))):
+        raise ValueError(f"must be a whole number >= 0 and <= {HIGHEST_GRADE}, or empty")
+    return int(cell) if cell else -1
+
+
+def _group(cell: str) -> str:
+    if not cell:
+        raise ValueError("must name the machine; windows of one machine decide every split")
+    return _text(cell)
+
+
+def _flag(cell: str) -> bool:
+    if cell not in ("0", "1"):
+        raise ValueError("must be 0 (absent) or 1 (present)")
+    return cell == "1"
+
+
+def _text(cell: str) -> str:
+    size = len(cell.encode(errors="surrogatepass"))
+    if size > _LONGEST_TEXT:
+        raise ValueError(f"has {size} byte, must have <= {_LONGEST_TEXT}; shorten it")
+    if any("\ud800" <= letter <= "\udfff" for letter in cell):
+        raise ValueError("is no UTF-8 text, must be; rewrite it")
+    match = _WITH_UNIT.fullmatch(cell)
+    ends = [end for end, d in ENDINGS.items() if match and match.group(1) in UNITS[d]]
+    if ends:
+        raise ValueError(f"has a unit, so its name must end in _{ends[0]}, the SI one; rename it")
+    return cell
+
+
+def severities_in(
+    columns: Mapping[str, Sequence[Value]], declared: Sequence[str], faults: list[str]
+) -> tuple[str, ...]:
+    """Names of the labels of wear, those declared first."""
+    names = tuple(dict.fromkeys([*declared, *filter(_is_severity, columns)]))
+    for name in names:
+        if name not in columns:
+            faults.append(f"severity {name} is no label{nearest(name, list(columns))}")
+        elif not _SEVERITY.fullmatch(name):
+            faults.append(
+                f"severity {name} must name kind, place and metres; rename the label to "
+                f"{known_severities(name)}, as recipes and models do, or alike"
+            )
+        elif any(isinstance(value, float) and value < 0 for value in columns[name]):
+            worst = min(value for value in columns[name] if isinstance(value, float))
+            faults.append(f"severity {name} = {worst:g} m must be >= 0; check the sign")
+    return names
+
+
+def known_severities(name: str) -> str:
+    """Severities that recipes know, those with the same words first.
+
+    Parameters
+    ----------
+    name : str
+        As a person calls it.
+
+    Examples
+    --------
+    >>> known_severities("sag")
+    'sag_bearing_1_m'
+    """
+    known = [each.column.replace("{}", "1") for each in all_wear_places().values()]
+    words = set(name.removesuffix("_m").split("_"))
+    alike = [column for column in known if words & set(column.split("_"))]
+    return listed(alike or known)
+
+
+def _is_severity(column: str) -> bool:
+    """True of a column that a machine's own wear has."""
+    known = (each.column.replace("{}", "[0-9]+") for each in all_wear_places().values())
+    return any(re.fullmatch(pattern, column) for pattern in known)
