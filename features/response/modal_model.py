@@ -190,6 +190,7 @@ def synthesise(
 
     Examples
     --------
+    >>> from wearstate.features.response.modal import fit_modes
     >>> f = np.arange(20.0, 60.0, 0.5)
     >>> value = 1 / (40.3**2 - f**2 + 2j * 0.01 * 40.3 * f)
     >>> modes = fit_modes(f, value, [40.0], [0.02], quantity="receptance")

@@ -278,6 +278,7 @@ def resonance_shift(modes: Modes, reference: Modes, *, within: float = 0.1) -> M
 
     Examples
     --------
+    >>> from wearstate.features.response.modal import fit_modes
     >>> f = np.arange(20.0, 60.0, 0.5)
     >>> before, after = (
     ...     fit_modes(f, 1 / (f0**2 - f**2 + 0.02j * f0 * f), [f0], [0.02], quantity="receptance")
