@@ -149,6 +149,7 @@ _SHIFTS = (
     factor("bearings.*.housing.stiffness_side", 0.7, 1.4, "another foundation"),
     factor("bearings.*.housing.damping_up", 0.4, 2.5, "bolts, chocks"),
     factor("bearings.*.housing.damping_side", 0.4, 2.5, "bolts, chocks"),
+    add("sensors.*.modes.*.share", -0.3, 0.3, "webs and covers that swing under a sensor"),
     factor("discs.*.mass", 0.9, 1.1, "estimated from drawings"),
     factor("discs.*.entrained_mass", 0.5, 1.5, "water that moves with the propeller"),
     factor("discs.*.buoyancy", 0.5, 1.5, "propeller half out of the water"),

@@ -428,6 +428,22 @@ DIRECTIONS = {"up": "vertical, up", "side": "horizontal, to starboard"}
 """Of sensors and forces, as a report tells them."""
 
 
+class LocalMode(Part):
+    """A part of a housing that swings in it, and that an accelerometer sits on.
+
+    Too light to push back: no other sensor hears of it.
+    """
+
+    frequency: Frequency = Field(gt=0, le=1e6, description="of the part on its housing")
+    damping_ratio: Ratio = Field(gt=0, lt=1, description="of this mode")
+    share: Ratio = Field(
+        default=0.0,
+        ge=-1,
+        le=1,
+        description="of its motion within the housing that the sensor hears; 0: none",
+    )
+
+
 class ShaftAccelerometer(Part):
     """An accelerometer on a bearing's housing, with its converter."""
 
@@ -442,6 +458,9 @@ class ShaftAccelerometer(Part):
         ge=_LEAST_RANGE, le=_MOST_RANGE, description="full scale, plus and minus"
     )
     bits: int = Field(default=24, ge=8, le=32, description="of its converter")
+    modes: tuple[LocalMode, ...] = Field(
+        default=(), max_length=MOST_PARTS, description="of the part of the housing it sits on"
+    )
 
 
 class ShaftProbe(ProximityProbe):

@@ -41,6 +41,7 @@ from ..scene.shaft_parts import (
     Turbulence,
 )
 from .elements import element_faults
+from .local_modes import heard_locally
 from .on_oil_films import BeamFilm, FilmBearing, ShaftFilmStatus, beam_film
 from .push import lead_samples, peak_push, pushed_motion, pushed_stations, pushes
 from .response import (
@@ -1186,7 +1187,11 @@ def _measured(
     angle = shaft_angle(scene)
     rows, clipped = [], 0
     readings = [
-        motion.acceleration(sensor.bearing, "y" if sensor.direction == "up" else "z")
+        heard_locally(
+            motion.acceleration(sensor.bearing, "y" if sensor.direction == "up" else "z"),
+            sensor.modes,
+            scene.sample_rate,
+        )
         for sensor in scene.sensors
     ]
     readings += [_reading(scene, state, motion, probe, angle) for probe in scene.probes]
