@@ -287,6 +287,27 @@ def test_entries_of_a_list_go_by_number(tmp_path):
     )
 
 
+def test_a_clearance_of_an_ideal_joint_is_no_severity(tmp_path):
+    text = 'name = "m"\nscene = "bilge-pump"\nrecords = 1\n'
+    worn = WORN.replace(SECOND, CRANKPIN).replace("120 mm", "0.1 mm").replace("200 mm", "0.2 mm")
+    ideal = '"joint.crankpin.rung" = "ideal"'
+    file = tmp_path / "m.toml"
+    file.write_text(f"{text}{worn}\n[fixed]\n{ideal}\n")
+    assert [fault.split("; ")[0] for fault in faults_of(file)] == [
+        f"severity.0.path = '{CRANKPIN}': joint.crankpin.rung = 'ideal' has no clearance, "
+        "in the scene with what the recipe fixes"
+    ]
+    options = '[[choice.option]]\nname = "{}"\nvalues = {{ "joint.crankpin.rung" = "{}" }}\n'
+    both = f"{options.format('worn', 'compliant')}{options.format('tight', 'ideal')}"
+    file.write_text(f'{text}{worn}\n[[choice]]\nname = "pin"\n{both}')
+    assert "with option 'tight' of choice 'pin'" in faults_of(file)[0]
+    file.write_text(
+        f'{text}{worn}\n[fixed]\n{ideal}\n[[choice]]\nname = "pin"\n'
+        f"{options.format('worn', 'compliant')}{options.format('rigid', 'link')}"
+    )
+    assert load_recipe(file).choices
+
+
 def test_severities_at_fault(tmp_path, second):
     again = WORN.replace(SECOND, CRANKPIN).replace("120 mm", "0.1 mm").replace("200 mm", "0.2 mm")
     text = 'name = "m"\nscene = "bilge-pump"\nrecords = 1\n'

@@ -277,6 +277,11 @@ def test_another_machine_is_told_by_its_name_and_not_by_the_keys_it_lacks(record
         wearstate.calibrate("propulsion-shaft", [recording])
 
 
+def test_a_recording_given_twice_is_refused(recording):
+    with pytest.raises(DataError, match="are the same recording; give each once"):
+        wearstate.calibrate("bilge-pump", [recording, replace(recording)])
+
+
 def test_a_recording_without_tacho_is_refused(recording):
     bare = replace(
         recording, signal=recording.vibration, channels=recording.channels[:2], tacho=None

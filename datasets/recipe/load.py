@@ -34,7 +34,13 @@ from .faults import (
     twin_faults,
 )
 from .recipe import Recipe, RecipeFault, conditions_of
-from .severities import severity_column, severity_faults, wearing_of, with_wear_limits
+from .severities import (
+    severity_column,
+    severity_faults,
+    silent_faults,
+    wearing_of,
+    with_wear_limits,
+)
 from .table import Confounder, RecipeTable
 from .text import RecipeError, beside, merged, read_recipe
 
@@ -132,6 +138,7 @@ def _resolved(
     axes = axes_of(sound, _with_lists(base), faults)
     faults += severity_faults(table.severity)
     choices = alternatives_of(table.choice, _with_lists(base), faults)
+    faults += silent_faults(table.severity, scene_from_table(base), choices)
     paths = [axis.path for found in axes.values() for axis in found]
     faults += path_clashes([*paths, *(path for each in choices for path in each.paths)])
     faults += confounder_faults(table.confounder)

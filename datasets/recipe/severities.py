@@ -7,6 +7,7 @@ from ...sim.scene.journal import ScarLimits
 from ...sim.scene.load import all_wear_places
 from ...sim.scene.scene import Scene, Wear
 from ..draws.draws import Axis, Bound, Range, has_value, value_at
+from ..draws.options import Alternatives
 from ..draws.wear_bounds import bound_of_limits
 from .recipe import Recipe, Wearing
 from .table import RecipeTable, Severity
@@ -173,6 +174,39 @@ def clearances(scene: Scene) -> dict[str, float]:
             if not star or own:
                 found[str(severity_column(path))] = float(value)
     return found
+
+
+def silent_faults(
+    severities: Sequence[Severity], scene: Scene, choices: Sequence[Alternatives]
+) -> list[str]:
+    """Clearances that a recipe draws of a joint that is ideal, always or with some option.
+
+    Such a joint has none: records would be labelled with a wear that nothing in them shows.
+    """
+    faults = []
+    for i, severity in enumerate(severities):
+        joint = severity.path.removesuffix(".diametral_clearance")
+        if not has_value(scene, severity.path) or joint == severity.path:
+            continue
+        faults += [
+            f"severity.{i}.path = {severity.path!r}: {joint}.rung = 'ideal' has no clearance, "
+            f"{where}; set {joint}.rung = 'compliant' there"
+            for where, rung in _rungs(joint, scene, choices)
+            if rung == "ideal"
+        ]
+    return faults
+
+
+def _rungs(joint: str, scene: Scene, choices: Sequence[Alternatives]) -> list[tuple[str, str]]:
+    """Where a recipe decides the rung of a joint, and as what."""
+    path, own = f"{joint}.rung", _rung_of(scene, joint)
+    found = [
+        (f"with option {option.name!r} of choice {choice.name!r}", option.values.get(path, own))
+        for choice in choices
+        if path in choice.paths
+        for option in choice.options
+    ]
+    return found or [("in the scene with what the recipe fixes", own)]
 
 
 def _rung_of(scene: Scene, path: str) -> str:

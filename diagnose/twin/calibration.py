@@ -4,6 +4,7 @@ import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -361,7 +362,11 @@ def _read(
         raise DataError(
             f"recordings = {len(heard)} must be >= 1 and <= {MOST_RECORDINGS}; choose some"
         )
-    return heard, tuple(each.source or "recording" for each in heard)
+    names = tuple(each.source or "recording" for each in heard)
+    for (one, a), (other, b) in combinations(zip(names, heard, strict=True), 2):
+        if np.array_equal(a.signal, b.signal):
+            raise DataError(f"{one} and {other} are the same recording; give each once")
+    return heard, names
 
 
 def _of_data_set(path: Path) -> list[Recording]:
