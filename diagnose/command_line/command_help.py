@@ -151,7 +151,6 @@ EXAMPLES: dict[str, tuple[str, ...]] = {
     ),
     "blindspots": (
         "wearstate blindspots pump.wsm -o blindspots.html",
-        "wearstate blindspots pump.wsm -n 20 --seed 1",
         "wearstate blindspots pump.wsm --only casing.modes -n 80",
     ),
     "demo": ("wearstate demo", "wearstate demo --folder trial"),
