@@ -3,6 +3,7 @@
 import runpy
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from wearstate.datasets.recipe.load import load_recipe
 from wearstate.datasets.recipe.records import sample_records
 from wearstate.datasets.recipe.text import RecipeError, toml_text
 from wearstate.diagnose.twin import opinion
-from wearstate.diagnose.twin.calibration import conditions_of
+from wearstate.diagnose.twin.calibration import calibration_text, conditions_of
 from wearstate.diagnose.twin.ensemble import simulated
 from wearstate.diagnose.twin.inversion import Gaussian, corrected, rounds_of, widened
 from wearstate.diagnose.twin.levels import LevelLayout, layout_of, levels_of, speed_of
@@ -398,8 +399,35 @@ def test_oil_is_asked_for_where_the_pin_is_dry_only():
 def test_channels_of_another_name_are_refused(recording):
     first, *rest = recording.channels
     other = replace(recording, channels=(replace(first, name="a"), *rest), source="a.h5")
-    with pytest.raises(DataError, match=r"a\.h5: channels a, acc_y .* must be acc_x, acc_y"):
+    with pytest.raises(DataError, match=r"a\.h5: channels a, acc_y must be acc_x, acc_y"):
         wearstate.calibrate("bilge-pump", [other])
+
+
+def test_recordings_of_two_rates_are_refused(recording):
+    other = replace(recording, sample_rate=12800.0, source="b.h5")
+    says = r"^b\.h5: sample rate = 12800 Hz must be 25600, that of the first"
+    with pytest.raises(DataError, match=says):
+        wearstate.calibrate("bilge-pump", [recording, other])
+
+
+@pytest.mark.parametrize(
+    ("p", "even", "told"),
+    [
+        (1.0, True, "fits machines of this scene: p = 1, refused below 0.02"),
+        (0.5, False, "fits machines of this scene: p = 0.5, refused below 0.02; largest misfit: x"),
+        (1e-3, True, "largest misfit: x"),
+    ],
+)
+def test_a_fit_is_told_as_one(p, even, told):
+    named = SimpleNamespace(name="pump")
+    found = SimpleNamespace(
+        numbers=(),
+        unknowns=SimpleNamespace(recipe=SimpleNamespace(scene=named, name="recipe"), named=()),
+        recordings=("a.h5",),
+        found=SimpleNamespace(members=1),
+        misfit=SimpleNamespace(refused=p < 0.02, p=p, even=even, text="x"),
+    )
+    assert calibration_text(found).splitlines()[-1] == told
 
 
 # --- second opinion

@@ -24,7 +24,7 @@ from ...sim.scene.load import load_scene, override, scene_from_table
 from ..pages.si_text import si_text
 from .inversion import LEAST_TOLD, Inverted, inverted, moved, rounds_of, standard
 from .levels import layout_of, levels_of, speed_of
-from .misfit import Misfit, misfit, refusal
+from .misfit import LEAST_P, Misfit, misfit, refusal
 from .regimes import PER_MEMBER, oiled_members, oiled_unknowns, with_regime
 from .unknowns import WEAR, TwinUnknowns, unknowns_of
 
@@ -364,7 +364,7 @@ def _read(
         )
     names = tuple(each.source or "recording" for each in heard)
     for (one, a), (other, b) in combinations(zip(names, heard, strict=True), 2):
-        if np.array_equal(a.signal, b.signal):
+        if a.sample_rate == b.sample_rate and np.array_equal(a.signal, b.signal):
             raise DataError(f"{one} and {other} are the same recording; give each once")
     return heard, names
 
@@ -426,11 +426,16 @@ def refuse_channels(plan: Recipe, heard: Sequence[Recording]) -> None:
     """Raise DataError where recordings have other channels than the scene, or other rates."""
     wanted = tuple(sensor.name for sensor in getattr(plan.scene, "sensors", ()))
     faults = [
-        f"{each.source or 'recording'}: channels {', '.join(each.vibration_names)} at "
-        f"{each.sample_rate:g} Hz must be {', '.join(wanted)} at {heard[0].sample_rate:g} Hz, as "
-        "in the scene; rename channels, or sensors of the scene"
+        f"{each.source or 'recording'}: channels {', '.join(each.vibration_names)} must be "
+        f"{', '.join(wanted)}, as in the scene; rename channels, or sensors of the scene"
         for each in heard
-        if each.vibration_names != wanted or each.sample_rate != heard[0].sample_rate
+        if each.vibration_names != wanted
+    ]
+    faults += [
+        f"{each.source or 'recording'}: sample rate = {each.sample_rate:g} Hz must be "
+        f"{heard[0].sample_rate:g}, that of the first; give recordings of one rate"
+        for each in heard
+        if each.sample_rate != heard[0].sample_rate
     ]
     if faults:
         raise DataError("\n".join(faults))
@@ -469,7 +474,15 @@ def calibration_text(found: "CalibratedScene") -> str:
         f"{_spread(each.posterior, each.unit):>21}   {each.narrower:.1f} x"
         for each in learnt
     ]
-    return "\n".join([head, *lines, f"largest misfit: {found.misfit.text}"])
+    return "\n".join([head, *lines, _fit_line(found.misfit)])
+
+
+def _fit_line(misfit: Misfit) -> str:
+    """How well the recordings fit; where they fit least, unless noise alone would be told."""
+    if misfit.refused:
+        return f"largest misfit: {misfit.text}"
+    fits = f"fits machines of this scene: p = {misfit.p:.2g}, refused below {LEAST_P:g}"
+    return fits if misfit.even else f"{fits}; largest misfit: {misfit.text}"
 
 
 def _spread(value: tuple[float, float], unit: str) -> str:
