@@ -112,7 +112,7 @@ def rest_curve(
     if geometry.bore is not None or geometry.grooves:
         raise ValueError(
             "bore and grooves must be absent: a scar or a groove makes the place of the journal "
-            "hang on the direction of the load; use sim.bearing.equilibrium for one load"
+            "hang on the direction of the load; use wearstate.film.equilibrium for one load"
         )
     if scar and rung != "direct":
         raise ValueError(f"rung = {rung!r} knows no scar; use 'direct'")
