@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from wearstate.datasets.generation.work import NUMERICS
 from wearstate.sim.fidelity.ladder import cost_of
 from wearstate.sim.machine.simulate import simulate, simulate_many
 from wearstate.sim.mechanism.crank_run import run_mechanism
@@ -303,3 +304,14 @@ def test_a_guide_against_its_bearing_is_refused():
     assert heard("bilge-pump", {**turned, "duration": "0.2 s"}).any()
     with pytest.raises(SceneError, match=r"by -0\.298 of it .* >= -0\.25 .*'driven'"):
         heard("bilge-pump", {**YIELDS, **turned, "duration": "0.2 s"})
+
+
+@pytest.mark.parametrize("rung", ["driven", "yielding"])
+def test_a_data_set_tells_every_rung_that_was_run(rung):
+    scene = load_scene("bilge-pump", {"duration": "0.3 s", "casing.rung": rung})
+    numerics = simulate(scene, seed=0).numerics
+    columns = {f"rung_{effect.replace('crankpin', 'joint')}" for effect in scene.effects}
+    columns.remove("rung_step")
+    assert columns <= NUMERICS.keys()
+    assert columns <= numerics.keys()
+    assert numerics["rung_casing"] == rung

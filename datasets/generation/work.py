@@ -21,6 +21,7 @@ NUMERICS = {
     "rung_guide": "S16",
     "rung_pressure": "S16",
     "rung_drive": "S16",
+    "rung_casing": "S16",
     "rung_film": "S16",
     "contact_law": "S24",
     "frf_sha256": "S64",
