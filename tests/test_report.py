@@ -217,6 +217,16 @@ def test_an_interval_beyond_the_possible_grades_is_said(model):
     assert "Possible" not in report_text(within)
 
 
+def test_a_grade_far_from_the_interval_has_its_reason(model):
+    """A grade of few training machines cannot be excluded by them, whatever the interval says."""
+    found, narrow = recording_of(1.2e-4), {"grade": 1, "severity": 1.2e-4, "low": 1.1e-4}
+    few = graded(**narrow, high=1.3e-4, possible_grades=(0, 1, 2, 3))
+    words = report_table(found, model, few)["grades_text"]
+    assert words.partition("; ")[2].startswith("the interval keeps away from 3 (condemned), but ")
+    near = graded(**narrow, high=1.3e-4, possible_grades=(0, 1, 2))
+    assert "keeps away" not in report_table(found, model, near)["grades_text"]
+
+
 def test_a_twin_stands_beside_the_model_and_a_disagreement_before_the_verdict(model):
     found = recording_of(2.5e-4)
     near = TwinOpinion(severity=2.4e-4, low=2.2e-4, high=2.7e-4, members=210, scene="mine")

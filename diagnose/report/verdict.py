@@ -483,9 +483,20 @@ def possible_words(estimate: Estimate, edges: Sequence[float]) -> str:
     >>> found = Estimate(verdict="graded", grade=2, possible_grades=(2,), low=2.4e-4, high=3.1e-4)
     >>> possible_words(found, (1e-4, 2e-4, 3e-4))
     'grade 2 (plan renewal); the interval, calibrated by itself, also reaches 3 (condemned)'
+    >>> few = {"possible_grades": (1, 2, 3), "low": 1.1e-4, "high": 1.3e-4}
+    >>> words = possible_words(Estimate(verdict="graded", grade=1, **few), (1e-4, 2e-4, 3e-4))
+    >>> words.partition("; ")[2].partition(",")[0]
+    'the interval keeps away from 3 (condemned)'
     """
-    possible = estimate.possible_grades
-    beyond = [g for g in touched_grades(estimate, edges) if g not in possible]
+    possible, touched = estimate.possible_grades, touched_grades(estimate, edges)
+    far = [g for g in possible if touched and not touched[0] - 1 <= g <= touched[-1] + 1]
+    if far:
+        return (
+            f"grade {grades_words(possible)}; the interval keeps away from {grades_words(far)}, "
+            "but training machines so worn are too few, or told too badly, to exclude it: train on "
+            "more"
+        )
+    beyond = [g for g in touched if g not in possible]
     if not beyond:
         return f"grade {grades_words(possible)}" if len(possible) > 1 else ""
     also = " and ".join(grades_words([grade]) for grade in beyond)
