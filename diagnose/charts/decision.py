@@ -98,7 +98,8 @@ def why_alike(found: Study) -> str:
     ):
         return ""
     if best_already(found):
-        return "your rungs are the best already"
+        known = "that this scene can run" if found.refused else "already"
+        return f"your rungs are the best {known}"
     return "" if rungs_too_coarse(found) else "nothing is gained by other rungs"
 
 
