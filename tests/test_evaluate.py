@@ -578,3 +578,17 @@ def test_the_benchmark_fails_on_a_miss():
     assert len(misses({"splits": [good], "cost": slow}, "pump")) == 1
     nothing = {**good, "mae_share_of_limit": None}
     assert "unfamiliar" in misses({"splits": [nothing]}, "pump")[0]
+
+
+@pytest.mark.parametrize(
+    ("names", "said"),
+    [
+        (["a", "c"], "of the model's 2 features it lacks 1, such as b and has beside them 1, such"),
+        (["a"], "of the model's 2 features it lacks 1, such as b; use"),
+        (["b", "a"], "of the model's 2 features it has another order; use"),
+    ],
+)
+def test_features_of_another_kind_are_told_by_what_differs(names, said):
+    model = SimpleNamespace(card=SimpleNamespace(features=["a", "b"]))
+    with pytest.raises(DataError, match=re.escape(f"set.h5: {said}")):
+        judging.unseen_rows(model, SimpleNamespace(names=tuple(names)), "", "set.h5")

@@ -317,9 +317,20 @@ def refuse_other_severity(model: WearModel, head: Attributes, path: str | Path) 
 def _check_features(model: WearModel, table: FeatureTable, path: str | Path) -> None:
     if list(table.names) != model.card.features:
         raise DataError(
-            f"{path}: its {len(table.names)} features are not the model's "
-            f"{len(model.card.features)}; use recordings with the model's channels and rate"
+            f"{path}: {_difference(table.names, model.card.features)}; use recordings with the "
+            "model's channels and rate"
         )
+
+
+def _difference(names: Sequence[str], wanted: Sequence[str]) -> str:
+    """In what the features of a data set differ from those that a model needs."""
+    sides = [("lacks", wanted, names), ("has beside them", names, wanted)]
+    told = [
+        f"{verb} {len(odd)}, such as {odd[0]}"
+        for verb, some, others in sides
+        if (odd := [name for name in some if name not in set(others)])
+    ]
+    return f"of the model's {len(wanted)} features it {' and '.join(told) or 'has another order'}"
 
 
 def _seen_machines(model: WearModel, table: FeatureTable, identity: str) -> NDArray[np.bool_]:
