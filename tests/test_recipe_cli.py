@@ -264,6 +264,14 @@ def test_machines_of_another_recipe_are_named():
     assert "6 records of 2 machines (those of journal-bearing-standard)" in text
 
 
+def test_an_estimate_tells_what_is_not_in_it():
+    table = preview(load_recipe("journal-bearing-small"), 6).table
+    given, chosen = (preview_text({**table, "fidelity": word}) for word in ("given", "auto"))
+    assert "by tabulated cost; not in it: compiling" in given
+    assert "pilots" not in given
+    assert "pilots that choose the rungs" in chosen
+
+
 def test_a_picture_of_the_draws(tmp_path):
     path = tmp_path / "draws.png"
     first = run("preview", "journal-bearing-small", "-n", 64, "--plot", path)

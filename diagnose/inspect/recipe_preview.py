@@ -223,7 +223,8 @@ def preview_text(table: Mapping[str, Any]) -> str:
         f"{table['sample_rate_hz']:g} Hz, {table['duration_s']:g} s each",
         f"  rungs ({_fidelity(table['fidelity'])}): "
         + ", ".join(f"{effect} {rung}" for effect, rung in table["rungs"].items()),
-        f"  estimate: {_time(seconds)} on {table['cores']} core(s), by tabulated cost",
+        f"  estimate: {_time(seconds)} on {table['cores']} core(s), by tabulated cost; not in it: "
+        + _not_in_it(table["fidelity"]),
         f"  sampling {table['sampling']}; drawn here: {table['drawn_records']} records",
     ]
     for column, grades in table["labels"].items():
@@ -239,6 +240,12 @@ def preview_text(table: Mapping[str, Any]) -> str:
         f"  correlation {c['rank']:+g}: {', '.join(c['paths'])}" for c in table["correlations"]
     ]
     return "\n".join([*lines, *_draw_lines(table["draws"])])
+
+
+def _not_in_it(fidelity: str) -> str:
+    """What takes time beside the records."""
+    once = "compiling, a minute or two when a machine is simulated for the first time"
+    return once if fidelity == "given" else f"{once}, and the pilots that choose the rungs"
 
 
 def _fidelity(word: str) -> str:
