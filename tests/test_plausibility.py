@@ -39,6 +39,7 @@ PIPES = {
     "pressure.suction_line.wave_speed": "1470 m/s",
     "pressure.discharge_line.wave_speed": "1490 m/s",
 }
+OIL = {"joint.crankpin.oil.viscosity": "0.06 Pa s", "joint.crankpin.oil.length": "50 mm"}
 NODES = {f"casing.modes.{i}.shape.acc_x": 0 for i in range(8)}
 BALANCED = {f"discs.{i}.unbalance": 0 for i in range(5)} | {
     "turbulence": [],
@@ -96,6 +97,10 @@ DOUBTFUL = {
         ("bilge-pump", PIPES),
         r"pressure.discharge_line.wave_speed = 1490 m/s is above the speed of sound .* = 1478 m/s, "
         "the limit of a rigid pipe",
+    ),
+    "unread oil": (
+        ("bilge-pump", OIL),
+        r"joint\.crankpin\.oil is given, but the rung 'compliant' is dry, usual is one of",
     ),
     "no excitation of a shaft": (("propulsion-shaft", BALANCED), "0 of them have an unbalance"),
     "no excitation of a journal": (

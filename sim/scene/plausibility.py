@@ -20,6 +20,7 @@ from ..parts.casing import CasingMode
 from .journal import JournalScene
 from .pump import FORCE_PLACES, PumpScene
 from .pump_hydraulics import PIPED_RUNGS
+from .pump_joints import OILED_RUNGS
 from .scene import Scene
 from .shaft import ShaftScene
 
@@ -277,6 +278,21 @@ def _fast_waves(pump: PumpScene) -> Iterator[str]:
             )
 
 
+def _unread_oil(pump: PumpScene) -> Iterator[str]:
+    """Pins with oil whose rung is a dry one."""
+    joints = {
+        f"throws.{index}.joint" if throw.joint else "joint": throw.joint or pump.joint
+        for index, throw in enumerate(pump.throws)
+    }
+    for place, joint in joints.items():
+        for name, pin in (("crankpin", joint.crankpin), ("wristpin", joint.wristpin)):
+            if pin is not None and pin.oil is not None and pin.rung not in OILED_RUNGS:
+                yield (
+                    f"{place}.{name}.oil is given, but the rung '{pin.rung}' is dry, usual is one "
+                    f"of {', '.join(OILED_RUNGS)}; set {place}.{name}.rung, or leave the oil out"
+                )
+
+
 def _unexcited_shaft(shaft: ShaftScene) -> Iterator[str]:
     propeller, coupling = shaft.propeller, shaft.coupling
     excited = (
@@ -357,6 +373,12 @@ SCENE_CHECKS: tuple[SceneCheck, ...] = (
         machine=PumpScene,
         function=_fast_waves,
         usual="0.7 to 0.95 times the speed of sound of the liquid without air",
+    ),
+    SceneCheck(
+        name="unread oil",
+        machine=PumpScene,
+        function=_unread_oil,
+        usual="film-map",
     ),
     SceneCheck(
         name="no excitation",
