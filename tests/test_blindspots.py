@@ -344,6 +344,16 @@ def test_a_run_is_gone_on_with(found, tmp_path, monkeypatch):
     assert find_blind_spots(MODEL, PUMP, **ways, kept=kept_rows(path, "key")) == found
 
 
+def test_amounts_carry_their_units():
+    rows = [*scene_rows(load_recipe("bilge-pump-standard"))]
+    rows += scene_rows(load_recipe("propulsion-shaft-standard"))
+    told = {(row.name, row.shift) for row in rows}
+    # 30 % of the range from -2 to 2 degrees beyond either end
+    assert {("tacho.late", "above, = 3.2 deg"), ("tacho.late", "below, = -3.2 deg")} <= told
+    assert {("bearings.*.offset", "-100 um"), ("bearings.*.offset", "+100 um")} <= told
+    assert not [row for row in rows if "SI" in row.shift]
+
+
 def test_rows_that_one_asks_for_are_those_of_the_whole_run(found):
     rows = shifts_of("piston.mass", 1.0, 1.25)
     ways = {"machines": 2, "scenes": rows, "signals": gains()}

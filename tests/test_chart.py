@@ -40,7 +40,7 @@ from wearstate.diagnose.charts.of_scene import (
 )
 from wearstate.diagnose.charts.page import SUFFIXES, chart_figure, chart_html, save_chart
 from wearstate.diagnose.charts.scene_edit import block_of
-from wearstate.diagnose.charts.words import HERE
+from wearstate.diagnose.charts.words import HERE, effect_words
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.sim.fidelity.ladder import cost_of
 from wearstate.sim.fidelity.pilot import (
@@ -845,6 +845,19 @@ def test_the_picture_says_simulated_and_numbers_its_front(chart):
     assert "2" not in texts
     [x, y] = [axes.get_scale() for axes in (figure.axes[0].xaxis, figure.axes[0].yaxis)]
     assert (x, y) == ("log", "log")
+
+
+@pytest.mark.parametrize("name", ["bilge-pump", "journal-bearing", "propulsion-shaft"])
+@pytest.mark.parametrize("first", [0, 3])
+def test_a_title_stays_within_the_picture(chart, name, first):
+    many = ", ".join(map(effect_words, load_scene(name).effects[first:]))
+    wide = replace(chart, varied=dict.fromkeys(chart.questions, many))
+    for question in chart.questions:
+        figure = question_figure(wide, question)
+        figure.draw_without_rendering()
+        title, whole = figure.axes[0].title.get_window_extent(), figure.bbox
+        assert whole.x0 <= title.x0
+        assert title.x1 <= whole.x1
 
 
 def test_numbers_of_near_points_and_the_legend_do_not_touch():

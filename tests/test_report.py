@@ -223,6 +223,9 @@ def test_a_grade_far_from_the_interval_has_its_reason(model):
     few = graded(**narrow, high=1.3e-4, possible_grades=(0, 1, 2, 3))
     words = report_table(found, model, few)["grades_text"]
     assert words.partition("; ")[2].startswith("the interval keeps away from 3 (condemned), but ")
+    beside = graded(**narrow | {"low": 0.9e-4}, high=1.3e-4, possible_grades=(1, 2, 3))
+    words = report_table(found, model, beside)["grades_text"]
+    assert words.split("; ")[2].endswith("also reaches 0 (as new)")
     near = graded(**narrow, high=1.3e-4, possible_grades=(0, 1, 2))
     assert "keeps away" not in report_table(found, model, near)["grades_text"]
 

@@ -1,7 +1,7 @@
 """What a wear model takes for granted: the same machines with one thing shifted.
 
-It may import ``sim.output``, ``sim.scene``, ``sim.machine``, ``datasets.file``,
-``datasets.source``, ``datasets.draws``, ``datasets.recipe``, ``datasets.measured``,
-``diagnose.pages``, ``diagnose.machines``, ``diagnose.learning``, ``diagnose.feature_rows``,
-``diagnose.wear_model``, ``diagnose.nameplate``.
+It may import ``sim.output``, ``sim.parts``, ``sim.scene``, ``sim.machine``,
+``datasets.file``, ``datasets.source``, ``datasets.draws``, ``datasets.recipe``,
+``datasets.measured``, ``diagnose.pages``, ``diagnose.machines``, ``diagnose.learning``,
+``diagnose.feature_rows``, ``diagnose.wear_model``, ``diagnose.nameplate``.
 """

@@ -16,10 +16,12 @@ from ...datasets.draws.draws import Axis, Vector, has_value, matches, value_at
 from ...datasets.draws.options import Alternatives, Taken
 from ...datasets.recipe.recipe import Recipe
 from ...datasets.recipe.records import Sample
+from ...sim.parts.wording import si_unit
 from ...sim.scene.load import override, scene_from_table
 from ...sim.scene.scene import Scene, SceneError
 from ..machines.registry import presentation_of
 from ..machines.shifts import Shift
+from ..pages.si_text import si_text
 
 BEYOND = 1.3
 """Of the edge of a range drawn by its logarithm; of others 30 % of the range is added."""
@@ -126,7 +128,7 @@ def scene_rows(recipe: Recipe, shifts: Sequence[Shift] | None = None) -> list[Sc
         row
         for each in drawn
         if each.path not in worn
-        for row in _beyond_rows(each, told.get(each.path))
+        for row in _beyond_rows(each, told.get(each.path), type(recipe.scene))
     ]
     return [*fixed, *beyond]
 
@@ -188,7 +190,7 @@ def _fixed_rows(shift: Shift, recipe: Recipe) -> Iterator[SceneRow]:
             continue
         yield SceneRow(
             name=shift.path,
-            shift=_words(shift, amount),
+            shift=_words(shift, amount, type(recipe.scene)),
             kind="fixed",
             why=shift.why,
             changes=_changer(shift, amount, recipe),
@@ -203,11 +205,17 @@ def _taken(path: str, recipe: Recipe) -> set[Any]:
     return values
 
 
-def _words(shift: Shift, amount: Any) -> str:
+def _words(shift: Shift, amount: Any, machine: type[Scene]) -> str:
     sign = {"factor": "x ", "add": "", "set": "= "}[shift.kind]
     if not isinstance(amount, (int, float)):
         return f"{sign}{amount}"
-    return f"{amount:+.3g} [SI]" if shift.kind == "add" else f"{sign}{amount:g}"
+    if shift.kind == "add":
+        return f"{'+' if amount >= 0 else ''}{_with_unit(amount, shift.path, machine)}"
+    return f"{sign}{amount:g}"
+
+
+def _with_unit(value: float, path: str, machine: type[Scene]) -> str:
+    return si_text(value, si_unit(machine, path.replace("*", "0")))
 
 
 def _changer(shift: Shift, amount: Any, recipe: Recipe) -> Callable[[Scene], Mapping[str, Any]]:
@@ -241,7 +249,7 @@ def _refuse_unread(shift: Shift, scene: Scene) -> None:
 # --- drawn values ---------------------------------------------------------------------------------
 
 
-def _beyond_rows(drawn: _Drawn, told: Shift | None) -> Iterator[SceneRow]:
+def _beyond_rows(drawn: _Drawn, told: Shift | None, machine: type[Scene]) -> Iterator[SceneRow]:
     axes = drawn.axes
     if any(_all_round(axis) for axis in axes):
         return
@@ -250,7 +258,7 @@ def _beyond_rows(drawn: _Drawn, told: Shift | None) -> Iterator[SceneRow]:
         where = f", with {drawn.option.option.name}" if drawn.option else ""
         yield SceneRow(
             name=drawn.path,
-            shift=f"{side}, {_shown(axes, ends, side)}{where}",
+            shift=f"{side}, {_shown(axes, ends, side, machine)}{where}",
             kind="drawn",
             why=told.why if told else "beyond the range that the recipe draws from",
             changes=_mover(ends),
@@ -297,12 +305,12 @@ def _edge(ends: tuple[float, float], side: str, *, logarithmic: bool) -> float:
     return high + step if high + step < 0 or high >= 0 else high / BEYOND
 
 
-def _shown(axes: Sequence[Axis], ends: Mapping[str, _Move], side: str) -> str:
+def _shown(axes: Sequence[Axis], ends: Mapping[str, _Move], side: str, machine: type[Scene]) -> str:
     if isinstance(axes[0], Vector):
         return f"{BEYOND:g} x as far from the scene's own"
     values = {ends[axis.path](None) for axis in axes}
     if len(values) == 1:
-        return f"= {next(iter(values)):.3g} [SI]"
+        return f"= {_with_unit(next(iter(values)), axes[0].path, machine)}"
     edge = axes[0].extremes()[0 if side == "below" else 1]
     ratio = ends[axes[0].path](None) / edge if edge else math.nan
     return f"{ratio:.3g} x the edge" if math.isfinite(ratio) else "30 % of the range"

@@ -30,6 +30,7 @@ UNTOLD, REFERENCE = "scatter too large to tell", "reference"
 TOO_CLOSE = "too close to call"
 _MOST_ROWS = 12  # of the front, in the table of quantities
 _WIDE = 46  # characters of a name on one line
+_TITLE_WIDTH = 52  # characters of a title above a panel of half a page
 
 
 def chart_figure(chart: Chart) -> Any:
@@ -108,7 +109,7 @@ def _draw_points(axes: Any, chart: Chart, question: str, *, columns: int) -> Non
     _draw_ring(axes, chart, question, finite)
     axes.set(xscale="log", xlabel=chart.cost_label, ylabel=chart.error_name(question))
     if question:
-        axes.set_title(_wrapped(chart.heading(question), 60), fontsize=10)
+        axes.set_title(_wrapped(chart.heading(question), _TITLE_WIDTH), fontsize=10)
     if chart.accuracy is not None:
         axes.set_yscale("log")
         axes.set_ylim(floor / 2, _HEADROOM * _highest(chart, points))

@@ -490,19 +490,19 @@ def possible_words(estimate: Estimate, edges: Sequence[float]) -> str:
     """
     possible, touched = estimate.possible_grades, touched_grades(estimate, edges)
     far = [g for g in possible if touched and not touched[0] - 1 <= g <= touched[-1] + 1]
-    if far:
-        return (
-            f"grade {grades_words(possible)}; the interval keeps away from {grades_words(far)}, "
-            "but training machines so worn are too few, or told too badly, to exclude it: train on "
-            "more"
-        )
     beyond = [g for g in touched if g not in possible]
-    if not beyond:
-        return f"grade {grades_words(possible)}" if len(possible) > 1 else ""
-    also = " and ".join(grades_words([grade]) for grade in beyond)
-    return (
-        f"grade {grades_words(possible)}; the interval, calibrated by itself, also reaches {also}"
-    )
+    if len(possible) < 2 and not beyond:
+        return ""
+    words = [f"grade {grades_words(possible)}"]
+    if far:
+        words.append(
+            f"the interval keeps away from {grades_words(far)}, but the model has seen too few "
+            "machines of such a grade, or estimates them too poorly, to exclude it: train on more"
+        )
+    if beyond:
+        also = " and ".join(grades_words([grade]) for grade in beyond)
+        words.append(f"the interval, calibrated by itself, also reaches {also}")
+    return "; ".join(words)
 
 
 def finding_words(finding: Mapping[str, Any]) -> str:
