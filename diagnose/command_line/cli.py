@@ -122,7 +122,7 @@ def cli(context: click.Context) -> None:
 @command()
 @click.argument("shell", type=click.Choice(["bash", "zsh", "fish"]))
 def completion(shell: str) -> None:
-    """Script that lets SHELL complete commands, options, scenes and recipes.
+    """Print the script that lets SHELL complete commands, options, scenes and recipes.
 
     For bash and zsh put `eval "$(wearstate completion bash)"` into ~/.bashrc or ~/.zshrc.
     """

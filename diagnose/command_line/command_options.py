@@ -63,12 +63,15 @@ PATH = PathType(path_type=Path)
 MOST_RECORDS = 10**8  # as wearstate.datasets.recipe.recipe, which is too heavy to import for --help
 LARGEST_SEED = 2**63 - 1
 json_option = click.option(
-    "--json", "as_json", is_flag=True, help="One JSON object on stdout; an error as one on stderr."
+    "--json",
+    "as_json",
+    is_flag=True,
+    help="Print one JSON object on stdout; an error as one on stderr.",
 )
 points_option = click.option(
     "--interactive",
     is_flag=True,
-    help="In the page (.html): points to zoom in on and to tap for their settings.",
+    help="Make the page (.html) zoomable; tap a point for its settings.",
 )
 
 force_option = click.option("--force", is_flag=True, help="Replace an existing output.")
@@ -90,7 +93,7 @@ join_option = click.option(
     "joined",
     multiple=True,
     metavar="[VIEW=]FILE",
-    help="Further tests of the same machines and states, to be told from together; repeat it.",
+    help="Further tests of the same machines in the same states, used together; repeatable.",
 )
 
 

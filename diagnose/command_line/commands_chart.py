@@ -36,12 +36,13 @@ from .command_options import (
 @command()
 @click.argument("scene_name", metavar="SCENE", type=SCENE)
 @click.option("--set", "pairs", multiple=True, metavar="PATH=VALUE", help="Replace a scene value.")
-@click.option("--map", "map_name", help="One map only; all that the machine has by default.")
-@click.option("--size", type=click.IntRange(3, 60), help="Cells along either axis.")
+@click.option("--map", "map_name", help="Draw one map only; default: all maps of the machine.")
+@click.option("--size", type=click.IntRange(3, 60), help="Cells along each axis.")
 @click.option(
     "--budget",
     type=Share(min=1.0, max=86_400.0),
-    help="Seconds, none by default: the scene's own methods first, the rest is drawn as not run.",
+    help="Time limit [s]; default: none. The scene's own methods run first; what is left is drawn "
+    "as not run.",
 )
 @click.option(
     "-o", "--output", type=PATH, help="Page or picture to write (.html, .png, .svg or .pdf)."
@@ -58,10 +59,10 @@ def stability(
     force: bool,
     as_json: bool,
 ) -> None:
-    """Where each method fails on SCENE, and how far the scene is from that.
+    """Map where each method fails on SCENE, and how far the scene is from failure.
 
-    Accurate, inaccurate or unstable, with a numerical or a physical cause; the scene is marked in
-    every map.
+    Each cell is accurate, inaccurate or unstable, with a numerical or a physical cause; the scene
+    is marked in every map.
     """
     from ..stability.atlas import atlas
     from ..stability.text import stability_table, stability_text
@@ -86,34 +87,47 @@ def stability(
     "--accuracy",
     type=Accuracy(1e-6, 0.5),
     default=None,
-    help="Error that every quantity may carry; the scene's own by default. Of a recipe: "
-    "verdict=2%, rise of the error of the wear estimate, in % of the limit.",
+    help="Largest error allowed in each quantity; default: the scene's own. For a recipe: "
+    "verdict=2%, the largest rise of the error of the wear estimate, in % of the limit.",
 )
 @click.option(
     "-n",
     "--records",
     type=click.IntRange(20, 10_000),
     default=None,
-    help="Of a recipe: records on every choice of rungs; 120 by default.",
+    help="For a recipe: records for each choice of rungs; default: 120.",
 )
-@click.option("--effect", "effects", multiple=True, help="Of a recipe: only this one.")
-@click.option("--folder", type=PATH, help="Of a recipe: keep its data sets, and go on from them.")
+@click.option(
+    "--effect",
+    "effects",
+    multiple=True,
+    help="For a recipe: compare the rungs of this effect only.",
+)
+@click.option(
+    "--folder",
+    type=PATH,
+    help="For a recipe: keep its data sets here, and continue from those already there.",
+)
 @click.option(
     "--budget",
     type=Share(1.0, 1e6),
     default=None,
-    help="Seconds; 90 of a scene, of a data set none. The same command with -o goes on.",
+    help="Time limit [s]; default: 90 for a scene, none for a data set. With -o, repeat the "
+    "command to continue.",
 )
-@click.option("-o", "--output", type=PATH, help="Chart (.html, .svg, .png, .pdf, .json, .csv).")
 @click.option(
-    "--apply", "applied", type=PATH, help="Scene or recipe to write (.toml): what is recommended."
+    "-o", "--output", type=PATH, help="Chart to write (.html, .svg, .png, .pdf, .json, .csv)."
+)
+@click.option(
+    "--apply", "applied", type=PATH, help="Write the recommended scene or recipe (.toml)."
 )
 @click.option(
     "--choice",
     type=click.Choice(["kept", "raised"]),
     default="kept",
     show_default=True,
-    help="Of --apply: with the rungs of the scene kept, or with rungs that may change.",
+    help="What --apply writes: the recommendation that keeps the rungs of the scene, or the one "
+    "that may change them.",
 )
 @points_option
 @seed_option
@@ -137,13 +151,13 @@ def chart(
     force: bool,
     as_json: bool,
 ) -> None:
-    """How much model SCENE needs: its own error, and what would be enough; or diagnosis on DATA.
+    """Chart cost against error: of the rungs of SCENE, or of features and models on DATA.
 
-    Of a scene: the error of its rungs and steps as they are written, the cheapest numerics that do
-    where its rungs stay, and the cheapest rungs where they may change. Cheap information comes
-    first, and a budget or Ctrl-C ends it with what is known by then; with -o the same command goes
-    on from there. Of a data set (.h5): features and models, cost against error. Of a recipe, with
-    --accuracy verdict=2%: which rungs may be cheaper while training on them keeps the verdict.
+    SCENE: the error of its rungs and steps as written, the cheapest numerics that suffice if its
+    rungs stay, and the cheapest rungs if they may change. Cheap information comes first; when the
+    budget ends, or at Ctrl-C, the answer so far is given, and with -o the same command continues
+    from there. DATA (.h5): features and models, cost against error. RECIPE with --accuracy
+    verdict=2%: which rungs may be cheaper if models trained on them must keep the verdict.
     """
     check_interactive(interactive, output)
     of_data = subject.endswith(DATA_SUFFIXES)
@@ -251,38 +265,42 @@ _SUFFIXES = (*CHART_SUFFIXES, ".htm")
     multiple=True,
     required=True,
     metavar="PATH=VALUES",
-    help="A..B, A..B/N or A,B,C with a unit at the end; repeat it, the change looked for last.",
+    help="Values, as A..B, A..B/N or A,B,C with a unit at the end; repeatable. The last is the "
+    "change to detect.",
 )
 @click.option("--set", "pairs", multiple=True, metavar="PATH=VALUE", help="Replace a scene value.")
 @click.option(
     "--show",
     multiple=True,
     metavar="NAME,…",
-    help="Features, or what the simulator knows; * and ? as in a shell.",
+    help="Features or true values of the simulation to show; * and ? match as in a shell.",
 )
 @click.option(
     "--points",
     type=click.IntRange(2, 1000),
     default=5,
     show_default=True,
-    help="Of a range that does not say how many.",
+    help="Points of a range A..B that is given without /N.",
 )
 @click.option(
     "--starts",
     type=click.IntRange(1, 1000),
     default=5,
     show_default=True,
-    help="Recordings at each point: other start angle, noise and random forces.",
+    help="Recordings at each point, each with its own start angle, noise and random forces.",
 )
 @click.option(
     "--confidence",
     type=Share(0.5, 0.9999),
     default=0.95,
     show_default=True,
-    help="Of telling a change, and of not telling one where there is none.",
+    help="Probability of detecting a change, and of reporting none where there is none.",
 )
 @click.option(
-    "-o", "--output", type=PATH, help="Page, table or picture (.html, .csv, .json, .png, .svg)."
+    "-o",
+    "--output",
+    type=PATH,
+    help="Page, table or picture to write (.html, .csv, .json, .png, .svg).",
 )
 @points_option
 @seed_option
@@ -304,11 +322,11 @@ def sweep(
     force: bool,
     as_json: bool,
 ) -> None:
-    """Vary numbers of SCENE: what shows a change, from which size on, and where first.
+    """Vary numbers of SCENE: find which feature shows a change, from which size, and where first.
 
-    The last --over is the change that is looked for, such as a clearance; those before it are
-    conditions, such as the speed. With -o, runs are kept beside the output until all are done:
-    after Ctrl-C the same command goes on. The CSV has one row for each point and start, SI.
+    The last --over is the change to detect, such as a clearance; those before it are conditions,
+    such as the speed. With -o, runs are kept beside the output until all are done: after Ctrl-C the
+    same command continues. The CSV has one row for each point and start, in SI units.
     """
     from ..pages.kept import part_file
     from ..sweep.axes import SweepError

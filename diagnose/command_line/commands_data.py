@@ -33,13 +33,13 @@ from .command_options import (
 
 @click.group(cls=HelpfulGroup)
 def recipe() -> None:
-    """What data sets are drawn from: list, show, check, preview, explain."""
+    """List, show, check, explain and preview recipes, from which data sets are drawn."""
 
 
 @recipe.command("list")
 @json_option
 def recipe_list(as_json: bool) -> None:
-    """Names and descriptions of the built-in recipes."""
+    """List the built-in recipes with their descriptions."""
     from ...datasets.recipe.text import read_recipe, recipe_names
 
     found = {name: read_recipe(name).table.get("description", "") for name in recipe_names()}
@@ -49,9 +49,9 @@ def recipe_list(as_json: bool) -> None:
 
 @recipe.command("show")
 @click.argument("name", metavar="RECIPE", type=RECIPE)
-@click.option("--whole", is_flag=True, help="With all that it extends.")
+@click.option("--whole", is_flag=True, help="Include what the recipe takes from those it extends.")
 def recipe_show(name: str, whole: bool) -> None:
-    """TOML text of a recipe: copy it, change it, check it."""
+    """Print the TOML text of a recipe, to copy, change and check."""
     from ...datasets.recipe.text import read_recipe, recipe_text
 
     click.echo(read_recipe(name).text if whole else recipe_text(name), nl=False)
@@ -61,7 +61,7 @@ def recipe_show(name: str, whole: bool) -> None:
 @click.argument("file", metavar="RECIPE", type=RECIPE)
 @json_option
 def recipe_check(file: str, as_json: bool) -> None:
-    """Check a recipe against its scene; every fault, and warnings of what is hardly meant."""
+    """Check a recipe against its scene: all faults at once, and warnings of likely mistakes."""
     from ...datasets.recipe.foreign_draws import draw_doubts
     from ...datasets.recipe.load import load_recipe
     from ...datasets.recipe.records import STRATA, sample_records
@@ -91,7 +91,7 @@ def recipe_check(file: str, as_json: bool) -> None:
 @click.argument("key", metavar="[KEY]", required=False, default="")
 @json_option
 def recipe_explain(key: str, as_json: bool) -> None:
-    """What every key of a recipe means: unit, range, default; KEY as severity.low."""
+    """Explain the keys of a recipe: meaning, unit, range, default; KEY as severity.low."""
     from ..inspect.keys import found_recipe_keys
     from ..inspect.keys_text import explained, keys_table
 
@@ -104,7 +104,7 @@ _records_option = click.option(
     "--records",
     type=click.IntRange(1, MOST_RECORDS),
     default=None,
-    help="Records; the recipe's by default.",
+    help="Number of records; default: as in the recipe.",
 )
 
 
@@ -125,7 +125,7 @@ def recipe_preview(
     force: bool,
     as_json: bool,
 ) -> None:
-    """What RECIPE (a built-in name or a TOML file) would make: draws, labels, time and size."""
+    """Show what RECIPE (a built-in name or a TOML file) would make: draws, labels, time, size."""
     from ...datasets.recipe.load import load_recipe
     from ..inspect.recipe_preview import preview, preview_figure, preview_text
 
@@ -145,26 +145,30 @@ def recipe_preview(
 @_records_option
 @click.option("-o", "--output", type=PATH, required=True, help="Data set to write (.h5).")
 @click.option(
-    "--view", default="", metavar="NAME", help="One of the recipe's further tests of each state."
+    "--view",
+    default="",
+    metavar="NAME",
+    help="Simulate this further test of the recipe instead of its main one.",
 )
 @click.option("--truth", is_flag=True, help="Also store forces and orbit.")
 @click.option(
     "--twin",
     type=PATH,
-    help="Calibrated scene (wearstate calibrate): every other machine is drawn as this one.",
+    help="Calibrated scene (wearstate calibrate), from which half of the machines are drawn.",
 )
 @click.option(
     "--fidelity",
     type=click.Choice(["auto", "given"]),
     default=None,
-    help="Least rungs that the accuracy needs, or as written; what the recipe says by default.",
+    help="auto: cheapest rungs that meet the accuracy; given: as in the scene; default: as in the "
+    "recipe.",
 )
 @seed_option
 @jobs_option
 @click.option(
     "--scheduler",
     metavar="tcp://HOST:PORT",
-    help="Simulate on the workers of a Dask cluster instead; the same bytes.",
+    help="Simulate on the workers of a Dask cluster; the records do not depend on it.",
 )
 @force_option
 @json_option
@@ -184,7 +188,7 @@ def generate(
 ) -> None:
     """Simulate a labelled data set from RECIPE (a built-in name or a TOML file).
 
-    An interrupted run goes on where it stopped when the same command is repeated.
+    Repeat the same command to continue an interrupted run.
     """
     from dataclasses import asdict
 
@@ -238,7 +242,7 @@ def _generated_text(summary: Any) -> str:
     type=click.Choice(["refuse", "drop"]),
     default="refuse",
     show_default=True,
-    help="Records whose id and signal an earlier data set has.",
+    help="What to do with records whose id and signal are already in an earlier data set.",
 )
 @force_option
 @json_option
@@ -249,9 +253,9 @@ def merge(
     force: bool,
     as_json: bool,
 ) -> None:
-    """Write the records of several data sets with the same channels and rate as one.
+    """Merge data sets with the same channels and sample rate into one.
 
-    Machines of different data sets stay apart; the column `source` tells where a record is from.
+    Machines of different data sets stay apart; the column `source` names the data set of a record.
     """
     from dataclasses import asdict
 
@@ -270,10 +274,10 @@ def merge(
     "--as",
     "kind",
     type=click.Choice(["h5", "parquet", "npz", "wav", "csv"]),
-    help="By the suffix of the output by default; wav and csv are folders.",
+    help="Format; default: by the suffix of the output. wav and csv write a folder.",
 )
-@click.option("--signals", is_flag=True, help="Parquet: signals too, as columns of lists.")
-@click.option("--compress", is_flag=True, help=".h5 and .npz: smaller, with the same values.")
+@click.option("--signals", is_flag=True, help="Parquet: include the signals, as columns of lists.")
+@click.option("--compress", is_flag=True, help=".h5 and .npz: smaller file with the same values.")
 @force_option
 @json_option
 def export(
@@ -285,7 +289,7 @@ def export(
     force: bool,
     as_json: bool,
 ) -> None:
-    """Write the data set DATA as Parquet, NumPy or HDF5 file, or as folder of WAV or CSV files."""
+    """Export the data set DATA to Parquet, NumPy or HDF5, or to a folder of WAV or CSV files."""
     from dataclasses import asdict
 
     from ...datasets.convert.export import export_set, exported_text
@@ -314,20 +318,23 @@ _SPLITS = (  # as wearstate.datasets.split.stored, which is too heavy to import 
 @click.argument("data", type=DATA)
 @click.option("--add", "kinds", multiple=True, type=click.Choice(_SPLITS), help="Split to store.")
 @click.option("--defaults", is_flag=True, help="Store every split that the records allow.")
-@click.option("--name", help="To store one split under; its kind by default.")
+@click.option("--name", help="Name of a single split to store; default: its kind.")
 @click.option(
     "--bound",
     "bounds",
     multiple=True,
     metavar="COLUMN=LOW:HIGH",
-    help="Of a region, in SI; one end may be left out. Records within all bounds are tested.",
+    help="Bound of a region, in SI units; one end may be left out. Records within all bounds are "
+    "the test side.",
 )
 @click.option(
     "--share",
     type=Share(0.01, 0.99),
-    help="Of the machines that is tested; of time-…: of a life that is trained on.",
+    help="Fraction of machines held out for testing; time-…: fraction of each life to train on.",
 )
-@click.option("--seed", type=click.IntRange(0, LARGEST_SEED), help="Of the choice of machines.")
+@click.option(
+    "--seed", type=click.IntRange(0, LARGEST_SEED), help="Seed of the choice of machines."
+)
 @force_option
 @json_option
 def splits(
@@ -341,7 +348,7 @@ def splits(
     force: bool,
     as_json: bool,
 ) -> None:
-    """Splits stored in the data set DATA, and further ones; signal and manifest stay as they are.
+    """Show the splits stored in DATA, or add some; signals and manifest stay as they are.
 
     With --force, a split of the same name is replaced.
     """
@@ -385,19 +392,28 @@ def _bounds(texts: Sequence[str]) -> dict[str, tuple[float, float]]:
 
 @command()
 @click.argument("paths", metavar="FILES…", nargs=-1, type=PATH)
-@click.option("--label", default="", metavar="COLUMN|FILE", help="What is to be told apart.")
-@click.option("--group", default="", metavar="COLUMN", help="Machine of each row.")
 @click.option(
-    "--split", default="", metavar="NAME", help="Stored split, or column with train and test."
+    "--label",
+    default="",
+    metavar="COLUMN|FILE",
+    help="Label to predict: a column, or a file of labels.",
+)
+@click.option(
+    "--group", default="", metavar="COLUMN", help="Column that names the machine of each row."
+)
+@click.option(
+    "--split", default="", metavar="NAME", help="Stored split, or column that holds train and test."
 )
 @click.option(
     "--nuisance",
     multiple=True,
     metavar="COLUMN",
-    help="Condition that must not follow the label.",
+    help="Column of a condition that must not follow the label.",
 )
-@click.option("--train", multiple=True, type=PATH, help="File that trains, against --test.")
-@click.option("--test", multiple=True, type=PATH, help="File that tests, against --train.")
+@click.option(
+    "--train", multiple=True, type=PATH, help="File of training rows, compared with --test."
+)
+@click.option("--test", multiple=True, type=PATH, help="File of test rows, compared with --train.")
 @click.option(
     "--fail-on",
     type=click.Choice(["warning", "alarm"]),
@@ -417,10 +433,10 @@ def audit(
     jobs: int | None,
     as_json: bool,
 ) -> None:
-    """Leaks, copies and unfit splits in data sets (.h5) and tables (.csv, .parquet).
+    """Find leaks, copies and unfit splits in data sets (.h5) and tables (.csv, .parquet).
 
-    Columns are named, or counted from 1. Data sets and tables of `wearstate features` know their
-    label and machines.
+    Columns are given by name, or by number from 1. Data sets and tables of `wearstate features`
+    know their label and machines.
     """
     from ...datasets.audit.audit import audit as run
     from ...datasets.audit.table import Roles

@@ -39,34 +39,39 @@ from .command_options import (
     "--records",
     type=click.IntRange(20, MOST_RECORDS),
     default=None,
-    help="Of every rung, with --across-fidelity; 120 by default.",
+    help="With --across-fidelity: records for each rung; default: 120.",
 )
-@click.option("--effect", "effects", multiple=True, help="With --across-fidelity: only this one.")
+@click.option(
+    "--effect",
+    "effects",
+    multiple=True,
+    help="With --across-fidelity: compare the rungs of this effect only.",
+)
 @click.option("--set", "pairs", multiple=True, metavar="PATH=VALUE", help="Replace a scene value.")
 @click.option(
     "--folder",
     type=PathType(path_type=Path, file_okay=False),
-    help="Keep the data sets of --across-fidelity, and use those that are there.",
+    help="Keep the data sets of --across-fidelity here, and reuse those already there.",
 )
 @click.option(
     "--split",
     metavar="NAME",
-    help="Split that DATA holds (wearstate splits): judge on all of its test side.",
+    help="Split stored in DATA (wearstate splits): judge on the whole of its test side.",
 )
 @click.option(
     "--retrain",
     multiple=True,
     metavar="NAME|all",
-    help="Train and judge anew with this part of DATA held out; may be repeated.",
+    help="Train again without this part of DATA and judge on it; repeatable.",
 )
 @join_option
 @click.option("--trained-on", type=PATH, help="MODEL's training set, for the baselines.")
 @click.option("--baseline", "healthy", type=PATH, help="Healthy records of DATA's machines.")
-@click.option("--quick", is_flag=True, help="Leave out baselines that need packages of others.")
+@click.option("--quick", is_flag=True, help="Leave out baselines that need third-party packages.")
 @click.option(
     "--cache",
     type=PathType(path_type=Path, file_okay=False),
-    help="Folder in which features of such packages are kept.",
+    help="Folder in which to keep features computed by third-party packages.",
 )
 @click.option("-o", "--output", type=PATH, help="Page, picture or JSON to write.")
 @seed_option
@@ -90,9 +95,9 @@ def evaluate(
 ) -> None:
     """Judge MODEL on the machine draws of DATA that it has not seen.
 
-    With --split: on what this split of DATA tests. With --retrain: train as MODEL was trained, with
-    other parts of DATA held out, and judge on these. With --across-fidelity: what training on a
-    cheaper model of the machine costs.
+    With --split: on the test side of this split of DATA. With --retrain: train as MODEL was
+    trained, with other parts of DATA held out, and judge on these. With --across-fidelity: find
+    what it costs to train on a cheaper model of the machine.
     """
     from ..class_model.file import CLASS_MODEL
     from ..wear_model.bundle import kind_of
@@ -211,19 +216,21 @@ def _judge_across(
 
 @command()
 @click.argument("model_file", metavar="MODEL", type=MODEL)
-@click.option("--recipe", metavar="RECIPE", help="Draws the machines; the model's own by default.")
+@click.option(
+    "--recipe", metavar="RECIPE", help="Recipe that draws the machines; default: the model's own."
+)
 @click.option(
     "-n",
     "--machines",
     type=click.IntRange(1, 300),
     default=12,
     show_default=True,
-    help="Simulated for every row.",
+    help="Machines simulated for each row.",
 )
 @click.option(
     "--budget",
     type=click.FloatRange(0, min_open=True),
-    help="Seconds after which no further row is begun; repeat the command to go on.",
+    help="Time [s] after which no further row is started; repeat the command to continue.",
 )
 @click.option(
     "--background",
@@ -234,7 +241,7 @@ def _judge_across(
     "--only",
     metavar="TEXT",
     multiple=True,
-    help="Rows whose name or shift contains TEXT, to look closer with more machines; repeatable.",
+    help="Only rows whose name or shift contains TEXT, to judge them on more machines; repeatable.",
 )
 @click.option("-o", "--output", type=PATH, help="HTML page to write.")
 @seed_option
@@ -252,12 +259,12 @@ def blindspots(
     force: bool,
     as_json: bool,
 ) -> None:
-    """What MODEL takes for granted: its error where one thing differs from its recipe.
+    """Measure the error of MODEL where one assumption of its recipe does not hold.
 
-    The same simulated machines, which it was not trained on, are judged again with each value that
-    the recipe holds fixed shifted, each drawn one beyond its range, and the signal disturbed. The
-    worst is first: the largest error without a caution. With -o, finished rows are kept beside the
-    page until all are done.
+    The same simulated machines, unseen in training, are judged again and again: each value that the
+    recipe holds fixed is shifted, each drawn value is moved beyond its range, and the signal is
+    disturbed, one at a time. The table begins with the largest error without a caution. With -o,
+    finished rows are kept beside the page until all are done.
     """
     from ..blindspots.blindspots import file_hash, find_blind_spots, kept_rows, recipe_of, run_key
     from ..blindspots.signals import signal_rows

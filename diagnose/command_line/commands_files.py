@@ -64,21 +64,24 @@ class _Segment(click.ParamType):  # type: ignore[type-arg]  # generic from click
 @click.option("-o", "--output", type=PATH, help="Data set to write (.h5).")
 @click.option("--list", "only_list", is_flag=True, help="Show what is in FILES; write nothing.")
 @source_options
-@click.option("--labels", type=PATH, help="CSV with a column 'file' and one for every label.")
+@click.option("--labels", type=PATH, help="CSV with a column 'file' and one column for each label.")
 @click.option(
-    "--label", "pairs", multiple=True, metavar="NAME=VALUE", help="The same label for all files."
+    "--label", "pairs", multiple=True, metavar="NAME=VALUE", help="Label given to all files."
 )
-@click.option("--speed", help="Shaft speed of all files, like '1500 rpm'.")
+@click.option("--speed", help="Shaft speed of all files, e.g. '1500 rpm'.")
 @click.option(
-    "--severity", multiple=True, metavar="LABEL", help="Label [m] that says how worn it is."
+    "--severity", multiple=True, metavar="LABEL", help="Label column holding the wear in metres."
 )
 @click.option(
-    "--limits", metavar="SCENE|LENGTHS", help="Grades: of a scene, or '0.1 mm, 0.2 mm, 0.3 mm'."
+    "--limits",
+    metavar="SCENE|LENGTHS",
+    help="Limits of the grades: those of a scene, or lengths, e.g. '0.1 mm, 0.2 mm, 0.3 mm'.",
 )
 @click.option(
     "--group-by",
     type=click.Choice(["file", "folder", "column"]),
-    help="What is one machine: column 'group' of the labels if it is there, else the file.",
+    help="What identifies a machine; default: column 'group' of the labels if there is one, else "
+    "the file.",
 )
 @click.option(
     "--segment",
@@ -88,11 +91,19 @@ class _Segment(click.ParamType):  # type: ignore[type-arg]  # generic from click
     help="Cut the files into records of this length.",
 )
 @click.option(
-    "--overlap", type=Share(0, 0.99), default=0.0, help="Part of a record the next one repeats."
+    "--overlap",
+    type=Share(0, 0.99),
+    default=0.0,
+    help="Fraction of each record that the next one repeats.",
 )
-@click.option("--place", multiple=True, metavar="CHANNEL=TEXT", help="Where a channel is.")
 @click.option(
-    "--direction", multiple=True, metavar="CHANNEL=TEXT", help="Which way it points or pushes."
+    "--place", multiple=True, metavar="CHANNEL=TEXT", help="Position of a channel on the machine."
+)
+@click.option(
+    "--direction",
+    multiple=True,
+    metavar="CHANNEL=TEXT",
+    help="Direction in which a sensor points or a force pushes.",
 )
 @jobs_option
 @force_option
@@ -106,9 +117,9 @@ def import_files(
     as_json: bool,
     **given: Any,
 ) -> None:
-    """Bring measured FILES into one data set: WAV, MATLAB, CSV, HDF5, NPY, UFF58, TDMS, binary.
+    """Convert measured FILES into one data set: WAV, MATLAB, CSV, HDF5, NPY, UFF58, TDMS, binary.
 
-    Rate and units are declared, by the files or here, or refused: they are never guessed.
+    Sample rate and units come from the files or from the options; they are never guessed.
     """
     from ...datasets.measured.data_set import import_recordings
     from ...datasets.measured.labels import read_limits
@@ -175,18 +186,24 @@ _PLOT_OPTIONS = ("draw", "force_channel", "speed_hz", "bearing")
 
 @command()
 @click.argument("file", type=FILE, required=False)
-@click.option("--fft", "of_fft", is_flag=True, help="Who computes Fourier transforms, timed here.")
+@click.option("--fft", "of_fft", is_flag=True, help="Show and time the FFT backend.")
 @click.option(
     "--verify", "check", is_flag=True, help="Check every record of a data set; exit 1 on a fault."
 )
 @click.option("--card", type=PATH, help="Page about a data set to write (.html or .md).")
-@click.option("--licence", default="not stated", show_default=True, help="Of the data, for --card.")
+@click.option(
+    "--licence", default="not stated", show_default=True, help="Licence of the data, for --card."
+)
 @click.option("--plot", type=PATH, help="Picture of a recording to write (.png, .svg or .pdf).")
 @click.option(
-    "--interactive", is_flag=True, help="Write --plot as a page (.html) to zoom and measure in."
+    "--interactive", is_flag=True, help="Write --plot as a page (.html) with zoom and cursors."
 )
-@click.option("--kind", type=click.Choice(_KINDS), help="What to plot; by default all it supports.")
-@click.option("--draw", multiple=True, metavar="NAME", help="Channel to plot; all by default.")
+@click.option(
+    "--kind",
+    type=click.Choice(_KINDS),
+    help="What to plot; default: all that the recording supports.",
+)
+@click.option("--draw", multiple=True, metavar="NAME", help="Channel to plot; default: all.")
 @click.option("--force-channel", metavar="NAME", help="Force of a transfer function to plot.")
 @speed_option
 @bearing_option
@@ -209,7 +226,7 @@ def info(
     as_json: bool,
     **given: Any,
 ) -> None:
-    """What a data set, recording or model is, checked; and pictures of a recording."""
+    """Describe and check a data set, recording or model; plot a recording."""
     from ..inspect.info import (
         describe,
         describe_fft,
@@ -284,22 +301,29 @@ _FEATURE_SETS = (
 
 @command()
 @click.argument("data", type=DATA, required=False)
-@click.option("-o", "--output", type=PATH, help="Table (.parquet, .csv, .h5).")
-@click.option("--list", "listing", is_flag=True, help="What there is: unit, needs, reference.")
+@click.option("-o", "--output", type=PATH, help="Table to write (.parquet, .csv, .h5).")
+@click.option(
+    "--list", "listing", is_flag=True, help="List all features: unit, requirements, reference."
+)
 @click.option(
     "--set",
     "feature_set",
     type=click.Choice(_FEATURE_SETS),
-    help="What models are trained on (default); all but the dearest; everything.",
+    help="standard: those that models are trained on (default); core: without the most expensive; "
+    "complete: all.",
 )
-@click.option("--only", multiple=True, metavar="NAMES", help="Only these, parted by commas.")
 @click.option(
-    "--rank", is_flag=True, help="Which features tell the wear; -o is a page or a table (.csv)."
+    "--only", multiple=True, metavar="NAMES", help="Only these features, separated by commas."
+)
+@click.option(
+    "--rank",
+    is_flag=True,
+    help="Rank the features by how well they show the wear; -o is then a page or a table (.csv).",
 )
 @click.option(
     "--target",
     metavar="COLUMN",
-    help="Of --rank: severity or label to be told; the first severity by default.",
+    help="With --rank: severity or label to predict; default: the first severity.",
 )
 @join_option
 @click.option("--machine", metavar="KIND", help="Kind of machine, for its ISO zone.")
@@ -307,7 +331,12 @@ _FEATURE_SETS = (
 @bearing_option
 @exponential_option
 @click.option(
-    "--band", "bands", type=Numbers(), multiple=True, metavar="LOW,HIGH", help="Band level [Hz]."
+    "--band",
+    "bands",
+    type=Numbers(),
+    multiple=True,
+    metavar="LOW,HIGH",
+    help="Also compute the level of this band [Hz]; repeatable.",
 )
 @click.option(
     "--envelope-band", type=Numbers(), metavar="LOW,HIGH", help="Band of the envelope [Hz]."
@@ -317,7 +346,7 @@ _FEATURE_SETS = (
     "speed_band_hz",
     type=Numbers(),
     metavar="LOW,HIGH",
-    help="Where the speed is looked for without a tacho [Hz].",
+    help="Range in which to look for the shaft speed without a tacho [Hz].",
 )
 @jobs_option
 @force_option
@@ -336,7 +365,7 @@ def features(
     as_json: bool,
     **about: Any,
 ) -> None:
-    """Feature table of the data set DATA (.parquet, .csv or .h5), manifest beside it.
+    """Compute the feature table of the data set DATA (.parquet, .csv or .h5), with a manifest.
 
     With --rank: which features separate the grades or follow the severity, alone and within each
     machine, and what they cost.

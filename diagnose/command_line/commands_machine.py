@@ -35,13 +35,13 @@ _ALIGN_FAIL_ON_HELP = (
 
 @click.group(cls=HelpfulGroup)
 def scene() -> None:
-    """The machines: list, show, check, explain; new ones, and a schema for editors."""
+    """List, show, check, explain and create scenes, the machines to simulate."""
 
 
 @scene.command("list")
 @json_option
 def scene_list(as_json: bool) -> None:
-    """Names and descriptions of the built-in scenes."""
+    """List the built-in scenes with their descriptions."""
     from ...sim.scene.load import load_scene, scene_names
 
     scenes = {name: load_scene(name).description for name in scene_names()}
@@ -51,7 +51,7 @@ def scene_list(as_json: bool) -> None:
 @scene.command("show")
 @click.argument("name", metavar="SCENE", type=SCENE)
 def scene_show(name: str) -> None:
-    """TOML text of a scene: copy it, change it, check it."""
+    """Print the TOML text of a scene, to copy, change and check."""
     from ...sim.scene.load import scene_table, scene_text
     from ...sim.scene.scene import SceneError
 
@@ -64,14 +64,18 @@ def scene_show(name: str) -> None:
 @scene.command("check")
 @click.argument("file", metavar="SCENE", type=SCENE)
 @click.option("--set", "pairs", multiple=True, metavar="PATH=VALUE", help="Replace a scene value.")
-@click.option("--deep", is_flag=True, help="Every figure beside what is usual; runs it shortly.")
+@click.option(
+    "--deep",
+    is_flag=True,
+    help="Compare each key figure with its usual range; runs a short simulation.",
+)
 @json_option
 def scene_check(file: str, pairs: Sequence[str], deep: bool, as_json: bool) -> None:
-    """Check a scene; every fault at once, and warnings of what is hardly meant.
+    """Check a scene: all faults at once, and warnings of likely mistakes.
 
-    --deep: a table of the machine's figures (natural frequencies, forces, films, contacts, cost),
-    each beside what is usual, with a cure where it is not. Exit 2 for faults, with --deep also
-    where a short simulated run fails; what is merely unusual is no fault.
+    --deep: a table of the machine's key figures (natural frequencies, forces, films, contacts,
+    cost), each with its usual range, and a correction where it is outside. Exit 2 for faults, with
+    --deep also where a short simulation fails; an unusual figure alone is no fault.
     """
     from ...sim.machine.simulate import check
     from ...sim.scene.plausibility import scene_doubts
@@ -103,9 +107,9 @@ def _deep_check(checked: Any, as_json: bool) -> None:
 @click.argument("key", metavar="[KEY]", required=False, default="")
 @json_option
 def scene_explain(subject: str, key: str, as_json: bool) -> None:
-    """What every key of a scene means: unit, range, default, and the rungs to choose from.
+    """Explain the keys of a scene: meaning, unit, range, default, and the rungs to choose from.
 
-    MACHINE is pump, journal or shaft; of a SCENE its own values are shown as well. KEY is a dotted
+    MACHINE is pump, journal or shaft; for a SCENE its own values are shown as well. KEY is a dotted
     path, a table or the end of a path: `scene explain pump pressure.rung`, for short
     `scene explain pump.pressure.rung`.
     """
@@ -124,10 +128,10 @@ _MACHINES = ("pump", "journal", "shaft")  # as wearstate.sim.scene.load, too hea
 
 @scene.command("schema")
 @click.argument("machine", type=click.Choice(_MACHINES))
-@click.option("-o", "--output", type=PATH, help="File to write (.json); stdout by default.")
+@click.option("-o", "--output", type=PATH, help="File to write (.json); default: stdout.")
 @force_option
 def scene_schema(machine: str, output: Path | None, force: bool) -> None:
-    """JSON schema of a scene, for an editor that completes and checks TOML.
+    """Print the JSON schema of a scene, for an editor that completes and checks TOML.
 
     Name it in the first line of a scene: `#:schema ./pump.json` (taplo, Even Better TOML).
     """
@@ -149,7 +153,7 @@ def scene_schema(machine: str, output: Path | None, force: bool) -> None:
 @click.option("-o", "--output", type=PATH, required=True, help="Scene to write (.toml).")
 @force_option
 def scene_new(machine: str, output: Path, force: bool) -> None:
-    """A scene of your own with the fewest keys that run: change its numbers, add others."""
+    """Write a scene of your own with the fewest keys that run: change its numbers, add others."""
     from ...sim.atomic import write_whole
     from ...sim.scene.load import minimal_text
 
@@ -227,8 +231,10 @@ def simulate(
 @command()
 @click.argument("scene_name", metavar="SCENE", type=SCENE)
 @click.option("--set", "pairs", multiple=True, metavar="PATH=VALUE", help="Replace a scene value.")
-@click.option("--low", type=float, help="Lowest frequency [Hz]; --high / 300.")
-@click.option("--high", type=float, help="Highest frequency [Hz]; 0.45 of the rate.")
+@click.option("--low", type=float, help="Lowest frequency [Hz]; default: --high / 300.")
+@click.option(
+    "--high", type=float, help="Highest frequency [Hz]; default: 0.45 of the sample rate."
+)
 @click.option("-o", "--output", type=PATH, help="Table to write (.csv).")
 @click.option("--plot", type=PATH, help="Picture to write (.png, .svg or .pdf).")
 @force_option
@@ -243,9 +249,9 @@ def frf(
     force: bool,
     as_json: bool,
 ) -> None:
-    """Transfer functions of SCENE: of a pump's casing, or of a running shaft line.
+    """Compute the transfer functions of SCENE: of a pump's casing, or of a running shaft line.
 
-    What a perfect test would measure; the table can be the `casing.frf` of a scene.
+    They are what a perfect test would measure; the table can be the `casing.frf` of a scene.
     """
     from ..pictures.scene_transfer import (
         save_csv,
@@ -278,46 +284,56 @@ def frf(
     type=click.Choice(["cold", "hot", "running", "all"]),
     default="all",
     show_default=True,
-    help="In which the limits must hold.",
+    help="Condition in which the limits must hold.",
 )
-@click.option("--calibrate/--no-calibrate", default=True, show_default=True, help="Look for moves.")
+@click.option(
+    "--calibrate/--no-calibrate",
+    default=True,
+    show_default=True,
+    help="Look for bearing moves that meet the limits.",
+)
 @click.option(
     "--prefer",
     type=click.Choice(["least", "fewest"]),
     default="least",
     show_default=True,
-    help="Least sum of moves, or fewest bearings moved.",
+    help="Smallest sum of moves, or fewest bearings moved.",
 )
 @click.option(
     "--target",
     type=click.Choice(["limits", "even", "vibration"]),
     default="limits",
     show_default=True,
-    help="limits: least moves that meet them; even: also reactions as even as they allow; "
-    "vibration: also the running line as quiet.",
+    help="limits: smallest moves that meet the limits; even: also the most equal reactions within "
+    "them; vibration: also the quietest running line within them.",
 )
 @click.option(
     "--margin",
     type=Share(0.0, 0.9),
     default=0.0,
     show_default=True,
-    help="Keep this share of each limit away from it.",
+    help="Safety margin to each limit, as a fraction of it.",
 )
-@click.option("--jack", metavar="BEARING", help="Jacking test beside this bearing.")
+@click.option("--jack", metavar="BEARING", help="Simulate a jacking test beside this bearing.")
 @click.option(
     "--test",
     "rig_test",
     type=click.Choice(["hammer", "shaker"]),
-    help="Simulated test of the running shaft before and after the moves.",
+    help="Simulate this test of the running shaft before and after the moves.",
 )
-@click.option("--push", metavar="BEARING", help="Where --test pushes the shaft up; aftmost.")
+@click.option(
+    "--push",
+    metavar="BEARING",
+    help="Bearing at which --test pushes the shaft up; default: the aftmost.",
+)
 @click.option("--test-plot", type=PATH, help="Picture of --test to write.")
 @click.option(
     "--from-test",
     "tests",
     type=PATH,
     multiple=True,
-    help="Data set of measured tests of the line, with force channels: its sags.",
+    help="Data set of measured tests of the line, with force channels, from which its sags are "
+    "estimated.",
 )
 @click.option("--reactions", type=PATH, help="CSV of measured reactions: bearing, reaction_kn.")
 @click.option(
@@ -359,10 +375,10 @@ def align(
     force: bool,
     as_json: bool,
 ) -> None:
-    """Bearing loads of the shaft line SCENE, and the moves that bring them within limits.
+    """Compute bearing loads of the shaft line SCENE, and the moves that bring them within limits.
 
-    With --from-test, --reactions or --jacking the line is first taken to where these put its
-    bearings.
+    With --from-test, --reactions or --jacking, the bearings are first placed where these
+    measurements put them.
     """
     from ..alignment.align import align as judge
     from ..alignment.figure import save_figure
@@ -450,7 +466,7 @@ def _tested(
 @command()
 @json_option
 def verify(as_json: bool) -> None:
-    """Every literature check: expected, obtained, tolerance, source. Exit 1 if one fails."""
+    """Compare the physics with literature: expected, obtained, tolerance; exit 1 on a failure."""
     from dataclasses import asdict
 
     from ..literature.verify import run_checks

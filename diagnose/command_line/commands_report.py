@@ -40,40 +40,42 @@ _FAIL_ON_HELP = "Exit 3 at a warning, 4 at an alarm, 5 when unfamiliar; alarm: o
 @click.option(
     "--interactive",
     is_flag=True,
-    help="Of one recording: curves to zoom and measure in the page; of many: their trends.",
+    help="Zoom and cursors in the page: the curves of one recording, or the trends of many.",
 )
 @click.option("--machine", metavar="KIND", help="Kind of machine, for its ISO zone.")
 @click.option(
     "--scene",
     metavar="SCENE|TOML",
-    help="The machine's nameplate: geometry, load, oil. A data set's own by default.",
+    help="Nameplate of the machine: geometry, load, oil; default: that of the data set.",
 )
 @click.option(
     "--set",
     "pairs",
     multiple=True,
     metavar="PATH=VALUE",
-    help="Replace a value of the nameplate, as load.static='4 kN +- 5 %'.",
+    help="Replace a value of the nameplate, e.g. load.static='4 kN +- 5 %'.",
 )
 @click.option(
     "--twin",
     type=PATH,
     metavar="SCENE",
-    help="Calibrated scene of this machine (wearstate calibrate): estimates the wear as well.",
+    help="Calibrated scene of this machine (wearstate calibrate): gives a second estimate.",
 )
-@click.option("--trend", is_flag=True, help="Of many recordings: severity over time, life left.")
+@click.option(
+    "--trend", is_flag=True, help="For many recordings: wear over time and remaining life."
+)
 @click.option(
     "--dates",
     metavar="names|mtime|CSV|COLUMN",
-    help="Times for --trend: in file names, of files, a table file,date or file,hours, or a column "
-    "of hours in the data set (operating_hours).",
+    help="Times for --trend: from file names (names), from the files (mtime), from a table "
+    "file,date or file,hours, or from a column of hours in the data set (operating_hours).",
 )
 @click.option(
     "--growth",
     type=click.Choice(["linear", "log"]),
     default="linear",
     show_default=True,
-    help="Of the wear over time: abrasive, or damage that feeds itself.",
+    help="Growth of the wear: linear for abrasion, log for damage that accelerates itself.",
 )
 @seed_option
 @source_options
@@ -93,12 +95,12 @@ def report(
     as_json: bool,
     **given: Any,
 ) -> None:
-    """The verdict on RECORDING: wear grade and severity with interval, or why there is none.
+    """Assess RECORDING: wear grade and wear with its interval, or why there is none.
 
-    Of a FOLDER, or a data set without --record: a table of all recordings, the most urgent first;
-    with --json one object a line. Exit 2 if nothing could be judged; with --fail-on, of many
-    recordings, the code of the worst: alarm, warning, bad input, unfamiliar. With times, only the
-    latest of a machine counts.
+    For a FOLDER, or a data set without --record: a table of all recordings, the most urgent first;
+    with --json one object per line. Exit 2 if nothing could be judged; with --fail-on and many
+    recordings, the code of the worst: alarm, warning, bad input, unfamiliar. If the recordings have
+    times, only the latest of each machine counts.
     """
     from ...datasets.file.views import views_of
     from ..class_model.file import CLASS_MODEL

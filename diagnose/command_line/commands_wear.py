@@ -36,20 +36,21 @@ from .command_options import (
     "unknown",
     multiple=True,
     metavar="NAME",
-    help="What to estimate, a path or choice of the recipe, * for any; repeat it. All by default.",
+    help="Path or choice of the recipe to estimate, * for any; repeatable. Default: all.",
 )
 @click.option(
     "--recipe",
     type=RECIPE,
     default=None,
-    help="What is unknown of such machines, and how widely; the standard one by default.",
+    help="Recipe that says what is unknown of such machines, and how widely; default: the "
+    "standard one.",
 )
 @click.option(
     "--budget",
     type=click.FloatRange(1, 86_400),
     default=None,
     metavar="SECONDS",
-    help="Time of a usual core; decides how many machines are simulated.",
+    help="Processor time on a typical core; determines how many machines are simulated.",
 )
 @seed_option
 @jobs_option
@@ -98,7 +99,7 @@ def calibrate(
     "--target",
     metavar="COLUMN",
     default=None,
-    help="Severity to train for, or label of named conditions; the first severity by default.",
+    help="Severity to train for, or label of named conditions; default: the first severity.",
 )
 @click.option(
     "--held-out",
@@ -110,32 +111,32 @@ def calibrate(
 @click.option(
     "--split",
     metavar="NAME",
-    help="Split that DATA holds (wearstate splits): learn from its training side alone.",
+    help="Split stored in DATA (wearstate splits): train on its training side only.",
 )
 @click.option(
     "--baseline",
     "healthy",
     type=PATH,
-    help="Healthy records of DATA's machines: a model that is told how each was when new.",
+    help="Healthy records of DATA's machines: the model compares each machine with its new state.",
 )
 @click.option(
     "--refuse",
     multiple=True,
     type=DATA,
-    help="Data set that the model must refuse: pins in oil, another fault or machine; repeatable.",
+    help="Data set that the model must refuse (pins in oil, another fault or machine); repeatable.",
 )
 @click.option(
     "--features",
     multiple=True,
     metavar="SET|NAMES|FILE",
-    help="Train on this set (standard, core, complete), these names or those in a text file. Of "
-    "several, or of select (all sets), folds choose.",
+    help="Features to train on: a set (standard, core, complete), names, or a text file of names. "
+    "Cross-validation chooses among several, or among all sets (select).",
 )
 @click.option(
     "--budget-ms",
     type=click.FloatRange(0, min_open=True),
     default=None,
-    help="Time that a prediction may take, beside its features [ms]; 5 by default.",
+    help="Time that a prediction may take, without its features [ms]; default: 5.",
 )
 @join_option
 @seed_option
@@ -160,9 +161,9 @@ def train(
 ) -> None:
     """Train a wear model on a labelled data set and judge it on held-out machine draws.
 
-    With --join: on several tests of each machine state together, the features of each named by
-    its view. Where the target names conditions instead of a severity: a model that tells which,
-    judged with every recording left out in turn.
+    With --join: on several tests of each machine state together; each feature is named after its
+    view. Where the target names conditions instead of a severity: a model that names the condition,
+    judged with each recording left out in turn.
     """
     from ...datasets.file.views import views_of
     from ..class_model.train import names_classes
@@ -277,13 +278,13 @@ def _train_classes(
     type=PathType(path_type=Path, file_okay=False),
     default=Path("demo"),
     show_default=True,
-    help="Where its files go: new, empty, or an earlier demo's, whose files are replaced.",
+    help="Folder for its files: new, empty, or that of an earlier demo, whose files are replaced.",
 )
 @seed_option
 @jobs_option
 @json_option
 def demo(folder: Path, seed: int, jobs: int | None, as_json: bool) -> None:
-    """The whole job, small: simulate, features, train, evaluate, report."""
+    """Run the whole workflow on a small example: simulate, features, train, evaluate, report."""
     from ..evaluation.text import score_lines
     from ..workflow.demo import run_demo
 

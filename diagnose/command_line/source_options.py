@@ -44,7 +44,7 @@ _SOURCE_OPTIONS = (
         "--like",
         type=PATH,
         metavar="MODEL|JSON",
-        help="Channels, units, rate and tacho as of a model, or of what `info --json` printed.",
+        help="Take channels, units, rate and tacho from a model or the output of `info --json`.",
     ),
     click.option("--fs", type=float, help="Sample rate [Hz], where the file has none."),
     click.option(
@@ -57,22 +57,25 @@ _SOURCE_OPTIONS = (
         "--sensitivity",
         multiple=True,
         metavar="[CHANNEL=]TEXT",
-        help="Of the sensor on a channel in volts: '100 mV/g'.",
+        help="Sensitivity of the sensor on a channel in volts, e.g. '100 mV/g'.",
     ),
     click.option(
         "--full-scale",
         multiple=True,
         metavar="[CHANNEL=]TEXT",
-        help="What the largest integer of a WAV file is worth: '10 V'.",
+        help="Value of the largest integer of a WAV file, e.g. '10 V'.",
     ),
     click.option(
         "--channels",
         multiple=True,
         metavar="NAME,…",
-        help="Channels wanted, in order, NEW=OLD to rename; where the file names none, all names.",
+        help="Channels to read, in order; NEW=OLD renames one. Where the file has no names: the "
+        "names of all.",
     ),
     click.option(
-        "--variable", multiple=True, help="Array, data set or group, where the file holds several."
+        "--variable",
+        multiple=True,
+        help="Array, data set or group to read, where the file holds several.",
     ),
     click.option("--tacho", help="Name of the tacho channel."),
     click.option(
@@ -80,35 +83,46 @@ _SOURCE_OPTIONS = (
         type=click.IntRange(1),
         default=1,
         show_default=True,
-        help="Of the tacho.",
+        help="Pulses of the tacho per revolution.",
     ),
-    click.option("--record", type=click.IntRange(0), default=0, help="Of several, counted from 0."),
+    click.option(
+        "--record",
+        type=click.IntRange(0),
+        default=0,
+        help="Record to read, counted from 0, where there are several.",
+    ),
     click.option(
         "--rows",
         type=click.Choice(["records"]),
-        help="Every row of an array or a text file is a record of one channel.",
+        help="Read each row of an array or a text file as a record of one channel.",
     ),
-    click.option("--delimiter", help="Of a text file: ',', ';', tab, space."),
-    click.option("--decimal", type=click.Choice([".", ","]), help="Of a text file."),
+    click.option("--delimiter", help="Delimiter of a text file: ',', ';', tab or space."),
+    click.option("--decimal", type=click.Choice([".", ","]), help="Decimal sign of a text file."),
     click.option(
-        "--header", type=click.IntRange(0), help="Lines above the numbers of a text file."
+        "--header", type=click.IntRange(0), help="Number of lines above the numbers of a text file."
     ),
-    click.option("--time-column", help="Name or number (from 1) of the times; 0: there is none."),
-    click.option("--dtype", help="Of headerless binary: '<int16', '>float32'."),
-    click.option("--n-channels", type=click.IntRange(1), help="Of headerless binary."),
+    click.option(
+        "--time-column", help="Name or number (from 1) of the column of times; 0: there is none."
+    ),
+    click.option("--dtype", help="Number type of headerless binary, e.g. '<int16', '>float32'."),
+    click.option(
+        "--n-channels", type=click.IntRange(1), help="Number of channels of headerless binary."
+    ),
     click.option(
         "--offset", type=click.IntRange(0), default=0, help="Bytes to skip in headerless binary."
     ),
     click.option(
         "--order",
         type=click.Choice(["interleaved", "blocks"]),
-        help="Of binary and arrays: sample by sample, or channel by channel.",
+        help="Order of binary and arrays: sample by sample, or channel by channel.",
     ),
     click.option(
-        "--partial", is_flag=True, help="Of a WAV, TDMS or binary file cut short: what is there."
+        "--partial",
+        is_flag=True,
+        help="Read what is there of a WAV, TDMS or binary file that was cut short.",
     ),
     click.option(
-        "--resample-to", type=float, metavar="HZ", help="Bring measured files to this rate."
+        "--resample-to", type=float, metavar="HZ", help="Resample measured files to this rate."
     ),
 )
 
@@ -190,7 +204,7 @@ class Numbers(click.ParamType):  # type: ignore[type-arg]
 speed_option = click.option(
     "--speed-hz",
     type=float,
-    help="Shaft speed [Hz] where there is no tacho; by default the one stored in the file.",
+    help="Shaft speed [Hz] where there is no tacho; default: the one stored in the file.",
 )
 
 
@@ -225,12 +239,14 @@ bearing_option = click.option(
     "--bearing",
     type=BearingNumbers(),
     metavar="N,d,D[,DEG]",
-    help="Rollers, their diameter, pitch diameter, contact angle: for its fault lines.",
+    help="Rolling bearing, for its fault frequencies: number and diameter of the rollers, pitch "
+    "diameter, contact angle.",
 )
 
 exponential_option = click.option(
     "--exponential",
     type=Share(1e-6, 1.0),
     default=1.0,
-    help="Impact test: window sunk to this at the end of a block, 1: none; damping is corrected.",
+    help="Impact test: value of the exponential window at the end of a block, 1 for none; damping "
+    "is corrected for it.",
 )
