@@ -86,7 +86,7 @@ def _warn_unkept(reason: str) -> None:
 @cache
 def _warn_damaged(folder: Path) -> None:
     """Once for each folder."""
-    _LOG.warning("the kernel cache %s is damaged: kernels are compiled anew and replaced", folder)
+    _LOG.warning("the kernel cache %s is damaged: kernels are compiled again and replaced", folder)
 
 
 def kernel_sources(folder: Path) -> list[Path]:

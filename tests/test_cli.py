@@ -307,7 +307,7 @@ def test_force_is_an_option_here_and_an_argument_in_the_library(tmp_path):
     run("generate", "bilge-pump-small", "-n", 1, "-o", tmp_path / "a.h5", "-j", 1)
     (tmp_path / "a.h5").rename(tmp_path / "a.h5.part")
     command = ("generate", "bilge-pump-small", "-n", 2, "-o", tmp_path / "a.h5")
-    refused(*command, says=["use --force to start anew"])
+    refused(*command, says=["use --force to restart"])
     (tmp_path / "b.h5").write_text("")
     refused(*command[:-1], tmp_path / "b.h5", says=["use --force to replace it"])
 

@@ -99,7 +99,7 @@ def test_unusual_machines_are_drawn_again_as_they_were(case, small_set):
     assert sorted(distance) == list(range(60))
     train, test = (case.groups[rows].tolist() for rows in SPLITS["geometry"][1](case))
     assert min(distance[group] for group in test) > max(distance[group] for group in train)
-    with pytest.raises(DataError, match=r"record 0 drawn anew has diametral_clearance"):
+    with pytest.raises(DataError, match=r"record 0 redrawn has diametral_clearance"):
         machine_distances(replace(drawn, seed=drawn.seed + 1))
     with pytest.raises(DataError, match="no recipe to draw its machines from"):
         machine_distances(replace(drawn, recipe=None))

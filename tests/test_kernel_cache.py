@@ -75,7 +75,7 @@ def test_damage_is_mended_with_one_warning(filled, ending, damage):
     damaged = damage(path.read_bytes())
     path.write_bytes(damaged)
     [warning] = run(filled)
-    assert "is damaged: kernels are compiled anew and replaced" in warning
+    assert "is damaged: kernels are compiled again and replaced" in warning
     assert not path.exists() or path.read_bytes() != damaged
     [index] = files(filled, ".nbi")
     _, names = pickle.loads(unsealed(index.read_bytes()))
@@ -255,7 +255,7 @@ def test_damaged_parts_are_mended_with_one_warning(laws, tmp_path):
         path.write_bytes(damage(path.read_bytes()))
     values, [warning] = laws(tmp_path, "law.sixteenth(2.0)")
     assert values == ["65536.0"]
-    assert "is damaged: kernels are compiled anew and replaced" in warning
+    assert "is damaged: kernels are compiled again and replaced" in warning
     assert all(unsealed(path.read_bytes()) is not None for path in parts)
     assert laws(tmp_path, "law._square(3.0), law._fourth(3.0)") == (["9.0", "81.0"], [])
 

@@ -130,7 +130,7 @@ def test_numbers_drawn_for_the_parts_of_another_scene_are_warned_of(tmp_path):
     assert said[0] == "mine: no fault, 1 warning(s)"
     assert said[1].startswith(
         "warning: joint.crankpin.friction: 0.02 to 0.08 (SI) is of the scene bilge-pump, dry.toml "
-        "has 0.2; give it anew"
+        "has 0.2; give it again"
     )
     draw = '[[machine]]\npath = "joint.crankpin.friction"\ndistribution = "factor"\n'
     for answer in (

@@ -209,7 +209,7 @@ def stamp(path, name, value):
     ("name", "value", "message"),
     [
         ("schema_version", 2, r"schema_version = 2 must be 1; update wearstate"),
-        ("schema_version", 0, r"schema_version = 0 must be 1; generate anew"),
+        ("schema_version", 0, r"schema_version = 0 must be 1; generate it again"),
         ("created_by", "other 1.0", r"created_by = 'other 1.0', must begin with 'wearstate'"),
         ("scene", "name = 't'", r"text of the scene does not fit its hash"),
         ("channels", "[", r"attributes cannot be read"),

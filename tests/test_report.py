@@ -533,7 +533,7 @@ def test_machines_are_paired_by_identity_and_never_by_number(referenced, tmp_pat
     drawn = written(tmp_path / "drawn.h5", **twelve, recipe='name = "other"')
     worn = written(tmp_path / "worn.h5", **twelve | {"clearances": [2e-4] * 12}, **made)
     told = {
-        nameless: "12 of 12 records do not tell their machine",
+        nameless: "12 of 12 records do not name their machine",
         named: "it has machine north; ",
         drawn: 'machine 0 of recipe "other", seed 0',
         worn: "12 of 12 recordings have a grade above 0",

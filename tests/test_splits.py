@@ -223,7 +223,7 @@ def test_geometry_of_another_version_is_refused(tmp_path):
     path = write_set(tmp_path / "old.h5", change={RECIPE.severity_columns[0]: 1e-4})
     with DataSet(path) as data:
         drawn = drawn_of(data)
-    with pytest.raises(DataError, match=r"record 0 drawn anew has .* of another version"):
+    with pytest.raises(DataError, match=r"record 0 redrawn has .* of another version"):
         machine_draws(drawn)
     assert "geometry" not in default_splits(drawn)
 

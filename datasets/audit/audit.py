@@ -47,7 +47,7 @@ CHECKS: dict[str, Callable[[AuditTable], Iterator[Finding]]] = {
 UNSEEN = (
     "whether training and test rows were scaled with common numbers: afterwards it does not show",
     "copies that were filtered, resampled, or have noise above -25 dB added to them",
-    "windows of one recording that share no sample: only their machine (group) tells",
+    "windows of one recording that share no sample: only their machine (group) shows it",
     "relations of three or more columns, powers, and models that combine weak columns",
     "labels that are wrong",
 )
@@ -284,7 +284,7 @@ def _unchecked(item: _Looked, files: int) -> Iterator[str]:
     elif len(np.unique(table.label)) < 2:
         yield f"{name}: nothing about the label, all rows have the same"
     if table.groups is None:
-        yield f"{name}: no machines are known, so that copies of one cannot be told; give group"
+        yield f"{name}: no machines are known, so that copies of one cannot be found; give group"
     if not table.nuisance:
         yield f"{name}: no conditions are named that must not follow the label; give nuisance"
     if not table.sides and not item.side:

@@ -267,10 +267,12 @@ def _check_signals(seen: _Seen) -> Iterator[IntegrityFinding]:
     )
     intact = ~signals.damaged
     yield from _fault(
-        "signal", "has samples that are not finite; generate anew", signals.infinite & intact
+        "signal", "has samples that are not finite; generate it again", signals.infinite & intact
     )
     silent = signals.zero & intact & seen.ok
-    yield from _fault("signal", "is zero throughout while its status is ok; generate anew", silent)
+    yield from _fault(
+        "signal", "is zero throughout while its status is ok; generate it again", silent
+    )
     yield from _note(
         "signal",
         "has a channel that never changes; look at the sensor",
@@ -313,7 +315,7 @@ def _check_identities(seen: _Seen) -> Iterator[IntegrityFinding]:
         del values
         yield from _fault(
             "duplicate",
-            f"{name} is that of another record, must be its own; generate or import anew",
+            f"{name} is that of another record, must be its own; generate or import it again",
             counts[inverse] > 1,
         )
 
@@ -336,10 +338,10 @@ def _check_numbers(seen: _Seen) -> Iterator[IntegrityFinding]:
             continue
         values = seen.numbers(name)
         yield from _fault(
-            "number", f"{name} is infinite; generate or import anew", np.isinf(values)
+            "number", f"{name} is infinite; generate or import it again", np.isinf(values)
         )
         if name in _must_be_known(seen):
-            text = f"{name} is not a number, must be known; generate anew"
+            text = f"{name} is not a number, must be known; generate it again"
             yield from _fault("number", text, np.isnan(values) & seen.ok)
     for name in [name for name in seen.head.severities if name in seen.columns]:
         yield from _fault("number", f"{name} must be >= 0; mend the label", seen.rows[name] < 0)
@@ -391,7 +393,7 @@ def _check_recipe(seen: _Seen) -> Iterator[IntegrityFinding]:
         if column in seen.columns:
             values = seen.numbers(column)
             outside = np.isfinite(values) & ~_within(values, bands)
-            text = f"{column} must be within {_bands_text(bands)} of the recipe; generate anew"
+            text = f"{column} must be within {_bands_text(bands)} of the recipe; generate it again"
             yield from _fault("range", text, outside)
     yield from _check_confounders(seen, recipe)
     yield from _check_groups(seen, recipe)
@@ -433,7 +435,7 @@ def _check_confounders(seen: _Seen, recipe: Recipe) -> Iterator[IntegrityFinding
         bands = [band for axis in fault.axes for band in axis.bands]
         wrong = np.where(present, ~_within(values, bands), values != 0)
         text = (
-            f"{value} must be within {_bands_text(bands)} where {presence}, else 0; generate anew"
+            f"{value} must be within {_bands_text(bands)} where {presence}, else 0; repeat generate"
         )
         yield from _fault("range", text, wrong)
 
@@ -442,13 +444,13 @@ def _check_groups(seen: _Seen, recipe: Recipe) -> Iterator[IntegrityFinding]:
     """What is drawn per machine is the same in all records of a machine."""
     most = recipe.table.records_per_group
     groups, inverse, counts = np.unique(seen.rows["group"], return_inverse=True, return_counts=True)
-    text = f"group has more than the {most} record(s) that the recipe says; generate anew"
+    text = f"group has more than the {most} record(s) that the recipe says; generate it again"
     yield from _fault("group", text, counts[inverse] > most)
     for name in _machine_columns(recipe) & set(seen.columns):
         values = seen.numbers(name)
         first = np.full(len(groups), math.nan)
         first[inverse[::-1]] = values[::-1]  # the first record of each group is written last
-        text = f"{name} is drawn per machine, must be one in a group; generate anew"
+        text = f"{name} is drawn per machine, must be one in a group; generate it again"
         differs = np.isfinite(values) & (values != first[inverse])
         yield from _fault("group", text, np.isin(inverse, inverse[differs]))
 
@@ -458,7 +460,7 @@ def _check_lives(seen: _Seen) -> Iterator[IntegrityFinding]:
     if _HOURS in seen.columns:
         hours, groups = seen.numbers(_HOURS), seen.rows["group"]
         back = (groups[1:] == groups[:-1]) & (hours[1:] < hours[:-1])
-        text = f"{_HOURS} must not fall from record to record of a group; generate anew"
+        text = f"{_HOURS} must not fall from record to record of a group; generate it again"
         yield from _fault("group", text, np.append(False, back))
 
 

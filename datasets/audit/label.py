@@ -31,8 +31,9 @@ def readable(table: AuditTable) -> Iterator[Finding]:
             where=table.source,
             columns=tuple(list(columns)[:SHOWN]),
             numbers={"columns": len(columns), "accuracy": dict(list(columns.items())[:SHOWN])},
-            what=f"{named(list(columns))} alone {'tells' if len(columns) == 1 else 'tell'} "
-            f"{table.label_name} in up to {best:.1%} of the rows"
+            what=f"{named(list(columns))} alone "
+            f"{'gives away' if len(columns) == 1 else 'give away'} {table.label_name} "
+            f"in up to {best:.1%} of the rows"
             + (" of other machines" if table.groups is not None else ""),
             means="either physics is that plain, and the data say nothing about a hard case, or "
             "the column holds the label in another form",
@@ -138,8 +139,8 @@ def _readable_order(table: AuditTable) -> Iterator[Finding]:
             severity="warning",
             where=table.source,
             numbers={"accuracy": accuracy},
-            what=f"the classes of {table.label_name} {how}: the place of a row tells its class in "
-            f"{accuracy:.1%} of the rows",
+            what=f"the classes of {table.label_name} {how}: the position of a row gives away its "
+            f"class in {accuracy:.1%} of the rows",
             means="anything that drifts along the file (time, temperature, a row number kept as a "
             "column) looks like the label, and a split that is not shuffled holds one class",
             cure="keep no row number as a column; record the classes in mixed order next time",
@@ -169,7 +170,8 @@ def _readable_text(table: AuditTable) -> Iterator[Finding]:
                     where=table.source,
                     columns=(name,),
                     numbers={"accuracy": accuracy, "place": place + 1},
-                    what=f"word {place + 1} of {name} tells {table.label_name} in {accuracy:.1%} "
+                    what=f"word {place + 1} of {name} gives away {table.label_name} in "
+                    f"{accuracy:.1%} "
                     "of the rows",
                     means="harmless as long as no model sees the name",
                     cure="keep the column out of the inputs",
@@ -277,6 +279,6 @@ def lone_machines(table: AuditTable) -> Iterator[Finding]:
             numbers={"machines": {table.classes[k]: int(machines[k]) for k in few}},
             what=f"classes of {table.label_name} with fewer than {FEWEST} machines: {names}; no "
             "machine has two classes",
-            means="what makes the machine cannot be told from what makes the class",
+            means="effects of the machine cannot be separated from those of the class",
             cure=f"record >= {FEWEST} machines of every class, or the same machines in several",
         )

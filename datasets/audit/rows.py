@@ -36,7 +36,7 @@ def row_copies(table: AuditTable) -> Iterator[Finding]:
         f"{pairs[0][0] + 1} and {pairs[0][1] + 1}"
         + (f"; {named}" if named else "")
         + (f"; {int(other.sum())} with different labels" if other.any() else ""),
-        means="a model is asked in the test what it was told in training"
+        means="a model is tested on what it was trained on"
         if across
         else "a random split would put one on either side",
         cure="keep one row of each, or give copies one group and split by it",

@@ -33,7 +33,7 @@ class OptionSet(Part):
     name: str = Field(pattern="^[a-z][a-z0-9_]*$", max_length=48, description="of its column")
     per: Literal["machine", "record"] = Field(
         default="machine",
-        description="whether a machine keeps its option, or every record draws anew",
+        description="whether a machine keeps its option, or every record draws its own",
     )
     option: tuple[Option, ...] = Field(
         min_length=2, description="the ways to choose from, each with its weight"

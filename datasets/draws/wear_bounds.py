@@ -83,7 +83,7 @@ def foreign_bounds(
         Faults.
     """
     cure = (
-        f"is of the scene {other}, must be of {scene}; give it anew, name it in without, or tell "
+        f"is of the scene {other}, must be of {scene}; give it again, name it in without, or give "
         "it by the limits ('150 % of limit', 'as new')"
     )
     faults = [

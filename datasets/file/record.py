@@ -514,7 +514,9 @@ def _stored_attributes(file: Any, path: Path) -> dict[str, Any]:
             "file is of another program: import it, giving sample rate and unit"
         )
     if stored["schema_version"] != SCHEMA_VERSION:
-        cure = "update wearstate" if stored["schema_version"] > SCHEMA_VERSION else "generate anew"
+        cure = (
+            "update wearstate" if stored["schema_version"] > SCHEMA_VERSION else "generate it again"
+        )
         raise DataError(
             f"{path}: schema_version = {stored['schema_version']} must be {SCHEMA_VERSION}; {cure}"
         )
@@ -539,7 +541,7 @@ def _check_layout(file: Any, attributes: Attributes, path: Path) -> None:
         if name not in (manifest.dtype.names or ())
     ]
     if missing:
-        raise DataError(f"{path}: manifest lacks {', '.join(missing)}; generate or import anew")
+        raise DataError(f"{path}: manifest lacks {', '.join(missing)}; generate or import it again")
 
 
 def _check_storage(dataset: Any, path: Path) -> None:
@@ -834,14 +836,14 @@ class DataSetWriter:
             if not _same(stored.get(name), value):
                 raise DataError(
                     f"{self.part}: {name} = {_short(stored.get(name))}, must be {_short(value)} "
-                    "to go on with it; repeat the command that began it, or use force to start anew"
+                    "to go on with it; repeat the command that began it, or use force to restart"
                 )
         found = (self._file["signal"].shape, self._file["manifest"].dtype)
         if found != (self._shape, self._dtype):
             raise DataError(
                 f"{self.part}: signal has shape {found[0]}, must be {self._shape} (records, "
                 "channels, samples) with the same manifest to go on with it; repeat the command "
-                "that began it, or use force to start anew"
+                "that began it, or use force to restart"
             )
 
     def _intact(self) -> NDArray[np.bool_]:

@@ -109,7 +109,7 @@ def _keys(data: DataSet) -> list[tuple[str, str]]:
         states = _texts(data, "record_id")  # record i of every view is of the same state
     if not states or "" in states or "" in data.machines:
         raise DataError(
-            f"{data.path}: its records do not tell machine and state, must to be joined; import "
+            f"{data.path}: its records do not name machine and state, which joining needs; import "
             "with the labels group and state"
         )
     return list(zip(data.machines, states, strict=True))

@@ -325,7 +325,7 @@ def _chosen(
     if not begun.fidelity:
         raise DataError(
             f"{path}.part: fidelity = 'given', must be 'auto' to go on with it; repeat the command "
-            "that began it, or use force to start anew"
+            "that began it, or use force to start again"
         )
     return FidelityChoice.load(begun.fidelity)
 

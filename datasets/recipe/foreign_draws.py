@@ -32,7 +32,7 @@ def draw_doubts(recipe: Recipe, inherited: Mapping[str, str]) -> list[str]:
     []
     """
     here = recipe.table.scene
-    cure = "give it anew, as a factor, or name it in without"
+    cure = "give it again, as a factor, or name it in without"
     doubts = []
     for axis in (*recipe.machine, *recipe.record):
         other = inherited.get(axis.path) or inherited.get(_starred(axis.path))

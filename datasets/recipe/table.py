@@ -66,7 +66,7 @@ class RecipeTable(Part):
     )
     description: str = Field(default="", description="one sentence for lists")
     scene: str = Field(min_length=1, description="a built-in scene or a file")
-    records: int = Field(ge=1, le=MOST_RECORDS, description="records made unless told otherwise")
+    records: int = Field(ge=1, le=MOST_RECORDS, description="number of records by default")
     fidelity: Literal["given", "auto"] | None = Field(
         default=None, description="rungs as written or as the accuracy needs; as the scene says"
     )

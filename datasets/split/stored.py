@@ -199,7 +199,7 @@ def machine_samples(drawn: Drawn) -> Iterator[Sample]:
         There is no recipe, or what is drawn is not what the file holds.
     """
     if drawn.recipe is None:
-        raise DataError("recipe: the file has none that draws its machines anew; use region")
+        raise DataError("recipe: the file has none that can draw its machines again; use region")
     groups = np.asarray(drawn.columns["group"])
     others = np.ones(groups.size, dtype=bool)
     others[np.unique(groups, return_index=True)[1]] = False
@@ -213,9 +213,9 @@ def _refuse_other_draw(drawn: Drawn, sample: Sample) -> None:
     value, group = sample.row[drawn.severity], int(drawn.columns["group"][sample.index])
     if abs(value - held) > _ROUNDING * abs(value) or sample.group != group:
         raise DataError(
-            f"geometry: record {sample.index} drawn anew has {drawn.severity} = {value:g}, must be "
+            f"geometry: record {sample.index} redrawn has {drawn.severity} = {value:g}, must be "
             f"{held:g} as in the file; it is of another version of wearstate: split with that one, "
-            "or generate anew"
+            "or generate it again"
         )
 
 

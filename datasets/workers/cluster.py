@@ -318,7 +318,7 @@ def _fingerprint() -> tuple[tuple[str, str], ...]:
 def _differences(ours: tuple[tuple[str, str], ...], found: Any) -> list[str]:
     """Faults of one worker, from what it answered."""
     if isinstance(found, BaseException):
-        return [f"cannot say what it runs ({first_line(found)}); start it anew"]
+        return [f"cannot say what it runs ({first_line(found)}); restart it"]
     if "missing" in found:
         return [
             f"wearstate cannot be imported ({found['missing']}); install wearstate {__version__} "

@@ -543,7 +543,7 @@ def chart_text(chart: Chart) -> str:
     unusable = ("invalid",) if chart.unfinished else ("invalid", "doubtful")
     dropped = [f"{p.name}: {p.reason}" for p in chart.points if p.verdict in unusable]
     for title, texts in (
-        ("not valid, or not to be told", dropped),
+        ("not valid, or not measurable", dropped),
         ("refused", chart.refused),
         ("pruned", chart.pruned),
     ):
@@ -588,7 +588,7 @@ def convergence_text(each: Convergence, labels: Mapping[str, str] | None = None)
     ...     steps=(0.04, 0.01), order=2.0, remaining=0.0033, converged=True))
     'step x2, x1, x1/2: peak moves by 4.00% then 1.00%, order 2.00, 0.33% left'
     """
-    order = f"order {each.order:.2f}" if math.isfinite(each.order) else "no order to be told"
+    order = f"order {each.order:.2f}" if math.isfinite(each.order) else "no order can be estimated"
     word = "" if each.converged else "; NOT CONVERGED"
     label = (labels or {}).get(each.quantity, each.quantity)
     return (

@@ -182,8 +182,8 @@ def _point(measured: _Measured, trial: _Trial, here: _Trial, accuracy: float) ->
     if verdict == "doubtful":
         words = (
             f"{percent(_rise(loss.loss).mean)}, standard error "
-            f"{percent(loss.loss.standard_error)}, cannot be told from {percent(accuracy)}: more "
-            f"records (-n); {words}"
+            f"{percent(loss.loss.standard_error)}, cannot be told apart from "
+            f"{percent(accuracy)}: more records (-n); {words}"
         )
     return Point(
         name=f"{trial.name} (the recipe as written)" if trial is here else trial.name,

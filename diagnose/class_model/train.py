@@ -480,7 +480,7 @@ def evaluate_classes(
     if rows.size == 0:
         raise DataError(
             f"{path}: 0 recordings of {', '.join(model.classes)} that the model has not seen, must "
-            "be > 0; train tells how it fares on recordings left out"
+            "be > 0; train shows its accuracy on recordings left out"
         )
     votes = Votes(
         shares=model.predict(table.values[rows]),

@@ -145,7 +145,7 @@ def refuse_strangers(path: str | Path, healthy: str | Path) -> None:
     Raises
     ------
     DataError
-        A set does not tell its machines, machines have no healthy record, or records of the
+        A set does not name its machines, machines have no healthy record, or records of the
         healthy set are of worn machines; all at once.
     """
     wanted, machines = _machines_in(path), _machines_in(healthy)
@@ -178,7 +178,7 @@ def _machines_in(path: str | Path) -> NDArray[np.str_]:
 
 def _unknown_words(path: str | Path, machines: NDArray[np.str_], other: str | Path) -> str:
     return (
-        f"{path}: {int((machines == '').sum())} of {len(machines)} records do not tell their "
+        f"{path}: {int((machines == '').sum())} of {len(machines)} records do not name their "
         f"machine, must be 0 to pair them with those of {other} (numbers and file names are no "
         "machines); import with the label group, or --group-by folder"
     )
@@ -345,6 +345,6 @@ class Baselines:
         if len(known) > 1:
             raise DataError(
                 f"{self.source} has healthy recordings of {len(known)} machines ({here}), must "
-                f"have those of one: {name} does not tell its machine; give a data set of its "
+                f"have those of one: {name} does not name its machine; give a data set of its "
                 "recordings only"
             )

@@ -38,7 +38,7 @@ _MOST_SWING = 0.35  # rms of the orbit over the radial clearance; beyond, it has
 _LOOSEST = 0.3  # standard error of the clearance's logarithm, above which nothing is told
 CONTRADICTED = 2.6  # root mean square of what is left, in standard deviations, per free number
 OR_HEALTHY = (
-    ", or give healthy recordings (--baseline): they tell offsets from a bore of another shape"
+    ", or give healthy recordings (--baseline): they separate offsets from a bore of another shape"
 )
 """Cure of readings that nothing explains, where there are none."""
 _WIDEST, _NARROWEST = 10.0, 0.1  # clearance looked for, over that as new

@@ -137,8 +137,8 @@ def rank_lines(found: RankedSet) -> list[str]:
     ranking = found.ranking
     best = ranking.features[0]
     lines = [
-        f"{best.name} tells most of {found.target}: {plain(best.information)} bits",
-        f"{len(ranking.telling)} of {len(ranking.features)} features tell more than chance "
+        f"{best.name} says most about {found.target}: {plain(best.information)} bits",
+        f"{len(ranking.telling)} of {len(ranking.features)} features say more than chance "
         f"({plain(ranking.chance)} bits; a shuffled target stays below it in 95 of 100 features)",
     ]
     if not found.classes and ranking.n_followed < ranking.n_machines:

@@ -151,8 +151,8 @@ def baseline_note(model: WearModel, baseline: Baseline | None) -> str:
             "machines"
         )
     return (
-        "the model was trained cold: the baseline is what the evidence is told against, the "
-        "estimate does not use it; for that, train with --baseline"
+        "the model was trained without healthy recordings: the evidence is compared with the "
+        "baseline, but the estimate does not use it; for that, train with --baseline"
     )
 
 
@@ -289,7 +289,7 @@ def iso_table(recording: Recording, machine: str | None) -> dict[str, Any]:
         "note": "",
     }
     if machine is None:
-        table["note"] = "the kind of machine is not given, and no signal tells it: --machine KIND"
+        table["note"] = "the kind of machine is not given, and no signal shows it: --machine KIND"
         return table
     known_machine(machine)
     kind = iso.machine_kind(machine)

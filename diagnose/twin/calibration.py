@@ -208,7 +208,9 @@ class CalibratedScene:
         for each in (file, beside):
             refuse_output(each, force)
         if not self.twin_table["names"]:
-            raise DataError("recordings tell none of the unknowns; give more or longer ones")
+            raise DataError(
+                "the recordings determine none of the unknowns; give more or longer ones"
+            )
         from_there = {
             key: _seen_from(file.parent, getattr(self, key)) for key in ("recipe", "base")
         }
@@ -224,7 +226,7 @@ class CalibratedScene:
     def __repr__(self) -> str:
         return (
             f"<CalibratedScene {self.unknowns.recipe.scene.name}: {len(self.numbers)} of "
-            f"{len(self.unknowns.named)} numbers told, p = {self.misfit.p:.2g}>"
+            f"{len(self.unknowns.named)} numbers determined, p = {self.misfit.p:.2g}>"
         )
 
 
@@ -466,7 +468,7 @@ def calibration_text(found: "CalibratedScene") -> str:
     head = (
         f"{plan.scene.name}, calibrated on {len(found.recordings)} recording(s) with "
         f"{found.found.members} simulated machines of {plan.name}: {len(learnt)} of "
-        f"{len(found.unknowns.named)} numbers told"
+        f"{len(found.unknowns.named)} numbers determined"
     )
     lines = [f"{'':{_WIDTH}} {'before':>21} {'now':>21}   narrower"]
     lines += [

@@ -176,7 +176,7 @@ def fit_strangers(training: TrainingRows, seed: int) -> tuple[tuple[Head, Strang
         raise DataError(
             "\n".join(
                 f"refuse: {rates.detection_rate:.0%} of {rates.records} recordings of {rates.name} "
-                f"are told from those of the training set, must be >= {_TOLD:.0%}; leave them "
+                f"differ from those of the training set, must be >= {_TOLD:.0%}; leave them "
                 "out, or train on them"
                 for rates in alike
             )

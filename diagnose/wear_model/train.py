@@ -306,8 +306,8 @@ def _refuse_undefined(training: "TrainingRows", path: str | Path) -> None:
         )
     if physical_rows(training.names, training.rows[:1]).shape[1] == 0:
         raise DataError(
-            f"{path}: its {len(training.names)} features are levels alone, which tell no familiar "
-            "machine from a strange one; add others: wearstate train --features"
+            f"{path}: its {len(training.names)} features are levels alone, which do not "
+            "separate familiar machines from strange ones; add others: wearstate train --features"
         )
 
 

@@ -147,7 +147,9 @@ def _least_squares(design: Vector, load: Vector) -> tuple[Vector, Vector]:
     left = load - design @ value
     freedom = load.size - design.shape[1]
     if freedom < 1:
-        raise CurveError("points with the bearing free are too few to tell their scatter; lift on")
+        raise CurveError(
+            "points with the bearing free are too few to estimate their scatter; lift on"
+        )
     spread = np.asarray(float(left @ left) / freedom * np.linalg.inv(design.T @ design))
     return np.asarray(value), spread
 

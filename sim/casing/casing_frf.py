@@ -494,7 +494,7 @@ def _record_faults(record: Mapping[str, Any], first: Mapping[str, Any]) -> Itera
         kind = record["abscissa_spec_data_type"]
         yield f"'{name}' is over the abscissa {kind}, must be frequency (18); export spectra"
     if not np.array_equal(record["x"], first["x"]):
-        yield f"'{name}' has other lines than '{_dof_name(first)}', must have the same; export anew"
+        yield f"'{name}' has other lines than '{_dof_name(first)}', export them alike"
     for label, known in (("ordinate", _ACCELERATION_UNITS), ("orddenom", _FORCE_UNITS)):
         unit = _label(record, label)
         if unit and unit.lower() not in known:

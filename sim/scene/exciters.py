@@ -93,7 +93,7 @@ class CasingExciter(Exciter):
         if self.angle_scatter:
             raise ValueError(
                 f"angle_scatter = {self.angle_scatter:g} rad must be 0 on a casing, whose modes "
-                "tell one direction at each place; remove it"
+                "have one direction at each place; remove it"
             )
         return self
 

@@ -663,7 +663,7 @@ def _transform(rotor: Rotor, basis: FreeBasis) -> Vector:
     if 2 * n_plane != n_beam:
         raise ValueError(
             f"basis of {2 * n_plane} coordinates must be of the rotor's own beam, {n_beam}; "
-            "make it anew with free_basis"
+            "make it again with free_basis"
         )
     n = rotor.mass.shape[0]
     transform = np.zeros((n, 2 * r + n - n_beam))
@@ -848,7 +848,7 @@ def harmonic_response(
     if isinstance(rotor, ReducedRotor):
         if speed is not None and speed != rotor.speed:
             raise ValueError(
-                f"speed = {speed} rad/s must be the reduced rotor's, {rotor.speed}; reduce it anew"
+                f"speed = {speed} rad/s must be the reduced rotor's, {rotor.speed}; reduce it again"
             )
         gain = rotor.receptance(hertz, responses, places)
     else:
