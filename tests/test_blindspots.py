@@ -315,6 +315,7 @@ def test_a_model_that_cautions_always_is_told_so():
         "rows": [],
         "machines": 30,
         "recipe": "x",
+        "usual_cautions": [],
     }
     lines = conclusion(table)
     assert lines == ["As trained, no verdict is without a caution (30 simulated machines of x)."]
@@ -429,6 +430,34 @@ def test_the_worst_without_a_caution_is_first():
     rows.append(told("some", -0.1))
     order = [row.name for row in ranked(rows, LIMIT)]
     assert order == ["large", "some", "small", "worse", "warned", "strange", "nothing"]
+
+
+def cautioned(name, error, *cautions):
+    row = told(name, error, error, verdict="caution")
+    return replace(row, said=tuple(replace(each, cautions=cautions) for each in row.said))
+
+
+def test_a_caution_that_every_machine_has_as_trained_does_not_count():
+    always, new = "its offsets are not told", "its load is outside"
+    rows = [cautioned("told", 0.4, always, new), cautioned("silent", 0.2, always)]
+    found = replace(spots(*rows), baseline=cautioned("as trained", 0.1, always))
+    table = blind_spots_table(found, CARD)
+    assert [row["name"] for row in table["rows"]] == ["silent", "told"]
+    silent, loud = (
+        {name: row[name]["value"] for name in ("clear_error", "cautioned")} for row in table["rows"]
+    )
+    assert silent == {"clear_error": pytest.approx(0.2), "cautioned": 0.0}
+    assert loud == {"clear_error": None, "cautioned": 1.0}
+    assert table["baseline"]["clear_error"]["value"] == pytest.approx(0.1)
+    assert any("not counted: its offsets are not told." in line for line in conclusion(table))
+
+
+def test_a_caution_of_some_machines_counts():
+    warned = cautioned("as trained", 0.1, "a")
+    some = replace(warned, said=(*warned.said[:1], *told("", 0.1).said))
+    table = blind_spots_table(replace(spots(cautioned("row", 0.2, "a")), baseline=some), CARD)
+    assert table["usual_cautions"] == []
+    assert table["rows"][0]["cautioned"]["value"] == 1.0
 
 
 def spots(*rows):

@@ -72,7 +72,7 @@ def blind_spots():
     table = {
         "recipe": "bilge-pump-standard", "severity": "diametral_clearance_crankpin_m",
         "rows": rows, "baseline": one_row("as trained", 0.03, kind="as trained"), "left": [],
-        "machines": 10,
+        "machines": 10, "usual_cautions": [],
     }  # fmt: skip
     return blind_spots_html(table, notice="trained on simulation")
 

@@ -11,14 +11,14 @@ from ..learning.scores import ScoreFigure, resampled, share
 from ..wear_model.estimate import Estimate
 
 FIGURES = (
-    ("clear_error", "mean error of what is graded without caution, over the condemning limit"),
-    ("error", "mean error of all that is graded, over the limit"),
+    ("clear_error", "mean error of what is graded without a caution that counts, over the limit"),
+    ("error", "mean error of all that is graded, over the condemning limit"),
     ("bias", "mean signed error of all that is graded, over the limit"),
     ("coverage", "share of the intervals that hold the severity"),
     ("refused", "share without a grade: unfamiliar or unusable"),
-    ("cautioned", "share graded with caution"),
+    ("cautioned", "share graded with a caution that counts"),
 )
-"""Name and meaning."""
+"""Name and meaning. A caution counts unless every machine has it as trained."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,6 +35,8 @@ class ShiftVerdict:
         As of :class:`~.wear_model.estimate.Estimate`.
     found, low, high : float or None
         Estimate and interval [m]; None without a grade.
+    cautions : tuple of str
+        Of the estimate.
     """
 
     machine: int
@@ -43,6 +45,7 @@ class ShiftVerdict:
     found: float | None
     low: float | None
     high: float | None
+    cautions: tuple[str, ...] = ()
 
 
 def answer_of(estimate: Estimate, machine: int, truth: float) -> ShiftVerdict:
@@ -55,6 +58,7 @@ def answer_of(estimate: Estimate, machine: int, truth: float) -> ShiftVerdict:
         found=ends[0],
         low=ends[1],
         high=ends[2],
+        cautions=estimate.cautions,
     )
 
 
@@ -92,11 +96,30 @@ class ShiftRow:
 
 def row_of(stored: Mapping[str, Any]) -> ShiftRow:
     """A row from what :meth:`Row.as_dict` gave."""
-    said = tuple(ShiftVerdict(**each) for each in stored["said"])
+    said = tuple(
+        ShiftVerdict(**{**each, "cautions": tuple(each["cautions"])}) for each in stored["said"]
+    )
     return ShiftRow(**{**stored, "said": said, "faults": tuple(stored["faults"])})
 
 
-def row_figures(row: ShiftRow, limit: float, *, seed: int = 0) -> dict[str, ScoreFigure]:
+def usual_cautions(baseline: ShiftRow) -> frozenset[str]:
+    """Cautions that every machine has as trained: they tell no row from another.
+
+    Examples
+    --------
+    >>> wear = {"truth": 2e-4, "verdict": "caution", "found": 2e-4, "low": 1e-4, "high": 3e-4}
+    >>> said = [ShiftVerdict(machine=i, cautions=("offsets", f"{i}"), **wear) for i in (0, 1)]
+    >>> row = ShiftRow(name="", shift="", kind="as trained", why="", said=tuple(said))
+    >>> sorted(usual_cautions(row))
+    ['offsets']
+    """
+    graded = [frozenset(each.cautions) for each in baseline.said if each.found is not None]
+    return frozenset.intersection(*graded) if graded else frozenset()
+
+
+def row_figures(
+    row: ShiftRow, limit: float, usual: frozenset[str] = frozenset(), *, seed: int = 0
+) -> dict[str, ScoreFigure]:
     """Every one of :data:`FIGURES`.
 
     Parameters
@@ -104,6 +127,8 @@ def row_figures(row: ShiftRow, limit: float, *, seed: int = 0) -> dict[str, Scor
     row : Row
     limit : float
         Condemning limit [m].
+    usual : frozenset of str
+        Cautions that do not count, of :func:`usual_cautions`.
     seed : int
         Of the resamples.
 
@@ -125,9 +150,10 @@ def row_figures(row: ShiftRow, limit: float, *, seed: int = 0) -> dict[str, Scor
         return {name: nothing for name, _ in FIGURES}
     draws = resampled([each.machine for each in row.said], seed=seed)
     off = _numbers((e.found, e.truth) for e in row.said) / limit
-    verdicts = np.array([each.verdict for each in row.said])
-    clear, cautious = verdicts == "graded", verdicts == "caution"
-    graded, every = clear | cautious, np.ones(len(row.said), dtype=bool)
+    graded = np.array([each.found is not None for each in row.said])
+    warned = np.array([_warned(each, usual) for each in row.said])
+    clear, cautious = graded & ~warned, graded & warned
+    every = np.ones(len(row.said), dtype=bool)
     inside = [
         e.low is not None and e.high is not None and e.low <= e.truth <= e.high for e in row.said
     ]
@@ -145,12 +171,19 @@ def row_figures(row: ShiftRow, limit: float, *, seed: int = 0) -> dict[str, Scor
     }
 
 
+def _warned(said: ShiftVerdict, usual: frozenset[str]) -> bool:
+    """Whether a caution counts; one without words does."""
+    return said.verdict == "caution" and (not said.cautions or not usual.issuperset(said.cautions))
+
+
 def _numbers(pairs: Iterable[tuple[float | None, float]]) -> Any:
     return np.array([math.nan if found is None else found - truth for found, truth in pairs])
 
 
-def ranked(rows: Sequence[ShiftRow], limit: float) -> list[ShiftRow]:
-    """Rows by the error of what is graded without caution, worst first.
+def ranked(
+    rows: Sequence[ShiftRow], limit: float, usual: frozenset[str] = frozenset()
+) -> list[ShiftRow]:
+    """Rows by the error of what is graded without a caution that counts, worst first.
 
     Rows of which nothing is graded so follow, by the error of all that is graded: there the model
     warns of itself. Rows that no machine could be simulated for come last.
@@ -159,7 +192,7 @@ def ranked(rows: Sequence[ShiftRow], limit: float) -> list[ShiftRow]:
     def place(row: ShiftRow) -> tuple[int, float]:
         if not row.said:
             return 2, 0.0
-        figures = row_figures(row, limit)
+        figures = row_figures(row, limit, usual)
         clear, every = figures["clear_error"].value, figures["error"].value
         if math.isnan(clear):
             return 1, math.inf if math.isnan(every) else -every

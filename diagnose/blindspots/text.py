@@ -7,7 +7,7 @@ from typing import Any
 from ..feature_rows.model_card import ModelCard
 from ..learning.scores import ScoreFigure
 from .blindspots import BlindSpots
-from .scores import FIGURES, ShiftRow, ranked, row_figures
+from .scores import FIGURES, ShiftRow, ranked, row_figures, usual_cautions
 
 Table = dict[str, Any]
 
@@ -30,22 +30,24 @@ def blind_spots_table(found: BlindSpots, card: ModelCard) -> Table:
         ``recipe``, ``severity``, ``condemning_limit_m``, ``machines``; ``baseline`` and ``rows``,
         the worst first, each with name, shift, kind, why, machines, figures (value, low, high; None
         where no machine tells), what was said of every machine, and the faults of those that could
-        not be simulated; ``left`` names rows that time did not suffice for.
+        not be simulated; ``usual_cautions``, which every machine has as trained and no figure
+        counts; ``left`` names rows that time did not suffice for.
     """
-    limit = float(card.condemning_limit_m)
+    limit, usual = float(card.condemning_limit_m), usual_cautions(found.baseline)
     return {
         "recipe": found.recipe,
         "severity": card.severity,
         "condemning_limit_m": limit,
         "machines": len(found.baseline.said),
-        "baseline": _row_table(found.baseline, limit),
-        "rows": [_row_table(row, limit) for row in ranked(found.rows, limit)],
+        "usual_cautions": sorted(usual),
+        "baseline": _row_table(found.baseline, limit, usual),
+        "rows": [_row_table(row, limit, usual) for row in ranked(found.rows, limit, usual)],
         "left": list(found.left),
     }
 
 
-def _row_table(row: ShiftRow, limit: float) -> Table:
-    figures = row_figures(row, limit)
+def _row_table(row: ShiftRow, limit: float, usual: frozenset[str]) -> Table:
+    figures = row_figures(row, limit, usual)
     stored = row.as_dict()
     return {
         **{name: stored[name] for name in ("name", "shift", "kind", "why")},
@@ -78,6 +80,10 @@ def conclusion(table: Table) -> list[str]:
             f"Largest error without a caution: {worst['name']} {worst['shift']}, "
             f"{percent(worst['clear_error']['value'])} %."
         )
+    lines += [
+        f"Every verdict has this caution, which is not counted: {caution}."
+        for caution in table["usual_cautions"]
+    ]
     if table["machines"] < FEW:
         lines.append(f"With fewer than {FEW} machines the intervals are too narrow: increase -n.")
     return lines

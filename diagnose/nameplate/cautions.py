@@ -66,7 +66,8 @@ def _gap_cautions(
     path = path_of_zero(plate.scene if plate else usual, unknown[0])
     return [
         f"no healthy recording of this machine shows the offsets of {', '.join(unknown)}, which "
-        "are taken to be as small as where the model was trained, and its estimate leans on them: "
+        "are taken to be as small as where the model was trained, and sensitivities as near to the "
+        "nominal, and its estimate leans on them: "
         f"give --baseline HEALTHY, or what is known of each: --set '{path}=0 um +- 5 um'"
     ]
 
