@@ -42,15 +42,11 @@ from wearstate.diagnose.charts.page import SUFFIXES, chart_figure, chart_html, s
 from wearstate.diagnose.charts.scene_edit import block_of
 from wearstate.diagnose.charts.words import HERE, effect_words
 from wearstate.diagnose.command_line.cli import cli
+from wearstate.sim.fidelity.differences import Candidate, Difference, differences
+from wearstate.sim.fidelity.findings import Answer, Convergence, Raise, Study
 from wearstate.sim.fidelity.ladder import cost_of
-from wearstate.sim.fidelity.pilot import (
-    Candidate,
-    Difference,
-    OutOfTimeError,
-    Pilot,
-    differences,
-)
-from wearstate.sim.fidelity.study import Answer, Convergence, Raise, Study, default_step
+from wearstate.sim.fidelity.pilot import OutOfTimeError, Pilot
+from wearstate.sim.fidelity.written import default_step
 from wearstate.sim.scene.load import load_scene, scene_text
 from wearstate.sim.scene.rungs import with_values
 

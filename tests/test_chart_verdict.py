@@ -10,7 +10,7 @@ from wearstate.diagnose.charts import verdict as module
 from wearstate.diagnose.charts.across import Loss
 from wearstate.diagnose.charts.verdict import LOSS, verdict_chart
 from wearstate.diagnose.command_line.cli import cli
-from wearstate.sim.fidelity.pilot import Difference
+from wearstate.sim.fidelity.differences import Difference
 
 SMALL = ("--set", "duration=0.1", "--set", "film.n_theta=24", "--set", "film.n_z=5")
 

@@ -13,19 +13,18 @@ from wearstate.datasets.generation.quantities import resolved, with_estimate
 from wearstate.datasets.workers.local import in_order
 from wearstate.diagnose.charts.of_scene import chart_of
 from wearstate.diagnose.charts.words import percent
-from wearstate.sim.fidelity import pilot as pilot_runs
+from wearstate.sim.fidelity import runs as pilot_runs
 from wearstate.sim.fidelity.choose import resolve, resolved_scene
-from wearstate.sim.fidelity.ladder import cost_of, effects_of
-from wearstate.sim.fidelity.pilot import (
-    TIMED,
+from wearstate.sim.fidelity.differences import (
     Candidate,
     Difference,
-    Outcome,
-    Pilot,
     differences,
     starts_to_tell,
     surely_within,
 )
+from wearstate.sim.fidelity.ladder import cost_of, effects_of
+from wearstate.sim.fidelity.pilot import TIMED, Pilot
+from wearstate.sim.fidelity.runs import Outcome
 from wearstate.sim.fidelity.study import Search, study
 from wearstate.sim.machine.simulate import recorder, simulate, simulate_many
 from wearstate.sim.output.status import SimulationError
@@ -854,7 +853,7 @@ def known_starts(scene, *, clock=None):
 def test_starts_of_a_pilot_are_recordings_of_their_own(name, monkeypatch):
     """What starts share is done once, timed or not; the recordings are those of `simulate`."""
     scene = load_scene(name, {"duration": "0.3 s"})
-    monkeypatch.setattr(pilot_runs, "_warm", {scene.machine})  # kernels are loaded: timed once
+    monkeypatch.setattr(pilot_runs, "warm", {scene.machine})  # kernels are loaded: timed once
     _, shared = known_starts(scene)
     timed, with_clock = known_starts(scene, clock=iter(range(100)).__next__)
     assert timed.seconds({}) == 1  # three looks at the clock a start, of the first three
@@ -916,7 +915,7 @@ def test_starts_side_by_side_have_the_outcomes_of_each_alone(jobs, alone, monkey
     }
     assert jobs > 1 or sum(n for n in lying if n > 1) >= 24  # two combinations of twelve
     lying.clear()
-    monkeypatch.setattr(pilot_runs, "_warm", {BRIEF_PUMP.machine})
+    monkeypatch.setattr(pilot_runs, "warm", {BRIEF_PUMP.machine})
     timed = outcomes_of_starts(**told, clock=time.perf_counter)
     assert jobs > 1 or sum(n for n in lying if n > 1) == 2 * (12 - TIMED)
     assert all(timed[name].quantities == each.quantities for name, each in alone.items())

@@ -16,7 +16,7 @@ from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.pages import embed
 from wearstate.diagnose.pages.embed import MOST_BYTES
 from wearstate.diagnose.pages.points import Mark, PointAxes, Series, point_block
-from wearstate.sim.fidelity.pilot import Difference
+from wearstate.sim.fidelity.differences import Difference
 from wearstate.sim.output.recording import DataError
 
 HOSTILE = "$$x$$ </script><img src=http://example.org/a>"
@@ -88,7 +88,7 @@ def test_a_point_tells_its_figures_and_its_settings(chart):
     [axes] = chart_points(chart)
     drawn = {each.name: each.marks for each in axes.series}
     assert set(drawn) == {
-        BEST, "scatter too large to tell", "cheapest within the accuracy", "your scene",
+        BEST, "scatter too large to decide", "cheapest within the accuracy", "your scene",
     }  # fmt: skip
     [mark] = drawn[BEST]
     assert (mark.x, mark.y) == (0.01, pytest.approx(1.5))

@@ -15,8 +15,8 @@ from wearstate.diagnose.sweep.axes import SweepError, parse_axis
 from wearstate.diagnose.sweep.detect import detect
 from wearstate.diagnose.sweep.sweep import kept_runs, measure, sweep_of, sweep_plan
 from wearstate.diagnose.sweep.text import conclusion, sweep_table
-from wearstate.sim.fidelity import pilot as pilot_runs
-from wearstate.sim.fidelity.pilot import Outcome
+from wearstate.sim.fidelity import runs as pilot_runs
+from wearstate.sim.fidelity.runs import Outcome
 from wearstate.sim.machine.simulate import simulate_many
 
 CLEARANCE = "joint.crankpin.diametral_clearance"

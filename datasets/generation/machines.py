@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ...features.rotation.orbit import filtered_orbits
 from ...features.rotation.order import order_amplitudes
 from ...features.signal.spectrum import band_edges, band_levels, decibel
-from ...sim.fidelity.pilot import Quantities, Quantity
+from ...sim.fidelity.runs import Quantities, Quantity
 from ...sim.output.recording import Recording
 from ...sim.scene.journal import JournalScene
 from ...sim.scene.pump import PumpScene

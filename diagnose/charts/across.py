@@ -17,8 +17,8 @@ from ...datasets.generation.generate import generate
 from ...datasets.recipe.load import load_recipe
 from ...datasets.recipe.severities import wear_limits
 from ...datasets.split.rules import group_folds
+from ...sim.fidelity.differences import Difference
 from ...sim.fidelity.ladder import cost_of, effects_of
-from ...sim.fidelity.pilot import Difference
 from ...sim.output.recording import DataError
 from ...sim.parts.wording import nearest
 from ...sim.scene.rungs import Effect, admissible, with_values

@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any
 
 from ...datasets.file.csv_cells import save_rows
-from ...sim.fidelity.pilot import Difference
-from ...sim.fidelity.study import Convergence
+from ...sim.fidelity.differences import Difference
+from ...sim.fidelity.findings import Convergence
 
 Progress = Callable[[int, int], None]
 Clock = Callable[[], float]

@@ -6,9 +6,9 @@ from dataclasses import replace
 from typing import Any
 
 from ...sim.fidelity.choose import estimated_error
+from ...sim.fidelity.differences import Candidate
+from ...sim.fidelity.findings import Answer, Study
 from ...sim.fidelity.ladder import effects_of
-from ...sim.fidelity.pilot import Candidate
-from ...sim.fidelity.study import Answer, Study
 from ...sim.scene.scene import Scene
 from .chart import remaining_error
 from .scene_edit import written_value

@@ -14,7 +14,7 @@ from ...datasets.file.record import DataSet
 from ...datasets.split.rules import group_folds
 from ...features.catalogue.needs import Layout
 from ...features.catalogue.row import absent_features, catalogue, feature_names, feature_row
-from ...sim.fidelity.pilot import Difference
+from ...sim.fidelity.differences import Difference
 from ...sim.output.recording import DataError, Recording
 from ..feature_rows.feature_table import FeatureTable, Progress, feature_table, recording_layout
 from ..learning.grades import GRADE_NAMES, grades_of

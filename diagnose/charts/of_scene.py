@@ -16,8 +16,12 @@ from ...datasets.generation.machines import known_of
 from ...datasets.generation.quantities import quantity_label
 from ...datasets.workers.local import in_order
 from ...sim.fidelity.choose import estimated_error
-from ...sim.fidelity.pilot import Candidate, Outcome, Pilot
-from ...sim.fidelity.study import Answer, Search, Study, default_step
+from ...sim.fidelity.differences import Candidate
+from ...sim.fidelity.findings import Answer, Study
+from ...sim.fidelity.pilot import Pilot
+from ...sim.fidelity.runs import Outcome
+from ...sim.fidelity.study import Search
+from ...sim.fidelity.written import default_step
 from ...sim.scene.scene import Scene
 from ..pages.kept import Kept
 from .chart import RECOMMENDED, Chart, Choice, Clock, Point, RungCost, front_of

@@ -4,8 +4,8 @@ import math
 from typing import cast
 
 from ...datasets.generation.quantities import quantity_label
-from ...sim.fidelity.pilot import Candidate, starts_to_tell, surely_within
-from ...sim.fidelity.study import Answer, Study
+from ...sim.fidelity.differences import Candidate, starts_to_tell, surely_within
+from ...sim.fidelity.findings import Answer, Study
 from ...sim.scene.scene import Scene
 from .chart import remaining_error
 from .decision import (

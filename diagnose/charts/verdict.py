@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...sim.fidelity.pilot import Difference
+from ...sim.fidelity.differences import Difference
 from ...sim.scene.rungs import admissible
 from ..feature_rows.feature_table import FeatureTable
 from .across import Loss, PairedJudge, RungSets, loss_of

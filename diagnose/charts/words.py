@@ -5,8 +5,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from ...datasets.generation.quantities import quantity_label
-from ...sim.fidelity.pilot import Candidate
-from ...sim.fidelity.study import Raise
+from ...sim.fidelity.differences import Candidate
+from ...sim.fidelity.findings import Raise
 from ...sim.scene.scene import Scene
 
 HERE = "your scene as written"

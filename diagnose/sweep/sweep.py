@@ -20,7 +20,7 @@ from ...datasets.generation.truths import truths_of
 from ...datasets.workers.local import in_order
 from ...features.catalogue.row import feature_row
 from ...sim.fidelity.choose import resolved_scene
-from ...sim.fidelity.pilot import (
+from ...sim.fidelity.runs import (
     Outcome,
     Quantity,
     QuantityError,

@@ -12,8 +12,11 @@ from typing import Any, NamedTuple
 
 from ..scene.rungs import Effect, Rung, admissible, with_values
 from ..scene.scene import Scene, SceneError, pinned_faults
+from .comparison import Comparison
+from .differences import Candidate
 from .ladder import cost_of, effects_of
-from .pilot import Candidate, Comparison, Pilot, Quantities
+from .pilot import Pilot
+from .runs import Quantities
 
 STARTS = 32
 """Most starts that a difference is averaged over, where they are not cheap."""

@@ -7,13 +7,12 @@ known by then is told, with how sure it is.
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from itertools import pairwise, product
+from dataclasses import replace
+from itertools import product
 from statistics import median_high
 from typing import Any
 
-from ..machine.registry import machine_of
-from ..scene.rungs import STEP_LEVELS, Effect, Rung, admissible, level_name, with_values
+from ..scene.rungs import STEP_LEVELS, Rung, level_name, with_values
 from ..scene.scene import Scene
 from .choose import (
     added_differences,
@@ -31,270 +30,28 @@ from .choose import (
     refusals,
     refuse_bad_reference,
 )
+from .comparison import Comparison, names
+from .convergence import convergence_of
+from .differences import FIRST, Candidate, starts_to_tell, surely_within
+from .findings import Answer, Convergence, Raise, Study, unconverged
 from .ladder import cost_of
-from .pilot import (
-    FIRST,
-    RESOLVED,
-    STILL,
-    Candidate,
-    Comparison,
-    Difference,
-    OutOfTimeError,
-    Pilot,
-    Quantities,
-    differences,
-    names,
-    starts_to_tell,
-    surely_within,
-)
+from .pilot import OutOfTimeError, Pilot
+from .runs import Quantities
+from .written import ladder, value_at, written_rung
 
 _CAPS = (4, 16)  # starts of the first rounds; the last takes as many as the accuracy wants
-_SIGMAS = 3.0  # beyond so many standard errors a difference is one
-_ROUNDING = 1e-9  # of relative changes: signals have single precision, truth has double
+
 _LEVELS_SHOWN = 3
+
 _SPARED = 1.5  # a predicted error up to this factor behind the front is run: sums are guesses
+
 _SHORTLIST = 2  # predicted combinations that are measured before the search goes on
-_SAME = 1e-9  # of two values
+
 _FEWEST = 2  # starts of a comparison
+
 _NO_BOUND = 1.0  # an error that may be as large as the quantity itself is none known
+
 _DEAR = 0.8  # s by the tables: a run of the reference that takes more is cut, where it may be
-
-
-@dataclass(frozen=True, kw_only=True)
-class Convergence:
-    """How the reference converges with the level of one numerical effect.
-
-    Attributes
-    ----------
-    effect : str
-    levels : tuple of str
-        Coarse to fine, the last is that of the reference.
-    quantity : str
-        The one that moves most.
-    steps : tuple of float
-        Its changes from level to level [-].
-    order : float
-        Observed, base two; NaN where it cannot be told.
-    remaining : float
-        Error left in the reference after Richardson; the last change where there is no order [-].
-    converged : bool
-        What remains is below the accuracy's third, or the last change is below scatter. Changes
-        that shrink slowly leave much.
-    """
-
-    effect: str
-    levels: tuple[str, ...]
-    quantity: str
-    steps: tuple[float, ...]
-    order: float
-    remaining: float
-    converged: bool
-
-
-@dataclass(frozen=True, kw_only=True)
-class Raise:
-    """What one rung of the scene as written costs: its error against the best rung of its effect.
-
-    Attributes
-    ----------
-    effect : str
-    written, best : str
-        Names of the rungs.
-    candidate : Candidate
-        The scene as written, against itself with that one rung raised.
-    """
-
-    effect: str
-    written: str
-    best: str
-    candidate: Candidate
-
-
-@dataclass(frozen=True, kw_only=True)
-class Answer:
-    """The cheapest combination of rungs that is good enough, among those that may be chosen.
-
-    Attributes
-    ----------
-    reference : Candidate
-        The best of them, which all errors are taken against.
-    written : Candidate or None
-        The scene as it is written; None where it has not been measured.
-    chosen : Candidate
-        Cheapest that is within the accuracy, by the tables; the reference where nothing else is.
-        Of a search that was ended before, the cheapest that may be, for all that is known, or
-        else the cheapest of those that are surely off by the least.
-    status : str
-        ``resolved``; ``so far`` where the search was ended before; ``unresolvable`` where
-        something cheaper could not be told from the reference for scatter; ``not converged``
-        where the reference itself is off by more than the accuracy.
-    candidates : tuple of Candidate
-        All that were measured, cheapest first.
-    convergence : tuple of Convergence
-        Of the reference, for each numerical effect.
-    changes : mapping of str to object
-        Dotted path -> value that turns the scene as written into the chosen one.
-    """
-
-    reference: Candidate
-    written: Candidate | None
-    chosen: Candidate
-    status: str
-    candidates: tuple[Candidate, ...]
-    convergence: tuple[Convergence, ...]
-    changes: Mapping[str, Any]
-
-    @property
-    def left(self) -> float:
-        """Error of the reference itself, of the effects that have not converged [-]."""
-        return unconverged(self.convergence)
-
-    @property
-    def doubted(self) -> tuple[Candidate, ...]:
-        """Cheaper combinations that could not be told from the reference."""
-        cheaper = (c for c in self.candidates if c.cost < self.chosen.cost)
-        return tuple(c for c in cheaper if c.verdict == "doubtful")
-
-
-@dataclass(frozen=True, kw_only=True)
-class Study:
-    """Error and cost of every combination that matters.
-
-    Attributes
-    ----------
-    accuracy : float
-    written : mapping of str to str
-        Effect -> rung of the scene as it is written.
-    kept : Answer
-        Where only numerics may change: against the same rungs with the finest numerics.
-    raised : Answer or None
-        Where rungs may change as well: against the highest admissible rung of every effect. None
-        where no rung may, or the best of them were not measured.
-    raises : tuple of Raise
-        What each rung of the scene as written costs by itself.
-    refused : tuple of str
-        Rungs that the scene does not admit, with the reason.
-    pruned : tuple of str
-        Rungs that another is better and cheaper than.
-    measured, planned : int
-        Combinations measured at all, and all that are known to be of interest.
-    status : str
-        ``resolved``, ``unresolvable``, ``not converged``, or ``out of budget``.
-    duration : float or None
-        Length of the recording of each run, where it was cut [s].
-    share : float
-        Of the time that a run of the scene simulates: what each run did.
-    seconds_left : float
-        Of one core, that the known combinations still take [s]; NaN without a clock.
-    """
-
-    accuracy: float
-    written: Mapping[str, str]
-    kept: Answer
-    raised: Answer | None
-    raises: tuple[Raise, ...]
-    refused: tuple[str, ...]
-    pruned: tuple[str, ...]
-    measured: int
-    planned: int
-    status: str
-    duration: float | None = None
-    share: float = 1.0
-    seconds_left: float = math.nan
-
-    @property
-    def whole(self) -> Answer:
-        """The answer of widest choice."""
-        return self.raised or self.kept
-
-    @property
-    def reference(self) -> Candidate:
-        """Best rungs that were compared with."""
-        return self.whole.reference
-
-    @property
-    def candidates(self) -> tuple[Candidate, ...]:
-        """Those of the widest choice, cheapest first."""
-        return self.whole.candidates
-
-    @property
-    def convergence(self) -> tuple[Convergence, ...]:
-        """Of the reference of the widest choice."""
-        return self.whole.convergence
-
-    @property
-    def front(self) -> tuple[Candidate, ...]:
-        """Candidates that no cheaper one is better than."""
-        found: list[Candidate] = []
-        for one in sorted(self.candidates, key=lambda c: (c.cost, c.error)):
-            if math.isfinite(one.error) and (not found or one.error < found[-1].error):
-                found.append(one)
-        return tuple(found)
-
-
-# --- the scene as written
-
-
-def written_rung(effect: Effect, scene: Scene) -> Rung:
-    """Rung of an effect that a scene has as it is written.
-
-    Parameters
-    ----------
-    effect : Effect
-        Of this scene.
-    scene : Scene
-
-    Returns
-    -------
-    Rung
-        Of the ladder where it has one of the same values, else one that changes nothing.
-
-    Examples
-    --------
-    >>> from wearstate.sim.fidelity.ladder import effects_of
-    >>> from wearstate.sim.scene.load import load_scene
-    >>> pump = load_scene("bilge-pump")  # writes no step: its contact needs no more than x2
-    >>> [written_rung(effect, pump).name for effect in effects_of(pump)][-3:]
-    ['constant-speed', 'driven', 'x2']
-    """
-    for rung in effect.rungs:
-        if all(_has(scene, path, value) for path, value in rung.values.items()):
-            return rung
-    return Rung(name=effect.current(scene), assumes="as written")
-
-
-def _has(scene: Scene, path: str, value: Any) -> bool:
-    own = default_step(scene) if path == "numerics.step" else _value_at(scene, path)
-    if isinstance(value, float) and own is not None:
-        return math.isclose(own, value, rel_tol=_SAME)
-    return bool(own == value)
-
-
-def _value_at(scene: Scene, path: str) -> Any:
-    node: Any = scene
-    for key in path.split("."):
-        node = node[int(key)] if isinstance(node, tuple) else getattr(node, key, None)
-    return node
-
-
-def default_step(scene: Scene) -> float | None:
-    """Step that a scene runs with [s]; None of a machine without."""
-    step = machine_of(scene).step
-    return None if step is None else step(scene)
-
-
-def _ladder(effect: Effect, scene: Scene) -> tuple[Rung, ...]:
-    """Admissible rungs, the written one among them, cheapest first."""
-    rungs = list(admissible(effect, scene))
-    written = written_rung(effect, scene)
-    if written.name not in [rung.name for rung in rungs]:
-        own = cost_of(scene)
-        dearer = (i for i, r in enumerate(rungs) if cost_of(with_values(scene, r.values)) > own)
-        rungs.insert(next(dearer, len(rungs)), written)
-    return tuple(rungs)
-
-
-# --- the search
 
 
 class Search:
@@ -304,7 +61,7 @@ class Search:
     ----------
     scene : Scene
     quantities : callable
-        See :data:`wearstate.sim.fidelity.pilot.Quantities`.
+        See :data:`wearstate.sim.fidelity.runs.Quantities`.
     accuracy : float, optional
         The scene's own by default; says when scatter is small enough.
     pinned : sequence of str
@@ -340,7 +97,7 @@ class Search:
         self.tell = tell or (lambda _what: None)
         self.numerical = {each.name for each in self.effects if each.numerical}
         self.written = {each.name: written_rung(each, scene) for each in self.effects}
-        self.ladders = {each.name: _ladder(each, scene) for each in self.effects}
+        self.ladders = {each.name: ladder(each, scene) for each in self.effects}
         self._starts = starts
         self.share = 1.0  # of the time that a run of the scene simulates
         self.kept = self._comparison(
@@ -368,7 +125,7 @@ class Search:
         fewest_turns : int
             Revolutions that a recording must have.
         """
-        scene, speed = self.scene, float(_value_at(self.scene, "drive.speed"))
+        scene, speed = self.scene, float(value_at(self.scene, "drive.speed"))
         settling = scene.settling_revolutions / speed
         whole = scene.duration + settling
         affordable = whole * _DEAR / reference_cost(self.best or self.kept) - settling
@@ -709,7 +466,7 @@ class Search:
         for name in comparison.rungs:
             rungs = [r for r in comparison.rungs[name] if r.name in levels][-_LEVELS_SHOWN:]
             if name in self.numerical and len(rungs) == _LEVELS_SHOWN:
-                found = _convergence(comparison, name, rungs)
+                found = convergence_of(comparison, name, rungs)
                 if found is not None:
                     yield found
 
@@ -886,20 +643,11 @@ class Search:
         return {
             path: value
             for path, value in chosen.values.items()
-            if _value_at(self.scene, path) != value
+            if value_at(self.scene, path) != value
         }
 
     def _with_seconds(self, candidate: Candidate) -> Candidate:
         return replace(candidate, seconds=self.pilot.seconds(candidate.values))
-
-
-def unconverged(levels: Sequence[Convergence]) -> float:
-    """Error that effects which have not converged leave in a reference, all together [-].
-
-    Infinite where changes do not shrink from level to level: the last of them bounds nothing.
-    """
-    open_ = [each for each in levels if not each.converged]
-    return sum(e.remaining if math.isfinite(e.order) else math.inf for e in open_)
 
 
 def study(
@@ -941,54 +689,3 @@ def _best_bet(judged: Sequence[Candidate], reference: Candidate) -> Candidate | 
     least = min(map(surely_within, open_), default=math.inf)
     most = min(_SPARED * least, _NO_BOUND)  # bounds of few starts scatter themselves
     return min((c for c in open_ if surely_within(c) <= most), key=lambda c: c.cost, default=None)
-
-
-# --- convergence
-
-
-def _convergence(comparison: Comparison, name: str, rungs: Sequence[Rung]) -> Convergence | None:
-    """Convergence over the starts that its levels were judged on, or more while they scatter."""
-    judged = [comparison.judge({**comparison.top, name: rung}) for rung in rungs]
-    starts, found = min(c.starts for c in judged[:-1]), None
-    most = min(comparison.starts, comparison.cap)
-    while True:
-        comparison.pilot.fill([c.values for c in judged], starts)
-        runs = [comparison.pilot.outcomes(c.values, starts) for c in judged]
-        if any(outcome.fault for row in runs for outcome in row):
-            return found
-        levels = [[outcome.quantities for outcome in row] for row in runs]
-        first, last = (differences(a, b) for a, b in pairwise(levels))
-        quantity = max(last, key=lambda each: last[each].error)
-        found = _order(
-            name, rungs, quantity, first[quantity].mean, last[quantity], comparison.accuracy
-        )
-        scatter = max(each.standard_error for each in last.values()) / comparison.accuracy
-        if scatter <= (RESOLVED if starts >= FIRST else STILL):
-            return found
-        if 2 * starts > most:  # few scattered starts show nothing
-            return found if 2 * starts > comparison.starts else None
-        starts *= 2
-
-
-def _order(
-    effect: str,
-    rungs: Sequence[Rung],
-    quantity: str,
-    before: float,
-    last: Difference,
-    accuracy: float,
-) -> Convergence:
-    """What the last two changes of a quantity say of the finest level."""
-    silent = last.error <= max(_SIGMAS * last.standard_error, _ROUNDING)
-    order = math.log2(abs(before / last.mean)) if before and last.mean else math.nan
-    told = not silent and math.isfinite(order) and order > 0
-    remaining = last.error / (2**order - 1) if told else last.error
-    return Convergence(
-        effect=effect,
-        levels=tuple(rung.name for rung in rungs),
-        quantity=quantity,
-        steps=(before, last.mean),
-        order=order if told else math.nan,
-        remaining=remaining,
-        converged=silent or remaining <= RESOLVED * accuracy,
-    )

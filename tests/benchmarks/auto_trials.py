@@ -21,8 +21,9 @@ from pathlib import Path
 import numpy as np
 from wearstate.datasets.generation.machines import known_of
 from wearstate.sim.fidelity.choose import affordable_starts, resolve
+from wearstate.sim.fidelity.differences import differences
 from wearstate.sim.fidelity.ladder import cost_of, effects_of
-from wearstate.sim.fidelity.pilot import Pilot, differences
+from wearstate.sim.fidelity.pilot import Pilot
 from wearstate.sim.machine.simulate import simulate
 from wearstate.sim.scene.load import load_scene, scene_names
 from wearstate.sim.scene.rungs import admissible, with_values

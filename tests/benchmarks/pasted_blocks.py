@@ -16,8 +16,9 @@ import sys
 from auto_trials import reference_values
 from first_answers import SCENES
 from wearstate.datasets.generation.machines import known_of
+from wearstate.sim.fidelity.differences import differences
 from wearstate.sim.fidelity.ladder import effects_of
-from wearstate.sim.fidelity.pilot import Pilot, differences
+from wearstate.sim.fidelity.pilot import Pilot
 from wearstate.sim.scene.load import load_scene
 from wearstate.sim.scene.rungs import admissible
 

@@ -1,0 +1,71 @@
+"""Rungs and values of a scene as it is written."""
+
+import math
+from typing import Any
+
+from ..machine.registry import machine_of
+from ..scene.rungs import Effect, Rung, admissible, with_values
+from ..scene.scene import Scene
+from .ladder import cost_of
+
+_SAME = 1e-9  # of two values
+
+
+def written_rung(effect: Effect, scene: Scene) -> Rung:
+    """Rung of an effect that a scene has as it is written.
+
+    Parameters
+    ----------
+    effect : Effect
+        Of this scene.
+    scene : Scene
+
+    Returns
+    -------
+    Rung
+        Of the ladder where it has one of the same values, else one that changes nothing.
+
+    Examples
+    --------
+    >>> from wearstate.sim.fidelity.ladder import effects_of
+    >>> from wearstate.sim.scene.load import load_scene
+    >>> pump = load_scene("bilge-pump")  # writes no step: its contact needs no more than x2
+    >>> [written_rung(effect, pump).name for effect in effects_of(pump)][-3:]
+    ['constant-speed', 'driven', 'x2']
+    """
+    for rung in effect.rungs:
+        if all(_has(scene, path, value) for path, value in rung.values.items()):
+            return rung
+    return Rung(name=effect.current(scene), assumes="as written")
+
+
+def _has(scene: Scene, path: str, value: Any) -> bool:
+    own = default_step(scene) if path == "numerics.step" else value_at(scene, path)
+    if isinstance(value, float) and own is not None:
+        return math.isclose(own, value, rel_tol=_SAME)
+    return bool(own == value)
+
+
+def value_at(scene: Scene, path: str) -> Any:
+    """Value of a scene at a dotted path; None where it has none."""
+    node: Any = scene
+    for key in path.split("."):
+        node = node[int(key)] if isinstance(node, tuple) else getattr(node, key, None)
+    return node
+
+
+def default_step(scene: Scene) -> float | None:
+    """Step that a scene runs with [s]; None of a machine without."""
+    step = machine_of(scene).step
+    return None if step is None else step(scene)
+
+
+def ladder(effect: Effect, scene: Scene) -> tuple[Rung, ...]:
+    """Admissible rungs, the written one among them, cheapest first."""
+    rungs = list(admissible(effect, scene))
+    written = written_rung(effect, scene)
+    if written.name not in [rung.name for rung in rungs]:
+        own = cost_of(scene)
+        dearer = (i for i, r in enumerate(rungs) if cost_of(with_values(scene, r.values)) > own)
+        rungs.insert(next(dearer, len(rungs)), written)
+    return tuple(rungs)
