@@ -14,9 +14,11 @@ from wearstate.diagnose.alignment.films import (
     film_states,
     moved_scene,
     resting,
-    transfer_figure,
 )
+from wearstate.diagnose.alignment.films import _curves as curves
+from wearstate.diagnose.alignment.films import _plan as plan_of
 from wearstate.diagnose.alignment.films import _pressure_unit as pressure_unit
+from wearstate.diagnose.alignment.films import _response_figure as response_figure
 from wearstate.diagnose.alignment.margins import jack_rows, margin_of, margin_rows
 from wearstate.diagnose.alignment.page import align_html
 from wearstate.diagnose.alignment.table import align_table
@@ -153,12 +155,16 @@ def test_page_and_json_hold_films_margins_and_jacks(rig):
 
 
 def test_a_picture_of_transfer_functions_shows_what_moves_do(rig):
-    figure = transfer_figure(rig, MOVES)
-    level = figure.axes[2]
-    before, after = (line.get_ydata() for line in level.get_lines())
+    plan = plan_of(rig, None)
+
+    def levels(moves):
+        figure = response_figure(plan, curves(rig, moves, {}, plan), None, 2)
+        return [line.get_ydata() for line in figure.axes[0].get_lines()]
+
+    before, after = levels(MOVES)
     assert 1 < np.abs(after - before).max() < 3  # dB, of the bearing that rises by .25 mm
-    [alone] = transfer_figure(rig).axes[2].get_lines()
-    np.testing.assert_allclose(alone.get_ydata(), before)
+    [alone] = levels({})
+    np.testing.assert_allclose(alone, before)
 
 
 @pytest.mark.slow  # a search for a rest that there is not, six times

@@ -38,10 +38,11 @@ from wearstate.diagnose.charts.of_scene import (
     scene_chart,
     scene_search,
 )
-from wearstate.diagnose.charts.page import SUFFIXES, chart_figure, chart_html, save_chart
+from wearstate.diagnose.charts.page import chart_figure, chart_html, save_chart
 from wearstate.diagnose.charts.scene_edit import block_of
 from wearstate.diagnose.charts.words import HERE, effect_words
 from wearstate.diagnose.command_line.cli import cli
+from wearstate.diagnose.command_line.command_options import CHART_SUFFIXES
 from wearstate.sim.fidelity.differences import Candidate, Difference, differences
 from wearstate.sim.fidelity.findings import Answer, Convergence, Raise, Study
 from wearstate.sim.fidelity.ladder import cost_of
@@ -775,7 +776,7 @@ def test_text_and_json_tell_the_same(chart):
         assert words in text
 
 
-@pytest.mark.parametrize("suffix", SUFFIXES)
+@pytest.mark.parametrize("suffix", CHART_SUFFIXES)
 def test_every_form_is_written(chart, suffix, tmp_path):
     path = tmp_path / f"chart{suffix}"
     save_chart(chart, path)

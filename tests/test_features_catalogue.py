@@ -22,7 +22,6 @@ from wearstate.features.signal import (
     spectral_shape,
     spectrum,
     statistics,
-    third_octave,
 )
 from wearstate.features.signal import kurtogram as blows
 
@@ -175,10 +174,24 @@ def test_third_octaves_are_named_as_engineers_do():
     nominal = [name.split("third_octave_")[1].removesuffix(".level_db") for name in names]
     assert nominal[:6] == ["25", "31.5", "40", "50", "63", "80"]
     assert nominal[-3:] == ["6300", "8000", "10000"]
-    noise = np.random.default_rng(0).standard_normal(N)
-    centres, levels = third_octave.third_octave_levels(noise, FS)
-    assert_allclose(list(only(noise, "third_octaves").values()), levels, rtol=1e-12)
-    assert len(centres) == len(nominal)
+    assert len(shared.STANDARD.octave_centres(FS)) == len(nominal)
+
+
+def test_third_octave_levels_of_tones_and_noise():
+    t = np.arange(51_200) / FS
+    x = np.sqrt(2) * (np.sin(2 * np.pi * 1000 * t) + 0.1 * np.sin(2 * np.pi * 4000 * t))
+    centres = shared.STANDARD.octave_centres(FS)
+    assert_allclose(centres[[0, -1]], [25.119, 10_000], rtol=1e-4)
+    levels = shared.Analysis(x[np.newaxis], FS).octave_levels[0]
+    # Segments meet a tone off their lines at different phases: 0.001 dB.
+    assert_allclose(levels[centres == 1000], 0.0, atol=1e-3)
+    assert_allclose(levels[np.isclose(centres, 3981.07)], -20.0, atol=1e-3)
+    noise = np.random.default_rng(5).standard_normal((2, 200_000))
+    found = shared.Analysis(noise, FS).octave_levels[:, centres >= 999]
+    # White noise rises by 1 dB a band; the narrowest, 231 Hz, has 3600 degrees of freedom, hence
+    # 0.1 dB: four of them.
+    width = centres[centres >= 999] * (10**0.05 - 10**-0.05)
+    assert_allclose(found, np.tile(10 * np.log10(width / (FS / 2)), (2, 1)), atol=0.4)
 
 
 @pytest.mark.parametrize(

@@ -140,38 +140,6 @@ def test_too_short_a_record_has_no_line_to_whirl_on():
         orbit.whirl(np.ones(128), FS, SPEED)
 
 
-def test_mounting_angles_of_drawings():
-    """Y at 45 degrees left, X at 45 degrees right, of shafts that turn either way."""
-    for clockwise in (False, True):
-        at = orbit.probe_angles(-45, 45, clockwise=clockwise)
-        # towards the left probe is up and left; x points right, or left where the shaft turns so
-        towards_left = orbit.displacement([1.0], [0.0], angles=at)[0]
-        left = 1 if clockwise else -1
-        assert towards_left == pytest.approx((left + 1j) / math.sqrt(2), abs=1e-15)
-        # forward is the way the shaft turns: from the bottom to the right if counter-clockwise
-        z = orbit.displacement(*readings(ellipse(1, 1), at), angles=at)
-        [forward], [backward] = orbit.filtered_orbits(z, TURNS, [1.0])
-        assert abs(forward) == pytest.approx(1, abs=1e-12)
-        assert abs(backward) < 1e-12
-    with pytest.raises(ValueError, match="must be finite"):
-        orbit.probe_angles(math.nan, 45)
-
-
-@pytest.mark.parametrize("sensitivity", [-7874.0, 4000.0])
-def test_gaps_and_a_shaft_that_rises_from_rest(sensitivity):
-    """A shaft at rest at the bottom of a clearance of 0.1 mm rises to 0.06 mm below the middle."""
-    clearance, at = 1e-4, orbit.probe_angles(-45, 45)
-    moved = np.full(50, (2e-5 - 6e-5j) - (-1j * clearance))
-    # the gap shrinks by the motion towards the probe
-    volts = [-9.0 - sensitivity * towards for towards in readings(moved, at)]
-    probes = [orbit.gap_displacement(v, rest_v=-9.0, sensitivity=sensitivity) for v in volts]
-    found = orbit.centreline(orbit.displacement(*probes, angles=at), rest=-1j * clearance)
-    # volts of 9 hold 1e-15 / 4000 m
-    assert found == pytest.approx(2e-5 - 6e-5j, abs=1e-17)
-    with pytest.raises(ValueError, match=r"sensitivity = 0\.0 V/m must be finite and not 0"):
-        orbit.gap_displacement([1.0], rest_v=0.0, sensitivity=0.0)
-
-
 # --- run-out
 
 SCRATCH = {1: 2e-5 * np.exp(0.4j), 2: 8e-6j, 3: 3e-6}
@@ -199,20 +167,6 @@ def test_slow_roll_vectors_leave_the_motion():
     assert abs(raw[0][0] - found[0][0]) > 5e-6
     with pytest.raises(ValueError, match=r"slow_roll has shapes \(2,\) and \(2,\), must be \(1,\)"):
         orbit.filtered_orbits(z, TURNS, [1.0], slow_roll=rolled)
-
-
-def test_the_run_out_waveform_leaves_the_motion_and_the_position():
-    slow_turns = 3.0 * np.arange(16 * N) / FS - 0.2
-    offsets = np.array([[0.0], [0.25]])
-    waveform = orbit.runout(7e-5 + surface(slow_turns, offsets), slow_turns)
-    points = np.arange(128) / 128
-    # orders up to 3 of 128 points: the interpolation's 5e-5 of the sum of 3.1e-5
-    assert_allclose(waveform, surface(points, offsets), rtol=0, atol=2e-9)
-    fast_turns = TURNS - 0.37
-    motion = ellipse(2e-5, 1e-5, 0.3, turns=fast_turns) + (1e-5 - 3e-5j)
-    probes = np.stack(readings(motion)) + surface(fast_turns, offsets)
-    found = orbit.displacement(*orbit.subtract_runout(probes, fast_turns, waveform))
-    assert_allclose(found, motion, rtol=0, atol=2 * math.sqrt(2) * 2e-9)
 
 
 def test_centreline_excursion_and_marks():

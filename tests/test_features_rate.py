@@ -56,8 +56,6 @@ VALUES = {
 """An argument for every name."""
 
 OTHER = {
-    "third_octave_levels": {"low": 25.0, "high": 100.0},
-    "phase_from_speed": {"speed_hz": np.full(N // 512, 16.0)},
     "multiple_h1": {"force": _RNG.standard_normal((2, N))},
     "other_rate": {"x": _RNG.standard_normal((1, N))},
     "transmissibility": {"x": _RNG.standard_normal((2, N))},

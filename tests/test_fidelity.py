@@ -25,7 +25,7 @@ from wearstate.sim.fidelity.differences import (
 from wearstate.sim.fidelity.ladder import cost_of, effects_of
 from wearstate.sim.fidelity.pilot import TIMED, Pilot
 from wearstate.sim.fidelity.runs import Outcome
-from wearstate.sim.fidelity.study import Search, study
+from wearstate.sim.fidelity.study import Search
 from wearstate.sim.machine.simulate import recorder, simulate, simulate_many
 from wearstate.sim.output.status import SimulationError
 from wearstate.sim.scene.load import load_scene, scene_names
@@ -272,6 +272,12 @@ def test_differences_are_taken_start_by_start():
 
 
 # --- the study
+
+
+def study(scene, quantities, *, late=None, **options):
+    search = Search(scene, quantities, **options)
+    search.measure(late)
+    return search.found()
 
 
 def test_a_study_shows_the_order_of_convergence_and_what_is_left():

@@ -35,7 +35,7 @@ from wearstate.sim.film.solve import (
 )
 from wearstate.sim.journal.ladder import FILM_LADDER
 from wearstate.sim.journal.recording import _FILMS
-from wearstate.sim.parts.oil_viscosity import vogel_viscosity, walther_viscosity
+from wearstate.sim.parts.oil_viscosity import walther_viscosity
 from wearstate.sim.scene.journal import Film
 
 FINE = {"n_theta": 144, "n_z": 33}
@@ -602,15 +602,6 @@ def test_walther_goes_through_its_points_and_the_standard_between():
     assert_allclose(walther_viscosity(343.15, points, density=1e6), nu, rtol=1e-12)
 
 
-def test_vogel_recovers_its_constants():
-    def eta(t):
-        return 5e-5 * math.exp(900.0 / (t - 170.0))
-
-    points = [(t, eta(t)) for t in (373.15, 293.15, 323.15)]  # any order
-    for t in (280.0, 310.0, 390.0):
-        assert_allclose(vogel_viscosity(t, points), eta(t), rtol=1e-10)
-
-
 @pytest.mark.parametrize(
     ("call", "words"),
     [
@@ -619,8 +610,6 @@ def test_vogel_recovers_its_constants():
         (lambda: walther_viscosity(313.0, [(313.0, 3e-5), (373.0, 1e-6)], density=850), ">= 2"),
         (lambda: walther_viscosity(500.0, [(313.0, 3e-5), (373.0, 5e-6)], density=850), ">= 2"),
         (lambda: walther_viscosity(313.0, [(313.0, 3e-5), (373.0, 5e-6)], density=0), "density"),
-        (lambda: vogel_viscosity(160.0, [(300, 0.1), (320, 0.03), (370, 0.005)]), "pole"),
-        (lambda: vogel_viscosity(300.0, [(300, 0.1), (320, 0.2), (370, 0.005)]), "falls"),
     ],
 )
 def test_viscosity_refuses(call, words):

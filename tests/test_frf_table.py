@@ -16,8 +16,8 @@ from wearstate.sim.casing.casing_frf import (
     read_frf_table,
 )
 from wearstate.sim.casing.decimation import edge_samples
-from wearstate.sim.casing.measured_casing import table_acceleration
-from wearstate.sim.casing.modes import CasingModes, band_limited_acceleration
+from wearstate.sim.casing.measured_casing import MeasuredCasing
+from wearstate.sim.casing.modes import CasingModes, ModalCasing
 from wearstate.sim.machine.simulate import check, simulate
 from wearstate.sim.parts.casing import FrfFile, beside
 from wearstate.sim.scene.load import load_scene, scene_from_table, scene_table, scene_text
@@ -182,12 +182,19 @@ def blows(n_steps, rate, seed=0):
     return forces
 
 
+def through(kind, casing, means):
+    """What a casing makes of forces, step by step."""
+    moving = kind(casing, FACTOR * FS, FACTOR, len(means))
+    moving.add(means.T)
+    return moving.finish()
+
+
 @pytest.mark.parametrize(("spacing", "top"), [(1.0, 12_800.0), (1.0, 20_000.0), (4.0, 13_000.0)])
 def test_a_table_of_known_modes_gives_their_acceleration(spacing, top):
     rate = FACTOR * FS
     means = blows(int(0.8 * rate), rate)
-    expected = band_limited_acceleration(means, rate, FACTOR, MODES)
-    run = table_acceleration(means, rate, FACTOR, table_of(MODES, spacing, top))
+    expected = through(ModalCasing, MODES, means)
+    run = through(MeasuredCasing, table_of(MODES, spacing, top), means)
     edge = edge_samples(FACTOR)
     inside = slice(edge, -edge)
     error = (run.acceleration - expected)[:, inside]
@@ -207,7 +214,7 @@ def test_a_blow_on_one_resonance_is_its_impulse_response():
     means = np.zeros((n * FACTOR, 1))
     means[hit * FACTOR] = 1.0 * FACTOR * FS  # 1 N s within one step
     unit = resonance(natural, zeta, 1 / mass)
-    run = table_acceleration(means, FACTOR * FS, FACTOR, table_of(unit, 2.0, 12_800.0))
+    run = through(MeasuredCasing, table_of(unit, 2.0, 12_800.0), means)
     w, wd = 2 * np.pi * natural, 2 * np.pi * natural * np.sqrt(1 - zeta**2)
     time = np.arange(1, 3000) / FS
     decay = np.exp(-zeta * w * time)
@@ -231,7 +238,7 @@ def test_the_end_does_not_wrap_round_to_the_beginning():
     n = 4000
     means = np.zeros((n * FACTOR, 2))
     means[-60 * FACTOR :] = 5e3
-    run = table_acceleration(means, FACTOR * FS, FACTOR, table_of(MODES, 4.0, 13_000.0))
+    run = through(MeasuredCasing, table_of(MODES, 4.0, 13_000.0), means)
     assert np.abs(run.acceleration[:, -40:]).max() > 10
     # The brick wall of the band edge, 1 / (pi 2000) of the jump at the worst.
     assert np.abs(run.acceleration[:, :2000]).max() < 2e-3 * np.abs(run.acceleration).max()
@@ -239,7 +246,7 @@ def test_the_end_does_not_wrap_round_to_the_beginning():
 
 def test_a_constant_force_is_in_balance_with_a_mounted_casing():
     means = np.full((3000, 2), 4e3)
-    run = table_acceleration(means, FACTOR * FS, FACTOR, table_of(MODES, 4.0, 13_000.0))
+    run = through(MeasuredCasing, table_of(MODES, 4.0, 13_000.0), means)
     assert_allclose(run.acceleration, 0.0, atol=1e-9)  # rounding of 4 kN through 3,000 lines
 
 
@@ -248,7 +255,7 @@ def test_a_floating_casing_recoils_with_its_mass():
     free = Accelerance(frequency=f, values=np.full((1, 1, len(f)), 1 / 60.0 + 0j))
     time = np.arange(6000) / (FACTOR * FS)
     means = 500 + 300 * np.sin(2 * np.pi * 20 * time)[:, None]
-    run = table_acceleration(means, FACTOR * FS, FACTOR, free)
+    run = through(MeasuredCasing, free, means)
     edge = edge_samples(FACTOR)
     # Row k is the middle of step k * factor; 1e-3: ripple of the decimation.
     assert_allclose(
@@ -261,7 +268,7 @@ def test_the_share_of_force_above_the_table():
     time = (np.arange(n * FACTOR) + 0.5) / (FACTOR * FS)
     low, high = 3.0 * np.sin(2 * np.pi * 2000 * time), 4.0 * np.sin(2 * np.pi * 9000 * time)
     means = np.stack([700 + low + high, np.full(len(time), -2e3)], axis=1)
-    run = table_acceleration(means, FACTOR * FS, FACTOR, table_of(MODES, 4.0, 6400.0))
+    run = through(MeasuredCasing, table_of(MODES, 4.0, 6400.0), means)
     # The forces are given as point values, not means: decimation lifts them by 1 / sinc.
     lift = np.sinc(np.array([2000.0, 9000.0]) / (FACTOR * FS)) ** -2
     expected = 16 * lift[1] / (9 * lift[0] + 16 * lift[1])

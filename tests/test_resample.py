@@ -10,7 +10,7 @@ from wearstate.features.rotation import order
 from wearstate.features.rotation.angle_resample import AngleSignal
 
 FS = 5120.0
-ERROR = resample.INTERPOLATION_ERROR
+ERROR = 5e-5  # of a tone in the pass band, and what is left of one above the stop band
 
 
 def steady(speed=20.3, n=20_480, start=-0.4, fs=FS):
@@ -128,7 +128,7 @@ def test_a_slowing_shaft_folds_nothing():
     rest = angle.signal - 0.5 * np.cos(2 * np.pi * 3 * angle.phase)
     assert np.abs(rest).max() < 1.5 * ERROR
     # without the widened kernel it would be there in full
-    places = resample.phase_places(phase, angle.phase)
+    places = np.interp(angle.phase, phase, np.arange(phase.size))
     assert np.std(resample.interpolate(whine, places)) > 0.6
 
 
@@ -151,16 +151,6 @@ def test_channels_are_independent_and_dtype_is_kept(dtype):
     one = resample.angular_resample(x[1, 2], phase)
     # the same products in another order
     assert_allclose(angle.signal[1, 2], one.signal, atol=1e-5 if dtype != np.float64 else 1e-13)
-
-
-def test_places_of_a_phase():
-    phase = ramp()
-    turns = np.linspace(0, phase[-1], 50)
-    truth = (np.sqrt(100 + 12 * turns) - 10) / 6 * 600
-    # a / (8 f fs) of the docstring: 6 / (8 * 10 * 600)
-    assert np.abs(resample.phase_places(phase, turns) - truth).max() <= 6 / (8 * 10 * 600) * 1.01
-    with pytest.raises(ValueError, match="must lie within the phase of the record"):
-        resample.phase_places(phase, [-1.0])
 
 
 @pytest.mark.parametrize(
@@ -249,7 +239,7 @@ def test_the_map_of_the_chirp_example():
     angle = resample.angular_resample(x, phase, points_per_revolution=32)
     found = resample.order_map(angle, revolutions=4, window="hann")
     assert found.orders[1] == 0.25
-    times = resample.phase_places(phase, found.turns) / 600
+    times = np.interp(found.turns, phase, np.arange(phase.size)) / 600
     for k, a in ((1, 2.0), (2.5, 1.0)):
         rms = found.rms[:, found.orders == k][:, 0]
         # Hann lobes of its neighbours 1.5 orders, 6 lines, off: 1 / (pi 6 * 35) of 2
@@ -284,7 +274,6 @@ def test_an_order_is_followed_in_amplitude_and_phase():
         (lambda a: resample.order_track(a, [0.0]), "orders = .* must be > 0"),
         (lambda a: resample.order_track(a, [7.0]), "must be > 0 and <= 6.4"),
         (lambda a: resample.angular_residual(a, np.ones(3)), "must end in 16 points"),
-        (lambda a: resample.synchronous_residual(np.ones(3), np.ones(2), np.ones(8)), "as x"),
     ],
 )
 def test_impossible_questions_are_refused(call, message):
@@ -317,10 +306,6 @@ def test_the_average_keeps_what_repeats_and_the_residual_the_rest(dtype):
     # band-limited to half the 5120 Hz or less, so at most 0.3, over 198 revolutions: 0.021; four
     # standard deviations over 128 points
     assert_allclose(average, truth, atol=4 * 0.3 / np.sqrt(198))
-    rest = resample.synchronous_residual(x, phase, average)
-    # all but 1 / 198 of the noise is left
-    assert np.std(rest) == pytest.approx(np.std(noise), rel=0.02)
-    assert np.std(rest - noise) < 0.3 / np.sqrt(198) * 1.2
     angular = resample.angular_residual(angle, average)
     assert_allclose(resample.synchronous_average(angular), 0, atol=1e-5)
     assert angular.first == angle.first
@@ -414,7 +399,7 @@ def test_effort_is_linear_in_the_length():
         for points in (16, 256, 1024):
             phase = steady(n=n)
             angle = resample.angular_resample(np.ones(n), phase, points_per_revolution=points)
-            places = resample.phase_places(phase, angle.phase)
+            places = np.interp(angle.phase, phase, np.arange(n))
             share = np.full(places.size, min(1.0, 20.3 * points / FS))
             weights = sum(
                 first.size * taps for _, first, taps in resample._pieces(places, share, n)

@@ -4,13 +4,11 @@ import json
 import math
 
 import numpy as np
-import pytest
 from numpy.testing import assert_allclose
 from wearstate.diagnose.learning.grades import grades_of
 from wearstate.diagnose.learning.scores import (
     FIGURES,
     Judged,
-    ScoreFigure,
     bound_of,
     confusion,
     figures,
@@ -20,7 +18,6 @@ from wearstate.diagnose.learning.scores import (
     resampled,
     share,
     smallest_found,
-    verdict_of,
 )
 
 EDGES = [1.0, 2.0, 3.0]
@@ -177,13 +174,6 @@ def test_confusion_counts_by_true_grade():
         [0, 0, 0, 0],
         [1, 0, 0, 0],
     ]
-
-
-@pytest.mark.parametrize(
-    ("low", "high", "word"), [(-2, -1, "better"), (1, 2, "worse"), (-1, 1, "no different")]
-)
-def test_a_difference_is_called_by_its_interval(low, high, word):
-    assert verdict_of(ScoreFigure(value=0.0, low=low, high=high)) == word
 
 
 # -- the smallest wear found

@@ -5,10 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
-from wearstate.features.rotation import angle_resample as resample
 from wearstate.features.rotation.tacholess_speed import (
     SpeedEstimate,
-    phase_from_speed,
     tacholess_speed,
 )
 
@@ -134,18 +132,10 @@ def test_two_harmonics_are_enough_where_the_band_holds_no_octave():
 def test_a_run_up_is_followed_when_allowed():
     rng = np.random.default_rng(3)
     t = np.arange(int(6 * FS)) / FS
-    x, phase = machine(rng, 20 + 2 * t, dict.fromkeys(range(1, 6), 1.0), noise=0.3)
+    x, _ = machine(rng, 20 + 2 * t, dict.fromkeys(range(1, 6), 1.0), noise=0.3)
     found = tacholess_speed(x, FS, band_hz=(15.0, 40.0), frame_s=0.4, largest_rate=0.3)
     # a frame of 0.4 s sees 0.8 rev/s go by, smeared evenly: a tenth of it at the most
     assert_allclose(found.speed_hz, 20 + 2 * found.times, atol=0.08)
-    found_phase = phase_from_speed(found.times, found.speed_hz, x.size, FS)
-    # constant for the first 0.2 s: 2 * 0.2^2 / 2 = 0.04 rev; the rest is scatter of the frames
-    assert np.abs(found_phase - phase).max() < 0.07
-    # and the orders stand still on it
-    angle = resample.angular_resample(x, found_phase, points_per_revolution=32)
-    rms = resample.order_map(angle, revolutions=8).rms
-    # phase errors of 0.05 rev, 0.3 rad, within a frame move 0.3^2 / 2 of order 1 to its sides
-    assert_allclose(rms[:, 8], 1 / np.sqrt(2), rtol=0.1)
 
 
 @given(scale=st.sampled_from([0.5, -2.0, 1e-6]), offset=st.floats(-1, 1))
@@ -204,35 +194,6 @@ def test_an_estimate_is_frozen():
     assert isinstance(found, SpeedEstimate)
     with pytest.raises(AttributeError):
         found.mean_hz = 1.0
-
-
-# --- phase from a speed
-
-
-def test_phase_of_a_ramp_is_its_integral():
-    times = np.linspace(0.2, 4.8, 9)
-    phase = phase_from_speed(times, 10 + 6 * times, 500, 100.0)
-    t = np.arange(500) / 100
-    # a straight line is its own PCHIP; constant outside: 6 * 0.2^2 / 2 at each end
-    inside = (t >= 0.2) & (t <= 4.8)
-    assert_allclose(phase[inside], (10 * t + 3 * t**2 + 3 * 0.2**2)[inside], rtol=1e-12)
-    assert phase[0] == 0
-    assert_allclose(phase_from_speed([1.0], [7.0], 11, 10.0), 0.7 * np.arange(11))
-
-
-@pytest.mark.parametrize(
-    ("times", "speed", "message"),
-    [
-        ([0, 1, 2], [5.0, 0.0, -5.0], r"speed_hz\[1\] = 0 rev/s must be > 0 .* stops or reverses"),
-        ([0, 1], [5.0, np.nan], r"speed_hz\[1\] = nan"),
-        ([0, 0], [5.0, 5.0], "times must be finite and increase"),
-        ([0, 1], [5.0], "must be equal rows"),
-        ([], [], "must be equal rows"),
-    ],
-)
-def test_speeds_through_zero_are_refused(times, speed, message):
-    with pytest.raises(ValueError, match=message):
-        phase_from_speed(times, speed, 100, 10.0)
 
 
 # --- measured

@@ -262,15 +262,14 @@ def _pressure_unit(bearing: JournalBearing, speed: float) -> float:
 # --- transfer functions before and after
 
 
-def transfer_figure(
+def transfer_images(
     scene: ShaftScene,
     moves: Mapping[str, float] | None = None,
     turns: Mapping[str, float] | None = None,
     *,
     measured: LineTest | None = None,
-    push: Place | None = None,
-) -> Any:
-    """Accelerances of the housings: measured, of the line as set, and after the moves.
+) -> list[PageImage]:
+    """Accelerances of the housings, each a picture: measured, as set, and after the moves.
 
     Parameters
     ----------
@@ -279,51 +278,15 @@ def transfer_figure(
     moves, turns : mapping of str to float, optional
         Proposed.
     measured : LineTest, optional
-        Where it pushes, its responses and its lines are drawn.
-    push : place, optional
-        Where the force acts without a measured test; by default the aftmost journal, up.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        A column a response: level over coherence, or level alone where nothing is measured.
+        Where it pushes, its responses and its lines are drawn; else the force acts on the aftmost
+        journal, up, and no coherence is drawn.
 
     Raises
     ------
     ShaftFilmError
         The line does not rest on its films as it is set.
     """
-    from matplotlib.figure import Figure
-
-    plan = _plan(scene, measured, push)
-    curves = _curves(scene, moves or {}, turns or {}, plan)
-    across = min(len(plan.responses), _SHOWN_PANELS)
-    rows = 1 if measured is None else 2
-    figure = Figure(figsize=(1 + 3.2 * across, 3.4 + 1.4 * (rows - 1)), layout="constrained")
-    ratios = [3, 1][:rows]
-    panels = figure.subplots(
-        rows, across, squeeze=False, sharex=True, sharey="row", height_ratios=ratios
-    )
-    for k in range(across):
-        _draw_response(panels[:, k], plan, curves, measured, k)
-    panels[0, 0].set_ylabel("accelerance [dB re 1 (m/s²)/N]")
-    panels[-1, 0].set_xlabel("frequency [Hz]")
-    if measured is not None:
-        panels[1, 0].set_ylabel("coherence")
-    panels[0, -1].legend(fontsize=8)
-    figure.suptitle(f"Transfer functions, pushing {_response_name(plan.force)}")
-    return figure
-
-
-def transfer_images(
-    scene: ShaftScene,
-    moves: Mapping[str, float] | None = None,
-    turns: Mapping[str, float] | None = None,
-    *,
-    measured: LineTest | None = None,
-) -> list[PageImage]:
-    """Of :func:`transfer_figure` every response as a picture of a page."""
-    plan = _plan(scene, measured, None)
+    plan = _plan(scene, measured)
     curves = _curves(scene, moves or {}, turns or {}, plan)
     shown = range(min(len(plan.responses), _SHOWN_PANELS))
     return [page_image(_response_figure(plan, curves, measured, k)) for k in shown]
@@ -378,11 +341,11 @@ class _Plan(NamedTuple):
     responses: tuple[Place, ...]
 
 
-def _plan(scene: ShaftScene, measured: LineTest | None, push: Place | None) -> _Plan:
+def _plan(scene: ShaftScene, measured: LineTest | None) -> _Plan:
     if measured is not None:
         own = measured.transfer
         return _Plan(own.frequencies, own.speed, own.force, own.responses)
-    force = push or (scene.bearings[0].name, "y")
+    force = scene.bearings[0].name, "y"
     responses: tuple[Place, ...] = tuple((b.name, "y", "housing") for b in scene.bearings)
     hertz = np.linspace(*_BAND, _LINES)
     return _Plan(hertz, math.tau * scene.drive.speed, force, responses)

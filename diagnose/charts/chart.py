@@ -16,7 +16,6 @@ from ...datasets.file.csv_cells import save_rows
 from ...sim.fidelity.differences import Difference
 from ...sim.fidelity.findings import Convergence
 
-Progress = Callable[[int, int], None]
 Clock = Callable[[], float]
 
 RECOMMENDED = ("resolved", "so far", "unresolvable")

@@ -167,7 +167,7 @@ def save_chart(chart: Chart, path: Path, *, force: bool = True, interactive: boo
     ----------
     chart : Chart
     path : Path
-        One of :data:`SUFFIXES`.
+        ``.html``, ``.json``, ``.csv``, ``.png``, ``.svg`` or ``.pdf``.
     force : bool
         Replace an existing file.
     interactive : bool
@@ -198,6 +198,3 @@ _PAGES: dict[str, Callable[[Chart], str]] = {
     ".svg": chart_svg,
     ".json": _json,
 }
-
-SUFFIXES = (".svg", ".png", ".pdf", ".html", ".json", ".csv")
-"""Forms in which a chart can be written."""

@@ -21,9 +21,6 @@ from ..pages.picture import PAGE_WIDTH, PageImage, drawn_alone, page_image
 from ..pages.si_text import plain
 from ..pages.words import quantity_name
 
-SUFFIXES = (".html", ".htm", ".csv")
-"""Of what a ranking is written as."""
-
 SHOWN = 20
 """Features in the table of a terminal; also those whose cost is measured."""
 

@@ -360,19 +360,6 @@ def bound_of(judged: Judged, edges: Sequence[float]) -> float | None:
     return accuracy_bound(true, edges, error)
 
 
-def verdict_of(difference: ScoreFigure) -> str:
-    """Better, worse, or no different at the level of the interval.
-
-    Examples
-    --------
-    >>> verdict_of(ScoreFigure(value=-1.0, low=-2.0, high=0.5))
-    'no different'
-    """
-    if difference.high < 0:
-        return "better"
-    return "worse" if difference.low > 0 else "no different"
-
-
 def smallest_found(
     truth: Float,
     found: Float,

@@ -16,7 +16,6 @@ from ..pictures.panel import COLOURS
 from .presentation import Presentation, Truths, label, told
 from .shifts import add, factor, set_to
 
-_REVOLUTIONS = 2  # drawn
 _MOST_ORDERS = 4.0  # of a full spectrum, to either side
 
 

@@ -14,7 +14,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...sim.alignment.alignment import influence, reactions
 from ...sim.scene.shaft import ShaftScene
@@ -22,8 +21,6 @@ from ...sim.shaft.on_oil_films import ShaftFilmError
 from ...sim.shaft.recording import alignment_line
 from .sag_model import MeasuredReactions, MeasuredTransfer, Prior, SagError
 from .sags import SagPosterior, estimate_sags
-
-Vector = NDArray[np.float64]
 
 CONDITIONS = ("periodic", "guembel")
 """How a film may rupture on a shaft line."""

@@ -23,9 +23,6 @@ from .text import (
     sweep_table,
 )
 
-SUFFIXES = (".html", ".htm", ".json", ".csv", ".png", ".svg", ".pdf")
-"""Of what a sweep is written as."""
-
 _CELL_BYTES = 120  # of the table
 
 
@@ -97,7 +94,7 @@ def save_sweep(sweep: Sweep, path: Path, *, force: bool = True, interactive: boo
     ----------
     sweep : Sweep
     path : Path
-        One of :data:`SUFFIXES`.
+        ``.html``, ``.htm``, ``.json``, ``.csv``, ``.png``, ``.svg`` or ``.pdf``.
     force : bool
         Replace an existing file.
     interactive : bool

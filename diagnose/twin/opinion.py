@@ -11,7 +11,6 @@ from statistics import NormalDist
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...datasets.draws.twin import Twin, TwinTable
 from ...datasets.recipe.load import load_recipe
@@ -25,8 +24,6 @@ from .inversion import Gaussian, inverted
 from .levels import layout_of, levels_of
 from .misfit import Misfit, misfit
 from .unknowns import WEAR, TwinUnknowns, unknowns_of
-
-Float = NDArray[np.float64]
 
 OPINION_ROUNDS = (120, 90)
 """Members of the rounds: of all wear, then around what the first has found."""

@@ -256,7 +256,7 @@ CORE_ROWS: tuple[Feature, ...] = (
         needs=("octaves",),
         labels=_octave_labels,
         function=lambda a: a.octave_levels,
-        reference=f"third_octave.third_octave_levels; {_IEC}",
+        reference=f"spectrum.band_levels; {_IEC}",
     ),
     Feature(
         name="spectral_centroid",

@@ -337,9 +337,9 @@ def block_spectra(
     -----
     With h the impulse response, ``exp(-d t) (h * x)`` is ``(exp(-d t) h) * (exp(-d t) x)``: with
     the exponential on force AND response the estimate is exactly the transfer function at
-    ``s = d + 2j pi f``. Every pole moves left by d; `undo_decay` moves a fitted one back. A
-    response that has not died away at the end of its block is cut, an error of the size of the
-    cut-off tail.
+    ``s = d + 2j pi f``. Every pole moves left by d; `modal_fit` moves it back where it is told
+    `decay`. A response that has not died away at the end of its block is cut, an error of the
+    size of the cut-off tail.
 
     References
     ----------
@@ -1045,39 +1045,3 @@ def window_decay(duration: float, *, last: float = 0.01) -> float:
             f"duration = {duration} s must be > 0 and last = {last} must be > 0 and <= 1"
         )
     return float(-np.log(last) / duration)
-
-
-def undo_decay(frequency: ArrayLike, damping_ratio: ArrayLike, decay: float) -> tuple[Float, Float]:
-    """Natural frequency and damping ratio without the exponential window.
-
-    Parameters
-    ----------
-    frequency : array_like
-        Undamped natural frequency read from the windowed response function [Hz].
-    damping_ratio : array_like
-        Damping ratio read from it, below 1 [-].
-    decay : float
-        Rate of the window [1/s].
-
-    Returns
-    -------
-    frequency : ndarray
-        [Hz]
-    damping_ratio : ndarray
-        [-]; negative if more decay is undone than was there.
-
-    Notes
-    -----
-    The window moves the pole ``s = 2 pi f (-zeta + j sqrt(1 - zeta^2))`` to ``s - decay``, exactly.
-    For light damping that is the usual ``zeta - decay / (2 pi f)``.
-
-    Examples
-    --------
-    >>> undo_decay(10.0, 0.05, decay=1.0)[1].round(6).item()
-    0.034107
-    """
-    ratio = np.asarray(damping_ratio, dtype=np.float64)
-    omega = 2 * np.pi * np.asarray(frequency, dtype=np.float64)
-    growth = -ratio * omega + decay
-    size = np.hypot(growth, omega * np.sqrt(1 - ratio**2))
-    return np.asarray(size / (2 * np.pi)), np.asarray(-growth / size)

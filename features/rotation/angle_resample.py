@@ -22,14 +22,6 @@ PASSBAND_SHARE = 0.4
 """Highest frequency kept whole, as a share of the lower of the two rates [-]: recorders are flat
 to 1 / 2.56 = 0.39 of their sample rate."""
 
-INTERPOLATION_ERROR = 5e-5
-"""Largest error of a tone in the pass band, and largest remnant of one above the stop band, as a
-share of its amplitude [-]."""
-
-STOPBAND_SHARE = 0.6
-"""Lowest frequency removed whole, as a share of the points per second [-]; what lies between folds
-to between 0.4 and 0.5, never below."""
-
 WINDOWS = {
     "boxcar": (1.0,),
     "hann": (1.0, -1.0),
@@ -204,47 +196,6 @@ def _pieces(
 
 
 # --- from time to angle
-
-
-def phase_places(phase: ArrayLike, turns: ArrayLike) -> Float:
-    """Where in the record the shaft had a phase.
-
-    Parameters
-    ----------
-    phase : array_like, shape (n_samples,)
-        Shaft phase [rev], increasing, as from `order.shaft_phase`.
-    turns : array_like, shape (n,)
-        Phases asked for [rev].
-
-    Returns
-    -------
-    ndarray, shape (n,)
-        Samples from the first one [-]; divide by fs for the time.
-
-    Raises
-    ------
-    ValueError
-        If the phase does not increase (the shaft stood still or reversed) or does not reach so
-        far.
-
-    Notes
-    -----
-    Straight between samples: off by at most ``a / (8 f fs)`` samples at a speed f changing by a
-    rev/s per second, 1.3e-4 samples at 10 rev/s, 6 rev/s^2 and 600 Hz.
-
-    Examples
-    --------
-    >>> phase_places([0.0, 0.5, 1.5], [0.25, 1.0]).tolist()
-    [0.5, 1.5]
-    """
-    known, wanted = np.asarray(phase, dtype=np.float64), np.asarray(turns, dtype=np.float64)
-    _check_increasing(known)
-    if wanted.size and not known[0] <= wanted.min() <= wanted.max() <= known[-1]:
-        raise ValueError(
-            f"turns = {wanted.min():.6g} … {wanted.max():.6g} rev must lie within the phase of the "
-            f"record, {known[0]:.6g} … {known[-1]:.6g} rev; record longer, or ask for fewer"
-        )
-    return np.interp(wanted, known, np.arange(known.size, dtype=np.float64))
 
 
 def _check_increasing(phase: Float) -> None:
@@ -462,7 +413,7 @@ class OrderMap:
     orders : ndarray, shape (n_orders,)
         Orders [-].
     turns : ndarray, shape (n_frames,)
-        Shaft phase in the middle of each frame [rev]; `phase_places` makes it a time.
+        Shaft phase in the middle of each frame [rev].
     rms : ndarray, shape (..., n_frames, n_orders)
         Rms amplitude, a tone's amplitude over the root of 2 [unit of the signal].
 
@@ -698,50 +649,3 @@ def angular_residual(angle: AngleSignal, average: ArrayLike) -> AngleSignal:
         )
     bins = (angle.first + np.arange(angle.signal.shape[-1])) % angle.points_per_revolution
     return replace(angle, signal=angle.signal - mean[..., bins])
-
-
-def synchronous_residual(x: ArrayLike, phase: ArrayLike, average: ArrayLike) -> NDArray[Any]:
-    """Signal over time without what repeats with the shaft.
-
-    Parameters
-    ----------
-    x : array_like, shape (..., n_samples)
-        Signal [any unit].
-    phase : array_like, shape (n_samples,)
-        Its shaft phase [rev].
-    average : array_like, shape (..., points_per_revolution)
-        Mean revolution [unit of x], as from `synchronous_average` of this or another record.
-
-    Returns
-    -------
-    ndarray, shape (..., n_samples)
-        ``x - average(phase)``, of the whole record [unit of x].
-
-    Raises
-    ------
-    ValueError
-        If lengths differ.
-
-    Notes
-    -----
-    The average is read between its points by `interpolate`: orders below 0.4 of its points are
-    taken out to 5e-5; what repeats with the shaft above them stays.
-
-    Examples
-    --------
-    >>> phase = np.arange(400) / 100
-    >>> mean = np.cos(2 * np.pi * np.arange(64) / 64)
-    >>> rest = synchronous_residual(np.cos(2 * np.pi * phase), phase, mean)
-    >>> bool(abs(rest).max() < 5e-5)
-    True
-    """
-    signal, turns = np.asarray(x), np.asarray(phase, dtype=np.float64)
-    if signal.shape[-1:] != turns.shape:
-        raise ValueError(
-            f"phase has shape {turns.shape}, must have {signal.shape[-1:]} as x; use one record"
-        )
-    mean = np.asarray(average)
-    points, margin = mean.shape[-1], _HALF_WIDTH + 1
-    round_about = np.take(mean, np.arange(-margin, points + margin), axis=-1, mode="wrap")
-    places = (turns - np.floor(turns)) * points + margin
-    return np.asarray(signal - interpolate(round_about, places).astype(signal.dtype, copy=False))

@@ -6,14 +6,12 @@ direction of rotation: forward precession then turns the way the shaft does.
 """
 
 import math
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..signal.fft import fft
 from ..signal.rate import check_rate
-from .angle_resample import angular_resample, synchronous_average, synchronous_residual
 from .order import order_amplitudes
 
 Float = NDArray[np.float64]
@@ -24,10 +22,6 @@ PROBE_ANGLES = (math.pi / 4, -math.pi / 4)
 
 WHIRL_BAND = (0.25, 0.75)
 """Where oil whirl is looked for [orders]: it turns at a little less than half the speed."""
-
-PROXIMITY_SENSITIVITY = -7874.0
-"""Change of the gap voltage of a usual eddy-current probe with its gap [V/m]: -200 mV a mil, API
-670."""
 
 _LEAST_ANGLE = math.radians(5.0)  # between probes: a smaller one multiplies their noise by 11
 
@@ -78,86 +72,6 @@ def displacement(
     x = (one * math.sin(angles[1]) - other * math.sin(angles[0])) / turn
     y = (other * math.cos(angles[0]) - one * math.cos(angles[1])) / turn
     return np.asarray(x + 1j * y)
-
-
-def probe_angles(
-    first_deg: float, second_deg: float, *, clockwise: bool = False
-) -> tuple[float, float]:
-    """Directions of two probes as drawings give them, for `displacement`.
-
-    Parameters
-    ----------
-    first_deg, second_deg : float
-        Where the probes are mounted, from the top to the right, seen from the driver [deg]: 45
-        for "45 degrees right", -45 for "45 degrees left".
-    clockwise : bool
-        Whether the shaft turns clockwise, seen from the driver.
-
-    Returns
-    -------
-    tuple of float
-        Angles from the x axis in the direction of rotation [rad], y being up: x points to the
-        right of a shaft that turns counter-clockwise, to the left of one that turns clockwise.
-
-    Raises
-    ------
-    ValueError
-        If an angle is not finite.
-
-    References
-    ----------
-    API Standard 670, "Machinery Protection Systems", 5th ed. (2014), section on radial probes.
-
-    Examples
-    --------
-    >>> [round(math.degrees(angle), 6) for angle in probe_angles(-45, 45)]
-    [135.0, 45.0]
-    >>> [round(math.degrees(angle), 6) for angle in probe_angles(-45, 45, clockwise=True)]
-    [45.0, 135.0]
-    """
-    sign = 1.0 if clockwise else -1.0
-    if not (math.isfinite(first_deg) and math.isfinite(second_deg)):
-        raise ValueError(f"probe angles = {first_deg}, {second_deg} deg must be finite; give both")
-    return math.radians(90 + sign * first_deg), math.radians(90 + sign * second_deg)
-
-
-def gap_displacement(
-    gap_v: ArrayLike, *, rest_v: float, sensitivity: float = PROXIMITY_SENSITIVITY
-) -> Float:
-    """Motion of the shaft towards a proximity probe, from its gap voltage.
-
-    Parameters
-    ----------
-    gap_v : array_like
-        Voltage of the probe, its direct part included [V].
-    rest_v : float
-        Voltage with the shaft at the reference position [V], say at rest in the bearing.
-    sensitivity : float
-        Change of the voltage with a growing gap [V/m]: negative for an eddy-current probe on a
-        negative supply.
-
-    Returns
-    -------
-    ndarray
-        ``(rest_v - gap_v) / sensitivity`` [m], positive towards the probe.
-
-    Raises
-    ------
-    ValueError
-        If the sensitivity is 0 or not finite.
-
-    Examples
-    --------
-    >>> gap_displacement([-9.0, -10.0], rest_v=-9.0, sensitivity=-8000.0).tolist()
-    [0.0, -0.000125]
-    """
-    if not (math.isfinite(sensitivity) and sensitivity != 0):
-        raise ValueError(
-            f"sensitivity = {sensitivity} V/m must be finite and not 0; -7874 is usual"
-        )
-    volts = np.asarray(gap_v, dtype=np.float64)
-    # Zero minus something, not minus zero.
-    return np.asarray((rest_v - volts) / sensitivity + 0.0)
 
 
 # --- one order
@@ -343,87 +257,6 @@ def precession(forward: ArrayLike, backward: ArrayLike) -> Float:
 
 
 # --- run-out
-
-
-def runout(
-    readings: ArrayLike, phase: ArrayLike, *, points_per_revolution: int = 128
-) -> NDArray[Any]:
-    """What a probe reads of the surface alone: shape and electrical faults, over one revolution.
-
-    Parameters
-    ----------
-    readings : array_like, shape (..., n_samples)
-        Probes, or ``x + j y``, while the shaft turns too slowly to vibrate [any unit].
-    phase : array_like, shape (n_samples,)
-        Shaft phase [rev]; 0 at the keyphasor mark.
-    points_per_revolution : int
-        Points in a revolution; orders up to 0.4 of it are kept.
-
-    Returns
-    -------
-    ndarray, shape (..., points_per_revolution)
-        Mean over the revolutions, its own mean removed so that positions stay [unit of readings].
-
-    Raises
-    ------
-    ValueError
-        As `resample.angular_resample`, or if less than one revolution is left.
-
-    Notes
-    -----
-    Noise falls with the root of the number of revolutions.
-
-    References
-    ----------
-    API Standard 670, "Machinery Protection Systems", 5th ed. (2014): run-out and its compensation.
-
-    Examples
-    --------
-    >>> phase = np.arange(1000) / 200
-    >>> scratch = runout(3 + np.cos(4 * np.pi * phase), phase)
-    >>> bool(abs(scratch - np.cos(4 * np.pi * np.arange(128) / 128)).max() < 1e-4)
-    True
-    """
-    angle = angular_resample(readings, phase, points_per_revolution=points_per_revolution)
-    average = synchronous_average(angle)
-    return np.asarray(average - average.mean(axis=-1, keepdims=True))
-
-
-def subtract_runout(readings: ArrayLike, phase: ArrayLike, waveform: ArrayLike) -> NDArray[Any]:
-    """Readings of a probe without the run-out of the surface below it.
-
-    Parameters
-    ----------
-    readings : array_like, shape (..., n_samples)
-        Probes, or ``x + j y`` [any unit].
-    phase : array_like, shape (n_samples,)
-        Shaft phase [rev], counted from the same mark as that of the run-out.
-    waveform : array_like, shape (..., points_per_revolution)
-        From `runout` of the same probes [unit of readings].
-
-    Returns
-    -------
-    ndarray, shape (..., n_samples)
-        Motion of the shaft [unit of readings].
-
-    Raises
-    ------
-    ValueError
-        If lengths differ.
-
-    Notes
-    -----
-    Assumes that the probe sees the same track of the shaft: an axial float moves it.
-
-    Examples
-    --------
-    >>> phase = np.arange(1000) / 200
-    >>> scratch = np.cos(4 * np.pi * np.arange(128) / 128)
-    >>> rest = subtract_runout(3 + np.cos(4 * np.pi * phase), phase, scratch)
-    >>> bool(abs(rest - 3).max() < 1e-4)
-    True
-    """
-    return synchronous_residual(readings, phase, waveform)
 
 
 # --- the whole record

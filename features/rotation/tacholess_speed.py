@@ -3,11 +3,9 @@
 import math
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import PchipInterpolator
 from scipy.ndimage import grey_dilation, maximum_filter1d, percentile_filter
 from scipy.special import stdtrit
 
@@ -449,69 +447,3 @@ def _scatter(speed: Float) -> float:
 
 
 # --- back to a phase
-
-
-def phase_from_speed(
-    times: ArrayLike, speed_hz: ArrayLike, n_samples: int, fs: float
-) -> NDArray[Any]:
-    """Phase of the shaft at every sample, from its speed.
-
-    Parameters
-    ----------
-    times : array_like, shape (n,)
-        Times [s], increasing, such as `SpeedEstimate.times`.
-    speed_hz : array_like, shape (n,)
-        Speed at these times [rev/s], > 0.
-    n_samples : int
-        Length of the record.
-    fs : float
-        Sample rate [Hz].
-
-    Returns
-    -------
-    ndarray, shape (n_samples,)
-        Phase [rev], increasing, 0 at the first sample: no mark of the shaft, so phases of orders
-        compare between channels only.
-
-    Raises
-    ------
-    ValueError
-        If a speed is not > 0 (the shaft stops or reverses), or the times do not increase.
-
-    Notes
-    -----
-    Integral of the monotone cubic (PCHIP) through the speeds, which never overshoots them; constant
-    outside the times. An error of the speed adds up: after n revolutions at a relative error e the
-    phase is off by n e.
-
-    Examples
-    --------
-    >>> phase_from_speed([0.0, 1.0], [10.0, 20.0], 3, 2.0).round(6).tolist()
-    [0.0, 6.25, 15.0]
-    """
-    check_rate(fs)
-    clock, speed = np.asarray(times, dtype=np.float64), np.asarray(speed_hz, dtype=np.float64)
-    _check_speeds(clock, speed)
-    samples = np.arange(n_samples) / fs
-    if clock.size == 1:
-        return np.asarray(speed[0] * samples)
-    curve = PchipInterpolator(clock, speed).antiderivative()
-    inside = np.clip(samples, clock[0], clock[-1])
-    phase = curve(inside) + np.where(samples < clock[0], speed[0], speed[-1]) * (samples - inside)
-    return np.asarray(phase - phase[0])
-
-
-def _check_speeds(times: Float, speed: Float) -> None:
-    faults = []
-    if times.ndim != 1 or times.shape != speed.shape or times.size < 1:
-        faults.append(f"speed_hz has shape {speed.shape}, times {times.shape}; must be equal rows")
-    elif not np.all(np.diff(times) > 0):
-        faults.append("times must be finite and increase; sort them")
-    wrong = np.flatnonzero(~((speed > 0) & (speed < np.inf)))
-    if wrong.size:
-        faults.append(
-            f"speed_hz[{wrong[0]}] = {speed.flat[wrong[0]]:.6g} rev/s must be > 0 and finite: the "
-            "shaft stops or reverses there; cut the record to one direction of rotation"
-        )
-    if faults:
-        raise ValueError("\n".join(faults))

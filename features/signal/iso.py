@@ -1,4 +1,4 @@
-"""Vibration severity on housings: velocity and displacement in the ISO band, and its zones.
+"""Vibration severity on housings: velocity in the ISO band, and its zones.
 
 Which boundaries hold depends on the machine, which no signal tells: the kind must be given. Parts
 3 (industrial machines) and 7 (rotodynamic pumps) exclude reciprocating machines, which have parts 6
@@ -14,7 +14,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .fft import fast_length, fast_length_within, irfft, rfft
+from .fft import fast_length, fast_length_within
 from .rate import rate_fault
 from .spectrum import line_weights, power_lines
 from .statistics import Real, centred
@@ -36,14 +36,7 @@ LINES_BELOW = 20.0
 FEWEST_LINES_BELOW = 5.0
 """Least lower edge of the band in line spacings [-]: integration is then right to 0.1 %."""
 
-SETTLING = 3.0
-"""Left out at each end of an integrated waveform, in periods of the lower edge [-]."""
-
-_TAPER = 1.0  # of each end before the transform, in periods of the lower edge
-_PADDING = 4.0  # behind it, in the same unit: what one end leaves must not reach the other
-
-
-# --- velocity and displacement
+# --- velocity
 
 
 def band_rms(x: ArrayLike, fs: float, band: Band, *, integrations: int = 0) -> Real:
@@ -151,119 +144,6 @@ def velocity_rms(acceleration: ArrayLike, fs: float, *, band: Band = ISO_BAND) -
     0.004
     """
     return band_rms(acceleration, fs, band, integrations=1)
-
-
-def integrated(x: ArrayLike, fs: float, band: Band, *, integrations: int) -> Real:
-    """Waveform integrated over time, within a band, without its ends.
-
-    Parameters
-    ----------
-    x : array_like, shape (..., n_samples)
-        Signal [any unit].
-    fs : float
-        Sample rate [Hz].
-    band : tuple of float
-        Lower and upper edge [Hz].
-    integrations : {0, 1, 2}
-        How often to integrate.
-
-    Returns
-    -------
-    ndarray, shape (..., n_samples - 2 floor(3 fs / low))
-        Waveform [unit of x times s^integrations] from 3 periods of the lower edge behind the first
-        sample to 3 before the last.
-
-    Raises
-    ------
-    ValueError
-        Unless 0 < low < high <= fs / 2 and the record holds 7 periods of the lower edge.
-
-    Notes
-    -----
-    One transform of the record, its ends tapered, divided by ``(j omega)^integrations``. The
-    gain is 1 from low to high and falls as a raised cosine to 0 at low / 2 and at 1.25 high (or
-    fs / 2); without that slope the ends would ring on. What they leave is below 0.8 % of the
-    amplitude of x over ``(2 pi low)^integrations``, and below 0.03 % from 2.5 low on (measured:
-    tones of any phase in the band).
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> wave = np.cos(2 * np.pi * 50 * np.arange(5120) / 5120)
-    >>> velocity = integrated(wave, 5120.0, (10.0, 1000.0), integrations=1)
-    >>> velocity.shape, round(float(velocity.max()) * 2 * np.pi * 50, 3)
-    ((2048,), 1.0)
-    """
-    if integrations not in (0, 1, 2):
-        raise ValueError(f"integrations = {integrations} must be 0, 1 or 2; give one of them")
-    signal = centred(x)
-    n = signal.shape[-1]
-    _check(n, fs, band, 2 * SETTLING + 1)
-    padded = fast_length(n + round(_PADDING * fs / band[0]))
-    taper = _tapered(n, round(_TAPER * fs / band[0])).astype(signal.dtype)
-    spectrum = rfft(signal * taper, padded)
-    spectrum *= _response(padded, fs, band, integrations).astype(spectrum.dtype)
-    settling = int(SETTLING * fs / band[0])
-    return irfft(spectrum, padded)[..., settling : n - settling]
-
-
-def _tapered(n: int, ends: int) -> NDArray[np.float64]:
-    """Ones whose first and last samples rise from 0 as a raised cosine [shape=(n,)]."""
-    window = np.ones(n)
-    window[:ends] = np.sin(0.5 * np.pi * (np.arange(ends) + 0.5) / ends) ** 2
-    window[n - ends :] = window[:ends][::-1]
-    return window
-
-
-def _response(n: int, fs: float, band: Band, integrations: int) -> NDArray[np.complex128]:
-    """Response of the band-limited integrator at the lines of a transform."""
-    low, high = band
-    f = np.arange(n // 2 + 1) * fs / n
-    top = min(1.25 * high, fs / 2)
-    rising = np.sin(0.5 * np.pi * np.clip(2 * f / low - 1, 0, 1)) ** 2
-    beyond = np.clip((f - high) / (top - high), 0, 1) if top > high else f > high
-    falling = np.cos(0.5 * np.pi * beyond) ** 2
-    divisor = (2j * np.pi * np.where(f > 0, f, 1)) ** integrations
-    return np.asarray(rising * falling / divisor)
-
-
-def displacement_peak_to_peak(acceleration: ArrayLike, fs: float, *, band: Band = ISO_BAND) -> Real:
-    """Peak-to-peak displacement in a band, from acceleration.
-
-    Parameters
-    ----------
-    acceleration : array_like, shape (..., n_samples)
-        Acceleration [m/s^2].
-    fs : float
-        Sample rate [Hz].
-    band : tuple of float
-        Lower and upper edge [Hz].
-
-    Returns
-    -------
-    ndarray, shape (...)
-        Highest minus lowest displacement [m], 3 periods of the lower edge at each end left out;
-        0 for a constant signal. NaN gives NaN.
-
-    Raises
-    ------
-    ValueError
-        As `integrated`.
-
-    Notes
-    -----
-    See `integrated` for the method. Noise below the band edge grows with the inverse square of
-    the frequency: raise the edge until the value settles.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> tone = (2 * np.pi * 25) ** 2 * 1e-4 * np.cos(2 * np.pi * 25 * np.arange(5120) / 5120)
-    >>> round(float(displacement_peak_to_peak(tone, 5120.0)) * 1e6)
-    200
-    """
-    path = integrated(acceleration, fs, band, integrations=2)
-    return np.asarray(path.max(axis=-1) - path.min(axis=-1))
 
 
 def _check(n_samples: int, fs: float, band: Band, periods: float) -> None:

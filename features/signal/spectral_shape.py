@@ -14,8 +14,6 @@ Float = NDArray[np.float64]
 FLOOR_QUANTILE = 0.25
 """Share of the lines taken to lie below the noise level's quartile [-]: the rest may hold tones."""
 
-_OVERLAP_CORRELATION = 1 / 36  # of the lines of half-overlapping Hann segments: (1/6)^2, Welch
-
 
 def spectral_centroid(lines: ArrayLike, fs: float) -> Float:
     """Mean frequency of the power of a spectrum.
@@ -168,44 +166,6 @@ def spectral_flatness(lines: ArrayLike) -> Float:
     return np.where(np.isnan(power).any(axis=-1), np.nan, np.where(some, mean, 0.0))
 
 
-def effective_averages(n_samples: int, nperseg: int) -> float:
-    """Independent averages that half-overlapping Hann segments of a record are worth.
-
-    Parameters
-    ----------
-    n_samples : int
-        Length of the record [samples].
-    nperseg : int
-        Length of the segments [samples], as given to `power_lines`.
-
-    Returns
-    -------
-    float
-        ``K / (1 + 2 (K - 1) / (36 K))`` of the K segments [-].
-
-    Raises
-    ------
-    ValueError
-        Unless 2 <= nperseg <= n_samples.
-
-    References
-    ----------
-    P. D. Welch, "The use of fast Fourier transform for the estimation of power spectra", IEEE
-    Trans. Audio Electroacoust. 15 (1967) 70-73, doi:10.1109/TAU.1967.1161901.
-
-    Examples
-    --------
-    >>> effective_averages(8192, 8192), round(effective_averages(122_880, 8192), 2)
-    (1.0, 27.52)
-    """
-    if not 2 <= nperseg <= n_samples:
-        raise ValueError(
-            f"nperseg = {nperseg} samples must be >= 2 and <= n_samples = {n_samples}; shorten it"
-        )
-    segments = (n_samples - nperseg) // (nperseg // 2) + 1
-    return segments / (1 + 2 * (segments - 1) / segments * _OVERLAP_CORRELATION)
-
-
 def noise_floor(
     lines: ArrayLike,
     fs: float,
@@ -222,7 +182,7 @@ def noise_floor(
     fs : float
         Sample rate [Hz].
     n_averages : float
-        Independent averages behind each line [-], see `effective_averages`.
+        Independent averages behind each line [-], as from `frf.effective_averages`.
     band : tuple of float, optional
         Where to look [Hz], the noise being white in it; by default from line 2 to the last but
         one.

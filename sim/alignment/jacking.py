@@ -28,8 +28,6 @@ from .alignment import (
 )
 
 Vector = NDArray[np.float64]
-Index = NDArray[np.int64]
-
 _BESIDE = 1e-9  # m
 _FIRST_LIFT = 1e-5  # m, of a search that doubles
 _LONGEST_LIFT = 1.0  # m

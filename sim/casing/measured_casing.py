@@ -29,26 +29,21 @@ class TableRun:
     force_share_above: float
 
 
-def table_acceleration(
-    means: NDArray[np.float64], step_rate: float, factor: int, accelerance: Accelerance
-) -> TableRun:
+class MeasuredCasing:
     """Acceleration of the housing at the sample rate, through measured responses.
+
+    The forces come piece by piece. Times and spoilt edges are those of :class:`.ModalCasing`.
 
     Parameters
     ----------
-    means : numpy.ndarray [shape=(n_steps, n_inputs)]
-        Means of the forces on the casing over each step [N].
+    accelerance : Accelerance
+        From every force to every sensor.
     step_rate : float
         Steps per second, `factor` times the sample rate.
     factor : int
         Steps per sample, >= 1.
-    accelerance : Accelerance
-        From every force to every sensor.
-
-    Returns
-    -------
-    TableRun
-        Acceleration with the times and the spoilt edges of :func:`band_limited_acceleration`.
+    n_steps : int
+        Of all pieces together.
 
     Notes
     -----
@@ -57,21 +52,6 @@ def table_acceleration(
     the length of the response, one over the line spacing, so that its end does not wrap round to
     its beginning. The casing starts in balance with the first forces, as the modes do: they have
     stood there for ever and meet the accelerance at zero frequency.
-    """
-    casing = MeasuredCasing(accelerance, step_rate, factor, len(means))
-    casing.add(means.T)
-    return casing.finish()
-
-
-class MeasuredCasing:
-    """:func:`table_acceleration` of forces that come piece by piece.
-
-    Parameters
-    ----------
-    accelerance, step_rate, factor
-        As there.
-    n_steps : int
-        Of all pieces together.
     """
 
     def __init__(

@@ -325,82 +325,31 @@ class _ModesInMotion:
         return self.take(more)[:, :left]
 
 
-def housing_acceleration(
-    forces: NDArray[np.float64], sample_rate: float, modes: CasingModes
-) -> NDArray[np.float64]:
-    """Acceleration of the housing under forces that are linear between samples.
-
-    Parameters
-    ----------
-    forces : numpy.ndarray [shape=(n_samples, n_inputs)]
-        Forces on the casing [N].
-    sample_rate : float
-        [Hz]
-    modes : CasingModes
-        The casing.
-
-    Returns
-    -------
-    numpy.ndarray [shape=(n_outputs, n_samples)]
-        [m/s^2]. The casing starts in static balance with the first forces.
-
-    Notes
-    -----
-    Each mode obeys ``q'' + 2 zeta w q' + w^2 q = sum_j phi_j F_j``, discretised exactly for a
-    force linear between samples. Under a band-limited force its resonances are low by
-    ``sinc^2(f / sample_rate)``, the share of the samples' spectrum that straight lines keep;
-    :func:`band_limited_acceleration` has no such loss.
-    """
-    casing = _ModesInMotion(modes, _AS_THEY_ARE, sample_rate)
-    found = [casing.add(piece) for piece in pieces(forces.T)]
-    return np.hstack([*found, casing.finish()])
-
-
-_AS_THEY_ARE = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])  # taps
-
-
-def band_limited_acceleration(
-    means: NDArray[np.float64], step_rate: float, factor: int, modes: CasingModes
-) -> NDArray[np.float64]:
+class ModalCasing:
     """Acceleration of the housing at the sample rate, from means of the forces over steps.
 
+    The forces come piece by piece. The acceleration is flat to :data:`PASS_BAND` of the sample
+    rate, with times as in :func:`decimate`.
+
     Parameters
     ----------
-    means : numpy.ndarray [shape=(n_steps, n_inputs)]
-        Means of the forces on the casing over each step [N].
+    modes : CasingModes
+        The casing.
     step_rate : float
         Steps per second, `factor` times the sample rate.
     factor : int
         At least 2, so that the images of the hold lie beyond the band.
-    modes : CasingModes
-        The casing.
-
-    Returns
-    -------
-    numpy.ndarray [shape=(n_outputs, n_steps // factor)]
-        [m/s^2], flat to :data:`PASS_BAND` of the sample rate, times as in :func:`decimate`.
+    n_steps : int
+        Of all pieces together.
 
     Notes
     -----
     The casing runs at the step rate, before anything is decimated. Its springs and dashpots feel
     straight lines between the means, which lose a sinc squared; they are given the means with
     that loss made up for, so that they and the bare masses, which feel the means as they are,
-    cancel each other below the modes as they should.
-    """
-    casing = ModalCasing(modes, step_rate, factor, len(means))
-    casing.add(means.T)
-    return casing.finish()
-
-
-class ModalCasing:
-    """:func:`band_limited_acceleration` of forces that come piece by piece; the same bytes.
-
-    Parameters
-    ----------
-    modes, step_rate, factor
-        As there.
-    n_steps : int
-        Of all pieces together.
+    cancel each other below the modes as they should. Each mode obeys
+    ``q'' + 2 zeta w q' + w^2 q = sum_j phi_j F_j``, discretised exactly for a force linear between
+    samples. It starts in static balance with the first forces.
     """
 
     def __init__(self, modes: CasingModes, step_rate: float, factor: int, n_steps: int) -> None:

@@ -155,38 +155,19 @@ def normal_force(
     return force
 
 
-@kernel
-def kelvin_voigt(
-    penetration: float, approach_speed: float, stiffness: float, damping: float
-) -> float:
-    """Spring and dashpot in parallel: ``F = K d + C d'`` [N].
-
-    The dashpot makes the force jump at first touch and turn negative before the surfaces part;
-    the solver releases the contact where the force reaches zero. Source: eq. 12 of Xia et al.
-    2017, the pump paper.
-    """
-    return stiffness * penetration + damping * approach_speed
-
-
 # --- friction
 
 
 @kernel
-def ramp_sign(speed: float, dead_speed: float, full_speed: float) -> float:
-    """Sign that is zero up to the dead speed and rises in proportion from there to the full one.
+def _ramp_parts(speed: float, dead_speed: float, full_speed: float) -> Any:
+    """Numerator and denominator of a sign that rises in proportion between two speeds.
+
+    Zero up to the dead speed, one from the full one on.
 
     References
     ----------
     Ambrosio (2003), Virtual Nonlinear Multibody Systems, NATO Science Series 103, 57-81.
     """
-    part, whole = _ramp_parts(speed, dead_speed, full_speed)
-    sign: float = part / whole
-    return sign
-
-
-@kernel
-def _ramp_parts(speed: float, dead_speed: float, full_speed: float) -> Any:
-    """Numerator and denominator of :func:`ramp_sign`."""
     size, reach = abs(speed), full_speed - dead_speed
     rises = dead_speed < size < full_speed
     part = size - dead_speed if rises else (1.0 if size > dead_speed else 0.0)
@@ -198,7 +179,7 @@ def friction_force(sliding_speed: float, normal_force: float, contact: Any) -> f
     """Regularised Coulomb friction plus the pump paper's viscous term ``C_t v`` [N].
 
     Coulomb's part is ``f N s(v)`` with s the regularised sign ``v / sqrt(v^2 + v_s^2)`` at the
-    `friction_speed` v_s, 0.995 at ten times that, or the :func:`ramp_sign` from
+    `friction_speed` v_s, 0.995 at ten times that, or one that rises in proportion from
     `friction_dead_speed` to `friction_speed`; a contact that pulls has none. The force has the
     sign of the sliding velocity, so on the body that slides, where it acts in the opposite sense,
     it never adds energy. At rest there is no friction: a constant load creeps.

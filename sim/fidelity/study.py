@@ -650,39 +650,6 @@ class Search:
         return replace(candidate, seconds=self.pilot.seconds(candidate.values))
 
 
-def study(
-    scene: Scene,
-    quantities: Quantities,
-    *,
-    accuracy: float | None = None,
-    pinned: Sequence[str] = (),
-    starts: int | None = None,
-    late: Callable[[float], bool] | None = None,
-    pilot: Pilot | None = None,
-) -> Study:
-    """Measure error and cost of every combination of rungs that matters.
-
-    Parameters
-    ----------
-    scene, quantities, accuracy, pinned, starts, pilot
-        As :class:`Search`.
-    late : callable, optional
-        As :meth:`Search.measure`.
-
-    Returns
-    -------
-    Study
-
-    Raises
-    ------
-    SceneError, ValueError
-        As :func:`wearstate.sim.fidelity.choose.resolve`.
-    """
-    search = Search(scene, quantities, accuracy=accuracy, pinned=pinned, starts=starts, pilot=pilot)
-    search.measure(late)
-    return search.found()
-
-
 def _best_bet(judged: Sequence[Candidate], reference: Candidate) -> Candidate | None:
     """Of what is cheaper and not surely off, the cheapest that is sure of little error."""
     open_ = [c for c in judged if c.verdict == "doubtful" and c.cost < reference.cost]

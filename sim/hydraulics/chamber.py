@@ -25,19 +25,6 @@ CHAMBER_OK = 0
 CHAMBER_NOT_FINITE = 1
 CHAMBER_NO_VOLUME = 2
 
-CHAMBER_TEXT = {
-    CHAMBER_OK: "done",
-    CHAMBER_NOT_FINITE: (
-        "the cylinder pressure is no longer finite or above 10 GPa; "
-        "shorten numerics.step or raise pressure.dead_volume"
-    ),
-    CHAMBER_NO_VOLUME: (
-        "the piston has taken up the whole chamber; "
-        "raise pressure.dead_volume above the piston area times the clearances of its joints"
-    ),
-}
-"""Status of :func:`chamber_step` -> one sentence with the cure."""
-
 CHAMBER_STATE = (
     "pressure",
     "vapour_volume",
@@ -448,7 +435,7 @@ def chamber_step(
     Returns
     -------
     int
-        ``CHAMBER_OK``, or why `state` was left as it was; :data:`CHAMBER_TEXT` has the cures.
+        ``CHAMBER_OK``, or why `state` was left as it was.
 
     Notes
     -----

@@ -68,59 +68,6 @@ def _walther(nu: float) -> float:
     if not _WALTHER_LEAST <= nu < math.inf:
         raise ValueError(
             f"kinematic viscosity = {nu:g} mm^2/s must be >= {_WALTHER_LEAST:g} for this form; "
-            "fit vogel_viscosity to measured points instead"
+            "give the viscosity at the temperature of the film instead"
         )
     return math.log10(math.log10(nu + _WALTHER_SHIFT))
-
-
-def vogel_viscosity(temperature: float, points: Sequence[tuple[float, float]]) -> float:
-    """Dynamic viscosity of an oil known at three temperatures [Pa s].
-
-    Parameters
-    ----------
-    temperature : float
-        Absolute [K].
-    points : sequence of three (float, float)
-        Temperatures [K] and dynamic viscosities there [Pa s].
-
-    Returns
-    -------
-    float
-
-    Raises
-    ------
-    ValueError
-        The three points are not on such a curve, or the temperature is not above its pole.
-
-    Notes
-    -----
-    ``eta = a exp(b / (T - c))``; c follows from the slopes of the logarithm between the points.
-    Within about 1 % between the points; useless near the pole c, 150 to 200 K for most oils.
-
-    References
-    ----------
-    Vogel (1921), Physikalische Zeitschrift 22, 645-646.
-
-    Examples
-    --------
-    >>> points = (293.15, 0.0829), (313.15, 0.0272), (373.15, 0.0043)
-    >>> round(vogel_viscosity(323.15, points), 4)
-    0.0177
-    """
-    ordered = sorted(points)
-    (t_1, e_1), (t_2, e_2), (t_3, e_3) = ordered
-    if not (0 < t_1 < t_2 < t_3 < math.inf and e_1 > e_2 > e_3 > 0):
-        raise ValueError(
-            f"points = {ordered} must be at three absolute temperatures, with a viscosity > 0 "
-            "that falls as it gets warmer"
-        )
-    # ln eta = ln a + b / (T - c): the slopes of two chords are as (t_3 - c) to (t_1 - c)
-    ratio = math.log(e_1 / e_2) / (t_2 - t_1) / (math.log(e_2 / e_3) / (t_3 - t_2))
-    pole = (ratio * t_1 - t_3) / (ratio - 1.0) if ratio > 1.0 else -math.inf
-    if not 0 <= pole < min(t_1, temperature):
-        raise ValueError(
-            f"temperature = {temperature} K must be above the pole of the curve, {pole:.4g} K, "
-            "which must be between 0 K and the first point; check the points"
-        )
-    b = math.log(e_1 / e_2) / (1 / (t_1 - pole) - 1 / (t_2 - pole))
-    return e_1 * math.exp(b / (temperature - pole) - b / (t_1 - pole))

@@ -11,8 +11,6 @@ from ..casing.decimation import decimate
 from ..excitation.forces import Push, exciter_push, read_cell
 from ..scene.pump import FORCE_PLACES, PumpScene
 
-Float = NDArray[np.float64]
-
 
 def casing_pushes(
     scene: PumpScene, *, n_steps: int, first: int, last: int, factor: int, seed: int

@@ -15,8 +15,6 @@ from ..scene.shaft_parts import ShaftExciter
 from .response import Place, ReducedRotor, Transient, time_response
 
 Float = NDArray[np.float64]
-Complex = NDArray[np.complex128]
-
 _SETTLED = math.log(1e4)
 """Time constants after which a motion from rest is the settled one to 1e-4."""
 

@@ -26,7 +26,7 @@ from wearstate.diagnose.evaluation.splits import (
     one_split,
 )
 from wearstate.diagnose.evaluation.text import best_baseline, splits_text
-from wearstate.diagnose.learning.scores import ScoreFigure, verdict_of
+from wearstate.diagnose.learning.scores import ScoreFigure
 from wearstate.diagnose.wear_model.train import train_model
 
 
@@ -161,7 +161,9 @@ def against_baselines(split: Mapping[str, Any], *, better: bool) -> list[tuple[b
     best = best_baseline(split)
     if best is None:
         return []
-    verdict = verdict_of(ScoreFigure(**split["baselines"][best]["difference_all"]))
+    difference = ScoreFigure(**split["baselines"][best]["difference_all"])
+    worse = "worse" if difference.low > 0 else "no different"
+    verdict = "better" if difference.high < 0 else worse
     good = verdict == "better" if better else verdict != "worse"
     wanted = "better" if better else "better or no different"
     return [(good, f"split {split['name']}: against {best} {verdict}, must be {wanted}")]
