@@ -13,12 +13,10 @@ Examples
 
 from .diagnose.alignment.align import Alignment, align
 from .sim.alignment.alignment import (
-    AlignmentError,
     AlignmentLine,
     Check,
     Condition,
     LineState,
-    Seat,
     check,
     influence,
     reactions,
@@ -27,6 +25,7 @@ from .sim.alignment.alignment import (
 from .sim.alignment.calibration import Calibration, calibrate
 from .sim.alignment.jacking import Flange, Jacking, gap_and_sag, jacking
 from .sim.alignment.jacking_curve import CurveFit, fit_curve
+from .sim.alignment.seats import AlignmentError, Seat
 from .sim.shaft.recording import alignment_conditions, alignment_line
 
 __all__ = [

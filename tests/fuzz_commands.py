@@ -62,7 +62,8 @@ def _option(key: str, value: object) -> tuple[str, str]:
 
 def data_set(path: Path) -> bytes:
     """A data set with everything that one can hold."""
-    from wearstate.datasets.file.record import Attributes, DataSetWriter
+    from wearstate.datasets.file.attributes import Attributes
+    from wearstate.datasets.file.writer import DataSetWriter
     from wearstate.sim.output.sensor import Channel
 
     head = Attributes(

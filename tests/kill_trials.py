@@ -38,7 +38,9 @@ from typing import Any
 
 import h5py
 import numpy as np
-from wearstate.datasets.file import record
+from wearstate.datasets.file import attributes, record
+from wearstate.datasets.file import writer as data_writer
+from wearstate.datasets.file.attributes import Attributes
 from wearstate.datasets.generation import generate
 from wearstate.diagnose.command_line import cli
 from wearstate.sim.output.sensor import Channel
@@ -82,7 +84,7 @@ def command(log: str, claim: bool, arguments: list[str]) -> None:
 
     generate.in_order = in_order  # type: ignore[assignment]
     if not claim:
-        record._take_space = lambda path: None
+        data_writer._take_space = lambda path: None
     cli.main(arguments)
 
 
@@ -553,7 +555,7 @@ def _refused(rig: Rig, path: Path) -> None:
 
 
 def each_line(rig: Rig, stride: int = 1) -> None:
-    """Die before every `stride`-th line of `record.py`, from the start of a file to its end.
+    """Die before every `stride`-th line of `datasets/file`, from the start of a file to its end.
 
     Three small records, hidden quantities from the second on: then the file is laid out anew.
     """
@@ -580,6 +582,8 @@ def each_line(rig: Rig, stride: int = 1) -> None:
 DEAD = 99
 """Exit code of a process that died of the trial."""
 
+WATCHED = {module.__file__ for module in (attributes, data_writer, record)}
+
 
 def _dying(number: int, path: Path) -> None:
     """Write the small file, and die before the given line."""
@@ -587,7 +591,7 @@ def _dying(number: int, path: Path) -> None:
 
     def watch(frame: Any, event: str, _: Any) -> Any:
         nonlocal left
-        if frame.f_code.co_filename != record.__file__:
+        if frame.f_code.co_filename not in WATCHED:
             return None
         if event == "line":
             left -= 1
@@ -603,9 +607,9 @@ def _dying(number: int, path: Path) -> None:
 def write_small(path: Path) -> None:
     """Write three records and a split, or what is missing of them."""
     channel = Channel(name="acc", unit="m/s^2", quantity="acceleration")
-    head = record.Attributes(sample_rate=100.0, channels=(channel,), origin="simulated")
+    head = Attributes(sample_rate=100.0, channels=(channel,), origin="simulated")
     shape = {"n_records": 3, "n_samples": 8}
-    with record.DataSetWriter(path, head, **shape, splits=("machines",)) as writer:
+    with data_writer.DataSetWriter(path, head, **shape, splits=("machines",)) as writer:
         for index in np.flatnonzero(~writer.done):
             row = {"record_id": str(index), "status": "ok" if index else "diverged"}
             truth = {"force": np.full(2, index), "orbit": np.full((2, 2), index)} if index else {}

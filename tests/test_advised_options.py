@@ -47,6 +47,7 @@ SPOKEN_BY = {
     "charts/sentences": {"chart"},
     "wear_model/estimate": {"evaluate", "report"},
     "evaluation/evaluate": {"evaluate"},
+    "evaluation/protocol": {"evaluate"},
     "evaluation/splits": {"evaluate"},
     "film_clearance/clearance": {"report"},
     "report/film": {"report"},

@@ -11,18 +11,16 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from wearstate.sim.alignment.alignment import (
     AS_SET,
-    AlignmentError,
     AlignmentLine,
     Condition,
-    Seat,
     check,
     influence,
     reactions,
-    seat_stations,
     span_loads,
 )
 from wearstate.sim.alignment.calibration import CalibrationStatus, calibrate
 from wearstate.sim.alignment.jacking import gap_and_sag, jacking
+from wearstate.sim.alignment.seats import AlignmentError, Seat, seat_stations
 from wearstate.sim.beam.beam import Disc, PointLoad, Section, assemble_beam
 
 STEEL = {"young": 2.1e11, "shear_modulus": 8.1e10, "density": 7850.0}

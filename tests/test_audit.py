@@ -17,12 +17,10 @@ from wearstate.datasets.audit.label import neighbour_accuracy
 from wearstate.datasets.audit.records import ANCHORS, anchors, copies, sketch
 from wearstate.datasets.audit.rows import _rank, copied_rows
 from wearstate.datasets.audit.table import AuditTable, Roles, coded, read_table
+from wearstate.datasets.file.attributes import Attributes
 from wearstate.datasets.file.machines import machine_origin
-from wearstate.datasets.file.record import (
-    Attributes,
-    DataSet,
-    DataSetWriter,
-)
+from wearstate.datasets.file.record import DataSet
+from wearstate.datasets.file.writer import DataSetWriter
 from wearstate.datasets.generation.generate import generate
 from wearstate.datasets.recipe.load import load_recipe
 from wearstate.diagnose.command_line.cli import cli

@@ -7,7 +7,6 @@ import numpy as np
 import pandas as pd
 import pytest
 from numpy.testing import assert_allclose
-from wearstate.datasets.file.record import Channel
 from wearstate.diagnose.evaluation import baselines
 from wearstate.diagnose.evaluation import foreign_features as foreign
 from wearstate.diagnose.evaluation.baselines import BASELINES, FOLDS, Side, choose, contest, side_of
@@ -22,6 +21,7 @@ from wearstate.diagnose.learning.grades import grades_of
 from wearstate.diagnose.learning.regressions import CANDIDATES
 from wearstate.diagnose.learning.scores import point_judged, resampled
 from wearstate.sim.output.recording import Recording
+from wearstate.sim.output.sensor import Channel
 
 EDGES = [1e-4, 2e-4, 3e-4]
 LIMIT = 3e-4

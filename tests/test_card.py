@@ -10,11 +10,9 @@ import h5py
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from wearstate.datasets.file.record import (
-    Attributes,
-    DataSet,
-    DataSetWriter,
-)
+from wearstate.datasets.file.attributes import Attributes
+from wearstate.datasets.file.record import DataSet
+from wearstate.datasets.file.writer import DataSetWriter
 from wearstate.datasets.generation.generate import generate
 from wearstate.datasets.recipe.load import load_recipe
 from wearstate.diagnose.command_line.cli import cli

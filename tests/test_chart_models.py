@@ -11,7 +11,8 @@ from numpy.testing import assert_allclose
 from sklearn.linear_model import RidgeCV
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
-from wearstate.datasets.file.record import Attributes, DataSetWriter
+from wearstate.datasets.file.attributes import Attributes
+from wearstate.datasets.file.writer import DataSetWriter
 from wearstate.datasets.generation.generate import generate
 from wearstate.datasets.recipe.load import load_recipe
 from wearstate.datasets.split.rules import group_folds

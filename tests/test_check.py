@@ -11,15 +11,10 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from wearstate.datasets.audit.integrity import check_set, checked_table, checked_text
+from wearstate.datasets.file.attributes import HASHES, Attributes, manifest_hash, signal_checksum
 from wearstate.datasets.file.columns import describe_columns, meanings
-from wearstate.datasets.file.record import (
-    HASHES,
-    Attributes,
-    DataSet,
-    DataSetWriter,
-    manifest_hash,
-    signal_checksum,
-)
+from wearstate.datasets.file.record import DataSet
+from wearstate.datasets.file.writer import DataSetWriter
 from wearstate.datasets.generation.generate import generate
 from wearstate.datasets.generation.work import NUMERICS
 from wearstate.datasets.recipe.load import load_recipe

@@ -316,7 +316,7 @@ def test_a_failed_simulation_leaves_nothing(tmp_path, monkeypatch):
     def fail(*_, **__):
         raise OSError(28, "No space left on device", str(tmp_path / "x.h5.part"))
 
-    monkeypatch.setattr("wearstate.datasets.file.record.DataSetWriter.write", fail)
+    monkeypatch.setattr("wearstate.datasets.file.writer.DataSetWriter.write", fail)
     error = refused("simulate", "bilge-pump", "-o", tmp_path / "x.h5", says=["No space", "x.h5'"])
     assert ".part" not in error
     assert list(tmp_path.iterdir()) == []

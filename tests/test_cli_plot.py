@@ -5,11 +5,9 @@ import json
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from wearstate.datasets.file.record import (
-    Attributes,
-    DataSet,
-    DataSetWriter,
-)
+from wearstate.datasets.file.attributes import Attributes
+from wearstate.datasets.file.record import DataSet
+from wearstate.datasets.file.writer import DataSetWriter
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.command_line.commands_files import _KINDS
 from wearstate.diagnose.inspect.info import plot_file

@@ -12,11 +12,12 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from numpy.testing import assert_allclose
-from wearstate.datasets.file.record import Channel, DataSet
+from wearstate.datasets.file.record import DataSet
 from wearstate.datasets.split.rules import check_no_leak
 from wearstate.datasets.split.stored import Split, drawn_of, store_splits, usable_sides
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.evaluation import evaluate as judging
+from wearstate.diagnose.evaluation import protocol
 from wearstate.diagnose.evaluation import splits as module
 from wearstate.diagnose.evaluation.evaluate import (
     P_LEVELS,
@@ -26,14 +27,12 @@ from wearstate.diagnose.evaluation.evaluate import (
     score,
 )
 from wearstate.diagnose.evaluation.figure import evaluation_html, save_evaluation
+from wearstate.diagnose.evaluation.protocol import costs, evaluate_splits, one_split
 from wearstate.diagnose.evaluation.splits import (
     SPLITS,
     case_of,
-    costs,
-    evaluate_splits,
     machine_distances,
     noisy_table,
-    one_split,
     with_noise,
 )
 from wearstate.diagnose.evaluation.text import score_lines, splits_text
@@ -43,6 +42,7 @@ from wearstate.diagnose.wear_model.estimate import Estimate
 from wearstate.diagnose.wear_model.file import load_model, save_model
 from wearstate.diagnose.wear_model.train import train_model
 from wearstate.sim.output.recording import DataError, Recording
+from wearstate.sim.output.sensor import Channel
 
 NAMES = ("random", "speed", "severity-beyond", "noise")  # of others, the rows are looked at
 CHEAP_MS = 0.05  # ridges only: the protocol is tested, not the model
@@ -252,14 +252,14 @@ def test_more_machines_are_no_worse(result):
 
 
 def test_the_learning_curve_trains_on_whole_machines(case, monkeypatch):
-    monkeypatch.setattr(module, "CURVE_MACHINES", (10, 20))
+    monkeypatch.setattr(protocol, "CURVE_MACHINES", (10, 20))
     seen = []
 
     def spy(rows):
         seen.append(np.unique(case.groups[rows]))
         return case.model
 
-    curve = module.learning_curve(replace(case, fit=spy))
+    curve = protocol.learning_curve(replace(case, fit=spy))
     assert [row["machines"] for row in curve] == [10, 20, 45]
     assert [len(each) for each in seen[:2]] == [10, 20]
     assert set(seen[0]) < set(seen[1])

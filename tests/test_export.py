@@ -19,11 +19,9 @@ from scipy.io import wavfile
 from wearstate.datasets.audit.integrity import check_set
 from wearstate.datasets.convert import export
 from wearstate.datasets.convert.export import ABOUT, FORMATS, LABELS, export_set
-from wearstate.datasets.file.record import (
-    Attributes,
-    DataSet,
-    DataSetWriter,
-)
+from wearstate.datasets.file.attributes import Attributes
+from wearstate.datasets.file.record import DataSet
+from wearstate.datasets.file.writer import DataSetWriter
 from wearstate.datasets.generation.generate import generate
 from wearstate.datasets.measured.label_columns import RESERVED
 from wearstate.datasets.recipe.load import load_recipe

@@ -7,11 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from wearstate.datasets.file.record import (
-    Attributes,
-    DataSet,
-    DataSetWriter,
-)
+from wearstate.datasets.file.attributes import Attributes
+from wearstate.datasets.file.record import DataSet
+from wearstate.datasets.file.writer import DataSetWriter
 from wearstate.datasets.split.rules import group_folds
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.feature_rows.feature_choice import choice_in, choices_of, select_set

@@ -4,7 +4,9 @@ import numpy as np
 import pandas as pd
 import pytest
 from click.testing import CliRunner
-from wearstate.datasets.file.record import Attributes, DataSet, DataSetWriter
+from wearstate.datasets.file.attributes import Attributes
+from wearstate.datasets.file.record import DataSet
+from wearstate.datasets.file.writer import DataSetWriter
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.feature_rows.feature_table import choice_of, feature_table
 from wearstate.diagnose.inspect.info import plot_file

@@ -14,12 +14,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.stats import rankdata
-from wearstate.datasets.file.record import (
-    DataSet,
-    DataSetWriter,
-    LostError,
-    WriteError,
-)
+from wearstate.datasets.file.record import DataSet
+from wearstate.datasets.file.writer import DataSetWriter, LostError, WriteError
 from wearstate.datasets.generation import generate as generation
 from wearstate.datasets.generation import work
 from wearstate.datasets.generation.generate import Stopped, generate, save_solution

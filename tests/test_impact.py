@@ -5,7 +5,8 @@ import pandas as pd
 import pytest
 from click.testing import CliRunner
 from numpy.testing import assert_allclose
-from wearstate.datasets.file.record import Attributes, DataSetWriter
+from wearstate.datasets.file.attributes import Attributes
+from wearstate.datasets.file.writer import DataSetWriter
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.features.catalogue import analysis
 from wearstate.features.catalogue import row as table

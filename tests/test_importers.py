@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.io import loadmat, savemat, wavfile
-from wearstate.datasets.file.record import Attributes, DataSetWriter
+from wearstate.datasets.file.attributes import Attributes
+from wearstate.datasets.file.writer import DataSetWriter
 from wearstate.datasets.measured import recording as importers
 from wearstate.datasets.measured.plan import EachChannel
 from wearstate.datasets.measured.recording import list_contents, read_recording

@@ -13,14 +13,10 @@ import numpy as np
 import pandas as pd
 import pytest
 from numpy.testing import assert_array_equal
-from wearstate.datasets.file import record
-from wearstate.datasets.file.record import (
-    Attributes,
-    DataSet,
-    DataSetWriter,
-    attributes_hash,
-    manifest_hash,
-)
+from wearstate.datasets.file import attributes, record, writer
+from wearstate.datasets.file.attributes import Attributes, attributes_hash, manifest_hash
+from wearstate.datasets.file.record import DataSet
+from wearstate.datasets.file.writer import DataSetWriter
 from wearstate.datasets.split.rules import group_split
 from wearstate.diagnose.feature_rows.feature_table import feature_table
 from wearstate.sim.output.recording import DataError
@@ -148,7 +144,7 @@ def test_a_stopped_run_has_the_hashes_of_an_uninterrupted_one(path, tmp_path):
 
 
 def test_a_run_begun_before_there_were_hashes_is_finished_without(tmp_path, monkeypatch):
-    monkeypatch.setattr(record, "stamped", lambda stored, _: dict(stored))
+    monkeypatch.setattr(writer, "stamped", lambda stored, _: dict(stored))
     with DataSet(written(tmp_path / "data.h5")) as data:
         assert data.unhashed == ("attributes_sha256", "manifest_sha256")
 
@@ -158,7 +154,7 @@ def test_the_hash_of_attributes_covers_each(path):
         stored = dict(file.attrs)
     whole = attributes_hash(stored)
     for name in stored:
-        if name not in record.HASHES:
+        if name not in attributes.HASHES:
             assert attributes_hash({k: v for k, v in stored.items() if k != name}) != whole
             assert attributes_hash({**stored, name: "other"}) != whole
 

@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from matplotlib.figure import Figure
-from wearstate.datasets.file.record import DataSet, DataSetWriter
+from wearstate.datasets.file.record import DataSet
+from wearstate.datasets.file.writer import DataSetWriter
 from wearstate.datasets.recipe.load import load_recipe
 from wearstate.diagnose.blindspots.page import blind_spots_html
 from wearstate.diagnose.command_line.cli import cli

@@ -5,12 +5,11 @@ import json
 import numpy as np
 import pytest
 from scipy.signal import resample_poly
-from wearstate.datasets.file.record import Channel
 from wearstate.datasets.measured.recording import read_recording
 from wearstate.diagnose.command_line.commands_report import report_exit
 from wearstate.diagnose.wear_model.file import load_model
 from wearstate.sim.output.recording import Recording
-from wearstate.sim.output.sensor import tacho_pulses
+from wearstate.sim.output.sensor import Channel, tacho_pulses
 from wearstate.sim.parts.units import STANDARD_GRAVITY
 
 FILES = [

@@ -10,7 +10,7 @@ import zipfile
 import numpy as np
 import pandas as pd
 import pytest
-from wearstate.datasets.file.record import Channel, DataSet
+from wearstate.datasets.file.record import DataSet
 from wearstate.diagnose.evaluation.evaluate import evaluate_model, score
 from wearstate.diagnose.feature_rows.feature_table import recording_features
 from wearstate.diagnose.feature_rows.model_card import LayoutCard, ModelCard
@@ -25,6 +25,7 @@ from wearstate.diagnose.wear_model.train import train_model
 from wearstate.diagnose.wear_model.training_rows import TrainingRows
 from wearstate.sim.machine.simulate import simulate
 from wearstate.sim.output.recording import DataError, Recording
+from wearstate.sim.output.sensor import Channel
 from wearstate.sim.scene.load import load_scene
 from wearstate.sim.wear.archard import grade
 
@@ -511,7 +512,7 @@ def test_a_copied_recipe_is_no_new_machine(trained, tmp_path, change):
 
 def test_a_training_signal_under_another_name_is_noticed(trained, small_set, tmp_path):
     """The same bytes in a set of no recipe: the checksum tells."""
-    from wearstate.datasets.file.record import DataSetWriter
+    from wearstate.datasets.file.writer import DataSetWriter
 
     with DataSet(small_set) as data:
         head = dataclasses.replace(data.attributes, recipe="")

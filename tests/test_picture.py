@@ -11,7 +11,6 @@ from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.text import Text
-from wearstate.datasets.file.record import Channel
 from wearstate.diagnose.alignment.align import align
 from wearstate.diagnose.alignment.figure import align_figure
 from wearstate.diagnose.alignment.page import align_html
@@ -23,6 +22,7 @@ from wearstate.diagnose.pictures.view import View
 from wearstate.diagnose.report.figures import trend_picture
 from wearstate.diagnose.report.trend import fit_trend
 from wearstate.sim.output.recording import Recording
+from wearstate.sim.output.sensor import Channel
 from wearstate.sim.output.sensor import Channel as SensorChannel
 from wearstate.sim.output.status import Status
 from wearstate.sim.scene.load import load_scene

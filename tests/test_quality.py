@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from wearstate.datasets.file.record import Channel, DataSet
+from wearstate.datasets.file.record import DataSet
 from wearstate.diagnose.feature_rows.quality import (
     Levels,
     Observation,
@@ -20,7 +20,7 @@ from wearstate.diagnose.feature_rows.quality import (
 )
 from wearstate.diagnose.wear_model.file import load_model
 from wearstate.sim.output.recording import Recording
-from wearstate.sim.output.sensor import mains_hum
+from wearstate.sim.output.sensor import Channel, mains_hum
 
 CAMPAIGN = runpy.run_path(str(Path(__file__).parent / "benchmarks" / "quality_faults.py"))
 PLANTED = CAMPAIGN["PLANTED"]

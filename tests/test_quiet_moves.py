@@ -6,8 +6,9 @@ from wearstate.diagnose.alignment.align import align
 from wearstate.diagnose.alignment.quiet_moves import quiet_moves, running_line, running_rms
 from wearstate.diagnose.alignment.table import align_table
 from wearstate.diagnose.alignment.text import align_text
-from wearstate.sim.alignment.alignment import AlignmentError, check
+from wearstate.sim.alignment.alignment import check
 from wearstate.sim.alignment.calibration import calibrate
+from wearstate.sim.alignment.seats import AlignmentError
 from wearstate.sim.scene.load import load_scene
 from wearstate.sim.scene.shaft_parts import AlignmentLimits
 from wearstate.sim.shaft.recording import alignment_conditions, alignment_line, shaft_recorder

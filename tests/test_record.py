@@ -14,13 +14,11 @@ import h5py
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
-from wearstate.datasets.file import hdf5_values, record
+from wearstate.datasets.file import hdf5_values, writer
+from wearstate.datasets.file.attributes import Attributes
 from wearstate.datasets.file.hdf5_values import is_plain
-from wearstate.datasets.file.record import (
-    Attributes,
-    DataSet,
-    DataSetWriter,
-)
+from wearstate.datasets.file.record import DataSet
+from wearstate.datasets.file.writer import DataSetWriter
 from wearstate.sim.output.recording import DataError, Recording
 from wearstate.sim.output.sensor import Channel
 
@@ -361,14 +359,14 @@ def test_nothing_is_left_when_set_up_fails(path, monkeypatch):
     def fail(*_, **__):
         raise OSError("no space")
 
-    monkeypatch.setattr(record, "_create", fail)
+    monkeypatch.setattr(writer, "_create", fail)
     with pytest.raises(DataError, match=r"data\.h5 cannot be made \(no space\); check rights"):
         begin(path)
     assert list(path.parent.iterdir()) == []
 
 
 def test_a_full_disk_is_told_beforehand(path, monkeypatch):
-    monkeypatch.setattr(record.shutil, "disk_usage", lambda _: SimpleNamespace(free=1000))
+    monkeypatch.setattr(writer.shutil, "disk_usage", lambda _: SimpleNamespace(free=1000))
     with pytest.raises(DataError, match=r"0\.0 GB are free, must be >= 0\.0 GB; ask for fewer"):
         begin(path)
     assert list(path.parent.iterdir()) == []

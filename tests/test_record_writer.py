@@ -8,13 +8,10 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from wearstate.datasets.file import record
-from wearstate.datasets.file.record import (
-    Attributes,
-    DataSet,
-    DataSetWriter,
-    WriteError,
-)
+from wearstate.datasets.file import writer
+from wearstate.datasets.file.attributes import Attributes
+from wearstate.datasets.file.record import DataSet
+from wearstate.datasets.file.writer import DataSetWriter, WriteError
 from wearstate.sim.output.recording import DataError
 from wearstate.sim.output.sensor import Channel
 
@@ -168,7 +165,8 @@ LIMITED = """
 import resource, sys
 from pathlib import Path
 import numpy as np
-from wearstate.datasets.file.record import Attributes, DataSetWriter, WriteError
+from wearstate.datasets.file.attributes import Attributes
+from wearstate.datasets.file.writer import DataSetWriter, WriteError
 from wearstate.sim.output.sensor import Channel
 channel = Channel(name="acc", unit="m/s^2", quantity="acceleration")
 head = Attributes(sample_rate=100.0, channels=(channel,), origin="simulated")
@@ -217,7 +215,7 @@ def test_a_place_that_cannot_be_written_is_told_and_left_clean(path, monkeypatch
     def refuse(file, *_):
         raise PermissionError(13, "Permission denied", str(file))
 
-    monkeypatch.setattr(record, "_take_space", refuse)
+    monkeypatch.setattr(writer, "_take_space", refuse)
     message = r"data\.h5 cannot be made \(Permission denied\); check rights and space, or choose"
     with pytest.raises(DataError, match=message):
         begin(path)

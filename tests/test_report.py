@@ -13,11 +13,9 @@ import pytest
 import wearstate
 from click.testing import CliRunner
 from matplotlib import pyplot
-from wearstate.datasets.file.record import (
-    Attributes,
-    DataSet,
-    DataSetWriter,
-)
+from wearstate.datasets.file.attributes import Attributes
+from wearstate.datasets.file.record import DataSet
+from wearstate.datasets.file.writer import DataSetWriter
 from wearstate.datasets.recipe.text import toml_text
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.command_line.commands_report import report_exit

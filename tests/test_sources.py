@@ -15,7 +15,8 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.io import loadmat, savemat, wavfile
 from wearstate.datasets.file import hdf5_values
-from wearstate.datasets.file.record import Attributes, DataSetWriter
+from wearstate.datasets.file.attributes import Attributes
+from wearstate.datasets.file.writer import DataSetWriter
 from wearstate.datasets.readers import flat as source_flat
 from wearstate.datasets.readers import mat5 as source_mat5
 from wearstate.datasets.readers import text as source_text

@@ -11,7 +11,8 @@ import pytest
 from click.testing import CliRunner
 from hypothesis import given
 from hypothesis import strategies as st
-from wearstate.datasets.file.record import Attributes, DataSetWriter
+from wearstate.datasets.file.attributes import Attributes
+from wearstate.datasets.file.writer import DataSetWriter
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.pages import embed
 from wearstate.diagnose.pages.embed import MOST_BYTES

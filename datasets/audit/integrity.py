@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from ...sim.output.recording import DataError, missing_file
 from ...sim.wear.archard import grade
 from ..draws.draws import Range
-from ..file.record import DataSet, signal_checksum
+from ..file.attributes import signal_checksum
+from ..file.record import DataSet
 from ..recipe.load import recorded_recipe
 from ..recipe.recipe import Recipe
 from ..split.rules import check_no_leak

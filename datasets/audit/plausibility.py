@@ -15,7 +15,7 @@ from ...sim.scene.plausibility import (
     sensor_limits,
 )
 from ...sim.scene.scene import Scene
-from ..file.record import Attributes
+from ..file.attributes import Attributes
 from ..recipe.load import recorded_scene
 
 

@@ -15,16 +15,12 @@ from numpy.typing import NDArray
 
 from ...sim.atomic import replacing
 from ...sim.output.recording import DataError, Recording
+from ..file.attributes import stamped
 from ..file.csv_cells import safe_frame
 from ..file.hdf5_values import write_values
 from ..file.machines import FILE
-from ..file.record import (
-    DataSet,
-    fill_split,
-    lay_out_split,
-    refuse_output,
-    stamped,
-)
+from ..file.record import DataSet
+from ..file.writer import fill_split, lay_out_split, refuse_output
 from ..measured.label_columns import GRADE, RESERVED
 from ..source.channel_units import known_unit
 

@@ -11,13 +11,9 @@ from typing import Any, Literal
 import numpy as np
 
 from ...sim.output.recording import DataError
-from ..file.record import (
-    Attributes,
-    DataSet,
-    DataSetWriter,
-    manifest_hash,
-    refuse_output,
-)
+from ..file.attributes import Attributes, manifest_hash
+from ..file.record import DataSet
+from ..file.writer import DataSetWriter, refuse_output
 from ..measured.label_table import listed, refusal
 from ..measured.plan import RATE_TOLERANCE
 

@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...sim.output.recording import DataError, Recording
-from .record import Attributes, DataSet
+from .attributes import Attributes
+from .record import DataSet
 
 VIEW, STATE = "view", "state"
 """Manifest columns: which test a record is, and of which state of its machine."""

@@ -24,15 +24,10 @@ from ...sim.machine.simulate import alike, simulates_together
 from ...sim.output.recording import DataError, Recording
 from ...sim.scene.scene import Scene, channels_of
 from ...sim.wear.archard import grade
+from ..file.attributes import Attributes
 from ..file.lock import holding
-from ..file.record import (
-    Attributes,
-    DataSetWriter,
-    LostError,
-    WriteError,
-    refuse_output,
-    unfinished_attributes,
-)
+from ..file.record import unfinished_attributes
+from ..file.writer import DataSetWriter, LostError, WriteError, refuse_output
 from ..recipe.load import load_recipe
 from ..recipe.recipe import Recipe, condition_of
 from ..recipe.records import LARGEST_SEED, Sample, overrides_text, sample_records
@@ -43,15 +38,7 @@ from ..split.stored import Drawn, default_splits, split_names
 from ..workers.local import in_order
 from ..workers.pool import WorkersError
 from .fidelity_choice import FidelityChoice, choose, with_choice
-from .work import (
-    NUMERICS,
-    RecordJob,
-    RecordOutcome,
-    each_alone,
-    numerics_of,
-    simulated,
-    together,
-)
+from .work import NUMERICS, RecordJob, RecordOutcome, each_alone, numerics_of, simulated, together
 
 _TOGETHER = 32
 """Records of a batch: two for every lane, all of as many steps; few enough to be kept in memory."""

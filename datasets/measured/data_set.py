@@ -16,13 +16,10 @@ from ...features.rotation.order import pulse_times
 from ...sim.output.recording import DataError
 from ...sim.output.sensor import Channel
 from ...sim.parts.wording import nearest
+from ..file.attributes import Attributes
 from ..file.machines import FILE, GROUP_NAME
-from ..file.record import (
-    Attributes,
-    DataSet,
-    DataSetWriter,
-    refuse_output,
-)
+from ..file.record import DataSet
+from ..file.writer import DataSetWriter, refuse_output
 from ..readers.open import open_records
 from ..source.part import SourceOptions
 from ..workers.local import in_order

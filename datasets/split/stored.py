@@ -17,13 +17,10 @@ from numpy.typing import NDArray
 from ...sim.atomic import replacing
 from ...sim.output.recording import DataError
 from ..draws.draws import Range
+from ..file.attributes import Attributes
 from ..file.lock import holding
-from ..file.record import (
-    Attributes,
-    DataSet,
-    fill_split,
-    lay_out_split,
-)
+from ..file.record import DataSet
+from ..file.writer import fill_split, lay_out_split
 from ..recipe.load import recorded_recipe
 from ..recipe.recipe import Recipe
 from ..recipe.records import Sample, sample_records

@@ -2,17 +2,10 @@
 
 from dataclasses import dataclass
 
-from ...sim.alignment.alignment import (
-    AlignmentError,
-    AlignmentLine,
-    Check,
-    Condition,
-    LineState,
-    check,
-    reactions,
-)
+from ...sim.alignment.alignment import AlignmentLine, Check, Condition, LineState, check, reactions
 from ...sim.alignment.calibration import Calibration, calibrate
 from ...sim.alignment.jacking import Jacking, jacking
+from ...sim.alignment.seats import AlignmentError
 from ...sim.brief import brief
 from ...sim.scene.scene import Scene
 from ...sim.scene.shaft import ShaftScene

@@ -11,8 +11,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ...sim.alignment.alignment import MET, AlignmentError, check, reactions
+from ...sim.alignment.alignment import MET, check, reactions
 from ...sim.alignment.calibration import Calibration, CalibrationStatus
+from ...sim.alignment.seats import AlignmentError
 from ...sim.scene.shaft import ShaftScene
 from ...sim.shaft.changed import (
     FreeLine,

@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ... import __version__
-from ...datasets.file.record import Attributes, DataSet
+from ...datasets.file.attributes import Attributes
+from ...datasets.file.record import DataSet
 from ...datasets.split.rules import check_no_leak, group_folds
 from ...sim.output.recording import DataError, Recording, Table
 from ..feature_rows.blows import NOISE_SCORE, blow_scores, blow_table

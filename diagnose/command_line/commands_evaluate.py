@@ -158,7 +158,8 @@ def _judge(
 ) -> None:
     """Of a finished model, or by splits; text or JSON, and a file if asked for."""
     from ..evaluation.figure import save_evaluation
-    from ..evaluation.splits import ALL_SPLITS, case_of, evaluate_splits
+    from ..evaluation.protocol import evaluate_splits
+    from ..evaluation.splits import ALL_SPLITS, case_of
     from ..evaluation.text import splits_text
     from ..wear_model.file import load_model
     from ..workflow.evaluate import evaluate as judge

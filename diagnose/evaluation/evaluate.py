@@ -9,7 +9,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from ...datasets.file.record import Attributes, DataSet
+from ...datasets.file.attributes import Attributes
+from ...datasets.file.record import DataSet
 from ...datasets.file.views import CompletingView
 from ...datasets.split.stored import Sides, usable_sides
 from ...sim.output.recording import DataError

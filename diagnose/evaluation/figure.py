@@ -35,7 +35,7 @@ def evaluation_figure(result: Result) -> Any:
     Parameters
     ----------
     result : mapping
-        Of :func:`wearstate.diagnose.evaluation.splits.evaluate_splits`, with one split made at
+        Of :func:`wearstate.diagnose.evaluation.protocol.evaluate_splits`, with one split made at
         least.
 
     Returns
@@ -260,7 +260,7 @@ def evaluation_html(result: Result, *, notice: str = "") -> str:
     Parameters
     ----------
     result : mapping
-        Of :func:`wearstate.diagnose.evaluation.splits.evaluate_splits`.
+        Of :func:`wearstate.diagnose.evaluation.protocol.evaluate_splits`.
     notice : str
         Of the model, where it was trained on simulation.
 
@@ -291,7 +291,7 @@ def save_evaluation(result: Result, path: Path, *, notice: str = "", force: bool
     Parameters
     ----------
     result : mapping
-        Of :func:`wearstate.diagnose.evaluation.splits.evaluate_splits`.
+        Of :func:`wearstate.diagnose.evaluation.protocol.evaluate_splits`.
     path : Path
         ``.html``, ``.png``, ``.svg``, ``.pdf`` or ``.json``.
     notice : str

@@ -178,7 +178,7 @@ def splits_text(result: Mapping[str, Any]) -> str:
     Parameters
     ----------
     result : mapping
-        Of :func:`wearstate.diagnose.evaluation.splits.evaluate_splits`.
+        Of :func:`wearstate.diagnose.evaluation.protocol.evaluate_splits`.
     """
     origin = "simulated" if result["origin"] == "simulated" else "measured"
     head = (

@@ -10,8 +10,9 @@ from typing import Any
 
 import pandas as pd
 
+from ...datasets.file.attributes import manifest_hash
 from ...datasets.file.columns import Column, describe_columns
-from ...datasets.file.record import DataSet, manifest_hash
+from ...datasets.file.record import DataSet
 from ...datasets.generation.fidelity_choice import FidelityChoice
 from ...sim.output.recording import DataError
 from ...sim.scene.load import scene_table

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from ...sim.alignment.alignment import AlignmentLine, Seat, influence, reactions, seat_stations
+from ...sim.alignment.alignment import AlignmentLine, influence, reactions
+from ...sim.alignment.seats import Seat, seat_stations
 from ...sim.beam.beam import Disc, Section, assemble_beam
 from ...sim.beam.rotor import Rotor, RotorModes, Support, modes
 

@@ -12,7 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from ...datasets.draws.draws import has_value
-from ...datasets.file.record import Attributes, DataSet
+from ...datasets.file.attributes import Attributes
+from ...datasets.file.record import DataSet
 from ...datasets.recipe.load import recorded_scene
 from ...datasets.recipe.recipe import condition_of
 from ...sim.output.recording import DataError

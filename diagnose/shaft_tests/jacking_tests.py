@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from ...sim.alignment.alignment import AlignmentError, influence
+from ...sim.alignment.alignment import influence
 from ...sim.alignment.jacking import Jacking, jacking
 from ...sim.alignment.jacking_curve import CurveError, CurveFit, fit_curve
+from ...sim.alignment.seats import AlignmentError
 from ...sim.output.recording import DataError
 from ...sim.scene.shaft import ShaftScene
 from ...sim.shaft.recording import alignment_conditions, alignment_line

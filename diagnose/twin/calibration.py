@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...datasets.draws.motor import motor_speed
-from ...datasets.file.record import DataSet, refuse_output
+from ...datasets.file.record import DataSet
+from ...datasets.file.writer import refuse_output
 from ...datasets.measured.recording import read_recording
 from ...datasets.recipe.load import load_recipe
 from ...datasets.recipe.recipe import Recipe

@@ -11,7 +11,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from ...datasets.file.record import Attributes, DataSet
+from ...datasets.file.attributes import Attributes
+from ...datasets.file.record import DataSet
 from ...datasets.recipe.text import name_in
 from ...datasets.split.rules import group_folds
 from ...sim.output.recording import DataError

@@ -12,8 +12,9 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from ... import __version__
+from ...datasets.file.attributes import Attributes
 from ...datasets.file.machines import machine_origin
-from ...datasets.file.record import Attributes, DataSet
+from ...datasets.file.record import DataSet
 from ...datasets.file.views import MARK, JoinedSet, layout_card
 from ...datasets.recipe.load import recorded_scene
 from ...datasets.recipe.severities import wear_limits
@@ -44,9 +45,7 @@ from ..feature_rows.noted import NOTED, notes_of
 from ..feature_rows.physical import physical_rows
 from ..feature_rows.transfer_reference import healthy_transfer
 from ..learning.grades import grades_of
-from ..learning.regressions import (
-    BUDGET_MS,
-)
+from ..learning.regressions import BUDGET_MS
 from .bundle import checked
 from .estimate import WearModel
 from .learn import Learnt, learn, refuse_no_wear

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ...datasets.file.record import refuse_output
 from ...datasets.file.views import views_of
+from ...datasets.file.writer import refuse_output
 from ...sim.output.recording import html_table
 from ..evaluation.evaluate import evaluate_model
 from ..evaluation.figure import save_evaluation
-from ..evaluation.splits import one_split
+from ..evaluation.protocol import one_split
 from ..evaluation.text import score_lines
 from ..feature_rows.feature_table import Progress
 from ..wear_model.estimate import WearModel

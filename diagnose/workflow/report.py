@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...datasets.file.record import refuse_output
+from ...datasets.file.writer import refuse_output
 from ...datasets.measured.recording import read_recording
 from ...sim.output.recording import Recording, Table
 from ..feature_rows.healthy import Baseline, Baselines

@@ -15,7 +15,7 @@ Marine Structures 18(1), 62-84, doi:10.1016/j.marstruc.2005.05.002.
 """
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -26,99 +26,14 @@ from scipy.linalg import cho_solve_banded, cholesky_banded
 
 from ..beam.beam import Beam, PointLoad
 from ..brief import brief
+from .contact import NO_GAP, HeldLine, Rest, come_to_rest, following, rest_on
+from .seats import AlignmentError, Seat, line_faults
 
 Vector = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 _BAND = 3  # half bandwidth of one plane: two coordinates a node, neighbours only
-NO_LOAD = 1e-9  # of the whole load: below this a reaction is rounding
-_NO_GAP = 1e-12  # m
 MET = 1e-6  # of a limit: no gauge sees it
-_MOST_POINTS = 100  # of one seat
-FEWEST_POINTS = 2  # points that a shaft can rest on
-
-
-class AlignmentError(ValueError):
-    """A line of bearings that cannot be, or a question that has no answer on it."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Seat:
-    """A bearing as the alignment sees it.
-
-    Attributes
-    ----------
-    name : str
-    station : float
-        Of the middle of the bearing [m].
-    offset : float
-        Height of the bottom of the bore there [m].
-    slope : float
-        Of the bore, against the line of reference [rad]: slope boring.
-    stiffness : float
-        Of the whole bearing with its foundation [N/m], > 0; infinite where it does not yield.
-    length, diameter : float
-        Of the bearing [m], both > 0 for a mean pressure; the length also for several points.
-    points : int
-        Support points, each in the middle of its share of the length, with its share of the
-        stiffness.
-    least_load, most_load : float
-        Limits of the reaction [N].
-    most_pressure : float
-        Limit of the mean pressure on the projected area [Pa].
-    most_slope : float
-        Limit of the slope of the shaft against the bore, either way [rad].
-    least_move, most_move : float
-        How far the bearing may be lowered (<= 0) and raised (>= 0) [m].
-    least_turn, most_turn : float
-        How far the bore may be turned (<= 0, >= 0) [rad].
-    """
-
-    name: str
-    station: float
-    offset: float = 0.0
-    slope: float = 0.0
-    stiffness: float = math.inf
-    length: float = 0.0
-    diameter: float = 0.0
-    points: int = 1
-    least_load: float = 0.0
-    most_load: float = math.inf
-    most_pressure: float = math.inf
-    most_slope: float = math.inf
-    least_move: float = 0.0
-    most_move: float = 0.0
-    least_turn: float = 0.0
-    most_turn: float = 0.0
-
-    @property
-    def area(self) -> float:
-        """Projected [m^2]; zero where the bearing's size is not given."""
-        return self.length * self.diameter
-
-    @property
-    def highest_load(self) -> float:
-        """What the limits of load and of mean pressure leave [N]."""
-        if not math.isfinite(self.most_pressure):
-            return self.most_load
-        return min(self.most_load, self.most_pressure * self.area)
-
-    @property
-    def point_stations(self) -> tuple[float, ...]:
-        """Of the support points, from aft [m]."""
-        share = self.length / self.points
-        return tuple(self.station + (k - (self.points - 1) / 2) * share for k in range(self.points))
-
-
-def seat_stations(seats: Iterable[Seat]) -> tuple[float, ...]:
-    """Where the beam must have nodes: the middle and the support points of every seat.
-
-    Examples
-    --------
-    >>> seat_stations([Seat(name="stern tube", station=2.0, length=1.0, points=2)])
-    (2.0, 1.75, 2.25)
-    """
-    return tuple(dict.fromkeys(at for seat in seats for at in (seat.station, *seat.point_stations)))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -182,7 +97,7 @@ class AlignmentLine:
     __repr__ = brief("names")
 
     def __post_init__(self) -> None:
-        faults = list(_line_faults(self.beam, self.seats))
+        faults = list(line_faults(self.beam, self.seats))
         if faults:
             raise AlignmentError("\n".join(faults))
 
@@ -237,41 +152,6 @@ class AlignmentLine:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class HeldLine:
-    """The beam with all its support points held: reactions and deflection over their heights.
-
-    Attributes
-    ----------
-    stations : numpy.ndarray [shape=(p,)]
-        Of the support points [m].
-    owner : numpy.ndarray [shape=(p,)]
-        Seat of each point.
-    stiffness : numpy.ndarray [shape=(p,)]
-        Of each point's seat share [N/m], infinite where rigid.
-    influence : numpy.ndarray [shape=(p, p)]
-        Change of reaction by height, all others held [N/m].
-    lines : numpy.ndarray [shape=(2 n, p)]
-        Deflection and slope of every node by height.
-    """
-
-    stations: Vector
-    owner: Index
-    stiffness: Vector
-    influence: Vector
-    lines: Vector
-    _factor: Vector
-    _coupling: Vector  # free coordinates by held ones
-    _held: Index
-    _free: Index
-
-    def carry(self, load: Vector) -> tuple[Vector, Vector]:
-        """Reactions (p,) and deflection (2 n,) under a load (2 n,) with all heights zero."""
-        line = np.zeros(load.size)
-        line[self._free] = cho_solve_banded((self._factor, False), load[self._free])
-        return self._coupling.T @ line[self._free] - load[self._held], line
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
 class LineState:
     """A line at rest.
 
@@ -315,7 +195,7 @@ class LineState:
     @property
     def contact(self) -> NDArray[np.bool_]:
         """Points that the shaft lies on [shape=(p,)]."""
-        return self.gaps <= _NO_GAP
+        return self.gaps <= NO_GAP
 
     @property
     def pressures(self) -> Vector:
@@ -402,7 +282,7 @@ def reactions(
     if unilateral:
         rest = come_to_rest(held, dead, heights)
     else:
-        rest = _on(held, dead, heights, np.ones(dead.size, dtype=bool))
+        rest = rest_on(held, dead, heights, np.ones(dead.size, dtype=bool))
     return _state(line, condition, heights, rest, sag)
 
 
@@ -667,115 +547,6 @@ def point_heights(line: AlignmentLine, condition: Condition) -> Vector:
     return heights
 
 
-# --- contact
-
-
-def following(held: HeldLine, contact: NDArray[np.bool_]) -> tuple[Vector, Vector]:
-    """T and G of the shaft's heights at the points, ``y = T h - G dead``.
-
-    A rigid point in contact stands at its height; the others balance their springs, those off
-    contact nothing: ``(A + k) y = k h - dead``.
-    """
-    spring = np.where(contact, held.stiffness, 0.0)
-    rigid = np.isinf(spring)
-    loose = ~rigid
-    follow = np.diag(rigid.astype(float))
-    give = np.zeros_like(follow)
-    if loose.any():
-        k = np.diag(spring[loose])
-        inner = held.influence[np.ix_(loose, loose)] + k
-        known = np.hstack([k, -held.influence[np.ix_(loose, rigid)], np.eye(k.shape[0])])
-        solved = np.linalg.solve(inner, known)
-        n, m = int(loose.sum()), int(rigid.sum())
-        follow[np.ix_(loose, loose)] = solved[:, :n]
-        follow[np.ix_(loose, rigid)] = solved[:, n : n + m]
-        give[np.ix_(loose, loose)] = solved[:, n + m :]
-    return follow, give
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Rest:
-    """Reactions and the shaft's height at the points, and which of them are in contact."""
-
-    force: Vector
-    height: Vector
-    contact: NDArray[np.bool_]
-
-
-def _on(held: HeldLine, dead: Vector, heights: Vector, contact: NDArray[np.bool_]) -> Rest:
-    follow, give = following(held, contact)
-    y = follow @ heights - give @ dead
-    force = dead + held.influence @ y
-    force[~contact] = 0.0
-    return Rest(force=force, height=y, contact=contact)
-
-
-def come_to_rest(held: HeldLine, dead: Vector, heights: Vector) -> Rest:
-    """Rest on points that only push: a primal active set on the reactions.
-
-    It starts from the two outermost points, which carry every load they can carry, and then takes
-    in the point that the shaft sinks into most, letting go those that would pull on the way. The
-    complementary energy falls in each round, so that no set of points comes twice.
-    """
-    least = -NO_LOAD * float(np.abs(dead).sum())
-    rest = _on(held, dead, heights, np.ones(dead.size, dtype=bool))
-    if rest.force.min() >= least:
-        return rest
-    force = _two_point_start(held, dead)
-    contact = force > 0
-    contact[[0, -1]] = True
-    for _ in range(10 * dead.size):
-        rest, contact, force = _let_go(held, dead, heights, contact, force, least)
-        gap = np.where(contact, 0.0, rest.height - heights)
-        if gap.min() >= -_NO_GAP:
-            return rest
-        contact = contact.copy()
-        contact[int(np.argmin(gap))] = True
-    raise AlignmentError(
-        "which bearings lift could not be settled; two support points may stand too close: give "
-        "them a finite stiffness, or fewer points"
-    )
-
-
-def _two_point_start(held: HeldLine, dead: Vector) -> Vector:
-    """Reactions of the first and the last point alone."""
-    s = held.stations
-    load, moment = float(dead.sum()), float(dead @ s)
-    if not load > 0 or not s[0] * load <= moment <= s[-1] * load:
-        where = f"at {moment / load:.4g} m" if load > 0 else "upward"
-        raise AlignmentError(
-            f"resultant of the loads = {load / 1e3:.4g} kN {where} must act downward between the "
-            f"first support at {s[0]:.4g} m and the last at {s[-1]:.4g} m, or the shaft tips; add "
-            "a support or mend the loads"
-        )
-    force = np.zeros(s.size)
-    force[-1] = (moment - load * s[0]) / (s[-1] - s[0])
-    force[0] = load - force[-1]
-    return force
-
-
-def _let_go(
-    held: HeldLine,
-    dead: Vector,
-    heights: Vector,
-    contact: NDArray[np.bool_],
-    force: Vector,
-    least: float,
-) -> tuple[Rest, NDArray[np.bool_], Vector]:
-    """Rest on the points in contact less those that come to pull on the way from `force`."""
-    while True:
-        rest = _on(held, dead, heights, contact)
-        pulls = contact & (rest.force < least)
-        if not pulls.any() or contact.sum() == FEWEST_POINTS:
-            return rest, contact, np.maximum(rest.force, 0.0)
-        way = force[pulls] / (force[pulls] - rest.force[pulls])
-        force = force + way.min() * (rest.force - force)
-        first = np.flatnonzero(pulls)[int(np.argmin(way))]
-        contact = contact.copy()
-        contact[first] = False
-        force[~contact] = 0.0
-
-
 def _state(
     line: AlignmentLine, condition: Condition, heights: Vector, rest: Rest, sag: Vector
 ) -> LineState:
@@ -796,9 +567,6 @@ def _state(
     )
 
 
-# --- checks
-
-
 def per_seat(line: AlignmentLine, values: Any, name: str) -> Vector:
     """One number for each seat, from a mapping, a sequence, or nothing."""
     n = len(line.seats)
@@ -815,75 +583,3 @@ def per_seat(line: AlignmentLine, values: Any, name: str) -> Vector:
             f"them for {', '.join(line.names)}"
         )
     return array
-
-
-def _line_faults(beam: Beam, seats: Sequence[Seat]) -> Iterator[str]:
-    names = [seat.name for seat in seats]
-    for name in dict.fromkeys(name for name in names if names.count(name) > 1):
-        yield f"bearing '{name}' is given {names.count(name)} times, must be once; rename one"
-    found = [fault for seat in seats for fault in _seat_faults(beam, seat)]
-    yield from found
-    if found:
-        return
-    at = [station for seat in seats for station in seat.point_stations]
-    if len(at) < FEWEST_POINTS:
-        least = FEWEST_POINTS
-        yield f"support points = {len(at)} must be >= {least}, or the shaft tips; add a bearing"
-    elif not np.all(np.diff(at) > 0):
-        yield (
-            f"support points at {', '.join(f'{s:.4g}' for s in at)} m must rise from aft forward "
-            "without a tie; order the bearings, and let none reach into another"
-        )
-
-
-def _seat_faults(beam: Beam, seat: Seat) -> Iterator[str]:
-    place = f"bearing '{seat.name}'"
-    for key in ("station", "offset", "slope"):
-        value = getattr(seat, key)
-        if not math.isfinite(value):
-            yield f"{place}: {key} = {value} must be finite; give a number"
-    yield from (f"{place}: {fault}" for fault in _range_faults(seat))
-    if not 1 <= seat.points <= _MOST_POINTS:
-        yield f"{place}: points = {seat.points} must be from 1 to {_MOST_POINTS}; about 10 will do"
-    elif seat.points > 1 and not seat.length > 0:
-        yield f"{place}: length = {seat.length:g} m must be > 0 with several points; give it"
-    else:
-        yield from (f"{place}: {fault}" for fault in _node_faults(beam, seat))
-
-
-def _range_faults(seat: Seat) -> Iterator[str]:
-    if not seat.stiffness > 0:
-        yield f"stiffness = {seat.stiffness:g} N/m must be > 0; leave it out for a rigid one"
-    for key in ("length", "diameter"):
-        value = getattr(seat, key)
-        if not 0 <= value < math.inf:
-            yield f"{key} = {value:g} m must be >= 0 and finite"
-    if not 0 <= seat.least_load < math.inf:
-        yield f"least_load = {seat.least_load:g} N must be >= 0; a bearing cannot pull"
-    if not seat.most_pressure > 0:
-        yield f"most_pressure = {seat.most_pressure:g} Pa must be > 0; leave it out for none"
-    elif math.isfinite(seat.most_pressure) and not seat.area > 0:
-        yield "most_pressure needs length and diameter; give both"
-    elif not seat.highest_load >= seat.least_load:
-        yield (
-            f"most_load with most_pressure = {seat.highest_load:g} N must be >= least_load = "
-            f"{seat.least_load:g} N; mend one of the limits"
-        )
-    if not seat.most_slope > 0:
-        yield f"most_slope = {seat.most_slope:g} rad must be > 0; leave it out for none"
-    for low, high in (("least_move", "most_move"), ("least_turn", "most_turn")):
-        if not getattr(seat, low) <= 0 <= getattr(seat, high) or not math.isfinite(
-            getattr(seat, high) - getattr(seat, low)
-        ):
-            yield (
-                f"{low} = {getattr(seat, low):g} and {high} = {getattr(seat, high):g} must be "
-                "<= 0 and >= 0 and finite; zero where the bearing stays"
-            )
-
-
-def _node_faults(beam: Beam, seat: Seat) -> Iterator[str]:
-    for station in seat_stations([seat]):
-        try:
-            beam.node(station)
-        except ValueError as error:
-            yield str(error)

@@ -13,18 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..brief import brief
-from .alignment import (
-    AS_SET,
-    AlignmentError,
-    AlignmentLine,
-    Check,
-    Condition,
-    LineState,
-    check,
-    reactions,
-)
+from .alignment import AS_SET, AlignmentLine, Check, Condition, LineState, check, reactions
 from .calibration_blocks import blocks_of, with_seats
 from .move_programme import STILL_MOVE, Block, MoveSolution, even_moves, least_moves, nearest_moves
+from .seats import AlignmentError
 
 Vector = NDArray[np.float64]
 
@@ -202,7 +194,7 @@ def calibrate(
 
     Examples
     --------
-    >>> from wearstate.sim.alignment.alignment import Seat
+    >>> from wearstate.sim.alignment.seats import Seat
     >>> from wearstate.sim.beam.beam import Section, assemble_beam
     >>> bar = Section(length=2.0, outer_diameter=0.1, young=2e11, shear_modulus=8e10, density=7800)
     >>> beam = assemble_beam([bar], stations=[1.0], theory="euler-bernoulli")

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .alignment import AlignmentLine, LineState, Seat, check, reactions
+from .alignment import AlignmentLine, LineState, check, reactions
 from .move_programme import (
     FEASIBLE,
     MILLIMETRES,
@@ -18,6 +18,7 @@ from .move_programme import (
     solution_of,
     widened,
 )
+from .seats import Seat
 
 
 def with_seats(line: AlignmentLine, seats: tuple[Seat, ...]) -> AlignmentLine:

@@ -11,21 +11,16 @@ from ..beam.beam import Beam, DistributedLoad, PointLoad, assemble_beam
 from ..brief import brief
 from .alignment import (
     AS_SET,
-    FEWEST_POINTS,
-    NO_LOAD,
-    AlignmentError,
     AlignmentLine,
     Condition,
     LineState,
-    Rest,
-    Seat,
-    come_to_rest,
-    following,
     per_seat,
     point_heights,
     reactions,
     vertical_load,
 )
+from .contact import NO_LOAD, Rest, come_to_rest, following
+from .seats import FEWEST_POINTS, AlignmentError, Seat
 
 Vector = NDArray[np.float64]
 _BESIDE = 1e-9  # m

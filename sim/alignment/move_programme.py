@@ -14,12 +14,12 @@ from .alignment import (
     MET,
     AlignmentLine,
     LineState,
-    following,
     gather_points,
     lever_arms,
     point_heights,
     vertical_load,
 )
+from .contact import following
 
 Vector = NDArray[np.float64]
 

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..alignment.alignment import AlignmentError, LineState, check, reactions
+from ..alignment.alignment import LineState, check, reactions
+from ..alignment.seats import AlignmentError
 from ..beam.rotor import Rotor, Support, modes, natural_frequencies
 from ..scene.shaft import ShaftScene
 from ..scene.shaft_parts import ShaftBearing

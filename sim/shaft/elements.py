@@ -4,7 +4,7 @@ import math
 from itertools import accumulate, pairwise
 from typing import cast
 
-from ..alignment.alignment import Seat, seat_stations
+from ..alignment.seats import Seat, seat_stations
 from ..scene.scene import Scene
 from ..scene.shaft import ShaftScene
 

@@ -13,7 +13,8 @@ from typing import NamedTuple, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from ..alignment.alignment import AlignmentLine, Condition, Seat, seat_stations
+from ..alignment.alignment import AlignmentLine, Condition
+from ..alignment.seats import Seat, seat_stations
 from ..beam.beam import Beam, Disc, PointLoad, Section, assemble_beam
 from ..beam.rotor import Rotor, Support
 from ..brief import brief

@@ -18,13 +18,8 @@ from typing import Any
 from wearstate.datasets.generation.generate import generate
 from wearstate.diagnose.evaluation.evaluate import evaluate_model
 from wearstate.diagnose.evaluation.figure import save_evaluation
-from wearstate.diagnose.evaluation.splits import (
-    ALL_SPLITS,
-    OWN,
-    case_of,
-    evaluate_splits,
-    one_split,
-)
+from wearstate.diagnose.evaluation.protocol import OWN, evaluate_splits, one_split
+from wearstate.diagnose.evaluation.splits import ALL_SPLITS, case_of
 from wearstate.diagnose.evaluation.text import best_baseline, splits_text
 from wearstate.diagnose.learning.scores import ScoreFigure
 from wearstate.diagnose.wear_model.train import train_model

@@ -17,7 +17,7 @@ All is simulated.
 
 import numpy as np
 from scipy import fft
-from wearstate.datasets.file.record import Channel
+from wearstate.sim.output.sensor import Channel
 
 FREQUENCY = np.array([142.0, 388.0, 815.0, 1370.0, 2240.0, 3450.0, 5180.0, 7620.0])
 DAMPING_RATIO = np.array([0.04, 0.025, 0.02, 0.02, 0.018, 0.016, 0.015, 0.015])

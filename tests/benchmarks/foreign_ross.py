@@ -29,7 +29,7 @@ from math import exp, log, pi
 import numpy as np
 from foreign_casing import tacho
 from foreign_records import Job, Program
-from wearstate.datasets.file.record import Channel
+from wearstate.sim.output.sensor import Channel
 
 SPEED, DIAMETER, LENGTH = 50.0, 0.1, 0.06  # [Hz], [m], [m]
 VISCOSITY, SUPPLY = 0.03, 47.0  # [Pa s], [C]

@@ -75,7 +75,7 @@ from foreign_records import Job, Program
 from foreign_ross_line import NoBalanceError, Rest, balance, beam, coupling_spring, pedestals
 from scipy import fft
 from scipy.linalg import solve_banded
-from wearstate.datasets.file.record import Channel
+from wearstate.sim.output.sensor import Channel
 
 DIFFERENCES = (
     *("grooves", "scar", "thermal", "bores", "coupling"),

@@ -23,7 +23,8 @@ from itertools import chain, islice
 from pathlib import Path
 from typing import Any
 
-from wearstate.datasets.file.record import DataSet, DataSetWriter
+from wearstate.datasets.file.record import DataSet
+from wearstate.datasets.file.writer import DataSetWriter
 from wearstate.datasets.generation import generate as generation
 from wearstate.datasets.generation.work import together
 from wearstate.datasets.recipe.load import load_recipe
