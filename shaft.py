@@ -23,20 +23,9 @@ from .sim.beam.beam import (
     assemble_beam,
     cowper_coefficient,
 )
-from .sim.beam.rotor import (
-    Campbell,
-    CriticalSpeeds,
-    Rotor,
-    RotorModes,
-    Support,
-    Unbalance,
-    campbell,
-    critical_speeds,
-    modes,
-    natural_frequencies,
-    orbit_axes,
-    unbalance_response,
-)
+from .sim.beam.campbell import Campbell, CriticalSpeeds, campbell, critical_speeds
+from .sim.beam.modes import RotorModes, modes, natural_frequencies
+from .sim.beam.rotor import Rotor, Support, Unbalance, orbit_axes, unbalance_response
 from .sim.shaft.on_oil_films import BeamFilm, FilmBearing, beam_film, supports
 from .sim.shaft.recording import ShaftState, shaft_beam, shaft_state
 from .sim.shaft.response import accelerance, receptance

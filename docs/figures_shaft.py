@@ -23,7 +23,8 @@ from wearstate.diagnose.shaft_tests.rig_setup import ShakerTest
 from wearstate.diagnose.shaft_tests.sag_model import Prior
 from wearstate.sim.alignment.alignment import AlignmentLine, influence, reactions
 from wearstate.sim.alignment.calibration import Calibration, calibrate
-from wearstate.sim.beam.rotor import Rotor, campbell
+from wearstate.sim.beam.campbell import campbell
+from wearstate.sim.beam.rotor import Rotor
 from wearstate.sim.machine.simulate import simulate
 from wearstate.sim.scene.load import load_scene
 from wearstate.sim.scene.shaft import ShaftScene

@@ -15,7 +15,8 @@ from wearstate.diagnose.shaft_tests import rig_test as rig
 from wearstate.features.response.frf import Frf
 from wearstate.sim.alignment.calibration import calibrate
 from wearstate.sim.beam.beam import Disc, Section, assemble_beam
-from wearstate.sim.beam.rotor import Rotor, Support, natural_frequencies
+from wearstate.sim.beam.modes import natural_frequencies
+from wearstate.sim.beam.rotor import Rotor, Support
 from wearstate.sim.scene.load import load_scene
 from wearstate.sim.shaft.recording import alignment_conditions, alignment_line
 from wearstate.sim.shaft.response import Broadband, Harmonic

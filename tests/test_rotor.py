@@ -10,7 +10,9 @@ from numpy.testing import assert_allclose
 from scipy import linalg
 from wearstate.sim.beam import rotor as rt
 from wearstate.sim.beam.beam import Disc, Section, assemble_beam
-from wearstate.sim.beam.rotor import Rotor, Support, Unbalance, campbell, critical_speeds, modes
+from wearstate.sim.beam.campbell import campbell, critical_speeds
+from wearstate.sim.beam.modes import modes
+from wearstate.sim.beam.rotor import Rotor, Support, Unbalance
 
 PI = math.pi
 STEEL = {"young": 211e9, "shear_modulus": 81.2e9, "density": 7810.0}

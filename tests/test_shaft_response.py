@@ -9,7 +9,8 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy import sparse
 from wearstate.sim.beam.beam import Disc, Section, assemble_beam
-from wearstate.sim.beam.rotor import Rotor, Support, Unbalance, modes, unbalance_response
+from wearstate.sim.beam.modes import modes
+from wearstate.sim.beam.rotor import Rotor, Support, Unbalance, unbalance_response
 from wearstate.sim.shaft import response as sr
 
 STEEL = {"young": 2.06e11, "shear_modulus": 7.92e10, "density": 7850.0}

@@ -34,6 +34,7 @@ from .foreign_features import Transform, foreign_rows, recordings_of, transforme
 
 Float = NDArray[np.float64]
 Index = NDArray[np.intp]
+
 Fit = Callable[[Index], WearModel]
 """Training rows -> a model that has seen no other row."""
 

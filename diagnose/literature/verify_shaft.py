@@ -12,7 +12,8 @@ from scipy import linalg
 from ...sim.alignment.alignment import AlignmentLine, influence, reactions
 from ...sim.alignment.seats import Seat, seat_stations
 from ...sim.beam.beam import Disc, Section, assemble_beam
-from ...sim.beam.rotor import Rotor, RotorModes, Support, modes
+from ...sim.beam.modes import RotorModes, modes
+from ...sim.beam.rotor import Rotor, Support
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from ..alignment.alignment import LineState, check, reactions
 from ..alignment.seats import AlignmentError
-from ..beam.rotor import Rotor, Support, modes, natural_frequencies
+from ..beam.modes import modes, natural_frequencies
+from ..beam.rotor import Rotor, Support
 from ..scene.shaft import ShaftScene
 from ..scene.shaft_parts import ShaftBearing
 from ..shaft.elements import element_lengths, half_wave
