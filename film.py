@@ -12,28 +12,22 @@ Examples
 (0.61, 250)
 """
 
-from .sim.film.bearing import (
+from .sim.bearing.coefficients import Flow, coefficients, flow, friction
+from .sim.bearing.equilibrium import (
     BearingError,
     Equilibrium,
-    Flow,
-    JournalBearing,
-    OperatingPoint,
-    Threshold,
-    Whirl,
     at_eccentricity,
-    coefficients,
     equilibrium,
-    flow,
-    friction,
-    operate,
+    sommerfeld_number,
+)
+from .sim.bearing.operate import JournalBearing, OperatingPoint, operate
+from .sim.bearing.short_bearing import (
     short_attitude,
     short_coefficients,
     short_eccentricity,
     short_load,
-    sommerfeld_number,
-    stability,
-    whirl,
 )
+from .sim.bearing.whirl import Threshold, Whirl, stability, whirl
 from .sim.film.impedance_map import ImpedanceMap, impedance_map
 from .sim.film.mass_conserving import mass_conserving
 from .sim.film.rungs import FILM_RUNGS

@@ -32,7 +32,7 @@ from wearstate.diagnose.report import film as film_report
 from wearstate.diagnose.report.beside import disagree
 from wearstate.diagnose.report.film import film_estimate, film_table, with_film
 from wearstate.diagnose.wear_model.estimate import Estimate
-from wearstate.sim.film.rest_curve import rest_curve
+from wearstate.sim.bearing.rest_curve import rest_curve
 from wearstate.sim.film.solve import FilmGeometry
 from wearstate.sim.machine.simulate import simulate
 from wearstate.sim.output.recording import DataError

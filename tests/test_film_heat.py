@@ -6,8 +6,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from scipy.integrate import quad
-from wearstate.sim.film.bearing import short_load
-from wearstate.sim.film.heat import film_temperature, friction_power
+from wearstate.sim.bearing.heat import film_temperature, friction_power
+from wearstate.sim.bearing.short_bearing import short_load
 from wearstate.sim.machine.simulate import simulate
 from wearstate.sim.pump_setup.films import film_temperature_of
 from wearstate.sim.scene.load import load_scene

@@ -11,11 +11,13 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 from scipy.sparse import csr_matrix
 from scipy.sparse.linalg import spsolve
-from wearstate.sim.film.bearing import coefficients, equilibrium, whirl
+from wearstate.sim.bearing.coefficients import coefficients
+from wearstate.sim.bearing.equilibrium import equilibrium
+from wearstate.sim.bearing.rest_curve import rest_curve
+from wearstate.sim.bearing.whirl import whirl
 from wearstate.sim.film.direct import direct_force
 from wearstate.sim.film.impedance_map import impedance_map
 from wearstate.sim.film.mass_conserving import mass_conserving
-from wearstate.sim.film.rest_curve import rest_curve
 from wearstate.sim.film.solve import (
     FilmGeometry,
     FilmState,

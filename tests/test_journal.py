@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from wearstate.datasets.recipe.severities import clearances
-from wearstate.sim.film.bearing import equilibrium
+from wearstate.sim.bearing.equilibrium import equilibrium
 from wearstate.sim.journal.recording import film_geometry, journal_scale
 from wearstate.sim.machine.simulate import check, simulate
 from wearstate.sim.output.status import SimulationError, Status

@@ -34,6 +34,7 @@ ROOMS = {
         "scene",
         "contact",
         "film",
+        "bearing",
         "excitation",
         "beam",
         "alignment",

@@ -8,10 +8,10 @@ import pytest
 from scipy.integrate import quad
 from scipy.optimize import brentq, root
 from wearstate.diagnose.literature.verify import checks
+from wearstate.sim.bearing.short_bearing import short_coefficients
 from wearstate.sim.contact.asperities import asperity_force, asperity_scale
 from wearstate.sim.contact.law import CONTACT
 from wearstate.sim.fidelity.ladder import effects_of
-from wearstate.sim.film.bearing import short_coefficients
 from wearstate.sim.film.impedance_map import impedance_map, map_force, map_resistance
 from wearstate.sim.film.short import short_force, short_resistance
 from wearstate.sim.film.solve import FilmGeometry

@@ -4,8 +4,9 @@ import math
 
 import numpy as np
 import pytest
-from wearstate.sim.film.bearing import equilibrium, short_attitude, short_eccentricity
-from wearstate.sim.film.rest_curve import rest_curve
+from wearstate.sim.bearing.equilibrium import equilibrium
+from wearstate.sim.bearing.rest_curve import rest_curve
+from wearstate.sim.bearing.short_bearing import short_attitude, short_eccentricity
 from wearstate.sim.film.solve import FilmGeometry, Groove, dufrane_scar
 
 SHORT = FilmGeometry(length_to_diameter=0.6)

@@ -12,7 +12,8 @@ from wearstate.diagnose.machines.shaft import _touching
 from wearstate.sim.beam.beam import Disc, PointLoad, Section, assemble_beam
 from wearstate.sim.beam.modes import modes
 from wearstate.sim.beam.rotor import Rotor
-from wearstate.sim.film.bearing import JournalBearing, coefficients, operate
+from wearstate.sim.bearing.coefficients import coefficients
+from wearstate.sim.bearing.operate import JournalBearing, operate
 from wearstate.sim.film.solve import FilmGeometry, Groove, dufrane_scar, worn_arc
 from wearstate.sim.scene.load import load_scene
 from wearstate.sim.shaft.on_oil_films import (

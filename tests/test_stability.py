@@ -30,14 +30,9 @@ from wearstate.diagnose.stability.orbit_maps import (
     threshold_speed,
     whirls,
 )
-from wearstate.diagnose.stability.steppers import (
-    STEPPERS,
-    bounce,
-    decays,
-    runge_kutta_limit,
-)
+from wearstate.diagnose.stability.steppers import STEPPERS, bounce, decays, runge_kutta_limit
+from wearstate.sim.bearing.equilibrium import BearingStatus, equilibrium
 from wearstate.sim.contact.closed_forms import kelvin_voigt_restitution
-from wearstate.sim.film.bearing import BearingStatus, equilibrium
 from wearstate.sim.film.solve import FilmGeometry, FilmState, FilmStatus, solve_relaxed
 from wearstate.sim.output.recording import DataError
 from wearstate.sim.pump_setup.contacts import contact_frequency, joint_mobility

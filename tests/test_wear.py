@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
-from wearstate.sim.film.bearing import JournalBearing, operate
+from wearstate.sim.bearing.operate import JournalBearing, operate
 from wearstate.sim.film.solve import dufrane_scar
 from wearstate.sim.journal.recording import film_geometry
 from wearstate.sim.pump_setup.ideal_motion import ideal_motion

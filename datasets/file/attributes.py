@@ -121,7 +121,7 @@ def texts_of(attributes: Attributes) -> dict[str, str]:
 def attributes_of(stored: Mapping[str, Any]) -> Attributes:
     """Inverse of :func:`_file_attributes`."""
     for name in ("recipe", "scene"):
-        if text_hash(stored[name]) != stored[f"{name}sha256"]:
+        if text_hash(stored[name]) != stored[f"{name}_sha256"]:
             raise DataError(f"text of the {name} does not fit its hash; take an intact copy")
     return Attributes(
         sample_rate=float(stored["sample_rate_hz"]),

@@ -1,5 +1,5 @@
 """The alignment of a shaft line: table, text, pictures, page, moves, films, margins, quiet running.
 
-It may import ``sim.scene``, ``sim.film``, ``sim.alignment``, ``sim.shaft``, ``diagnose.pages``,
+It may import ``sim.scene``, ``sim.bearing``, ``sim.alignment``, ``sim.shaft``, ``diagnose.pages``,
 ``diagnose.shaft_tests``, ``sim.brief``.
 """

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...sim.film.bearing import JournalBearing
+from ...sim.bearing.operate import JournalBearing
 from ...sim.scene.shaft import ShaftScene
 from ...sim.shaft.changed import free_line, line_model, rest, transfer
 from ...sim.shaft.on_oil_films import BeamFilm, ShaftFilmError

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 if TYPE_CHECKING:
-    from ...sim.film.rest_curve import RestCurve
+    from ...sim.bearing.rest_curve import RestCurve
 
 Float = NDArray[np.float64]
 
@@ -190,7 +190,7 @@ def film_clearance(
     Examples
     --------
     >>> from wearstate.sim.film.solve import FilmGeometry
-    >>> from wearstate.sim.film.rest_curve import rest_curve
+    >>> from wearstate.sim.bearing.rest_curve import rest_curve
     >>> curve = rest_curve(FilmGeometry(length_to_diameter=0.6), "short")
     >>> film_force, load, clearance = 7e-5, 6e3, 90e-6
     >>> place = clearance * curve.position([load * clearance**2 / film_force, 0.0])

@@ -1,6 +1,6 @@
 """Checks of the physics against literature, beside the expected values.
 
-It may import ``sim.jit``, ``sim.scene``, ``sim.contact``, ``sim.film``, ``sim.beam``,
-``sim.alignment``, ``sim.hydraulics``, ``sim.piping``, ``sim.mechanism``, ``sim.pump_setup``,
-``sim.pump``.
+It may import ``sim.jit``, ``sim.scene``, ``sim.contact``, ``sim.film``, ``sim.bearing``,
+``sim.beam``, ``sim.alignment``, ``sim.hydraulics``, ``sim.piping``, ``sim.mechanism``,
+``sim.pump_setup``, ``sim.pump``.
 """

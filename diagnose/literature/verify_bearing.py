@@ -10,7 +10,8 @@ import math
 from collections.abc import Callable
 from functools import cache, partial
 
-from ...sim.film.bearing import equilibrium, sommerfeld_number, whirl
+from ...sim.bearing.equilibrium import equilibrium, sommerfeld_number
+from ...sim.bearing.whirl import whirl
 from ...sim.film.solve import FilmGeometry, FilmSolution, FilmState, Groove, solve_direct
 
 MISPRINTED = {

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from ...sim.film.bearing import equilibrium, flow, friction, sommerfeld_number
+from ...sim.bearing.coefficients import flow, friction
+from ...sim.bearing.equilibrium import equilibrium, sommerfeld_number
 from ...sim.film.mass_conserving import mass_conserving, oil_in_gap, oil_volume
 from ...sim.film.solve import (
     FilmGeometry,

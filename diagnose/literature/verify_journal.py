@@ -4,16 +4,10 @@ import math
 from collections.abc import Callable
 from functools import cache, partial
 
-from ...sim.film.bearing import (
-    coefficients,
-    equilibrium,
-    flow,
-    friction,
-    short_coefficients,
-    short_eccentricity,
-    sommerfeld_number,
-    stability,
-)
+from ...sim.bearing.coefficients import coefficients, flow, friction
+from ...sim.bearing.equilibrium import equilibrium, sommerfeld_number
+from ...sim.bearing.short_bearing import short_coefficients, short_eccentricity
+from ...sim.bearing.whirl import stability
 from ...sim.film.solve import FilmGeometry, Groove
 
 

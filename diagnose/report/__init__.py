@@ -1,6 +1,6 @@
 """The verdict on recordings: advice, trend, text and page.
 
-It may import ``sim.output``, ``sim.scene``, ``sim.film``, ``sim.journal``, ``features.signal``,
+It may import ``sim.output``, ``sim.scene``, ``sim.bearing``, ``sim.journal``, ``features.signal``,
 ``datasets.file``, ``datasets.readers``, ``datasets.measured``, ``diagnose.pages``,
 ``diagnose.pictures``, ``diagnose.learning``, ``diagnose.feature_rows``, ``diagnose.wear_model``,
 ``diagnose.film_clearance``, ``diagnose.nameplate``, ``diagnose.twin``.

@@ -29,7 +29,7 @@ from ..wear_model.estimate import Estimate
 from .beside import length_words, with_second
 
 if TYPE_CHECKING:
-    from ...sim.film.rest_curve import RestCurve
+    from ...sim.bearing.rest_curve import RestCurve
 
 Float = NDArray[np.float64]
 
@@ -99,7 +99,7 @@ def _possible_films(scene: JournalScene) -> tuple["RestCurve", list[PossibleFilm
     That is the other solution of Reynolds' equation, for the whole of the machine's life, or a
     scar that came with the wear.
     """
-    from ...sim.film.rest_curve import rest_curve
+    from ...sim.bearing.rest_curve import rest_curve
     from ...sim.journal.recording import (
         film_geometry,  # compiled code: a second that others need not wait
     )

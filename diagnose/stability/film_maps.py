@@ -7,7 +7,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from ...sim.film.bearing import BearingStatus, equilibrium, sommerfeld_number
+from ...sim.bearing.equilibrium import BearingStatus, equilibrium, sommerfeld_number
 from ...sim.film.over_relaxed import PAPER_RELAXATION
 from ...sim.film.rungs import FILM_RUNGS
 from ...sim.film.solve import (

@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from ...sim.film.bearing import BearingError, equilibrium, whirl
+from ...sim.bearing.equilibrium import BearingError, equilibrium
+from ...sim.bearing.whirl import whirl
 from ...sim.journal.orbit import OrbitFilm, OrbitRun, OrbitStatus, film_force, load, run_orbit
 from ...sim.journal.recording import film_geometry, journal_film, journal_scale
 from ...sim.journal.validity import JOURNAL_STEP

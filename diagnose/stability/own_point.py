@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from functools import lru_cache
 from typing import Any, NamedTuple, cast
 
-from ...sim.film.bearing import equilibrium, sommerfeld_number
+from ...sim.bearing.equilibrium import equilibrium, sommerfeld_number
 from ...sim.film.solve import FilmGeometry
 from ...sim.journal.recording import film_geometry, journal_scale
 from ...sim.journal.validity import JOURNAL_STEP

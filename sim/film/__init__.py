@@ -1,4 +1,4 @@
-"""The oil film of a bearing: its solvers, its force map, the characteristics that follow.
+"""The oil film of a bearing: its solvers, its force map, its slopes.
 
 It may import ``sim.atomic``, ``sim.jit``, ``sim.brief``.
 """

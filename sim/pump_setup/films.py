@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..bearing.heat import film_temperature, friction_power
 from ..contact.asperities import asperity_scale
-from ..film.heat import film_temperature, friction_power
 from ..film.impedance_map import ImpedanceMap, impedance_map
 from ..film.solve import FilmGeometry
 from ..mechanism.layout import FILM, JOINT_OILED, Tables

@@ -46,20 +46,14 @@ from scipy.sparse.linalg import splu
 
 from ..beam.beam import Beam
 from ..beam.rotor import Support
+from ..bearing.operate import JournalBearing
+from ..bearing.short_bearing import short_attitude, short_eccentricity
 from ..brief import brief
-from ..film.bearing import JournalBearing, short_attitude, short_eccentricity
 from ..film.direct import DIRECT_OK, STATUS, DirectFilm, direct_tilted_force
 from ..film.impedance_map import ImpedanceMap, impedance_map, map_force
 from ..film.rungs import FILM_RUNGS
 from ..film.slopes import Coefficients, perturbation
-from ..film.solve import (
-    FilmGeometry,
-    FilmSolution,
-    FilmState,
-    FilmStatus,
-    direct_film,
-    worn_arc,
-)
+from ..film.solve import FilmGeometry, FilmSolution, FilmState, FilmStatus, direct_film, worn_arc
 
 Vector = NDArray[np.float64]
 

@@ -17,9 +17,9 @@ from ..alignment.alignment import AlignmentLine, Condition
 from ..alignment.seats import Seat, seat_stations
 from ..beam.beam import Beam, Disc, PointLoad, Section, assemble_beam
 from ..beam.rotor import Rotor, Support
+from ..bearing.operate import JournalBearing
 from ..brief import brief
 from ..excitation.forces import Push, read_cell
-from ..film.bearing import JournalBearing
 from ..film.solve import FilmGeometry, Groove
 from ..output.recording import Recorder, Recording
 from ..output.sensor import digitise

@@ -1,5 +1,5 @@
 """Wear: Archard's law, a joint over its life, the wear rate of a simulated machine.
 
 It may import ``sim.brief``, ``sim.output``, ``sim.parts``, ``sim.scene``, ``sim.film``,
-``sim.mechanism``, ``sim.pump``, ``sim.journal``.
+``sim.bearing``, ``sim.mechanism``, ``sim.pump``, ``sim.journal``.
 """

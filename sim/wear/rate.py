@@ -15,8 +15,8 @@ from functools import partial
 import numpy as np
 from scipy.optimize import brentq
 
+from ..bearing.equilibrium import BearingError, Equilibrium, equilibrium
 from ..brief import brief
-from ..film.bearing import BearingError, Equilibrium, equilibrium
 from ..film.solve import FilmGeometry
 from ..journal.recording import film_geometry
 from ..mechanism.crank_run import CrankRun

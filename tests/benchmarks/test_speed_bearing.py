@@ -18,7 +18,8 @@ import sys
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from wearstate.sim.film.bearing import coefficients, equilibrium
+from wearstate.sim.bearing.coefficients import coefficients
+from wearstate.sim.bearing.equilibrium import equilibrium
 from wearstate.sim.film.solve import FilmGeometry, Groove
 
 RADIUS, LENGTH, CLEARANCE, SPEED, LOAD = 0.2, 0.263144, 195e-6, 2 * math.pi * 15, 112814.91

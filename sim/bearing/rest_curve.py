@@ -1,8 +1,8 @@
 """Where a plain journal comes to rest on its film, over the load: a table of static equilibria.
 
 The load is of ``eta omega R^3 L / C^2``, lengths are over the radial clearance C, as in
-:mod:`.film.bearing`. A plain bore looks the same from all sides, so that one curve serves every
-direction of the load, and so it does for a scar that lies where the load presses; what is
+:mod:`.bearing.equilibrium`. A plain bore looks the same from all sides, so that one curve serves
+every direction of the load, and so it does for a scar that lies where the load presses; what is
 tabulated, the logit of the eccentricity ratio over the most that the bore allows and the attitude
 angle over the logarithm of the load, is nearly straight from the lightest load to the thinnest
 film.
@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicSpline
 
-from .bearing import equilibrium
-from .solve import FilmGeometry, dufrane_scar
+from ..film.solve import FilmGeometry, dufrane_scar
+from .equilibrium import equilibrium
 
 Vector = NDArray[np.float64]
 
@@ -84,7 +84,7 @@ def rest_curve(
     geometry : FilmGeometry
         With a round bore and without grooves.
     rung : str
-        Of :func:`.film.bearing.equilibrium`; "direct" for a scar.
+        Of :func:`.bearing.equilibrium.equilibrium`; "direct" for a scar.
     scar : float
         Its depth over C, in [0, 1): of :func:`.film.solve.dufrane_scar`.
     turned : float
@@ -103,7 +103,7 @@ def rest_curve(
 
     Examples
     --------
-    >>> from .bearing import equilibrium
+    >>> from .equilibrium import equilibrium
     >>> film = FilmGeometry(length_to_diameter=0.6, n_theta=36, n_z=9)
     >>> apart = rest_curve(film).position([1.7, 0.0]) - equilibrium(film, [1.7, 0.0]).position
     >>> bool(abs(apart).max() < 3e-3)

@@ -12,7 +12,7 @@ it warms, so there is one solution, between T0 and ``T0 + P(eta(T0)) / (rho c Q 
 import math
 from collections.abc import Callable
 
-from .bearing import short_eccentricity
+from .short_bearing import short_eccentricity
 
 _SETTLED = 1e-9  # of the warming
 _HALVINGS = 60
