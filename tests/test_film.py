@@ -13,7 +13,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import quad
 from scipy.optimize import nnls
 from wearstate.sim.contact.closed_forms import ocvirk_film, sommerfeld_film
-from wearstate.sim.film.direct import WARM, direct_force, direct_tilted_force
+from wearstate.sim.film.direct import direct_force, direct_tilted_force
+from wearstate.sim.film.direct_system import WARM
 from wearstate.sim.film.line import line_force
 from wearstate.sim.film.rungs import FILM_RUNGS
 from wearstate.sim.film.short import short_force

@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..brief import brief
-from ..film.direct import DIRECT_OK, STATUS, DirectFilm, direct_tilted_force
+from ..film.direct import DIRECT_OK, direct_tilted_force
+from ..film.direct_system import STATUS, DirectFilm
 from ..film.rungs import FILM_RUNGS
 from ..film.slopes import perturbation
 from ..film.solve import (

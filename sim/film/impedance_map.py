@@ -36,7 +36,8 @@ from numpy.typing import NDArray
 from ..atomic import sealed, unsealed, write_whole
 from ..brief import brief
 from ..jit import cache_folder, kernel
-from .direct import DIRECT_OK, STATUS, DirectFilm, direct_force
+from .direct import DIRECT_OK, direct_force
+from .direct_system import STATUS, DirectFilm
 from .solve import FilmGeometry, direct_film
 
 RADIAL, TANGENTIAL, PEAK = range(3)

@@ -8,18 +8,8 @@ to measure the direct solver against, and to show where the paper's method ends.
 import math
 
 from ..jit import kernel
-from .direct import (
-    DIRECT_TOUCH,
-    ITERATIONS,
-    STATUS,
-    WARM,
-    DirectFilm,
-    clip_pressure,
-    fill_equations,
-    inflow,
-    integrate_pressure,
-    residual,
-)
+from .direct import DIRECT_TOUCH, clip_pressure, fill_equations, integrate_pressure, residual
+from .direct_system import ITERATIONS, STATUS, WARM, DirectFilm, inflow
 from .line import CAVITATED, FIXED, GUEMBEL, PRESSURISED, REYNOLDS, widest_line
 
 PAPER_RELAXATION = 1.96

@@ -31,7 +31,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..jit import kernel
-from .direct import DirectFilm
+from .direct_system import DirectFilm
 from .line import CAVITATED, FIXED, GUEMBEL, PRESSURISED
 from .solve import FilmState
 

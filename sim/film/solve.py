@@ -18,18 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..brief import brief
-from .direct import (
-    DIRECT_ITERATIONS,
-    DIRECT_TOUCH,
-    ITERATIONS,
-    STATUS,
-    DirectFilm,
-    direct_tilted_force,
-    empty_direct_film,
-    residual,
-    start_from,
-)
+from .direct import DIRECT_ITERATIONS, DIRECT_TOUCH, direct_tilted_force, residual, start_from
 from .direct import direct_force as direct_force
+from .direct_system import ITERATIONS, STATUS, DirectFilm, empty_direct_film
 from .line import CONDITION_CODES, FIXED, line_force
 from .over_relaxed import (
     PAPER_RELAXATION,

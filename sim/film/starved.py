@@ -25,16 +25,13 @@ from .direct import (
     DIRECT_ITERATIONS,
     DIRECT_OK,
     DIRECT_TOUCH,
-    ITERATIONS,
-    STATUS,
-    WARM,
-    DirectFilm,
     direct_force,
     fill_equations,
     hold_lines,
     integrate_pressure,
     solve_sets,
 )
+from .direct_system import ITERATIONS, STATUS, WARM, DirectFilm
 
 FRONT, SLOPE, LINE, CUT = 0, 1, 2, 3  # places in DirectFilm.inlet
 

@@ -29,7 +29,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..contact.law import CONTACT, friction_force, normal_force
-from ..film.direct import DIRECT_OK, STATUS, DirectFilm
+from ..film.direct import DIRECT_OK
+from ..film.direct_system import STATUS, DirectFilm
 from ..film.impedance_map import ImpedanceMap, MapTable, map_force, map_peak
 from ..film.short import short_force
 from ..film.solve import FilmGeometry, direct_film

@@ -49,7 +49,8 @@ from ..beam.rotor import Support
 from ..bearing.operate import JournalBearing
 from ..bearing.short_bearing import short_attitude, short_eccentricity
 from ..brief import brief
-from ..film.direct import DIRECT_OK, STATUS, DirectFilm, direct_tilted_force
+from ..film.direct import DIRECT_OK, direct_tilted_force
+from ..film.direct_system import STATUS, DirectFilm
 from ..film.impedance_map import ImpedanceMap, impedance_map, map_force
 from ..film.rungs import FILM_RUNGS
 from ..film.slopes import Coefficients, perturbation

@@ -10,7 +10,8 @@ import time
 
 import numpy as np
 import pytest
-from wearstate.sim.film.direct import ITERATIONS, STATUS, WARM, DirectFilm, direct_force, residual
+from wearstate.sim.film.direct import direct_force, residual
+from wearstate.sim.film.direct_system import ITERATIONS, STATUS, WARM, DirectFilm
 from wearstate.sim.film.over_relaxed import PAPER_RELAXATION, relaxed_force
 from wearstate.sim.film.solve import FilmGeometry, FilmState, direct_film, mesh_error
 from wearstate.sim.jit import kernel
