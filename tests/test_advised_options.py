@@ -10,7 +10,7 @@ import click
 import pytest
 import wearstate
 from wearstate.diagnose.command_line.cli import cli
-from wearstate.diagnose.command_line.command_options import as_options
+from wearstate.diagnose.options.shared import as_options
 from wearstate.features.catalogue.analysis import Settings
 from wearstate.features.catalogue.needs import NEEDS, Layout
 
@@ -24,16 +24,10 @@ FOREIGN = {"--nthreads", "--least", "--most"}  # of `dask worker`; properties of
 NAMED = {"import": "import", "train": "train", "retrain": "train", "generate": "generate"}
 """Word before an option -> command that it tells to run."""
 OWN_RULE = {
-    "command_help.py",
-    "command_options.py",
-    "commands_chart.py",
-    "commands_data.py",
-    "commands_evaluate.py",
-    "commands_files.py",
-    "commands_machine.py",
-    "commands_report.py",
-    "commands_wear.py",
-    "source_options.py",
+    f"{path.parent.name}/{path.stem}"
+    for room in ("options", "command_line")
+    for path in ROOT.glob(f"diagnose/{room}/*.py")
+    if path.stem not in ("__init__", "cli", "chart_run")
 }
 """Files that hold many commands or declare options: see the test of usage errors."""
 SPOKEN_BY = {
@@ -43,7 +37,7 @@ SPOKEN_BY = {
     "inspect/audit_text": {"splits"},
     "inspect/rank_text": {"features"},
     "blindspots/blindspots": {"blindspots"},
-    "command_line/chart_commands": {"chart"},
+    "command_line/chart_run": {"chart"},
     "charts/sentences": {"chart"},
     "wear_model/estimate": {"evaluate", "report"},
     "evaluation/evaluate": {"evaluate"},
@@ -131,7 +125,7 @@ def messages():
 
 def readers(path, text, place):
     """Commands that must all have the option at a place of a message."""
-    if path.name in OWN_RULE:
+    if spot(path) in OWN_RULE:
         return set()
     before = text[:place]
     if said := COMMAND.findall(before):
@@ -190,8 +184,7 @@ def test_the_walk_finds_what_it_should():
 
 
 def test_a_file_whose_messages_name_bare_options_says_who_reads_them():
-    known = {f"command_line/{name.removesuffix('.py')}" for name in OWN_RULE}
-    known |= {"command_line/cli", *SPOKEN_BY}
+    known = {"command_line/cli", *OWN_RULE, *SPOKEN_BY}
     bare = {
         spot(path)
         for path, _, text in messages()
@@ -203,7 +196,7 @@ def test_a_file_whose_messages_name_bare_options_says_who_reads_them():
 
 def test_the_usage_errors_of_a_command_name_its_own_options():
     wrong = []
-    for path in ROOT.glob("diagnose/command_line/commands_*.py"):
+    for path in ROOT.glob("diagnose/command_line/*.py"):
         tree = ast.parse(path.read_text(encoding="utf-8"))
         for function in tree.body:
             if not isinstance(function, ast.FunctionDef):

@@ -122,11 +122,11 @@ def test_usage(arguments, message):
 
 
 def test_an_accuracy_in_per_cent_is_that_of_a_scene(monkeypatch):
-    from wearstate.diagnose.command_line import chart_commands
+    from wearstate.diagnose.command_line import chart_run
 
     seen = {}
     monkeypatch.setattr(
-        chart_commands, "scene_chart_command", lambda *_, **more: seen.update(more) or 1 / 0
+        chart_run, "scene_chart_command", lambda *_, **more: seen.update(more) or 1 / 0
     )
     run("bilge-pump", "--accuracy", "5%")
     assert seen["accuracy"] == 0.05

@@ -448,7 +448,7 @@ def test_a_caution_stands_beside_the_verdict_of_the_page(tmp_path, small_model):
 def test_the_bounds_of_the_options_are_those_of_the_library():
     """The command line repeats two numbers, because importing them would slow its help."""
     from wearstate.datasets.recipe import records, table
-    from wearstate.diagnose.command_line import command_options as module
+    from wearstate.diagnose.options import shared as module
 
     assert module.MOST_RECORDS == table.MOST_RECORDS
     assert module.LARGEST_SEED == records.LARGEST_SEED

@@ -10,7 +10,7 @@ from click.testing import CliRunner
 from numpy.testing import assert_allclose
 from wearstate.datasets.file.record import DataSet
 from wearstate.diagnose.command_line.cli import cli
-from wearstate.diagnose.command_line.commands_files import _FEATURE_SETS
+from wearstate.diagnose.command_line.features import _FEATURE_SETS
 from wearstate.diagnose.feature_rows.feature_table import choice_of, feature_table
 from wearstate.features.catalogue.catalogue import SETS, SetName
 from wearstate.features.signal import iso

@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.io import wavfile
 from wearstate.datasets.file.record import DataSet
 from wearstate.diagnose.command_line.cli import cli
-from wearstate.diagnose.command_line.command_options import as_options
+from wearstate.diagnose.options.shared import as_options
 from wearstate.sim.parts.units import STANDARD_GRAVITY
 
 RAMP = np.arange(400.0)

@@ -9,7 +9,7 @@ from wearstate.datasets.file.attributes import Attributes
 from wearstate.datasets.file.record import DataSet
 from wearstate.datasets.file.writer import DataSetWriter
 from wearstate.diagnose.command_line.cli import cli
-from wearstate.diagnose.command_line.commands_files import _KINDS
+from wearstate.diagnose.command_line.measured import _KINDS
 from wearstate.diagnose.inspect.info import plot_file
 from wearstate.diagnose.pictures.kinds import AUTO, KINDS
 from wearstate.diagnose.report.figures import report_pictures

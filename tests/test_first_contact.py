@@ -11,8 +11,8 @@ from click.testing import CliRunner
 from wearstate.datasets.recipe.load import load_recipe
 from wearstate.datasets.recipe.text import RecipeError, recipe_names
 from wearstate.diagnose.command_line.cli import cli
-from wearstate.diagnose.command_line.command_help import _GROUPS, EXAMPLES
-from wearstate.diagnose.command_line.command_names import built_in
+from wearstate.diagnose.options.help import _GROUPS, EXAMPLES
+from wearstate.diagnose.options.names import built_in
 from wearstate.sim.parts.units import UNITS, to_si
 from wearstate.sim.scene.load import minimal_text, scene_names
 

@@ -7,7 +7,7 @@ from wearstate.datasets.file.record import DataSet
 from wearstate.datasets.measured.data_set import import_recordings
 from wearstate.datasets.measured.plan import EachChannel
 from wearstate.datasets.readers.open import SourceOptions, open_source
-from wearstate.diagnose.command_line.source_options import BearingNumbers as _Bearing
+from wearstate.diagnose.options.source import BearingNumbers as _Bearing
 from wearstate.sim.output.recording import DataError
 
 SIGNAL = np.random.default_rng(5).standard_normal((2, 50))

@@ -93,6 +93,7 @@ ROOMS = {
         "sweep",
         "inspect",
         "workflow",
+        "options",
         "command_line",
     ],
 }
@@ -103,7 +104,7 @@ MOST_FILES = 14
 
 HEAVY = {
     "matplotlib": set(),  # inside functions only
-    "click": {"diagnose.command_line"},
+    "click": {"diagnose.options", "diagnose.command_line"},
     "rich": set(),
     "sklearn": {"diagnose", "features.catalogue"},
     "joblib": {"diagnose", "datasets"},

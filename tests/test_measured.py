@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import resample_poly
 from wearstate.datasets.measured.recording import read_recording
-from wearstate.diagnose.command_line.commands_report import report_exit
+from wearstate.diagnose.command_line.report import report_exit
 from wearstate.diagnose.wear_model.file import load_model
 from wearstate.sim.output.recording import Recording
 from wearstate.sim.output.sensor import Channel, tacho_pulses

@@ -22,7 +22,7 @@ from scipy.io import savemat, wavfile
 from wearstate.datasets.generation.generate import generate
 from wearstate.datasets.recipe.load import load_recipe
 from wearstate.diagnose.command_line.cli import cli
-from wearstate.diagnose.command_line.command_help import FIRST_CONTACT
+from wearstate.diagnose.options.help import FIRST_CONTACT
 from wearstate.sim.scene.load import minimal_text, scene_text
 
 from .conftest import made_once

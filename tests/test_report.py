@@ -18,7 +18,7 @@ from wearstate.datasets.file.record import DataSet
 from wearstate.datasets.file.writer import DataSetWriter
 from wearstate.datasets.recipe.text import toml_text
 from wearstate.diagnose.command_line.cli import cli
-from wearstate.diagnose.command_line.commands_report import report_exit
+from wearstate.diagnose.command_line.report import report_exit
 from wearstate.diagnose.feature_rows.healthy import Baseline, Baselines
 from wearstate.diagnose.feature_rows.quality import QualityFault
 from wearstate.diagnose.nameplate.nameplate import Nameplate

@@ -40,7 +40,7 @@ from wearstate.datasets.split.stored import (
     usable_sides,
 )
 from wearstate.diagnose.command_line.cli import cli
-from wearstate.diagnose.command_line.commands_data import _SPLITS
+from wearstate.diagnose.command_line.data_sets import _SPLITS
 from wearstate.sim.output.recording import DataError
 from wearstate.sim.output.sensor import Channel
 

@@ -1,4 +1,4 @@
-"""The commands and their options.
+"""The command line: a file of commands for each topic, and its entry point.
 
 It may import ``sim.atomic``, ``sim.output``, ``sim.parts``, ``sim.scene``, ``sim.machine``,
 ``sim.fidelity``, ``sim.deep_check``, ``features.catalogue``, ``datasets.file``,
@@ -8,5 +8,6 @@ It may import ``sim.atomic``, ``sim.output``, ``sim.parts``, ``sim.scene``, ``si
 ``diagnose.feature_rows``, ``diagnose.wear_model``, ``diagnose.nameplate``, ``diagnose.twin``,
 ``diagnose.report``, ``diagnose.class_model``, ``diagnose.evaluation``, ``diagnose.blindspots``,
 ``diagnose.charts``, ``diagnose.stability``, ``diagnose.shaft_tests``, ``diagnose.alignment``,
-``diagnose.literature``, ``diagnose.sweep``, ``diagnose.inspect``, ``diagnose.workflow``.
+``diagnose.literature``, ``diagnose.sweep``, ``diagnose.inspect``, ``diagnose.workflow``,
+``diagnose.options``.
 """

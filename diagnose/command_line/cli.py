@@ -17,16 +17,20 @@ import click
 from click.shell_completion import get_completion_class
 
 from ... import __version__
+from ..options.help import FIRST_CONTACT, HelpfulGroup, command
+from ..options.shared import EXIT_BAD_INPUT, EXIT_FAILED, as_options
 from ..pages.plain_json import json_text
-from .command_help import FIRST_CONTACT, HelpfulGroup, command
-from .command_options import EXIT_BAD_INPUT, EXIT_FAILED, as_options
-from .commands_chart import chart, stability, sweep
-from .commands_data import audit, export, generate, merge, recipe, splits
-from .commands_evaluate import blindspots, evaluate
-from .commands_files import features, import_files, info
-from .commands_machine import align, frf, scene, simulate, verify
-from .commands_report import report
-from .commands_wear import calibrate, demo, train
+from .align import align
+from .chart import chart, stability
+from .data_sets import audit, export, generate, merge, splits
+from .evaluate import blindspots, evaluate
+from .features import features
+from .measured import import_files, info
+from .recipe import recipe
+from .report import report
+from .scene import frf, scene, simulate, verify
+from .sweep import sweep
+from .train import calibrate, demo, train
 
 # files are written under another name first, which says nothing to the caller
 _UNFINISHED = re.compile(r"\.part\b|\.[0-9a-f]{8}\.tmp\b")

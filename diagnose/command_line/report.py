@@ -6,27 +6,26 @@ from typing import Any, NamedTuple
 
 import click
 
-from ..pages.plain_json import json_text
-from .command_help import command
-from .command_names import DATA, MODEL
-from .command_options import (
+from ..options.help import command
+from ..options.names import DATA, MODEL
+from ..options.outputs import PAGE_SUFFIXES, check_outputs
+from ..options.progress import progress_bar
+from ..options.shared import (
     EXIT_ALARM,
     EXIT_BAD_INPUT,
     EXIT_UNFAMILIAR,
     EXIT_WARNING,
-    PAGE_SUFFIXES,
     PATH,
-    check_outputs,
     emit,
     force_option,
     join_option,
     json_option,
     overrides_of,
-    progress_bar,
     seed_option,
     tell_bare,
 )
-from .source_options import declared_source, source_options
+from ..options.source import declared_source, source_options
+from ..pages.plain_json import json_text
 
 _FAIL_ON_HELP = "Exit 3 at a warning, 4 at an alarm, 5 when unfamiliar; alarm: only 4 and 5."
 

@@ -10,7 +10,8 @@ from typing import Any
 import click
 from click.shell_completion import CompletionItem
 
-from .command_options import DATA_SUFFIXES, MODEL_SUFFIXES, PathType
+from .outputs import DATA_SUFFIXES, MODEL_SUFFIXES
+from .shared import PathType
 
 _ROOT = Path(__file__).parents[2]
 _BUILT_IN = {"scene": _ROOT / "sim/scene/built_in", "recipe": _ROOT / "datasets/recipe/built_in"}

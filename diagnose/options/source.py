@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from .command_options import NUMBER, PATH, Share
+from .shared import NUMBER, PATH, Share
 
 
 def source_options(command: Callable[..., Any]) -> Callable[..., Any]:

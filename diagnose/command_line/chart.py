@@ -1,4 +1,4 @@
-"""Commands that vary a scene and show what comes of it: stability, chart, sweep."""
+"""Commands `chart` and `stability`: speed against accuracy, and where methods fail."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -6,26 +6,28 @@ from typing import Any
 
 import click
 
-from .command_help import command
-from .command_names import SCENE, built_in
-from .command_options import (
+from ..options.help import command
+from ..options.names import SCENE, built_in
+from ..options.outputs import (
     CHART_SUFFIXES,
     DATA_SUFFIXES,
-    EXIT_FAILED,
     PAGE_SUFFIXES,
-    PATH,
     PICTURE_SUFFIXES,
-    Accuracy,
-    Share,
     check_interactive,
     check_outputs,
+)
+from ..options.progress import progress_bar
+from ..options.shared import (
+    EXIT_FAILED,
+    PATH,
+    Accuracy,
+    Share,
     emit,
     force_option,
     jobs_option,
     json_option,
     overrides_of,
     points_option,
-    progress_bar,
     scene_of,
     seed_option,
     tell_bare,
@@ -165,7 +167,7 @@ def chart(
     if of_verdict and not of_data:
         if budget is not None or choice != "kept":
             raise click.UsageError("--budget and --choice are for a scene, not for a recipe")
-        from .chart_commands import verdict_chart_command
+        from .chart_run import verdict_chart_command
 
         assert share is not None
         found = verdict_chart_command(
@@ -198,7 +200,7 @@ def chart(
         raise click.UsageError(
             f"{subject} is a recipe: its chart takes --accuracy verdict=2%; or name its scene"
         )
-    from .chart_commands import scene_chart_command
+    from .chart_run import scene_chart_command
 
     values = overrides_of(pairs)
     tell_bare(subject, values)
@@ -222,6 +224,7 @@ def chart(
 
 
 _CHART_BUDGET = 90.0  # s of a scene
+
 _VERDICT_RECORDS = 120  # on every choice of rungs of a recipe
 
 
@@ -253,124 +256,3 @@ def _emit_chart(found: Any, files: Sequence[Path | None], as_json: bool) -> None
     written = [str(path) for path in files if path is not None]
     text = "\n".join([chart_text(found), *written])
     emit({**chart_table(found), "files": written}, as_json, text)
-
-
-_SUFFIXES = (*CHART_SUFFIXES, ".htm")
-
-
-@command()
-@click.argument("scene_name", metavar="SCENE", type=SCENE)
-@click.option(
-    "--over",
-    multiple=True,
-    required=True,
-    metavar="PATH=VALUES",
-    help="Values, as A..B, A..B/N or A,B,C with a unit at the end; repeatable. The last is the "
-    "change to detect.",
-)
-@click.option("--set", "pairs", multiple=True, metavar="PATH=VALUE", help="Replace a scene value.")
-@click.option(
-    "--show",
-    multiple=True,
-    metavar="NAME,…",
-    help="Features or true values of the simulation to show; * and ? match as in a shell.",
-)
-@click.option(
-    "--points",
-    type=click.IntRange(2, 1000),
-    default=5,
-    show_default=True,
-    help="Points of a range A..B that is given without /N.",
-)
-@click.option(
-    "--starts",
-    type=click.IntRange(1, 1000),
-    default=5,
-    show_default=True,
-    help="Recordings at each point, each with its own start angle, noise and random forces.",
-)
-@click.option(
-    "--confidence",
-    type=Share(0.5, 0.9999),
-    default=0.95,
-    show_default=True,
-    help="Probability of detecting a change, and of reporting none where there is none.",
-)
-@click.option(
-    "-o",
-    "--output",
-    type=PATH,
-    help="Page, table or picture to write (.html, .csv, .json, .png, .svg).",
-)
-@points_option
-@seed_option
-@jobs_option
-@force_option
-@json_option
-def sweep(
-    scene_name: str,
-    over: Sequence[str],
-    pairs: Sequence[str],
-    show: Sequence[str],
-    points: int,
-    starts: int,
-    confidence: float,
-    output: Path | None,
-    interactive: bool,
-    seed: int,
-    jobs: int | None,
-    force: bool,
-    as_json: bool,
-) -> None:
-    """Vary numbers of SCENE: find which feature shows a change, from which size, and where first.
-
-    The last --over is the change to detect, such as a clearance; those before it are conditions,
-    such as the speed. With -o, runs are kept beside the output until all are done: after Ctrl-C the
-    same command continues. The CSV has one row for each point and start, in SI units.
-    """
-    from ..pages.kept import part_file
-    from ..sweep.axes import SweepError
-    from ..sweep.page import save_sweep
-    from ..sweep.sweep import kept_runs, measure, sweep_of, sweep_plan
-    from ..sweep.text import sweep_table, sweep_text
-
-    check_interactive(interactive, output)
-    part = part_file(output)
-    going_on = part is not None and part.exists() and not force
-    check_outputs([scene_name], [(output, _SUFFIXES)], force or going_on)
-    values = overrides_of(pairs)
-    tell_bare(scene_name, values)
-    plan = sweep_plan(
-        scene_name,
-        over,
-        given=values,
-        show=[name for text in show for name in text.split(",") if name.strip()],
-        points=points,
-        starts=starts,
-        seed=seed,
-        confidence=confidence,
-    )
-    if part is not None and force:
-        part.unlink(missing_ok=True)
-    kept = kept_runs(part, plan)
-    interrupted = False
-    try:
-        with progress_bar("simulating") as progress:
-            measure(plan, kept, jobs=worker_count(jobs), progress=progress)
-    except KeyboardInterrupt:
-        interrupted = True
-    found = sweep_of(plan, kept)
-    if found.finished and all(run.fault for run in found.outcomes.values()):
-        kept.drop()
-        raise SweepError([f"no run succeeded: {fault}" for fault in found.faults])
-    if output is not None and found.outcomes:
-        save_sweep(found, output, force=force or going_on, interactive=interactive)
-        if found.finished:
-            kept.drop()
-    files = [str(output)] if output is not None and found.outcomes else []
-    text = "\n".join([sweep_text(found), *files])
-    emit({**sweep_table(found), "files": files}, as_json, text)
-    if interrupted:
-        on = "; the same command goes on from there" if output else ""
-        click.echo(f"interrupted: what was simulated is shown{on}", err=True)
-        raise click.exceptions.Exit(EXIT_FAILED)

@@ -1,13 +1,11 @@
-"""What the commands of the command line share: options, outputs, progress, JSON.
+"""What commands share: types and values of options, exit codes, output as text or JSON.
 
 Heavy imports stay inside the functions, so that ``--help`` answers at once.
 """
 
 import math
 import re
-import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -84,6 +82,14 @@ jobs_option = click.option(
     help="Worker processes; all cores by default. The result does not depend on it.",
 )
 
+records_option = click.option(
+    "-n",
+    "--records",
+    type=click.IntRange(1, MOST_RECORDS),
+    default=None,
+    help="Number of records; default: as in the recipe.",
+)
+
 seed_option = click.option(
     "--seed", type=click.IntRange(0, LARGEST_SEED), default=0, show_default=True
 )
@@ -107,153 +113,6 @@ def worker_count(jobs: int | None) -> int:
     from ...datasets.workers.local import cores
 
     return jobs or cores()
-
-
-DATA_SUFFIXES, MODEL_SUFFIXES, PAGE_SUFFIXES = (".h5", ".hdf5"), (".wsm",), (".html", ".htm")
-SCENE_SUFFIXES = (".toml",)
-CHART_SUFFIXES = (".svg", ".png", ".pdf", ".html", ".json", ".csv")
-PICTURE_SUFFIXES, TABLE_SUFFIXES = (".png", ".svg", ".pdf"), (".parquet", ".csv", ".h5")
-_Output = tuple[Path | None, tuple[str, ...]]
-"""A file to write, None where it was not asked for, and the suffixes it may have."""
-
-
-def check_interactive(interactive: bool, output: Path | None) -> None:
-    """Refuse points to tap where there is no page, or nothing to draw them."""
-    if not interactive:
-        return
-    if output is None or output.suffix not in PAGE_SUFFIXES:
-        raise click.UsageError("--interactive is for a page: name one with -o, as -o page.html")
-    from ..pages.embed import require_bokeh
-
-    require_bokeh()
-
-
-def check_outputs(inputs: Sequence[Path | str], outputs: Sequence[_Output], force: bool) -> None:
-    """Refuse outputs that cannot or must not be written, before any work.
-
-    Raises
-    ------
-    DataError
-        An output has the wrong suffix, is a folder or in none, exists and `force` is not given,
-        or is the same file as an input or another output: that one `force` does not override.
-    """
-    from ...sim.output.recording import DataError
-
-    wanted = [(path, suffixes) for path, suffixes in outputs if path is not None]
-    paths = [path for path, _ in wanted]
-    faults = [fault for path, suffixes in wanted for fault in _name_faults(path, suffixes)]
-    faults += [
-        f"{path} is also an input, must be another file; choose another name"
-        for path in paths
-        if any(_same_file(path, Path(source)) for source in inputs)
-    ]
-    faults += [
-        f"{path} is given for two outputs, must be one; choose another name"
-        for number, path in enumerate(paths)
-        if any(_same_file(path, other) for other in paths[:number])
-    ]
-    if not faults and not force:
-        faults = [
-            f"{path} exists; choose another name or use --force to replace it"
-            for path in paths
-            if path.exists()
-        ]
-    if faults:
-        raise DataError("\n".join(faults))
-
-
-def _name_faults(path: Path, suffixes: tuple[str, ...]) -> list[str]:
-    if path.is_dir():
-        return [f"{path} is a folder; name a file in it"]
-    if path.suffix not in suffixes:
-        return [f"{path}: suffix {path.suffix!r} must be one of {', '.join(suffixes)}; rename it"]
-    if not path.parent.is_dir():
-        return [f"{path.parent} is no folder; create it"]
-    return _unwritable(path.parent)
-
-
-def refuse_unwritable(output: Path) -> None:
-    """Refuse an output where nothing can be written, before any work.
-
-    Raises
-    ------
-    DataError
-        Names the folder and why.
-    """
-    from ...sim.output.recording import DataError
-
-    faults = _unwritable(output.parent) if output.parent.is_dir() else []
-    if faults:
-        raise DataError(faults[0])
-
-
-def _unwritable(folder: Path) -> list[str]:
-    """Tried, as rights alone do not tell: a disk may be full or mounted to be read only."""
-    from tempfile import TemporaryFile
-
-    try:
-        with TemporaryFile(dir=folder):
-            return []
-    except OSError as error:
-        why = error.strerror or type(error).__name__
-        return [f"{folder} cannot be written ({why}); check rights and space, or choose another"]
-
-
-def _same_file(one: Path, other: Path) -> bool:
-    if one.exists() and other.exists():
-        return one.samefile(other)  # also by another link
-    return one.resolve() == other.resolve()
-
-
-@contextmanager
-def progress_bar(what: str) -> Iterator[Callable[[int, int], None] | None]:
-    """Progress bar on stderr where a person watches; nothing elsewhere."""
-    if not sys.stderr.isatty():
-        yield None
-        return
-    from rich.console import Console
-    from rich.progress import MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-    columns = (*Progress.get_default_columns()[:2], MofNCompleteColumn(), TimeRemainingColumn())
-    rate = TextColumn("{task.fields[rate]}")
-    with Progress(*columns, rate, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(what, total=None, rate="")
-
-        def update(done: int, total: int) -> None:
-            speed = bar.tasks[task].speed  # of the last half minute
-            text = f"{float(f'{speed:.3g}'):g}/s" if speed else ""
-            bar.update(task, completed=done, total=total, rate=text)
-
-        yield update
-
-
-@contextmanager
-def time_bar() -> Iterator[Callable[[str, float, float], None] | None]:
-    """Bar on stderr where a person watches: what is done now, and the seconds left.
-
-    Gives a function of what is done, seconds gone by, and seconds that are left.
-    """
-    if not sys.stderr.isatty():
-        yield None
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn
-
-    left = TextColumn("about {task.fields[left]:.0f} s left")
-    columns = (BarColumn(), left, TextColumn("{task.description}"))
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("starting", total=1.0, left=0.0)
-
-        def update(what: str, gone: float, remaining: float) -> None:
-            bar.update(
-                task,
-                description=what,
-                completed=gone,
-                total=max(gone + remaining, 1e-3),
-                left=remaining,
-            )
-
-        yield update
 
 
 def scene_of(name: str, pairs: Sequence[str]) -> Any:

@@ -1,4 +1,4 @@
-"""The command `chart` of a scene, and of a recipe: measures, goes on, writes."""
+"""The run of `chart` on a scene or a recipe: measure, continue, write."""
 
 import os
 import time
@@ -27,8 +27,9 @@ from ..charts.of_scene import (
 from ..charts.scene_edit import apply_changes
 from ..charts.sentences import where_it_stands
 from ..charts.verdict import verdict_chart
+from ..options.outputs import CHART_SUFFIXES, SCENE_SUFFIXES, check_outputs
+from ..options.progress import time_bar
 from ..pages.kept import part_file
-from .command_options import CHART_SUFFIXES, SCENE_SUFFIXES, check_outputs, time_bar
 
 _QUESTIONS = {"kept": KEPT, "raised": RAISED}
 

@@ -7,21 +7,19 @@ from typing import Any
 
 import click
 
-from .command_help import command
-from .command_names import DATA, RECIPE, SCENE
-from .command_options import (
-    MODEL_SUFFIXES,
+from ..options.help import command
+from ..options.names import DATA, RECIPE, SCENE
+from ..options.outputs import MODEL_SUFFIXES, SCENE_SUFFIXES, check_outputs
+from ..options.progress import progress_bar
+from ..options.shared import (
     PATH,
-    SCENE_SUFFIXES,
     PathType,
     Share,
-    check_outputs,
     emit,
     force_option,
     jobs_option,
     join_option,
     json_option,
-    progress_bar,
     seed_option,
     worker_count,
 )

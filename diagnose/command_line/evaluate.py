@@ -6,21 +6,20 @@ from typing import Any
 
 import click
 
-from .command_help import command
-from .command_names import DATA, MODEL
-from .command_options import (
+from ..options.help import command
+from ..options.names import DATA, MODEL
+from ..options.outputs import PAGE_SUFFIXES, check_outputs
+from ..options.progress import progress_bar
+from ..options.shared import (
     MOST_RECORDS,
-    PAGE_SUFFIXES,
     PATH,
     PathType,
-    check_outputs,
     emit,
     force_option,
     jobs_option,
     join_option,
     json_option,
     overrides_of,
-    progress_bar,
     seed_option,
     worker_count,
 )
