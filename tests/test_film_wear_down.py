@@ -135,3 +135,24 @@ def test_a_scene_that_tells_the_bore_is_believed():
 def test_a_line_that_no_film_carries_says_so():
     scene = load_scene("propulsion-shaft", {"oil.viscosity_40": 2e-6, "oil.viscosity_100": 2e-6})
     assert "bearing" in sinking_places(scene, 0, LIMIT)
+
+
+# --- a film that is warmer than the oil
+
+
+def test_nobody_is_taken_to_have_read_a_thermometer():
+    bare = nameplate_of(None, "propulsion-shaft", {})
+    assert "film_warming_k" not in bare.conditions({})
+    assert bare.conditions({"film_warming_k": 0.0})["film_warming_k"] == 0.0
+    read = nameplate_of(None, "propulsion-shaft", {"bearings.stern_aft.film_warming": "0 K"})
+    assert read.conditions({"film_warming_k": 9.0})["film_warming_k"] == 0.0
+
+
+def test_a_warming_that_was_noted_thins_the_film_of_its_bearing_alone():
+    plate = nameplate_of(None, "propulsion-shaft", {})
+    day = plate.on_the_day({"viscosity_pa_s": 0.08, "film_warming_k": 10.0}, 5.0)
+    assert day.oil.dynamic_viscosity == pytest.approx(0.08, rel=1e-12)
+    assert day.oil.warmed(10.0) < 0.05  # Walther: 40 % for ten kelvin at 42 degrees
+    assert [bearing.film_warming for bearing in day.bearings] == [10.0, 0, 0, 0, 0]
+    known = nameplate_of(None, "propulsion-shaft", {"oil": {"viscosity": "80 mPa s"}})
+    assert known.on_the_day({"film_warming_k": 10.0}, 5.0).bearings[0].film_warming == 0

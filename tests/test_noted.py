@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from wearstate.diagnose.feature_rows.model_card import TrainedCondition
-from wearstate.diagnose.feature_rows.noted import NOTED, doubted, noted_values, strayed
+from wearstate.diagnose.feature_rows.noted import NOTED, doubted, given_of, noted_values, strayed
 from wearstate.diagnose.wear_model.bundle import load_bundle
 from wearstate.diagnose.wear_model.estimate import ModelError
 from wearstate.diagnose.wear_model.file import load_model, save_model
@@ -70,6 +70,55 @@ def test_strays_reach_a_fifth():
     values = np.column_stack([np.zeros(4000), np.linspace(-1, 1, 4000)])
     off = np.abs(strayed(names, values, seed=1, reach=1.2) - values).max(axis=0)
     np.testing.assert_allclose(off, [np.log(1.2), 0.2 * 2], rtol=0.01)
+
+
+# --- a condition that few people know
+
+
+def test_what_few_know_is_taken_as_usual_and_not_called_noted():
+    names = ["viscosity_pa_s", "film_warming_k"]
+    usual = NOTED["film_warming_k"].usual
+    found = noted_values(names, [{"viscosity_pa_s": 1.0}, {"film_warming_k": 0.0}])
+    np.testing.assert_array_equal(found, [[0.0, usual], [np.nan, 0.0]])
+    assert given_of(names, {"viscosity_pa_s": 1.0, "film_warming_k": float("nan")}) == (names[0],)
+
+
+def test_half_of_the_training_records_lack_it_and_others_are_doubted_as_without_it():
+    both = np.column_stack([np.zeros(4000), np.linspace(0, 15, 4000)])
+    noted = doubted(["viscosity_pa_s", "film_warming_k"], both, seed=1)
+    unnoted = noted[:, 1] == NOTED["film_warming_k"].usual
+    assert np.mean(unnoted) == pytest.approx(0.5, abs=0.03)  # four deviations of 4,000 coins
+    off = (noted - both)[~unnoted].std(axis=0)
+    np.testing.assert_allclose(off, [0.05, 0.07 * 15], rtol=0.08)
+
+
+def test_a_model_uses_a_thermometer_and_does_without():
+    """Severity by a level, the oil's viscosity and how much warmer the film is."""
+    rng = np.random.default_rng(4)
+    warming = rng.uniform(0, 15, N) * (rng.random(N) < 0.5)
+    rows = training(("viscosity_pa_s", "film_warming_k"), effect=1.0)
+    level = rows.rows.copy()
+    level[:, 0] -= 10 * 0.05 * warming  # 5 % of viscosity a kelvin
+    notes = [
+        {**note, "film_warming_k": float(kelvin)}
+        for note, kelvin in zip(rows.notes, warming, strict=True)
+    ]
+    found = learn(replace(rows, rows=level, notes=notes))
+
+    def error(told):
+        inputs = np.hstack([level, noted_values(rows.conditions, told)])
+        return np.abs(np.log(found.informed.severity.predict(inputs) / rows.severity)).mean()
+
+    without = [{"viscosity_pa_s": note["viscosity_pa_s"]} for note in notes]
+    assert error(notes) < 0.8 * error(without)
+    off = np.array(
+        [
+            found.informed.severity.predict(np.hstack([level, noted_values(rows.conditions, told)]))
+            / rows.severity
+            for told in (notes, without)
+        ]
+    )
+    assert abs(np.log(off).mean(axis=1)).max() < 0.05  # neither is biased by the warming
 
 
 @pytest.fixture(scope="module")

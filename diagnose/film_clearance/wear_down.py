@@ -193,10 +193,7 @@ def _with_bearing(scene: Any, bearing: int, changes: Mapping[str, float]) -> Any
 
 
 def _thicker(scene: Any) -> Any:
-    from ...sim.parts.oil import Oil
-
-    oil = Oil(viscosity=scene.oil.dynamic_viscosity * (1 + _CHANGE))
-    return scene.model_copy(update={"oil": oil})
+    return scene.model_copy(update={"oil": scene.oil.thickened(1 + _CHANGE)})
 
 
 def _wider(scene: Any, bearing: int) -> Any:

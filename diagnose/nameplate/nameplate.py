@@ -34,6 +34,7 @@ from ..film_clearance.clearance import Doubts
 
 _OIL = "oil.dynamic_viscosity"
 _SPEED = "drive.speed"
+_WARMING = "bearings.0.film_warming"
 _MEASURED = ("speed_hz", "start_angle_rad", "unbalance_kg_m")  # by the signals, or no matter here
 
 
@@ -88,7 +89,7 @@ class Nameplate:
         }
         scene = self.scene
         for path, value in noted.items():
-            if path != _SPEED and not self.was_told(path):
+            if path != _SPEED and not self.was_told(path) and _has_place(scene, path):
                 scene = _replaced(scene, path, value)
         return scene if speed_hz is None else _replaced(scene, _SPEED, speed_hz)
 
@@ -118,7 +119,7 @@ class Nameplate:
             column: condition_of(day, column)
             for column in NOTED
             if (place := places.get(column)) is not None and has_value(day, place)
-            if not self.assumed or self.was_told(place)
+            if self.was_told(place) or not (self.assumed or _left_out(day, column))
         }
         return {**row, **known}
 
@@ -129,11 +130,25 @@ class Nameplate:
         return path in self.told
 
 
+def _has_place(scene: Any, path: str) -> bool:
+    """False for the warming of a film whose oil is not known at other temperatures."""
+    return path != _WARMING or scene.oil.temperature is not None
+
+
+def _left_out(scene: Scene, column: str) -> bool:
+    """A scene without a number where few people have one: nothing says that it is zero."""
+    return NOTED[column].usual is not None and condition_of(scene, column) == 0
+
+
 def _replaced(scene: Any, path: str, value: float) -> Any:
     """A scene with one value in another place; what the scene does not have stays absent."""
     if path == _OIL:
-        return scene.model_copy(update={"oil": Oil(viscosity=value)})
+        oil: Oil = scene.oil
+        return scene.model_copy(update={"oil": oil.thickened(value / oil.dynamic_viscosity)})
     name, _, rest = path.partition(".")
+    if isinstance(scene, tuple):
+        place = int(name)
+        return (*scene[:place], _replaced(scene[place], rest, value), *scene[place + 1 :])
     inner = getattr(scene, name, None)
     if inner is None:
         return scene

@@ -20,7 +20,6 @@ from ...sim.film.solve import (
     solve_relaxed,
 )
 from ...sim.output.status import Status
-from ...sim.parts.oil import Oil
 from ...sim.scene.journal import JournalScene
 from ...sim.scene.scene import Scene, SceneError
 from ...sim.scene.shaft import ShaftScene
@@ -334,7 +333,8 @@ def _mesh_name(n_theta: int, n_z: int) -> str:
 def _line_at(
     scene: ShaftScene, speed: float, viscosity: float, mesh: tuple[int, int]
 ) -> ShaftScene:
-    values = {"drive.speed": speed, "duration": 2 / speed, "oil": Oil(viscosity=viscosity)}
+    oil = scene.oil.thickened(viscosity / scene.oil.dynamic_viscosity)
+    values = {"drive.speed": speed, "duration": 2 / speed, "oil": oil}
     values |= {"film.n_theta": mesh[0], "film.n_z": mesh[1]}
     # enough for the orders of the forces; more would ask for a finer beam
     values |= {"sample_rate": max(scene.sample_rate, 40 * speed), "tacho": None}

@@ -23,7 +23,7 @@ from ..feature_rows.feature_table import (
 )
 from ..feature_rows.healthy import Baseline, referenced_rows
 from ..feature_rows.model_card import ModelCard
-from ..feature_rows.noted import NOTED, noted_values
+from ..feature_rows.noted import NOTED, given_of, noted_values
 from ..feature_rows.physical import level_channels, levelled_rows
 from ..feature_rows.quality import (
     Levels,
@@ -623,7 +623,7 @@ class WearModel:
         )
         return Estimate(
             verdict="caution" if cautions else "graded",
-            noted=() if asked is self.blind else self.noted,
+            noted=() if asked is self.blind else given_of(self.noted, conditions),
             cautions=cautions,
             confounders=findings,
             evidence=self._evidence(raw, baseline),

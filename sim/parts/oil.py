@@ -83,6 +83,43 @@ class Oil(Part):
         assert self.temperature is not None  # the validator saw to it that all four are given
         return self.viscosity_at(self.temperature)
 
+    def warmed(self, kelvin: float) -> float:
+        """Dynamic viscosity in a film that is warmer by that much [Pa s].
+
+        Parameters
+        ----------
+        kelvin : float
+            [K]; other than zero only where the oil's temperature is given.
+
+        Examples
+        --------
+        >>> oil = Oil(temperature=313.15, viscosity_40=1e-4, viscosity_100=1.14e-5, density=875.0)
+        >>> round(oil.warmed(0.0), 4), round(oil.warmed(10.0), 4)
+        (0.0875, 0.0531)
+        """
+        if kelvin == 0:
+            return self.dynamic_viscosity
+        assert self.temperature is not None  # the scene's check saw to it
+        return self.viscosity_at(self.temperature + kelvin)
+
+    def thickened(self, ratio: float) -> Self:
+        """An oil of so many times the viscosity at every temperature.
+
+        Parameters
+        ----------
+        ratio : float
+
+        Examples
+        --------
+        >>> Oil(viscosity=0.02).thickened(1.5).viscosity
+        0.03
+        """
+        if self.viscosity is not None:
+            return self.model_copy(update={"viscosity": self.viscosity * ratio})
+        assert self.density is not None
+        # Walther's law is of the kinematic viscosity: the density takes any ratio, exactly
+        return self.model_copy(update={"density": self.density * ratio})
+
     def viscosity_at(self, temperature: float) -> float:
         """Dynamic viscosity at a temperature [Pa s], by Walther's law.
 

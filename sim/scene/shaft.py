@@ -73,6 +73,11 @@ class ShaftScene(Scene):
             "hull.deflection", "hull_deflection_m", "deflection of the hull under the bearings"
         ),
         ConditionPlace("propeller.thrust", "thrust_n", "thrust of the propeller"),
+        ConditionPlace(
+            "bearings.0.film_warming",
+            "film_warming_k",
+            "how much warmer the film of the first bearing is than the oil",
+        ),
     )
 
     machine: Literal["propulsion-shaft"] = Field(description="propulsion-shaft")
@@ -249,6 +254,29 @@ def _propeller_faults(discs: tuple[ShaftDisc, ...], propeller: Propeller | None)
     ]
 
 
+def _hull_faults(hull: Hull, propeller: Propeller | None) -> list[str]:
+    if propeller is not None:
+        return []
+    return [
+        f"hull.blade_tones.{i}: {max(tone.up, tone.side):g} m/s must be 0 without a propeller, "
+        "which has the blade rate; add a propeller or leave the tone out"
+        for i, tone in enumerate(hull.blade_tones)
+        if tone.up or tone.side
+    ]
+
+
+def _warming_faults(oil: Oil, bearings: tuple[ShaftBearing, ...]) -> list[str]:
+    if oil.viscosity is None:
+        return []
+    return [
+        f"bearings.{i}.film_warming = {bearing.film_warming:g} K must be 0 with oil.viscosity, "
+        "which says nothing of other temperatures; give oil.temperature, viscosity_40, "
+        "viscosity_100 and density instead"
+        for i, bearing in enumerate(bearings)
+        if bearing.film_warming
+    ]
+
+
 def _turbulence_faults(
     bearings: tuple[ShaftBearing, ...],
     discs: tuple[ShaftDisc, ...],
@@ -308,6 +336,8 @@ _CHECKS: tuple[tuple[Any, tuple[str, ...]], ...] = (
     (_bearing_faults, ("sections", "bearings")),
     (_sensor_faults, ("bearings", "sensors", "probes")),
     (_propeller_faults, ("discs", "propeller")),
+    (_hull_faults, ("hull", "propeller")),
+    (_warming_faults, ("oil", "bearings")),
     (_turbulence_faults, ("bearings", "discs", "turbulence")),
     (_exciter_faults, ("sections", "bearings", "discs", "exciters")),
     (_film_faults, ("film",)),

@@ -25,7 +25,9 @@ from ..parts.dimensions import (
     Ratio,
     RotationSpeed,
     Stiffness,
+    Temperature,
     Unbalance,
+    Velocity,
 )
 from ..parts.limits import (
     ANGLE_MOST,
@@ -52,6 +54,9 @@ _STEEPEST = 0.05  # rad: small angles are their sines to 0.04 %
 _THINNEST = 1e-6  # m, of a clearance of a shaft line: a micrometre
 _NOISIEST = 1e7  # m/s^2
 _LEAST_RANGE, _MOST_RANGE = 1e-9, 1e7  # m/s^2
+_HULL_FASTEST = 1.0  # m/s: a hundred times what people on board would bear
+_HULL_SHARE_MOST = 10.0  # a floor in resonance
+_WARMEST_FILM = 100.0  # K over the oil: white metal melts first
 
 MOST_PARTS = 200
 _MOST_BLADES = 20
@@ -62,6 +67,8 @@ _Slope = Annotated[Angle, Field(ge=-_STEEPEST, le=_STEEPEST)]
 _Phase = Annotated[Angle, Field(ge=-ANGLE_MOST, le=ANGLE_MOST)]
 _Load = Annotated[Force, Field(ge=-FORCE_MOST, le=FORCE_MOST)]
 _Turning = Annotated[Moment, Field(ge=-_MOMENT_MOST, le=_MOMENT_MOST)]
+_HullShare = Annotated[Ratio, Field(ge=-_HULL_SHARE_MOST, le=_HULL_SHARE_MOST)]
+_HullSpeed = Annotated[Velocity, Field(ge=0, le=_HULL_FASTEST)]
 _Name = Annotated[str, Field(min_length=1, max_length=NAME_LONGEST)]
 
 # --- shaft
@@ -190,6 +197,12 @@ class Housing(Part):
     damping_side: Damping = Field(
         default=0.0, ge=0, le=DAMPING_MOST, description="of the pedestal, horizontally"
     )
+    hull_share_up: _HullShare = Field(
+        default=1.0, description="of the hull's vibration that its foundation has, vertically"
+    )
+    hull_share_side: _HullShare = Field(
+        default=1.0, description="of the hull's vibration that its foundation has, horizontally"
+    )
 
 
 class AlignmentLimits(Part):
@@ -239,6 +252,12 @@ class ShaftBearing(Part):
         default=0.0, ge=0, lt=math.pi / 2, description="of an axial groove at either side; 0: none"
     )
     sag: Length = Field(default=0.0, ge=0, le=1.0, description="downwards, from its offset")
+    film_warming: Temperature = Field(
+        default=0.0,
+        ge=0,
+        le=_WARMEST_FILM,
+        description="how much warmer its film is than the oil; needs oil.temperature",
+    )
     rise: _Height = Field(default=0.0, description="of the bearing, once it is hot")
     lift: Length = Field(
         default=0.0, ge=0, le=1.0, description="of the journal on its film, on rigid supports"
@@ -264,11 +283,53 @@ class ShaftBearing(Part):
         return self
 
 
+class _HullTone(Part):
+    """A tone of the hull: the velocity ``up cos(angle + up_phase)``, and so to the side.
+
+    Every foundation has its share of it, in step with all others or against them.
+    """
+
+    up: _HullSpeed = Field(default=0.0, description="amplitude of the velocity, vertically")
+    side: _HullSpeed = Field(default=0.0, description="amplitude of the velocity, horizontally")
+    up_phase: _Phase = Field(default=0.0, description="of the vertical velocity")
+    side_phase: _Phase = Field(default=0.0, description="of the horizontal velocity")
+
+
+class HullBladeTone(_HullTone):
+    """What the propeller's pressure makes the hull do at a harmonic of the blade rate."""
+
+    harmonic: int = Field(ge=1, le=100, description="of the blade rate")
+
+
+class EngineTone(_HullTone):
+    """What an engine beside the line makes the hull do at an order of its speed."""
+
+    order: Ratio = Field(gt=0, le=100, description="of the engine's speed; 0.5 is a working cycle")
+
+
+class HullEngine(Part):
+    """An engine that runs beside the line, as a generating set; it keeps its own time."""
+
+    speed: RotationSpeed = Field(gt=0, le=1000, description="constant")
+    tones: tuple[EngineTone, ...] = Field(
+        default=(), max_length=MOST_PARTS, description="of the hull, by orders of this speed"
+    )
+
+
 class Hull(Part):
-    """How the hull bends under its cargo: a parabola between first and last bearing."""
+    """What the hull does under the bearings.
+
+    It bends under its cargo, a parabola between first and last bearing, and shakes their pedestals.
+    """
 
     deflection: _Height = Field(
         default=0.0, description="of the middle above the line through first and last bearing"
+    )
+    blade_tones: tuple[HullBladeTone, ...] = Field(
+        default=(), max_length=MOST_PARTS, description="vibration at the blade rate"
+    )
+    engines: tuple[HullEngine, ...] = Field(
+        default=(), max_length=MOST_PARTS, description="whose vibration reaches the bearings"
     )
 
 

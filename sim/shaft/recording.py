@@ -42,6 +42,7 @@ from ..scene.shaft_parts import (
     Turbulence,
 )
 from .elements import element_faults
+from .hull import engine_rate_faults, hull_forces, hull_orders
 from .local_modes import heard_locally
 from .on_oil_films import BeamFilm, FilmBearing, ShaftFilmStatus, beam_film
 from .push import lead_samples, peak_push, pushed_motion, pushed_stations, pushes
@@ -464,7 +465,7 @@ def _film_bearing(
             diameter=bearing.diameter,
             length=bearing.length,
             clearance=bearing.diametral_clearance / 2,
-            viscosity=scene.oil.dynamic_viscosity,
+            viscosity=scene.oil.warmed(bearing.film_warming),
             film=FilmGeometry(
                 length_to_diameter=bearing.length / bearing.diameter,
                 n_theta=film.n_theta * (_CORNERED if _has_corners(bearing) else 1),
@@ -663,7 +664,7 @@ class OrderForce(NamedTuple):
 
 
 def harmonic_forces(scene: ShaftScene) -> tuple[Harmonic, ...]:
-    """Unbalance, blade rate and coupling of a scene, as seen from its first sample.
+    """Unbalance, blade rate, coupling and hull of a scene, as seen from its first sample.
 
     Parameters
     ----------
@@ -672,7 +673,8 @@ def harmonic_forces(scene: ShaftScene) -> tuple[Harmonic, ...]:
     Returns
     -------
     tuple of Harmonic
-        One for every order of the speed, rising.
+        One for every order of the speed, rising; then those of
+        :func:`~wearstate.sim.shaft.hull.hull_forces`.
 
     Examples
     --------
@@ -688,10 +690,11 @@ def harmonic_forces(scene: ShaftScene) -> tuple[Harmonic, ...]:
         turned = amplitude * np.exp(1j * order * scene.drive.start_angle)
         at = orders.setdefault(order, {})
         at[place] = at.get(place, 0.0) + complex(turned)
-    return tuple(
+    of_the_shaft = tuple(
         Harmonic(frequency=order * scene.drive.speed, forces=orders[order])
         for order in sorted(orders)
     )
+    return of_the_shaft + hull_forces(scene)
 
 
 def _order_forces(scene: ShaftScene) -> list[OrderForce]:
@@ -887,13 +890,14 @@ def check_shaft(scene: Scene) -> None:
 def _sampling_faults(scene: ShaftScene) -> list[str]:
     revolution = 1 / scene.drive.speed
     faults = duration_faults(scene, revolution)
-    orders = [force.order for force in _order_forces(scene)]
+    orders = [*(force.order for force in _order_forces(scene)), *hull_orders(scene)]
     fewest = max([_FEWEST_PER_TURN, *(2 * order + 1 for order in orders)])
     if scene.sample_rate * revolution < fewest:
         faults.append(
             f"sample_rate = {scene.sample_rate:g} Hz must be >= {fewest / revolution:g} Hz, "
             f"{fewest} samples a revolution for the highest order of its forces; raise it"
         )
+    faults += engine_rate_faults(scene)
     faults += tacho_faults(scene, revolution)
     needed = scene.duration * scene.sample_rate * _BYTES_PER_SAMPLE
     return faults + memory_faults(scene, needed)
