@@ -93,7 +93,7 @@ def small_set(common: Path) -> Path:
     from wearstate.datasets.generation.generate import generate
 
     return made_once(
-        common / "small.h5", lambda path: generate("bilge-pump-small", None, path, seed=0, jobs=2)
+        common / "small.h5", lambda path: generate("bilge-pump-small", None, path, seed=0, jobs=1)
     )
 
 

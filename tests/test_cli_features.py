@@ -41,20 +41,20 @@ def test_list():
 
 
 @pytest.fixture(scope="module")
-def table_of(small_set, tmp_path_factory):
+def table_of(few_set, tmp_path_factory):
     folder = tmp_path_factory.mktemp("tables")
 
     def make(*options):
         path = folder / f"{abs(hash(options))}.csv"
-        result = run("features", small_set, "-o", path, "-j", 1, "--force", *options)
+        result = run("features", few_set, "-o", path, "-j", 1, "--force", *options)
         return pd.read_csv(path), result
 
     return make
 
 
-def test_only(table_of, small_set):
+def test_only(table_of, few_set):
     frame, _ = table_of("--only", "rms, kurtosis", "--only", "acc_x.third_octave_1000.level_db")
-    with DataSet(small_set) as data:
+    with DataSet(few_set) as data:
         manifest = set(data.manifest.columns)
         first = data[0].vibration
     added = [column for column in frame.columns if column not in manifest]
@@ -69,7 +69,7 @@ def test_only(table_of, small_set):
     assert_allclose(frame["acc_x.rms"][0], first[0].std(dtype=float), rtol=1e-5)
 
 
-def test_core_with_machine_and_bearing(table_of, small_set):
+def test_core_with_machine_and_bearing(table_of, few_set):
     frame, result = table_of(
         *("--only", "iso_zone,velocity_rms,bearing_lines,user_bands"),
         *("--machine", "reciprocating-1", "--bearing", "8,0.235,1.245,0", "--band", "500,2000"),
@@ -82,9 +82,9 @@ def test_core_with_machine_and_bearing(table_of, small_set):
     assert "acc_y.user_band_500_2000.level_db" in frame
 
 
-def test_a_set_says_what_is_absent(small_set, tmp_path):
+def test_a_set_says_what_is_absent(few_set, tmp_path):
     path = tmp_path / "t.csv"
-    result = run("features", small_set, "-o", path, "--set", "core", "--json", "-j", 2)
+    result = run("features", few_set, "-o", path, "--set", "core", "--json", "-j", 1)
     absent = json.loads(result.stdout)["absent"]
     assert absent["frf_levels"] == (
         "force channels = 0 must be >= 1; declare the unit N on import, or quantities in Python"
@@ -92,8 +92,8 @@ def test_a_set_says_what_is_absent(small_set, tmp_path):
     assert "iso_zone" in result.stderr
     assert "velocity_rms" not in absent
     core = set(pd.read_csv(path).columns)
-    assert core >= set(feature_table(small_set, choice=choice_of(only=["entropy"])).names)
-    standard = feature_table(small_set).names
+    assert core >= set(feature_table(few_set, choice=choice_of(only=["entropy"])).names)
+    standard = feature_table(few_set).names
     assert core > set(standard)
 
 
@@ -118,8 +118,8 @@ def test_the_usual_row_says_nothing(table_of):
         (("--set", "all"), "is not one of"),
     ],
 )
-def test_bad_choices_are_refused_before_any_work(small_set, tmp_path, options, message):
-    result = run("features", small_set, "-o", tmp_path / "t.csv", *options, code=2)
+def test_bad_choices_are_refused_before_any_work(few_set, tmp_path, options, message):
+    result = run("features", few_set, "-o", tmp_path / "t.csv", *options, code=2)
     assert message in result.stderr
     assert not (tmp_path / "t.csv").exists()
 

@@ -35,7 +35,7 @@ COMMANDS = {
     "atlas": "stability journal-bearing --map eccentricity-mesh --size 3 --budget 5",
     "batch": "report {few} --model {model}",
     "card": "info {data} --card",
-    "chart": "chart journal-bearing --set duration=0.3 --budget 5 -j 1",
+    "chart": "chart journal-bearing --set duration=0.3 --budget 2 -j 1",
     "evaluate": "evaluate {model} {data} --quick -j 1",
     "rank": "features {few} --rank -j 1",
     "report": "report {data} --record 5 --model {model}",

@@ -6,11 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from wearstate.diagnose.feature_rows import feature_table as features_module
 from wearstate.diagnose.feature_rows.feature_rank import (
     LEAST_OF_MACHINE,
     rank_features,
 )
 from wearstate.diagnose.feature_rows.feature_table import USUAL
+from wearstate.diagnose.inspect import rank_text as rank_module
 from wearstate.diagnose.inspect.rank_text import rank_set, value_images
 
 from .test_cli import refused, run, strict
@@ -147,7 +149,26 @@ def test_few_records_of_a_machine_and_gaps():
 # --- the command
 
 
-def test_the_clearance_of_a_pump_is_told_by_its_knocks(small_set, tmp_path):
+@pytest.fixture
+def known_features(small_set, small_trained, monkeypatch):
+    """Features of `small_set` as its training had them: of them the ranking is asked, no more."""
+
+    def told(path, **_):
+        assert path == small_set
+        return small_trained[1]
+
+    monkeypatch.setattr(features_module, "feature_table", told)
+
+
+@pytest.fixture
+def untimed(monkeypatch):
+    """Costs that are not measured: twenty features, each alone on four recordings."""
+    monkeypatch.setattr(
+        rank_module, "costs_ms", lambda path, choices: [1.0 + i for i in range(len(choices))]
+    )
+
+
+def test_the_clearance_of_a_pump_is_told_by_its_knocks(small_set, known_features, tmp_path):
     page = tmp_path / "rank.html"
     told = strict(run("features", small_set, "--rank", "-o", page, "-j", 1, "--json").stdout)
     assert told["target"] == "diametral_clearance_crankpin_m"
@@ -164,7 +185,7 @@ def test_the_clearance_of_a_pump_is_told_by_its_knocks(small_set, tmp_path):
     assert "<script" not in html
 
 
-def test_text_table_and_json_tell_the_same(few_set, tmp_path):
+def test_text_table_and_json_tell_the_same(few_set, untimed, tmp_path):
     table = tmp_path / "rank.csv"
     told = strict(run("features", few_set, "--rank", "-j", 1, "--json").stdout)
     text = run("features", few_set, "--rank", "-o", table, "-j", 1).stdout
@@ -173,7 +194,7 @@ def test_text_table_and_json_tell_the_same(few_set, tmp_path):
     assert [row["name"] for row in rows] == [each["name"] for each in told["features"]]
 
 
-def test_what_cannot_be_ranked_is_refused(small_set, tmp_path):
+def test_what_cannot_be_ranked_is_refused(small_set, known_features, tmp_path):
     refused("features", small_set, "--rank", "--target", "colour", says=["target = 'colour'"])
     refused("features", small_set, "--rank", "--target", "status", says=["the same in all records"])
     refused("features", small_set, "--target", "grade", "-o", tmp_path / "x.csv", says=["--rank"])
@@ -181,7 +202,7 @@ def test_what_cannot_be_ranked_is_refused(small_set, tmp_path):
     refused("features", small_set, says=["DATA and --rank"])
 
 
-def test_records_without_a_label_are_left_out(small_set, small_trained):
+def test_records_without_a_label_are_left_out(small_set, small_trained, untimed):
     _, table, _ = small_trained
     severity = "diametral_clearance_crankpin_m"
     blank = table.manifest.assign(**{severity: table.manifest[severity].where(lambda v: v > 1e-4)})
@@ -191,7 +212,7 @@ def test_records_without_a_label_are_left_out(small_set, small_trained):
     assert len(value_images(found)) == 6
 
 
-def test_another_label_is_ranked_as_conditions(small_set):
+def test_another_label_is_ranked_as_conditions(small_set, known_features, untimed):
     told = strict(
         run("features", small_set, "--rank", "--target", "grade", "-j", 1, "--json").stdout
     )
