@@ -14,15 +14,9 @@ Examples
 array([89.3, 89.3])
 """
 
-from .sim.beam.beam import (
-    Beam,
-    Disc,
-    DistributedLoad,
-    PointLoad,
-    Section,
-    assemble_beam,
-    cowper_coefficient,
-)
+from .sim.beam.beam import Beam, assemble_beam
+from .sim.beam.beam_matrices import cowper_coefficient
+from .sim.beam.beam_parts import Disc, DistributedLoad, PointLoad, Section
 from .sim.beam.campbell import Campbell, CriticalSpeeds, campbell, critical_speeds
 from .sim.beam.modes import RotorModes, modes, natural_frequencies
 from .sim.beam.rotor import Rotor, Support, Unbalance, orbit_axes, unbalance_response

@@ -21,7 +21,8 @@ from wearstate.sim.alignment.alignment import (
 from wearstate.sim.alignment.calibration import CalibrationStatus, calibrate
 from wearstate.sim.alignment.jacking import gap_and_sag, jacking
 from wearstate.sim.alignment.seats import AlignmentError, Seat, seat_stations
-from wearstate.sim.beam.beam import Disc, PointLoad, Section, assemble_beam
+from wearstate.sim.beam.beam import assemble_beam
+from wearstate.sim.beam.beam_parts import Disc, PointLoad, Section
 
 STEEL = {"young": 2.1e11, "shear_modulus": 8.1e10, "density": 7850.0}
 

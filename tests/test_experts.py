@@ -8,9 +8,10 @@ import zipfile
 import numpy as np
 import pytest
 from wearstate.diagnose.feature_rows.model_card import ConfounderRates
+from wearstate.diagnose.learning.blends import Blend
 from wearstate.diagnose.learning.experts import Experts, regime_shares
 from wearstate.diagnose.learning.heads import Head
-from wearstate.diagnose.learning.regressions import CANDIDATES, Blend
+from wearstate.diagnose.learning.regressions import CANDIDATES
 from wearstate.diagnose.wear_model.bundle import Bundle, save_bundle
 from wearstate.diagnose.wear_model.estimate import ModelError
 from wearstate.diagnose.wear_model.file import load_model, save_model

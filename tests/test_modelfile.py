@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from wearstate.diagnose.learning.blends import Blend, Forest
 from wearstate.diagnose.learning.nets import Nets
-from wearstate.diagnose.learning.regressions import Blend, Forest
 from wearstate.diagnose.wear_model import bundle as bundle_module
 from wearstate.diagnose.wear_model.arrays import blend_fits
 from wearstate.diagnose.wear_model.bundle import Bundle, feature_version, load_bundle, save_bundle

@@ -14,9 +14,10 @@ from wearstate.datasets.file.record import DataSet
 from wearstate.diagnose.evaluation.evaluate import evaluate_model, score
 from wearstate.diagnose.feature_rows.feature_table import recording_features
 from wearstate.diagnose.feature_rows.model_card import LayoutCard, ModelCard
+from wearstate.diagnose.learning.blends import Blend, Linear
 from wearstate.diagnose.learning.grades import accuracy_bound, grades_of
 from wearstate.diagnose.learning.heads import Head
-from wearstate.diagnose.learning.regressions import CANDIDATES, Blend, Linear
+from wearstate.diagnose.learning.regressions import CANDIDATES
 from wearstate.diagnose.wear_model import train as training
 from wearstate.diagnose.wear_model.estimate import ModelError
 from wearstate.diagnose.wear_model.file import load_model, save_model

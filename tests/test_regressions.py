@@ -6,9 +6,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from wearstate.datasets.split.rules import group_folds
+from wearstate.diagnose.learning.blends import Linear
 from wearstate.diagnose.learning.regressions import (
     CANDIDATES,
-    Linear,
     RegressionCandidate,
     blend_weights,
     fit_blend,

@@ -14,7 +14,8 @@ from wearstate.diagnose.shaft_tests import before_after, peak_changes, rig_figur
 from wearstate.diagnose.shaft_tests import rig_test as rig
 from wearstate.features.response.frf import Frf
 from wearstate.sim.alignment.calibration import calibrate
-from wearstate.sim.beam.beam import Disc, Section, assemble_beam
+from wearstate.sim.beam.beam import assemble_beam
+from wearstate.sim.beam.beam_parts import Disc, Section
 from wearstate.sim.beam.modes import natural_frequencies
 from wearstate.sim.beam.rotor import Rotor, Support
 from wearstate.sim.scene.load import load_scene

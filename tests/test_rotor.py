@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy import linalg
 from wearstate.sim.beam import rotor as rt
-from wearstate.sim.beam.beam import Disc, Section, assemble_beam
+from wearstate.sim.beam.beam import assemble_beam
+from wearstate.sim.beam.beam_parts import Disc, Section
 from wearstate.sim.beam.campbell import campbell, critical_speeds
 from wearstate.sim.beam.modes import modes
 from wearstate.sim.beam.rotor import Rotor, Support, Unbalance

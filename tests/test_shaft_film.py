@@ -9,7 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from wearstate.diagnose.machines.shaft import _touching
-from wearstate.sim.beam.beam import Disc, PointLoad, Section, assemble_beam
+from wearstate.sim.beam.beam import assemble_beam
+from wearstate.sim.beam.beam_parts import Disc, PointLoad, Section
 from wearstate.sim.beam.modes import modes
 from wearstate.sim.beam.rotor import Rotor
 from wearstate.sim.bearing.coefficients import coefficients

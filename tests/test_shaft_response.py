@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy import sparse
-from wearstate.sim.beam.beam import Disc, Section, assemble_beam
+from wearstate.sim.beam.beam import assemble_beam
+from wearstate.sim.beam.beam_parts import Disc, Section
 from wearstate.sim.beam.modes import modes
 from wearstate.sim.beam.rotor import Rotor, Support, Unbalance, unbalance_response
 from wearstate.sim.shaft import response as sr

@@ -10,8 +10,8 @@ from wearstate.datasets.file.record import DataSet
 from wearstate.datasets.generation.generate import generate
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.feature_rows.feature_table import USUAL, feature_table_names
+from wearstate.diagnose.learning.blends import Blend, Linear
 from wearstate.diagnose.learning.heads import Head, logit
-from wearstate.diagnose.learning.regressions import Blend, Linear
 from wearstate.diagnose.wear_model.file import load_model, save_model
 from wearstate.diagnose.wear_model.learn import learn
 from wearstate.diagnose.wear_model.strangers import REFUSED_AS_STRANGER, strangers_in

@@ -31,7 +31,8 @@ from ..feature_rows.feature_table import (
 )
 from ..feature_rows.model_card import ClassCard
 from ..feature_rows.quality import layout_faults, sample_faults
-from ..learning.regressions import CANDIDATES, Blend, Folds, fit_blend
+from ..learning.blends import Blend
+from ..learning.regressions import CANDIDATES, Folds, fit_blend
 from ..report.batch import Item, fault_of
 from ..wear_model.estimate import ModelError
 from ..wear_model.novelty import Familiarity, fit_familiarity

@@ -10,8 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .blends import Blend
 from .heads import FittedHead, Head
-from .regressions import USUAL, Blend, Fitted, Index, RegressionOption, cheapest_good, front
+from .regressions import USUAL, Fitted, Index, RegressionOption, cheapest_good, front
 
 Float = NDArray[np.float64]
 

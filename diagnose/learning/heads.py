@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .regressions import CANDIDATES, Blend, Fitted, Folds, RegressionCandidate, fit_blend
+from .blends import Blend
+from .regressions import CANDIDATES, Fitted, Folds, RegressionCandidate, fit_blend
 
 Float = NDArray[np.float64]
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .blends import Blend, Linear
 from .conformal import (
     COVERAGE,
     IntervalCalibration,
@@ -22,7 +23,6 @@ from .conformal import (
 )
 from .experts import Experts
 from .grades import GRADE_NAMES, grades_of
-from .regressions import Blend, Linear
 
 Float = NDArray[np.float64]
 

@@ -11,7 +11,8 @@ from scipy import linalg
 
 from ...sim.alignment.alignment import AlignmentLine, influence, reactions
 from ...sim.alignment.seats import Seat, seat_stations
-from ...sim.beam.beam import Disc, Section, assemble_beam
+from ...sim.beam.beam import assemble_beam
+from ...sim.beam.beam_parts import Disc, Section
 from ...sim.beam.modes import RotorModes, modes
 from ...sim.beam.rotor import Rotor, Support
 

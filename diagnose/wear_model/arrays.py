@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from ..feature_rows.model_card import Strict
+from ..learning.blends import Blend, Forest, Linear, Part
 from ..learning.nets import Nets
-from ..learning.regressions import Blend, Forest, Linear, Part
 from .bandwidth import tops_in
 from .noise_floor import floors_in, noise_levels_in
 from .novelty import Familiarity

@@ -13,10 +13,10 @@ from pydantic import Field, model_validator
 from ..feature_rows.model_card import ModelCard, Portion, Strict
 from ..feature_rows.physical import level_channels, physical_rows, shape_rows
 from ..feature_rows.quality import Levels
+from ..learning.blends import Blend, Linear
 from ..learning.conformal import IntervalCalibration, Scale, scale_inputs
 from ..learning.experts import Experts
 from ..learning.heads import Head
-from ..learning.regressions import Blend, Linear
 from ..learning.severity import Estimator
 from .arrays import (
     BlendStructure,

@@ -14,6 +14,7 @@ from ..feature_rows.feature_table import is_regime
 from ..feature_rows.model_card import StrangerRates
 from ..feature_rows.noted import doubted, noted_values, strayed
 from ..feature_rows.quality import Levels, fit_levels
+from ..learning.blends import Blend
 from ..learning.conformal import (
     IntervalCalibration,
     fit_scale,
@@ -28,7 +29,6 @@ from ..learning.regressions import (
     BUDGET_MS,
     CANDIDATES,
     WITNESSES,
-    Blend,
     Fitted,
     Folds,
     RegressionCandidate,

@@ -24,7 +24,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import cho_solve_banded, cholesky_banded
 
-from ..beam.beam import Beam, PointLoad
+from ..beam.beam import Beam
+from ..beam.beam_parts import PointLoad
 from ..brief import brief
 from .contact import NO_GAP, HeldLine, Rest, come_to_rest, following, rest_on
 from .seats import AlignmentError, Seat, line_faults

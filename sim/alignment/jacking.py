@@ -7,7 +7,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from ..beam.beam import Beam, DistributedLoad, PointLoad, assemble_beam
+from ..beam.beam import Beam, assemble_beam
+from ..beam.beam_parts import DistributedLoad, PointLoad
 from ..brief import brief
 from .alignment import (
     AS_SET,

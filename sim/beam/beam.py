@@ -20,17 +20,27 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.sparse import coo_array
 
 from ..brief import brief
+from .beam_matrices import (
+    SAME,
+    Sparse,
+    cut_forces,
+    gyroscopic_matrix,
+    mass_matrix,
+    merged,
+    mesh_elements,
+    mesh_nodes,
+    steady_load,
+    stiffness_matrix,
+)
+from .beam_parts import Disc, DistributedLoad, Elements, PointLoad, Section
 
 Vector = NDArray[np.float64]
 Index = NDArray[np.int64]
-Sparse = Any  # scipy.sparse.csc_array; scipy has no types
 
 STANDARD_GRAVITY = 9.80665
 """Acceleration of gravity [m/s^2] (CGPM 1901)."""
@@ -41,131 +51,8 @@ THEORIES = ("euler-bernoulli", "rayleigh", "timoshenko")
 COORDINATES = ("y", "slope_y", "z", "slope_z")
 """Of one node, in order."""
 
-_SAME = 1e-9  # of the shaft's length: stations nearer than this are one
 _NEAREST = 1e-4  # of the shaft's length: with an element so short reactions round to 1e-7
 _MOST_NODES = 20_000
-
-
-@dataclass(frozen=True, kw_only=True)
-class Section:
-    """A piece of the shaft of one material and one cross-section.
-
-    Attributes
-    ----------
-    length : float
-        [m]
-    outer_diameter, inner_diameter : float
-        [m]; 0 <= inner < outer.
-    young, shear_modulus : float
-        [Pa]
-    density : float
-        [kg/m^3]
-
-    Examples
-    --------
-    >>> section = Section(length=1.0, outer_diameter=0.2, young=2.11e11, shear_modulus=8.12e10,
-    ...                   density=7810.0)
-    >>> round(section.bending_stiffness / 1e6, 3)  # MN m^2
-    16.572
-    """
-
-    length: float
-    outer_diameter: float
-    inner_diameter: float = 0.0
-    young: float
-    shear_modulus: float
-    density: float
-
-    @property
-    def area(self) -> float:
-        """Of the cross-section [m^2]."""
-        return math.pi / 4 * (self.outer_diameter**2 - self.inner_diameter**2)
-
-    @property
-    def second_moment(self) -> float:
-        """Of the cross-section about a diameter [m^4]."""
-        return math.pi / 64 * (self.outer_diameter**4 - self.inner_diameter**4)
-
-    @property
-    def bending_stiffness(self) -> float:
-        """E I [N m^2]."""
-        return self.young * self.second_moment
-
-    @property
-    def poisson(self) -> float:
-        """E / 2 G - 1."""
-        return self.young / (2 * self.shear_modulus) - 1
-
-
-@dataclass(frozen=True, kw_only=True)
-class Disc:
-    """A rigid body on the shaft: propeller, coupling, wheel.
-
-    Attributes
-    ----------
-    station : float
-        [m]
-    mass : float
-        [kg]
-    polar_inertia, diametral_inertia : float
-        About the shaft's axis and about a diameter through the station [kg m^2].
-    entrained_mass : float
-        Of the water that moves with it [kg]: inertia without weight.
-    entrained_polar, entrained_diametral : float
-        The same of rotation [kg m^2]. The water is not taken to spin with the body, so it makes
-        no gyroscopic moment, and `entrained_polar` has no part in bending: it is kept here with
-        the propeller's other numbers.
-    buoyancy : float
-        Upward [N]; it lessens the weight.
-    """
-
-    station: float
-    mass: float
-    polar_inertia: float = 0.0
-    diametral_inertia: float = 0.0
-    entrained_mass: float = 0.0
-    entrained_polar: float = 0.0
-    entrained_diametral: float = 0.0
-    buoyancy: float = 0.0
-
-
-@dataclass(frozen=True, kw_only=True)
-class PointLoad:
-    """Steady force and moment at a station.
-
-    Attributes
-    ----------
-    station : float
-        [m]
-    up, side : float
-        Force along y and z [N].
-    moment_up, moment_side : float
-        Moment that turns slope_y and slope_z up [N m].
-    """
-
-    station: float
-    up: float = 0.0
-    side: float = 0.0
-    moment_up: float = 0.0
-    moment_side: float = 0.0
-
-
-@dataclass(frozen=True, kw_only=True)
-class DistributedLoad:
-    """Steady force spread evenly over a stretch of the shaft.
-
-    Attributes
-    ----------
-    start, end : float
-        Stations [m], start < end.
-    up, side : float
-        Along y and z [N/m].
-    """
-
-    start: float
-    end: float
-    up: float = 0.0
-    side: float = 0.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -190,31 +77,6 @@ class InternalForces:
     moment_side: Vector
     shear_up: Vector
     shear_side: Vector
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Elements:
-    """The elements between neighbouring stations; the fields are [shape=(n - 1,)].
-
-    Attributes
-    ----------
-    length : numpy.ndarray
-        [m]
-    bending, mass, rotary : numpy.ndarray
-        E I [N m^2], rho A [kg/m], rho I [kg m]; the last is zero where the theory has none.
-    shear_ratio : numpy.ndarray
-        ``12 E I / (k G A L^2)``; zero where the theory has no shear.
-    up, side : numpy.ndarray
-        Steady load with the shaft's own weight [N/m].
-    """
-
-    length: Vector
-    bending: Vector
-    mass: Vector
-    rotary: Vector
-    shear_ratio: Vector
-    up: Vector
-    side: Vector
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -281,7 +143,7 @@ class Beam:
             No node stands there; the message names the nearest.
         """
         nearest = int(np.argmin(np.abs(self.stations - station)))
-        if not abs(self.stations[nearest] - station) <= 2 * _SAME * self.length:
+        if not abs(self.stations[nearest] - station) <= 2 * SAME * self.length:
             raise ValueError(
                 f"station = {station:g} m is no node, the nearest is {self.stations[nearest]:g} m; "
                 "name it in `stations` of assemble_beam"
@@ -331,8 +193,8 @@ class Beam:
                 f"deflection of shape {q.shape} must be ({self.n_dof},); give every coordinate"
             )
         e = self.elements
-        shear_up, moment_up = _cut_forces(e, q[0::4], q[1::4], e.up)
-        shear_side, moment_side = _cut_forces(e, q[2::4], q[3::4], e.side)
+        shear_up, moment_up = cut_forces(e, q[0::4], q[1::4], e.up)
+        shear_side, moment_side = cut_forces(e, q[2::4], q[3::4], e.side)
         return InternalForces(
             stations=np.repeat(self.stations, 2)[1:-1],
             moment_up=moment_up,
@@ -424,15 +286,15 @@ def assemble_beam(
     if faults:
         raise ValueError("\n".join(faults))
     ends = np.cumsum([0.0, *(section.length for section in sections)])
-    nodes = _nodes(ends, _named_stations(discs, loads, stations), longest_element)
-    elements = _elements(nodes, ends, sections, loads, theory, shear_coefficient, gravity)
-    load = _steady_load(nodes, elements, discs, loads, gravity)
+    nodes = mesh_nodes(ends, _named_stations(discs, loads, stations), longest_element)
+    elements = mesh_elements(nodes, ends, sections, loads, theory, shear_coefficient, gravity)
+    load = steady_load(nodes, elements, discs, loads, gravity)
     own = float(elements.mass @ elements.length) * gravity
     return Beam(
         stations=nodes,
-        mass=_mass(nodes, elements, discs),
-        stiffness=_stiffness(elements),
-        gyroscopic=_gyroscopic(nodes, elements, discs),
+        mass=mass_matrix(nodes, elements, discs),
+        stiffness=stiffness_matrix(elements),
+        gyroscopic=gyroscopic_matrix(nodes, elements, discs),
         load=load,
         weight=own + sum(disc.mass * gravity - disc.buoyancy for disc in discs),
         elements=elements,
@@ -443,44 +305,6 @@ def assemble_beam(
         shear_coefficient=shear_coefficient,
         gravity=gravity,
     )
-
-
-def cowper_coefficient(poisson: float, diameter_ratio: float = 0.0) -> float:
-    """Shear coefficient k of a solid or hollow circle.
-
-    Parameters
-    ----------
-    poisson : float
-        Ratio in (-1, 0.5].
-    diameter_ratio : float
-        Inner over outer diameter, in [0, 1).
-
-    Returns
-    -------
-    float
-        Shear area over the area, k.
-
-    Raises
-    ------
-    ValueError
-        An argument is out of range.
-
-    References
-    ----------
-    Cowper (1966), Journal of Applied Mechanics 33(2), 335-340, doi:10.1115/1.3625046.
-
-    Examples
-    --------
-    >>> round(cowper_coefficient(0.3), 4), round(cowper_coefficient(0.3, 0.999999), 4)
-    (0.8864, 0.5306)
-    """
-    if not -1 < poisson <= 0.5:
-        raise ValueError(f"poisson = {poisson} must be in (-1, 0.5]; metals have about 0.3")
-    if not 0 <= diameter_ratio < 1:
-        raise ValueError(f"diameter_ratio = {diameter_ratio} must be in [0, 1); inner over outer")
-    square = (1 + diameter_ratio**2) ** 2
-    hollow = (20 + 12 * poisson) * diameter_ratio**2
-    return 6 * (1 + poisson) * square / ((7 + 6 * poisson) * square + hollow)
 
 
 # --- what is refused
@@ -571,13 +395,13 @@ def _place_faults(
     ends = np.cumsum([0.0, *(section.length for section in sections)])
     length = float(ends[-1])
     named = _named_stations(discs, loads, stations)
-    slack = _SAME * length
+    slack = SAME * length
     off = [(n, s) for n, s in named if not -slack <= s <= length + slack]
     for name, station in off:
         yield f"{name} = {station} m must be in [0, {length:g}] m, on the shaft; move it"
     if off:
         return
-    nodes = _merged(ends, named)
+    nodes = merged(ends, named)
     for left, right in pairwise(nodes):
         if right - left < _NEAREST * length:
             yield (
@@ -619,207 +443,3 @@ def _named_stations(
         places = ("station",) if isinstance(load, PointLoad) else ("start", "end")
         named += [(f"loads[{i}].{place}", getattr(load, place)) for place in places]
     return named
-
-
-def _merged(ends: Vector, named: list[tuple[str, float]]) -> Vector:
-    """Rising stations, each once; the ends of sections take precedence."""
-    slack = _SAME * ends[-1]
-    others = np.array([station for _, station in named], dtype=float)
-    if others.size:
-        nearest = np.abs(others[:, None] - ends).min(axis=1)
-        others = np.sort(others[nearest > slack])
-        others = others[np.diff(others, prepend=-math.inf) > slack]
-    return np.sort(np.concatenate([ends, others]))
-
-
-def _nodes(ends: Vector, named: list[tuple[str, float]], longest_element: float | None) -> Vector:
-    nodes = _merged(ends, named)
-    if longest_element is None:
-        return nodes
-    gaps = np.diff(nodes)
-    # a gap of a whole number of elements must not get one more by rounding
-    counts = np.maximum(1, np.ceil(gaps / longest_element * (1 - _SAME))).astype(int)
-    owner = np.repeat(np.arange(gaps.size), counts)
-    step = np.arange(owner.size) - np.repeat(np.cumsum(counts) - counts, counts)
-    return np.append(nodes[owner] + gaps[owner] * (step / counts[owner]), nodes[-1])
-
-
-def _elements(
-    nodes: Vector,
-    ends: Vector,
-    sections: Sequence[Section],
-    loads: Sequence[PointLoad | DistributedLoad],
-    theory: str,
-    shear_coefficient: float | str | None,
-    gravity: float,
-) -> Elements:
-    length, middle = np.diff(nodes), (nodes[:-1] + nodes[1:]) / 2
-    of = np.searchsorted(ends, middle) - 1
-    bending = np.array([section.bending_stiffness for section in sections])[of]
-    mass = np.array([section.density * section.area for section in sections])[of]
-    rotary = np.array([section.density * section.second_moment for section in sections])[of]
-    shear_ratio = np.zeros(length.size)
-    if theory == "timoshenko":
-        area = np.array([_shear_stiffness(section, shear_coefficient) for section in sections])[of]
-        shear_ratio = 12 * bending / (area * length**2)
-    up, side = -mass * gravity, np.zeros(length.size)
-    for load in loads:
-        if isinstance(load, DistributedLoad):
-            under = (load.start < middle) & (middle < load.end)
-            up, side = up + load.up * under, side + load.side * under
-    return Elements(
-        length=length,
-        bending=bending,
-        mass=mass,
-        rotary=np.zeros(length.size) if theory == "euler-bernoulli" else rotary,
-        shear_ratio=shear_ratio,
-        up=up,
-        side=side,
-    )
-
-
-def _shear_stiffness(section: Section, shear_coefficient: float | str | None) -> float:
-    """``k G A`` [N]."""
-    if shear_coefficient == "cowper":
-        ratio = section.inner_diameter / section.outer_diameter
-        k = cowper_coefficient(section.poisson, ratio)
-    else:
-        assert isinstance(shear_coefficient, (int, float))  # checked with the other arguments
-        k = float(shear_coefficient)
-    return k * section.shear_modulus * section.area
-
-
-# --- matrices of one plane, [shape=(n_elements, 4, 4)], of (w1, slope1, w2, slope2)
-
-
-def _plane_matrix(rows: Sequence[Sequence[Any]], length: Vector) -> Vector:
-    """Symmetric matrices from the upper triangle, the slopes scaled by the element's length."""
-    full = np.empty((length.size, 4, 4))
-    for i, row in enumerate(rows):
-        for j, value in enumerate(row, start=i):
-            full[:, i, j] = full[:, j, i] = value * length ** (i % 2 + j % 2)
-    return full
-
-
-def _plane_stiffness(e: Elements) -> Vector:
-    s = e.shear_ratio
-    rows: list[list[Any]] = [[12.0, 6.0, -12.0, 6.0], [4 + s, -6.0, 2 - s], [12.0, -6.0], [4 + s]]
-    scale: Vector = e.bending / (e.length**3 * (1 + s))
-    return scale[:, None, None] * _plane_matrix(rows, e.length)
-
-
-def _plane_mass(e: Elements) -> Vector:
-    """Of the translation."""
-    s = e.shear_ratio
-    ends, turns = 312 + 588 * s + 280 * s**2, 44 + 77 * s + 35 * s**2
-    across, skewed = 108 + 252 * s + 140 * s**2, 26 + 63 * s + 35 * s**2
-    own, other = 8 + 14 * s + 7 * s**2, 6 + 14 * s + 7 * s**2
-    rows = [[ends, turns, across, -skewed], [own, skewed, -other], [ends, -turns], [own]]
-    scale = e.mass * e.length / (840 * (1 + s) ** 2)
-    return scale[:, None, None] * _plane_matrix(rows, e.length)
-
-
-def _plane_rotary(e: Elements) -> Vector:
-    """Of the rotation about a diameter."""
-    s = e.shear_ratio
-    turns, own, other = 3 - 15 * s, 4 + 5 * s + 10 * s**2, -1 - 5 * s + 5 * s**2
-    rows: list[list[Any]] = [
-        [36.0, turns, -36.0, turns],
-        [own, -turns, other],
-        [36.0, -turns],
-        [own],
-    ]
-    scale: Vector = e.rotary / (30 * e.length * (1 + s) ** 2)
-    return scale[:, None, None] * _plane_matrix(rows, e.length)
-
-
-# --- assembly
-
-
-def _sparse(n_dof: int, parts: Sequence[tuple[Any, Any, Any]]) -> Sparse:
-    """Sum of (rows, columns, values) of any shapes; exact zeros are dropped."""
-    rows, columns, values = (np.concatenate([np.ravel(p[k]) for p in parts]) for k in range(3))
-    matrix = coo_array((values, (rows, columns)), shape=(n_dof, n_dof)).tocsc()
-    matrix.eliminate_zeros()
-    return matrix
-
-
-def _block(n_elements: int, rows: int, columns: int) -> tuple[Index, Index]:
-    """Places of a plane matrix: `rows` and `columns` are 0 for the plane of y, 2 for that of z."""
-    local = np.array([0, 1, 4, 5])
-    first = 4 * np.arange(n_elements)[:, None, None]
-    shape = (n_elements, 4, 4)
-    i = np.broadcast_to(first + rows + local[:, None], shape)
-    j = np.broadcast_to(first + columns + local, shape)
-    return i, j
-
-
-def _both_planes(plane: Vector) -> list[tuple[Any, Any, Any]]:
-    return [(*_block(len(plane), start, start), plane) for start in (0, 2)]
-
-
-def _stiffness(e: Elements) -> Sparse:
-    return _sparse(4 * (e.length.size + 1), _both_planes(_plane_stiffness(e)))
-
-
-def _mass(nodes: Vector, e: Elements, discs: Sequence[Disc]) -> Sparse:
-    parts: list[tuple[Any, Any, Any]] = _both_planes(_plane_mass(e) + _plane_rotary(e))
-    for disc in discs:
-        moved = disc.mass + disc.entrained_mass
-        turned = disc.diametral_inertia + disc.entrained_diametral
-        at = _first_dof(nodes, disc.station) + np.arange(4)
-        parts.append((at, at, [moved, turned, moved, turned]))
-    return _sparse(4 * nodes.size, parts)
-
-
-def _gyroscopic(nodes: Vector, e: Elements, discs: Sequence[Disc]) -> Sparse:
-    polar = 2 * _plane_rotary(e)  # a circle's polar moment is twice that about a diameter
-    parts: list[tuple[Any, Any, Any]] = [
-        (*_block(len(polar), 0, 2), polar),
-        (*_block(len(polar), 2, 0), -polar),
-    ]
-    for disc in discs:
-        turn = _first_dof(nodes, disc.station) + np.array([1, 3])
-        parts.append((turn, turn[::-1], [disc.polar_inertia, -disc.polar_inertia]))
-    return _sparse(4 * nodes.size, parts)
-
-
-def _steady_load(
-    nodes: Vector,
-    e: Elements,
-    discs: Sequence[Disc],
-    loads: Sequence[PointLoad | DistributedLoad],
-    gravity: float,
-) -> Vector:
-    load = np.zeros((nodes.size, 4))
-    for column, spread in ((0, e.up), (2, e.side)):
-        force, moment = spread * e.length / 2, spread * e.length**2 / 12
-        load[:-1, column] += force
-        load[1:, column] += force
-        load[:-1, column + 1] += moment
-        load[1:, column + 1] -= moment
-    flat = load.ravel()
-    for disc in discs:
-        flat[_first_dof(nodes, disc.station)] += disc.buoyancy - disc.mass * gravity
-    for point in loads:
-        if isinstance(point, PointLoad):
-            first = _first_dof(nodes, point.station)
-            flat[first : first + 4] += point.up, point.moment_up, point.side, point.moment_side
-    return flat
-
-
-def _first_dof(nodes: Vector, station: float) -> int:
-    return 4 * int(np.argmin(np.abs(nodes - station)))
-
-
-def _cut_forces(
-    e: Elements, deflection: Vector, slope: Vector, spread: Vector
-) -> tuple[Vector, Vector]:
-    """Shear and moment at both ends of every element, [shape=(2 n_elements,)]."""
-    ends = np.stack([deflection[:-1], slope[:-1], deflection[1:], slope[1:]], axis=1)
-    force = np.einsum("eij,ej->ei", _plane_stiffness(e), ends)
-    even, turn = spread * e.length / 2, spread * e.length**2 / 12
-    force -= np.stack([even, turn, even, -turn], axis=1)
-    shear = np.stack([force[:, 0], -force[:, 2]], axis=1)
-    moment = np.stack([-force[:, 1], force[:, 3]], axis=1)
-    return shear.ravel(), moment.ravel()

@@ -11,7 +11,7 @@ from scipy import linalg
 from scipy.optimize import brentq, linear_sum_assignment
 
 from ..brief import brief
-from .beam import Sparse
+from .beam_matrices import Sparse
 from .modes import EQUAL, Vibrations, direction_of, modes
 from .rotor import Rotor, RotorLaw
 

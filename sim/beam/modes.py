@@ -24,6 +24,7 @@ from .rotor import Rotor
 
 Vector = NDArray[np.float64]
 Complex = NDArray[np.complex128]
+
 Found = tuple[Complex, Complex, Vector]
 
 _SEED = 5  # of the first vector of a sparse search: any fixed one makes runs repeatable

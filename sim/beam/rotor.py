@@ -16,7 +16,8 @@ from scipy.sparse import block_array, coo_array, csc_array
 from scipy.sparse.linalg import splu
 
 from ..brief import brief
-from .beam import Beam, Sparse
+from .beam import Beam
+from .beam_matrices import Sparse
 
 Vector = NDArray[np.float64]
 Complex = NDArray[np.complex128]

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from ..alignment.alignment import AlignmentLine, Condition
 from ..alignment.seats import Seat, seat_stations
-from ..beam.beam import Beam, Disc, PointLoad, Section, assemble_beam
+from ..beam.beam import Beam, assemble_beam
+from ..beam.beam_parts import Disc, PointLoad, Section
 from ..beam.rotor import Rotor, Support
 from ..bearing.operate import JournalBearing
 from ..brief import brief

@@ -28,7 +28,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from threadpoolctl import threadpool_limits
 from wearstate.sim.alignment.alignment import AlignmentLine, influence, reactions
 from wearstate.sim.alignment.seats import Seat
-from wearstate.sim.beam.beam import Disc, Section, assemble_beam
+from wearstate.sim.beam.beam import assemble_beam
+from wearstate.sim.beam.beam_parts import Disc, Section
 from wearstate.sim.beam.rotor import Rotor, Support
 from wearstate.sim.fidelity.ladder import effects_of
 from wearstate.sim.machine.simulate import recorder, simulate

@@ -26,7 +26,8 @@ from twin_opinion import COLUMN, foreign_machines
 from wearstate.datasets.generation.generate import generate
 from wearstate.datasets.recipe.load import load_recipe
 from wearstate.diagnose.feature_rows.feature_table import feature_table, recording_features
-from wearstate.diagnose.learning.regressions import CANDIDATES, Blend
+from wearstate.diagnose.learning.blends import Blend
+from wearstate.diagnose.learning.regressions import CANDIDATES
 from wearstate.diagnose.learning.scores import resampled, share
 from wearstate.diagnose.wear_model.training_rows import TrainingRows
 from wearstate.sim.output.recording import Recording
