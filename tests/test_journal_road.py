@@ -219,7 +219,7 @@ def test_the_film_equilibrium_stands_beside_the_model(trained, data, tmp_path):
     few = tmp_path / "few.h5"  # the first records of the set
     generate("journal-bearing-small", 6, few, seed=3)
     whole = run("report", few, "--model", model, "--json").stdout.splitlines()
-    assert json.loads(whole[4])["film"] == table["film"]
+    assert json.loads(whole[4])["film"] == {**table["film"], "nameplate": str(few)}
     page = tmp_path / "all.html"
     run("report", few, "--model", model, "--scene", "journal-bearing", "-o", page)
     assert "Film equilibrium:" in page.read_text(encoding="utf-8")
