@@ -97,6 +97,7 @@ def test_neighbours_number_and_place_change_no_byte(drawn, alone, some):
         },
         {"joint.wristpin.rung": "compliant", "joint.guide.rung": "compliant"},
         {"crank.unbalance": "0.1 kg m"},
+        {"joint.crankpin.one_sided": 0.8, "joint.crankpin.diametral_clearance": "0.3 mm"},
         {"piston.seal_friction": "80 N", "piston.seal_friction_share": 0.02},
         {
             "joint.crankpin.law": "exact",

@@ -139,6 +139,7 @@ _OIL = {  # an eye 50 mm long in oil of a warm gearbox
     f"{_PIN}.oil.roughness": "0.6 um",
 }
 _STARVED = _OIL | {f"{_PIN}.oil.filled_gap": "10 um"}
+_DRY = {f"{_PIN}.rung": "compliant"}
 _LEVELS = {"pressure.rung": "two-level"}  # other rungs find these angles themselves
 _WRIST = {"joint.wristpin.rung": "compliant"}
 _GUIDE = {"joint.guide.rung": "compliant"}
@@ -161,6 +162,7 @@ _SHIFTS = (
     factor(f"{_PIN}.damping", 0.4, 2.5, "squeezed oil, cold or hot"),
     factor(f"{_PIN}.friction", 0.4, 2.0, "from full film to dry metal"),
     factor(f"{_PIN}.tangential_damping", 0.3, 3.0, "viscosity of the oil"),
+    set_to(f"{_PIN}.one_sided", (0.5,), "an eye worn oval where the load presses", under=_DRY),
     set_to(
         f"{_PIN}.law",
         ("hunt-crossley", "flores", "exact"),

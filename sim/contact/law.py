@@ -58,7 +58,8 @@ CONTACT = np.dtype(
         ("stiffness", np.float64),  # K of the elasticity: [N/m], Hertz [N/m^1.5]
         ("damping", np.float64),  # C of Kelvin-Voigt [N s/m]
         ("hysteresis", np.float64),  # a of the hysteresis laws
-        ("clearance", np.float64),  # radial [m]
+        ("clearance", np.float64),  # radial [m]; of a worn eye across the rod
+        ("slot", np.float64),  # by which an eye is longer along its rod than across [m]
         ("speed_floor", np.float64),  # least d'_0, or the constant one, > 0 [m/s]
         ("release", np.int64),  # RELEASE_*
         ("friction_law", np.int64),  # FRICTION_*

@@ -22,7 +22,7 @@ from .layout import (
     WRISTPIN,
     pose_of,
 )
-from .throw_motion import corner_margin, crank_offset, pin_touch, wrist_offset
+from .throw_motion import corner_margin, crank_offset, pin_touch, worn_eye, wrist_offset
 
 _MOST_CUTS = 8  # contact changes within one step and throw before the rest is taken as it is
 
@@ -38,9 +38,10 @@ def contact_margin(k: int, j: int, w: Any, row: int, t: Any) -> Any:
     sin_b, cos_b = sine_cosine(p.beta)
     if j == CRANKPIN:
         sin_a, cos_a = sine_cosine(w.crank[row, ANGLE] + q.phase)
-        d_x, d_y, v_x, v_y = crank_offset(p, omega, q, sin_a, cos_a, sin_b, cos_b)
+        offset = crank_offset(p, omega, q, sin_a, cos_a, sin_b, cos_b)
     else:
-        d_x, d_y, v_x, v_y = wrist_offset(p, q, sin_b, cos_b)
+        offset = wrist_offset(p, q, sin_b, cos_b)
+    (d_x, d_y, v_x, v_y), _ = worn_eye(offset, p.beta_rate, sin_b, cos_b, t.contacts[k, j])
     touch, _, _ = pin_touch(d_x, d_y, v_x, v_y, touching, impact, t.contacts[k, j])
     return touch.margin
 

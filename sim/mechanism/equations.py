@@ -48,6 +48,8 @@ from .throw_motion import (
     link_drag,
     motor_moment,
     seal_drag,
+    slot_moment,
+    worn_eye,
     wrist_offset,
 )
 
@@ -166,10 +168,12 @@ def _throw(k: int, w: Any, row: int, share: float, t: Any) -> None:
     sin_b, cos_b = sine_cosine(p.beta)
     pressure, added = _pressure(k, w, row, share, t)
     on_face, inv_px = -q.piston_area * pressure, 1.0 / (q.piston_mass + added)
-    at_crank = crank_offset(p, omega, q, sin_a, cos_a, sin_b, cos_b)
+    centred = crank_offset(p, omega, q, sin_a, cos_a, sin_b, cos_b)
+    at_crank, along = worn_eye(centred, p.beta_rate, sin_b, cos_b, t.contacts[k, CRANKPIN])
     pin, peak, overlap = _pin_load(
         CRANKPIN, q.crankpin_rung, q.crankpin_radius, at_crank, omega, k, b, held, t
     )
+    pin = slot_moment(pin, along, sin_b, cos_b)
     overlap_ratio = overlap / q.crankpin_radius if q.crankpin_rung != JOINT_IDEAL else 0.0
     wrist, guide_x, guide_y, guide_moment = PinLoad(0.0, 0.0, 0.0, 0.0), 0.0, 0.0, 0.0
     if q.wristpin_rung != JOINT_IDEAL:

@@ -87,6 +87,28 @@ def wrist_offset(p: Any, q: Any, sin_b: float, cos_b: float) -> Any:
 
 
 @kernel
+def worn_eye(offset: Any, beta_rate: float, sin_b: float, cos_b: float, c: Any) -> Any:
+    """Offset of the crank pin, see :func:`crank_offset`, from the nearest centre of a worn eye.
+
+    A pin that has sunk into one side of its eye, towards the wrist pin, has left the room of two
+    half circles and what is between them: their centres lie on a line along the rod, as long as
+    the contact's `slot`. Returned after it is how far along that line the centre lies [m].
+    """
+    d_x, d_y, v_x, v_y = offset
+    along = min(max(d_x * cos_b - d_y * sin_b, 0.0), c.slot)
+    swing = along * beta_rate
+    nearest = (d_x - along * cos_b, d_y + along * sin_b, v_x + swing * sin_b, v_y + swing * cos_b)
+    return nearest, along
+
+
+@kernel
+def slot_moment(pin: Any, along: float, sin_b: float, cos_b: float) -> Any:
+    """Load of a pin whose force acts so far along the rod from its eye's centre [m]."""
+    turning = along * (pin.x * sin_b + pin.y * cos_b)
+    return PinLoad(pin.x, pin.y, pin.on_pin, pin.on_eye + turning)
+
+
+@kernel
 def polar(d_x: float, d_y: float, v_x: float, v_y: float) -> Any:
     """Length, its rate, and direction; a centred pin has the stroke's, never NaN."""
     distance = math.sqrt(d_x * d_x + d_y * d_y)

@@ -73,6 +73,7 @@ class ContactLane(NamedTuple):
     damping: float
     hysteresis: float
     clearance: float
+    slot: float
     speed_floor: float
     release: float
     friction_law: float

@@ -23,6 +23,8 @@ from ..mechanism.throw_motion import (
     held_wrist,
     motor_moment,
     seal_drag,
+    slot_moment,
+    worn_eye,
     wrist_offset,
 )
 from .fields import fields_of, put_fields
@@ -62,6 +64,7 @@ def _as_told(c: Any, plain: bool) -> Any:
         c.damping,
         c.hysteresis,
         c.clearance,
+        c.slot,
         c.speed_floor,
         c.release,
         float(FRICTION_SMOOTH) if plain else c.friction_law,
@@ -136,22 +139,16 @@ def _in_crankpin(p: Any, s: Any, plain: bool) -> None:
             s.v[CRANK, lane],
         )
         radius = q.crankpin_radius
-        d_x, d_y, v_x, v_y = crank_offset(
-            pose,
-            omega,
-            q,
-            s.turned[0, lane],
-            s.turned[1, lane],
-            s.turned[2, lane],
-            s.turned[3, lane],
-        )
+        sin_b, cos_b = s.turned[2, lane], s.turned[3, lane]
+        centred = crank_offset(pose, omega, q, s.turned[0, lane], s.turned[1, lane], sin_b, cos_b)
+        (d_x, d_y, v_x, v_y), along = worn_eye(centred, pose.beta_rate, sin_b, cos_b, c)
         spin = omega * radius + pose.beta_rate * (radius + c.clearance)
         pin, touch = dry_pin(
             d_x, d_y, v_x, v_y, spin, radius, s.touching[0, lane] != 0.0, s.impact[0, lane], c
         )
         s.margin[0, lane], s.approach[0, lane] = touch.margin, touch.approach
         s.overlap[0, lane], s.normal[lane] = touch.overlap, touch.normal
-        put_fields(s.pin, lane, pin)
+        put_fields(s.pin, lane, slot_moment(pin, along, sin_b, cos_b))
 
 
 @subroutine

@@ -32,7 +32,7 @@ from .joints import joint_parts, joint_rungs, kept_by_scene
 
 
 def contact_record(
-    part: RevoluteJoint | Guide, clearance: float, load: float, mobility: float
+    part: RevoluteJoint | Guide, clearance: float, load: float, mobility: float, slot: float = 0.0
 ) -> NDArray[np.void]:
     """Kernel record of one contact.
 
@@ -46,6 +46,8 @@ def contact_record(
         Largest force of the ideal joint [N], which places the floor of the impact speed.
     mobility : float
         Largest acceleration of the contact per unit force [1/kg].
+    slot : float
+        By which an eye is longer along its rod than across [m].
 
     Returns
     -------
@@ -76,6 +78,7 @@ def contact_record(
         "damping": part.damping,
         "hysteresis": 0.0 if kelvin_voigt else hysteresis(part.law, part.restitution or 0.0),
         "clearance": clearance,
+        "slot": slot,
         "release": RELEASE_AT_ZERO_FORCE if kelvin_voigt else RELEASE_AT_ZERO_PENETRATION,
         "friction_law": FRICTION_RAMP if part.friction_law == "ramp" else FRICTION_SMOOTH,
         "friction": part.friction,
@@ -275,6 +278,14 @@ def _different_throws(scene: PumpScene) -> list[int]:
     return found
 
 
+def _worn_room(scene: PumpScene, part: RevoluteJoint | Guide) -> tuple[float, float]:
+    """Radial clearance across the rod, and by how much the eye is longer along it [m]."""
+    if isinstance(part, Guide) or scene.wear is None:
+        return part.clearance_radial, 0.0
+    slot = part.one_sided * max(part.clearance_diametral - scene.wear.as_new, 0.0)
+    return part.clearance_radial - slot / 2, slot
+
+
 @kept_by_scene
 def contact_table(scene: PumpScene, throw: int) -> NDArray[np.void]:
     """Contact records of one throw: crank pin, wrist pin, guide; an ideal joint's is empty.
@@ -290,8 +301,8 @@ def contact_table(scene: PumpScene, throw: int) -> NDArray[np.void]:
     for joint, part in enumerate(joint_parts(scene, throw)):
         if part is None or part.rung == "ideal":
             continue
-        clearance = part.clearance_radial
+        clearance, slot = _worn_room(scene, part)
         mobility = joint_mobility(scene, throw, joint)
-        table[joint] = contact_record(part, clearance, loads[joint], mobility)[0]
+        table[joint] = contact_record(part, clearance, loads[joint], mobility, slot)[0]
     table.flags.writeable = False
     return table

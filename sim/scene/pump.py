@@ -332,6 +332,7 @@ class PumpScene(Scene):
         checks = (
             (_rod_faults, ("crank", "joint", "rod")),
             (_guide_faults, ("joint", "piston")),
+            (_oval_faults, ("joint", "throws", "wear")),
             (_line_faults, ("pressure", "throws")),
             (_name_faults, ("sensors", "exciters", "tacho", "pressure", "throws")),
             (_shape_faults, ("casing", "sensors", "throws")),
@@ -358,6 +359,23 @@ def _guide_faults(joint: PumpJoints, piston: Piston) -> list[str]:
     if joint.guide is None or joint.guide.rung == "ideal" or piston.inertia is not None:
         return []
     return ["piston.inertia is missing; a piston in a guide with clearance tilts"]
+
+
+def _oval_faults(joint: PumpJoints, throws: tuple[Throw, ...], wear: Wear | None) -> list[str]:
+    """One-sided wear of another eye than the crank pin's, or of one that nobody knows as new."""
+    faults = []
+    for one in (joint, *(throw.joint for throw in throws if throw.joint)):
+        if one.wristpin is not None and one.wristpin.one_sided > 0:
+            faults.append(
+                f"joint.wristpin.one_sided = {one.wristpin.one_sided:g} must be 0: only the eye of "
+                "the crank pin may be oval; remove it"
+            )
+        if one.crankpin.one_sided > 0 and wear is None:
+            faults.append(
+                f"joint.crankpin.one_sided = {one.crankpin.one_sided:g} needs "
+                "wear.as_new_diametral, from which on the eye wears on one side; add the table wear"
+            )
+    return list(dict.fromkeys(faults))
 
 
 def _line_faults(pressure: CylinderPressure, throws: tuple[Throw, ...]) -> list[str]:

@@ -172,6 +172,13 @@ class RevoluteJoint(Contact):
     radial_clearance: Length | None = Field(
         default=None, ge=0, description="eye radius minus pin radius"
     )
+    one_sided: Ratio = Field(
+        default=0.0,
+        ge=0,
+        le=1,
+        description="of the wear beyond wear.as_new_diametral: where the load presses, so that "
+        "the eye has the clearance along the rod and less across it",
+    )
 
     @model_validator(mode="after")
     def _one_clearance_that_fits(self) -> Self:
@@ -182,6 +189,11 @@ class RevoluteJoint(Contact):
         ]
         faults = self.elastic_faults() if self.rung not in ("ideal", "link") else []
         faults += self._oil_faults()
+        if self.one_sided > 0 and self.rung not in ("ideal", "compliant"):
+            faults.append(
+                f"one_sided = {self.one_sided:g} must be 0 on the rung '{self.rung}', whose eye is "
+                "round; set rung = 'compliant' or one_sided = 0"
+            )
         if len(given) > 1 or (not given and self.rung != "ideal"):
             faults.append(
                 f"{' and '.join(given) if given else 'no clearance'} given, must be exactly one of "
