@@ -39,6 +39,17 @@ def at_load(scene):
     return math.floor(STEP_TIME * scene.sample_rate) - 1
 
 
+def test_an_order_of_the_load_peaks_where_its_phase_says():
+    """In its own cycle, counted from the keyphasor mark; along its direction, beside the weight."""
+    order = {"order": 3, "amplitude": "50 N", "angle": "90 deg", "phase": "30 deg"}
+    changes = {"rotor.unbalance": 0, "load.orders": [order], "duration": 0.2}
+    scene, solution = run("journal-bearing", {**changes, "drive.start_angle": "20 deg"})
+    steady = scene.rotor.mass * scene.gravity + scene.load.static
+    turned = 3 * solution.truth["state_angle"] - math.radians(30)
+    expected = np.stack([np.full(len(turned), steady), 50 * np.cos(turned)], axis=1)
+    assert_allclose(solution.truth["load_n"], expected, atol=1e-6 * steady)
+
+
 # --- the source paper: Ma, Lu, Chen, J. Vib. Meas. Diagn. 30 (2010) 5-10
 
 

@@ -83,6 +83,27 @@ def test_unbalance_of_a_free_mass(integrator):
     assert run.tau[-1] == pytest.approx(3 * TURN, abs=0.01)
 
 
+@pytest.mark.parametrize("integrator", ["rk4", "adaptive"])
+def test_orders_of_a_free_mass(integrator):
+    """X'' = a cos(n tau + p), each order by itself: X = -a cos(n tau + p) / n^2."""
+    orders = [(0.4, 0.3, 0.02, 0.0), (2.0, -1.0, 0.1, -0.2)]
+    n, phase, *peak = np.transpose(orders)
+    along = np.array(peak) / n**2
+    run = run_orbit(
+        no_film(),
+        load(alpha=1.0, orders=orders),
+        duration=3 * TURN,
+        start=tuple(-along @ np.cos(phase)),
+        start_velocity=tuple((along * n) @ np.sin(phase)),
+        integrator=integrator,
+        step=0.01,
+        tolerance=1e-9,
+    )
+    # RK4: n^4 h^4 / 120 per radian, 2e-8, of 0.2; adaptive as for the unbalance
+    expected = -np.cos(np.outer(run.tau, n) + phase) @ along.T
+    assert_allclose(run.position, expected, atol=1e-6)
+
+
 def test_a_jump_of_the_load_between_samples():
     """Free fall from the jump on: a parabola, to rounding, wherever the samples lie."""
     q = load(alpha=1.0, **step_history(1.2345, (0.1, -0.2)))

@@ -110,6 +110,12 @@ _DEGREE = math.radians(1.0)
 _SHIFTS = (
     factor("load.static", 0.7, 1.4, "belt tension, gear load"),
     add("load.static_across", -1500.0, 1500.0, "the load does not point where it is taken to"),
+    set_to(
+        "bearing.inlet_fill",
+        (0.6,),
+        "ring oiling, a blocked feed hole",
+        beside={"film.rung": "direct"},
+    ),
     factor("bearing.length", 0.85, 1.15, "chamfers, grooves, another bush"),
     factor("bearing.diameter", 0.95, 1.05, "another bush"),
     factor("oil.viscosity", 0.6, 1.6, "another grade, or 10 K"),

@@ -142,6 +142,7 @@ class Load(NamedTuple):
     phase: float  # of the unbalance at tau = 0 [rad]
     time: NDArray[np.float64]  # (n,) of the history [rad]
     history: NDArray[np.float64]  # (n, 2)
+    orders: NDArray[np.float64]  # (n, 4): order, phase at tau = 0 [rad], peak along X, Y
 
 
 _NO_TABLE = MapTable(np.zeros((3, 1, 4, 4)), 1, 1.0, 0.5, 1.0, 1.0, 1.0)
@@ -204,6 +205,7 @@ def load(
     phase: float = 0.0,
     time: ArrayLike | None = None,
     history: ArrayLike | None = None,
+    orders: ArrayLike = (),
 ) -> Load:
     """Load of a run, validated.
 
@@ -222,6 +224,8 @@ def load(
         first and after the last the history keeps their value.
     history : array_like [shape=(n, 2)], optional
         Load along X and Y at those instants, linear between them.
+    orders : array_like [shape=(n, 4)], optional
+        Loads that repeat: cycles per revolution, phase at tau = 0 [rad], peaks along X and Y.
 
     Returns
     -------
@@ -263,7 +267,8 @@ def load(
         )
     if wrong:
         raise ValueError("\n".join(wrong))
-    return Load(alpha, static[0], static[1], unbalance, phase, instants, values)
+    repeated = np.ascontiguousarray(orders, dtype=np.float64).reshape(-1, 4)
+    return Load(alpha, static[0], static[1], unbalance, phase, instants, values, repeated)
 
 
 def step_history(start: float, size: tuple[float, float]) -> dict[str, NDArray[np.float64]]:
@@ -344,6 +349,11 @@ def _load(q: Load, tau: float, cursor: Any) -> tuple[float, float, float, float]
         s, c = sine_cosine(tau + q.phase)
         y_slope, x_slope = q.unbalance * c, -q.unbalance * s
         x, y = x + y_slope, y - x_slope
+    for k in range(len(q.orders)):
+        order, along, across = q.orders[k, 0], q.orders[k, 2], q.orders[k, 3]
+        s, c = sine_cosine(order * tau + q.orders[k, 1])
+        x, y = x + along * c, y + across * c
+        x_slope, y_slope = x_slope - order * along * s, y_slope - order * across * s
     n = _interval(q.time, tau, cursor[0])
     cursor[0] = n
     if n < 0 or n + 1 == q.time.size:
@@ -1024,13 +1034,13 @@ def _check_run(
 def _overloaded(film: OrbitFilm, q: Load, state: NDArray[np.float64], tau: float) -> bool:
     """Whether the load is, now and in the end, more than the turning film carries at its edge.
 
-    The unbalance does not count.
+    Unbalance and orders do not count: they pass.
     """
     if film.code == FILM_NONE:
         return False
     place = state[:2] * (film.last_eccentricity / math.hypot(state[0], state[1]))
     capacity = q.alpha * math.hypot(*film_force(film, place[0], place[1], 0.0, 0.0))
-    resting = q._replace(unbalance=0.0)
+    resting = q._replace(unbalance=0.0, orders=np.zeros((0, 4)))
     return all(math.hypot(*load_at(resting, t)) > capacity for t in (tau, q.time[-1]))
 
 

@@ -260,6 +260,7 @@ def journal_load(scene: JournalScene, lead: float = 0.0) -> Load:
         ),
         unbalance=rotor.unbalance / (rotor.mass * scale.clearance),
         phase=scene.drive.start_angle + rotor.unbalance_angle - scale.speed * lead,
+        orders=_orders(scene, scale, lead),
         **history,
     )
 
@@ -289,6 +290,21 @@ _HISTORIES: dict[str, Callable[[JournalLoad, float, float, _Vector], _History]] 
     "half-sine": _half_sine,
 }
 """Course of a load. A new one is one row."""
+
+
+def _orders(scene: JournalScene, scale: JournalScale, lead: float) -> list[tuple[float, ...]]:
+    """Forces that repeat with the shaft, as :func:`.orbit.load` takes them."""
+    begin = scene.drive.start_angle - scale.speed * lead
+    return [
+        (
+            one.order,
+            one.order * begin - one.phase,
+            one.amplitude * math.cos(one.angle) / scale.force,
+            one.amplitude * math.sin(one.angle) / scale.force,
+        )
+        for one in scene.load.orders
+        if one.amplitude > 0
+    ]
 
 
 def _recorded(scene: JournalScene, scale: JournalScale, lead: float) -> _History:

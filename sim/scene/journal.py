@@ -236,6 +236,17 @@ class LoadRecord(Part):
     folder: str = Field(default="", exclude=True, description="where the file is looked for first")
 
 
+class LoadOrder(Part):
+    """A force that repeats with the shaft: belt, coupling, gear mesh, vanes."""
+
+    order: Ratio = Field(gt=0, le=1000, description="cycles per revolution; of a belt below 1")
+    amplitude: Force = Field(ge=0, le=FORCE_MOST, description="peak")
+    angle: _SHAFT_ANGLE = Field(default=0.0, description="direction, from X")
+    phase: _SHAFT_ANGLE = Field(
+        default=0.0, description="of its peak, in its own cycle from the keyphasor mark on"
+    )
+
+
 class JournalLoad(Part):
     """What pushes on the shaft besides its weight; times count from the first sample."""
 
@@ -251,6 +262,9 @@ class JournalLoad(Part):
     begin: Time = Field(default=0.0, ge=0, description="of step or pulse")
     length: Time | None = Field(default=None, gt=0, description="of the pulse")
     record: LoadRecord | None = None
+    orders: tuple[LoadOrder, ...] = Field(
+        default=(), max_length=_MOST_RUN_OUT, description="forces that repeat with the shaft"
+    )
 
     @model_validator(mode="after")
     def _history_complete(self) -> Self:

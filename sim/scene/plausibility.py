@@ -310,7 +310,8 @@ def _unexcited_shaft(shaft: ShaftScene) -> Iterator[str]:
 
 
 def _unexcited_journal(journal: JournalScene) -> Iterator[str]:
-    still = not journal.rotor.unbalance and journal.load.history == "none"
+    pushed = journal.load.history != "none" or any(one.amplitude for one in journal.load.orders)
+    still = not journal.rotor.unbalance and not pushed
     if still and journal.settling_revolutions > 0:
         yield (
             "rotor.unbalance = 0 kg m and load.history = 'none': nothing excites the shaft, which "
