@@ -97,6 +97,8 @@ class DataSetWriter:
 
     Examples
     --------
+    >>> from wearstate.datasets.file.record import DataSet
+    >>> from wearstate.sim.output.sensor import Channel
     >>> import tempfile
     >>> channel = Channel(name="acc", unit="m/s^2", quantity="acceleration")
     >>> head = Attributes(sample_rate=100.0, channels=(channel,), origin="measured")

@@ -41,7 +41,7 @@ def probe_means(recording: Recording) -> ProbeMeans:
 
     Examples
     --------
-    >>> from ...datasets.file.record import Channel
+    >>> from ...sim.output.sensor import Channel
     >>> probe = Channel(name="probe_1", unit="m", quantity="displacement")
     >>> still = Recording(signal=np.full((1, 8), 1e-5), sample_rate=8.0, channels=(probe,))
     >>> found = probe_means(still)

@@ -172,7 +172,9 @@ class Rotor:
 
     Examples
     --------
-    >>> from .beam import Section, assemble_beam
+    >>> from wearstate.sim.beam.modes import modes
+    >>> from .beam import assemble_beam
+    >>> from .beam_parts import Section
     >>> bar = Section(length=1.0, outer_diameter=0.05, young=2e11, shear_modulus=8e10,
     ...               density=7800.0)
     >>> beam = assemble_beam([bar], longest_element=0.1, theory="euler-bernoulli")
@@ -379,7 +381,8 @@ def unbalance_response(
 
     Examples
     --------
-    >>> from .beam import Section, assemble_beam
+    >>> from .beam import assemble_beam
+    >>> from .beam_parts import Section
     >>> bar = Section(length=1.0, outer_diameter=0.01, young=2e11, shear_modulus=8e10,
     ...               density=7800.0)
     >>> beam = assemble_beam([bar], stations=[0.5], shear_coefficient=1.0)

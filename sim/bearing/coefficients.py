@@ -82,6 +82,8 @@ def coefficients(
 
     Examples
     --------
+    >>> from wearstate.sim.bearing.equilibrium import equilibrium
+    >>> from wearstate.sim.film.solve import FilmGeometry
     >>> found = equilibrium(FilmGeometry(length_to_diameter=0.5), [0.5, 0.0])
     >>> own = coefficients(found, method="mesh")
     >>> displaced = coefficients(found, method="displacement")
@@ -158,6 +160,8 @@ def friction(found: Equilibrium) -> float:
 
     Examples
     --------
+    >>> from wearstate.sim.bearing.equilibrium import equilibrium, sommerfeld_number
+    >>> from wearstate.sim.film.solve import FilmGeometry
     >>> found = equilibrium(
     ...     FilmGeometry(length_to_diameter=1.0, condition="reynolds"),
     ...     [sommerfeld_number(0.121), 0.0],
@@ -212,6 +216,8 @@ def flow(found: Equilibrium) -> Flow:
 
     Examples
     --------
+    >>> from wearstate.sim.bearing.equilibrium import equilibrium, sommerfeld_number
+    >>> from wearstate.sim.film.solve import FilmGeometry
     >>> found = equilibrium(
     ...     FilmGeometry(length_to_diameter=1.0, condition="reynolds"),
     ...     [sommerfeld_number(0.121), 0.0],

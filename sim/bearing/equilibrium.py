@@ -242,7 +242,6 @@ def equilibrium(
 
     Examples
     --------
-    >>> from .solve import FilmGeometry
     >>> found = equilibrium(FilmGeometry(length_to_diameter=1.0), [1.2, 0.0])
     >>> round(found.eccentricity_ratio, 2), round(math.degrees(found.attitude_angle))
     (0.4, 65)

@@ -73,6 +73,7 @@ def stability(c: Coefficients) -> Threshold:
 
     Examples
     --------
+    >>> from wearstate.sim.bearing.short_bearing import short_coefficients
     >>> threshold = stability(short_coefficients(0.3))
     >>> [round(v, 4) for v in (threshold.whirl_ratio, threshold.speed)]
     [0.5194, 2.6058]
