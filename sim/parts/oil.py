@@ -95,7 +95,7 @@ class Oil(Part):
         --------
         >>> oil = Oil(temperature=313.15, viscosity_40=1e-4, viscosity_100=1.14e-5, density=875.0)
         >>> round(oil.warmed(0.0), 4), round(oil.warmed(10.0), 4)
-        (0.0875, 0.0531)
+        (0.0875, 0.0538)
         """
         if kelvin == 0:
             return self.dynamic_viscosity
