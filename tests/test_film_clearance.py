@@ -467,6 +467,21 @@ def test_sizes_that_nobody_gave_are_a_caution():
     assert "crank.radius" in said
 
 
+def test_sizes_that_an_option_of_the_recipe_sets_are_trained_too():
+    """Propellers of three, four and five blades: only another number is a caution."""
+    card = card_of("propulsion-shaft", "propulsion-shaft-standard")
+    said = {
+        blades: nameplate_cautions(
+            nameplate_of(None, "propulsion-shaft", {"propeller.blades": blades}), {}, card
+        )
+        for blades in (3, 4, 5, 6)
+    }
+    assert [blades for blades, found in said.items() if found] == [6]
+    assert said[6][0].startswith("propeller.blades = 6 ")
+    assert "trained at 3 to 5" in said[6][0]
+    assert nameplate_cautions(None, {}, card) == ()
+
+
 def test_sizes_that_training_drew_are_held_against_their_range():
     axes = load_recipe("bilge-pump-standard").machine
     low, high = next(axis.extremes() for axis in axes if axis.path == "piston.mass")

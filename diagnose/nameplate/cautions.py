@@ -5,6 +5,7 @@ from functools import cache
 from typing import Any
 
 from ...datasets.draws.draws import Vector
+from ...datasets.draws.options import Alternatives
 from ...datasets.recipe.load import load_recipe
 from ...datasets.recipe.text import recipe_names
 from ...sim.output.recording import Recording
@@ -111,8 +112,36 @@ def _drawn_by(recipe: str) -> Mapping[str, tuple[float, float]]:
     if recipe not in recipe_names():
         return {}
     found = load_recipe(recipe)
-    axes = (*found.machine, *found.record)
-    return {axis.path: axis.extremes() for axis in axes if not isinstance(axis, Vector)}
+    ranges = [
+        (axis.path, *axis.extremes())
+        for axis in (*found.machine, *found.record)
+        if not isinstance(axis, Vector)
+    ]
+    for choice in found.choices:
+        ranges += _chosen(choice, found.scene)
+    paths = {path for path, _, _ in ranges}
+    return {
+        path: (
+            min(low for name, low, _ in ranges if name == path),
+            max(high for name, _, high in ranges if name == path),
+        )
+        for path in paths
+    }
+
+
+def _chosen(choice: Alternatives, scene: Any) -> Iterator[tuple[str, float, float]]:
+    """Path, least and largest value of what the options of a choice set or draw.
+
+    An option that says nothing of a number leaves it as the scene has it.
+    """
+    for option in choice.options:
+        drawn = {a.path: a.extremes() for a in option.axes if not isinstance(a, Vector)}
+        for path in choice.paths:
+            value = option.values.get(path, _value(scene, path))
+            if path in drawn:
+                yield (path, *drawn[path])
+            elif isinstance(value, int | float):
+                yield path, float(value), float(value)
 
 
 def _taken_for_granted(usual: Any, drawn: Mapping[str, Any], told: frozenset[str]) -> Iterator[str]:
@@ -157,7 +186,7 @@ _LEAST_FORCE = 1e3  # N: a component that the trained scene has none of is told 
 
 
 def _value(scene: Any, path: str) -> float | None:
-    """None where the scene has no such part."""
+    """None where the scene has no such part, or it is no number."""
     for name in path.split("."):
         scene = getattr(scene, name, None)
-    return None if scene is None else float(scene)
+    return float(scene) if isinstance(scene, int | float) else None
