@@ -40,8 +40,6 @@ from .beam_matrices import (
 from .beam_parts import Disc, DistributedLoad, Elements, PointLoad, Section
 
 Vector = NDArray[np.float64]
-Index = NDArray[np.int64]
-
 STANDARD_GRAVITY = 9.80665
 """Acceleration of gravity [m/s^2] (CGPM 1901)."""
 
