@@ -529,7 +529,7 @@ def test_uff_units(tmp_path, labels, units, factor):
         ([{"orddenom_spec_data_type": 12}], "is over the quantity 12, must be force (13)"),
         ([{"abscissa_spec_data_type": 17}], "is over the abscissa 17, must be frequency (18)"),
         ([{"func_type": 6}], "has no frequency response function (58, type 4)"),
-        ([{}, {"ref_dir": 3, "x": F[:-1]}], "has other lines than '12:+X/3:-Y', must have the"),
+        ([{}, {"ref_dir": 3, "x": F[:-1]}], "has other lines than '12:+X/3:-Y', export them alike"),
         ([{}, {}], "has '12:+X/3:-Y' twice; export one of them"),
         ([{"ordinate_axis_units_lab": "inch/s^2"}], "is in 'inch/s^2', must be one of m/s^2"),
     ],

@@ -19,6 +19,7 @@ DIMENSIONS = {
     "_hz": "rotation speed",
     "_pa": "pressure",
     "_rad": "angle",
+    "_k": "temperature",
     "_n": "force",
     "_m": "length",
 }
