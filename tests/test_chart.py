@@ -42,7 +42,7 @@ from wearstate.diagnose.charts.page import chart_figure, chart_html, save_chart
 from wearstate.diagnose.charts.scene_edit import block_of
 from wearstate.diagnose.charts.words import HERE, effect_words
 from wearstate.diagnose.command_line.cli import cli
-from wearstate.diagnose.command_line.command_options import CHART_SUFFIXES
+from wearstate.diagnose.options.outputs import CHART_SUFFIXES
 from wearstate.sim.fidelity.differences import Candidate, Difference, differences
 from wearstate.sim.fidelity.findings import Answer, Convergence, Raise, Study
 from wearstate.sim.fidelity.ladder import cost_of

@@ -90,7 +90,7 @@ def test_where_two_kinds_fit_the_likelier_one_is_named(small_trained):
 def test_recordings_of_the_training_kind_cannot_be_refused():
     twins = familiar(machines=40, seed=9)
     same = Strangers(name="twins", rows=twins.rows, groups=twins.groups)
-    with pytest.raises(DataError, match=r"of 80 recordings of twins are told .* >= 50%; leave"):
+    with pytest.raises(DataError, match=r"of 80 recordings of twins differ .* >= 50%; leave"):
         learn(dataclasses.replace(familiar(), strangers=(same,)), budget_ms=LINES_MS)
 
 
