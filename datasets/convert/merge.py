@@ -120,8 +120,8 @@ def merge_sets(
     Examples
     --------
     >>> import tempfile
-    >>> from ..measured.data_set import import_recordings
-    >>> from ..source.part import SourceOptions
+    >>> from wearstate.datasets.measured.data_set import import_recordings
+    >>> from wearstate.datasets.source.part import SourceOptions
     >>> options = SourceOptions(fs=9.0, unit="g")
     >>> with tempfile.TemporaryDirectory() as name:
     ...     folder = Path(name)

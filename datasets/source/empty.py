@@ -19,7 +19,7 @@ def without_empty(part: FilePart) -> FilePart:
 
     Examples
     --------
-    >>> from .part import PartChannel
+    >>> from wearstate.datasets.source.part import PartChannel
     >>> rows = np.array([[1.0, np.nan], [np.nan, np.nan]])
     >>> names = (PartChannel(name="a"), PartChannel(name="b"))
     >>> part = FilePart(

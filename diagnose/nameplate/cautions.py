@@ -112,21 +112,14 @@ def _drawn_by(recipe: str) -> Mapping[str, tuple[float, float]]:
     if recipe not in recipe_names():
         return {}
     found = load_recipe(recipe)
-    ranges = [
-        (axis.path, *axis.extremes())
-        for axis in (*found.machine, *found.record)
-        if not isinstance(axis, Vector)
-    ]
+    ends: dict[str, list[float]] = {}
+    for axis in (*found.machine, *found.record):
+        if not isinstance(axis, Vector):
+            ends.setdefault(axis.path, []).extend(axis.extremes())
     for choice in found.choices:
-        ranges += _chosen(choice, found.scene)
-    paths = {path for path, _, _ in ranges}
-    return {
-        path: (
-            min(low for name, low, _ in ranges if name == path),
-            max(high for name, _, high in ranges if name == path),
-        )
-        for path in paths
-    }
+        for path, low, high in _chosen(choice, found.scene):
+            ends.setdefault(path, []).extend((low, high))
+    return {path: (min(values), max(values)) for path, values in ends.items()}
 
 
 def _chosen(choice: Alternatives, scene: Any) -> Iterator[tuple[str, float, float]]:

@@ -102,8 +102,8 @@ def campbell(
     Examples
     --------
     >>> from wearstate.sim.beam.rotor import Support
-    >>> from .beam import assemble_beam
-    >>> from .beam_parts import Disc, Section
+    >>> from wearstate.sim.beam.beam import assemble_beam
+    >>> from wearstate.sim.beam.beam_parts import Disc, Section
     >>> steel = dict(young=211e9, shear_modulus=81.2e9, density=7810.0)
     >>> beam = assemble_beam([Section(length=1.5, outer_diameter=0.05, **steel)],
     ...                      longest_element=0.25, shear_coefficient="cowper",
@@ -268,8 +268,8 @@ def critical_speeds(
     Examples
     --------
     >>> from wearstate.sim.beam.rotor import Support
-    >>> from .beam import assemble_beam
-    >>> from .beam_parts import Disc, Section
+    >>> from wearstate.sim.beam.beam import assemble_beam
+    >>> from wearstate.sim.beam.beam_parts import Disc, Section
     >>> bar = Section(length=1.0, outer_diameter=0.01, young=2e11, shear_modulus=8e10,
     ...               density=7800.0)
     >>> beam = assemble_beam([bar], discs=[Disc(station=0.5, mass=100.0)], shear_coefficient=1.0)

@@ -162,8 +162,8 @@ def modes(
     Examples
     --------
     >>> from wearstate.sim.beam.rotor import Support
-    >>> from .beam import assemble_beam
-    >>> from .beam_parts import Disc, Section
+    >>> from wearstate.sim.beam.beam import assemble_beam
+    >>> from wearstate.sim.beam.beam_parts import Disc, Section
     >>> steel = dict(young=211e9, shear_modulus=81.2e9, density=7810.0)
     >>> beam = assemble_beam([Section(length=1.5, outer_diameter=0.05, **steel)],
     ...                      longest_element=0.25, shear_coefficient="cowper",
@@ -221,8 +221,8 @@ def natural_frequencies(
     --------
     A free bar has rigid motions of no frequency in both planes, and ``(4.730 / l)^2 sqrt(EI / m)``:
 
-    >>> from .beam import assemble_beam
-    >>> from .beam_parts import Section
+    >>> from wearstate.sim.beam.beam import assemble_beam
+    >>> from wearstate.sim.beam.beam_parts import Section
     >>> bar = Section(length=2.0, outer_diameter=0.05, young=2e11, shear_modulus=8e10,
     ...               density=7850.0)
     >>> beam = assemble_beam([bar], theory="euler-bernoulli", longest_element=0.1)

@@ -173,8 +173,8 @@ class Rotor:
     Examples
     --------
     >>> from wearstate.sim.beam.modes import modes
-    >>> from .beam import assemble_beam
-    >>> from .beam_parts import Section
+    >>> from wearstate.sim.beam.beam import assemble_beam
+    >>> from wearstate.sim.beam.beam_parts import Section
     >>> bar = Section(length=1.0, outer_diameter=0.05, young=2e11, shear_modulus=8e10,
     ...               density=7800.0)
     >>> beam = assemble_beam([bar], longest_element=0.1, theory="euler-bernoulli")
@@ -381,8 +381,8 @@ def unbalance_response(
 
     Examples
     --------
-    >>> from .beam import assemble_beam
-    >>> from .beam_parts import Section
+    >>> from wearstate.sim.beam.beam import assemble_beam
+    >>> from wearstate.sim.beam.beam_parts import Section
     >>> bar = Section(length=1.0, outer_diameter=0.01, young=2e11, shear_modulus=8e10,
     ...               density=7800.0)
     >>> beam = assemble_beam([bar], stations=[0.5], shear_coefficient=1.0)

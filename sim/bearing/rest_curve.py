@@ -103,7 +103,7 @@ def rest_curve(
 
     Examples
     --------
-    >>> from .equilibrium import equilibrium
+    >>> from wearstate.sim.bearing.equilibrium import equilibrium
     >>> film = FilmGeometry(length_to_diameter=0.6, n_theta=36, n_z=9)
     >>> apart = rest_curve(film).position([1.7, 0.0]) - equilibrium(film, [1.7, 0.0]).position
     >>> bool(abs(apart).max() < 3e-3)

@@ -146,7 +146,7 @@ def mass_conserving(
 
     Examples
     --------
-    >>> from .solve import Groove
+    >>> from wearstate.sim.film.solve import Groove
     >>> groove = Groove(angle=1.571, width=0.262, length_share=0.75, pressure=0.2)
     >>> geometry = FilmGeometry(length_to_diameter=0.8, grooves=(groove,))
     >>> solution = mass_conserving(geometry, FilmState(x=0.5, y=0.0))

@@ -134,7 +134,7 @@ def mass_orbit(
     --------
     A journal under a steady load comes to rest where the steady film carries it:
 
-    >>> from .orbit import load
+    >>> from wearstate.sim.journal.orbit import load
     >>> bearing = FilmGeometry(length_to_diameter=0.5, n_theta=40, n_z=9, condition="reynolds")
     >>> run = mass_orbit(bearing, load(alpha=10.0, static=(5.0, 0.0)), duration=40.0, step=0.2)
     >>> run.status.text, run.position[-1].round(2).tolist(), round(run.filled[-1].item(), 2)

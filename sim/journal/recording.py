@@ -570,7 +570,7 @@ def squeeze_rate(film: OrbitFilm, run: OrbitRun) -> float:
 
     Examples
     --------
-    >>> from .orbit import load, run_orbit
+    >>> from wearstate.sim.journal.orbit import load, run_orbit
     >>> film = short_film(0.5)
     >>> run = run_orbit(film, load(alpha=1.0), duration=0.1)
     >>> bool(abs(squeeze_rate(film, run) / (4 * 0.5**2 * math.pi / 2) - 1) < 0.1)

@@ -238,7 +238,7 @@ def pressure_rungs(pump: PumpScene) -> tuple[Rung, ...]:
 
     Examples
     --------
-    >>> from ..scene.load import load_scene
+    >>> from wearstate.sim.scene.load import load_scene
     >>> pump = load_scene("bilge-pump")
     >>> pressure_rungs(pump)[-1].name
     'chamber'

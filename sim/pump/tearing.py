@@ -44,7 +44,7 @@ def torn_in_motion(scene: PumpScene) -> list[Tear]:
 
     Examples
     --------
-    >>> from ..scene.load import load_scene
+    >>> from wearstate.sim.scene.load import load_scene
     >>> torn_in_motion(load_scene("bilge-pump", {"pressure.rung": "heads"}))
     []
     """
@@ -69,7 +69,7 @@ def torn_by_knocks(scene: PumpScene, step: float) -> list[Tear]:
 
     Examples
     --------
-    >>> from ..scene.load import load_scene
+    >>> from wearstate.sim.scene.load import load_scene
     >>> worn = load_scene("bilge-pump", {"pressure.rung": "heads"})
     >>> torn_by_knocks(worn, 1 / 51200)[0].lowest < -1e5
     True

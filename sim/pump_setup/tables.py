@@ -203,7 +203,7 @@ def lines_of(scene: PumpScene, step: float) -> LinePair | None:
 
     Examples
     --------
-    >>> from ..scene.load import load_scene
+    >>> from wearstate.sim.scene.load import load_scene
     >>> lines_of(load_scene("bilge-pump"), 2e-5) is None
     True
     """

@@ -119,7 +119,7 @@ def guide_gain(scene: PumpScene) -> float:
 
     Examples
     --------
-    >>> from ..scene.load import load_scene
+    >>> from wearstate.sim.scene.load import load_scene
     >>> round(guide_gain(load_scene("bilge-pump")), 3)
     0.06
     """

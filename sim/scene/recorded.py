@@ -24,7 +24,7 @@ def recorded(scene: Scene, signal: NDArray[np.float32], **about: Any) -> Recordi
 
     Examples
     --------
-    >>> from .load import load_scene
+    >>> from wearstate.sim.scene.load import load_scene
     >>> scene = load_scene("bilge-pump", {"duration": "1 s"})
     >>> recorded(scene, np.zeros((3, 25600), dtype=np.float32))
     <Recording bilge-pump 1 s, 25.6 kHz, acc_x acc_y tacho>
@@ -45,7 +45,7 @@ def failed(scene: Scene, status: Status, numerics: dict[str, float | int | str])
 
     Examples
     --------
-    >>> from .load import load_scene
+    >>> from wearstate.sim.scene.load import load_scene
     >>> failed(load_scene("bilge-pump"), Status.OVERLAP, {}).status.name
     'OVERLAP'
     """

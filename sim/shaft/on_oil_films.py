@@ -429,7 +429,7 @@ def beam_film(
 
     Examples
     --------
-    >>> from ..beam.beam import Section, assemble_beam
+    >>> from wearstate.sim.beam.beam import Section, assemble_beam
     >>> steel = Section(length=8.0, outer_diameter=0.3, young=206e9, shear_modulus=79e9,
     ...                 density=7850.0)
     >>> beam = assemble_beam([steel], stations=(1.0, 4.0, 7.0), theory="euler-bernoulli")
@@ -490,7 +490,7 @@ def supports(
 
     Examples
     --------
-    >>> from ..beam.beam import Section, assemble_beam
+    >>> from wearstate.sim.beam.beam import Section, assemble_beam
     >>> steel = Section(length=4.0, outer_diameter=0.3, young=206e9, shear_modulus=79e9,
     ...                 density=7850.0)
     >>> beam = assemble_beam([steel], stations=(1.0, 3.0), theory="euler-bernoulli")
@@ -567,7 +567,7 @@ def journal_shifts(
     --------
     A whole line that rises takes its journals along:
 
-    >>> from ..beam.beam import Section, assemble_beam
+    >>> from wearstate.sim.beam.beam import Section, assemble_beam
     >>> steel = Section(length=4.0, outer_diameter=0.3, young=206e9, shear_modulus=79e9,
     ...                 density=7850.0)
     >>> beam = assemble_beam([steel], stations=(1.0, 3.0), theory="euler-bernoulli")
@@ -612,7 +612,7 @@ def coefficient_gradients(found: BeamFilm, *, step: float = GRADIENT_STEP) -> tu
 
     Examples
     --------
-    >>> from ..beam.beam import Section, assemble_beam
+    >>> from wearstate.sim.beam.beam import Section, assemble_beam
     >>> steel = Section(length=4.0, outer_diameter=0.3, young=206e9, shear_modulus=79e9,
     ...                 density=7850.0)
     >>> beam = assemble_beam([steel], stations=(1.0, 3.0), theory="euler-bernoulli")

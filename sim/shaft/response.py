@@ -104,8 +104,8 @@ def receptance(
 
     Examples
     --------
-    >>> from ..beam.beam import Section, assemble_beam
-    >>> from ..beam.rotor import Support
+    >>> from wearstate.sim.beam.beam import Section, assemble_beam
+    >>> from wearstate.sim.beam.rotor import Support
     >>> shaft = Section(length=2.0, outer_diameter=0.1, young=2.1e11, shear_modulus=8e10,
     ...                 density=7850.0)
     >>> beam = assemble_beam([shaft], theory="euler-bernoulli", longest_element=0.1)
@@ -192,7 +192,7 @@ def accelerance(
     --------
     A free shaft, pushed in its middle far below its first frequency, is a mass:
 
-    >>> from ..beam.beam import Section, assemble_beam
+    >>> from wearstate.sim.beam.beam import Section, assemble_beam
     >>> bar = Section(length=2.0, outer_diameter=0.1, young=2.1e11, shear_modulus=8e10,
     ...               density=7850.0)
     >>> beam = assemble_beam([bar], theory="euler-bernoulli", longest_element=0.1)
@@ -479,7 +479,7 @@ def free_basis(
 
     Examples
     --------
-    >>> from ..beam.beam import Section, assemble_beam
+    >>> from wearstate.sim.beam.beam import Section, assemble_beam
     >>> shaft = Section(length=10.0, outer_diameter=0.2, young=2.1e11, shear_modulus=8e10,
     ...                 density=7850.0)
     >>> beam = assemble_beam([shaft], theory="euler-bernoulli", longest_element=0.5)
@@ -621,8 +621,8 @@ def reduce_rotor(rotor: Rotor, basis: FreeBasis, *, speed: float = 0.0) -> Reduc
 
     Examples
     --------
-    >>> from ..beam.beam import Section, assemble_beam
-    >>> from ..beam.rotor import Support
+    >>> from wearstate.sim.beam.beam import Section, assemble_beam
+    >>> from wearstate.sim.beam.rotor import Support
     >>> shaft = Section(length=10.0, outer_diameter=0.2, young=2.1e11, shear_modulus=8e10,
     ...                 density=7850.0)
     >>> beam = assemble_beam([shaft], theory="euler-bernoulli", longest_element=0.5)
@@ -726,8 +726,8 @@ def modal_receptance(
 
     Examples
     --------
-    >>> from ..beam.beam import Section, assemble_beam
-    >>> from ..beam.rotor import Support
+    >>> from wearstate.sim.beam.beam import Section, assemble_beam
+    >>> from wearstate.sim.beam.rotor import Support
     >>> shaft = Section(length=10.0, outer_diameter=0.2, young=2.1e11, shear_modulus=8e10,
     ...                 density=7850.0)
     >>> beam = assemble_beam([shaft], theory="euler-bernoulli", longest_element=0.5)
@@ -923,8 +923,8 @@ def time_response(
 
     Examples
     --------
-    >>> from ..beam.beam import Section, assemble_beam
-    >>> from ..beam.rotor import Support
+    >>> from wearstate.sim.beam.beam import Section, assemble_beam
+    >>> from wearstate.sim.beam.rotor import Support
     >>> shaft = Section(length=10.0, outer_diameter=0.2, young=2.1e11, shear_modulus=8e10,
     ...                 density=7850.0)
     >>> beam = assemble_beam([shaft], theory="euler-bernoulli", longest_element=0.5)
