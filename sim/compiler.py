@@ -23,6 +23,7 @@ from numba.core.compiler import CompilerBase, DefaultPassBuilder, compile_result
 from numba.core.compiler_machinery import register_pass
 from numba.core.registry import CPUDispatcher
 from numba.core.typed_passes import NativeLowering
+from numba.core.types.containers import BaseNamedTuple, BaseTuple
 
 _NO_WRAPPERS = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
@@ -126,9 +127,28 @@ def _address(function: Any) -> tuple[str, str] | None:
     return function.__module__, function.__qualname__
 
 
-def _lasting(types: Any) -> bool:
-    """Whether types are described alike in every process."""
-    return " at 0x" not in str(types)
+def lasting(types: Any, function: Any) -> bool:
+    """Whether the types of a function's arguments are described alike in every process.
+
+    Those of a named tuple are described by its name alone. Of another copy of this package, under
+    another name, they would be taken for the function's own.
+    """
+    homes = {_package(function), __name__.partition(".")[0]}
+    return " at 0x" not in str(types) and homes.issuperset(map(_package, _classes(types)))
+
+
+def _package(found: Any) -> str:
+    name: str = found.__module__.partition(".")[0]
+    return name
+
+
+def _classes(types: Any) -> Iterator[type]:
+    """Classes of the named tuples in types."""
+    for each in types:
+        if isinstance(each, BaseNamedTuple):
+            yield each.instance_class
+        if isinstance(each, BaseTuple):
+            yield from _classes(each.types)
 
 
 class _PartLibrary(JITCodeLibrary):  # type: ignore[misc]
@@ -240,7 +260,8 @@ class _PartLowering(NativeLowering):  # type: ignore[misc]
 
     def run_pass(self, state: Any) -> bool:
         types = tuple(state.args)
-        address = _address(state.func_id.func) if _lasting(types) else None
+        function = state.func_id.func
+        address = _address(function) if lasting(types, function) else None
         origin = None if address is None else (*address, types)
         state.library = _PartLibrary(state.targetctx.codegen(), state.func_id.func_qualname, origin)
         if origin is not None:  # a name that every process gives it
@@ -334,8 +355,9 @@ class _Kept:
         self._store.save(name, (data.fndesc, data.signature, content))
 
     def _name(self, types: Any, codegen: Any) -> str | None:
-        if _address(self._function) is None or not _lasting(types) or self._function.__closure__:
+        function = self._function
+        if _address(function) is None or not lasting(types, function) or function.__closure__:
             return None
-        code = hashlib.sha256(self._function.__code__.co_code).hexdigest()
-        told = f"{self._function.__qualname__} {types} {codegen.magic_tuple()} {code}"
+        code = hashlib.sha256(function.__code__.co_code).hexdigest()
+        told = f"{function.__qualname__} {types} {codegen.magic_tuple()} {code}"
         return hashlib.sha256(told.encode()).hexdigest()[:32]

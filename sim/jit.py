@@ -26,7 +26,7 @@ from numba.core import config, serialize
 from numba.core.caching import FunctionCache
 
 from .atomic import sealed, unsealed, write_whole
-from .compiler import Kernel
+from .compiler import Kernel, lasting
 
 # No freedom is given to the compiler, not even contraction to fused multiply-add, which it would
 # use here and not there: a record has the same bytes alone and beside others. Forced inlining
@@ -153,8 +153,8 @@ class _SealedFiles:
     processes which write at once cannot mix theirs up.
     """
 
-    def __init__(self, folder: Path, stem: str, stamp: Any) -> None:
-        self._folder, self._stem, self._stamp = folder, stem, stamp
+    def __init__(self, function: Any, folder: Path, stem: str, stamp: Any) -> None:
+        self._function, self._folder, self._stem, self._stamp = function, folder, stem, stamp
         self._index = folder / f"{stem}.nbi"
 
     def load(self, key: Any) -> Any:
@@ -170,6 +170,8 @@ class _SealedFiles:
 
     def save(self, key: Any, data: Any) -> None:
         """Keep compiled code, where that is possible."""
+        if not lasting(key[0], self._function):  # a key begins with the types of the arguments
+            return
         content: bytes = _dumps(data)
         name = self._name_of(content)
         try:
@@ -265,7 +267,7 @@ def _compiled(function: Function, options: dict[str, Any]) -> Function:
     source, here = Path(function.__code__.co_filename), Path(__file__).parent
     if source.is_relative_to(here):
         place, stamp = folder / "sim" / source.relative_to(here).parent, None
-    files._cache_file = _SealedFiles(place, names.filename_base, stamp)
+    files._cache_file = _SealedFiles(function, place, names.filename_base, stamp)
     compiled: Any = Kernel(
         function, targetoptions=options, store=_SealedParts(place, names.filename_base, stamp)
     )

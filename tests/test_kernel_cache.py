@@ -304,3 +304,48 @@ def test_a_copy_that_is_imported_by_another_name_does_not_spoil_the_cache(tmp_pa
     assert run(tmp_path / "cache", told) == []
     assert run(tmp_path / "cache") == []
     assert len(files(tmp_path / "cache", ".nbi")) == 2
+
+
+PAIRS = """
+from typing import NamedTuple
+
+from ..jit import kernel, subroutine
+
+class Pair(NamedTuple):
+    x: float
+    y: float
+
+@subroutine
+def _product(pairs):
+    return pairs[0].x * pairs[0].y
+
+@kernel
+def area(pair):
+    return _product((pair,))
+"""
+
+
+def test_what_two_copies_compile_together_is_not_kept(tmp_path):
+    """Types of a class of the other copy look like those of one's own, and are none."""
+    package = Path(jit.__file__).parents[1]
+    for copy in (tmp_path / "wearstate", tmp_path / "renamed"):
+        shutil.copytree(package / "sim", copy / "sim", ignore=shutil.ignore_patterns("__pycache__"))
+        shutil.copyfile(package / "__init__.py", copy / "__init__.py")
+        (copy / "sim" / "laws").mkdir()
+        (copy / "sim" / "laws" / "__init__.py").touch()
+        (copy / "sim" / "laws" / "law.py").write_text(PAIRS)
+    told = f"import sys\nsys.path.insert(0, {str(tmp_path)!r})\n{CODE}\n"
+    asked = "from wearstate.sim.laws import law\nfrom renamed.sim.laws import law as other\n"
+
+    def area(pair):
+        process = start(tmp_path / "cache", f"{told}{asked}print(law.area({pair}(2.0, 3.0)))")
+        out, err = process.communicate(timeout=300)
+        return out.split()[1:], err
+
+    assert area("other.Pair") == (["6.0"], "")
+    assert area("law.Pair") == (["6.0"], "")  # with parts of its own types
+    shutil.rmtree(tmp_path / "renamed")
+    asked = "from wearstate.sim.laws import law\n"
+    assert area("law.Pair") == (["6.0"], "")  # without the other's module
+    assert kept(tmp_path / "cache", ".nbi") == {"area"}
+    assert kept(tmp_path / "cache", ".part") == {"_product"}
