@@ -4,6 +4,7 @@ import glob
 import json
 import re
 import shlex
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -16,7 +17,7 @@ from wearstate.datasets.measured.labels import read_labels
 from wearstate.datasets.readers.open import SourceOptions, open_source
 from wearstate.datasets.split.rules import group_folds
 from wearstate.diagnose.class_model.file import load_class_model, save_class_model
-from wearstate.diagnose.class_model.text import namings_summary
+from wearstate.diagnose.class_model.text import naming_text, namings_summary
 from wearstate.diagnose.class_model.train import (
     _clouds,
     _left_out_distances,
@@ -162,6 +163,19 @@ def test_a_recording_of_something_else_is_unfamiliar(trained, tmp_path):
     with DataSet(other) as data:
         verdicts = [model.estimate(data[i]).verdict for i in range(len(data))]
     assert verdicts.count("unfamiliar") >= 0.9 * len(verdicts)
+
+
+def test_a_name_of_a_recording_with_a_gap_comes_with_a_caution(trained):
+    with DataSet(trained[0]) as data:
+        item = data[0]
+    assert trained[1].estimate(item).cautions == ()
+    signal = item.signal.copy()
+    signal[0, 500:600] = 0.0
+    told = trained[1].estimate(replace(item, signal=signal))
+    assert told.verdict != "unusable"
+    [caution] = told.cautions
+    assert "samples were lost" in caution
+    assert f"caution: {caution}" in naming_text(told)
 
 
 def test_a_condition_near_a_trained_one_is_none_of_them(trained, tmp_path):

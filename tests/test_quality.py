@@ -109,6 +109,57 @@ def test_flat_tops_are_named_and_bar_a_verdict_from_a_tenth_on(share, bars):
     assert f"{-share:g}" in fault.text
 
 
+def blows_in_noise(size=20_000, noise=0.01):
+    rng = np.random.default_rng(0)
+    ring = np.exp(-np.arange(40) / 8) * np.sin(2 * np.pi * 0.2 * np.arange(40))
+    train = np.zeros(size)
+    train[::500] = rng.uniform(0.7, 1.0, size // 500)
+    return np.convolve(train, ring)[:size] + noise * rng.standard_normal(size)
+
+
+@pytest.mark.parametrize("held", [False, True])
+@pytest.mark.parametrize(("share", "bars"), [(0.01, False), (0.19, False), (0.21, True)])
+def test_samples_that_were_lost_are_named_and_bar_a_verdict_from_a_fifth_on(share, bars, held):
+    wave = blows_in_noise()
+    assert sample_faults(acceleration(wave[None])) == ()
+    lost = slice(7000, 7000 + round(share * wave.size))
+    wave[lost] = wave[6999] if held else 0.0
+    [fault] = sample_faults(acceleration(wave[None]))
+    assert (fault.kind, fault.channel, fault.bars) == ("gap", "acc_0", bars)
+    assert " from 7 s on: samples were lost" in fault.text or "from 6.999 s on" in fault.text
+
+
+def test_blocks_that_were_lost_are_counted():
+    wave = blows_in_noise()
+    for start in (1000, 5000, 9000):
+        wave[start : start + 256] = 0.0
+    [fault] = sample_faults(acceleration(wave[None]))
+    assert "stands still for 0.768 s, 0.038 of the recording" in fault.text
+    assert "and 2 times more" in fault.text
+
+
+def test_a_gap_of_a_probe_far_from_zero_is_no_saturation():
+    """Zeros are the lowest that a probe a millimetre off its shaft says."""
+    rng = np.random.default_rng(0)
+    gap = 1e-3 + 5e-5 * rng.standard_normal(5000)
+    gap[1000:1300] = 0.0
+    assert [fault.kind for fault in sample_faults(acceleration(gap[None]))] == ["gap"]
+
+
+def test_what_stands_still_by_itself_has_lost_nothing():
+    """Between the blows of a coarse converter; a force between blows; a square wave."""
+    coarse = np.round(20 * blows_in_noise(noise=1e-3)) / 20
+    assert np.diff(np.flatnonzero(np.diff(coarse))).max() > 256
+    assert sample_faults(acceleration(coarse[None])) == ()
+    push = np.zeros(5000)
+    push[::1000] = 1.0
+    force = Channel(name="force", unit="N", quantity="force")
+    hammer = Recording(signal=push[None], sample_rate=1000.0, channels=(force,))
+    assert not any(fault.kind == "gap" for fault in sample_faults(hammer))
+    square = np.sign(np.sin(2 * np.pi * 2 * np.arange(5000) / 1000 + 0.1))
+    assert not any(fault.kind == "gap" for fault in sample_faults(acceleration(square[None])))
+
+
 def test_all_faults_are_named_at_once():
     wave = np.clip(np.sin(2 * np.pi * 5 * np.arange(5000) / 1000), -0.5, 0.5)
     found = sample_faults(acceleration(np.array([np.full(5000, 2.0), wave])))
@@ -127,6 +178,29 @@ def test_a_graded_but_saturated_recording_says_so(model, familiar):
     estimate = model.estimate(replace(recording, signal=signal))
     assert estimate.verdict in ("caution", "unfamiliar")
     assert [fault.kind for fault in estimate.faults] == ["saturated"]
+
+
+def test_a_graded_recording_with_a_gap_says_so(model, familiar):
+    recording = familiar[0]
+    signal = recording.signal.copy()
+    signal[: len(recording.vibration_names), 5000:7000] = 0.0
+    estimate = model.estimate(replace(recording, signal=signal))
+    assert estimate.graded
+    assert {fault.kind for fault in estimate.faults} == {"gap"}
+    assert sum("samples were lost" in caution for caution in estimate.cautions) == 2
+
+
+def test_a_refused_recording_names_what_may_be_why(model, familiar):
+    """Without the highest samples, a twelfth, it is quieter than any machine; saturated, too."""
+    recording = familiar[0]
+    end = np.quantile(np.abs(recording.vibration), 11 / 12, axis=1).max()
+    rows = len(recording.vibration_names)
+    signal = recording.signal.copy()
+    signal[:rows] = signal[:rows].clip(-end, end)  # of too few samples to bar a verdict
+    estimate = model.estimate(replace(recording, signal=signal))
+    assert estimate.verdict in ("unfamiliar", "unusable")
+    assert [fault.kind for fault in estimate.faults if not fault.bars] == ["saturated"] * rows
+    assert any("it is saturated" in reason for reason in estimate.reasons)
 
 
 def test_a_verdict_under_loud_hum_is_one_with_caution(model, familiar):

@@ -76,8 +76,9 @@ def naming_text(naming: Naming) -> str:
     a; cannot be excluded: a, b
       votes  a 0.80, b 0.20
     """
+    cautions = "".join(f"\n  caution: {text}" for text in naming.cautions)
     if naming.verdict != "named":
-        return f"{naming.verdict}: {'; '.join(naming.reasons)}"
+        return f"{naming.verdict}: {'; '.join(naming.reasons)}{cautions}"
     votes = ", ".join(f"{name} {share:.2f}" for name, share in naming.shares.items())
     known = ""
     if naming.p_value is not None and naming.p_limit is not None:
@@ -85,4 +86,4 @@ def naming_text(naming: Naming) -> str:
             f"\n  familiar: p = {naming.p_value:.2g} (unfamiliar at {naming.p_limit:.2g} or less)"
         )
     possible = ", ".join(naming.possible)
-    return f"{naming.name}; cannot be excluded: {possible}\n  votes  {votes}{known}"
+    return f"{naming.name}; cannot be excluded: {possible}\n  votes  {votes}{known}{cautions}"

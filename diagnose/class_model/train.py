@@ -57,6 +57,8 @@ class Naming:
         Unfamiliar: like none of the trained recordings. Unusable: the recording is at fault.
     reasons : tuple of str
         Why there is no name; empty where there is one.
+    cautions : tuple of str
+        What makes a name doubtful: faults of the recording that bar none.
     name : str
         The likeliest class; empty without one.
     possible : tuple of str
@@ -71,6 +73,7 @@ class Naming:
 
     verdict: Literal["named", "unfamiliar", "unusable"]
     reasons: tuple[str, ...] = ()
+    cautions: tuple[str, ...] = ()
     name: str = ""
     possible: tuple[str, ...] = ()
     shares: Mapping[str, float]
@@ -184,7 +187,8 @@ class ClassModel:
                 f"the model's {len(self.names)} features are not the recording's {len(names)}; "
                 "use recordings like those it was trained on, or retrain it"
             )
-        return self.judge(row, blow_scores(recording))
+        flawed = tuple(fault.text for fault in faults)
+        return replace(self.judge(row, blow_scores(recording)), cautions=flawed)
 
     def judge(self, row: Float, blows: Float) -> Naming:
         """Tell the condition from features and blows.

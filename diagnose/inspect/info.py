@@ -247,14 +247,14 @@ class _Warnings:
 def _doubts(
     recording: Recording, scene: Scene | None = None, *, run: bool = False
 ) -> list[tuple[str, str]]:
-    """Check and text of what is hardly meant; of a measured one saturated channels and hum too."""
+    """Check and text of what is hardly meant; of a measured one saturation, gaps and hum too."""
     texts = [
         (doubt.check, doubt.text) for doubt in recording_doubts(recording, scene, scene_too=run)
     ]
     if recording.origin == "simulated":  # the converter has counted its clipped samples
         return texts
     faults = sample_faults(recording)
-    shown = [fault for fault in faults if fault.kind == "saturated"]
+    shown = [fault for fault in faults if fault.kind in ("saturated", "gap")]
     if all(fault.kind != "tacho" for fault in faults):
         shown += hum_faults(recording)
     return [*texts, *((fault.kind, fault.text) for fault in shown)]

@@ -482,7 +482,8 @@ class WearModel:
         return at_rate(replace(recording, joined=joined), self.card.sample_rate_hz)
 
     def _unusable(self, faults: tuple[QualityFault, ...], others: tuple[str, ...] = ()) -> Estimate:
-        reasons = (*(fault.text for fault in faults if fault.bars), *others)
+        bars, flawed = ([f.text for f in faults if f.bars is bar] for bar in (True, False))
+        reasons = (*bars, *others, *flawed)
         return Estimate(verdict="unusable", faults=faults, reasons=reasons, mode=self.mode)
 
     def _row(self, recording: Recording, reference: FrfReference | None) -> Float:
@@ -594,8 +595,9 @@ class WearModel:
                 _strangeness(look.distance, self.blind.calibration.distance),
                 *self._outside_cautions(row),
             )
+        flawed = tuple(fault.text for fault in faults)  # may be why it is unfamiliar
         if reasons:
-            return Estimate(verdict="unfamiliar", reasons=reasons, **known)
+            return Estimate(verdict="unfamiliar", reasons=(*reasons, *flawed), **known)
         asked, inputs = self._asked(row, baseline, conditions)
         findings = self._findings(row)
         odd = [
@@ -612,10 +614,10 @@ class WearModel:
                 f"it is unlike the training recordings in {ways} ways at once, must be in at most "
                 f"{_MOST_ODD}, as all machines of its kind were that it was tried on"
             )
-            return Estimate(verdict="unfamiliar", reasons=(whole, *strange), **known)
+            return Estimate(verdict="unfamiliar", reasons=(whole, *strange, *flawed), **known)
         cautions = (
             *told,
-            *(fault.text for fault in faults),
+            *flawed,
             *self._missing_cautions(conditions),
             *strange,
             *self._outside_cautions(row),
