@@ -202,6 +202,36 @@ def test_plain_words_are_no_options():
     assert as_options("use force", None) == "use force"
 
 
+def test_every_option_of_a_row_is_named_as_one():
+    command = cli.commands["import"]
+    for text, told in (
+        ("give delimiter, decimal and header, or", "give --delimiter, --decimal and --header, or"),
+        ("give time_column = 0 and fs if it", "give --time-column = 0 and --fs if it"),
+        ("none; name it with tacho", "none; name it with --tacho"),
+        ("give it, or header and unit", "give it, or header and unit"),
+    ):
+        assert as_options(text, command) == told
+
+
+def test_every_fault_of_a_file_is_one_of_the_json(wavs):
+    done = run("import", wavs[0], "-o", wavs[0].parent / "x.h5", "--json", code=2)
+    error = json.loads(done.stderr.splitlines()[-1])["error"]
+    assert error["faults"] == error["message"].split("\n")
+    assert len(error["faults"]) == 3
+
+
+def test_arrays_named_after_the_channels_are_chosen(tmp_path):
+    path = tmp_path / "n.npz"
+    np.savez(path, acc_x=RAMP, acc_y=-RAMP, tacho=2 * RAMP, other=np.ones(9))
+    rate = ("--fs", 10, "--unit", "g")
+    run("import", path, "-o", tmp_path / "a.h5", "--channels", "acc_y,x=acc_x", *rate)
+    with DataSet(tmp_path / "a.h5") as data:
+        assert data[0].names == ("acc_y", "x")
+        np.testing.assert_allclose(data[0].signal[1], 9.80665 * RAMP, rtol=1e-6)
+    refused("import", path, "-o", tmp_path / "b.h5", "--channels", "acc_x,key", *rate,
+            says=["choose with --variable, once for each channel"])  # fmt: skip
+
+
 def test_inputs_and_outputs_are_kept(wavs, tmp_path):
     path, options = tmp_path / "x.h5", ("--channels", "x,y,key", "--unit", "g")
     path.write_text("mine")
@@ -234,10 +264,10 @@ def test_the_report_on_a_wav_is_that_on_the_simulation(small_set, small_model, t
     assert ours["recording"]["origin"] == "measured"
     refused("report", path, *common, says=["--unit must be given"])
     refused("report", small_set, *common, "--unit", "g", says=["unit must not be given"])
-    # without its tacho named, it has three vibration channels
     plain = run("report", path, *common, *declared[:4], code=2).stdout
     assert "Unusable recording: no grade is given" in plain
-    assert "it has 3 vibration channel(s), the model needs 2: acc_x, acc_y" in plain
+    assert "its channel tacho is not named as its tacho; give --tacho tacho" in plain
+    assert "it has" not in plain  # nothing else is amiss
     page = tmp_path / "r.html"
     run("report", path, *common, *declared, "-o", page)
     assert "pump.wav: measured" in page.read_text()

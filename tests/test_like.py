@@ -57,8 +57,23 @@ def test_info_lets_explicit_options_win(folder):
     other = run("info", folder / "x.npy", *like, "--fs", "2000", code=2)
     assert "sample rate = 2000 Hz must be 1000 Hz, as in p.json" in other.stderr
     assert "give --resample-to 1000" in other.stderr
+    slow = run("info", folder / "x.npy", *like, "--fs", "500", code=2)
+    assert "a higher rate adds no band to samples that are there" in slow.stderr
+    assert "resample" not in slow.stderr
     resampled = run("info", folder / "x.npy", *like, "--fs", "2000", "--resample-to", "1000")
     assert json.loads(resampled.stdout)["sample_rate_hz"] == 1000.0
+
+
+def test_a_file_of_other_channels_than_the_profile_says_whose_they_are(folder):
+    np.save(folder / "one.npy", SIGNAL[0])
+    told = run("info", folder / "one.npy", "--like", folder / "p.json", code=2).stderr
+    assert "--channels = a, b, shaft (of p.json) must name the one channel" in told
+
+
+def test_a_profile_chooses_the_arrays_that_are_named_after_its_channels(folder):
+    np.savez(folder / "x.npz", b=SIGNAL[1], a=SIGNAL[0], shaft=SIGNAL[2], fs=1000.0)
+    told = run("info", folder / "x.npz", "--like", folder / "p.json", "--json").stdout
+    assert [channel["name"] for channel in json.loads(told)["channels"]] == ["a", "b", "shaft"]
 
 
 def test_a_profile_that_is_none_is_refused(folder):

@@ -245,6 +245,35 @@ def test_a_mark_beside_the_dead_centre_is_named_with_its_angle(model, familiar, 
     assert degrees == pytest.approx([abs(late)] * len(told), abs=10)
 
 
+def test_a_tacho_upside_down_is_named_as_that(model, familiar):
+    told = []
+    for recording in familiar[:4]:
+        row = recording.names.index(recording.tacho)
+        signal = recording.signal.copy()
+        signal[row] = signal[row].max() - signal[row]
+        found = model.estimate(replace(recording, signal=signal))
+        told += [fault.text for fault in found.faults if fault.kind == "tacho"]
+    assert told
+    assert all("multiply the channel by -1: its pulses point down" in text for text in told)
+
+
+def test_a_channel_that_is_the_tacho_but_not_named_as_it_is_said_so(model, familiar):
+    recording = replace(familiar[0], tacho=None)
+    found = model.estimate(recording)
+    [fault] = found.faults
+    assert (fault.kind, found.verdict) == ("tacho", "unusable")
+    assert "its channel tacho is not named as its tacho; give --tacho tacho" in fault.text
+
+
+def test_a_level_outside_the_trained_range_has_its_unit(model, familiar):
+    units = {each.name: each.unit for each in model.card.conditions}
+    assert (units["acc_x.rms"], units["shaft.speed_hz"]) == ("m/s^2", "Hz")
+    row = np.zeros(len(model.names))
+    assert any(
+        "acc_x.rms = 0 m/s^2 is outside" in text for text in model._condition_cautions(row, {})
+    )
+
+
 def test_a_header_that_does_not_fit_is_named_whole(model, familiar):
     recording = familiar[0]
     wrong = replace(

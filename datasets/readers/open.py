@@ -240,7 +240,7 @@ def list_sources(path: str | Path, options: SourceOptions | None = None) -> tupl
 
 def _refuse_unread(file: Path, part: FilePart, options: SourceOptions) -> None:
     """Numbers must not be left out like words, unless the channels are chosen without them."""
-    wanted = options.channels or (options.like.channels if options.like else ())
+    wanted = _wanted(options)
     chosen = {_split(entry)[1] or entry for entry in wanted}
     told = [text for name, text in part.unread.items() if not wanted or name in chosen]
     if told:
@@ -292,7 +292,8 @@ def _of_record(file: Path, part: FilePart, options: SourceOptions, record: int) 
 
 def _chosen(file: Path, contents: Contents, options: SourceOptions, record: int) -> FilePart:
     names = [part.name for part in contents.parts]
-    wanted = [_fitting(file, pattern, names) for pattern in options.variables]
+    asked = options.variables or _named_by_channels(names, options)
+    wanted = [_fitting(file, pattern, names) for pattern in asked]
     if wanted:
         missing = [name for name in wanted if name not in names]
         if missing:
@@ -302,7 +303,7 @@ def _chosen(file: Path, contents: Contents, options: SourceOptions, record: int)
             )
         found = [contents.parts[names.index(name)] for name in wanted]
         found = [_of_record(file, part, options, record) for part in found]
-        pairs = zip(found, options.variables, strict=True)
+        pairs = zip(found, asked, strict=True)
         return _merged(file, [_by_pattern(part, pattern) for part, pattern in pairs])
     known = [part for part in contents.parts if part.known_as]
     if len(known) == 1:
@@ -315,8 +316,20 @@ def _chosen(file: Path, contents: Contents, options: SourceOptions, record: int)
         )
     raise DataError(
         f"{file} holds {len(names)}: variable must be one of its arrays: {contents.listing()}; "
-        "choose with variable"
+        "choose with variable, once for each channel where each is an array"
     )
+
+
+def _wanted(options: SourceOptions) -> Sequence[str]:
+    """Channels that the caller names, else the profile; none for all."""
+    return options.channels or (options.like.channels if options.like else ())
+
+
+def _named_by_channels(names: Sequence[str], options: SourceOptions) -> tuple[str, ...]:
+    """Arrays that the channels to be read are named after, where every channel is one."""
+    wanted = _wanted(options)
+    arrays = [entry if entry in names else _split(entry)[1] or entry for entry in wanted]
+    return tuple(arrays) if len(names) > 1 and set(arrays) <= set(names) else ()
 
 
 def _fitting(file: Path, pattern: str, names: Sequence[str]) -> str:
@@ -394,7 +407,8 @@ def _settled(
     rate = _rate(part, options, faults, missing)
     like = options.like
     _refuse_unlike(rate, options, faults)
-    rows, names = _rows(part, options.channels or (like.channels if like else ()), faults)
+    whose = "" if options.channels or like is None else f" (of {like.source})"
+    rows, names = _rows(part, _wanted(options), faults, whose)
     _refuse_strangers(part, options, names, faults)
     meanings = [
         _meaning(part, row, name, options, faults, missing)
@@ -454,9 +468,12 @@ def _refuse_unlike(rate: float | None, options: SourceOptions, faults: list[str]
         return
     wanted = options.like.sample_rate
     if abs(rate / wanted - 1) > _SAME_RATE:
+        cure = f"give --resample-to {wanted:.10g}"
+        if rate < wanted:
+            cure = "record as fast: a higher rate adds no band to samples that are there"
         faults.append(
             f"sample rate = {rate:.10g} Hz must be {wanted:.10g} Hz, as in {options.like.source}; "
-            f"give --resample-to {wanted:.10g}"
+            f"{cure}"
         )
 
 
@@ -471,8 +488,10 @@ def _whole(rate: float, doubt: float) -> float:
     return float(math.ceil(rate * (1 - doubt)))
 
 
-def _rows(part: FilePart, wanted: Sequence[str], faults: list[str]) -> tuple[list[int], list[str]]:
-    """Which rows of the part, under which names."""
+def _rows(
+    part: FilePart, wanted: Sequence[str], faults: list[str], whose: str
+) -> tuple[list[int], list[str]]:
+    """Which rows of the part, under which names; `whose` the wanted ones are, for messages."""
     there = [channel.name for channel in part.channels]
     rows, names = list(range(len(there))), list(there)
     if len(there) > MOST_CHANNELS or not there:
@@ -487,9 +506,11 @@ def _rows(part: FilePart, wanted: Sequence[str], faults: list[str]) -> tuple[lis
     if wanted and not part.named and not all(name in there for name in shown):
         names = list(wanted)
         if len(names) != len(there):
+            many = "the one channel" if len(there) == 1 else f"all {len(there)} channels"
             faults.append(
-                f"channels = {names} must name all {len(there)} channels, which the file leaves "
-                f"unnamed, or choose of {', '.join(there[:_SHOWN_NAMES])} as new=old"
+                f"channels = {', '.join(names)}{whose} must name {many}, "
+                f"which the file leaves unnamed, or choose of {', '.join(there[:_SHOWN_NAMES])} as "
+                "new=old"
             )
             return [], []
     elif wanted:

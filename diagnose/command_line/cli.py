@@ -65,8 +65,10 @@ class _Group(HelpfulGroup):
                 raise  # not ours: a defect, with its traceback
             command = self.get_command(context, context.invoked_subcommand or "")
             code = EXIT_BAD_INPUT if isinstance(error, ValueError) else EXIT_FAILED
+            text = as_options(str(error), command)
+            # a scene's errors begin with a line that counts them, others are a line each
             faults = [as_options(fault, command) for fault in getattr(error, "faults", ())]
-            _end(context, as_options(str(error), command), code, faults)
+            _end(context, text, code, faults or text.splitlines())
         except KeyboardInterrupt as error:
             if not str(error):
                 raise  # click says that it ends

@@ -15,6 +15,7 @@ from ..options.shared import (
     NUMBER,
     PATH,
     Share,
+    as_options,
     emit,
     force_option,
     jobs_option,
@@ -256,7 +257,8 @@ def info(
             **read,
             **wanted,
         )
-        text += f"\n{picture_text(described['plot'])}"
+        command = click.get_current_context().command
+        text += f"\n{as_options(picture_text(described['plot']), command)}"
     emit(described, as_json, text)
 
 

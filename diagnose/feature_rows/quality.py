@@ -280,12 +280,29 @@ def mark_faults(recording: Recording, late_deg: float | None) -> tuple[QualityFa
     if late_deg is None:
         return ()
     side = "late" if late_deg > 0 else "early"
+    upright = "" if not _upside_down(recording, late_deg) else "multiply the channel by -1: "
+    if upright:
+        upright += "its pulses point down and end as late as that; or "
     text = (
         f"tacho {recording.tacho}: its mark comes about {abs(late_deg):.0f} degrees {side}, but "
-        "for which the recording is familiar; must be at the top dead centre: move the mark, shift "
-        "the channel by as much, or look for a valve that does not close"
+        f"for which the recording is familiar; must be at the top dead centre: {upright}move the "
+        "mark, shift the channel by as much, or look for a valve that does not close"
     )
     return (QualityFault(kind="tacho", channel=str(recording.tacho), text=text),)
+
+
+def _upside_down(recording: Recording, late_deg: float) -> bool:
+    """Whether pulses point down, so that their end is taken for the mark, and are so long."""
+    tacho = recording.tacho_signal
+    if tacho is None:
+        return False
+    below = float(np.mean(tacho < (float(tacho.min()) + float(tacho.max())) / 2))
+    width_deg = 360.0 * below / recording.pulses_per_revolution
+    return below < _HALF and abs(width_deg - late_deg) <= _MARK_BIN_DEG
+
+
+_HALF = 0.5
+_MARK_BIN_DEG = 10.0  # in steps of which a mark is moved to try it
 
 
 def layout_faults(recording: Recording, card: LayoutCard) -> tuple[QualityFault, ...]:
@@ -302,11 +319,19 @@ def layout_faults(recording: Recording, card: LayoutCard) -> tuple[QualityFault,
     tuple of QualityFault
         All of them.
     """
+    unnamed = _unnamed_tacho(recording, card)
+    vibration = [c for c in recording.vibration_channels if c.name != unnamed]
     return (
-        *_channel_faults(recording.vibration_channels, card),
+        *_channel_faults(vibration, card),
         *_tacho_layout_faults(recording, card),
         *_rate_faults(recording.sample_rate, card.sample_rate_hz),
     )
+
+
+def _unnamed_tacho(recording: Recording, card: LayoutCard) -> str | None:
+    """Channel of the model's tacho in a recording that names none."""
+    there = recording.tacho is None and card.tacho in recording.names
+    return card.tacho if there else None
 
 
 def _channel_faults(found: Sequence[Channel], card: LayoutCard) -> list[QualityFault]:
@@ -356,7 +381,9 @@ def _mapping(found: Sequence[str], wanted: Sequence[str]) -> str:
 
 def _tacho_layout_faults(recording: Recording, card: LayoutCard) -> list[QualityFault]:
     if (recording.tacho is None) != (card.tacho is None):
-        needs = "it has no tacho, the model needs one; record one, or name its channel"
+        needs = "it has no tacho, the model needs one; record one, or name it: --tacho CHANNEL"
+        if unnamed := _unnamed_tacho(recording, card):
+            needs = f"its channel {unnamed} is not named as its tacho; give --tacho {unnamed}"
         text = needs if card.tacho else "it has a tacho, the model was trained without"
         return [QualityFault(kind="tacho" if card.tacho else "layout", channel="", text=text)]
     if recording.pulses_per_revolution != card.pulses_per_revolution:

@@ -196,5 +196,7 @@ def _with_option(text: str, word: str, option: str) -> str:
     if "_" in word:
         return re.sub(rf"(?<![\w'-]){word}(?![\w'])", option, text)
     # may be a plain word elsewhere
-    place = rf"(?m)((?:^|: |\b(?:give|with|use) )){word}(?= = | must | to | and | if |[;,)]|$)"
+    others = r"(?:(?:--)?[\w-]+(?: = \w+)?(?:, | and ))*"
+    begin = rf"(?:^|: |\b(?:give|with|use) {others})"
+    place = rf"(?m)({begin}){word}(?= = | must | to | and | if |[;,)]|$)"
     return re.sub(rf"(; ){word}(?= = )", rf"\1{option}", re.sub(place, rf"\1{option}", text))

@@ -75,7 +75,8 @@ _SOURCE_OPTIONS = (
     click.option(
         "--variable",
         multiple=True,
-        help="Array, data set or group to read, where the file holds several.",
+        help="Array, data set or group to read, where the file holds several; repeatable: several "
+        "of one length become channels.",
     ),
     click.option("--tacho", help="Name of the tacho channel."),
     click.option(

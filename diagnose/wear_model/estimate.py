@@ -754,8 +754,8 @@ class WearModel:
             if value is None or not math.isfinite(value) or low <= value <= high:
                 continue
             cautions.append(
-                f"{name} = {value:.4g} {condition.unit} is outside the trained range "
-                f"{low:.4g} to {high:.4g} {condition.unit}: extrapolating"
+                f"{name} = {f'{value:.4g} {condition.unit}'.rstrip()} is outside the trained range "
+                f"{f'{low:.4g} to {high:.4g} {condition.unit}'.rstrip()}: extrapolating"
             )
         return cautions
 

@@ -22,6 +22,7 @@ from ...datasets.recipe.text import name_in
 from ...datasets.split.rules import check_no_leak, group_folds, group_split
 from ...datasets.split.stored import usable_sides
 from ...sim.output.recording import DataError
+from ...sim.output.sensor import Channel
 from ..feature_rows.feature_choice import (
     Candidates,
     Selection,
@@ -455,21 +456,29 @@ def _card(
         "tacho": head.tacho,
         "pulses_per_revolution": head.pulses_per_revolution,
         "features": list(table.names),
-        "conditions": _conditions(table, train),
+        "conditions": _conditions(table, train, head.channels),
         "mode": "cold",
         "baseline_records": 0,
     }
 
 
-def _conditions(table: FeatureTable, train: NDArray[np.intp]) -> list[dict[str, Any]]:
+def _conditions(
+    table: FeatureTable, train: NDArray[np.intp], channels: Sequence[Channel]
+) -> list[dict[str, Any]]:
     """Trained ranges: of what the signal tells, and of what was noted beside it."""
+    units = {f"{channel.name}.rms": channel.unit for channel in channels}
     columns = [
-        {"name": name, "feature": name, "unit": "Hz" if name.endswith("hz") else ""}
+        {"name": name, "feature": name, "unit": units.get(name, _unit_in(name))}
         | _range(table.values[train, i])
         for i, name in enumerate(table.names)
         if name.rpartition(MARK)[2] == "shaft.speed_hz" or name.endswith(".rms")
     ]
     return columns + _noted(table.manifest.iloc[train])
+
+
+def _unit_in(name: str) -> str:
+    """Of a feature, where its name ends with it; of a view's channel it is not known here."""
+    return "Hz" if name.endswith("hz") else ""
 
 
 def _noted(manifest: pd.DataFrame) -> list[dict[str, Any]]:
