@@ -98,7 +98,7 @@ def generate(
     scheduler: str | None = None,
     force: bool = False,
     truth: bool = False,
-    fidelity: Literal["auto", "given"] | None = None,
+    fidelity: Literal["given", "auto"] | None = None,
     progress: Callable[[int, int], None] | None = None,
     say: Callable[[str], None] | None = None,
 ) -> Summary:

@@ -67,7 +67,7 @@ def generate(
     view: str,
     truth: bool,
     twin: Path | None,
-    fidelity: Literal["auto", "given"] | None,
+    fidelity: Literal["given", "auto"] | None,
     seed: int,
     jobs: int | None,
     scheduler: str | None,
