@@ -4,8 +4,9 @@ import io
 import math
 import re
 import zipfile
+import zlib
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -26,6 +27,7 @@ from ..source.part import (
     damaged,
     foreign,
 )
+from ..source.rate_name import RateNote, is_rate_name, rate_note
 
 _NAMES = {
     "int8": "i1",
@@ -392,10 +394,32 @@ def npz_contents(path: Path, options: SourceOptions) -> Contents:
         raise damaged(path, error) from error
     with archive:
         found = [_npz_member(path, archive, info, options) for info in archive.infolist()]
+        rate = _npz_rate(archive)
     return Contents(
-        parts=tuple(item for item in found if isinstance(item, FilePart)),
+        parts=tuple(
+            replace(part, sample_rate=rate.declared, rate_note=rate.note, rate_seen=rate.seen)
+            for part in found
+            if isinstance(part, FilePart)
+        ),
         others=tuple(item for item in found if isinstance(item, str)),
     )
+
+
+def _npz_rate(archive: zipfile.ZipFile) -> RateNote:
+    """Of a single number under the name of a rate."""
+    for info in archive.infolist():
+        name = info.filename.removesuffix(".npy")
+        if not is_rate_name(name) or info.file_size > _LONGEST_HEADER:
+            continue
+        try:
+            value = np.load(io.BytesIO(archive.read(info)), allow_pickle=False)
+            return rate_note(name, float(value.item()))
+        except (*_NO_NUMBER, zipfile.BadZipFile, zlib.error):  # whatever else it is, it is no rate
+            continue
+    return RateNote()
+
+
+_NO_NUMBER = (ValueError, TypeError, EOFError, OSError, NotImplementedError, MemoryError)
 
 
 def _npz_member(

@@ -1,7 +1,6 @@
 """HDF5 of other programs, and MATLAB 7.3, which is HDF5 inside; read in pieces."""
 
 import math
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -13,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...sim.output.recording import DataError
-from ...sim.parts.units import to_si
 from ..file.hdf5_values import HDF5_FAULTS, Place, is_loose_text, plain_value, texts_apart
 from ..source.part import (
     LARGEST_INFLATED,
@@ -26,13 +24,12 @@ from ..source.part import (
     damaged,
     foreign,
 )
+from ..source.rate_name import RateNote, is_rate_name, rate_note
 from .flat import Axes, array_axes, numbered
-from .mat_tree import MOST_LEAVES, Leaf, Tree, tree_contents
+from .mat_tree import MOST_LEAVES, UNIT_NAMES, Leaf, Tree, tree_contents
 
 _DEEPEST = 32
 _LONGEST_TEXT = 4096
-_UNIT_NAMES = ("unit", "units", "Unit", "Units")
-_RATE_NAME = re.compile(r"(?:fs|sampl(?:e|ing)[_ ]?(?:rate|frequency))([_ ]?hz)?", re.IGNORECASE)
 
 
 def hdf5_contents(path: Path, options: SourceOptions) -> Contents:
@@ -119,8 +116,9 @@ def _recording_axes(path: Path, name: str, item: Any, options: SourceOptions) ->
 
 def _hdf5_part(path: Path, name: str, item: Any, axes: Axes, texts: "_Texts") -> FilePart:
     own = {key: text for (owner, key), text in texts.items() if owner == name}
-    unit = next((text for key in _UNIT_NAMES if (text := own.get(key) or _text(item, key))), None)
+    unit = next((text for key in UNIT_NAMES if (text := own.get(key) or _text(item, key))), None)
     names = numbered(name.rpartition("/")[2], axes.n_channels)
+    rate = _rate_of(item, own)
     return FilePart(
         name=name,
         about=f"{item.shape}",
@@ -128,7 +126,9 @@ def _hdf5_part(path: Path, name: str, item: Any, axes: Axes, texts: "_Texts") ->
         named=False,
         n_samples=axes.n_samples,
         fetch=partial(_fetch, path, item, axes),
-        sample_rate=_declared_rate(item, own),
+        sample_rate=rate.declared,
+        rate_note=rate.note,
+        rate_seen=rate.seen,
     )
 
 
@@ -150,8 +150,7 @@ def _texts_apart(path: Path, arrays: Sequence[tuple[str, Any]]) -> _Texts:
         (name, key)
         for name, item in arrays
         for key in item.attrs
-        if (key in _UNIT_NAMES or _RATE_NAME.fullmatch(key))
-        and is_loose_text(item.attrs.get_id(key))
+        if (key in UNIT_NAMES or is_rate_name(key)) and is_loose_text(item.attrs.get_id(key))
     ]
     try:
         texts = texts_apart(path, asked)
@@ -216,21 +215,17 @@ def _text(item: Any, key: str) -> str:
     return value.strip() if isinstance(value, str) else ""
 
 
-def _declared_rate(item: Any, texts: Mapping[str, str]) -> float | None:
-    """Rate of an attribute whose name or value says hertz."""
-    for key in item.attrs:
-        match = _RATE_NAME.fullmatch(key)
-        if match is None:
-            continue
-        if text := texts.get(key) or _text(item, key):
-            try:
-                return to_si(text, "frequency")
-            except ValueError:
-                continue
+def _rate_of(item: Any, texts: Mapping[str, str]) -> RateNote:
+    """Rate of the attributes: one whose name or value says hertz, else a number without a unit."""
+    found = RateNote()
+    for key in filter(is_rate_name, item.attrs):
         value = plain_value(item, key)
-        if match.group(1) and isinstance(value, (int, float, np.number)):
-            return float(value)
-    return None
+        number = float(value) if isinstance(value, (int, float, np.number)) else None
+        told = rate_note(key, texts.get(key) or _text(item, key) or number)
+        if told.declared is not None:
+            return told
+        found = told if found.seen is None else found
+    return found
 
 
 # --- MATLAB 7.3

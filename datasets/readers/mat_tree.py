@@ -8,10 +8,14 @@ from typing import Literal
 
 from ...sim.output.recording import DataError
 from ..source.part import Contents, Fetch, FilePart, PartChannel, SourceOptions
+from ..source.rate_name import RateNote, is_rate_name, rate_note
 from .flat import Axes, Flat, array_axes, numbered
 
 POUND_FORCE = 4.4482216152605
 """[N], exact: international pound times standard gravity."""
+
+UNIT_NAMES = ("unit", "units", "Unit", "Units")
+"""Under which files keep the unit of an array."""
 
 MOST_LEAVES = 10_000
 """Arrays, fields and cells believed of one file."""
@@ -128,13 +132,14 @@ def tree_contents(path: Path, tree: Tree, options: SourceOptions) -> Contents:
     """
     named = dict(_named(path, tree))
     known = None if options.variables else _known(path, tree, options)
+    structs = _by_struct(named)
     parts, others = [], []
     for name, leaf in named.items():
         if known is not None and name == known.name:
             continue
         found = _part(path, name, leaf, options)
         if isinstance(found, FilePart):
-            parts.append(found)
+            parts.append(_with_what_is_beside(found, structs))
         elif found:
             others.append(found)
     return Contents(parts=tuple([known, *parts] if known else parts), others=tuple(others))
@@ -157,6 +162,40 @@ def _named(path: Path, tree: Tree) -> Iterator[tuple[str, Leaf]]:
             for key, value in row.items()
         ]
         queue += reversed(inner)
+
+
+def _by_struct(named: Mapping[str, Leaf]) -> dict[str, dict[str, Leaf]]:
+    """Leaves by the struct that they are fields of, and by name there."""
+    found: dict[str, dict[str, Leaf]] = {}
+    for name, leaf in named.items():
+        struct, _, key = name.rpartition(".")
+        found.setdefault(struct, {})[key] = leaf
+    return found
+
+
+def _with_what_is_beside(part: FilePart, structs: Mapping[str, Mapping[str, Leaf]]) -> FilePart:
+    """An array with the unit that its struct holds, if for it alone, and the nearest rate."""
+    struct = part.name.rpartition(".")[0]
+    beside = structs[struct]
+    arrays = [leaf for leaf in beside.values() if leaf.kind == "numeric" and leaf.size > 1]
+    if struct and len(arrays) == 1:
+        texts = [beside[key].text for key in UNIT_NAMES if key in beside]
+        unit = next(filter(None, texts), None)
+        part = replace(part, channels=tuple(replace(c, unit=unit) for c in part.channels))
+    rate = _nearest_rate(struct, structs)
+    return replace(part, sample_rate=rate.declared, rate_note=rate.note, rate_seen=rate.seen)
+
+
+def _nearest_rate(struct: str, structs: Mapping[str, Mapping[str, Leaf]]) -> RateNote:
+    """Of the struct, else of the one that holds it, and so on."""
+    while True:
+        for key, leaf in structs.get(struct, {}).items():
+            told = rate_note(key, leaf.text or leaf.scalar()) if is_rate_name(key) else RateNote()
+            if told.declared is not None or told.seen is not None:
+                return told
+        if not struct:
+            return RateNote()
+        struct = struct.rpartition(".")[0]
 
 
 def _member(name: str, leaf: Leaf, index: int, key: str) -> str:

@@ -26,6 +26,7 @@ from ..source.part import (
     Contents,
     FilePart,
     PartChannel,
+    Profile,
     Source,
     SourceChannel,
     SourceOptions,
@@ -446,6 +447,7 @@ def _rate(
         return None
     if declared is None:
         if given is None and options.like is not None:
+            _refuse_other_rate(part, options.like, faults)
             return options.like.sample_rate
         if given is None:
             note = f" ({part.rate_note})" if part.rate_note else ""
@@ -460,6 +462,15 @@ def _rate(
         f"{f' ({part.known_as})' if part.known_as else ''}; leave it out"
     )
     return None
+
+
+def _refuse_other_rate(part: FilePart, like: Profile, faults: list[str]) -> None:
+    """The rate of a profile must not stand for another that the file seems to have."""
+    if part.rate_seen is not None and abs(part.rate_seen / like.sample_rate - 1) > _SAME_RATE:
+        faults.append(
+            f"sample rate = {like.sample_rate:.10g} Hz of {like.source} stands for what the file "
+            f"does not declare, but {part.rate_note}"
+        )
 
 
 def _refuse_unlike(rate: float | None, options: SourceOptions, faults: list[str]) -> None:

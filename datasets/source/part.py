@@ -227,6 +227,8 @@ class FilePart:
         Relative uncertainty of a printed rate; 0 where it is exact.
     rate_note : str
         Why the file does not declare a rate though it seems to.
+    rate_seen : float, optional
+        Number that would be the rate if it had a unit.
     bits : int
         Of integers over full scale, 0 for numbers that stand for themselves.
     conditions : mapping
@@ -252,6 +254,7 @@ class FilePart:
     sample_rate: float | None = None
     rate_doubt: float = 0.0
     rate_note: str = ""
+    rate_seen: float | None = None
     bits: int = 0
     conditions: Mapping[str, float] = field(default_factory=dict)
     known_as: str = ""
