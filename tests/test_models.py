@@ -632,6 +632,19 @@ def test_the_notice_does_not_hang_on_a_text_in_the_file(trained):
     assert model.notice.startswith("trained on simulation")
 
 
+def test_a_model_that_has_learnt_nothing_says_so(trained):
+    """Estimates of other machines than the true ones, as of shuffled labels."""
+    model = trained[0]
+    known = model.blind.calibration
+    assert model.blind.error < 0.5 * model.blind.guess_error
+    other = np.random.default_rng(0).permutation(known.estimate)
+    blind = dataclasses.replace(model.blind, calibration=dataclasses.replace(known, estimate=other))
+    told = dataclasses.replace(model, blind=blind).notice
+    assert told.startswith("trained on simulation; no measured joint")
+    assert "one guess for all by" in told
+    assert "tells hardly anything about the wear" in told
+
+
 def test_holding_out_too_much_is_refused_before_any_work(small_set, monkeypatch):
     monkeypatch.setattr(training, "feature_table", None)
     for share in (0.95, float("nan"), -0.1):

@@ -126,6 +126,7 @@ def trained(tmp_path_factory):
 def test_conditions_that_differ_are_told_apart_by_recordings_left_out(trained):
     _path, model, result = trained
     assert model.classes == ("cracked", "sound")
+    assert "chance" not in model.notice
     assert (result["recordings_right"], result["recordings_judged"]) == (8, 8)
     # of 8 recordings nobody can say more than this, however right they are
     assert result["recordings_interval"][0] == pytest.approx(0.025 ** (1 / 8))
@@ -137,7 +138,8 @@ def test_conditions_that_differ_are_told_apart_by_recordings_left_out(trained):
 def test_conditions_that_do_not_differ_are_not_told_apart(tmp_path):
     """Windows of one recording are alike, which must be of no help."""
     path = own_set(tmp_path, (("a", 700.0), ("b", 700.0)), seed=5)
-    _model, result = train_classes(path, target="condition", seed=0)
+    model, result = train_classes(path, target="condition", seed=0)
+    assert "the largest class alone would be 0.50: that may be chance" in model.notice
     assert result["accuracy"] < 0.85
     assert result["recordings_right"] <= 6  # 7 or 8 of 8 by chance: 9 in 256
 

@@ -141,6 +141,12 @@ class ClassModel:
                 "recognise unfamiliar recordings: a condition outside its classes "
                 "may be named as one of them"
             )
+        accuracy, guess = self.scores["accuracy"], self.scores["majority"]
+        if self.scores["recordings_judged"] and self.scores["intervals"]["accuracy"][0] <= guess:
+            few.append(
+                f"of recordings left out it named {accuracy:.2f} rightly, the largest class alone "
+                f"would be {guess:.2f}: that may be chance"
+            )
         return "; ".join(few)
 
     def distance(self, rows: Float) -> Float:

@@ -70,6 +70,12 @@ class Estimator:
         """Mean absolute error on machines that had no part in the fit [m]."""
         return float(np.abs(self.calibration.estimate - self.calibration.truth).mean())
 
+    @property
+    def guess_error(self) -> float:
+        """Mean absolute error of one guess for all these machines, their median [m]."""
+        truth = self.calibration.truth
+        return float(np.abs(truth - np.median(truth)).mean())
+
     def grading(
         self, inputs: Float, distance: float, edges: Sequence[float], *, cautious: bool
     ) -> dict[str, Any]:
