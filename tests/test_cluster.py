@@ -1,9 +1,9 @@
 """Workers of a Dask cluster: two processes on this machine."""
 
+import multiprocessing
 import os
 import signal
 import socket
-import subprocess
 import sys
 import threading
 import time
@@ -27,11 +27,34 @@ cloudpickle.register_pickle_by_value(sys.modules[__name__])  # workers cannot im
 N = 12
 
 
+# imports for seconds, once: every scheduler and worker is a fork of this server
+FORKS = multiprocessing.get_context("forkserver")
+FORKS.set_forkserver_preload(
+    [
+        "distributed.cli.dask_scheduler",
+        "distributed.cli.dask_worker",
+        "wearstate.datasets.generation.generate",
+    ]
+)
+
+COMMAND = """
+import os, signal
+from distributed.cli.dask_{what} import main
+signal.signal(signal.SIGINT, signal.default_int_handler)
+os.chdir({folder!r})
+log = os.open("{what}.log", os.O_WRONLY | os.O_CREAT | os.O_APPEND)
+os.dup2(log, 1)
+os.dup2(log, 2)
+main({arguments!r}, prog_name="dask-{what}")
+"""
+
+
 def start(folder, what, *arguments):
-    command = [sys.executable, "-P", "-m", f"distributed.cli.dask_{what}", *arguments]
-    log = folder / f"{what}.log"
-    with log.open("ab") as file:
-        return subprocess.Popen(command, cwd=folder, stdout=file, stderr=file)
+    """Run ``dask scheduler`` or ``dask worker`` in a process of its own."""
+    code = COMMAND.format(folder=str(folder), what=what, arguments=arguments)
+    process = FORKS.Process(target=exec, args=(code, {}), daemon=True)
+    process.start()
+    return process
 
 
 def start_worker(folder, address, threads=1):
@@ -79,7 +102,7 @@ class Cluster:
     def end(self):
         for process in (*self.workers, self.scheduler):
             process.kill()
-            process.wait()
+            process.join()
 
 
 @contextmanager

@@ -48,14 +48,22 @@ NAMES = ("random", "speed", "severity-beyond", "noise")  # of others, the rows a
 CHEAP_MS = 0.05  # ridges only: the protocol is tested, not the model
 
 
+def with_features(patch, table):
+    """Features of `small_set` are those of a table: they need not be computed again."""
+    for place in (training, judging, module):
+        patch.setattr(place, "feature_table", lambda path, **_: table)
+
+
 @pytest.fixture(scope="module")
-def trained(small_set):
-    return train_model(small_set, seed=0, budget_ms=CHEAP_MS)
+def trained(small_trained, small_set):
+    with pytest.MonkeyPatch.context() as patch:
+        with_features(patch, small_trained[1])
+        return train_model(small_set, seed=0, budget_ms=CHEAP_MS)
 
 
 @pytest.fixture(scope="module")
 def case(trained, small_set):
-    return case_of(trained[0], small_set, quick=True)
+    return case_of(trained[0], small_set, quick=True)  # with features of its own making
 
 
 @pytest.fixture(scope="module")
@@ -325,9 +333,8 @@ def split_set(small_set, tmp_path_factory):
 
 @pytest.fixture
 def known_features(trained, monkeypatch):
-    """Both sets hold the same signals: their features need not be computed again."""
-    for place in (training, judging, module):
-        monkeypatch.setattr(place, "feature_table", lambda path, **_: trained[1])
+    """Both sets hold the same signals."""
+    with_features(monkeypatch, trained[1])
 
 
 @pytest.fixture
@@ -403,7 +410,7 @@ def test_a_split_too_small_to_train_on_is_refused(small_set, tmp_path, known_fea
         train_model(path, split="fw", budget_ms=CHEAP_MS)
 
 
-def test_the_command_line_trains_and_judges_by_a_split(split_set, tmp_path):
+def test_the_command_line_trains_and_judges_by_a_split(split_set, tmp_path, known_features):
     model = tmp_path / "odd.wsm"
     ways = ["--split", "odd", "-j", "1", "--json"]
     done = CliRunner().invoke(
@@ -505,7 +512,7 @@ def test_a_finished_model_has_a_page_too(trained, small_set):
     assert evaluation_html(told).count("data:image/png;base64,") == 4
 
 
-def test_the_command_judges_by_splits(trained, small_set, tmp_path):
+def test_the_command_judges_by_splits(trained, small_set, tmp_path, known_features):
     model, page = tmp_path / "model.wsm", tmp_path / "page.html"
     save_model(trained[0], model)
     assert load_model(model).card.budget_ms == CHEAP_MS
