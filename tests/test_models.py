@@ -641,7 +641,7 @@ def test_a_model_that_has_learnt_nothing_says_so(trained):
     blind = dataclasses.replace(model.blind, calibration=dataclasses.replace(known, estimate=other))
     told = dataclasses.replace(model, blind=blind).notice
     assert told.startswith("trained on simulation; no measured joint")
-    assert "one guess for all by" in told
+    assert "one guess for all errs by" in told
     assert "tells hardly anything about the wear" in told
 
 

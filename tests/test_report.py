@@ -728,6 +728,20 @@ def test_a_trend_to_zoom_in_names_its_recordings(model_file, tmp_path):
     assert "'life.h5[0]'" in refused
 
 
+def test_recordings_without_a_date_are_named_as_in_no_trend(model_file, tmp_path):
+    data = written(tmp_path / "life.h5", np.linspace(1e-4, 2e-4, 7))
+    dates, page = tmp_path / "dates.csv", tmp_path / "r.html"
+    rows = [f"life.h5[{i}],2026-0{1 + i}-01\n" for i in range(7)]
+    dates.write_text("file,date\n" + "".join(rows))
+    judge = ("report", data, "--model", model_file, "--dates", dates, "-o", page)
+    assert "Undated" not in run(*judge).stdout
+    dates.write_text("file,date\n" + "".join(rows[:5]))
+    told = " ".join(run(*judge, "--force").stdout.split())
+    assert "Undated 2 of 7 recordings have no time that can be read and are in no trend" in told
+    assert "life.h5[5], life.h5[6]; begin the date in a name with the year" in told
+    assert "2 of 7 recordings have no time" in shown(page.read_text(encoding="utf-8"))
+
+
 def test_a_short_life_hastens_the_advice(model, tmp_path):
     """Grade 2 at its beginning, but the limit is 40 h away: a week would be too late."""
     hours = np.arange(12) * 10.0

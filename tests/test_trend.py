@@ -126,6 +126,15 @@ def test_too_little_since_the_last_maintenance_is_said():
     assert "of one moment only" in same.reason
 
 
+def test_files_copied_within_an_hour_show_no_trend():
+    """Their times are those of the copying; hours of operation may be as near as one likes."""
+    wear, hours = np.linspace(1e-4, 2e-4, 8), np.linspace(0, 0.9, 8)
+    copied = fit_trend(hours, wear, 0.9 * wear, 1.1 * wear, limit=3e-4, clock="calendar")
+    assert copied.outlook is None
+    assert "of one moment only, must be >= 5 over more than an hour" in copied.reason
+    assert trend_of(wear, hours).outlook is not None
+
+
 # --- the life left
 
 
@@ -221,6 +230,7 @@ def test_bad_points_are_refused(severity, hours, says):
         ("p_20240301.wav", "2024-03-01T00:00:00+00:00"),
         ("2024-03-01T08:30:15.h5", "2024-03-01T08:30:15+00:00"),
         ("a-2024_03_01_0830.csv", "2024-03-01T08:30:00+00:00"),
+        ("pump 01.03.2024 (2).wav", "2024-03-01T00:00:00+00:00"),
         ("p_20241345_20240301.wav", "2024-03-01T00:00:00+00:00"),  # the first is no date
     ],
 )
@@ -228,7 +238,9 @@ def test_dates_in_names(text, moment):
     assert date_in(text).isoformat() == moment
 
 
-@pytest.mark.parametrize("text", ["run12.wav", "123456789012.wav", "2024-02-30.h5", ""])
+@pytest.mark.parametrize(
+    "text", ["run12.wav", "123456789012.wav", "2024-02-30.h5", "30.02.2024.h5", "01-03-2024.h5", ""]
+)
 def test_numbers_that_are_no_dates(text):
     assert date_in(text) is None
 

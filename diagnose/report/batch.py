@@ -157,6 +157,20 @@ class Batch:
         """Rows that tell how the machines are now; the worst first."""
         return tuple(row for row in self.rows if row.current)
 
+    @property
+    def undated(self) -> str:
+        """Recordings that are in no trend for want of a time; empty where all or none have one."""
+        names = [row.name for row in self.rows if row.time_h is None]
+        if not names or len(names) == len(self.rows):
+            return ""
+        shown = ", ".join(sorted(names)[:_SHOWN_UNDATED])
+        more = f" and {len(names) - _SHOWN_UNDATED} more" if len(names) > _SHOWN_UNDATED else ""
+        return (
+            f"{len(names)} of {len(self.rows)} recordings have no time that can be read and are in "
+            f"no trend: {shown}{more}; begin the date in a name with the year, as 2026-11-23, or "
+            "give --dates CSV"
+        )
+
     def outlook_of(self, row: BatchRow) -> Outlook | None:
         """What the trend says of the machine, where the row is its latest recording."""
         trend = self.trends.get(row.machine)
@@ -180,6 +194,9 @@ class Batch:
         if all(row.grade is None for row in self.current):
             whole = f"no grade is given, {whole}"
         return f"{whole}; now: {told}" if past else f"{whole}: {told}"
+
+
+_SHOWN_UNDATED = 4
 
 
 # --- which recordings

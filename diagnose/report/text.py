@@ -101,6 +101,8 @@ def batch_text(batch: Batch) -> str:
         lines.append(_folded("Trend", f"{machine_heading(machine)}: {said}"))
     if batch.trends:
         lines.append(_folded("Assumes", _assumptions(batch)))
+    if batch.undated:
+        lines.append(_folded("Undated", batch.undated))
     if batch.notice:
         lines.append(_folded("Notice", batch.notice))
     return "\n".join(lines)

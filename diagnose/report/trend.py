@@ -22,6 +22,11 @@ Growth = Literal["linear", "log"]
 FEWEST_POINTS = 5
 """Recordings since the last maintenance that a line needs: two for it, three for its scatter."""
 
+_LONGEST_MOMENT_H: dict[Clock, float] = {"operating": 0.0, "calendar": 1.0}
+"""From the first recording to the last [h]: files that were copied have times seconds apart."""
+
+_SOME_TIME: dict[Clock, str] = {"operating": "some time", "calendar": "more than an hour"}
+
 LONGEST_REACH = 3.0
 """How far a line is believed, in lengths of the time it was seen over."""
 
@@ -192,15 +197,17 @@ def fit_trend(
     last = points[:, starts[-1] :]
     shared = dict(zip(("time_h", "severity", "low", "high"), points, strict=True))
     n, span = last.shape[1], float(last[0, -1] - last[0, 0])
-    if n < FEWEST_POINTS or span <= 0:
-        lack = f"{n} usable recordings" if span > 0 or n < 2 else "recordings of one moment only"
+    if n < FEWEST_POINTS or span <= _LONGEST_MOMENT_H[clock]:
+        brief = n > 1 and span <= _LONGEST_MOMENT_H[clock]
+        lack = "recordings of one moment only" if brief else f"{n} usable recordings"
         since = "" if len(starts) == 1 else " since the last maintenance"
         return Trend(
             **shared,
             starts=starts,
             **{name: np.empty(0) for name in ("ahead_h", "line", "line_low", "line_high")},
             outlook=None,
-            reason=f"{lack}{since}, must be >= {FEWEST_POINTS} over some time; record again",
+            reason=f"{lack}{since}, must be >= {FEWEST_POINTS} over {_SOME_TIME[clock]}; record "
+            "again, or give the times at which they were recorded",
             clock=clock,
             coverage=coverage,
         )
@@ -456,10 +463,13 @@ def _two_figures(value: float) -> str:
 _DATE = re.compile(
     r"(?<!\d)(\d{4})[-_.]?(\d\d)[-_.]?(\d\d)(?:[T_ -]?(\d\d)[-:.h]?(\d\d)(?:[-:.]?(\d\d))?)?(?!\d)"
 )
+_DAY_FIRST = re.compile(r"(?<!\d)(\d\d)\.(\d\d)\.(\d{4})(?!\d)")  # with dots it is never the month
 
 
 def date_in(text: str) -> datetime | None:
-    """Date, and time where there is one, in a file name or a cell; year first, taken as UTC.
+    """Date, and time where there is one, in a file name or a cell, taken as UTC.
+
+    The year comes first, or the day with dots between (``01.03.2024``, without a time).
 
     Examples
     --------
@@ -474,6 +484,12 @@ def date_in(text: str) -> datetime | None:
             hour, minute, second = clock
             return datetime(year, month, day, hour, minute, second, tzinfo=UTC)
         except ValueError:  # numbers that are no date
+            continue
+    for match in _DAY_FIRST.finditer(text):
+        try:
+            day, month, year = (int(part) for part in match.groups())
+            return datetime(year, month, day, tzinfo=UTC)
+        except ValueError:
             continue
     return None
 

@@ -286,8 +286,8 @@ class WearModel:
         simulated = SIMULATION_NOTICE if self.card.origin == "simulated" else ""
         error, guess = self.blind.error, self.blind.guess_error
         unskilled = (
-            f"on machines left out of training it erred by {1e3 * error:.3g} mm, one guess for all "
-            f"by {1e3 * guess:.3g} mm: it tells hardly anything about the wear"
+            f"found on machines left out of training to err by {1e3 * error:.3g} mm, where one "
+            f"guess for all errs by {1e3 * guess:.3g} mm: it tells hardly anything about the wear"
         )
         return "; ".join(filter(None, (simulated, unskilled * (error > _UNSKILLED * guess))))
 
