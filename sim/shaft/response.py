@@ -23,7 +23,6 @@ the shaft's there.
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -47,7 +46,6 @@ _MODAL_LINES = 1024
 _ISOTROPY = 1e-9  # of the largest entry: rounding of an assembly
 _NOTHING = 1e-16  # of the largest at the start
 _RANK = 1e-10  # of the largest: flatter residual shapes repeat others
-_CHECKED_LINES = 16
 _MOST_GROWTH = 10.0  # of an elimination without exchange of rows; it costs digits by its square
 _UNRESTRAINED = 1e-14  # reciprocal condition of the stiffness
 
@@ -62,8 +60,6 @@ def receptance(
     forces: Sequence[Place],
     *,
     speed: ArrayLike = 0.0,
-    method: str = "direct",
-    modes: int | None = None,
 ) -> Complex:
     """Displacement over force [m/N] (rad and N m for slopes and moments).
 
@@ -77,11 +73,6 @@ def receptance(
         Coordinates, or what :meth:`Rotor.dof` takes.
     speed : float or array-like [shape=(n_freq,)]
         Of the shaft [rad/s]; one for each frequency where they go together, as in a run-up.
-    method : str
-        *direct* or *modal*.
-    modes : int, optional
-        Free-free modes of one plane that *modal* keeps, at least 3; by default those up to three
-        times the highest frequency. :func:`modal_receptance` returns the error as well.
 
     Returns
     -------
@@ -91,8 +82,8 @@ def receptance(
     Raises
     ------
     ValueError
-        A frequency or the speed is not finite, a place is unknown, the method is unknown, or a
-        static force (0 Hz) acts on a shaft that nothing holds.
+        A frequency or the speed is not finite, a place is unknown, or a static force (0 Hz) acts
+        on a shaft that nothing holds.
 
     Notes
     -----
@@ -116,12 +107,6 @@ def receptance(
     >>> bool(abs(h[0, 0, 0] / expected - 1) < 1e-9)
     True
     """
-    if method == "modal":
-        return modal_receptance(
-            rotor, frequencies, responses, forces, speed=_one_speed(speed), modes=modes, checks=0
-        ).values
-    if method != "direct":
-        raise ValueError(f"method = {method!r} must be 'direct' or 'modal'")
     hertz = _checked_frequencies(frequencies)
     turning = np.broadcast_to(_checked_speed(speed), hertz.shape)
     rows, columns = _dofs(rotor, responses), _dofs(rotor, forces)
@@ -139,23 +124,6 @@ def receptance(
     return values
 
 
-def mobility(
-    rotor: Rotor,
-    frequencies: ArrayLike,
-    responses: Sequence[Place],
-    forces: Sequence[Place],
-    *,
-    speed: ArrayLike = 0.0,
-    method: str = "direct",
-    modes: int | None = None,
-) -> Complex:
-    """Velocity over force [m/(N s)]; as :func:`receptance`, times ``i w``."""
-    values = receptance(
-        rotor, frequencies, responses, forces, speed=speed, method=method, modes=modes
-    )
-    return values * _derivative(frequencies, 1)
-
-
 def accelerance(
     rotor: Rotor,
     frequencies: ArrayLike,
@@ -163,8 +131,6 @@ def accelerance(
     forces: Sequence[Place],
     *,
     speed: ArrayLike = 0.0,
-    method: str = "direct",
-    modes: int | None = None,
 ) -> Complex:
     """Acceleration over force [m/(N s^2)]: :func:`receptance` times ``-w^2``.
 
@@ -178,10 +144,6 @@ def accelerance(
         Coordinates, or what :meth:`Rotor.dof` takes.
     speed : float or array-like [shape=(n_freq,)]
         Of the shaft [rad/s].
-    method : str
-        As of :func:`receptance`.
-    modes : int, optional
-        As of :func:`receptance`.
 
     Returns
     -------
@@ -201,15 +163,9 @@ def accelerance(
     >>> round(float(1 / value.real), 1), round(beam.weight / 9.80665, 1)
     (123.3, 123.3)
     """
-    values = receptance(
-        rotor, frequencies, responses, forces, speed=speed, method=method, modes=modes
-    )
-    return values * _derivative(frequencies, 2)
-
-
-def _derivative(frequencies: ArrayLike, order: int) -> Complex:
+    values = receptance(rotor, frequencies, responses, forces, speed=speed)
     omega = 2 * math.pi * np.asarray(frequencies, dtype=float)
-    return np.asarray(((1j * omega) ** order)[:, None, None], dtype=np.complex128)
+    return values * ((1j * omega) ** 2)[:, None, None]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -440,8 +396,7 @@ class FreeBasis:
 def free_basis(
     beam: Beam,
     *,
-    limit_hz: float | None = None,
-    modes: int | None = None,
+    limit_hz: float,
     stations: Sequence[float] = (),
     slopes: bool = True,
 ) -> FreeBasis:
@@ -452,10 +407,8 @@ def free_basis(
     Parameters
     ----------
     beam : Beam
-    limit_hz : float, optional
-        Keep the modes up to here [Hz].
-    modes : int, optional
-        Or keep so many, at least 2, the rigid ones.
+    limit_hz : float
+        Keep the modes up to here, the two rigid ones at least [Hz].
     stations : sequence of float
         Where forces act on the shaft, supports first of all [m].
     slopes : bool
@@ -464,7 +417,7 @@ def free_basis(
     Raises
     ------
     ValueError
-        Not one of `limit_hz` and `modes` is given, or it is out of range.
+        The limit is out of range.
 
     Notes
     -----
@@ -487,13 +440,14 @@ def free_basis(
     >>> [round(float(f), 2) for f in basis.frequency_hz[:4]], basis.shapes.shape[1]
     ([0.0, 0.0, 9.21, 25.38], 6)
     """
-    if (limit_hz is None) == (modes is None):
-        raise ValueError("give either limit_hz or modes, one of the two")
+    if not 0 < limit_hz < math.inf:
+        raise ValueError(f"limit_hz = {limit_hz} Hz must be > 0 and finite")
     plane = np.flatnonzero(np.arange(beam.n_dof) % 4 < 2)
     values, shapes = linalg.eigh(*(_plane(a, plane) for a in (beam.stiffness, beam.mass)))
     squared = np.maximum(values, 0.0)
     squared[:2] = 0.0  # rigid
-    n_modes = _count_kept(squared, limit_hz, modes)
+    highest = (2 * math.pi * limit_hz) ** 2
+    n_modes = max(2, int(np.searchsorted(squared, highest, side="right")))
     kept = shapes[:, :n_modes]
     frequency = np.sqrt(squared) / (2 * math.pi)
     nodes = np.array([beam.node(station) for station in stations], dtype=np.int64)
@@ -509,19 +463,6 @@ def free_basis(
 
 def _plane(matrix: csc_array, plane: Index) -> Vector:
     return np.asarray(matrix[plane][:, plane].toarray(), dtype=float)
-
-
-def _count_kept(squared: Vector, limit_hz: float | None, modes: int | None) -> int:
-    if modes is not None:
-        if not 2 <= modes <= squared.size:
-            raise ValueError(
-                f"modes = {modes} must be from 2 (the rigid ones) to {squared.size}; "
-                "refine the beam for more"
-            )
-        return modes
-    if limit_hz is None or not 0 < limit_hz < math.inf:
-        raise ValueError(f"limit_hz = {limit_hz} Hz must be > 0 and finite")
-    return max(2, int(np.searchsorted(squared, (2 * math.pi * limit_hz) ** 2, side="right")))
 
 
 def _residual_shapes(omitted: Vector, squared: Vector, rows: Index) -> tuple[Vector, Vector]:
@@ -594,13 +535,8 @@ class ReducedRotor:
         """
         own = self.receptance(frequencies, responses, forces)
         exact = receptance(self.rotor, frequencies, responses, forces, speed=self.speed)
-        return float(_line_error(own, exact).max())
-
-
-def _line_error(own: Complex, exact: Complex) -> Vector:
-    """Of each line, over the line's largest entry."""
-    deviation = np.abs(own - exact).max(axis=(1, 2))
-    return np.asarray(deviation / np.abs(exact).max(axis=(1, 2)), dtype=float)
+        deviation = np.abs(own - exact).max(axis=(1, 2))
+        return float((deviation / np.abs(exact).max(axis=(1, 2))).max())
 
 
 def reduce_rotor(rotor: Rotor, basis: FreeBasis, *, speed: float = 0.0) -> ReducedRotor:
@@ -672,91 +608,6 @@ def _transform(rotor: Rotor, basis: FreeBasis) -> Vector:
     transform[np.flatnonzero(~forward), r : 2 * r] = basis.shapes
     transform[n_beam:, 2 * r :] = np.eye(n - n_beam)
     return transform
-
-
-class ModalReceptance(NamedTuple):
-    """A receptance by modes, and what it is worth.
-
-    Attributes
-    ----------
-    values : numpy.ndarray [shape=(n_freq, n_resp, n_force)]
-        [m/N]
-    error : numpy.ndarray [shape=(n_checked,)]
-        Deviation from the direct solution over the line's largest entry.
-    checked : numpy.ndarray [shape=(n_checked,)]
-        Indices of the lines where it was measured.
-    """
-
-    values: Complex
-    error: Vector
-    checked: Index
-
-
-def modal_receptance(
-    rotor: Rotor,
-    frequencies: ArrayLike,
-    responses: Sequence[Place],
-    forces: Sequence[Place],
-    *,
-    speed: float = 0.0,
-    modes: int | None = None,
-    residual: bool = True,
-    checks: int = _CHECKED_LINES,
-) -> ModalReceptance:
-    """Receptance by modal superposition, with its error measured.
-
-    Parameters
-    ----------
-    rotor, frequencies, responses, forces
-        As of :func:`receptance`.
-    speed : float
-        Of the shaft [rad/s].
-    modes : int, optional
-        Free-free modes of one plane to keep; by default those up to three times the highest
-        frequency.
-    residual : bool
-        With the residual flexibility of the modes left out, at supports and forces.
-    checks : int
-        Lines that are solved directly too, evenly spread over those given.
-
-    Raises
-    ------
-    ValueError
-        As of :func:`receptance` and :func:`free_basis`.
-
-    Examples
-    --------
-    >>> from wearstate.sim.beam.beam import Section, assemble_beam
-    >>> from wearstate.sim.beam.rotor import Support
-    >>> shaft = Section(length=10.0, outer_diameter=0.2, young=2.1e11, shear_modulus=8e10,
-    ...                 density=7850.0)
-    >>> beam = assemble_beam([shaft], theory="euler-bernoulli", longest_element=0.5)
-    >>> ends = [Support(name=n, station=s, stiffness=1e7 * np.eye(2), damping=1e4 * np.eye(2))
-    ...         for n, s in (("aft", 0.0), ("fore", 10.0))]
-    >>> found = modal_receptance(Rotor(beam=beam, supports=ends), np.linspace(1, 30, 200),
-    ...                          [("aft", "y")], [("fore", "y")])
-    >>> bool(found.error.max() < 1e-3)
-    True
-    """
-    hertz = _checked_frequencies(frequencies)
-    limit = 3 * float(np.abs(hertz).max(initial=1.0)) if modes is None else None
-    touched = _dofs(rotor, [*responses, *forces])
-    nodes = touched[touched < rotor.beam.n_dof] // 4
-    stations = [*(s.station for s in rotor.supports), *rotor.beam.stations[nodes]]
-    basis = free_basis(
-        rotor.beam,
-        limit_hz=limit,
-        modes=modes,
-        stations=sorted(set(stations)) if residual else (),
-        slopes=bool((touched % 2 == 1).any()) or any(len(s.stiffness) == 4 for s in rotor.supports),
-    )
-    reduced = reduce_rotor(rotor, basis, speed=speed)
-    values = reduced.receptance(hertz, responses, forces)
-    checked = np.unique(np.linspace(0, hertz.size - 1, min(checks, hertz.size)).astype(np.int64))
-    if not checked.size:
-        return ModalReceptance(values, np.empty(0), checked)
-    exact = receptance(rotor, hertz[checked], responses, forces, speed=speed)
-    return ModalReceptance(values, _line_error(values[checked], exact), checked)
 
 
 # --- steady and transient forces
@@ -1142,16 +993,6 @@ def _checked_speed(speed: ArrayLike) -> Vector:
     if not np.isfinite(turning).all():
         raise ValueError(f"speed = {speed!r} rad/s must be finite")
     return turning
-
-
-def _one_speed(speed: ArrayLike) -> float:
-    turning = _checked_speed(speed)
-    if turning.size != 1:
-        raise ValueError(
-            f"speed of shape {turning.shape} must be one number with method 'modal'; "
-            "take method 'direct' for a speed of each frequency"
-        )
-    return float(turning.reshape(()))
 
 
 def _check_restrained(rotor: Rotor) -> None:
