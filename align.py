@@ -26,7 +26,7 @@ from .sim.alignment.calibration import Calibration, calibrate
 from .sim.alignment.jacking import Flange, Jacking, gap_and_sag, jacking
 from .sim.alignment.jacking_curve import CurveFit, fit_curve
 from .sim.alignment.seats import AlignmentError, Seat
-from .sim.shaft.recording import alignment_conditions, alignment_line
+from .sim.shaft.line_alignment import alignment_conditions, alignment_line
 
 __all__ = [
     "Alignment",

@@ -20,9 +20,11 @@ from .sim.beam.beam_parts import Disc, DistributedLoad, PointLoad, Section
 from .sim.beam.campbell import Campbell, CriticalSpeeds, campbell, critical_speeds
 from .sim.beam.modes import RotorModes, modes, natural_frequencies
 from .sim.beam.rotor import Rotor, Support, Unbalance, orbit_axes, unbalance_response
-from .sim.shaft.on_oil_films import BeamFilm, FilmBearing, beam_film, supports
-from .sim.shaft.recording import ShaftState, shaft_beam, shaft_state
-from .sim.shaft.response import accelerance, receptance
+from .sim.shaft.at_rest import ShaftState, shaft_state
+from .sim.shaft.line_beam import shaft_beam
+from .sim.shaft_films.film_bearing import FilmBearing
+from .sim.shaft_films.on_oil_films import BeamFilm, beam_film, supports
+from .sim.shaft_response.receptance import accelerance, receptance
 
 __all__ = [
     "Beam",

@@ -28,15 +28,11 @@ from wearstate.sim.beam.rotor import Rotor
 from wearstate.sim.machine.simulate import simulate
 from wearstate.sim.scene.load import load_scene
 from wearstate.sim.scene.shaft import ShaftScene
+from wearstate.sim.shaft.at_rest import ShaftState, shaft_state
 from wearstate.sim.shaft.changed import free_line, line_model, rest, unit_change
 from wearstate.sim.shaft.changed import transfer as transfer_of
-from wearstate.sim.shaft.recording import (
-    ShaftState,
-    alignment_conditions,
-    alignment_line,
-    shaft_state,
-)
-from wearstate.sim.shaft.response import accelerance
+from wearstate.sim.shaft.line_alignment import alignment_conditions, alignment_line
+from wearstate.sim.shaft_response.receptance import accelerance
 
 MISALIGNED = {"bearings.2.offset": "-1.0 mm", "bearings.3.offset": "1.4 mm"}
 """The line before calibration: chocks of the two intermediate bearings badly set."""

@@ -25,7 +25,7 @@ from wearstate.diagnose.alignment.table import align_table
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.sim.alignment.alignment import Check, check, reactions
 from wearstate.sim.scene.load import load_scene
-from wearstate.sim.shaft.recording import shaft_state
+from wearstate.sim.shaft.at_rest import shaft_state
 
 MOVES = {"third": 0.25e-3}
 

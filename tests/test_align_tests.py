@@ -15,7 +15,7 @@ from wearstate.sim.machine.simulate import simulate
 from wearstate.sim.output.recording import DataError, Recording
 from wearstate.sim.scene.load import load_scene
 from wearstate.sim.shaft.changed import free_line, line_model, rest, transfer
-from wearstate.sim.shaft.recording import alignment_conditions, alignment_line
+from wearstate.sim.shaft.line_alignment import alignment_conditions, alignment_line
 
 STRAIGHT = {"bearings.2.offset": "0 mm"}
 SAG = 0.15e-3

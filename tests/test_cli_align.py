@@ -10,7 +10,7 @@ from wearstate.diagnose.alignment.text import align_text
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.sim.alignment.alignment import reactions
 from wearstate.sim.scene.load import load_scene
-from wearstate.sim.shaft.recording import alignment_conditions, alignment_line
+from wearstate.sim.shaft.line_alignment import alignment_conditions, alignment_line
 
 SCENE = "propulsion-shaft"
 SAGGED = ("--set", "bearings.2.sag=1.6 mm")  # the intermediate bearing lifts, and chocks mend it

@@ -20,9 +20,11 @@ from wearstate.sim.output.status import SimulationError, Status
 from wearstate.sim.scene.exciters import Exciter, PlacedExciter
 from wearstate.sim.scene.load import load_scene
 from wearstate.sim.scene.scene import SceneError, channels_of
+from wearstate.sim.shaft.at_rest import reduced_rotor, shaft_state
 from wearstate.sim.shaft.push import exciter_places
-from wearstate.sim.shaft.recording import peak_motion, reduced_rotor, shaft_state
-from wearstate.sim.shaft.response import Harmonic, accelerance, harmonic_response
+from wearstate.sim.shaft.recording import peak_motion
+from wearstate.sim.shaft_response.receptance import accelerance
+from wearstate.sim.shaft_response.time_response import Harmonic, harmonic_response
 
 FS = 1024.0
 STILL = {

@@ -31,8 +31,8 @@ from wearstate.sim.output.status import SimulationError
 from wearstate.sim.scene.load import load_scene, scene_names
 from wearstate.sim.scene.rungs import with_values
 from wearstate.sim.scene.scene import SceneError
-from wearstate.sim.shaft.recording import shaft_state
-from wearstate.sim.shaft.response import receptance
+from wearstate.sim.shaft.at_rest import shaft_state
+from wearstate.sim.shaft_response.receptance import receptance
 
 ACCURACIES = (0.01, 0.02, 0.05, 0.10)
 CONVERGENCE_ORDER = 2.0

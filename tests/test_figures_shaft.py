@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import wearstate
-from wearstate.sim.shaft.response import accelerance
+from wearstate.sim.shaft_response.receptance import accelerance
 
 SCRIPT = Path(wearstate.__file__).parent / "docs" / "figures_shaft.py"
 

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 from wearstate.datasets.file.record import DataSet
 from wearstate.sim.scene.load import load_scene
-from wearstate.sim.shaft.recording import harmonic_forces, reduced_rotor, shaft_state
-from wearstate.sim.shaft.response import harmonic_response
+from wearstate.sim.shaft.at_rest import reduced_rotor, shaft_state
+from wearstate.sim.shaft.forces import harmonic_forces
+from wearstate.sim.shaft_response.time_response import harmonic_response
 
 BENCHMARKS = Path(__file__).parent / "benchmarks"
 sys.path.insert(0, str(BENCHMARKS))  # its files import one another by name

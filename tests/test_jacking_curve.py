@@ -13,7 +13,7 @@ from wearstate.sim.alignment.jacking import jacking
 from wearstate.sim.alignment.jacking_curve import CurveError, fit_curve
 from wearstate.sim.output.recording import DataError
 from wearstate.sim.scene.load import load_scene
-from wearstate.sim.shaft.recording import alignment_conditions, alignment_line
+from wearstate.sim.shaft.line_alignment import alignment_conditions, alignment_line
 
 STRAIGHT = {"bearings.2.offset": "0 mm"}
 SAG = 0.15e-3  # m, of the third bearing

@@ -18,9 +18,10 @@ from wearstate.sim.pump.validity import pump_step, pump_steps
 from wearstate.sim.scene.load import MACHINES, load_scene, scene_names
 from wearstate.sim.scene.rungs import admissible, with_values
 from wearstate.sim.scene.scene import SceneError
+from wearstate.sim.shaft.at_rest import reduced_rotor, shaft_state
 from wearstate.sim.shaft.elements import element_faults, element_lengths
 from wearstate.sim.shaft.ladder import shaft_states
-from wearstate.sim.shaft.recording import reduced_rotor, shaft_beam, shaft_state
+from wearstate.sim.shaft.line_beam import shaft_beam
 
 PUMPS = ("bilge-pump", "slider-crank-benchmark", "triplex-pump")
 JOURNALS = tuple(name for name in scene_names() if name.startswith("journal"))

@@ -46,6 +46,8 @@ ROOMS = {
         "pump",
         "pump_lanes",
         "journal",
+        "shaft_films",
+        "shaft_response",
         "shaft",
         "wear",
         "machine",

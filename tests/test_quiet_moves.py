@@ -11,7 +11,8 @@ from wearstate.sim.alignment.calibration import calibrate
 from wearstate.sim.alignment.seats import AlignmentError
 from wearstate.sim.scene.load import load_scene
 from wearstate.sim.scene.shaft_parts import AlignmentLimits
-from wearstate.sim.shaft.recording import alignment_conditions, alignment_line, shaft_recorder
+from wearstate.sim.shaft.line_alignment import alignment_conditions, alignment_line
+from wearstate.sim.shaft.recording import shaft_recorder
 
 
 def calibrated(scene, **asked):

@@ -19,8 +19,8 @@ from wearstate.sim.beam.beam_parts import Disc, Section
 from wearstate.sim.beam.modes import natural_frequencies
 from wearstate.sim.beam.rotor import Rotor, Support
 from wearstate.sim.scene.load import load_scene
-from wearstate.sim.shaft.recording import alignment_conditions, alignment_line
-from wearstate.sim.shaft.response import Broadband, Harmonic
+from wearstate.sim.shaft.line_alignment import alignment_conditions, alignment_line
+from wearstate.sim.shaft_response.time_response import Broadband, Harmonic
 
 RATE = 1024.0
 SPEED = 2 * np.pi * 12.0

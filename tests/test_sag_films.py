@@ -9,7 +9,7 @@ from wearstate.diagnose.shaft_tests.sags import SagPosterior, estimate_sags
 from wearstate.sim.alignment.alignment import reactions
 from wearstate.sim.scene.load import load_scene
 from wearstate.sim.shaft.changed import free_line, line_model, rest, transfer
-from wearstate.sim.shaft.recording import alignment_conditions, alignment_line
+from wearstate.sim.shaft.line_alignment import alignment_conditions, alignment_line
 
 PRIOR = Prior(sag=0.2e-3)
 SAGS = np.array([0.05e-3, 0.12e-3])

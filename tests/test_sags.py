@@ -31,7 +31,7 @@ from wearstate.diagnose.shaft_tests.sags import estimate_sags
 from wearstate.sim.alignment.alignment import influence, reactions
 from wearstate.sim.scene.load import load_scene
 from wearstate.sim.shaft.changed import free_line, line_model, part_of, rest, transfer
-from wearstate.sim.shaft.recording import alignment_conditions, alignment_line
+from wearstate.sim.shaft.line_alignment import alignment_conditions, alignment_line
 
 CONFIDENCE = 0.9
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from wearstate.sim.scene.load import load_scene
 from wearstate.sim.shaft import changed as shaft_change
+from wearstate.sim.shaft.at_rest import shaft_state
 from wearstate.sim.shaft.changed import (
     QUANTITIES,
     coefficient_slopes,
@@ -18,9 +19,8 @@ from wearstate.sim.shaft.changed import (
     transfer_slopes,
     unit_change,
 )
-from wearstate.sim.shaft.on_oil_films import coefficient_gradients, journal_shifts
-from wearstate.sim.shaft.recording import shaft_state
-from wearstate.sim.shaft.response import accelerance
+from wearstate.sim.shaft_films.small_changes import coefficient_gradients, journal_shifts
+from wearstate.sim.shaft_response.receptance import accelerance
 
 SPEED = 2 * math.pi * 10
 HERTZ = np.array([12.0, 33.0, 70.0, 145.0, 320.0])

@@ -17,14 +17,11 @@ from wearstate.sim.bearing.coefficients import coefficients
 from wearstate.sim.bearing.operate import JournalBearing, operate
 from wearstate.sim.film.solve import FilmGeometry, Groove, dufrane_scar, worn_arc
 from wearstate.sim.scene.load import load_scene
-from wearstate.sim.shaft.on_oil_films import (
-    FilmBearing,
-    ShaftFilmError,
-    ShaftFilmStatus,
-    beam_film,
-    supports,
-)
-from wearstate.sim.shaft.recording import film_bearings, running_beam
+from wearstate.sim.shaft.at_rest import film_bearings
+from wearstate.sim.shaft.line_beam import running_beam
+from wearstate.sim.shaft_films.film_bearing import FilmBearing
+from wearstate.sim.shaft_films.on_oil_films import beam_film, supports
+from wearstate.sim.shaft_films.status import ShaftFilmError, ShaftFilmStatus
 
 SPEED = 2 * math.pi * 2.0
 STATIONS = (1.3, 5.0, 11.0, 17.0)

@@ -9,9 +9,9 @@ from scipy.sparse.linalg import spsolve
 from wearstate.sim.machine.simulate import check, simulate
 from wearstate.sim.scene.load import load_scene
 from wearstate.sim.scene.scene import SceneError
+from wearstate.sim.shaft.at_rest import film_bearings, shaft_state
 from wearstate.sim.shaft.hull import hull_forces
-from wearstate.sim.shaft.recording import film_bearings, shaft_state
-from wearstate.sim.shaft.response import harmonic_response
+from wearstate.sim.shaft_response.time_response import harmonic_response
 
 SPEED = 2e-3  # m/s, of the hull
 NO_SHAFT_DAMPING = {"shaft.damping_ratio": 0.0}  # which holds the shaft to a ground that stands

@@ -11,22 +11,17 @@ from wearstate.sim.output.status import SimulationError, Status
 from wearstate.sim.scene.load import load_scene
 from wearstate.sim.scene.scene import SceneError, channels_of
 from wearstate.sim.scene.shaft_parts import Coupling, Turbulence
-from wearstate.sim.shaft.recording import (
-    alignment_conditions,
-    alignment_line,
+from wearstate.sim.shaft.at_rest import film_bearings, reduced_rotor, shaft_state
+from wearstate.sim.shaft.forces import (
     coupling_forces,
-    coupling_loads,
-    film_bearings,
     harmonic_forces,
-    hull_shape,
-    peak_motion,
     random_forces,
-    reduced_rotor,
-    shaft_beam,
-    shaft_state,
     turbulence_density,
 )
-from wearstate.sim.shaft.response import receptance
+from wearstate.sim.shaft.line_alignment import alignment_conditions, alignment_line, hull_shape
+from wearstate.sim.shaft.line_beam import coupling_loads, shaft_beam
+from wearstate.sim.shaft.recording import peak_motion
+from wearstate.sim.shaft_response.receptance import receptance
 
 QUIET = {
     "propeller.blade_rate": [],

@@ -12,7 +12,16 @@ from wearstate.sim.beam.beam import assemble_beam
 from wearstate.sim.beam.beam_parts import Disc, Section
 from wearstate.sim.beam.modes import modes
 from wearstate.sim.beam.rotor import Rotor, Support, Unbalance, unbalance_response
-from wearstate.sim.shaft import response as sr
+from wearstate.sim.shaft_response.places import dofs
+from wearstate.sim.shaft_response.receptance import accelerance, receptance
+from wearstate.sim.shaft_response.reduced import free_basis, reduce_rotor
+from wearstate.sim.shaft_response.time_response import (
+    Broadband,
+    Harmonic,
+    Transient,
+    harmonic_response,
+    time_response,
+)
 
 STEEL = {"young": 2.06e11, "shear_modulus": 7.92e10, "density": 7850.0}
 FILM = {
@@ -74,7 +83,7 @@ def everywhere(rotor):
 
 def dense(rotor, frequencies, responses, forces, speed=0.0):
     """By the definition."""
-    rows, columns = sr._dofs(rotor, responses), sr._dofs(rotor, forces)
+    rows, columns = dofs(rotor, responses), dofs(rotor, forces)
     found = []
     for hertz in frequencies:
         w = 2 * math.pi * hertz
@@ -111,7 +120,7 @@ def assert_receptance(found, expected, tolerance):
 def test_direct_is_the_inverse_of_the_dynamic_stiffness(options, speed):
     rotor = line(**options)
     places = everywhere(rotor)
-    found = sr.receptance(rotor, LINES, places, places, speed=speed)
+    found = receptance(rotor, LINES, places, places, speed=speed)
     # rounding by the condition of the whole, some 1e5
     assert_receptance(found, dense(rotor, LINES, places, places, speed), 1e-10)
 
@@ -124,15 +133,15 @@ def test_a_housing_alone_is_a_mass_on_a_spring():
     w = 2 * math.pi * hertz
     expected = 1 / (k - mass * w**2 + 1j * w * c)
     place = [("alone", "y", "housing")]
-    found = sr.receptance(rotor, hertz, place, place)[:, 0, 0]
+    found = receptance(rotor, hertz, place, place)[:, 0, 0]
     assert_allclose(found, expected, rtol=1e-13)  # one division
     phase = np.degrees(np.angle(found))
     assert_allclose(phase[[0, 3, 5]], [0, -90, -180], atol=0.6)  # stiffness, resonance, mass
     assert_allclose(1j * w[3] * found[3], 1 / c, rtol=1e-12)  # mobility at resonance
     assert_allclose(
-        sr.accelerance(rotor, hertz, place, place)[:, 0, 0], -(w**2) * expected, rtol=1e-13
+        accelerance(rotor, hertz, place, place)[:, 0, 0], -(w**2) * expected, rtol=1e-13
     )
-    far = sr.accelerance(rotor, [1e4], place, place)[0, 0, 0]
+    far = accelerance(rotor, [1e4], place, place)[0, 0, 0]
     assert_allclose(far, 1 / mass, rtol=2e-4)  # positive; c / (w m) is 1e-4
 
 
@@ -178,7 +187,7 @@ def test_free_bar_of_bishop_and_johnson():
             longest_element=element,
             theory="euler-bernoulli",
         )
-        found = sr.receptance(Rotor(beam=beam), lines, [0, beam.n_dof - 4], [0])[:, :, 0]
+        found = receptance(Rotor(beam=beam), lines, [0, beam.n_dof - 4], [0])[:, :, 0]
         assert np.abs(found.imag).max() == 0
         errors.append(np.abs(found / exact - 1).max())
     assert errors[-1] < 1e-4
@@ -189,11 +198,11 @@ def test_free_bar_of_bishop_and_johnson():
 def test_static_limit_is_the_flexibility():
     rotor = line(film=TILTED)
     places = everywhere(rotor)
-    found = sr.receptance(rotor, [0.0], places, places)[0]
-    rows = sr._dofs(rotor, places)
+    found = receptance(rotor, [0.0], places, places)[0]
+    rows = dofs(rotor, places)
     expected = np.linalg.inv(rotor.stiffness.toarray())[np.ix_(rows, rows)]
     assert_receptance(found[None], expected[None], 1e-10)  # condition 1e5
-    near = sr.receptance(rotor, [1e-4], places, places)[0]
+    near = receptance(rotor, [1e-4], places, places)[0]
     assert_receptance(near[None], expected[None], 1e-5)  # damping: w c / k = 6e-4 * 0.005
 
 
@@ -201,7 +210,7 @@ def test_static_limit_is_the_flexibility():
 def test_reciprocity_at_rest_on_symmetric_supports(damping_ratio):
     rotor = line(film=symmetric(TILTED), damping_ratio=damping_ratio)
     places = everywhere(rotor)
-    found = sr.receptance(rotor, np.linspace(0.5, 500, 2000), places, places)
+    found = receptance(rotor, np.linspace(0.5, 500, 2000), places, places)
     largest = np.abs(found).max(axis=(1, 2), keepdims=True)
     assert np.abs((found - found.swapaxes(1, 2)) / largest).max() < 1e-10  # the contract
 
@@ -210,8 +219,8 @@ def test_reciprocity_with_the_speed_reversed():
     rotor = line(film=symmetric(TILTED))
     places = everywhere(rotor)
     lines = np.linspace(0.5, 200, 300)
-    forward = sr.receptance(rotor, lines, places, places, speed=60.0)
-    backward = sr.receptance(rotor, lines, places, places, speed=-60.0)
+    forward = receptance(rotor, lines, places, places, speed=60.0)
+    backward = receptance(rotor, lines, places, places, speed=-60.0)
     largest = np.abs(forward).max(axis=(1, 2), keepdims=True)
     assert np.abs((forward - backward.swapaxes(1, 2)) / largest).max() < 1e-10
     assert np.abs((forward - forward.swapaxes(1, 2)) / largest).max() > 1e-3  # not of itself
@@ -227,7 +236,7 @@ def test_a_span_that_resonates_between_clamped_ends_keeps_its_digits():
     cut = [a[inner][:, inner].toarray() for a in (rotor.stiffness, rotor.mass)]
     lowest = np.sqrt(np.linalg.eigvals(np.linalg.solve(cut[1], cut[0])).real.min())
     hertz = lowest / (2 * math.pi) * (1 + np.array([-1e-6, 0.0, 1e-9]))
-    found = sr.receptance(rotor, hertz, places, places)
+    found = receptance(rotor, hertz, places, places)
     # without exchange 1e-3 and worse
     assert_receptance(found, dense(rotor, hertz, places, places), 1e-9)
 
@@ -235,9 +244,9 @@ def test_a_span_that_resonates_between_clamped_ends_keeps_its_digits():
 def test_speed_of_each_line_is_that_line_s():
     rotor = line()
     speeds = 2 * math.pi * LINES
-    together = sr.receptance(rotor, LINES, [("a", "y")], [0], speed=speeds)
+    together = receptance(rotor, LINES, [("a", "y")], [0], speed=speeds)
     apart = [
-        sr.receptance(rotor, [f], [("a", "y")], [0], speed=s)[0]
+        receptance(rotor, [f], [("a", "y")], [0], speed=s)[0]
         for f, s in zip(LINES, speeds, strict=True)
     ]
     assert_allclose(together, apart, rtol=1e-12)  # the same sums
@@ -250,19 +259,19 @@ def test_synchronous_response_is_that_of_the_unbalance():
     expected = unbalance_response(rotor, speeds, [mass])
     for k, speed in enumerate(speeds):
         force = 2.0 * speed**2 * np.exp(0.3j)
-        turning = sr.Harmonic(
+        turning = Harmonic(
             frequency=speed / (2 * math.pi), forces={(0.0, "y"): force, (0.0, "z"): -1j * force}
         )
         places = [("a", "y"), ("a", "z"), ("d", "y", "housing")]
-        found = sr.harmonic_response(rotor, [turning], places, speed=speed)[0]
-        rows = sr._dofs(rotor, places)
+        found = harmonic_response(rotor, [turning], places, speed=speed)[0]
+        rows = dofs(rotor, places)
         assert_allclose(found, expected[k, rows], rtol=1e-9)  # two solvers of one system
 
 
 def test_a_force_that_turns_in_round_supports_makes_a_circle():
     rotor = line(film={"stiffness": 1e8 * np.eye(2), "damping": 1e5 * np.eye(2)}, pedestal={})
-    turning = sr.Harmonic(frequency=4.0, forces={(0.0, "y"): 100.0, (0.0, "z"): -100.0j})
-    y, z = sr.harmonic_response(rotor, [turning], [("b", "y"), ("b", "z")], speed=30.0)[0]
+    turning = Harmonic(frequency=4.0, forces={(0.0, "y"): 100.0, (0.0, "z"): -100.0j})
+    y, z = harmonic_response(rotor, [turning], [("b", "y"), ("b", "z")], speed=30.0)[0]
     assert_allclose(z / y, -1j, rtol=1e-10)
 
 
@@ -271,7 +280,7 @@ def test_a_force_does_work_on_what_only_dissipates(speed):
     rotor = line(film=symmetric(FILM), damping_ratio=0.01)
     places = everywhere(rotor)
     hertz = np.linspace(1, 300, 400)
-    found = sr.receptance(rotor, hertz, places, places, speed=speed)
+    found = receptance(rotor, hertz, places, places, speed=speed)
     found *= 2j * math.pi * hertz[:, None, None]  # mobility
     hermitian = (found + found.conj().swapaxes(1, 2)) / 2
     power = np.linalg.eigvalsh(hermitian)
@@ -281,8 +290,8 @@ def test_a_force_does_work_on_what_only_dissipates(speed):
 
 def test_poles_stand_where_the_rotor_has_its_modes():
     rotor = line(damping_ratio=0.01)
-    basis = sr.free_basis(rotor.beam, limit_hz=2000.0, stations=STATIONS)
-    own = sr.reduce_rotor(rotor, basis, speed=40.0).poles
+    basis = free_basis(rotor.beam, limit_hz=2000.0, stations=STATIONS)
+    own = reduce_rotor(rotor, basis, speed=40.0).poles
     expected = modes(rotor, speed=40.0, count=6).eigenvalues
     for pole in expected:
         assert np.abs(own - pole).min() < 1e-6 * abs(pole)  # of the basis, measured 1e-9
@@ -293,8 +302,8 @@ def test_poles_stand_where_the_rotor_has_its_modes():
 
 def basis_of(beam, n_modes, **options):
     """As free_basis, of a number of modes."""
-    first, last = sr.free_basis(beam, limit_hz=20_000.0).frequency_hz[n_modes - 1 : n_modes + 1]
-    basis = sr.free_basis(beam, limit_hz=(first + last) / 2, **options)
+    first, last = free_basis(beam, limit_hz=20_000.0).frequency_hz[n_modes - 1 : n_modes + 1]
+    basis = free_basis(beam, limit_hz=(first + last) / 2, **options)
     assert basis.n_modes == n_modes
     return basis
 
@@ -313,7 +322,7 @@ def modal_error(n_modes, residual, hertz):
     ]
     forced = [0.0, 3.0, 7.0] if residual else []
     basis = basis_of(beam, n_modes, stations=forced, slopes=False)
-    reduced = sr.reduce_rotor(Rotor(beam=beam, supports=springs), basis)
+    reduced = reduce_rotor(Rotor(beam=beam, supports=springs), basis)
     return reduced.measured_error([hertz], [0], [0])
 
 
@@ -332,7 +341,7 @@ def test_modal_error_is_what_it_is_measured_to_be():
     places = everywhere(rotor)
     lines = np.linspace(1, 60, 40)
     basis = basis_of(rotor.beam, 6, stations=[0.0, *STATIONS, 5.0, 10.0])
-    reduced = sr.reduce_rotor(rotor, basis, speed=40.0)
+    reduced = reduce_rotor(rotor, basis, speed=40.0)
     found = reduced.receptance(lines, places, places)
     exact = dense(rotor, lines, places, places, 40.0)
     expected = np.abs(found - exact).max(axis=(1, 2)) / np.abs(exact).max(axis=(1, 2))
@@ -348,18 +357,18 @@ def test_modal_comes_to_the_direct(film, speed):
     places = everywhere(rotor)
     lines = np.linspace(0.5, 60, 30)
     basis = basis_of(rotor.beam, 30, stations=[0.0, *STATIONS, 5.0, 10.0])
-    found = sr.reduce_rotor(rotor, basis, speed=speed).receptance(lines, places, places)
-    expected = sr.receptance(rotor, lines, places, places, speed=speed)
+    found = reduce_rotor(rotor, basis, speed=speed).receptance(lines, places, places)
+    expected = receptance(rotor, lines, places, places, speed=speed)
     assert_receptance(found, expected, 1e-5)  # of places without residual shape; measured 2e-7
 
 
 def test_one_basis_serves_other_films():
     rotor = line()
-    basis = sr.free_basis(rotor.beam, limit_hz=600.0, stations=[0.0, *STATIONS])
+    basis = free_basis(rotor.beam, limit_hz=600.0, stations=[0.0, *STATIONS])
     lines, places = np.linspace(1, 60, 7), [0, ("a", "y"), ("b", "y", "housing")]
     for stiffer in (1.0, 0.2, 5.0):
         other = line(film={key: stiffer * value for key, value in TILTED.items()})
-        reduced = sr.reduce_rotor(other, basis, speed=10.0)
+        reduced = reduce_rotor(other, basis, speed=10.0)
         assert reduced.measured_error(lines, places, places) < 1e-5  # measured below 1e-6
 
 
@@ -368,8 +377,8 @@ def test_one_basis_serves_other_films():
 
 def reduced_line(**options):
     rotor = line(**{"damping_ratio": 0.01, **options})
-    basis = sr.free_basis(rotor.beam, limit_hz=500.0, stations=[0.0, *STATIONS])
-    return sr.reduce_rotor(rotor, basis, speed=20.0)
+    basis = free_basis(rotor.beam, limit_hz=500.0, stations=[0.0, *STATIONS])
+    return reduce_rotor(rotor, basis, speed=20.0)
 
 
 def gaussian(t, centre, width):
@@ -382,12 +391,12 @@ def test_a_blow_rings_as_the_closed_form(zeta, centre):
     """The pulse's spectrum at the poles, once the pulse is over."""
     mass, w0 = 100.0, 2 * math.pi * 10
     rotor = lone_housing(mass, mass * w0**2, 2 * zeta * mass * w0)
-    reduced = sr.reduce_rotor(rotor, sr.free_basis(rotor.beam, limit_hz=200.0, stations=STATIONS))
+    reduced = reduce_rotor(rotor, free_basis(rotor.beam, limit_hz=200.0, stations=STATIONS))
     fs, n, width = 1000.0, 3500, 5e-3
     t = np.arange(n) / fs
     place = ("alone", "z", "housing")
-    blow = sr.Transient(samples=1e3 * gaussian(t, centre, width), forces={place: 1.0})
-    found = sr.time_response(
+    blow = Transient(samples=1e3 * gaussian(t, centre, width), forces={place: 1.0})
+    found = time_response(
         reduced,
         [place, place, place, (1.0, "y")],
         n_samples=n,
@@ -418,13 +427,13 @@ def test_work_of_a_blow_is_dissipated_or_still_there():
     samples = 1e4 * gaussian(t, 0.03, 3e-3)
     everything = list(range(rotor.n_dof))
     both = [
-        sr.time_response(
+        time_response(
             reduced,
             everything,
             n_samples=n,
             sample_rate=fs,
             quantity=quantity,
-            transients=[sr.Transient(samples=samples, forces={(0.0, "y"): 1.0})],
+            transients=[Transient(samples=samples, forces={(0.0, "y"): 1.0})],
         )
         for quantity in ("displacement", "velocity")
     ]
@@ -448,15 +457,15 @@ def test_steady_harmonics_are_the_transfer_function_times_the_force():
     fs, n, hertz = 800.0, 400, 7.3
     force = 50.0 - 20.0j
     forces = {(0.0, "y"): force, ("b", "z"): 30.0j}
-    found = sr.time_response(
+    found = time_response(
         reduced,
         places,
         n_samples=n,
         sample_rate=fs,
         quantity="acceleration",
-        harmonics=[sr.Harmonic(frequency=hertz, forces=forces)],
+        harmonics=[Harmonic(frequency=hertz, forces=forces)],
     )
-    gain = sr.receptance(reduced.rotor, [hertz], places, list(forces), speed=20.0)[0]
+    gain = receptance(reduced.rotor, [hertz], places, list(forces), speed=20.0)[0]
     w = 2 * math.pi * hertz
     phasor = -(w**2) * gain @ np.array(list(forces.values()))
     expected = (phasor[:, None] * np.exp(1j * w * np.arange(n) / fs)).real
@@ -466,15 +475,15 @@ def test_steady_harmonics_are_the_transfer_function_times_the_force():
 
 def test_a_steady_force_gives_the_static_deflection():
     reduced = reduced_line()
-    found = sr.time_response(
+    found = time_response(
         reduced,
         [("b", "y")],
         n_samples=5,
         sample_rate=100.0,
         quantity="displacement",
-        harmonics=[sr.Harmonic(frequency=0.0, forces={(0.0, "y"): -1e4})],
+        harmonics=[Harmonic(frequency=0.0, forces={(0.0, "y"): -1e4})],
     )
-    expected = -1e4 * sr.receptance(reduced.rotor, [0.0], [("b", "y")], [0]).real.item()
+    expected = -1e4 * receptance(reduced.rotor, [0.0], [("b", "y")], [0]).real.item()
     assert_allclose(found, expected, rtol=1e-7)  # exact in the basis, up to its rounding
 
 
@@ -485,18 +494,16 @@ def test_a_periodic_transient_settles_to_the_harmonic():
     n = int(fs * 25 / slowest)
     t = np.arange(n) / fs
     kw = {"n_samples": n, "sample_rate": fs, "quantity": "displacement"}
-    driven = sr.time_response(
+    driven = time_response(
         reduced,
         [("a", "y")],
-        transients=[
-            sr.Transient(samples=np.sin(2 * math.pi * hertz * t), forces={(0.0, "y"): 1.0})
-        ],
+        transients=[Transient(samples=np.sin(2 * math.pi * hertz * t), forces={(0.0, "y"): 1.0})],
         **kw,
     )[0]
-    steady = sr.time_response(
+    steady = time_response(
         reduced,
         [("a", "y")],
-        harmonics=[sr.Harmonic(frequency=hertz, forces={(0.0, "y"): -1j})],
+        harmonics=[Harmonic(frequency=hertz, forces={(0.0, "y"): -1j})],
         **kw,
     )[0]
     middle = slice(int(0.8 * n), int(0.9 * n))
@@ -509,16 +516,16 @@ def test_random_response_has_the_density_of_the_force_times_the_gain():
     reduced = reduced_line()
     fs, n = 400.0, 200_000
     band = ([10.0, 60.0], [4.0, 4.0])
-    source = sr.Broadband(
+    source = Broadband(
         frequencies=band[0], density=band[1], forces={(0.0, "y"): 1.0, ("b", "z"): -0.5}
     )
-    found = sr.time_response(
+    found = time_response(
         reduced, [("a", "y")], n_samples=n, sample_rate=fs, broadband=[source], seed=7
     )[0]
     edges = np.linspace(12, 58, 13)
     spectrum = np.abs(np.fft.rfft(found)) ** 2 * 2 / (fs * n)
     hertz = np.fft.rfftfreq(n, 1 / fs)
-    gain = sr.accelerance(reduced.rotor, hertz[::20], [("a", "y")], [0, ("b", "z")], speed=20.0)
+    gain = accelerance(reduced.rotor, hertz[::20], [("a", "y")], [0, ("b", "z")], speed=20.0)
     expected = 4.0 * np.interp(hertz, hertz[::20], np.abs(gain[:, 0] @ np.array([1.0, -0.5])) ** 2)
     for low, high in pairwise(edges):
         lines = (hertz >= low) & (hertz < high)
@@ -533,10 +540,10 @@ def test_random_response_has_the_density_of_the_force_times_the_gain():
 
 def test_random_forces_repeat_with_the_seed_and_are_independent():
     reduced = reduced_line()
-    source = sr.Broadband(frequencies=[5, 50], density=[1.0, 1.0], forces={(0.0, "y"): 1.0})
+    source = Broadband(frequencies=[5, 50], density=[1.0, 1.0], forces={(0.0, "y"): 1.0})
 
     def run(seed, *sources):
-        return sr.time_response(
+        return time_response(
             reduced, [0], n_samples=20_000, sample_rate=200.0, broadband=sources, seed=seed
         )[0]
 
@@ -553,13 +560,13 @@ def test_kinds_of_forces_add():
     reduced = reduced_line()
     t = np.arange(500) / 500.0
     kinds = {
-        "harmonics": [sr.Harmonic(frequency=20.0, forces={0: 1.0})],
-        "broadband": [sr.Broadband(frequencies=[1, 90], density=[1, 2], forces={2: 1.0})],
-        "transients": [sr.Transient(samples=gaussian(t, 0.3, 0.01), forces={0: 5.0})],
+        "harmonics": [Harmonic(frequency=20.0, forces={0: 1.0})],
+        "broadband": [Broadband(frequencies=[1, 90], density=[1, 2], forces={2: 1.0})],
+        "transients": [Transient(samples=gaussian(t, 0.3, 0.01), forces={0: 5.0})],
     }
     kw = {"n_samples": 500, "sample_rate": 500.0, "seed": 3}
-    together = sr.time_response(reduced, [0, 2], **kinds, **kw)
-    apart = [sr.time_response(reduced, [0, 2], **{kind: kinds[kind]}, **kw) for kind in kinds]
+    together = time_response(reduced, [0, 2], **kinds, **kw)
+    apart = [time_response(reduced, [0, 2], **{kind: kinds[kind]}, **kw) for kind in kinds]
     assert min(np.abs(part).max() for part in apart) > 0
     assert_allclose(together, sum(apart), atol=1e-12 * np.abs(together).max())
 
@@ -572,17 +579,17 @@ def test_a_free_shaft_has_no_static_response():
     with pytest.raises(
         ValueError, match=r"0 Hz must meet a shaft that its supports hold.*add a support"
     ):
-        sr.receptance(rotor, [0.0, 1.0], [0], [0])
-    assert np.isfinite(sr.receptance(rotor, [1.0], [0], [0])).all()
+        receptance(rotor, [0.0, 1.0], [0], [0])
+    assert np.isfinite(receptance(rotor, [1.0], [0], [0])).all()
 
 
 def test_an_unstable_shaft_is_refused_in_time():
     whirling = {"stiffness": np.array([[1e8, 9e7], [-9e7, 1e8]]), "damping": 1e4 * np.eye(2)}
     rotor = line(film=whirling)
-    reduced = sr.reduce_rotor(rotor, basis_of(rotor.beam, 8, stations=STATIONS))
+    reduced = reduce_rotor(rotor, basis_of(rotor.beam, 8, stations=STATIONS))
     assert not reduced.stable
     with pytest.raises(ValueError, match=r"growth rate = .* must be < 0: the shaft whirls"):
-        sr.time_response(reduced, [0], n_samples=10, sample_rate=100.0)
+        time_response(reduced, [0], n_samples=10, sample_rate=100.0)
 
 
 def test_planes_that_differ_away_from_supports_are_refused():
@@ -595,7 +602,7 @@ def test_planes_that_differ_away_from_supports_are_refused():
         supports=[Support(name="a", station=1.0, **FILM)],
     )
     with pytest.raises(ValueError, match="stiffness of the shaft differs between its planes"):
-        sr.receptance(rotor, [1.0], [0], [0])
+        receptance(rotor, [1.0], [0], [0])
 
 
 @pytest.mark.parametrize(
@@ -612,35 +619,35 @@ def test_planes_that_differ_away_from_supports_are_refused():
 def test_receptance_refuses(change, message):
     arguments = {"frequencies": [1.0, 2.0], "responses": [0], "forces": [0], **change}
     with pytest.raises(ValueError, match=message):
-        sr.receptance(line(), **arguments)
+        receptance(line(), **arguments)
 
 
 def test_a_basis_of_another_beam_is_refused():
-    basis = sr.free_basis(shaft(element=1.0), limit_hz=100.0)
+    basis = free_basis(shaft(element=1.0), limit_hz=100.0)
     with pytest.raises(ValueError, match="must be of the rotor's own beam"):
-        sr.reduce_rotor(line(), basis)
+        reduce_rotor(line(), basis)
 
 
 def test_a_reduced_rotor_answers_at_its_own_speed_only():
     with pytest.raises(ValueError, match=r"must be the reduced rotor's, 20\.0"):
-        sr.harmonic_response(
-            reduced_line(), [sr.Harmonic(frequency=1.0, forces={0: 1.0})], [0], speed=10.0
+        harmonic_response(
+            reduced_line(), [Harmonic(frequency=1.0, forces={0: 1.0})], [0], speed=10.0
         )
 
 
 def test_all_faults_of_a_record_at_once():
     with pytest.raises(ValueError, match="n_samples") as caught:
-        sr.time_response(
+        time_response(
             reduced_line(),
             [0],
             n_samples=1,
             sample_rate=-1.0,
-            harmonics=[sr.Harmonic(frequency=60.0, forces={0: 1.0})],
+            harmonics=[Harmonic(frequency=60.0, forces={0: 1.0})],
             broadband=[
-                sr.Broadband(frequencies=[5, 1], density=[1, -1], forces={0: 1.0}),
-                sr.Broadband(frequencies=[5], density=[1], forces={0: 1.0}),
+                Broadband(frequencies=[5, 1], density=[1, -1], forces={0: 1.0}),
+                Broadband(frequencies=[5], density=[1], forces={0: 1.0}),
             ],
-            transients=[sr.Transient(samples=[1.0, math.nan], forces={0: 1.0})],
+            transients=[Transient(samples=[1.0, math.nan], forces={0: 1.0})],
         )
     text = str(caught.value)
     for part in (
@@ -656,20 +663,20 @@ def test_all_faults_of_a_record_at_once():
 
 
 def test_an_amplitude_that_is_no_number_is_refused():
-    blow = sr.Harmonic(frequency=1.0, forces={0: 1.0, ("a", "y"): math.nan})
+    blow = Harmonic(frequency=1.0, forces={0: 1.0, ("a", "y"): math.nan})
     with pytest.raises(ValueError, match=r"force 0 at \('a', 'y'\) = .*nan.* must be finite"):
-        sr.harmonic_response(line(), [blow], [0])
+        harmonic_response(line(), [blow], [0])
 
 
 def test_no_force_moves_nothing():
-    still = sr.time_response(reduced_line(), [0, 1], n_samples=8, sample_rate=10.0)
+    still = time_response(reduced_line(), [0, 1], n_samples=8, sample_rate=10.0)
     assert (still == 0).all()
-    assert sr.harmonic_response(line(), [], [0, 1]).shape == (0, 2)
-    empty = sr.Harmonic(frequency=1.0, forces={})
-    assert (sr.harmonic_response(line(), [empty], [0, 1]) == np.zeros((1, 2))).all()
+    assert harmonic_response(line(), [], [0, 1]).shape == (0, 2)
+    empty = Harmonic(frequency=1.0, forces={})
+    assert (harmonic_response(line(), [empty], [0, 1]) == np.zeros((1, 2))).all()
 
 
 @pytest.mark.parametrize("quantity", ["speed", ["velocity"], ["velocity", "jerk"]])
 def test_an_unknown_quantity_is_refused(quantity):
     with pytest.raises(ValueError, match="must be one of displacement, velocity, acceleration"):
-        sr.time_response(reduced_line(), [0, 1], n_samples=4, sample_rate=10.0, quantity=quantity)
+        time_response(reduced_line(), [0, 1], n_samples=4, sample_rate=10.0, quantity=quantity)

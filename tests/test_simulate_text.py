@@ -88,7 +88,7 @@ def test_the_reactions_of_a_shaft_sum_to_its_weight():
     total = value(summary, "reaction_sum")
     assert sum(value(summary, name) for name in names) == pytest.approx(total)
     from wearstate.sim.scene.load import load_scene
-    from wearstate.sim.shaft.recording import running_beam
+    from wearstate.sim.shaft.line_beam import running_beam
 
     weight = running_beam(load_scene("shaft-rig")).downward_load
     assert total == pytest.approx(weight, rel=0.02)  # means of whole and a part of a revolution

@@ -1,5 +1,5 @@
 """The alignment of a shaft line: table, text, pictures, page, moves, films, margins, quiet running.
 
-It may import ``sim.scene``, ``sim.bearing``, ``sim.alignment``, ``sim.shaft``, ``diagnose.pages``,
-``diagnose.shaft_tests``, ``sim.brief``.
+It may import ``sim.brief``, ``sim.scene``, ``sim.bearing``, ``sim.alignment``, ``sim.shaft_films``,
+``sim.shaft_response``, ``sim.shaft``, ``diagnose.pages``, ``diagnose.shaft_tests``.
 """

@@ -9,7 +9,7 @@ from ...sim.alignment.seats import AlignmentError
 from ...sim.brief import brief
 from ...sim.scene.scene import Scene
 from ...sim.scene.shaft import ShaftScene
-from ...sim.shaft.recording import alignment_conditions, alignment_line
+from ...sim.shaft.line_alignment import alignment_conditions, alignment_line
 from .quiet_moves import QuietMoves, quiet_moves
 
 

@@ -18,8 +18,9 @@ from numpy.typing import NDArray
 from ...sim.bearing.operate import JournalBearing
 from ...sim.scene.shaft import ShaftScene
 from ...sim.shaft.changed import free_line, line_model, rest, transfer
-from ...sim.shaft.on_oil_films import BeamFilm, ShaftFilmError
-from ...sim.shaft.response import Place
+from ...sim.shaft_films.on_oil_films import BeamFilm
+from ...sim.shaft_films.status import ShaftFilmError
+from ...sim.shaft_response.places import Place
 from ..pages.page import short_name
 from ..pages.picture import PAGE_WIDTH, PageImage, page_image
 from ..shaft_tests.before_after import turned_scene

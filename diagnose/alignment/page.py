@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from ...sim.alignment.alignment import LineState, influence
-from ...sim.shaft.on_oil_films import ShaftFilmError
+from ...sim.shaft_films.status import ShaftFilmError
 from ..pages.page import render, save_page
 from ..pages.picture import PageImage, page_image
 from ..shaft_tests.before_after import EXPECTED, BeforeAfter, rig_text

@@ -24,9 +24,10 @@ from ...sim.shaft.changed import (
     rest,
     transfer,
 )
-from ...sim.shaft.on_oil_films import BeamFilm, ShaftFilmError
-from ...sim.shaft.recording import harmonic_forces, random_forces
-from ...sim.shaft.response import Harmonic
+from ...sim.shaft.forces import harmonic_forces, random_forces
+from ...sim.shaft_films.on_oil_films import BeamFilm
+from ...sim.shaft_films.status import ShaftFilmError
+from ...sim.shaft_response.time_response import Harmonic
 from ..shaft_tests.next_test import usual_responses
 from .margins import margin_of
 
@@ -232,7 +233,7 @@ def quiet_moves(scene: ShaftScene, found: Calibration, *, margin: float = 0.0) -
     --------
     >>> from wearstate.sim.alignment.calibration import calibrate
     >>> from wearstate.sim.scene.load import load_scene
-    >>> from wearstate.sim.shaft.recording import alignment_line
+    >>> from wearstate.sim.shaft.line_alignment import alignment_line
     >>> rig = load_scene("shaft-rig", {"bearings.2.offset": "0 mm"})
     >>> quieter = quiet_moves(rig, calibrate(alignment_line(rig)))
     >>> bool(np.mean(quieter.after**2) <= np.mean(quieter.before**2))

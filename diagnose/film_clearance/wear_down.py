@@ -142,7 +142,7 @@ def sinking_places(
     -----
     Viscosity and clearance as new are taken to move the journal alike in every bore.
     """
-    from ...sim.shaft.on_oil_films import ShaftFilmError
+    from ...sim.shaft_films.status import ShaftFilmError
 
     shares = _HEALTHY if healthy else _SHARES
     wears = [share * limit for share in shares]
@@ -168,8 +168,9 @@ def sinking_places(
 
 def _ways(scene: "ShaftScene", bearing: int, wears: Sequence[float]) -> Float:
     """Heights and sides over the middle of the bore as new [m, shape=(n_wears, 2)]."""
-    from ...sim.shaft.on_oil_films import beam_film
-    from ...sim.shaft.recording import film_bearings, running_beam
+    from ...sim.shaft.at_rest import film_bearings
+    from ...sim.shaft.line_beam import running_beam
+    from ...sim.shaft_films.on_oil_films import beam_film
 
     beam, places = running_beam(scene), []
     for wear in wears:

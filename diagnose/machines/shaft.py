@@ -17,7 +17,7 @@ from .presentation import Presentation, Truths, density, label, told
 from .shifts import add, factor, set_to
 
 if TYPE_CHECKING:
-    from ...sim.shaft.recording import ShaftState
+    from ...sim.shaft.at_rest import ShaftState
 
 _REVOLUTIONS = 2  # drawn
 
@@ -25,7 +25,7 @@ _REVOLUTIONS = 2  # drawn
 def _draw_shaft(figure: Any, scene: Scene, solution: Recording) -> None:
     """The line with what it carries, its journals in their bores, and what its sensors see."""
     shaft = cast(ShaftScene, scene)
-    from ...sim.shaft.recording import shaft_state  # kernels, which a nameplate needs none of
+    from ...sim.shaft.at_rest import shaft_state  # kernels, which a nameplate needs none of
 
     state = shaft_state(shaft)
     panels = figure.subplot_mosaic(

@@ -1,5 +1,6 @@
 """Tests of a shaft line: rig test, jacking, transfer functions; sags; the next test to do.
 
 It may import ``sim.output``, ``sim.scene``, ``sim.excitation``, ``sim.beam``, ``sim.alignment``,
-``sim.shaft``, ``features.response``, ``features.rotation``, ``datasets.file``, ``diagnose.pages``.
+``sim.shaft_films``, ``sim.shaft_response``, ``sim.shaft``, ``features.response``,
+``features.rotation``, ``datasets.file``, ``diagnose.pages``.
 """

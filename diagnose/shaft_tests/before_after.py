@@ -11,8 +11,10 @@ from ...features.response.frf import Estimator
 from ...sim.alignment.calibration import Calibration
 from ...sim.scene.scene import Scene
 from ...sim.scene.shaft import ShaftScene
-from ...sim.shaft.recording import harmonic_forces, random_forces, shaft_beam, shaft_state
-from ...sim.shaft.response import Place
+from ...sim.shaft.at_rest import shaft_state
+from ...sim.shaft.forces import harmonic_forces, random_forces
+from ...sim.shaft.line_beam import shaft_beam
+from ...sim.shaft_response.places import Place
 from .peak_changes import PROMINENCE_DB, PeakChange, peak_changes
 from .rig_setup import TEST_KINDS, HammerTest, RigError, ShakerTest, free_time
 from .rig_test import Plant, RigTest, named_place, needed_time, rotor_plant, run_test

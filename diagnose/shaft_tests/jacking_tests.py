@@ -14,7 +14,7 @@ from ...sim.alignment.jacking_curve import CurveError, CurveFit, fit_curve
 from ...sim.alignment.seats import AlignmentError
 from ...sim.output.recording import DataError
 from ...sim.scene.shaft import ShaftScene
-from ...sim.shaft.recording import alignment_conditions, alignment_line
+from ...sim.shaft.line_alignment import alignment_conditions, alignment_line
 from .next_test import JACKING_ERROR
 from .sag_model import MeasuredReactions, SagError
 

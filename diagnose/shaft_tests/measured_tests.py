@@ -15,7 +15,7 @@ from ...features.rotation.order import pulse_times
 from ...sim.output.recording import DataError, Recording
 from ...sim.output.sensor import Channel
 from ...sim.scene.shaft import ShaftScene
-from ...sim.shaft.response import Place
+from ...sim.shaft_response.places import Place
 from .next_test import JACKING_ERROR
 from .sag_model import MeasuredReactions, MeasuredTransfer
 

@@ -29,9 +29,11 @@ from ...sim.shaft.changed import (
     transfer,
     transfer_slopes,
 )
-from ...sim.shaft.on_oil_films import BeamFilm
-from ...sim.shaft.recording import alignment_conditions, alignment_line, random_forces, shaft_beam
-from ...sim.shaft.response import Place
+from ...sim.shaft.forces import random_forces
+from ...sim.shaft.line_alignment import alignment_conditions, alignment_line
+from ...sim.shaft.line_beam import shaft_beam
+from ...sim.shaft_films.on_oil_films import BeamFilm
+from ...sim.shaft_response.places import Place
 from .rig_setup import HammerTest, ShakerTest
 from .sag_model import (
     MeasuredReactions,

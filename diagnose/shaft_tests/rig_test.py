@@ -16,17 +16,10 @@ from numpy.typing import NDArray
 from ...features.response.frf import Estimator, Frf, block_spectra, estimate_frf
 from ...features.rotation.order import order_amplitudes
 from ...sim.beam.rotor import Rotor
-from ...sim.shaft.response import (
-    Broadband,
-    Harmonic,
-    Place,
-    ReducedRotor,
-    Transient,
-    accelerance,
-    free_basis,
-    reduce_rotor,
-    time_response,
-)
+from ...sim.shaft_response.places import Place
+from ...sim.shaft_response.receptance import accelerance
+from ...sim.shaft_response.reduced import ReducedRotor, free_basis, reduce_rotor
+from ...sim.shaft_response.time_response import Broadband, Harmonic, Transient, time_response
 from .rig_setup import LEFT_OVER, TEST_KINDS, HammerTest, RigError, RigSetup, ShakerTest, free_time
 
 Float = NDArray[np.float64]
@@ -94,7 +87,7 @@ def rotor_plant(
     speed : float
         [rad/s]
     force : place
-        Where the test force acts, see :mod:`wearstate.sim.shaft.response`.
+        Where the test force acts, see :mod:`wearstate.sim.shaft_response.places`.
     responses : mapping of str to place
         Channel -> where its accelerometer is.
     sample_rate : float
@@ -115,7 +108,7 @@ def rotor_plant(
 
     Examples
     --------
-    >>> from wearstate.sim.shaft.recording import shaft_state
+    >>> from wearstate.sim.shaft.at_rest import shaft_state
     >>> from wearstate.sim.scene.load import load_scene
     >>> rotor = shaft_state(load_scene("propulsion-shaft")).rotor
     >>> plant = rotor_plant(rotor, speed=31.4, force=("stern_aft", "y"), sample_rate=1024.0,

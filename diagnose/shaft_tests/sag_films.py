@@ -17,8 +17,8 @@ import numpy as np
 
 from ...sim.alignment.alignment import influence, reactions
 from ...sim.scene.shaft import ShaftScene
-from ...sim.shaft.on_oil_films import ShaftFilmError
-from ...sim.shaft.recording import alignment_line
+from ...sim.shaft.line_alignment import alignment_line
+from ...sim.shaft_films.status import ShaftFilmError
 from .sag_model import MeasuredReactions, MeasuredTransfer, Prior, SagError
 from .sags import SagPosterior, estimate_sags
 

@@ -31,9 +31,10 @@ from ...sim.shaft.changed import (
     transfer_slopes,
     unit_change,
 )
-from ...sim.shaft.on_oil_films import BeamFilm, ShaftFilmError
-from ...sim.shaft.recording import alignment_conditions, alignment_line
-from ...sim.shaft.response import Place
+from ...sim.shaft.line_alignment import alignment_conditions, alignment_line
+from ...sim.shaft_films.on_oil_films import BeamFilm
+from ...sim.shaft_films.status import ShaftFilmError
+from ...sim.shaft_response.places import Place
 
 Vector = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -136,7 +137,7 @@ class Prior:
         ``a / sqrt(3)``.
     film : float
         Of every coefficient of every film over the film's size [-]: the error of the film's model
-        and of its mesh, see :mod:`wearstate.sim.shaft.on_oil_films`.
+        and of its mesh, see :mod:`wearstate.sim.shaft_films.on_oil_films`.
     gain : float
         Of the logarithm of each response's gain over the force's [-].
     """

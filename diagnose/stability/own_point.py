@@ -17,7 +17,7 @@ from ...sim.output.recording import Recording
 from ...sim.scene.journal import JournalScene
 from ...sim.scene.scene import Scene
 from ...sim.scene.shaft import ShaftScene
-from ...sim.shaft.recording import film_bearings, shaft_state
+from ...sim.shaft.at_rest import film_bearings, shaft_state
 
 GAP_LEFT = "gap left, 1 - eccentricity ratio"
 """Axis of the films."""

@@ -15,14 +15,10 @@ from ..beam.modes import modes, natural_frequencies
 from ..beam.rotor import Rotor, Support
 from ..scene.shaft import ShaftScene
 from ..scene.shaft_parts import ShaftBearing
+from ..shaft.at_rest import ShaftState, shaft_state
 from ..shaft.elements import element_lengths, half_wave
-from ..shaft.recording import (
-    ShaftState,
-    alignment_conditions,
-    alignment_line,
-    shaft_beam,
-    shaft_state,
-)
+from ..shaft.line_alignment import alignment_conditions, alignment_line
+from ..shaft.line_beam import shaft_beam
 from .rows import OIL_DENSITY, RECORDING, Quantity, ShortRun, taylor_share, trial
 
 _TURNS = 4.0  # of the trial: the response is steady from its first sample

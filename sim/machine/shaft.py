@@ -10,10 +10,12 @@ from ..output.transfer import SceneTransfer
 from ..scene.scene import Scene, SceneError
 from ..scene.shaft import ShaftScene
 from ..scene.shaft_parts import ShaftExciter
+from ..shaft.at_rest import shaft_state
 from ..shaft.ladder import BEAM_RUNGS, shaft_cost, shaft_effects
 from ..shaft.push import exciter_place
-from ..shaft.recording import check_shaft, shaft_recorder, shaft_state, simulate_shaft
-from ..shaft.response import Place, accelerance
+from ..shaft.recording import check_shaft, shaft_recorder, simulate_shaft
+from ..shaft_response.places import Place
+from ..shaft_response.receptance import accelerance
 from .registry import MachinePhysics
 
 Float = NDArray[np.float64]

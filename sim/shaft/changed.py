@@ -30,16 +30,13 @@ from numpy.typing import ArrayLike, NDArray
 from ..beam.beam import Beam
 from ..beam.rotor import Rotor
 from ..scene.shaft import ShaftScene
-from .on_oil_films import (
-    GRADIENT_STEP,
-    BeamFilm,
-    FilmBearing,
-    beam_film,
-    coefficient_gradients,
-    journal_shifts,
-)
-from .recording import film_bearings, running_beam
-from .response import Place, receptance
+from ..shaft_films.film_bearing import FilmBearing
+from ..shaft_films.on_oil_films import BeamFilm, beam_film
+from ..shaft_films.small_changes import GRADIENT_STEP, coefficient_gradients, journal_shifts
+from ..shaft_response.places import Place
+from ..shaft_response.receptance import receptance
+from .at_rest import film_bearings
+from .line_beam import running_beam
 
 Vector = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -198,7 +195,7 @@ def line_model(scene: ShaftScene) -> LineModel:
     Raises
     ------
     ValueError
-        As :func:`.shaft.recording.shaft_beam`.
+        As :func:`.line_beam.shaft_beam`.
 
     Examples
     --------
@@ -296,7 +293,7 @@ def coefficient_slopes(
     directions : numpy.ndarray [shape=(p, n, 42)]
         Changes.
     step : float
-        As of :func:`.shaft.on_oil_films.coefficient_gradients`.
+        As of :func:`.small_changes.coefficient_gradients`.
 
     Returns
     -------

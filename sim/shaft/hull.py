@@ -11,7 +11,8 @@ from collections.abc import Iterator
 
 from ..scene.shaft import ShaftScene
 from ..scene.shaft_parts import EngineTone, Housing, HullBladeTone
-from .response import Harmonic, Place
+from ..shaft_response.places import Place
+from ..shaft_response.time_response import Harmonic
 
 
 def hull_forces(scene: ShaftScene) -> tuple[Harmonic, ...]:

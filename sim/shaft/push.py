@@ -12,7 +12,9 @@ from numpy.typing import NDArray
 from ..excitation.forces import Push, exciter_push, half_sine
 from ..scene.shaft import ShaftScene
 from ..scene.shaft_parts import ShaftExciter
-from .response import Place, ReducedRotor, Transient, time_response
+from ..shaft_response.places import Place
+from ..shaft_response.reduced import ReducedRotor
+from ..shaft_response.time_response import Transient, time_response
 
 Float = NDArray[np.float64]
 _SETTLED = math.log(1e4)
@@ -60,7 +62,7 @@ def exciter_places(scene: ShaftScene) -> tuple[Place, ...]:
     Returns
     -------
     tuple of place
-        See :mod:`.shaft.response`.
+        See :mod:`.shaft_response.places`.
 
     Examples
     --------

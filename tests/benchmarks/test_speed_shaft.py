@@ -35,14 +35,9 @@ from wearstate.sim.fidelity.ladder import effects_of
 from wearstate.sim.machine.simulate import recorder, simulate
 from wearstate.sim.scene.load import load_scene
 from wearstate.sim.scene.rungs import admissible, with_values
-from wearstate.sim.shaft.response import (
-    Broadband,
-    Harmonic,
-    free_basis,
-    receptance,
-    reduce_rotor,
-    time_response,
-)
+from wearstate.sim.shaft_response.receptance import receptance
+from wearstate.sim.shaft_response.reduced import free_basis, reduce_rotor
+from wearstate.sim.shaft_response.time_response import Broadband, Harmonic, time_response
 
 ELEMENTS, LENGTH, DIAMETER = 100, 40.0, 0.4
 NODES = (5, 17, 29, 41, 53, 65, 77, 89)
