@@ -1,11 +1,13 @@
 """A damaged kernel cache mends itself, with one warning; code that is not whole is never run."""
 
 import hashlib
+import multiprocessing
 import os
 import pickle
 import shutil
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 import pytest
@@ -17,20 +19,54 @@ CODE = "from wearstate.sim.jit import near_sine_cosine\nprint(near_sine_cosine(0
 SINE = "0.479425538604203"
 
 
-def start(cache, code=CODE):
-    environment = os.environ | {"WEARSTATE_CACHE": str(cache)}
+# numba is imported once: every process but those of `fresh` is a fork of this server
+FORKS = multiprocessing.get_context("forkserver")
+FORKS.set_forkserver_preload(["numba"])
+
+FORKED = """
+import os
+os.environ["WEARSTATE_CACHE"] = {cache!r}
+for stream, path in ((1, {out!r}), (2, {err!r})):
+    os.dup2(os.open(path, os.O_WRONLY | os.O_CREAT), stream)
+exec({code!r}, {{"__name__": "__main__"}})
+"""
+
+
+class Forked:
+    """A process that begins without a kernel."""
+
+    def __init__(self, cache, code=CODE):
+        self.said = tempfile.TemporaryDirectory()
+        out, err = self.files = [Path(self.said.name, stream) for stream in ("out", "err")]
+        forked = FORKED.format(cache=str(cache), out=str(out), err=str(err), code=code)
+        self.process = FORKS.Process(target=exec, args=(forked, {}))
+        self.process.start()
+
+    def communicate(self, timeout):
+        """What it said, once it has ended."""
+        self.process.join(timeout)
+        with self.said:
+            return tuple(path.read_text() for path in self.files)
+
+    @property
+    def returncode(self):
+        return self.process.exitcode
+
+
+def fresh(cache, code=CODE):
+    """A process of its own from the beginning, its hashes too."""
     return subprocess.Popen(
         [sys.executable, "-P", "-c", code],
-        env=environment,
+        env=os.environ | {"WEARSTATE_CACHE": str(cache)},
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
     )
 
 
-def run(cache, code=CODE):
+def run(cache, code=CODE, begun=Forked):
     """Warnings of one process that needs a kernel."""
-    process = start(cache, code)
+    process = begun(cache, code)
     out, err = process.communicate(timeout=300)
     assert process.returncode == 0, err
     assert out.strip().startswith(SINE)
@@ -40,7 +76,7 @@ def run(cache, code=CODE):
 @pytest.fixture(scope="module")
 def filled(tmp_path_factory):
     folder = tmp_path_factory.mktemp("cache")
-    assert run(folder) == []
+    assert run(folder, begun=fresh) == []
     return folder
 
 
@@ -51,7 +87,7 @@ def files(folder, ending):
 def test_the_cache_is_used(filled):
     before = {path: path.stat().st_mtime_ns for path in filled.rglob("*.nb*")}
     assert len(before) == 2  # one index, one file of code
-    assert run(filled) == []
+    assert run(filled, begun=fresh) == []
     assert {path: path.stat().st_mtime_ns for path in filled.rglob("*.nb*")} == before
 
 
@@ -92,7 +128,7 @@ def test_what_was_mended_is_used(filled):
 def test_processes_at_once_on_a_damaged_cache(filled):
     for path in (*files(filled, ".nbi"), *files(filled, ".nbc")):
         path.write_bytes(b"")
-    processes = [start(filled) for _ in range(3)]
+    processes = [Forked(filled) for _ in range(3)]
     for process in processes:
         out, err = process.communicate(timeout=300)
         assert process.returncode == 0, err
@@ -183,7 +219,7 @@ def test_kernels_of_one_name_in_two_folders_are_kept_apart(tmp_path):
     told = f"import sys\nsys.path.insert(0, {str(tmp_path)!r})\n{CODE}\n"
     asked = "from wearstate.sim.one import law as a\nfrom wearstate.sim.two import law as b\n"
     for _ in range(2):  # compiled, then read back
-        process = start(tmp_path / "cache", f"{told}{asked}print(a.law(1.0), b.law(1.0))")
+        process = Forked(tmp_path / "cache", f"{told}{asked}print(a.law(1.0), b.law(1.0))")
         out, err = process.communicate(timeout=300)
         assert (out.split()[1:], err) == (["2.0", "3.0"], "")
     assert len(list((tmp_path / "cache").glob("kernels-*/sim/*/law.law*.nbi"))) == 2
@@ -223,8 +259,8 @@ def laws(tmp_path_factory):
     told = f"import sys\nsys.path.insert(0, {str(folder)!r})\n{CODE}\n"
     asked = "from wearstate.sim.laws import law\nprint("
 
-    def ask(cache, expression):
-        out, err = start(cache, f"{told}{asked}{expression})").communicate(timeout=300)
+    def ask(cache, expression, begun=Forked):
+        out, err = begun(cache, f"{told}{asked}{expression})").communicate(timeout=300)
         return out.split()[1:], err.splitlines()
 
     return ask
@@ -237,12 +273,12 @@ def kept(cache, ending):
 
 
 def test_a_callee_is_kept_as_a_part_for_all_that_call_it(laws, tmp_path):
-    assert laws(tmp_path, "law.eighth(2.0)") == (["256.0"], [])
+    assert laws(tmp_path, "law.eighth(2.0)", fresh) == (["256.0"], [])
     assert kept(tmp_path, ".nbi") == {"eighth"}  # no machine code that nobody calls
     assert kept(tmp_path, ".part") == {"_square", "_fourth"}
     parts = {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*.part")}
     misses = "sum(law._fourth.part._cache_misses.values())"
-    assert laws(tmp_path, f"law.sixteenth(2.0), {misses}") == (["65536.0", "0"], [])
+    assert laws(tmp_path, f"law.sixteenth(2.0), {misses}", fresh) == (["65536.0", "0"], [])
     assert laws(tmp_path, "law._fourth(2.0), law._fourth(3)") == (["16.0", "81"], [])
     assert kept(tmp_path, ".nbi") == {"eighth", "sixteenth", "_fourth"}
     assert {path: path.stat().st_mtime_ns for path in parts} == parts
@@ -338,7 +374,7 @@ def test_what_two_copies_compile_together_is_not_kept(tmp_path):
     asked = "from wearstate.sim.laws import law\nfrom renamed.sim.laws import law as other\n"
 
     def area(pair):
-        process = start(tmp_path / "cache", f"{told}{asked}print(law.area({pair}(2.0, 3.0)))")
+        process = Forked(tmp_path / "cache", f"{told}{asked}print(law.area({pair}(2.0, 3.0)))")
         out, err = process.communicate(timeout=300)
         return out.split()[1:], err
 
