@@ -391,14 +391,7 @@ def run_worn(scene, t, *, step, n_steps, angle=0.3):
 
 def scratch(state, contact):
     """Scratch of the kernels with a state in its row 0."""
-    w = layout.Work(
-        crank=np.zeros((5, 5)),
-        stage=np.zeros((5, 1), layout.STAGE),
-        held=np.zeros(1, layout.HELD),
-        moment=np.zeros(2),
-        matrix=np.zeros((4, 6)),
-        place=np.zeros((4, 6)),
-    )
+    w = layout.scratch(1)
     w.crank[0, :2] = state[:2]
     w.stage["y"][0] = bodies_of(state)
     w.stage["margin"] = 1.0  # a contact that is none asks for no change

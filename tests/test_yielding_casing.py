@@ -29,6 +29,7 @@ def free_casing(step, mass, *, along=1.0, across=0.0, pushed=("pin_x", "pin_y"))
         reach=np.array([[0.5 * step**2, 1.0, step]]),
         give=np.array([[along, across]]) / math.sqrt(mass),
         held=np.zeros((1, 2)),
+        journal=np.zeros((1, 2)),
         blend=np.zeros((2, 2)),
     )
 

@@ -10,7 +10,15 @@ from ...sim.contact.closed_forms import IdealCrank
 from ...sim.contact.law import CONTACT
 from ...sim.hydraulics.parameters import HYDRAULIC
 from ...sim.mechanism.crank_run import CrankRun, run_mechanism
-from ...sim.mechanism.layout import BODY, GUIDE, JOINT_COMPLIANT, THROW, Machine, Tables
+from ...sim.mechanism.layout import (
+    BODY,
+    GUIDE,
+    JOINT_COMPLIANT,
+    MAIN_BEARING,
+    THROW,
+    Machine,
+    Tables,
+)
 from ...sim.mechanism.oiled_joint import OIL
 from ...sim.pump_setup.ideal_motion import ideal_motion
 from ...sim.scene.load import load_scene
@@ -75,6 +83,8 @@ def one_throw(numbers: dict[str, float], contacts: dict[int, np.void], **machine
         liquid=np.zeros(1, HYDRAULIC),
         oils=np.zeros((1, 2), OIL),
         maps=np.zeros(1),
+        bearing=np.zeros(0, MAIN_BEARING),
+        bore=np.zeros(0, CONTACT),
         machine=shared,
     )
 

@@ -143,6 +143,13 @@ _DRY = {f"{_PIN}.rung": "compliant"}
 _LEVELS = {"pressure.rung": "two-level"}  # other rungs find these angles themselves
 _WRIST = {"joint.wristpin.rung": "compliant"}
 _GUIDE = {"joint.guide.rung": "compliant"}
+_MAIN_BEARING = {  # both together; crank and flywheel
+    "crank.mass": "60 kg",
+    "crank.bearing.journal_diameter": "70 mm",
+    "crank.bearing.stiffness": "400 MN/m",
+    "crank.bearing.damping": "60 kN s/m",
+    "crank.bearing.friction": 0.02,
+}
 
 _SHIFTS = (
     set_to(
@@ -189,6 +196,12 @@ _SHIFTS = (
     ),
     set_to("joint.guide.rung", ("compliant",), "a crosshead with the play of a new one"),
     set_to("joint.guide.diametral_clearance", ("0.25 mm",), "a worn crosshead", beside=_GUIDE),
+    set_to(
+        "crank.bearing.diametral_clearance",
+        ("0.06 mm", "0.16 mm"),
+        "main bearings with play, as new and worn",
+        beside=_MAIN_BEARING,
+    ),
     factor("casing.modes.*.frequency", 0.85, 1.15, "another foundation or pattern"),
     factor("casing.modes.*.damping_ratio", 0.4, 2.5, "joints, paint, pipes"),
     factor("rod.mass", 0.8, 1.25, "another drawing"),

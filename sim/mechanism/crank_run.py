@@ -16,19 +16,18 @@ from .layout import (
     FLOORED,
     FORCES,
     GAPS,
-    HELD,
     IN_TENSION,
     JOINT_OILED,
     NOT_LOCATED,
     PER_THROW,
     SPEED,
-    STAGE,
     WITH_VAPOUR,
     LinePair,
     SharedLines,
     Tables,
-    Work,
     Yielding,
+    force_column,
+    scratch,
 )
 from .march import MarchRecord, Tally, integrate
 
@@ -81,8 +80,9 @@ class CrankRun(CrankTally):
     ----------
     turns : numpy.ndarray [shape=(n_steps + 1, 2)]
         Crank angle [rad] and speed [rad/s] at the ends of the steps.
-    forces : numpy.ndarray [shape=(n_steps, 1 + 9 n_throws)]
-        Drive moment [N m], then per throw the columns of :data:`FORCES` [N], means over each step.
+    forces : numpy.ndarray [shape=(n_steps, 1 + 10 n_throws)]
+        Drive moment [N m], then per throw the columns of :data:`FORCES` [N], means over each step;
+        where main bearings have play two more, :data:`CRANK_FORCES`.
     bodies : numpy.ndarray [shape=(n_steps + 1, n_throws, 12)] or None
         Columns as :data:`BODY`, then their rates, at the ends of the steps; the state in the
         middle of a step, to which its forces belong, is the mean of two rows. None where not kept.
@@ -93,6 +93,9 @@ class CrankRun(CrankTally):
     ends : numpy.ndarray [shape=(n_steps + 1, 2)] or None
         Pressure [Pa] of suction and discharge line at the pump, means over the steps before; None
         where no line is modelled.
+    journal : numpy.ndarray [shape=(n_steps + 1, 4)] or None
+        Crank's journal from the centre of its bore (x, y) [m], and how fast [m/s], at the ends of
+        the steps; None where main bearings have no play or states are not kept.
     """
 
     turns: NDArray[np.float64]
@@ -101,10 +104,12 @@ class CrankRun(CrankTally):
     chambers: NDArray[np.float64] | None
     gaps: NDArray[np.float64] | None = None
     ends: NDArray[np.float64] | None = None
+    journal: NDArray[np.float64] | None = None
 
     def force(self, name: str, throw: int = 0) -> NDArray[np.float64]:
-        """One column of the forces, by its name in :data:`FORCES` [N]."""
-        return self.forces[:, 1 + len(FORCES) * throw + FORCES.index(name)]
+        """One column of the forces, by its name in :data:`FORCES` or :data:`CRANK_FORCES` [N]."""
+        n_throws = (self.forces.shape[1] - 1) // len(FORCES)
+        return self.forces[:, force_column(name, throw, n_throws)]
 
 
 _NO_LINES = LinePair(
@@ -125,6 +130,7 @@ def run_mechanism(
     n_steps: int,
     chambers: NDArray[np.float64] | None = None,
     films: NDArray[np.float64] | None = None,
+    journal: NDArray[np.float64] | None = None,
     lines: LinePair | None = None,
     casing: Yielding = AT_REST,
     keep_states: bool = True,
@@ -148,6 +154,9 @@ def run_mechanism(
         State of the chambers at the start.
     films : numpy.ndarray [shape=(n_throws, 4)], optional
         Columns as :data:`FILM`, at the start; inside the clearances.
+    journal : numpy.ndarray [shape=(4,)], optional
+        Place of the crank's journal from the centre of its bore (x, y) [m], and how fast [m/s], at
+        the start, where main bearings have play.
     lines : LinePair, optional
         Shared by the chambers of all throws, each of which then breathes; replaced by their state
         at the end.
@@ -168,14 +177,7 @@ def run_mechanism(
         np.any(t.throws["crankpin_rung"] == JOINT_OILED)
         or np.any(t.throws["wristpin_rung"] == JOINT_OILED)
     )
-    w = Work(
-        crank=np.zeros((5, 5)),
-        stage=np.zeros((5, n), STAGE),
-        held=np.zeros(n, HELD),
-        moment=np.zeros(2),
-        matrix=np.zeros((4, 6)),
-        place=np.zeros((4, 6)),
-    )
+    w = scratch(n, len(t.bearing))
     shared = SharedLines(
         lines=_NO_LINES if lines is None else lines,
         pairs=np.zeros(1, PAIR),
@@ -187,16 +189,19 @@ def run_mechanism(
     w.stage["y"][0] = bodies
     if films is not None:
         w.stage["film"][0] = films
+    if journal is not None:
+        w.journal["y"][0] = journal
     chamber = np.zeros((n, 8))
     if chambers is not None:
         chamber[:, :6] = chambers
     r = MarchRecord(
         turns=np.empty((n_steps + 1, 2)),
-        forces=np.zeros((n_steps, 1 + n * len(FORCES))),
+        forces=np.zeros((n_steps, 1 + n * len(FORCES) + 2 * len(t.bearing))),
         states=np.empty((rows, n, PER_THROW)),
         chambers=np.empty((n_steps + 1 if breathing else 1, n, 8)),
         gaps=np.zeros((n_steps + 1 if oiled else 1, n, len(GAPS))),
         ends=np.zeros((n_steps + 1 if lines else 1, 2)),
+        journal=np.empty((rows if len(t.bearing) else 1, 4)),
     )
     tally = Tally(counts=np.zeros(5, np.int64), peak=np.zeros(1))
     moved, ridden = np.zeros((len(casing.react), 3)), np.zeros((3, 2))
@@ -209,6 +214,7 @@ def run_mechanism(
         chambers=r.chambers[: done + 1, :, :6] if breathing else None,
         gaps=r.gaps[: done + 1] if oiled else None,
         ends=r.ends[: done + 1] if lines else None,
+        journal=r.journal[: done + 1] if keep_states and len(t.bearing) else None,
         step=step,
         status=Status(code),
         peak_normal_force=float(tally.peak[0]),

@@ -22,6 +22,7 @@ from .layout import (
     WRISTPIN,
     pose_of,
 )
+from .main_bearing import journal_margin, with_play
 from .throw_motion import corner_margin, crank_offset, pin_touch, worn_eye, wrist_offset
 
 _MOST_CUTS = 8  # contact changes within one step and throw before the rest is taken as it is
@@ -29,7 +30,9 @@ _MOST_CUTS = 8  # contact changes within one step and throw before the rest is t
 
 @kernel
 def contact_margin(k: int, j: int, w: Any, row: int, t: Any) -> Any:
-    """Margin of one contact alone, for the search of its change."""
+    """Margin of one contact alone, for the search of its change; after all throws the journal's."""
+    if k == t.throws.shape[0]:
+        return journal_margin(w, row, t)
     q, p, omega = t.throws[k], pose_of(w.stage[row, k]), w.crank[row, SPEED]
     touching, impact = w.held[k].touching[j] != 0, w.held[k].impact[j]
     if j > WRISTPIN:
@@ -38,7 +41,7 @@ def contact_margin(k: int, j: int, w: Any, row: int, t: Any) -> Any:
     sin_b, cos_b = sine_cosine(p.beta)
     if j == CRANKPIN:
         sin_a, cos_a = sine_cosine(w.crank[row, ANGLE] + q.phase)
-        offset = crank_offset(p, omega, q, sin_a, cos_a, sin_b, cos_b)
+        offset = with_play(crank_offset(p, omega, q, sin_a, cos_a, sin_b, cos_b), w, row, t)
     else:
         offset = wrist_offset(p, q, sin_b, cos_b)
     (d_x, d_y, v_x, v_y), _ = worn_eye(offset, p.beta_rate, sin_b, cos_b, t.contacts[k, j])
@@ -64,31 +67,45 @@ def _hermite(
 
 
 @kernel
-def _interpolate(k: int, w: Any, i: int, h: float, s: float) -> None:
+def _interpolate(k: int, w: Any, i: int, h: float, s: float, t: Any) -> None:
     """State of crank and one throw a fraction s into the step from row i, into row 2."""
     y, z = w.crank, 1 - i
     for c in range(2):
         y[2, c] = _hermite(y[i, c], y[i, 2 + c], y[z, c], y[z, 2 + c], h, s)
+    for n in range(w.journal.shape[1]):
+        at, start, end = w.journal[2, n], w.journal[i, n], w.journal[z, n]
+        for c in range(4):
+            at.y[c] = _hermite(start.y[c], start.rate[c], end.y[c], end.rate[c], h, s)
+    if k == t.throws.shape[0]:
+        return
     here, before, after = w.stage[2, k], w.stage[i, k], w.stage[z, k]
     for c in range(PER_THROW):
         here.y[c] = _hermite(before.y[c], before.rate[c], after.y[c], after.rate[c], h, s)
 
 
 @kernel
+def _margin_of(k: int, j: int, w: Any, row: int, t: Any) -> float:
+    """Margin of a contact as the derivative of a row has left it [N]."""
+    journal = k == t.throws.shape[0]
+    margin: float = w.journal[row, 0].margin if journal else w.stage[row, k].margin[j]
+    return margin
+
+
+@kernel
 def _locate_change(k: int, j: int, w: Any, i: int, h: float, t: Any) -> Any:
     """Fraction of the step at which one contact changes: Illinois on the dense output."""
     low, high = 0.0, 1.0
-    f_low, f_high = w.stage[i, k].margin[j], w.stage[1 - i, k].margin[j]
+    f_low, f_high = _margin_of(k, j, w, i, t), _margin_of(k, j, w, 1 - i, t)
     share = 0.5
     while f_low <= 0.0:  # changed just now, at rounding: it must hold before it changes again
         if share < 1e-4:
             return 0.0  # it never holds: it asks for the change at once
-        _interpolate(k, w, i, h, share)
+        _interpolate(k, w, i, h, share, t)
         low, f_low = share, contact_margin(k, j, w, 2, t)
         share *= 0.5
     for _ in range(60):
         s = high - f_high * (high - low) / (f_high - f_low)
-        _interpolate(k, w, i, h, s)
+        _interpolate(k, w, i, h, s, t)
         f = contact_margin(k, j, w, 2, t)
         if f > 0.0:
             low, f_low = s, f
@@ -114,6 +131,12 @@ def _first_change(w: Any, i: int, h: float, locate: bool, t: Any) -> Any:
                 share = _locate_change(k, j, w, i, h, t) if locate else 1.0
                 if throw < 0 or share < first:
                     first, throw, contact = share, k, j
+    for n in range(w.journal.shape[1]):
+        if w.journal[1 - i, n].margin < 0.0:
+            k = t.throws.shape[0]
+            share = _locate_change(k, 0, w, i, h, t) if locate else 1.0
+            if throw < 0 or share < first:
+                first, throw, contact = share, k, 0
     return first, throw, contact
 
 
@@ -128,6 +151,10 @@ def _advance(w: Any, row: int, i: int, share: float, slope: int) -> None:
             here.y[c] = start.y[c] + share * rate.rate[c]
         for c in range(len(FILM)):
             here.film[c] = start.film[c] + share * rate.film_rate[c]
+    for n in range(w.journal.shape[1]):
+        at, begin, moving = w.journal[row, n], w.journal[i, n], w.journal[slope, n]
+        for c in range(4):
+            at.y[c] = begin.y[c] + share * moving.rate[c]
 
 
 @kernel
@@ -151,6 +178,13 @@ def _finish(w: Any, i: int, h: float) -> None:
         for c in range(len(FILM)):
             rate = mean_of_stages(a.film_rate[c], b.film_rate[c] + c_.film_rate[c], d.film_rate[c])
             end.film[c] = a.film[c] + sixth * rate
+    for n in range(w.journal.shape[1]):
+        last, first, second = w.journal[1 - i, n], w.journal[i, n], w.journal[2, n]
+        third, fourth = w.journal[3, n], w.journal[4, n]
+        for c in range(4):
+            middle = second.rate[c] + third.rate[c]
+            rate = mean_of_stages(first.rate[c], middle, fourth.rate[c])
+            last.y[c] = first.y[c] + sixth * rate
 
 
 @kernel
@@ -175,6 +209,8 @@ def _stages(w: Any, i: int, h: float, passed: float, whole: float, fresh: bool, 
 @kernel
 def _flip(k: int, j: int, w: Any, i: int, t: Any) -> int:
     """Open or close one contact; 1 where it closed more slowly than its law's floor."""
+    if k == t.throws.shape[0]:
+        return _flip_journal(w, i, t)
     held = w.held[k]
     held.touching[j] = 1 - held.touching[j]
     if held.touching[j] == 0:
@@ -182,6 +218,16 @@ def _flip(k: int, j: int, w: Any, i: int, t: Any) -> int:
     held.impact[j] = max(w.stage[i, k].approach[j], 0.0)
     c = t.contacts[k, min(j, GUIDE)]
     return 1 if c.law != LAW_CONSTANT_LOSS and held.impact[j] < c.speed_floor else 0
+
+
+@kernel
+def _flip_journal(w: Any, i: int, t: Any) -> int:
+    held, c = w.journal_held[0], t.bore[0]
+    held.touching = 1 - held.touching
+    if held.touching == 0:
+        return 0
+    held.impact = max(w.journal[i, 0].approach, 0.0)
+    return 1 if c.law != LAW_CONSTANT_LOSS and held.impact < c.speed_floor else 0
 
 
 @kernel
@@ -196,6 +242,10 @@ def _change(throw: int, contact: int, w: Any, i: int, t: Any, tally: Any) -> Non
             if (k == throw and j == contact) or w.stage[i, k].margin[j] < 0.0:
                 tally.counts[CHANGES] += 1
                 tally.counts[FLOORED] += _flip(k, j, w, i, t)
+    for n in range(w.journal.shape[1]):
+        if throw == t.throws.shape[0] or w.journal[i, n].margin < 0.0:
+            tally.counts[CHANGES] += 1
+            tally.counts[FLOORED] += _flip(t.throws.shape[0], 0, w, i, t)
 
 
 @kernel
@@ -213,6 +263,13 @@ def _record_forces(w: Any, i: int, weight: float, forces: Any, step: int, tally:
                 a.force[n], b.force[n] + c.force[n], d.force[n]
             )
         tally.peak[0] = max(tally.peak[0], max(a.normal, max(b.normal, c.normal)))
+    for n in range(w.journal.shape[1]):
+        a_, b_, c_, d_ = w.journal[i, n], w.journal[2, n], w.journal[3, n], w.journal[4, n]
+        f = 1 + len(FORCES) * w.stage.shape[1]
+        for way in range(2):
+            middle = b_.force[way] + c_.force[way]
+            forces[step, f + way] += weight * mean_of_stages(a_.force[way], middle, d_.force[way])
+        tally.peak[0] = max(tally.peak[0], max(a_.normal, max(b_.normal, c_.normal)))
 
 
 @kernel

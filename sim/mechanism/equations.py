@@ -36,6 +36,7 @@ from .layout import (
     WRISTPIN,
     pose_of,
 )
+from .main_bearing import journal_motion, spun_up, with_play
 from .oiled_joint import oiled_joint
 from .throw_motion import (
     PinLoad,
@@ -168,7 +169,7 @@ def _throw(k: int, w: Any, row: int, share: float, t: Any) -> None:
     sin_b, cos_b = sine_cosine(p.beta)
     pressure, added = _pressure(k, w, row, share, t)
     on_face, inv_px = -q.piston_area * pressure, 1.0 / (q.piston_mass + added)
-    centred = crank_offset(p, omega, q, sin_a, cos_a, sin_b, cos_b)
+    centred = with_play(crank_offset(p, omega, q, sin_a, cos_a, sin_b, cos_b), w, row, t)
     at_crank, along = worn_eye(centred, p.beta_rate, sin_b, cos_b, t.contacts[k, CRANKPIN])
     pin, peak, overlap = _pin_load(
         CRANKPIN, q.crankpin_rung, q.crankpin_radius, at_crank, omega, k, b, held, t
@@ -226,7 +227,11 @@ def derivative_of_record(w: Any, row: int, share: float, t: Any) -> None:
         _throw(k, w, row, share, t)
     w.crank[row, ANGLE_RATE], w.crank[row, SPEED_RATE] = w.crank[row, SPEED], 0.0
     sin_a, cos_a = sine_cosine(w.crank[row, ANGLE] + t.throws[0].phase)
-    load = crank_load(w.moment[0], sin_a, cos_a, m)
+    a_x, a_y = 0.0, 0.0
+    if t.bearing.shape[0] > 0:
+        a_x, a_y = journal_motion(w, row, t, sin_a, cos_a)
+        spun_up(w, row, t, a_x, a_y, sin_a, cos_a)
+    load = crank_load(w.moment[0], sin_a, cos_a, a_x, a_y, m)
     w.crank[row, MOMENT] = -load
     if m.inverse_inertia == 0.0:
         return
@@ -234,6 +239,8 @@ def derivative_of_record(w: Any, row: int, share: float, t: Any) -> None:
     turning = m.inverse_inertia * (drive + load) / (1.0 - m.inverse_inertia * w.moment[1])
     w.crank[row, SPEED_RATE] = turning
     w.crank[row, MOMENT] = drive
+    if t.bearing.shape[0] > 0:
+        spun_up(w, row, t, a_x, a_y, sin_a, cos_a)
     for k in range(t.throws.shape[0]):
         if t.throws[k].crankpin_rung >= JOINT_COMPLIANT:
             continue

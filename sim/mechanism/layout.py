@@ -48,6 +48,16 @@ CONTACTS = 6
 upper then lower."""
 
 
+MAIN_BEARING = np.dtype(
+    [
+        ("inverse_mass", "f8"),  # of all that turns on it [1/kg]
+        ("eccentricity", "f8"),  # of its centre of mass, along the first throw [m]
+        ("radius", "f8"),  # of the journal [m]
+    ]
+)
+"""Main bearings with play, seen as one; a crank without play has none."""
+
+
 class Machine(NamedTuple):
     """What the throws share, in SI."""
 
@@ -90,6 +100,17 @@ FORCES = (
 the stroke.
 Before them stands the drive moment [N m]."""
 
+CRANK_FORCES = ("main_x", "main_y")
+"""Mean force over a step of a journal with play on its main bearing [N], after all throws'."""
+
+
+def force_column(name: str, throw: int, n_throws: int) -> int:
+    """Column of a force of a throw, counted from 0, or of the crank among those of a run."""
+    if name in CRANK_FORCES:
+        return 1 + len(FORCES) * n_throws + CRANK_FORCES.index(name)
+    return 1 + len(FORCES) * throw + FORCES.index(name)
+
+
 PIN_FORCE, WRIST_FORCE, GUIDE_FORCE, FACE_FORCE, SEAL_FORCE, VALVE_FORCES = (
     0,
     2,
@@ -118,6 +139,8 @@ class Tables(NamedTuple):
     liquid: NDArray[Any]  # (n_throws,) of HYDRAULIC
     oils: NDArray[Any]  # (n_throws, 2) of OIL
     maps: NDArray[np.float64]  # coefficients of all films that are maps, one after the other
+    bearing: NDArray[Any]  # (0 or 1,) of MAIN_BEARING
+    bore: NDArray[Any]  # (0 or 1,) of CONTACT: its journal in its bore
     machine: Machine
 
 
@@ -129,6 +152,7 @@ class Yielding(NamedTuple):
     reach: NDArray[np.float64]  # (n_modes, 3): place after it, per place and speed before it
     give: NDArray[np.float64]  # (n_modes, 2): shape at the bearing, along and across [kg^-0.5]
     held: NDArray[np.float64]  # (n_modes, 2): pushes back by what it carries [kg^0.5]
+    journal: NDArray[np.float64]  # (n_modes, 2): modal force per force of CRANK_FORCES
     blend: NDArray[np.float64]  # (2, 2): what that makes of its acceleration, see `settled`
 
 
@@ -153,6 +177,7 @@ AT_REST = Yielding(
     reach=np.zeros((0, 3)),
     give=np.zeros((0, 2)),
     held=np.zeros((0, 2)),
+    journal=np.zeros((0, 2)),
     blend=np.zeros((2, 2)),
 )
 """A bearing that does not move."""
@@ -187,6 +212,22 @@ HELD = np.dtype(
 )
 """What one throw remembers from step to step."""
 
+JOURNAL = np.dtype(
+    [
+        ("y", "f8", 4),  # journal from the centre of its bore (x, y) [m], and how fast [m/s]
+        ("rate", "f8", 4),
+        ("force", "f8", 2),  # on the bearing (x, y) [N]
+        ("margin", "f8"),
+        ("approach", "f8"),
+        ("normal", "f8"),
+        ("overlap", "f8"),  # over the journal's radius
+    ]
+)
+"""The journal of a crank in main bearings with play, at one stage of a step."""
+
+JOURNAL_HELD = np.dtype([("touching", "i8"), ("impact", "f8")])
+"""What it remembers from step to step, as of :data:`HELD`."""
+
 ANGLE, SPEED, ANGLE_RATE, SPEED_RATE, MOMENT = range(5)
 """Columns of the crank's stages."""
 
@@ -211,6 +252,22 @@ class Work(NamedTuple):
     moment: NDArray[np.float64]  # (2,): on the crank, and per crank acceleration
     matrix: NDArray[np.float64]  # (4, 6): constraint equations with two right sides, see SIZE
     place: NDArray[np.float64]  # (4, 6): of each constraint force, see AT_JOINT
+    journal: NDArray[Any]  # (5, 0 or 1) of JOURNAL
+    journal_held: NDArray[Any]  # (0 or 1,) of JOURNAL_HELD
+
+
+def scratch(n_throws: int, n_bearings: int = 0) -> Work:
+    """Scratch of a march, all zeros."""
+    return Work(
+        crank=np.zeros((5, 5)),
+        stage=np.zeros((5, n_throws), STAGE),
+        held=np.zeros(n_throws, HELD),
+        moment=np.zeros(2),
+        matrix=np.zeros((4, 6)),
+        place=np.zeros((4, 6)),
+        journal=np.zeros((5, n_bearings), JOURNAL),
+        journal_held=np.zeros(n_bearings, JOURNAL_HELD),
+    )
 
 
 class LinePair(NamedTuple):

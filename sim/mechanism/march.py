@@ -35,6 +35,7 @@ from .layout import (
     Machine,
     Tables,
 )
+from .main_bearing import journal_margin
 
 
 @kernel
@@ -127,11 +128,17 @@ def _fault(w: Any, i: int) -> int:
             return 2
         if abs(b.y[BETA]) > 1.5:  # rad
             return 3
+    for n in range(w.journal.shape[1]):
+        journal = w.journal[i, n]
+        for c in range(4):
+            total += journal.y[c]
+        if journal.overlap > OVERLAP_LIMIT:
+            return 2
     return 0 if math.isfinite(total) else 1
 
 
 class MarchRecord(NamedTuple):
-    """What a run leaves behind; the last four have one row where they are not needed."""
+    """What a run leaves behind; the last five have one row where they are not needed."""
 
     turns: NDArray[np.float64]  # (n_steps + 1, 2): crank angle and speed
     forces: NDArray[np.float64]  # (n_steps, 1 + n_throws * len(FORCES))
@@ -139,6 +146,7 @@ class MarchRecord(NamedTuple):
     chambers: NDArray[np.float64]  # (n_steps + 1, n_throws, 8)
     gaps: NDArray[np.float64]  # (n_steps + 1, n_throws, len(GAPS))
     ends: NDArray[np.float64]  # (n_steps + 1, 2): pressures of the lines at the pump
+    journal: NDArray[np.float64]  # (n_steps + 1, 4): as JOURNAL's y
 
 
 class Tally(NamedTuple):
@@ -168,6 +176,8 @@ def begin(w: Any, t: Any, chamber: Any) -> bool:
                 w.stage[row, k].margin[j] = NO_CHANGE
             if _is_compliant(q, j):  # closed is what would close if it were open
                 held.touching[j] = 1 if contact_margin(k, j, w, 0, t) < 0.0 else 0
+    for n in range(w.journal.shape[1]):
+        w.journal_held[n].touching = 1 if journal_margin(w, 0, t) < 0.0 else 0
     return breathing
 
 
@@ -186,6 +196,9 @@ def _keep(w: Any, i: int, chamber: Any, states: Any, r: Any, row: int) -> None:
         if r.gaps.shape[0] > 1:
             for c in range(len(GAPS)):
                 r.gaps[row, k, c] = w.stage[i, k].gaps[c]
+    if r.journal.shape[0] > 1:
+        for c in range(4):
+            r.journal[row, c] = w.journal[i, 0].y[c]
 
 
 @kernel
@@ -250,6 +263,10 @@ def _on_moving_bearing(
             for n in range(len(PUSHES)):
                 own += y.push[mode, k, n] * forces[step, 1 + len(FORCES) * k + PUSHES[n]]
             force += own
+        for n in range(t.bearing.shape[0]):
+            first = 1 + len(FORCES) * y.push.shape[1] + 2 * n
+            force += y.journal[mode, 0] * forces[step, first]
+            force += y.journal[mode, 1] * forces[step, first + 1]
         r = y.react[mode]
         a = of_mode(force, moved[mode, 0], moved[mode, 1], r[0], r[1], r[2])
         moved[mode, 2] = force
@@ -279,7 +296,7 @@ def _on_moving_bearing(
         m.breakdown_slip,
         m.baumgarte,
     )
-    return Tables(t.throws, t.contacts, t.liquid, t.oils, t.maps, machine)
+    return Tables(t.throws, t.contacts, t.liquid, t.oils, t.maps, t.bearing, t.bore, machine)
 
 
 @kernel

@@ -347,6 +347,9 @@ def motor_moment(speed: float, m: Any) -> Any:
 
 
 @kernel
-def crank_load(moment: float, sin_a: float, cos_a: float, m: Any) -> Any:
-    """Moment on the crank with the weight of its own unbalance [N m]."""
-    return moment + m.static_moment * (m.gravity_x * sin_a - m.gravity_y * cos_a)
+def crank_load(moment: float, sin_a: float, cos_a: float, a_x: float, a_y: float, m: Any) -> Any:
+    """Moment on the crank with the weight of its own unbalance [N m].
+
+    `a_x` and `a_y` are what its journal accelerates by [m/s^2].
+    """
+    return moment + m.static_moment * ((m.gravity_x + a_x) * sin_a - (m.gravity_y + a_y) * cos_a)

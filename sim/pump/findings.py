@@ -10,7 +10,14 @@ from ..casing.decimation import decimate
 from ..excitation.forces import Push
 from ..hydraulics.valves import lift_left
 from ..mechanism.crank_run import CrankRun, CrankTally
-from ..mechanism.layout import FORCES, GUIDE, JOINT_COMPLIANT, JOINT_LINK, JOINT_OILED
+from ..mechanism.layout import (
+    CRANK_FORCES,
+    GUIDE,
+    JOINT_COMPLIANT,
+    JOINT_LINK,
+    JOINT_OILED,
+    force_column,
+)
 from ..output.status import Status
 from ..pump_setup.contacts import contact_rate, contact_table
 from ..pump_setup.films import film_temperature_of
@@ -79,6 +86,7 @@ def run_numerics(gathered: Gathering, run: CrankTally, lift: float) -> dict[str,
         "rung_joint": scene.joint.crankpin.rung,
         "rung_wristpin": _rung_of(scene.joint.wristpin),
         "rung_guide": _rung_of(scene.joint.guide),
+        "rung_mainbearing": _rung_of(scene.crank.bearing),
         "rung_pressure": scene.pressure.rung,
         "rung_drive": scene.drive.rung,
         "rung_casing": scene.casing.rung,
@@ -222,9 +230,14 @@ def run_truth(run: CrankRun, plan: RunPlan) -> dict[str, Any]:
     truth: dict[str, Any] = {"state_alpha": turned}
     truth["state_alpha_rate"] = plan.at_samples(run.turns[:, 1])
     throws = range(len(plan.scene.throws))
-    columns = [1 + len(FORCES) * throw + FORCES.index(name) for throw in throws for name in _KEPT]
+    columns = [force_column(name, throw, len(throws)) for throw in throws for name in _KEPT]
+    if run.journal is not None:
+        columns += [force_column(name, 0, len(throws)) for name in CRANK_FORCES]
+        truth["main_bearing_offset_m"] = plan.at_samples(run.journal[:, :2])
     force = decimate(run.forces[:, [0, *columns]], plan.factor)[plan.kept]  # it costs by the column
     truth["drive_moment_n_m"] = force[:, 0]
+    if run.journal is not None:
+        truth["main_bearing_force_n"] = force[:, -len(CRANK_FORCES) :]
     if run.ends is not None:
         ends = plan.at_samples(run.ends)
         truth["suction_line_pressure_pa"] = ends[:, 0]
@@ -251,7 +264,8 @@ def _throw_truth(
 ) -> list[tuple[str, NDArray[np.float64]]]:
     assert run.bodies is not None  # truth was asked for
     bodies = plan.at_samples(run.bodies[:, throw])
-    offsets = pin_offsets(plan.scene, turned, bodies, throw)
+    journal = None if run.journal is None else plan.at_samples(run.journal)
+    offsets = pin_offsets(plan.scene, turned, bodies, throw, journal=journal)
     found = [
         ("pin_force_n", force[:, 0:2]),
         ("wrist_force_n", force[:, 2:4]),

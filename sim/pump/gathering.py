@@ -10,8 +10,9 @@ from ..casing.casing_frf import Accelerance, load_accelerance
 from ..casing.decimation import Decimation
 from ..casing.measured_casing import MeasuredCasing
 from ..casing.modes import CasingModes, ModalCasing, casing_inputs
-from ..mechanism.layout import FORCES
+from ..mechanism.layout import force_column
 from ..parts.casing import CasingMode, specific_key
+from ..pump_setup.joints import has_main_play
 from ..pump_setup.yielding import rubs_in_guide, throw_on_casing
 from ..scene.pump import CRANK_PLACES, FORCE_PLACES, GUIDE_PLACES, VALVE_PLACES, PumpScene
 from ..scene.pump_hydraulics import BREATHING_RUNGS
@@ -71,7 +72,7 @@ class Gathering:
         self.plan, self.seed = plan, seed
         self.pushes = plan.pushes(seed)
         self._sources = _sources(scene, columns)
-        self._pistons = [_row_of("piston_x", throw, columns) for throw in range(n_throws)]
+        self._pistons = [_row_of("piston_x", throw, n_throws, columns) for throw in range(n_throws)]
         self._bearings = [
             list(self._sources).index(_force_key(scene, place, 1))
             for place in ("bearing_x", "bearing_y")
@@ -82,7 +83,7 @@ class Gathering:
             for throw, _ in scene.pressure_sensors
         ]
         self._known = [
-            _row_of(name, throw, columns)
+            _row_of(name, throw, n_throws, columns)
             for throw in range(n_throws if truth else 0)
             for name in _GATHERED_FORCES
         ]
@@ -178,7 +179,7 @@ class Gathering:
             np.multiply(forces[source], sign, out=row)
             for other, its_sign in others:
                 row += its_sign * forces[other]
-        if self.plan.scene.crank.unbalance > 0:
+        if self.plan.scene.crank.unbalance > 0 and not has_main_play(self.plan.scene):
             rows[self._bearings] += _crank_throws(self.plan, turns)
         for row, push in zip(rows[len(self._sources) :], self.pushes, strict=True):
             row[:] = push.along[first : first + n]
@@ -230,9 +231,9 @@ GATHERED_TRUTH = ("state_alpha", "pin_force_n", "guide_force_n", "piston_pressur
 """Of a run's truth: what is at hand without its states, by throw as there."""
 
 
-def _row_of(force: str, throw: int, columns: tuple[int, ...] | None) -> int:
+def _row_of(force: str, throw: int, n_throws: int, columns: tuple[int, ...] | None) -> int:
     """Row of a force of a throw among those that are kept."""
-    column = 1 + len(FORCES) * throw + FORCES.index(force)
+    column = force_column(force, throw, n_throws)
     return column if columns is None else columns.index(column)
 
 
@@ -247,7 +248,7 @@ def _sources(
     found: dict[str, list[tuple[int, float]]] = {}
     for throw in range(len(scene.throws)):
         for place, name, sign in throw_on_casing(scene, throw):
-            row = _row_of(name, throw, columns)
+            row = _row_of(name, throw, len(scene.throws), columns)
             found.setdefault(_force_key(scene, place, throw + 1), []).append((row, sign))
     return found
 

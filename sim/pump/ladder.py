@@ -75,7 +75,7 @@ JOINT_RUNGS = (
 """Rungs of crank pin and wrist pin."""
 
 GUIDE_RUNGS = tuple(rung for rung in JOINT_RUNGS if rung.name in ("ideal", "compliant"))
-"""Rungs of a guide."""
+"""Rungs of a guide, and of main bearings."""
 
 PRESSURE_RUNGS = (
     Rung(
@@ -179,6 +179,7 @@ PUMP_STEP_LEVELS = (4.0, 2.0, 4 / 3, 1.0, 0.5, 0.25)
 def pump_effects(scene: Scene) -> Iterator[Effect]:
     """Effects of a pump, each with its rungs; their names are in its scene type."""
     yield from _joint_effects(scene)
+    yield from _bearing_effect(scene)
     yield from _pressure_effect(scene)
     yield from _drive_effect(scene)
     yield from _casing_effect(scene)
@@ -200,6 +201,14 @@ def _joint_effects(scene: Scene) -> Iterator[Effect]:
         table = GUIDE_RUNGS if name == "guide" else pin_rungs(part)
         rungs = written(table, _throw_paths(pump, "joint", f"{name}.rung"))
         yield effect(name, scene, rungs, partial(_joint_rung, name), beyond=_beyond)
+
+
+def _bearing_effect(scene: Scene) -> Iterator[Effect]:
+    if cast(PumpScene, scene).crank.bearing is not None:
+        rungs = written(GUIDE_RUNGS, ["crank.bearing.rung"])
+        yield effect(
+            "mainbearing", scene, rungs, lambda one: str(one.crank.bearing.rung), beyond=_beyond
+        )
 
 
 def pin_rungs(part: RevoluteJoint) -> tuple[Rung, ...]:
@@ -262,7 +271,7 @@ def _casing_effect(scene: Scene) -> Iterator[Effect]:
 
 def _stiffest(scene: PumpScene) -> PumpScene:
     """The scene with every contact that it can have: a step that is stable there is so anywhere."""
-    for joint in _joint_effects(scene):
+    for joint in (*_joint_effects(scene), *_bearing_effect(scene)):
         dry = joint.rung("compliant")
         if joint.refusal(scene, dry.name) is None:
             scene = with_values(scene, dry.values)

@@ -10,7 +10,7 @@ from ..mechanism.crank_run import CrankRun, run_mechanism
 from ..mechanism.layout import JOINT_IDEAL
 from ..pump_setup.films import start_films
 from ..pump_setup.ideal_motion import forces_on_piston, ideal_motion
-from ..pump_setup.joints import gravity_along_and_across, joint_rungs
+from ..pump_setup.joints import gravity_along_and_across, has_main_play, joint_rungs
 from ..pump_setup.tables import begun, lines_of
 from ..pump_setup.yielding import yielding_of
 from ..scene.pump import PumpScene
@@ -26,7 +26,7 @@ def needs_integration(scene: PumpScene) -> bool:
     )
     breathing = any(scene.pressures(k).rung in BREATHING_RUNGS for k in range(len(scene.throws)))
     answered = scene.drive.rung != "constant-speed" or scene.casing.rung == "yielding"
-    return not ideal or breathing or answered
+    return not ideal or breathing or answered or has_main_play(scene)
 
 
 def run_scene(
@@ -60,7 +60,8 @@ def run_scene(
         speed=start.speed,
         bodies=start.bodies,
         chambers=start.chambers,
-        films=start_films(t, start.bodies, start_angle),
+        films=start_films(t, start.bodies, start_angle, start.journal),
+        journal=start.journal,
         lines=lines_of(scene, step),
         casing=yielding_of(scene, step),
         step=step,
@@ -132,7 +133,12 @@ def _ideal_bodies(scene: PumpScene, motion: IdealCrank) -> NDArray[np.float64]:
 
 
 def pin_offsets(
-    scene: PumpScene, angle: NDArray[np.float64], bodies: NDArray[np.float64], throw: int = 0
+    scene: PumpScene,
+    angle: NDArray[np.float64],
+    bodies: NDArray[np.float64],
+    throw: int = 0,
+    *,
+    journal: NDArray[np.float64] | None = None,
 ) -> NDArray[np.float64]:
     """Position of the pins' centres from those of their eyes [m].
 
@@ -145,6 +151,8 @@ def pin_offsets(
         Of the throw, columns as ``BODY``, then their rates.
     throw : int
         Counted from 0.
+    journal : numpy.ndarray [shape=(n, 4)], optional
+        Of a crank with play in its main bearings, as of :class:`.CrankRun`.
 
     Returns
     -------
@@ -157,10 +165,11 @@ def pin_offsets(
     centre = scene.rod.centre_of_mass
     arm = scene.rod.length - centre
     sin_b, cos_b = np.sin(beta), np.cos(beta)
+    crank_x, crank_y = (0.0, 0.0) if journal is None else journal[:, :2].T
     return np.column_stack(
         [
-            scene.crank.radius * np.cos(angle) - x + arm * cos_b,
-            scene.crank.radius * np.sin(angle) - y - arm * sin_b,
+            crank_x + scene.crank.radius * np.cos(angle) - x + arm * cos_b,
+            crank_y + scene.crank.radius * np.sin(angle) - y - arm * sin_b,
             piston - x - centre * cos_b,
             across - y + centre * sin_b,
         ]

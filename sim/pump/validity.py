@@ -7,16 +7,17 @@ from ..mechanism.layout import JOINT_COMPLIANT, OVERLAP_LIMIT
 from ..output.status import Status
 from ..piping.pipe import FEWEST_REACHES
 from ..pump_setup.contacts import (
+    bore_table,
     contact_frequency,
     contact_rate,
     contact_table,
     penetration_under,
 )
-from ..pump_setup.ideal_motion import joint_loads
-from ..pump_setup.joints import joint_parts, joint_rungs
+from ..pump_setup.ideal_motion import joint_loads, largest_bearing_load
+from ..pump_setup.joints import JOINT_CODES, joint_parts
 from ..pump_setup.yielding import guide_gain
 from ..scene.pump import PumpScene
-from ..scene.pump_joints import OILED_RUNGS, Guide, RevoluteJoint
+from ..scene.pump_joints import OILED_RUNGS, Guide, MainBearing, RevoluteJoint
 from .tearing import torn_by_knocks, torn_in_motion
 
 STEP_PER_CONTACT_TIME = 0.3
@@ -59,7 +60,7 @@ def _opposed(scene: PumpScene) -> list[str]:
 _MOST_OPPOSED = -0.25  # a bilge pump ran with -0.24, and away with -0.48
 
 
-def _joints(scene: PumpScene) -> Iterator[tuple[int, str, RevoluteJoint | Guide]]:
+def _joints(scene: PumpScene) -> Iterator[tuple[int, str, RevoluteJoint | Guide | MainBearing]]:
     """Throw, path and part of every joint that is given, those of the scene's own tables once."""
     for throw, own in enumerate(scene.throws):
         if throw > 0 and own.joint is None and scene.throws[0].joint is None:
@@ -69,6 +70,11 @@ def _joints(scene: PumpScene) -> Iterator[tuple[int, str, RevoluteJoint | Guide]
         for name, part in zip(names, joint_parts(scene, throw), strict=True):
             if part is not None:
                 yield throw, f"{where}.{name}", part
+    if scene.crank.bearing is not None:
+        yield 0, _BEARING, scene.crank.bearing
+
+
+_BEARING = "crank.bearing"
 
 
 _UNRESOLVED = 4.0
@@ -121,31 +127,36 @@ def _sunk(scene: PumpScene) -> list[tuple[Status, str]]:
     """Contacts too soft for their load: beyond their law, or blind to their own clearance."""
     found = []
     for throw, path, part in _joints(scene):
-        joint = ("crankpin", "wristpin", "guide").index(path.rpartition(".")[2])
-        if joint_rungs(scene, throw)[joint] < JOINT_COMPLIANT:
+        if JOINT_CODES[part.rung] < JOINT_COMPLIANT:
             continue
-        load = joint_loads(scene, throw)[joint]
-        depth = penetration_under(contact_table(scene, throw)[joint], load)
+        if path == _BEARING:
+            load, contact = largest_bearing_load(scene), bore_table(scene)[0]
+        else:
+            joint = ("crankpin", "wristpin", "guide").index(path.rpartition(".")[2])
+            load = joint_loads(scene, throw)[joint]
+            contact = contact_table(scene, throw)[joint]
+        depth = penetration_under(contact, load)
         found += [*_overlaps(path, part, depth, load), *_unresolved(path, part, depth, load)]
     return found
 
 
 def _overlaps(
-    path: str, part: RevoluteJoint | Guide, depth: float, load: float
+    path: str, part: RevoluteJoint | Guide | MainBearing, depth: float, load: float
 ) -> list[tuple[Status, str]]:
-    most = OVERLAP_LIMIT * _size(part)
+    size, what = _size(part)
+    most = OVERLAP_LIMIT * size
     if depth <= most:
         return []
     text = (
         f"{path}: penetration under {load:.3g} N = {depth:.3g} m must be <= {most:.3g} m, "
-        f"{OVERLAP_LIMIT:g} of {_SIZE_OF[isinstance(part, Guide)]}, where the contact law ends; "
+        f"{OVERLAP_LIMIT:g} of {what}, where the contact law ends; "
         f"raise its stiffness, or set {path}.rung = 'ideal'"
     )
     return [(Status.OVERLAP, text)]
 
 
 def _unresolved(
-    path: str, part: RevoluteJoint | Guide, depth: float, load: float
+    path: str, part: RevoluteJoint | Guide | MainBearing, depth: float, load: float
 ) -> list[tuple[Status, str]]:
     gap = part.clearance_radial
     if depth <= _UNRESOLVED * gap:
@@ -158,12 +169,13 @@ def _unresolved(
     return [(Status.UNRESOLVED, text)]
 
 
-_SIZE_OF = ("the pin's radius", "half the height")
-
-
-def _size(part: RevoluteJoint | Guide) -> float:
-    """Length that an overlap is measured against: pin radius, half height of a guided part."""
-    return (part.height if isinstance(part, Guide) else part.pin_diameter) / 2
+def _size(part: RevoluteJoint | Guide | MainBearing) -> tuple[float, str]:
+    """Length that an overlap is measured against [m], and what it is."""
+    if isinstance(part, Guide):
+        return part.height / 2, "half the height"
+    if isinstance(part, MainBearing):
+        return part.journal_diameter / 2, "the journal's radius"
+    return part.pin_diameter / 2, "the pin's radius"
 
 
 def _torn(scene: PumpScene) -> list[tuple[Status, str]]:

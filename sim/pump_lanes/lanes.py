@@ -40,7 +40,7 @@ from ..mechanism.layout import (
 )
 from ..output.status import Status
 from ..pump_setup.films import runs_on_a_map
-from ..pump_setup.joints import JOINT_CODES, joint_parts, joint_rungs
+from ..pump_setup.joints import JOINT_CODES, has_main_play, joint_parts, joint_rungs
 from ..pump_setup.tables import Start
 from ..scene.pump import PumpScene
 from ..scene.pump_hydraulics import PIPED_RUNGS
@@ -103,6 +103,7 @@ def lane_kind(scene: PumpScene) -> LaneKind | None:
     rungs = {scene.pressures(k).rung for k in throws}
     known = (
         len(throws) <= LANES
+        and not has_main_play(scene)
         and set(crankpins) in ({JOINT_COMPLIANT}, {JOINT_OILED})
         and {JOINT_IDEAL, JOINT_COMPLIANT}.issuperset(wristpins)
         and rungs.isdisjoint(("heads", *PIPED_RUNGS))

@@ -143,7 +143,7 @@ def _together(
 def lane_job(plan: RunPlan) -> LaneJob:
     """What a lane is told of a planned recording whose :func:`.lanes.lane_kind` is not None."""
     tables, start = begun(plan.scene, plan.step, plan.first_angle)
-    films = start_films(tables, start.bodies, plan.first_angle)
+    films = start_films(tables, start.bodies, plan.first_angle, start.journal)
     return LaneJob(
         tables=tables,
         start=start,

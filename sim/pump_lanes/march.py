@@ -13,13 +13,13 @@ from ..mechanism.layout import (
     CONTACTS,
     FORCES,
     GUIDE,
-    HELD,
+    MAIN_BEARING,
     NO_CHANGE,
     OVERLAP_LIMIT,
     PUSHES,
-    STAGE,
     Tables,
     Work,
+    scratch,
 )
 from ..mechanism.march import Tally, begin, carried_on, of_mode, settled
 from .chambers import breathe_alone, count_vapour, enter_chamber, lanes_breathe
@@ -35,6 +35,8 @@ class Alone(NamedTuple):
     liquid: NDArray[Any]  # (LANES,) of HYDRAULIC
     oils: NDArray[Any]  # (LANES, 2) of OIL
     maps: NDArray[np.float64]  # of all runs
+    bearing: NDArray[Any]  # (0,): no lane has play in its main bearings
+    bore: NDArray[Any]  # (0,)
     work: Work
     chambers: NDArray[np.float64]  # (LANES, 8)
     forces: NDArray[np.float64]  # (1, 1 + n_throws * len(FORCES)): of one step
@@ -70,7 +72,14 @@ def _tables_of(lane: int, p: Any, a: Any) -> Any:
     """Of the record whose first throw is in a lane."""
     own = slice(lane, lane + p.throws)
     return Tables(
-        a.throws[own], a.contacts[own], a.liquid[own], a.oils[own], a.maps, machine_of_lane(p, lane)
+        a.throws[own],
+        a.contacts[own],
+        a.liquid[own],
+        a.oils[own],
+        a.maps,
+        a.bearing,
+        a.bore,
+        machine_of_lane(p, lane),
     )
 
 
@@ -583,14 +592,9 @@ def alone(t: Tables, maps: NDArray[np.float64]) -> Alone:
         liquid=np.zeros(LANES, t.liquid.dtype),
         oils=np.zeros((LANES, 2), t.oils.dtype),
         maps=maps,
-        work=Work(
-            crank=np.zeros((5, 5)),
-            stage=np.zeros((5, n), STAGE),
-            held=np.zeros(n, HELD),
-            moment=np.zeros(2),
-            matrix=np.zeros((4, 6)),
-            place=np.zeros((4, 6)),
-        ),
+        bearing=np.zeros(0, MAIN_BEARING),
+        bore=np.zeros(0, t.contacts.dtype),
+        work=scratch(n),
         chambers=np.zeros((LANES, 8)),
         forces=np.zeros((1, 1 + n * len(FORCES))),
         counts=np.zeros((LANES, 5), np.int64),

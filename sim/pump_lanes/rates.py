@@ -281,7 +281,7 @@ def _crank_moment(p: Any, s: Any, lane: int) -> float:
 @kernel
 def _crank_rate(p: Any, s: Any, lane: int, moment: float, sin_a: float, cos_a: float) -> float:
     m = machine_of_lane(p, lane)
-    load = crank_load(moment, sin_a, cos_a, m)
+    load = crank_load(moment, sin_a, cos_a, 0.0, 0.0, m)
     rate: float = m.inverse_inertia * (motor_moment(s.v[CRANK, lane], m) + load)
     return rate
 

@@ -26,19 +26,23 @@ from ..contact.law import (
 from ..jit import kernel
 from ..mechanism.layout import CRANKPIN, GUIDE, JOINT_COMPLIANT, JOINT_IDEAL, JOINT_LINK, WRISTPIN
 from ..scene.pump import PumpScene
-from ..scene.pump_joints import OILED_RUNGS, Guide, RevoluteJoint
-from .ideal_motion import joint_loads
-from .joints import joint_parts, joint_rungs, kept_by_scene
+from ..scene.pump_joints import OILED_RUNGS, Guide, MainBearing, RevoluteJoint
+from .ideal_motion import joint_loads, largest_bearing_load
+from .joints import has_main_play, joint_parts, joint_rungs, kept_by_scene
 
 
 def contact_record(
-    part: RevoluteJoint | Guide, clearance: float, load: float, mobility: float, slot: float = 0.0
+    part: RevoluteJoint | Guide | MainBearing,
+    clearance: float,
+    load: float,
+    mobility: float,
+    slot: float = 0.0,
 ) -> NDArray[np.void]:
     """Kernel record of one contact.
 
     Parameters
     ----------
-    part : RevoluteJoint or Guide
+    part : RevoluteJoint, Guide or MainBearing
         Of the scene, not ideal.
     clearance : float
         Radial, or on either side of a guide [m].
@@ -137,9 +141,9 @@ PEAK_OVER_LOAD = 3.0  # what a knock may add to the ideal load, where the elasti
 
 
 def _rod_jacobian(scene: PumpScene, throw: int, beta: float) -> NDArray[np.float64]:
-    """Relative motion of pin and eye at crank pin (x, y), wrist pin (x, y), guide (y, two ends).
+    """Motion of pin in eye at crank and wrist pin (x, y), guide (y, two ends), main bearing (x, y).
 
-    Columns: rod x, y, beta; piston x, y, tilt.
+    Columns: rod x, y, beta; piston x, y, tilt; crank x, y.
     """
     arm, centre = scene.rod.length - scene.rod.centre_of_mass, scene.rod.centre_of_mass
     s, c = math.sin(beta), math.cos(beta)
@@ -147,12 +151,14 @@ def _rod_jacobian(scene: PumpScene, throw: int, beta: float) -> NDArray[np.float
     reach = guide.length / 2 if guide else 0.0
     return np.array(
         [
-            [-1.0, 0.0, -arm * s, 0.0, 0.0, 0.0],
-            [0.0, -1.0, -arm * c, 0.0, 0.0, 0.0],
-            [-1.0, 0.0, centre * s, 1.0, 0.0, 0.0],
-            [0.0, -1.0, centre * c, 0.0, 1.0, 0.0],
-            [0.0, 0.0, 0.0, 0.0, 1.0, reach],
-            [0.0, 0.0, 0.0, 0.0, 1.0, -reach],
+            [-1.0, 0.0, -arm * s, 0.0, 0.0, 0.0, 1.0, 0.0],
+            [0.0, -1.0, -arm * c, 0.0, 0.0, 0.0, 0.0, 1.0],
+            [-1.0, 0.0, centre * s, 1.0, 0.0, 0.0, 0.0, 0.0],
+            [0.0, -1.0, centre * c, 0.0, 1.0, 0.0, 0.0, 0.0],
+            [0.0, 0.0, 0.0, 0.0, 1.0, reach, 0.0, 0.0],
+            [0.0, 0.0, 0.0, 0.0, 1.0, -reach, 0.0, 0.0],
+            [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0],
+            [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0],
         ]
     )
 
@@ -164,7 +170,8 @@ _JOINT_ROWS = (slice(0, 2), slice(2, 4), slice(4, 6))
 def _compliances(scene: PumpScene, throw: int) -> NDArray[np.float64]:
     """Acceleration of every row of the jacobian per force along every other [1/kg].
 
-    At five swings of the rod, from none to its largest: shape (5, 6, 6).
+    At five swings of the rod, from none to its largest: shape (5, 8, 8). All throws that push a
+    crank with play the same way are felt by each as a crank of its share of the mass.
     """
     rod, piston = scene.rod, scene.piston
     rungs = joint_rungs(scene, throw)
@@ -177,6 +184,7 @@ def _compliances(scene: PumpScene, throw: int) -> NDArray[np.float64]:
             1 / piston.mass,
             1 / piston.mass if free else 0.0,
             1 / piston.inertia if free and piston.inertia else 0.0,
+            *2 * [_crank_mobility(scene)],
         ]
     )
     jacobian = np.array([_rod_jacobian(scene, throw, beta) for beta in _betas(scene)])
@@ -188,6 +196,13 @@ def _compliances(scene: PumpScene, throw: int) -> NDArray[np.float64]:
     compliances = jacobian @ inverse @ _transposed(jacobian)
     compliances.flags.writeable = False
     return compliances
+
+
+def _crank_mobility(scene: PumpScene) -> float:
+    """Acceleration of a crank with play per force that each of its throws adds [1/kg]."""
+    if not has_main_play(scene) or scene.crank.mass is None:
+        return 0.0
+    return len(scene.throws) / scene.crank.mass
 
 
 def _transposed(matrices: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -215,12 +230,15 @@ def _largest(scene: PumpScene, throw: int, weights: tuple[float, ...]) -> float:
 def _springs_and_dampers(
     scene: PumpScene, throw: int
 ) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Tangent stiffness and damping of every joint: a link's own stiffness is load over length."""
+    """Tangent stiffness and damping of every joint, and of the main bearing.
+
+    A link's own stiffness is load over length.
+    """
     springs, dampers = [], []
-    records = contact_table(scene, throw)
-    loads = joint_loads(scene, throw)
-    rungs = joint_rungs(scene, throw)
-    for joint, (record, load, rung) in enumerate(zip(records, loads, rungs, strict=True)):
+    records = [*contact_table(scene, throw), *bore_table(scene)]
+    loads = [*joint_loads(scene, throw), largest_bearing_load(scene)]
+    rungs = [*joint_rungs(scene, throw), JOINT_COMPLIANT]
+    for joint, (record, load, rung) in enumerate(zip(records, loads, rungs, strict=False)):
         peak = PEAK_OVER_LOAD * load
         if rung >= JOINT_COMPLIANT:
             linear = record["elasticity"] == ELASTIC_LINEAR
@@ -235,6 +253,8 @@ def _springs_and_dampers(
         else:
             springs.append(0.0)
             dampers.append(0.0)
+    nothing = [0.0] * (len(_JOINT_ROWS) + 1 - len(springs))
+    springs, dampers = springs + nothing, dampers + nothing
     return tuple(springs), tuple(dampers)
 
 
@@ -306,3 +326,21 @@ def contact_table(scene: PumpScene, throw: int) -> NDArray[np.void]:
         table[joint] = contact_record(part, clearance, loads[joint], mobility, slot)[0]
     table.flags.writeable = False
     return table
+
+
+@kept_by_scene
+def bore_table(scene: PumpScene) -> NDArray[np.void]:
+    """Contact record of a crank's journal in main bearings with play; empty without.
+
+    Returns
+    -------
+    numpy.ndarray [shape=(0 or 1,), dtype=CONTACT]
+        Read-only.
+    """
+    part = scene.crank.bearing
+    if part is None or not has_main_play(scene):
+        return np.zeros(0, dtype=CONTACT)
+    load, mobility = largest_bearing_load(scene), _crank_mobility(scene)
+    record = contact_record(part, part.clearance_radial, load, mobility)
+    record.flags.writeable = False
+    return record

@@ -189,8 +189,12 @@ def _oil_values(
     }
 
 
-def start_films(t: Tables, bodies: NDArray[np.float64], angle: float) -> NDArray[np.float64]:
+def start_films(
+    t: Tables, bodies: NDArray[np.float64], angle: float, journal: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """Where the films let the pins be at the start, by the scene's own pins; zeros without oil.
+
+    `journal` is where that of the crank begins in its main bearing [shape=(4,)].
 
     Returns
     -------
@@ -202,7 +206,7 @@ def start_films(t: Tables, bodies: NDArray[np.float64], angle: float) -> NDArray
         x, y, beta, piston, across = bodies[throw, :5]
         own = angle + q["phase"]
         turn = np.array([math.cos(beta), -math.sin(beta)])
-        crank = q["crank_radius"] * np.array([math.cos(own), math.sin(own)])
+        crank = journal[:2] + q["crank_radius"] * np.array([math.cos(own), math.sin(own)])
         offsets = (
             crank - np.array([x, y]) + q["rod_arm"] * turn,
             np.array([piston - x, across - y]) - q["rod_centre"] * turn,

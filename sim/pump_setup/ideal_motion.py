@@ -54,6 +54,38 @@ def ideal_motion(scene: PumpScene, angle: NDArray[np.float64], throw: int = 0) -
     return ideal_crank(own, piston_force=-(liquid + seal), **known)
 
 
+def bearing_load(scene: PumpScene, angle: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Force of the crank on its main bearings without play at constant speed (x, y) [N].
+
+    Its own weight, which takes a ``crank.mass``, and its unbalance included.
+
+    Parameters
+    ----------
+    scene : PumpScene
+    angle : numpy.ndarray [shape=(n,)]
+        Crank angle of the first throw [rad].
+
+    Returns
+    -------
+    numpy.ndarray [shape=(2, n)]
+    """
+    weight, first = gravity_along_and_across(scene), angle + scene.throws[0].phase
+    flung = scene.crank.unbalance * (2 * math.pi * scene.drive.speed) ** 2
+    load = flung * np.stack([np.cos(first), np.sin(first)])
+    load -= (scene.crank.mass or 0.0) * np.array(weight)[:, None]
+    for throw in range(len(scene.throws)):
+        motion = ideal_motion(scene, angle, throw)
+        load -= np.stack([motion.pin_force_x, motion.pin_force_y])
+    return np.asarray(load)
+
+
+@kept_by_scene
+def largest_bearing_load(scene: PumpScene) -> float:
+    """Largest of :func:`bearing_load` over a revolution [N]."""
+    load = bearing_load(scene, np.linspace(0.0, 2 * math.pi, LOAD_ANGLES, endpoint=False))
+    return float(np.hypot(*load).max())
+
+
 def forces_on_piston(
     scene: PumpScene, motion: IdealCrank, own: NDArray[np.float64], throw: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

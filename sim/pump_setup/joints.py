@@ -67,6 +67,11 @@ def joint_rungs(scene: PumpScene, throw: int) -> tuple[int, int, int]:
     return first, second, third
 
 
+def has_main_play(scene: PumpScene) -> bool:
+    """Whether the crank has play in its main bearings, and so a motion of its own."""
+    return scene.crank.bearing is not None and scene.crank.bearing.rung != "ideal"
+
+
 def hydraulics_of(scene: PumpScene, throw: int) -> NDArray[np.void]:
     """Hydraulics of one throw, one record."""
     return hydraulics_under(scene, scene.pressures(throw))

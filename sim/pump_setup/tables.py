@@ -13,6 +13,7 @@ from ..mechanism.layout import (
     GUIDE,
     JOINT_COMPLIANT,
     JOINT_IDEAL,
+    MAIN_BEARING,
     THROW,
     WRISTPIN,
     LinePair,
@@ -22,10 +23,16 @@ from ..mechanism.layout import (
 from ..piping.pipe import pipe_parameters, pipe_start
 from ..scene.pump import PumpScene
 from ..scene.pump_hydraulics import PIPED_RUNGS
-from .contacts import contact_table, penetration_under
+from .contacts import bore_table, contact_table, penetration_under
 from .films import joint_maps, oil_table
-from .ideal_motion import ideal_motion, seal_numbers
-from .joints import gravity_along_and_across, hydraulics_of, joint_rungs, piston_area
+from .ideal_motion import bearing_load, ideal_motion, seal_numbers
+from .joints import (
+    gravity_along_and_across,
+    has_main_play,
+    hydraulics_of,
+    joint_rungs,
+    piston_area,
+)
 
 _BAUMGARTE_PER_RADIAN = 30.0
 """Decay rate of constraint drift over the crank speed. Not over the step: a rate that grew as the
@@ -75,6 +82,20 @@ def throw_record(scene: PumpScene, throw: int, step: float) -> NDArray[np.void]:
     return record
 
 
+def bearing_record(scene: PumpScene) -> NDArray[np.void]:
+    """Kernel record of main bearings with play, empty where there are none.
+
+    Returns
+    -------
+    numpy.ndarray [shape=(0 or 1,), dtype=MAIN_BEARING]
+    """
+    crank = scene.crank
+    if crank.bearing is None or crank.mass is None or not has_main_play(scene):
+        return np.zeros(0, MAIN_BEARING)
+    numbers = (1 / crank.mass, crank.unbalance / crank.mass, crank.bearing.journal_diameter / 2)
+    return np.array([numbers], MAIN_BEARING)
+
+
 def tables(scene: PumpScene, step: float) -> Tables:
     """Everything the mechanism's kernel needs of a scene, at this step [s]."""
     throws = range(len(scene.throws))
@@ -88,6 +109,8 @@ def tables(scene: PumpScene, step: float) -> Tables:
         liquid=np.concatenate([hydraulics_of(scene, throw) for throw in throws]).astype(HYDRAULIC),
         oils=np.stack([oil_table(scene, throw, contacts[throw], maps, step) for throw in throws]),
         maps=np.concatenate([np.zeros(1), *(m.table.coefficients.ravel() for m in maps.values())]),
+        bearing=bearing_record(scene),
+        bore=bore_table(scene),
         machine=Machine(
             gravity_x=gravity_x,
             gravity_y=gravity_y,
@@ -120,8 +143,23 @@ def start_state(scene: PumpScene, angle: float, t: Tables) -> NDArray[np.float64
     numpy.ndarray [shape=(n_throws, 12)]
         Columns as ``BODY``, then their rates. Pins and eyes move together.
     """
-    rows = [_throw_start(scene, angle, throw, t) for throw in range(len(scene.throws))]
+    journal = start_journal(scene, angle, t)[:2]
+    rows = [_throw_start(scene, angle, throw, t, journal) for throw in range(len(scene.throws))]
     return np.array(rows)
+
+
+def start_journal(scene: PumpScene, angle: float, t: Tables) -> NDArray[np.float64]:
+    """Place of the journal where it rests in its bore under the ideal joints' forces, and speed.
+
+    Returns
+    -------
+    numpy.ndarray [shape=(4,)]
+        From the centre of its bore (x, y) [m], and how fast [m/s]; 0 where it has no play.
+    """
+    if not len(t.bearing):
+        return np.zeros(4)
+    on_bore = bearing_load(scene, np.array([angle]))[:, 0]
+    return np.array([*_rest(t.bore[0], JOINT_COMPLIANT, on_bore), 0.0, 0.0])
 
 
 def _rest(contact: Any, rung: int, force: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -134,7 +172,9 @@ def _rest(contact: Any, rung: int, force: NDArray[np.float64]) -> NDArray[np.flo
     return np.asarray((float(contact["clearance"]) + pressed) * direction)
 
 
-def _throw_start(scene: PumpScene, angle: float, throw: int, t: Tables) -> NDArray[np.float64]:
+def _throw_start(
+    scene: PumpScene, angle: float, throw: int, t: Tables, journal: NDArray[np.float64]
+) -> NDArray[np.float64]:
     ideal = ideal_motion(scene, np.array([angle]), throw)
     rungs = joint_rungs(scene, throw)
     contacts = t.contacts[throw]
@@ -150,7 +190,7 @@ def _throw_start(scene: PumpScene, angle: float, throw: int, t: Tables) -> NDArr
         force = float(ideal.guide_force[0])
         pressed = penetration_under(contacts[GUIDE], abs(force) / 2)
         across = -math.copysign(float(contacts[GUIDE]["clearance"]) + pressed, force)
-    pin = radius * np.array([math.cos(own), math.sin(own)])
+    pin = journal + radius * np.array([math.cos(own), math.sin(own)])
     eye = pin - at_pin
     # out of reach only where the contact is far too soft: the run then says so by its status
     sin_b = min(1.0, max(-1.0, (eye[1] - across + at_wrist[1]) / length))
@@ -239,6 +279,7 @@ class Start(NamedTuple):
     speed: float
     bodies: NDArray[np.float64]
     chambers: NDArray[np.float64]
+    journal: NDArray[np.float64]
 
 
 def begun(scene: PumpScene, step: float, start_angle: float) -> tuple[Tables, Start]:
@@ -247,4 +288,10 @@ def begun(scene: PumpScene, step: float, start_angle: float) -> tuple[Tables, St
     bodies = start_state(scene, start_angle, t)
     speed = 2 * math.pi * scene.drive.speed
     chambers = start_chambers(t, bodies)
-    return t, Start(angle=start_angle, speed=speed, bodies=bodies, chambers=chambers)
+    return t, Start(
+        angle=start_angle,
+        speed=speed,
+        bodies=bodies,
+        chambers=chambers,
+        journal=start_journal(scene, start_angle, t),
+    )

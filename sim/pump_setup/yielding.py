@@ -6,17 +6,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..casing.modes import casing_inputs, exact_oscillator
-from ..mechanism.layout import AT_REST, CRANKPIN, FORCES, GUIDE, JOINT_COMPLIANT, PUSHES, Yielding
+from ..mechanism.layout import (
+    AT_REST,
+    CRANK_FORCES,
+    CRANKPIN,
+    FORCES,
+    GUIDE,
+    JOINT_COMPLIANT,
+    PUSHES,
+    Yielding,
+)
 from ..scene.pump import GUIDE_PLACES, VALVE_PLACES, PumpScene
 from ..scene.pump_hydraulics import BREATHING_RUNGS
-from .joints import joint_rungs
+from .joints import has_main_play, joint_rungs
 
 
 def throw_on_casing(scene: PumpScene, throw: int) -> list[tuple[str, str, float]]:
     """Places of the casing, the force of the mechanism behind each, and its sign there."""
     reactions = [
-        ("bearing_x", "pin_x", -1.0),
-        ("bearing_y", "pin_y", -1.0),
+        *_on_bearing(scene),
         ("guide_y", "guide_y", -1.0),
         ("cylinder_x", "piston_x", -1.0),
     ]
@@ -27,6 +35,14 @@ def throw_on_casing(scene: PumpScene, throw: int) -> list[tuple[str, str, float]
     if scene.pressures(throw).rung in BREATHING_RUNGS:
         reactions += [(place, place, 1.0) for place in VALVE_PLACES]
     return reactions
+
+
+def _on_bearing(scene: PumpScene) -> list[tuple[str, str, float]]:
+    """What a throw does to its main bearing; of a journal with play every throw's has its share."""
+    if not has_main_play(scene):
+        return [("bearing_x", "pin_x", -1.0), ("bearing_y", "pin_y", -1.0)]
+    share = 1 / len(scene.throws)
+    return [(place, name, share) for place, name in zip(_BEARING, CRANK_FORCES, strict=True)]
 
 
 def rubs_in_guide(scene: PumpScene, throw: int) -> bool:
@@ -48,12 +64,14 @@ def yielding_of(scene: PumpScene, step: float) -> Yielding:
     throws = range(len(scene.throws))
     feet = 1.0 if scene.casing.feet is None else scene.casing.feet.stiffness_ratio
     push = np.zeros((len(modes), len(throws), len(PUSHES)))
+    journal = np.zeros((len(modes), len(CRANK_FORCES)))
     for throw in throws:
         for place, name, sign in throw_on_casing(scene, throw):
-            column = PUSHES.index(FORCES.index(name))
-            push[:, throw, column] += [
-                sign * casing_inputs(m.shape, place, throw + 1) for m in modes
-            ]
+            pushed = [sign * casing_inputs(m.shape, place, throw + 1) for m in modes]
+            if name in CRANK_FORCES:
+                journal[:, CRANK_FORCES.index(name)] += pushed
+            else:
+                push[:, throw, PUSHES.index(FORCES.index(name))] += pushed
     react, reach = step_of_modes([mode.on_feet(feet) for mode in modes], step)
     give, held = bearing_shapes(scene)[moving], _held(scene)[moving]
     gain = give.T @ (react[:, :1] * held)
@@ -63,6 +81,7 @@ def yielding_of(scene: PumpScene, step: float) -> Yielding:
         reach=reach,
         give=give,
         held=held,
+        journal=journal,
         blend=np.asarray(np.linalg.solve(np.eye(2) + gain, gain), np.float64),
     )
 

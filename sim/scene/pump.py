@@ -40,7 +40,7 @@ from ..parts.wording import nearest
 from .exciters import CasingExciter, force_channel
 from .journal import ScarLimits
 from .pump_hydraulics import PIPED_RUNGS, CylinderPressure, PressureSensor
-from .pump_joints import PumpJoints, Throw
+from .pump_joints import MainBearing, PumpJoints, Throw
 from .scene import (
     SPEED,
     START_ANGLE,
@@ -142,6 +142,20 @@ class Crank(Part):
         le=_UNBALANCE_MOST,
         description="mass times eccentricity of the whole crank, along the first throw",
     )
+    mass: Mass | None = Field(
+        default=None,
+        ge=LIGHTEST,
+        le=HEAVIEST,
+        description="of crank, flywheel and all that turns on the main bearings, where they have "
+        "play",
+    )
+    bearing: MainBearing | None = None
+
+    @model_validator(mode="after")
+    def _mass_in_play(self) -> Self:
+        if self.bearing is not None and self.bearing.rung != "ideal" and self.mass is None:
+            raise ValueError("mass is missing; a crank with play in its main bearings moves")
+        return self
 
 
 class Rod(Part):
@@ -220,11 +234,14 @@ class PumpScene(Scene):
     """A reciprocating pump of one to many equal throws with clearance in its joints."""
 
     physics = "wearstate.sim.machine.pump"
-    effects = ("crankpin", "wristpin", "guide", "pressure", "drive", "casing", "step")
+    effects = (
+        *("crankpin", "wristpin", "guide", "mainbearing", "pressure", "drive", "casing", "step"),
+    )
     wear_places = (
         WearPlace("joint.crankpin.diametral_clearance", "crankpin", _PLAY, "wear"),
         WearPlace("joint.wristpin.diametral_clearance", "wristpin", _PLAY, "wear_wristpin"),
         WearPlace("joint.guide.diametral_clearance", "guide", _PLAY),
+        WearPlace("crank.bearing.diametral_clearance", "mainbearing", _PLAY),
         WearPlace("throws.*.joint.crankpin.diametral_clearance", "crankpin_{}", _PLAY, "wear"),
         WearPlace(
             "throws.*.joint.wristpin.diametral_clearance", "wristpin_{}", _PLAY, "wear_wristpin"
@@ -333,6 +350,7 @@ class PumpScene(Scene):
             (_rod_faults, ("crank", "joint", "rod")),
             (_guide_faults, ("joint", "piston")),
             (_oval_faults, ("joint", "throws", "wear")),
+            (_play_faults, ("crank", "joint", "throws")),
             (_line_faults, ("pressure", "throws")),
             (_name_faults, ("sensors", "exciters", "tacho", "pressure", "throws")),
             (_shape_faults, ("casing", "sensors", "throws")),
@@ -378,6 +396,18 @@ def _oval_faults(joint: PumpJoints, throws: tuple[Throw, ...], wear: Wear | None
     return list(dict.fromkeys(faults))
 
 
+def _play_faults(crank: Crank, joint: PumpJoints, throws: tuple[Throw, ...]) -> list[str]:
+    """A crank that is held by constraints and has play as well: no pin's force would move it."""
+    if crank.bearing is None or crank.bearing.rung == "ideal":
+        return []
+    pins = {(throw.joint or joint).crankpin.rung for throw in throws}
+    return [
+        f"joint.crankpin.rung = '{rung}' holds the crank, must be a rung with a force where "
+        "crank.bearing has play; set it to 'compliant', or crank.bearing.rung = 'ideal'"
+        for rung in sorted(pins & {"ideal", "link"})
+    ]
+
+
 def _line_faults(pressure: CylinderPressure, throws: tuple[Throw, ...]) -> list[str]:
     """Throws on pipes of their own: all of them share one suction and one discharge line."""
     each = [throw.pressure or pressure for throw in throws]
@@ -395,6 +425,7 @@ def _line_faults(pressure: CylinderPressure, throws: tuple[Throw, ...]) -> list[
 
 def _rod_faults(crank: Crank, joint: PumpJoints, rod: Rod) -> list[str]:
     play = joint.wristpin.clearance_radial if joint.wristpin else 0.0
+    play += crank.bearing.clearance_radial if crank.bearing else 0.0
     reach = crank.radius + joint.crankpin.clearance_radial + play
     if rod.length > reach:
         return []

@@ -248,6 +248,13 @@ class RevoluteJoint(Contact):
         return 2 * self.clearance_radial
 
 
+def _must_yield(part: "Guide | MainBearing") -> None:
+    """Refuse a part that shall touch and does not say how it yields."""
+    faults = part.elastic_faults() if part.rung == "compliant" else []
+    if faults:
+        raise ValueError("\n".join(faults))
+
+
 class Guide(Contact):
     """The guide of piston or crosshead, across the stroke in the plane of the crank."""
 
@@ -267,9 +274,32 @@ class Guide(Contact):
 
     @model_validator(mode="after")
     def _surfaces(self) -> Self:
-        faults = self.elastic_faults() if self.rung == "compliant" else []
-        if faults:
-            raise ValueError("\n".join(faults))
+        _must_yield(self)
+        return self
+
+
+class MainBearing(Contact):
+    """The main bearings of the crank with play, seen as one: the crank moves parallel to itself.
+
+    Stiffness and damping are those of all bearings together.
+    """
+
+    rung: Literal["ideal", "compliant"] = Field(
+        default="compliant", description="ideal: no play; compliant: contact of journal and bore"
+    )
+    journal_diameter: Length = Field(gt=0, le=LONGEST, description="nominal")
+    diametral_clearance: Length = Field(
+        ge=0, le=LONGEST, description="bore diameter minus journal diameter"
+    )
+
+    @property
+    def clearance_radial(self) -> float:
+        """Radial clearance [m]."""
+        return self.diametral_clearance / 2
+
+    @model_validator(mode="after")
+    def _surfaces(self) -> Self:
+        _must_yield(self)
         return self
 
 

@@ -1,0 +1,81 @@
+"""A crank whose journal has play in its main bearings: where it is, what it does to the throws.
+
+The bearings are seen as one, in the plane of the throws: the crank moves parallel to itself. With
+the journal's place u from the centre of its bore, seen from the casing, the crank's mass m and the
+eccentricity e of its centre of mass along the first throw, at crank angle a,
+
+    m (u'' - e w^2 (cos a, sin a) + e w' (-sin a, cos a)) = -sum F - N - m g
+
+where F are the forces of the pins on their rods and N that of the journal on its bore, by the same
+laws of contact and friction as those of a pin. About the journal's centre the crank feels the
+moments of both, and that of its own mass, which hangs as if gravity were g + u''.
+"""
+
+from typing import Any
+
+from ..jit import kernel
+from .layout import PIN_FORCE, SPEED, SPEED_RATE
+from .throw_motion import dry_pin, pin_touch
+
+
+@kernel
+def with_play(offset: Any, w: Any, row: int, t: Any) -> Any:
+    """Offset of a crank pin, see :func:`.throw_motion.crank_offset`, where the journal has play."""
+    if t.bearing.shape[0] == 0:
+        return offset
+    d_x, d_y, v_x, v_y = offset
+    u = w.journal[row, 0].y
+    return d_x + u[0], d_y + u[1], v_x + u[2], v_y + u[3]
+
+
+@kernel
+def journal_margin(w: Any, row: int, t: Any) -> float:
+    """Margin of the journal's contact alone, for the search of its change [N]."""
+    u, held = w.journal[row, 0].y, w.journal_held[0]
+    touch, _, _ = pin_touch(u[0], u[1], u[2], u[3], held.touching != 0, held.impact, t.bore[0])
+    margin: float = touch.margin
+    return margin
+
+
+@kernel
+def journal_motion(w: Any, row: int, t: Any, sin_a: float, cos_a: float) -> Any:
+    """Acceleration of the journal (x, y) [m/s^2] at constant crank speed; adds to the moments.
+
+    A crank that speeds up moves it by `e w' (sin a, -cos a)` more, see :func:`spun_up`.
+    """
+    b, journal, held = t.bearing[0], w.journal[row, 0], w.journal_held[0]
+    u, omega = journal.y, w.crank[row, SPEED]
+    load, touch = dry_pin(
+        u[0],
+        u[1],
+        u[2],
+        u[3],
+        omega * b.radius,
+        b.radius,
+        held.touching != 0,
+        held.impact,
+        t.bore[0],
+    )
+    push_x, push_y = -load.x, -load.y
+    for k in range(t.throws.shape[0]):
+        push_x -= w.stage[row, k].force[PIN_FORCE]
+        push_y -= w.stage[row, k].force[PIN_FORCE + 1]
+    flung = b.eccentricity * omega * omega
+    journal.force[0], journal.force[1] = load.x, load.y
+    journal.margin, journal.approach = touch.margin, touch.approach
+    journal.normal, journal.overlap = touch.normal, touch.overlap / b.radius
+    w.moment[0] += load.on_pin
+    w.moment[1] += t.machine.static_moment * b.eccentricity
+    return (
+        push_x * b.inverse_mass - t.machine.gravity_x + flung * cos_a,
+        push_y * b.inverse_mass - t.machine.gravity_y + flung * sin_a,
+    )
+
+
+@kernel
+def spun_up(w: Any, row: int, t: Any, a_x: float, a_y: float, sin_a: float, cos_a: float) -> None:
+    """Rates of the journal, from its acceleration at constant speed and that of the crank."""
+    journal = w.journal[row, 0]
+    swung = t.bearing[0].eccentricity * w.crank[row, SPEED_RATE]
+    journal.rate[0], journal.rate[1] = journal.y[2], journal.y[3]
+    journal.rate[2], journal.rate[3] = a_x + swung * sin_a, a_y - swung * cos_a
