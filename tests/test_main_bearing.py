@@ -10,12 +10,13 @@ from wearstate.sim.machine.simulate import simulate, simulate_many
 from wearstate.sim.mechanism.crank_run import run_mechanism
 from wearstate.sim.mechanism.layout import AT_REST
 from wearstate.sim.pump_setup import contacts, films, ideal_motion, tables, yielding
+from wearstate.sim.pump_setup.films import bore_temperature
 from wearstate.sim.scene.load import load_scene
 from wearstate.sim.scene.scene import SceneError
 
 PLAY = {
     "crank.mass": "60 kg",
-    "crank.bearing.journal_diameter": "70 mm",
+    "crank.bearing.pin_diameter": "70 mm",
     "crank.bearing.diametral_clearance": "0.1 mm",
     "crank.bearing.stiffness": "400 MN/m",
     "crank.bearing.damping": "60 kN s/m",
@@ -71,7 +72,11 @@ def test_an_unbalanced_crank_leans_on_its_bore_where_its_heavy_side_is():
     radius = (clearance * 20e6 + mass * e * omega**2) / (20e6 - mass * omega**2)
     speed = radius * omega
     _, found = run(
-        scene, step=step, n_steps=20_000, angle=0.0, journal=np.array([radius, 0.0, 0.0, speed])
+        scene,
+        step=step,
+        n_steps=20_000,
+        angle=0.0,
+        journal=np.array([radius, 0.0, 0.0, speed, 0.0, 0.0]),
     )
     turned = np.exp(-1j * found.turns[:, 0])
     place = (found.journal[:, 0] + 1j * found.journal[:, 1]) * turned
@@ -230,3 +235,53 @@ def test_chart_and_auto_may_leave_the_play_out():
     assert [rung.name for rung in effect.rungs] == ["ideal", "compliant"]
     assert "mainbearing" not in {one.name for one in effects_of(load_scene("bilge-pump"))}
     assert AT_REST.journal.shape == (0, 2)
+
+
+OIL = {
+    "crank.bearing.rung": "film-short",
+    "crank.bearing.oil.viscosity": "0.06 Pa s",
+    "crank.bearing.oil.length": "20 mm",
+}
+
+
+def test_a_journal_in_oil_floats_where_the_short_bearing_says():
+    """Under the crank's weight alone: load and attitude of Ocvirk's film."""
+    light = {"rod.mass": "1 g", "piston.mass": "1 g", "rod.inertia": "1e-5 kg m^2"}
+    alone = {"pressure.rung": "none", "piston.seal_friction": 0.0, "duration": "3 s"}
+    soft = {"joint.crankpin.stiffness": "100 kN/m", "joint.crankpin.damping": "1 N s/m"}
+    soft |= {"joint.crankpin.friction": 0.0, "joint.crankpin.tangential_damping": 0.0}
+    turn = {"drive.speed": "1200 rpm", "stroke_inclination": "0 deg", "crank.mass": "20 kg"}
+    scene = worn(**OIL | light | alone | soft | turn)
+    truth = simulate(scene, seed=1, truth=True).truth
+    # means over a revolution: rod and piston swing by 2 N
+    x, y = truth["main_bearing_offset_m"][-1280:].mean(axis=0) / 0.05e-3
+    load = -truth["main_bearing_force_n"][-1280:].mean(axis=0)[1]
+    assert_allclose(load, 20 * 9.80665, rtol=1e-3)
+    y += load / 400e6 / 0.05e-3  # the wall yields, a hundredth of the clearance
+    e = math.hypot(x, y)
+    # eta U L^3 / (4 c^2) * e / (1 - e^2)^2 * sqrt(pi^2 (1 - e^2) + 16 e^2)
+    scale = 0.06 * math.tau * 20 * 0.035 * 0.02**3 / (4 * 0.05e-3**2)
+    carried = scale * e / (1 - e * e) ** 2 * math.sqrt(math.pi**2 * (1 - e * e) + 16 * e * e)
+    assert_allclose(carried, load, rtol=5e-3)
+    attitude = math.atan2(x, -y)  # from the load, which points along -y, with the rotation
+    assert_allclose(math.tan(attitude), math.pi * math.sqrt(1 - e * e) / (4 * e), rtol=5e-3)
+
+
+def test_oil_cushions_the_journal():
+    """Flooded main bearings: the casing hears the pin again, and the film is told."""
+    dry, oiled = (simulate(worn(duration="2 s", **more), seed=1) for more in ({}, OIL))
+    plain = simulate(load_scene("bilge-pump", {"duration": "2 s"}), seed=1)
+    levels = [np.std(np.asarray(one.signal)[1]) for one in (plain, oiled, dry)]
+    assert levels[2] > 2 * levels[0]
+    assert levels[1] < 1.3 * levels[0]
+    assert oiled.numerics["rung_mainbearing"] == "film-short"
+    assert 1e-6 < oiled.numerics["min_film_m"] < 0.05e-3
+
+
+def test_main_bearings_are_as_warm_as_their_heat_balance():
+    oil = {"temperature": "320 K", "viscosity_40": "68 mm^2/s", "viscosity_100": "8.7 mm^2/s"}
+    oil |= {"density": "870 kg/m^3", "conductance": "5 W/K", "viscosity": None}
+    heat = OIL | {f"crank.bearing.oil.{name}": value for name, value in oil.items()}
+    warm = bore_temperature(worn(**{name: value for name, value in heat.items() if value}))
+    assert 320.5 < warm < 360
+    assert bore_temperature(worn(**OIL)) is None

@@ -85,6 +85,7 @@ def one_throw(numbers: dict[str, float], contacts: dict[int, np.void], **machine
         maps=np.zeros(1),
         bearing=np.zeros(0, MAIN_BEARING),
         bore=np.zeros(0, CONTACT),
+        bore_oil=np.zeros(0, OIL),
         machine=shared,
     )
 

@@ -145,7 +145,7 @@ _WRIST = {"joint.wristpin.rung": "compliant"}
 _GUIDE = {"joint.guide.rung": "compliant"}
 _MAIN_BEARING = {  # both together; crank and flywheel
     "crank.mass": "60 kg",
-    "crank.bearing.journal_diameter": "70 mm",
+    "crank.bearing.pin_diameter": "70 mm",
     "crank.bearing.stiffness": "400 MN/m",
     "crank.bearing.damping": "60 kN s/m",
     "crank.bearing.friction": 0.02,

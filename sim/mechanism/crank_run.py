@@ -96,6 +96,9 @@ class CrankRun(CrankTally):
     journal : numpy.ndarray [shape=(n_steps + 1, 4)] or None
         Crank's journal from the centre of its bore (x, y) [m], and how fast [m/s], at the ends of
         the steps; None where main bearings have no play or states are not kept.
+    bore_gaps : numpy.ndarray [shape=(n_steps + 1, 2)] or None
+        Least gap of the film of the main bearings [m], and what its touching peaks carry [N], as
+        `gaps`; None where none is oiled.
     """
 
     turns: NDArray[np.float64]
@@ -105,6 +108,7 @@ class CrankRun(CrankTally):
     gaps: NDArray[np.float64] | None = None
     ends: NDArray[np.float64] | None = None
     journal: NDArray[np.float64] | None = None
+    bore_gaps: NDArray[np.float64] | None = None
 
     def force(self, name: str, throw: int = 0) -> NDArray[np.float64]:
         """One column of the forces, by its name in :data:`FORCES` or :data:`CRANK_FORCES` [N]."""
@@ -154,9 +158,9 @@ def run_mechanism(
         State of the chambers at the start.
     films : numpy.ndarray [shape=(n_throws, 4)], optional
         Columns as :data:`FILM`, at the start; inside the clearances.
-    journal : numpy.ndarray [shape=(4,)], optional
-        Place of the crank's journal from the centre of its bore (x, y) [m], and how fast [m/s], at
-        the start, where main bearings have play.
+    journal : numpy.ndarray [shape=(6,)], optional
+        Place of the crank's journal from the centre of its bore (x, y) [m], how fast [m/s], and
+        where its film lets it be [m], at the start, where main bearings have play.
     lines : LinePair, optional
         Shared by the chambers of all throws, each of which then breathes; replaced by their state
         at the end.
@@ -189,8 +193,8 @@ def run_mechanism(
     w.stage["y"][0] = bodies
     if films is not None:
         w.stage["film"][0] = films
-    if journal is not None:
-        w.journal["y"][0] = journal
+    if journal is not None and len(t.bearing):
+        w.journal["y"][0, 0], w.journal["film"][0, 0] = journal[:4], journal[4:]
     chamber = np.zeros((n, 8))
     if chambers is not None:
         chamber[:, :6] = chambers
@@ -202,6 +206,7 @@ def run_mechanism(
         gaps=np.zeros((n_steps + 1 if oiled else 1, n, len(GAPS))),
         ends=np.zeros((n_steps + 1 if lines else 1, 2)),
         journal=np.empty((rows if len(t.bearing) else 1, 4)),
+        bore_gaps=np.empty((n_steps + 1 if np.any(t.bearing["rung"] == JOINT_OILED) else 1, 2)),
     )
     tally = Tally(counts=np.zeros(5, np.int64), peak=np.zeros(1))
     moved, ridden = np.zeros((len(casing.react), 3)), np.zeros((3, 2))
@@ -215,6 +220,7 @@ def run_mechanism(
         gaps=r.gaps[: done + 1] if oiled else None,
         ends=r.ends[: done + 1] if lines else None,
         journal=r.journal[: done + 1] if keep_states and len(t.bearing) else None,
+        bore_gaps=r.bore_gaps[: done + 1] if len(r.bore_gaps) > 1 else None,
         step=step,
         status=Status(code),
         peak_normal_force=float(tally.peak[0]),

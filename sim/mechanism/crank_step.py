@@ -155,6 +155,8 @@ def _advance(w: Any, row: int, i: int, share: float, slope: int) -> None:
         at, begin, moving = w.journal[row, n], w.journal[i, n], w.journal[slope, n]
         for c in range(4):
             at.y[c] = begin.y[c] + share * moving.rate[c]
+        for c in range(2):
+            at.film[c] = begin.film[c] + share * moving.film_rate[c]
 
 
 @kernel
@@ -185,6 +187,10 @@ def _finish(w: Any, i: int, h: float) -> None:
             middle = second.rate[c] + third.rate[c]
             rate = mean_of_stages(first.rate[c], middle, fourth.rate[c])
             last.y[c] = first.y[c] + sixth * rate
+        for c in range(2):
+            middle = second.film_rate[c] + third.film_rate[c]
+            rate = mean_of_stages(first.film_rate[c], middle, fourth.film_rate[c])
+            last.film[c] = first.film[c] + sixth * rate
 
 
 @kernel

@@ -53,6 +53,7 @@ MAIN_BEARING = np.dtype(
         ("inverse_mass", "f8"),  # of all that turns on it [1/kg]
         ("eccentricity", "f8"),  # of its centre of mass, along the first throw [m]
         ("radius", "f8"),  # of the journal [m]
+        ("rung", "i8"),  # JOINT_COMPLIANT or JOINT_OILED
     ]
 )
 """Main bearings with play, seen as one; a crank without play has none."""
@@ -141,6 +142,7 @@ class Tables(NamedTuple):
     maps: NDArray[np.float64]  # coefficients of all films that are maps, one after the other
     bearing: NDArray[Any]  # (0 or 1,) of MAIN_BEARING
     bore: NDArray[Any]  # (0 or 1,) of CONTACT: its journal in its bore
+    bore_oil: NDArray[Any]  # (0 or 1,) of OIL
     machine: Machine
 
 
@@ -221,11 +223,14 @@ JOURNAL = np.dtype(
         ("approach", "f8"),
         ("normal", "f8"),
         ("overlap", "f8"),  # over the journal's radius
+        ("film", "f8", 2),  # where the film lets the journal be [m]
+        ("film_rate", "f8", 2),
+        ("gaps", "f8", 2),  # least gap of the film [m], and what touching peaks carry [N]
     ]
 )
 """The journal of a crank in main bearings with play, at one stage of a step."""
 
-JOURNAL_HELD = np.dtype([("touching", "i8"), ("impact", "f8")])
+JOURNAL_HELD = np.dtype([("touching", "i8"), ("impact", "f8"), ("squeeze", "f8", 2)])
 """What it remembers from step to step, as of :data:`HELD`."""
 
 ANGLE, SPEED, ANGLE_RATE, SPEED_RATE, MOMENT = range(5)

@@ -7,14 +7,16 @@ eccentricity e of its centre of mass along the first throw, at crank angle a,
     m (u'' - e w^2 (cos a, sin a) + e w' (-sin a, cos a)) = -sum F - N - m g
 
 where F are the forces of the pins on their rods and N that of the journal on its bore, by the same
-laws of contact and friction as those of a pin. About the journal's centre the crank feels the
+laws as those of a pin: contact and friction, or oil. About the journal's centre the crank feels the
 moments of both, and that of its own mass, which hangs as if gravity were g + u''.
 """
 
+import math
 from typing import Any
 
 from ..jit import kernel
-from .layout import PIN_FORCE, SPEED, SPEED_RATE
+from .layout import JOINT_OILED, NO_CHANGE, PIN_FORCE, SPEED, SPEED_RATE
+from .oiled_joint import oiled_joint
 from .throw_motion import dry_pin, pin_touch
 
 
@@ -31,6 +33,8 @@ def with_play(offset: Any, w: Any, row: int, t: Any) -> Any:
 @kernel
 def journal_margin(w: Any, row: int, t: Any) -> float:
     """Margin of the journal's contact alone, for the search of its change [N]."""
+    if t.bearing[0].rung == JOINT_OILED:
+        return NO_CHANGE
     u, held = w.journal[row, 0].y, w.journal_held[0]
     touch, _, _ = pin_touch(u[0], u[1], u[2], u[3], held.touching != 0, held.impact, t.bore[0])
     margin: float = touch.margin
@@ -38,13 +42,33 @@ def journal_margin(w: Any, row: int, t: Any) -> float:
 
 
 @kernel
-def journal_motion(w: Any, row: int, t: Any, sin_a: float, cos_a: float) -> Any:
-    """Acceleration of the journal (x, y) [m/s^2] at constant crank speed; adds to the moments.
-
-    A crank that speeds up moves it by `e w' (sin a, -cos a)` more, see :func:`spun_up`.
-    """
+def _on_bore(w: Any, row: int, t: Any) -> float:
+    """Force of the journal on its bore, into its row; the moment on the crank [N m]."""
     b, journal, held = t.bearing[0], w.journal[row, 0], w.journal_held[0]
-    u, omega = journal.y, w.crank[row, SPEED]
+    u, s, omega = journal.y, journal.film, w.crank[row, SPEED]
+    if b.rung == JOINT_OILED:
+        f_x, f_y, moment, _, rate_x, rate_y, gap, peaks = oiled_joint(
+            s[0],
+            s[1],
+            u[0],
+            u[1],
+            u[2],
+            u[3],
+            omega,
+            0.0,
+            held.squeeze,
+            t.bore[0],
+            t.bore_oil[0],
+            t.maps,
+        )
+        journal.film_rate[0], journal.film_rate[1] = rate_x, rate_y
+        journal.gaps[0], journal.gaps[1] = gap, peaks
+        journal.force[0], journal.force[1] = f_x, f_y
+        journal.margin, journal.normal = NO_CHANGE, math.sqrt(f_x * f_x + f_y * f_y)
+        overlap = math.sqrt(u[0] * u[0] + u[1] * u[1]) - t.bore[0].clearance
+        journal.overlap = overlap / b.radius
+        turning: float = moment
+        return turning
     load, touch = dry_pin(
         u[0],
         u[1],
@@ -56,16 +80,27 @@ def journal_motion(w: Any, row: int, t: Any, sin_a: float, cos_a: float) -> Any:
         held.impact,
         t.bore[0],
     )
-    push_x, push_y = -load.x, -load.y
+    journal.force[0], journal.force[1] = load.x, load.y
+    journal.margin, journal.approach = touch.margin, touch.approach
+    journal.normal, journal.overlap = touch.normal, touch.overlap / b.radius
+    rubbing: float = load.on_pin
+    return rubbing
+
+
+@kernel
+def journal_motion(w: Any, row: int, t: Any, sin_a: float, cos_a: float) -> Any:
+    """Acceleration of the journal (x, y) [m/s^2] at constant crank speed; adds to the moments.
+
+    A crank that speeds up moves it by `e w' (sin a, -cos a)` more, see :func:`spun_up`.
+    """
+    b, omega = t.bearing[0], w.crank[row, SPEED]
+    w.moment[0] += _on_bore(w, row, t)
+    w.moment[1] += t.machine.static_moment * b.eccentricity
+    push_x, push_y = -w.journal[row, 0].force[0], -w.journal[row, 0].force[1]
     for k in range(t.throws.shape[0]):
         push_x -= w.stage[row, k].force[PIN_FORCE]
         push_y -= w.stage[row, k].force[PIN_FORCE + 1]
     flung = b.eccentricity * omega * omega
-    journal.force[0], journal.force[1] = load.x, load.y
-    journal.margin, journal.approach = touch.margin, touch.approach
-    journal.normal, journal.overlap = touch.normal, touch.overlap / b.radius
-    w.moment[0] += load.on_pin
-    w.moment[1] += t.machine.static_moment * b.eccentricity
     return (
         push_x * b.inverse_mass - t.machine.gravity_x + flung * cos_a,
         push_y * b.inverse_mass - t.machine.gravity_y + flung * sin_a,

@@ -138,7 +138,7 @@ def _fault(w: Any, i: int) -> int:
 
 
 class MarchRecord(NamedTuple):
-    """What a run leaves behind; the last five have one row where they are not needed."""
+    """What a run leaves behind; the last six have one row where they are not needed."""
 
     turns: NDArray[np.float64]  # (n_steps + 1, 2): crank angle and speed
     forces: NDArray[np.float64]  # (n_steps, 1 + n_throws * len(FORCES))
@@ -147,6 +147,7 @@ class MarchRecord(NamedTuple):
     gaps: NDArray[np.float64]  # (n_steps + 1, n_throws, len(GAPS))
     ends: NDArray[np.float64]  # (n_steps + 1, 2): pressures of the lines at the pump
     journal: NDArray[np.float64]  # (n_steps + 1, 4): as JOURNAL's y
+    bore_gaps: NDArray[np.float64]  # (n_steps + 1, 2): as JOURNAL's gaps
 
 
 class Tally(NamedTuple):
@@ -199,6 +200,9 @@ def _keep(w: Any, i: int, chamber: Any, states: Any, r: Any, row: int) -> None:
     if r.journal.shape[0] > 1:
         for c in range(4):
             r.journal[row, c] = w.journal[i, 0].y[c]
+    if r.bore_gaps.shape[0] > 1:
+        for c in range(2):
+            r.bore_gaps[row, c] = w.journal[i, 0].gaps[c]
 
 
 @kernel
@@ -296,7 +300,9 @@ def _on_moving_bearing(
         m.breakdown_slip,
         m.baumgarte,
     )
-    return Tables(t.throws, t.contacts, t.liquid, t.oils, t.maps, t.bearing, t.bore, machine)
+    return Tables(
+        t.throws, t.contacts, t.liquid, t.oils, t.maps, t.bearing, t.bore, t.bore_oil, machine
+    )
 
 
 @kernel
@@ -316,7 +322,9 @@ def integrate(
     weight = (t.machine.gravity_x, t.machine.gravity_y)
     breathing = begin(w, t, chamber)
     i, fresh = 0, False
-    if r.gaps.shape[0] > 1:  # the films of the start are those of its derivative
+    if (
+        r.gaps.shape[0] > 1 or r.bore_gaps.shape[0] > 1
+    ):  # the films of the start are those of its derivative
         derivative_of_record(w, i, 0.0, t)
     lines = shared.lines
     _keep(w, i, chamber, lines.states, r, 0)

@@ -20,7 +20,7 @@ from ..mechanism.layout import (
 )
 from ..output.status import Status
 from ..pump_setup.contacts import contact_rate, contact_table
-from ..pump_setup.films import film_temperature_of
+from ..pump_setup.films import bore_temperature, film_temperature_of
 from ..pump_setup.joints import joint_rungs
 from ..scene.pump import PumpScene
 from ..scene.pump_joints import OILED_RUNGS
@@ -132,7 +132,7 @@ def _film_numerics(gathered: Gathering) -> dict[str, float | int | str]:
     scene = gathered.plan.scene
     pins = zip(*np.nonzero(oiled_pins(scene)), strict=True)
     warm = [film_temperature_of(scene, int(throw), int(joint)) for throw, joint in pins]
-    known = [each for each in warm if each is not None]
+    known = [each for each in (*warm, bore_temperature(scene)) if each is not None]
     return {**({"film_temperature_k": max(known)} if known else {}), **gathered.films}
 
 
@@ -186,7 +186,8 @@ def run_warnings(numerics: dict[str, float | int | str]) -> tuple[str, ...]:
 
 def film_warnings(scene: PumpScene, numerics: dict[str, float | int | str]) -> tuple[str, ...]:
     """Films that are thinner than their surfaces are rough, where no rung knows of peaks."""
-    pins = [part for part in (scene.joint.crankpin, scene.joint.wristpin) if part is not None]
+    joints = (scene.joint.crankpin, scene.joint.wristpin, scene.crank.bearing)
+    pins = [part for part in joints if part is not None]
     oiled = [part for part in pins if part.rung in OILED_RUNGS and part.oil is not None]
     if not oiled or any(part.rung == "mixed" for part in oiled):
         return ()
@@ -236,6 +237,8 @@ def run_truth(run: CrankRun, plan: RunPlan) -> dict[str, Any]:
         truth["main_bearing_offset_m"] = plan.at_samples(run.journal[:, :2])
     force = decimate(run.forces[:, [0, *columns]], plan.factor)[plan.kept]  # it costs by the column
     truth["drive_moment_n_m"] = force[:, 0]
+    if run.bore_gaps is not None:
+        truth["main_bearing_gap_m"] = plan.at_samples(run.bore_gaps[:, 0])
     if run.journal is not None:
         truth["main_bearing_force_n"] = force[:, -len(CRANK_FORCES) :]
     if run.ends is not None:

@@ -72,10 +72,10 @@ JOINT_RUNGS = (
         nanoseconds_per_step=1000.0,
     ),
 )
-"""Rungs of crank pin and wrist pin."""
+"""Rungs of crank pin and wrist pin; of main bearings, which no link can hold, all others."""
 
 GUIDE_RUNGS = tuple(rung for rung in JOINT_RUNGS if rung.name in ("ideal", "compliant"))
-"""Rungs of a guide, and of main bearings."""
+"""Rungs of a guide."""
 
 PRESSURE_RUNGS = (
     Rung(
@@ -204,8 +204,10 @@ def _joint_effects(scene: Scene) -> Iterator[Effect]:
 
 
 def _bearing_effect(scene: Scene) -> Iterator[Effect]:
-    if cast(PumpScene, scene).crank.bearing is not None:
-        rungs = written(GUIDE_RUNGS, ["crank.bearing.rung"])
+    bearing = cast(PumpScene, scene).crank.bearing
+    if bearing is not None:
+        held = [rung for rung in pin_rungs(bearing) if rung.name != "link"]
+        rungs = written(held, ["crank.bearing.rung"])
         yield effect(
             "mainbearing", scene, rungs, lambda one: str(one.crank.bearing.rung), beyond=_beyond
         )

@@ -91,16 +91,21 @@ def simulate_pump(
             run.turns[ends],
             run.forces[steps].T,
             None if run.chambers is None else run.chambers[ends][:, :, list(GATHERED)],
-            None if run.gaps is None else _pin_gaps(pump, run.gaps[ends]),
+            _film_gaps(pump, run, ends),
         )
     whole = run if truth else None
     return recording_of(gathered, run, truth=whole, raise_on_failure=raise_on_failure)
 
 
-def _pin_gaps(scene: PumpScene, gaps: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Of all films of a run: gap and force of peaks of the oiled pins [shape=(n, n_pins, 2)]."""
-    oiled = oiled_pins(scene)
-    return np.stack([gaps[:, :, :GUIDE][:, oiled], gaps[:, :, GUIDE:][:, oiled]], axis=2)
+def _film_gaps(scene: PumpScene, run: CrankRun, ends: slice) -> NDArray[np.float64] | None:
+    """Gap and force of peaks of all films of a run [shape=(n, n_films, 2)]; None without any."""
+    films = []
+    if run.gaps is not None:
+        gaps, oiled = run.gaps[ends], oiled_pins(scene)
+        films.append(np.stack([gaps[:, :, :GUIDE][:, oiled], gaps[:, :, GUIDE:][:, oiled]], axis=2))
+    if run.bore_gaps is not None:
+        films.append(run.bore_gaps[ends][:, None])
+    return np.concatenate(films, axis=1) if films else None
 
 
 def refused_run(scene: PumpScene, error: "LimitError") -> Recording:

@@ -17,7 +17,7 @@ from ..pump_setup.ideal_motion import joint_loads, largest_bearing_load
 from ..pump_setup.joints import JOINT_CODES, joint_parts
 from ..pump_setup.yielding import guide_gain
 from ..scene.pump import PumpScene
-from ..scene.pump_joints import OILED_RUNGS, Guide, MainBearing, RevoluteJoint
+from ..scene.pump_joints import OILED_RUNGS, Guide, RevoluteJoint
 from .tearing import torn_by_knocks, torn_in_motion
 
 STEP_PER_CONTACT_TIME = 0.3
@@ -60,7 +60,7 @@ def _opposed(scene: PumpScene) -> list[str]:
 _MOST_OPPOSED = -0.25  # a bilge pump ran with -0.24, and away with -0.48
 
 
-def _joints(scene: PumpScene) -> Iterator[tuple[int, str, RevoluteJoint | Guide | MainBearing]]:
+def _joints(scene: PumpScene) -> Iterator[tuple[int, str, RevoluteJoint | Guide]]:
     """Throw, path and part of every joint that is given, those of the scene's own tables once."""
     for throw, own in enumerate(scene.throws):
         if throw > 0 and own.joint is None and scene.throws[0].joint is None:
@@ -141,7 +141,7 @@ def _sunk(scene: PumpScene) -> list[tuple[Status, str]]:
 
 
 def _overlaps(
-    path: str, part: RevoluteJoint | Guide | MainBearing, depth: float, load: float
+    path: str, part: RevoluteJoint | Guide, depth: float, load: float
 ) -> list[tuple[Status, str]]:
     size, what = _size(part)
     most = OVERLAP_LIMIT * size
@@ -156,7 +156,7 @@ def _overlaps(
 
 
 def _unresolved(
-    path: str, part: RevoluteJoint | Guide | MainBearing, depth: float, load: float
+    path: str, part: RevoluteJoint | Guide, depth: float, load: float
 ) -> list[tuple[Status, str]]:
     gap = part.clearance_radial
     if depth <= _UNRESOLVED * gap:
@@ -169,12 +169,10 @@ def _unresolved(
     return [(Status.UNRESOLVED, text)]
 
 
-def _size(part: RevoluteJoint | Guide | MainBearing) -> tuple[float, str]:
+def _size(part: RevoluteJoint | Guide) -> tuple[float, str]:
     """Length that an overlap is measured against [m], and what it is."""
     if isinstance(part, Guide):
         return part.height / 2, "half the height"
-    if isinstance(part, MainBearing):
-        return part.journal_diameter / 2, "the journal's radius"
     return part.pin_diameter / 2, "the pin's radius"
 
 

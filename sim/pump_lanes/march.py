@@ -37,6 +37,7 @@ class Alone(NamedTuple):
     maps: NDArray[np.float64]  # of all runs
     bearing: NDArray[Any]  # (0,): no lane has play in its main bearings
     bore: NDArray[Any]  # (0,)
+    bore_oil: NDArray[Any]  # (0,)
     work: Work
     chambers: NDArray[np.float64]  # (LANES, 8)
     forces: NDArray[np.float64]  # (1, 1 + n_throws * len(FORCES)): of one step
@@ -79,6 +80,7 @@ def _tables_of(lane: int, p: Any, a: Any) -> Any:
         a.maps,
         a.bearing,
         a.bore,
+        a.bore_oil,
         machine_of_lane(p, lane),
     )
 
@@ -594,6 +596,7 @@ def alone(t: Tables, maps: NDArray[np.float64]) -> Alone:
         maps=maps,
         bearing=np.zeros(0, MAIN_BEARING),
         bore=np.zeros(0, t.contacts.dtype),
+        bore_oil=np.zeros(0, t.oils.dtype),
         work=scratch(n),
         chambers=np.zeros((LANES, 8)),
         forces=np.zeros((1, 1 + n * len(FORCES))),

@@ -26,13 +26,13 @@ from ..contact.law import (
 from ..jit import kernel
 from ..mechanism.layout import CRANKPIN, GUIDE, JOINT_COMPLIANT, JOINT_IDEAL, JOINT_LINK, WRISTPIN
 from ..scene.pump import PumpScene
-from ..scene.pump_joints import OILED_RUNGS, Guide, MainBearing, RevoluteJoint
+from ..scene.pump_joints import OILED_RUNGS, Guide, RevoluteJoint
 from .ideal_motion import joint_loads, largest_bearing_load
 from .joints import has_main_play, joint_parts, joint_rungs, kept_by_scene
 
 
 def contact_record(
-    part: RevoluteJoint | Guide | MainBearing,
+    part: RevoluteJoint | Guide,
     clearance: float,
     load: float,
     mobility: float,
@@ -42,7 +42,7 @@ def contact_record(
 
     Parameters
     ----------
-    part : RevoluteJoint, Guide or MainBearing
+    part : RevoluteJoint or Guide
         Of the scene, not ideal.
     clearance : float
         Radial, or on either side of a guide [m].

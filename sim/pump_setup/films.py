@@ -14,8 +14,14 @@ from ..mechanism.layout import FILM, JOINT_OILED, Tables
 from ..mechanism.oiled_joint import OIL
 from ..scene.pump import PumpScene
 from ..scene.pump_joints import OILED_RUNGS, RevoluteJoint
-from .contacts import PEAK_OVER_LOAD, tangent_stiffness
-from .ideal_motion import LOAD_ANGLES, ideal_motion, joint_loads
+from .contacts import PEAK_OVER_LOAD, bore_table, tangent_stiffness
+from .ideal_motion import (
+    LOAD_ANGLES,
+    bearing_load,
+    ideal_motion,
+    joint_loads,
+    largest_bearing_load,
+)
 from .joints import joint_parts, kept_by_scene
 
 _WALL_PER_STEP = (
@@ -30,7 +36,7 @@ def joint_maps(scene: PumpScene) -> dict[float, ImpedanceMap]:
         {
             _land(part) / part.pin_diameter
             for throw in range(len(scene.throws))
-            for part in joint_parts(scene, throw)[:2]
+            for part in (*joint_parts(scene, throw)[:2], scene.crank.bearing)
             if part is not None and runs_on_a_map(part)
         }
     )
@@ -83,11 +89,27 @@ def oil_table(
     for joint, part in enumerate(joint_parts(scene, throw)[:2]):
         if isinstance(part, RevoluteJoint) and part.oil is not None and part.rung in OILED_RUNGS:
             warm = film_temperature_of(scene, throw, joint)
-            oil = part.oil
-            viscosity = oil.dynamic_viscosity if warm is None else oil.viscosity_at(warm)
-            values = _oil_values(part, viscosity, contacts[joint], loads[joint], maps, step)
+            values = _oil_values(part, warm, contacts[joint], loads[joint], maps, step)
             for name, value in values.items():
                 table[joint][name] = value
+    return table
+
+
+def bore_oil_table(scene: PumpScene, maps: dict[float, Any], step: float) -> NDArray[np.void]:
+    """Record of the oil in main bearings with play, zeros where they are dry; empty without play.
+
+    Returns
+    -------
+    numpy.ndarray [shape=(0 or 1,), dtype=OIL]
+    """
+    part, contact = scene.crank.bearing, bore_table(scene)
+    table = np.zeros(len(contact), dtype=OIL)
+    if part is None or part.rung not in OILED_RUNGS:
+        return table
+    warm = bore_temperature(scene)
+    values = _oil_values(part, warm, contact[0], largest_bearing_load(scene), maps, step)
+    for name, value in values.items():
+        table[name] = value
     return table
 
 
@@ -107,12 +129,35 @@ def film_temperature_of(scene: PumpScene, throw: int, joint: int) -> float | Non
         None of a pin that is not asked for one: its oil is as warm as the scene says.
     """
     part = joint_parts(scene, throw)[joint]
-    if not isinstance(part, RevoluteJoint) or part.rung not in OILED_RUNGS or part.oil is None:
+    if not isinstance(part, RevoluteJoint) or not _is_heated(part):
         return None
-    oil, carried = part.oil, part.oil.carried_per_kelvin
-    if not carried or oil.temperature is None:
+    return _heat_balance(part, *_usual_spin_and_load(scene, throw)[joint])
+
+
+@kept_by_scene
+def bore_temperature(scene: PumpScene) -> float | None:
+    """The same of the film of the main bearings [K]."""
+    part = scene.crank.bearing
+    if part is None or not _is_heated(part):
         return None
-    spin, load = _usual_spin_and_load(scene, throw)[joint]
+    load = bearing_load(scene, np.linspace(0.0, math.tau, LOAD_ANGLES, endpoint=False))
+    usual = math.sqrt(float(np.mean(np.sum(load**2, axis=0))))
+    return _heat_balance(part, math.tau * scene.drive.speed, usual)
+
+
+def _is_heated(part: RevoluteJoint) -> bool:
+    """Whether a joint has a film that is asked for its heat balance."""
+    if part.rung not in OILED_RUNGS or part.oil is None:
+        return False
+    return bool(part.oil.carried_per_kelvin) and part.oil.temperature is not None
+
+
+def _heat_balance(part: RevoluteJoint, spin: float, load: float) -> float:
+    """Temperature of a film [K] by root mean squares of its spin [rad/s] and load [N]."""
+    oil = part.oil
+    assert oil is not None
+    assert oil.temperature is not None
+    assert oil.carried_per_kelvin
     lands = 2 if oil.groove_width > 0 else 1
 
     def power(temperature: float) -> float:
@@ -125,7 +170,7 @@ def film_temperature_of(scene: PumpScene, throw: int, joint: int) -> float | Non
             gap=part.clearance_radial,
         )
 
-    return film_temperature(oil.temperature, power, carried)
+    return film_temperature(oil.temperature, power, oil.carried_per_kelvin)
 
 
 def _usual_spin_and_load(scene: PumpScene, throw: int) -> list[tuple[float, float]]:
@@ -147,7 +192,7 @@ def _usual_spin_and_load(scene: PumpScene, throw: int) -> list[tuple[float, floa
 
 def _oil_values(
     part: RevoluteJoint,
-    viscosity: float,
+    warm: float | None,
     contact: Any,
     load: float,
     maps: dict[float, Any],
@@ -155,6 +200,7 @@ def _oil_values(
 ) -> dict[str, float]:
     oil, gap, radius = part.oil, part.clearance_radial, part.pin_diameter / 2
     assert oil is not None
+    viscosity = oil.dynamic_viscosity if warm is None else oil.viscosity_at(warm)
     land = _land(part)
     lands = 2 if oil.groove_width > 0 else 1
     rough = oil.roughness if part.rung == "mixed" and oil.roughness else 0.0
@@ -189,12 +235,18 @@ def _oil_values(
     }
 
 
+def deepest_start(offset: NDArray[np.float64], contact: Any) -> NDArray[np.float64]:
+    """Where a film begins to let a pin be that begins at an offset from its eye's centre [m]."""
+    most, size = _DEEPEST_START * float(contact["clearance"]), float(np.hypot(*offset))
+    return offset * min(1.0, most / size) if size > 0 else offset
+
+
 def start_films(
     t: Tables, bodies: NDArray[np.float64], angle: float, journal: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Where the films let the pins be at the start, by the scene's own pins; zeros without oil.
 
-    `journal` is where that of the crank begins in its main bearing [shape=(4,)].
+    `journal` is where that of the crank begins in its main bearing [shape=(6,)].
 
     Returns
     -------
@@ -213,7 +265,7 @@ def start_films(
         )
         for joint, rung in enumerate((q["crankpin_rung"], q["wristpin_rung"])):
             if rung == JOINT_OILED:
-                size = float(np.hypot(*offsets[joint]))
-                most = _DEEPEST_START * t.contacts[throw, joint]["clearance"]
-                films[throw, 2 * joint : 2 * joint + 2] = offsets[joint] * min(1.0, most / size)
+                films[throw, 2 * joint : 2 * joint + 2] = deepest_start(
+                    offsets[joint], t.contacts[throw, joint]
+                )
     return films

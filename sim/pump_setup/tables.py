@@ -24,9 +24,10 @@ from ..piping.pipe import pipe_parameters, pipe_start
 from ..scene.pump import PumpScene
 from ..scene.pump_hydraulics import PIPED_RUNGS
 from .contacts import bore_table, contact_table, penetration_under
-from .films import joint_maps, oil_table
+from .films import bore_oil_table, deepest_start, joint_maps, oil_table
 from .ideal_motion import bearing_load, ideal_motion, seal_numbers
 from .joints import (
+    JOINT_CODES,
     gravity_along_and_across,
     has_main_play,
     hydraulics_of,
@@ -92,8 +93,8 @@ def bearing_record(scene: PumpScene) -> NDArray[np.void]:
     crank = scene.crank
     if crank.bearing is None or crank.mass is None or not has_main_play(scene):
         return np.zeros(0, MAIN_BEARING)
-    numbers = (1 / crank.mass, crank.unbalance / crank.mass, crank.bearing.journal_diameter / 2)
-    return np.array([numbers], MAIN_BEARING)
+    rung, radius = JOINT_CODES[crank.bearing.rung], crank.bearing.pin_diameter / 2
+    return np.array([(1 / crank.mass, crank.unbalance / crank.mass, radius, rung)], MAIN_BEARING)
 
 
 def tables(scene: PumpScene, step: float) -> Tables:
@@ -111,6 +112,7 @@ def tables(scene: PumpScene, step: float) -> Tables:
         maps=np.concatenate([np.zeros(1), *(m.table.coefficients.ravel() for m in maps.values())]),
         bearing=bearing_record(scene),
         bore=bore_table(scene),
+        bore_oil=bore_oil_table(scene, maps, step),
         machine=Machine(
             gravity_x=gravity_x,
             gravity_y=gravity_y,
@@ -153,13 +155,15 @@ def start_journal(scene: PumpScene, angle: float, t: Tables) -> NDArray[np.float
 
     Returns
     -------
-    numpy.ndarray [shape=(4,)]
-        From the centre of its bore (x, y) [m], and how fast [m/s]; 0 where it has no play.
+    numpy.ndarray [shape=(6,)]
+        From the centre of its bore (x, y) [m], how fast [m/s], and where its film lets it be [m];
+        0 where it has no play.
     """
     if not len(t.bearing):
-        return np.zeros(4)
+        return np.zeros(6)
     on_bore = bearing_load(scene, np.array([angle]))[:, 0]
-    return np.array([*_rest(t.bore[0], JOINT_COMPLIANT, on_bore), 0.0, 0.0])
+    place = _rest(t.bore[0], JOINT_COMPLIANT, on_bore)
+    return np.array([*place, 0.0, 0.0, *deepest_start(place, t.bore[0])])
 
 
 def _rest(contact: Any, rung: int, force: NDArray[np.float64]) -> NDArray[np.float64]:

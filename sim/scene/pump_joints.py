@@ -248,11 +248,29 @@ class RevoluteJoint(Contact):
         return 2 * self.clearance_radial
 
 
-def _must_yield(part: "Guide | MainBearing") -> None:
-    """Refuse a part that shall touch and does not say how it yields."""
-    faults = part.elastic_faults() if part.rung == "compliant" else []
-    if faults:
-        raise ValueError("\n".join(faults))
+class MainBearing(RevoluteJoint):
+    """The main bearings of the crank with play, seen as one: the crank moves parallel to itself.
+
+    The pin is the journal of the crank. Stiffness, damping and the length of the film are those of
+    all bearings together.
+    """
+
+    @model_validator(mode="after")
+    def _moves_and_is_round(self) -> Self:
+        faults = []
+        if self.rung == "link":
+            faults.append(
+                "rung = 'link' must be one with a force: the crank is held by its bearings alone; "
+                "set rung = 'compliant'"
+            )
+        if self.one_sided > 0:
+            faults.append(
+                f"one_sided = {self.one_sided:g} must be 0: only the eye of the crank pin may be "
+                "oval; remove it"
+            )
+        if faults:
+            raise ValueError("\n".join(faults))
+        return self
 
 
 class Guide(Contact):
@@ -274,32 +292,9 @@ class Guide(Contact):
 
     @model_validator(mode="after")
     def _surfaces(self) -> Self:
-        _must_yield(self)
-        return self
-
-
-class MainBearing(Contact):
-    """The main bearings of the crank with play, seen as one: the crank moves parallel to itself.
-
-    Stiffness and damping are those of all bearings together.
-    """
-
-    rung: Literal["ideal", "compliant"] = Field(
-        default="compliant", description="ideal: no play; compliant: contact of journal and bore"
-    )
-    journal_diameter: Length = Field(gt=0, le=LONGEST, description="nominal")
-    diametral_clearance: Length = Field(
-        ge=0, le=LONGEST, description="bore diameter minus journal diameter"
-    )
-
-    @property
-    def clearance_radial(self) -> float:
-        """Radial clearance [m]."""
-        return self.diametral_clearance / 2
-
-    @model_validator(mode="after")
-    def _surfaces(self) -> Self:
-        _must_yield(self)
+        faults = self.elastic_faults() if self.rung == "compliant" else []
+        if faults:
+            raise ValueError("\n".join(faults))
         return self
 
 
