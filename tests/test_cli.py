@@ -85,6 +85,7 @@ def test_simulate_writes_a_recording_that_info_and_report_read(tmp_path, small_m
     assert table["schema_version"] == 2
     assert table["estimate"]["verdict"] == "graded"
     assert "trained on simulation" in table["notice"]
+    assert any("main bearings" in text for text in table["unseen"])
 
 
 def test_generate_features_train_evaluate_report(tmp_path, few_set):
@@ -99,7 +100,9 @@ def test_generate_features_train_evaluate_report(tmp_path, few_set):
     page = tmp_path / "report.html"
     text = run("report", few_set, "--record", 5, "--model", model, "-o", page).stdout
     assert "Notice      trained on simulation" in text
+    assert "Not seen    a crank-pin eye" in text
     html = page.read_text()
+    assert html.count("Not seen by this model") == 2
     assert html.count("data:image/png;base64,") == 3
     assert "http://" not in html
     assert "https://" not in html

@@ -25,7 +25,7 @@ from wearstate.diagnose.film_clearance.clearance import (
     _Problem,
     film_clearance,
 )
-from wearstate.diagnose.nameplate.cautions import known_beside, nameplate_cautions
+from wearstate.diagnose.nameplate.cautions import known_beside, nameplate_cautions, unseen_texts
 from wearstate.diagnose.nameplate.nameplate import Nameplate, day_of, nameplate_of
 from wearstate.diagnose.nameplate.sensors import as_told, known_zeros, taken_out_words
 from wearstate.diagnose.report import film as film_report
@@ -490,6 +490,23 @@ def test_sizes_that_training_drew_are_held_against_their_range():
         said = nameplate_cautions(plate, {}, PUMP_CARD)
         assert len(said) == cautioned
         assert all(f"trained at {low:.4g} to {high:.4g} kg" in each for each in said)
+
+
+def test_what_misleads_without_a_warning_is_said_unless_the_recipe_draws_it():
+    def said(scene, recipe, severity):
+        card = card_of(scene, recipe).model_copy(update={"severity": severity})
+        return unseen_texts(card)
+
+    crankpin = "diametral_clearance_crankpin_m"
+    eye, play = said("bilge-pump", "bilge-pump-standard", crankpin)
+    assert "along the rod" in eye
+    assert "main bearings" in play
+    assert said("bilge-pump", "of one's own", crankpin) == []  # nobody knows what it draws
+    assert said("bilge-pump", "bilge-pump-standard", "stretch_lost_feet_m") == []
+    line = ("propulsion-shaft", "propulsion-shaft-{}", "wear_down_aft_m")
+    [film] = said(line[0], line[1].format("standard"), line[2])
+    assert "warmer" in film
+    assert said(line[0], line[1].format("warm"), line[2]) == []  # it draws them
 
 
 # --- beside the trained model

@@ -166,7 +166,7 @@ def _expanded(shift: Shift, recipe: Recipe) -> Iterator[Shift]:
     """The row as it is where the scene has its path, and under every throw that has it."""
     for prefix in ("", "throws.*."):
         path = prefix + shift.path
-        if _paths(path, recipe.scene, recipe.base):
+        if _paths(path, recipe.scene, recipe.base) or (shift.adds and not prefix):
             beside = {prefix + key: value for key, value in shift.beside.items()}
             yield replace(shift, path=path, beside=beside)
 
@@ -222,8 +222,9 @@ def _changer(shift: Shift, amount: Any, recipe: Recipe) -> Callable[[Scene], Map
     def changes(scene: Scene) -> Mapping[str, Any]:
         _refuse_unread(shift, scene)
         found = {}
-        for path in _paths(shift.path, scene, recipe.base):
-            value = value_at(scene, path)
+        paths = _paths(shift.path, scene, recipe.base)
+        for path in paths or ([shift.path] if shift.adds else []):
+            value = None if shift.adds else value_at(scene, path)
             if shift.kind == "set":
                 found[path] = amount
             elif value is not None and not (shift.kind == "factor" and value == 0):

@@ -60,6 +60,25 @@ def no_lines(_truth: Truths) -> Iterator[tuple[str, str]]:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Unseen:
+    """What misleads a model without a warning, unless its recipe draws it.
+
+    Attributes
+    ----------
+    path : str
+        Of the value in the scene; a recipe that sets or draws it trains models that know it.
+    severity : str
+        Of the models that it misleads: what its name begins with.
+    text : str
+        What they do, and what a person can check instead.
+    """
+
+    path: str
+    severity: str
+    text: str
+
+
+@dataclass(frozen=True, kw_only=True)
 class Presentation:
     """How a machine is shown, and what of it a model takes for granted.
 
@@ -73,9 +92,12 @@ class Presentation:
         What of a nameplate recipes leave as it is, as dotted paths of the scene.
     shifts : tuple of Shift
         What may differ from one machine to the next.
+    unseen : tuple of Unseen
+        Of that, what misleads without a warning.
     """
 
     draw: Callable[[Any, Scene, Recording], None] = draw_signals
     lines: Callable[[Truths], Iterator[tuple[str, str]]] = no_lines
     sizes: tuple[str, ...] = ()
     shifts: tuple[Shift, ...] = ()
+    unseen: tuple[Unseen, ...] = ()

@@ -12,7 +12,7 @@ from ...sim.scene.scene import Scene
 from ..pages.page import short_name
 from ..pages.si_text import plain
 from ..pictures.panel import COLOURS
-from .presentation import Presentation, Truths, density, label, told
+from .presentation import Presentation, Truths, Unseen, density, label, told
 from .shifts import factor, set_to
 
 _REVOLUTIONS = 2  # drawn
@@ -201,6 +201,7 @@ _SHIFTS = (
         ("0.06 mm", "0.16 mm"),
         "main bearings with play, as new and worn",
         beside=_MAIN_BEARING,
+        adds=True,
     ),
     factor("casing.modes.*.frequency", 0.85, 1.15, "another foundation or pattern"),
     factor("casing.modes.*.damping_ratio", 0.4, 2.5, "joints, paint, pipes"),
@@ -212,10 +213,25 @@ _SHIFTS = (
     factor("crank.radius", 0.9, 1.1, "another stroke"),
 )
 
+_UNSEEN = (  # measured: docs/decisions/029-oval-eye.md
+    Unseen(
+        path=f"{_PIN}.one_sided",
+        severity="diametral_clearance_crankpin",
+        text="a crank-pin eye that has worn on its loaded side only is read as wide as it is "
+        "across the rod, a third of the limit too low; measure its clearance along the rod",
+    ),
+    Unseen(
+        path="crank.bearing.diametral_clearance",
+        severity="diametral_clearance_crankpin",
+        text="play in the main bearings misleads the estimate by a quarter of the limit; lift the "
+        "crank against a dial gauge",
+    ),
+)
 
 PRESENTATION = Presentation(
     draw=_draw_pump,
     lines=_lines,
     sizes=("crank.radius", "rod.length", "piston.diameter", "piston.mass", "rod.mass"),
     shifts=_SHIFTS,
+    unseen=_UNSEEN,
 )

@@ -13,7 +13,7 @@ from ...sim.scene.shaft import ShaftScene
 from ..pages.page import short_name
 from ..pages.si_text import plain, si_text
 from ..pictures.panel import COLOURS
-from .presentation import Presentation, Truths, density, label, told
+from .presentation import Presentation, Truths, Unseen, density, label, told
 from .shifts import add, factor, set_to
 
 if TYPE_CHECKING:
@@ -166,9 +166,19 @@ _SHIFTS = (
 )
 
 
+_UNSEEN = (  # measured: docs/decisions/028-hull-and-warm-films.md
+    Unseen(
+        path="bearings.0.film_warming",
+        severity="wear_down",
+        text="a film that is warmer than the oil noted is read as 3 to 5 % of the limit more wear; "
+        "note the bearing's temperature, and use a model of propulsion-shaft-warm",
+    ),
+)
+
 PRESENTATION = Presentation(
     draw=_draw_shaft,
     lines=_lines,
     sizes=("propeller.blades",),
     shifts=_SHIFTS,
+    unseen=_UNSEEN,
 )

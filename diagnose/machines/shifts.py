@@ -1,9 +1,9 @@
 """What a recipe may take for granted: plausible shifts of every machine's scene, with reasons.
 
-A row whose path a scene lacks is left out; one that the recipe draws is shifted beyond its range
-instead, see :mod:`.blindspots.rows`. All amounts are estimates of what differs from one machine, or
-one nameplate, to the next. The rows of each machine
-are beside how it is shown; a new row is one line.
+A row whose path a scene lacks is left out, unless it adds the part; one that the recipe draws is
+shifted beyond its range instead, see :mod:`.blindspots.rows`. All amounts are estimates of what
+differs from one machine, or one nameplate, to the next. The rows of each machine are beside how it
+is shown; a new row is one line.
 """
 
 from collections.abc import Mapping
@@ -31,6 +31,8 @@ class Shift:
         What has to be set with it, by dotted path.
     under : mapping
         What the scene must say for the value to count, by dotted path: a rung that reads it.
+    adds : bool
+        Whether the row holds for scenes that lack the part too: `beside` describes all of it.
     """
 
     path: str
@@ -39,6 +41,7 @@ class Shift:
     why: str
     beside: Mapping[str, Any] = field(default_factory=dict)
     under: Mapping[str, Any] = field(default_factory=dict)
+    adds: bool = False
 
 
 def factor(path: str, low: float, high: float, why: str) -> Shift:
@@ -58,7 +61,8 @@ def set_to(
     *,
     beside: Mapping[str, Any] | None = None,
     under: Mapping[str, Any] | None = None,
+    adds: bool = False,
 ) -> Shift:
-    """A value replaced."""
+    """A value replaced; of a part that a scene may lack, `adds` makes it with what is `beside`."""
     with_it: dict[str, Mapping[str, Any]] = {"beside": beside or {}, "under": under or {}}
-    return Shift(path=path, kind="set", amounts=amounts, why=why, **with_it)
+    return Shift(path=path, kind="set", amounts=amounts, why=why, adds=adds, **with_it)

@@ -73,6 +73,22 @@ def _gap_cautions(
     ]
 
 
+def unseen_texts(card: ModelCard) -> list[str]:
+    """What would mislead a model without a warning, of what its built-in recipe does not draw.
+
+    Empty of other recipes: nobody knows what they draw.
+    """
+    trained = card.trained_on
+    if trained.recipe not in recipe_names() or trained.scene not in scene_names():
+        return []
+    drawn = _drawn_by(trained.recipe)
+    return [
+        each.text
+        for each in presentation_of(load_scene(trained.scene)).unseen
+        if each.path not in drawn and card.severity.startswith(each.severity)
+    ]
+
+
 def nameplate_cautions(
     plate: Nameplate | None, row: Mapping[str, Any], card: ModelCard
 ) -> tuple[str, ...]:

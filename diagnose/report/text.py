@@ -60,6 +60,7 @@ def report_text(table: Mapping[str, Any]) -> str:
         lines.append(("Familiarity", f"p = {estimate['p_value']:.2g} ({limit}){near}"))
     if table["provenance"]["baseline"] and table["baseline_note"]:
         lines.append(("Baseline", table["baseline_note"]))
+    lines += [("Not seen", text) for text in table["unseen"]]
     if table["notice"]:
         lines.append(("Notice", table["notice"]))
     return "\n".join(_folded(name, text) for name, text in lines)

@@ -17,6 +17,7 @@ from ..feature_rows.feature_table import is_regime, regime_words
 from ..feature_rows.healthy import Baseline
 from ..feature_rows.model_card import ModelCard
 from ..learning.grades import GRADE_NAMES
+from ..nameplate.cautions import unseen_texts
 from ..nameplate.nameplate import Nameplate
 from ..nameplate.sensors import as_told, taken_out_words
 from ..pages.words import quantity_name
@@ -92,7 +93,8 @@ def report_table(
         equilibrium says, None where it says nothing of this machine), ``twin`` (what the twin
         says, None without), ``disagreements`` (of these with the model), ``grades_text``,
         ``advice``, ``limits``, ``iso``, ``outlook``, ``evidence_summary``, ``evidence``,
-        ``baseline_note``, ``notice``, ``provenance``. Lengths in metres, speeds in revolutions
+        ``baseline_note``, ``unseen`` (what would mislead the model without a warning), ``notice``,
+        ``provenance``. Lengths in metres, speeds in revolutions
         per second.
 
     Raises
@@ -126,6 +128,7 @@ def report_table(
             for name, value, healthy, moved in estimate.evidence
         ],
         "baseline_note": baseline_note(model, baseline),
+        "unseen": unseen_texts(card) if estimate.graded else [],
         "notice": model.notice,
         "provenance": {
             "program": f"wearstate {__version__}",

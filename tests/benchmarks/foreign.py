@@ -1,6 +1,6 @@
 """How well does a wear model fare on a machine that another program simulates?
 
-    python tests/benchmarks/foreign.py bilge-pump [--program A] [-n 60] [--baseline 3] [--peel]
+    python tests/benchmarks/foreign.py bilge-pump [--program A|B|loose|oval] [-n 60] [--peel]
 
 Trains on the library's own records (or takes `--model`, repeatedly), and judges on records of an
 independent program of the same nominal numbers: `foreign_pump.py`, `foreign_exudyn.py`,
@@ -36,7 +36,12 @@ from wearstate.diagnose.wear_model.file import load_model, save_model
 from wearstate.diagnose.wear_model.train import train_model
 
 PROGRAMS = {
-    "bilge-pump": {"A": "foreign_pump.PUMP_A", "B": "foreign_exudyn.PUMP_B"},
+    "bilge-pump": {
+        "A": "foreign_pump.PUMP_A",
+        "B": "foreign_exudyn.PUMP_B",
+        "loose": "foreign_pump.PUMP_LOOSE",
+        "oval": "foreign_pump.PUMP_OVAL",
+    },
     "journal-bearing": {"A": "foreign_ross.JOURNAL", "B": "foreign_journal.JOURNAL_B"},
     "propulsion-shaft": {"A": "foreign_ross_shaft.SHAFT"},
 }

@@ -172,7 +172,7 @@ def simulate(
     first = run.start_angle - omega * settled / rate
     container = exudyn.SystemContainer()
     system = container.AddSystem()
-    start = start_state(first, omega)
+    start = start_state(first, omega)[:6]
     _, wrist, pin, eye = exudyn_crank.add_mechanism(system, CRANK, start)
     contact = add_pin(system, items, pin, eye, machine, run, on)
     along = system.AddMarker(items.MarkerNodeCoordinate(nodeNumber=wrist, coordinate=0))
