@@ -206,7 +206,7 @@ def _joint_effects(scene: Scene) -> Iterator[Effect]:
 def _bearing_effect(scene: Scene) -> Iterator[Effect]:
     bearing = cast(PumpScene, scene).crank.bearing
     if bearing is not None:
-        held = [rung for rung in pin_rungs(bearing) if rung.name != "link"]
+        held = tuple(rung for rung in pin_rungs(bearing) if rung.name != "link")
         rungs = written(held, ["crank.bearing.rung"])
         yield effect(
             "mainbearing", scene, rungs, lambda one: str(one.crank.bearing.rung), beyond=_beyond
