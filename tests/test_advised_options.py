@@ -33,6 +33,7 @@ OWN_RULE = {
 SPOKEN_BY = {
     "charts/across": {"evaluate"},
     "report/advice": {"report"},
+    "report/batch": {"report"},
     "alignment/text": {"align"},
     "inspect/audit_text": {"splits"},
     "inspect/rank_text": {"features"},

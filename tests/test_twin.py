@@ -278,6 +278,16 @@ def test_another_machine_is_told_by_its_name_and_not_by_the_keys_it_lacks(record
         wearstate.calibrate("propulsion-shaft", [recording])
 
 
+def test_a_file_that_is_no_data_set_is_sent_to_be_imported(tmp_path):
+    np.save(tmp_path / "pump.npy", np.ones((3, 50)))
+    with pytest.raises(
+        DataError, match=r"wearstate import pump\.npy -o healthy\.h5, with its units"
+    ):
+        wearstate.calibrate("bilge-pump", [tmp_path / "pump.npy"])
+    with pytest.raises(DataError, match="'journal-bearing' must be 'reciprocating-pump'"):
+        wearstate.calibrate("journal-bearing", [tmp_path / "pump.npy"])  # whatever the file is
+
+
 def test_a_recording_given_twice_is_refused(recording):
     with pytest.raises(DataError, match="are the same recording; give each once"):
         wearstate.calibrate("bilge-pump", [recording, replace(recording)])

@@ -329,6 +329,11 @@ def _refuse_by_name(path: Path) -> None:
         there = part.is_file()
         cure = f"{part.name} is there: run the same command again" if there else "check the path"
         raise DataError(missing_file(path, cure))
+    if path.suffix.lower() not in (".h5", ".hdf5") and not h5py.is_hdf5(path):
+        raise DataError(
+            f"{path} is no data set; make one of measured files: wearstate import {path.name} -o "
+            "data.h5, with their units"
+        )
 
 
 def _stored_attributes(file: Any, path: Path) -> dict[str, Any]:
@@ -337,7 +342,7 @@ def _stored_attributes(file: Any, path: Path) -> dict[str, Any]:
     if not str(stored.get("created_by", "")).startswith("wearstate "):
         raise DataError(
             f"{path}: created_by = {stored.get('created_by')!r}, must begin with 'wearstate'; the "
-            "file is of another program: import it, giving sample rate and unit"
+            "file is of another program: wearstate import makes it a data set, given rate and units"
         )
     if stored["schema_version"] != SCHEMA_VERSION:
         cure = (

@@ -306,6 +306,7 @@ def calibrate(
     >>> mine.misfit.refused, "casing.modes.1.frequency" in [each.path for each in mine.numbers]
     (False, True)
     """
+    _refuse_other_machines(scene)
     heard, names = _read(recordings)
     chosen = _chosen(recipe, scene)
     plan = _prior(chosen, scene, heard[0])
@@ -360,7 +361,7 @@ def _read(
         elif Path(each).suffix.lower() in (".h5", ".hdf5") and Path(each).is_file():
             heard += _of_data_set(Path(each))
         else:
-            heard.append(read_recording(each))
+            heard.append(_of_file(Path(each)))
     if not 1 <= len(heard) <= MOST_RECORDINGS:
         raise DataError(
             f"recordings = {len(heard)} must be >= 1 and <= {MOST_RECORDINGS}; choose some"
@@ -372,13 +373,25 @@ def _read(
     return heard, names
 
 
+def _of_file(path: Path) -> Recording:
+    """A measured file that says by itself what it holds."""
+    try:
+        return read_recording(path)
+    except DataError as error:
+        if not path.is_file():
+            raise
+        cure = f"wearstate import {path.name} -o healthy.h5, with its units and tacho"
+        raise DataError(f"{error}\n{path}: or make a data set of it: {cure}") from error
+
+
 def _of_data_set(path: Path) -> list[Recording]:
     with DataSet(path) as data:
         if len(data) > MOST_RECORDINGS or len(set(data.machines)) > 1:
             machines = len(set(data.machines))
             raise DataError(
                 f"{path}: {len(data)} records of {machines} machines must be <= {MOST_RECORDINGS} "
-                "of one; take those of this machine: wearstate export"
+                "of one; take those of this machine: wearstate export "
+                f"{path.name} --as wav -o folder, and import them"
             )
         return [replace(data[i], source=f"{path.name}:{i}") for i in range(len(data))]
 
@@ -397,12 +410,6 @@ def _chosen(recipe: str | Path, scene: str | Path) -> str | Path:
 
 def _prior(recipe: str | Path, scene: str | Path, first: Recording) -> Recipe:
     """The recipe around the scene, sampled as the recordings are."""
-    machine = load_scene(scene).machine
-    if machine != "reciprocating-pump":
-        raise DataError(
-            f"machine = '{machine}' must be 'reciprocating-pump' to be calibrated; use "
-            "wearstate align or a film's clearance for others"
-        )
     try:
         return load_recipe(recipe, {"sample_rate": first.sample_rate}, scene=scene)
     except RecipeError as error:
@@ -411,6 +418,15 @@ def _prior(recipe: str | Path, scene: str | Path, first: Recording) -> Recipe:
         raise RecipeError(
             f"{recipe} varies what {scene} lacks ({_FULL_SCENE})", error.faults
         ) from None
+
+
+def _refuse_other_machines(scene: str | Path) -> None:
+    machine = load_scene(scene).machine
+    if machine != "reciprocating-pump":
+        raise DataError(
+            f"machine = '{machine}' must be 'reciprocating-pump' to be calibrated; use "
+            "wearstate align or a film's clearance for others"
+        )
 
 
 def _as_new(plan: Recipe) -> tuple[float, float]:
