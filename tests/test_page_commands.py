@@ -23,6 +23,7 @@ from wearstate.datasets.generation.generate import generate
 from wearstate.datasets.recipe.load import load_recipe
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.options.help import FIRST_CONTACT
+from wearstate.diagnose.twin import inversion
 from wearstate.sim.scene.load import minimal_text, scene_text
 
 from .conftest import made_once
@@ -43,6 +44,7 @@ CUTS = (
     ("chart data", "--budget", "1"),
     ("stability", "--size", "3"),
     ("stability", "--budget", "1"),
+    ("recipe preview", "-n", "24"),
     ("sweep", "--starts", "1"),
     ("sweep bilge-pump", "--set", "duration=1.2 s"),
 )
@@ -318,6 +320,7 @@ def supplied(page, words, request):
 @pytest.mark.parametrize("name", SHOWING)
 def test_the_commands_of_a_page_run(name, tmp_path, monkeypatch, request):
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(inversion, "FEWEST", 40)  # machines of a calibration, whatever its budget
     for words in command_lines(PAGES[name]):
         if shlex.join(words) in SLOW:
             continue
@@ -345,8 +348,9 @@ def test_tables_of_this_file_name_what_stands_on_a_page():
 def _params(pattern):
     return [
         param
-        for name, command in cli.commands.items()
+        for name, group in cli.commands.items()
         if re.match(pattern.split()[0], name)
+        for command in (group, *getattr(group, "commands", {}).values())
         for param in command.params
     ]
 
