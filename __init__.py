@@ -34,11 +34,11 @@ if TYPE_CHECKING:
     from .diagnose.twin.calibration import CalibratedScene as CalibratedScene
     from .diagnose.twin.calibration import MisfitError as MisfitError
     from .diagnose.twin.calibration import calibrate as calibrate
-    from .diagnose.wear_model.estimate import Estimate as Estimate
-    from .diagnose.wear_model.estimate import ModelError as ModelError
+    from .diagnose.wear_model.bundle import ModelError as ModelError
     from .diagnose.wear_model.estimate import WearModel as WearModel
     from .diagnose.wear_model.file import load_model as load_model
     from .diagnose.wear_model.file import save_model as save_model
+    from .diagnose.wear_model.verdict import Estimate as Estimate
     from .diagnose.workflow.evaluate import Evaluation as Evaluation
     from .diagnose.workflow.evaluate import evaluate as evaluate
     from .diagnose.workflow.report import Report as Report
@@ -66,10 +66,10 @@ _HOMES = {
     "ClassModel": ".diagnose.class_model.train",
     "DataError": ".sim.output.recording",
     "DataSet": ".datasets.file.record",
-    "Estimate": ".diagnose.wear_model.estimate",
+    "Estimate": ".diagnose.wear_model.verdict",
     "Evaluation": ".diagnose.workflow.evaluate",
     "MisfitError": ".diagnose.twin.calibration",
-    "ModelError": ".diagnose.wear_model.estimate",
+    "ModelError": ".diagnose.wear_model.bundle",
     "Recording": ".sim.output.recording",
     "Report": ".diagnose.workflow.report",
     "Scene": ".sim.scene.scene",

@@ -45,8 +45,8 @@ from .sim.film.solve import (
     solve_long,
     solve_short,
 )
+from .sim.journal.load import load
 from .sim.journal.mass_orbit import MassOrbit, mass_orbit
-from .sim.journal.orbit import load
 
 __all__ = [
     "FILM_RUNGS",

@@ -12,7 +12,8 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from sheets import COLOURS, folder_asked, label, sheet, write
 from wearstate.sim.bearing.equilibrium import equilibrium
-from wearstate.sim.film.impedance_map import impedance_map, map_force
+from wearstate.sim.film.impedance_map import impedance_map
+from wearstate.sim.film.map_look_up import map_force
 from wearstate.sim.film.rungs import FILM_RUNGS
 from wearstate.sim.film.solve import FilmGeometry, FilmState, dufrane_scar, film_gap, solve_direct
 from wearstate.sim.machine.simulate import simulate

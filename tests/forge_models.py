@@ -360,7 +360,7 @@ def child(model: str) -> None:
 
 
 def verdict(path: Path, row: Any, wanted: str) -> str:
-    from wearstate.diagnose.wear_model.estimate import ModelError
+    from wearstate.diagnose.wear_model.bundle import ModelError
     from wearstate.diagnose.wear_model.file import load_model
 
     try:

@@ -23,7 +23,8 @@ from typing import Any
 import h5py
 import numpy as np
 from scipy.io import savemat, wavfile
-from wearstate.datasets.readers.open import SourceOptions, list_sources, open_source
+from wearstate.datasets.readers.open import list_sources, open_source
+from wearstate.datasets.source.part import SourceOptions
 from wearstate.sim.output.recording import DataError
 
 N_SAMPLES = 60

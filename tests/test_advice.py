@@ -14,7 +14,7 @@ from wearstate.diagnose.report.advice import (
     work_words,
 )
 from wearstate.diagnose.report.trend import Outlook
-from wearstate.diagnose.wear_model.estimate import NO_BASELINE, Estimate
+from wearstate.diagnose.wear_model.verdict import NO_BASELINE, Estimate
 
 PIN = "diametral clearance, crankpin"
 EDGES = (1e-4, 2e-4, 3e-4)

@@ -21,7 +21,7 @@ from wearstate.diagnose.blindspots.text import blind_spots_table, blind_spots_te
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.machines.registry import presentation_of
 from wearstate.diagnose.machines.shifts import Shift
-from wearstate.diagnose.wear_model.estimate import Estimate
+from wearstate.diagnose.wear_model.verdict import Estimate
 from wearstate.features.rotation.order import pulse_times
 from wearstate.sim.output.recording import DataError, Recording
 from wearstate.sim.output.sensor import Channel, tacho_pulses

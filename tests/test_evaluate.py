@@ -38,9 +38,9 @@ from wearstate.diagnose.evaluation.splits import (
 from wearstate.diagnose.evaluation.text import score_lines, splits_text
 from wearstate.diagnose.learning.scores import resampled
 from wearstate.diagnose.wear_model import train as training
-from wearstate.diagnose.wear_model.estimate import Estimate
 from wearstate.diagnose.wear_model.file import load_model, save_model
 from wearstate.diagnose.wear_model.train import train_model
+from wearstate.diagnose.wear_model.verdict import Estimate
 from wearstate.sim.output.recording import DataError, Recording
 from wearstate.sim.output.sensor import Channel
 

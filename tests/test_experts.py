@@ -7,16 +7,15 @@ import zipfile
 
 import numpy as np
 import pytest
+from wearstate.diagnose.familiarity.noise_floor import lifted_rows
 from wearstate.diagnose.feature_rows.model_card import ConfounderRates
 from wearstate.diagnose.learning.blends import Blend
 from wearstate.diagnose.learning.experts import Experts, regime_shares
 from wearstate.diagnose.learning.heads import Head
 from wearstate.diagnose.learning.regressions import CANDIDATES
-from wearstate.diagnose.wear_model.bundle import Bundle, save_bundle
-from wearstate.diagnose.wear_model.estimate import ModelError
+from wearstate.diagnose.wear_model.bundle import Bundle, ModelError, save_bundle
 from wearstate.diagnose.wear_model.file import load_model, save_model
 from wearstate.diagnose.wear_model.learn import learn
-from wearstate.diagnose.wear_model.noise_floor import lifted_rows
 from wearstate.diagnose.wear_model.training_rows import TrainingRows
 
 NAMES = ("a.shape_1", "a.kurtosis", "a.rms")

@@ -31,7 +31,7 @@ from wearstate.diagnose.nameplate.sensors import as_told, known_zeros, taken_out
 from wearstate.diagnose.report import film as film_report
 from wearstate.diagnose.report.beside import disagree
 from wearstate.diagnose.report.film import film_estimate, film_table, with_film
-from wearstate.diagnose.wear_model.estimate import Estimate
+from wearstate.diagnose.wear_model.verdict import Estimate
 from wearstate.sim.bearing.rest_curve import rest_curve
 from wearstate.sim.film.solve import FilmGeometry
 from wearstate.sim.machine.simulate import simulate

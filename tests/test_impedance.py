@@ -8,8 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from wearstate.sim.film import impedance_map as im
+from wearstate.sim.film import map_look_up as look_up
 from wearstate.sim.film.direct import direct_force
-from wearstate.sim.film.impedance_map import impedance_map, map_force, map_peak, map_scales
+from wearstate.sim.film.impedance_map import impedance_map
+from wearstate.sim.film.map_look_up import map_force, map_peak, map_scales
 from wearstate.sim.film.short import short_force
 from wearstate.sim.film.solve import FilmGeometry, Groove, direct_film
 
@@ -153,13 +155,13 @@ def test_a_round_bore_is_only_wider():
 @given(st.floats(0, math.pi), st.floats(-100, 100))
 def test_stretched_angle(angle, decades):
     size = 10**decades
-    found = im.stretched_angle(size * math.cos(angle), size * math.sin(angle))
+    found = look_up.stretched_angle(size * math.cos(angle), size * math.sin(angle))
     # fitted within 2.7e-7 of the half angle
     assert found == pytest.approx(angle, abs=6e-7)
 
 
 def test_stretched_angle_is_continuous_where_it_is_joined():
-    before, behind = (im.stretched_angle(a, 1.0) for a in (1e-12, -1e-12))
+    before, behind = (look_up.stretched_angle(a, 1.0) for a in (1e-12, -1e-12))
     # a jump would be seen by every difference quotient
     assert abs(behind - before) < 1e-11
 
@@ -235,7 +237,7 @@ def test_splines_are_of_fourth_order(ends, function):
         c = im._spline_coefficients(function(np.arange(n) / cells), 0, ends)
         x = np.linspace(0, 1, 997)
         i = np.minimum((x * cells).astype(int), cells - 1)
-        w = np.array([im._weights(share) for share in x * cells - i])
+        w = np.array([look_up._weights(share) for share in x * cells - i])
         value = sum(c[i + k] * w[:, k] for k in range(4))
         return np.abs(value - function(x)).max()
 

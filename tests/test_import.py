@@ -17,7 +17,7 @@ from wearstate.datasets.measured import label_table
 from wearstate.datasets.measured import plan as import_plan
 from wearstate.datasets.measured.data_set import NO_PULSES, import_recordings
 from wearstate.datasets.measured.labels import read_labels, read_limits
-from wearstate.datasets.readers.open import SourceOptions
+from wearstate.datasets.source.part import SourceOptions
 from wearstate.sim.output.recording import DataError
 from wearstate.sim.parts.units import STANDARD_GRAVITY
 

@@ -6,7 +6,8 @@ from scipy.io import savemat
 from wearstate.datasets.file.record import DataSet
 from wearstate.datasets.measured.data_set import import_recordings
 from wearstate.datasets.measured.plan import EachChannel
-from wearstate.datasets.readers.open import SourceOptions, open_source
+from wearstate.datasets.readers.open import open_source
+from wearstate.datasets.source.part import SourceOptions
 from wearstate.diagnose.options.source import BearingNumbers as _Bearing
 from wearstate.sim.output.recording import DataError
 

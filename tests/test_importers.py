@@ -10,7 +10,7 @@ from wearstate.datasets.file.writer import DataSetWriter
 from wearstate.datasets.measured import recording as importers
 from wearstate.datasets.measured.plan import EachChannel
 from wearstate.datasets.measured.recording import list_contents, read_recording
-from wearstate.datasets.readers.open import SourceOptions
+from wearstate.datasets.source.part import SourceOptions
 from wearstate.sim.output.recording import DataError
 from wearstate.sim.output.sensor import Channel
 from wearstate.sim.parts.units import STANDARD_GRAVITY

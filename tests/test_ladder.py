@@ -9,7 +9,9 @@ from numpy.testing import assert_allclose
 from wearstate.sim.casing.decimation import edge_samples
 from wearstate.sim.fidelity.ladder import cost_of, effects_of
 from wearstate.sim.journal.ladder import journal_calls
-from wearstate.sim.journal.orbit import load, run_orbit, short_film
+from wearstate.sim.journal.load import load
+from wearstate.sim.journal.orbit import run_orbit
+from wearstate.sim.journal.orbit_film import short_film
 from wearstate.sim.journal.recording import journal_film, squeeze_rate
 from wearstate.sim.journal.validity import orbit_faults
 from wearstate.sim.machine.registry import machine_of

@@ -79,6 +79,7 @@ ROOMS = {
         "machines",
         "learning",
         "feature_rows",
+        "familiarity",
         "wear_model",
         "film_clearance",
         "nameplate",

@@ -7,8 +7,11 @@ import pytest
 from wearstate.sim.film.impedance_map import impedance_map
 from wearstate.sim.film.mass_conserving import mass_conserving, oil_intake
 from wearstate.sim.film.solve import FilmGeometry, FilmState
+from wearstate.sim.journal.load import Load, load
 from wearstate.sim.journal.mass_orbit import mass_orbit
-from wearstate.sim.journal.orbit import Load, OrbitStatus, load, map_film, run_orbit
+from wearstate.sim.journal.orbit import run_orbit
+from wearstate.sim.journal.orbit_film import map_film
+from wearstate.sim.journal.orbit_status import OrbitStatus
 
 # Ausas, Jai, Buscaglia (2009), section 5: lengths over the circumference, time over a period of
 # the load, in which the shaft turns once; gap 1 + X cos 2 pi x, so that X and Y point the other way

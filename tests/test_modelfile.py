@@ -13,8 +13,13 @@ from wearstate.diagnose.learning.blends import Blend, Forest
 from wearstate.diagnose.learning.nets import Nets
 from wearstate.diagnose.wear_model import bundle as bundle_module
 from wearstate.diagnose.wear_model.arrays import blend_fits
-from wearstate.diagnose.wear_model.bundle import Bundle, feature_version, load_bundle, save_bundle
-from wearstate.diagnose.wear_model.estimate import ModelError
+from wearstate.diagnose.wear_model.bundle import (
+    Bundle,
+    ModelError,
+    feature_version,
+    load_bundle,
+    save_bundle,
+)
 from wearstate.diagnose.wear_model.file import load_model, save_model
 
 FILES = 60  # four of every kind; the campaign is a script

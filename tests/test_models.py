@@ -19,7 +19,7 @@ from wearstate.diagnose.learning.grades import accuracy_bound, grades_of
 from wearstate.diagnose.learning.heads import Head
 from wearstate.diagnose.learning.regressions import CANDIDATES
 from wearstate.diagnose.wear_model import train as training
-from wearstate.diagnose.wear_model.estimate import ModelError
+from wearstate.diagnose.wear_model.bundle import ModelError
 from wearstate.diagnose.wear_model.file import load_model, save_model
 from wearstate.diagnose.wear_model.learn import learn
 from wearstate.diagnose.wear_model.train import train_model

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from wearstate.diagnose.feature_rows.model_card import TrainedCondition
 from wearstate.diagnose.feature_rows.noted import NOTED, doubted, given_of, noted_values, strayed
-from wearstate.diagnose.wear_model.bundle import load_bundle
-from wearstate.diagnose.wear_model.estimate import ModelError
+from wearstate.diagnose.wear_model.bundle import ModelError, load_bundle
 from wearstate.diagnose.wear_model.file import load_model, save_model
 from wearstate.diagnose.wear_model.learn import learn
 from wearstate.diagnose.wear_model.training_rows import TrainingRows

@@ -9,6 +9,19 @@ import numpy as np
 import pytest
 from scipy.signal import butter, sosfilt
 from wearstate.datasets.file.record import DataSet
+from wearstate.diagnose.familiarity.bandwidth import cut_off
+from wearstate.diagnose.familiarity.noise_floor import (
+    fit_least,
+    lifted_rows,
+    noise_floors,
+    noisiest,
+)
+from wearstate.diagnose.familiarity.novelty import (
+    fit_familiarity,
+    free_distance,
+    novelty_p_value,
+    outside_weight,
+)
 from wearstate.diagnose.feature_rows.feature_choice import feature_words
 from wearstate.diagnose.feature_rows.feature_table import recording_features
 from wearstate.diagnose.feature_rows.physical import (
@@ -18,19 +31,6 @@ from wearstate.diagnose.feature_rows.physical import (
     moved_rows,
     physical_rows,
     shape_rows,
-)
-from wearstate.diagnose.wear_model.bandwidth import cut_off
-from wearstate.diagnose.wear_model.noise_floor import (
-    fit_least,
-    lifted_rows,
-    noise_floors,
-    noisiest,
-)
-from wearstate.diagnose.wear_model.novelty import (
-    fit_familiarity,
-    free_distance,
-    novelty_p_value,
-    outside_weight,
 )
 from wearstate.features.catalogue.row import feature_names, feature_row
 from wearstate.sim.machine.simulate import simulate

@@ -12,7 +12,8 @@ from wearstate.sim.bearing.short_bearing import short_coefficients
 from wearstate.sim.contact.asperities import asperity_force, asperity_scale
 from wearstate.sim.contact.law import CONTACT
 from wearstate.sim.fidelity.ladder import effects_of
-from wearstate.sim.film.impedance_map import impedance_map, map_force, map_resistance
+from wearstate.sim.film.impedance_map import impedance_map
+from wearstate.sim.film.map_look_up import map_force, map_resistance
 from wearstate.sim.film.short import short_force, short_resistance
 from wearstate.sim.film.solve import FilmGeometry
 from wearstate.sim.machine.simulate import simulate

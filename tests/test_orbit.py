@@ -12,23 +12,17 @@ from wearstate.sim.film.direct import direct_force
 from wearstate.sim.film.impedance_map import impedance_map
 from wearstate.sim.film.short import short_force
 from wearstate.sim.film.solve import FilmGeometry, direct_film
-from wearstate.sim.journal.orbit import (
-    INTEGRATORS,
-    OrbitStatus,
-    Wall,
-    film_force,
-    film_trace,
+from wearstate.sim.journal.load import (
     half_sine_history,
     load,
     load_at,
-    map_film,
-    no_film,
     rectangular_history,
-    run_orbit,
-    short_film,
-    solved_film,
     step_history,
 )
+from wearstate.sim.journal.orbit import INTEGRATORS, film_trace, run_orbit
+from wearstate.sim.journal.orbit_film import film_force, map_film, no_film, short_film, solved_film
+from wearstate.sim.journal.orbit_march import Wall
+from wearstate.sim.journal.orbit_status import OrbitStatus
 
 TURN = 2 * math.pi
 PAPER = {"alpha": 0.83537, "static": (0.3972, 0.0)}

@@ -14,7 +14,8 @@ from click.testing import CliRunner
 from wearstate.datasets.file.record import DataSet
 from wearstate.datasets.measured.data_set import import_recordings
 from wearstate.datasets.measured.labels import read_labels
-from wearstate.datasets.readers.open import SourceOptions, open_source
+from wearstate.datasets.readers.open import open_source
+from wearstate.datasets.source.part import SourceOptions
 from wearstate.datasets.split.rules import group_folds
 from wearstate.diagnose.class_model.file import load_class_model, save_class_model
 from wearstate.diagnose.class_model.text import naming_text, namings_summary
@@ -29,7 +30,7 @@ from wearstate.diagnose.class_model.votes import Votes, set_of
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.feature_rows.blows import NOISE_SCORE, blow_scores
 from wearstate.diagnose.feature_rows.feature_table import feature_table, recording_features
-from wearstate.diagnose.wear_model.estimate import ModelError
+from wearstate.diagnose.wear_model.bundle import ModelError
 from wearstate.diagnose.wear_model.file import load_model
 from wearstate.sim.output.recording import DataError
 

@@ -4,8 +4,8 @@ import h5py
 import numpy as np
 import pytest
 from scipy.io import savemat
-from wearstate.datasets.readers.open import SourceOptions, open_source
-from wearstate.datasets.source.part import Profile
+from wearstate.datasets.readers.open import open_source
+from wearstate.datasets.source.part import Profile, SourceOptions
 from wearstate.sim.output.recording import DataError
 
 WAVE = np.sin(np.arange(300.0))

@@ -32,8 +32,9 @@ from wearstate.diagnose.evaluation.evaluate import by_choice, by_confounder, eva
 from wearstate.diagnose.evaluation.text import part_lines
 from wearstate.diagnose.feature_rows.feature_table import confounders_in, regimes_in
 from wearstate.diagnose.inspect.info import describe, description_text
-from wearstate.diagnose.wear_model.estimate import FaultFinding
+from wearstate.diagnose.wear_model.cautions import finding_cautions
 from wearstate.diagnose.wear_model.train import train_model
+from wearstate.diagnose.wear_model.verdict import FaultFinding
 from wearstate.sim.output.recording import DataError
 from wearstate.sim.output.status import Status
 from wearstate.sim.scene.load import load_scene, override, scene_table, scene_text
@@ -847,10 +848,8 @@ def test_a_regime_is_found_like_a_fault_and_not_to_be_mended(trained):
         finding = FaultFinding(
             name=name, probability=0.9, present=True, detection_rate=0.9, false_alarm_rate=0.1
         )
-        told = dataclasses.replace(
-            model, card=model.card.model_copy(update={"confounders": [rates]})
-        )
-        [caution] = told._finding_cautions((finding,))
+        told = model.card.model_copy(update={"confounders": [rates]})
+        [caution] = finding_cautions(told, (finding,))
         assert caution.startswith(found)
         assert "0.06 mm instead of 0.02 mm" in caution
         assert cure in caution

@@ -37,9 +37,9 @@ from wearstate.diagnose.report.verdict import (
     zone_words,
 )
 from wearstate.diagnose.twin.opinion import TwinOpinion
-from wearstate.diagnose.wear_model.estimate import Estimate, FaultFinding
 from wearstate.diagnose.wear_model.file import load_model, save_model
 from wearstate.diagnose.wear_model.train import train_model
+from wearstate.diagnose.wear_model.verdict import Estimate, FaultFinding
 from wearstate.diagnose.workflow.report import Report
 from wearstate.sim.output.recording import DataError, Recording
 from wearstate.sim.output.sensor import Channel
@@ -577,7 +577,7 @@ def test_measured_machines_go_by_the_names_that_they_were_imported_with(referenc
 def test_faults_of_a_baseline_are_told_once(referenced, tmp_path):
     from scipy.io import wavfile
     from wearstate.datasets.measured.recording import read_recording
-    from wearstate.datasets.readers.open import SourceOptions
+    from wearstate.datasets.source.part import SourceOptions
     from wearstate.diagnose.feature_rows.healthy import baseline_of
 
     model = load_model(referenced[0])

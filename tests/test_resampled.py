@@ -6,8 +6,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 from wearstate.datasets.file.record import DataSet
 from wearstate.datasets.measured.data_set import import_recordings
 from wearstate.datasets.measured.recording import read_recording
-from wearstate.datasets.readers.open import SourceOptions, open_source
+from wearstate.datasets.readers.open import open_source
 from wearstate.datasets.source import resampled_tacho
+from wearstate.datasets.source.part import SourceOptions
 from wearstate.features.rotation.order import pulse_times
 from wearstate.sim.output.recording import DataError
 

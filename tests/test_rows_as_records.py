@@ -9,7 +9,8 @@ from wearstate.datasets.file.record import DataSet
 from wearstate.datasets.measured.data_set import import_recordings
 from wearstate.datasets.measured.labels import read_labels
 from wearstate.datasets.measured.recording import read_recording
-from wearstate.datasets.readers.open import SourceOptions, open_source
+from wearstate.datasets.readers.open import open_source
+from wearstate.datasets.source.part import SourceOptions
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.sim.output.recording import DataError
 

@@ -3,7 +3,8 @@
 from datetime import datetime, timedelta
 
 import pytest
-from wearstate.datasets.readers.open import SourceOptions, open_source
+from wearstate.datasets.readers.open import open_source
+from wearstate.datasets.source.part import SourceOptions
 from wearstate.sim.output.recording import DataError
 
 START = datetime(2024, 5, 1, 23, 59, 59, 900000)
@@ -21,9 +22,13 @@ def written(path, texts, *, header="time,acc [g]\n", mark=","):
 
 
 def refusal(path, **options):
-    with pytest.raises(DataError) as caught, open_source(path, SourceOptions(**options)) as source:
-        source.refuse_undeclared()
-    return str(caught.value)
+    """Why a file is refused, or what it does not declare."""
+    try:
+        with open_source(path, SourceOptions(**options)) as source:
+            assert source.undeclared
+            return "\n".join(source.undeclared)
+    except DataError as error:
+        return str(error)
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,8 @@ import pytest
 from click.testing import CliRunner
 from scipy.io import savemat, wavfile
 from wearstate.datasets.measured.recording import read_recording
-from wearstate.datasets.readers.open import SourceOptions, open_source
+from wearstate.datasets.readers.open import open_source
+from wearstate.datasets.source.part import SourceOptions
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.sim.output.recording import DataError
 

@@ -9,8 +9,8 @@ import pytest
 import scipy
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.io import loadmat, savemat, wavfile
-from wearstate.datasets.readers.open import SourceOptions, list_sources, open_source
-from wearstate.datasets.source.part import DECLARED
+from wearstate.datasets.readers.open import list_sources, open_source
+from wearstate.datasets.source.part import DECLARED, SourceOptions
 from wearstate.sim.output.recording import DataError
 
 SIGNAL = np.random.default_rng(3).standard_normal((2, 50))

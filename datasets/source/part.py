@@ -393,11 +393,6 @@ class Source:
     n_records: int = 1
     empty: tuple[str, ...] = ()
 
-    def refuse_undeclared(self) -> None:
-        """Raise a DataError that names every rate and unit that nobody declares."""
-        if self.undeclared:
-            raise DataError("\n".join(f"{self.path}: {text}" for text in self.undeclared))
-
     def read(self, start: int = 0, stop: int | None = None) -> NDArray[np.float64]:
         """Read some samples of all channels.
 

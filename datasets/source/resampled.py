@@ -60,7 +60,8 @@ def resampled(source: Source, rate: float | None, tacho: str | None = None) -> S
     --------
     >>> import tempfile
     >>> from pathlib import Path
-    >>> from wearstate.datasets.readers.open import SourceOptions, open_source
+    >>> from wearstate.datasets.readers.open import open_source
+    >>> from wearstate.datasets.source.part import SourceOptions
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     file = Path(folder) / "x.npy"
     ...     np.save(file, np.ones((1, 4000)))

@@ -25,7 +25,6 @@ from ...sim.shaft.changed import (
     transfer,
 )
 from ...sim.shaft.forces import harmonic_forces, random_forces
-from ...sim.shaft_films.on_oil_films import BeamFilm
 from ...sim.shaft_films.status import ShaftFilmError
 from ...sim.shaft_response.time_response import Harmonic
 from ..shaft_tests.next_test import usual_responses
@@ -119,7 +118,7 @@ def running_line(scene: ShaftScene) -> Running:
     )
 
 
-def running_rms(running: Running, moves: Vector, start: BeamFilm | None = None) -> Vector:
+def running_rms(running: Running, moves: Vector) -> Vector:
     """Acceleration at every sensor with the bearings moved.
 
     Parameters
@@ -127,8 +126,6 @@ def running_rms(running: Running, moves: Vector, start: BeamFilm | None = None) 
     running : Running
     moves : numpy.ndarray [shape=(n,)]
         Upward [m].
-    start : BeamFilm, optional
-        Of a line nearby.
 
     Returns
     -------
@@ -149,7 +146,7 @@ def running_rms(running: Running, moves: Vector, start: BeamFilm | None = None) 
     change = no_change(moves.size)
     change[:, 0] = moves
     model = running.model.changed(change)
-    film = rest(model, running.speed, start=start)
+    film = rest(model, running.speed)
     power = np.zeros(0)
     if running.orders is not None:
         through = transfer(model, film, running.orders).value

@@ -29,7 +29,7 @@ from ..machines.registry import presentation_of
 from ..nameplate.cautions import known_beside
 from ..nameplate.nameplate import Nameplate
 from ..pages.kept import Kept
-from ..wear_model.estimate import Estimate
+from ..wear_model.verdict import Estimate
 from .rows import SceneRow, scene_rows
 from .scores import ShiftRow, ShiftVerdict, answer_of, row_of
 from .signals import SignalRow, signal_rows

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..learning.scores import ScoreFigure, resampled, share
-from ..wear_model.estimate import Estimate
+from ..wear_model.verdict import Estimate
 
 FIGURES = (
     ("clear_error", "mean error of what is graded without a caution that counts, over the limit"),
@@ -32,7 +32,7 @@ class ShiftVerdict:
     truth : float
         Severity [m].
     verdict : str
-        As of :class:`~.wear_model.estimate.Estimate`.
+        As of :class:`~.wear_model.verdict.Estimate`.
     found, low, high : float or None
         Estimate and interval [m]; None without a grade.
     cautions : tuple of str
@@ -118,7 +118,7 @@ def usual_cautions(baseline: ShiftRow) -> frozenset[str]:
 
 
 def row_figures(
-    row: ShiftRow, limit: float, usual: frozenset[str] = frozenset(), *, seed: int = 0
+    row: ShiftRow, limit: float, usual: frozenset[str] = frozenset()
 ) -> dict[str, ScoreFigure]:
     """Every one of :data:`FIGURES`.
 
@@ -129,8 +129,6 @@ def row_figures(
         Condemning limit [m].
     usual : frozenset of str
         Cautions that do not count, of :func:`usual_cautions`.
-    seed : int
-        Of the resamples.
 
     Returns
     -------
@@ -148,7 +146,7 @@ def row_figures(
     if not row.said:
         nothing = ScoreFigure(value=math.nan, low=math.nan, high=math.nan)
         return {name: nothing for name, _ in FIGURES}
-    draws = resampled([each.machine for each in row.said], seed=seed)
+    draws = resampled([each.machine for each in row.said])
     off = _numbers((e.found, e.truth) for e in row.said) / limit
     graded = np.array([each.found is not None for each in row.said])
     warned = np.array([_warned(each, usual) for each in row.said])

@@ -4,7 +4,7 @@ import hashlib
 import json
 import math
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -92,7 +92,6 @@ def scene_search(
     jobs: int = 1,
     clock: Clock = time.perf_counter,
     kept: Kept[Outcome] | None = None,
-    tell: Callable[[str], None] | None = None,
 ) -> Search:
     """Search over the rungs of a scene, nothing measured yet.
 
@@ -108,8 +107,6 @@ def scene_search(
         Seconds; importable by name where there are workers.
     kept : Kept, optional
         Runs of an earlier search; new ones are added.
-    tell : callable, optional
-        Called with what is measured next.
 
     Raises
     ------
@@ -128,7 +125,7 @@ def scene_search(
         spread=partial(in_order, jobs=jobs),
         at_once=jobs,
     )
-    search = Search(scene, known.quantities, accuracy=accuracy, pilot=pilot, tell=tell)
+    search = Search(scene, known.quantities, accuracy=accuracy, pilot=pilot)
     if known.fewest_turns is not None:
         search.shorten(known.fewest_turns)
     return search
@@ -158,13 +155,12 @@ def scene_chart(
     accuracy: float | None = None,
     budget: float | None = None,
     jobs: int = 1,
-    clock: Clock = time.perf_counter,
 ) -> Chart:
     """Measure where a scene stands, and what would be enough.
 
     Parameters
     ----------
-    scene, accuracy, jobs, clock
+    scene, accuracy, jobs
         As :func:`scene_search`.
     budget : float, optional
         As :func:`measure`.
@@ -180,8 +176,8 @@ def scene_chart(
     ValueError
         The accuracy is out of bounds.
     """
-    search = scene_search(scene, accuracy=accuracy, jobs=jobs, clock=clock)
-    measure(search, budget=budget, clock=clock)
+    search = scene_search(scene, accuracy=accuracy, jobs=jobs)
+    measure(search, budget=budget)
     return chart_of(scene, search.found())
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from ..familiarity.novelty import Familiarity
 from ..feature_rows.model_card import ClassCard, Strict
 from ..feature_rows.physical import physical_rows
 from ..wear_model.arrays import (
@@ -23,9 +24,7 @@ from ..wear_model.arrays import (
     refuse_more,
     shapes_of,
 )
-from ..wear_model.bundle import Bundle, load_parts, refuse_misfits, save_bundle
-from ..wear_model.estimate import ModelError
-from ..wear_model.novelty import Familiarity
+from ..wear_model.bundle import Bundle, ModelError, load_parts, refuse_misfits, save_bundle
 from .train import ClassModel
 from .votes import Votes
 
@@ -96,7 +95,7 @@ def load_class_model(path: str | Path) -> ClassModel:
     >>> import wearstate
     >>> wearstate.load_class_model("pump.wsm")  # doctest: +IGNORE_EXCEPTION_DETAIL
     Traceback (most recent call last):
-    wearstate.diagnose.wear_model.estimate.ModelError: pump.wsm is a wear model
+    wearstate.diagnose.wear_model.bundle.ModelError: pump.wsm is a wear model
     """
     model = load_parts(path, CLASS_MODEL, ClassCard, _Structure, _model_of)
     _check(model, path)

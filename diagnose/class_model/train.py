@@ -19,6 +19,7 @@ from ...datasets.file.attributes import Attributes
 from ...datasets.file.record import DataSet
 from ...datasets.split.rules import check_no_leak, group_folds
 from ...sim.output.recording import DataError, Recording, Table
+from ..familiarity.novelty import Familiarity, fit_familiarity
 from ..feature_rows.blows import NOISE_SCORE, blow_scores, blow_table
 from ..feature_rows.feature_choice import choice_card, choice_in
 from ..feature_rows.feature_table import (
@@ -34,8 +35,7 @@ from ..feature_rows.quality import layout_faults, sample_faults
 from ..learning.blends import Blend
 from ..learning.regressions import CANDIDATES, Folds, fit_blend
 from ..report.batch import Item, fault_of
-from ..wear_model.estimate import ModelError
-from ..wear_model.novelty import Familiarity, fit_familiarity
+from ..wear_model.bundle import ModelError
 from .votes import FEWEST, Votes, score_votes, set_of
 
 Float = NDArray[np.float64]

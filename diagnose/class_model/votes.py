@@ -231,8 +231,8 @@ def _recordings_right(votes: Votes, judged: NDArray[np.bool_]) -> tuple[int, int
     return int((means.argmax(axis=1) == truth).sum()), len(groups)
 
 
-def _exact_interval(right: int, of: int, level: float = 0.95) -> list[float]:
-    """Clopper-Pearson interval of a share.
+def _exact_interval(right: int, of: int) -> list[float]:
+    """Clopper-Pearson interval of a share, at 95 %.
 
     Examples
     --------
@@ -241,5 +241,5 @@ def _exact_interval(right: int, of: int, level: float = 0.95) -> list[float]:
     """
     from scipy.stats import binomtest
 
-    told = binomtest(right, of).proportion_ci(level)
+    told = binomtest(right, of).proportion_ci(0.95)
     return [float(told.low), float(told.high)]

@@ -39,8 +39,9 @@ from ..learning.scores import (
     share,
 )
 from ..learning.severity import Estimator
-from ..wear_model.estimate import Estimate, WearModel
+from ..wear_model.estimate import WearModel
 from ..wear_model.train import draw_identity
+from ..wear_model.verdict import Estimate
 from .baselines import Side, contest, side_of
 from .foreign_features import transformed_rows
 

@@ -2,13 +2,14 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ...datasets.file.record import DataSet
-from ...features.catalogue.analysis import STANDARD, Analysis, Settings
+from ...features.catalogue.analysis import STANDARD, Analysis
 from ...features.response.modal_model import Modes
 from ...features.response.transfer import FrfReference
 from ...sim.output.recording import Recording
@@ -16,7 +17,7 @@ from .feature_table import FeatureSelection, recording_analysis
 
 
 def transfer_reference(
-    recordings: Iterable[Recording], settings: Settings = STANDARD, *, modes: bool = False
+    recordings: Iterable[Recording], *, modes: bool = False
 ) -> FrfReference | None:
     """Mean transfer functions of healthy recordings of one machine.
 
@@ -25,7 +26,6 @@ def transfer_reference(
     recordings : iterable of Recording
         Tests of the same forces and responses; of impact tests those whose blocks are as long as
         the first one's are averaged.
-    settings : Settings
     modes : bool
         Whether to fit the modes of the mean, too.
 
@@ -34,7 +34,7 @@ def transfer_reference(
     FrfReference or None
         None where no recording is a test.
     """
-    tests = [recording_analysis(recording, settings) for recording in recordings]
+    tests = [recording_analysis(recording, STANDARD) for recording in recordings]
     known = [test for test in tests if test is not None]
     if not known:
         return None
@@ -126,7 +126,7 @@ class HealthyTransfer:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """What a worker process is sent: it makes the references that it needs itself."""
-        return _opened, (self.path, self.modes)
+        return partial(HealthyTransfer, path=self.path, modes=self.modes), ()
 
     def of(self, machine: str) -> FrfReference | None:
         """That of a machine; None where it has no healthy test."""
@@ -137,10 +137,6 @@ class HealthyTransfer:
                 tests = (data[int(index)] for index in usable)
                 self._found[machine] = transfer_reference(tests, modes=self.modes)
         return self._found[machine]
-
-
-def _opened(path: Path, modes: bool) -> HealthyTransfer:
-    return HealthyTransfer(path=path, modes=modes)
 
 
 def healthy_transfer(

@@ -454,11 +454,14 @@ def _choice(kind: fft.Kind, rows: int, n: int, dtype: str) -> dict[str, Any]:
     }
 
 
-def _least_time(function: Callable[[], Any], repeats: int = 15) -> float:
+_REPEATS = 15
+
+
+def _least_time(function: Callable[[], Any]) -> float:
     """Least duration of several calls [s]; the first, which may plan, is not counted."""
     function()
     least = float("inf")
-    for _ in range(repeats):
+    for _ in range(_REPEATS):
         start = time.perf_counter()
         function()
         least = min(least, time.perf_counter() - start)

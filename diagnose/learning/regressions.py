@@ -119,10 +119,6 @@ def _fit_boosting(rows: Float, _moved: Float, target: Float, seed: int) -> Part:
     return _forest(tables, offset=float(np.ravel(model._baseline_prediction)[0]), log=True)
 
 
-def _nets(rows: Float, moved: Float, target: Float, seed: int) -> Part:
-    return fit_nets(rows, moved, target, seed)
-
-
 @dataclass(frozen=True, kw_only=True)
 class _Tree:
     """Nodes of one tree, numbered from its root 0; of a leaf only the value counts."""
@@ -201,7 +197,7 @@ CANDIDATES: tuple[RegressionCandidate, ...] = (
     ),
     RegressionCandidate(name="trees", cost_ms=0.4, fit=_fit_trees),
     RegressionCandidate(name="boosting", cost_ms=0.4, fit=_fit_boosting, fewest=_FEWEST_BOOSTED),
-    RegressionCandidate(name="nets", cost_ms=0.4, fit=_nets, fewest=FEWEST_RECORDS),
+    RegressionCandidate(name="nets", cost_ms=0.4, fit=fit_nets, fewest=FEWEST_RECORDS),
 )
 """From fast to strong, lines of the logarithm first. The costs are tabulated, not timed at each
 training, so that the choice is the same on every computer: measured for one recording of 1,500

@@ -94,7 +94,7 @@ class Estimator:
         Returns
         -------
         dict
-            Fields of :class:`~.wear_model.estimate.Estimate`.
+            Fields of :class:`~.wear_model.verdict.Estimate`.
         """
         severity = float(self.severity.predict(inputs)[0])
         known = self.known(cautious=cautious)

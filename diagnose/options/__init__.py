@@ -1,6 +1,6 @@
 """What commands share: options, arguments, outputs, progress, help.
 
 It may import ``sim.output``, ``sim.parts``, ``sim.scene``, ``datasets.workers``,
-``datasets.readers``, ``datasets.recipe``, ``datasets.measured``, ``diagnose.pages``,
+``datasets.source``, ``datasets.recipe``, ``datasets.measured``, ``diagnose.pages``,
 ``diagnose.wear_model``.
 """

@@ -130,7 +130,7 @@ _SOURCE_OPTIONS = (
 
 def declared_source(given: Mapping[str, Any]) -> Any:
     """Options about a measured file, as the library takes them."""
-    from ...datasets.readers.open import SourceOptions
+    from ...datasets.source.part import SourceOptions
 
     column = given["time_column"]
     return SourceOptions(

@@ -164,16 +164,14 @@ def page_image(figure: Any, *, colours: int | None = None) -> PageImage:
     )
 
 
-def drawn_alone(
-    draw: Callable[[Any], None], *, width: float = PAGE_WIDTH, height: float = PAGE_HEIGHT
-) -> PageImage:
+def drawn_alone(draw: Callable[[Any], None], *, height: float = PAGE_HEIGHT) -> PageImage:
     """One pair of axes as a picture of a page.
 
     Parameters
     ----------
     draw : callable
         ``draw(axes)``
-    width, height : float
+    height : float
         [inch]
 
     Returns
@@ -182,7 +180,7 @@ def drawn_alone(
     """
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(width, height), layout="constrained")
+    figure = Figure(figsize=(PAGE_WIDTH, height), layout="constrained")
     draw(figure.add_subplot())
     return page_image(figure)
 

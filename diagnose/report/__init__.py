@@ -1,7 +1,7 @@
 """The verdict on recordings: advice, trend, text and page.
 
 It may import ``sim.output``, ``sim.scene``, ``sim.bearing``, ``sim.journal``, ``features.signal``,
-``datasets.file``, ``datasets.readers``, ``datasets.measured``, ``diagnose.pages``,
-``diagnose.pictures``, ``diagnose.learning``, ``diagnose.feature_rows``, ``diagnose.wear_model``,
-``diagnose.film_clearance``, ``diagnose.nameplate``, ``diagnose.twin``.
+``datasets.file``, ``datasets.source``, ``datasets.readers``, ``datasets.measured``,
+``diagnose.pages``, ``diagnose.pictures``, ``diagnose.learning``, ``diagnose.feature_rows``,
+``diagnose.wear_model``, ``diagnose.film_clearance``, ``diagnose.nameplate``, ``diagnose.twin``.
 """

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from ..learning.grades import ALARM_GRADE, WARNING_GRADE, grades_of
-from ..wear_model.estimate import Estimate
+from ..wear_model.verdict import Estimate
 from .trend import Outlook, span_words
 
 Action = Literal["none", "watch", "confirm", "plan", "stop", "check"]

@@ -18,7 +18,8 @@ from ...datasets.file.machines import GROUP_NAME
 from ...datasets.file.record import DataSet
 from ...datasets.file.views import CompletingView, JoinedSet
 from ...datasets.measured.recording import read_recording
-from ...datasets.readers.open import READERS, SourceOptions
+from ...datasets.readers.open import READERS
+from ...datasets.source.part import SourceOptions
 from ...sim.output.recording import DataError, Recording
 from ..feature_rows.feature_table import Progress, is_regime, regime_words
 from ..feature_rows.healthy import Baselines
@@ -28,7 +29,9 @@ from ..nameplate.cautions import known_beside
 from ..nameplate.nameplate import Nameplate
 from ..nameplate.sensors import as_told
 from ..pages.words import quantity_name
-from ..wear_model.estimate import Estimate, ModelError, WearModel
+from ..wear_model.bundle import ModelError
+from ..wear_model.estimate import WearModel
+from ..wear_model.verdict import Estimate
 from .advice import Advice, advise
 from .film import film_estimate, film_table, with_film
 from .trend import Growth, Outlook, Trend, date_in, fit_trend, hours_of, read_dates

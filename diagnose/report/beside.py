@@ -10,7 +10,7 @@ from typing import Any
 
 from ..film_clearance.clearance import FilmEstimate
 from ..twin.opinion import TwinOpinion
-from ..wear_model.estimate import Estimate
+from ..wear_model.verdict import Estimate
 
 SecondEstimate = FilmEstimate | TwinOpinion
 """Either has `severity`, `low` and `high`, None where it says nothing, and `coverage`."""

@@ -25,7 +25,7 @@ from ..film_clearance.clearance import (
 )
 from ..film_clearance.wear_down import SinkingRun, film_wear_down, possible_bores, sinking_places
 from ..nameplate.nameplate import Nameplate, told_conditions
-from ..wear_model.estimate import Estimate
+from ..wear_model.verdict import Estimate
 from .beside import length_words, with_second
 
 if TYPE_CHECKING:

@@ -18,7 +18,8 @@ from ..pages.points import PointBlock, point_block
 from ..pictures.view import View
 from ..pictures.zoom import ZoomBlock, zoom_block
 from ..pictures.zoom_curves import zoom_curves
-from ..wear_model.estimate import Estimate, WearModel
+from ..wear_model.estimate import WearModel
+from ..wear_model.verdict import Estimate
 from .advice import brief_words
 from .batch import Batch, BatchRow, machine_heading
 from .figures import (

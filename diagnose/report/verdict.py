@@ -23,7 +23,8 @@ from ..nameplate.sensors import as_told, taken_out_words
 from ..pages.words import quantity_name
 from ..pictures.view import View
 from ..twin.opinion import TwinOpinion
-from ..wear_model.estimate import Estimate, WearModel, input_faults, unseen_words
+from ..wear_model.estimate import WearModel, input_faults
+from ..wear_model.verdict import Estimate, unseen_words
 from .advice import advise, touched_grades
 from .beside import new_cautions, twin_table, with_twin
 from .film import film_estimate, film_table, with_film

@@ -7,7 +7,6 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ...features.response.frf import Estimator
 from ...sim.alignment.calibration import Calibration
 from ...sim.scene.scene import Scene
 from ...sim.scene.shaft import ShaftScene
@@ -15,7 +14,7 @@ from ...sim.shaft.at_rest import shaft_state
 from ...sim.shaft.forces import harmonic_forces, random_forces
 from ...sim.shaft.line_beam import shaft_beam
 from ...sim.shaft_response.places import Place
-from .peak_changes import PROMINENCE_DB, PeakChange, peak_changes
+from .peak_changes import PeakChange, peak_changes
 from .rig_setup import TEST_KINDS, HammerTest, RigError, ShakerTest, free_time
 from .rig_test import Plant, RigTest, named_place, needed_time, rotor_plant, run_test
 
@@ -153,11 +152,7 @@ def before_after(
     force: Place,
     turns: Mapping[str, float] | None = None,
     setup: HammerTest | ShakerTest | None = None,
-    direction: Literal["up", "side"] = "up",
     seed: int = 0,
-    estimator: Estimator = "h1",
-    confidence: float = 0.95,
-    prominence: float = PROMINENCE_DB,
 ) -> BeforeAfter:
     """Test a shaft before and after its bearings are moved, and follow the peaks.
 
@@ -172,16 +167,8 @@ def before_after(
         Bearing -> by how much its bore is turned [rad].
     setup : HammerTest or ShakerTest, optional
         A hammer test as it stands by default.
-    direction : str
-        Of the accelerometers, ``up`` or ``side``.
     seed : int
         Of both tests, which are independent of each other.
-    estimator : str
-        ``h1`` or ``h2``.
-    confidence : float
-        Of discs, intervals and, over all peaks together, verdicts [-].
-    prominence : float
-        Of a peak [dB].
 
     Returns
     -------
@@ -215,13 +202,9 @@ def before_after(
     seeds = np.random.SeedSequence(seed).generate_state(2)
     before, after = (
         run_test(
-            scene_plant(
-                state, lifts, force=force, sample_rate=test.sample_rate, direction=direction
-            ),
+            scene_plant(state, lifts, force=force, sample_rate=test.sample_rate),
             test,
             seed=int(own),
-            estimator=estimator,
-            confidence=confidence,
         )
         for state, lifts, own in (
             (scene, None, seeds[0]),
@@ -234,7 +217,7 @@ def before_after(
         force=force,
         before=before,
         after=after,
-        changes=peak_changes(before, after, prominence=prominence, confidence=confidence),
+        changes=peak_changes(before, after),
     )
 
 

@@ -25,6 +25,8 @@ _MOST_LINES = 200  # evenly taken, of the band
 _FLOOR = 0.01  # of a transfer function: leakage and calibration
 _FEWEST_HEARD = 0.05  # of the lines of the band: mere noise makes some of a hundredth of them
 _LOW_HZ = 5.0
+_HIGH_HZ = 400.0
+_HIGH_SHARE = 0.4  # of the sample rate
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -45,13 +47,7 @@ class LineTest:
     text: str
 
 
-def read_tests(
-    path: str | Path,
-    scene: ShaftScene,
-    *,
-    low: float = _LOW_HZ,
-    high: float | None = None,
-) -> tuple[LineTest, ...]:
+def read_tests(path: str | Path, scene: ShaftScene) -> tuple[LineTest, ...]:
     """Tests of one line from a data set or recording of this program.
 
     Parameters
@@ -60,10 +56,6 @@ def read_tests(
         Every record is a test of the same line; `import` makes such a file of measured ones.
     scene : ShaftScene
         Whose sensors and exciters name the channels that do not say where they are.
-    low : float
-        Lowest frequency that is used [Hz].
-    high : float, optional
-        Highest [Hz]; by default 0.4 of the sample rate, and no more than 400.
 
     Returns
     -------
@@ -83,27 +75,17 @@ def read_tests(
             f"{path}: machines = {len(machines)} must be 1, the line that is to be aligned; "
             "keep the records of one machine"
         )
-    return tuple(
-        test
-        for number in range(len(data))
-        for test in line_tests(data[number], scene, low=low, high=high)
-    )
+    return tuple(test for number in range(len(data)) for test in line_tests(data[number], scene))
 
 
-def line_tests(
-    recording: Recording,
-    scene: ShaftScene,
-    *,
-    low: float = _LOW_HZ,
-    high: float | None = None,
-) -> tuple[LineTest, ...]:
+def line_tests(recording: Recording, scene: ShaftScene) -> tuple[LineTest, ...]:
     """Transfer functions of a recording, from each of its forces to its accelerometers.
 
     Parameters
     ----------
     recording : Recording
         With force and acceleration channels; a tacho, or a speed in its manifest.
-    scene, low, high
+    scene
         As of :func:`read_tests`.
 
     Returns
@@ -123,10 +105,10 @@ def line_tests(
             "must be >= 1; record both, or name the force with import --force"
         )
     fs = recording.sample_rate
-    top = min(0.4 * fs, 400.0) if high is None else high
+    top = min(_HIGH_SHARE * fs, _HIGH_HZ)
     rows = [recording.signal[[recording.names.index(c.name) for c in kind]]
             for kind in (forces, seen)]  # fmt: skip
-    found = measured_transfer(rows[0], rows[1], fs, nperseg=_window(recording), band=(low, top))
+    found = measured_transfer(rows[0], rows[1], fs, nperseg=_window(recording), band=(_LOW_HZ, top))
     if found.decay or np.isnan(found.coherence).any():
         raise DataError(
             f"{recording.source}: blows = 1 must be >= 2 for a coherence, by which a test is "

@@ -330,7 +330,6 @@ def rank_tests(
     *,
     prior: Prior | None = None,
     setup: HammerTest | ShakerTest | None = None,
-    speed: float | None = None,
     places: Sequence[Place] | None = None,
     responses: Sequence[Place] | None = None,
     jacks: Sequence[str] = (),
@@ -348,8 +347,6 @@ def rank_tests(
         The one with which it was estimated.
     setup : HammerTest or ShakerTest, optional
         With the most force that there is; by default a shaker of a fiftieth of the shaft's weight.
-    speed : float, optional
-        Of the shaft [rad/s]; by default the scene's.
     places : sequence of place, optional
         Where to push; by default :func:`candidate_places`.
     responses : sequence of place, optional
@@ -387,7 +384,7 @@ def rank_tests(
     now, values = _state_of_knowledge(scene, known, own)
     ranked = []
     if pushed and seen:
-        turning = math.tau * scene.drive.speed if speed is None else speed
+        turning = math.tau * scene.drive.speed
         test = setup or ShakerTest(force=_usual_force(scene))
         ranked += _pushes(scene, own, now, values, test, turning, pushed, seen)
     ranked += [_jacked(scene, own, now, values, name, condition) for name in jacks]

@@ -1,6 +1,5 @@
 """Picture of a test before and after: transfer functions, peaks that moved."""
 
-import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -20,7 +19,6 @@ def rig_figure(
     result: BeforeAfter,
     *,
     channels: Sequence[str] | None = None,
-    columns: int | None = None,
     title: bool = True,
 ) -> Any:
     """Accelerance at the bearings before and after, with confidence, model and coherence.
@@ -30,8 +28,6 @@ def rig_figure(
     result : BeforeAfter
     channels : sequence of str, optional
         Those to draw; all by default.
-    columns : int, optional
-        Channels beside each other; all by default.
     title : bool
         Above them; a page says the same.
 
@@ -52,28 +48,20 @@ def rig_figure(
     if unknown:
         known = ", ".join(result.before.channels)
         raise RigError(f"channels = {', '.join(unknown)} must be of {known}")
-    across = min(columns or len(names), len(names))
-    down = math.ceil(len(names) / across)
-    figure = Figure(figsize=(1 + 3.6 * across, 5.6 * down), layout="constrained")
+    figure = Figure(figsize=(1 + 3.6 * len(names), 5.6), layout="constrained")
     if title:
         name = short_name(result.scene, 60)
         figure.suptitle(f"{name}: accelerance before and after the moves (simulated test)")
     panels = figure.subplots(
-        2 * down, across, sharex=True, sharey="row", height_ratios=[3, 1] * down, squeeze=False
+        2, len(names), sharex=True, sharey="row", height_ratios=[3, 1], squeeze=False
     )
     highest = max(float(level_db(t.model).max()) for t in (result.before, result.after))
-    for place in range(down * across):
-        row, column = divmod(place, across)
-        pair = panels[2 * row : 2 * row + 2, column]
-        if place < len(names):
-            _draw_channel(pair, result, names[place])
-        else:
-            for axes in pair:
-                axes.set_axis_off()
-    for level, coherence in zip(panels[::2, 0], panels[1::2, 0], strict=True):
-        level.set_ylim(highest - _SHOWN_DB, highest + _SHOWN_DB / 10)
-        level.set_ylabel("accelerance [dB re 1 (m/s²)/N]")
-        coherence.set_ylabel("coherence")
+    for name, pair in zip(names, panels.T, strict=True):
+        _draw_channel(pair, result, name)
+    level, coherence = panels[:, 0]
+    level.set_ylim(highest - _SHOWN_DB, highest + _SHOWN_DB / 10)
+    level.set_ylabel("accelerance [dB re 1 (m/s²)/N]")
+    coherence.set_ylabel("coherence")
     panels[0, -1].legend(fontsize=8, loc="lower right")
     return figure
 

@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
-from scipy.special import chdtrc, chdtri, ndtr, ndtri
+from scipy.special import chdtrc, chdtri, ndtri
 
 from ...sim.scene.shaft import ShaftScene
 from .sag_model import (
@@ -115,10 +115,6 @@ class SagPosterior:
         off = self.mean - np.asarray(sags)
         distance = float(off @ np.linalg.solve(self.covariance, off))
         return distance <= float(chdtri(off.size, 1 - confidence))
-
-    def exceeds(self, sag: float) -> Vector:
-        """Probability that each bearing has sagged by more than this [m] [shape=(k,)]."""
-        return np.asarray(ndtr((self.mean - sag) / self.deviation))
 
 
 def estimate_sags(

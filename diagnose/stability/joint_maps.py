@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...sim.contact.closed_forms import kelvin_voigt_restitution
-from ...sim.journal.orbit import OrbitStatus
+from ...sim.journal.orbit_status import OrbitStatus
 from ...sim.mechanism.layout import JOINT_COMPLIANT
 from ...sim.output.recording import Recording
 from ...sim.output.status import Status

@@ -413,29 +413,26 @@ def coarse_first(shape: tuple[int, int]) -> Iterator[tuple[int, int]]:
         stride //= 2
 
 
-def edge(
-    codes: NDArray[np.int64], x: Sequence[float], bad: tuple[Verdict, ...] = (Verdict.UNSTABLE,)
-) -> NDArray[np.float64]:
-    """Where each row turns bad, between the last good cell and the first bad one.
+def edge(codes: NDArray[np.int64], x: Sequence[float]) -> NDArray[np.float64]:
+    """Where each row turns unstable, between the last stable cell and the first unstable one.
 
     Parameters
     ----------
     codes : numpy.ndarray [shape=(n_y, n_x)]
     x : sequence of float
         Of the columns, > 0.
-    bad : tuple of Verdict
 
     Returns
     -------
     numpy.ndarray [shape=(n_y,)]
-        Geometric mean of the two; NaN where a row is all good or all bad.
+        Geometric mean of the two; NaN where a row is all stable or all unstable.
 
     Examples
     --------
     >>> edge(np.array([[1, 1, 3], [1, 1, 1]]), [1.0, 4.0, 9.0])
     array([ 6., nan])
     """
-    hit = np.isin(codes, bad)
+    hit = codes == Verdict.UNSTABLE
     first = np.argmax(hit, axis=1)
     known = hit.any(axis=1) & (first > 0)
     values = np.asarray(x, float)

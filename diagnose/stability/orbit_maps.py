@@ -9,7 +9,10 @@ from scipy.optimize import brentq
 
 from ...sim.bearing.equilibrium import BearingError, equilibrium
 from ...sim.bearing.whirl import whirl
-from ...sim.journal.orbit import OrbitFilm, OrbitRun, OrbitStatus, film_force, load, run_orbit
+from ...sim.journal.load import load
+from ...sim.journal.orbit import OrbitRun, run_orbit
+from ...sim.journal.orbit_film import OrbitFilm, film_force
+from ...sim.journal.orbit_status import OrbitStatus
 from ...sim.journal.recording import film_geometry, journal_film, journal_scale
 from ...sim.journal.validity import JOURNAL_STEP
 from ...sim.scene.journal import JournalScene
@@ -413,7 +416,6 @@ def whirls(
     integrator: str = "adaptive",
     step: float = 0.02,
     tolerance: float = 1e-7,
-    watch: float = _WATCH,
 ) -> tuple[bool | None, str]:
     """Whether a small displacement from the equilibrium grows.
 
@@ -426,8 +428,6 @@ def whirls(
         Of the orbit.
     step, tolerance : float
         Of the integrator.
-    watch : float
-        How long the motion is followed [rad].
 
     Returns
     -------
@@ -448,7 +448,7 @@ def whirls(
     run = run_orbit(
         film,
         load(alpha=scale.alpha, static=(weight / scale.force, 0.0)),
-        duration=watch,
+        duration=_WATCH,
         start=(float(place[0]), float(place[1])),
         integrator=integrator,
         step=step,

@@ -2,7 +2,7 @@
 
 No recording is computed with them: they are measured beside the machines' own methods
 (:mod:`.mechanism.crank_step` cuts its Runge-Kutta steps where a contact changes,
-:mod:`.journal.orbit` has RODAS), and show where the methods of the source papers fail.
+:mod:`.journal.orbit_step` has RODAS), and show where the methods of the source papers fail.
 
 A stepper takes arrays of one shape, so that a whole plane of steps and stiffnesses advances at
 once. The limits are those of the damped oscillator ``x'' + 2 zeta omega x' + omega^2 x = 0``.

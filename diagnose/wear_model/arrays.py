@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from ..familiarity.bandwidth import tops_in
+from ..familiarity.noise_floor import floors_in, noise_levels_in
+from ..familiarity.novelty import Familiarity
+from ..familiarity.quietness import peak_channels
 from ..feature_rows.model_card import Strict
 from ..learning.blends import Blend, Forest, Linear, Part
 from ..learning.nets import Nets
-from .bandwidth import tops_in
-from .noise_floor import floors_in, noise_levels_in
-from .novelty import Familiarity
-from .quietness import peak_channels
 
 _LARGEST_NUMBER = 1e60  # of an array: products of a few are still finite
 _LEAST_SPREAD = 1e-60

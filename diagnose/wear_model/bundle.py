@@ -24,7 +24,6 @@ from ...features.catalogue.analysis import STANDARD
 from ...features.catalogue.row import catalogue
 from ...sim.atomic import replacing
 from ...sim.output.recording import DataError, missing_file
-from .estimate import ModelError
 
 BUNDLE_SCHEMA = 7
 
@@ -35,6 +34,10 @@ _BOUNDS = dict.fromkeys((_SEAL, _CARD, _STRUCTURE), _LARGEST_TABLE) | {_ARRAYS: 
 _MOST_ARRAYS = 10_000
 _LONGEST_HEADER = 1024  # byte, of an array: numpy's own have 118
 _FEATURES = 2  # to be raised when a feature is computed in another way
+
+
+class ModelError(ValueError):
+    """A model file cannot be used; names what is wrong and what helps."""
 
 
 @dataclass(frozen=True, kw_only=True)

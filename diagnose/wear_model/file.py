@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from ..familiarity.novelty import Familiarity
 from ..feature_rows.model_card import ModelCard, Portion, Strict
 from ..feature_rows.physical import level_channels, physical_rows, shape_rows
 from ..feature_rows.quality import Levels
@@ -33,9 +34,8 @@ from .arrays import (
     shapes_of,
     spreads_fit,
 )
-from .bundle import Bundle, checked, load_parts, refuse_misfits, save_bundle
-from .estimate import ModelError, WearModel
-from .novelty import Familiarity
+from .bundle import Bundle, ModelError, checked, load_parts, refuse_misfits, save_bundle
+from .estimate import WearModel
 
 _KIND = "wear model"
 

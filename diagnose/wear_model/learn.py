@@ -9,6 +9,9 @@ from numpy.typing import NDArray
 
 from ...datasets.split.rules import group_folds
 from ...sim.output.recording import DataError
+from ..familiarity.noise_floor import usual_excess
+from ..familiarity.novelty import REACH, Familiarity, fit_familiarity, outside_weight
+from ..familiarity.quietness import CAUTIONED_SHARE, REFUSED_SHARE, most_lacking
 from ..feature_rows.feature_choice import Selection
 from ..feature_rows.feature_table import is_regime
 from ..feature_rows.model_card import StrangerRates
@@ -36,9 +39,6 @@ from ..learning.regressions import (
     fit_line,
 )
 from ..learning.severity import Estimator
-from .noise_floor import usual_excess
-from .novelty import REACH, Familiarity, fit_familiarity, outside_weight
-from .quietness import CAUTIONED_SHARE, REFUSED_SHARE, most_lacking
 from .strangers import fit_strangers
 from .training_rows import FOLDS, TrainingRows
 

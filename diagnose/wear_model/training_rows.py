@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..familiarity.novelty import REACH
 from ..feature_rows.healthy import referenced_rows
 from ..feature_rows.physical import moved_rows
-from .novelty import REACH
 
 Float = NDArray[np.float64]
 

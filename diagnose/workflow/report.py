@@ -22,8 +22,9 @@ from ..report.page import report_html
 from ..report.text import report_text
 from ..report.verdict import known_machine, report_table
 from ..twin.opinion import TwinOpinion, second_opinion
-from ..wear_model.estimate import Estimate, WearModel
+from ..wear_model.estimate import WearModel
 from ..wear_model.file import load_model
+from ..wear_model.verdict import Estimate
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)

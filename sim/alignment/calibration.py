@@ -7,12 +7,12 @@ lift, in all conditions at once; the line is then solved anew with the moves.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from enum import IntEnum
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..brief import brief
+from ..output.status import Ending
 from .alignment import AS_SET, AlignmentLine, Check, Condition, LineState, check, reactions
 from .calibration_blocks import blocks_of, with_seats
 from .move_programme import STILL_MOVE, Block, MoveSolution, even_moves, least_moves, nearest_moves
@@ -30,36 +30,22 @@ _JUST = 5e-3  # of a limit: nearer is on it
 _HALVINGS = 6  # of a margin that cannot be kept: to 1/64 of it
 
 
-class CalibrationStatus(IntEnum):
+class CalibrationStatus(Ending):
     """How a calibration ended. Everything but WITHIN and DONE carries a cure."""
 
-    WITHIN = 0
-    DONE = 1
-    INFEASIBLE = 2
-    UNRESOLVED = 3
+    WITHIN = 0, "every limit is met; nothing moves"
+    DONE = 1, "the moves bring every reaction, pressure and slope within its limits"
+    INFEASIBLE = 2, "no moves within their bounds bring every limit; widen one of what blocks"
+    UNRESOLVED = (
+        3,
+        "the search did not settle; give close support points a finite stiffness, fewer points, "
+        "or more seconds",
+    )
 
     @property
     def ok(self) -> bool:
         """True where every limit is met after the moves."""
         return self in (CalibrationStatus.WITHIN, CalibrationStatus.DONE)
-
-    @property
-    def text(self) -> str:
-        """One sentence with the cure."""
-        return _CALIBRATION_TEXT[self]
-
-
-_CALIBRATION_TEXT = {
-    CalibrationStatus.WITHIN: "every limit is met; nothing moves",
-    CalibrationStatus.DONE: "the moves bring every reaction, pressure and slope within its limits",
-    CalibrationStatus.INFEASIBLE: (
-        "no moves within their bounds bring every limit; widen one of what blocks"
-    ),
-    CalibrationStatus.UNRESOLVED: (
-        "the search did not settle; give close support points a finite stiffness, fewer points, "
-        "or more seconds"
-    ),
-}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

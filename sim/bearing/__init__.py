@@ -1,4 +1,4 @@
 """A journal bearing on its film: equilibrium, coefficients, whirl threshold, heat; in SI.
 
-It may import ``sim.film``, ``sim.brief``.
+It may import ``sim.brief``, ``sim.output``, ``sim.film``.
 """

@@ -7,7 +7,6 @@ force is of ``eta omega R^3 L / C^2``, so that the Sommerfeld number is ``S = 1 
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from enum import IntEnum
 from functools import partial
 from typing import NamedTuple
 
@@ -28,6 +27,7 @@ from ..film.solve import (
     starved_film,
 )
 from ..film.starved import starved_force
+from ..output.status import Ending
 from .short_bearing import MOST_ITERATIONS, short_attitude, short_eccentricity
 
 Vector = NDArray[np.float64]
@@ -43,45 +43,30 @@ _OPPOSED = 0.8  # cosine: within 37 degrees of the load
 _NEAREST = 0.9  # of the way to contact in one plain step
 
 
-class BearingStatus(IntEnum):
+class BearingStatus(Ending):
     """How the search for an equilibrium ended. Everything but OK carries a cure."""
 
-    OK = 0
-    OVERLOAD = 1
-    NO_CONVERGENCE = 2
-    NO_ROOM = 3
-    COARSE = 4
-
-    @property
-    def ok(self) -> bool:
-        """True where the equilibrium can be used."""
-        return self is BearingStatus.OK
-
-    @property
-    def text(self) -> str:
-        """One sentence with the cure."""
-        return _STATUS_TEXT[self]
-
-
-_STATUS_TEXT = {
-    BearingStatus.OK: "done",
-    BearingStatus.OVERLOAD: (
+    OK = 0, "done"
+    OVERLOAD = (
+        1,
         "the film cannot carry this load with a gap that the mesh resolves; lower the load or the "
-        "tilt, or raise the viscosity, the speed or the length"
-    ),
-    BearingStatus.NO_CONVERGENCE: (
+        "tilt, or raise the viscosity, the speed or the length",
+    )
+    NO_CONVERGENCE = (
+        2,
         "no equilibrium was found; lower a groove's feed pressure that outweighs the load, choose "
-        "condition = 'periodic', refine n_theta and n_z, or give a start closer to it"
-    ),
-    BearingStatus.NO_ROOM: (
+        "condition = 'periodic', refine n_theta and n_z, or give a start closer to it",
+    )
+    NO_ROOM = (
+        3,
         "the tilted journal touches the bore in every position; lower the tilt below 2 C from end "
-        "to end"
-    ),
-    BearingStatus.COARSE: (
+        "to end",
+    )
+    COARSE = (
+        4,
         "the film at the equilibrium is too thin for the mesh, and the position with it; raise "
-        "n_theta, or lower the load"
-    ),
-}
+        "n_theta, or lower the load",
+    )
 
 
 class BearingError(RuntimeError):

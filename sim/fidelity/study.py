@@ -15,7 +15,6 @@ from typing import Any
 from ..scene.rungs import STEP_LEVELS, Rung, level_name, with_values
 from ..scene.scene import Scene
 from .choose import (
-    added_differences,
     affordable_starts,
     checked_accuracy,
     combinations,
@@ -25,7 +24,6 @@ from .choose import (
     first_cured,
     free_effects,
     largest_sum,
-    leaves_room,
     reference_cost,
     refusals,
     refuse_bad_reference,
@@ -34,6 +32,7 @@ from .comparison import Comparison, names
 from .convergence import convergence_of
 from .differences import FIRST, Candidate, starts_to_tell, surely_within
 from .findings import Answer, Convergence, Raise, Study, unconverged
+from .front import SPARED, by_cost, cheapest_numerics, single_changes, undominated
 from .ladder import cost_of
 from .pilot import OutOfTimeError, Pilot
 from .runs import Quantities
@@ -42,8 +41,6 @@ from .written import ladder, value_at, written_rung
 _CAPS = (4, 16)  # starts of the first rounds; the last takes as many as the accuracy wants
 
 _LEVELS_SHOWN = 3
-
-_SPARED = 1.5  # a predicted error up to this factor behind the front is run: sums are guesses
 
 _SHORTLIST = 2  # predicted combinations that are measured before the search goes on
 
@@ -377,88 +374,15 @@ class Search:
         """What is on the front beside the answers."""
         self.tell("the rest of the front")
         widest = self._widest
-        widest.judge(self._lowered(widest))
-        kept, self._pruned = self._undominated(widest)
-        for rungs in self._by_cost(widest, kept):
+        widest.judge(cheapest_numerics(widest, self.numerical))
+        kept, self._pruned = undominated(widest, self.numerical)
+        for rungs in by_cost(widest, self.numerical, kept):
             widest.judge(rungs)
 
     @property
     def _widest(self) -> Comparison:
         """The comparison of widest choice that can be run."""
         return self.kept if self.best is None or self.fault else self.best
-
-    def _lowered(self, comparison: Comparison) -> dict[str, Rung]:
-        """The best rungs with the cheapest numerics that use up no more than half the accuracy."""
-        found = dict(comparison.top)
-        for name in self.numerical & set(comparison.rungs):
-            for rung in comparison.rungs[name]:
-                known = comparison.known({**comparison.top, name: rung})
-                if known is not None and leaves_room(known, self.accuracy):
-                    found[name] = rung
-                    break
-        return found
-
-    def _base(self, comparison: Comparison) -> dict[str, Rung]:
-        """What rungs of physics are tried in by themselves: the best rungs, cheaply run."""
-        lowered = self._lowered(comparison)
-        known = comparison.known(lowered)
-        told = known is not None and leaves_room(known, self.accuracy)
-        return lowered if told else dict(comparison.top)
-
-    def _single(self, comparison: Comparison, name: str, rung: Rung) -> dict[str, Rung]:
-        base = comparison.top if name in self.numerical else self._base(comparison)
-        return {**base, name: rung}
-
-    def _singles(self, comparison: Comparison) -> list[dict[str, Rung]]:
-        """The best rungs with each rung of one effect in turn."""
-        each = comparison.rungs.items()
-        return [self._single(comparison, name, rung) for name, rungs in each for rung in rungs]
-
-    def _undominated(self, comparison: Comparison) -> tuple[dict[str, list[Rung]], list[str]]:
-        """Rungs of each effect that no cheaper one is as good as, by their errors alone; others."""
-        kept: dict[str, list[Rung]] = {}
-        pruned = []
-        for name, rungs in comparison.rungs.items():
-            kept[name] = [comparison.top[name]]
-            ahead = [(r, comparison.judge(self._single(comparison, name, r))) for r in rungs[:-1]]
-            ahead.reverse()
-            for i, (rung, single) in enumerate(ahead):
-                cheaper = [other for _, other in ahead[i + 1 :] if other.cost <= single.cost]
-                best = min((other.error for other in cheaper), default=math.inf)
-                if single.verdict == "invalid":
-                    continue  # its reason stands among what is not valid
-                if best <= single.error:
-                    pruned.append(f"{name} = {rung.name}: a cheaper one errs no more")
-                else:
-                    kept[name].append(rung)
-        return kept, pruned
-
-    def _by_cost(
-        self, comparison: Comparison, kept: Mapping[str, list[Rung]]
-    ) -> list[dict[str, Rung]]:
-        """Combinations, cheapest first; those that errors alone put behind others left out."""
-        before = {
-            name: comparison.judge(self._single(comparison, name, comparison.top[name]))
-            for name in kept
-        }
-        rows: list[tuple[float, float, int, dict[str, Rung]]] = []
-        for combination in product(*kept.values()):
-            rungs = dict(zip(kept, combination, strict=True))
-            alone = [
-                added_differences(
-                    comparison.judge(self._single(comparison, name, rung)), before[name]
-                )
-                for name, rung in rungs.items()
-                if rung is not comparison.top[name]
-            ]
-            cost = cost_of(with_values(self.scene, comparison.values(rungs)))
-            rows.append((cost, largest_sum(alone), len(rows), rungs))
-        front, least = [], math.inf
-        for _, error, _, rungs in sorted(rows, key=lambda row: row[:3]):
-            if error < least * _SPARED:
-                front.append(rungs)
-                least = min(least, error)
-        return front
 
     def _convergences(self, comparison: Comparison) -> Iterator[Convergence]:
         """Of every numerical effect with three levels or more; rungs between two are left out."""
@@ -476,7 +400,7 @@ class Search:
         """Combinations told, or measured at all, and all that are known to be of interest."""
         told, known = 0, 0
         for each in self._all():
-            singles = self._singles(each) if id(each) not in self._done else []
+            singles = single_changes(each, self.numerical) if id(each) not in self._done else []
             if each not in self.raises.values():
                 singles.append(self.written)
             wanted = {names(rungs): each.known(rungs) for rungs in singles}
@@ -514,10 +438,12 @@ class Search:
 
     def _front_left(self, comparison: Comparison) -> float:
         """Time that combinations for the rest of the front take by the tables [s], once known."""
-        if any(comparison.known(rungs) is None for rungs in self._singles(comparison)):
+        if any(
+            comparison.known(rungs) is None for rungs in single_changes(comparison, self.numerical)
+        ):
             return 0.0
         cap, comparison.cap = comparison.cap, 0.0  # nothing is run
-        ahead = self._by_cost(comparison, self._undominated(comparison)[0])
+        ahead = by_cost(comparison, self.numerical, undominated(comparison, self.numerical)[0])
         comparison.cap = cap
         usual = median_high(c.starts for c in comparison.judged())
         return sum(
@@ -527,7 +453,11 @@ class Search:
         )
 
     def _remaining(self, comparison: Comparison) -> float:
-        singles = [r for r in self._singles(comparison) if names(r) != names(comparison.top)]
+        singles = [
+            r
+            for r in single_changes(comparison, self.numerical)
+            if names(r) != names(comparison.top)
+        ]
         found = {names(rungs): (rungs, comparison.known(rungs)) for rungs in singles}
         open_ = [(r, c) for r, c in found.values() if c is None or not comparison.told(c)]
         done = max((c.starts for c in comparison.judged()), default=0)
@@ -654,5 +584,5 @@ def _best_bet(judged: Sequence[Candidate], reference: Candidate) -> Candidate | 
     """Of what is cheaper and not surely off, the cheapest that is sure of little error."""
     open_ = [c for c in judged if c.verdict == "doubtful" and c.cost < reference.cost]
     least = min(map(surely_within, open_), default=math.inf)
-    most = min(_SPARED * least, _NO_BOUND)  # bounds of few starts scatter themselves
+    most = min(SPARED * least, _NO_BOUND)  # bounds of few starts scatter themselves
     return min((c for c in open_ if surely_within(c) <= most), key=lambda c: c.cost, default=None)

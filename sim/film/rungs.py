@@ -21,8 +21,7 @@ class FilmRung:
     nanoseconds : float
         One call on the mesh of 72 by 17, near a previous one, for ranking [ns].
     field : callable
-        ``(geometry, state, start=None) -> FilmSolution``; `start` is a solution nearby. Of a table
-        the film that it is made from.
+        ``(geometry, state) -> FilmSolution``; of a table the film that it is made from.
     scene : bool
         A scene may choose it.
     bearing : bool

@@ -400,9 +400,7 @@ def film_gap(geometry: FilmGeometry, state: FilmState) -> Array:
 # --- rungs
 
 
-def solve_short(
-    geometry: FilmGeometry, state: FilmState, start: FilmSolution | None = None
-) -> FilmSolution:
+def solve_short(geometry: FilmGeometry, state: FilmState) -> FilmSolution:
     """Short film (Ocvirk): no pressure flow along the circumference, Guembel's condition.
 
     Parameters
@@ -411,8 +409,6 @@ def solve_short(
         Plain bore without grooves.
     state : FilmState
         Aligned.
-    start : FilmSolution, optional
-        Not needed by a closed form.
 
     Returns
     -------
@@ -430,7 +426,6 @@ def solve_short(
     >>> solve_short(geometry, FilmState(x=0.5, y=0.0)).force.round(5)
     array([-0.01778,  0.02418])
     """
-    del start
     _require("short", geometry, state, plain=True)
     least = 1.0 - math.hypot(state.x, state.y)
     if least <= 0:
@@ -453,9 +448,7 @@ def solve_short(
     )
 
 
-def solve_long(
-    geometry: FilmGeometry, state: FilmState, start: FilmSolution | None = None
-) -> FilmSolution:
+def solve_long(geometry: FilmGeometry, state: FilmState) -> FilmSolution:
     """Long film (Sommerfeld): no flow to the ends.
 
     Guembel's condition fixes the pressure by p = 0 at the widest gap. A film that is squeezed
@@ -467,8 +460,6 @@ def solve_long(
         Its ``n_z`` does not matter.
     state : FilmState
         Aligned.
-    start : FilmSolution, optional
-        Not needed.
 
     Returns
     -------
@@ -487,13 +478,10 @@ def solve_long(
     >>> round(1 / (math.pi * math.hypot(*force)), 4)  # Sommerfeld number
     0.0389
     """
-    del start
     return _solve_line(geometry, state, long=True)
 
 
-def solve_finite(
-    geometry: FilmGeometry, state: FilmState, start: FilmSolution | None = None
-) -> FilmSolution:
+def solve_finite(geometry: FilmGeometry, state: FilmState) -> FilmSolution:
     """Film of finite length with a parabola along it: one dimension to solve.
 
     Parameters
@@ -502,8 +490,6 @@ def solve_finite(
         Grooves are taken as long as the bearing.
     state : FilmState
         Aligned.
-    start : FilmSolution, optional
-        Not needed.
 
     Returns
     -------
@@ -525,7 +511,6 @@ def solve_finite(
     >>> solve_finite(geometry, FilmState(x=0.6, y=0.0)).force.round(2)
     array([-0.66,  0.74])
     """
-    del start
     return _solve_line(geometry, state, long=False)
 
 

@@ -23,7 +23,8 @@ from numpy.typing import NDArray
 from ..brief import brief
 from ..film.mass_conserving import EndPressure, MassStep, mass_step, oil_in_gap
 from ..film.solve import FilmGeometry, FilmSolution, FilmState
-from .orbit import Load, OrbitStatus, load_at
+from .load import Load, load_at
+from .orbit_status import OrbitStatus
 
 _SETTLED = 1e-7  # of the gap that is left: what the place at the end of a step may be off by
 _MOST_TRIALS = 40  # films of one step
@@ -134,7 +135,7 @@ def mass_orbit(
     --------
     A journal under a steady load comes to rest where the steady film carries it:
 
-    >>> from wearstate.sim.journal.orbit import load
+    >>> from wearstate.sim.journal.load import load
     >>> bearing = FilmGeometry(length_to_diameter=0.5, n_theta=40, n_z=9, condition="reynolds")
     >>> run = mass_orbit(bearing, load(alpha=10.0, static=(5.0, 0.0)), duration=40.0, step=0.2)
     >>> run.status.text, run.position[-1].round(2).tolist(), round(run.filled[-1].item(), 2)

@@ -21,24 +21,11 @@ from ..scene.journal import JournalLoad, JournalScene
 from ..scene.recorded import failed, recorded
 from ..scene.sampling import duration_faults, memory_faults, tacho_faults
 from ..scene.scene import Scene, SceneError
-from .orbit import (
-    FilmTrace,
-    Load,
-    OrbitFilm,
-    OrbitRun,
-    OrbitStatus,
-    Wall,
-    film_trace,
-    half_sine_history,
-    load,
-    load_at,
-    map_film,
-    rectangular_history,
-    run_orbit,
-    short_film,
-    solved_film,
-    step_history,
-)
+from .load import Load, half_sine_history, load, load_at, rectangular_history, step_history
+from .orbit import FilmTrace, OrbitRun, film_trace, run_orbit
+from .orbit_film import OrbitFilm, map_film, short_film, solved_film
+from .orbit_march import Wall
+from .orbit_status import OrbitStatus
 from .validity import JOURNAL_STEP, orbit_faults
 
 Float = NDArray[np.float64]
@@ -570,7 +557,8 @@ def squeeze_rate(film: OrbitFilm, run: OrbitRun) -> float:
 
     Examples
     --------
-    >>> from wearstate.sim.journal.orbit import load, run_orbit
+    >>> from wearstate.sim.journal.load import load
+    >>> from wearstate.sim.journal.orbit import run_orbit
     >>> film = short_film(0.5)
     >>> run = run_orbit(film, load(alpha=1.0), duration=0.1)
     >>> bool(abs(squeeze_rate(film, run) / (4 * 0.5**2 * math.pi / 2) - 1) < 0.1)

@@ -34,7 +34,7 @@ import numpy as np
 
 from ..contact.asperities import asperity_force
 from ..contact.law import elastic_force, friction_force
-from ..film.impedance_map import MapTable, map_resistance
+from ..film.map_look_up import MapTable, map_resistance
 from ..film.short import filled_angle, short_resistance
 from ..jit import kernel
 

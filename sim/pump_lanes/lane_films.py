@@ -4,7 +4,7 @@ import math
 from typing import Any
 
 from ..contact.asperities import SEPARATION
-from ..film.impedance_map import RADIAL, TANGENTIAL, MapPlace, map_patches, map_place, map_tensor
+from ..film.map_look_up import RADIAL, TANGENTIAL, MapPlace, map_patches, map_place, map_tensor
 from ..film.short import short_resistance
 from ..jit import kernel, subroutine
 from ..mechanism.oiled_joint import (

@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..film.impedance_map import MapPlace
+from ..film.map_look_up import MapPlace
 from ..hydraulics.valves import ValveSide
 from ..jit import kernel
 from ..mechanism.layout import CONTACTS, PUSHES, Machine

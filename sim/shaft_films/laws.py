@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from ..film.direct import DIRECT_OK, direct_tilted_force
 from ..film.direct_system import STATUS, DirectFilm
-from ..film.impedance_map import ImpedanceMap, impedance_map, map_force
+from ..film.impedance_map import ImpedanceMap, impedance_map
+from ..film.map_look_up import map_force
 from ..film.rungs import FILM_RUNGS
 from ..film.slopes import Coefficients, perturbation
 from ..film.solve import FilmGeometry, FilmSolution, FilmState, FilmStatus, direct_film

@@ -1,52 +1,37 @@
 """How the search for the balance of shaft and films ended, with the cure."""
 
-from enum import IntEnum
+from ..output.status import Ending
 
 
-class ShaftFilmStatus(IntEnum):
+class ShaftFilmStatus(Ending):
     """How the search for the balance ended. Everything but OK carries a cure."""
 
-    OK = 0
-    OVERLOAD = 1
-    EDGE_CONTACT = 2
-    NO_ROOM = 3
-    NO_CONVERGENCE = 4
-    COARSE = 5
-
-    @property
-    def ok(self) -> bool:
-        """True where the balance can be used."""
-        return self is ShaftFilmStatus.OK
-
-    @property
-    def text(self) -> str:
-        """One sentence with the cure."""
-        return _STATUS_TEXT[self]
-
-
-_STATUS_TEXT = {
-    ShaftFilmStatus.OK: "done",
-    ShaftFilmStatus.OVERLOAD: (
+    OK = 0, "done"
+    OVERLOAD = (
+        1,
         "the film cannot carry the bearing's load with a gap that the mesh resolves; lower the "
-        "bearing, or raise the viscosity, the speed or the length"
-    ),
-    ShaftFilmStatus.EDGE_CONTACT: (
+        "bearing, or raise the viscosity, the speed or the length",
+    )
+    EDGE_CONTACT = (
+        2,
         "the journal touches the edge of the bore; bring the slope of the bore nearer to that of "
-        "the shaft, lower the bearing, or raise the viscosity or the speed"
-    ),
-    ShaftFilmStatus.NO_ROOM: (
+        "the shaft, lower the bearing, or raise the viscosity or the speed",
+    )
+    NO_ROOM = (
+        3,
         "the shaft bends so far that the journal touches both ends of the bore; bring the slope of "
-        "the bore nearer to that of the shaft, or raise the clearance"
-    ),
-    ShaftFilmStatus.NO_CONVERGENCE: (
+        "the bore nearer to that of the shaft, or raise the clearance",
+    )
+    NO_CONVERGENCE = (
+        4,
         "beam and films found no balance; give a start closer to it, refine the "
-        "mesh, or lower a groove's feed pressure that outweighs the load"
-    ),
-    ShaftFilmStatus.COARSE: (
+        "mesh, or lower a groove's feed pressure that outweighs the load",
+    )
+    COARSE = (
+        5,
         "the film is too thin for the mesh, and the answer with it; raise n_theta or the number of "
-        "refinements, or lower the load"
-    ),
-}
+        "refinements, or lower the load",
+    )
 
 
 class ShaftFilmError(RuntimeError):

@@ -19,8 +19,9 @@ import numpy as np
 from wearstate.datasets.recipe.load import load_recipe
 from wearstate.datasets.recipe.recipe import Recipe
 from wearstate.datasets.recipe.records import Sample, sample_records
-from wearstate.diagnose.wear_model.estimate import Estimate, WearModel
+from wearstate.diagnose.wear_model.estimate import WearModel
 from wearstate.diagnose.wear_model.file import load_model
+from wearstate.diagnose.wear_model.verdict import Estimate
 from wearstate.features.rotation.order import pulse_times, shaft_phase
 from wearstate.sim.machine.simulate import simulate_many
 from wearstate.sim.output.recording import Recording

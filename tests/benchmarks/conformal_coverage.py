@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from wearstate.datasets.file.record import DataSet
 from wearstate.datasets.split.rules import group_split
+from wearstate.diagnose.familiarity.novelty import novelty_p_value
 from wearstate.diagnose.feature_rows.feature_table import feature_table
 from wearstate.diagnose.learning.conformal import (
     grade_limits,
@@ -23,7 +24,6 @@ from wearstate.diagnose.learning.conformal import (
 )
 from wearstate.diagnose.learning.grades import grades_of
 from wearstate.diagnose.wear_model.learn import learn
-from wearstate.diagnose.wear_model.novelty import novelty_p_value
 from wearstate.diagnose.wear_model.training_rows import TrainingRows
 
 

@@ -31,9 +31,10 @@ from wearstate.diagnose.evaluation.evaluate import judge_rows, judged_rows
 from wearstate.diagnose.feature_rows.feature_choice import choice_in
 from wearstate.diagnose.feature_rows.healthy import Baselines, references
 from wearstate.diagnose.learning.scores import Judged, ScoreFigure, resampled, share
-from wearstate.diagnose.wear_model.estimate import Estimate, WearModel
+from wearstate.diagnose.wear_model.estimate import WearModel
 from wearstate.diagnose.wear_model.file import load_model, save_model
 from wearstate.diagnose.wear_model.train import train_model
+from wearstate.diagnose.wear_model.verdict import Estimate
 
 PROGRAMS = {
     "bilge-pump": {

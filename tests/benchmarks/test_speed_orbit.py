@@ -17,7 +17,9 @@ from wearstate.sim.film.impedance_map import impedance_map
 from wearstate.sim.film.over_relaxed import PAPER_RELAXATION, relaxed_force
 from wearstate.sim.film.solve import FilmGeometry, direct_film
 from wearstate.sim.jit import kernel
-from wearstate.sim.journal.orbit import load, map_film, run_orbit, solved_film, step_history
+from wearstate.sim.journal.load import load, step_history
+from wearstate.sim.journal.orbit import run_orbit
+from wearstate.sim.journal.orbit_film import map_film, solved_film
 
 ALPHA, WEIGHT, JUMP = 0.83537, 0.3972, 16 * math.pi
 STEP, STEPS, TOLERANCE = 0.02, 7000, 1e-5

@@ -1,0 +1,96 @@
+"""Combinations of rungs worth running besides the answer: those that errors alone do not rule out.
+
+`numerical` names the effects of which a finer rung only costs: steps, tolerances and meshes.
+"""
+
+import math
+from collections.abc import Mapping, Set
+from itertools import product
+
+from ..scene.rungs import Rung, with_values
+from .choose import added_differences, largest_sum, leaves_room
+from .comparison import Comparison
+from .ladder import cost_of
+
+SPARED = 1.5  # a predicted error up to this factor behind the front is run: sums are guesses
+
+
+def cheapest_numerics(comparison: Comparison, numerical: Set[str]) -> dict[str, Rung]:
+    """The best rungs with the cheapest numerics that use up no more than half the accuracy."""
+    found = dict(comparison.top)
+    for name in numerical & set(comparison.rungs):
+        for rung in comparison.rungs[name]:
+            known = comparison.known({**comparison.top, name: rung})
+            if known is not None and leaves_room(known, comparison.accuracy):
+                found[name] = rung
+                break
+    return found
+
+
+def single_changes(comparison: Comparison, numerical: Set[str]) -> list[dict[str, Rung]]:
+    """The best rungs with each rung of one effect in turn."""
+    each = comparison.rungs.items()
+    return [_single(comparison, numerical, name, rung) for name, rungs in each for rung in rungs]
+
+
+def _single(comparison: Comparison, numerical: Set[str], name: str, rung: Rung) -> dict[str, Rung]:
+    base = comparison.top if name in numerical else _base(comparison, numerical)
+    return {**base, name: rung}
+
+
+def _base(comparison: Comparison, numerical: Set[str]) -> dict[str, Rung]:
+    """What rungs of physics are tried in by themselves: the best rungs, cheaply run."""
+    lowered = cheapest_numerics(comparison, numerical)
+    known = comparison.known(lowered)
+    told = known is not None and leaves_room(known, comparison.accuracy)
+    return lowered if told else dict(comparison.top)
+
+
+def undominated(
+    comparison: Comparison, numerical: Set[str]
+) -> tuple[dict[str, list[Rung]], list[str]]:
+    """Rungs of each effect that no cheaper one is as good as, by their errors alone; others."""
+    kept: dict[str, list[Rung]] = {}
+    pruned = []
+    for name, rungs in comparison.rungs.items():
+        kept[name] = [comparison.top[name]]
+        ahead = [(r, comparison.judge(_single(comparison, numerical, name, r))) for r in rungs[:-1]]
+        ahead.reverse()
+        for i, (rung, single) in enumerate(ahead):
+            cheaper = [other for _, other in ahead[i + 1 :] if other.cost <= single.cost]
+            best = min((other.error for other in cheaper), default=math.inf)
+            if single.verdict == "invalid":
+                continue  # its reason stands among what is not valid
+            if best <= single.error:
+                pruned.append(f"{name} = {rung.name}: a cheaper one errs no more")
+            else:
+                kept[name].append(rung)
+    return kept, pruned
+
+
+def by_cost(
+    comparison: Comparison, numerical: Set[str], kept: Mapping[str, list[Rung]]
+) -> list[dict[str, Rung]]:
+    """Combinations, cheapest first; those that errors alone put behind others left out."""
+    before = {
+        name: comparison.judge(_single(comparison, numerical, name, comparison.top[name]))
+        for name in kept
+    }
+    rows: list[tuple[float, float, int, dict[str, Rung]]] = []
+    for combination in product(*kept.values()):
+        rungs = dict(zip(kept, combination, strict=True))
+        alone = [
+            added_differences(
+                comparison.judge(_single(comparison, numerical, name, rung)), before[name]
+            )
+            for name, rung in rungs.items()
+            if rung is not comparison.top[name]
+        ]
+        cost = cost_of(with_values(comparison.pilot.scene, comparison.values(rungs)))
+        rows.append((cost, largest_sum(alone), len(rows), rungs))
+    front, least = [], math.inf
+    for _, error, _, rungs in sorted(rows, key=lambda row: row[:3]):
+        if error < least * SPARED:
+            front.append(rungs)
+            least = min(least, error)
+    return front
