@@ -476,9 +476,22 @@ def _refuse_size(
     free = shutil.disk_usage(folder).free
     if needed > free:
         raise DataError(
-            f"{folder}: {free / 1e9:.1f} GB are free, must be >= {needed / 1e9:.1f} GB; ask for "
+            f"{folder}: {size_words(free)} are free, must be >= {size_words(needed)}; ask for "
             "fewer records or choose another disk"
         )
+
+
+def size_words(count: int) -> str:
+    """Bytes for people.
+
+    Examples
+    --------
+    >>> size_words(1_474_560), size_words(23 * 10**9)
+    ('1.47 MB', '23 GB')
+    """
+    units = (("GB", 1e9), ("MB", 1e6), ("kB", 1e3))
+    unit, scale = next((each for each in units if count >= each[1]), units[-1])
+    return f"{count / scale:.3g} {unit}"
 
 
 def _create(

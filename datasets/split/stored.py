@@ -20,7 +20,7 @@ from ..draws.draws import Range
 from ..file.attributes import Attributes
 from ..file.lock import holding
 from ..file.record import DataSet
-from ..file.writer import fill_split, lay_out_split
+from ..file.writer import fill_split, lay_out_split, size_words
 from ..recipe.load import recorded_recipe
 from ..recipe.recipe import Recipe
 from ..recipe.records import Sample, sample_records
@@ -567,7 +567,7 @@ def _store(place: Path, splits: Sequence[Split], n_records: int, force: bool) ->
     size, free = place.stat().st_size, shutil.disk_usage(place.parent).free
     if size > free:
         raise DataError(
-            f"{place.parent}: {free / 1e9:.1f} GB are free, must be >= {size / 1e9:.1f} GB for a "
+            f"{place.parent}: {size_words(free)} are free, must be >= {size_words(size)} for a "
             "copy; make room"
         )
     with replacing(place, force=True) as fresh:

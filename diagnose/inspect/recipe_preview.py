@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...datasets.draws.draws import Draw, Range, matches
+from ...datasets.file.writer import size_words
 from ...datasets.generation.work import NUMERICS
 from ...datasets.recipe.recipe import Recipe
 from ...datasets.recipe.records import Sample, sample_records
@@ -218,7 +219,7 @@ def preview_text(table: Mapping[str, Any]) -> str:
     seconds = table["estimated_time_s"]
     lines = [
         f"{table['recipe']}: {table['description']}",
-        f"  {machines}, {table['signal_s']:.6g} s of signal, {_size(table['size_bytes'])}",
+        f"  {machines}, {table['signal_s']:.6g} s of signal, {size_words(table['size_bytes'])}",
         f"  scene {table['scene']}: {', '.join(table['channels'])} at "
         f"{table['sample_rate_hz']:g} Hz, {table['duration_s']:g} s each",
         f"  rungs ({_fidelity(table['fidelity'])}): "
@@ -250,11 +251,6 @@ def _not_in_it(fidelity: str) -> str:
 
 def _fidelity(word: str) -> str:
     return "as written" if word == "given" else "chosen when generated; here as written"
-
-
-def _size(count: int) -> str:
-    unit, scale = ("GB", 1e9) if count >= 1e9 else ("MB", 1e6)
-    return f"{count / scale:.3g} {unit}"
 
 
 def _time(seconds: float) -> str:
