@@ -9,7 +9,6 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import product
-from statistics import median_high
 from typing import Any
 
 from ..scene.rungs import STEP_LEVELS, Rung, level_name, with_values
@@ -30,12 +29,13 @@ from .choose import (
 )
 from .comparison import Comparison, names
 from .convergence import convergence_of
-from .differences import FIRST, Candidate, starts_to_tell, surely_within
+from .differences import FIRST, Candidate, surely_within
 from .findings import Answer, Convergence, Raise, Study, unconverged
 from .front import SPARED, by_cost, cheapest_numerics, single_changes, undominated
 from .ladder import cost_of
 from .pilot import OutOfTimeError, Pilot
 from .runs import Quantities
+from .time_left import seconds_of_doubts, seconds_of_front
 from .written import ladder, value_at, written_rung
 
 _CAPS = (4, 16)  # starts of the first rounds; the last takes as many as the accuracy wants
@@ -43,8 +43,6 @@ _CAPS = (4, 16)  # starts of the first rounds; the last takes as many as the acc
 _LEVELS_SHOWN = 3
 
 _SHORTLIST = 2  # predicted combinations that are measured before the search goes on
-
-_FEWEST = 2  # starts of a comparison
 
 _NO_BOUND = 1.0  # an error that may be as large as the quantity itself is none known
 
@@ -417,8 +415,11 @@ class Search:
         """
         widest = self._widest
         open_ = [each for each in self._all() if each is widest or id(each) not in self._done]
-        known = sum(self._remaining(each) + self._confirmation_left(each) for each in open_)
-        return known + self._front_left(widest)
+        known = sum(
+            seconds_of_doubts(each, self.numerical) + self._confirmation_left(each)
+            for each in open_
+        )
+        return known + seconds_of_front(widest, self.numerical)
 
     def _unconfirmed(self, comparison: Comparison) -> bool:
         """Whether what would be chosen is known of cut recordings alone."""
@@ -435,45 +436,6 @@ class Search:
         runs, starts = self.pilot.uncut(), max(FIRST, found.starts >> self._more_starts())
         both = (found.values, comparison.values(comparison.top))
         return sum(runs.tabulated(values, 0, starts) for values in both)
-
-    def _front_left(self, comparison: Comparison) -> float:
-        """Time that combinations for the rest of the front take by the tables [s], once known."""
-        if any(
-            comparison.known(rungs) is None for rungs in single_changes(comparison, self.numerical)
-        ):
-            return 0.0
-        cap, comparison.cap = comparison.cap, 0.0  # nothing is run
-        ahead = by_cost(comparison, self.numerical, undominated(comparison, self.numerical)[0])
-        comparison.cap = cap
-        usual = median_high(c.starts for c in comparison.judged())
-        return sum(
-            self.pilot.tabulated(comparison.values(rungs), 0, usual)
-            for rungs in ahead
-            if comparison.known(rungs) is None
-        )
-
-    def _remaining(self, comparison: Comparison) -> float:
-        singles = [
-            r
-            for r in single_changes(comparison, self.numerical)
-            if names(r) != names(comparison.top)
-        ]
-        found = {names(rungs): (rungs, comparison.known(rungs)) for rungs in singles}
-        open_ = [(r, c) for r, c in found.values() if c is None or not comparison.told(c)]
-        done = max((c.starts for c in comparison.judged()), default=0)
-        needed = [self._needed(c, comparison.starts) for _, c in open_ if c is not None]
-        most, total = max([done, _FEWEST, *needed]), 0.0
-        for rungs, known in open_:  # of what has not run at all, as many as of the rest
-            first = 0 if known is None else known.starts
-            last = most if known is None else self._needed(known, comparison.starts)
-            total += self.pilot.tabulated(comparison.values(rungs), first, last)
-        top = comparison.values(comparison.top)
-        return total + self.pilot.tabulated(top, done, most) if open_ else 0.0
-
-    def _needed(self, candidate: Candidate, most: int) -> int:
-        """Starts that a doubt takes, which are doubled; twice as many at the least."""
-        needed = max(starts_to_tell(candidate, self.accuracy), 2 * candidate.starts)
-        return max(min(most, needed), candidate.starts)
 
     def found(self) -> Study:
         """What has been measured so far; nothing is run."""
