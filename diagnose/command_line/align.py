@@ -7,7 +7,7 @@ from typing import Any
 import click
 
 from ..options.help import command
-from ..options.names import SCENE
+from ..options.names import scene_argument
 from ..options.outputs import (
     PAGE_SUFFIXES,
     PICTURE_SUFFIXES,
@@ -23,6 +23,7 @@ from ..options.shared import (
     json_option,
     scene_of,
     seed_option,
+    set_option,
 )
 
 _ALIGN_FAIL_ON_HELP = (
@@ -31,8 +32,8 @@ _ALIGN_FAIL_ON_HELP = (
 
 
 @command()
-@click.argument("scene_name", metavar="SCENE", type=SCENE)
-@click.option("--set", "pairs", multiple=True, metavar="PATH=VALUE", help="Replace a scene value.")
+@scene_argument
+@set_option
 @click.option(
     "--condition",
     type=click.Choice(["cold", "hot", "running", "all"]),

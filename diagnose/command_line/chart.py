@@ -7,7 +7,7 @@ from typing import Any
 import click
 
 from ..options.help import command
-from ..options.names import SCENE, built_in
+from ..options.names import built_in, scene_argument
 from ..options.outputs import (
     CHART_SUFFIXES,
     DATA_SUFFIXES,
@@ -30,14 +30,15 @@ from ..options.shared import (
     points_option,
     scene_of,
     seed_option,
+    set_option,
     tell_bare,
     worker_count,
 )
 
 
 @command()
-@click.argument("scene_name", metavar="SCENE", type=SCENE)
-@click.option("--set", "pairs", multiple=True, metavar="PATH=VALUE", help="Replace a scene value.")
+@scene_argument
+@set_option
 @click.option("--map", "map_name", help="Draw one map only; default: all maps of the machine.")
 @click.option("--size", type=click.IntRange(3, 60), help="Cells along each axis.")
 @click.option(
@@ -84,7 +85,7 @@ def stability(
 
 @command()
 @click.argument("subject", metavar="SCENE|DATA|RECIPE")
-@click.option("--set", "pairs", multiple=True, metavar="PATH=VALUE", help="Replace a scene value.")
+@set_option
 @click.option(
     "--accuracy",
     type=Accuracy(1e-6, 0.5),

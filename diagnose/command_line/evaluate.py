@@ -21,6 +21,7 @@ from ..options.shared import (
     json_option,
     overrides_of,
     seed_option,
+    set_option,
     worker_count,
 )
 
@@ -46,7 +47,7 @@ from ..options.shared import (
     multiple=True,
     help="With --across-fidelity: compare the rungs of this effect only.",
 )
-@click.option("--set", "pairs", multiple=True, metavar="PATH=VALUE", help="Replace a scene value.")
+@set_option
 @click.option(
     "--folder",
     type=PathType(path_type=Path, file_okay=False),

@@ -7,7 +7,7 @@ from typing import Any
 import click
 
 from ..options.help import HelpfulGroup, command
-from ..options.names import SCENE
+from ..options.names import SCENE, scene_argument
 from ..options.outputs import (
     DATA_SUFFIXES,
     PICTURE_SUFFIXES,
@@ -23,6 +23,7 @@ from ..options.shared import (
     json_option,
     scene_of,
     seed_option,
+    set_option,
 )
 from ..pages.plain_json import json_text
 
@@ -57,7 +58,7 @@ def scene_show(name: str) -> None:
 
 @scene.command("check")
 @click.argument("file", metavar="SCENE", type=SCENE)
-@click.option("--set", "pairs", multiple=True, metavar="PATH=VALUE", help="Replace a scene value.")
+@set_option
 @click.option(
     "--deep",
     is_flag=True,
@@ -160,8 +161,8 @@ def scene_new(machine: str, output: Path, force: bool) -> None:
 
 
 @command()
-@click.argument("scene_name", metavar="SCENE", type=SCENE)
-@click.option("--set", "pairs", multiple=True, metavar="PATH=VALUE", help="Replace a scene value.")
+@scene_argument
+@set_option
 @click.option("-o", "--output", type=PATH, help="Recording to write (.h5).")
 @click.option("--plot", type=PATH, help="Picture to write (.png, .svg or .pdf).")
 @click.option("--truth", is_flag=True, help="Also store forces and orbit.")
@@ -223,8 +224,8 @@ def simulate(
 
 
 @command()
-@click.argument("scene_name", metavar="SCENE", type=SCENE)
-@click.option("--set", "pairs", multiple=True, metavar="PATH=VALUE", help="Replace a scene value.")
+@scene_argument
+@set_option
 @click.option("--low", type=float, help="Lowest frequency [Hz]; default: --high / 300.")
 @click.option(
     "--high", type=float, help="Highest frequency [Hz]; default: 0.45 of the sample rate."

@@ -6,7 +6,7 @@ from pathlib import Path
 import click
 
 from ..options.help import command
-from ..options.names import SCENE
+from ..options.names import scene_argument
 from ..options.outputs import (
     CHART_SUFFIXES,
     check_interactive,
@@ -24,6 +24,7 @@ from ..options.shared import (
     overrides_of,
     points_option,
     seed_option,
+    set_option,
     tell_bare,
     worker_count,
 )
@@ -32,7 +33,7 @@ _SUFFIXES = (*CHART_SUFFIXES, ".htm")
 
 
 @command()
-@click.argument("scene_name", metavar="SCENE", type=SCENE)
+@scene_argument
 @click.option(
     "--over",
     multiple=True,
@@ -41,7 +42,7 @@ _SUFFIXES = (*CHART_SUFFIXES, ".htm")
     help="Values, as A..B, A..B/N or A,B,C with a unit at the end; repeatable. The last is the "
     "change to detect.",
 )
-@click.option("--set", "pairs", multiple=True, metavar="PATH=VALUE", help="Replace a scene value.")
+@set_option
 @click.option(
     "--show",
     multiple=True,

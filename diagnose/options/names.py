@@ -92,6 +92,8 @@ class RecipeName(_Name):
 
 SCENE, RECIPE = SceneName(), RecipeName()
 
+scene_argument = click.argument("scene_name", metavar="SCENE", type=SCENE)
+
 
 class _Kind(PathType):
     """A path to files of one kind; those of another, and built-in names, are refused by name."""

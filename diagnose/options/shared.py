@@ -72,6 +72,10 @@ points_option = click.option(
     help="Make the page (.html) zoomable; tap a point for its settings.",
 )
 
+set_option = click.option(
+    "--set", "pairs", multiple=True, metavar="PATH=VALUE", help="Replace a scene value."
+)
+
 force_option = click.option("--force", is_flag=True, help="Replace an existing output.")
 
 jobs_option = click.option(
