@@ -23,7 +23,6 @@ from wearstate.datasets.generation.generate import generate
 from wearstate.datasets.recipe.load import load_recipe
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.options.help import FIRST_CONTACT
-from wearstate.diagnose.twin import inversion
 from wearstate.sim.scene.load import minimal_text, scene_text
 
 from .conftest import made_once
@@ -320,7 +319,6 @@ def supplied(page, words, request):
 @pytest.mark.parametrize("name", SHOWING)
 def test_the_commands_of_a_page_run(name, tmp_path, monkeypatch, request):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(inversion, "FEWEST", 40)  # machines of a calibration, whatever its budget
     for words in command_lines(PAGES[name]):
         if shlex.join(words) in SLOW:
             continue
