@@ -12,7 +12,12 @@ from wearstate.datasets.generation.generate import save_solution
 from wearstate.datasets.recipe.load import load_recipe
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.feature_rows.healthy import Baseline
-from wearstate.diagnose.feature_rows.model_card import ModelCard, TrainedCondition, TrainedOn
+from wearstate.diagnose.feature_rows.model_card import (
+    ModelCard,
+    StrangerRates,
+    TrainedCondition,
+    TrainedOn,
+)
 from wearstate.diagnose.feature_rows.probe_means import probe_means
 from wearstate.diagnose.film_clearance.clearance import (
     SCARS,
@@ -501,6 +506,12 @@ def test_what_misleads_without_a_warning_is_said_unless_the_recipe_draws_it():
     eye, play = said("bilge-pump", "bilge-pump-standard", crankpin)
     assert "along the rod" in eye
     assert "main bearings" in play
+    loose = StrangerRates(
+        name="bilge-pump-loose", records=500, detection_rate=1.0, false_alarm_rate=0.0
+    )
+    shown = card_of("bilge-pump", "bilge-pump-standard")
+    shown = shown.model_copy(update={"severity": crankpin, "strangers": [loose]})
+    assert unseen_texts(shown) == [eye]  # it refuses play in the main bearings
     assert said("bilge-pump", "of one's own", crankpin) == []  # nobody knows what it draws
     assert said("bilge-pump", "bilge-pump-standard", "stretch_lost_feet_m") == []
     line = ("propulsion-shaft", "propulsion-shaft-{}", "wear_down_aft_m")

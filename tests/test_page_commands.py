@@ -233,9 +233,13 @@ def lines_tested(view):
     return make
 
 
-def oiled(path, request):
-    """Short records of pins in oil, 20 starved and 20 flooded: the fewest that can be refused."""
-    generate(load_recipe("bilge-pump-lubricated", {"duration": "1 s"}), 40, path, seed=17)
+def strange(recipe, records):
+    """Short records of what a model must refuse: of a kind 20 are the fewest."""
+
+    def make(path, request):
+        generate(load_recipe(recipe, {"duration": "1 s"}), records, path, seed=17)
+
+    return make
 
 
 SHAKEN = recorded("shaft-rig", exciters__0__force="20 N", duration="20 s", sample_rate="1.024 kHz")
@@ -263,7 +267,8 @@ STAND_INS = {
     "other.h5": fixture("few_set"),
     "pump.wsm": fixture("small_model"),
     "bearing.wsm": fixture("bearing_model"),
-    "oil.h5": oiled,
+    "oil.h5": strange("bilge-pump-lubricated", 40),  # 20 starved, 20 flooded
+    "loose.h5": strange("bilge-pump-loose", 20),
     "pump.toml": scene("bilge-pump"),
     "bearing.toml": scene("journal-bearing"),
     "line.toml": scene("shaft-rig"),

@@ -70,12 +70,15 @@ class Unseen:
     severity : str
         Of the models that it misleads: what its name begins with.
     text : str
-        What they do, and what a person can check instead.
+        What it does, and what a person can check instead.
+    shown : str
+        Recipe of such machines: a model that was shown them refuses them.
     """
 
     path: str
     severity: str
     text: str
+    shown: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -74,7 +74,7 @@ def _gap_cautions(
 
 
 def unseen_texts(card: ModelCard) -> list[str]:
-    """What would mislead a model without a warning, of what its built-in recipe does not draw.
+    """What would mislead a model without a warning: not drawn by its built-in recipe, nor shown.
 
     Empty of other recipes: nobody knows what they draw.
     """
@@ -82,10 +82,13 @@ def unseen_texts(card: ModelCard) -> list[str]:
     if trained.recipe not in recipe_names() or trained.scene not in scene_names():
         return []
     drawn = _drawn_by(trained.recipe)
+    shown = {kind.name for kind in card.strangers}
     return [
         each.text
         for each in presentation_of(load_scene(trained.scene)).unseen
-        if each.path not in drawn and card.severity.startswith(each.severity)
+        if each.path not in drawn
+        and each.shown not in shown
+        and card.severity.startswith(each.severity)
     ]
 
 
