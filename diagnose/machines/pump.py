@@ -223,8 +223,8 @@ _UNSEEN = (  # measured: docs/decisions/029-oval-eye.md and 031-loose-main-beari
     Unseen(
         path="crank.bearing.diametral_clearance",
         severity="diametral_clearance_crankpin",
-        text="a crank that moves in its main bearings, with play or in oil, misleads the estimate by "
-        "a fifth to two thirds of the limit; lift it against a dial gauge, or show the model "
+        text="a crank that moves in its main bearings, with play or in oil, misleads the estimate "
+        "by a fifth to two thirds of the limit; lift it against a dial gauge, or show the model "
         "records of bilge-pump-loose to refuse (train --refuse)",
         shown="bilge-pump-loose",
     ),
