@@ -18,6 +18,7 @@ from wearstate.diagnose.feature_rows.quality import (
     sample_faults,
     suspicions,
 )
+from wearstate.diagnose.wear_model.cautions import condition_cautions
 from wearstate.diagnose.wear_model.file import load_model
 from wearstate.sim.output.recording import Recording
 from wearstate.sim.output.sensor import Channel, mains_hum
@@ -269,9 +270,8 @@ def test_a_level_outside_the_trained_range_has_its_unit(model, familiar):
     units = {each.name: each.unit for each in model.card.conditions}
     assert (units["acc_x.rms"], units["shaft.speed_hz"]) == ("m/s^2", "Hz")
     row = np.zeros(len(model.names))
-    assert any(
-        "acc_x.rms = 0 m/s^2 is outside" in text for text in model._condition_cautions(row, {})
-    )
+    told = condition_cautions(model.card, row, {})
+    assert any("acc_x.rms = 0 m/s^2 is outside" in text for text in told)
 
 
 def test_a_header_that_does_not_fit_is_named_whole(model, familiar):

@@ -22,7 +22,7 @@ from .layout import (
     WRISTPIN,
     pose_of,
 )
-from .main_bearing import journal_margin, with_play
+from .main_bearing import is_journal, journal_margin, with_play
 from .throw_motion import corner_margin, crank_offset, pin_touch, worn_eye, wrist_offset
 
 _MOST_CUTS = 8  # contact changes within one step and throw before the rest is taken as it is
@@ -31,7 +31,7 @@ _MOST_CUTS = 8  # contact changes within one step and throw before the rest is t
 @kernel
 def contact_margin(k: int, j: int, w: Any, row: int, t: Any) -> Any:
     """Margin of one contact alone, for the search of its change; after all throws the journal's."""
-    if k == t.throws.shape[0]:
+    if is_journal(k, t):
         return journal_margin(w, row, t)
     q, p, omega = t.throws[k], pose_of(w.stage[row, k]), w.crank[row, SPEED]
     touching, impact = w.held[k].touching[j] != 0, w.held[k].impact[j]
@@ -76,7 +76,7 @@ def _interpolate(k: int, w: Any, i: int, h: float, s: float, t: Any) -> None:
         at, start, end = w.journal[2, n], w.journal[i, n], w.journal[z, n]
         for c in range(4):
             at.y[c] = _hermite(start.y[c], start.rate[c], end.y[c], end.rate[c], h, s)
-    if k == t.throws.shape[0]:
+    if is_journal(k, t):
         return
     here, before, after = w.stage[2, k], w.stage[i, k], w.stage[z, k]
     for c in range(PER_THROW):
@@ -86,8 +86,7 @@ def _interpolate(k: int, w: Any, i: int, h: float, s: float, t: Any) -> None:
 @kernel
 def _margin_of(k: int, j: int, w: Any, row: int, t: Any) -> float:
     """Margin of a contact as the derivative of a row has left it [N]."""
-    journal = k == t.throws.shape[0]
-    margin: float = w.journal[row, 0].margin if journal else w.stage[row, k].margin[j]
+    margin: float = w.journal[row, 0].margin if is_journal(k, t) else w.stage[row, k].margin[j]
     return margin
 
 
@@ -215,7 +214,7 @@ def _stages(w: Any, i: int, h: float, passed: float, whole: float, fresh: bool, 
 @kernel
 def _flip(k: int, j: int, w: Any, i: int, t: Any) -> int:
     """Open or close one contact; 1 where it closed more slowly than its law's floor."""
-    if k == t.throws.shape[0]:
+    if is_journal(k, t):
         return _flip_journal(w, i, t)
     held = w.held[k]
     held.touching[j] = 1 - held.touching[j]
@@ -249,7 +248,7 @@ def _change(throw: int, contact: int, w: Any, i: int, t: Any, tally: Any) -> Non
                 tally.counts[CHANGES] += 1
                 tally.counts[FLOORED] += _flip(k, j, w, i, t)
     for n in range(w.journal.shape[1]):
-        if throw == t.throws.shape[0] or w.journal[i, n].margin < 0.0:
+        if is_journal(throw, t) or w.journal[i, n].margin < 0.0:
             tally.counts[CHANGES] += 1
             tally.counts[FLOORED] += _flip(t.throws.shape[0], 0, w, i, t)
 
@@ -270,12 +269,15 @@ def _record_forces(w: Any, i: int, weight: float, forces: Any, step: int, tally:
             )
         tally.peak[0] = max(tally.peak[0], max(a.normal, max(b.normal, c.normal)))
     for n in range(w.journal.shape[1]):
-        a_, b_, c_, d_ = w.journal[i, n], w.journal[2, n], w.journal[3, n], w.journal[4, n]
+        first, second = w.journal[i, n], w.journal[2, n]
+        third, fourth = w.journal[3, n], w.journal[4, n]
         f = 1 + len(FORCES) * w.stage.shape[1]
         for way in range(2):
-            middle = b_.force[way] + c_.force[way]
-            forces[step, f + way] += weight * mean_of_stages(a_.force[way], middle, d_.force[way])
-        tally.peak[0] = max(tally.peak[0], max(a_.normal, max(b_.normal, c_.normal)))
+            middle = second.force[way] + third.force[way]
+            mean = mean_of_stages(first.force[way], middle, fourth.force[way])
+            forces[step, f + way] += weight * mean
+        highest = max(first.normal, max(second.normal, third.normal))
+        tally.peak[0] = max(tally.peak[0], highest)
 
 
 @kernel

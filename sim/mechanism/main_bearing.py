@@ -21,6 +21,13 @@ from .throw_motion import dry_pin, pin_touch
 
 
 @kernel
+def is_journal(k: int, t: Any) -> bool:
+    """Whether a place of contact is that of the crank's journal: it is counted after all throws."""
+    found: bool = k == t.throws.shape[0]
+    return found
+
+
+@kernel
 def with_play(offset: Any, w: Any, row: int, t: Any) -> Any:
     """Offset of a crank pin, see :func:`.throw_motion.crank_offset`, where the journal has play."""
     if t.bearing.shape[0] == 0:

@@ -108,7 +108,7 @@ def prepared_lanes(starts, release, step, n_steps):
     jobs = []
     for start in starts:
         told, bodies = tables_and_bodies(start, release, step)
-        begin = Start(start[0], start[1], bodies, np.zeros((1, 6)))
+        begin = Start(start[0], start[1], bodies, np.zeros((1, 6)), np.zeros(6))
         films = start_films(told, bodies, start[0], np.zeros(6))
         jobs.append(
             LaneJob(
