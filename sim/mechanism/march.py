@@ -322,9 +322,8 @@ def integrate(
     weight = (t.machine.gravity_x, t.machine.gravity_y)
     breathing = begin(w, t, chamber)
     i, fresh = 0, False
-    if (
-        r.gaps.shape[0] > 1 or r.bore_gaps.shape[0] > 1
-    ):  # the films of the start are those of its derivative
+    # the films of the start are those of its derivative
+    if r.gaps.shape[0] > 1 or r.bore_gaps.shape[0] > 1:
         derivative_of_record(w, i, 0.0, t)
     lines = shared.lines
     _keep(w, i, chamber, lines.states, r, 0)
