@@ -20,6 +20,7 @@ NUMERICS = {
     "rung_wristpin": "S16",
     "rung_guide": "S16",
     "rung_mainbearing": "S16",
+    "rung_rod": "S16",
     "rung_pressure": "S16",
     "rung_drive": "S16",
     "rung_casing": "S16",

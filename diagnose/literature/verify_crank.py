@@ -15,6 +15,7 @@ from ...sim.mechanism.layout import (
     GUIDE,
     JOINT_COMPLIANT,
     MAIN_BEARING,
+    ROD_MODES,
     THROW,
     Machine,
     Tables,
@@ -86,6 +87,7 @@ def one_throw(numbers: dict[str, float], contacts: dict[int, np.void], **machine
         bearing=np.zeros(0, MAIN_BEARING),
         bore=np.zeros(0, CONTACT),
         bore_oil=np.zeros(0, OIL),
+        flex=np.zeros(0, ROD_MODES),
         machine=shared,
     )
 

@@ -150,6 +150,7 @@ _MAIN_BEARING = {  # both together; crank and flywheel
     "crank.bearing.damping": "60 kN s/m",
     "crank.bearing.friction": 0.02,
 }
+_SECTION = {"rod.section_area": "8 cm^2", "rod.section_radius": "8 mm"}  # a bar of 28 mm
 
 _SHIFTS = (
     set_to(
@@ -203,6 +204,7 @@ _SHIFTS = (
         beside=_MAIN_BEARING,
         adds=True,
     ),
+    set_to("rod.rung", ("elastic",), "steel stretches and bends", beside=_SECTION, adds=True),
     factor("casing.modes.*.frequency", 0.85, 1.15, "another foundation or pattern"),
     factor("casing.modes.*.damping_ratio", 0.4, 2.5, "joints, paint, pipes"),
     factor("rod.mass", 0.8, 1.25, "another drawing"),

@@ -1,9 +1,20 @@
 """Constraint forces of ideal joints and links: one linear system for each throw."""
 
-from typing import Any
+from typing import Any, NamedTuple
 
 from ..contact.law import friction_force
 from ..jit import kernel
+from .elastic_rod import (
+    clear_spin,
+    eye_acceleration,
+    eye_turn,
+    inverse_inertia,
+    is_elastic,
+    lever_of,
+    mode_accelerations,
+    of_bent_eye,
+    push_modes,
+)
 from .layout import (
     ALONG_X,
     ALONG_Y,
@@ -58,17 +69,22 @@ def _equations(
     omega, b_rate = w.crank[row, SPEED], b.y[BETA_RATE]
     if joint == CRANKPIN:
         rung, arm, radius, spin = q.crankpin_rung, q.rod_arm, q.crankpin_radius, omega
-        d_x, d_y, v_x, v_y = crank_offset(pose_of(b), omega, q, sin_a, cos_a, sin_b, cos_b)
+        offset = crank_offset(pose_of(b), omega, q, sin_a, cos_a, sin_b, cos_b)
         pull = q.crank_radius * omega * omega
         apart_x, apart_y = -pull * cos_a, -pull * sin_a
         turn_x, turn_y = -q.crank_radius * sin_a, q.crank_radius * cos_a
     else:
         rung, arm, radius, spin = q.wristpin_rung, -q.rod_centre, q.wristpin_radius, b.y[TILT_RATE]
-        d_x, d_y, v_x, v_y = wrist_offset(pose_of(b), q, sin_b, cos_b)
+        offset = wrist_offset(pose_of(b), q, sin_b, cos_b)
         apart_x, apart_y = b.rate[PISTON_X_RATE], b.rate[PISTON_Y_RATE]
         turn_x, turn_y = 0.0, 0.0
-    apart_x -= b.rate[ROD_X_RATE] + arm * (b.rate[BETA_RATE] * sin_b + b_rate * b_rate * cos_b)
-    apart_y -= b.rate[ROD_Y_RATE] + arm * (b.rate[BETA_RATE] * cos_b - b_rate * b_rate * sin_b)
+    swung_x = arm * (b.rate[BETA_RATE] * sin_b + b_rate * b_rate * cos_b)
+    swung_y = arm * (b.rate[BETA_RATE] * cos_b - b_rate * b_rate * sin_b)
+    if is_elastic(t):
+        swung_x, swung_y = eye_acceleration(joint, k, w, row, t, sin_b, cos_b)
+    apart_x -= b.rate[ROD_X_RATE] + swung_x
+    apart_y -= b.rate[ROD_Y_RATE] + swung_y
+    d_x, d_y, v_x, v_y = of_bent_eye(offset, joint, b_rate, k, w, row, t, sin_b, cos_b)
     if rung == JOINT_IDEAL:
         for i in range(2):  # along x, then along y
             x, y = 1.0 - i, 1.0 * i
@@ -81,7 +97,8 @@ def _equations(
         return n + 2
     distance, speed, n_x, n_y = polar(d_x, d_y, v_x, v_y)
     swing = v_y * n_x - v_x * n_y
-    sliding = swing + radius * spin + (radius + c.clearance) * b_rate
+    eye = eye_turn(joint, b_rate, k, w, row, t)
+    sliding = swing + radius * spin + (radius + c.clearance) * eye
     share = side * (friction_force(sliding, 1.0, c) - c.tangential_damping * sliding)
     w.place[n, AT_JOINT], w.place[n, RUBBING] = joint, share
     w.place[n, ALONG_X], w.place[n, ALONG_Y] = n_x - share * n_y, n_y + share * n_x
@@ -93,28 +110,45 @@ def _equations(
     return n + 1
 
 
-@kernel
-def _unit_swing(j: int, k: int, w: Any, t: Any, sin_b: float, cos_b: float) -> Any:
-    """Angular acceleration of the rod per unit of constraint force j."""
-    q, crank = t.throws[k], w.place[j, AT_JOINT] == CRANKPIN
-    arm = q.rod_arm if crank else -q.rod_centre
-    radius = q.crankpin_radius if crank else q.wristpin_radius
-    eye = radius + t.contacts[k, CRANKPIN if crank else WRISTPIN].clearance
-    along = w.place[j, ALONG_X] * sin_b + w.place[j, ALONG_Y] * cos_b
-    return (arm * along - eye * w.place[j, RUBBING]) * q.inverse_rod_inertia
+class _Unit(NamedTuple):
+    """What a unit of one constraint force makes of its rod: accelerations [1/kg], [1/(kg m)]."""
+
+    swing: float
+    stretch: float  # of the modes; 0 of a rigid rod
+    bow: float
 
 
 @kernel
-def _mobilities(n: int, k: int, w: Any, t: Any, sin_b: float, cos_b: float, inv_px: float) -> None:
+def _unit(j: int, k: int, w: Any, row: int, t: Any, sin_b: float, cos_b: float) -> Any:
+    q, joint = t.throws[k], CRANKPIN if w.place[j, AT_JOINT] == CRANKPIN else WRISTPIN
+    radius = q.crankpin_radius if joint == CRANKPIN else q.wristpin_radius
+    couple = (radius + t.contacts[k, joint].clearance) * w.place[j, RUBBING]
+    u_x, u_y = w.place[j, ALONG_X], w.place[j, ALONG_Y]
+    at = lever_of(joint, k, w, row, t)
+    turning = at.along * (u_x * sin_b + u_y * cos_b) - at.across * (u_y * sin_b - u_x * cos_b)
+    swing = (turning - couple) * inverse_inertia(k, w, row, t)
+    if not is_elastic(t):
+        return _Unit(swing, 0.0, 0.0)
+    stretch, bow = mode_accelerations(joint, u_x, u_y, couple, k, w, row, t, sin_b, cos_b)
+    return _Unit(swing, stretch, bow)
+
+
+@kernel
+def _mobilities(
+    n: int, k: int, w: Any, row: int, t: Any, sin_b: float, cos_b: float, inv_px: float
+) -> None:
     """What every unit constraint force does to every equation."""
     q = t.throws[k]
     for j in range(n):
         u_x, u_y = w.place[j, ALONG_X], w.place[j, ALONG_Y]
-        swing = _unit_swing(j, k, w, t, sin_b, cos_b)
+        unit = _unit(j, k, w, row, t, sin_b, cos_b)
         for i in range(n):
-            reach = q.rod_arm if w.place[i, AT_JOINT] == CRANKPIN else -q.rod_centre
-            e_x = u_x * q.inverse_rod_mass + reach * swing * sin_b
-            e_y = u_y * q.inverse_rod_mass + reach * swing * cos_b
+            joint = CRANKPIN if w.place[i, AT_JOINT] == CRANKPIN else WRISTPIN
+            at = lever_of(joint, k, w, row, t)
+            along = at.reach * unit.stretch - at.across * unit.swing
+            across = at.along * unit.swing + at.shape * unit.bow
+            e_x = u_x * q.inverse_rod_mass + across * sin_b - along * cos_b
+            e_y = u_y * q.inverse_rod_mass + across * cos_b + along * sin_b
             if w.place[j, AT_JOINT] == WRISTPIN and w.place[i, AT_JOINT] == WRISTPIN:
                 e_x += u_x * inv_px
                 e_y += u_y * q.inverse_piston_across
@@ -123,7 +157,7 @@ def _mobilities(n: int, k: int, w: Any, t: Any, sin_b: float, cos_b: float, inv_
 
 @kernel
 def _add_force(
-    size: float, j: int, k: int, rate: Any, force: Any, w: Any, t: Any, swing: float, inv_px: float
+    size: float, j: int, k: int, rate: Any, force: Any, w: Any, t: Any, unit: Any, inv_px: float
 ) -> Any:
     """Add constraint force j to rates and forces of a throw; its friction's moment on the crank."""
     q = t.throws[k]
@@ -134,7 +168,7 @@ def _add_force(
     )
     rate[ROD_X_RATE] += f_x * q.inverse_rod_mass
     rate[ROD_Y_RATE] += f_y * q.inverse_rod_mass
-    rate[BETA_RATE] += size * swing
+    rate[BETA_RATE] += size * unit.swing
     if w.place[j, AT_JOINT] == CRANKPIN:
         force[PIN_FORCE] += f_x
         force[PIN_FORCE + 1] += f_y
@@ -172,7 +206,7 @@ def constrain(
             n = _equations(CRANKPIN, n, at_pin, k, w, row, t, sin_a, cos_a, sin_b, cos_b)
         if q.wristpin_rung < JOINT_COMPLIANT:
             n = _equations(WRISTPIN, n, at_wrist, k, w, row, t, sin_a, cos_a, sin_b, cos_b)
-        _mobilities(n, k, w, t, sin_b, cos_b, inv_px)
+        _mobilities(n, k, w, row, t, sin_b, cos_b, inv_px)
         _eliminate(w, n)
         least, was_pin, was_wrist = 1.0, at_pin, at_wrist
         if q.crankpin_rung == JOINT_LINK:  # the first equation
@@ -190,15 +224,16 @@ def constrain(
             b.rate_per_turn[c] = 0.0
         for c in range(VALVE_FORCES):
             b.force_per_turn[c] = 0.0
+        clear_spin(k, w, row)
     moment, rubbing = 0.0, 0.0
     for j in range(n):
-        swing = _unit_swing(j, k, w, t, sin_b, cos_b)
-        moment += _add_force(w.matrix[j, SIZE], j, k, b.rate, b.force, w, t, swing, inv_px)
+        unit = _unit(j, k, w, row, t, sin_b, cos_b)
+        size, more = w.matrix[j, SIZE], w.matrix[j, SIZE_PER_TURN]
+        moment += _add_force(size, j, k, b.rate, b.force, w, t, unit, inv_px)
         if per_turn:
-            more = w.matrix[j, SIZE_PER_TURN]
-            rubbing += _add_force(
-                more, j, k, b.rate_per_turn, b.force_per_turn, w, t, swing, inv_px
-            )
+            rubbing += _add_force(more, j, k, b.rate_per_turn, b.force_per_turn, w, t, unit, inv_px)
+        if is_elastic(t):
+            push_modes(size, more if per_turn else 0.0, unit.stretch, unit.bow, k, w, row)
     if per_turn:
         along, across = b.force_per_turn[PIN_FORCE], b.force_per_turn[PIN_FORCE + 1]
         w.moment[1] += rubbing + q.crank_radius * (along * sin_a - across * cos_a)

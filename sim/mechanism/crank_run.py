@@ -13,6 +13,7 @@ from .layout import (
     ANGLE,
     AT_REST,
     CHANGES,
+    FLEX,
     FLOORED,
     FORCES,
     GAPS,
@@ -99,6 +100,9 @@ class CrankRun(CrankTally):
     bore_gaps : numpy.ndarray [shape=(n_steps + 1, 2)] or None
         Least gap of the film of the main bearings [m], and what its touching peaks carry [N], as
         `gaps`; None where none is oiled.
+    flex : numpy.ndarray [shape=(n_steps + 1, n_throws, 4)] or None
+        Stretch and bow of every rod [m], then their rates, as :data:`FLEX`, at the ends of the
+        steps; None where rods are rigid or states are not kept.
     """
 
     turns: NDArray[np.float64]
@@ -109,6 +113,7 @@ class CrankRun(CrankTally):
     ends: NDArray[np.float64] | None = None
     journal: NDArray[np.float64] | None = None
     bore_gaps: NDArray[np.float64] | None = None
+    flex: NDArray[np.float64] | None = None
 
     def force(self, name: str, throw: int = 0) -> NDArray[np.float64]:
         """One column of the forces, by its name in :data:`FORCES` or :data:`CRANK_FORCES` [N]."""
@@ -135,6 +140,7 @@ def run_mechanism(
     chambers: NDArray[np.float64] | None = None,
     films: NDArray[np.float64] | None = None,
     journal: NDArray[np.float64] | None = None,
+    flex: NDArray[np.float64] | None = None,
     lines: LinePair | None = None,
     casing: Yielding = AT_REST,
     keep_states: bool = True,
@@ -161,6 +167,8 @@ def run_mechanism(
     journal : numpy.ndarray [shape=(6,)], optional
         Place of the crank's journal from the centre of its bore (x, y) [m], how fast [m/s], and
         where its film lets it be [m], at the start, where main bearings have play.
+    flex : numpy.ndarray [shape=(n_throws, 4)], optional
+        Stretch and bow of every elastic rod [m], then their rates, at the start; else 0.
     lines : LinePair, optional
         Shared by the chambers of all throws, each of which then breathes; replaced by their state
         at the end.
@@ -181,7 +189,7 @@ def run_mechanism(
         np.any(t.throws["crankpin_rung"] == JOINT_OILED)
         or np.any(t.throws["wristpin_rung"] == JOINT_OILED)
     )
-    w = scratch(n, len(t.bearing))
+    w = scratch(n, len(t.bearing), len(t.flex))
     shared = SharedLines(
         lines=_NO_LINES if lines is None else lines,
         pairs=np.zeros(1, PAIR),
@@ -195,6 +203,8 @@ def run_mechanism(
         w.stage["film"][0] = films
     if journal is not None and len(t.bearing):
         w.journal["y"][0, 0], w.journal["film"][0, 0] = journal[:4], journal[4:]
+    if flex is not None:
+        w.flex["y"][0] = flex
     chamber = np.zeros((n, 8))
     if chambers is not None:
         chamber[:, :6] = chambers
@@ -207,6 +217,7 @@ def run_mechanism(
         ends=np.zeros((n_steps + 1 if lines else 1, 2)),
         journal=np.empty((rows if len(t.bearing) else 1, 4)),
         bore_gaps=np.empty((n_steps + 1 if np.any(t.bearing["rung"] == JOINT_OILED) else 1, 2)),
+        flex=np.empty((rows if len(t.flex) else 1, n, 2 * len(FLEX))),
     )
     tally = Tally(counts=np.zeros(5, np.int64), peak=np.zeros(1))
     moved, ridden = np.zeros((len(casing.react), 3)), np.zeros((3, 2))
@@ -221,6 +232,7 @@ def run_mechanism(
         ends=r.ends[: done + 1] if lines else None,
         journal=r.journal[: done + 1] if keep_states and len(t.bearing) else None,
         bore_gaps=r.bore_gaps[: done + 1] if len(r.bore_gaps) > 1 else None,
+        flex=r.flex[: done + 1] if keep_states and len(t.flex) else None,
         step=step,
         status=Status(code),
         peak_normal_force=float(tally.peak[0]),

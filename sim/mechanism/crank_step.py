@@ -4,6 +4,7 @@ from typing import Any
 
 from ..contact.law import LAW_CONSTANT_LOSS
 from ..jit import kernel, sine_cosine
+from .elastic_rod import of_bent_eye
 from .equations import derivative_of_record
 from .layout import (
     ANGLE,
@@ -11,6 +12,7 @@ from .layout import (
     CONTACTS,
     CRANKPIN,
     FILM,
+    FLEX,
     FLOORED,
     FORCES,
     GUIDE,
@@ -44,6 +46,7 @@ def contact_margin(k: int, j: int, w: Any, row: int, t: Any) -> Any:
         offset = with_play(crank_offset(p, omega, q, sin_a, cos_a, sin_b, cos_b), w, row, t)
     else:
         offset = wrist_offset(p, q, sin_b, cos_b)
+    offset = of_bent_eye(offset, j, p.beta_rate, k, w, row, t, sin_b, cos_b)
     (d_x, d_y, v_x, v_y), _ = worn_eye(offset, p.beta_rate, sin_b, cos_b, t.contacts[k, j])
     touch, _, _ = pin_touch(d_x, d_y, v_x, v_y, touching, impact, t.contacts[k, j])
     return touch.margin
@@ -78,6 +81,10 @@ def _interpolate(k: int, w: Any, i: int, h: float, s: float, t: Any) -> None:
             at.y[c] = _hermite(start.y[c], start.rate[c], end.y[c], end.rate[c], h, s)
     if is_journal(k, t):
         return
+    if w.flex.shape[1] > 0:
+        bent, first, last = w.flex[2, k], w.flex[i, k], w.flex[z, k]
+        for c in range(2 * len(FLEX)):
+            bent.y[c] = _hermite(first.y[c], first.rate[c], last.y[c], last.rate[c], h, s)
     here, before, after = w.stage[2, k], w.stage[i, k], w.stage[z, k]
     for c in range(PER_THROW):
         here.y[c] = _hermite(before.y[c], before.rate[c], after.y[c], after.rate[c], h, s)
@@ -150,6 +157,10 @@ def _advance(w: Any, row: int, i: int, share: float, slope: int) -> None:
             here.y[c] = start.y[c] + share * rate.rate[c]
         for c in range(len(FILM)):
             here.film[c] = start.film[c] + share * rate.film_rate[c]
+    for k in range(w.flex.shape[1]):
+        bent, held, bending = w.flex[row, k], w.flex[i, k], w.flex[slope, k]
+        for c in range(2 * len(FLEX)):
+            bent.y[c] = held.y[c] + share * bending.rate[c]
     for n in range(w.journal.shape[1]):
         at, begin, moving = w.journal[row, n], w.journal[i, n], w.journal[slope, n]
         for c in range(4):
@@ -179,6 +190,13 @@ def _finish(w: Any, i: int, h: float) -> None:
         for c in range(len(FILM)):
             rate = mean_of_stages(a.film_rate[c], b.film_rate[c] + c_.film_rate[c], d.film_rate[c])
             end.film[c] = a.film[c] + sixth * rate
+    for k in range(w.flex.shape[1]):
+        last, first, second = w.flex[1 - i, k], w.flex[i, k], w.flex[2, k]
+        third, fourth = w.flex[3, k], w.flex[4, k]
+        for c in range(2 * len(FLEX)):
+            middle = second.rate[c] + third.rate[c]
+            rate = mean_of_stages(first.rate[c], middle, fourth.rate[c])
+            last.y[c] = first.y[c] + sixth * rate
     for n in range(w.journal.shape[1]):
         last, first, second = w.journal[1 - i, n], w.journal[i, n], w.journal[2, n]
         third, fourth = w.journal[3, n], w.journal[4, n]

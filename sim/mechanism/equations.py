@@ -7,6 +7,7 @@ from ..hydraulics.parameters import PRESSURE_CHAMBER
 from ..hydraulics.piston_pressure import line_pressure
 from ..jit import kernel, sine_cosine
 from .constraints import constrain
+from .elastic_rod import eye_turn, flexed, is_elastic, of_bent_eye, spun_up_rods
 from .layout import (
     ANGLE,
     ANGLE_RATE,
@@ -63,6 +64,7 @@ def _oiled(
     v_x: float,
     v_y: float,
     pin_turn: float,
+    eye: float,
     k: int,
     b: Any,
     held: Any,
@@ -78,7 +80,7 @@ def _oiled(
         v_x,
         v_y,
         pin_turn,
-        -b.y[BETA_RATE],
+        -eye,
         held.squeeze[joint],
         t.contacts[k, joint],
         t.oils[k, joint],
@@ -96,6 +98,7 @@ def _pin_load(
     radius: float,
     offset: Any,
     pin_turn: float,
+    eye: float,
     k: int,
     b: Any,
     held: Any,
@@ -103,16 +106,17 @@ def _pin_load(
 ) -> Any:
     """Load of a pin on the rod by any rung that is a force, what presses, and the overlap.
 
-    A link's load is its viscous part; the pin of an ideal joint has none.
+    `eye` is the rate at which its eye turns, in the sense of the rod's angle [rad/s]. A link's load
+    is its viscous part; the pin of an ideal joint has none.
     """
     if rung == JOINT_IDEAL:
         return PinLoad(0.0, 0.0, 0.0, 0.0), 0.0, 0.0
     d_x, d_y, v_x, v_y = offset
     c = t.contacts[k, joint]
     if rung == JOINT_OILED:
-        load, peak = _oiled(joint, d_x, d_y, v_x, v_y, pin_turn, k, b, held, t)
+        load, peak = _oiled(joint, d_x, d_y, v_x, v_y, pin_turn, eye, k, b, held, t)
         return load, peak, math.sqrt(d_x * d_x + d_y * d_y) - c.clearance
-    spin = pin_turn * radius + b.y[BETA_RATE] * (radius + c.clearance)
+    spin = pin_turn * radius + eye * (radius + c.clearance)
     if rung == JOINT_LINK:
         f_x, f_y, rub = link_drag(d_x, d_y, v_x, v_y, spin, c)
         return PinLoad(f_x, f_y, -radius * rub, (radius + c.clearance) * rub), 0.0, 0.0
@@ -170,17 +174,21 @@ def _throw(k: int, w: Any, row: int, share: float, t: Any) -> None:
     pressure, added = _pressure(k, w, row, share, t)
     on_face, inv_px = -q.piston_area * pressure, 1.0 / (q.piston_mass + added)
     centred = with_play(crank_offset(p, omega, q, sin_a, cos_a, sin_b, cos_b), w, row, t)
+    centred = of_bent_eye(centred, CRANKPIN, p.beta_rate, k, w, row, t, sin_b, cos_b)
     at_crank, along = worn_eye(centred, p.beta_rate, sin_b, cos_b, t.contacts[k, CRANKPIN])
-    pin, peak, overlap = _pin_load(
-        CRANKPIN, q.crankpin_rung, q.crankpin_radius, at_crank, omega, k, b, held, t
+    eye = eye_turn(CRANKPIN, p.beta_rate, k, w, row, t)
+    at_eye, peak, overlap = _pin_load(
+        CRANKPIN, q.crankpin_rung, q.crankpin_radius, at_crank, omega, eye, k, b, held, t
     )
-    pin = slot_moment(pin, along, sin_b, cos_b)
+    pin = slot_moment(at_eye, along, sin_b, cos_b)
     overlap_ratio = overlap / q.crankpin_radius if q.crankpin_rung != JOINT_IDEAL else 0.0
     wrist, guide_x, guide_y, guide_moment = PinLoad(0.0, 0.0, 0.0, 0.0), 0.0, 0.0, 0.0
     if q.wristpin_rung != JOINT_IDEAL:
         at_wrist = wrist_offset(p, q, sin_b, cos_b)
+        at_wrist = of_bent_eye(at_wrist, WRISTPIN, p.beta_rate, k, w, row, t, sin_b, cos_b)
+        eye = eye_turn(WRISTPIN, p.beta_rate, k, w, row, t)
         wrist, normal, overlap = _pin_load(
-            WRISTPIN, q.wristpin_rung, q.wristpin_radius, at_wrist, p.tilt_rate, k, b, held, t
+            WRISTPIN, q.wristpin_rung, q.wristpin_radius, at_wrist, p.tilt_rate, eye, k, b, held, t
         )
         peak, overlap_ratio = max(peak, normal), max(overlap_ratio, overlap / q.wristpin_radius)
     if q.guide_rung == JOINT_COMPLIANT:
@@ -192,8 +200,11 @@ def _throw(k: int, w: Any, row: int, share: float, t: Any) -> None:
     rates = free_motion(
         q, m, on_face + seal, inv_px, pin, wrist, guide_x, guide_y, guide_moment, sin_b, cos_b
     )
+    if is_elastic(t):
+        rates = flexed(k, w, row, t, rates, at_eye, wrist, sin_b, cos_b)
     wrist_x, wrist_y = wrist.x, wrist.y
-    if q.crankpin_rung >= JOINT_COMPLIANT and q.wristpin_rung == JOINT_IDEAL:
+    held_alone = q.crankpin_rung >= JOINT_COMPLIANT and not is_elastic(t)
+    if held_alone and q.wristpin_rung == JOINT_IDEAL:
         rates, wrist_x, wrist_y = held_wrist(q, m, p, rates, inv_px, sin_b, cos_b, 1.0)
     for i in range(len(BODY)):
         b.rate[i] = b.y[len(BODY) + i]
@@ -204,7 +215,8 @@ def _throw(k: int, w: Any, row: int, share: float, t: Any) -> None:
     b.force[WRIST_FORCE], b.force[WRIST_FORCE + 1] = wrist_x, wrist_y
     b.normal, b.overlap, b.link = peak, overlap_ratio, 0.0
     crank_moment = pin.on_pin
-    if q.crankpin_rung < JOINT_COMPLIANT or q.wristpin_rung == JOINT_LINK:
+    constrained = q.crankpin_rung < JOINT_COMPLIANT or q.wristpin_rung == JOINT_LINK
+    if constrained or (is_elastic(t) and q.wristpin_rung == JOINT_IDEAL):
         crank_moment += constrain(k, w, row, t, sin_a, cos_a, sin_b, cos_b, inv_px)
     pin_x, pin_y = b.force[PIN_FORCE], b.force[PIN_FORCE + 1]
     w.moment[0] += crank_moment + q.crank_radius * (pin_x * sin_a - pin_y * cos_a)
@@ -241,6 +253,7 @@ def derivative_of_record(w: Any, row: int, share: float, t: Any) -> None:
     w.crank[row, MOMENT] = drive
     if t.bearing.shape[0] > 0:
         spun_up(w, row, t, a_x, a_y, sin_a, cos_a)
+    spun_up_rods(turning, w, row, t)
     for k in range(t.throws.shape[0]):
         if t.throws[k].crankpin_rung >= JOINT_COMPLIANT:
             continue

@@ -59,6 +59,31 @@ MAIN_BEARING = np.dtype(
 """Main bearings with play, seen as one; a crank without play has none."""
 
 
+ROD_MODES = np.dtype(
+    [
+        ("length", "f8"),  # between the eyes [m]
+        ("inverse_stretch_mass", "f8"),  # [1/kg]
+        ("inverse_bow_mass", "f8"),
+        ("stretch_stiffness", "f8"),
+        ("bow_stiffness", "f8"),
+        ("stretch_damping", "f8"),
+        ("bow_damping", "f8"),
+        ("crank_shape", "f8"),  # motion of the crank pin's eye across the rod, per bow
+        ("wrist_shape", "f8"),
+        ("crank_slope", "f8"),  # its turning [rad/m]
+        ("wrist_slope", "f8"),
+    ]
+)
+"""Modes of an elastic rod, see :mod:`.elastic_rod`; rigid rods have none."""
+
+FLEX = ("stretch", "bow")
+"""Coordinates of an elastic rod: between its eyes, in its middle [m]; the state holds these, then
+their rates."""
+
+STRETCH, BOW, STRETCH_RATE, BOW_RATE = range(2 * len(FLEX))
+"""Columns of an elastic rod's state."""
+
+
 class Machine(NamedTuple):
     """What the throws share, in SI."""
 
@@ -143,6 +168,7 @@ class Tables(NamedTuple):
     bearing: NDArray[Any]  # (0 or 1,) of MAIN_BEARING
     bore: NDArray[Any]  # (0 or 1,) of CONTACT: its journal in its bore
     bore_oil: NDArray[Any]  # (0 or 1,) of OIL
+    flex: NDArray[Any]  # (0 or n_throws,) of ROD_MODES
     machine: Machine
 
 
@@ -233,6 +259,15 @@ JOURNAL = np.dtype(
 JOURNAL_HELD = np.dtype([("touching", "i8"), ("impact", "f8"), ("squeeze", "f8", 2)])
 """What it remembers from step to step, as of :data:`HELD`."""
 
+ROD_STATE = np.dtype(
+    [
+        ("y", "f8", 2 * len(FLEX)),
+        ("rate", "f8", 2 * len(FLEX)),
+        ("rate_per_turn", "f8", len(FLEX)),  # of the rates, per crank acceleration
+    ]
+)
+"""An elastic rod at one stage of a step."""
+
 ANGLE, SPEED, ANGLE_RATE, SPEED_RATE, MOMENT = range(5)
 """Columns of the crank's stages."""
 
@@ -259,9 +294,10 @@ class Work(NamedTuple):
     place: NDArray[np.float64]  # (4, 6): of each constraint force, see AT_JOINT
     journal: NDArray[Any]  # (5, 0 or 1) of JOURNAL
     journal_held: NDArray[Any]  # (0 or 1,) of JOURNAL_HELD
+    flex: NDArray[Any]  # (5, 0 or n_throws) of ROD_STATE
 
 
-def scratch(n_throws: int, n_bearings: int = 0) -> Work:
+def scratch(n_throws: int, n_bearings: int = 0, n_elastic: int = 0) -> Work:
     """Scratch of a march, all zeros."""
     return Work(
         crank=np.zeros((5, 5)),
@@ -272,6 +308,7 @@ def scratch(n_throws: int, n_bearings: int = 0) -> Work:
         place=np.zeros((4, 6)),
         journal=np.zeros((5, n_bearings), JOURNAL),
         journal_held=np.zeros(n_bearings, JOURNAL_HELD),
+        flex=np.zeros((5, n_elastic), ROD_STATE),
     )
 
 

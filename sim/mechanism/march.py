@@ -18,6 +18,7 @@ from .layout import (
     BETA,
     CONTACTS,
     CRANKPIN,
+    FLEX,
     FORCES,
     GAPS,
     IN_TENSION,
@@ -134,11 +135,14 @@ def _fault(w: Any, i: int) -> int:
             total += journal.y[c]
         if journal.overlap > OVERLAP_LIMIT:
             return 2
+    for k in range(w.flex.shape[1]):
+        for c in range(2 * len(FLEX)):
+            total += w.flex[i, k].y[c]
     return 0 if math.isfinite(total) else 1
 
 
 class MarchRecord(NamedTuple):
-    """What a run leaves behind; the last six have one row where they are not needed."""
+    """What a run leaves behind; the last seven have one row where they are not needed."""
 
     turns: NDArray[np.float64]  # (n_steps + 1, 2): crank angle and speed
     forces: NDArray[np.float64]  # (n_steps, 1 + n_throws * len(FORCES))
@@ -148,6 +152,7 @@ class MarchRecord(NamedTuple):
     ends: NDArray[np.float64]  # (n_steps + 1, 2): pressures of the lines at the pump
     journal: NDArray[np.float64]  # (n_steps + 1, 4): as JOURNAL's y
     bore_gaps: NDArray[np.float64]  # (n_steps + 1, 2): as JOURNAL's gaps
+    flex: NDArray[np.float64]  # (n_steps + 1, n_throws, 4): as ROD_STATE's y
 
 
 class Tally(NamedTuple):
@@ -203,6 +208,10 @@ def _keep(w: Any, i: int, chamber: Any, states: Any, r: Any, row: int) -> None:
     if r.bore_gaps.shape[0] > 1:
         for c in range(2):
             r.bore_gaps[row, c] = w.journal[i, 0].gaps[c]
+    if r.flex.shape[0] > 1:
+        for k in range(w.flex.shape[1]):
+            for c in range(2 * len(FLEX)):
+                r.flex[row, k, c] = w.flex[i, k].y[c]
 
 
 @kernel
@@ -301,7 +310,16 @@ def _on_moving_bearing(
         m.baumgarte,
     )
     return Tables(
-        t.throws, t.contacts, t.liquid, t.oils, t.maps, t.bearing, t.bore, t.bore_oil, machine
+        t.throws,
+        t.contacts,
+        t.liquid,
+        t.oils,
+        t.maps,
+        t.bearing,
+        t.bore,
+        t.bore_oil,
+        t.flex,
+        machine,
     )
 
 

@@ -11,11 +11,13 @@ from ..excitation.forces import Push
 from ..hydraulics.valves import lift_left
 from ..mechanism.crank_run import CrankRun, CrankTally
 from ..mechanism.layout import (
+    BOW,
     CRANK_FORCES,
     GUIDE,
     JOINT_COMPLIANT,
     JOINT_LINK,
     JOINT_OILED,
+    STRETCH,
     force_column,
 )
 from ..output.status import Status
@@ -87,6 +89,7 @@ def run_numerics(gathered: Gathering, run: CrankTally, lift: float) -> dict[str,
         "rung_wristpin": _rung_of(scene.joint.wristpin),
         "rung_guide": _rung_of(scene.joint.guide),
         "rung_mainbearing": _rung_of(scene.crank.bearing),
+        "rung_rod": scene.rod.rung,
         "rung_pressure": scene.pressure.rung,
         "rung_drive": scene.drive.rung,
         "rung_casing": scene.casing.rung,
@@ -268,7 +271,8 @@ def _throw_truth(
     assert run.bodies is not None  # truth was asked for
     bodies = plan.at_samples(run.bodies[:, throw])
     journal = None if run.journal is None else plan.at_samples(run.journal)
-    offsets = pin_offsets(plan.scene, turned, bodies, throw, journal=journal)
+    flex = None if run.flex is None else plan.at_samples(run.flex[:, throw])
+    offsets = pin_offsets(plan.scene, turned, bodies, throw, journal=journal, flex=flex)
     found = [
         ("pin_force_n", force[:, 0:2]),
         ("wrist_force_n", force[:, 2:4]),
@@ -283,6 +287,8 @@ def _throw_truth(
         ("state_beta", bodies[:, 2]),
         ("state_beta_rate", bodies[:, 8]),
     ]
+    if flex is not None:
+        found += [("rod_stretch_m", flex[:, STRETCH]), ("rod_bow_m", flex[:, BOW])]
     if run.gaps is not None:
         gaps = plan.at_samples(run.gaps[:, throw])
         rungs = joint_rungs(plan.scene, throw)

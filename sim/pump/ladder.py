@@ -77,6 +77,23 @@ JOINT_RUNGS = (
 GUIDE_RUNGS = tuple(rung for rung in JOINT_RUNGS if rung.name in ("ideal", "compliant"))
 """Rungs of a guide."""
 
+ROD_RUNGS = (
+    Rung(
+        name="rigid",
+        assumes="the rod keeps its shape",
+        nanoseconds_per_step=0.0,
+    ),
+    Rung(
+        name="elastic",
+        assumes="the rod stretches and bends: one mode each, between and across its eyes",
+        reference="Shabana 2020, floating frame of reference with mean axes",
+        valid="up to its second modes; force along it far below Euler's load",
+        needs="rod.section_area and rod.section_radius",
+        nanoseconds_per_step=200.0,
+    ),
+)
+"""Rungs of the rods, all alike."""
+
 PRESSURE_RUNGS = (
     Rung(
         name="none",
@@ -166,6 +183,7 @@ CASING_RUNGS = (
 
 PUMP_LADDERS = {
     "joint": JOINT_RUNGS,
+    "rod": ROD_RUNGS,
     "pressure": PRESSURE_RUNGS,
     "drive": DRIVE_RUNGS,
     "casing": CASING_RUNGS,
@@ -180,6 +198,7 @@ def pump_effects(scene: Scene) -> Iterator[Effect]:
     """Effects of a pump, each with its rungs; their names are in its scene type."""
     yield from _joint_effects(scene)
     yield from _bearing_effect(scene)
+    yield from _rod_effect(scene)
     yield from _pressure_effect(scene)
     yield from _drive_effect(scene)
     yield from _casing_effect(scene)
@@ -211,6 +230,12 @@ def _bearing_effect(scene: Scene) -> Iterator[Effect]:
         yield effect(
             "mainbearing", scene, rungs, lambda one: str(one.crank.bearing.rung), beyond=_beyond
         )
+
+
+def _rod_effect(scene: Scene) -> Iterator[Effect]:
+    if cast(PumpScene, scene).rod.section_area is not None:
+        rungs = written(ROD_RUNGS, ["rod.rung"])
+        yield effect("rod", scene, rungs, lambda one: str(one.rod.rung), beyond=_beyond)
 
 
 def pin_rungs(part: RevoluteJoint) -> tuple[Rung, ...]:
@@ -272,11 +297,12 @@ def _casing_effect(scene: Scene) -> Iterator[Effect]:
 
 
 def _stiffest(scene: PumpScene) -> PumpScene:
-    """The scene with every contact that it can have: a step that is stable there is so anywhere."""
-    for joint in (*_joint_effects(scene), *_bearing_effect(scene)):
-        dry = joint.rung("compliant")
-        if joint.refusal(scene, dry.name) is None:
-            scene = with_values(scene, dry.values)
+    """The scene with every spring that it can have: a step that is stable there is so anywhere."""
+    joints = (*_joint_effects(scene), *_bearing_effect(scene))
+    stiff = [(part, "compliant") for part in joints]
+    for part, name in [*stiff, *((rod, "elastic") for rod in _rod_effect(scene))]:
+        if part.refusal(scene, name) is None:
+            scene = with_values(scene, part.rung(name).values)
     return scene
 
 
@@ -314,7 +340,8 @@ def pump_cost(scene: Scene) -> float:
     per_step = _CASING_FIXED + mode * len(pump.casing.modes) + price(DRIVE_RUNGS, pump.drive.rung)
     per_step += _REACH * _reaches(pump)
     for throw in range(len(pump.throws)):
-        per_step += _MECHANISM + price(PRESSURE_RUNGS, pump.pressures(throw).rung)
+        per_step += _MECHANISM + price(ROD_RUNGS, pump.rod.rung)
+        per_step += price(PRESSURE_RUNGS, pump.pressures(throw).rung)
         for part in joint_parts(pump, throw):
             per_step += price(JOINT_RUNGS, "ideal" if part is None else part.rung)
     return 1e-9 * per_step * pump_steps(pump)

@@ -7,10 +7,11 @@ from numpy.typing import NDArray
 
 from ..contact.closed_forms import IdealCrank
 from ..mechanism.crank_run import CrankRun, run_mechanism
-from ..mechanism.layout import JOINT_IDEAL
+from ..mechanism.layout import BOW, JOINT_IDEAL, STRETCH
 from ..pump_setup.films import start_films
 from ..pump_setup.ideal_motion import forces_on_piston, ideal_motion
 from ..pump_setup.joints import gravity_along_and_across, has_main_play, joint_rungs
+from ..pump_setup.rods import rod_table
 from ..pump_setup.tables import begun, lines_of
 from ..pump_setup.yielding import yielding_of
 from ..scene.pump import PumpScene
@@ -26,7 +27,8 @@ def needs_integration(scene: PumpScene) -> bool:
     )
     breathing = any(scene.pressures(k).rung in BREATHING_RUNGS for k in range(len(scene.throws)))
     answered = scene.drive.rung != "constant-speed" or scene.casing.rung == "yielding"
-    return not ideal or breathing or answered or has_main_play(scene)
+    moving = has_main_play(scene) or scene.rod.rung == "elastic"
+    return not ideal or breathing or answered or moving
 
 
 def run_scene(
@@ -139,6 +141,7 @@ def pin_offsets(
     throw: int = 0,
     *,
     journal: NDArray[np.float64] | None = None,
+    flex: NDArray[np.float64] | None = None,
 ) -> NDArray[np.float64]:
     """Position of the pins' centres from those of their eyes [m].
 
@@ -153,6 +156,8 @@ def pin_offsets(
         Counted from 0.
     journal : numpy.ndarray [shape=(n, 4)], optional
         Of a crank with play in its main bearings, as of :class:`.CrankRun`.
+    flex : numpy.ndarray [shape=(n, 4)], optional
+        Of the throw's elastic rod, as of :class:`.CrankRun`.
 
     Returns
     -------
@@ -166,7 +171,7 @@ def pin_offsets(
     arm = scene.rod.length - centre
     sin_b, cos_b = np.sin(beta), np.cos(beta)
     crank_x, crank_y = (0.0, 0.0) if journal is None else journal[:, :2].T
-    return np.column_stack(
+    offsets = np.column_stack(
         [
             crank_x + scene.crank.radius * np.cos(angle) - x + arm * cos_b,
             crank_y + scene.crank.radius * np.sin(angle) - y - arm * sin_b,
@@ -174,3 +179,20 @@ def pin_offsets(
             across - y + centre * sin_b,
         ]
     )
+    return offsets if flex is None else offsets - _eyes_moved(scene, flex, sin_b, cos_b)
+
+
+def _eyes_moved(
+    scene: PumpScene,
+    flex: NDArray[np.float64],
+    sin_b: NDArray[np.float64],
+    cos_b: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """By which stretch and bow of the rod move its eyes, columns as of :func:`pin_offsets` [m]."""
+    modes, centre = rod_table(scene)[0], scene.rod.centre_of_mass / scene.rod.length
+    stretch, bow = flex[:, STRETCH], flex[:, BOW]
+    moved = []
+    for reach, shape in ((1 - centre, modes["crank_shape"]), (-centre, modes["wrist_shape"])):
+        along, across = reach * stretch, shape * bow
+        moved += [across * sin_b - along * cos_b, across * cos_b + along * sin_b]
+    return np.column_stack(moved)

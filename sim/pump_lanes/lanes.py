@@ -104,6 +104,7 @@ def lane_kind(scene: PumpScene) -> LaneKind | None:
     known = (
         len(throws) <= LANES
         and not has_main_play(scene)
+        and scene.rod.rung == "rigid"
         and set(crankpins) in ({JOINT_COMPLIANT}, {JOINT_OILED})
         and {JOINT_IDEAL, JOINT_COMPLIANT}.issuperset(wristpins)
         and rungs.isdisjoint(("heads", *PIPED_RUNGS))

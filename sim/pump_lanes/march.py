@@ -17,6 +17,7 @@ from ..mechanism.layout import (
     NO_CHANGE,
     OVERLAP_LIMIT,
     PUSHES,
+    ROD_MODES,
     Tables,
     Work,
     scratch,
@@ -38,6 +39,7 @@ class Alone(NamedTuple):
     bearing: NDArray[Any]  # (0,): no lane has play in its main bearings
     bore: NDArray[Any]  # (0,)
     bore_oil: NDArray[Any]  # (0,)
+    flex: NDArray[Any]  # (0,): no lane has elastic rods
     work: Work
     chambers: NDArray[np.float64]  # (LANES, 8)
     forces: NDArray[np.float64]  # (1, 1 + n_throws * len(FORCES)): of one step
@@ -81,6 +83,7 @@ def _tables_of(lane: int, p: Any, a: Any) -> Any:
         a.bearing,
         a.bore,
         a.bore_oil,
+        a.flex,
         machine_of_lane(p, lane),
     )
 
@@ -597,6 +600,7 @@ def alone(t: Tables, maps: NDArray[np.float64]) -> Alone:
         bearing=np.zeros(0, MAIN_BEARING),
         bore=np.zeros(0, t.contacts.dtype),
         bore_oil=np.zeros(0, t.oils.dtype),
+        flex=np.zeros(0, ROD_MODES),
         work=scratch(n),
         chambers=np.zeros((LANES, 8)),
         forces=np.zeros((1, 1 + n * len(FORCES))),

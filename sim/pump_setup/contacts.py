@@ -24,11 +24,20 @@ from ..contact.law import (
     hysteresis,
 )
 from ..jit import kernel
-from ..mechanism.layout import CRANKPIN, GUIDE, JOINT_COMPLIANT, JOINT_IDEAL, JOINT_LINK, WRISTPIN
+from ..mechanism.layout import (
+    CRANKPIN,
+    FLEX,
+    GUIDE,
+    JOINT_COMPLIANT,
+    JOINT_IDEAL,
+    JOINT_LINK,
+    WRISTPIN,
+)
 from ..scene.pump import PumpScene
 from ..scene.pump_joints import OILED_RUNGS, Guide, RevoluteJoint
 from .ideal_motion import joint_loads, largest_bearing_load
 from .joints import has_main_play, joint_parts, joint_rungs, kept_by_scene
+from .rods import rod_table
 
 
 def contact_record(
@@ -163,6 +172,33 @@ def _rod_jacobian(scene: PumpScene, throw: int, beta: float) -> NDArray[np.float
     )
 
 
+def _flex_jacobian(scene: PumpScene, beta: float) -> NDArray[np.float64]:
+    """The same rows per stretch and bow of an elastic rod, and below them these two themselves."""
+    modes, rod = rod_table(scene)[0], scene.rod
+    s, c = math.sin(beta), math.cos(beta)
+    crank, wrist = 1 - rod.centre_of_mass / rod.length, -rod.centre_of_mass / rod.length
+    shapes = modes["crank_shape"], modes["wrist_shape"]
+    return np.array(
+        [
+            [crank * c, -shapes[0] * s],
+            [-crank * s, -shapes[0] * c],
+            [wrist * c, -shapes[1] * s],
+            [-wrist * s, -shapes[1] * c],
+            *4 * [[0.0, 0.0]],
+            [1.0, 0.0],
+            [0.0, 1.0],
+        ]
+    )
+
+
+def _jacobian(scene: PumpScene, throw: int, beta: float) -> NDArray[np.float64]:
+    """Rows and columns of :func:`_rod_jacobian`, and two more of each where rods are elastic."""
+    rigid = _rod_jacobian(scene, throw, beta)
+    if scene.rod.rung == "rigid":
+        return rigid
+    return np.hstack([np.vstack([rigid, np.zeros((2, 8))]), _flex_jacobian(scene, beta)])
+
+
 _JOINT_ROWS = (slice(0, 2), slice(2, 4), slice(4, 6))
 
 
@@ -170,12 +206,13 @@ _JOINT_ROWS = (slice(0, 2), slice(2, 4), slice(4, 6))
 def _compliances(scene: PumpScene, throw: int) -> NDArray[np.float64]:
     """Acceleration of every row of the jacobian per force along every other [1/kg].
 
-    At five swings of the rod, from none to its largest: shape (5, 8, 8). All throws that push a
+    At five swings of the rod, from none to its largest: shape (5, n, n), n = 8 with a rigid rod,
+    10 with an elastic one. All throws that push a
     crank with play the same way are felt by each as a crank of its share of the mass.
     """
     rod, piston = scene.rod, scene.piston
     rungs = joint_rungs(scene, throw)
-    free = rungs[GUIDE] == JOINT_COMPLIANT
+    free, own = rungs[GUIDE] == JOINT_COMPLIANT, rod_table(scene)[:1]
     inverse: NDArray[np.float64] = np.diag(
         [
             1 / rod.mass,
@@ -185,9 +222,10 @@ def _compliances(scene: PumpScene, throw: int) -> NDArray[np.float64]:
             1 / piston.mass if free else 0.0,
             1 / piston.inertia if free and piston.inertia else 0.0,
             *2 * [_crank_mobility(scene)],
+            *(float(modes[f"inverse_{name}_mass"]) for modes in own for name in FLEX),
         ]
     )
-    jacobian = np.array([_rod_jacobian(scene, throw, beta) for beta in _betas(scene)])
+    jacobian = np.array([_jacobian(scene, throw, beta) for beta in _betas(scene)])
     ideal = [_JOINT_ROWS[j] for j in (CRANKPIN, WRISTPIN) if rungs[j] == JOINT_IDEAL]
     if ideal:
         held = np.concatenate([jacobian[:, rows] for rows in ideal], axis=1)
@@ -220,17 +258,17 @@ def joint_mobility(scene: PumpScene, throw: int, joint: int) -> float:
     return float(np.linalg.eigvalsh(_compliances(scene, throw)[:, rows, rows]).max())
 
 
-def _largest(scene: PumpScene, throw: int, weights: tuple[float, ...]) -> float:
-    """Largest eigenvalue of the mechanism on springs (or dampers) in its joints."""
-    root = np.sqrt(np.repeat(weights, 2))
+def _largest(scene: PumpScene, throw: int, weights: NDArray[np.float64]) -> float:
+    """Largest eigenvalue of the mechanism on springs (or dampers) along its rows."""
+    root = np.sqrt(weights)
     return float(np.linalg.eigvalsh(root[:, None] * _compliances(scene, throw) * root).max())
 
 
 @kept_by_scene
 def _springs_and_dampers(
     scene: PumpScene, throw: int
-) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Tangent stiffness and damping of every joint, and of the main bearing.
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Tangent stiffness and damping along every row of :func:`_jacobian`.
 
     A link's own stiffness is load over length.
     """
@@ -254,15 +292,20 @@ def _springs_and_dampers(
             springs.append(0.0)
             dampers.append(0.0)
     nothing = [0.0] * (len(_JOINT_ROWS) + 1 - len(springs))
-    springs, dampers = springs + nothing, dampers + nothing
-    return tuple(springs), tuple(dampers)
+    modes = rod_table(scene)[:1]
+    stiff = [float(row[f"{name}_stiffness"]) for row in modes for name in FLEX]
+    lossy = [float(row[f"{name}_damping"]) for row in modes for name in FLEX]
+    rows = np.repeat([springs + nothing, dampers + nothing], 2, axis=1)
+    return np.append(rows[0], stiff), np.append(rows[1], lossy)
 
 
 def contact_frequency(scene: PumpScene) -> float:
-    """Largest angular frequency of the mechanism on its undamped contact springs [rad/s].
+    """Largest angular frequency of the mechanism on its undamped springs [rad/s].
+
+    These are its contacts, and its rods where they are elastic.
 
     The mass felt at a joint depends on the direction; its least value over a revolution sets the
-    fastest contact, and so the step. 0 where every joint is ideal.
+    fastest contact, and so the step. 0 where every joint is ideal and rods are rigid.
     """
     return max(
         math.sqrt(_largest(scene, throw, _springs_and_dampers(scene, throw)[0]))

@@ -34,6 +34,7 @@ from .joints import (
     joint_rungs,
     piston_area,
 )
+from .rods import rod_table
 
 _BAUMGARTE_PER_RADIAN = 30.0
 """Decay rate of constraint drift over the crank speed. Not over the step: a rate that grew as the
@@ -113,6 +114,7 @@ def tables(scene: PumpScene, step: float) -> Tables:
         bearing=bearing_record(scene),
         bore=bore_table(scene),
         bore_oil=bore_oil_table(scene, maps, step),
+        flex=rod_table(scene),
         machine=Machine(
             gravity_x=gravity_x,
             gravity_y=gravity_y,

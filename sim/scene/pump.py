@@ -10,12 +10,14 @@ from ..output.sensor import Channel
 from ..parts.casing import Casing, FrfFile
 from ..parts.dimensions import (
     Angle,
+    Area,
     Force,
     Gravity,
     Inertia,
     Length,
     Mass,
     Moment,
+    Pressure,
     Ratio,
     RotationSpeed,
     Unbalance,
@@ -54,6 +56,7 @@ from .scene import (
 
 _MOMENT_MOST = 1e9  # N m
 _UNBALANCE_MOST = 1e6  # kg m
+_AREA_MOST = 1e4  # m^2
 
 _MOST_THROWS = 32
 
@@ -159,8 +162,15 @@ class Crank(Part):
 
 
 class Rod(Part):
-    """The connecting rod."""
+    """The connecting rod: rigid, or elastic with its first axial and its first bending mode.
 
+    Of an elastic rod the mass is spread evenly between the eyes but for what mass, centre of mass
+    and inertia leave to either of them.
+    """
+
+    rung: Literal["rigid", "elastic"] = Field(
+        default="rigid", description="rigid, or one that stretches and bends"
+    )
     length: Length = Field(
         gt=0, le=LONGEST, description="between the centres of wrist pin and crank-pin eye"
     )
@@ -169,6 +179,61 @@ class Rod(Part):
     inertia: Inertia = Field(
         ge=INERTIA_LEAST, le=INERTIA_MOST, description="about the centre of mass"
     )
+    elastic_modulus: Pressure = Field(
+        default=206e9, gt=0, le=1e13, description="of an elastic rod; steel"
+    )
+    section_area: Area | None = Field(
+        default=None, gt=0, le=_AREA_MOST, description="of an elastic rod's shank"
+    )
+    section_radius: Length | None = Field(
+        default=None,
+        gt=0,
+        le=LONGEST,
+        description="of gyration of the shank's section in the plane of motion; of a bar its depth "
+        "over 3.46",
+    )
+    damping_ratio: Ratio = Field(
+        default=0.01, ge=0, lt=1, description="of both modes of an elastic rod"
+    )
+
+    @property
+    def shank_mass(self) -> float:
+        """Mass that is spread evenly between the eyes [kg]."""
+        lever = self.centre_of_mass * (self.length - self.centre_of_mass)
+        return 6 * (self.mass * lever - self.inertia) / self.length**2
+
+    @property
+    def eye_masses(self) -> tuple[float, float]:
+        """What is left at wrist pin and crank pin beside the shank [kg]."""
+        crank = self.mass * self.centre_of_mass / self.length - self.shank_mass / 2
+        return self.mass - self.shank_mass - crank, crank
+
+    @model_validator(mode="after")
+    def _elastic_told(self) -> Self:
+        if self.rung == "rigid":
+            return self
+        faults = [
+            f"{name} is missing; the rung 'elastic' needs it"
+            for name in ("section_area", "section_radius")
+            if getattr(self, name) is None
+        ]
+        least, most = self.inertia_range
+        if not least <= self.inertia < most:
+            faults.append(
+                f"inertia = {self.inertia:g} kg m^2 must be >= {least:.4g} and < {most:.4g} kg m^2 "
+                "for a rod with a shank between two eyes; check inertia and centre_of_mass, or set "
+                "rung = 'rigid'"
+            )
+        if faults:
+            raise ValueError("\n".join(faults))
+        return self
+
+    @property
+    def inertia_range(self) -> tuple[float, float]:
+        """Least inertia, with one eye of no mass, and that of two eyes without shank [kg m^2]."""
+        near = min(self.centre_of_mass, self.length - self.centre_of_mass)
+        most = self.mass * self.centre_of_mass * (self.length - self.centre_of_mass)
+        return most - self.mass * near * self.length / 3, most
 
     @model_validator(mode="after")
     def _centre_between_pins(self) -> Self:
@@ -235,7 +300,17 @@ class PumpScene(Scene):
 
     physics = "wearstate.sim.machine.pump"
     effects = (
-        *("crankpin", "wristpin", "guide", "mainbearing", "pressure", "drive", "casing", "step"),
+        *(
+            "crankpin",
+            "wristpin",
+            "guide",
+            "mainbearing",
+            "rod",
+            "pressure",
+            "drive",
+            "casing",
+            "step",
+        ),
     )
     wear_places = (
         WearPlace("joint.crankpin.diametral_clearance", "crankpin", _PLAY, "wear"),
