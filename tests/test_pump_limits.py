@@ -119,6 +119,12 @@ BEFORE_THE_RUN = {
         pump(GUIDE, {"joint.guide.stiffness": "10 kN/m", "joint.guide.damping": 0}),
         r"joint\.guide: penetration under .* N = .* m must be <= 0\.005 m, 0\.1 of half the height",
     ),
+    "rod near its buckling": (
+        Status.SLENDER,
+        pump({"rod.rung": "elastic", "rod.section_area": 1e-4, "rod.section_radius": 2e-3}),
+        r"rod: force along it = .* N must be <= 1\.3e\+03 N, 0\.1 of Euler's load, .*; raise "
+        r"rod\.section_radius or rod\.section_area, or set rod\.rung = 'rigid'",
+    ),
     "column torn by knocks": (
         Status.VAPOUR,
         pump(HEADS, crank_pin(diametral_clearance="0.4 mm")),

@@ -48,7 +48,7 @@ def lever_of(joint: int, k: int, w: Any, row: int, t: Any) -> Any:
     """Lever of the eye at one end of a rod, see :class:`Lever`; without modes of a rigid one."""
     q = t.throws[k]
     arm = q.rod_arm if joint == CRANKPIN else -q.rod_centre
-    if t.flex.shape[0] == 0:
+    if not is_elastic(t):
         return Lever(arm, 0.0, 0.0, 0.0, 0.0)
     f, y = t.flex[k], w.flex[row, k].y
     reach = arm / f.length
@@ -70,7 +70,7 @@ def of_bent_eye(
     cos_b: float,
 ) -> Any:
     """Offset of a pin, see :func:`.throw_motion.crank_offset`, from the eye of an elastic rod."""
-    if t.flex.shape[0] == 0:
+    if not is_elastic(t):
         return offset
     d_x, d_y, v_x, v_y = offset
     y, at = w.flex[row, k].y, lever_of(joint, k, w, row, t)
@@ -88,7 +88,7 @@ def of_bent_eye(
 @kernel
 def eye_turn(joint: int, beta_rate: float, k: int, w: Any, row: int, t: Any) -> float:
     """Rate at which the eye of a joint turns, in the sense of the rod's angle [rad/s]."""
-    if t.flex.shape[0] == 0:
+    if not is_elastic(t):
         return beta_rate
     turn: float = beta_rate + lever_of(joint, k, w, row, t).slope * w.flex[row, k].y[BOW_RATE]
     return turn
@@ -98,7 +98,7 @@ def eye_turn(joint: int, beta_rate: float, k: int, w: Any, row: int, t: Any) -> 
 def inverse_inertia(k: int, w: Any, row: int, t: Any) -> float:
     """Of a rod about its centre of mass, as it is stretched and bent [1/(kg m^2)]."""
     rigid: float = t.throws[k].inverse_rod_inertia
-    if t.flex.shape[0] == 0:
+    if not is_elastic(t):
         return rigid
     f, y = t.flex[k], w.flex[row, k].y
     longer = 1.0 + y[STRETCH] / f.length

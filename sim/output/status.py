@@ -122,6 +122,11 @@ class Status(Ending):
         "the line is unstable on its films and would whirl without bound; load the bearings more "
         "evenly, or lower the speed",
     )
+    SLENDER = (
+        22,
+        "the force along an elastic rod softens its bending; raise rod.section_radius or "
+        "rod.section_area, or set rod.rung = 'rigid'",
+    )
 
     def __str__(self) -> str:
         """Name and cure in words.

@@ -15,6 +15,7 @@ from ..pump_setup.contacts import (
 )
 from ..pump_setup.ideal_motion import joint_loads, largest_bearing_load
 from ..pump_setup.joints import JOINT_CODES, joint_parts
+from ..pump_setup.rods import buckling_load
 from ..pump_setup.yielding import guide_gain
 from ..scene.pump import PumpScene
 from ..scene.pump_joints import OILED_RUNGS, Guide, RevoluteJoint
@@ -97,6 +98,7 @@ def limits(scene: PumpScene) -> list[tuple[Status, str]]:
     """
     checks: tuple[Callable[[PumpScene], list[tuple[Status, str]]], ...] = (
         _sunk,
+        _slender,
         _torn,
         _too_long,
         _too_short,
@@ -167,6 +169,23 @@ def _unresolved(
         f"raise its stiffness, or set {path}.rung = 'ideal'"
     )
     return [(Status.UNRESOLVED, text)]
+
+
+_MOST_OF_EULER = 0.1  # softens a rod's bending to 0.95 of its frequency, which is left out
+
+
+def _slender(scene: PumpScene) -> list[tuple[Status, str]]:
+    """Elastic rods whose load would soften or buckle them: their bending knows of none."""
+    most = _MOST_OF_EULER * buckling_load(scene)
+    load = max(max(joint_loads(scene, throw)[:2]) for throw in range(len(scene.throws)))
+    if load <= most:
+        return []
+    text = (
+        f"rod: force along it = {load:.3g} N must be <= {most:.3g} N, {_MOST_OF_EULER:g} of "
+        "Euler's load, beyond which it softens the bending; raise rod.section_radius or "
+        "rod.section_area, or set rod.rung = 'rigid'"
+    )
+    return [(Status.SLENDER, text)]
 
 
 def _size(part: RevoluteJoint | Guide) -> tuple[float, str]:

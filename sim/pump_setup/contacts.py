@@ -191,10 +191,12 @@ def _flex_jacobian(scene: PumpScene, beta: float) -> NDArray[np.float64]:
     )
 
 
-def _jacobian(scene: PumpScene, throw: int, beta: float) -> NDArray[np.float64]:
-    """Rows and columns of :func:`_rod_jacobian`, and two more of each where rods are elastic."""
+def _jacobian(
+    scene: PumpScene, throw: int, beta: float, modes: NDArray[np.void]
+) -> NDArray[np.float64]:
+    """Rows and columns of :func:`_rod_jacobian`, and two more of each where rods have modes."""
     rigid = _rod_jacobian(scene, throw, beta)
-    if scene.rod.rung == "rigid":
+    if not len(modes):
         return rigid
     return np.hstack([np.vstack([rigid, np.zeros((2, 8))]), _flex_jacobian(scene, beta)])
 
@@ -203,16 +205,16 @@ _JOINT_ROWS = (slice(0, 2), slice(2, 4), slice(4, 6))
 
 
 @kept_by_scene
-def _compliances(scene: PumpScene, throw: int) -> NDArray[np.float64]:
+def _compliances(scene: PumpScene, throw: int, flexing: int) -> NDArray[np.float64]:
     """Acceleration of every row of the jacobian per force along every other [1/kg].
 
-    At five swings of the rod, from none to its largest: shape (5, n, n), n = 8 with a rigid rod,
-    10 with an elastic one. All throws that push a
-    crank with play the same way are felt by each as a crank of its share of the mass.
+    At five swings of the rod, from none to its largest: shape (5, n, n), n = 8, or 10 with an
+    elastic rod that may flex (`flexing` 1). All throws that push a crank with play the same way are
+    felt by each as a crank of its share of the mass.
     """
     rod, piston = scene.rod, scene.piston
     rungs = joint_rungs(scene, throw)
-    free, own = rungs[GUIDE] == JOINT_COMPLIANT, rod_table(scene)[:1]
+    free, modes = rungs[GUIDE] == JOINT_COMPLIANT, rod_table(scene)[:flexing]
     inverse: NDArray[np.float64] = np.diag(
         [
             1 / rod.mass,
@@ -222,10 +224,10 @@ def _compliances(scene: PumpScene, throw: int) -> NDArray[np.float64]:
             1 / piston.mass if free else 0.0,
             1 / piston.inertia if free and piston.inertia else 0.0,
             *2 * [_crank_mobility(scene)],
-            *(float(modes[f"inverse_{name}_mass"]) for modes in own for name in FLEX),
+            *(float(row[f"inverse_{name}_mass"]) for row in modes for name in FLEX),
         ]
     )
-    jacobian = np.array([_jacobian(scene, throw, beta) for beta in _betas(scene)])
+    jacobian = np.array([_jacobian(scene, throw, beta, modes) for beta in _betas(scene)])
     ideal = [_JOINT_ROWS[j] for j in (CRANKPIN, WRISTPIN) if rungs[j] == JOINT_IDEAL]
     if ideal:
         held = np.concatenate([jacobian[:, rows] for rows in ideal], axis=1)
@@ -253,15 +255,19 @@ def _betas(scene: PumpScene) -> NDArray[np.float64]:
 
 
 def joint_mobility(scene: PumpScene, throw: int, joint: int) -> float:
-    """Largest acceleration of a joint per unit force in it, over a revolution [1/kg]."""
+    """Largest acceleration of a joint per unit force in it, over a revolution [1/kg].
+
+    Of rigid rods: what a wall or a link loses by default may not depend on how finely its rod is
+    modelled.
+    """
     rows = _JOINT_ROWS[joint]
-    return float(np.linalg.eigvalsh(_compliances(scene, throw)[:, rows, rows]).max())
+    return float(np.linalg.eigvalsh(_compliances(scene, throw, 0)[:, rows, rows]).max())
 
 
 def _largest(scene: PumpScene, throw: int, weights: NDArray[np.float64]) -> float:
     """Largest eigenvalue of the mechanism on springs (or dampers) along its rows."""
     root = np.sqrt(weights)
-    return float(np.linalg.eigvalsh(root[:, None] * _compliances(scene, throw) * root).max())
+    return float(np.linalg.eigvalsh(root[:, None] * _compliances(scene, throw, 1) * root).max())
 
 
 @kept_by_scene

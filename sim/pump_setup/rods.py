@@ -10,6 +10,15 @@ from ..scene.pump import PumpScene
 from .joints import kept_by_scene
 
 
+def buckling_load(scene: PumpScene) -> float:
+    """Euler's load of a rod between its pins [N]; infinite where rods are rigid."""
+    rod = scene.rod
+    if rod.rung == "rigid" or rod.section_area is None or rod.section_radius is None:
+        return math.inf
+    bending = rod.elastic_modulus * rod.section_area * rod.section_radius**2
+    return math.pi**2 * bending / rod.length**2
+
+
 @kept_by_scene
 def rod_table(scene: PumpScene) -> NDArray[np.void]:
     """Modes of the rod of every throw, alike; empty where rods are rigid.

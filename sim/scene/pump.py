@@ -57,6 +57,7 @@ from .scene import (
 _MOMENT_MOST = 1e9  # N m
 _UNBALANCE_MOST = 1e6  # kg m
 _AREA_MOST = 1e4  # m^2
+_ROUNDING = 1e-9  # of the inertia of an even bar, which is the least there is
 
 _MOST_THROWS = 32
 
@@ -218,7 +219,7 @@ class Rod(Part):
             if getattr(self, name) is None
         ]
         least, most = self.inertia_range
-        if not least <= self.inertia < most:
+        if not least * (1 - _ROUNDING) <= self.inertia < most:
             faults.append(
                 f"inertia = {self.inertia:g} kg m^2 must be >= {least:.4g} and < {most:.4g} kg m^2 "
                 "for a rod with a shank between two eyes; check inertia and centre_of_mass, or set "
