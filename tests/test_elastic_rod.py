@@ -325,6 +325,22 @@ def test_elastic_rods_of_a_scene_are_recorded_with_their_truth(throws):
     assert lane_kind(scene) is None
 
 
+@pytest.mark.parametrize("rung", ["compliant", "link", "film-short"])
+def test_what_joints_lose_by_default_does_not_depend_on_the_rod(rung):
+    """Wall damping, the damping of links and the floor of impact speeds are those of rigid rods."""
+    joint = {"joint.crankpin.rung": rung}
+    if rung == "compliant":
+        joint |= {f"joint.crankpin.{k}": v for k, v in HYSTERETIC.items()}
+    if rung == "film-short":
+        joint |= {"joint.crankpin.oil.viscosity": 0.06, "joint.crankpin.oil.length": 0.015}
+    rigid = contacts.contact_table(load_scene("bilge-pump", joint), 0)
+    assert rigid[0] == contacts.contact_table(elastic(**joint), 0)[0]
+    assert rigid["damping"][0] > 0 or 0 < rigid["speed_floor"][0] < 1
+
+
+HYSTERETIC = {"law": "hunt-crossley", "restitution": 0.5, "damping": 0.0}
+
+
 def test_the_step_follows_the_fastest_of_contacts_and_rods():
     """Springs of a rod make its contacts ring faster than a rigid rod's; a stiff one most."""
     rates = [
