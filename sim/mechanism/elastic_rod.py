@@ -14,7 +14,7 @@ Newton's equation of the rod stays as it is, Euler's has an inertia that changes
     ((J (1 + u / L)^2 + m_v v^2) b')' = sum (F . ((1 + u / L) s g - v w e) - M)
 
 for forces F of the pins at both eyes and the moments M against their turning. The axial force does
-not soften the bending: it is far below Euler's load.
+not soften the bending: it stays below a tenth of Euler's load.
 
 Source: Shabana (2020), Dynamics of Multibody Systems, floating frame of reference with mean axes.
 """

@@ -87,7 +87,7 @@ ROD_RUNGS = (
         name="elastic",
         assumes="the rod stretches and bends: one mode each, between and across its eyes",
         reference="Shabana 2020, floating frame of reference with mean axes",
-        valid="up to its second modes; force along it far below Euler's load",
+        valid="up to its second modes; force along it up to a tenth of Euler's load",
         needs="rod.section_area and rod.section_radius",
         nanoseconds_per_step=200.0,
     ),
