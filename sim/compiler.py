@@ -53,6 +53,8 @@ class Kernel(CPUDispatcher):  # type: ignore[misc]
         Compiler; that of whole kernels.
     store : Store, optional
         For the part; without it every process makes it anew.
+    apart : bool
+        Records and arrays among its arguments do not overlap; nobody checks that.
     """
 
     def __init__(
@@ -62,6 +64,7 @@ class Kernel(CPUDispatcher):  # type: ignore[misc]
         targetoptions: dict[str, Any] | None = None,
         pipeline_class: type | None = None,
         store: Store | None = None,
+        apart: bool = False,
     ) -> None:
         options = {"nopython": True, "boundscheck": None, **(targetoptions or {})}
         variables = locals or {}
@@ -71,7 +74,9 @@ class Kernel(CPUDispatcher):  # type: ignore[misc]
             options | {"no_cfunc_wrapper": True},
             pipeline_class or _WholeCompiler,
         )
-        self.part = _Part(py_func, variables, options | _NO_WRAPPERS, _PartCompiler)
+        self.part = _Part(
+            py_func, variables, options | _NO_WRAPPERS, _ApartCompiler if apart else _PartCompiler
+        )
         if store is not None:
             self.part._cache = _Kept(py_func, store)
 
@@ -311,6 +316,14 @@ class _WholeCompiler(CompilerBase):  # type: ignore[misc]
 
 class _PartCompiler(_WholeCompiler):
     lowering = _PartLowering
+
+
+class _ApartCompiler(_PartCompiler):
+    """Code of a part that never reads through one argument what it wrote through another."""
+
+    def define_pipelines(self) -> list[Any]:
+        self.state.flags.noalias = True
+        return super().define_pipelines()
 
 
 class _Kept:

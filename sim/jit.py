@@ -248,10 +248,18 @@ def subroutine(function: Function) -> Function:
     return _compiled(function, _OPTIONS | {"forceinline": False})
 
 
-def _compiled(function: Function, options: dict[str, Any]) -> Function:
+def kernel_apart(function: Function) -> Function:
+    """As :func:`kernel`, of a function whose records and arrays do not overlap in memory.
+
+    Its loops lie in vectors without a check, at every call, of what might overlap.
+    """
+    return _compiled(function, _OPTIONS, apart=True)
+
+
+def _compiled(function: Function, options: dict[str, Any], apart: bool = False) -> Function:
     folder = cache_folder()
     if folder is None:
-        return Kernel(function, targetoptions=options)
+        return Kernel(function, targetoptions=options, apart=apart)
     settings: Any = config
     before = settings.CACHE_DIR
     settings.CACHE_DIR = str(folder)  # read by numba at once, restored at once
@@ -261,7 +269,7 @@ def _compiled(function: Function, options: dict[str, Any]) -> Function:
         settings.CACHE_DIR = before
     place = Path(files.cache_path)
     if not place.is_relative_to(folder):  # numba found it unwritable and took another
-        return Kernel(function, targetoptions=options)
+        return Kernel(function, targetoptions=options, apart=apart)
     names = files._impl
     stamp = names.locator.get_source_stamp()
     source, here = Path(function.__code__.co_filename), Path(__file__).parent
@@ -269,7 +277,10 @@ def _compiled(function: Function, options: dict[str, Any]) -> Function:
         place, stamp = folder / "sim" / source.relative_to(here).parent, None
     files._cache_file = _SealedFiles(function, place, names.filename_base, stamp)
     compiled: Any = Kernel(
-        function, targetoptions=options, store=_SealedParts(place, names.filename_base, stamp)
+        function,
+        targetoptions=options,
+        store=_SealedParts(place, names.filename_base, stamp),
+        apart=apart,
     )
     compiled._cache = files
     return compiled  # type: ignore[no-any-return]

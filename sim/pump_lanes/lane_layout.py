@@ -140,6 +140,15 @@ NEVER = ContactLane(*[0.0] * len(ContactLane._fields))._replace(
 MOST_MODES = 16
 """Of a casing that yields in lanes; one with more runs alone."""
 
+PUSH, REACT, REACH, GIVE, HELD, MOVED, _MODE_ROWS = np.cumsum(
+    [0, len(PUSHES), 3, 3, 2, 2, 3]
+).tolist()
+"""First rows of a mode's numbers, as ``Yielding``, and of its place, speed and force."""
+
+CASING = np.dtype([("modes", "f8", (MOST_MODES, _MODE_ROWS, LANES))])
+"""Modes of the casings of all lanes, numbers and state of each in one block: the compiler lays a
+loop over lanes into vectors only where it knows how far what it reads is from what it writes."""
+
 PLAIN_LAWS = tuple(
     ContactLane._fields.index(name) for name in ("law", "elasticity", "friction_law")
 )
@@ -164,12 +173,7 @@ PLAN = np.dtype(
         ("weight", "f8", LANES),  # of a step's force in its mean, as the march of one weighs it
         ("modes", "i8"),  # of the casing that has most of them
         ("gravity", "f8", (2, LANES)),  # of a bearing at rest
-        ("push", "f8", (MOST_MODES, len(PUSHES), LANES)),  # as ``Yielding``
-        ("react", "f8", (MOST_MODES, 3, LANES)),
-        ("reach", "f8", (MOST_MODES, 3, LANES)),
-        ("give", "f8", (MOST_MODES, 2, LANES)),
-        ("held", "f8", (MOST_MODES, 2, LANES)),
-        ("blend", "f8", (2, 2, LANES)),
+        ("blend", "f8", (2, 2, LANES)),  # as ``Yielding``
     ]
 )
 """Numbers of all lanes, codes as numbers too; columns as the fields of the tuples above."""
@@ -231,8 +235,7 @@ STATE = np.dtype(
         ("carried", "f8", LANES),  # by touching peaks
         ("asks", "f8", LANES),  # 1 where a contact asks for a change within this step
         ("bad", "f8", LANES),  # status code of this step
-        ("moved", "f8", (MOST_MODES, 3, LANES)),  # place, speed and force of the casing's modes
-        ("pushed", "f8", LANES),  # force of a throw on one of them
+        ("pushed", "f8", LANES),  # force of a throw on a mode of the casing
         ("bearing", "f8", (2, LANES)),  # its acceleration with the casing
         ("past", "f8", (2, 2, LANES)),  # the same, one and two steps before
         ("felt", "f8", (2, LANES)),  # of it, by what turns

@@ -45,16 +45,23 @@ from ..pump_setup.tables import Start
 from ..scene.pump import PumpScene
 from ..scene.pump_hydraulics import PIPED_RUNGS
 from .lane_layout import (
+    CASING,
     CRANK,
     DRY,
+    GIVE,
+    HELD,
     LANE_FORCES,
     LANES,
     MAPPED_FILM,
     MOST_MODES,
+    MOVED,
     NEVER,
     PLACES,
     PLAIN_LAWS,
     PLAN,
+    PUSH,
+    REACH,
+    REACT,
     SHORT_FILM,
     STATE,
     ChamberLane,
@@ -212,6 +219,7 @@ class _Lanes:
         self._plan = np.zeros(1, PLAN)
         self._plan["throws"] = kind.throws
         self._state = np.zeros(1, STATE)
+        self._casing = np.zeros(1, CASING)
         self._number = np.full(LANES, -1)  # of the job in each lane
         self._at = np.zeros(LANES, np.int64)  # steps taken of it and not handed on
         self._left = np.zeros(LANES, np.int64)
@@ -295,11 +303,11 @@ class _Lanes:
         """Write a casing into the lane of a throw; one at rest has no mode."""
         plan, n = self._plan[0], len(casing.react)
         plan["modes"] = max(plan["modes"], n)
-        for name in ("push", "react", "reach", "give", "held"):
-            plan[name][..., lane] = 0.0
-        plan["push"][:n, :, lane] = casing.push[:, throw] if n else 0.0
-        plan["react"][:n, :, lane], plan["reach"][:n, :, lane] = casing.react, casing.reach
-        plan["give"][:n, :, lane], plan["held"][:n, :, lane] = casing.give, casing.held
+        modes = self._casing["modes"][0, :, :, lane]  # a view
+        modes[:] = 0.0
+        modes[:n, PUSH:REACT] = casing.push[:, throw] if n else 0.0
+        modes[:n, REACT:REACH], modes[:n, REACH:GIVE] = casing.react, casing.reach
+        modes[:n, GIVE:HELD], modes[:n, HELD:MOVED] = casing.give, casing.held
         plan["blend"][..., lane] = casing.blend
 
     def go_on(self) -> None:
@@ -308,6 +316,7 @@ class _Lanes:
             self._kind,
             self._plan[0],
             self._state[0],
+            self._casing[0],
             self._alone,
             self._kept,
             self._columns,
@@ -380,6 +389,7 @@ def march_on(
     kind: Any,
     p: Any,
     s: Any,
+    m: Any,
     a: Any,
     k: Any,
     columns: Any,
@@ -400,7 +410,7 @@ def march_on(
             return
         for lane in range(LANES):
             k.done[lane] = n if k.code[lane] == 0 else 0
-        march(kind, n, p, s, a, k)
+        march(kind, n, p, s, m, a, k)
         _take(k, columns, at, past, kind)
         failed = False
         for lane in range(LANES):

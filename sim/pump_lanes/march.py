@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..hydraulics.chamber import GATHERED
-from ..jit import kernel, subroutine
+from ..jit import kernel, kernel_apart, subroutine
 from ..mechanism.crank_step import mean_of_stages, step_of_record
 from ..mechanism.equations import derivative_of_record
 from ..mechanism.layout import (
@@ -24,8 +24,23 @@ from ..mechanism.layout import (
 )
 from ..mechanism.march import Tally, begin, carried_on, of_mode, settled
 from .chambers import breathe_alone, count_vapour, enter_chamber, lanes_breathe
-from .lane_layout import ALL_MOVING, BETA, CRANK, DRY, LANE_FORCES, LANES, MOVING, PLACES
-from .rates import beyond_limit, machine_of_lane, rates
+from .lane_layout import (
+    ALL_MOVING,
+    BETA,
+    CRANK,
+    DRY,
+    GIVE,
+    HELD,
+    LANE_FORCES,
+    LANES,
+    MOVED,
+    MOVING,
+    PLACES,
+    PUSH,
+    REACH,
+    REACT,
+)
+from .rates import accelerate, beyond_limit, loads, machine_of_lane, rates
 
 
 class Alone(NamedTuple):
@@ -455,51 +470,68 @@ _VAPOUR, _SUCTION_LIFT, _DISCHARGE_LIFT = GATHERED
 
 
 @kernel
-def _push_mode(p: Any, s: Any, left: Any, n: int, mode: int) -> None:
-    for lane in range(LANES):
-        own = 0.0
-        for c in range(len(PUSHES)):
-            own += p.push[mode, c, lane] * left.forces[c, n, lane]
-        s.pushed[lane] = 0.0 + own
+def _pushed(m: Any, left: Any, n: int, mode: int, lane: int) -> float:
+    """Force of a throw on a mode."""
+    own = 0.0
+    for c in range(len(PUSHES)):
+        own += m.modes[mode, PUSH + c, lane] * left.forces[c, n, lane]
+    return 0.0 + own
 
 
 @kernel
-def _push_together(p: Any, s: Any) -> None:
+def _mean_acceleration(m: Any, mode: int, lane: int, force: float) -> float:
+    k = m.modes
+    q, v = k[mode, MOVED, lane], k[mode, MOVED + 1, lane]
+    a: float = of_mode(
+        force, q, v, k[mode, REACT, lane], k[mode, REACT + 1, lane], k[mode, REACT + 2, lane]
+    )
+    return a
+
+
+@kernel
+def _carry(m: Any, s: Any, mode: int, lane: int, force: float) -> None:
+    """Add to a bearing's acceleration that of a mode."""
+    a = _mean_acceleration(m, mode, lane, force)
+    m.modes[mode, MOVED + 2, lane] = force
+    s.bearing[0, lane] += m.modes[mode, GIVE, lane] * a
+    s.bearing[1, lane] += m.modes[mode, GIVE + 1, lane] * a
+
+
+@kernel_apart
+def _push_mode(m: Any, s: Any, left: Any, n: int, mode: int) -> None:
+    for lane in range(LANES):
+        _carry(m, s, mode, lane, _pushed(m, left, n, mode, lane))
+
+
+@kernel_apart
+def _push_mode_together(throws: int, m: Any, s: Any, left: Any, n: int, mode: int) -> None:
     """The throws of a record push on the same modes."""
-    n = p.throws
-    for first in range(0, LANES - n + 1, n):
-        force = 0.0
-        for lane in range(first, first + n):
-            force += s.pushed[lane]
-        for lane in range(first, first + n):
-            s.pushed[lane] = force
-
-
-@kernel
-def _accelerate_mode(p: Any, s: Any, mode: int) -> None:
-    r = p.react
     for lane in range(LANES):
-        force, q, v = s.pushed[lane], s.moved[mode, 0, lane], s.moved[mode, 1, lane]
-        a = of_mode(force, q, v, r[mode, 0, lane], r[mode, 1, lane], r[mode, 2, lane])
-        s.moved[mode, 2, lane] = force
-        s.bearing[0, lane] += p.give[mode, 0, lane] * a
-        s.bearing[1, lane] += p.give[mode, 1, lane] * a
+        s.pushed[lane] = _pushed(m, left, n, mode, lane)
+    for first in range(0, LANES - throws + 1, throws):
+        force = 0.0
+        for lane in range(first, first + throws):
+            force += s.pushed[lane]
+        for lane in range(first, first + throws):
+            s.pushed[lane] = force
+    for lane in range(LANES):
+        _carry(m, s, mode, lane, s.pushed[lane])
 
 
-@kernel
-def _move_mode(p: Any, s: Any, mode: int) -> None:
-    r, to = p.react, p.reach
+@kernel_apart
+def _move_mode(m: Any, p: Any, s: Any, mode: int) -> None:
+    k = m.modes
     for lane in range(LANES):
         late_x = s.felt[0, lane] - s.bearing[0, lane]
         late_y = s.felt[1, lane] - s.bearing[1, lane]
-        held_x, held_y = p.held[mode, 0, lane], p.held[mode, 1, lane]
-        force = s.moved[mode, 2, lane] + held_x * late_x + held_y * late_y
-        q, v = s.moved[mode, 0, lane], s.moved[mode, 1, lane]
-        a = of_mode(force, q, v, r[mode, 0, lane], r[mode, 1, lane], r[mode, 2, lane])
-        s.moved[mode, 0, lane] = of_mode(
-            force, q, v, to[mode, 0, lane], to[mode, 1, lane], to[mode, 2, lane]
+        held_x, held_y = k[mode, HELD, lane], k[mode, HELD + 1, lane]
+        force = k[mode, MOVED + 2, lane] + held_x * late_x + held_y * late_y
+        q, v = k[mode, MOVED, lane], k[mode, MOVED + 1, lane]
+        a = _mean_acceleration(m, mode, lane, force)
+        k[mode, MOVED, lane] = of_mode(
+            force, q, v, k[mode, REACH, lane], k[mode, REACH + 1, lane], k[mode, REACH + 2, lane]
         )
-        s.moved[mode, 1, lane] = v + p.step[lane] * a
+        k[mode, MOVED + 1, lane] = v + p.step[lane] * a
 
 
 @kernel
@@ -517,24 +549,25 @@ def _settle(p: Any, s: Any) -> None:
 
 
 @subroutine
-def _move_bearings(p: Any, s: Any, left: Any, n: int) -> None:
+def _move_bearings(p: Any, s: Any, m: Any, left: Any, n: int) -> None:
     """What turns is heavier in the next step by how the casing accelerates its bearing."""
-    for c in range(2):
-        for lane in range(LANES):
+    for lane in range(LANES):
+        for c in range(2):
             s.past[1, c, lane], s.past[0, c, lane] = s.past[0, c, lane], s.bearing[c, lane]
             s.bearing[c, lane] = 0.0
     for mode in range(p.modes):
-        _push_mode(p, s, left, n, mode)
         if p.throws > 1:
-            _push_together(p, s)
-        _accelerate_mode(p, s, mode)
+            _push_mode_together(p.throws, m, s, left, n, mode)
+        else:
+            _push_mode(m, s, left, n, mode)
     _settle(p, s)
     for mode in range(p.modes):
-        _move_mode(p, s, mode)
-    for c in range(2):
-        for lane in range(LANES):
-            s.felt[c, lane] = carried_on(s.bearing[c, lane], s.past[0, c, lane], s.past[1, c, lane])
-            p.machine[c, lane] = p.gravity[c, lane] + s.felt[c, lane]
+        _move_mode(m, p, s, mode)
+    for lane in range(LANES):
+        for c in range(2):
+            felt = carried_on(s.bearing[c, lane], s.past[0, c, lane], s.past[1, c, lane])
+            s.felt[c, lane] = felt
+            p.machine[c, lane] = p.gravity[c, lane] + felt
 
 
 @subroutine
@@ -550,11 +583,12 @@ def _keep_gaps(s: Any, left: Any, n: int) -> None:
 
 
 @subroutine
-def march(kind: Any, n: int, p: Any, s: Any, a: Any, k: Any) -> None:
+def march(kind: Any, n: int, p: Any, s: Any, m: Any, a: Any, k: Any) -> None:
     """Take n steps of all lanes, of one kind.
 
     Chambers are stepped before the rates at the end of a step are made, which so feel the pressure
-    that is found, not the extrapolated one. What asks for a cut does not depend on it.
+    that is found, not the extrapolated one. What asks for a cut does not depend on it, nor on what
+    a casing that yields does to the bearings: with one the accelerations wait for that.
     """
     across, breathing = kind.guide, kind.breathing
     left, oiled = k.left[0], kind.oil != DRY
@@ -567,13 +601,17 @@ def march(kind: Any, n: int, p: Any, s: Any, a: Any, k: Any) -> None:
         rates(p, s, 1.0, kind, a.maps)
         _to_end(p, s, left, step, across, oiled)
         with_care = lanes_breathe(p, s, a, k.code) if breathing else 0
-        rates(p, s, 0.0, kind, a.maps)
-        if _judge(p, s) > 0:
+        loads(p, s, 0.0, kind, a.maps)
+        found = _judge(p, s)
+        if found > 0 or not kind.yields:
+            accelerate(p, s)
+        if found > 0:
             again = _mend(breathing, p, s, a, k, step)
-            if breathing and again > 0:
+            if breathing:
                 with_care += again
-                if not oiled:
-                    rates(p, s, 0.0, kind, a.maps)
+            if again > 0 and (breathing or kind.yields) and not oiled:
+                loads(p, s, 0.0, kind, a.maps)
+                accelerate(p, s)
         if oiled:
             _keep_gaps(s, left, step)
             if breathing:  # the march of one seeks its films anew under the pressure that it found
@@ -584,8 +622,8 @@ def march(kind: Any, n: int, p: Any, s: Any, a: Any, k: Any) -> None:
                 count_vapour(s, a)
         _keep_turns(s, left, step)
         if kind.yields:
-            _move_bearings(p, s, left, step)
-            rates(p, s, 0.0, kind, a.maps)
+            _move_bearings(p, s, m, left, step)
+            accelerate(p, s)
 
 
 def alone(t: Tables, maps: NDArray[np.float64]) -> Alone:

@@ -314,6 +314,13 @@ def _turn_crank_together(p: Any, s: Any) -> None:
 @kernel
 def rates(p: Any, s: Any, share: float, kind: Any, maps: Any) -> None:
     """Accelerations, forces and margins of all lanes; `share` of the step has passed."""
+    loads(p, s, share, kind, maps)
+    accelerate(p, s)
+
+
+@kernel
+def loads(p: Any, s: Any, share: float, kind: Any, maps: Any) -> None:
+    """What the joints and the liquid do, and margins, of all lanes."""
     _turn(p, s)
     if kind.breathing:
         _press_chambers(s, share)
@@ -337,6 +344,11 @@ def rates(p: Any, s: Any, share: float, kind: Any, maps: Any) -> None:
         else:
             _rear(p, s)
             _front(p, s)
+
+
+@kernel
+def accelerate(p: Any, s: Any) -> None:
+    """Accelerations and forces of all lanes under the loads that were found."""
     _accelerate(p, s)
     if p.driven != 0.0 and p.throws > 1:
         _turn_crank_together(p, s)
