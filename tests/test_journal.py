@@ -266,6 +266,18 @@ def test_noise_is_of_the_seed_alone():
     assert_array_equal(one.truth["journal_m"], other.truth["journal_m"])
 
 
+def test_hum_is_added_to_what_a_probe_reads():
+    hum = {"sensors.1.mains": "2 um", "sensors.1.mains_frequency": "60 Hz", "duration": "0.5 s"}
+    _, plain = bearing({"duration": "0.5 s"})
+    _, humming = bearing(hum)
+    added = humming.signal.astype(float) - plain.signal
+    assert_array_equal(added[[0, 2]], 0)
+    assert added[1].std() == pytest.approx(2e-6, rel=1e-3)  # 30 whole periods
+    lines = np.abs(np.fft.rfft(added[1])) ** 2
+    of_60_hz = lines[np.array([1, 2, 3, 5]) * 30].sum()
+    assert of_60_hz == pytest.approx(lines.sum(), rel=1e-4)
+
+
 def test_the_tacho_rises_at_whole_turns():
     scene, solution = bearing({"drive.start_angle": "90 deg"})
     pulse = solution.signal[2]

@@ -1,4 +1,4 @@
-"""What an accelerometer hears of the part of the housing it sits on."""
+"""What an accelerometer hears of the part of the housing it sits on, and hum."""
 
 import numpy as np
 import pytest
@@ -66,3 +66,13 @@ def test_a_mode_is_heard_by_its_own_sensor_alone():
     near = np.abs(lines - 300) < 3
     power = [np.sum(np.abs(np.fft.rfft(row)[near]) ** 2) for row in (heard[1], plain[1])]
     assert power[0] / power[1] == pytest.approx(1 + 3.0**2, rel=0.1)  # |1 + 0.3 / (2j 0.05)|^2
+
+
+def test_hum_comes_to_its_own_sensor_alone():
+    still = {"duration": "1 s", "probes.0.noise": 0.0, "sensors.1.noise": 0.0}
+    still |= {"probes.1.noise": 0.0}  # its noise would follow the phases of the hum
+    plain = simulate(load_scene("propulsion-shaft", still), seed=1).signal
+    hum = {"sensors.4.mains": "0.2 m/s^2", "probes.0.mains": "5 um"}
+    humming = simulate(load_scene("propulsion-shaft", {**still, **hum}), seed=1).signal
+    added = (humming.astype(float) - plain).std(axis=1)
+    assert_allclose(added, [0, 0, 0, 0, 0.2, 5e-6, 0, 0], rtol=1e-3)  # 50 whole periods

@@ -14,7 +14,7 @@ from ..contact.law import CONTACT
 from ..film.impedance_map import impedance_map
 from ..film.solve import LEAST_CELLS, FilmGeometry, Groove, dufrane_scar
 from ..output.recording import Recording
-from ..output.sensor import digitise
+from ..output.sensor import digitise, floor_of
 from ..output.status import SimulationError, Status
 from ..output.track import track_under
 from ..scene.journal import JournalLoad, JournalScene
@@ -440,7 +440,14 @@ def _measured(
             + track_under(scene.rotor.run_out, scene.rotor.dents, plan.angle - probe.angle)
             + probe.offset,
             gain=probe.gain,
-            noise=probe.noise,
+            noise=floor_of(
+                towards.size,
+                scene.sample_rate,
+                noise=probe.noise,
+                mains=probe.mains,
+                mains_frequency=probe.mains_frequency,
+                rng=rng,
+            ),
             full_scale=probe.range,
             bits=probe.bits,
             rng=rng,

@@ -339,6 +339,51 @@ def mains_hum(
 _HUM_BLOCK = 512  # samples
 
 
+def floor_of(
+    n: int,
+    fs: float,
+    *,
+    noise: float,
+    slope: float = 0.0,
+    mains: float,
+    mains_frequency: float,
+    rng: np.random.Generator,
+) -> NDArray[np.float64]:
+    """What a sensor shows of a machine at rest: its own noise and the hum of the mains.
+
+    Parameters
+    ----------
+    n : int
+        Samples.
+    fs : float
+        Sample rate [Hz].
+    noise : float
+        rms, in the sensor's unit.
+    slope : float
+        Its power density falls as ``1 / f**slope``.
+    mains : float
+        rms of the hum, harmonics and all, in the sensor's unit.
+    mains_frequency : float
+        [Hz]
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    numpy.ndarray [shape=(n,)]
+        In the sensor's unit.
+
+    Examples
+    --------
+    >>> rng = np.random.default_rng(0)
+    >>> round(float(floor_of(4000, 1e3, noise=3, mains=4, mains_frequency=50, rng=rng).std()), 1)
+    5.0
+    """
+    floor = coloured_noise(n, fs, rms=noise, slope=slope, rng=rng)
+    if mains > 0:
+        floor = floor + mains_hum(n, fs, rms=mains, frequency=mains_frequency, rng=rng)
+    return floor
+
+
 def digitise(
     acceleration: NDArray[np.float64],
     *,

@@ -12,10 +12,9 @@ from ..mechanism.layout import GUIDE
 from ..output.recording import Recording
 from ..output.sensor import (
     anti_alias_poles,
-    coloured_noise,
     digitise,
+    floor_of,
     low_pass,
-    mains_hum,
     mounting_poles,
 )
 from ..output.status import SimulationError, Status
@@ -231,10 +230,15 @@ def _floor(
     sensor: Accelerometer, n: int, fs: float, rng: np.random.Generator
 ) -> NDArray[np.float64]:
     """What the sensor shows of a machine at rest [m/s^2, shape=(n,)]."""
-    noise = coloured_noise(n, fs, rms=sensor.noise, slope=sensor.noise_slope, rng=rng)
-    if sensor.mains > 0:
-        noise += mains_hum(n, fs, rms=sensor.mains, frequency=sensor.mains_frequency, rng=rng)
-    return noise
+    return floor_of(
+        n,
+        fs,
+        noise=sensor.noise,
+        slope=sensor.noise_slope,
+        mains=sensor.mains,
+        mains_frequency=sensor.mains_frequency,
+        rng=rng,
+    )
 
 
 def _front_end(sensor: Accelerometer, row: NDArray[np.float64], fs: float) -> NDArray[np.float64]:

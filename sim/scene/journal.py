@@ -16,6 +16,7 @@ from ..parts.dimensions import (
     Angle,
     Damping,
     Force,
+    Frequency,
     Gravity,
     Length,
     Mass,
@@ -343,6 +344,10 @@ class ProximityProbe(Part):
         default=0.0, ge=-_GAP_MOST, le=_GAP_MOST, description="reading of a centred shaft"
     )
     noise: Length = Field(default=0.0, ge=0, le=_GAP_MOST, description="rms of white noise")
+    mains: Length = Field(
+        default=0.0, ge=0, le=_GAP_MOST, description="rms of hum, harmonics and all"
+    )
+    mains_frequency: Frequency = Field(default=50.0, ge=15, le=400, description="of the hum")
     range: Length = Field(
         ge=_GAP_LEAST, le=_GAP_MOST, description="full scale, plus and minus, about the set gap"
     )

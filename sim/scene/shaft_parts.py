@@ -515,6 +515,10 @@ class ShaftAccelerometer(Part):
         default=1.0, ge=GAIN_LEAST, le=GAIN_MOST, description="true sensitivity over nominal"
     )
     noise: Acceleration = Field(default=0.0, ge=0, le=_NOISIEST, description="rms of white noise")
+    mains: Acceleration = Field(
+        default=0.0, ge=0, le=_NOISIEST, description="rms of hum, harmonics and all"
+    )
+    mains_frequency: Frequency = Field(default=50.0, ge=15, le=400, description="of the hum")
     range: Acceleration = Field(
         ge=_LEAST_RANGE, le=_MOST_RANGE, description="full scale, plus and minus"
     )

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..excitation.forces import Push, read_cell
 from ..output.recording import Recorder, Recording
-from ..output.sensor import digitise
+from ..output.sensor import digitise, floor_of
 from ..output.status import SimulationError, Status
 from ..output.track import track_under
 from ..scene.exciters import pushing_faults
@@ -383,7 +383,14 @@ def _measured(
         row, lost = digitise(
             reading,
             gain=part.gain,
-            noise=part.noise,
+            noise=floor_of(
+                angle.size,
+                scene.sample_rate,
+                noise=part.noise,
+                mains=part.mains,
+                mains_frequency=part.mains_frequency,
+                rng=rng,
+            ),
             full_scale=part.range,
             bits=part.bits,
             rng=rng,
