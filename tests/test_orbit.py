@@ -16,6 +16,7 @@ from wearstate.sim.journal.load import (
     half_sine_history,
     load,
     load_at,
+    loads_at,
     rectangular_history,
     step_history,
 )
@@ -127,6 +128,8 @@ def test_history_is_linear_between_its_instants():
         (9.0, (1.0, 0.0)),
     ):
         assert_allclose(load_at(q, tau), expected, atol=1e-15)
+    many = np.array([0.5, 9.0, 3.0, 1.25, 2.0])
+    assert loads_at(q, many).tolist() == [[*load_at(q, tau)] for tau in many]
 
 
 def test_the_papers_histories():

@@ -176,3 +176,16 @@ def load_at(q: Load, tau: float) -> tuple[float, float]:
     """Load along X and Y at an instant [rad]; at a jump, the value after it."""
     x, y, _, _ = load_and_rates(q, tau, np.zeros(1, np.int64))
     return x, y
+
+
+def loads_at(q: Load, tau: NDArray[np.float64]) -> NDArray[np.float64]:
+    """:func:`load_at` at many instants [shape=(n, 2)]: one call of a kernel for all of them."""
+    found = np.empty((len(tau), 2))
+    _loads(q, tau, np.zeros(1, np.int64), found)
+    return found
+
+
+@kernel
+def _loads(q: Load, tau: Any, cursor: Any, found: Any) -> None:
+    for i in range(tau.size):
+        found[i, 0], found[i, 1], _, _ = load_and_rates(q, tau[i], cursor)

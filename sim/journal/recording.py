@@ -21,7 +21,7 @@ from ..scene.journal import JournalLoad, JournalScene
 from ..scene.recorded import failed, recorded
 from ..scene.sampling import duration_faults, memory_faults, tacho_faults
 from ..scene.scene import Scene, SceneError
-from .load import Load, half_sine_history, load, load_at, rectangular_history, step_history
+from .load import Load, half_sine_history, load, loads_at, rectangular_history, step_history
 from .orbit import FilmTrace, OrbitRun, film_trace, run_orbit
 from .orbit_film import OrbitFilm, map_film, short_film, solved_film
 from .orbit_march import Wall
@@ -229,7 +229,7 @@ def journal_load(scene: JournalScene, lead: float = 0.0) -> Load:
     --------
     >>> from wearstate.sim.scene.load import load_scene
     >>> pulse = journal_load(load_scene("journal-rectangular-pulse"))
-    >>> [round(load_at(pulse, tau)[0], 3) for tau in (50.0, 51.0, 57.0)]
+    >>> loads_at(pulse, np.array([50.0, 51.0, 57.0]))[:, 0].round(3).tolist()
     [0.397, 1.397, 0.397]
     """
     scale, part, rotor = journal_scale(scene), scene.load, scene.rotor
@@ -607,7 +607,7 @@ def _truth(
         "journal_velocity_m_s": scale.clearance * scale.speed * run.velocity[kept],
         "film_force_n": scale.alpha * scale.force * trace.force[kept],
         "min_film_m": scale.clearance * film_gap(scene, run.position[kept]),
-        "load_n": scale.force * np.array([load_at(loads, tau) for tau in run.tau[kept]]),
+        "load_n": scale.force * loads_at(loads, run.tau[kept]),
     }
     if trace.peak_pressure is not None:
         truth["peak_pressure_pa"] = scale.pressure * trace.peak_pressure[kept]
