@@ -4,11 +4,12 @@ import math
 
 import numpy as np
 import pytest
+from numba import typeof
 from numpy.testing import assert_allclose
 from wearstate.sim.fidelity.ladder import effects_of
 from wearstate.sim.machine.simulate import simulate, simulate_many
 from wearstate.sim.mechanism.crank_run import run_mechanism
-from wearstate.sim.mechanism.layout import PUSHES, Yielding
+from wearstate.sim.mechanism.layout import AT_REST, PUSHES, Yielding
 from wearstate.sim.pump_setup import contacts, films, ideal_motion, tables, yielding
 from wearstate.sim.pump_setup.films import bore_temperature
 from wearstate.sim.scene.load import load_scene
@@ -55,6 +56,18 @@ def run(scene, *, step, n_steps, inertia=0.0, angle=0.3, journal=None, casing=No
     )
     assert found.status.ok
     return t, found
+
+
+def test_every_crank_runs_in_the_same_kernel():
+    """Of other types, such as read-only arrays, a quarter of a minute would go into one more."""
+    rod = {"rod.rung": "elastic", "rod.section_area": "8 cm^2", "rod.section_radius": "8 mm"}
+    casing = {"casing.rung": "yielding"}
+    scenes = [load_scene("bilge-pump", rod), worn(), worn(**rod), worn(**rod, **casing)]
+    plain = load_scene("bilge-pump")
+    assert {typeof(tables.tables(scene, 2e-5)) for scene in scenes} == {
+        typeof(tables.tables(plain, 2e-5))
+    }
+    assert typeof(yielding.yielding_of(scenes[-1], 2e-5)) == typeof(AT_REST)
 
 
 def test_an_unbalanced_crank_leans_on_its_bore_where_its_heavy_side_is():

@@ -112,9 +112,9 @@ def tables(scene: PumpScene, step: float) -> Tables:
         oils=np.stack([oil_table(scene, throw, contacts[throw], maps, step) for throw in throws]),
         maps=np.concatenate([np.zeros(1), *(m.table.coefficients.ravel() for m in maps.values())]),
         bearing=bearing_record(scene),
-        bore=bore_table(scene),
+        bore=bore_table(scene).copy(),  # of read-only arrays the kernel would be compiled again
         bore_oil=bore_oil_table(scene, maps, step),
-        flex=rod_table(scene),
+        flex=rod_table(scene).copy(),
         machine=Machine(
             gravity_x=gravity_x,
             gravity_y=gravity_y,
