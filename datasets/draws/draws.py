@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, Self
+from typing import Any, Literal, NamedTuple, NoReturn, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -12,6 +12,7 @@ from scipy.special import ndtri
 from ...sim.parts.dimensions import Ratio
 from ...sim.parts.part import Part
 from ...sim.scene.load import numbered, override, scene_from_table
+from ...sim.scene.rungs import with_values
 from ...sim.scene.scene import Scene, SceneError
 
 Bound = float | str
@@ -180,10 +181,11 @@ def axes_of(
         Place -> one axis for every value the draw's path stands for; none where it is at fault.
     """
     axes: dict[str, list[Axis]] = {}
+    whole = _Whole(base, scene_from_table(base))
     for place, draw in places.items():
         try:
-            found = [_axis(draw, path, base) for path in matches(base, draw.path)]
-            _try_extremes(found, base)
+            found = [_axis(draw, path, whole) for path in matches(base, draw.path)]
+            _try_extremes(found, whole)
             axes[place] = found
         except SceneError as error:
             faults += [f"{place} ({draw.path}): {fault}" for fault in error.faults]
@@ -222,25 +224,37 @@ def _node(base: Any, path: str) -> Any:
     return base
 
 
-def _axis(draw: Draw, path: str, base: Mapping[str, Any]) -> Axis:
+class _Whole(NamedTuple):
+    """A scene as a table and as it is validated: parts that stay need not be validated again."""
+
+    base: Mapping[str, Any]
+    scene: Scene
+
+    def changed(self, values: Mapping[str, Any]) -> Scene:
+        """The scene with values replaced by dotted path, or why it is none, in its own words."""
+        try:
+            return with_values(self.scene, values)
+        except (SceneError, AttributeError):  # tables that are no parts, such as shapes of modes
+            return scene_from_table(override(self.base, values))
+
+
+def _axis(draw: Draw, path: str, whole: _Whole) -> Axis:
     if draw.distribution == "relative-normal":
-        vector = _scene_value(base, path)
+        vector = _own_value(whole, path)
         if not isinstance(vector, Mapping) or not any(vector.values()):
             raise SceneError(path, [f"{path} is no table of numbers, as relative-normal needs"])
         return Vector(path, vector, draw.scale or 0.0)
     kind = KINDS[draw.distribution]
     if kind.relative:
-        bands = _relative_bands(draw, path, base)
+        bands = _relative_bands(draw, path, whole)
     else:
-        bands = tuple((_in_si(base, path, a), _in_si(base, path, b)) for a, b in draw.ranges)
+        bands = tuple((_in_si(whole, path, a), _in_si(whole, path, b)) for a, b in draw.ranges)
     _refuse_bands(path, bands, positive=kind.scale is math.log)
     return Range(path, kind, bands)
 
 
-def _relative_bands(
-    draw: Draw, path: str, base: Mapping[str, Any]
-) -> tuple[tuple[float, float], ...]:
-    value = _scene_value(base, path)
+def _relative_bands(draw: Draw, path: str, whole: _Whole) -> tuple[tuple[float, float], ...]:
+    value = _own_value(whole, path)
     if not isinstance(value, float) or value == 0:
         raise SceneError(path, [f"{path} = {value!r} must not be 0 to be multiplied; use uniform"])
     if any(isinstance(factor, str) for band in draw.ranges for factor in band):
@@ -262,27 +276,35 @@ def _refuse_bands(path: str, bands: tuple[tuple[float, float], ...], *, positive
         raise SceneError(path, [f"{path}: low = {flat[0]:g} must be > 0 for a logarithm; raise it"])
 
 
-def _in_si(base: Mapping[str, Any], path: str, value: Bound) -> float:
+def _in_si(whole: _Whole, path: str, value: Bound) -> float:
     """Bound in SI, by letting the scene itself read it."""
-    number = _scene_value(override(base, {path: value}), path)
+    values = {path: value}
+    scene = whole.changed(values)
+    if not has_value(scene, path):
+        _refuse_path(override(whole.base, values), path)
+    number = value_at(scene, path)
     if isinstance(number, bool) or not isinstance(number, (int, float)):
         raise SceneError(path, [f"{path} = {number!r} is no number; draw one that is"])
     return float(number)
 
 
-def _scene_value(base: Mapping[str, Any], path: str) -> Any:
-    """Validated value at a dotted path; a path the scene lacks is refused in the scene's words."""
-    scene = scene_from_table(base)
-    if not has_value(scene, path):
-        scene_from_table(override(base, {path: 0.0}))  # names the nearest key
-        by_number = numbered(base, path)
-        cure = (
-            "see the scene's own tables"
-            if by_number == path
-            else f"a recipe counts the entries of a list: {by_number}"
-        )
-        raise SceneError(path, [f"{path} does not lead to a value; {cure}"])
-    return value_at(scene, path)
+def _own_value(whole: _Whole, path: str) -> Any:
+    """Value of the scene at a dotted path."""
+    if not has_value(whole.scene, path):
+        _refuse_path(whole.base, path)
+    return value_at(whole.scene, path)
+
+
+def _refuse_path(base: Mapping[str, Any], path: str) -> NoReturn:
+    """Refuse a path that a scene lacks, in the scene's words."""
+    scene_from_table(override(base, {path: 0.0}))  # names the nearest key
+    by_number = numbered(base, path)
+    cure = (
+        "see the scene's own tables"
+        if by_number == path
+        else f"a recipe counts the entries of a list: {by_number}"
+    )
+    raise SceneError(path, [f"{path} does not lead to a value; {cure}"])
 
 
 def value_at(node: Any, path: str) -> Any:
@@ -312,7 +334,7 @@ def has_value(scene: Scene, path: str) -> bool:
     return True
 
 
-def _try_extremes(axes: Sequence[Axis], base: Mapping[str, Any]) -> None:
+def _try_extremes(axes: Sequence[Axis], whole: _Whole) -> None:
     """Let the scene refuse bounds now rather than in the middle of a run."""
     for end in (0, 1):
-        scene_from_table(override(base, {axis.path: axis.extremes()[end] for axis in axes}))
+        whole.changed({axis.path: axis.extremes()[end] for axis in axes})

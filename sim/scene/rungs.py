@@ -8,6 +8,7 @@ machine are beside its physics, as ``ladder.py``.
 """
 
 import math
+from collections import OrderedDict
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
@@ -174,11 +175,28 @@ def _refused(rungs: tuple[Rung, ...], beyond: Beyond, scene: Scene, name: str) -
     return next((fault for fault in found if fault not in shared), None)
 
 
-def _faults_of(rung: Rung, beyond: Beyond, scene: Scene) -> list[str]:
+def _faults_of(rung: Rung, beyond: Beyond, scene: Scene) -> tuple[str, ...]:
+    """Faults of a scene with a rung; the last ones are kept, as every rung asks for all others'.
+
+    A scene is known by its identity, which no other takes while it is held here.
+    """
+    key = (id(scene), beyond, tuple(rung.values.items()))
+    _, faults = _KEPT.get(key) or (scene, _found_in(rung, beyond, scene))
+    _KEPT[key] = scene, faults
+    while len(_KEPT) > _MOST_KEPT:
+        _KEPT.popitem(last=False)
+    return faults
+
+
+_KEPT: OrderedDict[tuple[Any, ...], tuple[Scene, tuple[str, ...]]] = OrderedDict()
+_MOST_KEPT = 256
+
+
+def _found_in(rung: Rung, beyond: Beyond, scene: Scene) -> tuple[str, ...]:
     try:
-        return beyond(with_values(scene, rung.values))
+        return tuple(beyond(with_values(scene, rung.values)))
     except SceneError as error:
-        return list(error.faults)
+        return tuple(error.faults)
 
 
 def effect(
