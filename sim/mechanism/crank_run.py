@@ -220,8 +220,8 @@ def run_mechanism(
         flex=np.empty((rows if len(t.flex) else 1, n, 2 * len(FLEX))),
     )
     tally = Tally(counts=np.zeros(5, np.int64), peak=np.zeros(1))
-    moved, ridden = np.zeros((len(casing.react), 3)), np.zeros((3, 2))
-    code, done = integrate(step, t, casing, moved, ridden, w, chamber, shared, r, tally)
+    moved, felt = np.zeros((len(casing.react), 5)), np.zeros((3, 2))
+    code, done = integrate(step, t, casing, moved, felt, w, chamber, shared, r, tally)
     return CrankRun(
         steps=done,
         turns=r.turns[: done + 1],

@@ -141,9 +141,9 @@ MOST_MODES = 16
 """Of a casing that yields in lanes; one with more runs alone."""
 
 PUSH, REACT, REACH, GIVE, HELD, MOVED, _MODE_ROWS = np.cumsum(
-    [0, len(PUSHES), 3, 3, 2, 2, 3]
+    [0, len(PUSHES), 3, 3, 2, 2, 5]
 ).tolist()
-"""First rows of a mode's numbers, as ``Yielding``, and of its place, speed and force."""
+"""First rows of a mode's numbers, as ``Yielding``; of its place, speed and last three forces."""
 
 CASING = np.dtype([("modes", "f8", (MOST_MODES, _MODE_ROWS, LANES))])
 """Modes of the casings of all lanes, numbers and state of each in one block: the compiler lays a
@@ -236,9 +236,10 @@ STATE = np.dtype(
         ("asks", "f8", LANES),  # 1 where a contact asks for a change within this step
         ("bad", "f8", LANES),  # status code of this step
         ("pushed", "f8", LANES),  # force of a throw on a mode of the casing
-        ("bearing", "f8", (2, LANES)),  # its acceleration with the casing
-        ("past", "f8", (2, 2, LANES)),  # the same, one and two steps before
+        ("bearing", "f8", (2, LANES)),  # its acceleration with the casing, zero between steps
         ("felt", "f8", (2, LANES)),  # of it, by what turns
+        ("felt_before", "f8", (2, 2, LANES)),  # one and two steps before
+        ("late", "f8", (2, LANES)),  # by how much what was felt was ahead of it
     ]
 )
 """All lanes in the middle of their step. One record: the compiler lays a loop into vectors where it
