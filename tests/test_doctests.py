@@ -2,6 +2,7 @@
 
 import doctest
 import importlib
+import linecache
 import pkgutil
 
 import pytest
@@ -35,5 +36,7 @@ def test_docstrings(name, tmp_path, monkeypatch, request):
         for file, fixture in (("pump.h5", data), ("pump.wsm", "small_model")):
             (tmp_path / file).symlink_to(request.getfixturevalue(fixture))
     monkeypatch.chdir(tmp_path)  # an example that writes a file leaves none behind
+    # its debugger, which nothing starts, would look for changes in every source, each time
+    monkeypatch.setattr(linecache, "checkcache", lambda *_: None)
     failed, _ = doctest.testmod(module, optionflags=doctest.NORMALIZE_WHITESPACE)
     assert failed == 0

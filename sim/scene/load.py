@@ -8,6 +8,7 @@ cure, and names the nearest match of an unknown key. Kernels trust what passes.
 import re
 import tomllib
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -211,8 +212,7 @@ def scene_table(text: str, name: str = "scene") -> dict[str, Any]:
     try:
         if _LONG_KEY.search(text):  # the parser takes the square of its length
             raise RecursionError
-        table = tomllib.loads(text)
-        faults = _unlike_toml(table)
+        table, faults = _parsed(text)
     except RecursionError:
         raise SceneError(name, ["not TOML: lists or tables nested too deep; flatten it"]) from None
     except tomllib.TOMLDecodeError as error:
@@ -220,8 +220,16 @@ def scene_table(text: str, name: str = "scene") -> dict[str, Any]:
     except ValueError:  # a whole number that Python does not turn
         raise SceneError(name, [f"a whole number {_LONG_NUMBER}"]) from None
     if faults:
-        raise SceneError(name, faults)
-    return table
+        raise SceneError(name, [*faults])
+    copied: dict[str, Any] = _copy(table)
+    return copied
+
+
+@lru_cache(maxsize=32)
+def _parsed(text: str) -> tuple[dict[str, Any], tuple[str, ...]]:
+    """Table of a text, and what is wrong with it; kept, as recipes of one scene read it in turn."""
+    table = tomllib.loads(text)
+    return table, tuple(_unlike_toml(table))
 
 
 def _unlike_toml(table: Mapping[str, Any]) -> list[str]:
