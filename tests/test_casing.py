@@ -272,6 +272,19 @@ def total_response(factor, frequency):
 
 
 @pytest.mark.parametrize("factor", FACTORS)
+def test_the_filter_is_that_of_scipy(factor):
+    n = len(decimation_filter(factor))
+    width = (1 - 2 * PASS_BAND) * 2 / factor
+    fewest, beta = signal.kaiserord(80.0, width)
+    assert fewest <= n <= fewest + 2 * factor + 1
+    grid = np.linspace(0, 1 / factor, 129)
+    end = [1 / factor, 1.0] if factor > 1 else []
+    gain = np.append(1 / np.sinc(grid / 2), np.zeros(len(end)))
+    expected = signal.firwin2(n, [*grid, *end], gain, nfreqs=2**15 + 1, window=("kaiser", beta))
+    assert_allclose(decimation_filter(factor), expected, atol=1e-15)  # rounding
+
+
+@pytest.mark.parametrize("factor", FACTORS)
 def test_pass_band_is_flat_with_the_step_mean(factor):
     inside = np.linspace(1e-6, PASS_BAND, 2001)
     level = 20 * np.log10(total_response(factor, inside))

@@ -382,6 +382,18 @@ def test_the_command_line_imports_nothing_slow(module):
     assert imported_by(f"import {module}") & SLOW_TO_IMPORT == set()
 
 
+def test_nothing_that_simulates_imports_what_is_slow_and_seldom_needed(sources):
+    """`scipy.signal` and `scipy.stats` take half a second together, at every start."""
+    seldom, found = {"scipy.signal", "scipy.stats"}, []
+    for name, tree in sources.items():
+        for node in tree.body:
+            if isinstance(node, ast.ImportFrom) and not node.level:
+                given = {node.module, *(f"{node.module}.{each.name}" for each in node.names)}
+                found += [name] if given & seldom else []
+    assert [name for name in found if not name.startswith("diagnose.")] == []
+    assert found  # is seen
+
+
 def test_scenes_are_validated_without_the_kernels():
     assert imported_by("import wearstate.sim.scene.load") & SLOW_TO_IMPORT == set()
 

@@ -26,7 +26,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import fft, interpolate, signal
+from scipy import fft
 
 from ..parts.casing import FrfFile, specific_key
 from ..parts.units import STANDARD_GRAVITY
@@ -120,6 +120,8 @@ class Accelerance:
         >>> bool(abs(peak - 10j) < 0.01)
         True
         """
+        from scipy.signal import ZoomFFT  # half a second, for measured casings only
+
         response, rate = _impulse_response(self)
         lead = round(_LEAD * response.shape[-1])
         inside = frequency <= self.frequency[-1] * (1 + 1e-12)
@@ -128,9 +130,7 @@ class Accelerance:
         if len(asked) < 2:  # a record of one or two samples; nothing but zero frequency
             result[..., : len(asked)] = response.sum(axis=-1, keepdims=True)
             return result
-        zoom = signal.ZoomFFT(
-            response.shape[-1], [0.0, asked[-1]], len(asked), fs=rate, endpoint=True
-        )
+        zoom = ZoomFFT(response.shape[-1], [0.0, asked[-1]], len(asked), fs=rate, endpoint=True)
         back = np.exp(2j * np.pi * asked * lead / rate)
         result[..., inside] = zoom(np.roll(response, lead, axis=-1)) * back
         return result
@@ -176,7 +176,9 @@ def _on_even_lines(accelerance: Accelerance) -> tuple[NDArray[np.complex128], fl
     if len(given) == n - first:
         values[..., first:] = accelerance.values
     else:
-        spline = interpolate.CubicSpline(given, accelerance.values, axis=-1)
+        from scipy.interpolate import CubicSpline  # slow to import, for few files
+
+        spline = CubicSpline(given, accelerance.values, axis=-1)
         values[..., first:] = spline(grid[first:])
     if first > 0:
         values[..., :first] = values[..., first : first + 1] * (grid[:first] / grid[first]) ** 2
