@@ -18,20 +18,29 @@ settings.load_profile("results")
 DEAR = (
     "test_same_bytes",
     "test_chart",
+    "test_generate",
     "test_stability",
+    "test_fidelity",
+    "test_lanes",
+    "test_page_commands",
     "test_evaluate",
     "test_site",
-    "test_page_commands",
+    "test_shaft_road",
     "test_looks",
-    "test_generate",
-    "test_cli",
-    "test_kill",
-    "test_choices",
+    "test_twin",
     "test_doctests",
+    "test_strangers",
+    "test_recipes_shipped",
+    "test_report",
+    "test_kill",
+    "test_picture",
+    "test_cli",
+    "test_foreign",
+    "test_oiled_joint",
+    "test_journal_road",
     "test_assemble",
-    "test_bearing",
 )
-"""Files of the longest tests: begun first, so that no process is left alone with one of them. The
+"""Files of 15 s and more: begun first, so that no process is left alone with one of them. The
 first ones ask for no model, which one process makes while the others wait."""
 
 
