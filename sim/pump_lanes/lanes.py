@@ -70,7 +70,8 @@ from .lane_layout import (
     OilLane,
     ThrowLane,
 )
-from .march import LEFT, STRETCH, Stretch, alone, enter_lane, march
+from .march import LEFT, STRETCH, Stretch, march
+from .one_lane import alone, enter_lane
 
 Float = NDArray[np.float64]
 
