@@ -1,5 +1,7 @@
 """Mutual information of one column with a target, from the distances of nearest neighbours."""
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import cKDTree
@@ -53,20 +55,28 @@ def mutual_information(
     >>> round(mutual_information(x, x > 0.5, classes=True) / float(np.log(2)), 2)  # [bits]
     0.99
     """
-    rng = check_random_state(seed)
-    column = _parted(values, rng)
+    noise = _noise(seed, np.size(values))
+    column = _parted(values, noise[0])
     if classes:
         return _with_conditions(column, np.asarray(target), neighbours)
-    return _with_numbers(column, _parted(target, rng), neighbours)
+    return _with_numbers(column, _parted(target, noise[1]), neighbours)
 
 
-def _parted(values: ArrayLike, rng: np.random.RandomState) -> Float:
+@lru_cache(maxsize=8)
+def _noise(seed: int, size: int) -> Float:
+    """For values and target [shape=(2, size)]; kept, as all features of a table ask for the same."""
+    found: Float = check_random_state(seed).standard_normal((2, size))
+    found.flags.writeable = False
+    return found
+
+
+def _parted(values: ArrayLike, noise: Float) -> Float:
     """Values over their standard deviation, equal ones parted by noise."""
     column = np.asarray(values, dtype=np.float64)
     deviation = column.std()
     scaled = column / deviation if deviation > 0 else column
     size = max(1.0, float(np.abs(scaled).mean()))
-    return np.asarray(scaled + _JITTER * size * rng.standard_normal(column.size))
+    return np.asarray(scaled + _JITTER * size * noise)
 
 
 def _with_numbers(x: Float, y: Float, neighbours: int) -> float:
