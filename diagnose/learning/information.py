@@ -64,7 +64,7 @@ def mutual_information(
 
 @lru_cache(maxsize=8)
 def _noise(seed: int, size: int) -> Float:
-    """For values and target [shape=(2, size)]; kept, as all features of a table ask for the same."""
+    """For values and target [shape=(2, size)]; kept, as every feature of a table needs the same."""
     found: Float = check_random_state(seed).standard_normal((2, size))
     found.flags.writeable = False
     return found
