@@ -42,25 +42,27 @@ whole_job() {  # NAME RESOLUTION; lowest-direct makes low what -r names, and not
 whole_job lowest lowest-direct > "$scratch/lowest.log" 2>&1 & lowest=$!
 ended types "$types"
 ended warm "$warm"  # its kernels are those of the newest libraries: not compiled a second time
-whole_job newest highest > "$scratch/newest.log" 2>&1 & newest=$!
-ended newest "$newest"
-(
+newest_job() {
+  (whole_job newest highest) || return
   cd "$scratch"
-  newest/bin/wearstate --version
-  newest/bin/wearstate scene list
-  newest/bin/wearstate simulate bilge-pump --set "duration=0.4 s" -o rec.h5
-  newest/bin/wearstate info rec.h5
-  newest/bin/wearstate simulate journal-bearing --set "duration=0.1 s" -o journal.h5
-  newest/bin/wearstate verify
-)
+  newest/bin/wearstate --version \
+    && newest/bin/wearstate scene list \
+    && newest/bin/wearstate simulate bilge-pump --set "duration=0.4 s" -o rec.h5 \
+    && newest/bin/wearstate info rec.h5 \
+    && newest/bin/wearstate simulate journal-bearing --set "duration=0.1 s" -o journal.h5 \
+    && newest/bin/wearstate verify
+}
+newest_job > "$scratch/newest.log" 2>&1 & newest=$!
+
+# every process has a core already: threads would only wait for each other
+export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
+# a file a process, so that what its tests share is made once; dear files first (tests/conftest.py)
+"$bin/pytest" -q -n 2 --dist loadfile --no-loadscope-reorder --durations 15
+
+ended newest "$newest"
 ended lowest "$lowest"
 versions() {  # NAME
   "$bin/uv" pip freeze --quiet --python "$scratch/$1/bin/python" | grep -i '^num'
 }
 [ "$(versions lowest)" != "$(versions newest)" ] \
   || { echo "lowest and newest have the same libraries: $(versions lowest)"; exit 1; }
-
-# every process has a core already: threads would only wait for each other
-export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
-# a file a process, so that what its tests share is made once; dear files first (tests/conftest.py)
-"$bin/pytest" -q -n 2 --dist loadfile --no-loadscope-reorder --durations 15
