@@ -514,6 +514,8 @@ def test_what_misleads_without_a_warning_is_said_unless_the_recipe_draws_it():
     assert unseen_texts(shown) == [eye]  # it refuses play in the main bearings
     assert said("bilge-pump", "of one's own", crankpin) == []  # nobody knows what it draws
     assert said("bilge-pump", "bilge-pump-standard", "stretch_lost_feet_m") == []
+    [starved] = said("journal-bearing", "journal-bearing-standard", "diametral_clearance_m")
+    assert "check the feed" in starved
     line = ("propulsion-shaft", "propulsion-shaft-{}", "wear_down_aft_m")
     [film] = said(line[0], line[1].format("standard"), line[2])
     assert "warmer" in film

@@ -13,7 +13,7 @@ from ...sim.scene.journal import JournalScene
 from ...sim.scene.scene import Scene
 from ..pages.si_text import plain
 from ..pictures.panel import COLOURS
-from .presentation import Presentation, Truths, label, told
+from .presentation import Presentation, Truths, Unseen, label, told
 from .shifts import add, factor, set_to
 
 _MOST_ORDERS = 4.0  # of a full spectrum, to either side
@@ -131,10 +131,19 @@ _SHIFTS = (
     set_to("film.condition", ("guembel", "reynolds", "periodic"), "where the film ends"),
 )
 
+_UNSEEN = (  # measured: docs/evaluation.md, and docs/decisions/027-starved-inlet.md
+    Unseen(
+        path="bearing.inlet_fill",
+        severity="diametral_clearance",
+        text="a film that its inlet does not fill (a blocked feed hole, ring oiling) is read as up "
+        "to a tenth of the limit more clearance; check the feed",
+    ),
+)
 
 PRESENTATION = Presentation(
     draw=_draw_journal,
     lines=_lines,
     sizes=("bearing.diameter", "bearing.length", "rotor.mass", "load.static_across"),
     shifts=_SHIFTS,
+    unseen=_UNSEEN,
 )
