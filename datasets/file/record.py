@@ -6,11 +6,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import h5py
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from ...sim.output.recording import DataError, Recording, html_table, missing_file
@@ -24,6 +23,9 @@ from .attributes import (
 )
 from .hdf5_values import HDF5_FAULTS, is_plain, plain_values
 from .machines import machine_identities
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 SCHEMA_VERSION = 1
 
@@ -131,7 +133,7 @@ class DataSet:
         return length, f"{head.sample_rate:.6g} Hz", " ".join(head.names), label
 
     @cached_property
-    def manifest(self) -> pd.DataFrame:
+    def manifest(self) -> "pd.DataFrame":
         """The rows as a table with texts decoded; made when first asked for."""
         with refusing(self.path, "manifest"):
             return _decoded(self.rows)
@@ -416,7 +418,9 @@ def _plain_row(row: np.void) -> dict[str, Any]:
     }
 
 
-def _decoded(rows: NDArray[np.void]) -> pd.DataFrame:
+def _decoded(rows: NDArray[np.void]) -> "pd.DataFrame":
+    import pandas as pd  # a quarter of a second, which processes that simulate do not need
+
     columns = {}
     for name in rows.dtype.names or ():
         column = rows[name]
