@@ -10,7 +10,7 @@ demo: $(STAMP)
 	$(BIN)/wearstate demo
 
 test: $(STAMP)
-	bash tests/run.sh $(BIN)
+	bash tests/run.sh $(BIN) $(JOBS)
 
 # make check FILE="tests/test_film.py tests/test_bearing.py": lint and these tests alone
 check: $(STAMP)

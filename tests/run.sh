@@ -1,9 +1,11 @@
 #!/usr/bin/env bash
 # Everything that must be green: lint, types, tests and doctests, and the wheel on its own.
-# Usage: tests/run.sh BIN, with BIN the folder of an environment that holds the test extra.
+# Usage: tests/run.sh BIN [JOBS], with BIN the folder of an environment that holds the test extra and
+# JOBS the number of test processes, 2 unless told otherwise: one a core, 1.5 GB each.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 bin=$(cd "$1" && pwd)
+jobs=${2:-2}
 unset PYTHONDONTWRITEBYTECODE  # every process would compile every module that it imports
 
 "$bin/ruff" check .
@@ -57,7 +59,7 @@ newest_job > "$scratch/newest.log" 2>&1 & newest=$!
 # every process has a core already: threads would only wait for each other
 export OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 # a file a process, so that what its tests share is made once; dear files first (tests/conftest.py)
-"$bin/pytest" -q -n 2 --dist loadfile --no-loadscope-reorder --durations 15
+"$bin/pytest" -q -n "$jobs" --dist loadfile --no-loadscope-reorder --durations 15
 
 ended newest "$newest"
 ended lowest "$lowest"
