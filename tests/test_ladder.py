@@ -311,6 +311,17 @@ def test_a_finer_tolerance_takes_more_calls_by_less_than_a_level(name):
         assert 1 < fine / coarse < 4
 
 
+def test_predicted_calls_follow_the_fastest_force():
+    """A force of order 6 takes five times the steps of the unbalance; one of no size takes none."""
+    ratios = []
+    for force in ("0 N", "200 N"):
+        orders = [{"order": 6.0, "amplitude": force}]
+        scene = load_scene("journal-bearing", {"film.rung": "short", "load.orders": orders})
+        calls = simulate(scene, seed=1).numerics["film_calls"]
+        ratios.append(calls / journal_calls(scene))
+    assert 1 / 2 < ratios[1] / ratios[0] < 2
+
+
 def test_a_fixed_step_asks_for_as_many_solves_as_predicted():
     scene = load_scene("journal-step", {"film.rung": "short", "numerics.integrator": "rk4"})
     calls = simulate(scene, seed=1).numerics["film_calls"]

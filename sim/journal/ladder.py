@@ -95,7 +95,8 @@ _MESH = 72, 17  # on which a solve is tabulated
 
 _CALLS_PER_STEP = {"euler": 1, "rk4": 4, "adaptive": 10}
 
-_STEPS_PER_TURN = 11.0  # of the adaptive integrator at the tolerance below, in the mean of scenes
+_STEPS_PER_CYCLE = 11.0
+"""Of the fastest force, by the adaptive integrator at the tolerance below, in the mean of scenes."""
 
 _TOLERANCE = 1e-5
 
@@ -110,7 +111,8 @@ def journal_calls(scene: JournalScene) -> float:
     numerics = scene.numerics
     if numerics.integrator == "adaptive":
         finer = math.sqrt(math.sqrt(_TOLERANCE / numerics.tolerance))
-        steps = turns * _STEPS_PER_TURN * finer
+        fastest = max([1.0, *(force.order for force in scene.load.orders if force.amplitude > 0)])
+        steps = turns * fastest * _STEPS_PER_CYCLE * finer
     else:
         steps = turns / (scene.drive.speed * journal_step(scene))
     return steps * _CALLS_PER_STEP[numerics.integrator]
