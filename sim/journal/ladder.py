@@ -96,7 +96,7 @@ _MESH = 72, 17  # on which a solve is tabulated
 _CALLS_PER_STEP = {"euler": 1, "rk4": 4, "adaptive": 10}
 
 _STEPS_PER_CYCLE = 11.0
-"""Of the fastest force, by the adaptive integrator at the tolerance below, in the mean of scenes."""
+"""Of the fastest force, with the adaptive integrator at this tolerance, in the mean of scenes."""
 
 _TOLERANCE = 1e-5
 
