@@ -101,7 +101,8 @@ def kernel_sources(folder: Path) -> list[Path]:
     >>> {"jit", "law"} <= names, "simulate" in names
     (True, False)
     """
-    imports = {path: _imported_from(folder, path) for path in folder.rglob("*.py")}
+    files = {*folder.rglob("*.py")}
+    imports = {path: _imported_from(files, path) for path in files}
     this = folder / Path(__file__).name
     found, ahead = set(), [path for path, targets in imports.items() if this in targets]
     while ahead:
@@ -112,8 +113,8 @@ def kernel_sources(folder: Path) -> list[Path]:
     return sorted(found, key=lambda path: path.relative_to(folder).parts)
 
 
-def _imported_from(folder: Path, path: Path) -> list[Path]:
-    """Files in or below `folder` that the relative imports of one file name."""
+def _imported_from(files: set[Path], path: Path) -> list[Path]:
+    """Those of some files that the relative imports of one of them name."""
     text = path.read_text(encoding="utf-8")
     statements = ast.parse("\n".join(_IMPORT.findall(text))).body
     return [
@@ -121,7 +122,7 @@ def _imported_from(folder: Path, path: Path) -> list[Path]:
         for statement in statements
         if isinstance(statement, ast.ImportFrom)
         for file in _named_files(statement, path)
-        if folder in file.parents and file.is_file()
+        if file in files
     ]
 
 
