@@ -440,14 +440,7 @@ def _measured(
             + track_under(scene.rotor.run_out, scene.rotor.dents, plan.angle - probe.angle)
             + probe.offset,
             gain=probe.gain,
-            noise=floor_of(
-                towards.size,
-                scene.sample_rate,
-                noise=probe.noise,
-                mains=probe.mains,
-                mains_frequency=probe.mains_frequency,
-                rng=rng,
-            ),
+            noise=floor_of(probe, towards.size, scene.sample_rate, rng=rng),
             full_scale=probe.range,
             bits=probe.bits,
             rng=rng,

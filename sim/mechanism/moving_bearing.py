@@ -45,8 +45,8 @@ def carried_on(now: float, before: float, older: float) -> float:
 
     Only what pushes on the modes is carried on, and what the mechanism felt: how the modes ring
     through the next step follows from where they are. The bearing's acceleration carried on with
-    its ringing left up to 1.4 dB in the band of the highest modes at two steps to a sample; along
-    a line such pumps are off by up to 1.3 dB, and held by up to 4.5.
+    its ringing left up to 1.5 dB in the band of the highest modes at two steps to a sample; along
+    a line such pumps are off by up to 1.3 dB, and held by up to 4.5 (docs/decisions/024).
     """
     return 3.0 * (now - before) + older
 

@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -339,32 +339,39 @@ def mains_hum(
 _HUM_BLOCK = 512  # samples
 
 
+class NoisySensor(Protocol):
+    """What a scene tells of a sensor that shows more than the machine, in the sensor's unit."""
+
+    @property
+    def noise(self) -> float:
+        """Rms of its own."""
+        ...
+
+    @property
+    def mains(self) -> float:
+        """Rms of hum, harmonics and all."""
+        ...
+
+    @property
+    def mains_frequency(self) -> float:
+        """Of the hum [Hz]."""
+        ...
+
+
 def floor_of(
-    n: int,
-    fs: float,
-    *,
-    noise: float,
-    slope: float = 0.0,
-    mains: float,
-    mains_frequency: float,
-    rng: np.random.Generator,
+    sensor: NoisySensor, n: int, fs: float, *, slope: float = 0.0, rng: np.random.Generator
 ) -> NDArray[np.float64]:
     """What a sensor shows of a machine at rest: its own noise and the hum of the mains.
 
     Parameters
     ----------
+    sensor : NoisySensor
     n : int
         Samples.
     fs : float
         Sample rate [Hz].
-    noise : float
-        rms, in the sensor's unit.
     slope : float
-        Its power density falls as ``1 / f**slope``.
-    mains : float
-        rms of the hum, harmonics and all, in the sensor's unit.
-    mains_frequency : float
-        [Hz]
+        The power density of its noise falls as ``1 / f**slope``.
     rng : numpy.random.Generator
 
     Returns
@@ -374,13 +381,14 @@ def floor_of(
 
     Examples
     --------
-    >>> rng = np.random.default_rng(0)
-    >>> round(float(floor_of(4000, 1e3, noise=3, mains=4, mains_frequency=50, rng=rng).std()), 1)
+    >>> from types import SimpleNamespace
+    >>> probe = SimpleNamespace(noise=3.0, mains=4.0, mains_frequency=50.0)
+    >>> round(float(floor_of(probe, 4000, 1e3, rng=np.random.default_rng(0)).std()), 1)
     5.0
     """
-    floor = coloured_noise(n, fs, rms=noise, slope=slope, rng=rng)
-    if mains > 0:
-        floor = floor + mains_hum(n, fs, rms=mains, frequency=mains_frequency, rng=rng)
+    floor = coloured_noise(n, fs, rms=sensor.noise, slope=slope, rng=rng)
+    if sensor.mains > 0:
+        floor += mains_hum(n, fs, rms=sensor.mains, frequency=sensor.mains_frequency, rng=rng)
     return floor
 
 

@@ -203,7 +203,9 @@ def _measured(
         channel, lost = digitise(
             _front_end(sensor, row, scene.sample_rate)[plan.kept],
             gain=sensor.gain,
-            noise=_floor(sensor, plan.n_samples, scene.sample_rate, rng),
+            noise=floor_of(
+                sensor, plan.n_samples, scene.sample_rate, slope=sensor.noise_slope, rng=rng
+            ),
             full_scale=sensor.range,
             bits=sensor.bits,
             rng=rng,
@@ -224,21 +226,6 @@ def _measured(
     elif scene.tacho:
         rows.append(scene.tacho.channel(angle))
     return np.stack(rows), clipped
-
-
-def _floor(
-    sensor: Accelerometer, n: int, fs: float, rng: np.random.Generator
-) -> NDArray[np.float64]:
-    """What the sensor shows of a machine at rest [m/s^2, shape=(n,)]."""
-    return floor_of(
-        n,
-        fs,
-        noise=sensor.noise,
-        slope=sensor.noise_slope,
-        mains=sensor.mains,
-        mains_frequency=sensor.mains_frequency,
-        rng=rng,
-    )
 
 
 def _front_end(sensor: Accelerometer, row: NDArray[np.float64], fs: float) -> NDArray[np.float64]:

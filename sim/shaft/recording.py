@@ -383,14 +383,7 @@ def _measured(
         row, lost = digitise(
             reading,
             gain=part.gain,
-            noise=floor_of(
-                angle.size,
-                scene.sample_rate,
-                noise=part.noise,
-                mains=part.mains,
-                mains_frequency=part.mains_frequency,
-                rng=rng,
-            ),
+            noise=floor_of(part, angle.size, scene.sample_rate, rng=rng),
             full_scale=part.range,
             bits=part.bits,
             rng=rng,
