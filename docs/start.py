@@ -13,7 +13,7 @@ recording = wearstate.simulate(pump, seed=1, truth=True)
 recording.plot()[0].figure.savefig("recording.png")
 print(recording, f"largest pin force {np.abs(recording.truth['pin_force_n']).max():.0f} N")
 
-# Forty records of twenty pumps that differ; scikit-learn tells the clearance from features.
+# Forty records of twenty different pumps; scikit-learn estimates the clearance from features.
 wearstate.generate("bilge-pump-small", 40, "pump.h5", seed=0, force=True)
 with wearstate.DataSet("pump.h5") as data:
     clearance = 1e3 * data.manifest["diametral_clearance_crankpin_m"].to_numpy()  # [mm]
@@ -24,7 +24,7 @@ with wearstate.DataSet("pump.h5") as data:
     search.fit(data, clearance)
 print(f"{search.best_params_}, mean error {-search.best_score_:.3f} mm")
 
-# The model of this package adds an interval, a grade, and a test that it knows the machine.
+# The model of this package adds an interval, a grade, and a test whether the machine is familiar.
 model = wearstate.train("pump.h5", seed=0)
 report = wearstate.report(recording, model)
 print(report)
