@@ -260,13 +260,16 @@ def test_a_fill_out_of_bounds(fill):
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (lambda: bearing(0.5, grooves=(Groove(angle=0.0, width=0.1),)), "knows no grooves"),
-        (lambda: bearing(0.5, condition="guembel"), "no condition 'guembel'"),
-        (lambda: solve_direct(bearing(0.5), replace(HERE, tilt_x=0.1)), "knows no tilt"),
+        (lambda: bearing(0.5, grooves=(Groove(angle=0.0, width=0.1),)), "must be 1 with grooves"),
+        (lambda: bearing(0.5, condition="guembel"), "must be 1 with 'guembel'"),
+        (
+            lambda: solve_direct(bearing(0.5), replace(HERE, tilt_x=0.1)),
+            "must be 1 for a tilted journal",
+        ),
         (lambda: solve_short(bearing(0.5), HERE), "has no starved inlet"),
         (lambda: solve_finite(bearing(0.5), HERE), "has no starved inlet"),
         (lambda: impedance_map(bearing(0.5)), "inlet_fill = 0.5 must be 1 for a map"),
-        (lambda: mass_conserving(bearing(0.5), HERE), "is of the direct film"),
+        (lambda: mass_conserving(bearing(0.5), HERE), "works with the direct film only"),
     ],
 )
 def test_films_that_know_no_starved_inlet(call, words):

@@ -4,9 +4,9 @@ The flow over the faces of a cell balances, with the face's own ``H^3`` and the 
 squeeze integrated exactly along the circumference. Cavitation (P >= 0) is a linear
 complementarity problem with an M-matrix; it is solved by policy iteration (the primal-dual active
 set method): take a set of pressurised nodes, solve there, drop nodes that pull, add those that
-would be filled, until the set stays. This ends after finitely many solves, in an orbit mostly
-after one or two. Each solve eliminates line by line along the circumference, started behind a
-line without unknowns so that the circle need not be closed; where there is none, one line is kept
+would be filled, until the set no longer changes. This ends after finitely many solves, in an orbit
+mostly after one or two. Each solve eliminates line by line along the circumference, starting behind
+a line without unknowns so that the circle need not be closed; if there is none, one line is kept
 back as a border.
 """
 
@@ -50,7 +50,7 @@ DIRECT_ITERATIONS = 2
 def direct_force(
     work: DirectFilm, x: float, y: float, x_rate: float, y_rate: float
 ) -> tuple[float, float]:
-    """Force on an aligned journal, started from the cavitated region of the call before.
+    """Force on an aligned journal, starting from the cavitated region of the last call.
 
     Parameters
     ----------
@@ -58,12 +58,12 @@ def direct_force(
     x, y : float
         Journal centre over C.
     x_rate, y_rate : float
-        Its rates by tau.
+        Velocity of the centre: derivatives by tau.
 
     Returns
     -------
     tuple of float
-        Non-dimensional F_X, F_Y; zero where the journal touches (``work.outcome[STATUS]``).
+        Non-dimensional F_X, F_Y; zero if the journal touches the bore (``work.outcome[STATUS]``).
     """
     return direct_tilted_force(work, x, y, x_rate, y_rate, 0.0, 0.0, 0.0, 0.0)
 
@@ -80,7 +80,7 @@ def direct_tilted_force(
     tilt_x_rate: float,
     tilt_y_rate: float,
 ) -> tuple[float, float]:
-    """Force on a journal that may be tilted; a mirrored workspace knows no tilt."""
+    """Force on a journal that may be tilted; a mirrored workspace ignores the tilt."""
     work.outcome[STATUS] = DIRECT_OK
     work.outcome[ITERATIONS] = 0
     least = fill_equations(work, x, y, x_rate, y_rate, tilt_x, tilt_y, tilt_x_rate, tilt_y_rate)
@@ -103,7 +103,7 @@ def direct_tilted_force(
 
 @kernel
 def solve_sets(work: DirectFilm) -> None:
-    """Pressure and its set for the equations at hand; solves are added to the iterations."""
+    """Find the pressure and its set for the current equations; the solves count as iterations."""
     work.outcome[STATUS] = DIRECT_ITERATIONS
     for _ in range(MOST_SETS):
         solve_set(work)
@@ -115,9 +115,9 @@ def solve_sets(work: DirectFilm) -> None:
 
 @kernel
 def hold_lines(work: DirectFilm, first: int, last: int) -> None:
-    """Hold the lines from one to another at zero pressure; others that were held are free again.
+    """Hold a range of lines at zero pressure and release all others; for films without grooves.
 
-    Of a film without grooves. A cold film is taken as filled wherever wedge and squeeze fill it.
+    A cold film starts filled wherever wedge and squeeze fill it.
     """
     n, m = work.state.shape
     for i in range(n):
@@ -147,7 +147,7 @@ def fill_equations(
     tilt_x_rate: float,
     tilt_y_rate: float,
 ) -> float:
-    """Conductances of all faces and sources of all cells; the least gap of the mesh."""
+    """Fill in all conductances and sources; return the least gap of the mesh."""
     n, m = work.state.shape
     k = work.pressure.shape[1]
     step = 2.0 * math.pi / n
@@ -193,7 +193,7 @@ def fill_equations(
 
 @kernel
 def _narrowest(work: DirectFilm, x: float, y: float) -> float:
-    """Gap on the line of centres, where no node need lie."""
+    """Gap on the line of centres, which need not pass through a node."""
     n = work.bore.shape[0]
     turn = math.atan2(y, x) * (0.5 / math.pi)
     place = (turn - math.floor(turn)) * n
@@ -209,7 +209,7 @@ def _narrowest(work: DirectFilm, x: float, y: float) -> float:
 
 @kernel
 def _set_out(work: DirectFilm, x: float, y: float, x_rate: float, y_rate: float) -> None:
-    """First set of nodes: that of the call before, or all that the wedge and squeeze fill."""
+    """Set the initial nodes: those of the last call, or all that the wedge and squeeze fill."""
     n, m = work.state.shape
     if work.condition == REYNOLDS:
         _move_fixed_line(work, widest_line(work, x, y))
@@ -235,7 +235,7 @@ def _set_out(work: DirectFilm, x: float, y: float, x_rate: float, y_rate: float)
 
 @kernel
 def _move_fixed_line(work: DirectFilm, line: int) -> None:
-    """Hold another line at zero pressure; the old one is free again."""
+    """Hold another line at zero pressure and release the old one."""
     m = work.state.shape[1]
     old = work.outcome[BREAK_LINE]
     work.outcome[BREAK_LINE] = line
@@ -253,7 +253,7 @@ def _move_fixed_line(work: DirectFilm, line: int) -> None:
 
 @kernel
 def start_from(work: DirectFilm, pressure: NDArray[np.float64]) -> None:
-    """Take the cavitated region of a pressure field [shape=(n, k)] for the next call's start."""
+    """Start the next call from the cavitated region of a pressure field [shape=(n, k)]."""
     n, m = work.state.shape
     for i in range(n):
         for j in range(m):
@@ -270,7 +270,7 @@ def start_from(work: DirectFilm, pressure: NDArray[np.float64]) -> None:
 
 @kernel
 def _update_set(work: DirectFilm) -> int:
-    """Drop nodes that pull, add nodes that would be filled; how many."""
+    """Drop nodes that pull and add nodes that would be filled; return their number."""
     n, m = work.state.shape
     strongest = 0.0
     for i in range(n):
@@ -327,11 +327,11 @@ def clip_pressure(work: DirectFilm) -> None:
 
 @kernel
 def residual(work: DirectFilm) -> float:
-    """How far the pressure at hand is from the solution, over the largest pressure.
+    """Residual of the current pressure, relative to the largest pressure.
 
-    At each node the smaller of the pressure and of what it exceeds the mean of its neighbours and
-    source by; both are >= 0 and one of them is zero where the film is solved. With the Guembel
-    condition, whose equations end before the negative pressure is dropped, the second alone.
+    At each node the smaller of two numbers: the pressure, and its excess over the mean of its
+    neighbours and source. Both are >= 0, and one of them is zero at the solution. With the Guembel
+    condition, whose equations are solved before negative pressure is dropped, only the second.
     """
     n, m = work.state.shape
     largest = 0.0
@@ -350,7 +350,7 @@ def residual(work: DirectFilm) -> float:
 
 @kernel
 def integrate_pressure(work: DirectFilm) -> tuple[float, float]:
-    """Force and moment by the trapezoidal rule; the pressure of a mirrored film is completed."""
+    """Force and moment by the trapezoidal rule, over both halves of a mirrored film."""
     n, m = work.state.shape
     k = work.pressure.shape[1]
     cell = 2.0 * math.pi / (n * (k - 1))
@@ -367,7 +367,7 @@ def integrate_pressure(work: DirectFilm) -> tuple[float, float]:
         fy -= total * work.sine[i]
         moment_x -= first * work.cosine[i]
         moment_y -= first * work.sine[i]
-    if work.mirrored == 1:  # the other half turns the other way
+    if work.mirrored == 1:  # the other half has the opposite moment arm
         moment_x = moment_y = 0.0
     work.measure[3] = moment_x * cell
     work.measure[4] = moment_y * cell

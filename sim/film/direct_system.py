@@ -1,4 +1,4 @@
-"""Linear system of the direct film: its storage and its elimination, with a border if need be."""
+"""Linear system of the direct film: its storage, and its elimination with an optional border."""
 
 import math
 from typing import NamedTuple
@@ -9,27 +9,27 @@ from numpy.typing import NDArray
 from ..jit import kernel
 from .line import PRESSURISED, finite_factor
 
-STATUS = 0  # places in DirectFilm.outcome
+STATUS = 0  # indices into DirectFilm.outcome
 ITERATIONS = 1
 WARM = 2
 BREAK_LINE = 3
 START = 4  # line behind which the elimination starts
-CHANGED = 5  # place after it of the first line whose set is new
+CHANGED = 5  # first line whose set is new, counted from START
 _1, _2, _3, _4, _5, _6, _7 = (np.uint64(i) for i in range(1, 8))
 
 
 class DirectFilm(NamedTuple):
-    """Workspace of one film on one mesh; made by :func:`direct_film`, filled by the kernels.
+    """Workspace of one film on one mesh; created by :func:`direct_film`.
 
-    ``n`` nodes along the circumference, ``k`` along the length with both ends, ``m`` unknown in
-    each line: half of the length up to and with the middle where the film is mirrored.
+    ``n`` nodes along the circumference, ``k`` along the length with both ends, ``m`` unknowns in
+    each line: if the film is mirrored, half of the length including the middle.
     """
 
     condition: int
     mirrored: int
     length_factor: float  # (R / L)^2
-    line_share: float  # of the flow round the circle in one dimension, see film_line
-    line_leak: float  # flow to the ends over that
+    line_share: float  # factor of the flow round the circle in one dimension, see film_line
+    line_leak: float  # flow to the ends over line_share
     cosine: NDArray[np.float64]  # at nodes (n,)
     sine: NDArray[np.float64]
     face_cosine: NDArray[np.float64]  # at the face behind each node (n,)
@@ -46,7 +46,7 @@ class DirectFilm(NamedTuple):
     source: NDArray[np.float64]  # (n, m)
     diagonal: NDArray[np.float64]  # sum of a cell's conductances (n, m)
     band: NDArray[np.float64]  # upper half, its first column the diagonal (n m, >= 2 m)
-    flat_band: NDArray[np.float64]  # the same memory
+    flat_band: NDArray[np.float64]  # same memory as band
     inverse: NDArray[np.float64]  # of the diagonal (n m,)
     right: NDArray[np.float64]  # (n m,)
     solution: NDArray[np.float64]  # (n m,)
@@ -74,7 +74,7 @@ def empty_direct_film(
     mirrored: bool,
     inlet_fill: float = 1.0,
 ) -> DirectFilm:
-    """Workspace of a mesh, cold.
+    """Create the workspace of a mesh, without a starting point.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ def empty_direct_film(
     bore : numpy.ndarray [shape=(n,)]
         Extra gap at the nodes, over C.
     fixed : numpy.ndarray [shape=(n, k)]
-        Not zero at the nodes of a groove.
+        Non-zero at the nodes of a groove.
     fixed_pressure : numpy.ndarray [shape=(n, k)]
         Non-dimensional pressure there.
     condition : int
@@ -139,10 +139,10 @@ def empty_direct_film(
 
 
 def _length_weights(k: int, m: int, mirrored: bool) -> NDArray[np.float64]:
-    """Weights of the trapezoidal rule in cells, both halves together where they are alike.
+    """Weights of the trapezoidal rule in cells, with both halves added if the film is mirrored.
 
-    The rule that counts the work of the cells' own balance, so that damping stays symmetric on any
-    mesh; Simpson's rule has a third of the mesh error or less, but loses that.
+    This rule matches the work of the cells' own balance, so that damping stays symmetric on any
+    mesh; Simpson's rule has at most a third of the mesh error but loses that symmetry.
     """
     weights = np.ones(k)
     if mirrored:
@@ -196,7 +196,7 @@ def solve_set(work: DirectFilm) -> None:
 
 @kernel
 def _choose_start(work: DirectFilm) -> int:
-    """A line without unknowns, the one of the solve before if it can stay; -1 if there is none."""
+    """Find a line without unknowns, preferably that of the last solve; -1 if there is none."""
     start: int = work.outcome[START]
     if start >= 0 and work.unknowns[start] == 0:
         return start
@@ -210,7 +210,7 @@ def _choose_start(work: DirectFilm) -> int:
 
 @kernel
 def inflow(work: DirectFilm, i: int, j: int, unknowns: int) -> float:
-    """Source and the inflow from neighbours, those in an unknown state counted on request."""
+    """Source plus inflow from known neighbours, and from unknown ones if `unknowns` is 1."""
     n, m = work.state.shape
     before = i - 1 if i > 0 else n - 1
     behind = i + 1 if i < n - 1 else 0
@@ -228,7 +228,7 @@ def inflow(work: DirectFilm, i: int, j: int, unknowns: int) -> float:
 
 @kernel
 def _fill_line(work: DirectFilm, i: int) -> None:
-    """Rows of one line in the band; a node that is known gets a row of its own."""
+    """Fill one line's rows of the band; a known node gets a trivial row."""
     n, m = work.state.shape
     behind = i + 1 if i < n - 1 else 0
     r = work.row[i]
@@ -250,11 +250,11 @@ def _fill_line(work: DirectFilm, i: int) -> None:
 
 @kernel
 def _eliminate(work: DirectFilm, first: int, rows: int) -> None:
-    """Factorise the band from a row on as U^T D^-1 U, and the right side with it.
+    """Factorise the band from a given row on as U^T D^-1 U, together with the right-hand side.
 
-    Eight entries of a row are held in registers while the rows above are taken off, the newest
-    last as it is waited for; the band is wide enough that entries past its edge read as zero.
-    Unsigned places spare the test for negative ones, which would cost half of the time.
+    Eight entries of a row stay in registers while the rows above are subtracted, the newest
+    last because it is ready last; the band is wide enough that entries past its edge read as zero.
+    Unsigned indices avoid the test for negative ones, which would cost half of the time.
     """
     band, inverse, right = work.flat_band, work.inverse, work.right
     m = work.state.shape[1]
@@ -311,7 +311,7 @@ def _substitute(work: DirectFilm, rows: int) -> None:
 
 @kernel
 def _solve_bordered(work: DirectFilm, line: int, rows: int) -> None:
-    """Solve with one line kept back: its unknowns follow from a small dense system."""
+    """Solve with one line kept as a border: its unknowns follow from a small dense system."""
     n, m = work.state.shape
     before = line - 1 if line > 0 else n - 1
     behind = line + 1 if line < n - 1 else 0
@@ -358,7 +358,7 @@ def _solve_bordered(work: DirectFilm, line: int, rows: int) -> None:
 
 @kernel
 def _eliminate_border(work: DirectFilm, rows: int) -> None:
-    """Solve for all columns of the border with the factors at hand."""
+    """Solve for all columns of the border with the current factors."""
     m = work.state.shape[1]
     band, border = work.band, work.border
     for r in range(rows):

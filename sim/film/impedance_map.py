@@ -1,21 +1,21 @@
-"""The film reduced to a map: the force of any position and velocity, interpolated.
+"""Impedance map of a film: its force for any position and velocity, interpolated.
 
 With ``V = (X' + Y/2, Y' - X/2)`` the right-hand side of Reynolds' equation for a round bore is
-``-12 (V_x cos + V_y sin)``. Where neither oil is fed under pressure nor the film ruptures at
-another pressure than that of the ends, every cavitation condition is homogeneous: the pressure of
+``-12 (V_x cos + V_y sin)``. If no oil is fed under pressure and the film ruptures at
+the pressure of the ends, every cavitation condition is homogeneous: the pressure of
 ``a V`` is ``a`` times that of V, a >= 0. The force is then ``|V|`` times a function of eccentricity
 and the angle between V and the line of centres, and, with grooves, of the attitude of that line. A
 worn bore drags oil into its own wedge whatever V is: its force is not homogeneous, and it has no
 such map.
 
-Towards the wall that function has a boundary layer: a velocity along the wall acts as much as one
-towards it that is smaller by the root of the gap. Lubrication theory of a parabolic gap
-``g (1 + theta^2 / 2 g)``, ``g = 1 - eccentricity``, tells the scales. The table is kept over
-``sqrt(g)`` and the angle of ``(V_r, sqrt(1 - eps^2) V_t)``, and holds
+Towards the wall that function has a boundary layer: a velocity along the wall has the same effect
+as a velocity towards it that is smaller by the root of the gap. Lubrication theory of a parabolic
+gap ``g (1 + theta^2 / 2 g)``, ``g = 1 - eccentricity``, gives the scales. The axes of the table are
+``sqrt(g)`` and the angle of ``(V_r, sqrt(1 - eps^2) V_t)``, and its entries
 
     F_r / (G |V|), F_t / (G |V| sqrt(1 - eps^2)), P_max sqrt(1 - eps^2) / (G |V|)
 
-with that stretched V and ``G = 3 sqrt(2) pi g^(-3/2) / (1 + 2 g (D/L)^2)``, the squeeze force of a
+with that scaled V and ``G = 3 sqrt(2) pi g^(-3/2) / (1 + 2 g (D/L)^2)``, the squeeze force of a
 long film near the wall, joined to that of a short one (half as large times (L/D)^2 / g). All three
 stay bounded and smooth up to contact. Interpolation is by cubic B-splines (C2).
 
@@ -42,24 +42,24 @@ from .map_look_up import TANGENTIAL, MapTable, map_force, map_scales
 from .solve import FilmGeometry, direct_film
 
 LAST_ECCENTRICITY = 0.995
-"""Where maps end unless told: beyond, five degrees of arc are wider than the narrow gap."""
+"""Default end of maps: beyond, five degrees of arc are wider than the narrow gap."""
 
-_SAMPLES = 1000  # random states by which a map is judged
-_LEVELS = 3  # counts of knots tried for a plain bore, each twice as fine
+_SAMPLES = 1000  # random states to estimate a map's error
+_LEVELS = 3  # numbers of knots tried for a plain bore, each twice as fine
 _PLAIN_KNOTS = (33, 49)  # over sqrt(g), over half a turn of V
-_GROOVED_KNOTS = (17, 32)  # over sqrt(g), over a whole turn of V; twice as fine gains a third only
-_ATTITUDES = 36  # knots over the attitude with grooves, at nodes of the mesh where they divide
+_GROOVED_KNOTS = (17, 32)  # over sqrt(g), over a whole turn of V; doubling them gains only a third
+_ATTITUDES = 36  # knots over the attitude with grooves, at mesh nodes if the numbers divide
 
 
 @dataclass(frozen=True, kw_only=True)
 class MapError:
-    """Error of the force against direct solves on the same mesh, over the direct force.
+    """Error of the map's force against direct solves on the same mesh, over the direct force.
 
     Attributes
     ----------
     median, most, worst : float
-        Of random states, even in ``sqrt(1 - eccentricity)`` and in the stretched angle of V: half
-        of them, 95 % of them and all of them lie below.
+        Median, 95th percentile and maximum over random states, evenly spread in
+        ``sqrt(1 - eccentricity)`` and in the scaled angle of V.
     """
 
     median: float
@@ -69,21 +69,21 @@ class MapError:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ImpedanceMap:
-    """The film of one geometry as a table.
+    """Film of one geometry as a table.
 
     Attributes
     ----------
     table : MapTable
         For :func:`map_force` and :func:`map_peak`.
     last_eccentricity : float
-        End of the table. Beyond, the kernels give the force at the end: callers must ask.
+        End of the table. Beyond it the kernels return the force at the end: callers must check.
     accuracy : float
-        That was asked for.
+        Requested accuracy.
     interpolation : MapError
-        With the line of centres on a node of the mesh, where the table is exact at its knots: what
-        interpolation costs.
+        Interpolation error: with the line of centres on a node of the mesh, where the table is
+        exact at its knots.
     turned : MapError
-        With the line of centres anywhere: this adds what the mesh changes as the journal turns.
+        With the line of centres anywhere: adds the effect of the mesh as the journal turns.
     """
 
     table: MapTable
@@ -96,18 +96,18 @@ class ImpedanceMap:
 
     @property
     def accurate(self) -> bool:
-        """Whether 95 % of the states interpolate within the accuracy that was asked for."""
+        """Whether 95 % of the states interpolate within the requested accuracy."""
         return self.interpolation.most <= self.accuracy
 
     @property
     def knots(self) -> tuple[int, ...]:
-        """Table entries along the attitude, the root of the gap, and the angle of V."""
+        """Number of table entries along the attitude, the root of the gap, and the angle of V."""
         return self.table.coefficients.shape[1:]
 
     def force(
         self, x: float, y: float, x_rate: float = 0.0, y_rate: float = 0.0
     ) -> tuple[float, float]:
-        """Force on the journal, see :func:`map_force`; refuses what lies beyond the table.
+        """Force on the journal, see :func:`map_force`; raises beyond the table.
 
         Raises
         ------
@@ -130,7 +130,7 @@ class ImpedanceMap:
 def _solve_line(
     work: DirectFilm, x: float, y: float, n_x: float, n_y: float, velocity: Any, values: Any
 ) -> int:
-    """F_r, F_t, P_max for velocities V (along, across the line of centres); failures."""
+    """F_r, F_t, P_max for velocities V (along, across the line of centres); return the failures."""
     failures = 0
     n, k = work.pressure.shape
     for j in range(velocity.shape[0]):
@@ -155,7 +155,7 @@ def _scaled_solves(
     attitude: float,
     angles: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Table values of one place of the journal for stretched angles of V, (n, 3)."""
+    """Table values at one position of the journal for scaled angles of V, (n, 3)."""
     n_x, n_y = math.cos(attitude), math.sin(attitude)
     _, stretch, scale = map_scales(table, eccentricity)
     velocity = np.column_stack([np.cos(angles), np.sin(angles) / stretch])
@@ -199,7 +199,7 @@ def _spline_coefficients(values: NDArray[np.float64], axis: int, ends: str) -> N
 def _blank_table(
     geometry: FilmGeometry, knots: tuple[int, int, int], last_eccentricity: float
 ) -> MapTable:
-    """Scales of a table with knots over attitude, root and angle; no coefficients yet."""
+    """Create a table's scales with knots over attitude, root and angle, without coefficients."""
     attitudes, roots, angles = knots
     plain = attitudes == 1
     root = math.sqrt(1 - last_eccentricity)
@@ -217,7 +217,7 @@ def _blank_table(
 def _build_table(
     geometry: FilmGeometry, knots: tuple[int, int, int], last_eccentricity: float
 ) -> MapTable:
-    """Direct solves at all knots, warm along the angle of V, and the splines through them."""
+    """Solve directly at all knots, warm along the angle of V, and fit the splines."""
     attitudes, roots, angles = knots
     table = _blank_table(geometry, knots, last_eccentricity)
     work = direct_film(geometry)
@@ -270,7 +270,7 @@ def _measure(geometry: FilmGeometry, table: MapTable, *, turned: bool) -> MapErr
 def _refined(
     geometry: FilmGeometry, last_eccentricity: float, accuracy: float
 ) -> tuple[MapTable, MapError]:
-    """The coarsest table that is accurate, or the finest that is tried."""
+    """Return the coarsest table that is accurate, else the finest tried."""
     if geometry.grooves:
         table = _build_table(geometry, (_ATTITUDES, *_GROOVED_KNOTS), last_eccentricity)
         return table, _measure(geometry, table, turned=False)
@@ -295,12 +295,12 @@ def impedance_map(
     Parameters
     ----------
     geometry : FilmGeometry
-        A round bore gives a map over two numbers, one with grooves at the pressure of the ends a
-        map over three.
+        A round bore gives a map over two variables; grooves at the pressure of the ends add a
+        third.
     last_eccentricity : float
         End of the table, in (0, 1).
     accuracy : float
-        Error of the force that 95 % of the states shall keep; the knots of a plain bore are doubled
+        Error of the force for 95 % of the states; the knots of a plain bore are doubled
         up to twice to reach it. See :attr:`ImpedanceMap.accurate`.
     cached : bool
         Read and write the map in the cache folder of the kernels, under a hash of the arguments
@@ -309,19 +309,19 @@ def impedance_map(
     Returns
     -------
     ImpedanceMap
-        With its measured errors.
+        Includes its measured errors.
 
     Raises
     ------
     ValueError
-        A groove is fed under pressure, the bore is not round, an argument is out of its range, or
+        A groove is fed under pressure, the bore is not round, an argument is out of range, or
         the journal touches the bore within `last_eccentricity`.
 
     Notes
     -----
-    A worn bore would add ``1 / |V|`` as a parameter, feed pressure the same, and tilt two angles
-    and two rates: those maps cost more solves than the orbits that would use them. A film that
-    conserves oil has a memory and no map.
+    A worn bore would add ``1 / |V|`` as a parameter, and so would feed pressure; tilt would add two
+    angles and two rates. Such maps cost more solves than the orbits that would use them. A film
+    that conserves oil has a memory and no map.
 
     Examples
     --------
@@ -350,8 +350,8 @@ def impedance_map(
 
 def _check(geometry: FilmGeometry, last_eccentricity: float, accuracy: float) -> None:
     wrong = [
-        f"grooves[{n}].pressure = {groove.pressure:g} must be 0 for a map, as the force is no "
-        "longer proportional to the velocity; use the direct film"
+        f"grooves[{n}].pressure = {groove.pressure:g} must be 0 for a map, because the force is "
+        "not proportional to the velocity; use the direct film"
         for n, groove in enumerate(geometry.grooves)
         if groove.pressure != 0
     ]
@@ -362,12 +362,12 @@ def _check(geometry: FilmGeometry, last_eccentricity: float, accuracy: float) ->
         )
     if geometry.inlet_fill < 1:
         wrong.append(
-            f"inlet_fill = {geometry.inlet_fill:g} must be 1 for a map, as the front of a starved "
-            "film hangs on the velocity; use the direct film"
+            f"inlet_fill = {geometry.inlet_fill:g} must be 1 for a map, because the front of a "
+            "starved film depends on the velocity; use the direct film"
         )
     if not 0 < last_eccentricity < 1:
         wrong.append(
-            f"last_eccentricity = {last_eccentricity:g} must be in (0, 1); the force has no bound "
+            f"last_eccentricity = {last_eccentricity:g} must be in (0, 1); the force is unbounded "
             "at 1"
         )
     if not accuracy > 0:
@@ -394,7 +394,7 @@ def _cache_path(geometry: FilmGeometry, last_eccentricity: float, accuracy: floa
 
 
 def _write(path: Path, found: ImpedanceMap) -> None:
-    """Whole or not at all; a cache that cannot be written is no error."""
+    """Write the file whole or not at all; failing to write the cache is no error."""
     table = found.table._asdict()
     coefficients = table.pop("coefficients")
     content = io.BytesIO()
@@ -416,7 +416,7 @@ def _numbers(error: MapError) -> tuple[float, float, float]:
 
 
 def _read(path: Path) -> ImpedanceMap | None:
-    """None where there is no such file or its content is not what was written."""
+    """Read a map; None if there is no such file or its content is damaged."""
     try:
         content = unsealed(path.read_bytes())
     except OSError:

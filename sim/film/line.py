@@ -1,13 +1,13 @@
-"""Oil film of one dimension, compiled: the circumference, with the pressure's shape over z given.
+"""Oil film of one dimension, compiled: the circumference, with a given shape over z.
 
 With a parabola along the length, ``P = 3/2 p (1 - 4 z^2)``, the equation times a weight and
 averaged over the length is
 
     s (H^3 p')' - 12 (R/L)^2 H^3 p = 6 H' + 12 dH/dtau
 
-for the mean pressure p. The share s makes it exact where the gap is even and the load varies as
-the ``1.5``-th harmonic (:func:`finite_factor`): 6/5 in a short bearing, as Galerkin's method has
-it, and 1 in a long one. Without the second term the film is long.
+for the mean pressure p. The factor s makes it exact if the gap is uniform and the load varies as
+the ``1.5``-th harmonic (:func:`finite_factor`): 6/5 in a short bearing, as in Galerkin's method,
+and 1 in a long one. Without the second term the film is long.
 """
 
 import math
@@ -29,15 +29,15 @@ DROPPED = 3  # marks while the set is revised
 ADDED = 4
 
 MOST_SETS = 200
-"""Limit of the sets tried; cold starts from one dimension settle within 10."""
+"""Maximum number of sets tried; cold starts from one dimension settle within 10."""
 
 _HARMONIC = 1.5  # balances eccentricities up to 0.9: lower ones vary slower, higher ones faster
 
 
 def finite_factor(length_to_diameter: float) -> float:
-    """Share s of the flow round the circle in the film of one dimension.
+    """Factor s of the flow round the circle in the film of one dimension.
 
-    Over an even gap a source ``cos k theta`` gives the mean pressure of a long bearing times
+    Over a uniform gap a source ``cos k theta`` gives the mean pressure of a long bearing times
     ``1 - tanh(q) / q`` with ``q = k L / D``; s is chosen so that the parabola gives the same at
     k = 1.5. The force is then within 0.2 % of the direct solve up to L/D = 1/4 and eccentricity
     0.95, within 2 % up to L/D = 1 and 6 % up to L/D = 4, each up to 0.9 (measured).
@@ -48,19 +48,19 @@ def finite_factor(length_to_diameter: float) -> float:
     [1.2, 1.188, 1.007]
     """
     q = _HARMONIC * length_to_diameter
-    if q < 0.05:  # the series: beyond its first term 1e-5
+    if q < 0.05:  # series expansion: beyond its first term 1e-5
         return 1.2
     return 1.0 / (1.0 - math.tanh(q) / q) - 3.0 / (q * q)
 
 
 @kernel
 def solve_line(work: Any) -> int:
-    """Mean pressure of each line, left in ``work.line[:, 3]``, after :func:`fill_lines`.
+    """Solve for the mean pressure of each line after :func:`fill_lines`; see ``work.line[:, 3]``.
 
     Returns
     -------
     int
-        Solves needed; 0 where the set of pressurised lines did not settle.
+        Number of solves; 0 if the set of pressurised lines did not settle.
     """
     for iteration in range(MOST_SETS):
         _solve_line_set(work)
@@ -91,8 +91,8 @@ def line_force(
     Returns
     -------
     tuple of float
-        Non-dimensional F_X, F_Y; zero where the journal touches the bore or the set of
-        pressurised lines did not settle (a long film that is only squeezed may have none).
+        Non-dimensional F_X, F_Y; zero if the journal touches the bore or the set of pressurised
+        lines did not settle (a long film that is only squeezed may have none).
     """
     share = 1.0 if long == 1 else work.line_share
     leak = 0.0 if long == 1 else work.line_leak
@@ -110,7 +110,7 @@ def line_force(
 
 @kernel
 def _update_lines(work: Any) -> bool:
-    """Drop lines that pull, add lines that would be filled; whether any."""
+    """Drop lines that pull and add lines that would be filled; return whether any changed."""
     line = work.line
     n = line.shape[0]
     changed = False
@@ -137,10 +137,10 @@ def _update_lines(work: Any) -> bool:
 
 @kernel
 def fill_lines(work: Any, x: float, y: float, x_rate: float, y_rate: float, leak: float) -> None:
-    """Set out the film of one dimension in the columns of ``work.line``.
+    """Set up the film of one dimension in the columns of ``work.line``.
 
-    Columns 0 conductance to the next line, 1 diagonal, 2 source, 3 pressure, 4 state; those
-    behind are scratch. All pressures are times the share of :func:`finite_factor`.
+    Columns 0 conductance to the next line, 1 diagonal, 2 source, 3 pressure, 4 state; the others
+    are scratch space. All pressures are multiplied by the factor of :func:`finite_factor`.
     """
     n = work.line.shape[0]
     middle = work.fixed.shape[1] // 2

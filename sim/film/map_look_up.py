@@ -9,13 +9,13 @@ from numpy.typing import NDArray
 from ..jit import kernel
 
 RADIAL, TANGENTIAL, PEAK = range(3)
-"""What the table holds: components of the force in the frame of the line of centres, peak."""
+"""Entries of the table: components of the force in the frame of the line of centres, peak."""
 
-_TINY = 1e-300  # keeps 0 / 0 from the direction of no velocity
+_TINY = 1e-300  # avoids 0 / 0 at zero velocity
 
 
 class MapTable(NamedTuple):
-    """What the kernels know of a map."""
+    """Table of a map, as the kernels use it."""
 
     coefficients: NDArray[np.float64]  # (3, n_attitudes, n_gap + 2, n_angle + 2 or 3)
     mirrored: int  # 1 for a plain bore: half a turn of V, one attitude
@@ -30,9 +30,9 @@ class MapTable(NamedTuple):
 def stretched_angle(along: float, across: float) -> float:
     """Angle of (along, across) in [0, pi] for across >= 0, within 6e-7 rad of the arc tangent.
 
-    Twice the arc tangent of the half angle's tangent by an odd polynomial on [0, 1] (a least
-    largest error fit, exact at 0 and 1, so that the angle is continuous). Build and look-up use the
-    same, hence its error does not matter.
+    Twice the arc tangent of the half angle's tangent by an odd polynomial on [0, 1], a minimax fit
+    that is exact at 0 and 1, so that the angle is continuous. Table and look-up use the same
+    function, hence its error does not matter.
 
     Examples
     --------
@@ -41,7 +41,7 @@ def stretched_angle(along: float, across: float) -> float:
     """
     t = across / (math.sqrt(along * along + across * across) + abs(along) + _TINY)
     z = t * t
-    q = z * z  # powers in pairs: the look-up waits for every operation in a row
+    q = z * z  # paired powers shorten the chain of dependent operations
     low = (0.9999958816524089 - 0.3331660701852026 * z) + q * (
         0.19800800206264005 - 0.13206149560785463 * z
     )
@@ -52,7 +52,7 @@ def stretched_angle(along: float, across: float) -> float:
 
 @kernel
 def _weights(u: float) -> tuple[float, float, float, float]:
-    """Of four neighbouring cubic B-splines, at the share u of the cell in the middle."""
+    """Weights of four neighbouring cubic B-splines at the share u of the middle cell."""
     v = 1.0 - u
     third = 1.0 / 6.0
     return (
@@ -65,7 +65,7 @@ def _weights(u: float) -> tuple[float, float, float, float]:
 
 @kernel
 def _cell(position: float, cells: int) -> tuple[int, float]:
-    """Cell of a position in knots, and the share of it that lies behind."""
+    """Cell of a position in knots, and the share of the cell before it."""
     i = min(int(position), cells - 1)
     return i, position - i
 
@@ -98,7 +98,7 @@ def _entry(table: MapTable, what: int, k: int, i: int, j: int, u: Any, v: Any, w
 
 @kernel
 def map_scales(table: MapTable, eccentricity: float) -> tuple[float, float, float]:
-    """sqrt(g), sqrt(1 - eps^2) and G of the scaling, held at their last beyond the table."""
+    """sqrt(g), sqrt(1 - eps^2) and G of the scaling, constant beyond the end of the table."""
     gap = max(1.0 - eccentricity, table.least_root * table.least_root)
     root = math.sqrt(gap)
     stretch = math.sqrt(gap * (2.0 - gap))
@@ -147,9 +147,10 @@ def map_force(
     table : MapTable
     x, y : float
         Journal centre over C. Beyond the last eccentricity of the table the force is that at its
-        end, for the trial points of an integrator; a caller that keeps such a point must say so.
+        end, meant for trial points of an integrator; a caller that accepts such a point must report
+        it.
     x_rate, y_rate : float
-        Its rates by tau.
+        Velocity of the centre: derivatives by tau.
 
     Returns
     -------
@@ -178,12 +179,12 @@ def map_resistance(
     Parameters
     ----------
     table : MapTable
-        Of a plain bore.
+        Map of a plain bore.
     x, y : float
         Journal centre over C, as for :func:`map_force`.
     v_x, v_y : float
-        Velocity V in the frame in which both surfaces turn as much forth as back; (0, 0) counts as
-        one along the line of centres.
+        Velocity V in the frame in which both surfaces turn equally fast in opposite directions; (0,
+        0) counts as one along the line of centres.
 
     Returns
     -------
@@ -200,16 +201,16 @@ def map_resistance(
 
 
 class MapPlace(NamedTuple):
-    """Where a state lies in the map of a plain bore, and the scales of what stands there."""
+    """Position of a state in the map of a plain bore, and the scales of its entries."""
 
     n_x: float  # line of centres
     n_y: float
     stretch: float
     scale: float
-    c: float  # of the stretched angle of V
+    c: float  # cosine and sine of the scaled angle of V
     s: float
     side: float
-    i: float  # cell, and the share of it that lies behind
+    i: float  # cell, and the share of it before the state
     p: float
     j: float
     q: float
@@ -219,7 +220,7 @@ class MapPlace(NamedTuple):
 def map_place(
     table: Any, roots: float, angles: float, x: float, y: float, v_x: float, v_y: float
 ) -> Any:
-    """See :class:`MapPlace`; `roots` and `angles` are the coefficients' numbers."""
+    """See :class:`MapPlace`; `roots` and `angles` are the numbers of coefficients."""
     eccentricity = math.sqrt(x * x + y * y)
     apart = eccentricity > 0.0
     distance = eccentricity if apart else 1.0
@@ -237,14 +238,14 @@ def map_place(
 
 @kernel
 def _cell_of(position: float, cells: float) -> Any:
-    """As :func:`_cell`, in numbers that lie in vectors; no number is in the first cell."""
+    """Vectorisable :func:`_cell`, in floats; NaN falls into the first cell."""
     i = min(np.floor(position if position > 0.0 else 0.0), cells - 1.0)
     return i, position - i
 
 
 @kernel
 def map_patches(radial: Any, tangential: Any, i: float, j: float, p: float, q: float) -> Any:
-    """Both entries of the map and their derivatives by the knots of the angle."""
+    """Both entries of the map and their derivatives by the angle in knots."""
     row, column, v, w, rate = int(i), int(j), _weights(p), _weights(q), _rates(q)
     return (
         _patch(radial, row, column, v, w),
@@ -258,7 +259,7 @@ def map_patches(radial: Any, tangential: Any, i: float, j: float, p: float, q: f
 def map_tensor(
     m: Any, per_radian: float, f_r: float, f_t: float, g_r: float, g_t: float
 ) -> tuple[float, float, float, float]:
-    """Resistance from what stands in the map."""
+    """Resistance from the entries of the map."""
     c, s, n_x, n_y, stretch, scale = m.c, m.s, m.n_x, m.n_y, m.stretch, m.scale
     g_r *= per_radian
     g_t *= per_radian
@@ -278,9 +279,9 @@ def map_tensor(
 
 @kernel
 def map_peak(table: MapTable, x: float, y: float, x_rate: float, y_rate: float) -> float:
-    """Largest non-dimensional pressure of the film, arguments as :func:`map_force`.
+    """Largest non-dimensional pressure of the film, with the arguments of :func:`map_force`.
 
-    The largest of a mesh's nodes has kinks where it moves from node to node: expect three times the
+    The largest node of a mesh has kinks where it moves to the next node: expect three times the
     error of the force.
     """
     _, _, _, size, stretch, k, i, j, u, v, w = _look_up(table, x, y, x_rate, y_rate)

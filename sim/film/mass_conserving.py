@@ -1,6 +1,6 @@
-"""Oil film that keeps its mass through cavitation (Jakobsson, Floberg, Olsson; Elrod, Adams).
+"""Oil film that conserves mass through cavitation (Jakobsson, Floberg, Olsson; Elrod, Adams).
 
-Where the film has ruptured the pressure is zero and the gap is filled in part: the film fraction
+Where the film has ruptured the pressure is zero and the gap is partly filled: the film fraction
 ``fill`` <= 1 takes the place of the pressure as the unknown. Non-dimensional as in
 :mod:`.film.solve`,
 
@@ -9,9 +9,9 @@ Where the film has ruptured the pressure is zero and the gap is filled in part: 
 
 balanced over the cells of the direct solver's mesh, the film fraction carried from upstream. A
 cell belongs to the full set (its pressure is unknown) or to the cavitated one (its film fraction
-is); for given sets the balance is linear, and whatever the sets its matrix is diagonally dominant
-by columns, because no cell can pass on more than it receives. The sets are exchanged until they
-stay, mostly after five to ten banded solutions.
+is); for given sets the balance is linear, and for any sets its matrix is diagonally dominant
+by columns, because no cell can pass on more than it receives. Cells change sets until the sets
+settle, mostly after five to ten banded solutions.
 
 Oil enters from grooves, from ends under pressure, and under the condition ``"reynolds"`` of a
 bearing without grooves from a line at the widest gap that is kept full at zero pressure.
@@ -36,27 +36,27 @@ from .solve import (
     groove_nodes,
 )
 
-_SETTLED = 1e-12  # of the highest pressure, and of a full gap: what rounding may pull or overfill
-_LOSS = 1e-13  # of the stream: empties a steady ring that nothing feeds, else undetermined
+_SETTLED = 1e-12  # of the highest pressure, and of a full gap: tolerated tension or overfill
+_LOSS = 1e-13  # of the stream: drains a steady ring without supply, which is otherwise undetermined
 _MOST_SETS = 100  # 3500 random films, from any start, settled within 50
 
 EndPressure = float | tuple[float, float]
-"""Pressure at both ends alike, or at z = -1/2 and z = 1/2."""
+"""Pressure of both ends, or at z = -1/2 and z = 1/2."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MassStep:
-    """The film after a step in time, and where its oil went.
+    """Film after a time step, and the oil that entered it.
 
     Attributes
     ----------
     solution : FilmSolution
         Pressure, force and film fraction at the end of the step.
     oil : numpy.ndarray [shape=(n_theta, n_z)]
-        Oil on unit area over C, to be handed to the next step.
+        Oil on unit area over C, the input of the next step.
     intake : numpy.ndarray [shape=(n_theta, n_z)]
-        Volume over R L C that each cell took in from outside during the step: from grooves, to
-        the ends (negative), zero to rounding anywhere else. Its sum is the change of
+        Volume over R L C that each cell took in from outside during the step: from grooves;
+        negative at the ends; zero to rounding elsewhere. Its sum is the change of
         :func:`oil_volume`.
     """
 
@@ -66,7 +66,7 @@ class MassStep:
 
 
 class _Cells(NamedTuple):
-    """Balance of every cell of a mesh; ends and grooves are held.
+    """Balance of every cell of a mesh; ends and grooves are held at a fixed state.
 
     ``(convect + store) fill - convect' fill' = flow in by pressure + source``, where a prime is
     upstream and ``along`` and ``across`` conduct to the next line and the next node of the line.
@@ -80,7 +80,7 @@ class _Cells(NamedTuple):
     held: NDArray[np.int8]  # (n, k)
     pressure: NDArray[np.float64]  # where held (n, k)
     place: NDArray[np.int64]  # of each line in the order of elimination (n,)
-    rows: int  # unknown in each line: columns 1 to rows
+    rows: int  # unknowns in each line: columns 1 to rows
 
 
 class _Answer(NamedTuple):
@@ -101,29 +101,30 @@ def mass_conserving(
     end_pressure: EndPressure = 0.0,
     end_fill: float = 1.0,
 ) -> FilmSolution:
-    """Film with mass-conserving cavitation: steady, and what a velocity at once adds to it.
+    """Film with mass-conserving cavitation: steady, or perturbed by a given velocity.
 
     Parameters
     ----------
     geometry : FilmGeometry
-        Its condition says where oil comes from where there is no groove: from the widest gap
-        (``"reynolds"``) or from nowhere.
+        Its condition determines the oil supply without grooves: the widest gap
+        (``"reynolds"``) or none.
     state : FilmState
-        Where rates are given the film is the steady one of this position, after the time in
+        If rates are given, the film is the steady one of this position, advanced by the time in
         which oil is carried over one cell at these rates.
     start : FilmSolution, optional
-        Of this mesh; its full and cavitated cells are tried first. Does not change the answer.
+        Solution on this mesh; its full and cavitated cells are tried first. Does not change the
+        result.
     end_pressure : float or (float, float)
-        Non-dimensional pressure P >= 0 at both ends, or at z = -1/2 and z = 1/2; where it is above
+        Non-dimensional pressure P >= 0 at both ends, or at z = -1/2 and z = 1/2; if it is above
         zero the end is flooded.
     end_fill : float
-        Film fraction of the ends in [0, 1]; matters for the volume of oil alone, since nothing
-        flows in from an end at zero pressure.
+        Film fraction of the ends in [0, 1]; affects only the volume of oil, since nothing flows in
+        from an end at zero pressure.
 
     Returns
     -------
     FilmSolution
-        With `fill`. ``FilmStatus.STARVED`` and no pressure where no oil can enter.
+        With `fill`. ``FilmStatus.STARVED`` and no pressure if no oil can enter.
 
     Raises
     ------
@@ -132,10 +133,10 @@ def mass_conserving(
 
     Notes
     -----
-    There is no steady film about a moving journal: with its film fraction held, a closing gap
-    would lose oil, and more than one film would do. :func:`mass_step` follows a motion in time.
-    First order in the mesh where the film ruptures and forms again: forces within 0.5 %, film
-    fractions within 0.01 on 100 x 25.
+    A moving journal has no steady film: with its film fraction held, a closing gap would lose oil,
+    and the film would not be unique. Use :func:`mass_step` to follow a motion in time. First order
+    in the mesh where the film ruptures and forms again: forces within 0.5 %, film fractions within
+    0.01 on 100 x 25.
 
     References
     ----------
@@ -181,27 +182,27 @@ def mass_step(
     end_pressure: EndPressure = 0.0,
     end_fill: float = 1.0,
 ) -> MassStep:
-    """Carry the film over one step in time by the implicit Euler method.
+    """Advance the film by one time step of the implicit Euler method.
 
     Parameters
     ----------
     geometry : FilmGeometry
         As in :func:`mass_conserving`; without groove, line and flooded ends the film loses oil.
     state : FilmState
-        Position at the end of the step; the rates do not enter, the oil before tells them.
+        Position at the end of the step; its rates are ignored, as `oil` implies them.
     oil : numpy.ndarray [shape=(n_theta, n_z)]
-        On unit area over C >= 0, before the step: of :func:`oil_in_gap` or of the step before.
+        On unit area over C >= 0, before the step: from :func:`oil_in_gap` or the last step.
     step : float
         In tau, > 0.
     start : FilmSolution, optional
-        As in :func:`mass_conserving`, mostly that of the step before.
+        As in :func:`mass_conserving`, usually the solution of the last step.
     end_pressure, end_fill : float
         As in :func:`mass_conserving`.
 
     Returns
     -------
     MassStep
-        Stable at any step; first order in it.
+        Stable for any step; first order in the step.
 
     Raises
     ------
@@ -243,7 +244,7 @@ def oil_in_gap(geometry: FilmGeometry, state: FilmState, fill: ArrayLike) -> NDA
     ----------
     geometry : FilmGeometry
     state : FilmState
-        Its position.
+        Position of the journal.
     fill : float or array_like [shape=(n_theta, n_z)]
         Film fraction.
 
@@ -280,17 +281,17 @@ def oil_intake(
     *,
     end_pressure: EndPressure = 0.0,
 ) -> NDArray[np.float64]:
-    """What each cell of a steady film takes in from outside, volume over R L C in unit tau.
+    """Oil that each cell of a steady film takes in from outside, volume over R L C in unit tau.
 
     Parameters
     ----------
     geometry, state, solution, end_pressure
-        As given to and returned by :func:`mass_conserving`, the state at rest.
+        As passed to and returned by :func:`mass_conserving`, the state at rest.
 
     Returns
     -------
     numpy.ndarray [shape=(n_theta, n_z)]
-        Flow from grooves, to the ends (negative), zero to rounding anywhere else. Times
+        Flow from grooves, negative at the ends, zero to rounding elsewhere. Times
         ``omega R L C`` in [m^3/s]. The leakage is that of the faces half a cell off the ends,
         first order in the mesh: 8 % low with 17 nodes over the length.
 
@@ -325,7 +326,7 @@ def _both(end_pressure: EndPressure) -> tuple[float, float]:
 
 
 def _alike(end_pressure: EndPressure) -> bool:
-    """Whether one half of the length mirrors the other."""
+    """Whether the two halves of the length mirror each other."""
     first, last = _both(end_pressure)
     return first == last
 
@@ -377,7 +378,7 @@ def _gap(
 
 
 def _least_gap(geometry: FilmGeometry, state: FilmState) -> float:
-    """Least gap over C: of the nodes, or between two on the line of centres of either end."""
+    """Least gap over C: at the nodes, or between them on the line of centres at either end."""
     least = float(film_gap(geometry, state).min())
     for z in (-0.5, 0.5):
         x, y = state.x + z * state.tilt_x, state.y + z * state.tilt_y
@@ -388,7 +389,7 @@ def _least_gap(geometry: FilmGeometry, state: FilmState) -> float:
 
 
 def _resolved(geometry: FilmGeometry, state: FilmState, least: float) -> FilmStatus:
-    """Whether the mesh has enough cells across the narrow gap, where it is narrowest."""
+    """Status by the number of cells across the narrow gap, where it is narrowest."""
     gap = film_gap(geometry, state)
     narrow = gap[:, int(np.argmin(gap.min(axis=0)))] < 2.0 * least
     return FilmStatus.COARSE if np.count_nonzero(narrow) < LEAST_CELLS else FilmStatus.OK
@@ -405,7 +406,7 @@ def _bore(geometry: FilmGeometry) -> NDArray[np.float64]:
 
 
 def _cell_gap(geometry: FilmGeometry, state: FilmState) -> NDArray[np.float64]:
-    """Gap over C, the mean of each cell along the circumference: what its oil is measured by."""
+    """Gap over C, the mean of each cell along the circumference, for the oil volume."""
     angle = _angles(geometry)
     mean = math.sin(math.pi / geometry.n_theta) / (math.pi / geometry.n_theta)
     z = np.linspace(-0.5, 0.5, geometry.n_z)
@@ -419,8 +420,8 @@ def _held(geometry: FilmGeometry, state: FilmState, end_pressure: EndPressure) -
     """Cells that are kept full, and their pressure: ends, grooves, or a line at the widest gap."""
     if geometry.inlet_fill < 1:
         raise ValueError(
-            f"inlet_fill = {geometry.inlet_fill} is of the direct film; give this one the oil by "
-            "grooves, ends or a state of its own"
+            f"inlet_fill = {geometry.inlet_fill} works with the direct film only; supply oil by "
+            "grooves, pressurised ends or an oil state"
         )
     held, pressure = groove_nodes(geometry)
     if geometry.condition == "reynolds" and not geometry.grooves:
@@ -440,7 +441,7 @@ def _cells(geometry: FilmGeometry, state: FilmState, held: _Held) -> _Cells:
     face = angle + 0.5 * step
     face_bore = 0.5 * (bore + np.roll(bore, -1))
     gap = _gap(state, np.cos(face), np.sin(face), face_bore, z)
-    # the last column is beyond the end; it is never used
+    # the last column is beyond the end and unused
     between = _gap(state, np.cos(angle), np.sin(angle), bore, z + 0.5 / (k - 1))
     length_factor = 0.25 / geometry.length_to_diameter**2
     return _Cells(
@@ -457,7 +458,7 @@ def _cells(geometry: FilmGeometry, state: FilmState, held: _Held) -> _Cells:
 
 
 def _fold(n: int) -> NDArray[np.int64]:
-    """Order of the lines in which neighbours on the circle are never more than two apart."""
+    """Order of the lines in which neighbours on the circle are at most two apart."""
     line = np.arange(n)
     return np.where(2 * line < n, 2 * line, 2 * (n - line) - 1)
 
@@ -482,7 +483,7 @@ def _moves(state: FilmState) -> bool:
 def _oil_before(
     geometry: FilmGeometry, state: FilmState, fill: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], float]:
-    """Oil of a film fraction a while ago, and that while: until the present position."""
+    """Oil of a film fraction a short time ago, and that time."""
     rate = FilmState(
         x=state.x_rate, y=state.y_rate, tilt_x=state.tilt_x_rate, tilt_y=state.tilt_y_rate
     )
@@ -495,7 +496,7 @@ def _oil_before(
 
 
 def _half(cells: _Cells) -> _Cells:
-    """The cells from one end up to the middle, whose half a wall closes off."""
+    """Cells from one end to the middle, where a wall closes the middle cells."""
     middle = cells.rows // 2 + 2
     part = {name: getattr(cells, name)[:, :middle].copy() for name in _Cells._fields[:7]}
     for name in ("convect", "along", "store", "source"):
@@ -523,10 +524,10 @@ def _solve(
 
 
 def _exchange(cells: _Cells, full: NDArray[np.bool_]) -> _Answer:
-    """Exchange full and cavitated cells until both sets stay."""
+    """Exchange full and cavitated cells until both sets settle."""
     n, rows = full.shape[0], cells.rows
     unknown = slice(1, rows + 1)
-    side = 2 * rows  # of the band, both above and below the diagonal
+    side = 2 * rows  # bands above and below the diagonal each
     band = np.zeros((3 * side + 1, n * rows), order="F")
     right = np.zeros(n * rows)
     free = cells.held[:, unknown] == 0
@@ -537,7 +538,7 @@ def _exchange(cells: _Cells, full: NDArray[np.bool_]) -> _Answer:
         iterations += 1
         _fill_band(cells, full, band, right)
         _, _, answer, info = lapack.dgbsv(side, side, band, right, overwrite_ab=1, overwrite_b=1)
-        if info != 0:  # no way on from a singular balance
+        if info != 0:  # the balance is singular
             break
         value = answer.reshape(n, rows)[cells.place]
         inner = full[:, unknown]
@@ -563,7 +564,7 @@ def _fill_band(
     """Balance of all cells for the present sets, in the layout of LAPACK's gbsv."""
     n, k = full.shape
     m = cells.rows
-    middle = 4 * m  # the row of the band that holds the diagonal
+    middle = 4 * m  # the band's row that holds the diagonal
     band[:] = 0.0
     for i in range(n):
         before = i - 1 if i > 0 else n - 1
@@ -599,7 +600,7 @@ def _couple(
     conductance: float,
     upstream: int,
 ) -> None:
-    """What the cell of row r receives from its neighbour (i, j)."""
+    """Add what the cell of row r receives from its neighbour (i, j)."""
     carried = cells.convect[i, j] if upstream == 1 else 0.0
     if cells.held[i, j] != 0:
         right[r] += carried + conductance * cells.pressure[i, j]
@@ -616,7 +617,7 @@ def _couple(
 def _excess(
     cells: _Cells, pressure: NDArray[np.float64], fill: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """What leaves or stays in each cell less what comes in, twelve times the volume in unit tau."""
+    """Outflow and storage less inflow of each cell, twelve times the volume in unit tau."""
     carried = cells.convect * fill
     along = cells.along * (pressure - np.roll(pressure, -1, axis=0))
     across = cells.across[:, :-1] * (pressure[:, :-1] - pressure[:, 1:])
@@ -633,7 +634,7 @@ def _solution(
     pressure, fill = answer.pressure, answer.fill
     free = cells.held == 0
     excess = _excess(cells, pressure, fill)[free]
-    # the largest stream of a cell; a cell's own may be nothing
+    # scaled by the largest stream of any cell; a cell's own may be zero
     scale = np.max(cells.convect + np.abs(cells.store) + np.abs(cells.source))
     n, k = pressure.shape
     angle, z, width = _angles(geometry), np.linspace(-0.5, 0.5, k), _widths(k)
@@ -652,7 +653,7 @@ def _solution(
 
 
 def _failed(geometry: FilmGeometry, status: FilmStatus, least: float) -> FilmSolution:
-    """A film that carries nothing, with the reason."""
+    """Film without force, with the reason."""
     shape = (geometry.n_theta, geometry.n_z)
     return FilmSolution(
         pressure=np.zeros(shape),

@@ -1,8 +1,8 @@
 """Over-relaxation of the finite oil film, as the orbit paper solves it: the slow reference.
 
 Point by point over the mesh of :mod:`.film.direct`, on the same equations, with pressures below
-zero set to zero at once (which converges to the complementarity solution: Cryer 1971). It is here
-to measure the direct solver against, and to show where the paper's method ends.
+zero set to zero at once (which converges to the complementarity solution: Cryer 1971). It serves
+to verify the direct solver, and to show the limits of the paper's method.
 """
 
 import math
@@ -19,10 +19,10 @@ RELAX_DIVERGED = 3
 RELAX_STALLED = 4
 RELAX_LIMIT = 5
 
-_GROWTH = 1e6  # of a sweep's change over the first one: beyond any transient of a convergent run
+_GROWTH = 1e6  # of a sweep's change over the first one: more than in any convergent run
 _WATCH = 250  # sweeps; a convergent factor of 0.999 shrinks the change to 0.78 over them
 _STALL = 0.9
-_LARGE = 1e-3  # a run whose pressures still move by this much does not stand at rounding
+_LARGE = 1e-3  # a run whose pressures still change by this much is not at rounding level
 
 
 @kernel
@@ -41,16 +41,16 @@ def relaxed_force(
     Parameters
     ----------
     work : DirectFilm
-        Any; one that is not mirrored is swept over the whole length, as in the paper. Set
+        Any workspace; one that is not mirrored is swept over the whole length, as in the paper. Set
         ``outcome[WARM]`` to 0 to start from zero pressure.
     x, y, x_rate, y_rate : float
         As in :func:`.film.direct.direct_force`.
     relaxation : float
         Factor in (0, 2); the paper's is :data:`PAPER_RELAXATION`.
     tolerance : float
-        Of the sum of changes in a sweep over the sum of pressures.
+        Sum of changes in a sweep over the sum of pressures.
     most_sweeps : int
-        Limit.
+        Maximum number of sweeps.
 
     Returns
     -------
@@ -94,7 +94,7 @@ def _prepare(work: DirectFilm, x: float, y: float) -> None:
 
 @kernel
 def _sweep_until(work: DirectFilm, relaxation: float, tolerance: float, most_sweeps: int) -> int:
-    """Sweep; 0 or the status that ended it."""
+    """Sweep to the tolerance; return 0 or the status that ended the sweeps."""
     first = math.inf
     watched = math.inf
     for sweep in range(most_sweeps):
@@ -115,7 +115,7 @@ def _sweep_until(work: DirectFilm, relaxation: float, tolerance: float, most_swe
 
 @kernel
 def _sweep(work: DirectFilm, relaxation: float) -> float:
-    """One sweep over all nodes; the sum of changes over the sum of pressures."""
+    """Sweep all nodes once; return the sum of changes over the sum of pressures."""
     n, m = work.state.shape
     free = work.condition == GUEMBEL
     changes = 0.0

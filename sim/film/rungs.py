@@ -1,7 +1,7 @@
-"""Every film that the program knows, from the cheapest to the best: one table.
+"""Table of all film models, from the cheapest to the best.
 
-What a scene may choose, what the ladders rank, what characteristics of a bearing and a line are
-computed with, and what only tests the others are all read from it.
+It determines what a scene may choose, how ladders rank films, and which films serve for bearing
+characteristics, for shaft lines, or only for verification.
 """
 
 from collections.abc import Callable
@@ -13,24 +13,24 @@ from .solve import FilmSolution, solve_direct, solve_finite, solve_long, solve_s
 
 @dataclass(frozen=True, kw_only=True)
 class FilmRung:
-    """One way to get the pressure of an oil film.
+    """One model of an oil film.
 
     Attributes
     ----------
     name, assumes, valid, reference : str
     nanoseconds : float
-        One call on the mesh of 72 by 17, near a previous one, for ranking [ns].
+        Time of one call on the mesh of 72 by 17, near a previous one, for ranking [ns].
     field : callable
-        ``(geometry, state) -> FilmSolution``; of a table the film that it is made from.
+        ``(geometry, state) -> FilmSolution``; for a table, the film that it is built from.
     scene : bool
-        A scene may choose it.
+        Whether a scene may choose it.
     bearing : bool
-        Equilibrium and coefficients of a single bearing are computed with it.
+        Whether equilibrium and coefficients of a single bearing are computed with it.
     tilted : bool
-        It knows a journal that is tilted in its bearing.
+        Whether it handles a journal that is tilted in its bearing.
     verification : bool
-        It is there to test the others: seconds for what they do in milliseconds. A line can lie
-        on it when called from Python; no scene, no ladder and no command offers it.
+        For verification only: takes seconds where others take milliseconds. A line can use it
+        when called from Python; no scene, ladder or command offers it.
     """
 
     name: str
@@ -73,7 +73,7 @@ FILM_RUNGS: tuple[FilmRung, ...] = (
     ),
     FilmRung(
         name="map",
-        assumes="the direct film of a plain aligned bore, interpolated in a table of it",
+        assumes="the direct film of a plain aligned bore, interpolated in a table",
         valid="a plain aligned bore without feed pressure",
         reference="Childs, Moes, van Leeuwen (1977) for the idea",
         nanoseconds=125.0,
@@ -103,4 +103,4 @@ FILM_RUNGS: tuple[FilmRung, ...] = (
         verification=True,
     ),
 )
-"""A new rung is one row. A line may lie on any of them."""
+"""A new rung is one row. A line may use any of them."""

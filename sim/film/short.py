@@ -15,15 +15,15 @@ def short_force(
     Parameters
     ----------
     length_to_diameter : float
-        L / D; the force goes with its square. Within 5 % of the finite film up to about 1/4 at
-        low eccentricity, less at high.
+        L / D; the force is proportional to its square. Within 5 % of the finite film up to about
+        1/4 at low eccentricity, less at high.
     x, y, x_rate, y_rate : float
         Journal centre over C and its rates by tau.
 
     Returns
     -------
     tuple of float
-        Non-dimensional F_X, F_Y; zero where the journal touches the bore.
+        Non-dimensional F_X, F_Y; zero if the journal touches the bore.
 
     Notes
     -----
@@ -71,10 +71,10 @@ def short_resistance(
     x, y : float
         Journal centre over C, inside the circle of radius 1.
     v_x, v_y : float
-        Direction of the velocity V in the frame in which both surfaces turn as much forth as back.
-        At rest the film is that of a velocity along the line of centres.
+        Direction of the velocity V in the frame in which both surfaces turn equally fast
+        in opposite directions. At rest the film is that of a velocity along the line of centres.
     filled : float
-        Thickest gap over C that holds oil; from 2 on every gap does.
+        Thickest gap over C that holds oil; from 2 on, every gap does.
 
     Returns
     -------
@@ -124,7 +124,7 @@ def short_resistance(
 
 @kernel
 def filled_angle(eccentricity: float, filled: float) -> float:
-    """Sommerfeld's angle up to which the gap holds oil: 0 nowhere, pi everywhere."""
+    """Sommerfeld's angle up to which the gap holds oil; 0: nowhere, pi: everywhere."""
     _, _, angle = _filled_arc(eccentricity, 1.0 - eccentricity * eccentricity, filled)
     found: float = angle
     return found
@@ -144,8 +144,9 @@ def _filled_arc(e: float, rest: float, filled: float) -> Any:
 def _over_the_arc(c_0: float, s_0: float, e: float, rest: float, filled: float) -> Any:
     """Integrals of ``(e + cos g)^2``, ``sin^2 g``, ``(e + cos g) sin g`` where the arc holds oil.
 
-    Its middle has the cosine c_0 and the sine s_0, its half width the cosine ``-e c_0``: it begins
-    above -pi and may pass beyond pi. Oil is up to an angle on either side of the least gap.
+    The arc's middle has the cosine c_0 and the sine s_0, its half width the cosine ``-e c_0``: it
+    begins above -pi and may pass beyond pi. Oil extends to an angle on either side of the least
+    gap.
     """
     c_h = -e * c_0
     s_h = math.sqrt(1.0 - c_h * c_h)

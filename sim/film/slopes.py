@@ -1,17 +1,17 @@
-"""Stiffness and damping of a film just solved, from its own equations.
+"""Stiffness and damping of a solved film, from its own equations.
 
 With the equations ``A(x) P = b(x, x')`` on the pressurised nodes and a force ``-w . P``, the
 stiffness is ``(A^-1 w) . (db/dx - dA/dx P)``: A is symmetric, so one factorisation with a
 right-hand side for each force gives all. Where the film ruptures P and its slope vanish, so that a
-displacement of its rim is of second order: the rim may be held. It has to be held in the right
+displacement of its rim is of second order: the rim may be held, provided that it is in the right
 place:
 
 ===============  =================================================================================
 rim              held
 ===============  =================================================================================
-of the mesh      at the first node without pressure: the exact slopes of the mesh's own force,
-                 which a Newton search needs. The rim jumps from node to node, and what is known
-                 of a small motion with it: an uneven error of first order
+of the mesh      at the first node without pressure: the exact derivatives of the mesh's own
+                 force, which a Newton search needs. The rim jumps from node to node, and with it
+                 the coefficients of a small motion: an uneven error of first order
 between nodes    where the wedge has taken up what flows over the last face; a node beyond that
                  face but within the rim counts, and the conductance to the rim goes with the
                  distance left (Shortley and Weller): an even error of second order
@@ -39,7 +39,7 @@ Vector = NDArray[np.float64]
 
 _LEAST_CUT = 1e-3  # of a cell: a node nearer to the rim than this counts as on it
 _LEAST_SIDE = 0.05  # the same along the length, where the rim is known by interpolation
-_NEAR = 9  # cells to either side of the rim in which a line knows how far it is
+_NEAR = 9  # cells to either side of the rim whose distance from it is noted
 
 
 class Coefficients(NamedTuple):
@@ -49,35 +49,35 @@ class Coefficients(NamedTuple):
     damping: Vector
 
     def per_load(self, load: float) -> "Coefficients":
-        """Coefficients as tables print them: ``K C / W`` and ``C C omega / W``."""
+        """Coefficients in the usual tabulated form: ``K C / W`` and ``C C omega / W``."""
         return Coefficients(self.stiffness / load, self.damping / load)
 
 
 class _Rim(NamedTuple):
-    """The pressurised region with its rim, and the steady flow in it."""
+    """Pressurised region with its rim, and the steady flow in it."""
 
     state: NDArray[np.int8]  # PRESSURISED within the rim (n, m)
     volume: Vector  # share of each node's cell in its balance (n, m)
     along: Vector  # conductance to the next line, or to a rim before it (n, m)
     across: Vector  # (n, m + 1)
-    flow: Vector  # steady, to the next line or over the middle of what is left to the rim (n, m)
-    ahead: Vector  # cells from the last node to the rim with the rotation, else 0 (n, m)
-    back: Vector  # the same against it
+    flow: Vector  # steady, to the next line or to the rim, there at half the distance (n, m)
+    ahead: Vector  # cells from the last node to the rim downstream, else 0 (n, m)
+    back: Vector  # the same upstream
     depth: Vector  # cells to the nearest rim of the line, negative outside, 0 far off (n, m)
 
 
 def perturbation(work: DirectFilm, state: FilmState, *, resolved: bool = False) -> Coefficients:
-    """Stiffness and damping of a film just solved.
+    """Stiffness and damping of a solved film.
 
     Parameters
     ----------
     work : DirectFilm
         As :func:`.film.direct.direct_tilted_force` left it.
     state : FilmState
-        That it was solved for, at rest.
+        Its state, at rest.
     resolved : bool
-        Whether the rim stands between nodes. Without it these are the slopes of the mesh's own
-        force, up to rounding.
+        Whether the rim lies between nodes. If not, the result is the exact derivative of the mesh's
+        own force, up to rounding.
 
     Returns
     -------
@@ -158,10 +158,10 @@ def _draw_rim(
 
 @kernel
 def _reach(work: DirectFilm, i: int, j: int, way: int) -> float:
-    """Cells by which the film reaches past the last face of a line.
+    """Cells by which the film extends past the last face of a line.
 
-    At the rim the wedge has taken up what flows in, over that face and from the lines beside. It
-    may stand before a groove within its cell; -1 where the film reaches the groove.
+    At the rim the wedge has taken up the inflow over that face and from the adjacent lines. The rim
+    may lie in the cell before a groove; -1 if the film reaches the groove.
     """
     n = work.state.shape[0]
     cells = 0
@@ -194,7 +194,7 @@ def _reach(work: DirectFilm, i: int, j: int, way: int) -> float:
 
 @kernel
 def _inflow_beside(work: DirectFilm, i: int, j: int) -> float:
-    """Flow into a cavitated cell from the nodes beside it along the length."""
+    """Flow into a cavitated cell from its neighbours along the length."""
     total = 0.0
     if j > 0 and work.state[i, j - 1] == PRESSURISED:
         total += work.across[i, j] * work.pressure[i, j]
@@ -215,7 +215,7 @@ def _filled_part(work: DirectFilm, i: int, j: int, way: int, inflow: float, take
 
 @kernel
 def _measure_depth(rim: _Rim, i: int, j: int, way: int, rest: float) -> None:
-    """Note how far from this rim the nodes of the line are."""
+    """Record the distance of the line's nodes from this rim."""
     n = rim.state.shape[0]
     for cells in range(_NEAR):
         place = (i - way * cells) % n
@@ -248,9 +248,9 @@ def _close_sides(work: DirectFilm, rim: _Rim) -> None:
 
 
 def _pressed_shares(pressure: Vector) -> Vector:
-    """Weights of the nodes in the integral of what is above zero, for Guembel's condition.
+    """Weights of the nodes in the integral of the positive pressure, for Guembel's condition.
 
-    A line of P from node to node crosses zero somewhere; what a node changes counts up to there.
+    P is linear between nodes and crosses zero somewhere; a node's contribution ends there.
     """
     own = pressure[:, 1:-1]
     shares: Vector = np.zeros_like(own)
@@ -351,7 +351,7 @@ def _outflow(along: Vector, across: Vector, pressure: Vector) -> Vector:
 
 
 def _unclipped(work: DirectFilm) -> Vector:
-    """Pressure that solves the equations (n, m + 2); *guembel* has dropped what is negative."""
+    """Pressure that solves the equations (n, m + 2), before *guembel* drops what is negative."""
     m = work.state.shape[1]
     pressure = work.pressure[:, : m + 2].copy()
     if work.condition != GUEMBEL:
@@ -364,7 +364,7 @@ def _unclipped(work: DirectFilm) -> Vector:
 
 
 def _force_weights(work: DirectFilm, counted: Vector) -> Vector:
-    """Share of every unknown pressure in F_X, F_Y and the moments (n, m, 2 or 4)."""
+    """Weight of every unknown pressure in F_X, F_Y and the moments (n, m, 2 or 4)."""
     m = work.state.shape[1]
     z = np.arange(1, m + 1) / (work.pressure.shape[1] - 1) - 0.5
     sides = np.full(m, 2.0 if work.mirrored else 1.0)
@@ -393,7 +393,7 @@ def _solve(rim: _Rim, right: Vector) -> Vector:
 
 @kernel
 def _fill_band(rim: _Rim, order: NDArray[np.int64], place: NDArray[np.int64], band: Vector) -> None:
-    """Upper half of A line by line, the diagonal first; a node that is known has a row of one."""
+    """Upper half of A line by line, the diagonal first; a known node has a unit row."""
     n, m = rim.state.shape
     for p in range(order.size):
         i = order[p]
@@ -414,7 +414,7 @@ def _fill_band(rim: _Rim, order: NDArray[np.int64], place: NDArray[np.int64], ba
 
 @kernel
 def _solve_band(band: Vector, right: Vector) -> None:
-    """Gauss elimination of a symmetric band; the solutions take the place of the right sides."""
+    """Gauss elimination of a symmetric band; the solutions replace the right-hand sides."""
     rows, count = right.shape
     most = band.shape[1] - 1
     for r in range(rows):
@@ -437,10 +437,10 @@ def _solve_band(band: Vector, right: Vector) -> None:
 
 
 def _line_order(occupied: NDArray[np.bool_]) -> tuple[NDArray[np.intp], int]:
-    """Lines with unknowns so ordered that neighbours are near, and how far apart at most.
+    """Order lines with unknowns so that neighbours are close; also the largest distance.
 
-    Behind a line without unknowns the circle is open. Where all have some it is laid double, like
-    a belt: 0, n - 1, 1, n - 2 and so on.
+    Behind a line without unknowns the circle is open. If every line has some, the circle is folded
+    like a belt: 0, n - 1, 1, n - 2 and so on.
     """
     n = occupied.size
     if not occupied.all():

@@ -35,11 +35,12 @@ from .starved import starved_force
 Array = NDArray[np.float64]
 
 LEAST_CELLS = 4.0
-"""Cells over the arc where the gap is below twice its least; fewer are :attr:`FilmStatus.COARSE`.
-With four the force on the standard mesh is within 5 % of the converged one, measured."""
+"""Least number of cells over the arc where the gap is below twice its least value; a mesh with
+fewer is :attr:`FilmStatus.COARSE`.
+With four, the force on the standard mesh is within 5 % of the converged one, measured."""
 
 _LEAST_NODES = 5  # of a mesh each way: two cells on either side of the middle
-_ROUND = 1e-9  # of an angle or a length: a node on the edge of a groove belongs to it
+_ROUND = 1e-9  # tolerance of an angle or a length: a node on the edge of a groove belongs to it
 
 
 class FilmStatus(Enum):
@@ -59,11 +60,11 @@ class FilmStatus(Enum):
     )
     DIVERGED = "over-relaxation diverged; lower the relaxation factor below 2, or solve directly"
     STALLED = (
-        "over-relaxation no longer comes closer, at rounding or at a factor that overshoots; "
+        "over-relaxation has stalled, at rounding or from a factor that overshoots; "
         "raise the tolerance, lower the relaxation factor, or solve directly"
     )
     SWEEPS = (
-        "over-relaxation used up its sweeps before its tolerance; allow more sweeps, raise the "
+        "over-relaxation reached its limit of sweeps; allow more sweeps, raise the "
         "tolerance, or solve directly"
     )
     STARVED = (
@@ -76,7 +77,7 @@ class FilmStatus(Enum):
 class Groove:
     """Axial groove, centred in the length, held at its feed pressure.
 
-    Nodes of the mesh within it are held; at the least the nearest line and the middle.
+    Mesh nodes within it are held, at least the nearest line and the middle.
 
     Attributes
     ----------
@@ -189,9 +190,9 @@ class FilmSolution:
     ----------
     pressure : numpy.ndarray [shape=(n_theta, n_z)]
     force : numpy.ndarray [shape=(2,)]
-        On the journal.
+        Force on the journal.
     moment : numpy.ndarray [shape=(2,)]
-        ``-∬ P z (cos, sin)`` with z over L: what turns the tilt (tilt_x, tilt_y) back.
+        ``-∬ P z (cos, sin)`` with z over L: it opposes the tilt (tilt_x, tilt_y).
     min_thickness : float
         Least gap over C, ends included.
     cavitated_share : float
@@ -200,9 +201,9 @@ class FilmSolution:
     residual : float
         :func:`.film.direct.residual`, over the largest pressure.
     iterations : int
-        Solves or sweeps.
+        Number of solves or sweeps.
     fill : numpy.ndarray [shape=(n_theta, n_z)] or None
-        Film fraction, of the rung that has one.
+        Film fraction, if the solver has one.
     """
 
     pressure: Array
@@ -222,15 +223,15 @@ class FilmSolution:
 
 
 def worn_arc(depth: float, clearance: float, angle: float, n_theta: int) -> Array:
-    """Extra gap of a bore with an arc worn into it that is another circle's.
+    """Extra gap of a bore with a circular arc worn into it.
 
     Parameters
     ----------
     depth : float
         Deepest wear over C, >= 0.
     clearance : float
-        Of the journal in the arc, over C, > 0: near 0 the journal fits the arc, at 1 the arc is as
-        wide as the bore.
+        Clearance of the journal in the arc, over C, > 0: near 0 the journal fits the arc, at 1 the
+        arc is as wide as the bore.
     angle : float
         Middle of the arc from the X axis [rad].
     n_theta : int
@@ -250,7 +251,7 @@ def worn_arc(depth: float, clearance: float, angle: float, n_theta: int) -> Arra
     Notes
     -----
     From the middle of the bore, the arc's circle of radius ``R + clearance C`` has its own middle
-    ``depth + 1 - clearance`` lower, for gaps that are small beside R.
+    ``depth + 1 - clearance`` lower, for gaps that are small compared with R.
 
     Examples
     --------
@@ -258,14 +259,14 @@ def worn_arc(depth: float, clearance: float, angle: float, n_theta: int) -> Arra
     array([2.   , 1.268, 0.   , 0.   , 0.   , 0.   , 0.   , 1.268])
     """
     if not 0 <= depth < math.inf:
-        raise ValueError(f"depth = {depth} must be >= 0 and finite; it is the wear depth over C")
+        raise ValueError(f"depth = {depth} must be >= 0 and finite (wear depth over C)")
     if not 0 < clearance < math.inf:
-        raise ValueError(f"clearance = {clearance} must be > 0 and finite; it is over C")
+        raise ValueError(f"clearance = {clearance} must be > 0 and finite (over C)")
     return _other_circle(depth + 1.0 - clearance, 1.0 - clearance, angle, n_theta)
 
 
 def _other_circle(lower: float, smaller: float, angle: float, n_theta: int) -> Array:
-    """Gap beyond a bore of a circle whose middle is lower, and whose clearance is smaller."""
+    """Gap beyond the bore of a circle with a lower middle and a smaller clearance."""
     theta = 2 * math.pi * np.arange(n_theta) / n_theta
     return np.maximum(0.0, lower * np.cos(theta - angle) - smaller)
 
@@ -303,18 +304,18 @@ def dufrane_scar(depth: float, angle: float, n_theta: int) -> Array:
     array([0.4  , 0.107, 0.   , 0.   , 0.   , 0.   , 0.   , 0.107])
     """
     if not 0 <= depth < 2:
-        raise ValueError(f"depth = {depth} must be in [0, 2); it is the wear depth over C")
+        raise ValueError(f"depth = {depth} must be in [0, 2) (wear depth over C)")
     return _other_circle(1.0, 1.0 - depth, angle, n_theta)
 
 
 def direct_film(geometry: FilmGeometry, *, tilted: bool = False) -> DirectFilm:
-    """Workspace of the direct solver for :func:`.film.direct.direct_force`, cold.
+    """Create the workspace of the direct solver :func:`.film.direct.direct_force`.
 
     Parameters
     ----------
     geometry : FilmGeometry
     tilted : bool
-        Whether the journal may tilt: then the whole length is solved instead of half of it.
+        Whether the journal may tilt; if so, the whole length is solved instead of half of it.
 
     Examples
     --------
@@ -338,7 +339,7 @@ def direct_film(geometry: FilmGeometry, *, tilted: bool = False) -> DirectFilm:
 
 
 def starved_film(geometry: FilmGeometry, *, tilted: bool) -> DirectFilm:
-    """Workspace of :func:`.film.starved.starved_force`, cold.
+    """Create the workspace of :func:`.film.starved.starved_force`.
 
     Raises
     ------
@@ -347,7 +348,7 @@ def starved_film(geometry: FilmGeometry, *, tilted: bool) -> DirectFilm:
     """
     if tilted:
         raise ValueError(
-            f"inlet_fill = {geometry.inlet_fill} knows no tilt, the front of the film being "
+            f"inlet_fill = {geometry.inlet_fill} must be 1 for a tilted journal, as the front is "
             "straight; set the tilt to 0 or the fill to 1"
         )
     return direct_film(geometry)
@@ -377,7 +378,7 @@ def film_gap(geometry: FilmGeometry, state: FilmState) -> Array:
     geometry : FilmGeometry
         Bearing and mesh.
     state : FilmState
-        Place of the journal.
+        Position of the journal.
 
     Returns
     -------
@@ -408,7 +409,7 @@ def solve_short(geometry: FilmGeometry, state: FilmState) -> FilmSolution:
     geometry : FilmGeometry
         Plain bore without grooves.
     state : FilmState
-        Aligned.
+        Aligned journal.
 
     Returns
     -------
@@ -418,7 +419,7 @@ def solve_short(geometry: FilmGeometry, state: FilmState) -> FilmSolution:
     Raises
     ------
     ValueError
-        Tilt, bore or grooves.
+        Tilt, bore or grooves are given.
 
     Examples
     --------
@@ -452,14 +453,14 @@ def solve_long(geometry: FilmGeometry, state: FilmState) -> FilmSolution:
     """Long film (Sommerfeld): no flow to the ends.
 
     Guembel's condition fixes the pressure by p = 0 at the widest gap. A film that is squeezed
-    without being dragged may have no line to leave by: ``FilmStatus.ITERATIONS``.
+    without being dragged may have no cavitated line: ``FilmStatus.ITERATIONS``.
 
     Parameters
     ----------
     geometry : FilmGeometry
         Its ``n_z`` does not matter.
     state : FilmState
-        Aligned.
+        Aligned journal.
 
     Returns
     -------
@@ -469,7 +470,7 @@ def solve_long(geometry: FilmGeometry, state: FilmState) -> FilmSolution:
     Raises
     ------
     ValueError
-        Tilt.
+        Tilt is given.
 
     Examples
     --------
@@ -482,14 +483,14 @@ def solve_long(geometry: FilmGeometry, state: FilmState) -> FilmSolution:
 
 
 def solve_finite(geometry: FilmGeometry, state: FilmState) -> FilmSolution:
-    """Film of finite length with a parabola along it: one dimension to solve.
+    """Film of finite length with a parabola along it: a one-dimensional problem.
 
     Parameters
     ----------
     geometry : FilmGeometry
-        Grooves are taken as long as the bearing.
+        Grooves are assumed to be as long as the bearing.
     state : FilmState
-        Aligned.
+        Aligned journal.
 
     Returns
     -------
@@ -499,7 +500,7 @@ def solve_finite(geometry: FilmGeometry, state: FilmState) -> FilmSolution:
     Raises
     ------
     ValueError
-        Tilt.
+        Tilt is given.
 
     Notes
     -----
@@ -524,9 +525,9 @@ def solve_direct(
     geometry : FilmGeometry
         Any bore, grooves and condition.
     state : FilmState
-        Also tilted.
+        May be tilted.
     start : FilmSolution, optional
-        Of the same mesh, nearby: its cavitated region is the first guess.
+        A nearby solution on the same mesh: its cavitated region is the first guess.
 
     Returns
     -------
@@ -536,11 +537,11 @@ def solve_direct(
     Raises
     ------
     ValueError
-        `start` is of another mesh.
+        `start` has another mesh.
 
     Notes
     -----
-    See :mod:`.film.direct`; :func:`mesh_error` estimates what the mesh costs.
+    See :mod:`.film.direct`; :func:`mesh_error` estimates the mesh error.
 
     Examples
     --------
@@ -589,19 +590,19 @@ def solve_relaxed(
     ----------
     geometry : FilmGeometry
     state : FilmState
-        Aligned.
+        Aligned journal.
     start : FilmSolution, optional
-        Of the same mesh: its pressure is the first guess.
+        On the same mesh: its pressure is the first guess.
     relaxation : float
         Factor; 1.96 in the paper.
     tolerance : float
-        Of the changes in a sweep over the pressures.
+        Sum of changes in a sweep over the sum of pressures.
     most_sweeps : int
 
     Raises
     ------
     ValueError
-        Tilt, or `start` is of another mesh.
+        Tilt is given, or `start` has another mesh.
 
     Examples
     --------
@@ -632,12 +633,12 @@ def solve_relaxed(
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MeshError:
-    """What the mesh of a direct solve costs, by Richardson's extrapolation.
+    """Mesh error of a direct solve, by Richardson's extrapolation.
 
     Attributes
     ----------
     force : numpy.ndarray [shape=(2,)]
-        Extrapolated to no mesh.
+        Extrapolated to zero spacing.
     relative : float
         Estimated error of the force on the mesh of the geometry, over the force.
     """
@@ -647,20 +648,20 @@ class MeshError:
 
 
 def mesh_error(geometry: FilmGeometry, state: FilmState) -> MeshError:
-    """Estimate the mesh error of :func:`solve_direct` by a solve on half of the mesh.
+    """Estimate the mesh error of :func:`solve_direct` by a solve on every second node.
 
     Parameters
     ----------
     geometry : FilmGeometry
-        Of an even ``n_theta``, and an ``n_z`` one more than a multiple of four, so that every
-        second node makes a mesh.
+        With an even ``n_theta``, and an ``n_z`` one more than a multiple of four, so that every
+        second node forms a mesh.
     state : FilmState
-        Where the journal is.
+        Position of the journal.
 
     Returns
     -------
     MeshError
-        Of the force.
+        Error of the force.
 
     Raises
     ------
@@ -747,17 +748,17 @@ def _groove_problems(name: str, groove: Groove) -> list[str]:
 def _inlet_problems(geometry: FilmGeometry) -> list[str]:
     fill = geometry.inlet_fill
     if not 0 < fill <= 1:
-        return [f"inlet_fill = {fill} must be in (0, 1]; at 1 the film takes all that it needs"]
+        return [f"inlet_fill = {fill} must be in (0, 1]; at 1 the film is flooded"]
     if fill == 1:
         return []
     problems = []
     if geometry.grooves:
         problems.append(
-            f"inlet_fill = {fill} knows no grooves, which are full; remove them or the fill"
+            f"inlet_fill = {fill} must be 1 with grooves, which are full; remove them or the fill"
         )
     if geometry.condition == "guembel":
         problems.append(
-            f"inlet_fill = {fill} has no condition 'guembel', whose film is full all round; set "
+            f"inlet_fill = {fill} must be 1 with 'guembel', whose film is full all round; set "
             "condition = 'periodic'"
         )
     return problems
@@ -782,7 +783,7 @@ def _require_mesh(geometry: FilmGeometry, start: FilmSolution) -> None:
     if start.pressure.shape != mesh:
         raise ValueError(
             f"start has a mesh of {start.pressure.shape} and must have {mesh}; "
-            "start from a solution of the same geometry, or from none"
+            "start from a solution of the same geometry, or pass no start"
         )
 
 
@@ -836,14 +837,14 @@ def _mesh_solution(
 
 
 def _residual(work: DirectFilm) -> float:
-    """Residual of the field at hand; the kernel's own where negative pressure was dropped."""
+    """Residual of the current field; the kernel's own if negative pressure was dropped."""
     if work.condition == CONDITION_CODES["guembel"]:
         return float(work.measure[2])
     return float(residual(work))
 
 
 def _least_gap(geometry: FilmGeometry, state: FilmState, gap: Array) -> float:
-    """Least gap of an aligned journal: of the nodes, or between two on the line of centres."""
+    """Least gap of an aligned journal: at the nodes, or between two on the line of centres."""
     least = 1.0 - math.hypot(state.x, state.y)
     if geometry.bore is not None:
         theta = 2 * math.pi * np.arange(geometry.n_theta) / geometry.n_theta
@@ -853,14 +854,14 @@ def _least_gap(geometry: FilmGeometry, state: FilmState, gap: Array) -> float:
 
 
 def _resolved(gap: Array, least: float) -> FilmStatus:
-    """Whether the mesh has enough cells across the narrow gap, at every node of the length."""
+    """Status by the number of cells across the narrow gap, at every node of the length."""
     narrow = np.count_nonzero(gap < 2.0 * least, axis=0)
     at = int(np.argmin(gap.min(axis=0)))
     return FilmStatus.COARSE if narrow[at] < LEAST_CELLS else FilmStatus.OK
 
 
 def _touch(geometry: FilmGeometry, least: float) -> FilmSolution:
-    """No film: no force, and the reason."""
+    """Solution without film or force, with the reason."""
     return FilmSolution(
         pressure=np.zeros((geometry.n_theta, geometry.n_z)),
         force=np.zeros(2),
@@ -879,4 +880,4 @@ _STATUS = {
     RELAX_STALLED: FilmStatus.STALLED,
     RELAX_LIMIT: FilmStatus.SWEEPS,
 }
-"""Code of the kernels -> status; done and coarse are told by the mesh."""
+"""Code of the kernels -> status; the mesh distinguishes done from coarse."""

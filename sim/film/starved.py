@@ -1,18 +1,18 @@
-"""Film whose inlet is not filled: the oil brought in decides where the film begins.
+"""Film with a starved inlet: the oil supply determines where the film begins.
 
 Behind the widest gap the oil covers the journal as a layer of the thickness ``t = fill (1 + e)``
-over C, the share `fill` of the widest gap, and is carried on without pressure until it fills the
+over C, the share `fill` of the widest gap, and is carried along without pressure until it fills the
 narrowing gap. From that line on the film is that of :mod:`.film.direct`. The line is straight along
 the length and lies where the film takes in just what the layer brings,
 
     mean over z of (6 H - H^3 dP/dtheta) = 6 t
 
-so that it begins before the gap has narrowed to t: the pressure behind it holds oil back. Where the
-film at the widest gap takes in no more than that, it begins there (the condition *reynolds*), and
-where the narrowest gap is still wider than the layer there is no pressure. The line lies anywhere
+so that it begins before the gap has narrowed to t: the pressure behind it holds oil back. If the
+film at the widest gap takes in no more than that, it begins there (the condition *reynolds*); if
+the narrowest gap is wider than the layer, there is no pressure. The line lies anywhere
 between the nodes; the cell behind it is cut, so that the force has no jumps. The oil in the layer
-is at rest against the front: what a moving journal leaves there for a part of a turn is not
-followed (:mod:`.journal.mass_orbit` does).
+does not move relative to the front: oil left there by a moving journal for part of a turn is not
+modelled (:mod:`.journal.mass_orbit` does so).
 
 Artiles, Heshmat (1985), J. Tribology 107(1), 1-13; Etsion, Pinkus (1975), J. Lubrication
 Technology 97(1), 89-95.
@@ -33,12 +33,12 @@ from .direct import (
 )
 from .direct_system import ITERATIONS, STATUS, WARM, DirectFilm
 
-FRONT, SLOPE, LINE, CUT = 0, 1, 2, 3  # places in DirectFilm.inlet
+FRONT, SLOPE, LINE, CUT = 0, 1, 2, 3  # indices into DirectFilm.inlet
 
-_LEAST_CUT = 1e-6  # of a cell between the front and its first node
+_LEAST_CUT = 1e-6  # least part of a cell between the front and its first node
 _TOLERANCE = 1e-8  # of the flow: the force then jumps by a 400th of an integrator's difference
 _MOST_FRONTS = 60
-_SLOW = 6  # fronts after which every third halves what is left
+_SLOW = 6  # fronts after which every third step bisects
 _NEAR = 1e-13  # rad
 
 
@@ -46,9 +46,9 @@ _NEAR = 1e-13  # rad
 def solved_force(
     work: DirectFilm, x: float, y: float, x_rate: float, y_rate: float
 ) -> tuple[float, float]:
-    """Force on an aligned journal: of :func:`starved_force` where its inlet is not filled.
+    """Force on an aligned journal by the solver that fits its inlet.
 
-    Elsewhere of :func:`.film.direct.direct_force`.
+    :func:`starved_force` for a starved inlet, else :func:`.film.direct.direct_force`.
     """
     if work.inlet_fill < 1.0:
         return starved_force(work, x, y, x_rate, y_rate)
@@ -64,17 +64,17 @@ def starved_force(
     Parameters
     ----------
     work : DirectFilm
-        With an ``inlet_fill`` below 1, without grooves.
+        With an ``inlet_fill`` below 1 and without grooves.
     x, y : float
         Journal centre over C.
     x_rate, y_rate : float
-        Its rates by tau.
+        Velocity of the centre: derivatives by tau.
 
     Returns
     -------
     tuple of float
-        Non-dimensional F_X, F_Y; zero where the journal touches (``work.outcome[STATUS]``), and
-        where its gap is nowhere filled.
+        Non-dimensional F_X, F_Y; zero if the journal touches the bore (``work.outcome[STATUS]``)
+        or the gap is nowhere filled.
     """
     work.outcome[STATUS] = DIRECT_OK
     work.outcome[ITERATIONS] = 0
@@ -96,7 +96,7 @@ def starved_force(
 
 @kernel
 def _cut_force(work: DirectFilm) -> tuple[float, float]:
-    """Force of the film, its first line's pressure counted on the cell that is left of it."""
+    """Force of the film, with the first line's pressure weighted by its cut cell."""
     n, m = work.state.shape
     f_x, f_y = integrate_pressure(work)
     line = int(work.inlet[LINE])
@@ -110,7 +110,7 @@ def _cut_force(work: DirectFilm) -> tuple[float, float]:
 
 @kernel
 def _find_front(work: DirectFilm, x: float, y: float, x_rate: float, y_rate: float) -> bool:
-    """Root of what the film lacks, by secants within what is known to hold it."""
+    """Find the front that takes in just the supply, by safeguarded secants."""
     low, high = 0.0, math.pi
     front, slope = work.inlet[FRONT], work.inlet[SLOPE]
     before, lacked = 0.0, 0.0
@@ -138,7 +138,7 @@ def _find_front(work: DirectFilm, x: float, y: float, x_rate: float, y_rate: flo
 def _next_front(
     front: float, lacks: float, slope: float, low: float, high: float, trial: int
 ) -> float:
-    """Where a secant leads; an end not yet tried, or the middle, where it leads out."""
+    """Next front by the secant; an untried end or the middle if it leaves the bracket."""
     middle = 0.5 * (low + high)
     if not slope < 0.0 or (trial >= _SLOW and trial % 3 == 0):
         return middle
@@ -154,12 +154,12 @@ def _next_front(
 def _lack(
     work: DirectFilm, x: float, y: float, x_rate: float, y_rate: float, front: float
 ) -> float:
-    """Flow that a film takes in at a front, an angle from the widest gap, beyond what is there."""
+    """Flow that a film from a front on (angle from the widest gap) takes in beyond the supply."""
     n, m = work.state.shape
     step = 2.0 * math.pi / n
     widest = (math.atan2(y, x) + math.pi) / step
     place = widest + front / step
-    behind = math.floor(place) + 1.0  # place of the first node of the film
+    behind = math.floor(place) + 1.0  # index of the first node of the film
     cut = max(behind - place, _LEAST_CUT)
     line = int(behind) % n
     hold_lines(work, int(widest) % n, (line - 1) % n)
@@ -183,7 +183,7 @@ def _lack(
 
 @kernel
 def _gap(work: DirectFilm, line: int, ahead: float, x: float, y: float) -> float:
-    """Gap a share of a cell ahead of a line."""
+    """Gap at a fraction of a cell ahead of a line."""
     n = work.state.shape[0]
     angle = (line - ahead) * (2.0 * math.pi / n)
     bore = ahead * work.bore[(line - 1) % n] + (1.0 - ahead) * work.bore[line]
@@ -194,7 +194,7 @@ def _gap(work: DirectFilm, line: int, ahead: float, x: float, y: float) -> float
 def _cut_cell(
     work: DirectFilm, line: int, cut: float, x: float, y: float, x_rate: float, y_rate: float
 ) -> None:
-    """Equations of the first line of a film, that of the front before mended."""
+    """Restore the line of the last front, and set the equations of the film's first line."""
     n, m = work.state.shape
     length_step = 1.0 / (work.pressure.shape[1] - 1)
     step = 2.0 * math.pi / n
@@ -222,7 +222,7 @@ def _cut_cell(
 
 @kernel
 def _keep(work: DirectFilm, line: int) -> None:
-    """Note the equations of a line before they are cut."""
+    """Save the equations of a line before they are cut."""
     n, m = work.state.shape
     work.inlet[LINE] = float(line)
     for j in range(m):
@@ -235,7 +235,7 @@ def _keep(work: DirectFilm, line: int) -> None:
 
 @kernel
 def _mend(work: DirectFilm) -> None:
-    """Put back the equations of the line that was cut last."""
+    """Restore the equations of the line that was cut last."""
     n, m = work.state.shape
     line = int(work.inlet[LINE])
     if line < 0:
