@@ -51,7 +51,7 @@ SPOKEN_BY = {
     "response/impact": {"features", "info"},
     "pages/kept": {"blindspots", "chart"},
     "pages/points": {"chart", "report", "sweep"},
-    "feature_rows/quality": {"report"},
+    "recording_faults/layout": {"report"},
     "report/verdict": {"report"},
     "templates/report_batch.html": {"report"},
     "charts/scene_edit": {"chart", "simulate"},

@@ -19,9 +19,9 @@ from wearstate.diagnose.feature_rows.feature_table import (
     held_against,
     recording_features,
 )
-from wearstate.diagnose.feature_rows.healthy import Baselines
 from wearstate.diagnose.feature_rows.model_card import FeatureChoice, ModelCard
-from wearstate.diagnose.feature_rows.transfer_reference import HealthyTransfer
+from wearstate.diagnose.healthy_reference.healthy import Baselines
+from wearstate.diagnose.healthy_reference.transfer_reference import HealthyTransfer
 from wearstate.diagnose.wear_model.bundle import ModelError, load_bundle
 from wearstate.diagnose.wear_model.file import load_model, save_model
 from wearstate.diagnose.wear_model.train import train_model

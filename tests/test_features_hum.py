@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from wearstate.diagnose.feature_rows.surroundings import MOST_HUM, hum_faults
+from wearstate.diagnose.recording_faults.surroundings import MOST_HUM, hum_faults
 from wearstate.features.signal.hum import hum_power
 from wearstate.sim.output.recording import Recording
 from wearstate.sim.output.sensor import Channel, coloured_noise, mains_hum

@@ -11,14 +11,12 @@ from wearstate.datasets.file.record import DataSet
 from wearstate.datasets.generation.generate import save_solution
 from wearstate.datasets.recipe.load import load_recipe
 from wearstate.diagnose.command_line.cli import cli
-from wearstate.diagnose.feature_rows.healthy import Baseline
 from wearstate.diagnose.feature_rows.model_card import (
     ModelCard,
     StrangerRates,
     TrainedCondition,
     TrainedOn,
 )
-from wearstate.diagnose.feature_rows.probe_means import probe_means
 from wearstate.diagnose.film_clearance.clearance import (
     SCARS,
     Doubts,
@@ -30,6 +28,8 @@ from wearstate.diagnose.film_clearance.clearance import (
     _Problem,
     film_clearance,
 )
+from wearstate.diagnose.healthy_reference.healthy import Baseline
+from wearstate.diagnose.healthy_reference.probe_means import probe_means
 from wearstate.diagnose.nameplate.cautions import known_beside, nameplate_cautions, unseen_texts
 from wearstate.diagnose.nameplate.nameplate import Nameplate, day_of, nameplate_of
 from wearstate.diagnose.nameplate.sensors import as_told, known_zeros, taken_out_words

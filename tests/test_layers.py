@@ -79,6 +79,8 @@ ROOMS = {
         "machines",
         "learning",
         "feature_rows",
+        "recording_faults",
+        "healthy_reference",
         "familiarity",
         "wear_model",
         "film_clearance",

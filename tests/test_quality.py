@@ -9,15 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from wearstate.datasets.file.record import DataSet
-from wearstate.diagnose.feature_rows.quality import (
-    Levels,
-    Observation,
-    fit_levels,
-    layout_faults,
-    quiet_faults,
-    sample_faults,
-    suspicions,
-)
+from wearstate.diagnose.recording_faults.layout import layout_faults
+from wearstate.diagnose.recording_faults.levels import Levels, fit_levels, quiet_faults
+from wearstate.diagnose.recording_faults.samples import sample_faults
+from wearstate.diagnose.recording_faults.suspicions import Observation, suspicions
 from wearstate.diagnose.wear_model.cautions import condition_cautions
 from wearstate.diagnose.wear_model.file import load_model
 from wearstate.sim.output.recording import Recording

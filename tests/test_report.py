@@ -19,10 +19,10 @@ from wearstate.datasets.file.writer import DataSetWriter
 from wearstate.datasets.recipe.text import toml_text
 from wearstate.diagnose.command_line.cli import cli
 from wearstate.diagnose.command_line.report import report_exit
-from wearstate.diagnose.feature_rows.healthy import Baseline, Baselines
-from wearstate.diagnose.feature_rows.quality import QualityFault
+from wearstate.diagnose.healthy_reference.healthy import Baseline, Baselines
 from wearstate.diagnose.nameplate.nameplate import Nameplate
 from wearstate.diagnose.pages.embed import MOST_BYTES
+from wearstate.diagnose.recording_faults.fault import QualityFault
 from wearstate.diagnose.report import page as page_module
 from wearstate.diagnose.report.batch import judge_all, recordings_in, times_of
 from wearstate.diagnose.report.figures import moved_panel, report_pictures
@@ -578,7 +578,7 @@ def test_faults_of_a_baseline_are_told_once(referenced, tmp_path):
     from scipy.io import wavfile
     from wearstate.datasets.measured.recording import read_recording
     from wearstate.datasets.source.part import SourceOptions
-    from wearstate.diagnose.feature_rows.healthy import baseline_of
+    from wearstate.diagnose.healthy_reference.healthy import baseline_of
 
     model = load_model(referenced[0])
     wavfile.write(tmp_path / "x.wav", 8000, np.zeros(9000, dtype=np.float32))

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from wearstate.diagnose.feature_rows.healthy import baseline_of
 from wearstate.diagnose.feature_rows.resampling import at_rate
+from wearstate.diagnose.healthy_reference.healthy import baseline_of
 from wearstate.sim.machine.simulate import simulate
 from wearstate.sim.output.recording import Recording
 from wearstate.sim.output.sensor import Channel

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from wearstate.diagnose.familiarity.noise_floor import swing_of_turn
-from wearstate.diagnose.feature_rows.surroundings import company_faults
+from wearstate.diagnose.recording_faults.surroundings import company_faults
 from wearstate.diagnose.wear_model.file import load_model
 from wearstate.features.rotation.other_rate import UNHEARD, other_rate
 from wearstate.features.signal.steady_tone import SILENT, steady_tone

@@ -31,9 +31,10 @@ from ..feature_rows.feature_table import (
     recording_features,
 )
 from ..feature_rows.model_card import ClassCard
-from ..feature_rows.quality import layout_faults, sample_faults
 from ..learning.blends import Blend
 from ..learning.regressions import CANDIDATES, Folds, fit_blend
+from ..recording_faults.layout import layout_faults
+from ..recording_faults.samples import sample_faults
 from ..report.batch import Item, fault_of
 from ..wear_model.bundle import ModelError
 from .votes import FEWEST, Votes, score_votes, set_of

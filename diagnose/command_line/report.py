@@ -103,7 +103,7 @@ def report(
     """
     from ...datasets.file.views import views_of
     from ..class_model.file import CLASS_MODEL
-    from ..feature_rows.healthy import Baselines
+    from ..healthy_reference.healthy import Baselines
     from ..nameplate.nameplate import nameplate_of
     from ..report.verdict import known_machine
     from ..wear_model.bundle import kind_of

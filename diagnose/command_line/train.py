@@ -168,8 +168,8 @@ def train(
     from ..evaluation.evaluate import score
     from ..evaluation.text import features_text, refusal_lines, score_lines
     from ..feature_rows.feature_choice import choice_in, choices_of, costs_ms
-    from ..feature_rows.healthy import references
-    from ..feature_rows.transfer_reference import healthy_transfer
+    from ..healthy_reference.healthy import references
+    from ..healthy_reference.transfer_reference import healthy_transfer
     from ..wear_model.file import save_model
     from ..wear_model.train import train_model
 

@@ -22,9 +22,9 @@ from ..feature_rows.feature_table import (
     confounders_in,
     feature_table,
 )
-from ..feature_rows.healthy import references, refuse_strangers
 from ..feature_rows.noted import notes_of
-from ..feature_rows.transfer_reference import healthy_transfer
+from ..healthy_reference.healthy import references, refuse_strangers
+from ..healthy_reference.transfer_reference import healthy_transfer
 from ..learning.conformal import grade_limits, grade_set, interval
 from ..learning.grades import grades_of
 from ..learning.scores import (

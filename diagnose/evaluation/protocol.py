@@ -15,8 +15,8 @@ from ...datasets.split.rules import check_no_leak
 from ...datasets.split.stored import usable_sides
 from ...sim.output.recording import DataError, Recording
 from ..feature_rows.feature_table import FeatureTable
-from ..feature_rows.healthy import Baseline
 from ..feature_rows.noted import notes_of
+from ..healthy_reference.healthy import Baseline
 from ..learning.scores import ScoreFigure, figures, plain, resampled, smallest_found
 from ..wear_model.estimate import WearModel
 from .baselines import BASELINES, Rival, choose

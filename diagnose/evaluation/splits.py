@@ -24,8 +24,8 @@ from ..feature_rows.feature_table import (
     held_against,
     recording_features,
 )
-from ..feature_rows.healthy import references
-from ..feature_rows.transfer_reference import healthy_transfer
+from ..healthy_reference.healthy import references
+from ..healthy_reference.transfer_reference import healthy_transfer
 from ..wear_model.estimate import WearModel
 from ..wear_model.train import fit_model
 from .baselines import Side, side_of

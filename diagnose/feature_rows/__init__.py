@@ -1,6 +1,6 @@
-"""From recordings to rows for learning: quality checks, reference, choice of features.
+"""From recordings to rows for learning: feature tables, choice and ranking of features.
 
 It may import ``sim.atomic``, ``sim.output``, ``features.signal``, ``features.response``,
-``features.rotation``, ``features.catalogue``, ``datasets.file``, ``datasets.workers``,
-``datasets.split``, ``diagnose.learning``.
+``features.catalogue``, ``datasets.file``, ``datasets.workers``, ``datasets.split``,
+``diagnose.learning``.
 """

@@ -20,8 +20,6 @@ from ...sim.output.sensor import Channel
 from ...sim.scene.scene import Scene
 from ..class_model.file import CLASS_MODEL, load_class_model
 from ..feature_rows.feature_table import choice_of, confounders_in
-from ..feature_rows.quality import sample_faults
-from ..feature_rows.surroundings import hum_faults
 from ..pages.embed import require_bokeh
 from ..pages.page import save_page
 from ..pages.picture import page_image, save_picture
@@ -30,6 +28,8 @@ from ..pictures.panel import panel_figure
 from ..pictures.view import View
 from ..pictures.zoom import STILL_COLOURS, zoom_page
 from ..pictures.zoom_curves import zoom_curves
+from ..recording_faults.samples import sample_faults
+from ..recording_faults.surroundings import hum_faults
 from ..wear_model.bundle import kind_of
 from ..wear_model.file import load_model
 

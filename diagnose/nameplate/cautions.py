@@ -11,8 +11,8 @@ from ...datasets.recipe.text import recipe_names
 from ...sim.output.recording import Recording
 from ...sim.parts.wording import si_unit
 from ...sim.scene.load import load_scene, scene_names
-from ..feature_rows.healthy import Baseline
 from ..feature_rows.model_card import ModelCard
+from ..healthy_reference.healthy import Baseline
 from ..machines.registry import presentation_of
 from ..pages.si_text import si_text
 from .nameplate import Nameplate, day_of

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ...sim.output.recording import Recording
-from ..feature_rows.healthy import Baseline
+from ..healthy_reference.healthy import Baseline
 from ..pages.si_text import si_text
 from .nameplate import Nameplate
 

@@ -22,8 +22,8 @@ from ...datasets.readers.open import READERS
 from ...datasets.source.part import SourceOptions
 from ...sim.output.recording import DataError, Recording
 from ..feature_rows.feature_table import Progress, is_regime, regime_words
-from ..feature_rows.healthy import Baselines
 from ..film_clearance.clearance import FilmEstimate
+from ..healthy_reference.healthy import Baselines
 from ..learning.grades import GRADE_NAMES, WARNING_GRADE
 from ..nameplate.cautions import known_beside
 from ..nameplate.nameplate import Nameplate

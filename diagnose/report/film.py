@@ -14,8 +14,6 @@ from numpy.typing import NDArray
 from ...sim.output.recording import Recording
 from ...sim.scene.journal import JournalScene, ProximityProbe
 from ...sim.scene.shaft import ShaftScene
-from ..feature_rows.healthy import Baseline
-from ..feature_rows.probe_means import ProbeMeans, probe_means
 from ..film_clearance.clearance import (
     SCARS,
     FilmEstimate,
@@ -24,6 +22,8 @@ from ..film_clearance.clearance import (
     film_clearance,
 )
 from ..film_clearance.wear_down import SinkingRun, film_wear_down, possible_bores, sinking_places
+from ..healthy_reference.healthy import Baseline
+from ..healthy_reference.probe_means import ProbeMeans, probe_means
 from ..nameplate.nameplate import Nameplate, told_conditions
 from ..wear_model.verdict import Estimate
 from .beside import length_words, with_second

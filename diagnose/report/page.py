@@ -7,7 +7,7 @@ from typing import Any
 
 from ...sim.output.recording import DataError, Recording
 from ..feature_rows.feature_choice import feature_words
-from ..feature_rows.healthy import Baseline, Baselines
+from ..healthy_reference.healthy import Baseline, Baselines
 from ..learning.grades import GRADE_COLOURS, NO_GRADE_COLOUR
 from ..nameplate.cautions import known_beside
 from ..nameplate.nameplate import Nameplate

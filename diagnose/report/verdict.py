@@ -14,8 +14,8 @@ from ...features.signal import iso
 from ...sim.output.recording import DataError, Recording
 from ..feature_rows.feature_choice import choice_in, words_of
 from ..feature_rows.feature_table import is_regime, regime_words
-from ..feature_rows.healthy import Baseline
 from ..feature_rows.model_card import ModelCard
+from ..healthy_reference.healthy import Baseline
 from ..learning.grades import GRADE_NAMES
 from ..nameplate.cautions import unseen_texts
 from ..nameplate.nameplate import Nameplate

@@ -2,5 +2,6 @@
 
 It may import ``sim.atomic``, ``sim.output``, ``features.response``, ``features.catalogue``,
 ``datasets.file``, ``datasets.source``, ``datasets.recipe``, ``datasets.split``,
-``diagnose.learning``, ``diagnose.feature_rows``, ``diagnose.familiarity``.
+``diagnose.learning``, ``diagnose.feature_rows``, ``diagnose.recording_faults``,
+``diagnose.healthy_reference``, ``diagnose.familiarity``.
 """

@@ -17,9 +17,10 @@ from ..familiarity.quietness import CAUTIONED_SHARE
 from ..feature_rows.feature_choice import feature_words, value_words
 from ..feature_rows.feature_table import is_regime, kind_words, knows_no_oil, regime_words
 from ..feature_rows.model_card import ModelCard
-from ..feature_rows.quality import Levels, Observation
 from ..learning.heads import Head, logit
 from ..learning.severity import Estimator
+from ..recording_faults.levels import Levels
+from ..recording_faults.suspicions import Observation
 from .verdict import FaultFinding
 
 Float = NDArray[np.float64]

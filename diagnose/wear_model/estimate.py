@@ -19,27 +19,21 @@ from ..feature_rows.feature_table import (
     held_against,
     recording_features,
 )
-from ..feature_rows.healthy import Baseline, referenced_rows
 from ..feature_rows.model_card import ModelCard
 from ..feature_rows.noted import NOTED, given_of, noted_values
 from ..feature_rows.physical import level_channels, levelled_rows
-from ..feature_rows.quality import (
-    Levels,
-    Observation,
-    QualityFault,
-    coupling_faults,
-    layout_faults,
-    mark_faults,
-    place_faults,
-    quiet_faults,
-    recording_faults,
-    suspicions,
-)
 from ..feature_rows.resampling import at_rate
-from ..feature_rows.surroundings import company_faults, hum_faults
-from ..feature_rows.transfer_reference import told_against
+from ..healthy_reference.healthy import Baseline, referenced_rows
+from ..healthy_reference.transfer_reference import told_against
 from ..learning.heads import Head
 from ..learning.severity import Estimator
+from ..recording_faults.fault import QualityFault
+from ..recording_faults.layout import layout_faults, recording_faults
+from ..recording_faults.levels import Levels, quiet_faults
+from ..recording_faults.probes import coupling_faults, place_faults
+from ..recording_faults.surroundings import company_faults, hum_faults
+from ..recording_faults.suspicions import Observation, suspicions
+from ..recording_faults.tacho_mark import mark_faults
 from .bundle import ModelError
 from .cautions import (
     OFF_LEVEL,

@@ -13,12 +13,12 @@ from pydantic import Field, model_validator
 from ..familiarity.novelty import Familiarity
 from ..feature_rows.model_card import ModelCard, Portion, Strict
 from ..feature_rows.physical import level_channels, physical_rows, shape_rows
-from ..feature_rows.quality import Levels
 from ..learning.blends import Blend, Linear
 from ..learning.conformal import IntervalCalibration, Scale, scale_inputs
 from ..learning.experts import Experts
 from ..learning.heads import Head
 from ..learning.severity import Estimator
+from ..recording_faults.levels import Levels
 from .arrays import (
     BlendStructure,
     blend_arrays,

@@ -16,7 +16,6 @@ from ..feature_rows.feature_choice import Selection
 from ..feature_rows.feature_table import is_regime
 from ..feature_rows.model_card import StrangerRates
 from ..feature_rows.noted import doubted, noted_values, strayed
-from ..feature_rows.quality import Levels, fit_levels
 from ..learning.blends import Blend
 from ..learning.conformal import (
     IntervalCalibration,
@@ -39,6 +38,7 @@ from ..learning.regressions import (
     fit_line,
 )
 from ..learning.severity import Estimator
+from ..recording_faults.levels import Levels, fit_levels
 from .strangers import fit_strangers
 from .training_rows import FOLDS, TrainingRows
 

@@ -40,11 +40,11 @@ from ..feature_rows.feature_table import (
     feature_table,
     regimes_in,
 )
-from ..feature_rows.healthy import references, refuse_strangers
 from ..feature_rows.model_card import LayoutCard, ModelCard
 from ..feature_rows.noted import NOTED, notes_of
 from ..feature_rows.physical import physical_rows
-from ..feature_rows.transfer_reference import healthy_transfer
+from ..healthy_reference.healthy import references, refuse_strangers
+from ..healthy_reference.transfer_reference import healthy_transfer
 from ..learning.grades import grades_of
 from ..learning.regressions import BUDGET_MS
 from .bundle import checked

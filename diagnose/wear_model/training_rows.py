@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..familiarity.novelty import REACH
-from ..feature_rows.healthy import referenced_rows
 from ..feature_rows.physical import moved_rows
+from ..healthy_reference.healthy import referenced_rows
 
 Float = NDArray[np.float64]
 

@@ -5,9 +5,9 @@ from typing import Any, Literal
 
 from ...sim.output.recording import html_table
 from ..feature_rows.feature_table import regime_words
-from ..feature_rows.quality import QualityFault
 from ..learning.conformal import COVERAGE
 from ..learning.grades import GRADE_NAMES
+from ..recording_faults.fault import QualityFault
 
 Verdict = Literal["graded", "caution", "unfamiliar", "unusable"]
 Mode = Literal["cold", "referenced"]

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ...datasets.file.writer import refuse_output
 from ...datasets.measured.recording import read_recording
 from ...sim.output.recording import Recording, Table
-from ..feature_rows.healthy import Baseline, Baselines
+from ..healthy_reference.healthy import Baseline, Baselines
 from ..nameplate.cautions import known_beside
 from ..nameplate.nameplate import Nameplate, nameplate_of
 from ..nameplate.sensors import as_told

@@ -23,8 +23,8 @@ import numpy as np
 from wearstate.datasets.file.record import DataSet
 from wearstate.datasets.generation.generate import generate
 from wearstate.datasets.recipe.load import load_recipe
-from wearstate.diagnose.feature_rows.healthy import Baseline
-from wearstate.diagnose.feature_rows.probe_means import probe_means
+from wearstate.diagnose.healthy_reference.healthy import Baseline
+from wearstate.diagnose.healthy_reference.probe_means import probe_means
 from wearstate.diagnose.nameplate.nameplate import nameplate_of
 from wearstate.diagnose.report.film import film_estimate
 

@@ -29,7 +29,7 @@ from wearstate.datasets.file.record import DataSet
 from wearstate.datasets.generation.generate import generate
 from wearstate.diagnose.evaluation.evaluate import judge_rows, judged_rows
 from wearstate.diagnose.feature_rows.feature_choice import choice_in
-from wearstate.diagnose.feature_rows.healthy import Baselines, references
+from wearstate.diagnose.healthy_reference.healthy import Baselines, references
 from wearstate.diagnose.learning.scores import Judged, ScoreFigure, resampled, share
 from wearstate.diagnose.wear_model.estimate import WearModel
 from wearstate.diagnose.wear_model.file import load_model, save_model

@@ -13,7 +13,7 @@ from ...features.catalogue.analysis import STANDARD, Analysis
 from ...features.response.modal_model import Modes
 from ...features.response.transfer import FrfReference
 from ...sim.output.recording import Recording
-from .feature_table import FeatureSelection, recording_analysis
+from ..feature_rows.feature_table import FeatureSelection, recording_analysis
 
 
 def transfer_reference(

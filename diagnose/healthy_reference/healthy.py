@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from ...datasets.file.record import DataSet
 from ...features.response.transfer import FrfReference
 from ...sim.output.recording import DataError, Recording
-from .feature_choice import choice_in
-from .feature_table import (
+from ..feature_rows.feature_choice import choice_in
+from ..feature_rows.feature_table import (
     USUAL,
     FeatureSelection,
     FeatureTable,
@@ -21,10 +21,11 @@ from .feature_table import (
     held_against,
     recording_features,
 )
-from .model_card import ModelCard
+from ..feature_rows.model_card import ModelCard
+from ..feature_rows.resampling import at_rate
+from ..recording_faults.layout import layout_faults
+from ..recording_faults.samples import sample_faults
 from .probe_means import ProbeMeans, probe_means
-from .quality import layout_faults, sample_faults
-from .resampling import at_rate
 from .transfer_reference import (
     healthy_transfer,
     told_against,

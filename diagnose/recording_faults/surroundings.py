@@ -10,7 +10,7 @@ from ...features.rotation.other_rate import other_rate
 from ...features.signal.hum import hum_power
 from ...features.signal.steady_tone import steady_tone
 from ...sim.output.recording import Recording
-from .quality import QualityFault
+from .fault import QualityFault
 
 MOST_HUM = 0.05
 """Share of a channel's mean square beyond which hum is a caution: -13 dB. At -20 dB estimates of
