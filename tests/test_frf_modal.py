@@ -582,7 +582,7 @@ BAD = np.where(F == 50, np.nan, NARROW)
             "mode at 90 Hz must lie in the band|no pole",
         ),
         (lambda: modal.fit_modes(F, NARROW, [90.0] * 2, [0.01] * 2), "starts must differ"),
-        (lambda: modal._inverse(np.ones((4, 2))), "n_modes = 1 is more than the data tell apart"),
+        (lambda: modal._inverse(np.ones((4, 2))), "n_modes = 1 is more than the data can resolve"),
         (lambda: modal.modal_fit(F, NARROW, n_modes=0), "n_modes = 0 must be >= 1; leave it out"),
         (lambda: modal.modal_fit(F, NARROW.conj()), "at 90.* Hz must decay, but grow"),
         (lambda: modal.modal_fit(F, noise(F.size, 0)), "no pole stays stable|must"),

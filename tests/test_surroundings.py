@@ -8,7 +8,7 @@ import pytest
 from wearstate.diagnose.familiarity.noise_floor import swing_of_turn
 from wearstate.diagnose.recording_faults.surroundings import company_faults
 from wearstate.diagnose.wear_model.file import load_model
-from wearstate.features.rotation.other_rate import UNHEARD, other_rate
+from wearstate.features.rotation.other_rate import NO_OTHER_RATE, other_rate
 from wearstate.features.signal.steady_tone import SILENT, steady_tone
 from wearstate.sim.machine.simulate import simulate
 from wearstate.sim.scene.load import load_scene
@@ -94,7 +94,7 @@ def test_the_own_rate_and_its_simple_ratios_are_left_out():
 
 @pytest.mark.parametrize("turns", [0, 1, 5])
 def test_few_turns_tell_no_rate(turns):
-    assert other_rate(np.ones((2, 9000)), FS, np.arange(turns) * 0.2) == UNHEARD
+    assert other_rate(np.ones((2, 9000)), FS, np.arange(turns) * 0.2) == NO_OTHER_RATE
 
 
 def test_a_fast_shaft_has_fewer_multiples_and_no_false_rate():

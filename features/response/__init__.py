@@ -1,4 +1,4 @@
-"""What answers a force: transfer functions, impact tests, modes.
+"""Response to a force: transfer functions, impact tests, modes.
 
-It may import ``features.signal``.
+May import ``features.signal``.
 """

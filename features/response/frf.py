@@ -1,7 +1,7 @@
 """Frequency response functions from a measured force and the responses to it, with confidence.
 
-One force, any number of responses. Blocks of samples -> averaged spectra -> H1 or H2 with
-coherence and the disc that holds the true value with a stated probability.
+One force, any number of responses: blocks of samples are averaged to spectra, which give H1 or H2,
+the coherence, and a confidence disc for each line.
 """
 
 from dataclasses import dataclass, replace
@@ -21,8 +21,8 @@ Complex = NDArray[np.complex128]
 Estimator = Literal["h1", "h2"]
 
 TRIGGER_SHARE = 0.1
-"""Default trigger level of a blow, as a share of the largest force in the record [-]: blows of a
-hand scatter by a factor of three or so, and the noise of a force cell is far below."""
+"""Default trigger level of a blow, as a share of the largest force in the record [-]: blows by hand
+scatter by a factor of about three, and the noise of a force cell is far lower."""
 
 DECIBEL_PER_NEPER = 20 / np.log(10)
 """Level in decibels of a relative change in amplitude, to first order [dB]."""
@@ -35,7 +35,7 @@ class Spectra:
     Attributes
     ----------
     frequency : ndarray, shape (n_lines,)
-        [Hz]
+        Frequency of the lines [Hz].
     force : ndarray, shape (n_lines,)
         Mean of ``|X|^2``: a density [N^2/Hz] from `welch_spectra`, an energy density per blow
         [N^2 s/Hz] from `block_spectra`.
@@ -46,12 +46,12 @@ class Spectra:
     blocks : int
         Blocks averaged.
     averages : float
-        Independent blocks that are worth as much, <= `blocks`; see `effective_averages`.
+        Equivalent number of independent blocks, <= `blocks`; see `effective_averages`.
     nyquist : float
         Half the sample rate [Hz].
     decay : float
-        Rate of an exponential window that force and response both carry [1/s]; the response
-        function then belongs to ``s = decay + 2j pi f``.
+        Rate of the exponential window on both force and response [1/s]; the response function then
+        belongs to ``s = decay + 2j pi f``.
     """
 
     frequency: Float
@@ -69,12 +69,12 @@ class Spectra:
         return np.asarray((self.frequency == 0) | (self.frequency == self.nyquist))
 
     def between(self, low: float, high: float) -> "Spectra":
-        """Same spectra, only the lines from `low` to `high` [Hz], ends included.
+        """Same spectra with only the lines from `low` to `high` [Hz], ends included.
 
         Raises
         ------
         ValueError
-            If no line lies there.
+            If no line lies in that range.
         """
         kept = (self.frequency >= low) & (self.frequency <= high)
         if not kept.any():
@@ -98,7 +98,7 @@ class Frf:
     Attributes
     ----------
     frequency : ndarray, shape (n_lines,)
-        [Hz]
+        Frequency of the lines [Hz].
     value : ndarray, shape (n_channels, n_lines)
         Complex, response over force for ``exp(+j w t)`` [unit of response / N].
     coherence : ndarray, shape (n_channels, n_lines)
@@ -106,13 +106,13 @@ class Frf:
     radius : ndarray, shape (n_channels, n_lines)
         Radius of the confidence disc about `value` [unit of value].
     averages : float
-        Independent averages behind it [-].
+        Number of independent averages [-].
     estimator : str
         ``h1`` or ``h2``.
     confidence : float
         Probability that the disc of a single line holds the true value [-].
     decay : float
-        As in `Spectra` [1/s].
+        Rate of the exponential window, as in `Spectra` [1/s].
     """
 
     frequency: Float
@@ -126,7 +126,7 @@ class Frf:
 
     @property
     def magnitude_interval(self) -> tuple[Float, Float]:
-        """Least and largest magnitude in the disc [unit of value], each (n_channels, n_lines)."""
+        """Smallest and largest magnitude in the disc [unit of value], (n_channels, n_lines)."""
         size = np.abs(self.value)
         return np.maximum(size - self.radius, 0.0), size + self.radius
 
@@ -144,7 +144,7 @@ def blocks_of(x: ArrayLike, nperseg: int, step: int) -> Real:
     Returns
     -------
     ndarray, shape (..., n_blocks, nperseg)
-        A view where `x` is float32 or float64, and float64 otherwise; samples after the last whole
+        A view if `x` is float32 or float64, otherwise a float64 copy; samples after the last whole
         block are left out.
 
     Raises
@@ -176,7 +176,7 @@ def blocks_of(x: ArrayLike, nperseg: int, step: int) -> Real:
 
 
 def effective_averages(window: ArrayLike, step: int, n_blocks: int) -> float:
-    """Number of independent blocks that average as well as overlapping ones.
+    """Number of independent blocks whose average has the same variance as that of overlapping ones.
 
     Parameters
     ----------
@@ -205,7 +205,7 @@ def effective_averages(window: ArrayLike, step: int, n_blocks: int) -> float:
 
     Examples
     --------
-    A boxcar without overlap loses nothing; Hann at one half loses one part in eighteen.
+    A boxcar without overlap loses nothing; Hann overlapping by half loses one part in eighteen.
 
     >>> effective_averages([1.0] * 64, 64, 10)
     10.0
@@ -243,7 +243,7 @@ def welch_spectra(
     nperseg : int
         Block length [samples]; lines ``fs / nperseg`` apart.
     overlap : float
-        Share of a block that the next one repeats, 0 <= overlap < 1 [-].
+        Share of a block that is repeated in the next one, 0 <= overlap < 1 [-].
     window : array_like, shape (nperseg,), optional
         Window [-]; periodic Hann by default.
     detrend : bool
@@ -261,8 +261,8 @@ def welch_spectra(
 
     Notes
     -----
-    Leakage biases the result where a resonance is narrower than some four lines; a burst that has
-    died within its block has none, see `block_spectra`.
+    Leakage biases the result if a resonance is narrower than about four lines; a burst that has
+    decayed within its block causes none, see `block_spectra`.
 
     References
     ----------
@@ -312,7 +312,7 @@ def block_spectra(
     Parameters
     ----------
     force : array_like, shape (n_blocks, nperseg)
-        Force, one event a block [N].
+        Force, one event per block [N].
     response : array_like, shape (n_blocks, nperseg) or (n_blocks, n_channels, nperseg)
         Responses [any unit].
     fs : float
@@ -320,8 +320,7 @@ def block_spectra(
     force_window : array_like, shape (nperseg,), optional
         Window of the force alone, see `force_window`: it cuts off the noise after the blow.
     decay : float
-        Rate of an exponential window laid over force and response, >= 0 [1/s]; see
-        `window_decay`.
+        Rate of an exponential window applied to force and response, >= 0 [1/s]; see `window_decay`.
 
     Returns
     -------
@@ -336,10 +335,10 @@ def block_spectra(
     Notes
     -----
     With h the impulse response, ``exp(-d t) (h * x)`` is ``(exp(-d t) h) * (exp(-d t) x)``: with
-    the exponential on force AND response the estimate is exactly the transfer function at
-    ``s = d + 2j pi f``. Every pole moves left by d; `modal_fit` moves it back where it is told
-    `decay`. A response that has not died away at the end of its block is cut, an error of the
-    size of the cut-off tail.
+    the exponential on force AND response the estimate is exactly the transfer function at ``s = d +
+    2j pi f``. Every pole moves left by d; `modal_fit` moves it back if given `decay`. A response
+    that has not died away at the end of its block is cut off, which causes an error of the size of
+    the tail.
 
     References
     ----------
@@ -446,7 +445,7 @@ def h1(spectra: Spectra) -> Complex:
     Returns
     -------
     ndarray, shape (n_channels, n_lines)
-        [unit of response / N]
+        Response function [unit of response / N].
 
     Raises
     ------
@@ -482,12 +481,13 @@ def h2(spectra: Spectra) -> Complex:
     Returns
     -------
     ndarray, shape (n_channels, n_lines)
-        [unit of response / N]; ``|h2| >= |h1|``, and their ratio is the coherence.
+        Response function [unit of response / N]; ``|h2| >= |h1|``, and their ratio is the
+        coherence.
 
     Raises
     ------
     ValueError
-        If a line has no response that hangs together with the force.
+        If a line has no response correlated with the force.
 
     Notes
     -----
@@ -510,37 +510,37 @@ def h2(spectra: Spectra) -> Complex:
 
 
 def hv(spectra: Spectra, *, noise_ratio: ArrayLike | None = None) -> Complex:
-    """Estimate by total least squares, for noise on the force and on the responses.
+    """Total least squares estimate, for noise on the force and on the responses.
 
     Parameters
     ----------
     spectra : Spectra
     noise_ratio : array_like, optional
-        Power of the noise on a response over that on the force, > 0 [(unit of response / N)^2];
-        a number, one a line, or of the shape of the result. By default ``Syy / Sxx``: noise in
+        Power of the noise on a response over that on the force, > 0 [(unit of response / N)^2]; one
+        number, one per line, or in the shape of the result. By default ``Syy / Sxx``: noise in
         proportion to the signals.
 
     Returns
     -------
     ndarray, shape (n_channels, n_lines)
-        [unit of response / N]; ``|h1| <= |hv| <= |h2|``, all three of one phase.
+        Response function [unit of response / N]; ``|h1| <= |hv| <= |h2|``, all with the same phase.
 
     Raises
     ------
     ValueError
-        If a line has no force, or no response that hangs together with it; or if `noise_ratio`
-        is not > 0 or has a wrong shape.
+        If a line has no force or no response correlated with it, or `noise_ratio` is not > 0 or has
+        a wrong shape.
 
     Notes
     -----
-    With k the noise ratio, the estimate makes ``sum |Y - H X|^2 / (k + |H|^2)`` least::
+    With k the noise ratio, the estimate minimises ``sum |Y - H X|^2 / (k + |H|^2)``::
 
         Hv = (Syy - k Sxx + sqrt((Syy - k Sxx)^2 + 4 k |Sxy|^2)) / (2 Syx)
 
-    unbiased for many averages if k is right. Large k leads to H1, small k to H2; the default is
-    their geometric mean, ``|Hv| = sqrt(Syy / Sxx)``, which no change of units alters. (A k of 1,
-    as other programs have it, depends on the units.) There is no confidence disc: with noise on
-    both sides the blocks alone do not tell it.
+    It is unbiased for many averages if k is right. Large k leads to H1, small k to H2; the default
+    is their geometric mean, ``|Hv| = sqrt(Syy / Sxx)``, which does not depend on the units. (A k of
+    1, as in other programs, does.) There is no confidence disc: with noise on both sides the blocks
+    alone do not determine it.
 
     References
     ----------
@@ -569,7 +569,7 @@ def hv(spectra: Spectra, *, noise_ratio: ArrayLike | None = None) -> Complex:
         )
     excess = spectra.response - ratio * force
     root = np.hypot(excess, 2 * np.sqrt(ratio) * np.abs(cross))
-    # Of the two forms of the root the one that does not cancel.
+    # The form of the root without cancellation.
     above = np.where(excess > 0, excess + root, 2 * ratio * np.abs(cross))
     below = np.where(excess > 0, 2 * np.abs(cross), root - excess)
     return np.asarray(above / below * (cross / np.abs(cross)))
@@ -585,27 +585,27 @@ def _check_power(frequency: Float, power: Float, name: str) -> None:
 
 
 def coherence(spectra: Spectra) -> Float:
-    """Ordinary coherence, the share of the response that one linear system makes of the force.
+    """Ordinary coherence: the share of the response that is linear in the force.
 
     Parameters
     ----------
     spectra : Spectra
-        Of two blocks or more.
+        Spectra of two blocks or more.
 
     Returns
     -------
     ndarray, shape (n_channels, n_lines)
-        ``|Sxy|^2 / (Sxx Syy)``, 0 to 1 [-]; 0 where force or response is silent.
+        ``|Sxy|^2 / (Sxx Syy)``, 0 to 1 [-]; 0 if force or response is silent.
 
     Raises
     ------
     ValueError
-        If there is one block only: its coherence is 1 whatever the noise.
+        If there is only one block: its coherence is 1 at any noise level.
 
     Notes
     -----
-    Noise r times as strong as the signal on one side lowers it to ``1 / (1 + r)``. Where the truth
-    is 0, the mean of the estimate is ``1 / averages``.
+    Noise on one side, r times as strong as the signal, lowers it to ``1 / (1 + r)``. If the true
+    value is 0, the mean of the estimate is ``1 / averages``.
 
     References
     ----------
@@ -642,7 +642,7 @@ def random_error(coherence: ArrayLike, averages: float) -> Float:
     Returns
     -------
     ndarray
-        ``sqrt(1 - gamma^2) / (|gamma| sqrt(2 averages))`` [-]; infinite where the coherence is 0.
+        ``sqrt(1 - gamma^2) / (|gamma| sqrt(2 averages))`` [-]; infinite if the coherence is 0.
 
     Raises
     ------
@@ -651,8 +651,8 @@ def random_error(coherence: ArrayLike, averages: float) -> Float:
 
     Notes
     -----
-    First order in the error: good below some 0.2. An estimated coherence makes it the estimate of
-    a standard deviation, best with ten averages or more.
+    First order in the error: accurate below about 0.2. With an estimated coherence the result is an
+    estimate, too, good from about ten averages on.
 
     References
     ----------
@@ -681,7 +681,7 @@ def confidence_radius(
     Parameters
     ----------
     spectra : Spectra
-        Of two blocks or more.
+        Spectra of two blocks or more.
     confidence : float
         Probability for one line, between 0 and 1 [-].
     estimator : str
@@ -690,7 +690,7 @@ def confidence_radius(
     Returns
     -------
     ndarray, shape (n_channels, n_lines)
-        [unit of response / N]; infinite for ``h2`` where the noise leaves no bound.
+        Radius [unit of response / N]; infinite for ``h2`` if the noise leaves no bound.
 
     Raises
     ------
@@ -707,17 +707,17 @@ def confidence_radius(
 
         |H1 - H|^2 <= 2 / (2 n - 2) F(2, 2 n - 2) (1 - g^2) Syy / Sxx
 
-    exactly, and F with two degrees of freedom above has the closed form
-    ``(n - 1) ((1 - confidence)^(-1 / (n - 1)) - 1)``. The strength of the blows may vary as it
-    likes. On the two real lines (0 and half the sample rate) F(1, n - 1) takes its place. With
-    overlap n is the effective number of averages and the statement approximate, and with noise on
-    the force it does not hold: H1 is biased then.
+    exactly. The quantile of F with 2 numerator degrees of freedom has the closed form ``(n - 1) ((1
+    - confidence)^(-1 / (n - 1)) - 1)``. The strength of the blows may vary freely. On the two real
+    lines (0 and half the sample rate) F(1, n - 1) is used instead. With overlap, n is the effective
+    number of averages and the statement approximate; with noise on the force it does not hold,
+    because H1 is then biased.
 
-    For H2 the same holds of ``1 / H2`` as an estimate of ``1 / H``, noise on the force alone; the
-    radius is that of the smallest disc about H2 that covers the image of that disc.
+    For H2 the same holds for ``1 / H2`` as an estimate of ``1 / H``, with noise on the force alone;
+    the radius is that of the smallest disc about H2 that covers the image of that disc.
 
-    Bias from leakage, from a cut-off tail or from a non-linear system is outside the disc, and
-    lines are taken one by one: of 100 lines some 5 lie outside at 95 %.
+    Bias from leakage, a cut-off tail or a non-linear system is not included, and the probability is
+    per line: of 100 lines about 5 lie outside at 95 %.
 
     References
     ----------
@@ -749,7 +749,7 @@ def confidence_radius(
     if estimator == "h1":
         _check_power(spectra.frequency, spectra.force, "force")
         return np.asarray(np.sqrt(bound * (1 - share) * spectra.response / spectra.force))
-    # In units of |1 / H2| the disc of 1 / H has radius rho; its image reaches to rho / (1 - rho).
+    # In units of |1 / H2| the disc of 1 / H has radius rho; its image extends to rho / (1 - rho).
     rho = np.sqrt(bound) * np.sqrt(2.0) * random_error(share, 1.0)
     reach = np.divide(rho, 1 - rho, out=np.full_like(rho, np.inf), where=rho < 1)
     return np.asarray(np.abs(h2(spectra)) * reach)
@@ -771,12 +771,12 @@ def estimate_frf(spectra: Spectra, *, estimator: Estimator = "h1", confidence: f
     Parameters
     ----------
     spectra : Spectra
-        Of two blocks or more, see `block_spectra` and `welch_spectra`.
+        Spectra of two blocks or more, see `block_spectra` and `welch_spectra`.
     estimator : str
-        ``h1``: noise is on the responses, as with a hammer. ``h2``: noise is on the force, as
-        where a shaker's force drops at a resonance.
+        ``h1``: noise is on the responses, as with a hammer. ``h2``: noise is on the force, as when
+        a shaker's force drops at a resonance.
     confidence : float
-        Of the disc of each line [-].
+        Probability for the disc of each line [-].
 
     Returns
     -------
@@ -785,7 +785,7 @@ def estimate_frf(spectra: Spectra, *, estimator: Estimator = "h1", confidence: f
     Raises
     ------
     ValueError
-        If the estimator is unknown, or as `coherence`, `confidence_radius`, `h1` and `h2`.
+        If the estimator is unknown, or as for `coherence`, `confidence_radius`, `h1` and `h2`.
 
     Examples
     --------
@@ -820,13 +820,14 @@ def level_deviation(frf: Frf) -> Float:
     Returns
     -------
     ndarray, shape (n_channels, n_lines)
-        [dB]; the squared deviation rests on ``2 averages - 2`` degrees of freedom. Infinite where
-        the coherence is 0.
+        Standard deviation [dB]; the variance rests on ``2 averages - 2`` degrees of freedom.
+        Infinite if the coherence is 0.
 
     Notes
     -----
-    First order in the error, as `random_error`, but with ``averages - 1`` in place of `averages`:
-    the coherence is an estimate from the same blocks, whose residual has lost a degree of freedom.
+    First order in the error, as for `random_error`, but with ``averages - 1`` in place of
+    `averages`: the coherence is estimated from the same blocks, whose residual has lost a degree of
+    freedom.
 
     Examples
     --------
@@ -854,7 +855,7 @@ class Blows:
     nperseg : int
         Samples of a block.
     rejected : tuple of str
-        A sentence for each blow left out.
+        One message for each blow left out.
     """
 
     starts: NDArray[np.intp]
@@ -892,12 +893,12 @@ def find_blows(
     Raises
     ------
     ValueError
-        If the force has no pulse, or no blow is left; the sentence says why.
+        If the force has no pulse, or no blow is left; the message gives the reasons.
 
     Notes
     -----
-    A block is a double hit if the force, having fallen below half the level, reaches the level
-    again before the block ends. The second hit spoils the smooth spectrum of the first, and its
+    A block is a double hit if the force, after falling below half the level, reaches the level
+    again before the block ends. The second hit distorts the smooth spectrum of the first, and the
     response belongs to both.
 
     Examples
@@ -939,14 +940,14 @@ def find_blows(
 
 
 def onsets(force: Float, level: float) -> NDArray[np.intp]:
-    """Samples at which a force reaches a level, coming from below half of it.
+    """Samples at which a force rises to a level after being below half of it.
 
     Parameters
     ----------
     force : ndarray, shape (n_samples,)
-        [N]
+        Force [N].
     level : float
-        > 0 [N]
+        Level, > 0 [N].
 
     Returns
     -------
@@ -976,7 +977,7 @@ def _fault(onsets: NDArray[np.intp], start: int, onset: int, end: int, n_samples
 
 
 def force_window(nperseg: int, fs: float, *, end: float, fall: float) -> Float:
-    """Window that lets a blow pass and cuts off the noise after it.
+    """Window that passes a blow and cuts off the noise after it.
 
     Parameters
     ----------
@@ -985,14 +986,14 @@ def force_window(nperseg: int, fs: float, *, end: float, fall: float) -> Float:
     fs : float
         Sample rate [Hz].
     end : float
-        One up to this time after the first sample, > 0 [s].
+        Duration of the part equal to one, from the first sample, > 0 [s].
     fall : float
         Duration of the half cosine from one to zero after that, >= 0 [s].
 
     Returns
     -------
     ndarray, shape (nperseg,)
-        [-]
+        Window [-].
 
     Raises
     ------
@@ -1016,14 +1017,14 @@ def force_window(nperseg: int, fs: float, *, end: float, fall: float) -> Float:
 
 
 def window_decay(duration: float, *, last: float = 0.01) -> float:
-    """Rate of the exponential window that has sunk to `last` at the end of a block.
+    """Rate of the exponential window that has decayed to `last` at the end of a block.
 
     Parameters
     ----------
     duration : float
-        Of the block, > 0 [s].
+        Length of the block, > 0 [s].
     last : float
-        Window at its end, 0 < last <= 1 [-].
+        Value of the window at the end, 0 < last <= 1 [-].
 
     Returns
     -------
@@ -1033,7 +1034,7 @@ def window_decay(duration: float, *, last: float = 0.01) -> float:
     Raises
     ------
     ValueError
-        If an argument leaves its range.
+        If an argument is out of range.
 
     Examples
     --------

@@ -1,7 +1,7 @@
-"""Impact tests: how one is recognised in its force, cut into blows and analysed.
+"""Impact tests: how they are recognised by their force, cut into blows and analysed.
 
-One rule for tables, pictures and the API. A blow is a short pulse of one sign; each block runs from
-shortly before a blow to the next one or to the end of the record.
+Tables, pictures and the API share one rule. A blow is a short pulse of one sign; each block runs
+from shortly before a blow to the next one or to the end of the record.
 """
 
 from dataclasses import dataclass
@@ -15,29 +15,31 @@ from . import frf
 Float = NDArray[np.float64]
 
 MOST_STRUCK = 0.05
-"""Largest share of a hammer's samples that reach the trigger level [-]: of a random force a third
-do, of a burst that lasts a fifth of its block, a fifteenth."""
+"""Largest share of a hammer record's samples that reach the trigger level [-]: a random force has a
+third, a burst that lasts a fifth of its block a fifteenth."""
 
 MOST_OF_ONE = 0.2
-"""The same where they are one blow, that ends in the record: a short record of a soft tip [-]."""
+"""The same for a single blow that ends within the record: a short record of a soft tip [-]."""
 
 LARGEST_PULL = 0.5
-"""Largest force against the blows, in largest blows [-]: filters ring back by a fifth or so."""
+"""Largest force opposite to the blows, in units of the largest blow [-]: filters overshoot by about
+a fifth."""
 
 PRETRIGGER_S = 0.002
-"""Time before a blow that its block holds, where the record does [s]."""
+"""Length of the block before the blow, if the record allows it [s]."""
 
 BOUNCE_S = 0.016
-"""Force within this time of a blow belongs to it [s]."""
+"""Force within this time after a blow counts as part of it [s]."""
 
 MOST_RINGING = 0.15
-"""Share of its loudest at which a response may end without a word [-]; one of noise has all."""
+"""Level at the end of the block, as a share of the loudest, from which a response is reported as
+cut off [-]; noise alone has 1."""
 
 WIDEST_LINES_HZ = 12.5
 """Widest line spacing of a transfer function in a table [Hz]."""
 
 MOST_SHORTENED = 0.75
-"""Share of the blows that the blocks must suit [-]; longer ones leave the rest out."""
+"""Share of the blows that the block length must suit [-]; the others are left out."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,14 +51,14 @@ class Impacts:
     force : ndarray, shape (n_samples,)
         Force without the cell's offset [N].
     blows : Blows
-        The blocks, one blow each.
+        Blocks, one blow each.
     fs : float
         Sample rate [Hz].
     ringing : float
-        Rms of the windowed response in the last tenth of the blocks, in that of the loudest tenth
-        [-]; 0 where it is not known.
+        Rms of the windowed response in the last tenth of the blocks, over that of the loudest tenth
+        [-]; 0 if unknown.
     faults : tuple of str
-        What is wrong with the only blow there is; it is analysed all the same.
+        Defects of the blow if there is only one; it is analysed nevertheless.
     """
 
     force: Float
@@ -67,16 +69,16 @@ class Impacts:
 
     @property
     def text(self) -> str:
-        """What is averaged, and what that leaves unknown."""
+        """Description of what is averaged, and of its limits."""
         count = len(self.blows.starts)
         left = len(self.blows.rejected)
         words = [f"{count} blows"] if count > 1 else [_ONE_BLOW, *self.faults]
-        told = "; ".join(words) + (f", {left} left out" if left else "")
-        return "; ".join([told, *self._short])
+        summary = "; ".join(words) + (f", {left} left out" if left else "")
+        return "; ".join([summary, *self._short])
 
     @property
     def _short(self) -> list[str]:
-        """What it costs that blocks are short: of the lines of a table, and of the ringing."""
+        """Limits of short blocks: line spacing, and response cut off at the end."""
         words = []
         resolved = self.fs / self.blows.nperseg
         if resolved > WIDEST_LINES_HZ:
@@ -100,17 +102,17 @@ _ONE_BLOW = (
 
 
 def pressing(force: ArrayLike) -> Float:
-    """Force without its offset, blows counted positive.
+    """Force without its offset, with blows counted positive.
 
     Parameters
     ----------
     force : array_like, shape (n_samples,)
-        [N]
+        Force [N].
 
     Returns
     -------
     ndarray, shape (n_samples,)
-        Less its median, and turned where the largest excursion is negative [N].
+        Force less its median, with the sign changed if the largest excursion is negative [N].
 
     Examples
     --------
@@ -128,13 +130,13 @@ def is_impact(force: ArrayLike) -> bool:
     Parameters
     ----------
     force : array_like, shape (n_samples,)
-        [N]
+        Force [N].
 
     Returns
     -------
     bool
-        True where at most `MOST_STRUCK` of the samples reach a tenth of the largest, of a single
-        blow `MOST_OF_ONE`, and the largest one the other way is at most `LARGEST_PULL` of it.
+        True if at most `MOST_STRUCK` of the samples (`MOST_OF_ONE` for a single blow) reach a tenth
+        of the largest, and the largest one of opposite sign is at most `LARGEST_PULL` of it.
 
     Examples
     --------
@@ -151,7 +153,7 @@ def is_impact(force: ArrayLike) -> bool:
 
 
 def _is_one(struck: NDArray[np.bool_]) -> bool:
-    """Whether the samples follow each other and the last is not among them."""
+    """Whether the struck samples are consecutive and do not include the last one."""
     return not struck[-1] and np.count_nonzero(np.diff(struck.astype(np.int8)) < 0) == 1
 
 
@@ -167,26 +169,26 @@ def find_impacts(
     fs : float
         Sample rate [Hz].
     response : array_like, shape (n_channels, n_samples), optional
-        By which it is told how far it has died away at the end of a block [any unit].
+        Response, which shows how far it has died away at the end of a block [any unit].
     last : float
-        What the exponential window over it has sunk to there [-]; see `impact_spectra`.
+        Value of the exponential window at the end of a block [-]; see `impact_spectra`.
 
     Returns
     -------
     Impacts
-        Blocks as long as three quarters of the blows allow. Double hits, and blows that the record
-        cuts, are left out; where no other is there, the block from the first one to the end of the
-        record is kept, and its faults are said.
+        Blocks as long as three quarters of the blows allow. Double hits, and blows cut off by the
+        record, are left out. If there is no other, the block from the first blow to the end of the
+        record is kept, and its defects are reported.
 
     Raises
     ------
     ValueError
-        If the force is no row of finite samples, or constant.
+        If the force is not one row of finite samples, or is constant.
 
     Notes
     -----
-    The samples before a block need not be there: force and response are cut alike, and what they
-    share of a shift cancels in their ratio.
+    The block may start before the record: force and response are cut alike, and a common shift
+    cancels in their ratio.
 
     Examples
     --------
@@ -229,7 +231,7 @@ def find_impacts(
 
 
 def _ringing(blows: frf.Blows, response: ArrayLike | None) -> float:
-    """Rms of the last tenth of the blocks over that of the loudest tenth, of the worst channel."""
+    """Rms of the last tenth of the blows over that of the loudest tenth, for the worst channel."""
     tenth = blows.nperseg // _PARTS
     if response is None or np.size(response) == 0 or tenth == 0:
         return 0.0
@@ -246,7 +248,7 @@ _PARTS = 10
 
 
 def _events(hits: NDArray[np.intp], bounce: int) -> NDArray[np.intp]:
-    """First hit of each blow; what follows within `bounce` samples belongs to it."""
+    """First hit of each blow; hits within `bounce` samples after it belong to it."""
     first = [int(hits[0])]
     for hit in hits[1:]:
         if hit - first[-1] >= bounce:
@@ -255,9 +257,9 @@ def _events(hits: NDArray[np.intp], bounce: int) -> NDArray[np.intp]:
 
 
 def _several(pulse: Float, fs: float, events: NDArray[np.intp], lead: int) -> frf.Blows | None:
-    """Blocks of a test of several blows; None where all of them are at fault."""
+    """Blocks of a test of several blows; None if all of them are defective."""
     gaps = np.diff(np.append(events, pulse.size))
-    # a double hit makes a short gap; it is left out, and must not shorten the others
+    # a double hit has a short gap; it is left out, and must not shorten the other blocks
     usual = np.sort(gaps[gaps > np.median(gaps) / 4])[::-1]
     suited = min(usual.size, max(2, int(np.ceil(MOST_SHORTENED * usual.size))))
     nperseg = int(0.9 * usual[suited - 1]) // 2 * 2
@@ -269,7 +271,7 @@ def _several(pulse: Float, fs: float, events: NDArray[np.intp], lead: int) -> fr
         padded[lead : lead + int(events[1]) - lead] = 0.0
     try:
         found = frf.find_blows(padded, fs, nperseg=nperseg, pretrigger=lead)
-    except ValueError:  # every blow is at fault: the record is sound, and analysed as a whole
+    except ValueError:  # every blow is defective: the whole record is analysed as one block
         return None
     starts = np.maximum(found.starts - lead, 0)
     kept = starts + nperseg <= pulse.size
@@ -303,33 +305,33 @@ def impact_spectra(
     Parameters
     ----------
     force : array_like, shape (n_samples,)
-        [N]
+        Force [N].
     response : array_like, shape (n_channels, n_samples)
-        [any unit]
+        Responses [any unit].
     fs : float
         Sample rate [Hz].
     least : int
-        Samples of a block at least; shorter ones are filled with zeros.
+        Fewest samples of a block; shorter ones are zero-padded.
     last : float
-        What an exponential window over force and response has sunk to at the end of a block,
-        0 < last <= 1 [-]; 1 for none. With one, the force is also cut off after its blow.
+        Value of an exponential window over force and response at the end of a block, 0 < last <= 1
+        [-]; 1 for none. With a window, the force is also cut off after its blow.
 
     Returns
     -------
     spectra : Spectra
-        With the window's rate, which a modal fit takes out of the damping again.
+        Spectra with the rate of the window, which a modal fit removes from the damping.
     impacts : Impacts
-        What was averaged.
+        Blocks that were averaged.
 
     Raises
     ------
     ValueError
-        As `find_impacts`, `frf.window_decay` and `frf.block_spectra`.
+        As for `find_impacts`, `frf.window_decay` and `frf.block_spectra`.
 
     Notes
     -----
-    Without a window a response that is cut at the end of its block keeps its poles at the lines of
-    the block; with one, levels at the resonances fall by the damping that the window adds.
+    Without a window, the poles of a response that is cut off at the end of its block lie at the
+    lines of the block; with a window, levels at the resonances fall by the added damping.
 
     Examples
     --------

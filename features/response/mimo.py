@@ -1,4 +1,4 @@
-"""Frequency response functions from several forces that act at once: shakers, or shafts."""
+"""Frequency response functions of several simultaneous forces: shakers, or shafts."""
 
 from dataclasses import dataclass
 
@@ -15,8 +15,8 @@ Float = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 MOST_CONDITION = 1e6
-"""Largest condition number of the coherence matrix of the forces: beyond it they are copies of one
-another, and double-precision spectra keep too few digits of their difference."""
+"""Largest condition number of the coherence matrix of the forces: above it they are copies of one
+another, and double-precision spectra lose too many digits of their difference."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,19 +26,19 @@ class MultiFrf:
     Attributes
     ----------
     frequency : ndarray, shape (n_lines,)
-        [Hz]
+        Frequency of the lines [Hz].
     value : ndarray, shape (n_channels, n_forces, n_lines)
-        H1, response over each force, the others at rest [unit of response / N].
+        H1: response per unit of each force, with the others absent [unit of response / N].
     coherence : ndarray, shape (n_channels, n_lines)
-        Multiple coherence, the share of the response that all forces together make, 0 to 1 [-].
+        Multiple coherence: share of the response caused by all forces together, 0 to 1 [-].
     partial : ndarray, shape (n_channels, n_forces, n_lines)
-        Partial coherence: that of a response and one force once what the other forces make is
-        taken out of both, 0 to 1 [-]; of one force alone the ordinary coherence.
+        Partial coherence: that between a response and one force after removing the contribution of
+        the other forces from both, 0 to 1 [-]; for a single force the ordinary coherence.
     condition : ndarray, shape (n_lines,)
-        Condition number of the matrix of coherences among the forces, >= 1 [-]: by its root at
-        most the noise of a function grows against forces that are independent.
+        Condition number of the matrix of coherences among the forces, >= 1 [-]: compared with
+        independent forces, the noise of a function grows by at most its square root.
     averages : float
-        Independent averages behind it [-].
+        Number of independent averages [-].
     """
 
     frequency: Float
@@ -62,20 +62,20 @@ def multiple_h1(
     Parameters
     ----------
     force : array_like, shape (n_forces, n_samples)
-        Forces [N]; transforms of float32 stay single where the responses are, too.
+        Forces [N]; transforms of float32 stay single if the responses are float32, too.
     response : array_like, shape (n_samples,) or (n_channels, n_samples)
         Responses [any unit].
     fs : float
         Sample rate [Hz].
     nperseg : int
-        Block length [samples], under a periodic Hann window, mean removed.
+        Block length [samples]; the blocks get a periodic Hann window, and their mean is removed.
     overlap : float
-        Share of a block that the next one repeats, 0 <= overlap < 1 [-].
+        Share of a block that is repeated in the next one, 0 <= overlap < 1 [-].
 
     Returns
     -------
     MultiFrf
-        On the lines above 0 Hz and below half the sample rate.
+        Functions on the lines above 0 Hz and below half the sample rate.
 
     Raises
     ------
@@ -87,11 +87,11 @@ def multiple_h1(
     -----
     ``H1 = Gyx Gxx^-1`` line by line, with the matrices of the averaged spectra: noise on the
     responses leaves it unbiased, noise on the forces does not. More averages than forces are
-    needed, and with n_forces out of n averages a coherence of nothing is ``n_forces / n``.
+    needed: for unrelated signals, n_forces and n averages give a coherence of ``n_forces / n``.
 
-    What the other forces leave of force k has the power ``1 / [Gxx^-1]kk``, and the response to it
-    stands beside the noise N that no force explains, so that the partial coherence is
-    ``|Hk|^2 / (|Hk|^2 + N [Gxx^-1]kk)``. Taking the others out costs ``n_forces - 1`` averages.
+    Force k, after removing the other forces, has the power ``1 / [Gxx^-1]kk``. With N the noise
+    that no force explains, the partial coherence is ``|Hk|^2 / (|Hk|^2 + N [Gxx^-1]kk)``. Removing
+    the others costs ``n_forces - 1`` averages.
 
     References
     ----------
@@ -120,7 +120,7 @@ def multiple_h1(
         )
     lines = rfft(centred(rows) * window)[..., 1 : (nperseg + 1) // 2]
     frequency = np.arange(1, lines.shape[-1] + 1) * (fs / nperseg)
-    # Matrices line by line: (n_lines, n_rows, n_rows), the element (i, k) the mean of Zi conj(Zk).
+    # Matrices line by line (n_lines, n_rows, n_rows): element (i, k) is the mean of Zi conj(Zk).
     stacked = np.ascontiguousarray(np.moveaxis(lines, -1, 0))
     products = stacked @ np.swapaxes(stacked, -1, -2).conj()
     spectra = products.astype(np.complex128) / rows.shape[1]
@@ -145,7 +145,7 @@ def multiple_h1(
 
 
 def _partial(value: Complex, forces: Complex, noise: Float) -> Float:
-    """Partial coherences (n_lines, n_channels, n_forces) of functions of forces of power one."""
+    """Partial coherences (n_lines, n_channels, n_forces) of functions of unit-power forces."""
     inverse = np.diagonal(np.linalg.inv(forces), axis1=-2, axis2=-1).real
     told = np.square(value.real) + np.square(value.imag)
     whole = told + noise[..., np.newaxis] * inverse[:, np.newaxis]
@@ -170,7 +170,7 @@ def _records(force: ArrayLike, response: ArrayLike) -> tuple[Real, Real]:
 
 
 def _sizes(spectra: Complex, frequency: Float) -> tuple[Float, Float]:
-    """Root powers of the forces (n_lines, n_forces) and the condition of their coherences."""
+    """Rms of the forces (n_lines, n_forces) and condition number of their coherence matrix."""
     size = np.sqrt(np.diagonal(spectra, axis1=-2, axis2=-1).real)
     silent = np.flatnonzero(~np.all(size > 0, axis=-1))
     if silent.size:

@@ -1,7 +1,7 @@
-"""Modal model of measured response functions: frequencies, dampings, residues.
+"""Modal model of measured response functions: frequencies, damping ratios, residues.
 
-Poles come from :mod:`.response.stable_poles`, or one by one from the peaks; the fit of the whole
-model settles them and gives each its deviation.
+Poles come from :mod:`.response.stable_poles`, or one by one from the peaks; a fit of the whole
+model refines them and gives each its standard deviation.
 """
 
 from collections.abc import Callable
@@ -26,15 +26,15 @@ from .stable_poles import LEAST_CHAIN, complex_frequency_poles, line_weights, st
 Float = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-_MOST_DOUBT = 1 / 3  # standard deviation of a mode's residue in its best channel, relative to it
-_LEAST_DIFFERENCE = 1e-7  # of the effects of two poles: about the root of the rounding
+_MOST_DOUBT = 1 / 3  # largest relative standard deviation of a mode's residue in its best channel
+_LEAST_DIFFERENCE = 1e-7  # between the effects of two poles: about the root of the rounding error
 
-_MOST_GROWTH = 5.0  # natural logarithm of how far a start's damping may be wrong
+_MOST_GROWTH = 5.0  # natural logarithm of the largest error factor in a starting value of damping
 
 
 @dataclass(frozen=True)
 class _Problem:
-    """Weighted lines of all channels, against which poles are judged.
+    """Weighted lines of all channels, to which poles are fitted.
 
     `s` (n_lines,), `factor` = s^d (n_lines,), `weights` (1 or n_channels, n_lines), `target`
     (n_channels, 2 n_lines) weighted real and imaginary parts.
@@ -51,10 +51,10 @@ class _Problem:
         return np.concatenate([scaled.real, scaled.imag], axis=-2)
 
     def fit(self, pole: Complex) -> tuple[Float, Float, Float]:
-        """Orthonormal basis, its triangle, and the coefficients (n_channels, 2 n_modes + 4)."""
+        """Orthonormal basis, triangular factor and coefficients (n_channels, 2 n_modes + 4)."""
         basis, triangle = np.linalg.qr(self.rows(_columns(self.s, pole)))
         parts = np.swapaxes(basis, -1, -2) @ self.target[..., np.newaxis]
-        # Two poles may meet on the way to the solution: then no plain inverse exists.
+        # Two poles may meet during the iteration: then no plain inverse exists.
         return basis, triangle, (np.linalg.pinv(triangle) @ parts)[..., 0]
 
     def residual(self, pole: Complex) -> Float:
@@ -63,7 +63,7 @@ class _Problem:
         return np.asarray(self.target - _along(basis, self.target[..., np.newaxis])[..., 0])
 
     def slopes(self, pole: Complex, residue: Complex) -> Float:
-        """Change of the model per change of the real and the imaginary parts of the poles.
+        """Derivative of the model with respect to the real and imaginary parts of the poles.
 
         Shape (n_channels, 2 n_lines, 2 n_modes) [s/rad].
         """
@@ -81,7 +81,7 @@ def _along(basis: Float, columns: Float) -> Float:
 def _columns(s: Complex, pole: Complex) -> Complex:
     """Columns of the real parameters Re A, Im A of each mode, L and U, in the receptance.
 
-    The four of the background are scaled to the size of the lines, which keeps them in step.
+    The four background columns are scaled to the size of the lines, for good conditioning.
     """
     direct, mirrored = (1 / (s[:, np.newaxis] - p) for p in (pole, pole.conj()))
     lower = np.square(np.abs(s).mean() / s)[:, np.newaxis]
@@ -106,21 +106,21 @@ def fit_modes(
     Parameters
     ----------
     frequency : array_like, shape (n_lines,)
-        Lines of the band [Hz]; a line at 0 Hz is left out, as it holds nothing about a mode.
+        Lines of the band [Hz]; a line at 0 Hz is left out, as it contains nothing about a mode.
     value : array_like, shape (n_lines,) or (n_channels, n_lines)
         Response functions to one force.
     start_frequency, start_damping : array_like, shape (n_modes,)
         Natural frequencies [Hz] and damping ratios [-] to start from. The sign of a damping ratio
         is kept: negative ones fit a phase that rises through the resonance.
     quantity : str
-        What `value` is: ``receptance``, ``mobility`` or ``accelerance``.
+        Quantity of `value`: ``receptance``, ``mobility`` or ``accelerance``.
     deviation : array_like, optional
-        Standard deviation of every line, or anything in proportion to it, such as `Frf.radius`
-        [unit of value]. Lines count alike by default, which suits a hammer: noise of one strength
-        on the response.
+        Standard deviation of every line, or anything proportional to it, such as `Frf.radius` [unit
+        of value]. By default all lines have equal weight, which suits a hammer: the noise on the
+        response has the same strength at all of them.
     decay : float
-        Rate of the exponential window the functions carry [1/s], see `Frf.decay`; the modes come
-        out without it.
+        Rate of the exponential window of the functions [1/s], see `Frf.decay`; its effect is
+        removed from the modes.
 
     Returns
     -------
@@ -129,18 +129,19 @@ def fit_modes(
     Raises
     ------
     ValueError
-        If the data or starts cannot be used (all faults are named), the fit does not settle, or
+        If the data or starts cannot be used (all faults are named), the fit does not converge, or
         the lines do not determine the modes.
 
     Notes
     -----
-    Residues and background are linear in the data and are solved for at every step (variable
+    Residues and background are linear in the data and solved for at every step (variable
     projection); the poles follow by Levenberg and Marquardt. With independent, circular normal
-    noise of the given deviations this is maximum likelihood, hence without bias to first order,
-    and the deviations of the result are its Cramer-Rao bounds with the noise read from the misfit.
-    They hold what noise does, not what leakage, non-linearity or a missing mode do. Modes beyond
-    the band are caught as long as ``L / s^2 + U`` describes them in it. Structural damping eta
-    reads as ``zeta = eta / 2``; where complex modal constants go with it, as in no model of
+    noise of the given deviations this is maximum likelihood, hence unbiased to first order, and the
+    deviations of the result are its Cramer-Rao bounds with the noise taken from the misfit. They
+    include the effect of noise, not that of leakage, non-linearity or a missing mode. Modes beyond
+    the band are covered as long as ``L / s^2 + U`` describes them within it. Structural damping eta
+    reads as ``zeta = eta / 2``; if complex modal constants occur with it, unlike in any model of
+    conjugate pairs, a band about each mode keeps the error small.
     conjugate pairs, a band about each mode keeps the error small.
 
     References
@@ -204,10 +205,11 @@ def _starts(frequency: ArrayLike, damping_ratio: ArrayLike) -> Complex:
 
 
 def _settled(problem: _Problem, start: Complex, decay: float) -> Complex:
-    """Poles of least misfit.
+    """Poles of smallest misfit.
 
-    Unknowns are the logarithm of each pole's distance from the axis, softly bounded, and its shift
-    along it in units of that distance: all of order one, and no pole can cross the axis.
+    The unknowns are the logarithm of each pole's distance from the imaginary axis, softly bounded,
+    and its shift along the axis in units of that distance: all of order one, and no pole can cross
+    the axis.
     """
     count = start.size
     size = np.abs(start.real)
@@ -238,16 +240,16 @@ def _settled(problem: _Problem, start: Complex, decay: float) -> Complex:
         settled = False
     if not settled:
         raise ValueError(
-            f"fit of {count} modes must settle, but its poles run away; start nearer, give fewer "
+            f"fit of {count} modes must converge, but its poles diverge; start nearer, give fewer "
             "modes or narrow the band"
         )
     return pole_of(found.x)
 
 
 def _slopes(problem: _Problem, pole: Complex) -> Float:
-    """Change of the residual per change of each pole's parts, (n_values, 2 n_modes) [s/rad].
+    """Derivative of the residual by each pole's parts, (n_values, 2 n_modes) [s/rad].
 
-    Kaufman's approximation: the turn of the basis towards the residual is left out.
+    Kaufman's approximation: the rotation of the basis towards the residual is left out.
     """
     basis, _, parts = problem.fit(pole)
     slopes = problem.slopes(pole, _residues(parts, pole.size))
@@ -293,13 +295,13 @@ def _inverse(slopes: Float) -> Float:
             inverse = np.linalg.inv(triangle) / size[:, np.newaxis]
             return np.asarray(inverse @ inverse.T)
     raise ValueError(
-        f"n_modes = {slopes.shape[1] // 2} is more than the data tell apart: two starts lead to "
-        "one pole, or one to nothing; give fewer"
+        f"n_modes = {slopes.shape[1] // 2} is more than the data can resolve: two starts lead "
+        "to one pole, or one to nothing; give fewer"
     )
 
 
 def _slopes_of_size(pole: Complex) -> tuple[Float, Float]:
-    """Of natural frequency [Hz] and damping ratio per rad/s of the parts, (n_modes, 2 n_modes)."""
+    """Derivatives of frequency [Hz] and damping ratio by a pole's parts, (n_modes, 2 n_modes)."""
     size, real, imaginary = np.abs(pole), pole.real, pole.imag
     frequency = np.concatenate([np.diag(real / size), np.diag(imaginary / size)], axis=1)
     ratio = [np.diag(-(imaginary**2) / size**3), np.diag(real * imaginary / size**3)]
@@ -311,7 +313,7 @@ def _deviation(slope: Float, spread: Float) -> Float:
 
 
 def _residue_deviation(problem: _Problem, pole: Complex, variance: float, spread: Float) -> Float:
-    """By the noise on the lines, and by what the scatter of the poles drags along."""
+    """Standard deviation from the noise on the lines and from the scatter of the poles."""
     basis, triangle, parts = problem.fit(pole)
     inverse = np.linalg.inv(triangle)
     slopes = problem.slopes(pole, _residues(parts, pole.size))
@@ -332,20 +334,20 @@ def modal_fit(
     decay: float = 0.0,
     highest_order: int | None = None,
 ) -> Modes:
-    """Find and fit the modes of a band, their number and starting values unknown.
+    """Find and fit the modes of a band, without their number or starting values.
 
     Parameters
     ----------
     frequency : array_like, shape (n_lines,)
-        Rising [Hz].
+        Frequency of the lines, rising [Hz].
     value : array_like, shape (n_lines,) or (n_channels, n_lines)
         Response functions to one force.
     band : tuple of float, optional
         First and last frequency to use [Hz]; all lines by default.
     n_modes : int, optional
-        Keep only so many: those that stand out highest. All that the data determine by default.
+        Number of modes kept: those that stand out most. By default all that the data determine.
     quantity : str
-        What `value` is: ``receptance``, ``mobility`` or ``accelerance``.
+        Quantity of `value`: ``receptance``, ``mobility`` or ``accelerance``.
     deviation : array_like, optional
         As in `fit_modes`.
     decay : float
@@ -356,23 +358,23 @@ def modal_fit(
     Returns
     -------
     Modes
-        By rising frequency.
+        Modes in order of rising frequency.
 
     Raises
     ------
     ValueError
-        As `fit_modes`, or if no pole stays stable.
+        As for `fit_modes`, or if no pole stays stable.
 
     Notes
     -----
-    Poles of `complex_frequency_poles` for orders 1, 2, … that `stabilise` follows through
-    `LEAST_CHAIN` orders are the starts of `fit_modes`. A mode is dropped, and the rest fitted
-    again, as long as its residue is known to a third of itself in no channel, its damping not
-    to itself, or its frequency has left the band.
+    The starts of `fit_modes` are poles of `complex_frequency_poles` for orders 1, 2, … that
+    `stabilise` follows through `LEAST_CHAIN` orders. A mode is dropped, and the rest fitted again,
+    if its residue is not known to a third in any channel, its damping is not known to within its
+    own size, or its frequency has left the band.
 
-    A resonance narrower than some four lines that was measured with a window (Hann) is no longer
-    of this form: leakage comes out as further modes within a line or two of it. `n_modes` leaves
-    them out; more lines, a burst or an exponential window avoid them.
+    A resonance narrower than about four lines measured with a window (Hann) does not have this
+    form: leakage appears as further modes within a line or two of it. `n_modes` leaves them out;
+    more lines, a burst or an exponential window avoid them.
 
     Examples
     --------
@@ -424,21 +426,21 @@ def peak_fits(
     Parameters
     ----------
     frequency, value, quantity, decay
-        As in `modal_fit`, of many lines.
+        As in `modal_fit`, with many lines.
     n_modes : int
-        Peaks wanted.
+        Number of peaks wanted.
     highest_order : int
-        As in `modal_fit`, of the surroundings of one peak; 10 at the most.
+        As in `modal_fit`, for the surroundings of one peak; 10 at most.
 
     Returns
     -------
     Modes
-        As many as were found, to the lines around the peaks.
+        As many modes as were found, fitted to the lines around the peaks.
 
     Raises
     ------
     ValueError
-        If no peak is a mode, or as `fit_modes`.
+        If no peak is a mode, or as for `fit_modes`.
 
     Examples
     --------
@@ -462,7 +464,7 @@ def peak_fits(
                 lines, functions, band=band, n_modes=1, quantity=quantity, decay=decay,
                 highest_order=min(highest_order, 10),
             )  # fmt: skip
-        except ValueError:  # a peak of the noise: the functions are sound
+        except ValueError:  # a peak of noise: the functions are valid
             continue
         found.append(mode)
         near |= (lines >= band[0]) & (lines <= band[1])
@@ -480,10 +482,10 @@ def peak_fits(
 
 
 PEAK_REACH = 40
-"""Lines to either side of a peak that are fitted with it."""
+"""Lines on either side of a peak that are fitted with it."""
 
 MOST_TRIED = 3
-"""Peaks that are tried for each mode that is wanted."""
+"""Peaks tried for each mode wanted."""
 
 
 def _between(lines: Float, low: float, high: float) -> NDArray[np.bool_]:
@@ -513,7 +515,7 @@ def _no_modes(poles: list[Complex], orders: range) -> str:
 def _determined(
     fit: Callable[[Float, Float], Modes], frequency: Float, ratio: Float, band: tuple[float, float]
 ) -> Modes:
-    """Modes that the data determine, the others dropped one by one, the worst first."""
+    """Modes that the data determine; the others are dropped one by one, the worst first."""
     while True:
         modes = fit(frequency, ratio)
         doubt = np.maximum(

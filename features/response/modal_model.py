@@ -1,4 +1,4 @@
-"""Modes, and the response functions that they are fitted to or made into."""
+"""Modes, and the response functions they are fitted to or synthesised into."""
 
 from dataclasses import dataclass
 from typing import Literal, get_args
@@ -12,12 +12,12 @@ Complex = NDArray[np.complex128]
 Quantity = Literal["receptance", "mobility", "accelerance"]
 
 DERIVATIVES = {"receptance": 0, "mobility": 1, "accelerance": 2}
-"""Response over force -> how often the displacement is differentiated."""
+"""Number of times the displacement is differentiated, by quantity of response over force."""
 
 FEWEST_LINES = 5
-"""Lines that a fit of one mode needs: a pole, a residue and two background terms are four."""
+"""Lines needed to fit one mode: a pole, a residue and two background terms are four."""
 
-_SIZES = (1e-60, 1e60)  # of functions: their squares and fourth powers must stay numbers
+_SIZES = (1e-60, 1e60)  # of functions: their squares and fourth powers must be representable
 
 WIDEST = 0.5  # damping ratio: a pole further from the axis is background, not a resonance
 
@@ -38,16 +38,16 @@ class Modes:
     residue : ndarray, shape (n_channels, n_modes)
         A, of the receptance [unit of receptance * rad/s].
     lower, upper : ndarray, shape (n_channels,)
-        L and U, what the modes below and above the band leave in it [unit of receptance *
-        rad^2/s^2 and unit of receptance].
+        L and U, the contributions of the modes below and above the band to the receptance [unit of
+        receptance * rad^2/s^2 and unit of receptance].
     quantity : str
-        What the fitted functions were: ``receptance``, ``mobility`` or ``accelerance``.
+        Quantity of the fitted functions: ``receptance``, ``mobility`` or ``accelerance``.
     frequency_deviation : ndarray, shape (n_modes,)
         Standard deviation of `frequency` from the scatter about the fit [Hz].
     damping_deviation : ndarray, shape (n_modes,)
-        Of `damping_ratio` [-].
+        Standard deviation of `damping_ratio` [-].
     residue_deviation : ndarray, shape (n_channels, n_modes)
-        Of `residue`, root of the summed variances of its two parts.
+        Standard deviation of `residue`, root of the summed variances of its two parts.
     fit_error : ndarray, shape (n_channels,)
         Rms difference of fit and data over the rms of the data [-].
     """
@@ -64,10 +64,10 @@ class Modes:
     fit_error: Float
 
     def __repr__(self) -> str:
-        """Number of modes, and where they lie."""
-        told = ", ".join(f"{each:.4g}" for each in self.frequency[:6])
+        """Number of modes and their frequencies."""
+        listed = ", ".join(f"{each:.4g}" for each in self.frequency[:6])
         more = ", …" if len(self.frequency) > 6 else ""
-        return f"<Modes of {self.quantity}, {len(self.frequency)}: {told}{more} Hz>"
+        return f"<Modes of {self.quantity}, {len(self.frequency)}: {listed}{more} Hz>"
 
     @property
     def pole(self) -> Complex:
@@ -78,7 +78,7 @@ class Modes:
     def modal_constant(self) -> Complex:
         """``2 j w_d A``, shape (n_channels, n_modes): a product of two mass-normalised shapes.
 
-        Real for proportional damping [1/kg where displacement and force are in SI units].
+        Real for proportional damping [1/kg if displacement and force are in SI units].
         """
         return np.asarray(2j * self.pole.imag * self.residue)
 
@@ -117,7 +117,7 @@ def frequency_and_damping(pole: Complex) -> tuple[Float, Float]:
 def checked_functions(
     frequency: ArrayLike, value: ArrayLike, *, least: int = FEWEST_LINES
 ) -> tuple[Float, Complex]:
-    """Lines (n_lines,) and functions (n_channels, n_lines), or all that is wrong with them."""
+    """Lines (n_lines,) and functions (n_channels, n_lines), checked; all faults in one error."""
     lines = np.asarray(frequency, dtype=np.float64)
     functions = np.atleast_2d(np.asarray(value, dtype=np.complex128))
     if lines.ndim != 1 or functions.ndim != 2 or functions.shape[-1] != lines.size:
@@ -147,12 +147,12 @@ def checked_functions(
 
 
 def derivative_order(quantity: str) -> int:
-    """How often the displacement is differentiated in a quantity, or that there is none such."""
+    """Number of times the displacement is differentiated in a quantity, which must exist."""
     if quantity not in DERIVATIVES:
         raise ValueError(f"quantity = {quantity!r} must be one of {', '.join(get_args(Quantity))}")
     return DERIVATIVES[quantity]
 
 
 def squared_size(z: Complex) -> Float:
-    """``|z|^2`` without its root."""
+    """``|z|^2`` without taking a root."""
     return np.asarray(np.square(z.real) + np.square(z.imag))

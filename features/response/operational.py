@@ -1,7 +1,7 @@
-"""What a running machine tells of its own transfer paths, where no force is measured.
+"""Transfer paths of a running machine without a measured force.
 
-A transmissibility sets one channel against another: where both answer to the same source, the
-source drops out and the path between them is left. A deflection shape does so order by order, with
+A transmissibility relates one channel to another: if both respond to the same source, the source
+cancels and the path between them remains. A deflection shape does the same for each order, with
 phase.
 """
 
@@ -54,22 +54,22 @@ def transmissibility(x: ArrayLike, fs: float, edges: ArrayLike) -> tuple[Float, 
     Returns
     -------
     level : ndarray, shape (n_pairs, n_bands)
-        Power of the first channel that comes with the second, over the power of the second
-        [dB]; -200 dB where either is silent.
+        Power of the first channel that is coherent with the second, over the power of the second
+        [dB]; -200 dB if either is silent.
     coherence : ndarray, shape (n_pairs, n_bands)
-        Share of the first channel's power that comes with the second [-].
+        Share of the first channel's power that is coherent with the second [-].
 
     Raises
     ------
     ValueError
-        Signals are not finite, or as `spectrum.line_weights`.
+        If signals are not finite, or as for `spectrum.line_weights`.
 
     Notes
     -----
     Line by line the estimate is ``|Sba|^2 / Sbb^2``, weighted with the power of the reference.
-    Noise of the first channel alone leaves the level as it is and lowers the coherence; of n
-    independent averages without any connection the coherence is 1/n, not 0. Several sources at
-    once give a mixture of their paths: that compares conditions, it is no property of the
+    Noise on the first channel alone leaves the level unchanged and lowers the coherence; for n
+    independent averages of unrelated signals the coherence is 1/n, not 0. Several simultaneous
+    sources give a mixture of their paths: suitable for comparing conditions, but no property of the
     structure.
 
     References
@@ -111,7 +111,7 @@ def _cross_lines(
 
 
 def _share(part: Float, whole: Float) -> Float:
-    """Part of a whole; 0 of silence."""
+    """Part over whole; 0 for silence."""
     return np.where(whole > 0, part / np.where(whole > 0, whole, 1.0), 0.0)
 
 
@@ -126,8 +126,8 @@ def deflection_shape(vectors: ArrayLike) -> Float:
     Returns
     -------
     ndarray, shape (n_pairs, n_orders, 3)
-        Ratio of the amplitudes, first to second [dB], and cosine and sine of the phase by which the
-        first leads [-]; -200 dB, 0 and 0 where either is silent.
+        Ratio of the amplitudes, first to second [dB], and cosine and sine of the phase lead of the
+        first [-]; -200 dB, 0 and 0 if either is silent.
 
     References
     ----------

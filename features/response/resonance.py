@@ -12,8 +12,8 @@ from .modal_model import (
 Integer = NDArray[np.intp]
 
 PROMINENCE = 6.0
-"""Rise of a resonance above the valleys beside it [dB]: ten averages at a coherence of 0.9 scatter
-by 0.65 dB a line, and hardly ever make one."""
+"""Rise of a resonance above the valleys on either side [dB]: with ten averages at a coherence of
+0.9, lines scatter by 0.65 dB and hardly ever form one."""
 
 
 def find_resonances(
@@ -24,16 +24,16 @@ def find_resonances(
     Parameters
     ----------
     frequency : array_like, shape (n_lines,)
-        [Hz]
+        Frequency of the lines [Hz].
     value : array_like, shape (n_lines,) or (n_channels, n_lines)
-        Response functions, of one quantity and unit.
+        Response functions of one quantity and unit.
     prominence : float
-        Rise above the higher of the two valleys beside it, > 0 [dB].
+        Rise above the higher of the two adjacent valleys, > 0 [dB].
 
     Returns
     -------
     ndarray of int, shape (n_peaks,)
-        Indices of the lines, ascending; empty where nothing stands out.
+        Indices of the lines, ascending; empty if nothing stands out.
 
     Raises
     ------
@@ -43,9 +43,9 @@ def find_resonances(
 
     Notes
     -----
-    Peaks of ``10 log10 sum |H|^2`` over the channels: a channel at a node of a mode misses it,
-    the sum does not. Two modes closer than their half-power width make one peak; `stable_modes`
-    tells them apart.
+    Peaks of ``10 log10 sum |H|^2`` over the channels: a channel at a node of a mode misses it, the
+    sum does not. Two modes closer than their half-power width form one peak; `stable_modes`
+    separates them.
 
     Examples
     --------
@@ -54,7 +54,7 @@ def find_resonances(
     >>> find_resonances(f, value).tolist()
     [30, 70]
     """
-    from scipy.signal import find_peaks  # half a second, which no report needs
+    from scipy.signal import find_peaks  # import takes half a second, and reports do not need it
 
     _, functions = checked_functions(frequency, value)
     if not prominence > 0:

@@ -1,4 +1,4 @@
-"""What a change has done: band levels, assurance criteria, resonance shift."""
+"""Changes of response functions: band levels, assurance criteria, resonance shift."""
 
 from dataclasses import dataclass
 
@@ -26,15 +26,15 @@ def band_response_levels(
     value : array_like, shape (n_lines,) or (n_channels, n_lines)
         Response functions.
     edges : array_like, shape (n_bands + 1,)
-        Ascending; a band takes the lines from its lower edge to below its upper one [Hz].
+        Ascending edges; a band includes its lower edge and excludes its upper one [Hz].
     weight : array_like, shape (n_lines,) or (n_channels, n_lines), optional
-        Of the lines, >= 0 [-], as their coherence; all alike by default.
+        Weight of each line, >= 0 [-], such as its coherence; equal by default.
 
     Returns
     -------
     ndarray, shape (n_channels, n_bands)
-        ``10 log10`` of the mean of ``|H|^2`` over the lines [dB re 1 unit of value]; NaN where
-        every line of a band has the weight 0.
+        ``10 log10`` of the mean of ``|H|^2`` over the lines [dB re 1 unit of value]; NaN if all
+        lines of a band have the weight 0.
 
     Raises
     ------
@@ -44,8 +44,8 @@ def band_response_levels(
 
     Notes
     -----
-    The level of the response to a white force in that band, less the level of the force. The
-    difference to the levels of a reference is the change in dB, free of the unit.
+    This is the level of the response to a white force in that band, less the level of the force.
+    The difference from the levels of a reference is the change in dB, independent of the unit.
 
     Examples
     --------
@@ -81,7 +81,7 @@ def band_response_levels(
 
 
 def frequency_response_assurance(value: ArrayLike, reference: ArrayLike) -> Float:
-    """Frequency response assurance criterion (FRAC): likeness of shape over frequency.
+    """Frequency response assurance criterion (FRAC): similarity in shape over frequency.
 
     Parameters
     ----------
@@ -91,8 +91,8 @@ def frequency_response_assurance(value: ArrayLike, reference: ArrayLike) -> Floa
     Returns
     -------
     ndarray, shape (n_channels,)
-        ``|sum H R*|^2 / (sum |H|^2 sum |R|^2)`` over the lines, 0 to 1 [-]; 1 where one is a
-        complex multiple of the other.
+        ``|sum H R*|^2 / (sum |H|^2 sum |R|^2)`` over the lines, 0 to 1 [-]; 1 if one is a complex
+        multiple of the other.
 
     Raises
     ------
@@ -101,8 +101,8 @@ def frequency_response_assurance(value: ArrayLike, reference: ArrayLike) -> Floa
 
     Notes
     -----
-    Blind to level and to a common phase. Two resonances of one half-power width b, alone in the
-    band and a distance d apart, have ``1 / (1 + (d / b)^2)``: one half at one width.
+    Insensitive to level and to a common phase. Two resonances of one half-power width b, alone in
+    the band and a distance d apart, have ``1 / (1 + (d / b)^2)``: one half at one width.
 
     References
     ----------
@@ -136,7 +136,7 @@ def _same(value: ArrayLike, reference: ArrayLike) -> tuple[Complex, Complex]:
 
 @dataclass(frozen=True, kw_only=True)
 class ModeShift:
-    """What has become of the modes of a reference.
+    """Changes of the modes relative to a reference.
 
     Attributes
     ----------
@@ -147,11 +147,11 @@ class ModeShift:
     frequency_deviation : ndarray, shape (n_pairs,)
         Its standard deviation, from those of both fits [-].
     damping_ratio : ndarray, shape (n_pairs,)
-        New damping ratio over the old one [-].
+        New damping ratio over the reference's [-].
     level : ndarray, shape (n_channels, n_pairs)
         Change of the height of the resonance, ``|A| / |Re p|`` [dB].
     lost, new : tuple of int
-        Modes of the reference without a partner, and of the new set.
+        Modes without a partner: of the reference, and of the new set.
     """
 
     pairs: Integer
@@ -164,7 +164,7 @@ class ModeShift:
 
 
 def resonance_shift(modes: Modes, reference: Modes, *, within: float = 0.1) -> ModeShift:
-    """Pair the modes of two fits and tell how they have moved.
+    """Pair the modes of two fits and compare them.
 
     Parameters
     ----------
@@ -184,9 +184,9 @@ def resonance_shift(modes: Modes, reference: Modes, *, within: float = 0.1) -> M
 
     Notes
     -----
-    Pairs make the sum of ``|f / f_ref - 1| / within + 1 - MAC`` least, a mode left alone costing
-    2, with the modal assurance criterion MAC of the residues over the channels: modes that have
-    changed places are told apart by shape where there are channels enough. With one channel MAC
+    The pairs minimise the sum of ``|f / f_ref - 1| / within + 1 - MAC``, with a cost of 2 for an
+    unpaired mode and the modal assurance criterion MAC of the residues over the channels: given
+    enough channels, modes that have swapped order are distinguished by shape. With one channel MAC
     is 1, and the nearest frequency decides.
 
     Examples
@@ -226,7 +226,7 @@ def resonance_shift(modes: Modes, reference: Modes, *, within: float = 0.1) -> M
 
 
 def _paired(modes: Modes, reference: Modes, within: float) -> Integer:
-    """Indices (reference, modes) of the cheapest pairs, (n_pairs, 2)."""
+    """Indices (reference, modes) of the pairs of least cost, (n_pairs, 2)."""
     apart = np.abs(modes.frequency / reference.frequency[:, np.newaxis] - 1) / within
     product = squared_size(reference.residue.conj().T @ modes.residue)
     sizes = [np.sum(squared_size(x.residue), axis=0) for x in (reference, modes)]

@@ -1,4 +1,4 @@
-"""Poles by least squares in the complex frequency, and which stay stable over model orders."""
+"""Poles by least squares in the complex frequency, and their stability over model orders."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -13,15 +13,15 @@ Complex = NDArray[np.complex128]
 Integer = NDArray[np.intp]
 
 FREQUENCY_TOLERANCE = 0.01
-"""Change of a stable pole's natural frequency from one model order to the next [-]."""
+"""Largest change of a stable pole's natural frequency between successive model orders [-]."""
 
 DAMPING_TOLERANCE = 0.05
-"""Change of a stable pole's damping ratio, relative to it [-]."""
+"""Largest relative change of a stable pole's damping ratio between successive orders [-]."""
 
 LEAST_CHAIN = 5
 """Successive model orders through which a pole must stay stable to count as a mode."""
 
-_ARC = 0.95  # of the unit circle taken by the band: a gap, as the function does not close on itself
+_ARC = 0.95  # of the unit circle covered by the band; the function does not close on itself
 
 
 def complex_frequency_poles(
@@ -43,18 +43,17 @@ def complex_frequency_poles(
     orders : iterable of int
         Numbers of poles, each >= 1 and <= (n_lines - 1) / 2.
     deviation : array_like, optional
-        Standard deviation of every line, or anything in proportion to it, such as `Frf.radius`;
-        shape as `value` or one that broadcasts to it [unit of value]. Lines count alike by
-        default.
+        Standard deviation of every line, or anything proportional to it, such as `Frf.radius`; in
+        the shape of `value` or broadcastable to it [unit of value]. Equal weights by default.
     decay : float
-        Rate of the exponential window the functions carry [1/s], see `Frf.decay`.
+        Rate of the exponential window of the functions [1/s], see `Frf.decay`.
 
     Returns
     -------
     list of ndarray
-        For each order the poles whose damped frequency lies in the band, ascending in it [rad/s].
-        Those that grow (real part > 0) are the excess poles of a model of high order, and are to
-        be left out.
+        For each order the poles whose damped frequency lies in the band, in ascending order of it
+        [rad/s]. Growing ones (real part > 0) are the excess poles of a model of high order, to be
+        left out.
 
     Raises
     ------
@@ -63,12 +62,12 @@ def complex_frequency_poles(
 
     Notes
     -----
-    All channels share the denominator of ``N_c(z) / D(z)`` with ``z = exp(s T)``, the band laid
-    over 95 % of the unit circle and coefficients complex, so that bands may start anywhere and
-    high orders stay well conditioned. ``sum |W (N_c - D H_c)|^2`` is least with the constant
-    coefficient of D at 1, which sends the excess poles outside the circle. It is linear, hence
-    without starting values, and biased: noise of a share r of the response shifts a pole by the
-    order of r^2 of its width. `fit_modes` removes the bias.
+    All channels share the denominator of ``N_c(z) / D(z)`` with ``z = exp(s T)``. The band is
+    mapped to 95 % of the unit circle and the coefficients are complex, so that bands may start
+    anywhere and high orders stay well conditioned. ``sum |W (N_c - D H_c)|^2`` is minimised with
+    the constant coefficient of D at 1, which moves the excess poles outside the circle. The problem
+    is linear, so that no starting values are needed, but biased: noise of a share r of the response
+    shifts a pole by the order of r^2 of its width. `fit_modes` removes the bias.
 
     References
     ----------
@@ -112,7 +111,7 @@ def complex_frequency_poles(
 
 
 def line_weights(deviation: ArrayLike | None, functions: Complex) -> Float:
-    """One over the deviations, (1, n_lines) or (n_channels, n_lines), of size one."""
+    """One over the deviations, (1, n_lines) or (n_channels, n_lines), scaled to order one."""
     if deviation is None:
         return np.ones((1, functions.shape[1]))
     scatter = np.atleast_2d(np.asarray(deviation, dtype=np.float64))
@@ -129,7 +128,7 @@ def line_weights(deviation: ArrayLike | None, functions: Complex) -> Float:
 def _normal_equations(
     powers: Complex, functions: Complex, weights: Float, order: int
 ) -> tuple[Complex, list[Complex]]:
-    """Products of the columns ``z^k H`` and, channel by channel, their parts along ``z^k``."""
+    """Products of the columns ``z^k H`` and, channel by channel, their projections on ``z^k``."""
     columns = powers[:, np.newaxis] ** np.arange(order + 1)
     products = np.zeros((order + 1, order + 1), dtype=np.complex128)
     projected = []
@@ -143,10 +142,10 @@ def _normal_equations(
 
 
 def _denominator_zeros(products: Complex, projected: list[Complex], order: int) -> Complex:
-    """Zeros of D of one order, its constant coefficient being 1.
+    """Zeros of D for one order, with its constant coefficient equal to 1.
 
-    The numerators are eliminated: orthonormal columns are nested, so the first ones of the highest
-    order serve every lower one.
+    The numerators are eliminated: orthonormal columns are nested, so that the first ones of the
+    highest order serve every lower one.
     """
     kept = slice(order + 1)
     matrix = products[kept, kept].copy()
@@ -158,7 +157,7 @@ def _denominator_zeros(products: Complex, projected: list[Complex], order: int) 
 
 @dataclass(frozen=True, kw_only=True)
 class Stabilisation:
-    """Decaying poles of ascending model orders, one entry a pole: the stabilisation diagram.
+    """Decaying poles of ascending model orders, one entry per pole: the stabilisation diagram.
 
     Attributes
     ----------
@@ -167,11 +166,11 @@ class Stabilisation:
     frequency : ndarray, shape (n_poles,)
         Undamped natural frequency [Hz].
     damping_ratio : ndarray, shape (n_poles,)
-        [-]
+        Damping ratio [-].
     chain : ndarray of int, shape (n_poles,)
-        Poles with one number continue each other from order to order.
+        Number of the chain; poles of one chain continue each other from order to order.
     length : ndarray of int, shape (n_poles,)
-        Poles of the chain so far; above 1 this one is stable.
+        Poles of the chain so far; above 1 this pole is stable.
     """
 
     order: Integer
@@ -183,8 +182,9 @@ class Stabilisation:
     def modes(self, *, least: int = LEAST_CHAIN) -> tuple[Float, Float]:
         """Frequencies [Hz] and damping ratios, medians of the chains of `least` poles or more.
 
-        Chains within their damping of each other count as one, unless they mostly run side by
-        side: a pole whose damping jumps starts a new chain, close modes stand in the same orders.
+        Chains closer to each other than their damping count as one, unless they share most orders:
+        a pole whose damping jumps starts a new chain, whereas close modes appear in the same
+        orders.
         """
         accepted: list[tuple[float, float, set[int]]] = []
         number, count = np.unique(self.chain, return_counts=True)
@@ -218,12 +218,12 @@ def stabilise(
         Their orders, ascending.
     frequency_tolerance, damping_tolerance : float
         Largest relative changes of natural frequency and damping ratio between successive orders
-        at which a pole is the same one [-].
+        for two poles to count as the same [-].
 
     Returns
     -------
     Stabilisation
-        Of the poles that decay, with damping ratios up to one half.
+        Diagram of the decaying poles with damping ratios up to one half.
 
     Raises
     ------
@@ -232,8 +232,8 @@ def stabilise(
 
     Notes
     -----
-    Pairs are formed nearest first, each pole used once, so two close modes keep their own chains.
-    A chain that has missed an order may be taken up again.
+    Pairs are formed nearest first, each pole used once, so that two close modes keep their own
+    chains. A chain may continue after missing an order.
 
     References
     ----------
@@ -278,7 +278,7 @@ def stabilise(
 def _continued(
     old: list[complex], new: list[complex], tolerances: tuple[float, float]
 ) -> dict[int, int]:
-    """New pole -> the old one it continues, nearest pairs first."""
+    """Map from new poles to the old ones they continue, nearest pairs first."""
     if not old or not new:
         return {}
     was, now = np.array(old), np.array(new)[:, np.newaxis]

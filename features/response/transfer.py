@@ -1,9 +1,9 @@
-"""Transfer functions of a test, by one rule for tables, pictures and the API.
+"""Transfer functions of a test, computed alike for tables, pictures and the API.
 
 A path leads from one force to one response. Blows are found, cut and averaged by
 :mod:`wearstate.features.response.impact`; any other force is cut into half-overlapped windows,
-several at once into matrices of spectra. Lines that noise alone could have made are left out of
-what is told.
+several simultaneous forces into matrices of spectra. Lines that noise alone could have caused are
+left out of the results.
 """
 
 from dataclasses import dataclass, replace
@@ -21,36 +21,37 @@ Float = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 CHANCE = 0.01
-"""Share of the lines of mere noise that pass for coherent [-]."""
+"""Share of the lines of pure noise that pass as coherent [-]."""
 
 LEAST_DIP = 6.0
-"""Depth of an antiresonance below the lower of the two crests beside it [dB]."""
+"""Depth of an antiresonance below the lower of the two adjacent crests [dB]."""
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Transfer:
-    """Transfer functions of a test, one row a path.
+    """Transfer functions of a test, one row per path.
 
     Attributes
     ----------
     frequency : ndarray, shape (n_lines,)
-        [Hz]
+        Frequency of the lines [Hz].
     value : ndarray, shape (n_paths, n_lines)
-        H1, the other forces at rest; paths of a response follow each other [unit of response / N];
-        0 where the force is silent.
+        H1, with the other forces absent; the paths of a response are consecutive [unit of response
+        / N]; 0 if the force is silent.
     coherence : ndarray, shape (n_paths, n_lines)
-        Ordinary coherence, of several forces the partial one, 0 to 1 [-]; NaN of a single blow.
+        Ordinary coherence, or the partial one for several forces, 0 to 1 [-]; NaN for a single
+        blow.
     averages : float
-        Independent averages behind `coherence` [-].
+        Number of independent averages behind `coherence` [-].
     n_forces : int
     words : str
-        What was averaged, for people.
+        Readable description of what was averaged.
     struck : bool
-        By a hammer.
+        Whether the force was a hammer's.
     decay : float
         As in :class:`wearstate.features.response.frf.Spectra` [1/s].
     paths, units : tuple of str
-        ``response / force`` and unit of each path; empty where the channels had no names.
+        ``response / force`` and unit of each path; empty if the channels had no names.
 
     Examples
     --------
@@ -82,12 +83,12 @@ class Transfer:
         Parameters
         ----------
         ax : sequence of two matplotlib.axes.Axes, optional
-            For magnitude and coherence; a new figure by default.
+            Axes for magnitude and coherence; a new figure by default.
 
         Returns
         -------
         ndarray of matplotlib.axes.Axes, shape (2,)
-            The axes, to draw into or to save by their ``figure``.
+            The axes, for further drawing or for saving through their ``figure``.
 
         Examples
         --------
@@ -117,9 +118,9 @@ class Transfer:
 
     @property
     def heard(self) -> NDArray[np.bool_]:
-        """Lines that noise alone would not make [shape=(n_paths, n_lines)].
+        """Whether each line exceeds what noise alone would cause [shape=(n_paths, n_lines)].
 
-        Of a single blow all that are not 0: nothing is known of its noise.
+        For a single blow, all lines that are not 0: its noise is unknown.
         """
         if np.isnan(self.coherence).any():
             return np.asarray(self.value != 0)
@@ -134,7 +135,7 @@ class Transfer:
     def noise(self) -> Float:
         """Variance of each function [(unit of response / N)^2, shape=(n_paths, n_lines)].
 
-        0 of a single blow, whose noise is not known.
+        0 for a single blow, whose noise is unknown.
         """
         share = np.where(np.isnan(self.coherence), 1.0, self.coherence)
         power = (1 - share) * np.abs(self.value) ** 2
@@ -152,12 +153,13 @@ class Transfer:
         Returns
         -------
         ndarray, shape (n_paths, n_lines)
-            ``H1``, ``H1 / g^2`` or ``H1 / g``, g^2 being the coherence [unit of response / N]; 0
-            where it is 0. A single blow has one function only.
+            ``H1``, ``H1 / g^2`` or ``H1 / g``, with g^2 the coherence [unit of response / N]; 0 if
+            that is 0. A single blow has one function only.
 
         Notes
         -----
-        Of several forces those of a response and a force from which the others are taken out.
+        With several forces, the functions between a response and one force after the others are
+        removed.
         """
         power = _ESTIMATORS[estimator]
         share = np.where(np.isnan(self.coherence), 1.0, self.coherence) ** power
@@ -170,16 +172,16 @@ _ESTIMATORS = {"h1": 0.0, "hv": 0.5, "h2": 1.0}
 
 @dataclass(frozen=True, eq=False)
 class FrfReference:
-    """Transfer functions that later ones are held against, as of the healthy machine.
+    """Reference for later transfer functions, usually those of the healthy machine.
 
     Parameters
     ----------
     frequency : ndarray, shape (n_lines,)
-        [Hz]
+        Frequency of the lines [Hz].
     value : ndarray, shape (n_paths, n_lines)
-        [unit of response / unit of force]
+        Transfer functions [unit of response / unit of force].
     modes : Modes, optional
-        Of the same functions; without them there is no shift to tell.
+        Modes of the same functions; without them no shift is computed.
 
     Examples
     --------
@@ -192,19 +194,19 @@ class FrfReference:
     modes: modal_model.Modes | None = None
 
     def at(self, frequency: Float, n_paths: int) -> Complex:
-        """The functions on the lines of a test [shape=(n_paths, n_lines)].
+        """Functions on the lines of a test [shape=(n_paths, n_lines)].
 
         Parameters
         ----------
         frequency : ndarray, shape (n_lines,)
-            [Hz]
+            Lines of the test [Hz].
         n_paths : int
-            Of the test.
+            Number of paths of the test.
 
         Raises
         ------
         ValueError
-            It has other paths, or ends a line or more within the test's.
+            If it has other paths, or ends a line or more within the test's range.
         """
         line = float(frequency[1] - frequency[0]) if frequency.size > 1 else 0.0
         ends = self.frequency[0] - line, self.frequency[-1] + line
@@ -228,7 +230,7 @@ def coherence_limit(averages: float, chance: float = CHANCE) -> float:
     averages : float
         Independent averages, > 1 [-].
     chance : float
-        0 to 1 [-]
+        Probability, 0 to 1 [-].
 
     Returns
     -------
@@ -259,31 +261,31 @@ def excited_spectra(
     least: int = 8,
     last: float = 1.0,
 ) -> tuple[frf.Spectra, str]:
-    """Averaged spectra of one force: of its blows if it is a hammer's, else of windows.
+    """Averaged spectra of one force: over blows for a hammer, otherwise over windows.
 
     Parameters
     ----------
     force : array_like, shape (n_samples,)
-        [N]
+        Force [N].
     response : array_like, shape (n_channels, n_samples)
-        [any unit]
+        Responses [any unit].
     fs : float
         Sample rate [Hz].
     nperseg : int
         Length of a window [samples].
     least, last
-        As of :func:`wearstate.features.response.impact.impact_spectra`.
+        As for :func:`wearstate.features.response.impact.impact_spectra`.
 
     Returns
     -------
     spectra : Spectra
     words : str
-        What was averaged, for people.
+        Readable description of what was averaged.
 
     Raises
     ------
     ValueError
-        As :func:`wearstate.features.response.impact.impact_spectra` and
+        As for :func:`wearstate.features.response.impact.impact_spectra` and
         :func:`wearstate.features.response.frf.welch_spectra`.
 
     Examples
@@ -314,32 +316,32 @@ def measured_transfer(
     Parameters
     ----------
     force : array_like, shape (n_forces, n_samples)
-        Of each shaker, or of one hammer [N].
+        Force of each shaker, or of one hammer [N].
     response : array_like, shape (n_responses, n_samples)
-        [any unit]
+        Responses [any unit].
     fs : float
         Sample rate [Hz].
     nperseg : int
-        Length of a window, and of a blow's block at least [samples].
+        Length of a window, and smallest length of a blow's block [samples].
     last : float
-        As of :func:`excited_spectra` [-].
+        As for :func:`excited_spectra` [-].
     band : tuple of float
         First and last frequency [Hz].
 
     Returns
     -------
     Transfer
-        On the lines of the band, without those at 0 Hz and at half the sample rate.
+        Functions on the lines of the band, without those at 0 Hz and at half the sample rate.
 
     Raises
     ------
     ValueError
-        Several forces are copies of one another, or as :func:`excited_spectra` and
+        If several forces are copies of one another, or as for :func:`excited_spectra` and
         :func:`wearstate.features.response.mimo.multiple_h1`.
 
     Notes
     -----
-    A force that never varies leads nowhere: its paths are 0, and the other forces are taken alone.
+    The paths of a force that never varies are 0, and the other forces are analysed without it.
 
     Examples
     --------
@@ -408,42 +410,42 @@ def _of_several(forces: NDArray[np.float64], responses: ArrayLike, fs: float, n:
 def _all_paths(
     rows: NDArray[np.complexfloating] | Float, responses: int, alive: NDArray[np.intp], forces: int
 ) -> Complex:
-    """Rows of the paths from live forces among those of all forces, which are 0."""
+    """Rows of the paths from live forces, with zero rows added for the other forces."""
     full = np.zeros((responses, forces, rows.shape[-1]), dtype=np.complex128)
     places = alive if alive.size else np.zeros(1, dtype=np.intp)
     full[:, places] = rows.reshape(responses, places.size, -1)
     return full.reshape(-1, rows.shape[-1])
 
 
-# --- what they show
+# --- results of a test
 
 
 def band_levels(transfer: Transfer, edges: ArrayLike, *, estimator: str = "h1") -> Float:
-    """Levels of the paths in bands, whatever their coherence.
+    """Levels of the paths in bands, regardless of coherence.
 
     Parameters
     ----------
     transfer : Transfer
     edges : array_like, shape (n_bands + 1,)
-        [Hz]
+        Band edges [Hz].
     estimator : str
-        As of :meth:`Transfer.estimate`.
+        As for :meth:`Transfer.estimate`.
 
     Returns
     -------
     ndarray, shape (n_paths, n_bands)
-        [dB re 1 (unit of response / N)^2]; -200 of a silent path.
+        Levels [dB re 1 (unit of response / N)^2]; -200 for a silent path.
 
     Raises
     ------
     ValueError
-        As :func:`wearstate.features.response.response_change.band_response_levels`.
+        As for :func:`wearstate.features.response.response_change.band_response_levels`.
     """
     return _levels(transfer, transfer.estimate(estimator), np.ones(transfer.value.shape), edges)
 
 
 def _levels(transfer: Transfer, value: Complex, weight: Float, edges: ArrayLike) -> Float:
-    """Weighted band levels; -200 dB of silent paths."""
+    """Weighted band levels; -200 dB for silent paths."""
     moving = np.any(value != 0, axis=-1)
     levels = np.full((len(value), np.size(edges) - 1), decibel(0.0))
     if moving.any():
@@ -454,22 +456,21 @@ def _levels(transfer: Transfer, value: Complex, weight: Float, edges: ArrayLike)
 
 
 def profile(transfer: Transfer, edges: ArrayLike) -> tuple[Float, NDArray[np.bool_]]:
-    """Levels of the paths in narrow bands: noise taken off, lines weighted by their coherence.
+    """Levels of the paths in narrow bands: noise subtracted, lines weighted by their coherence.
 
     Parameters
     ----------
     transfer : Transfer
     edges : array_like, shape (n_bands + 1,)
-        [Hz]
+        Band edges [Hz].
 
     Returns
     -------
     levels : ndarray, shape (n_paths, n_bands)
-        [dB re 1 (unit of response / N)^2]; a band in which nothing is heard goes with its
-        neighbours, interpolated over the logarithm of the frequency; -200 of a path in which
-        nothing is heard at all.
+        Levels [dB re 1 (unit of response / N)^2]; a band without signal is interpolated between its
+        neighbours over the logarithm of the frequency; -200 for a path without any signal.
     heard : ndarray of bool, shape (n_paths, n_bands)
-        Bands that noise alone would fill as high with the probability `CHANCE` at most.
+        Bands whose level noise alone reaches with at most the probability `CHANCE`.
 
     Raises
     ------
@@ -478,13 +479,13 @@ def profile(transfer: Transfer, edges: ArrayLike) -> tuple[Float, NDArray[np.boo
 
     Notes
     -----
-    ``|H1|^2`` has the expectation ``|H|^2 + v``, with ``v = (1 - g^2) |H1|^2 / (g^2 (n - 1))`` of n
-    averages, told by the residual, which is independent of H1. The level is that of the mean of
-    ``|H1|^2 - v`` over the lines, each with the weight ``P / (P + v)``, the coherence that the
-    averaged function has there, P being the mean with the weights ``1 / v``. The estimated
-    coherence of a line is no good for a weight, nor for leaving it out: it is high where chance
-    makes H1 large. Of noise alone ``|H1|^2 / v`` has about the mean 1 and in a band a gamma
-    distribution of as many degrees as there are independent lines under a Hann window.
+    ``|H1|^2`` has the expectation ``|H|^2 + v``, with ``v = (1 - g^2) |H1|^2 / (g^2 (n - 1))`` for
+    n averages, determined from the residual, which is independent of H1. The level is that of the
+    mean of ``|H1|^2 - v`` over the lines, each with the weight ``P / (P + v)``, the coherence that
+    the averaged function has there, P being the mean with the weights ``1 / v``. The estimated
+    coherence of a line must not be used to weight it or to leave it out: it is high where chance
+    makes H1 large. For noise alone, the mean of ``|H1|^2 / v`` over a band is about 1 and follows a
+    gamma distribution with as many degrees as there are independent lines under a Hann window.
 
     Examples
     --------
@@ -516,24 +517,24 @@ def profile(transfer: Transfer, edges: ArrayLike) -> tuple[Float, NDArray[np.boo
     return _filled(decibel(np.maximum(level, 0.0)), heard, np.sqrt(limits[1:] * limits[:-1])), heard
 
 
-_LEAST_NOISE = 1e-6  # of a band's mean power: leakage, and no line alone decides
+_LEAST_NOISE = 1e-6  # of a band's mean power: leakage; also keeps a single line from dominating
 
 
 def _ratio(above: Float, below: Float) -> Float:
-    """Quotient, 0 where nothing stands below."""
+    """Quotient; 0 if the denominator is 0."""
     quotient: Float = np.divide(above, below, out=np.zeros_like(below), where=below > 0)
     return quotient
 
 
 def _noise_limits(counts: NDArray[np.intp]) -> Float:
-    """What a mean over lines of noise exceeds with the chance `CHANCE`, in means of it [-]."""
+    """Ratio to its mean that a mean over noise lines exceeds with probability `CHANCE` [-]."""
     # Under Hann the powers of neighbouring lines correlate by (2/3)^2.
     free = counts / (1 + 2 * (2 / 3) ** 2 * (1 - 1 / counts))
     return np.asarray(gammainccinv(free, CHANCE) / free)
 
 
 def _filled(levels: Float, heard: NDArray[np.bool_], middle: Float) -> Float:
-    """Levels with the bands that are not heard interpolated between those that are."""
+    """Levels, interpolated in the bands without signal."""
     place = np.log(middle)
     for row, known in zip(levels, heard, strict=True):
         row[:] = np.interp(place, place[known], row[known]) if known.any() else decibel(0.0)
@@ -541,24 +542,25 @@ def _filled(levels: Float, heard: NDArray[np.bool_], middle: Float) -> Float:
 
 
 def antiresonances(transfer: Transfer, count: int) -> Float:
-    """Deepest antiresonances of the paths, among the lines that are heard.
+    """Deepest antiresonances of the paths, among the lines above noise.
 
     Parameters
     ----------
     transfer : Transfer
     count : int
-        Of each path.
+        Number for each path.
 
     Returns
     -------
     ndarray, shape (n_paths, count, 2)
-        Frequency [Hz], rising, and depth below the lower of the crests beside it [dB]; zeros where
+        Frequency [Hz], rising, and depth below the lower of the adjacent crests [dB]; zeros if
         there are fewer.
 
     Notes
     -----
-    The lines at the bottom of a dip are the first to drown, and are left out then: the frequency is
-    that of the zero of a straight line in the complex plane through the lines beside the bottom.
+    The lines at the bottom of a dip are the first to disappear in noise and are then left out. The
+    frequency is therefore the zero of a straight line in the complex plane through the lines next
+    to the bottom.
 
     Examples
     --------
@@ -582,7 +584,7 @@ def antiresonances(transfer: Transfer, count: int) -> Float:
 
 def _dips(frequency: Float, value: Complex) -> list[tuple[float, float]]:
     """Depth [dB] and frequency [Hz] of the dips of one function, the deepest last."""
-    from scipy.signal import find_peaks  # half a second, which no report needs
+    from scipy.signal import find_peaks  # import takes half a second, and reports do not need it
 
     level = decibel(np.abs(value) ** 2)
     places, about = find_peaks(-level, prominence=LEAST_DIP)
@@ -593,7 +595,7 @@ def _dips(frequency: Float, value: Complex) -> list[tuple[float, float]]:
 
 
 def _zero(frequency: Float, value: Complex, at: int) -> float:
-    """Where the straight line through the neighbours of a line comes nearest to 0 [Hz]."""
+    """Frequency where the straight line through a line's neighbours is nearest to 0 [Hz]."""
     below, above = frequency[at - 1], frequency[at + 1]
     slope = (value[at + 1] - value[at - 1]) / (above - below)
     size = abs(slope) ** 2
@@ -613,22 +615,22 @@ def fit_transfer(
     highest_order: int,
     most_lines: int,
 ) -> modal_model.Modes | None:
-    """Modes of some paths, on the lines that one of them is heard at.
+    """Modes of some paths, on the lines that are above noise in one of them.
 
     Parameters
     ----------
     transfer : Transfer
     paths : list of int
-        Moving ones to responses of one quantity.
+        Indices of paths to moving responses of one quantity.
     quantity, n_modes, highest_order
-        As of :func:`wearstate.features.response.modal.modal_fit`.
+        As for :func:`wearstate.features.response.modal.modal_fit`.
     most_lines : int
-        Of more lines each peak is fitted alone.
+        Number of lines above which each peak is fitted separately.
 
     Returns
     -------
     Modes or None
-        None where no pole is stable, or nothing moves.
+        None if no pole is stable, or nothing moves.
     """
     kept = transfer.heard[paths].any(axis=0)
     if np.count_nonzero(kept) < modal_model.FEWEST_LINES:
@@ -643,12 +645,12 @@ def fit_transfer(
             decay=transfer.decay,
             highest_order=min(highest_order, int(np.count_nonzero(kept)) // 3),
         )
-    except ValueError:  # no stable pole: the functions are sound
+    except ValueError:  # no stable pole: the functions are valid
         return None
 
 
 def mode_shapes(modes: modal_model.Modes) -> tuple[Float, Float]:
-    """Shapes as the force of each path sees them, with their standard deviations.
+    """Mode shapes as seen by the force of each path, with standard deviations.
 
     Parameters
     ----------
@@ -658,7 +660,7 @@ def mode_shapes(modes: modal_model.Modes) -> tuple[Float, Float]:
     -------
     shape, deviation : ndarray, shape (n_paths, n_modes)
         Real parts of the modal constants over the root of the sum of their squares [-]. The sign is
-        that of the response against the force, which no scaling of the shape turns round.
+        that of the response relative to the force, which no scaling of the shape reverses.
     """
     constant = modes.modal_constant
     size = np.linalg.norm(constant, axis=0)
@@ -667,7 +669,7 @@ def mode_shapes(modes: modal_model.Modes) -> tuple[Float, Float]:
 
 
 def static_flexibility(modes: modal_model.Modes) -> tuple[Float, Float]:
-    """Static flexibility that the modes and what lies above them add up to, and the latter alone.
+    """Static flexibility of the modes and all above them, and that of the latter alone.
 
     Parameters
     ----------
@@ -676,8 +678,8 @@ def static_flexibility(modes: modal_model.Modes) -> tuple[Float, Float]:
     Returns
     -------
     whole, residual : ndarray, shape (n_paths,)
-        Receptance at rest, ``sum 2 Re(-A / p) + Re U`` and ``Re U`` [unit of receptance]; without
-        the modes below the band, as a rigid one that moves freely.
+        Receptance at rest, ``sum 2 Re(-A / p) + Re U`` and ``Re U`` [unit of receptance]; modes
+        below the band, such as a free rigid-body mode, are not included.
 
     Examples
     --------
@@ -693,23 +695,23 @@ def static_flexibility(modes: modal_model.Modes) -> tuple[Float, Float]:
 def mode_changes(
     modes: modal_model.Modes | None, reference: modal_model.Modes, count: int
 ) -> Float:
-    """What has become of each mode of a reference.
+    """Changes of each mode of a reference.
 
     Parameters
     ----------
     modes : Modes or None
-        Of the test.
+        Modes of the test.
     reference : Modes
-        Of the same paths.
+        Modes of the same paths in the reference.
     count : int
-        Modes told.
+        Number of modes in the result.
 
     Returns
     -------
     ndarray, shape (count, 5)
         Relative change of the frequency and its standard deviation [-], logarithm of the ratio of
         the damping ratios [-], mean change of level over the paths [dB], and modal assurance
-        criterion MAC [-]; zeros of a mode that is not found again.
+        criterion MAC [-]; zeros for a mode that is not found again.
     """
     table = np.zeros((count, 5))
     if modes is None or modes.residue.shape[0] != reference.residue.shape[0]:

@@ -1,4 +1,4 @@
-"""What turns: tacho, speed, orders, crank angle, orbit, cylinder pressure, balancing.
+"""Rotation: tacho, speed, orders, crank angle, orbit, cylinder pressure, balancing.
 
-It may import ``features.signal``.
+May import ``features.signal``.
 """

@@ -1,7 +1,7 @@
 """Signals over the shaft angle: band-limited resampling, order spectra and maps, averages.
 
-Time samples become points a constant angle apart, so that everything locked to the shaft stands
-still however the speed changes.
+Time samples become points a constant angle apart, so that everything locked to the shaft keeps its
+place at any speed.
 """
 
 import math
@@ -19,21 +19,21 @@ from ..signal.statistics import Real, centred
 Float = NDArray[np.float64]
 
 PASSBAND_SHARE = 0.4
-"""Highest frequency kept whole, as a share of the lower of the two rates [-]: recorders are flat
-to 1 / 2.56 = 0.39 of their sample rate."""
+"""Highest frequency kept unchanged, as a share of the lower of the two rates [-]: recorders are
+flat up to 1 / 2.56 = 0.39 of their sample rate."""
 
 WINDOWS = {
     "boxcar": (1.0,),
     "hann": (1.0, -1.0),
-    # ISO 18431-2: lines read a tone between them at most 0.1 % low.
+    # ISO 18431-2: a tone between two lines reads at most 0.1 % low.
     "flattop": (1.0, -1.933, 1.286, -0.388, 0.0322),
 }
-"""Name -> cosine coefficients of a periodic window [-]."""
+"""Cosine coefficients of periodic windows by name [-]."""
 
-_HALF_WIDTH = 16  # zero crossings of the kernel either side
-_STEPS = 1024  # of the kernel's table in one zero crossing: straight lines between are 4e-7 off
-_KAISER_BETA = 9.62  # 96 dB: the least worst error of 16 crossings at 0.4 of the rate
-_CHUNK_WEIGHTS = 32_768  # 256 KiB of them, a cache's worth
+_HALF_WIDTH = 16  # zero crossings of the kernel on either side
+_STEPS = 1024  # table entries per zero crossing of the kernel: linear interpolation is 4e-7 off
+_KAISER_BETA = 9.62  # 96 dB: smallest maximum error for 16 crossings at 0.4 of the rate
+_CHUNK_WEIGHTS = 32_768  # 256 KiB of weights, which fit into a cache
 
 Window = Literal["boxcar", "hann", "flattop"]
 
@@ -47,7 +47,7 @@ class AngleSignal:
     signal : ndarray, shape (..., n_points)
         Values [any unit].
     first : int
-        Number of the first point; point 0 lies at phase 0, the first tacho pulse.
+        Number of the first point; point 0 is at phase 0, the first tacho pulse.
     points_per_revolution : int
         Points in one revolution.
 
@@ -69,12 +69,12 @@ class AngleSignal:
 
     @property
     def revolutions(self) -> int:
-        """Whole revolutions in it."""
+        """Number of whole revolutions."""
         return int(self.signal.shape[-1] // self.points_per_revolution)
 
     @property
     def highest_order(self) -> float:
-        """Orders up to here are right [cycles per revolution]."""
+        """Highest order that is correct [cycles per revolution]."""
         return PASSBAND_SHARE * self.points_per_revolution
 
 
@@ -83,7 +83,7 @@ class AngleSignal:
 
 @lru_cache(maxsize=2)
 def _kernel(dtype: np.dtype[Any]) -> tuple[Real, Real]:
-    """Kaiser-windowed sinc from its middle on, and its step to the next entry."""
+    """Half of a Kaiser-windowed sinc, and the step from each entry to the next."""
     crossing = np.arange(_HALF_WIDTH * _STEPS + 1) / _STEPS
     shape = np.sqrt(1.0 - (crossing / _HALF_WIDTH) ** 2)
     kernel = np.sinc(crossing) * np.i0(_KAISER_BETA * shape) / np.i0(_KAISER_BETA)
@@ -95,7 +95,8 @@ def _weights(start: Float, share: Float, taps: int, dtype: np.dtype[Any]) -> Rea
     """Weight of `taps` samples, the first `start` before each place [shape=(n_places, taps)]."""
     value, step = _kernel(dtype)
     scale = (share * _STEPS).astype(dtype)
-    # Single precision counts table entries to a thousandth: 1e-6 of the weight.
+    # In single precision the table position is exact to a thousandth of an entry: 1e-6 of the
+    # weight.
     distance = np.arange(taps, dtype=dtype) - start.astype(dtype)[:, np.newaxis]
     distance *= scale[:, np.newaxis]
     np.abs(distance, out=distance)
@@ -104,7 +105,7 @@ def _weights(start: Float, share: Float, taps: int, dtype: np.dtype[Any]) -> Rea
     distance -= entry
     distance *= step[entry]
     distance += value[entry]
-    # A sum of exactly one keeps a constant constant.
+    # With a sum of exactly one, a constant stays constant.
     distance /= distance.sum(axis=1, keepdims=True)
     return np.asarray(distance)
 
@@ -117,15 +118,15 @@ def interpolate(x: ArrayLike, places: ArrayLike, *, share: ArrayLike = 1.0) -> N
     x : array_like, shape (..., n_samples)
         Signal [any unit], real or complex.
     places : array_like, shape (n_places,)
-        Where, in samples from the first one [-].
+        Places, in samples from the first one [-].
     share : array_like, shape () or (n_places,)
-        Band kept at each place, as a share of the sample rate's own [-], in (0, 1]: the rate at
-        which the places follow each other, if lower.
+        Band kept at each place, as a share of the sample rate's own [-], in (0, 1]: the rate of the
+        places if it is lower than the sample rate.
 
     Returns
     -------
     ndarray, shape (..., n_places)
-        Values [unit of x], single and double precision kept, others become float64.
+        Values [unit of x]; single and double precision are kept, other types become float64.
 
     Raises
     ------
@@ -135,10 +136,10 @@ def interpolate(x: ArrayLike, places: ArrayLike, *, share: ArrayLike = 1.0) -> N
 
     Notes
     -----
-    Kaiser-windowed sinc of 16 zero crossings either side, widened by ``1 / share``. With
-    ``r = share fs``: a tone below 0.4 r is right to 5e-5 of its amplitude, one above 0.6 r is
-    brought down to 5e-5, in between it is lowered; a constant is exact. Effort grows with the
-    samples in between the places, so it is linear in the length of the record.
+    Kaiser-windowed sinc with 16 zero crossings on either side, widened by ``1 / share``. With ``r =
+    share fs``: a tone below 0.4 r is right to 5e-5 of its amplitude, one above 0.6 r is attenuated
+    to 5e-5, in between it is reduced; a constant is exact. The effort grows with the samples
+    between the places, hence linearly with the length of the record.
 
     References
     ----------
@@ -183,12 +184,13 @@ def _check_places(places: Float, share: Float, n_samples: int) -> None:
 def _pieces(
     places: Float, share: Float, n_samples: int
 ) -> Iterator[tuple[slice, NDArray[np.intp], int]]:
-    """Places a cache-sized piece at a time: which, their first samples, how many of them."""
+    """Cache-sized pieces of the places: index, first samples, number of samples."""
     widest = 2 * math.ceil(_HALF_WIDTH / float(share.min(initial=1.0)))
     at_once = max(1, _CHUNK_WEIGHTS // widest)
     for start in range(0, places.size, at_once):
         part = slice(start, start + at_once)
-        # Shares change little within a piece, so few of its weights are beyond a kernel's end.
+        # The share changes little within a piece, so that few weights are wasted beyond a kernel's
+        # end.
         taps = min(2 * math.ceil(_HALF_WIDTH / float(share[part].min())), n_samples)
         first = np.floor(places[part]).astype(np.intp) - taps // 2 + 1
         np.clip(first, 0, n_samples - taps, out=first)
@@ -213,7 +215,7 @@ def _check_increasing(phase: Float) -> None:
 def angular_resample(
     x: ArrayLike, phase: ArrayLike, *, points_per_revolution: int = 256
 ) -> AngleSignal:
-    """Resample a signal to a constant shaft angle between its points.
+    """Resample a signal to points a constant shaft angle apart.
 
     Parameters
     ----------
@@ -222,13 +224,13 @@ def angular_resample(
     phase : array_like, shape (n_samples,)
         Shaft phase [rev], increasing, as from `order.shaft_phase`.
     points_per_revolution : int
-        Points in one revolution; orders up to 0.4 of it are right.
+        Points in one revolution; orders up to 0.4 of it are correct.
 
     Returns
     -------
     AngleSignal
-        From the first to the last point whose kernel fits in the record: 16 samples (or 16
-        points, where these are further apart) are lost at both ends. dtype kept.
+        Points from the first to the last whose kernel fits into the record: 16 samples (or 16
+        points if these are further apart) are lost at either end. dtype kept.
 
     Raises
     ------
@@ -239,10 +241,10 @@ def angular_resample(
     Notes
     -----
     At a speed f, frequencies below ``0.4 min(fs, f points_per_revolution)`` are kept to 5e-5 of
-    their amplitude and those above ``0.6 f points_per_revolution`` removed to 5e-5, so nothing
-    folds onto the orders below 0.4 `points_per_revolution` however slowly the shaft turns: the
-    kernel widens with the time between two points. Assumes that the speed changes little during
-    16 points.
+    their amplitude and those above ``0.6 f points_per_revolution`` removed to 5e-5. Nothing aliases
+    onto the orders below 0.4 `points_per_revolution`, however slowly the shaft turns, because the
+    kernel widens with the time between two points. The speed is assumed to change little during 16
+    points.
 
     References
     ----------
@@ -293,7 +295,7 @@ def _band_share(phase: Float, places: Float, points_per_revolution: int) -> Floa
 
 
 def _supported(places: Float, share: Float, n_samples: int) -> slice:
-    """Places whose kernel fits in the record."""
+    """Places whose kernel fits into the record."""
     reach = _HALF_WIDTH / share
     fits = np.flatnonzero((places >= reach) & (places <= n_samples - 1 - reach))
     if fits.size == 0 or fits[-1] - fits[0] + 1 != fits.size:
@@ -308,14 +310,14 @@ def _supported(places: Float, share: Float, n_samples: int) -> slice:
 
 
 def cosine_window(n: int, name: Window = "hann") -> Float:
-    """Periodic window made of cosines, with a mean of one.
+    """Periodic cosine-sum window with a mean of one.
 
     Parameters
     ----------
     n : int
         Length.
     name : {"boxcar", "hann", "flattop"}
-        Which one, see `WINDOWS`.
+        Name, see `WINDOWS`.
 
     Returns
     -------
@@ -325,7 +327,7 @@ def cosine_window(n: int, name: Window = "hann") -> Float:
     Raises
     ------
     ValueError
-        If there is no such window.
+        If there is no window of that name.
 
     Examples
     --------
@@ -339,15 +341,16 @@ def cosine_window(n: int, name: Window = "hann") -> Float:
 
 
 def order_spectrum(angle: AngleSignal, *, window: Window = "hann") -> tuple[Float, NDArray[Any]]:
-    """Amplitude and phase over the order, of the whole revolutions of a record.
+    """Amplitude and phase over the order, from the whole revolutions of a record.
 
     Parameters
     ----------
     angle : AngleSignal
         Real signal from `angular_resample` [any unit]; its mean is removed.
     window : {"boxcar", "hann", "flattop"}
-        With "boxcar" whole orders do not leak into each other at all, but half and broken orders
-        spread wide; "flattop" reads any order within 0.1 %, its neighbours 5 lines off.
+        With "boxcar", whole orders do not leak into each other at all, but half and fractional
+        orders leak widely; "flattop" reads any order within 0.1 %, with other orders 5 lines away
+        or more.
 
     Returns
     -------
@@ -395,7 +398,7 @@ def order_spectrum(angle: AngleSignal, *, window: Window = "hann") -> tuple[Floa
 
 
 def _line_count(angle: AngleSignal, n: int) -> int:
-    """Lines of an n-point transform up to the highest right order."""
+    """Number of lines of an n-point transform up to the highest correct order."""
     return math.floor(angle.highest_order * n / angle.points_per_revolution + 1e-9) + 1
 
 
@@ -451,7 +454,7 @@ def order_map(
     Returns
     -------
     OrderMap
-        Of every frame that fits; dtype of the signal kept.
+        Map of all frames that fit; dtype of the signal kept.
 
     Raises
     ------
@@ -460,8 +463,8 @@ def order_map(
 
     Notes
     -----
-    Two orders are told apart if 10 / revolutions apart with "flattop", 4 / revolutions with
-    "hann". A constant amplitude A reads ``A / sqrt(2)``, to 0.1 % at any order with "flattop".
+    Two orders are resolved if 10 / revolutions apart with "flattop", 4 / revolutions with "hann". A
+    constant amplitude A reads ``A / sqrt(2)``, to 0.1 % at any order with "flattop".
 
     References
     ----------
@@ -483,7 +486,7 @@ def order_map(
     taper = (cosine_window(n, window) * (math.sqrt(2) / n)).astype(signal.dtype)
     lines = _line_count(angle, n)
     rms = np.empty((*frames.shape[:-1], lines), dtype=signal.dtype)
-    for k in range(frames.shape[-2]):  # a frame at a time: memory stays flat
+    for k in range(frames.shape[-2]):  # one frame at a time, to limit memory
         np.abs(rfft(frames[..., k, :] * taper)[..., :lines], out=rms[..., k, :])
     middles = angle.first + hop * np.arange(frames.shape[-2]) + n / 2
     return OrderMap(
@@ -505,7 +508,7 @@ def _check_map(angle: AngleSignal, revolutions: int, overlap: float) -> None:
 def order_track(
     angle: AngleSignal, orders: ArrayLike, *, revolutions: int = 8, window: Window = "hann"
 ) -> tuple[Float, NDArray[Any]]:
-    """Amplitude and phase of given orders as the revolutions go by, as for a Bode plot.
+    """Amplitude and phase of given orders over the revolutions, as for a Bode plot.
 
     Parameters
     ----------
@@ -564,20 +567,20 @@ def order_track(
 
 
 def _products(frames: NDArray[Any], waves: NDArray[Any]) -> NDArray[Any]:
-    """Frames times complex waves, without a complex copy of the frames."""
+    """Products of frames and complex waves, without a complex copy of the frames."""
     return np.asarray(frames @ waves.real + 1j * (frames @ waves.imag))
 
 
-# --- what repeats, and what does not
+# --- synchronous average and residual
 
 
 def synchronous_average(angle: AngleSignal) -> NDArray[Any]:
-    """Mean revolution: what repeats with the shaft.
+    """Mean revolution: the part of the signal that repeats with the shaft.
 
     Parameters
     ----------
     angle : AngleSignal
-        From `angular_resample` [any unit], real or complex; its mean is kept.
+        Signal from `angular_resample` [any unit], real or complex; its mean is kept.
 
     Returns
     -------
@@ -591,8 +594,8 @@ def synchronous_average(angle: AngleSignal) -> NDArray[Any]:
 
     Notes
     -----
-    Noise falls by the root of R. An order k that is no whole number is left with
-    ``|sin(pi k R) / (R sin(pi k))|`` of its amplitude: a comb.
+    Noise falls by the root of R. A non-integer order k keeps ``|sin(pi k R) / (R sin(pi k))|`` of
+    its amplitude: a comb filter.
 
     References
     ----------
@@ -616,14 +619,14 @@ def synchronous_average(angle: AngleSignal) -> NDArray[Any]:
 
 
 def angular_residual(angle: AngleSignal, average: ArrayLike) -> AngleSignal:
-    """Signal over the angle without what repeats with the shaft.
+    """Signal over the angle without the part that repeats with the shaft.
 
     Parameters
     ----------
     angle : AngleSignal
-        From `angular_resample` [any unit].
+        Signal from `angular_resample` [any unit].
     average : array_like, shape (..., points_per_revolution)
-        From `synchronous_average` [same unit].
+        Mean revolution from `synchronous_average` [same unit].
 
     Returns
     -------

@@ -8,20 +8,20 @@ from numpy.typing import ArrayLike, NDArray
 Complex = NDArray[np.complex128]
 
 LARGEST_CONDITION = 50.0
-"""Largest condition number of the influence coefficients [-]: errors of the readings of 2 % make
-masses with errors of 100 % there, so the planes are not told apart."""
+"""Largest condition number of the influence coefficients [-]: at it, reading errors of 2 % cause
+errors of 100 % in the masses, so that the planes cannot be distinguished."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Correction:
-    """Masses that balance, and what is left.
+    """Correction masses and the residual vibration.
 
     Parameters
     ----------
     masses : ndarray, shape (n_planes,)
-        Complex, angle as that of the trial masses [unit of the trial masses].
+        Complex masses, with angles counted as for the trial masses [unit of the trial masses].
     residual : ndarray, shape (n_sensors,)
-        Predicted 1X vibration with them [unit of the vibration]; 0 with as many planes as
+        Predicted 1X vibration with the masses [unit of the vibration]; 0 with as many planes as
         sensors.
 
     Examples
@@ -37,14 +37,14 @@ class Correction:
 def influence_coefficients(
     initial: ArrayLike, trials: ArrayLike, trial_masses: ArrayLike
 ) -> Complex:
-    """Change of the vibration by a unit mass in each plane.
+    """Change of the vibration per unit mass in each plane.
 
     Parameters
     ----------
     initial : array_like, shape (n_sensors,)
         Complex 1X vibration of the machine as found [any unit], as from `order.order_amplitudes`.
     trials : array_like, shape (n_planes, n_sensors)
-        With a trial mass in one plane after the other, the one before taken out [same unit].
+        Vibration with a trial mass in one plane at a time, the previous one removed [same unit].
     trial_masses : array_like, shape (n_planes,)
         Complex trial masses [any unit, such as kg or kg m], angle from the mark.
 
@@ -61,7 +61,7 @@ def influence_coefficients(
     Notes
     -----
     Angles of vibration and mass may be counted either way (with or against the rotation, lead or
-    lag), but all alike. Assumes a linear machine at one speed.
+    lag), but all in the same way. Assumes a linear machine at one speed.
 
     References
     ----------
@@ -97,20 +97,20 @@ def _check_runs(initial: Complex, trials: Complex, masses: Complex) -> None:
 
 
 def correction_masses(coefficients: ArrayLike, initial: ArrayLike) -> Correction:
-    """Masses to add so that the vibration becomes as small as it can.
+    """Correction masses that minimise the vibration.
 
     Parameters
     ----------
     coefficients : array_like, shape (n_sensors, n_planes)
-        From `influence_coefficients`.
+        Coefficients from `influence_coefficients`.
     initial : array_like, shape (n_sensors,)
-        Complex 1X vibration, trial masses taken out.
+        Complex 1X vibration with the trial masses removed.
 
     Returns
     -------
     Correction
-        Masses, exact with as many planes as sensors, by least squares with fewer; and the
-        vibration they leave.
+        Masses, exact with as many planes as sensors, by least squares with fewer; and the residual
+        vibration.
 
     Raises
     ------

@@ -1,10 +1,10 @@
-"""Edges of a logic level between two samples: told apart, and placed to a fraction of a sample.
+"""Edges of a logic level between two samples, located to a fraction of a sample.
 
-A pulse that a converter averages over each sample, or a filter rounds, tells by its slope where
-between two samples it rose. A logic level that is sampled as it is tells only between which two:
-its edge lies anywhere within that sample, on average in its middle. A shaft's speed changes little
-from one pulse to the next, so the smoothest row of edges within those samples is far nearer to the
-truth than their middles.
+If a converter averages over each sample, or a filter rounds the pulse, the slope shows where
+between two samples the edge lies. A logic level that is sampled instantaneously shows only between
+which two samples: the edge is anywhere within that interval, on average in its middle. A shaft's
+speed changes little from one pulse to the next, so that the smoothest row of edges within those
+intervals is much more accurate than their middles.
 """
 
 import numpy as np
@@ -14,11 +14,11 @@ from scipy.linalg import solveh_banded
 Float = NDArray[np.float64]
 
 _LEVEL_SHARE = 0.02
-"""Of the swing: samples of a logic level keep so near to either level [-]."""
+"""Largest distance of a logic level's samples from either level, as a share of the swing [-]."""
 
 _LOGIC_SHARE = 0.9
-"""Of the edges: a record with as many without a sample on the slope is a logic level [-]. Of edges
-that are averaged over a sample one in 25 has none."""
+"""Smallest share of edges without a sample on the slope in a logic level [-]. If each sample is
+averaged over its interval, one edge in 25 has none."""
 
 _HALF_SAMPLE = 0.5
 _STIFFEST, _SOFTEST = 1e9, 1e-6
@@ -32,9 +32,9 @@ def is_logic_level(before: NDArray[np.float64], after: NDArray[np.float64], swin
     Parameters
     ----------
     before, after : ndarray, shape (n_edges,)
-        Samples on either side of every edge, over the lowest sample [any unit].
+        Samples on either side of every edge, above the lowest sample [any unit].
     swing : float
-        Highest sample over the lowest [the same].
+        Highest minus lowest sample [same unit].
 
     Examples
     --------
@@ -48,24 +48,24 @@ def is_logic_level(before: NDArray[np.float64], after: NDArray[np.float64], swin
 
 
 def placed_edges(before: NDArray[np.intp], around: Float, otherwise: Float) -> Float:
-    """Where the rising edges of a pulse train lie, by what kind of train it is.
+    """Positions of the rising edges of a pulse train, by the method that suits the train.
 
     Parameters
     ----------
     before : ndarray, shape (n_edges,)
         Last sample of each edge below the level, increasing.
     around : ndarray, shape (n_edges, 4)
-        Samples from the one in front of that to the two behind it, the lowest of the record 0, its
-        highest 1 [-]; NaN outside the record.
+        Samples from the one before that to the two after it, scaled so that the lowest of the
+        record is 0 and its highest 1 [-]; NaN outside the record.
     otherwise : ndarray, shape (n_edges,)
-        Places of the edges that take longer than two samples [samples].
+        Positions of the edges that take longer than two samples [samples].
 
     Returns
     -------
     ndarray, shape (n_edges,)
-        [samples]. Of a sampled logic level the `smoothest`. Else a step that was averaged over a
-        sample lies by its area: each sample is the mean over the interval round it, so what lies
-        above zero in the four is what lies behind the edge.
+        Positions [samples]. For a sampled logic level those of `smoothest`. Otherwise a step
+        averaged over a sample is located by its area: each sample is the mean over the interval
+        around it, so that the sum of the four gives the part after the edge.
 
     Examples
     --------
@@ -79,7 +79,7 @@ def placed_edges(before: NDArray[np.intp], around: Float, otherwise: Float) -> F
 
 
 def smoothest(edges: Float) -> Float:
-    """Smoothest row of edges that sampled ones allow.
+    """Smoothest row of edges that is consistent with the sampled ones.
 
     Parameters
     ----------
@@ -89,13 +89,13 @@ def smoothest(edges: Float) -> Float:
     Returns
     -------
     ndarray, shape (n_edges,)
-        [samples]; fewer than five edges come back as they are.
+        Positions of the edges [samples]; fewer than five are returned unchanged.
 
     Notes
     -----
     Whittaker's smoother, ``(I + s D'D) t = edges`` with the third differences D: a steady
-    acceleration costs nothing. The stiffness s is the largest that moves no edge by more than half
-    a sample, and what the fit of n edges is uncertain by, ``1 / sqrt(n)`` of a sample.
+    acceleration is not penalised. The stiffness s is the largest that moves no edge by more than
+    half a sample plus the uncertainty of a fit of n edges, ``1 / sqrt(n)`` of a sample.
 
     References
     ----------
@@ -116,7 +116,7 @@ def smoothest(edges: Float) -> Float:
     steady = np.polynomial.polynomial.polyval(
         number, np.polynomial.polynomial.polyfit(number, edges, 2)
     )
-    rest = edges - steady  # a parabola costs nothing, and would cost digits
+    rest = edges - steady  # a parabola is not penalised; removing it saves digits
     low, high = np.log(_SOFTEST), np.log(_STIFFEST)
     best = rest
     for _ in range(_HALVINGS):
@@ -130,7 +130,7 @@ def smoothest(edges: Float) -> Float:
 
 
 def _whittaker(x: Float, stiffness: float) -> Float:
-    """Solution of ``(I + s D'D) t = x``, D the third differences."""
+    """Solution of ``(I + s D'D) t = x``, with D the third differences."""
     n = x.size
     bands = np.zeros((4, n))  # upper form: row 3 - k holds diagonal k
     weights = np.array([-1.0, 3.0, -3.0, 1.0])

@@ -1,8 +1,8 @@
 """Shaft orbits from two displacement probes: filtered orbits, full spectrum, whirl, centreline.
 
-The two probes are read as one complex displacement ``z = x + j y``. The first probe looks at the
-shaft 45 degrees ahead of the x axis and the second one 45 degrees behind it, ahead meaning in the
-direction of rotation: forward precession then turns the way the shaft does.
+The two probes are read as one complex displacement ``z = x + j y``. The first probe is 45 degrees
+ahead of the x axis and the second one 45 degrees behind it, ahead meaning in the direction of
+rotation: forward precession then turns in the direction of the shaft.
 """
 
 import math
@@ -18,12 +18,12 @@ Float = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 PROBE_ANGLES = (math.pi / 4, -math.pi / 4)
-"""Of the first and the second probe, from the x axis in the direction of rotation [rad]."""
+"""Angles of the first and second probe from the x axis, in the direction of rotation [rad]."""
 
 WHIRL_BAND = (0.25, 0.75)
-"""Where oil whirl is looked for [orders]: it turns at a little less than half the speed."""
+"""Band searched for oil whirl [orders]: whirl turns at a little less than half the speed."""
 
-_LEAST_ANGLE = math.radians(5.0)  # between probes: a smaller one multiplies their noise by 11
+_LEAST_ANGLE = math.radians(5.0)  # between probes: a smaller angle multiplies their noise by 11
 
 
 def displacement(
@@ -46,12 +46,12 @@ def displacement(
     Raises
     ------
     ValueError
-        If the probes look along nearly the same line, or their shapes differ.
+        If the probes are nearly parallel, or their shapes differ.
 
     Notes
     -----
-    Solves ``x cos(a_i) + y sin(a_i) = d_i``. Exact for a shaft of large radius compared with its
-    motion; the curvature adds ``|z|^2 / (2 R)``, below 0.1 % in any bearing.
+    Solves ``x cos(a_i) + y sin(a_i) = d_i``. Exact if the radius of the shaft is large compared
+    with its motion; the curvature adds ``|z|^2 / (2 R)``, below 0.1 % in any bearing.
 
     Examples
     --------
@@ -95,9 +95,9 @@ def filtered_orbits(
     orders : array_like, shape (n_orders,)
         Orders [-], > 0.
     slow_roll : tuple of array_like, shape (n_orders,) each, optional
-        Forward and backward vectors of the same orders while the shaft turns so slowly that it
-        does not vibrate (below a tenth of its first critical speed), from this function and the
-        same pulses: the run-out of the surface, taken off.
+        Forward and backward vectors of the same orders, from this function and the same pulses,
+        while the shaft turns so slowly that it does not vibrate (below a tenth of its first
+        critical speed). They are the run-out of the surface, and are subtracted.
 
     Returns
     -------
@@ -107,7 +107,7 @@ def filtered_orbits(
     Raises
     ------
     ValueError
-        As `order.order_amplitudes`, or if `slow_roll` has other orders.
+        As for `order.order_amplitudes`, or if `slow_roll` has other orders.
 
     Notes
     -----
@@ -148,7 +148,7 @@ def orbit_path(forward: complex, backward: complex, angle: ArrayLike) -> Complex
     Parameters
     ----------
     forward, backward : complex
-        From `filtered_orbits` [any unit].
+        Vectors from `filtered_orbits` [any unit].
     angle : array_like, shape (n,)
         Order times shaft angle [rad].
 
@@ -172,7 +172,7 @@ def semi_axes(forward: ArrayLike, backward: ArrayLike) -> tuple[Float, Float]:
     Parameters
     ----------
     forward, backward : array_like
-        Complex, from `filtered_orbits` [any unit].
+        Complex vectors from `filtered_orbits` [any unit].
 
     Returns
     -------
@@ -194,13 +194,13 @@ def inclination(forward: ArrayLike, backward: ArrayLike) -> Float:
     Parameters
     ----------
     forward, backward : array_like
-        Complex, from `filtered_orbits`.
+        Complex vectors from `filtered_orbits`.
 
     Returns
     -------
     ndarray
-        From the x axis in the direction of rotation [rad], in (-pi/2, pi/2]; meaningless for a
-        circle, where one of the vectors is 0.
+        Angle from the x axis in the direction of rotation [rad], in (-pi/2, pi/2]; meaningless for
+        a circle, for which one of the vectors is 0.
 
     Examples
     --------
@@ -211,12 +211,12 @@ def inclination(forward: ArrayLike, backward: ArrayLike) -> Float:
 
 
 def ellipticity(forward: ArrayLike, backward: ArrayLike) -> Float:
-    """Minor over major axis: 1 of a circle, 0 of a line, 0 of a point.
+    """Minor over major axis: 1 for a circle, 0 for a line or a point.
 
     Parameters
     ----------
     forward, backward : array_like
-        Complex, from `filtered_orbits`.
+        Complex vectors from `filtered_orbits`.
 
     Examples
     --------
@@ -233,13 +233,13 @@ def precession(forward: ArrayLike, backward: ArrayLike) -> Float:
     Parameters
     ----------
     forward, backward : array_like
-        Complex, from `filtered_orbits`.
+        Complex vectors from `filtered_orbits`.
 
     Returns
     -------
     ndarray
-        ``(|R+| - |R-|) / (|R+| + |R-|)``: 1 a forward circle, 0 a line (or a point), -1 a
-        backward circle.
+        ``(|R+| - |R-|) / (|R+| + |R-|)``: 1 for a forward circle, 0 for a line (or a point), -1 for
+        a backward circle.
 
     References
     ----------
@@ -256,9 +256,6 @@ def precession(forward: ArrayLike, backward: ArrayLike) -> Float:
     return np.asarray((ahead - behind) / np.where(total > 0, total, 1.0))
 
 
-# --- run-out
-
-
 # --- the whole record
 
 
@@ -270,14 +267,14 @@ def centreline(z: ArrayLike, *, rest: complex = 0.0) -> complex:
     z : array_like, shape (n_samples,)
         ``x + j y`` [any unit].
     rest : complex
-        Where in the bearing the shaft was when the probes read 0 [unit of z], from the middle:
-        ``-1j * radial_clearance`` for a shaft at rest at the bottom, with y up.
+        Position of the shaft, from the middle of the bearing, at which the probes read 0 [unit of
+        z]: ``-1j * radial_clearance`` for a shaft at rest at the bottom, with y up.
 
     Returns
     -------
     complex
-        Its absolute value is the mean eccentricity [unit of z], its argument the attitude, from
-        the x axis in the direction of rotation.
+        Mean position: its absolute value is the mean eccentricity [unit of z], its argument the
+        attitude angle from the x axis in the direction of rotation.
 
     Examples
     --------
@@ -319,10 +316,10 @@ def full_spectrum(z: ArrayLike, fs: float) -> tuple[Float, Complex]:
     Returns
     -------
     frequency : ndarray, shape (n_samples,)
-        Rising [Hz].
+        Frequency, rising [Hz].
     vector : ndarray, shape (n_samples,)
         Two-sided coefficients [unit of z]: ``x = a cos wt, y = b sin wt`` gives
-        ``R+ = (a + b) / 2`` and ``R- = (a - b) / 2`` where w is a line.
+        ``R+ = (a + b) / 2`` and ``R- = (a - b) / 2`` if w is a line.
 
     Raises
     ------
@@ -331,8 +328,8 @@ def full_spectrum(z: ArrayLike, fs: float) -> tuple[Float, Complex]:
 
     Notes
     -----
-    Mean removed, Hann window divided by its mean. A tone between two lines reads up to 15 % low
-    (1.4 dB), as with any Hann window.
+    The mean is removed; the Hann window is divided by its mean. A tone between two lines reads up
+    to 15 % (1.4 dB) low, as with any Hann window.
 
     References
     ----------
@@ -358,7 +355,7 @@ def full_spectrum(z: ArrayLike, fs: float) -> tuple[Float, Complex]:
 
 
 def _hann(n: int) -> Float:
-    """Periodic Hann window; of one sample, one."""
+    """Periodic Hann window; 1 for a single sample."""
     return 0.5 - 0.5 * np.cos(2 * np.pi * np.arange(n) / n) if n > 1 else np.ones(1)
 
 
@@ -376,15 +373,15 @@ def whirl(
     speed_hz : float
         Shaft speed [Hz].
     band : tuple of float
-        Where it is looked for [orders].
+        Band to search [orders].
 
     Returns
     -------
     ratio : float
-        Its frequency over the speed [-]; that of the loudest noise where nothing whirls. 0 of an
-        orbit that stands still.
+        Frequency of the motion over the speed [-]; without whirl, that of the loudest noise; 0 for
+        a constant position.
     radius : float
-        Of its circle [unit of z].
+        Radius of its circle [unit of z].
 
     Raises
     ------
@@ -393,10 +390,10 @@ def whirl(
 
     Notes
     -----
-    Frequency and radius from the ratio of the two largest lines of a Hann window: exact for a
-    steady tone alone (Grandke). The record should hold 20 revolutions, so that the leakage of the
-    synchronous orbit, which falls with the third power of the distance in lines, is below 0.3 % at
-    the edge of the band and below 0.04 % at half the speed.
+    Frequency and radius follow from the ratio of the two largest lines of a Hann window: exact for
+    a single steady tone (Grandke). The record should hold 20 revolutions, so that the leakage of
+    the synchronous orbit, which falls with the third power of the distance in lines, is below 0.3 %
+    at the edge of the band and below 0.04 % at half the speed.
 
     References
     ----------
@@ -424,7 +421,7 @@ def whirl(
         return 0.0, 0.0
     side = 1 if size[(top + 1) % size.size] >= size[top - 1] else -1
     beside = size[(top + side) % size.size] / size[top]
-    shift = (2 * beside - 1) / (1 + beside)  # lines, of a Hann window
+    shift = (2 * beside - 1) / (1 + beside)  # lines, for a Hann window
     shift = min(max(shift, 0.0), 0.5)
     spacing = fs / size.size
     return float(frequency[top] + side * shift * spacing) / speed_hz, float(
@@ -433,14 +430,14 @@ def whirl(
 
 
 def _hann_loss(shift: float) -> float:
-    """What a Hann line reads low `shift` lines off a tone, as the factor that mends it."""
+    """Factor that corrects the reading of a Hann line `shift` lines away from the tone [-]."""
     if shift == 0:
         return 1.0
     return math.pi * shift * (1 - shift**2) / math.sin(math.pi * shift)
 
 
 def keyphasor_marks(z: ArrayLike, fs: float, pulses: ArrayLike) -> Complex:
-    """Where the shaft is at each tacho pulse: the dots on an orbit plot.
+    """Position of the shaft at each tacho pulse: the dots on an orbit plot.
 
     Parameters
     ----------
@@ -454,7 +451,7 @@ def keyphasor_marks(z: ArrayLike, fs: float, pulses: ArrayLike) -> Complex:
     Returns
     -------
     ndarray, shape (n_pulses,)
-        Interpolated linearly [unit of z].
+        Positions, interpolated linearly [unit of z].
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Features that follow the shaft: tacho pulses, phase, orders, and energy over the crank angle."""
+"""Features locked to the shaft: tacho pulses, phase, orders, and energy over the crank angle."""
 
 from itertools import pairwise
 from typing import Any
@@ -16,8 +16,8 @@ from .edges import placed_edges
 Float = NDArray[np.float64]
 
 HYSTERESIS_SHARE = 0.3
-"""Distance of the two switching thresholds from the level, as a share of the way to the nearer
-extreme [-]: 15 % of the swing either side of its middle."""
+"""Distance of the two switching thresholds from the level, as a share of the distance to the nearer
+extreme [-]: 15 % of the swing on either side of its middle."""
 
 INTERVAL_JUMP = 1.8
 """Largest ratio of neighbouring pulse intervals [-]: a missed pulse makes it 2."""
@@ -27,10 +27,11 @@ WINDOW_S = 0.010
 degrees at 5 rev/s, less than one bin of 10 degrees, and has lines 100 Hz apart."""
 
 DEAD_CENTRE_HALF_WIDTH_DEG = 20.0
-"""Half width of the window round a dead centre, and half its length after one [deg]."""
+"""Half width of the window about a dead centre, and half the length of the window after it
+[deg]."""
 
 IMPACT_THRESHOLD = 4.0
-"""Short-time energy that counts as an impact, in medians of it [-]."""
+"""Short-time energy from which a peak counts as an impact, over the median energy [-]."""
 
 _CHUNK_FRAMES = 256
 _CHUNK_SAMPLES = 8192
@@ -61,14 +62,14 @@ def pulse_times(tacho: ArrayLike, fs: float, *, level: float | None = None) -> F
 
     Notes
     -----
-    An edge counts when the signal has gone from 30 % of the way to the nearer extreme below the
-    level to as much above it, so noise smaller than that cannot count twice. Its time is
-    interpolated linearly between the two samples round the level; a step that was averaged over a
-    sample is placed by its area, see `edges.placed_edges`: both exact, both without bias. A
-    sampled logic level has nothing to interpolate: each of its edges lies within a sample, and the
-    smoothest row of edges within those samples is taken, see `edges.smoothest`. An edge already
-    running at the first sample is no edge. The default level trusts the extremes: give `level`
-    where spikes exceed the pulses; every edge is then where the line through two samples meets it.
+    An edge counts if the signal goes from 30 % of the distance to the nearer extreme below the
+    level to the same share above it, so that smaller noise cannot cause double counts. Its time is
+    interpolated linearly between the two samples around the level; a step averaged over a sample is
+    located by its area, see `edges.placed_edges`. Both are exact and unbiased. A sampled logic
+    level has nothing to interpolate: each edge lies within a sample, and the smoothest row of edges
+    within those samples is taken, see `edges.smoothest`. An edge in progress at the first sample
+    does not count. The default level relies on the extremes: give `level` if spikes exceed the
+    pulses; every edge is then located by linear interpolation at that level.
 
     Examples
     --------
@@ -119,7 +120,7 @@ def _edge_samples(volts: Float, level: float, margin: float) -> NDArray[np.intp]
     rise = (state[decided[:-1]] < 0) & (state[decided[1:]] > 0)
     arrived = decided[1:][rise]
     crossings = np.flatnonzero((volts[:-1] < level) & (volts[1:] >= level))
-    # Every arrival has a crossing before it, since it came from below.
+    # Each rise has a crossing before it, since the signal came from below.
     return np.asarray(crossings[np.searchsorted(crossings, arrived) - 1])
 
 
@@ -137,7 +138,7 @@ def shaft_phase(
     fs : float
         Sample rate [Hz].
     pulses_per_revolution : int
-        Pulses in one revolution. Above 1, phase zero is whichever pulse came first.
+        Pulses in one revolution. Above 1, phase zero is at the first pulse of the record.
 
     Returns
     -------
@@ -147,14 +148,14 @@ def shaft_phase(
     Raises
     ------
     ValueError
-        If there are fewer than two pulses, they do not increase, neighbouring intervals differ by
-        a factor of 1.8 or more, or the record goes on for 1.8 intervals without a pulse.
+        If there are fewer than two pulses, they do not increase, neighbouring intervals differ by a
+        factor of 1.8 or more, or the record has no pulse for 1.8 intervals at one end.
 
     Notes
     -----
-    Monotone cubic (PCHIP) through the pulses, and at the end slopes outside them. Speed may drift
-    from one revolution to the next; speed ripple inside a revolution is invisible to one pulse a
-    revolution and stays in the signal as frequency modulation.
+    Monotone cubic (PCHIP) through the pulses, with the end slopes beyond them. The speed may drift
+    from one revolution to the next; one pulse per revolution does not show speed ripple within a
+    revolution, which stays in the signal as frequency modulation.
 
     References
     ----------
@@ -166,7 +167,7 @@ def shaft_phase(
     >>> shaft_phase([0.1, 0.3], n_samples=5, fs=10.0).round(6).tolist()
     [-0.5, 0.0, 0.5, 1.0, 1.5]
     """
-    from scipy.interpolate import PchipInterpolator  # a third of a second: not at every start
+    from scipy.interpolate import PchipInterpolator  # import takes a third of a second
 
     check_rate(fs)
     times = np.asarray(pulses, dtype=np.float64)
@@ -200,7 +201,7 @@ def check_pulses(times: Float, n_samples: int, fs: float, per_revolution: int) -
     Raises
     ------
     ValueError
-        As `shaft_phase`.
+        As for `shaft_phase`.
 
     Examples
     --------
@@ -240,7 +241,7 @@ def _check_regular(times: Float, intervals: Float, duration: float) -> None:
 
 
 def revolution_weights(phase: ArrayLike) -> Float:
-    """Phase that each sample stands for, cut off after the last whole revolution.
+    """Phase increment of each sample, cut off after the last whole revolution.
 
     Parameters
     ----------
@@ -250,8 +251,8 @@ def revolution_weights(phase: ArrayLike) -> Float:
     Returns
     -------
     ndarray, shape (n_samples,)
-        Weights [rev] that sum to the whole number of revolutions in the record, zero after them;
-        the sample in which the last revolution ends has the part that belongs to it.
+        Weights [rev] that sum to the number of whole revolutions in the record, zero after them;
+        the sample in which the last revolution ends has its share.
 
     Raises
     ------
@@ -269,7 +270,7 @@ def revolution_weights(phase: ArrayLike) -> Float:
     inner = (turns[1:] + turns[:-1]) / 2
     ends = 2 * turns[[0, -1]] - inner[[0, -1]]
     cells = np.concatenate((ends[:1], inner, ends[1:])) - ends[0]
-    # Rounding of the pulse times must not cost the last revolution.
+    # Rounding of the pulse times must not lose the last revolution.
     whole = np.floor(cells[-1] + 1e-9)
     if whole < 1:
         raise ValueError(
@@ -301,14 +302,14 @@ def order_amplitudes(x: ArrayLike, phase: ArrayLike, orders: ArrayLike) -> NDArr
     Raises
     ------
     ValueError
-        If an order is not > 0 or passes half the sample rate, the lengths differ, or the record
-        is shorter than one revolution.
+        If an order is not > 0 or exceeds half the sample rate, the lengths differ, or the record is
+        shorter than one revolution.
 
     Notes
     -----
-    Integrating over phase, not time, keeps whole orders orthogonal while the speed changes. A
-    neighbour of amplitude B at a distance d [orders] leaks at most ``2 B / (pi d R)``, and nothing
-    where d is a whole number. Amplitudes that change over the record are averaged.
+    Integration over phase, not time, keeps whole orders orthogonal while the speed changes. A
+    neighbour of amplitude B at a distance d [orders] leaks at most ``2 B / (pi d R)``, and not at
+    all if d is a whole number. Amplitudes that change over the record are averaged.
 
     References
     ----------
@@ -345,7 +346,7 @@ def _check_orders(orders: Float, phase: Float) -> None:
 
 
 def _project(signal: Real, phase: Float, weights: Float, orders: Float) -> NDArray[Any]:
-    """Weighted sum of the signal against every order, a cache-sized piece at a time."""
+    """Weighted sum of the signal times the wave of each order, in cache-sized pieces."""
     rows = signal.reshape(-1, signal.shape[-1])
     total = np.zeros((rows.shape[0], orders.size), dtype=np.complex128)
     for start in range(0, phase.size, _CHUNK_SAMPLES):
@@ -390,12 +391,12 @@ def default_window(fs: float) -> tuple[int, int]:
     Returns
     -------
     nperseg, hop : int
-        The power of two nearest to 10 ms, at least 16, and a quarter of it [samples].
+        Power of two nearest to 10 ms, at least 16, and a quarter of it [samples].
 
     Notes
     -----
-    Squared Hann windows a quarter of their length apart add up to a constant, so the mean of the
-    short-time energies is the mean square of the signal.
+    Squared Hann windows a quarter of their length apart add up to a constant, so that the mean of
+    the short-time energies is the mean square of the signal.
 
     Examples
     --------
@@ -429,7 +430,7 @@ def short_time_energy(x: ArrayLike, fs: float, *, edges: ArrayLike, nperseg: int
     Raises
     ------
     ValueError
-        Unless 8 <= nperseg <= n_samples and 1 <= hop <= nperseg / 3, or as `line_weights`.
+        Unless 8 <= nperseg <= n_samples and 1 <= hop <= nperseg / 3, or as for `line_weights`.
 
     Examples
     --------
@@ -445,7 +446,7 @@ def short_time_energy(x: ArrayLike, fs: float, *, edges: ArrayLike, nperseg: int
     window = hann(nperseg)
     taper = window.astype(signal.dtype)
     scaled = one_sided_scale(window)[:, np.newaxis] * line_weights(nperseg, fs, edges)
-    # Real and imaginary parts lie side by side: two equal rows of weights add their squares.
+    # Real and imaginary parts are adjacent: two equal rows of weights add their squares.
     weights = np.repeat(scaled, 2, axis=0).astype(signal.dtype)
     rows = signal.reshape(-1, signal.shape[-1])
     frames = np.lib.stride_tricks.sliding_window_view(rows, nperseg, axis=-1)[:, ::hop]
@@ -525,8 +526,8 @@ def mean_over_angle(energy: ArrayLike, boundaries: ArrayLike, *, angle_bins: int
 
     Notes
     -----
-    Each frame's energy is taken as constant between its boundaries and divided between the bins
-    it touches in proportion to the time spent there. So no bin is ever empty, at any speed.
+    Each frame's energy is taken as constant between its boundaries and divided among the bins it
+    touches in proportion to the time spent there, so that no bin is empty at any speed.
 
     Examples
     --------
@@ -551,12 +552,12 @@ def mean_over_angle(energy: ArrayLike, boundaries: ArrayLike, *, angle_bins: int
 
 
 def _whole_bins(position: Float, angle_bins: int) -> tuple[int, int]:
-    """First bin edge in the record and the whole revolutions from there."""
+    """First bin edge in the record and the number of whole revolutions from there."""
     if angle_bins < 1:
         raise ValueError(f"angle_bins = {angle_bins} must be >= 1; 36 makes bins of 10 degrees")
     if not np.all(np.diff(position) > 0):
         raise ValueError("phase at the frame boundaries must increase; check the tacho")
-    # Rounding of the pulse times must not cost a bin at either end.
+    # Rounding of the pulse times must not lose a bin at either end.
     first = int(np.ceil(position[0] - 1e-6))
     revolutions = int((position[-1] + 1e-6 - first) // angle_bins)
     if revolutions < 1:
@@ -603,14 +604,14 @@ def crank_angle_map(
     Raises
     ------
     ValueError
-        As `short_time_energy` and `mean_over_angle`.
+        As for `short_time_energy` and `mean_over_angle`.
 
     Notes
     -----
-    A frame belongs to the angle at its centre, so an impact shows in the bin where it happens,
-    spread by the window: half of its energy within ±1 ms at the default, 1.8 degrees at
-    5 rev/s. The default resolves bins of 10 degrees up to about 7 rev/s; above, shorten
-    `nperseg`, widen the lines, or accept neighbouring bins that look alike.
+    A frame belongs to the angle at its centre, so that an impact appears in the bin where it
+    happens, spread by the window: half of its energy within ±1 ms at the default, 1.8 degrees at 5
+    rev/s. The default resolves bins of 10 degrees up to about 7 rev/s; above, shorten `nperseg`,
+    widen the lines, or accept that neighbouring bins look alike.
 
     References
     ----------
@@ -647,8 +648,8 @@ def angle_harmonics(profile: ArrayLike, *, n_harmonics: int = 3) -> Float:
     Returns
     -------
     ndarray, shape (..., n_harmonics, 2)
-        Cosine and sine coefficients of the level [dB], angles taken at the bin centres: a level
-        of ``c cos(k angle) + s sin(k angle)`` gives (c, s) at k. A gain leaves them unchanged.
+        Cosine and sine coefficients of the level [dB], with angles at the bin centres: a level of
+        ``c cos(k angle) + s sin(k angle)`` gives (c, s) at k. A gain does not change them.
 
     Raises
     ------
@@ -676,14 +677,14 @@ def angle_harmonics(profile: ArrayLike, *, n_harmonics: int = 3) -> Float:
 
 
 def angle_window_level(profile: ArrayLike, start_deg: float, stop_deg: float) -> Float:
-    """Mean energy within a window of the shaft angle, against the whole revolution.
+    """Mean energy within a window of the shaft angle, relative to the whole revolution.
 
     Parameters
     ----------
     profile : array_like, shape (..., angle_bins)
         Mean energy per bin [(unit of x)^2].
     start_deg, stop_deg : float
-        Window [deg after the pulse], from -360 on; it may pass through 0 or 360. Bins cut by its
+        Window [deg after the pulse], from -360 on; it may extend across 0 or 360. Bins cut by its
         ends count in part.
 
     Returns
@@ -716,7 +717,7 @@ def angle_window_level(profile: ArrayLike, start_deg: float, stop_deg: float) ->
 
 
 def dead_centre_levels(profile: ArrayLike) -> Float:
-    """Energy round and after both dead centres, against the whole revolution.
+    """Energy about and after both dead centres, relative to the whole revolution.
 
     Parameters
     ----------
@@ -726,14 +727,14 @@ def dead_centre_levels(profile: ArrayLike) -> Float:
     Returns
     -------
     ndarray, shape (..., 2, 2)
-        Levels [dB re the mean over the revolution], first index: dead centre at 0 and at
-        180 degrees; second: within 20 degrees either side of it, within 40 degrees after it.
+        Levels [dB re the mean over the revolution], first index: dead centre at 0 and at 180
+        degrees; second: within 20 degrees on either side of it, within 40 degrees after it.
 
     Notes
     -----
     A worn crank or wrist pin knocks where the force in the rod changes sign, at or after a dead
-    centre. Assumes that the pulse marks a dead centre; otherwise the two windows are simply two
-    fixed places.
+    centre. This assumes that the pulse marks a dead centre; otherwise the two windows are just two
+    fixed positions.
 
     Examples
     --------
@@ -753,7 +754,7 @@ def dead_centre_levels(profile: ArrayLike) -> Float:
 
 
 def angle_kurtosis(profile: ArrayLike) -> Float:
-    """How unevenly the energy is spread over the revolution.
+    """Unevenness of the energy over the revolution.
 
     Parameters
     ----------
@@ -763,8 +764,8 @@ def angle_kurtosis(profile: ArrayLike) -> Float:
     Returns
     -------
     ndarray, shape (...)
-        Pearson kurtosis of the bins [-]: near 1 for two equal halves, near angle_bins for a
-        single knock; 0 where every bin is equal.
+        Pearson kurtosis of the bins [-]: near 1 for two equal halves, near angle_bins for a single
+        knock; 0 if all bins are equal.
 
     Examples
     --------
@@ -777,7 +778,7 @@ def angle_kurtosis(profile: ArrayLike) -> Float:
 def impacts_per_revolution(
     energy: ArrayLike, boundaries: ArrayLike, *, threshold: float = IMPACT_THRESHOLD
 ) -> Float:
-    """Count of peaks of the short-time energy that stand out from its median.
+    """Number of peaks of the short-time energy that stand out from its median.
 
     Parameters
     ----------
@@ -786,7 +787,7 @@ def impacts_per_revolution(
     boundaries : array_like, shape (n_frames + 1,)
         Phase at the frame boundaries [rev].
     threshold : float
-        Least peak, in medians [-].
+        Smallest peak, in medians [-].
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Knocks of another machine in the recording of one: at a rate that its own turn does not have."""
+"""Knocks of another machine in a recording: at a rate that the own rotation does not have."""
 
 import math
 from collections.abc import Sequence
@@ -14,51 +14,51 @@ from ..signal.spectrum import hann
 Float = NDArray[np.float64]
 
 RATIOS: Final = (0.55, 1.85)
-"""Rates that are looked for, over the shaft's own [-]."""
+"""Range of the search, as multiples of the shaft's own rate [-]."""
 
 HARMONICS: Final = 14
-"""Multiples of a rate that knocks are looked for at."""
+"""Number of multiples of a rate that are searched for knocks."""
 
-_BLOCK_S = 0.0025  # of one level: a knock is a few of them long
-_BINS = 48  # of a turn
-_SMOOTHED = 5  # bins, of the scatter in a turn
+_BLOCK_S = 0.0025  # one level each; a knock lasts a few of them
+_BINS = 48  # per turn
+_SMOOTHED = 5  # bins, for the scatter within a turn
 _LEAST_SCATTER = 0.02  # nepers^2: noise in a block of 64 samples has 0.04
 _FEWEST_TURNS = 6.0
 _PADDING = 4
-_STEPS = 2  # of the rate, to a line at the highest multiple
-_OWN_LINES = 1.6  # lines about a multiple of the own rate: it belongs to that
-_BESIDE = 0.03  # of the own rate: the same speed cannot be told
+_STEPS = 2  # per line width at the highest multiple, in the search over rates
+_OWN_LINES = 1.6  # lines this near to a multiple of the own rate belong to it
+_BESIDE = 0.03  # of the own rate: nearer rates cannot be distinguished from it
 _SIMPLE_REACH = 0.006
-_SIMPLE = sorted({n / m for m in range(1, 6) for n in range(1, 10)})  # loose pins turn in them
-_BACKGROUND_ORDERS = 4.0  # to either side, whose mean is the background
-_LOUDEST = 6.0  # medians, that a line may add to the background
-_NOISE = 0.6  # mean of log(1 + power over background) of noise
-_LEAST_SHARE = 0.35  # of the multiples must be free of the own ones
+_SIMPLE = sorted({n / m for m in range(1, 6) for n in range(1, 10)})  # ratios of loose pins
+_BACKGROUND_ORDERS = 4.0  # on either side; their mean is the background
+_LOUDEST = 6.0  # medians, the most that a line adds to the background
+_NOISE = 0.6  # mean of log(1 + power over background) for noise
+_LEAST_SHARE = 0.35  # of the multiples must be clear of the own ones
 _SILENCE = 1e-30
 
 
 class OtherRate(NamedTuple):
-    """Rate of knocks that the own turn does not explain.
+    """Rate of knocks that the machine's own rotation does not explain.
 
     Attributes
     ----------
     rate_hz : float
-        [Hz]
+        Rate [Hz].
     evidence : float
-        Mean over its multiples of ``log(1 + power over background)``, less that of noise, times
-        the root of their number [-].
+        Mean over the multiples of the rate of ``log(1 + power over background)``, less that of
+        noise, times the root of their number [-].
     """
 
     rate_hz: float
     evidence: float
 
 
-UNHEARD: Final = OtherRate(0.0, 0.0)
-"""Of a recording too short to tell."""
+NO_OTHER_RATE: Final = OtherRate(0.0, 0.0)
+"""Result for a recording that is too short."""
 
 
 def other_rate(x: Sequence[ArrayLike], fs: float, marks: ArrayLike) -> OtherRate:
-    """Likeliest rate of another machine's knocks.
+    """Most likely rate of another machine's knocks.
 
     Parameters
     ----------
@@ -67,26 +67,26 @@ def other_rate(x: Sequence[ArrayLike], fs: float, marks: ArrayLike) -> OtherRate
     fs : float
         Sample rate [Hz].
     marks : array_like, shape (n_turns + 1,)
-        When each turn of the own shaft begins [s], increasing.
+        Start of each turn of the own shaft [s], increasing.
 
     Returns
     -------
     OtherRate
-        Between 0.55 and 1.85 times the own; :data:`UNHEARD` of less than six turns.
+        Rate between 0.55 and 1.85 times the own; :data:`NO_OTHER_RATE` for less than six turns.
 
     Raises
     ------
     ValueError
-        The rate is not positive.
+        If the rate is not positive.
 
     Notes
     -----
-    The level of the second difference, in nepers, in blocks of 2.5 ms, which turns knocks of any
-    strength into the same few nepers. From each channel's the mean at every angle of the own turn
-    is taken, and the rest divided by its scatter there: where the own machine is quiet, another is
-    heard. In the spectrum of their sum, knocks stand at the multiples of their rate. Left out are
-    what is beside the own multiples, rates within 3 % of the own, and its simple ratios (2/3, 3/2,
-    up to fifths), in which a loose joint moves by itself.
+    The level of the second difference is taken in blocks of 2.5 ms in nepers, so that knocks of any
+    strength count with the same few nepers. The mean at every angle of the own turn is subtracted
+    for each channel, and the rest divided by its scatter there, which emphasises the angles at
+    which the own machine is quiet. In the spectrum of the sum of the channels, knocks appear at the
+    multiples of their rate. Left out are lines next to the own multiples, rates within 3 % of the
+    own, and its simple ratios (2/3, 3/2, up to fifths), at which a loose joint moves by itself.
 
     Examples
     --------
@@ -108,7 +108,7 @@ def other_rate(x: Sequence[ArrayLike], fs: float, marks: ArrayLike) -> OtherRate
     n_blocks = (signals[0].size - 2) // block
     centres = ((np.arange(n_blocks) + 0.5) * block + 1) / fs
     if begins.size < _FEWEST_TURNS + 1:
-        return UNHEARD
+        return NO_OTHER_RATE
     inside = (centres >= begins[0]) & (centres <= begins[-1])
     turn = np.interp(centres[inside], begins, np.arange(begins.size)) % 1
     rest = sum(
@@ -120,7 +120,7 @@ def other_rate(x: Sequence[ArrayLike], fs: float, marks: ArrayLike) -> OtherRate
 
 
 def _levels(row: NDArray[np.floating], block: int) -> Float:
-    """Of the second difference [Np of power, shape=(n_blocks,)]."""
+    """Level of the second difference [Np of power, shape=(n_blocks,)]."""
     bent = row[2:] - 2 * row[1:-1] + row[:-2]
     blocks = bent[: bent.size // block * block].reshape(-1, block)
     power = np.einsum("ij,ij->i", blocks, blocks) / block
@@ -128,7 +128,7 @@ def _levels(row: NDArray[np.floating], block: int) -> Float:
 
 
 def _unexplained(levels: Float, turn: Float) -> Float:
-    """Without the mean at each angle, over the scatter there."""
+    """Levels less their mean at each angle, over the scatter there."""
     cell = np.minimum((turn * _BINS).astype(np.intp), _BINS - 1)
     count = np.maximum(np.bincount(cell, minlength=_BINS), 1)
     rest = levels - (np.bincount(cell, levels, minlength=_BINS) / count)[cell]
@@ -142,7 +142,7 @@ def _unexplained(levels: Float, turn: Float) -> Float:
 def _likeliest(rest: Float, rate: float, own: float) -> OtherRate:
     lasts = rest.size / rate
     if lasts * own < _FEWEST_TURNS:
-        return UNHEARD
+        return NO_OTHER_RATE
     length = fast_length(_PADDING * rest.size)
     power = np.abs(rfft(np.pad(rest * hann(rest.size), (0, length - rest.size)))) ** 2
     step = rate / length
@@ -152,8 +152,8 @@ def _likeliest(rest: Float, rate: float, own: float) -> OtherRate:
     rates = _rates(own, 1 / (_STEPS * HARMONICS * lasts))
     place = np.rint(np.outer(rates / step, np.arange(1, HARMONICS + 1))).astype(np.intp)
     place = np.minimum(place, power.size - 1)
-    free[-1] = False  # where those beyond the highest line are looked up
-    sums = (free * (found + 1j))[place].sum(axis=1)  # one look-up for both
+    free[-1] = False  # multiples beyond the highest line refer to it
+    sums = (free * (found + 1j))[place].sum(axis=1)  # sum and count in one look-up
     counted = np.maximum(sums.imag, _LEAST_SHARE * HARMONICS)
     evidence = (sums.real - _NOISE * sums.imag) / np.sqrt(counted)
     best = int(np.argmax(evidence))
@@ -161,7 +161,7 @@ def _likeliest(rest: Float, rate: float, own: float) -> OtherRate:
 
 
 def _background(power: Float, lines_an_order: float) -> Float:
-    """Mean of the lines around each, strong ones cut down."""
+    """Mean of the lines around each, with strong lines capped."""
     middle = float(np.median(power[: math.ceil(25 * lines_an_order)]))
     capped = np.append(0.0, np.cumsum(np.minimum(power, _LOUDEST * middle)))
     reach = math.ceil(_BACKGROUND_ORDERS * lines_an_order)
@@ -171,7 +171,7 @@ def _background(power: Float, lines_an_order: float) -> Float:
 
 
 def _rates(own: float, step: float) -> Float:
-    """Rates that are tried [Hz]."""
+    """Trial rates [Hz]."""
     ratios = np.arange(RATIOS[0], RATIOS[1], step / own)
     above = np.searchsorted(_SIMPLE, ratios)
     simple = np.array(_SIMPLE)

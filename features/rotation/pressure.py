@@ -1,10 +1,10 @@
-"""What a pressure over the crank angle tells of a cylinder: its two levels, and when it turns.
+"""Cylinder pressure over the crank angle: its two levels, and the times of its transitions.
 
-The two levels are told from the pressure itself, so the mark need not be at a dead centre; the
-angles count from the mark, which a tacho sets at the top dead centre, where the piston turns from
-discharge to suction. A connecting line or a slow transmitter delays both transitions alike, by
-``speed * 360 deg`` times its delay (first order: its time constant; second order:
-``zeta / (pi f)``), and widens them: no pressure tells its own lag.
+The two levels are determined from the pressure itself, so that the mark need not be at a dead
+centre; the angles count from the mark, which a tacho sets at the top dead centre, where the piston
+turns from discharge to suction. A connecting line or a slow transmitter delays both transitions
+alike, by ``speed * 360 deg`` times its delay (first order: its time constant; second order: ``zeta
+/ (pi f)``), and widens them: this lag cannot be determined from the pressure.
 """
 
 from typing import NamedTuple
@@ -17,31 +17,32 @@ from ..signal.statistics import Real
 Float = NDArray[np.float64]
 
 CELLS = 720
-"""Most cells of a mean revolution [-]: half a degree, where the record has a sample for each."""
+"""Largest number of cells in a mean revolution [-]: half a degree each, if the record has as many
+samples."""
 
 LEAST_CELLS = 36
-"""Fewest samples in a revolution of which transitions are told [-]: ten degrees each."""
+"""Fewest samples per revolution for transitions [-]: ten degrees each."""
 
-_LOW, _HIGH = 0.1, 0.9  # of a transition: what a rise time is told between, IEC 60469
-_LEFT, _REACHED = 0.25, 0.75  # of the change: where a level is left for good, the other reached
-_INNER = 0.25  # of a level's stretch left out at either end: what follows a transition rings there
+_LOW, _HIGH = 0.1, 0.9  # of a transition: between them the rise time is measured, IEC 60469
+_LEFT, _REACHED = 0.25, 0.75  # of the change: a level counts as left, the other as reached
+_INNER = 0.25  # of a level's stretch, left out at either end, where the pressure still rings
 _TURN = 360.0  # deg
 
 
 class Transitions(NamedTuple):
-    """Levels of a mean revolution and what lies between them.
+    """Levels of a mean revolution and the transitions between them.
 
     Attributes
     ----------
     suction, discharge : float
-        Medians of the inner halves of the lower and of the upper stretch [unit of x].
+        Medians of the inner halves of the lower and the upper stretch [unit of x].
     suction_ripple, discharge_ripple : float
-        rms about them there, of what repeats every revolution [unit of x].
+        Rms about them there, of the part that repeats every revolution [unit of x].
     rise, fall : float
-        Angle at which half of the change is done, after the bottom dead centre, which is half a
-        turn from the mark, and after the mark [deg], from -180 to 180.
+        Angles at which half of the change is completed, after the bottom dead centre (half a turn
+        from the mark) and after the mark [deg], from -180 to 180.
     rise_width, fall_width : float
-        From a tenth to nine tenths of the change [deg].
+        Angle from a tenth to nine tenths of the change [deg].
     """
 
     suction: float
@@ -60,15 +61,15 @@ def mean_revolution(x: Real, phase: Float) -> Float:
     Parameters
     ----------
     x : ndarray, shape (n_samples,)
-        [any unit], with its mean.
+        Signal [any unit], with its mean.
     phase : ndarray, shape (n_samples,)
         Shaft phase, increasing [rev].
 
     Returns
     -------
     ndarray, shape (n_cells,)
-        Cell k is centred on the angle ``k / n_cells`` [unit of x]. There are :data:`CELLS`, or as
-        many as a revolution has samples.
+        Values; cell k is centred on the angle ``k / n_cells`` [unit of x]. There are :data:`CELLS`,
+        or as many as a revolution has samples.
 
     Raises
     ------
@@ -77,8 +78,7 @@ def mean_revolution(x: Real, phase: Float) -> Float:
 
     Notes
     -----
-    White noise falls by the root of the samples in a cell. Cells that no sample fell into are
-    interpolated.
+    White noise falls by the root of the samples in a cell. Cells without a sample are interpolated.
 
     Examples
     --------
@@ -112,15 +112,15 @@ def transitions(cycle: Float) -> Transitions:
     Returns
     -------
     Transitions
-        All angles 0 where the pressure does not change.
+        Levels and transitions; all angles are 0 if the pressure does not change.
 
     Notes
     -----
-    A level holds until three quarters of the change to the other are done, so that a line that
-    rings does not count as another rise (down to a damping ratio of 0.05). Levels and stretches
-    are told by turns until they agree. A transition that is a straight ramp of width W shows
-    ``0.8 W``, a cubic with level ends ``0.608 W``; one as narrow as a cell or two shows wider, by
-    half a cell.
+    A level lasts until three quarters of the change to the other are completed, so that ringing of
+    the line does not count as another rise (down to a damping ratio of 0.05). Levels and stretches
+    are determined alternately until they agree. A transition that is a straight ramp of width W
+    reads ``0.8 W``, a cubic with level ends ``0.608 W``; one only a cell or two wide reads half a
+    cell too much.
 
     Examples
     --------
@@ -131,7 +131,7 @@ def transitions(cycle: Float) -> Transitions:
     [1.0, 3.0, 0.0, 0.0, 15.0, 8.0, 13.0, 8.0]
     """
     low, high = (float(value) for value in np.percentile(cycle, (10, 90)))
-    for _ in range(3):  # the second time the medians stand
+    for _ in range(3):  # the medians are final after the second pass
         if not high > low:
             return Transitions(low, low, *(6 * (0.0,)))
         start, length = _longest(_discharging((cycle - low) / (high - low)))
@@ -154,14 +154,14 @@ def transitions(cycle: Float) -> Transitions:
 
 
 def _discharging(share: Float) -> NDArray[np.bool_]:
-    """Which cells are on the upper level, by the last level that was reached before each."""
-    told = np.flatnonzero((share < _LEFT) | (share > _REACHED))
-    last = told[np.searchsorted(told, np.arange(share.size), side="right") - 1]
+    """Whether each cell is on the upper level, by the last level reached before it."""
+    decided = np.flatnonzero((share < _LEFT) | (share > _REACHED))
+    last = decided[np.searchsorted(decided, np.arange(share.size), side="right") - 1]
     return np.asarray(share[last] > _REACHED)
 
 
 def _longest(above: NDArray[np.bool_]) -> tuple[int, int]:
-    """First cell and number of cells of the longest stretch, which may run over the end."""
+    """First cell and number of cells of the longest stretch, which may wrap around the end."""
     first = int(np.flatnonzero(~above)[0])
     turned = np.append(np.roll(above, -first), False)
     change = np.diff(turned.astype(np.int8))
@@ -171,13 +171,13 @@ def _longest(above: NDArray[np.bool_]) -> tuple[int, int]:
 
 
 def _inner(cycle: Float, start: int, length: int) -> Float:
-    """Middle of a stretch."""
+    """Inner part of a stretch."""
     cut = int(_INNER * length)
     return np.asarray(np.take(cycle, np.arange(start + cut, start + length - cut), mode="wrap"))
 
 
 def _edge(rising: Float, reached: int) -> tuple[float, float]:
-    """Half of a rise [deg] and its width [deg], by the cell in which the upper level is reached."""
+    """Middle and width of a rise [deg], from the cell in which the upper level is reached."""
     reach = rising.size // 4
     around = np.take(rising, np.arange(reached - reach, reached + reach), mode="wrap")
     half = _last_below(around[: reach + 1], 0.5)
@@ -189,7 +189,7 @@ def _edge(rising: Float, reached: int) -> tuple[float, float]:
 
 
 def _last_below(rising: Float, level: float) -> float:
-    """Where a rise passes a level for the last time, between cells; its first cell if never."""
+    """Position at which a rise passes a level last, between cells; 0 if never."""
     below = np.flatnonzero(rising[:-1] <= level)
     if not below.size:
         return 0.0
@@ -199,5 +199,5 @@ def _last_below(rising: Float, level: float) -> float:
 
 
 def _centred(angle: float) -> float:
-    """The same angle from -180 to 180 [deg]."""
+    """The same angle, within -180 to 180 [deg]."""
     return (angle + _TURN / 2) % _TURN - _TURN / 2

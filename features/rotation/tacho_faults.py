@@ -1,4 +1,4 @@
-"""Faults of tacho pulses: missing, extra, jittery, or of a shaft that stops; mended on demand."""
+"""Faults of tacho pulses: missing, extra, jittery, or at a standstill; repair on request."""
 
 from dataclasses import dataclass
 
@@ -12,37 +12,37 @@ from .order import INTERVAL_JUMP
 Float = NDArray[np.float64]
 
 LARGEST_FAULTY_SHARE = 0.1
-"""More wrong pulses than this share of all [-] are not mended: the level is wrong."""
+"""Largest share of wrong pulses that is repaired [-]: with more, the trigger level is wrong."""
 
 LONGEST_GAP = 4
-"""Longest gap that is mended, in intervals [-]: three pulses in a row."""
+"""Longest gap that is repaired, in intervals [-]: three pulses in a row."""
 
 STANDSTILL_GROWTH = 1.15
-"""Neighbouring intervals grow by more than this towards a standstill [-]. At a constant
-deceleration a the last interval before it is 1.3 times the one before; at a tenth of that
-deceleration nothing stops."""
+"""Growth of neighbouring intervals that marks a standstill [-]. At a constant deceleration the last
+interval before a standstill is 1.3 times the one before; at a tenth of that deceleration the shaft
+does not stop."""
 
 _NEIGHBOURS = 9  # intervals: their median survives two extra pulses, or four missing
-_GAP_ROUNDING = 0.2  # of a gap's length: a half-integer number of intervals is no whole one
+_GAP_ROUNDING = 0.2  # of a gap's length: a half-integer number of intervals is rejected
 
 
 @dataclass(frozen=True, kw_only=True)
 class PulseFaults:
-    """What is wrong with a row of tacho pulses.
+    """Faults in a row of tacho pulses.
 
     Parameters
     ----------
     missing : ndarray, shape (n_missing,)
         Times at which a pulse is missing [s].
     extra : ndarray, shape (n_extra,)
-        Times of the pulses that are too many [s].
+        Times of the surplus pulses [s].
     standstills : ndarray, shape (n_standstills,)
-        Times round which the shaft stopped, and perhaps reversed [s].
+        Times around which the shaft stopped, and possibly reversed [s].
     unclear : ndarray, shape (n_unclear,)
-        Times of gaps that no whole number of missing pulses explains, or more than three [s].
+        Times of gaps that do not fit a whole number of missing pulses, or of more than three [s].
     jitter_rev : float
-        Standard deviation of the pulses about a smoothly changing speed [rev]; 0 where fewer than
-        four pulses are left to judge by.
+        Standard deviation of the pulses about a smoothly changing speed [rev]; 0 if fewer than four
+        pulses are left to determine it.
 
     Examples
     --------
@@ -74,7 +74,7 @@ class PulseFaults:
 
     @property
     def count(self) -> int:
-        """All but the jitter."""
+        """Number of faults apart from the jitter."""
         return sum(t.size for t in (self.missing, self.extra, self.standstills, self.unclear))
 
 
@@ -84,7 +84,7 @@ def _some(times: Float) -> str:
 
 
 def pulse_faults(pulses: ArrayLike, *, pulses_per_revolution: int = 1) -> PulseFaults:
-    """Find missing and extra pulses, standstills and jitter; nothing is changed.
+    """Find missing and extra pulses, standstills and jitter, without changing anything.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def pulse_faults(pulses: ArrayLike, *, pulses_per_revolution: int = 1) -> PulseF
     Returns
     -------
     PulseFaults
-        All that was found.
+        All faults found.
 
     Raises
     ------
@@ -105,12 +105,13 @@ def pulse_faults(pulses: ArrayLike, *, pulses_per_revolution: int = 1) -> PulseF
 
     Notes
     -----
-    An interval is compared with the median of the nine round it. One shorter than 1 / 1.8 of it
-    has an extra pulse at the end whose removal leaves the more regular interval; one longer than
-    1.8 times is a gap of as many pulses as fit, or a standstill where the intervals grow towards
-    it and shrink after it. One tacho sees no direction: a shaft that reverses looks like one that
-    stops. Jitter is the third difference of the times, which a steady acceleration leaves at 0,
-    over the root of 20; order k loses ``(2 pi k jitter)^2 / 2`` of its amplitude by it.
+    An interval is compared with the median of the nine around it. If it is shorter than 1 / 1.8 of
+    the median, the end whose removal leaves the more regular interval is an extra pulse. If it is
+    longer than 1.8 times, it is a gap of as many pulses as fit, or a standstill if the intervals
+    grow towards it and shrink after it. One tacho does not show the direction: a shaft that
+    reverses looks like one that stops. Jitter is the third difference of the times, which is 0 for
+    a steady acceleration, over the root of 20; it lowers the amplitude of order k by the share ``(2
+    pi k jitter)^2 / 2``.
 
     Examples
     --------
@@ -122,7 +123,7 @@ def pulse_faults(pulses: ArrayLike, *, pulses_per_revolution: int = 1) -> PulseF
 
 
 def mend_pulses(pulses: ArrayLike, *, pulses_per_revolution: int = 1) -> tuple[Float, PulseFaults]:
-    """Leave extra pulses out and put missing ones in.
+    """Remove extra pulses and insert missing ones.
 
     Parameters
     ----------
@@ -134,15 +135,15 @@ def mend_pulses(pulses: ArrayLike, *, pulses_per_revolution: int = 1) -> tuple[F
     Returns
     -------
     mended : ndarray, shape (n_mended,)
-        Pulse times [s]; those put in lie on a cubic spline through the others.
+        Pulse times [s]; inserted ones lie on a cubic spline through the others.
     faults : PulseFaults
-        What was found, hence changed.
+        Faults found, and repaired.
 
     Raises
     ------
     ValueError
-        As `pulse_faults`; or if the shaft stands still, a gap is unclear, or more than a tenth of
-        the pulses (and more than one) is wrong: nothing is guessed there.
+        As for `pulse_faults`; or if the shaft stands still, a gap is unclear, or more than a tenth
+        of the pulses (and more than one) is wrong: such faults are not repaired.
 
     Examples
     --------
@@ -175,7 +176,7 @@ def mend_pulses(pulses: ArrayLike, *, pulses_per_revolution: int = 1) -> tuple[F
 
 
 def _examine(pulses: ArrayLike, per_revolution: int) -> tuple[Float, PulseFaults]:
-    """Pulses that are not extra, and every fault."""
+    """Pulses that are not extra, and all faults."""
     times = np.asarray(pulses, dtype=np.float64)
     _check_times(times, per_revolution)
     kept = _without_extra(times)
@@ -206,14 +207,14 @@ def _check_times(times: Float, per_revolution: int) -> None:
 
 
 def _usual(intervals: Float) -> Float:
-    """Median of the intervals round each [s]."""
+    """Median of the intervals around each [s]."""
     return np.asarray(median_filter(intervals, size=_NEIGHBOURS, mode="reflect"))
 
 
 def _without_extra(times: Float) -> Float:
-    """Pulses without those too many, the worst first, as long as one is found."""
+    """Pulses without the extra ones, removed one at a time, the worst first."""
     kept = times
-    # More than these would change the usual interval itself.
+    # Removing more would change the usual interval itself.
     for _ in range(times.size // 4):
         intervals = np.diff(kept)
         usual = _usual(intervals)
@@ -225,10 +226,10 @@ def _without_extra(times: Float) -> Float:
 
 
 def _extra_of(intervals: Float, short: int, usual: float) -> int:
-    """Which of the two pulses round a short interval is too many."""
+    """Which of the two pulses around a short interval is the extra one."""
 
     def irregularity(neighbour: int) -> float:
-        # At an end of the row there is no interval to make regular.
+        # At an end of the row there is no neighbouring interval to compare.
         inside = 0 <= neighbour < intervals.size
         merged = intervals[short] + (intervals[neighbour] if inside else 0.0)
         return abs(float(np.log(merged / usual))) if inside else float(np.log(INTERVAL_JUMP) / 2)
@@ -247,7 +248,7 @@ def _is_standstill(intervals: Float, gap: int) -> bool:
 
 
 def _missing(kept: Float, steps: Float) -> Float:
-    """Times of the pulses that the steps leave out."""
+    """Times of the pulses missing between the steps."""
     numbers = np.concatenate(([0.0], np.cumsum(steps)))
     absent = np.setdiff1d(np.arange(numbers[-1]), numbers)
     return np.asarray(CubicSpline(numbers, kept)(absent))
@@ -256,7 +257,7 @@ def _missing(kept: Float, steps: Float) -> Float:
 def _jitter(kept: Float, steps: Float) -> float:
     """Scatter of the pulses about a smooth speed, in intervals."""
     third = np.diff(kept, 3)
-    whole = np.convolve(steps == 1, np.ones(3), "valid") == 3  # no gap among the three intervals
+    whole = np.convolve(steps == 1, np.ones(3), "valid") == 3  # no gap within the three intervals
     if not whole.any():
         return 0.0
     relative = third[whole] / np.convolve(np.diff(kept), np.ones(3) / 3, "valid")[whole]

@@ -16,27 +16,27 @@ from ..signal.spectrum import hann
 Float = NDArray[np.float64]
 
 FEWEST_REVOLUTIONS = 4
-"""Revolutions of the slowest speed in a frame [-]: below, harmonics run into each other."""
+"""Fewest revolutions of the slowest speed in a frame [-]: with fewer, harmonics overlap."""
 
 USUAL_REVOLUTIONS = (16, 32)
-"""Revolutions of the slowest speed in a frame where the record is long enough [-]."""
+"""Revolutions of the slowest speed in a frame if the record is long enough [-]."""
 
 LEAST_EVIDENCE = 3.1
-"""By which the best speed must beat every other, and silence [nepers of power a frame]: two
-harmonics 15 dB above the noise, or four that half the speed would leave without company."""
+"""Smallest lead of the best speed over every other, and over silence [nepers of power per frame]:
+two harmonics 15 dB above the noise, or four whose odd neighbours half the speed would miss."""
 
 HIT_RATIO = 6.0
-"""Power of a line over the noise beside it that is evidence neither way [-]; noise alone exceeds
-it once in 400 lines."""
+"""Ratio of a line's power to the adjacent noise that counts neither for nor against a speed [-];
+noise alone exceeds it once in 400 lines."""
 
 _PADDING = 2  # spectral lines per resolved line
-_LARGEST_HIT, _LARGEST_MISS = 3.0, 1.0  # nepers: no single line may decide, nor any gap forbid
+_LARGEST_HIT, _LARGEST_MISS = 3.0, 1.0  # nepers, so that no single line or gap decides
 _QUARTILE = 0.28768  # of exponentially distributed noise, over its mean: ln(4 / 3)
-_STEPS_A_LINE = 2  # of the speed grid, at the highest harmonic
-_HANN_SCATTER = 0.62  # resolved lines, of a tone at a power ratio of 1: calibrated by simulation
-_BESIDE = 0.02  # nearer speeds are the same one [-]
-_OVERLAP = 4  # frames begun in the length of one
-_LARGEST_DISAGREEMENT = 0.15  # resolved lines, of a harmonic beyond its noise: changing speed
+_STEPS_A_LINE = 2  # of the speed grid, per line at the highest harmonic
+_HANN_SCATTER = 0.62  # resolved lines, for a tone at a power ratio of 1: calibrated by simulation
+_BESIDE = 0.02  # speeds nearer than this count as the same [-]
+_OVERLAP = 4  # frames begun within the length of one
+_LARGEST_DISAGREEMENT = 0.15  # resolved lines beyond the noise of a harmonic: changing speed
 _LEAKAGE_REACH = 10  # resolved lines
 _LEAST_SHARE = 1e-6  # of the strongest line, whose side lobes are 58 dB down at that reach
 
@@ -52,13 +52,13 @@ class SpeedEstimate:
     speed_hz : ndarray, shape (n_frames,)
         Mean speed within each frame [rev/s].
     deviation_hz : ndarray, shape (n_frames,)
-        Standard deviation of each [rev/s].
+        Standard deviation of the speed in each frame [rev/s].
     mean_hz, low_hz, high_hz : float
         Mean over the frames, and the interval that holds the mean speed of the record [rev/s].
     margin : float
-        By which the best speed beats the next one [nepers of power a frame].
+        Lead of the best speed over the next one [nepers of power per frame].
     rival_hz : float
-        The next best speed [rev/s]; NaN where the band holds no other.
+        Next best speed [rev/s]; NaN if the band holds no other.
     n_harmonics : float
         Harmonics used, mean over the frames [-].
 
@@ -98,22 +98,24 @@ def tacholess_speed(
     Parameters
     ----------
     x : array_like, shape (n_samples,)
-        Vibration, for instance a velocity, which favours low harmonics [any unit]. Not the envelope
-        of a faulty bearing: its own frequency and the sidebands make families of their own.
+        Vibration, preferably a velocity, which emphasises low harmonics [any unit]. Not the
+        envelope signal of a faulty bearing, whose fault frequency and sidebands form families of
+        harmonics, too.
     fs : float
         Sample rate [Hz].
     band_hz : tuple of float
-        Where the speed is looked for [rev/s]. Without an octave in it, two harmonics are enough.
+        Band to search for the speed [rev/s]. If it spans less than an octave, two harmonics are
+        enough.
     n_harmonics : int
-        Harmonics of the upper end of the band that are looked at; lower speeds have more.
+        Harmonics considered at the upper end of the band; lower speeds have more.
     frame_s : float, optional
-        Length of a frame [s]; by default 16 to 32 revolutions of the lower end of the band, a
-        quarter of the record between them; half the record at the most. Shorten it where the speed
-        changes fast.
+        Length of a frame [s]; by default a quarter of the record, but at least 16 and at most 32
+        revolutions of the lower end of the band; never more than half the record. Shorten it if the
+        speed changes fast.
     largest_rate : float
         Largest relative change of the speed [1/s].
     confidence : float
-        Of the interval [-], in (0, 1).
+        Probability of the interval [-], in (0, 1).
 
     Returns
     -------
@@ -123,28 +125,28 @@ def tacholess_speed(
     Raises
     ------
     ValueError
-        If an argument is out of range or the record too short (all at once); if no harmonic
-        stands out of the noise; if another speed explains the spectrum nearly as well (then the
-        message names both); if the harmonics do not agree, or are lost in a frame.
+        If an argument is out of range or the record too short (all at once); if no harmonic stands
+        out of the noise; if another speed explains the spectrum nearly as well (the message names
+        both); if the harmonics do not agree, or are lost in a frame.
 
     Notes
     -----
-    Every line of a frame's Hann spectrum is divided by the noise round it (its lower quartile) or
-    the side lobes of stronger lines beside it, whichever is more. A speed scores the logarithms of
-    the lines at its harmonics over a ratio of 6, each cut to -1 … 3, summed up to the harmonic
-    where the sum is largest. So half the true speed loses 1 for every odd multiple that is not
-    there, and twice the speed all lines it leaves out. The path of the largest sum through all
-    frames, changing no faster than `largest_rate`, is the speed; it must beat every other by 3.1
-    per frame, which takes two harmonics. Then the peaks of the harmonics must lie where the others
-    put them, and those that do in most frames must begin at 1 or 2 and not all be multiples of one
-    number: 118 and 236 Hz make no 23.6 rev/s.
+    Every line of a frame's Hann spectrum is divided by the noise around it (its lower quartile) or
+    by the side lobes of stronger adjacent lines, whichever is more. The score of a speed is the sum
+    of the logarithms of the lines at its harmonics over a ratio of 6, each limited to -1 … 3, up to
+    the harmonic at which the sum is largest. Half the true speed thus loses 1 for every missing odd
+    multiple, and twice the speed loses all lines it leaves out. The speed is the path of largest
+    sum through all frames that changes no faster than `largest_rate`; it must lead every other by
+    3.1 per frame, which takes two harmonics. The peaks of the harmonics must also agree on one
+    speed, and those that do in most frames must start at 1 or 2 and must not all be multiples of
+    one number: 118 and 236 Hz are not accepted as 23.6 rev/s.
 
-    Within a frame, each harmonic k gives its own estimate from the ratios of three Hann lines
-    (Grandke), with a deviation of ``0.62 / (k T sqrt(ratio))`` (T: length of the frame). They are
-    averaged by weight; where they disagree more than that, the deviation grows by the Birge ratio.
-    The interval of the mean adds the scatter of the frames about a straight line. It is one of a
-    steady or slowly changing speed; harmonics of another machine at nearly the same speed, or a
-    ripple at whole multiples of the speed, are not in it.
+    Within a frame, each harmonic k gives an estimate from the ratios of three Hann lines (Grandke),
+    with a standard deviation of ``0.62 / (k T sqrt(ratio))`` (T: length of the frame). They are
+    averaged by weight; if they disagree more than that, the deviation is multiplied by the Birge
+    ratio. The interval of the mean adds the scatter of the frames about a straight line. It holds
+    for a steady or slowly changing speed; it does not include harmonics of another machine at
+    nearly the same speed, or a ripple at whole multiples of the speed.
 
     References
     ----------
@@ -194,7 +196,7 @@ def tacholess_speed(
 
 
 def _frame_length(x: Float, fs: float, band: tuple[float, float], frame_s: float | None) -> int:
-    """Samples in a frame; 0 where the arguments make none."""
+    """Samples in a frame; 0 if the arguments allow none."""
     if not (fs > 0 and band[0] > 0):
         return 0
     duration = x.shape[-1] / fs
@@ -239,7 +241,7 @@ def _check_speed_request(
 def _whitened_frames(
     x: Float, length: int, fs: float, highest_speed: float, top: float
 ) -> tuple[Float, Float, NDArray[np.intp]]:
-    """Power of each line, and over the noise there [shape=(n_frames, n_lines)]; frames' starts."""
+    """Power of each line, its ratio to the noise [shape=(n_frames, n_lines)], and frame starts."""
     hop = max(1, length // _OVERLAP)
     starts = np.arange(0, x.size - length + 1, hop)
     line = fs / (length * _PADDING)
@@ -252,7 +254,7 @@ def _whitened_frames(
         padded[:length] = (frame - frame.mean()) * window
         power[k] = np.abs(rfft(padded)[:lines]) ** 2
     width = 2 * math.ceil(1.5 * highest_speed / line) + 1
-    # Row by row: scipy has a quick way for one dimension only.
+    # Row by row: scipy is fast for one dimension only.
     quartiles = [percentile_filter(row, 25, size=width, mode="mirror") for row in power]
     noise = np.asarray(quartiles) / _QUARTILE
     np.maximum(noise, _leakage(power), out=noise)
@@ -260,10 +262,10 @@ def _whitened_frames(
 
 
 def _leakage(power: Float) -> Float:
-    """Largest power that other lines can have left in each [shape=(n_frames, n_lines)]."""
+    """Largest power that other lines can leak into each [shape=(n_frames, n_lines)]."""
     apart = np.arange(-_LEAKAGE_REACH * _PADDING, _LEAKAGE_REACH * _PADDING + 1) / _PADDING
     far = np.maximum(np.abs(apart), 2.0)
-    # Envelope of the side lobes of a Hann window, and twice that where tones meet.
+    # Envelope of the side lobes of a Hann window, doubled where tones overlap.
     lobes = np.where(np.abs(apart) >= 2, 2 / (np.pi * far * (far**2 - 1)), 1e-30) ** 2
     level = np.log(np.maximum(power, np.finfo(float).tiny))
     near = np.exp(grey_dilation(level, structure=np.log(lobes)[np.newaxis], mode="mirror"))
@@ -279,7 +281,7 @@ def _speed_grid(band: tuple[float, float], top_lines: float) -> Float:
 def _scores(ratio: Float, line: float, grid: Float, top: float) -> Float:
     """Evidence for every speed in every frame [nepers, shape=(n_frames, n_speeds)]."""
     logarithm = np.log(np.maximum(ratio, 1e-12) / HIT_RATIO)
-    # The last term only breaks ties between speeds on the flanks of the same strong lines.
+    # The last term only decides between equal speeds on the flanks of the same strong lines.
     lines = np.clip(logarithm, -_LARGEST_MISS, _LARGEST_HIT) + 0.005 * np.maximum(logarithm, 0)
     running = np.zeros((ratio.shape[0], grid.size))
     best = np.zeros_like(running)
@@ -292,14 +294,14 @@ def _scores(ratio: Float, line: float, grid: Float, top: float) -> Float:
 
 
 def _best_path(score: Float, reach: int) -> tuple[NDArray[np.intp], float]:
-    """Speeds (grid numbers) of the largest sum, a frame changing by `reach` steps at the most.
+    """Speeds (grid numbers) of largest sum that change by at most `reach` steps per frame.
 
     Returns
     -------
     path : ndarray, shape (n_frames,)
         Grid numbers.
     total : float
-        Its mean score.
+        Mean score of the path.
     """
     totals = np.array(score)
     for before, total in pairwise(totals):
@@ -309,7 +311,7 @@ def _best_path(score: Float, reach: int) -> tuple[NDArray[np.intp], float]:
     for k in range(len(score) - 1, 0, -1):
         start = max(path[k] - reach, 0)
         within = totals[k - 1, start : path[k] + reach + 1]
-        # Among equals the nearest one: the speed stays where it is.
+        # Among equals take the nearest: the speed does not change without need.
         equal = start + np.flatnonzero(within == within.max())
         path[k - 1] = equal[np.argmin(np.abs(equal - path[k]))]
     return path, float(totals[-1].max()) / len(score)
@@ -318,7 +320,7 @@ def _best_path(score: Float, reach: int) -> tuple[NDArray[np.intp], float]:
 def _best_rival(
     score: Float, grid: Float, path: NDArray[np.intp], reach: int, resolution: float
 ) -> tuple[float, float]:
-    """Mean score of the best path that is nowhere near the given one, and its mean speed."""
+    """Mean score and mean speed of the best path that stays clear of the given one."""
     found = grid[path][:, np.newaxis]
     beside = np.maximum(_BESIDE, 2 * resolution / found)
     away = np.where(np.abs(np.log(grid / found)) > beside, score, -np.inf)
@@ -345,13 +347,13 @@ def _check_evidence(total: float, rival: float, path_hz: Float, rival_hz: float)
         )
 
 
-# --- to a fraction of a line
+# --- refinement to a fraction of a line
 
 
 def _refined(
     power: Float, ratio: Float, line: float, coarse: Float, top: float, times: Float
 ) -> tuple[Float, Float, Float]:
-    """Speed, its deviation [rev/s] and the harmonics used, in every frame."""
+    """Speed, its standard deviation [rev/s] and the harmonics used, in every frame."""
     results = [
         _refined_frame(*frame, line, top) for frame in zip(power, ratio, coarse, strict=True)
     ]
@@ -367,7 +369,7 @@ def _refined(
 
 
 def _check_numbers(numbers: list[NDArray[np.intp]], coarse: Float) -> None:
-    """Harmonics clear in half of the frames: a low one, and not all multiples of one number."""
+    """Refuse harmonics without a low one, or with a common divisor, in half of the frames."""
     found, counts = np.unique(np.concatenate(numbers), return_counts=True)
     usual = found[counts >= len(numbers) / 2]
     if usual.size == 0 or usual[0] > 2 or np.gcd.reduce(usual) > 1:
@@ -381,7 +383,7 @@ def _check_numbers(numbers: list[NDArray[np.intp]], coarse: Float) -> None:
 def _refined_frame(
     power: Float, ratio: Float, coarse: float, line: float, top: float
 ) -> tuple[float, float, NDArray[np.intp]]:
-    """Speed, deviation [rev/s] and numbers of the harmonics that agree on it."""
+    """Speed, standard deviation [rev/s] and numbers of the harmonics that agree on it."""
     numbers = np.arange(1, int(top / coarse) + 1)
     speed, used = coarse, np.ones(numbers.size, dtype=bool)
     for _ in range(4):  # low harmonics first: each pass brings higher ones within reach
@@ -403,9 +405,9 @@ def _refined_frame(
 
 
 def _own_estimates(power: Float, ratio: Float, expected: Float) -> tuple[Float, Float]:
-    """Place [lines] and ratio of the peak within a resolved line of each expected place.
+    """Position [lines] and ratio of the peak within a resolved line of each expected position.
 
-    A peak at the rim of its search has ratio 0.
+    A peak at the edge of its search range has the ratio 0.
     """
     around = np.arange(-_PADDING, _PADDING + 1)
     rim = 2 * _PADDING
@@ -413,7 +415,7 @@ def _own_estimates(power: Float, ratio: Float, expected: Float) -> tuple[Float, 
     near = power[middle[:, np.newaxis] + around]
     at = np.argmax(near, axis=1)
     peak = middle + around[at]
-    # Amplitudes a resolved line either side over the peak's: each tells the shift of a tone alone.
+    # Amplitudes one resolved line to either side over the peak's: each gives the shift of a tone.
     beside = power[np.stack((peak - _PADDING, peak + _PADDING))]
     alpha = np.sqrt(beside / np.maximum(power[peak], np.finfo(float).tiny))
     below, above = (2 * alpha - 1) / (1 + alpha)
@@ -424,12 +426,12 @@ def _own_estimates(power: Float, ratio: Float, expected: Float) -> tuple[Float, 
 def _mean_interval(
     speed: Float, deviation: Float, used: Float, independent: float, confidence: float
 ) -> tuple[float, float]:
-    """Mean over the frames, and half the interval round it."""
+    """Mean over the frames, and half width of its interval."""
     noise = float(np.mean(deviation**2))
     drift = max(_scatter(speed) - noise, 0.0)
-    # Errors of neighbouring frames cancel in part, since their phases join: the variance of noise
-    # falls with the third power of the length, of which the second is taken. Drift between frames
-    # falls with the first, and the ends of the record count less than its middle.
+    # Errors of neighbouring frames partly cancel, since their phases are continuous: the variance
+    # of noise falls with the third power of the length, of which the second is taken. Drift between
+    # frames falls with the first, and the ends of the record count less than its middle.
     variance = noise / independent**2 + drift / max(independent / 2, 1.0)
     freedom = max(min(2 * independent - 2, float(used.sum()) / _OVERLAP - 1), 1.0)
     quantile = float(stdtrit(freedom, (1 + confidence) / 2))
@@ -444,6 +446,3 @@ def _scatter(speed: Float) -> float:
     slope = float(frame @ speed) / float(frame @ frame)
     bent = speed - speed.mean() - slope * frame
     return float(bent @ bent) / (speed.size - 2)
-
-
-# --- back to a phase

@@ -1,4 +1,4 @@
 """One channel at a time: transforms, spectra, statistics, cepstrum, envelope, severity.
 
-It may import nothing of the house.
+Imports nothing else of the package.
 """

@@ -12,7 +12,7 @@ from .spectrum import hann, line_frequencies, power_lines
 Float = NDArray[np.float64]
 
 DEEPEST_LINE = 1e-12
-"""Smallest line, over the largest, that the logarithm sees [-]: -120 dB."""
+"""Smallest line, over the largest, that enters the logarithm [-]: -120 dB."""
 
 
 def cepstrum_of_lines(lines: ArrayLike, fs: float) -> tuple[Float, Float]:
@@ -65,7 +65,7 @@ def cepstrum_of_lines(lines: ArrayLike, fs: float) -> tuple[Float, Float]:
 
 
 def _logarithm(lines: ArrayLike) -> Float:
-    """``ln sqrt P`` with line 0 replaced and a floor; 0 of a spectrum without power."""
+    """``ln sqrt P`` with line 0 replaced and a floor; 0 for a spectrum without power."""
     power = np.array(lines, dtype=np.float64)
     if power.ndim == 0 or power.shape[-1] < 3:
         raise ValueError(f"lines of shape {power.shape} must be three or more; give a spectrum")
@@ -74,7 +74,8 @@ def _logarithm(lines: ArrayLike) -> Float:
     power[..., 0] = power[..., 1]
     largest = power.max(axis=-1, keepdims=True)
     relative = power / np.where(largest > 0, largest, 1)
-    # The gain is added apart, so that the depth of the floor goes with it.
+    # The gain is added separately, so that the floor stays at the same depth below the largest
+    # line.
     gain = np.log(np.where(largest > 0, largest, 1)) / 2
     logarithm = np.log(np.maximum(relative, DEEPEST_LINE)) / 2 + gain
     return np.where(largest > 0, logarithm, 0.0)
@@ -90,25 +91,25 @@ def cepstrum(x: ArrayLike, fs: float, *, nperseg: int | None = None) -> tuple[Fl
     fs : float
         Sample rate [Hz].
     nperseg : int, optional
-        Segment length [samples]; see `default_nperseg`. It must hold several periods of what is
+        Segment length [samples]; see `default_nperseg`. It must hold several periods of the spacing
         sought.
 
     Returns
     -------
     quefrency : ndarray, shape (nperseg // 2 + 1,)
-        [s].
+        Quefrency [s].
     cepstrum : ndarray, shape (..., nperseg // 2 + 1)
-        [-]; 0 for a constant signal, by convention.
+        Real cepstrum [-]; 0 for a constant signal, by convention.
 
     Raises
     ------
     ValueError
-        As `power_lines` and `cepstrum_of_lines`.
+        As for `power_lines` and `cepstrum_of_lines`.
 
     Notes
     -----
-    See `cepstrum_of_lines`. An echo later than a small part of the segment reads low, since
-    Hann's window has moved on: by about the window's own correlation at that lag.
+    See `cepstrum_of_lines`. An echo later than a small part of the segment reads low, by about the
+    autocorrelation of Hann's window at that lag.
 
     Examples
     --------
@@ -140,11 +141,11 @@ def harmonic_spacing(
     fs : float
         Sample rate [Hz].
     low, high : float
-        Least and greatest spacing [Hz]. Below ``high = 2 low`` a family cannot be taken for
-        every second line of another.
+        Smallest and largest spacing [Hz]. With ``high`` below ``2 low``, a family cannot be
+        mistaken for every second line of another.
     band : tuple of float, optional
-        Where the family lies [Hz]; the whole spectrum by default. A few sidebands about a carrier
-        want a band of their own.
+        Band that holds the family [Hz]; the whole spectrum by default. A few sidebands about a
+        carrier need a narrow band around them.
     nperseg : int, optional
         Segment length [samples]; by default eight periods of `low` or more, if the record is
         long enough.
@@ -152,10 +153,10 @@ def harmonic_spacing(
     Returns
     -------
     spacing : ndarray, shape (...)
-        [Hz]; 0 where nothing moves.
+        Spacing [Hz]; 0 for a constant signal.
     height : ndarray, shape (...)
-        Height of its peak over the median of the envelope between, in robust standard deviations
-        of it [-]; noise alone reaches 3, one time in a hundred 5.
+        Height of the peak above the median of the envelope, in robust standard deviations of the
+        envelope [-]; noise alone reaches 3, one time in a hundred 5.
 
     Raises
     ------
@@ -165,12 +166,13 @@ def harmonic_spacing(
 
     Notes
     -----
-    The inverse transform of the logarithm between the edges of the band, less its mean and tapered,
-    in absolute value: the envelope of the real cepstrum. Sidebands about a carrier that is no
-    multiple of their spacing leave in the cepstrum itself a ripple of the carrier's period, whose
-    crest lies beside their own. The highest line between the quefrencies 1 / high and 1 / low is
-    taken, with a parabola through it and its neighbours: for a family that fills the spectrum,
-    within half a sample of the period, that is ``spacing / (2 fs)`` of the spacing.
+    The logarithm between the edges of the band, less its mean and tapered, is transformed back; its
+    absolute value is the envelope of the real cepstrum. The cepstrum itself is not used: sidebands
+    about a carrier that is no multiple of their spacing leave a ripple in it with the carrier's
+    period, whose crest is next to their own peak. The highest line between the quefrencies 1 / high
+    and 1 / low is refined with a parabola through its neighbours. For a family that fills the
+    spectrum, the period is right within half a sample, the spacing within the share ``spacing / (2
+    fs)``.
 
     References
     ----------

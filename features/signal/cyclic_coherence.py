@@ -1,4 +1,4 @@
-"""Cyclic coherence: carriers whose power comes and goes at a cycle's rate."""
+"""Cyclic coherence: carriers whose power varies at a cyclic frequency."""
 
 import math
 from typing import Any
@@ -17,7 +17,8 @@ Float = NDArray[np.float64]
 Complex = NDArray[np.complexfloating[Any, Any]]
 
 OVERLAP = 4
-"""Hann frames over every sample [-]: fewer alias the cyclic frequency with the frame rate."""
+"""Number of Hann frames that cover each sample [-]: fewer alias the cyclic frequency with the frame
+rate."""
 
 
 def cyclic_coherence(
@@ -28,13 +29,13 @@ def cyclic_coherence(
     Parameters
     ----------
     x : array_like, shape (n_samples,)
-        Signal [any unit]; its mean is removed. Resampled over the shaft angle, `fs` counts samples
-        a revolution, and both frequencies below are orders.
+        Signal [any unit]; its mean is removed. For a signal resampled over the shaft angle, `fs` is
+        samples per revolution, and both frequencies below are orders.
     fs : float
         Sample rate [Hz].
     cyclic_hz : array_like, shape (n_cyclic,)
-        Cyclic frequencies alpha [Hz], > 0 and < fs / 2. They are resolved to ``fs / n_samples``:
-        search round a bearing's frequency in steps of that.
+        Cyclic frequencies alpha [Hz], > 0 and < fs / 2. The resolution is ``fs / n_samples``:
+        search around a bearing's frequency in steps of that.
     nperseg : int
         Length of the Hann frames, three quarters overlapping [samples].
 
@@ -43,23 +44,23 @@ def cyclic_coherence(
     frequency : ndarray, shape (nperseg // 2 + 1,)
         Spectral frequency f [Hz].
     coherence : ndarray, shape (n_cyclic, nperseg // 2 + 1)
-        ``|<X(f) X*(f - alpha)>|^2 / (<|X(f)|^2> <|X(f - alpha)|^2>)``, between 0 and 1 [-]; 0 of
+        ``|<X(f) X*(f - alpha)>|^2 / (<|X(f)|^2> <|X(f - alpha)|^2>)``, between 0 and 1 [-]; 0 for
         silence. Its mean over f is the enhanced envelope spectrum at alpha.
 
     Raises
     ------
     ValueError
-        As `checked_signal`, if `x` is no single row, `nperseg` is no multiple of 4 from
-        16 up to a third of the record, a cyclic frequency leaves its bounds, or the record
-        holds no whole period of it.
+        As for `checked_signal`, or if `x` is not one row, `nperseg` is not a multiple of 4 from 16
+        up to a third of the record, a cyclic frequency is out of bounds, or the record is shorter
+        than one period of it.
 
     Notes
     -----
     Averaged cyclic periodogram. Compare with `coherence_threshold`: noise has about one over the
-    number of independent frames. Stationary tones a cyclic frequency apart are coherent too, and
-    one tone with its own mirror image at twice its frequency: take the orders of the shaft out
-    first. Narrower lines (a longer `nperseg`) than the cyclic frequency resolve the sidebands of a
-    modulated tone; wider ones suit blows.
+    number of independent frames. Two stationary tones that differ by the cyclic frequency are
+    coherent too, and so is a tone with its own mirror image, at twice its frequency: remove the
+    orders of the shaft first. Lines narrower than the cyclic frequency (a longer `nperseg`) resolve
+    the sidebands of a modulated tone; wider ones suit impacts.
 
     References
     ----------
@@ -68,7 +69,7 @@ def cyclic_coherence(
 
     Examples
     --------
-    Noise whose power swings 40 times a second, and not 50 times:
+    Noise whose power varies 40 times a second, and not 50 times:
 
     >>> t = np.arange(32_768) / 8192
     >>> x = np.random.default_rng(0).standard_normal(t.size) * (1 + np.cos(2 * np.pi * 40 * t))
@@ -83,7 +84,7 @@ def cyclic_coherence(
     rms = math.sqrt(float(np.mean(np.square(signal, dtype=np.float64)))) or 1.0
     window = hann(nperseg) / rms
     hop = nperseg // OVERLAP
-    # The shift by alpha inside a frame is one window for all frames; their places add a factor.
+    # The shift by alpha within a frame is one window for all frames; their positions add a factor.
     turning = window * np.exp(2j * np.pi / fs * np.outer(cycles, np.arange(nperseg)))
     frames = sliding_window_view(signal, nperseg)[::hop]
     power, shifted, cross = _sums(frames, window, turning, cycles * (hop / fs))
@@ -101,7 +102,7 @@ def _sums(
 ) -> tuple[Float, Float, NDArray[np.complex128]]:
     """Sums over the frames of |X(f)|^2, |X(f - alpha)|^2 and X(f) X*(f - alpha).
 
-    `drift` is what each cyclic frequency turns from frame to frame [rev, shape=(n_cyclic,)].
+    `drift` is the phase that each cyclic frequency gains per frame [rev, shape=(n_cyclic,)].
     """
     n_lines = window.size // 2 + 1
     power, shifted = np.zeros(n_lines), np.zeros((drift.size, n_lines))
@@ -133,24 +134,24 @@ def coherence_threshold(n_samples: int, *, nperseg: int = 256, probability: floa
     nperseg : int
         Length of the frames, as in `cyclic_coherence` [samples].
     probability : float
-        Of a false alarm at one line and one cyclic frequency [-]; divide by their number for the
-        largest of many.
+        Probability of a false alarm at one line and one cyclic frequency [-]; for the largest of
+        many, divide it by their number.
 
     Returns
     -------
     float
-        ``1 - probability**(1 / (n - 1))`` of n independent frames [-].
+        ``1 - probability**(1 / (n - 1))`` for n independent frames [-].
 
     Raises
     ------
     ValueError
-        If `nperseg` is as `cyclic_coherence` refuses it, or unless 0 < probability < 1.
+        If `nperseg` is not valid for `cyclic_coherence`, or unless 0 < probability < 1.
 
     Notes
     -----
-    The squared coherence of n independent pairs of complex Gaussian numbers. The K frames that
-    overlap by three quarters count as ``n = K / (1 + 2 sum_j (1 - j / K) r_j^2)``, with r_j the
-    correlation of the window with itself j frames on; a Hann window gives K / 1.92.
+    Distribution of the squared coherence of n independent pairs of complex Gaussian numbers. K
+    frames that overlap by three quarters count as ``n = K / (1 + 2 sum_j (1 - j / K) r_j^2)``, with
+    r_j the correlation of the window with itself shifted by j frames; a Hann window gives K / 1.92.
 
     References
     ----------
@@ -179,7 +180,7 @@ def coherence_threshold(n_samples: int, *, nperseg: int = 256, probability: floa
 def _check_frames(shape: tuple[int, ...], nperseg: int) -> None:
     if len(shape) != 1:
         raise ValueError(f"x has shape {shape}, must be (n_samples,); give one channel")
-    most = shape[0] // 3  # 8 frames and more
+    most = shape[0] // 3  # 8 frames or more
     if nperseg % OVERLAP or not 16 <= nperseg <= most:
         raise ValueError(
             f"nperseg = {nperseg} samples must be a multiple of {OVERLAP}, >= 16 and <= {most}, a "

@@ -1,8 +1,8 @@
 """Envelope of a signal, its spectrum, and the lines of rolling bearings in it.
 
-A local defect strikes once a passage and rings a resonance. The band round that resonance, shifted
-down to zero frequency, is slow enough to read the rate of the blows from; the kurtogram
-(:mod:`.signal.kurtogram`) finds it.
+A local defect causes one impact per passage and rings a resonance. The band round that resonance,
+shifted down to zero frequency, is slow enough to read the impact rate from; the kurtogram
+(:mod:`.signal.kurtogram`) finds the band.
 """
 
 import math
@@ -24,35 +24,36 @@ Band = tuple[float, float]
 Kind = Literal["squared", "plain", "log"]
 
 FEWEST_LINES = 8
-"""Spectral lines a band must hold to have an envelope worth a spectrum [-]."""
+"""Fewest spectral lines that a band needs for an envelope spectrum [-]."""
 
 LOG_FLOOR = 1e-3
-"""Smallest squared envelope the logarithm tells apart, in medians [-]: of a stationary band, 0.07 %
-of the samples lie lower."""
+"""Floor of the squared envelope under the logarithm, in medians [-]: 0.07 % of the samples of a
+stationary band lie below it."""
 
 SLIP = 0.02
-"""How far a bearing's lines lie from the geometry's, as a share [-]: rollers slide 1 to 2 %."""
+"""Relative deviation of a bearing's lines from the frequencies of its geometry [-]: rollers slide 1
+to 2 %."""
 
 NEIGHBOURHOOD = 0.3
 """Half width of the surroundings a fault line is compared with, in fault frequencies [-]."""
 
 LARGEST_SPREAD = 0.15
-"""Largest slip times harmonics [-]: half the surroundings are left to compare with."""
+"""Largest slip times harmonics [-]: leaves half the surroundings for comparison."""
 
 SHOWN_ORDERS = 20.5
-"""Orders of the shaft that an envelope spectrum shows without a bearing [-]."""
+"""Orders of the shaft shown in an envelope spectrum if no bearing is known [-]."""
 
 SHOWN_HARMONICS = 3.5
-"""Harmonics of the inner race that it shows with one [-]."""
+"""Harmonics of the inner race shown if the bearing is known [-]."""
 
 SHOWN_HZ = 500.0
-"""What it shows where the speed is unknown [Hz]."""
+"""Width of the envelope spectrum shown if the speed is unknown [Hz]."""
 
-_FEWEST_NEIGHBOURS = 8  # lines; the median of fewer is no background
+_FEWEST_NEIGHBOURS = 8  # lines; the median of fewer is not a reliable background
 
 
 def checked_signal(x: ArrayLike, fs: float, *, least: int = 2 * FEWEST_LINES) -> Real:
-    """Zero-mean signal of finite samples, or a sentence that says what is wrong with it.
+    """Signal minus its mean, after a check of its samples, length and rate.
 
     Parameters
     ----------
@@ -71,7 +72,7 @@ def checked_signal(x: ArrayLike, fs: float, *, least: int = 2 * FEWEST_LINES) ->
     Raises
     ------
     ValueError
-        If a sample is not finite, there are too few, or `fs` is not believed.
+        If a sample is not finite, there are too few samples, or `fs` is not plausible.
 
     Examples
     --------
@@ -97,7 +98,7 @@ def checked_signal(x: ArrayLike, fs: float, *, least: int = 2 * FEWEST_LINES) ->
 
 
 def baseband(x: ArrayLike, fs: float, band: Band | None = None) -> tuple[Complex, float]:
-    """Analytic signal of a band, shifted down to zero frequency, at a rate that suits the band.
+    """Analytic signal of a band, shifted to zero frequency and decimated to suit the bandwidth.
 
     Parameters
     ----------
@@ -120,14 +121,14 @@ def baseband(x: ArrayLike, fs: float, band: Band | None = None) -> tuple[Complex
     Raises
     ------
     ValueError
-        As `checked_signal`, or if the band leaves 0 … fs / 2, has no width, or holds fewer than
+        As for `checked_signal`, or if the band leaves 0 … fs / 2, has no width, or holds fewer than
         8 lines of ``fs / n_samples``.
 
     Notes
     -----
     The lines of one Fourier transform inside the band (both edges included), transformed back. The
-    edges are sharp: a blow rings for about two over the width. The record counts as periodic: a
-    step between its ends shows as a blow there, which a window on the envelope takes away.
+    edges are sharp: an impact rings for about 2 / bandwidth. The record is treated as periodic: a
+    step between its ends appears there as an impact, which a window on the envelope removes.
 
     Examples
     --------
@@ -142,19 +143,19 @@ def baseband(x: ArrayLike, fs: float, band: Band | None = None) -> tuple[Complex
     n = fast_length(2 * (past - first))
     lines = np.zeros((*signal.shape[:-1], n), dtype=np.result_type(signal.dtype, np.complex64))
     lines[..., : past - first] = rfft(signal)[..., first:past]
-    lines *= 2 * n / n_samples  # the half of negative frequency, and the shorter transform back
+    lines *= 2 * n / n_samples  # negative frequencies, and the shorter inverse transform
     return np.asarray(ifft(lines)), fs * n / n_samples
 
 
 def _band_lines(n_samples: int, fs: float, band: Band) -> tuple[int, int]:
-    """First line of a band and the one past its last, neither 0 nor fs / 2."""
+    """First line of a band and one past its last line; lines 0 and fs / 2 are left out."""
     low, high = band
     if not 0 <= low < high <= fs / 2:
         raise ValueError(
             f"band = {low:.6g} … {high:.6g} Hz must rise and lie in 0 … fs / 2 = {fs / 2:.6g} Hz; "
             "move its edges"
         )
-    # Edges a rounding error beside a line still mean that line.
+    # An edge within a rounding error of a line counts as that line.
     first = max(1, math.ceil(low * n_samples / fs - 1e-9))
     past = min((n_samples - 1) // 2, math.floor(high * n_samples / fs + 1e-9)) + 1
     if past - first < FEWEST_LINES:
@@ -175,7 +176,7 @@ def envelope(x: ArrayLike, fs: float, band: Band | None = None) -> tuple[Real, f
     fs : float
         Sample rate [Hz].
     band : tuple of float, optional
-        Lower and upper edge [Hz]; everything by default.
+        Lower and upper edge [Hz]; 0 to fs / 2 by default.
 
     Returns
     -------
@@ -187,7 +188,7 @@ def envelope(x: ArrayLike, fs: float, band: Band | None = None) -> tuple[Real, f
     Raises
     ------
     ValueError
-        As `baseband`.
+        As for `baseband`.
 
     Examples
     --------
@@ -213,11 +214,11 @@ def envelope_spectrum(
     fs : float
         Sample rate [Hz].
     band : tuple of float, optional
-        Lower and upper edge [Hz], as from `Kurtogram.band`; everything by default.
+        Lower and upper edge [Hz], as from `Kurtogram.band`; 0 to fs / 2 by default.
     kind : {"squared", "plain", "log"}
-        What is transformed: the squared envelope, the envelope, or the natural logarithm of the
-        squared envelope. The logarithm keeps one large blow, whatever its cause, from drowning the
-        periodic ones; the plain envelope stands between.
+        Quantity transformed: the squared envelope, the envelope, or the natural logarithm of the
+        squared envelope. The logarithm prevents one large impact, whatever its cause, from masking
+        the periodic ones; the plain envelope lies between the two.
 
     Returns
     -------
@@ -231,7 +232,7 @@ def envelope_spectrum(
     Raises
     ------
     ValueError
-        As `baseband`, or if `kind` is none of the three.
+        As for `baseband`, or if `kind` is none of the three.
 
     Notes
     -----
@@ -262,7 +263,7 @@ def envelope_spectrum(
     window = hann(n).astype(wave.dtype)
     share = window / window.sum()
     wave -= (wave * share).sum(axis=-1, keepdims=True)
-    # Beyond the width of the band, the square has nothing and the others little but aliases.
+    # Beyond the bandwidth, the squared envelope has nothing and the other two mostly aliases.
     first, past = _band_lines(np.shape(x)[-1], fs, (0.0, fs / 2) if band is None else band)
     amplitude = 2 * np.abs(rfft(wave * share))[..., : past - first]
     return np.arange(past - first) * (rate / n), amplitude
@@ -286,19 +287,19 @@ _KINDS: dict[str, Callable[[Real], Real]] = {
 
 @dataclass(frozen=True, kw_only=True)
 class BearingFrequencies:
-    """How often the parts of a rolling bearing meet, its outer race at rest.
+    """Fault frequencies of a rolling bearing with its outer race at rest.
 
     Attributes
     ----------
     cage : float
-        Turns of the cage (FTF) [Hz, or orders].
+        Rotation of the cage (FTF) [Hz, or orders].
     outer : float
         Rollers passing a point of the outer race (BPFO) [Hz, or orders].
     inner : float
         Rollers passing a point of the inner race (BPFI) [Hz, or orders].
     roller : float
-        Turns of a roller about itself (BSF); a damaged one strikes a race twice a turn [Hz, or
-        orders].
+        Rotation of a roller about its own axis (BSF); a damaged roller strikes a race twice per
+        turn [Hz, or orders].
 
     Examples
     --------
@@ -327,16 +328,16 @@ def bearing_frequencies(
     rollers : int
         Number of rolling elements.
     roller_diameter, pitch_diameter : float
-        Of a roller, and of the circle of their centres [m, or one other unit for both].
+        Diameters of a roller and of the pitch circle [m, or any one unit for both].
     contact_angle : float
-        Between the line through the contacts and the radial plane [rad].
+        Angle between the line through the contacts and the radial plane [rad].
     speed_hz : float
         Speed of the inner race, the outer one at rest [Hz]; 1 gives orders of the shaft.
 
     Returns
     -------
     BearingFrequencies
-        [unit of speed_hz].
+        Fault frequencies [unit of speed_hz].
 
     Raises
     ------
@@ -347,7 +348,7 @@ def bearing_frequencies(
     Notes
     -----
     Pure rolling, with ``r = d cos(angle) / D``: cage ``(1 - r) / 2``, outer ``n (1 - r) / 2``,
-    inner ``n (1 + r) / 2``, roller ``D (1 - r^2) / (2 d)``. Real rollers slide, and the lines lie
+    inner ``n (1 + r) / 2``, roller ``D (1 - r^2) / (2 d)``. Real rollers slide, and their lines lie
     1 to 2 % off.
 
     References
@@ -390,15 +391,15 @@ def _check_bearing(rollers: int, roller: float, pitch: float, angle: float, spee
 
 @dataclass(frozen=True, kw_only=True)
 class FaultLine:
-    """What stands in an envelope spectrum at a fault frequency and its harmonics.
+    """A fault frequency and its harmonics as measured in an envelope spectrum.
 
     Attributes
     ----------
     frequency : float
-        Where the fundamental is found [Hz, or orders]; that of the loudest noise where there is
-        none.
+        Measured frequency of the fundamental [Hz, or orders]; without a fault line, that of the
+        loudest noise.
     score : float
-        Geometric mean of `ratios` [-]: about 2 of noise, seldom 4; above 10 of a clear fault.
+        Geometric mean of `ratios` [-]: about 2 for noise, seldom 4; above 10 for a clear fault.
     ratios : ndarray, shape (n_harmonics,)
         Amplitude of each harmonic over the median of its surroundings [-].
     amplitudes : ndarray, shape (n_harmonics,)
@@ -426,41 +427,40 @@ def fault_line(
     harmonics: int = 3,
     slip: float = SLIP,
 ) -> FaultLine:
-    """Look for a fault frequency and its harmonics in an envelope spectrum.
+    """Fault frequency and its harmonics, searched for in an envelope spectrum.
 
     Parameters
     ----------
     frequency : array_like, shape (n_lines,)
         Evenly spaced from 0 [Hz, or orders], as from `envelope_spectrum`.
     amplitude : array_like, shape (n_lines,)
-        Of the lines [any unit].
+        Amplitude of each line [any unit].
     fault_hz : float
         Frequency by geometry [unit of frequency], as from `bearing_frequencies`.
     harmonics : int
-        Number of harmonics, the fundamental one of them; those beyond the spectrum are left out.
+        Number of harmonics, including the fundamental; those beyond the spectrum are left out.
     slip : float
         Half width of the search, as a share of the frequency [-]; rounded up to whole lines.
 
     Returns
     -------
     FaultLine
-        At the frequency within the search that scores highest.
+        Fault line at the frequency with the highest score within the search.
 
     Raises
     ------
     ValueError
-        If the spectrum is no row of finite amplitudes over even frequencies from 0, it does not
-        reach the fault frequency and its surroundings, the lines are too coarse for it, or slip
-        times harmonics leaves no surroundings; all faults at once.
+        If the spectrum is not one row of finite amplitudes at evenly spaced frequencies from 0, it
+        does not cover the fault frequency and its surroundings, the lines are too coarse for it, or
+        slip times harmonics leaves no surroundings; all faults at once.
 
     Notes
     -----
-    A trial frequency on line k takes the largest line within half a line's worth of each harmonic
-    and divides it by the median of the lines up to 0.3 fault frequencies away, those within the
-    slip left out. All harmonics share one fundamental, so that a multiple of another fault's
-    frequency that falls into one search does not pass for this one. A silent spectrum scores 0.
-    The position is refined between the lines of a Hann window at the harmonic that stands out
-    most.
+    A trial frequency on line k takes the largest line within half a line's width of each harmonic
+    and divides it by the median of the lines up to 0.3 fault frequencies away, without those within
+    the slip. All harmonics share one fundamental, so that a multiple of another fault's frequency
+    inside one search range is not mistaken for this fault. A silent spectrum scores 0. The position
+    is interpolated between the lines of a Hann window at the most prominent harmonic.
 
     Examples
     --------
@@ -528,23 +528,23 @@ def _check_search(spacing: float, n_lines: int, fault: float, harmonics: int, sl
 
 
 def _highest_line(size: Float, centres: NDArray[np.intp], reach: int) -> NDArray[np.intp]:
-    """Of the lines up to `reach` away from each centre, the largest."""
+    """Index of the largest line within `reach` lines of each centre."""
     near = centres[:, np.newaxis] + np.arange(-reach, reach + 1)
     return np.asarray(near[np.arange(centres.size), np.argmax(size[near], axis=1)])
 
 
 def _background(size: Float, centre: float, order: float, spread: float) -> float:
-    """Median round a harmonic at line `centre`, the search left out; never 0."""
+    """Median around the harmonic at line `centre`, without the search range; never 0."""
     lines = np.arange(size.size)
     far = np.abs(lines - centre)
     around = (far <= NEIGHBOURHOOD * order) & (far > max(spread * order, 2)) & (lines > 0)
-    # A spectrum of exact zeros beside its peaks is as deep as its rounding.
+    # A spectrum of exact zeros next to its peaks counts as its rounding error.
     least = max(np.finfo(float).eps * float(size.max()), np.finfo(float).tiny)
     return max(float(np.median(size[around])), least)
 
 
 def _between_lines(size: Float, top: int) -> float:
-    """Distance of a tone from its highest Hann line [lines]; Grandke's ratio of two lines."""
+    """Distance of a tone from its highest Hann line [lines], by Grandke's ratio of two lines."""
     if size[top] == 0 or top + 1 >= size.size:
         return 0.0
     side = 1 if size[top + 1] >= size[top - 1] else -1
@@ -553,14 +553,14 @@ def _between_lines(size: Float, top: int) -> float:
 
 
 def envelope_span(speed_hz: float | None, bearing: BearingFrequencies | None) -> float:
-    """Frequencies of the envelope that are of interest, from 0 to this.
+    """Upper end of the envelope frequencies that are of interest.
 
     Parameters
     ----------
     speed_hz : float, optional
         Shaft speed [Hz].
     bearing : BearingFrequencies, optional
-        In orders of the shaft.
+        Fault frequencies in orders of the shaft.
 
     Returns
     -------

@@ -1,8 +1,8 @@
-"""The Fourier transforms every feature goes through: FFTW or scipy, by a measured rule.
+"""Fourier transforms for all features, by FFTW or scipy according to a measured rule.
 
-FFTW plans with ESTIMATE, which looks at no clock: one length has one plan, hence the same bits in
-every process of a machine. Only ``WEARSTATE_FFT=measure`` asks for timed plans, kept as wisdom in
-the cache of the user; ``WEARSTATE_FFT=scipy`` leaves FFTW out.
+FFTW plans with ESTIMATE, which times nothing: one length has one plan, hence the same bits in every
+process of a machine. With ``WEARSTATE_FFT=measure``, plans are timed and kept as wisdom in the
+user's cache; ``WEARSTATE_FFT=scipy`` leaves FFTW out.
 """
 
 import hashlib
@@ -28,18 +28,18 @@ MODES = ("auto", "measure", "scipy")
 """Values of ``WEARSTATE_FFT``; the first is the default."""
 
 FFTW_LENGTHS = (2048, 131_072)
-"""Shortest and longest transform that is given to FFTW [samples]."""
+"""Shortest and longest transform that FFTW computes [samples]."""
 
 FFTW_FACTORS = (2, 3, 5, 7)
-"""Prime factors a length may have to be given to FFTW."""
+"""Prime factors allowed in the length of a transform that FFTW computes."""
 
 _MOST_PLANS = 16  # per thread: at most 64 MB of buffers
 
-_PLANNING = threading.Lock()  # FFTW plans in one thread at a time
+_PLANNING = threading.Lock()  # FFTW may plan in one thread at a time only
 
 
 class FFTModeError(ValueError):
-    """``WEARSTATE_FFT`` holds no mode."""
+    """``WEARSTATE_FFT`` does not name a mode."""
 
 
 # --- transforms
@@ -71,7 +71,7 @@ def rfft(x: ArrayLike, n: int | None = None, *, axis: int = -1) -> Complex:
 
     Notes
     -----
-    See `choose_engine` for who computes it.
+    See `choose_engine` for the library that computes it.
 
     Examples
     --------
@@ -176,7 +176,7 @@ def ifft(spectrum: ArrayLike, n: int | None = None, *, axis: int = -1) -> Comple
 
 
 def fast_length(n: int) -> int:
-    """Least length >= n that transforms fast: its prime factors are 2, 3 and 5.
+    """Smallest length >= n that transforms fast: its prime factors are 2, 3 and 5.
 
     Parameters
     ----------
@@ -204,12 +204,12 @@ def fast_length(n: int) -> int:
 
 
 def fast_length_within(n: int) -> int:
-    """Greatest even length <= n that transforms fast: its prime factors are 2, 3, 5 and 7.
+    """Largest even length <= n that transforms fast: its prime factors are 2, 3, 5 and 7.
 
     Parameters
     ----------
     n : int
-        Length at hand [samples], >= 2.
+        Available length [samples], >= 2.
 
     Returns
     -------
@@ -234,11 +234,11 @@ def fast_length_within(n: int) -> int:
     return length
 
 
-# --- who computes it
+# --- choice of the library
 
 
 def choose_engine(kind: Kind, n: int, rows: int, dtype: DTypeLike) -> Engine:
-    """Which library transforms such data, in the default mode.
+    """Library that transforms such data in the default mode.
 
     Parameters
     ----------
@@ -249,19 +249,19 @@ def choose_engine(kind: Kind, n: int, rows: int, dtype: DTypeLike) -> Engine:
     rows : int
         Number of transforms in one call.
     dtype : dtype
-        Of the data that go in.
+        Type of the input data.
 
     Returns
     -------
     {"fftw", "scipy"}
-        FFTW for up to three rows of 2048 … 131,072 samples, a number without prime factors above
-        7, of a type that needs no conversion; scipy for the rest.
+        FFTW for up to three rows of 2048 … 131,072 samples if the length has no prime factor above
+        7 and the type needs no conversion; otherwise scipy.
 
     Notes
     -----
-    Measured on one core of an AMD EPYC at 16 such lengths, calls and copies included: the time of
-    scipy 1.17 over that of FFTW 3.3.5, planned with ESTIMATE and fed row by row through its own
-    aligned buffers; the median and the range.
+    Time of scipy 1.17 over that of FFTW 3.3.5, median and range over 16 such lengths, measured on
+    one core of an AMD EPYC with calls and copies included. FFTW was planned with ESTIMATE and fed
+    row by row through its own aligned buffers.
 
     ======================  ====================  ====================
     transform, data         1 row                 3 rows
@@ -274,12 +274,12 @@ def choose_engine(kind: Kind, n: int, rows: int, dtype: DTypeLike) -> Engine:
     fft, ifft, complex128   1.48 (0.99 … 1.79)    1.45 (0.94 … 4.24)
     ======================  ====================  ====================
 
-    From four rows on, scipy transforms several side by side: of 48 rows of 256 float32 it takes
-    0.39 of FFTW's time, of 12 rows of 8192 0.94. A call of FFTW costs 2 us more than one of
-    scipy, 1.2 at 256 samples. Prime factors above 7 give 0.5 … 2.9, with plans that take up to
-    0.3 s; above 131,072 samples both are bound by memory (0.4 … 3.4). A plan of a new length takes
-    1 to 20 ms. FFTW's MEASURE would win on batches too (1.3 … 1.7), but takes seconds to plan,
-    and its plan, hence the last bits of every feature, may differ from one process to the next.
+    From four rows on, scipy transforms several in parallel: for 48 rows of 256 float32 it takes
+    0.39 of FFTW's time, for 12 rows of 8192 0.94. A call of FFTW costs 2 us more than one of scipy,
+    1.2 at 256 samples. Prime factors above 7 give 0.5 … 2.9, with plans that take up to 0.3 s;
+    above 131,072 samples both are bound by memory (0.4 … 3.4). A plan of a new length takes 1 to 20
+    ms. FFTW's MEASURE would be faster on batches too (1.3 … 1.7), but takes seconds to plan, and
+    its plan, hence the last bits of every feature, may differ from one process to the next.
 
     Examples
     --------
@@ -289,12 +289,12 @@ def choose_engine(kind: Kind, n: int, rows: int, dtype: DTypeLike) -> Engine:
     if not FFTW_LENGTHS[0] <= n <= FFTW_LENGTHS[1] or not 0 < rows <= 3 or not _smooth(n):
         return "scipy"
     code = np.dtype(dtype).char
-    # What needs a conversion is left to scipy, which also halves the work of an fft of real data.
+    # Data that need a conversion go to scipy, which also halves the work of an fft of real data.
     return "fftw" if code in ("fd" if kind == "rfft" else "FD") else "scipy"
 
 
 def engine_in_force(kind: Kind, n: int, rows: int, dtype: DTypeLike) -> Engine:
-    """Which library transforms such data here: as `choose_engine`, but scipy where FFTW is not.
+    """Library in use here: that of `choose_engine`, or scipy if FFTW is not available.
 
     Parameters
     ----------
@@ -304,12 +304,12 @@ def engine_in_force(kind: Kind, n: int, rows: int, dtype: DTypeLike) -> Engine:
     Returns
     -------
     {"fftw", "scipy"}
-        scipy in the mode "scipy", and where pyfftw is not installed.
+        scipy in the mode "scipy", or if pyfftw is not installed.
 
     Raises
     ------
     FFTModeError
-        If the environment asks for a mode that does not exist.
+        If the environment variable names no mode.
 
     Examples
     --------
@@ -329,7 +329,7 @@ def transform(
     axis: int = -1,
     engine: Engine | None = None,
 ) -> NDArray[Any]:
-    """Any of the four transforms, by the library of choice.
+    """Any of the four transforms, by the selected library.
 
     Parameters
     ----------
@@ -352,7 +352,7 @@ def transform(
     Raises
     ------
     TypeError, ValueError
-        As the four functions.
+        As for the four functions.
     ImportError
         If `engine` is "fftw" and pyfftw is not installed.
 
@@ -391,18 +391,18 @@ def _smooth(n: int) -> bool:
 
 @cache
 def fft_mode() -> str:
-    """The mode in force: ``WEARSTATE_FFT``, read once.
+    """Mode in force: ``WEARSTATE_FFT``, read once.
 
     Returns
     -------
     {"auto", "measure", "scipy"}
-        By the rule of `choose_engine`, with plans that are reproducible; the same rule with plans
-        that are timed once and kept; scipy alone.
+        "auto": the rule of `choose_engine` with reproducible plans; "measure": the same rule with
+        plans that are timed once and kept; "scipy": scipy alone.
 
     Raises
     ------
     FFTModeError
-        If the variable holds anything else.
+        If the variable holds any other value.
 
     Examples
     --------
@@ -419,7 +419,7 @@ def fft_mode() -> str:
 
 @cache
 def fftw_library() -> Any | None:
-    """The module ``pyfftw``, imported at its first use, or None where it is not installed."""
+    """Module ``pyfftw``, imported at its first use, or None if it is not installed."""
     try:
         import pyfftw
     except ImportError:
@@ -431,7 +431,7 @@ def fftw_library() -> Any | None:
 
 
 class _Plan:
-    """One transform of FFTW between its own two aligned buffers."""
+    """One FFTW transform between its own two aligned buffers."""
 
     def __init__(self, kind: Kind, n: int, double: bool) -> None:
         library = fftw_library()
@@ -450,7 +450,7 @@ class _Plan:
 
 
 def _planned(library: Any, source: NDArray[Any], target: NDArray[Any], direction: str) -> Any:
-    """Plan by the mode in force; the buffers may be overwritten."""
+    """Plan in the mode in force; the buffers may be overwritten."""
 
     def plan(effort: str) -> Any:
         flags = (effort, "FFTW_DESTROY_INPUT")
@@ -461,7 +461,7 @@ def _planned(library: Any, source: NDArray[Any], target: NDArray[Any], direction
         made = plan("FFTW_MEASURE")
         _remember(library)
         return made
-    # Wisdom of a timed plan, somebody else's in this process, would decide the estimate too.
+    # Wisdom of a timed plan made elsewhere in this process would change the estimate too.
     wisdom = library.export_wisdom()
     library.forget_wisdom()
     try:
@@ -472,7 +472,7 @@ def _planned(library: Any, source: NDArray[Any], target: NDArray[Any], direction
 
 
 class _Plans(threading.local):
-    """The latest plans of one thread: two threads must not share a buffer."""
+    """Latest plans of one thread: two threads must not share a buffer."""
 
     def __init__(self) -> None:
         self.kept: OrderedDict[tuple[Kind, int, bool], _Plan] = OrderedDict()
@@ -499,7 +499,7 @@ def _by_fftw(kind: Kind, data: NDArray[Any], n: int) -> NDArray[Any]:
     pairs = zip(data.reshape(-1, data.shape[-1]), result.reshape(-1, target.size), strict=True)
     for row, transformed in pairs:
         source[:taken] = row[:taken]
-        source[taken:] = 0  # the last transform may have left anything there
+        source[taken:] = 0  # the previous transform may have left data there
         plan.execute()
         if plan.scale is None:
             transformed[:] = target
@@ -512,7 +512,7 @@ def _by_fftw(kind: Kind, data: NDArray[Any], n: int) -> NDArray[Any]:
 
 
 def wisdom_file() -> Path | None:
-    """File of the timed plans of this user, or None without a home directory.
+    """File of this user's timed plans, or None without a home directory.
 
     The folder is ``$WEARSTATE_CACHE``, else ``$XDG_CACHE_HOME/wearstate``, else
     ``~/.cache/wearstate``. Only the mode "measure" reads or writes it.
@@ -538,7 +538,7 @@ def _digest(wisdom: list[str]) -> str:
 
 
 def _recall(library: Any) -> bool:
-    """Take in the wisdom of earlier processes; False if there is none that is sound."""
+    """Load the wisdom of earlier processes; return False if there is none or it is damaged."""
     path = wisdom_file()
     try:
         held = json.loads(path.read_text(encoding="ascii")) if path else {}
@@ -546,14 +546,14 @@ def _recall(library: Any) -> bool:
         sound = len(wisdom) == 2 and held["sha256"] == _digest(wisdom)
     except (OSError, ValueError, KeyError, TypeError):
         return False
-    if not sound:  # cut or edited: FFTW's parser never sees it
+    if not sound:  # truncated or edited: keep it from FFTW's parser
         return False
     double, single = (text.encode() for text in wisdom)
     return all(library.import_wisdom((double, single, library.export_wisdom()[2])))
 
 
 def _remember(library: Any) -> bool:
-    """Keep the wisdom of this process, in one step; False where nothing can be written."""
+    """Save the wisdom of this process atomically; return False if it cannot be written."""
     path = wisdom_file()
     if path is None:
         return False

@@ -1,4 +1,4 @@
-"""Hum of the mains: lines at exact multiples of 50 or 60 Hz that no turning part accounts for."""
+"""Hum of the mains: lines at exact multiples of 50 or 60 Hz that are no shaft order."""
 
 import math
 
@@ -14,18 +14,18 @@ MAINS_HZ = (50.0, 60.0)
 """Frequencies of public supplies [Hz]."""
 
 HARMONICS = (1, 2, 3, 4, 5, 6, 7, 9)
-"""Multiples that hum is looked for at: the odd ones of a loop, the even ones of a rectifier."""
+"""Multiples searched for hum: odd ones from an earth loop, even ones from a rectifier."""
 
-_ENOUGH_HZ = 1600.0  # of blocks: lines are looked for below 0.6 kHz, and blurred little there
+_ENOUGH_HZ = 1600.0  # block rate: the search ends below 0.6 kHz, where averaging takes little
 _LOBE = 2.0  # lines on either side that Hann's window spreads a tone over
 _DRIFT = 1e-3  # of a supply's frequency: public ones keep 0.05 Hz
-_REACH_HZ = 12.0  # to either side of a line: where its neighbours are
-_REACH_ORDERS = 1.6  # the same in orders, so that the next ones on both sides are among them
-_FIRST_ORDERS = 8  # of the shaft: each stands out by itself, as hum does
+_REACH_HZ = 12.0  # neighbours are searched this far on either side of a line
+_REACH_ORDERS = 1.6  # the same in orders, so that the next order on either side is included
+_FIRST_ORDERS = 8  # of the shaft: each can stand out as hum does
 
 
 def hum_power(x: ArrayLike, fs: float, *, speed_hz: float) -> dict[float, float]:
-    """Mean square of what stands out at the multiples of each supply's frequency.
+    """Mean square that stands out at the multiples of each supply's frequency.
 
     Parameters
     ----------
@@ -34,13 +34,12 @@ def hum_power(x: ArrayLike, fs: float, *, speed_hz: float) -> dict[float, float]
     fs : float
         Sample rate [Hz].
     speed_hz : float
-        Mean shaft speed [Hz]: lines of the first eight orders are no hum.
+        Mean shaft speed [Hz]: lines of the first eight orders do not count as hum.
 
     Returns
     -------
-    dict of float to float
-        By :data:`MAINS_HZ`, the mean square [unit^2] of the lines less that of the strongest
-        neighbour of each within 12 Hz or 1.6 orders; 0 where the signal is too short to tell.
+    For each of :data:`MAINS_HZ`, the mean square [unit^2] of the lines less that of the strongest
+    neighbour of each within 12 Hz or 1.6 orders; 0 if the signal is too short.
 
     Raises
     ------
@@ -49,8 +48,8 @@ def hum_power(x: ArrayLike, fs: float, *, speed_hz: float) -> dict[float, float]
 
     Notes
     -----
-    Samples are averaged in blocks of about 0.6 ms first, and the lines raised by what that takes
-    from them: a twentieth of the samples tells as much below 0.6 kHz.
+    Samples are first averaged in blocks of about 0.6 ms, and the lines are corrected for the loss:
+    below 0.6 kHz a twentieth of the samples gives the same result.
 
     Examples
     --------
@@ -75,7 +74,8 @@ def hum_power(x: ArrayLike, fs: float, *, speed_hz: float) -> dict[float, float]
     step = fs / signal.size
     window = 0.5 - 0.5 * np.cos(math.tau * np.arange(signal.size) / signal.size)
     lines = np.abs(rfft((signal - signal.mean()) * window)) ** 2
-    cycles = np.arange(lines.size) / signal.size  # per block: its mean leaves sinc over sinc
+    cycles = np.arange(lines.size) / signal.size  # per block
+    # Averaging in blocks attenuates by the ratio of two sincs.
     lines *= (np.sinc(cycles / block) / np.sinc(cycles)) ** 2
     summed = np.append(0.0, np.cumsum(lines)) * (2 / (signal.size * float(window @ window)))
     return {
@@ -90,12 +90,12 @@ def hum_power(x: ArrayLike, fs: float, *, speed_hz: float) -> dict[float, float]
 
 
 def _half(frequency: float, step: float) -> int:
-    """Lines on either side that belong to a tone."""
+    """Number of lines on either side that belong to a tone."""
     return math.ceil(_LOBE + _DRIFT * frequency / step)
 
 
 def _standing_out(summed: Float, place: float, step: float, reach: float) -> float:
-    """Mean square about a line beyond that about its strongest neighbour."""
+    """Mean square about a line in excess of that about its strongest neighbour."""
     half = _half(place * step, step)
     centre, width, far = round(place), 2 * half + 1, math.ceil(reach / step)
     low = max(centre - far, 0)
@@ -106,7 +106,7 @@ def _standing_out(summed: Float, place: float, step: float, reach: float) -> flo
 
 
 def _is_order(frequency: float, speed_hz: float, apart_hz: float) -> bool:
-    """Whether one of the shaft's first orders is as good as there."""
+    """Whether the frequency is too near to one of the shaft's first orders to be separated."""
     order = round(frequency / speed_hz)
     return order <= _FIRST_ORDERS and abs(frequency - order * speed_hz) <= max(
         apart_hz, 0.01 * frequency

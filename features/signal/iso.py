@@ -1,8 +1,8 @@
 """Vibration severity on housings: velocity in the ISO band, and its zones.
 
-Which boundaries hold depends on the machine, which no signal tells: the kind must be given. Parts
-3 (industrial machines) and 7 (rotodynamic pumps) exclude reciprocating machines, which have parts 6
-and 8 of their own.
+The boundaries depend on the kind of machine, which cannot be inferred from a signal and must be
+given. Parts 3 (industrial machines) and 7 (rotodynamic pumps) exclude reciprocating machines, which
+have parts 6 and 8 of their own.
 """
 
 import difflib
@@ -22,25 +22,25 @@ from .statistics import Real, centred
 Band = tuple[float, float]
 
 ISO_BAND: Band = (10.0, 1000.0)
-"""Where severity is measured from 600 rpm on [Hz] (ISO 20816-3)."""
+"""Band of the severity from 600 rpm on [Hz] (ISO 20816-3)."""
 
 SLOW_ISO_BAND: Band = (2.0, 1000.0)
-"""Where it is measured below 600 rpm, and on reciprocating machines [Hz]."""
+"""Band below 600 rpm, and for reciprocating machines [Hz]."""
 
 SLOW_SPEED_HZ = 10.0
 """Speed below which a rotating machine is slow [Hz], 600 rpm."""
 
 LINES_BELOW = 20.0
-"""Lower edge of the band in line spacings, where the record is long enough [-]."""
+"""Lower edge of the band in line spacings if the record is long enough [-]."""
 
 FEWEST_LINES_BELOW = 5.0
-"""Least lower edge of the band in line spacings [-]: integration is then right to 0.1 %."""
+"""Smallest lower edge of the band in line spacings [-]: integration is then right to 0.1 %."""
 
 # --- velocity
 
 
 def band_rms(x: ArrayLike, fs: float, band: Band, *, integrations: int = 0) -> Real:
-    """Root mean square of a signal in a band, integrated over time where asked.
+    """Root mean square of a signal in a band, integrated over time if requested.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ def band_rms(x: ArrayLike, fs: float, band: Band, *, integrations: int = 0) -> R
     band : tuple of float
         Lower and upper edge [Hz].
     integrations : {0, 1, 2}
-        How often to integrate over time: 1 makes velocity of acceleration, 2 displacement.
+        Number of integrations over time: 1 turns acceleration into velocity, 2 into displacement.
 
     Returns
     -------
@@ -68,14 +68,14 @@ def band_rms(x: ArrayLike, fs: float, band: Band, *, integrations: int = 0) -> R
     The averaged Hann lines of `power_lines`, each divided by its angular frequency to the power
     ``2 integrations``, summed over the band; lines on its edges count by the share inside.
 
-    A window of finite length spreads a tone over lines k of different divisors, which alone would
+    A window of finite length spreads a tone over lines k with different divisors, which alone would
     make the mean square too large by ``1 / k^2`` (``10 / (3 k^2)`` for displacement), since the
-    power of Hann's lobe has the variance 1/3 line^2. Dividing by ``k^2 + 1`` and by
-    ``k^4 + 10 k^2 / 3`` takes this leading term away. What is left for a tone within the band, in
-    rms: below 1e-3 from k = 5 on, 3e-4 from 10, 6e-5 from 20.
+    power of Hann's lobe has the variance 1/3 line^2. Dividing by ``k^2 + 1`` and by ``k^4 + 10 k^2
+    / 3`` removes this leading term. The error left for a tone within the band, in rms: below 1e-3
+    from k = 5 on, 3e-4 from 10, 6e-5 from 20.
 
-    A tone d lines below the band leaks into it at most the share ``sqrt(0.0135 / (d - 1/2)^5)`` of
-    its own rms, divided by the angular frequency of the lower edge: 4.2e-4 for d = 10.
+    A tone d lines below the band leaks into it by at most the share ``sqrt(0.0135 / (d - 1/2)^5)``
+    of its own rms, divided by the angular frequency of the lower edge: 4.2e-4 for d = 10.
 
     Examples
     --------
@@ -96,7 +96,7 @@ def band_rms(x: ArrayLike, fs: float, band: Band, *, integrations: int = 0) -> R
 
 
 def _divisors(nperseg: int, fs: float, integrations: int) -> NDArray[np.float64]:
-    """Factors that integrate the mean square of Hann lines, the spread of the lobe mended."""
+    """Factors that integrate the mean square of Hann lines, corrected for the width of the lobe."""
     k = np.arange(nperseg // 2 + 1, dtype=np.float64)
     powers = (np.ones_like(k), k**2 + 1, k**4 + 10 * k**2 / 3)[integrations]
     powers[0] = np.inf if integrations else 1.0
@@ -104,7 +104,7 @@ def _divisors(nperseg: int, fs: float, integrations: int) -> NDArray[np.float64]
 
 
 def velocity_rms(acceleration: ArrayLike, fs: float, *, band: Band = ISO_BAND) -> Real:
-    """Velocity in the ISO band: the severity of a vibration.
+    """Velocity in the ISO band: vibration severity.
 
     Parameters
     ----------
@@ -123,12 +123,12 @@ def velocity_rms(acceleration: ArrayLike, fs: float, *, band: Band = ISO_BAND) -
     Raises
     ------
     ValueError
-        As `band_rms`.
+        As for `band_rms`.
 
     Notes
     -----
-    See `band_rms` for the method and its bounds. ISO 2954 asks of an instrument 10 % inside the
-    band and half the power at its edges; here the edges are sharp, but for one line.
+    See `band_rms` for the method and its bounds. ISO 2954 requires of an instrument 10 % inside the
+    band and half the power at its edges; here the edges are sharp to within one line.
 
     References
     ----------
@@ -147,7 +147,7 @@ def velocity_rms(acceleration: ArrayLike, fs: float, *, band: Band = ISO_BAND) -
 
 
 def _check(n_samples: int, fs: float, band: Band, periods: float) -> None:
-    """Refuse bands that the sample rate or the duration cannot bear."""
+    """Refuse bands that the sample rate or the duration does not allow."""
     low, high = band
     faults = []
     if fault := rate_fault(fs):
@@ -175,18 +175,18 @@ class MachineKind:
     Parameters
     ----------
     velocity_mm_s : tuple of float
-        Rms between A and B, B and C, C and D [mm/s], as printed.
+        Rms between A and B, B and C, C and D [mm/s], as printed in the standard.
     displacement_um : tuple of float, optional
-        The same of displacement [um], where the standard gives it.
+        The same for displacement [um], if the standard gives it.
     standard : str
-        Where the boundaries come from.
+        Source of the boundaries.
     machine : str
-        What the kind comprises.
+        Machines covered.
     reciprocating : bool
-        Whether the band starts at 2 Hz whatever the speed.
+        Whether the band starts at 2 Hz at any speed.
     confidence : float
-        That the figures stand so in the standard [-]: they were taken from secondary sources.
-        Confirm those below 0.9 before a contract hangs on them.
+        Probability that the standard gives exactly these figures [-]: they were taken from
+        secondary sources. Check those below 0.9 before relying on them in a contract.
     """
 
     velocity_mm_s: tuple[float, float, float]
@@ -198,7 +198,8 @@ class MachineKind:
 
 
 ZONES = "ABCD"
-"""Letters of the zones 0 to 3: new; good for long; not for long; damaging."""
+"""Letters of the zones 0 to 3: new; acceptable for long-term operation; acceptable for a limited
+time; damaging."""
 
 _PART_3 = "ISO 20816-3:2022 (10816-3:2009)"
 _PART_6 = "ISO 10816-6:1995, read by classes"
@@ -243,7 +244,7 @@ _GRADES_UM = (71.0, 113.0, 178.0, 283.0, 448.0, 710.0, 1125.0)
 
 
 def _reciprocating(number: int) -> MachineKind:
-    """Class of part 6: three grades in a row, one further with every class."""
+    """Class of part 6: three adjacent grades, starting one higher with each class."""
     velocity, um = _GRADES_MM_S[number - 1 :], _GRADES_UM[number - 1 :]
     return MachineKind(
         velocity_mm_s=(velocity[0], velocity[1], velocity[2]),
@@ -273,7 +274,7 @@ KINDS: Mapping[str, MachineKind] = MappingProxyType(
         "compressor-piping": _compressor("dampers and piping", (12.7, 19.0, 28.5)),
     }
 )
-"""Kinds of machine by name. Part 6 or 8 serves a reciprocating pump by analogy only."""
+"""Kinds of machine by name. For a reciprocating pump, parts 6 and 8 apply by analogy only."""
 
 
 def machine_kind(name: str) -> MachineKind:
@@ -292,7 +293,7 @@ def machine_kind(name: str) -> MachineKind:
     Raises
     ------
     ValueError
-        If there is none of that name.
+        If there is no kind of that name.
 
     Examples
     --------
@@ -314,7 +315,7 @@ def iso_band(kind: str, speed_hz: float | None = None) -> Band:
     kind : str
         Key of `KINDS`.
     speed_hz : float, optional
-        Shaft speed [Hz], which a rotating machine needs.
+        Shaft speed [Hz], required for a rotating machine.
 
     Returns
     -------
@@ -348,20 +349,20 @@ def zone(
     velocity : array_like, shape (...)
         Rms in the band of the kind [m/s], as from `velocity_rms`.
     kind : str
-        Machine, a key of `KINDS`; it cannot be told from the signal.
+        Machine, a key of `KINDS`; it cannot be inferred from the signal.
     displacement : array_like, shape (...), optional
-        Rms in the same band [m]; the worse of both zones counts.
+        Rms in the same band [m]; the worse of the two zones counts.
 
     Returns
     -------
     ndarray of int, shape (...)
-        0 to 3, the letters of which are in `ZONES`; a value on a boundary is in the better zone.
+        0 to 3, indices into `ZONES`; a value on a boundary is in the better zone.
 
     Raises
     ------
     ValueError
-        For an unknown kind, a value that is negative or not finite, or a displacement where the
-        standard has no boundaries of it.
+        For an unknown kind, a value that is negative or not finite, or a displacement if the
+        standard gives no boundaries for it.
 
     References
     ----------
@@ -384,11 +385,11 @@ def zone(
 def _place(
     values: ArrayLike, boundaries: tuple[float, float, float], scale: float, name: str, unit: str
 ) -> NDArray[np.intp]:
-    """Number of boundaries that each value is above."""
+    """Number of boundaries that each value exceeds."""
     size = np.asarray(values, dtype=np.float64)
     wrong = size[~((size >= 0) & (size < np.inf))]
     if wrong.size:
         raise ValueError(f"{name} = {wrong[0]} {unit} must be >= 0 and finite; mend the signal")
-    # What is printed as 4.5 mm/s need not be the 0.0045 of a float: six digits are enough.
+    # A printed boundary of 4.5 mm/s need not equal the float 0.0045: compare to six digits.
     edges = np.asarray(boundaries) / scale * (1 + 1e-6)
     return np.asarray(np.searchsorted(edges, size, side="left"))

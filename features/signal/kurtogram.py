@@ -1,4 +1,4 @@
-"""Spectral kurtosis and kurtogram: in which band a signal is made of blows."""
+"""Spectral kurtosis and kurtogram: the band in which a signal is most impulsive."""
 
 import math
 from dataclasses import dataclass
@@ -22,38 +22,39 @@ DEEPEST_LEVEL = 7
 """Default depth: 128 bands, each 1/256 of the sample rate wide."""
 
 FEWEST_SAMPLES_LOG2 = 7
-"""Binary logarithm of the samples that level 0 takes; each level below doubles them. The finest
+"""Binary logarithm of the samples that level 0 needs; each further level doubles them. The finest
 bands then have 64 independent samples."""
 
 SETTLING = 4.0
-"""Length of the tapers at the ends of the record, and of what is left out after each, in samples
-of the finest band [-]: what leaks past them lies 80 dB or more below the record."""
+"""Length of the tapers at the ends of the record, and of the part left out after each, in samples
+of the finest band [-]: leakage beyond them lies 80 dB or more below the record."""
 
 SILENCE = 1e-8
-"""Mean square of a band, as a share of the record's, below which it may hold leakage only [-]."""
+"""Mean square of a band, as a share of the record's, below which it may be leakage alone [-]."""
 
 LONE_SHARE = 1 / 3
-"""Share of a band's fourth moment that, within `_LONE_PARTS` of the record, is a lone event [-]:
-blows that come back four times or more leave each eighth of the record less."""
+"""Share of a band's fourth moment within `_LONE_PARTS` of the record that marks a lone event [-]:
+impacts that recur four times or more leave less than that in each eighth of the record."""
 
 FEWEST_FRAMES, MANY_FRAMES = 64, 256
-"""Frames from which spectral kurtosis looks for lone events [-]: below the former any share may be
-one of noise, below the latter a third is that of every tenth line, half of none."""
+"""Numbers of frames [-]: from the first on, spectral kurtosis looks for lone events (with fewer,
+noise can reach any share); below the second, a third is reached by every tenth line of noise, a
+half by none."""
 
 LONE_SHARE_OF_FEW = 1 / 2
-"""`LONE_SHARE` below the latter [-]."""
+"""`LONE_SHARE` below `MANY_FRAMES` [-]."""
 
 FEWEST_POOLED = 31
-"""Frames from which it looks for lone events at all [-], below `FEWEST_FRAMES` over neighbouring
-lines together; the default frames leave at least so many."""
+"""Fewest frames for any search for lone events [-], below `FEWEST_FRAMES` over neighbouring lines
+together; the default frames leave at least that many."""
 
 MOST_LONE = 3
-"""Lone events left out of a band [-]; with more, they come back."""
+"""Lone events left out of a band [-]; more than that count as recurring."""
 
-_PARTS = 16  # of a record, in which lone events are looked for
-_LONE_PARTS = 2  # neighbours: an event may lie on the edge of two
+_PARTS = 16  # of a record, searched for lone events
+_LONE_PARTS = 2  # adjacent: an event may lie on the boundary of two
 
-_POOLED_LINES = 9  # neighbours in spectral kurtosis, a third of whose noise is shared
+_POOLED_LINES = 9  # averaged in spectral kurtosis; a third of their noise is shared
 LINE_SILENCE = 1e-12  # of the power of all lines; below it is rounding
 _INDEPENDENCE = 0.703  # samples a flanked band holds per independent fourth moment, times its width
 CHUNK = 32_768  # complex samples transformed at a time, half a megabyte
@@ -79,27 +80,26 @@ def spectral_kurtosis(x: ArrayLike, fs: float, *, nperseg: int | None = None) ->
     frequency : ndarray, shape (n_lines,)
         ``k fs / nperseg`` for k = 2 … nperseg / 2 - 2 [Hz].
     kurtosis : ndarray, shape (..., n_lines)
-        0 of stationary Gaussian noise, -1 of a tone of constant amplitude, above 0 of blows [-];
-        -1 also of silence. Precision of `x` kept.
+        0 for stationary Gaussian noise, -1 for a tone of constant amplitude, above 0 for impacts
+        [-]; also -1 for silence. Precision of `x` kept.
 
     Raises
     ------
     ValueError
-        As `checked_signal`, or if `nperseg` is odd, below 16, or leaves fewer than 4
-        frames.
+        As for `checked_signal`, or if `nperseg` is odd, below 16, or leaves fewer than 4 frames.
 
     Notes
     -----
     ``(K + 1) / (K - 1) (<|X|^4> / <|X|^2>^2 - 1) - 1`` over K frames, the form of
     ``<|X|^4> / <|X|^2>^2 - 2`` that is free of bias for Gaussian noise and independent frames at
     any K; the overlap leaves a bias of ``-1 / (9 K)``. Standard deviation on such noise
-    ``2 / sqrt(K)``. The lines at either end, which overlap their own mirror image and
-    scatter otherwise, are left out.
+    ``2 / sqrt(K)``. The lines at either end are left out: they overlap their own mirror image and
+    have a different scatter.
 
-    Lone events are left out by the rule of `kurtogram`, line by line, where there are 256 frames or
-    more, and from 64 on where they have half of a line's ``<|X|^4>``; from 31 on, where they have
-    half of it in the mean of nine neighbouring lines. K then counts the frames that are left.
-    Of noise, one line in a hundred loses some.
+    Lone events are left out line by line, by the rule of `kurtogram`, if there are 256 frames or
+    more; from 64 frames on if they make up half of a line's ``<|X|^4>``; from 31 on if they make up
+    half of it in the mean of nine neighbouring lines. K then counts the remaining frames. In noise,
+    one line in a hundred loses some.
 
     References
     ----------
@@ -138,10 +138,10 @@ def spectral_kurtosis(x: ArrayLike, fs: float, *, nperseg: int | None = None) ->
 
 
 def _pooled(fourth: Float) -> Float:
-    """Share of each part in the fourth moment, mean of a line and its neighbours.
+    """Share of each part in the fourth moment, averaged over a line and its neighbours.
 
-    Of few frames one line of noise has its largest in a single one; an event has it in all lines
-    of its neighbourhood.
+    With few frames, the largest value of a line of noise may lie in a single frame; an event
+    appears in all lines of its neighbourhood.
     """
     total = fourth.sum(axis=-1, keepdims=True)
     share = np.divide(fourth, total, out=np.zeros_like(fourth), where=total > 0)
@@ -152,7 +152,7 @@ def _pooled(fourth: Float) -> Float:
 
 
 def _begins(n: int, n_parts: int) -> NDArray[np.intp]:
-    """First of the n samples or frames in each part of the record [shape=(n_parts,)]."""
+    """First sample or frame of each part of the record, of n in all [shape=(n_parts,)]."""
     return np.arange(n_parts) * n // n_parts
 
 
@@ -179,7 +179,7 @@ def _moments(
 
 
 def _over(above: Float, below: Float, *, silence: Float) -> Float:
-    """Quotient; 1, the least it can be, where the root of the divisor is not above `silence`."""
+    """Quotient; 1, its minimum, if the root of the divisor is not above `silence`."""
     heard = np.sqrt(below) > silence
     return np.asarray(np.divide(above, below, out=np.ones_like(below), where=heard))
 
@@ -198,8 +198,8 @@ class Kurtogram:
     level : ndarray, shape (n_rows,)
         Binary logarithm of the number of bands in each row: 0, 1, log2(3), 2, log2(6) … [-].
     kurtosis : tuple of ndarray
-        One per row, from the lowest band to the highest [-]: 0 of stationary Gaussian noise, -1 of
-        a tone of constant amplitude or of silence. Lone events are left out, see `kurtogram`.
+        One per row, from the lowest band to the highest [-]: 0 for stationary Gaussian noise, -1
+        for a tone of constant amplitude or silence. Lone events are left out, see `kurtogram`.
     deviation : ndarray, shape (n_rows,)
         Standard deviation of the kurtosis of stationary Gaussian noise in each row [-].
 
@@ -217,7 +217,7 @@ class Kurtogram:
 
     @property
     def best(self) -> tuple[int, int]:
-        """Row and number of the band of the largest kurtosis; of equals, the widest."""
+        """Row and number of the band of largest kurtosis; among equals, the widest."""
         tops = [int(np.argmax(row)) for row in self.kurtosis]
         values = [row[top] for row, top in zip(self.kurtosis, tops, strict=True)]
         row = int(np.argmax(values))
@@ -231,9 +231,9 @@ class Kurtogram:
 
     @property
     def score(self) -> float:
-        """Largest kurtosis, in standard deviations of what noise has in such a band [-].
+        """Largest kurtosis, in standard deviations of that of noise in the same band [-].
 
-        Noise has 2 to 4, and 7 in one record of a hundred; tones and silence have 0.
+        Noise scores 2 to 4, and 7 in one record of a hundred; tones and silence score 0.
         """
         row, _ = self.best
         return max(self.highest, 0.0) / float(self.deviation[row])
@@ -257,12 +257,12 @@ class Kurtogram:
         return high - low
 
     def image(self) -> Float:
-        """Kurtosis as a picture: one row a level, each band as wide as it is.
+        """Kurtosis as a picture: one row per level, each band drawn at its width.
 
         Returns
         -------
         ndarray, shape (n_rows, 3 * 2**levels)
-            Columns share 0 … fs / 2 evenly [-].
+            Kurtosis [-]; the columns divide 0 … fs / 2 evenly.
         """
         columns = 3 * max(row.size for row in self.kurtosis)
         return np.stack([np.repeat(row, columns // row.size) for row in self.kurtosis])
@@ -278,38 +278,38 @@ def kurtogram(x: ArrayLike, fs: float, *, levels: int | None = None) -> Kurtogra
     fs : float
         Sample rate [Hz].
     levels : int, optional
-        Depth of the tree: the narrowest bands are ``fs / 2 / 2**levels`` wide. 7, or as many as
-        the record is long enough for. To show a fault line and its harmonics, a band must be
-        several fault frequencies wide.
+        Depth of the tree: the narrowest bands are ``fs / 2 / 2**levels`` wide. By default 7, or as
+        many as the length of the record allows. To show a fault line and its harmonics, a band must
+        be several fault frequencies wide.
 
     Returns
     -------
     Kurtogram
-        With the band of the largest kurtosis.
+        Kurtogram with the band of largest kurtosis.
 
     Raises
     ------
     ValueError
-        As `checked_signal`, if `x` is no single row, or unless 1 <= levels <=
-        log2(n_samples) - 7.
+        As for `checked_signal`, or if `x` is not one row, or unless 1 <= levels <= log2(n_samples)
+        - 7.
 
     Notes
     -----
-    Each row cuts 0 … fs / 2 into 1, 2, 3, 4, 6, 8, 12 … bands, the tree of the reference. Where
-    that filters and decimates from level to level, here every band is a slice of one Fourier
-    transform with smooth flanks half a band wide, transformed back at 1.5 times its bandwidth.
-    The kurtosis of the complex envelope z is ``<|z|^4> / <|z|^2>^2 - 2``. The ends of the record
-    are tapered and left out, 16 samples of the finest band together, so that the step between
-    them is no blow.
+    Each row divides 0 … fs / 2 into 1, 2, 3, 4, 6, 8, 12 … bands, the tree of the reference. The
+    reference filters and decimates from level to level; here every band is a slice of one Fourier
+    transform with smooth flanks half a band wide, transformed back at 1.5 times its bandwidth. The
+    kurtosis of the complex envelope z is ``<|z|^4> / <|z|^2>^2 - 2``. The ends of the record are
+    tapered and left out, 16 samples of the finest band in total, so that the step between them does
+    not count as an impact.
 
-    With n independent samples in a band (time left times width), noise scatters by about
-    ``2 / sqrt(n)`` (`Kurtogram.deviation`). The largest of all bands is then a narrow one at 2 to
-    4 times that, 7 in one record of a hundred.
+    With n independent samples in a band (remaining time times bandwidth), noise scatters by about
+    ``2 / sqrt(n)`` (`Kurtogram.deviation`). The largest of all bands is then a narrow one at 2 to 4
+    times that, 7 in one record of a hundred.
 
-    One single blow would have a higher kurtosis than a train of them, and is no defect that comes
-    back. Where an eighth of the record holds more than a third of a band's ``<|z|^4>``, it is left
-    out of both means, and again of what is left, three times at the most. A train of four blows
-    or more is not touched, and noise next to never.
+    A single impact would have a higher kurtosis than a train of them, but is not a recurring
+    defect. If an eighth of the record holds more than a third of a band's ``<|z|^4>``, it is left
+    out of both means; this is repeated on the remainder, up to three times. A train of four impacts
+    or more is not affected, and noise almost never.
 
     References
     ----------
@@ -318,7 +318,7 @@ def kurtogram(x: ArrayLike, fs: float, *, levels: int | None = None) -> Kurtogra
 
     Examples
     --------
-    A blow every 50 ms that rings at 3.5 kHz, in noise:
+    An impact every 50 ms that rings at 3.5 kHz, in noise:
 
     >>> t = np.arange(20_000) / 10_000
     >>> ring = np.exp(-800 * (t % 0.05)) * np.sin(2 * np.pi * 3500 * t)
@@ -341,7 +341,7 @@ def kurtogram(x: ArrayLike, fs: float, *, levels: int | None = None) -> Kurtogra
     parts = [_part_moments(lines, count, kept) for count in counts]
     silence = np.asarray(SILENCE * float(parts[0][0].sum()))
     moments = [_repeated(second, fourth) for second, fourth in parts]
-    inside = (kept[1] - kept[0]) * lines.size * 4 / 3  # samples of the record left
+    inside = (kept[1] - kept[0]) * lines.size * 4 / 3  # samples of the record that remain
     return Kurtogram(
         fs=fs,
         level=np.log2(counts),
@@ -351,7 +351,7 @@ def kurtogram(x: ArrayLike, fs: float, *, levels: int | None = None) -> Kurtogra
 
 
 def kurtogram_levels(n_samples: int, fs: float, span: float) -> int:
-    """Depth of a kurtogram whose narrowest bands still hold the frequencies of interest.
+    """Depth of a kurtogram whose narrowest bands still cover the frequencies of interest.
 
     Parameters
     ----------
@@ -365,7 +365,7 @@ def kurtogram_levels(n_samples: int, fs: float, span: float) -> int:
     Returns
     -------
     int
-        For `kurtogram`, >= 1.
+        Depth for `kurtogram`, >= 1.
 
     Examples
     --------
@@ -379,15 +379,15 @@ def kurtogram_levels(n_samples: int, fs: float, span: float) -> int:
 
 
 def _bands_per_row(depth: int) -> list[int]:
-    """Halves of halves, and thirds of those but the last two: 1, 2, 3, 4, 6, 8 …."""
+    """Numbers of bands: powers of two, and three times all but the last two: 1, 2, 3, 4, 6, 8 …."""
     return sorted({1 << k for k in range(depth + 1)} | {3 << k for k in range(depth - 1)})
 
 
 def _tapered_lines(signal: Real, depth: int) -> tuple[Complex, tuple[float, float]]:
-    """Lines of the tapered record below fs / 2, and the part of the transform to look at.
+    """Lines of the tapered record below fs / 2, and the part of the inverse transform to use.
 
-    The record, scaled to an rms of 1, is padded to a length whose half every row divides into
-    bands with flanks of whole lines. Zeros stand for what is below 0 and above fs / 2.
+    The record, scaled to an rms of 1, is zero-padded so that every row divides its half spectrum
+    into bands with flanks of whole lines. Zeros fill the lines below 0 and above fs / 2.
     """
     unit = 3 << (depth + 3)
     length = unit * fast_length(-(-signal.size // unit))
@@ -407,7 +407,7 @@ def _tapered_lines(signal: Real, depth: int) -> tuple[Complex, tuple[float, floa
 def _repeated(second: Float, fourth: Float) -> tuple[Float, Float]:
     """Mean |z|^2 and |z|^4 of every band without its lone events [shape=(count,) each].
 
-    From the parts of both means that fall into each part of the record [shape=(count, _PARTS)].
+    Arguments: the contributions of each part of the record to both means [shape=(count, _PARTS)].
     """
     kept = _without_lone(fourth, LONE_SHARE)
     share = kept.mean(axis=-1)
@@ -415,10 +415,10 @@ def _repeated(second: Float, fourth: Float) -> tuple[Float, Float]:
 
 
 def _without_lone(fourth: Float, most: float) -> Float:
-    """Weight of each part: 0 where a lone event is, else 1 [shape=(..., n_parts)].
+    """Weight of each part: 0 at a lone event, else 1 [shape=(..., n_parts)].
 
-    From what each part adds to the fourth moment, and the share that neighbours may have at the
-    most; see `kurtogram`.
+    `fourth` holds what each part adds to the fourth moment, `most` the largest share that adjacent
+    parts may have; see `kurtogram`.
     """
     kept = np.ones(fourth.shape)
     if fourth.shape[-1] < _LONE_PARTS:
@@ -434,9 +434,9 @@ def _without_lone(fourth: Float, most: float) -> Float:
 
 
 def _part_moments(lines: Complex, count: int, kept: tuple[float, float]) -> tuple[Float, Float]:
-    """What each part of the record adds to mean |z|^2 and |z|^4 [shape=(count, _PARTS) each].
+    """Contribution of each part of the record to mean |z|^2 and |z|^4 [shape=(count, _PARTS) each].
 
-    `lines` begin a quarter of their number below 0, with zeros, and end as far above fs / 2.
+    `lines` begin a quarter of their number below 0, padded with zeros, and end as far above fs / 2.
     """
     width = lines.size * 2 // 3 // count
     weight = _flanks(width).astype(lines.real.dtype)
@@ -455,14 +455,14 @@ def _part_moments(lines: Complex, count: int, kept: tuple[float, float]) -> tupl
         np.square(wave, out=wave)
         power = wave[:, ::2] + wave[:, 1::2]
         second[part] = np.add.reduceat(power, begins, axis=-1, dtype=np.float64)
-        # A dot product would wake BLAS threads, which cost more than they bring on a busy machine.
+        # A dot product would start BLAS threads, which cost more than they save on a busy machine.
         np.square(power, out=power)
         fourth[part] = np.add.reduceat(power, begins, axis=-1, dtype=np.float64)
     return second / (past - first), fourth / (past - first)
 
 
 def _flanks(width: int) -> Float:
-    """Weights of the lines of a band: their squares and its neighbours' add up to 1.
+    """Weights of the lines of a band: its squares and its neighbours' add up to 1.
 
     They reach a quarter of the width beyond either edge [shape=(3 width / 2,)]. Meyer's polynomial
     makes the flank smooth, so that the band settles within the tapers (Daubechies, "Ten lectures on

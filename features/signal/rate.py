@@ -1,20 +1,20 @@
-"""Sample rates that are believed: one check for every function that takes one.
+"""Plausible sample rates: one check for every function that takes one.
 
-Of the standard library only.
+It imports the standard library only.
 """
 
 RATE_LEAST, RATE_MOST = 1e-3, 1e8
-"""Sample rates [Hz]: a level every quarter of an hour, acoustic emission. Beyond them a unit or an
-exponent has slipped."""
+"""Plausible sample rates [Hz]: from one level every quarter of an hour to acoustic emission. A
+value beyond them has a wrong unit or exponent."""
 
 
 def rate_fault(fs: float) -> str:
-    """What is wrong with a sample rate; empty where nothing is.
+    """Message about an implausible sample rate; empty if the rate is plausible.
 
     Parameters
     ----------
     fs : float
-        [Hz]
+        Sample rate [Hz].
 
     Examples
     --------
@@ -29,17 +29,17 @@ def rate_fault(fs: float) -> str:
 
 
 def check_rate(fs: float) -> None:
-    """Refuse a sample rate that is not believed.
+    """Refuse an implausible sample rate.
 
     Parameters
     ----------
     fs : float
-        [Hz]
+        Sample rate [Hz].
 
     Raises
     ------
     ValueError
-        It is below 1 mHz, above 100 MHz, or no number.
+        If it is below 1 mHz, above 100 MHz, or not a number.
     """
     if fault := rate_fault(fs):
         raise ValueError(fault)

@@ -1,4 +1,4 @@
-"""The shape of a spectrum: where its power lies, how it is spread, and what is only noise."""
+"""The shape of a spectrum: position and spread of its power, and its noise floor."""
 
 import math
 
@@ -12,7 +12,7 @@ from .spectrum import line_frequencies
 Float = NDArray[np.float64]
 
 FLOOR_QUANTILE = 0.25
-"""Share of the lines taken to lie below the noise level's quartile [-]: the rest may hold tones."""
+"""Quantile of the lines used for the noise level [-]: the lines above it may hold tones."""
 
 
 def spectral_centroid(lines: ArrayLike, fs: float) -> Float:
@@ -37,8 +37,8 @@ def spectral_centroid(lines: ArrayLike, fs: float) -> Float:
 
     Notes
     -----
-    Exact for a tone away from the ends: Hann's lobe is symmetric on a line, and off it its power
-    still has the tone's frequency as mean.
+    Exact for a tone away from the ends: Hann's lobe is symmetric about a tone on a line, and its
+    power has the tone's frequency as mean between lines, too.
 
     Examples
     --------
@@ -88,7 +88,7 @@ def spectral_spread(lines: ArrayLike, fs: float) -> Float:
 
 
 def spectral_entropy(lines: ArrayLike) -> Float:
-    """How evenly the power is spread over the lines: the order of the signal.
+    """Evenness of the power over the lines: normalised spectral entropy.
 
     Parameters
     ----------
@@ -108,9 +108,9 @@ def spectral_entropy(lines: ArrayLike) -> Float:
 
     Notes
     -----
-    A tone on a line of a Hann spectrum has ``0.868 / ln(n_lines - 1)``. White noise comes to 1
-    with many averages; from one segment its lines scatter, which costs
-    ``(1 - 0.5772) / ln(n_lines - 1)``.
+    A tone on a line of a Hann spectrum has ``0.868 / ln(n_lines - 1)``. White noise approaches 1
+    with many averages; with one segment its lines scatter, which lowers it by ``(1 - 0.5772) /
+    ln(n_lines - 1)``.
 
     References
     ----------
@@ -184,13 +184,13 @@ def noise_floor(
     n_averages : float
         Independent averages behind each line [-], as from `frf.effective_averages`.
     band : tuple of float, optional
-        Where to look [Hz], the noise being white in it; by default from line 2 to the last but
-        one.
+        Band of the search [Hz], in which the noise must be white; by default from line 2 to the
+        last but one.
 
     Returns
     -------
     ndarray, shape (...)
-        One-sided [(unit of x)^2 / Hz]; 0 for a constant signal.
+        One-sided density [(unit of x)^2 / Hz]; 0 for a constant signal.
 
     Raises
     ------
@@ -253,7 +253,7 @@ def _without_mean(lines: ArrayLike) -> Float:
 
 
 def _shares(lines: ArrayLike) -> Float:
-    """Lines over their sum; zeros of a spectrum without power."""
+    """Lines over their sum; zeros for a spectrum without power."""
     power = _checked(lines)
     total = power.sum(axis=-1, keepdims=True)
     return np.asarray(power / np.where(total == 0, 1, total))

@@ -11,7 +11,7 @@ from .rate import check_rate, rate_fault
 from .statistics import Real, centred
 
 LEVEL_FLOOR = 1e-20
-"""Smallest mean square a level distinguishes from silence [(unit of x)^2], that is -200 dB."""
+"""Smallest mean square that differs from silence in a level [(unit of x)^2], that is -200 dB."""
 
 HIGHEST_EDGE_HZ = 11_500.0
 """Default upper edge [Hz]: inside the flat range of a stud-mounted industrial accelerometer."""
@@ -20,7 +20,8 @@ NYQUIST_SHARE = 0.45
 """Default upper edge as a share of the sample rate, clear of the anti-alias filter's slope [-]."""
 
 HANN_BANDWIDTH = 1.5
-"""Equivalent noise bandwidth of Hann's window [lines]: a tone's own line holds 1 / 1.5 of it."""
+"""Equivalent noise bandwidth of Hann's window [lines]: the line of a tone holds 1 / 1.5 of its
+power."""
 
 LINE_SPACING_HZ = 4.0
 """Widest line spacing of the default spectrum [Hz]: four lines in the lowest default band."""
@@ -85,10 +86,10 @@ def band_edges(
 def line_band_edges(
     fs: float, nperseg: int, *, n_bands: int = 20, low: float = 200.0, high: float | None = None
 ) -> NDArray[np.float64]:
-    """Band edges half-way between lines of a short transform, one whole line or more per band.
+    """Band edges half-way between lines of a short transform, with at least one line per band.
 
-    Logarithmic where the lines are dense enough; a band that would be narrower than a line takes
-    a whole one, and the bands above share what is left.
+    The edges are logarithmic where the lines are dense enough; a band that would be narrower than a
+    line takes a whole one, and the bands above divide the rest.
 
     Parameters
     ----------
@@ -110,7 +111,7 @@ def line_band_edges(
     Raises
     ------
     ValueError
-        As `band_edges`, or if there are fewer lines between `low` and `high` than bands.
+        As for `band_edges`, or if there are fewer lines between `low` and `high` than bands.
 
     Examples
     --------
@@ -131,7 +132,7 @@ def line_band_edges(
 
 
 def _line_counts(first: int, last: int, n_bands: int) -> NDArray[np.float64]:
-    """Line number opening each band, and the one past the last [shape=(n_bands + 1,)]."""
+    """Number of the first line of each band, and one past the last [shape=(n_bands + 1,)]."""
     opening = [first]
     for remaining in range(n_bands, 0, -1):
         current = opening[-1]
@@ -165,9 +166,9 @@ def _check_band_limits(fs: float, n_bands: int, low: float, high: float) -> None
 def line_weights(n_samples: int, fs: float, edges: ArrayLike) -> NDArray[np.float64]:
     """Share of every spectral line that falls into every band.
 
-    Each line stands for the cell half a spacing to either side of it, and is divided at the
-    band edges in proportion, so that bands narrower than a line stay defined and adjoining bands
-    neither lose nor count energy twice.
+    Each line stands for the cell half a spacing to either side of it and is divided at the band
+    edges in proportion. Bands narrower than a line thus stay defined, and adjoining bands neither
+    lose nor double-count energy.
 
     Parameters
     ----------
@@ -208,7 +209,7 @@ def line_weights(n_samples: int, fs: float, edges: ArrayLike) -> NDArray[np.floa
 
 
 def band_weights(n_samples: int, fs: float, bands: ArrayLike) -> NDArray[np.float64]:
-    """Share of every spectral line that falls into bands of any place, which may overlap.
+    """Share of every spectral line that falls into each of any bands, which may overlap.
 
     Parameters
     ----------
@@ -222,7 +223,7 @@ def band_weights(n_samples: int, fs: float, bands: ArrayLike) -> NDArray[np.floa
     Returns
     -------
     ndarray, shape (n_samples // 2 + 1, n_bands)
-        Shares between 0 and 1 [-], as of `line_weights`, read only.
+        Shares between 0 and 1 [-], as for `line_weights`, read only.
 
     Raises
     ------
@@ -250,11 +251,11 @@ def band_weights(n_samples: int, fs: float, bands: ArrayLike) -> NDArray[np.floa
     return _shares(n_samples, fs, tuple((low, high) for low, high in pairs.tolist()))
 
 
-@lru_cache(maxsize=8)  # the same for every record of a data set, and dearer than its transform
+@lru_cache(maxsize=8)  # the same for every record of a data set, and slower than its transform
 def _shares(
     n_samples: int, fs: float, bands: tuple[tuple[float, float], ...]
 ) -> NDArray[np.float64]:
-    """Overlap of the cells of the lines with bands, over the width of the cells; read only."""
+    """Overlap of the lines' cells with the bands, over the width of the cells; read only."""
     lower, upper = np.array(bands).T
     cells = (np.arange(n_samples // 2 + 2) - 0.5) * fs / n_samples
     cells = np.clip(cells, 0.0, fs / 2)
@@ -424,12 +425,12 @@ def band_levels(
     Raises
     ------
     ValueError
-        As `power_lines` and `line_weights`.
+        As for `power_lines` and `line_weights`.
 
     Notes
     -----
-    A sine nearer than two line spacings to an edge is shared with the next band, because Hann's
-    main lobe is four lines wide.
+    The power of a sine nearer than two line spacings to an edge is shared with the next band,
+    because Hann's main lobe is four lines wide.
 
     Examples
     --------
@@ -461,7 +462,7 @@ def levels_from_lines(lines: ArrayLike, fs: float, edges: ArrayLike) -> NDArray[
     Raises
     ------
     ValueError
-        As `line_weights`.
+        As for `line_weights`.
 
     Examples
     --------
@@ -526,19 +527,19 @@ def amplitude_spectrum(
     Returns
     -------
     frequency : ndarray, shape (nperseg // 2 + 1,)
-        [Hz].
+        Frequency [Hz].
     amplitude : ndarray, shape (..., nperseg // 2 + 1)
-        Of the tone on each line [unit of x]; averaged as mean squares over the segments.
+        Amplitude of the tone on each line [unit of x]; averaged as mean squares over the segments.
 
     Raises
     ------
     ValueError
-        As `power_lines`.
+        As for `power_lines`.
 
     Notes
     -----
     Corrected for Hann's coherent gain: exact for a tone on a line, up to 15.1 % (1.42 dB) low
-    between two; `strongest_tone` mends that. Noise reads by its density times 1.5 line spacings.
+    between two; `strongest_tone` corrects that. Noise reads as its density times 1.5 line spacings.
 
     Examples
     --------
@@ -554,7 +555,7 @@ def amplitude_spectrum(
 
 
 def whole_segment(x: ArrayLike) -> int:
-    """Longest even segment [samples]: that which reads a record as one."""
+    """Longest even segment [samples]: it covers the whole record."""
     n = np.shape(x)[-1] if np.ndim(x) else 0
     return n - n % 2
 
@@ -576,18 +577,18 @@ def power_spectral_density(
     Returns
     -------
     frequency : ndarray, shape (nperseg // 2 + 1,)
-        [Hz].
+        Frequency [Hz].
     density : ndarray, shape (..., nperseg // 2 + 1)
         One-sided [(unit of x)^2 / Hz]; its sum times the spacing is the mean square.
 
     Raises
     ------
     ValueError
-        As `power_lines`.
+        As for `power_lines`.
 
     Notes
     -----
-    `scipy.signal.welch` of the signal less its mean, with ``detrend=False``.
+    Same as `scipy.signal.welch` with ``detrend=False`` of the signal less its mean.
 
     Examples
     --------
@@ -618,19 +619,19 @@ def strongest_tone(
     fs : float
         Sample rate [Hz].
     band : tuple of float, optional
-        Where to look [Hz]; everywhere by default.
+        Band to search [Hz]; the whole spectrum by default.
     nperseg : int, optional
         Segment length [samples], even; the whole record by default.
 
     Returns
     -------
     frequency, amplitude : ndarray, shape (...)
-        [Hz] and peak value [unit of x]; 0 and 0 where nothing moves.
+        Frequency [Hz] and peak value [unit of x]; both 0 for a constant signal.
 
     Raises
     ------
     ValueError
-        As `power_lines`, or if the band holds no line between the first and the last.
+        As for `power_lines`, or if the band holds no line between the first and the last.
 
     Notes
     -----
@@ -668,7 +669,7 @@ def strongest_tone(
     below, peak, above = (_pick(lines, top + step) for step in (-1, 0, 1))
     side = np.where(above >= below, 1, -1)
     beside = np.sqrt(np.maximum(above, below) / np.where(peak > 0, peak, 1))
-    # A neighbour beyond half the peak's own amplitude pulls towards it, by half a line at most.
+    # A neighbour above half the peak's own amplitude pulls towards it, by half a line at most.
     shift = np.clip((2 * beside - 1) / (1 + beside), 0, 0.5)
     amplitude = np.sqrt(2 * HANN_BANDWIDTH * peak) * _hann_loss(shift)
     place = (top + side * shift) * frequency[1]
@@ -676,20 +677,20 @@ def strongest_tone(
 
 
 def _pick(lines: NDArray[np.float64], index: NDArray[np.intp]) -> NDArray[np.float64]:
-    """One line of every channel."""
+    """One line of each channel."""
     return np.asarray(np.take_along_axis(lines, index[..., np.newaxis], axis=-1)[..., 0])
 
 
 def _hann_loss(shift: NDArray[np.float64]) -> NDArray[np.float64]:
-    """What a Hann line reads low off a tone, as the factor that mends it."""
+    """Factor that corrects the reading of a Hann line for its distance from the tone [-]."""
     return np.asarray((1 - shift**2) / np.sinc(shift))
 
 
-# --- bands of any place
+# --- arbitrary bands
 
 
 def levels_in_bands(lines: ArrayLike, fs: float, bands: ArrayLike) -> NDArray[np.float64]:
-    """Levels in bands of any place, of a spectrum that has already been computed.
+    """Levels in arbitrary bands of a spectrum that has already been computed.
 
     Parameters
     ----------
@@ -708,7 +709,7 @@ def levels_in_bands(lines: ArrayLike, fs: float, bands: ArrayLike) -> NDArray[np
     Raises
     ------
     ValueError
-        As `band_weights`.
+        As for `band_weights`.
 
     Examples
     --------

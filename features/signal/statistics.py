@@ -42,7 +42,7 @@ def centred(x: ArrayLike) -> Real:
         signal = signal.astype(np.float64)
     if signal.ndim == 0 or signal.shape[-1] == 0:
         raise ValueError(f"n_samples = 0 (shape {signal.shape}) must be >= 1; give a signal")
-    # Subtracting one sample first leaves exact zeros of a constant, where the mean would round.
+    # Subtracting one sample first leaves exact zeros for a constant, whose mean would be rounded.
     shifted: Real = signal - signal[..., :1]
     shifted -= shifted.mean(axis=-1, keepdims=True)
     return shifted
@@ -185,7 +185,7 @@ def _signs(signal: Real) -> NDArray[np.bool_]:
         latest = np.where(zero, 0, np.arange(signal.shape[-1]))
         latest = np.maximum.accumulate(latest, axis=-1)
         above = np.take_along_axis(above, latest, axis=-1)
-        # Before the first sample off 0 there is none to go with: nothing is crossed there.
+        # Samples before the first nonzero one take its sign, so that no crossing is counted there.
         first = np.argmin(zero, axis=-1)[..., np.newaxis]
         begun = np.arange(signal.shape[-1]) >= first
         above = np.where(begun, above, np.take_along_axis(above, first, axis=-1))
@@ -193,7 +193,7 @@ def _signs(signal: Real) -> NDArray[np.bool_]:
 
 
 def _ratio(above: Real, below: Real) -> Real:
-    """Quotient that is 0 where the denominator is 0: the value of a constant signal."""
+    """Quotient; 0 if the denominator is 0, as for a constant signal."""
     out: Real = np.zeros_like(np.asarray(below))
     return np.asarray(np.divide(above, below, out=out, where=np.asarray(below) != 0))
 
@@ -418,7 +418,7 @@ def kurtosis(x: ArrayLike) -> Real:
 
 
 def clearance_factor(x: ArrayLike) -> Real:
-    """Peak over the squared mean root of the absolute value: single impacts weigh most in it.
+    """Peak over the squared mean root of the absolute value: very sensitive to single impacts.
 
     Parameters
     ----------
@@ -450,7 +450,7 @@ def clearance_factor(x: ArrayLike) -> Real:
 
 
 def k_factor(x: ArrayLike) -> Real:
-    """Peak times rms: grows with the size of the events and with that of the rest.
+    """Peak times rms: grows with the largest events and with the overall level.
 
     Parameters
     ----------
@@ -471,7 +471,7 @@ def k_factor(x: ArrayLike) -> Real:
     References
     ----------
     A. Sturm, R. Foerster, N. Hippmann, D. Kinsky, "Waelzlagerdiagnostik an Maschinen und Anlagen"
-    (1986), whose index K(t) is this product as new over this product now.
+    (1986), whose index K(t) is this product in new condition over the present one.
 
     Examples
     --------
@@ -482,7 +482,7 @@ def k_factor(x: ArrayLike) -> Real:
 
 
 def zero_crossing_rate(x: ArrayLike, fs: float) -> Real:
-    """Changes of sign about the mean in a second.
+    """Sign changes about the mean per second.
 
     Parameters
     ----------
@@ -496,8 +496,8 @@ def zero_crossing_rate(x: ArrayLike, fs: float) -> Real:
     ndarray, shape (...)
         Crossings over the duration from the first to the last sample [1/s]: 2 f for a sine of
         frequency f, ``2 sqrt(m2 / m0)`` for Gaussian noise, with the moments
-        ``m_i = integral f^i S(f) df`` (Rice), less the crossings that come twice between two
-        samples. A sample at the mean goes with the one before it, so that touching it is no
+        ``m_i = integral f^i S(f) df`` (Rice), less the crossings that come in pairs between two
+        samples. A sample at the mean counts with the one before it, so that touching the mean is no
         crossing. 0 for a constant signal and for one sample.
 
     Raises
@@ -532,8 +532,8 @@ def entropy(x: ArrayLike) -> Real:
     -------
     ndarray, shape (...)
         ``-sum_i p_i log2 p_i`` over 64 bins of equal width from the lowest to the highest sample
-        [bit]: 6 for a uniform distribution, 5.72 for a sine, 1 for a square wave, 0 for a
-        constant signal. Few large events make it small, since they widen the bins.
+        [bit]: 6 for a uniform distribution, 5.72 for a sine, 1 for a square wave, 0 for a constant
+        signal. A few large events lower it, since they widen the bins.
 
     Raises
     ------
@@ -542,9 +542,8 @@ def entropy(x: ArrayLike) -> Real:
 
     Notes
     -----
-    Each bin holds its lower edge, so a sign flip can move the samples that lie on edges. The
-    estimate is low by about ``63 / (2 ln 2 n_samples)`` bit (Miller), 0.002 bit at 25,600
-    samples.
+    Each bin includes its lower edge, so that a change of sign can move samples on the edges. The
+    estimate is low by about ``63 / (2 ln 2 n_samples)`` bit (Miller), 0.002 bit at 25,600 samples.
 
     References
     ----------

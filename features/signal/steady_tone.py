@@ -1,4 +1,4 @@
-"""A tone that sounds on where all else comes and goes: of a gear mesh, or of a fan."""
+"""Steady tone amid louder, varying vibration: of a gear mesh, or of a fan."""
 
 import math
 from typing import Final, NamedTuple
@@ -15,13 +15,13 @@ from .spectrum import hann
 Complex = NDArray[np.complexfloating]
 Float = NDArray[np.float64]
 
-_ENOUGH_HZ = 3200.0  # of blocks: tones are looked for below 1.3 kHz
-_FRAME_S = 0.024  # a casing's modes above 0.2 kHz die away within a few of them
-_TOP_SHARE = 0.42  # of the rate of blocks: above, their means are weak
+_ENOUGH_HZ = 3200.0  # block rate: tones are searched below 1.3 kHz
+_FRAME_S = 0.024  # a casing's modes above 0.2 kHz decay within a few frames
+_TOP_SHARE = 0.42  # of the block rate: averaging attenuates tones above it
 _FEWEST_FRAMES = 64
-_TRIED = 6  # bins whose phase goes on the most evenly
-_BESIDE_HZ = 1.0  # of a multiple of a supply's frequency: hum
-_REACH = 0.75  # of the bins' distance: a tone farther off is nearer to another bin
+_TRIED = 6  # bins whose phase advances most evenly
+_BESIDE_HZ = 1.0  # distance from a multiple of a supply's frequency: hum
+_REACH = 0.75  # of the bin spacing: a tone farther away is nearer to another bin
 
 
 class SteadyTone(NamedTuple):
@@ -30,13 +30,13 @@ class SteadyTone(NamedTuple):
     Attributes
     ----------
     frequency_hz : float
-        [Hz]
+        Frequency [Hz].
     amplitude : float
-        [unit of the signal]
+        Amplitude [unit of the signal].
     scatter : float
-        By how much half of all short-time amplitudes, as complex numbers, are off its own at most,
-        over its own [-]: 0 of a pure tone, 1 and more where something else is louder most of the
-        time.
+        Median distance of the short-time amplitudes, as complex numbers, from the tone's own, over
+        the tone's amplitude [-]: 0 for a pure tone, 1 or more if something else is louder most of
+        the time.
     """
 
     frequency_hz: float
@@ -45,11 +45,11 @@ class SteadyTone(NamedTuple):
 
 
 SILENT: Final = SteadyTone(0.0, 0.0, math.inf)
-"""Of a signal without any tone, or too short to tell."""
+"""Result for a signal without any tone, or one that is too short."""
 
 
 def steady_tone(x: ArrayLike, fs: float, *, low_hz: float) -> SteadyTone:
-    """Steadiest tone from a frequency on up to 1.3 kHz, hum of the mains left out.
+    """Steadiest tone between a given frequency and 1.3 kHz, hum of the mains excluded.
 
     Parameters
     ----------
@@ -58,25 +58,26 @@ def steady_tone(x: ArrayLike, fs: float, *, low_hz: float) -> SteadyTone:
     fs : float
         Sample rate [Hz].
     low_hz : float
-        Lowest frequency that counts [Hz].
+        Lowest frequency considered [Hz].
 
     Returns
     -------
     SteadyTone
-        Of the least scatter; :data:`SILENT` of a signal shorter than half a second.
+        Tone of least scatter; :data:`SILENT` for a signal shorter than half a second.
 
     Raises
     ------
     ValueError
-        A rate or frequency is not positive.
+        If a rate or frequency is not positive.
 
     Notes
     -----
-    Samples are averaged in blocks of 0.3 ms, and transformed in Hann frames of 24 ms that overlap
-    by half. In a bin, the frames of a tone have one amplitude, and a phase that goes on by the same
-    angle from each to the next. That angle is where the transform of their phases alone is largest,
-    whatever the louder frames do; turned back by it, half of all frames lie as near to their median
-    as the scatter says. A mode that rings after every blow has one phase too, and no one amplitude.
+    Samples are averaged in blocks of 0.3 ms and transformed in Hann frames of 24 ms that overlap by
+    half. In a bin, all frames of a tone have the same amplitude, and the phase advances by the same
+    angle from frame to frame. That angle is where the transform of the phases alone is largest, so
+    that louder frames do not dominate it. With this rotation removed, the median distance of the
+    frames from their median is the scatter. A mode that rings after every impact has a steady phase
+    too, but no steady amplitude.
 
     Examples
     --------
@@ -105,12 +106,13 @@ def steady_tone(x: ArrayLike, fs: float, *, low_hz: float) -> SteadyTone:
     even = np.abs(np.einsum("ij,ij->i", phases[:, 1:], phases[:, :-1].conj()))
     tried = np.argsort(-even)[:_TRIED]
     tone = _steadiest(lines[tried], phases[tried], bins[tried], rate / hop, low_hz)
-    lost = float(np.sinc(tone.frequency_hz / rate) / np.sinc(tone.frequency_hz / fs))  # by blocks
-    return tone._replace(amplitude=tone.amplitude / lost)
+    # Averaging in blocks lets this share of the amplitude through.
+    passed = float(np.sinc(tone.frequency_hz / rate) / np.sinc(tone.frequency_hz / fs))
+    return tone._replace(amplitude=tone.amplitude / passed)
 
 
 def _blocks(signal: NDArray[np.floating], fs: float) -> tuple[NDArray[np.floating], float]:
-    """Means of blocks of samples, and their rate [Hz]."""
+    """Means of blocks of samples, and the block rate [Hz]."""
     block = max(1, int(fs / _ENOUGH_HZ))
     samples = signal.astype(np.result_type(signal, np.float32), copy=False)
     whole = samples[: samples.size // block * block].reshape(-1, block)
@@ -118,7 +120,7 @@ def _blocks(signal: NDArray[np.floating], fs: float) -> tuple[NDArray[np.floatin
 
 
 def _frames(blocks: NDArray[np.floating], length: int) -> tuple[Complex, Float]:
-    """Amplitudes of every bin in every frame [shape=(n_bins, n_frames)], and the bins' numbers."""
+    """Amplitudes of every bin in every frame [shape=(n_bins, n_frames)], and the bin numbers."""
     window = hann(length)
     window = (window * (2 / window.sum())).astype(blocks.dtype)
     frames = sliding_window_view(blocks, length)[:: length // 2]
@@ -129,7 +131,7 @@ def _frames(blocks: NDArray[np.floating], length: int) -> tuple[Complex, Float]:
 def _steadiest(
     lines: Complex, phases: Complex, bins: Float, frame_rate: float, low_hz: float
 ) -> SteadyTone:
-    """Of the tones that the phases of each bin follow best, the one of the least scatter."""
+    """Tone of least scatter among those that best fit the phases of each bin."""
     n = lines.shape[-1]
     length = fast_length(2 * n)
     turns = np.abs(fft(np.pad(phases, ((0, 0), (0, length - n)))))
@@ -153,7 +155,7 @@ def _steadiest(
 
 
 def _hann_response(bins: float) -> float:
-    """Of a tone that lies beside a bin, less than one bin away; at its middle 1."""
+    """Response of Hann's window to a tone less than one bin away; 1 at the centre of the bin."""
     return float(np.sinc(bins)) / (1 - bins**2)
 
 
