@@ -66,11 +66,11 @@ _HOMES = {
     "tacholess_speed": ".rotation.tacholess_speed",
     "velocity_rms": ".signal.iso",
 }
-"""Public name -> module that defines it; the block above tells type checkers the same."""
+"""Module that defines each public name; the block above says the same to type checkers."""
 
 __all__ = [*_HOMES]
 
-if not TYPE_CHECKING:  # a type checker would take it that there is every name
+if not TYPE_CHECKING:  # with __getattr__, a type checker would accept any name
 
     def __getattr__(name: str) -> "Any":
         """Import the public name on first use."""

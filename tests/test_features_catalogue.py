@@ -685,8 +685,8 @@ def test_single_values_by_name():
         (["kurtossis"], r"feature 'kurtossis' is unknown; did you mean kurtosis\?"),
         (["ch_0.rmss"], r"feature 'ch_0.rmss' is unknown; did you mean ch_0.rms\?"),
         (["qqqqqqqq"], r"feature 'qqqqqqqq' is unknown; see wearstate features --list"),
-        (["order_levels"], r"order_levels is not to be had: tacho = none must be there"),
-        (["x1y2", "frf_levels"], r"(?s)frf_levels is not to be had: force .*'x1y2' is unknown"),
+        (["order_levels"], r"order_levels is not available: tacho = none must be there"),
+        (["x1y2", "frf_levels"], r"(?s)frf_levels is not available: force .*'x1y2' is unknown"),
         ([], r"only = \(\) must name one feature or more"),
     ],
 )

@@ -76,7 +76,7 @@ def test_only_asks_nothing_of_the_other_rows(tmp_path, monkeypatch):
     monkeypatch.setattr(order, "pulse_times", None)  # not even the tacho is read
     assert feature_table(data, choice=choice_of(only=["rms"])).names == ("acc.rms",)
     refused = run("features", data, "-o", tmp_path / "t.csv", "--only", "band_levels", code=2)
-    assert "band_levels is not to be had: fs = 80 Hz is too low: low = 50.0 Hz" in refused.stderr
+    assert "band_levels is not available: fs = 80 Hz is too low: low = 50.0 Hz" in refused.stderr
 
 
 @pytest.mark.parametrize("rate", [64.0, 100.0, 150.0, 500.0, 1280.0, 2560.0, 4096.0, 8192.0])

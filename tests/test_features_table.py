@@ -261,7 +261,7 @@ def test_bands_closer_than_a_hertz_have_no_names_and_are_left_out():
     names = table.feature_names(["a"], 200.0, tacho=False, settings=close)
     assert "a.rms" in names
     assert not any("band" in name for name in names)
-    with pytest.raises(ValueError, match=r"band_levels is not to be had: fs = 200 Hz is too low"):
+    with pytest.raises(ValueError, match=r"band_levels is not available: fs = 200 Hz is too low"):
         table.feature_names(["a"], 200.0, tacho=False, settings=close, only=["band_levels"])
     twice = shared.Settings(bands=((1.0, 2.0), (1.0, 2.0)))
     with pytest.raises(ValueError, match=r"feature names equal, must be 0"):

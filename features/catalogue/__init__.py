@@ -1,4 +1,4 @@
-"""The catalogue of features, and the row that they make of one recording.
+"""The catalogue of features, and the feature row of a recording.
 
-It may import ``features.signal``, ``features.response``, ``features.rotation``.
+May import ``features.signal``, ``features.response``, ``features.rotation``.
 """

@@ -1,4 +1,4 @@
-"""What the features of one recording share: the choices behind them, and transforms made once."""
+"""Shared basis of the features of one recording: settings, and transforms computed once."""
 
 import math
 from dataclasses import dataclass
@@ -23,54 +23,54 @@ Band = tuple[float, float]
 
 ACCELERATION, DISPLACEMENT, FORCE = "acceleration", "displacement", "force"
 PRESSURE = "pressure"
-"""Quantities that decide what a channel is good for: severity, an orbit, a transfer function, the
-conditions in a cylinder."""
+"""Quantities of channels that some features require: for severity, an orbit, a transfer function,
+cylinder pressures."""
 
 FAULTS = ("outer", "inner", "roller", "cage")
-"""Parts of a rolling bearing that a fault line is looked for of."""
+"""Parts of a rolling bearing whose fault lines are searched."""
 
 FEWEST_OCTAVE_LINES = 4
-"""Lines in the lowest third octave, where the record is long enough [-]."""
+"""Lines in the lowest third octave if the record is long enough [-]."""
 
 FEWEST_BLOCKS = 8
-"""Half-overlapping blocks for each force behind a transfer function [-]: its random error is then
-13 % at a coherence of 0.8."""
+"""Half-overlapping blocks per force for a transfer function [-]: its random error is then 13 % at a
+coherence of 0.8."""
 
 FEWEST_FRF_LINES = 8
-"""Lines of a transfer function, below which it is told nothing of [-]."""
+"""Fewest lines of a transfer function for its features [-]."""
 
 HIGHEST_ORDER = 20
-"""Highest order of the stabilisation [-]: found the same modes as the usual 30 in half its time."""
+"""Highest order of the stabilisation [-]: finds the same modes as the usual 30 in half the time."""
 
 USUAL_WINDOW = 2048
-"""Window of a transfer function, as analysers have it [samples]."""
+"""Window of a transfer function, the usual one of analysers [samples]."""
 
 MOST_LINES = 1024
-"""Lines that one modal fit takes [-]; of more, each peak is fitted alone: a fit of all takes half a
-minute where blows are seconds apart."""
+"""Most lines of one modal fit [-]; with more, each peak is fitted separately: a fit of all takes
+half a minute if blows are seconds apart."""
 
-_THINNING_PAD = 32  # samples at the lower rate between the end of a record and its start, wrapped
+_THINNING_PAD = 32  # samples at the lower rate between the end and the start of the record
 
 
 @dataclass(frozen=True, kw_only=True)
 class Settings:
-    """Choices behind the catalogue; rows compare only when made with equal ones.
+    """Settings of the catalogue; only rows computed with equal settings are comparable.
 
-    What no signal tells (the kind of machine, the geometry of a bearing) is None unless given, and
-    the features that need it are then absent.
+    What cannot be inferred from a signal (the kind of machine, the geometry of a bearing) is None
+    unless given, and the features that need it are then absent.
 
     Parameters
     ----------
     n_bands : int
         Bands of the long spectrum.
     band_low : float
-        Their lower edge [Hz].
+        Lower edge of these bands [Hz].
     map_bands : int
         Bands of the crank-angle map.
     map_low : float
-        Their lower edge [Hz].
+        Lower edge of the map's bands [Hz].
     high : float, optional
-        Upper edge of both [Hz]; see `band_edges`.
+        Upper edge of spectrum and map [Hz]; see `band_edges`.
     angle_bins : int
         Bins in one revolution.
     orders : tuple of float
@@ -78,41 +78,41 @@ class Settings:
     orbit_orders : tuple of float
         Orders of the filtered orbits [-].
     impact_threshold : float
-        Least short-time energy of an impact, in medians [-].
+        Smallest short-time energy of an impact, in medians [-].
     bands : tuple of tuple of float
-        Bands of your own, lower and upper edge [Hz].
+        Additional bands, lower and upper edge [Hz].
     octave_low : float
         Lowest third octave [Hz].
     spacing_band_hz : tuple of float
-        Where the spacing of harmonics or sidebands is looked for [Hz].
+        Range searched for the spacing of harmonics or sidebands [Hz].
     points_per_revolution : int
-        Points of the synchronous average; it holds the orders below 0.4 of it.
+        Points of the synchronous average; it holds the orders below 0.4 of this number.
     envelope_band : tuple of float, optional
         Band of the envelope [Hz]; fs / 8 to 0.4 fs by default.
     machine : str, optional
         Kind of machine, a key of `iso.KINDS`; a rotating one needs `speed_hz` too.
     speed_hz : float, optional
-        Nominal shaft speed [Hz]: for the zone, and for bearing lines where there is no tacho.
+        Nominal shaft speed [Hz]: for the zone, and for bearing lines without a tacho.
     speed_band_hz : tuple of float, optional
-        Where the speed is looked for without a tacho [Hz].
+        Range searched for the speed without a tacho [Hz].
     bearing : BearingFrequencies, optional
         Fault frequencies in orders of the shaft.
     frf_spacing_hz : float
-        Widest line spacing of a transfer function [Hz]; lines are closer where the record has
+        Widest line spacing of a transfer function [Hz]; lines are closer if the record has
         `FEWEST_BLOCKS` windows of 2,048 samples for each force.
     exponential : float
-        What the exponential window of an impact test has sunk to at the end of a block [-]; 1 for
-        none. See `impact.impact_spectra`.
+        Value of the exponential window of an impact test at the end of a block [-]; 1 for none. See
+        `impact.impact_spectra`.
     frf_bands : int
-        Its bands, from `band_low`.
+        Bands of a transfer function, from `band_low`.
     profile_bands : int
-        Its narrow bands, from `profile_low`.
+        Narrow bands of a transfer function, from `profile_low`.
     profile_low : float
-        Their lower edge, from which on modes are looked for, too [Hz].
+        Lower edge of the narrow bands and of the search for modes [Hz].
     n_modes : int
-        Modes of it that are reported, those that stand out highest, and antiresonances.
+        Number of modes reported, those that stand out most, and of antiresonances.
     reference : FrfReference, optional
-        What a transfer function is held against.
+        Reference for transfer functions.
 
     Examples
     --------
@@ -158,7 +158,7 @@ class Settings:
         )
 
     def octave_centres(self, fs: float) -> Float:
-        """Third octaves up to the upper edge [Hz]; ValueError where there are none."""
+        """Third octaves up to the upper edge [Hz]; ValueError if there are none."""
         top = spectrum.upper_edge(fs, self.high) * 10**-0.05
         return third_octave_centres(self.octave_low, 1000 * 10 ** (_whole(10 * _decades(top)) / 10))
 
@@ -167,7 +167,7 @@ class Settings:
         return (fs / 8, 0.4 * fs) if self.envelope_band is None else self.envelope_band
 
     def severity_band(self) -> Band:
-        """Band of the severity [Hz]: that of the machine, where its kind and speed are known."""
+        """Band of the severity [Hz]: that of the machine if its kind and speed are known."""
         if self.machine is None:
             return iso.ISO_BAND
         if self.speed_hz is None and not iso.machine_kind(self.machine).reciprocating:
@@ -175,11 +175,11 @@ class Settings:
         return iso.iso_band(self.machine, self.speed_hz)
 
     def frf_nperseg(self, fs: float) -> int:
-        """Least length of the windows of a transfer function [samples]: a power of two."""
+        """Smallest length of the windows of a transfer function [samples]: a power of two."""
         return 1 << max(3, math.ceil(math.log2(fs / self.frf_spacing_hz)))
 
     def profile_nperseg(self, fs: float) -> int:
-        """Length of the windows where the record is long enough [samples]."""
+        """Length of the windows if the record is long enough [samples]."""
         return max(self.frf_nperseg(fs), USUAL_WINDOW)
 
     def frf_edges(self, fs: float) -> Float:
@@ -218,16 +218,16 @@ def _decades(frequency: float) -> float:
 
 
 def _whole(number: float) -> int:
-    # An edge that is an exact third octave but for rounding counts as one.
+    # An edge that is a third octave except for rounding counts as one.
     return math.floor(number + 1e-9)
 
 
 STANDARD = Settings()
-"""The settings used unless others are given."""
+"""Default settings."""
 
 
 class Analysis:
-    """One recording with every transform its features share, each computed at most once.
+    """One recording with all transforms that its features share, each computed at most once.
 
     Parameters
     ----------
@@ -244,7 +244,7 @@ class Analysis:
     quantities : tuple of str, optional
         Quantity of every channel; all ``acceleration`` by default.
     pressures : ndarray, shape (n_pressures, n_samples), optional
-        Of cylinders [Pa], beside the vibration.
+        Cylinder pressures [Pa], in addition to the vibration.
     settings : Settings
         Bands, bins and orders.
 
@@ -365,7 +365,7 @@ class Analysis:
 
     @cached_property
     def speed_hz(self) -> float:
-        """Mean shaft speed from the tacho, without one the nominal one [Hz]."""
+        """Mean shaft speed from the tacho, or else the nominal speed [Hz]."""
         if self._pulses is None:
             if self.settings.speed_hz is None:
                 raise ValueError("speed_hz is missing: the feature needs a tacho or a speed")
@@ -391,7 +391,7 @@ class Analysis:
 
     @cached_property
     def angle(self) -> resample.AngleSignal:
-        """Signals over the shaft angle; fast ones are thinned to the rate that is needed first."""
+        """Signals over the shaft angle; fast ones are first decimated to the required rate."""
         points = self.settings.points_per_revolution
         factor = max(1, int(1 / (points * float(np.diff(self.phase).max()))))
         while fast_length(factor) != factor:
@@ -401,7 +401,7 @@ class Analysis:
 
     @cached_property
     def synchronous(self) -> tuple[Amplitude, Amplitude]:
-        """Statistics of the mean revolution, and of what is left of the signal without it."""
+        """Statistics of the mean revolution, and of the signal without it."""
         mean = resample.synchronous_average(self.angle)
         rest = resample.angular_residual(self.angle, mean)
         whole = rest.signal[..., : rest.revolutions * rest.points_per_revolution]
@@ -463,21 +463,21 @@ class Analysis:
     def envelope_spectrum(self) -> tuple[Float, Real]:
         """Envelope spectrum [Hz and unit of x, shape=(n_channels, n_lines)].
 
-        Not of the squared envelope: that carries the scatter of the blows, and tells a damaged race
-        less clearly.
+        The squared envelope is not used: it carries the scatter of the impacts and shows a damaged
+        race less clearly.
         """
         band = self.settings.envelope_edges(self.fs)
         return envelope.envelope_spectrum(self.vibration, self.fs, band, kind="plain")
 
     @cached_property
     def fault_lines(self) -> list[list[envelope.FaultLine | None]]:
-        """Of every channel, the line of each of `FAULTS` in `envelope_spectrum`."""
+        """Lines of each of `FAULTS` in `envelope_spectrum`, by channel."""
         frequency, amplitude = self.envelope_spectrum
         return [self._lines_of_faults(frequency, row) for row in amplitude]
 
     @cached_property
     def kurtograms(self) -> list[kurtogram.Kurtogram]:
-        """Of every channel."""
+        """Kurtogram of each channel."""
         known = self._pulses is not None or self.settings.speed_hz is not None
         span = envelope.envelope_span(self.speed_hz if known else None, self.settings.bearing)
         levels = kurtogram.kurtogram_levels(self.vibration.shape[-1], self.fs, span)
@@ -485,7 +485,7 @@ class Analysis:
 
     @cached_property
     def kurtogram_fault_lines(self) -> list[list[envelope.FaultLine | None]]:
-        """As `fault_lines`, in the band of the largest kurtosis of each channel."""
+        """As `fault_lines`, in the band of largest kurtosis of each channel."""
         pairs = zip(self.vibration, self.kurtograms, strict=True)
         found = (envelope.envelope_spectrum(row, self.fs, k.band, kind="plain") for row, k in pairs)
         return [self._lines_of_faults(*lines) for lines in found]
@@ -506,11 +506,11 @@ class Analysis:
         return bool(self.fs / self.vibration.shape[-1] <= frequency < self.fs / 2)
 
     def _lines_of_faults(self, place: Float, size: Real) -> list[envelope.FaultLine | None]:
-        """Line of each fault; None where the spectrum is too short or too coarse to show it."""
+        """Line of each fault; None if the spectrum is too short or too coarse to show it."""
         orders = self.settings.bearing
         if orders is None:
             raise ValueError("bearing is missing: the feature needs its geometry; give it")
-        # A damaged roller strikes both races, hence twice a turn.
+        # A damaged roller strikes both races, hence twice per turn.
         places = (orders.outer, orders.inner, 2 * orders.roller, orders.cage)
         return [_line_or_none(place, size, self.speed_hz * k) for k in places]
 
@@ -544,14 +544,14 @@ class Analysis:
 
     @cached_property
     def frf_profile(self) -> tuple[Float, NDArray[np.bool_]]:
-        """Levels of the paths in narrow bands, and which of these are heard."""
+        """Levels of the paths in narrow bands, and which of these are above noise."""
         return transfer.profile(self.transfer_functions, self.settings.profile_edges(self.fs))
 
     @cached_property
     def modal_paths(self) -> list[int]:
-        """Paths that a modal fit takes: moving ones to responses of the first one's quantity.
+        """Paths used in a modal fit: moving ones to responses of the first one's quantity.
 
-        Poles are shared, residues not: functions of another quantity have other residues.
+        Poles are shared, residues are not: functions of another quantity have other residues.
         """
         kinds = [self._quantities[i] for i in self.responses]
         found = self.transfer_functions
@@ -562,16 +562,16 @@ class Analysis:
 
     @cached_property
     def modal_quantity(self) -> modal_model.Quantity:
-        """What the functions of `modal_paths` are called."""
+        """Quantity of the functions of `modal_paths`."""
         return MODAL_QUANTITIES.get(self._quantities[self.responses[0]], ACCELERANCE)
 
     @cached_property
     def modes(self) -> modal_model.Modes | None:
-        """Modes of `modal_paths`; None where no pole is stable."""
+        """Modes of `modal_paths`; None if no pole is stable."""
         return self.modes_of(self.transfer_functions)
 
     def modes_of(self, found: transfer.Transfer) -> modal_model.Modes | None:
-        """Modes of functions of the same paths, as the mean of several tests."""
+        """Modes of functions of the same paths, such as the mean of several tests."""
         return transfer.fit_transfer(
             found,
             self.modal_paths,
@@ -583,7 +583,7 @@ class Analysis:
 
     @cached_property
     def reference_modes(self) -> modal_model.Modes:
-        """Modes of the reference; ValueError where it has none."""
+        """Modes of the reference; ValueError if it has none."""
         known = self.settings.reference
         if known is None or known.modes is None:
             raise ValueError("reference has no modes: the feature needs them; fit the reference")
@@ -596,17 +596,17 @@ MODAL_QUANTITIES: dict[str, modal_model.Quantity] = {
     "velocity": "mobility",
     DISPLACEMENT: "receptance",
 }
-"""Quantity of a response -> what its transfer function from a force is called."""
+"""Quantity of the transfer function by quantity of the response."""
 
 
-_FAULT_REACH = 3 * (1 + envelope.SLIP) + envelope.NEIGHBOURHOOD  # fault frequencies looked at
+_FAULT_REACH = 3 * (1 + envelope.SLIP) + envelope.NEIGHBOURHOOD  # fault frequencies covered
 
 
 def _line_or_none(place: Float, size: Real, fault_hz: float) -> envelope.FaultLine | None:
     reach = math.ceil(_FAULT_REACH * fault_hz / float(place[1])) + 8
     try:
         return envelope.fault_line(place[:reach], size[:reach], fault_hz)
-    except ValueError:  # the spectrum is sound: only the frequency can be out of its reach
+    except ValueError:  # the spectrum is valid: only the frequency can be out of its range
         return None
 
 
@@ -614,14 +614,14 @@ def _line_or_none(place: Float, size: Real, fault_hz: float) -> envelope.FaultLi
 
 
 def thinned(x: Real, factor: int) -> NDArray[Any]:
-    """Every so many samples of a signal, what they cannot hold taken out first.
+    """Every n-th sample of a signal after low-pass filtering.
 
     Parameters
     ----------
     x : ndarray, shape (..., n_samples)
         Signal [any unit].
     factor : int
-        Samples for one, >= 1.
+        Decimation factor n, >= 1.
 
     Returns
     -------
@@ -630,9 +630,9 @@ def thinned(x: Real, factor: int) -> NDArray[Any]:
 
     Notes
     -----
-    One transform of the record, zeros behind it. The gain is 1 up to 0.4 of the lower rate and
-    falls as a raised cosine to 0 at half of it. The ends of the record show as steps there: about
-    16 samples at the lower rate are spoiled by more than 1 % of the step.
+    One transform of the zero-padded record. The gain is 1 up to 0.4 of the lower rate and falls as
+    a raised cosine to 0 at half of it. The ends of the record act as steps: about 16 samples at the
+    lower rate are wrong by more than 1 % of the step.
 
     Examples
     --------

@@ -1,6 +1,6 @@
-"""The sets of the catalogue's features: standard, core and complete.
+"""The feature sets of the catalogue: standard, core and complete.
 
-The rows are beside it: :mod:`.catalogue.standard_rows`, :mod:`.catalogue.core_rows` and
+Their rows are in :mod:`.catalogue.standard_rows`, :mod:`.catalogue.core_rows` and
 :mod:`.catalogue.complete_rows`.
 """
 
@@ -25,11 +25,11 @@ SETS: Mapping[SetName, tuple[Feature, ...]] = MappingProxyType(
         "complete": (*_STANDARD, *CORE_ROWS, *COMPLETE_ROWS),
     }
 )
-"""Rows of every set: what models are trained on, all that is cheap, and everything."""
+"""Rows of each set: default for training, all that is fast to compute, and everything."""
 
 
 def smallest_set(feature: Feature) -> SetName:
-    """Smallest set that has a feature.
+    """Smallest set that contains a feature.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Rows that the complete set adds to the core one: what costs most."""
+"""Rows that the complete set adds to the core one: the slowest to compute."""
 
 from collections.abc import Callable
 
@@ -25,7 +25,7 @@ def _mode_labels(*parts: str) -> Callable[[Settings, float], tuple[str, ...]]:
 
 
 def _of_modes(*parts: str) -> Callable[[Analysis], Float]:
-    """Parts of the modes, rising; zeros where there are fewer."""
+    """Parts of the modes in order of frequency; zeros if there are fewer."""
 
     def values(analysis: Analysis) -> Float:
         table = np.zeros((analysis.settings.n_modes, len(parts)))
@@ -38,7 +38,7 @@ def _of_modes(*parts: str) -> Callable[[Analysis], Float]:
 
 
 def _mode_shapes(analysis: Analysis) -> Float:
-    """Shape and its deviation, of every path and mode; zeros where there is none."""
+    """Shape and its standard deviation for every path and mode; zeros if there is none."""
     paths = len(analysis.transfer_functions.value)
     table = np.zeros((paths, analysis.settings.n_modes, 2))
     if analysis.modes is not None:
@@ -48,7 +48,7 @@ def _mode_shapes(analysis: Analysis) -> Float:
 
 
 def _static_stiffness(analysis: Analysis) -> Float:
-    """Stiffness at rest, and of what lies above the modes; 200 dB where nothing moves."""
+    """Static stiffness, and that of the modes above the band; 200 dB if nothing moves."""
     table = np.full((len(analysis.transfer_functions.value), 2), -decibel(0.0))
     if analysis.modes is not None:
         flexibility = stacked(*transfer.static_flexibility(analysis.modes))
@@ -62,10 +62,10 @@ def _mode_changes(analysis: Analysis) -> Float:
 
 
 def _resonance_shift(analysis: Analysis) -> Float:
-    """Mean relative shift of the modes that are found again, and the share of those that are."""
+    """Mean relative shift of the modes found again, and the share of such modes."""
     known, found = analysis.reference_modes, analysis.modes
     if found is None or found.residue.shape[0] != known.residue.shape[0]:
-        return np.zeros(2)  # a dead sensor: nothing is found again
+        return np.zeros(2)  # a dead sensor: no mode is found again
     shift = response_change.resonance_shift(found, known)
     count = len(shift.frequency)
     mean = float(shift.frequency.mean()) if count else 0.0
@@ -164,4 +164,4 @@ COMPLETE_ROWS: tuple[Feature, ...] = (
         "Allemang, IMAC I (1982) 110-116",
     ),
 )
-"""What `complete` has beside `core`: what costs most."""
+"""Rows that `complete` adds to `core`: the slowest to compute."""

@@ -1,4 +1,4 @@
-"""Rows that the core set adds to the standard one: all else that is cheap."""
+"""Rows that the core set adds to the standard one: all others that are fast to compute."""
 
 from collections.abc import Callable
 
@@ -43,7 +43,7 @@ def _octave_labels(settings: Settings, fs: float) -> tuple[str, ...]:
 
 
 def _nominal(centre: float) -> str:
-    """Nominal mid-band frequency of a third octave, as engineers know it (IEC 61260-1, annex E)."""
+    """Nominal mid-band frequency of a third octave (IEC 61260-1, annex E)."""
     decade, place = divmod(round(10 * np.log10(centre)), 10)
     return f"{_R10[place] * 10.0**decade:g}"
 
@@ -112,7 +112,7 @@ def _synchronous(analysis: Analysis) -> Float:
 
 
 def _tacholess(analysis: Analysis) -> Float:
-    """Speed, half its interval, and 1; zeros where no harmonics stand out."""
+    """Speed, half its interval, and 1; zeros if no harmonics stand out."""
     band = analysis.settings.speed_band_hz
     if band is None:
         raise ValueError("speed_band_hz is missing: the feature needs it; give it")
@@ -130,7 +130,7 @@ def _speed_or_none(row: Real, fs: float, band: tuple[float, float]) -> tuple[flo
 def _envelope_line(analysis: Analysis) -> Float:
     """Highest line of the envelope spectrum, and its ratio to the median line."""
     frequency, amplitude = analysis.envelope_spectrum
-    # The mean of the envelope, taken out, leaves its lobe on lines 0 and 1.
+    # Removing the mean of the envelope leaves its lobe on lines 0 and 1.
     lines = amplitude[..., 2:]
     highest, middle = lines.max(axis=-1), np.median(lines, axis=-1)
     heard = middle > 0
@@ -156,9 +156,9 @@ def _estimator_labels(estimator: str) -> Callable[[Settings, float], tuple[str, 
 
 
 def _frf_quality(analysis: Analysis) -> Float:
-    """Mean coherence, random error that goes with it, 1 at the most, and share of lines left out.
+    """Mean coherence, its random error (1 at most), and share of lines left out.
 
-    NaN of one blow but for the last: nothing is left out then, for want of a reason.
+    For a single blow the first two are NaN and no line is left out.
     """
     found = analysis.transfer_functions
     mean = found.coherence.mean(axis=-1)
@@ -169,7 +169,7 @@ def _frf_quality(analysis: Analysis) -> Float:
 
 
 def _frf_assurance(analysis: Analysis) -> Float:
-    """Likeness to the reference, path by path; 0 of a silent one."""
+    """Similarity to the reference, path by path; 0 for a silent path."""
     found, known = analysis.transfer_functions, analysis.settings.reference
     if known is None:
         raise ValueError("reference = None must be given: the feature needs it; measure one")
@@ -435,4 +435,4 @@ CORE_ROWS: tuple[Feature, ...] = (
         "Heylen, Lammens, Swansea (1996) 48-57",
     ),
 )
-"""What `core` has beside the standard row."""
+"""Rows that `core` adds to the standard set."""

@@ -1,4 +1,4 @@
-"""Spectra and orbits of a recording as values that can be read by channel and plotted."""
+"""Spectra and orbits of a recording as objects that can be read by channel and plotted."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -19,7 +19,7 @@ from ..signal.envelope import envelope_spectrum as envelope_lines
 from ..signal.rate import check_rate
 from ..signal.spectrum import amplitude_spectrum
 from .analysis import DISPLACEMENT, FORCE, Analysis
-from .row import Recorded, probe_rows
+from .row import Recorded
 
 Float = NDArray[np.float64]
 Data = Recorded | ArrayLike | pd.DataFrame
@@ -35,7 +35,7 @@ class Spectrum:
     Attributes
     ----------
     kind : str
-        What it is, for titles.
+        Name for titles.
     lines : ndarray, shape (n_lines,)
         Frequencies [Hz] or orders [-].
     value : ndarray, shape (n_channels, n_lines)
@@ -65,14 +65,14 @@ class Spectrum:
         return np.asarray(np.abs(self.value))
 
     def __getitem__(self, name: str) -> NDArray[Any]:
-        """Amplitude of a channel [shape=(n_lines,)]; KeyError names what there is."""
+        """Amplitude of a channel [shape=(n_lines,)]; a KeyError lists the channels."""
         if name not in self.names:
             raise KeyError(f"channel {name!r} must be one of {', '.join(self.names)}")
         row: NDArray[Any] = self.amplitude[self.names.index(name)]
         return row
 
     def plot(self, *, ax: Any = None, high: float | None = None) -> Any:
-        """Draw every channel, one axes below the other.
+        """Draw every channel in axes of its own, one below the other.
 
         Parameters
         ----------
@@ -84,7 +84,7 @@ class Spectrum:
         Returns
         -------
         ndarray of matplotlib.axes.Axes, shape (n_channels,)
-            The axes, to draw into or to save by their ``figure``.
+            The axes, for further drawing or for saving through their ``figure``.
 
         Examples
         --------
@@ -118,11 +118,11 @@ class Orbit:
     path : ndarray, shape (n_samples,)
         ``x + j y`` with its mean [unit of the probes].
     sample_rate : float
-        In samples a second [Hz].
+        Sample rate [Hz].
     unit : str
-        Of the path; empty where unknown.
+        Unit of the path; empty if unknown.
     marks : ndarray, shape (n_pulses,)
-        Where the shaft is at each tacho pulse; empty without a tacho.
+        Position of the shaft at each tacho pulse; empty without a tacho.
 
     Examples
     --------
@@ -143,12 +143,12 @@ class Orbit:
         Parameters
         ----------
         ax : matplotlib.axes.Axes, optional
-            A new figure by default.
+            Axes to draw into; a new figure by default.
 
         Returns
         -------
         matplotlib.axes.Axes
-            The axes, to draw into or to save by their ``figure``.
+            The axes, for further drawing or for saving through their ``figure``.
 
         Examples
         --------
@@ -201,7 +201,7 @@ def spectrum(
     Raises
     ------
     ValueError
-        If rate and names are missing or given twice, or as
+        If rate and names are missing or given twice, or as for
         :func:`wearstate.features.signal.spectrum.amplitude_spectrum`.
 
     Examples
@@ -241,9 +241,9 @@ def envelope_spectrum(
     channel_names : sequence of str, optional
         Names of the rows of an array; ``ch_0``, ``ch_1``, … by default.
     band : tuple of float, optional
-        Lower and upper edge [Hz]; everything by default.
+        Lower and upper edge [Hz]; 0 to fs / 2 by default.
     kind : {"squared", "plain", "log"}
-        Which envelope is transformed.
+        Form of the envelope that is transformed.
 
     Returns
     -------
@@ -253,7 +253,7 @@ def envelope_spectrum(
     Raises
     ------
     ValueError
-        If rate and names are missing or given twice, or as
+        If rate and names are missing or given twice, or as for
         :func:`wearstate.features.signal.envelope.envelope_spectrum`.
 
     Examples
@@ -294,13 +294,13 @@ def order_spectrum(
     fs : float, optional
         Sample rate of an array or a table [Hz].
     tacho : array_like, shape (n_samples,), optional
-        Pulses beside an array or a table [V].
+        Pulses that go with an array or a table [V].
     pulses_per_revolution : int
         Pulses of `tacho` in one revolution.
     channel_names : sequence of str, optional
         Names of the rows of an array; ``ch_0``, ``ch_1``, … by default.
     window : {"boxcar", "hann", "flattop"}
-        As of :func:`wearstate.features.rotation.angle_resample.order_spectrum`.
+        As in :func:`wearstate.features.rotation.angle_resample.order_spectrum`.
 
     Returns
     -------
@@ -347,9 +347,9 @@ def frf(recording: Recorded, *, nperseg: int | None = None) -> Transfer:
     Parameters
     ----------
     recording : Recording
-        Of a test with a shaker or hammer: one force channel [N] or more, and responses.
+        Test with a shaker or hammer: one force channel [N] or more, and responses.
     nperseg : int, optional
-        Samples in a window; lines at most as far apart as the features have them by default.
+        Samples in a window; by default as for the features.
 
     Returns
     -------
@@ -359,7 +359,7 @@ def frf(recording: Recorded, *, nperseg: int | None = None) -> Transfer:
     Raises
     ------
     ValueError
-        If there is no force or no response, or as
+        If there is no force or no response, or as for
         :func:`wearstate.features.response.transfer.measured_transfer`.
 
     Examples
@@ -400,11 +400,11 @@ def orbit(
     Parameters
     ----------
     data : Recording, array_like of shape (2, n_samples), or DataFrame
-        Readings of the probes; of a recording its two displacement channels.
+        Readings of the probes; for a recording, its two displacement channels.
     fs : float, optional
         Sample rate of an array or a table [Hz].
     tacho : array_like, shape (n_samples,), optional
-        Pulses beside an array or a table [V].
+        Pulses that go with an array or a table [V].
     angles : tuple of float
         Directions of the probes, from the x axis in the direction of rotation [rad].
 
@@ -416,7 +416,7 @@ def orbit(
     Raises
     ------
     ValueError
-        If there are not two probes, rate is missing or given twice, or as
+        If there are not two probes, rate is missing or given twice, or as for
         :func:`wearstate.features.rotation.orbit.displacement`.
 
     Examples
@@ -426,12 +426,12 @@ def orbit(
     <Orbit 0.2 s, 1000 Hz, 0 tacho pulses>
     """
     given = _read(data, fs, None, tacho)
-    if not given.told:  # an array is its probes
-        given = replace(given, quantities=(DISPLACEMENT,) * len(given.signals))
-    rows = probe_rows(given.quantities)
-    if rows is None:
-        count = given.quantities.count(DISPLACEMENT)
-        raise ValueError(f"n_probes = {count} must be 2; give the displacements of one bearing")
+    quantities = given.quantities
+    if not given.from_recording:  # all rows of an array are probes
+        quantities = (DISPLACEMENT,) * len(given.signals)
+    rows = [i for i, quantity in enumerate(quantities) if quantity == DISPLACEMENT]
+    if len(rows) != 2:
+        raise ValueError(f"n_probes = {len(rows)} must be 2; give the displacements of one bearing")
     path = displacement(given.signals[rows[0]], given.signals[rows[1]], angles=angles)
     marks = np.empty(0, dtype=np.complex128)
     if given.tacho is not None:
@@ -441,7 +441,7 @@ def orbit(
 
 @dataclass(frozen=True, kw_only=True)
 class _Given:
-    """Signals with what is known of them; `told`: a recording said it."""
+    """Signals with their known properties, from a recording or as given by the caller."""
 
     signals: NDArray[Any]
     fs: float
@@ -450,7 +450,7 @@ class _Given:
     quantities: tuple[str, ...]
     tacho: NDArray[Any] | None = None
     pulses_per_revolution: int = 1
-    told: bool = False
+    from_recording: bool = False
 
 
 def _read(
@@ -461,8 +461,8 @@ def _read(
     pulses_per_revolution: int = 1,
 ) -> _Given:
     if isinstance(data, Recorded):
-        told = {"fs": fs, "tacho": tacho, "channel_names": channel_names}
-        if given := [name for name, value in told.items() if value is not None]:
+        arguments = {"fs": fs, "tacho": tacho, "channel_names": channel_names}
+        if given := [name for name, value in arguments.items() if value is not None]:
             raise ValueError(f"{', '.join(given)} must be left out; the recording has its own")
         return _Given(
             signals=data.vibration,
@@ -472,7 +472,7 @@ def _read(
             quantities=tuple(data.vibration_quantities),
             tacho=data.tacho_signal,
             pulses_per_revolution=data.pulses_per_revolution,
-            told=True,
+            from_recording=True,
         )
     if isinstance(data, (str, Path)):
         raise ValueError(
@@ -506,7 +506,7 @@ def _read(
 
 
 def _refuse_gaps(signals: NDArray[Any], names: Sequence[str]) -> None:
-    """Refuse samples that are no numbers: one spoils every line of a transform."""
+    """Refuse non-finite samples: one spoils every line of a transform."""
     faults = []
     for name, row in zip(names, signals, strict=True):
         bad = np.flatnonzero(~np.isfinite(row))
@@ -520,7 +520,7 @@ def _refuse_gaps(signals: NDArray[Any], names: Sequence[str]) -> None:
 
 
 def _axes(n: int, given: Any) -> Any:
-    """Axes as given, or new ones below each other."""
+    """The given axes, or new ones below each other."""
     if given is None:
         from matplotlib import pyplot as plt
 

@@ -28,24 +28,23 @@ class Feature:
     Parameters
     ----------
     name : str
-        What it is, unique in the catalogue.
+        Name, unique in the catalogue.
     unit : str
         Unit of its values; "x" stands for the unit of the signal.
     needs : tuple of str
-        What it cannot be had without, keys of `needs.NEEDS`; nothing but a vibration by default.
+        Requirements, keys of `needs.NEEDS`; by default only a vibration.
     uses : tuple of str
-        What else it takes into account where it is there; ``tacho`` alone has a meaning.
+        Optional inputs that are used if available; only ``tacho`` has a meaning.
     scope : {"channel", "housing", "path", "pair", "shaft", "orbit", "frf", "cylinder"}
-        Whether it exists once per channel, per acceleration, per path from a force to a channel
-        that is none, per pair of channels, per record, per orbit, per test, or per cylinder
-        pressure.
+        Whether it exists once per channel, per acceleration, per path from a force to another
+        channel, per pair of channels, per record, per orbit, per test, or per cylinder pressure.
     labels : callable
-        ``labels(settings, fs)`` names its values within one of these.
+        ``labels(settings, fs)`` names the values within one of these.
     function : callable
-        ``function(analysis)`` gives them [shape=(n_channels, …), (n_paths, …), (n_pairs, …) or
-        (…)].
+        ``function(analysis)`` computes the values [shape=(n_channels, …), (n_paths, …), (n_pairs,
+        …) or (…)].
     reference : str
-        Where it is defined.
+        Source of the definition.
 
     Examples
     --------
@@ -65,18 +64,18 @@ class Feature:
 
 
 def named(*labels: str) -> Callable[[Settings, float], tuple[str, ...]]:
-    """Labels that no setting changes."""
+    """Labels that do not depend on the settings."""
     return lambda _settings, _fs: labels
 
 
 def band_names(edges: Float) -> tuple[str, ...]:
-    """Bands as text, in whole hertz."""
+    """Names of bands, in whole hertz."""
     bounds = np.rint(edges).astype(int)
     return tuple(f"band_{a}_{b}" for a, b in pairwise(bounds))
 
 
 def order_labels(settings: Settings, _fs: float) -> tuple[str, ...]:
-    """Levels of the orders of the settings."""
+    """Labels of the levels of the orders in the settings."""
     return tuple(
         f"order_{int(k):02d}.level_db" if k == int(k) else f"order_{k:g}.level_db"
         for k in settings.orders
@@ -84,15 +83,15 @@ def order_labels(settings: Settings, _fs: float) -> tuple[str, ...]:
 
 
 def stacked(*columns: Real) -> Float:
-    """Values of one channel side by side [shape=(n_channels, n_values)]."""
+    """Columns of values, side by side for each channel [shape=(n_channels, n_values)]."""
     return np.stack([np.asarray(column, dtype=np.float64) for column in columns], axis=-1)
 
 
 def scores(lines: list[list[FaultLine | None]]) -> Float:
-    """Scores of fault lines by channel, 0 where none was found [shape=(n_channels, n_faults)]."""
+    """Scores of fault lines by channel, 0 if none was found [shape=(n_channels, n_faults)]."""
     return np.array([[line.score if line is not None else 0.0 for line in row] for row in lines])
 
 
 def fault_labels(prefix: str, part: str) -> Callable[[Settings, float], tuple[str, ...]]:
-    """One part of every fault of rolling bearings."""
+    """Labels of one part for every fault of rolling bearings."""
     return named(*(f"{prefix}_{fault}.{part}" for fault in FAULTS))

@@ -1,4 +1,4 @@
-"""What a feature needs, and what a recording offers: known before a sample is read."""
+"""Requirements of features, and what a recording offers: known before a sample is read."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -27,14 +27,14 @@ from .analysis import (
 
 @dataclass(frozen=True, kw_only=True)
 class Layout:
-    """What a recording offers the catalogue.
+    """Properties of a recording on which the catalogue depends.
 
     Parameters
     ----------
     channels : tuple of str
         Names of the channels but the tacho.
     quantities : tuple of str
-        Quantity of each.
+        Quantity of each channel.
     fs : float
         Sample rate [Hz].
     tacho : bool
@@ -42,11 +42,11 @@ class Layout:
     pulses_per_revolution : int
         Pulses in one revolution.
     n_samples : int, optional
-        Length of the record; None where it is long enough for anything.
+        Length of the record; None for a length that suffices for every feature.
     impact : bool
         Whether the force is that of a hammer: its blocks follow the record, which may be short.
     settings : Settings
-        Choices, and what no signal tells.
+        Settings, including what cannot be inferred from a signal.
 
     Examples
     --------
@@ -68,10 +68,10 @@ class Layout:
 
     @property
     def cylinders(self) -> NDArray[np.bool_]:
-        """Which channels are pressures of cylinders, read over the crank angle.
+        """Whether each channel is a cylinder pressure, read over the crank angle.
 
-        All pressures, if a tacho with one pulse a revolution and another quantity are there; none
-        otherwise: then they are signals like any other.
+        All pressures are, if there are a tacho with one pulse per revolution and another quantity;
+        otherwise none is, and pressures are treated like any other signal.
         """
         found = np.array([kind == PRESSURE for kind in self.quantities], dtype=np.bool_)
         return found & (self.tacho and self.pulses_per_revolution == 1 and not found.all())
@@ -108,14 +108,14 @@ class Layout:
 
 
 def struck(signals: NDArray[np.floating], quantities: Sequence[str]) -> bool:
-    """Whether a record is an impact test: of its channels one is a force, that of a hammer.
+    """Whether a record is an impact test: exactly one channel is a force, that of a hammer.
 
     Parameters
     ----------
     signals : ndarray, shape (n_channels, n_samples)
-        [any unit]
+        Signals [any unit].
     quantities : sequence of str
-        Of each channel.
+        Quantity of each channel.
 
     Examples
     --------
@@ -129,14 +129,15 @@ def struck(signals: NDArray[np.floating], quantities: Sequence[str]) -> bool:
 
 @dataclass(frozen=True, kw_only=True)
 class Need:
-    """One thing that a feature cannot do without.
+    """One requirement of features.
 
     Parameters
     ----------
     text : str
-        What it is, as `features --list` shows it.
+        Name, as shown by `features --list`.
     fault : callable
-        ``fault(layout)`` says what is wrong and what helps, or nothing where the need is met.
+        ``fault(layout)`` returns the fault and its cure, or an empty text if the requirement is
+        met.
 
     Examples
     --------
@@ -164,9 +165,9 @@ def _casing(layout: Layout) -> str:
 
 
 def crank_map_fault(fs: float, settings: Settings = STANDARD) -> str:
-    """Why a sample rate has no room for the bands of the crank-angle map.
+    """Reason why a sample rate is too low for the bands of the crank-angle map.
 
-    A slow rate, as of a shaft line, shows orders; what knocks there is no map's worth of bands.
+    A low rate, as for a shaft line, shows orders; its knocks do not fill the bands of a map.
 
     Parameters
     ----------
@@ -177,12 +178,12 @@ def crank_map_fault(fs: float, settings: Settings = STANDARD) -> str:
     Returns
     -------
     str
-        Value, bound and cure; empty where there is room.
+        Value, bound and cure; empty if the rate suffices.
 
     Raises
     ------
     ValueError
-        The sample rate is none that is believed.
+        If the sample rate is not plausible.
 
     Examples
     --------
@@ -198,7 +199,7 @@ def _spectrum_bands(layout: Layout) -> str:
 
 
 def _bands_fault(choice: Callable[[float], NDArray[np.float64]], fs: float) -> str:
-    """Why a sample rate has no room for all bands of a row; their names tell whole hertz."""
+    """Reason why a sample rate is too low for the bands of a row; names are in whole hertz."""
     try:
         edges = choice(fs)
     except ValueError as error:
@@ -210,12 +211,12 @@ def _bands_fault(choice: Callable[[float], NDArray[np.float64]], fs: float) -> s
 
 
 def _too_slow(fs: float, error: ValueError) -> str:
-    """A refusal of bands, whose own cure is that of a caller who chooses them."""
+    """Message of refused bands, with a cure for callers who do not choose them."""
     return f"fs = {fs:.6g} Hz is too low: {str(error).split('; ')[0]}; sample faster"
 
 
 def _declared(unit: str, too_many: bool = False) -> str:
-    """What helps where channels lack a quantity or have it too often: files tell it by the unit."""
+    """Cure if channels of a quantity are missing or too many: files declare it by the unit."""
     if too_many:
         return "choose the channels on import: wearstate import --channels"
     return f"declare the unit {unit} on import, or quantities in Python"
@@ -337,7 +338,7 @@ def _speed(layout: Layout) -> str:
 def _speed_band(layout: Layout) -> str:
     band = layout.settings.speed_band_hz
     if band is None:
-        return "speed_band_hz = None must be given; say where the speed may lie"
+        return "speed_band_hz = None must be given; give the range of the speed"
     return _duration(
         layout, 2 * speed.FEWEST_REVOLUTIONS / band[0], "raise the lower end of speed_band_hz"
     )
@@ -363,7 +364,7 @@ def _spacing(layout: Layout) -> str:
 
 def _envelope(layout: Layout) -> str:
     low, high = layout.settings.envelope_edges(layout.fs)
-    # One line more: both edges may lie between lines.
+    # One more line, since both edges may lie between lines.
     least = (envelope.FEWEST_LINES + 1) / (high - low) if high > low else math.inf
     return _rate(layout, high) or _duration(layout, least, "widen envelope_band")
 
@@ -372,7 +373,7 @@ NEEDS: Mapping[str, Need] = MappingProxyType(
     {
         "tacho": Need(text="tacho", fault=_tacho),
         "mark": Need(text="one pulse per revolution", fault=_mark),
-        "casing": Need(text="a channel that is no displacement, rate for its map", fault=_casing),
+        "casing": Need(text="a channel other than displacement, rate for its map", fault=_casing),
         "spectrum bands": Need(text="rate for the bands", fault=_spectrum_bands),
         "probes": Need(text="two displacement probes", fault=_probes),
         "acceleration": Need(text="acceleration", fault=_severity),
@@ -380,9 +381,9 @@ NEEDS: Mapping[str, Need] = MappingProxyType(
         "speed": Need(text="tacho or nominal speed", fault=_speed),
         "bearing": Need(text="bearing geometry", fault=_bearing),
         "speed band": Need(text="band of the speed", fault=_speed_band),
-        "bands": Need(text="bands of your own", fault=_bands),
+        "bands": Need(text="additional bands", fault=_bands),
         "octaves": Need(text="record that resolves the lowest third octave", fault=_octaves),
-        "spacing": Need(text="record of two periods of the least spacing", fault=_spacing),
+        "spacing": Need(text="record of two periods of the smallest spacing", fault=_spacing),
         "envelope": Need(text="band of eight lines", fault=_envelope),
         "frames": Need(text="256 samples", fault=_samples(256)),
         "cycles": Need(text="768 samples", fault=_samples(768)),
@@ -394,11 +395,11 @@ NEEDS: Mapping[str, Need] = MappingProxyType(
         "reference modes": Need(text="modes of the reference", fault=_reference_modes),
     }
 )
-"""Every need by its name in `Feature.needs`."""
+"""All requirements, by their names in `Feature.needs`."""
 
 
 def shortcomings(needs: tuple[str, ...], layout: Layout) -> str:
-    """Why a recording cannot have a feature; empty where it can.
+    """Reasons why a recording cannot have a feature; empty if it can.
 
     Parameters
     ----------
@@ -410,7 +411,7 @@ def shortcomings(needs: tuple[str, ...], layout: Layout) -> str:
     Returns
     -------
     str
-        Every unmet need, parted by semicolons.
+        All unmet requirements, separated by semicolons.
 
     Examples
     --------

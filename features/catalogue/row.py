@@ -1,4 +1,4 @@
-"""The row of features of one recording: which ones it has, their names and their values."""
+"""The feature row of one recording: which features it has, their names and values."""
 
 import difflib
 from collections.abc import Mapping, Sequence
@@ -24,21 +24,21 @@ from .needs import NEEDS, Layout, shortcomings, struck
 Float = NDArray[np.float64]
 
 LARGEST_SAMPLE = 1e9
-"""Largest believable sample [unit of x]: beyond it, squares leave the range of float32."""
+"""Largest plausible sample [unit of x]: above it, squares leave the range of float32."""
 
 FEWEST_SAMPLES = 64
-"""Shortest record that is given a spectrum."""
+"""Shortest record for which a spectrum is computed."""
 
-# --- what there is
+# --- the catalogue
 
 
 def catalogue(feature_set: SetName = "complete") -> tuple[dict[str, str], ...]:
-    """The catalogue as text, for people.
+    """The catalogue as text.
 
     Parameters
     ----------
     feature_set : {"standard", "core", "complete"}
-        Which rows.
+        Rows to return.
 
     Returns
     -------
@@ -76,33 +76,16 @@ def _rows_of(feature_set: SetName) -> tuple[Feature, ...]:
     return SETS[feature_set]
 
 
-def probe_rows(quantities: Sequence[str]) -> tuple[int, int] | None:
-    """Channels of the two proximity probes of an orbit; None unless there are exactly two.
-
-    Parameters
-    ----------
-    quantities : sequence of str
-        Of every vibration channel.
-
-    Examples
-    --------
-    >>> probe_rows(["acceleration", "displacement", "displacement"])
-    (1, 2)
-    """
-    kinds = tuple(quantities)
-    return Layout(channels=kinds, quantities=kinds, fs=1.0).probes
-
-
 # --- which features a recording has
 
 
 @dataclass(frozen=True, kw_only=True)
 class _Plan:
-    """Features to compute, and which of their values to keep."""
+    """Features to compute, and the values of them to keep."""
 
     features: tuple[Feature, ...]
     names: tuple[str, ...]
-    picks: tuple[NDArray[np.intp] | None, ...]  # of each feature; None for all
+    picks: tuple[NDArray[np.intp] | None, ...]  # for each feature; None for all
 
 
 def feature_names(
@@ -126,10 +109,10 @@ def feature_names(
         Names of the vibration channels, unique.
     fs : float
         Sample rate [Hz]; it decides the bands, whose edges are part of the name.
-    tacho : bool
+    Sample rate [Hz]; it determines the bands, whose edges are part of the name.
         Whether there is a tacho.
     pulses_per_revolution : int
-        Its pulses in one revolution.
+        Pulses of the tacho in one revolution.
     quantities : sequence of str, optional
         Quantity of every channel; all ``acceleration`` by default.
     n_samples : int, optional
@@ -147,13 +130,13 @@ def feature_names(
     -------
     tuple of str
         ``channel.label``, ``first_over_second.label``, ``shaft.label``, ``orbit.label``,
-        ``frf.label``, and of several forces ``response_per_force.label``; pressures come last.
+        ``frf.label``, and with several forces ``response_per_force.label``; pressures come last.
 
     Raises
     ------
     ValueError
         If a channel name is empty or repeated, the numbers of names and quantities differ, a band
-        does not fit below fs / 2, or as `feature_row` for `feature_set` and `only`.
+        does not fit below fs / 2, or as for `feature_row` regarding `feature_set` and `only`.
 
     Examples
     --------
@@ -180,24 +163,24 @@ def feature_names(
 def layout_names(
     layout: Layout, feature_set: SetName = "complete", only: Sequence[str] | None = None
 ) -> tuple[str, ...]:
-    """As :func:`feature_names`, of what a recording offers."""
+    """As :func:`feature_names`, for a recording's layout."""
     return _plan(layout, feature_set, _wanted(only)).names
 
 
 def absent_features(layout: Layout, feature_set: SetName = "complete") -> dict[str, str]:
-    """Features of a set that a recording cannot have, and why.
+    """Features of a set that a recording cannot have, with the reasons.
 
     Parameters
     ----------
     layout : Layout
-        What the recording offers.
+        Properties of the recording.
     feature_set : {"standard", "core", "complete"}
-        Which rows.
+        Rows to consider.
 
     Returns
     -------
     dict
-        Name -> every unmet need with its bound and its cure.
+        Every unmet requirement with its bound and cure, by feature name.
 
     Raises
     ------
@@ -256,7 +239,7 @@ def _names_of(row: Feature, layout: Layout) -> tuple[str, ...]:
 
 
 def _owners(scope: Scope, layout: Layout) -> tuple[str, ...]:
-    """What a feature exists once per."""
+    """Names of the channels, pairs, paths or other objects that a feature exists for."""
     channels = layout.vibrations
     forces = [channels[i] for i in layout.rows_of(FORCE)]
     responses = [name for name in channels if name not in forces]
@@ -300,9 +283,9 @@ def _wanted(only: Sequence[str] | None) -> tuple[str, ...] | None:
 
 
 def _check_wanted(only: tuple[str, ...], faults: Mapping[str, str], known: set[str]) -> None:
-    """Refuse what does not exist, and what this recording cannot have; all at once."""
+    """Refuse names that do not exist or are not available for this recording; all at once."""
     complaints = [
-        f"feature {name} is not to be had: {faults[name]}" for name in only if faults.get(name)
+        f"feature {name} is not available: {faults[name]}" for name in only if faults.get(name)
     ]
     for name in only:
         if name not in faults and name not in known:
@@ -323,19 +306,19 @@ _LARGEST: SetName = get_args(SetName)[-1]
 
 @runtime_checkable
 class Recorded(Protocol):
-    """A recording that knows its own rate, channels and tacho."""
+    """A recording that knows its rate, channels and tacho."""
 
     @property
     def vibration(self) -> NDArray[np.float32]:
-        """Every channel but the tacho [shape=(n_channels, n_samples)]."""
+        """All channels but the tacho [shape=(n_channels, n_samples)]."""
 
     @property
     def vibration_names(self) -> tuple[str, ...]:
-        """Name of each."""
+        """Name of each channel."""
 
     @property
     def vibration_quantities(self) -> tuple[str, ...]:
-        """Quantity of each."""
+        """Quantity of each channel."""
 
     @property
     def units(self) -> Mapping[str, str]:
@@ -351,7 +334,7 @@ class Recorded(Protocol):
 
     @property
     def pulses_per_revolution(self) -> int:
-        """Of the tacho."""
+        """Pulses of the tacho in one revolution."""
 
 
 def feature_row(
@@ -372,56 +355,54 @@ def feature_row(
     ----------
     vibration : Recording, array_like of shape (n_channels, n_samples) or (n_samples,), or DataFrame
         Accelerations [m/s^2, or one other unit for all channels], displacements with their mean
-        [m]. float32 stays float32 in the transforms. A recording says itself what `fs` to
-        `quantities` say of an array; a table has samples down its rows, its columns name the
-        channels.
+        [m]. float32 stays float32 in the transforms. For a recording, `fs` to `quantities` are its
+        own; a table has samples down its rows, and its columns name the channels.
     fs : float, optional
-        Sample rate [Hz], of an array or a table.
+        Sample rate of an array or a table [Hz].
     tacho : array_like, shape (n_samples,), optional
         Pulses [V], whose rising edge is angle 0; without it the features that need it are absent.
     pulses_per_revolution : int
-        Pulses in one revolution. Above 1, angle 0 is any one of them, and the crank angle of two
-        records no longer compares.
+        Pulses in one revolution. Above 1, angle 0 is at any one of them, and crank angles of two
+        records are not comparable.
     channel_names : sequence of str, optional
         Names of the channels; ``ch_0``, ``ch_1``, … by default.
     quantities : sequence of str, optional
         Quantity of every channel; all ``acceleration`` by default. With exactly two of
         ``displacement`` the features of their orbit are added, with one or more of ``force`` those
-        of the transfer functions from them. One of ``pressure`` beside another quantity, with a
-        tacho of one pulse, is that of a cylinder: it has features of its own and no others.
+        of the transfer functions from them. A ``pressure`` next to another quantity, with a tacho
+        of one pulse, is a cylinder pressure: it has only features of its own.
     settings : Settings
         Bands, bins and orders; the kind of machine, the geometry of a bearing.
-    feature_set : {"standard", "core", "complete"}
-        What models are trained on; all but kurtogram, cyclic coherence and modal fit; everything.
-        Features whose needs are not met are absent; `absent_features` says why.
+    Default for training; all but kurtogram, cyclic coherence and modal fit; everything. Features
+    whose requirements are not met are absent; `absent_features` gives the reasons.
     only : sequence of str, optional
-        Names of features, or of single values, from any set; nothing else is computed. Then an
-        unmet need is an error.
+        Names of features, or of single values, from any set; nothing else is computed. An unmet
+        requirement is then an error.
 
     Returns
     -------
     names : tuple of str
         As `feature_names`.
     values : ndarray, shape (n_features,)
-        Float64, in the order of the names; finite, but coherence and random error of a single
-        blow are NaN. A constant channel, a dead sensor,
-        has rms, frequencies, scores and ratios 0, levels of -200 dB, spectral kurtosis and
-        kurtogram -1, and as their places the lowest line and the whole band.
+        Values in the order of the names, float64; finite, except that coherence and random error of
+        a single blow are NaN. A constant channel (dead sensor) has rms, frequencies, scores and
+        ratios 0, levels of -200 dB, spectral kurtosis and kurtogram -1, and as their positions the
+        lowest line and the whole band.
 
     Raises
     ------
     ValueError
         If a sample is not finite or exceeds 1e9, the record is shorter than 64 samples or (with a
-        tacho) one revolution, the lengths or the number of names disagree, `only` names what does
-        not exist or is not to be had, or as `pulse_times` and `shaft_phase`. All faults of the
-        vibration are named at once.
+        tacho) one revolution, the lengths or the number of names disagree, `only` names a feature
+        that does not exist or is not available, or as for `pulse_times` and `shaft_phase`. All
+        faults of the vibration are named at once.
 
     Notes
     -----
-    Valid for stationary running. See `order.crank_angle_map` for the speeds at which the angle
-    bins are resolved. A bearing's score is 0 where the record cannot show its line: the
-    frequency is too low for the duration, or beyond the band. Without harmonics that stand out,
-    `tacholess_speed` is 0 and its flag ``found`` 0; modes that are not there have frequency 0.
+    Valid for stationary running. See `order.crank_angle_map` for the speeds at which the angle bins
+    are resolved. A bearing's score is 0 if the record cannot show its line: the frequency is too
+    low for the duration, or beyond the band. If no harmonics stand out, `tacholess_speed` is 0 and
+    its flag ``found`` 0; missing modes have frequency 0.
 
     Examples
     --------
@@ -490,7 +471,7 @@ def feature_row(
 
 
 def _planned(settings: Settings) -> Settings:
-    """Settings by which names are planned: any reference is as good as another."""
+    """Settings for planning names: they depend only on whether there is a reference, with modes."""
     known = settings.reference
     if known is None:
         return settings

@@ -1,4 +1,4 @@
-"""Rows of the standard set of features: what models are trained on by default."""
+"""Rows of the standard set of features, the default for training."""
 
 import math
 from collections.abc import Callable
@@ -55,15 +55,16 @@ def _speed(analysis: Analysis) -> Float:
 
 
 def _speed_variation(analysis: Analysis) -> Float:
-    """Scatter of the pulses' intervals over their mean; 0 where single samples could make it."""
+    """Scatter of the pulse intervals over their mean; 0 if it may come from sampling alone."""
     intervals = np.diff(analysis.pulses)
-    found = intervals.std()
-    return np.asarray(found / intervals.mean() if found > UNTOLD_SAMPLES / analysis.fs else 0.0)
+    scatter = intervals.std()
+    sampled = scatter <= EDGE_SCATTER_SAMPLES / analysis.fs
+    return np.asarray(0.0 if sampled else scatter / intervals.mean())
 
 
-UNTOLD_SAMPLES = 1 / math.sqrt(6)
-"""Scatter of intervals between edges that are known to one sample [samples]: a sampled logic level
-tells no less, and one whose edges are averaged must not tell more to a model."""
+EDGE_SCATTER_SAMPLES = 1 / math.sqrt(6)
+"""Scatter of intervals between edges known to one sample [samples]: the limit for a sampled logic
+level, applied to averaged edges, too, so that a model does not see more in them."""
 
 _DEAD_CENTRES = named(
     *(f"dead_centre_{a}.{place}_db" for a in ("000", "180") for place in ("around", "after"))
@@ -218,7 +219,7 @@ CATALOGUE: tuple[Feature, ...] = (
         reference="order.pulse_times",
     ),
 )
-"""Every feature, in the order of the row."""
+"""All features, in the order of the row."""
 
 
 def _of_cylinders(*parts: str) -> Callable[[Analysis], Float]:
@@ -257,7 +258,7 @@ CYLINDER_CATALOGUE: tuple[Feature, ...] = (
         reference=f"pressure.transitions; {_PUMP}",
     ),
 )
-"""Features of a cylinder pressure beside a vibration, after those of a test."""
+"""Features of a cylinder pressure next to a vibration, after those of a test."""
 
 TEST_CATALOGUE: tuple[Feature, ...] = (
     Feature(

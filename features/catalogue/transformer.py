@@ -22,8 +22,8 @@ Records = Sequence[Recorded] | ArrayLike
 class SignalFeatures(TransformerMixin, BaseEstimator):  # type: ignore[misc]
     """Features of recordings, or of every record of an array, as a step of a scikit-learn pipeline.
 
-    Takes a list of recordings, an open :class:`wearstate.DataSet`, or an array. Recordings say
-    themselves what `fs` to `pulses_per_revolution` say of an array.
+    Takes a list of recordings, an open :class:`wearstate.DataSet`, or an array. For recordings,
+    `fs` to `pulses_per_revolution` are their own.
 
     Parameters
     ----------
@@ -32,13 +32,13 @@ class SignalFeatures(TransformerMixin, BaseEstimator):  # type: ignore[misc]
     channel_names : sequence of str, optional
         Names of the channels but the tacho; ``ch_0``, ``ch_1``, … by default.
     quantities : sequence of str, optional
-        Quantity of each; all ``acceleration`` by default.
+        Quantity of each channel; all ``acceleration`` by default.
     tacho : int, optional
-        Channel that holds the tacho.
+        Index of the tacho channel.
     pulses_per_revolution : int
-        Its pulses in one revolution.
+        Pulses of the tacho in one revolution.
     feature_set : {"standard", "core", "complete"}
-        Which rows of the catalogue; those whose needs are not met are absent.
+        Rows of the catalogue; those whose requirements are not met are absent.
     only : sequence of str, optional
         Names of features, or of single columns, from any set; nothing else is computed.
     settings : Settings
@@ -47,18 +47,18 @@ class SignalFeatures(TransformerMixin, BaseEstimator):  # type: ignore[misc]
     Attributes
     ----------
     n_channels_in_, n_samples_in_ : int
-        Shape of the records seen by `fit`; of recordings, the shortest one.
+        Shape of the records seen by `fit`; for recordings, that of the shortest.
     layout_ : tuple or None
         Sample rate, channels, quantities, whether there is a tacho, and its pulses per revolution,
-        of the recordings seen by `fit`; None of an array.
+        of the recordings seen by `fit`; None for an array.
     feature_names_out_ : tuple of str
         Columns.
 
     Notes
     -----
-    Nothing is learned: `fit` settles which columns there are. All features of a record share its
-    transforms, each made at most once, and only those that a wanted feature needs are made. The
-    output is a pandas DataFrame; ``set_output(transform="default")`` changes nothing.
+    Nothing is learned: `fit` determines the columns. All features of a record share its transforms,
+    each computed at most once, and only if a requested feature needs it. The output is a pandas
+    DataFrame; ``set_output(transform="default")`` changes nothing.
 
     Examples
     --------
@@ -94,7 +94,7 @@ class SignalFeatures(TransformerMixin, BaseEstimator):  # type: ignore[misc]
         self.settings = settings
 
     def fit(self, X: Records, y: Any = None) -> Self:  # noqa: ARG002 - scikit-learn's signature
-        """Settle the columns.
+        """Determine the columns.
 
         Parameters
         ----------
@@ -113,8 +113,7 @@ class SignalFeatures(TransformerMixin, BaseEstimator):  # type: ignore[misc]
         ------
         ValueError
             If the shape or an argument does not fit, recordings differ in more than their length,
-            or as
-            :func:`wearstate.features.catalogue.row.feature_names`.
+            or as for :func:`wearstate.features.catalogue.row.feature_names`.
         """
         recordings = _recordings(X)
         self.layout_: _Layout | None = None
@@ -154,7 +153,7 @@ class SignalFeatures(TransformerMixin, BaseEstimator):  # type: ignore[misc]
         self.layout_ = _layout(first)
         self.n_channels_in_ = len(first.vibration_names) + (first.tacho_signal is not None)
         self.n_samples_in_ = first.vibration.shape[-1]
-        if isinstance(recordings, list | tuple):  # the records of a file are alike
+        if isinstance(recordings, list | tuple):  # the records of a file all have the same layout
             for number in range(1, len(recordings)):
                 one = self._alike(recordings, number)
                 self.n_samples_in_ = min(self.n_samples_in_, one.vibration.shape[-1])
@@ -173,7 +172,7 @@ class SignalFeatures(TransformerMixin, BaseEstimator):  # type: ignore[misc]
         return self
 
     def _alike(self, recordings: Sequence[Recorded], number: int) -> Recorded:
-        """One of the recordings, refused where it is none of the layout of `fit`."""
+        """One of the recordings; refused if its layout differs from that of `fit`."""
         one = recordings[number]
         if (found := _layout(one)) != self.layout_:
             raise ValueError(
@@ -188,19 +187,19 @@ class SignalFeatures(TransformerMixin, BaseEstimator):  # type: ignore[misc]
         Parameters
         ----------
         X : sequence of Recording, DataSet, or array_like
-            As of `fit`, with the same channels, rate and tacho; arrays with as many samples,
+            As for `fit`, with the same channels, rate and tacho; arrays with as many samples,
             recordings long enough for the same features.
 
         Returns
         -------
         pandas.DataFrame, shape (n_records, n_features)
-            float64.
+            Features, float64.
 
         Raises
         ------
         ValueError
-            If the shape is another one, or as :func:`wearstate.features.catalogue.row.feature_row`;
-            then the record is named.
+            If the shape differs, or as for :func:`wearstate.features.catalogue.row.feature_row`,
+            with the record named.
         """
         check_is_fitted(self)
         recordings = _recordings(X)
@@ -245,17 +244,17 @@ class SignalFeatures(TransformerMixin, BaseEstimator):  # type: ignore[misc]
         return np.array([known[name] for name in self.feature_names_out_])
 
     def narrowed(self, columns: Sequence[str]) -> "SignalFeatures":
-        """Unfitted transformer of the same kind that computes these columns only.
+        """Unfitted transformer of the same kind that computes only the given columns.
 
         Parameters
         ----------
         columns : sequence of str
-            Names of columns or features, such as those a model has come to use.
+            Names of columns or features, such as those used by a model.
 
         Returns
         -------
         SignalFeatures
-            Its columns come in the order of the catalogue.
+            Transformer whose columns are in the order of the catalogue.
 
         Examples
         --------
@@ -275,7 +274,7 @@ class SignalFeatures(TransformerMixin, BaseEstimator):  # type: ignore[misc]
         Returns
         -------
         ndarray of object, shape (n_features,)
-            As :func:`wearstate.features.catalogue.row.feature_names`.
+            As for :func:`wearstate.features.catalogue.row.feature_names`.
         """
         check_is_fitted(self)
         return np.array(self.feature_names_out_, dtype=object)
@@ -322,7 +321,7 @@ _Layout = tuple[float, tuple[str, ...], tuple[str, ...], bool, int]
 
 
 def _layout(one: Recorded) -> _Layout:
-    """What recordings of one table must share."""
+    """Properties that the recordings of one table must share."""
     tacho = one.tacho_signal is not None
     return (
         float(one.sample_rate),
@@ -334,7 +333,7 @@ def _layout(one: Recorded) -> _Layout:
 
 
 def _recordings(X: Any) -> Sequence[Recorded] | None:
-    """The recordings; None of an array."""
+    """The recordings; None for an array."""
     if isinstance(X, np.ndarray) and X.dtype != object:
         return None
     if isinstance(X, Recorded):
