@@ -30,12 +30,16 @@ from wearstate.diagnose.film_clearance.clearance import (
 )
 from wearstate.diagnose.healthy_reference.healthy import Baseline
 from wearstate.diagnose.healthy_reference.probe_means import probe_means
-from wearstate.diagnose.nameplate.cautions import known_beside, nameplate_cautions, unseen_texts
+from wearstate.diagnose.nameplate.cautions import (
+    nameplate_cautions,
+    recording_context,
+    unseen_texts,
+)
 from wearstate.diagnose.nameplate.nameplate import Nameplate, day_of, nameplate_of
-from wearstate.diagnose.nameplate.sensors import as_told, known_zeros, taken_out_words
+from wearstate.diagnose.nameplate.sensors import corrected_recording, correction_words, known_zeros
 from wearstate.diagnose.report import film as film_report
-from wearstate.diagnose.report.beside import disagree
 from wearstate.diagnose.report.film import film_estimate, film_table, with_film
+from wearstate.diagnose.report.second_estimate import disagree
 from wearstate.diagnose.wear_model.verdict import Estimate
 from wearstate.sim.bearing.rest_curve import rest_curve
 from wearstate.sim.film.solve import FilmGeometry
@@ -374,19 +378,20 @@ def test_the_day_is_what_a_person_told_then_what_was_noted_then_the_nameplate():
 
 def test_probes_without_healthy_recordings_are_a_caution(tmp_path):
     recording = recorded(tmp_path / "a.h5", {})
-    assert "offsets of probe_1, probe_2" in " ".join(known_beside(None, recording, CARD)["told"])
+    said = " ".join(recording_context(None, recording, CARD)["told"])
+    assert "offsets of probe_1, probe_2" in said
     zeros = {f"sensors.{i}.offset": "0 um +- 5 um" for i in range(2)}
     told = nameplate_of(None, "journal-bearing", zeros)
-    assert known_beside(told, recording, CARD)["told"] == ()
+    assert recording_context(told, recording, CARD)["told"] == ()
     one = nameplate_of(None, "journal-bearing", {"sensors.0.offset": "0 um"})
-    [said] = known_beside(one, recording, CARD)["told"]
+    [said] = recording_context(one, recording, CARD)["told"]
     assert "offsets of probe_2, which" in said
     path, zero = _cure_in(said)  # of that probe
-    assert nameplate_of(None, "journal-bearing", {path: zero}).told == {"sensors.1.offset"}
+    assert nameplate_of(None, "journal-bearing", {path: zero}).set_paths == {"sensors.1.offset"}
     line = nameplate_of(None, "propulsion-shaft", {"probes.probe_1.offset": "0 um"})
-    [said] = known_beside(line, recording, card_of("propulsion-shaft"))["told"]
+    [said] = recording_context(line, recording, card_of("propulsion-shaft"))["told"]
     assert _cure_in(said)[0] == "probes.1.offset"
-    [said] = known_beside(None, recording, card_of("propulsion-shaft"))["told"][-1:]
+    [said] = recording_context(None, recording, card_of("propulsion-shaft"))["told"][-1:]
     assert _cure_in(said)[0] == "probes.0.offset"
 
 
@@ -405,16 +410,16 @@ def test_offset_and_sensitivity_that_a_person_told_are_taken_out(tmp_path):
     off = {"sensors.0.offset": -20e-6, "sensors.1.gain": 1.25}
     plain, seen = (recorded(tmp_path / f"{i}.h5", each) for i, each in enumerate(({}, off)))
     told = nameplate_of(None, "journal-bearing", off)
-    np.testing.assert_allclose(as_told(seen, told).signal, plain.signal, atol=2e-7)
+    np.testing.assert_allclose(corrected_recording(seen, told).signal, plain.signal, atol=2e-7)
     assert np.abs(seen.signal - plain.signal)[:2].max(axis=1).min() > 2e-6
-    assert as_told(seen, nameplate_of(None, "journal-bearing", {})) is seen
-    assert as_told(seen, None) is seen
+    assert corrected_recording(seen, nameplate_of(None, "journal-bearing", {})) is seen
+    assert corrected_recording(seen, None) is seen
     healthy = Baseline(features=np.zeros(1), recordings=1, source="")
-    assert as_told(seen, told, healthy) is seen
+    assert corrected_recording(seen, told, healthy) is seen
     # sensors are as well known by their names
     named = {"sensors.probe_1.offset": "-20 um", "sensors.probe_2.gain": 1.25}
     by_name = nameplate_of(None, "journal-bearing", named)
-    np.testing.assert_allclose(as_told(seen, by_name).signal, plain.signal, atol=2e-7)
+    np.testing.assert_allclose(corrected_recording(seen, by_name).signal, plain.signal, atol=2e-7)
     assert known_zeros(by_name) == {"probe_1"}
 
 
@@ -422,7 +427,7 @@ def test_a_triaxial_sensor_has_one_sensitivity_on_all_its_channels(tmp_path):
     scene = load_scene("bilge-pump")
     head = Accelerometer(name="head", axes=("x", "y"), gain=2.0, range=100.0)
     plate = Nameplate(
-        scene=scene.model_copy(update={"sensors": (head,)}), told=frozenset({"sensors.0.gain"})
+        scene=scene.model_copy(update={"sensors": (head,)}), set_paths=frozenset({"sensors.0.gain"})
     )
     recording = recorded(tmp_path / "a.h5", {})
     channels = tuple(
@@ -430,7 +435,7 @@ def test_a_triaxial_sensor_has_one_sensitivity_on_all_its_channels(tmp_path):
         for name in ("head_x", "head_y", "head")
     )
     seen = replace(recording, signal=np.ones((3, 8), np.float32), channels=channels, tacho=None)
-    assert as_told(seen, plate).signal[:, 0].tolist() == [0.5, 0.5, 1.0]
+    assert corrected_recording(seen, plate).signal[:, 0].tolist() == [0.5, 0.5, 1.0]
 
 
 def test_sensors_of_a_scene_that_a_person_gave_are_taken_out_and_said(tmp_path):
@@ -441,16 +446,16 @@ def test_sensors_of_a_scene_that_a_person_gave_are_taken_out_and_said(tmp_path):
     )
     (tmp_path / "mine.toml").write_text(text)
     mine = nameplate_of(None, str(tmp_path / "mine.toml"), {"sensors.1.gain": 1.25})
-    np.testing.assert_allclose(as_told(seen, mine).signal, plain.signal, atol=2e-7)
-    assert taken_out_words(seen, mine) == "offset -20 um of probe_1, gain 1.25 of probe_2"
+    np.testing.assert_allclose(corrected_recording(seen, mine).signal, plain.signal, atol=2e-7)
+    assert correction_words(seen, mine) == "offset -20 um of probe_1, gain 1.25 of probe_2"
     # a data set's own scene has those that its records were simulated with
-    assert as_told(seen, nameplate_of(tmp_path / "1.h5", None, {})) is seen
-    assert taken_out_words(seen, nameplate_of(None, "journal-bearing", {})) == ""
+    assert corrected_recording(seen, nameplate_of(tmp_path / "1.h5", None, {})) is seen
+    assert correction_words(seen, nameplate_of(None, "journal-bearing", {})) == ""
 
 
 def test_a_nameplate_of_another_machine_is_a_caution():
     plate = nameplate_of(None, "bilge-pump", {})
-    assert "is of a reciprocating-pump" in nameplate_cautions(plate, {}, CARD)[0]
+    assert "is for a reciprocating-pump" in nameplate_cautions(plate, {}, CARD)[0]
     assert nameplate_cautions(None, {}, card_of("of another program")) == ()
 
 

@@ -388,9 +388,8 @@ def test_pictures_and_zone_are_of_the_readings_that_were_judged(model, monkeypat
     doubled = dataclasses.replace(plain, signal=plain.signal * np.float32([[2], [1]]))
     pump = wearstate.load_scene("bilge-pump")
     sensor = pump.sensors[0].model_copy(update={"name": "acc", "gain": 2.0})
-    plate = Nameplate(
-        scene=pump.model_copy(update={"sensors": (sensor,)}), told=frozenset({"sensors.0.gain"})
-    )
+    known = pump.model_copy(update={"sensors": (sensor,)})
+    plate = Nameplate(scene=known, set_paths=frozenset({"sensors.0.gain"}))
     table, wanted = (
         report_table(each, model, graded(), machine="reciprocating-2", plate=known)
         for each, known in ((doubled, plate), (plain, None))

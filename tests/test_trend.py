@@ -195,7 +195,7 @@ def test_the_sentence_gives_the_band():
     text = trend_of(1e-4 + 2e-8 * HOURS, clock="calendar").outlook.text
     assert text.startswith("the condemning limit is reached in ")
     assert "(90 %), most likely after " in text
-    assert trend_of(1e-4 + 2e-8 * HOURS).outlook.assumption.startswith("wear goes on at the")
+    assert trend_of(1e-4 + 2e-8 * HOURS).outlook.assumption.startswith("wear continues at the")
 
 
 def test_many_recordings_are_grouped():

@@ -26,7 +26,7 @@ from ...sim.output.recording import DataError, Recording
 from ...sim.scene.scene import Scene, SceneError, channels_of
 from ..feature_rows.model_card import ModelCard
 from ..machines.registry import presentation_of
-from ..nameplate.cautions import known_beside
+from ..nameplate.cautions import recording_context
 from ..nameplate.nameplate import Nameplate
 from ..pages.kept import Kept
 from ..wear_model.verdict import Estimate
@@ -186,8 +186,10 @@ class _Machines:
 
     def judged(self, recording: Recording, scene: Scene, sample: Sample) -> ShiftVerdict:
         """What the model says of a recording of a machine whose nameplate is known."""
-        plate = Nameplate(scene=scene, told=frozenset(presentation_of(scene).sizes), assumed=True)
-        estimate = self.model.estimate(recording, **known_beside(plate, recording, self.model.card))
+        sizes = frozenset(presentation_of(scene).sizes)
+        plate = Nameplate(scene=scene, set_paths=sizes, assumed=True)
+        context = recording_context(plate, recording, self.model.card)
+        estimate = self.model.estimate(recording, **context)
         return answer_of(estimate, sample.group, float(sample.row[self.column]))
 
 

@@ -309,7 +309,7 @@ def _report_many(told: _ReportTask) -> list[_Verdict]:
             dates=dates,
             growth=given["growth"],
             seed=given["seed"],
-            tell=(lambda line: click.echo(json_text(line))) if told.as_json else None,
+            on_result=(lambda line: click.echo(json_text(line))) if told.as_json else None,
             progress=progress,
         )
         if told.output is not None:

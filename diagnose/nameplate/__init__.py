@@ -1,4 +1,4 @@
-"""What is known of a machine beside its signals, and cautions that follow.
+"""Known data of a machine and its operation, and the cautions that follow from them.
 
 It may import ``sim.output``, ``sim.parts``, ``sim.scene``, ``datasets.file``, ``datasets.draws``,
 ``datasets.recipe``, ``diagnose.pages``, ``diagnose.machines``, ``diagnose.feature_rows``,

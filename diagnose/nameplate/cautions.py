@@ -1,4 +1,4 @@
-"""Where a nameplate is not what a model was trained on: nothing in the signals need show it."""
+"""Differences between a nameplate and a model's training, which the signals need not show."""
 
 from collections.abc import Iterator, Mapping
 from functools import cache
@@ -18,23 +18,23 @@ from ..pages.si_text import si_text
 from .nameplate import Nameplate, day_of
 from .sensors import known_zeros, path_of_zero
 
-_SAME = 0.02  # over the trained value: nameplates are rounded
+_SAME = 0.02  # relative to the trained value: nameplates are rounded
 
 
-def known_beside(
+def recording_context(
     plate: Nameplate | None,
     recording: Recording,
     card: ModelCard,
     baseline: Baseline | None = None,
 ) -> dict[str, Any]:
-    """What a model should be told of a recording beside its signals.
+    """Input of a model in addition to the signals of a recording.
 
     Parameters
     ----------
     plate : Nameplate or None
     recording : Recording
     card : ModelCard
-        Of the model.
+        Card of the model.
     baseline : Baseline, optional
         Healthy recordings of the same machine.
 
@@ -43,18 +43,19 @@ def known_beside(
     dict
         ``conditions`` and ``told`` of :meth:`~.wear_model.estimate.WearModel.estimate`.
     """
-    simulated = recording.origin == "simulated"  # in memory: whoever made it knows its scene
-    told = () if plate is None and simulated else nameplate_cautions(plate, recording.row, card)
+    simulated = recording.origin == "simulated"  # in memory: the caller knows its scene
+    known = plate is None and simulated
+    cautions = () if known else nameplate_cautions(plate, recording.row, card)
     return {
         "conditions": day_of(plate, recording.row),
-        "told": (*told, *_gap_cautions(plate, recording, baseline, card.trained_on.scene)),
+        "told": (*cautions, *_gap_cautions(plate, recording, baseline, card.trained_on.scene)),
     }
 
 
 def _gap_cautions(
     plate: Nameplate | None, recording: Recording, baseline: Baseline | None, trained: str
 ) -> list[str]:
-    """Where a shaft runs is read from gap voltages, whose zero nobody knows by itself."""
+    """Caution if the zero of a gap voltage, which gives the shaft position, is unknown."""
     probes = [
         channel.name
         for channel in recording.vibration_channels
@@ -67,16 +68,16 @@ def _gap_cautions(
     path = path_of_zero(plate.scene if plate else usual, unknown[0])
     return [
         f"no healthy recording of this machine shows the offsets of {', '.join(unknown)}, which "
-        "are taken to be as small as where the model was trained, and sensitivities as near to the "
-        "nominal, and its estimate leans on them: "
-        f"give --baseline HEALTHY, or what is known of each: --set '{path}=0 um +- 5 um'"
+        "are assumed to be as small as in the training of the model, and sensitivities as near to "
+        "the nominal, and its estimate depends on them: "
+        f"give --baseline HEALTHY, or the known offset of each: --set '{path}=0 um +- 5 um'"
     ]
 
 
 def unseen_texts(card: ModelCard) -> list[str]:
-    """What would mislead a model without a warning: not drawn by its built-in recipe, nor shown.
+    """Effects that mislead a model without a warning: its built-in recipe does not vary them.
 
-    Empty of other recipes: nobody knows what they draw.
+    Empty for other recipes, whose variation is unknown.
     """
     trained = card.trained_on
     if trained.recipe not in recipe_names() or trained.scene not in scene_names():
@@ -95,21 +96,21 @@ def unseen_texts(card: ModelCard) -> list[str]:
 def nameplate_cautions(
     plate: Nameplate | None, row: Mapping[str, Any], card: ModelCard
 ) -> tuple[str, ...]:
-    """What a person should know before trusting a model on a machine.
+    """Cautions before trusting a model on a machine.
 
     Parameters
     ----------
     plate : Nameplate or None
     row : mapping
-        What was noted beside the recording.
+        Conditions noted with the recording.
     card : ModelCard
-        Of the model.
+        Card of the model.
 
     Returns
     -------
     tuple of str
-        Of each size that is not that of the machines that the model was trained on, or of all of
-        them where nobody gave a nameplate.
+        One for each size that differs from the machines of the training, or one for all sizes if
+        there is no nameplate.
     """
     trained = card.trained_on.scene
     if trained not in scene_names():
@@ -117,17 +118,17 @@ def nameplate_cautions(
     usual: Any = load_scene(trained)
     drawn = _drawn_by(card.trained_on.recipe)
     if plate is None:
-        return tuple(_taken_for_granted(usual, drawn, frozenset()))
+        return tuple(_assumed_sizes(usual, drawn, frozenset()))
     day: Any = plate.on_the_day(row, None)
     if usual.machine != day.machine:
-        return (f"the nameplate is of a {day.machine}, the model of a {usual.machine}",)
-    granted = _taken_for_granted(usual, drawn, plate.told) if plate.assumed else ()
+        return (f"the nameplate is for a {day.machine}, the model for a {usual.machine}",)
+    granted = _assumed_sizes(usual, drawn, plate.set_paths) if plate.assumed else ()
     return (*granted, *_otherwise_built(day, usual, drawn))
 
 
 @cache
 def _drawn_by(recipe: str) -> Mapping[str, tuple[float, float]]:
-    """Least and largest value of each number that a built-in recipe draws, by its path."""
+    """Smallest and largest value of each number that a built-in recipe draws, by path."""
     if recipe not in recipe_names():
         return {}
     found = load_recipe(recipe)
@@ -142,9 +143,9 @@ def _drawn_by(recipe: str) -> Mapping[str, tuple[float, float]]:
 
 
 def _chosen(choice: Alternatives, scene: Any) -> Iterator[tuple[str, float, float]]:
-    """Path, least and largest value of what the options of a choice set or draw.
+    """Path, smallest and largest value of each number that the options of a choice set or draw.
 
-    An option that says nothing of a number leaves it as the scene has it.
+    An option without a number keeps that of the scene.
     """
     for option in choice.options:
         drawn = {a.path: a.extremes() for a in option.axes if not isinstance(a, Vector)}
@@ -156,12 +157,12 @@ def _chosen(choice: Alternatives, scene: Any) -> Iterator[tuple[str, float, floa
                 yield path, float(value), float(value)
 
 
-def _taken_for_granted(usual: Any, drawn: Mapping[str, Any], told: frozenset[str]) -> Iterator[str]:
-    """That a model knows machines of one size, and nobody said that this one has it."""
+def _assumed_sizes(usual: Any, drawn: Mapping[str, Any], known: frozenset[str]) -> Iterator[str]:
+    """Caution that a model assumes machines of one size, and that of this machine is unknown."""
     sizes = {
         path: value
         for path in presentation_of(usual).sizes
-        if path not in drawn and path not in told and (value := _value(usual, path))
+        if path not in drawn and path not in known and (value := _value(usual, path))
     }
     if sizes:
         words = [
@@ -169,16 +170,15 @@ def _taken_for_granted(usual: Any, drawn: Mapping[str, Any], told: frozenset[str
             for path, value in sizes.items()
         ]
         yield (
-            f"no nameplate: the model takes for granted that {', '.join(words)}, and no signal "
-            "shows whether that is so: give --scene MINE.toml, or --scene "
-            f"{usual.name} where it is"
+            f"no nameplate: the model assumes {', '.join(words)}, which no signal can confirm: "
+            f"give --scene MINE.toml, or --scene {usual.name} if this is correct"
         )
 
 
 def _otherwise_built(
     day: Any, usual: Any, drawn: Mapping[str, tuple[float, float]]
 ) -> Iterator[str]:
-    """Sizes that differ from those of the machines that the model was trained on."""
+    """Cautions on sizes that differ from those of the machines in the training."""
     for path in presentation_of(day).sizes:
         unit = si_unit(type(day), path)
         mine, theirs = _value(day, path), _value(usual, path)
@@ -190,15 +190,15 @@ def _otherwise_built(
             trained = f"{low:.4g}" if low == high else f"{low:.4g} to {high:.4g}"
             yield (
                 f"{path} = {mine:.4g} {unit} by the nameplate, the model was trained at "
-                f"{trained} {unit} and knows no other"
+                f"{trained} {unit} only"
             )
 
 
-_LEAST_FORCE = 1e3  # N: a component that the trained scene has none of is told from 20 N on
+_LEAST_FORCE = 1e3  # N: a component absent from the trained scene is reported from 20 N on
 
 
 def _value(scene: Any, path: str) -> float | None:
-    """None where the scene has no such part, or it is no number."""
+    """Number at a path of a scene; None if the part is absent or is not a number."""
     for name in path.split("."):
         scene = getattr(scene, name, None)
     return float(scene) if isinstance(scene, int | float) else None

@@ -1,7 +1,7 @@
-"""What is known of a machine beside its signals: its scene, the day's conditions, their doubts.
+"""Known data of a machine: its scene, the conditions of the day and their uncertainties.
 
-The scene says how the machine is built and how it usually runs; the manifest row of a recording,
-where it has one, how it ran on the day. What a person sets for one recording goes before both.
+The scene gives the design and the usual operation of the machine, the manifest row of a recording
+the operation on the day. Values set by the user take precedence over both.
 """
 
 import json
@@ -35,32 +35,32 @@ from ..film_clearance.clearance import Doubts
 _OIL = "oil.dynamic_viscosity"
 _SPEED = "drive.speed"
 _WARMING = "bearings.0.film_warming"
-_MEASURED = ("speed_hz", "start_angle_rad", "unbalance_kg_m")  # by the signals, or no matter here
+_MEASURED = ("speed_hz", "start_angle_rad", "unbalance_kg_m")  # from the signals, or irrelevant
 
 
 @dataclass(frozen=True, kw_only=True)
 class Nameplate:
-    """A machine as it is known beside its signals.
+    """Known data of a machine.
 
     Attributes
     ----------
     scene : Scene
         Geometry, load, oil.
-    told : frozenset of str
-        Dotted paths that a person set, entries of lists by number: these go before what a manifest
-        notes.
+    set_paths : frozenset of str
+        Dotted paths set by the user, entries of lists by number; they take precedence over the
+        manifest.
     doubts : Doubts
-        How well all that is known.
+        Standard uncertainties of these data.
     source : str
-        Where it is from, for the report.
+        Origin of the nameplate, for the report.
     assumed : bool
-        Nobody gave a scene: what no one told is that of the machine a model was trained on.
+        No scene was given: values not set are those of the scene that a model was trained on.
     given : bool
-        A person gave the scene, with what it says of this machine's sensors.
+        The user gave the scene, including the errors of this machine's sensors.
     """
 
     scene: Scene
-    told: frozenset[str] = field(default_factory=frozenset)
+    set_paths: frozenset[str] = field(default_factory=frozenset)
     doubts: Doubts = field(default_factory=Doubts)
     source: str = ""
     assumed: bool = False
@@ -74,7 +74,7 @@ class Nameplate:
         row : mapping
             Manifest values; columns of the machine's operating conditions are read.
         speed_hz : float or None
-            As measured [Hz].
+            Measured speed [Hz].
 
         Examples
         --------
@@ -89,23 +89,23 @@ class Nameplate:
         }
         scene = self.scene
         for path, value in noted.items():
-            if path != _SPEED and not self.was_told(path) and _has_place(scene, path):
+            if path != _SPEED and not self.is_set(path) and _has_place(scene, path):
                 scene = _replaced(scene, path, value)
         return scene if speed_hz is None else _replaced(scene, _SPEED, speed_hz)
 
     def conditions(self, row: Mapping[str, Any]) -> dict[str, Any]:
-        """What is known of a recording's day: what a person told, what was noted, what is usual.
+        """Known conditions of a recording: set by the user, noted with it, or usual.
 
         Parameters
         ----------
         row : mapping
-            What was noted beside the recording.
+            Conditions noted with the recording.
 
         Returns
         -------
         dict
-            The row, with every column of :data:`~.feature_rows.noted.NOTED` that the scene has a
-            value for.
+            The row, completed by the columns of :data:`~.feature_rows.noted.NOTED` for which the
+            scene has a value.
 
         Examples
         --------
@@ -119,29 +119,29 @@ class Nameplate:
             column: condition_of(day, column)
             for column in NOTED
             if (place := places.get(column)) is not None and has_value(day, place)
-            if self.was_told(place) or not (self.assumed or _left_out(day, column))
+            if self.is_set(place) or not (self.assumed or _left_out(day, column))
         }
         return {**row, **known}
 
-    def was_told(self, path: str) -> bool:
-        """Whether a person set this value, or one that it follows from."""
+    def is_set(self, path: str) -> bool:
+        """Whether the user set this value, or one that determines it."""
         if path == _OIL:
-            return any(told.startswith("oil.") for told in self.told)
-        return path in self.told
+            return any(each.startswith("oil.") for each in self.set_paths)
+        return path in self.set_paths
 
 
 def _has_place(scene: Any, path: str) -> bool:
-    """False for the warming of a film whose oil is not known at other temperatures."""
+    """False for the warming of a film if the oil is unknown at other temperatures."""
     return path != _WARMING or scene.oil.temperature is not None
 
 
 def _left_out(scene: Scene, column: str) -> bool:
-    """A scene without a number where few people have one: nothing says that it is zero."""
+    """Whether a zero in the scene only means that the rarely known number was left out."""
     return NOTED[column].usual is not None and condition_of(scene, column) == 0
 
 
 def _replaced(scene: Any, path: str, value: float) -> Any:
-    """A scene with one value in another place; what the scene does not have stays absent."""
+    """Replace one value of a scene; a part that the scene lacks stays absent."""
     if path == _OIL:
         oil: Oil = scene.oil
         return scene.model_copy(update={"oil": oil.thickened(value / oil.dynamic_viscosity)})
@@ -167,26 +167,26 @@ def nameplate_of(
     Parameters
     ----------
     source : Path, optional
-        The recording: a data set may hold its scene.
+        File of the recording: a data set may hold its scene.
     scene : str, optional
-        A built-in scene or a file, that goes before the one of the data set.
+        Built-in scene or file; it takes precedence over that of the data set.
     values : mapping
-        Dotted path -> value that replaces the scene's, a text with ``+-`` and its standard
-        uncertainty in per cent or in its own unit, where it is not the usual one.
+        Dotted path -> value that replaces the scene's. A text may add ``+-`` and a standard
+        uncertainty, in per cent or in the unit of the value, that replaces the usual one.
     usual : str
-        Scene that a model was trained on: taken where values are set and no scene is known.
+        Scene that a model was trained on; used if values are set and no scene is known.
 
     Returns
     -------
     Nameplate or None
-        None where nothing is known.
+        None if nothing is known.
 
     Raises
     ------
     SceneError
-        It is no scene, or does not take a value.
+        The scene is invalid, or does not accept a value.
     DataError
-        An uncertainty is none.
+        An uncertainty is invalid.
 
     Examples
     --------
@@ -204,7 +204,7 @@ def nameplate_of(
         except SceneError:
             if plain:
                 raise
-            return None  # a file of another version: nothing was asked of it
+            return None  # a file of another version, whose scene nobody requested
     elif plain and usual in scene_names():
         found = scene_from_table(override(scene_table(scene_text(usual)), plain))
         name = f"scene {usual}, which the model was trained on"
@@ -213,10 +213,10 @@ def nameplate_of(
     assumed = scene is None and head is None
     doubts = replace(_usual_doubts(found), **_doubts(spreads, found, plain))
     table = found.model_dump(mode="json")
-    told = frozenset(numbered(table, path) for path in plain)
+    set_paths = frozenset(numbered(table, path) for path in plain)
     return Nameplate(
         scene=found,
-        told=told,
+        set_paths=set_paths,
         doubts=doubts,
         source=name,
         assumed=assumed,
@@ -225,30 +225,30 @@ def nameplate_of(
 
 
 def day_of(plate: Nameplate | None, row: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Conditions of a recording's day, as far as they are known beside its signals.
+    """Known conditions of a recording.
 
     Parameters
     ----------
     plate : Nameplate or None
     row : mapping
-        What was noted beside the recording.
+        Conditions noted with the recording.
     """
     return row if plate is None else plate.conditions(row)
 
 
 def _head_of(source: Path) -> Attributes | None:
-    """Attributes of a data set that a scene was written in."""
+    """Attributes of a data set that holds a scene; else None."""
     if source.suffix.lower() not in (".h5", ".hdf5"):
         return None
     try:
         with DataSet(source) as data:
             return data.attributes if data.attributes.scene else None
     except DataError:
-        return None  # of another program: it has no scene
+        return None  # written by another program: it has no scene
 
 
 def _scene_in(head: Attributes, values: Mapping[str, Any]) -> Scene:
-    """Scene of a data set of a recipe (TOML), or of one recording (JSON), with values replaced."""
+    """Scene of a data set from a recipe (TOML) or of one recording (JSON), with values replaced."""
     if head.scene.lstrip().startswith("{"):
         return scene_from_table(override(json.loads(head.scene), values))
     overrides = {**json.loads(head.overrides or "{}"), **values}
@@ -256,7 +256,7 @@ def _scene_in(head: Attributes, values: Mapping[str, Any]) -> Scene:
 
 
 def _parted(values: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, str]]:
-    """Values, and what stands behind their ``+-``."""
+    """Values, and the texts after their ``+-``."""
     plain: dict[str, Any] = {}
     spreads: dict[str, str] = {}
     for path, value in values.items():
@@ -267,11 +267,11 @@ def _parted(values: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, str]]:
     return plain, spreads
 
 
-_OFFSET_SHARE = 0.005  # of a probe's range: how well the reading of a centred shaft is known
+_OFFSET_SHARE = 0.005  # of a probe's range: uncertainty of the reading at a centred shaft
 
 
 def _usual_doubts(scene: Any) -> Doubts:
-    """Those of the scene's probes."""
+    """Usual uncertainties of the scene's probes."""
     probes = [*getattr(scene, "probes", ()), *getattr(scene, "sensors", ())]
     ranges = [probe.range for probe in probes if hasattr(probe, "offset")]
     return Doubts(offset=_OFFSET_SHARE * max(ranges)) if ranges else Doubts()
@@ -285,7 +285,7 @@ def _doubts(
         kind = _kind_of(path)
         if kind is None:
             raise DataError(
-                f"{path} = {values[path]} takes no uncertainty, must be of load, oil, or a probe's "
+                f"{path} = {values[path]} takes no uncertainty, must be a load, oil, or a probe's "
                 "offset or gain; leave the +- out"
             )
         found[kind] = max(found.get(kind, 0.0), _spread(path, text, kind, scene))
@@ -293,7 +293,7 @@ def _doubts(
 
 
 def _kind_of(path: str) -> str | None:
-    """The doubt that a value's uncertainty is."""
+    """Field of :class:`Doubts` that the uncertainty of a value belongs to."""
     table, *_, name = path.split(".")
     if table == "load":
         return "load"
@@ -303,7 +303,7 @@ def _kind_of(path: str) -> str | None:
 
 
 def _spread(path: str, text: str, kind: str, scene: Scene) -> float:
-    """As :class:`Doubts` has it: over the value, or of an offset in metres."""
+    """Uncertainty as in :class:`Doubts`: relative to the value, for an offset in metres."""
     if text.endswith("%") and kind != "offset":
         share = _number(path, text[:-1]) / 100
     elif kind == "offset":
@@ -326,19 +326,19 @@ def _number(path: str, text: str) -> float:
 
 
 def _warmer(scene: Any, kelvin: float) -> float:
-    """By how much the viscosity falls."""
+    """Relative change of the viscosity over a temperature difference."""
     oil: Oil = scene.oil
-    assert oil.temperature is not None  # a scene that was given a temperature has one
+    assert oil.temperature is not None  # the user set it
     warm = oil.model_copy(update={"temperature": oil.temperature + kelvin})
     return abs(math.log(warm.dynamic_viscosity / oil.dynamic_viscosity))
 
 
-def told_conditions(plate: Nameplate, row: Mapping[str, Any]) -> Sequence[str]:
-    """Loads and oil of the day that were noted or set, by their manifest columns."""
+def known_conditions(plate: Nameplate, row: Mapping[str, Any]) -> Sequence[str]:
+    """Manifest columns of the loads and oil conditions that were noted or set."""
     return [
         each.column
         for each in plate.scene.condition_places
         if each.column not in _MEASURED
-        if plate.was_told(each.path)
+        if plate.is_set(each.path)
         or (isinstance(row.get(each.column), float | int) and math.isfinite(row[each.column]))
     ]

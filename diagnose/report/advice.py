@@ -20,8 +20,8 @@ Confidence = Literal[
     "unreferenced",
 ]
 
-RULE_OF_THUMB = "rule of thumb, not of a standard"
-"""What a horizon of the table rests on: the usual shortening of intervals as a part wears."""
+RULE_OF_THUMB = "rule of thumb, not from a standard"
+"""Basis of the horizons in the table: intervals are usually shortened as a part wears."""
 
 FROM_TREND = "from the trend"
 
@@ -33,15 +33,15 @@ class Advice:
     Attributes
     ----------
     action : {"none", "watch", "confirm", "plan", "stop", "check"}
-        ``confirm``: measure the part before acting; ``check``: the recording, not the machine.
+        ``confirm``: measure the part before acting; ``check``: inspect the recording.
     sentence : str
-        For the engineer.
+        Advice to the engineer.
     days : float or None
-        Within which to act or to record again [d]; None where there is nothing to wait for.
+        Time within which to act or to record again [d]; None if waiting changes nothing.
     horizon : str
         The same in words.
     basis : str
-        What the horizon rests on.
+        Basis of the horizon.
     """
 
     action: Action
@@ -164,7 +164,7 @@ _RULES: dict[tuple[int | None, Confidence], _Rule] = {
         days=None,
     ),
 }
-"""Grade and confidence -> what to do; a grade 0 cannot be better, a grade 3 not worse."""
+"""Grade and confidence -> what to do. Grade 0 cannot be better, grade 3 cannot be worse."""
 
 _WORDS = {
     0: "now",
@@ -176,23 +176,23 @@ _WORDS = {
     90: "within 3 months",
 }
 _REALIGNED = ("sag", "parallel offset", "angular offset")
-"""Kinds of severity that no new part mends."""
+"""Kinds of severity that a new part does not cure."""
 
 
 def touched_grades(estimate: Estimate, edges: Sequence[float]) -> tuple[int, ...]:
-    """Grades that the interval of the severity touches.
+    """Grades that the interval of the severity reaches.
 
     Parameters
     ----------
     estimate : Estimate
     edges : sequence of float
-        Where grades 1, 2, … begin [m].
+        Lower bounds of grades 1, 2, … [m].
 
     Returns
     -------
     tuple of int
-        Empty without an interval. It may hold grades that `possible_grades` does not, as each is
-        calibrated by itself.
+        Empty without an interval. It may hold grades that `possible_grades` does not, because the
+        two are calibrated separately.
 
     Examples
     --------
@@ -220,19 +220,19 @@ def brief_words(action: str, horizon: str) -> str:
 
 
 def confidence_of(estimate: Estimate, edges: Sequence[float]) -> Confidence:
-    """How sure a verdict is: by itself, by its cautions, and by the grades it cannot exclude.
+    """Confidence in a verdict, from the verdict, its cautions and the grades not excluded.
 
     Parameters
     ----------
     estimate : Estimate
     edges : sequence of float
-        Where grades 1, 2, … begin [m]: whoever reads that the interval reaches beyond a limit
-        expects advice that reckons with it.
+        Lower bounds of grades 1, 2, … [m]. The advice has to allow for an interval that reaches
+        beyond a limit.
 
     Returns
     -------
     str
-        Where grades on both sides are possible, the worse; caution goes before both.
+        The worse if grades on both sides are possible; a caution takes precedence over both.
     """
     if estimate.unreferenced:
         return "unreferenced"
@@ -242,7 +242,7 @@ def confidence_of(estimate: Estimate, edges: Sequence[float]) -> Confidence:
 
 
 def _doubt(estimate: Estimate, grade: int, edges: Sequence[float]) -> Confidence:
-    """What the grades that set or interval leaves open make of a grade."""
+    """Confidence in a grade, given the grades that its set and its interval leave open."""
     grades = (*estimate.possible_grades, *touched_grades(estimate, edges))
     if max(grades) > grade:
         far = max(grades) >= ALARM_GRADE and grade < WARNING_GRADE
@@ -251,12 +251,12 @@ def _doubt(estimate: Estimate, grade: int, edges: Sequence[float]) -> Confidence
 
 
 def work_words(quantity: str) -> str:
-    """The work that a worn quantity asks for.
+    """Maintenance work that a worn quantity requires.
 
     Parameters
     ----------
     quantity : str
-        Kind and place, as of :func:`wearstate.diagnose.pages.words.quantity_name`.
+        Kind and place, from :func:`wearstate.diagnose.pages.words.quantity_name`.
 
     Examples
     --------
@@ -284,10 +284,10 @@ def advise(
     quantity : str
         What wears: kind and place.
     edges : sequence of float
-        Where grades 1, 2, … begin [m].
+        Lower bounds of grades 1, 2, … [m].
     outlook : Outlook, optional
-        Of the machine's trend: its early end replaces the rule of thumb, where it is earlier, or
-        where the table says nothing but to record again.
+        Outlook of the machine's trend. The early end of the remaining life replaces the rule of
+        thumb if it comes sooner.
 
     Returns
     -------
@@ -295,8 +295,8 @@ def advise(
 
     Notes
     -----
-    The intervals are rules of thumb: recordings come closer together as wear grows, so that there
-    are several between the first sign and the limit. They are marked as such.
+    The intervals are rules of thumb and marked as such: they shorten as wear grows, so that several
+    recordings lie between the first sign and the limit.
 
     Examples
     --------
@@ -318,7 +318,7 @@ def advise(
 
 
 def _days(rule: _Rule, estimate: Estimate, edges: Sequence[float]) -> float | None:
-    """A caution makes no one more patient than the doubt itself would."""
+    """Horizon [d]: a caution never makes it longer than the doubt alone would."""
     if rule.days is None or estimate.grade is None:
         return None
     doubt = _doubt(estimate, estimate.grade, edges)
@@ -327,7 +327,7 @@ def _days(rule: _Rule, estimate: Estimate, edges: Sequence[float]) -> float | No
 
 
 def _with_outlook(plain: Advice, outlook: Outlook) -> Advice:
-    """The trend may only hasten: a long life ahead does not make recordings superfluous."""
+    """Shorten the horizon by the trend; a long remaining life does not lengthen it."""
     early = outlook.remaining_low_h
     if early is None or plain.days is None or early / 24 >= plain.days:
         return plain

@@ -1,7 +1,7 @@
 """The verdict on many recordings: a folder, or every record of a data set, and their trends.
 
-One recording is in memory at a time; of the others a row is kept. One that cannot be read becomes a
-row with its fault.
+Only one recording is in memory at a time; for the others a row is kept. A recording that cannot be
+read becomes a row that names its fault.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -25,9 +25,9 @@ from ..feature_rows.feature_table import Progress, is_regime, regime_words
 from ..film_clearance.clearance import FilmEstimate
 from ..healthy_reference.healthy import Baselines
 from ..learning.grades import GRADE_NAMES, WARNING_GRADE
-from ..nameplate.cautions import known_beside
+from ..nameplate.cautions import recording_context
 from ..nameplate.nameplate import Nameplate
-from ..nameplate.sensors import as_told
+from ..nameplate.sensors import corrected_recording
 from ..pages.words import quantity_name
 from ..wear_model.bundle import ModelError
 from ..wear_model.estimate import WearModel
@@ -38,10 +38,10 @@ from .trend import Growth, Outlook, Trend, date_in, fit_trend, hours_of, read_da
 from .verdict import NO_REFERENCE, REPORT_SCHEMA, headline, limits_table, model_table
 
 HOURS = "operating_hours"
-"""Manifest column and condition that times recordings unless told otherwise."""
+"""Default manifest column and condition for the time of a recording [h]."""
 
 _DATA_SETS = (".h5", ".hdf5")
-_NO_RECORDINGS = (".txt",)  # read when named, but in a folder usually notes
+_NO_RECORDINGS = (".txt",)  # read if named; in a folder usually notes
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,12 +51,12 @@ class Item:
     Attributes
     ----------
     name : str
-        File, and number in it.
+        File name, and record number in it.
     machine : str
-        Which machine it is of; empty where all are of one.
+        Machine of the recording; empty if all are from one machine.
     path : Path
     row : mapping
-        What its data set knows of it.
+        Its manifest row; empty if the file is no data set.
     load : callable
         Reads it; raises DataError.
     """
@@ -70,15 +70,15 @@ class Item:
 
 @dataclass(frozen=True, kw_only=True)
 class BatchRow:
-    """What the table says of one recording.
+    """Row of one recording in the table.
 
     Attributes
     ----------
     number : int
-        Among the items.
+        Index of its item.
     name, machine : str
     time_h : float or None
-        Operating hours, or hours of the calendar since 1970 [h].
+        Operating hours, or calendar hours since 1970 [h].
     headline : str
     verdict : str
     grade : int or None
@@ -88,11 +88,11 @@ class BatchRow:
     action, advice, horizon : str
         What to do and how soon.
     days : float or None
-        The same as a number [d].
+        The horizon as a number [d].
     note : str
         The first reason or caution.
     current : bool
-        It tells how the machine is now: with times, the latest of its machine only, else each.
+        It shows the present state: only the latest recording of a machine if times are known.
     """
 
     number: int
@@ -115,9 +115,9 @@ class BatchRow:
 
     @property
     def urgency(self) -> tuple[bool, int, float, float]:
-        """For sorting: what must be acted on, what could not be judged, what is fine, what was.
+        """Sort key: action needed, then not judged, then healthy, then past recordings.
 
-        Of what must be acted on the soonest first, of equals the most worn.
+        Among those that need action the shortest horizon comes first, then the most worn.
         """
         past = not self.current
         if past:
@@ -139,11 +139,11 @@ class Batch:
     rows : tuple of BatchRow
         The most urgent first.
     items : tuple of Item
-        By the number of their row.
+        In the order of `BatchRow.number`.
     trends : dict
         Machine -> Trend.
     limits, provenance : dict
-        As of :func:`wearstate.diagnose.report.verdict.report_table`.
+        As in :func:`wearstate.diagnose.report.verdict.report_table`.
     notice : str
     """
 
@@ -157,12 +157,12 @@ class Batch:
 
     @property
     def current(self) -> tuple[BatchRow, ...]:
-        """Rows that tell how the machines are now; the worst first."""
+        """Rows that show the present state of the machines; the worst first."""
         return tuple(row for row in self.rows if row.current)
 
     @property
     def undated(self) -> str:
-        """Recordings that are in no trend for want of a time; empty where all or none have one."""
+        """Message on recordings in no trend for lack of a time; empty if all or none have one."""
         names = [row.name for row in self.rows if row.time_h is None]
         if not names or len(names) == len(self.rows):
             return ""
@@ -175,12 +175,12 @@ class Batch:
         )
 
     def outlook_of(self, row: BatchRow) -> Outlook | None:
-        """What the trend says of the machine, where the row is its latest recording."""
+        """Outlook of the machine's trend; None unless the row is its latest recording."""
         trend = self.trends.get(row.machine)
         return trend.outlook if trend and row.current and row.time_h is not None else None
 
     def counts(self) -> dict[str, int]:
-        """Current recordings of each grade from the worst, and those without."""
+        """Number of current recordings of each grade, worst first, and of those without a grade."""
         words = [(grade, GRADE_NAMES[grade]) for grade in reversed(range(len(GRADE_NAMES)))]
         found = {name: sum(row.grade == grade for row in self.current) for grade, name in words}
         alone = sum(row.headline == NO_REFERENCE for row in self.current)
@@ -190,13 +190,13 @@ class Batch:
         return found | {"without healthy reference": alone}
 
     def summary(self) -> str:
-        """How many there are, and how the current ones are."""
-        told = ", ".join(f"{count} {name}" for name, count in self.counts().items() if count)
+        """Number of recordings, and verdicts on the current ones."""
+        verdicts = ", ".join(f"{count} {name}" for name, count in self.counts().items() if count)
         past = len(self.rows) - len(self.current)
         whole = f"{len(self.rows)} recordings"
         if all(row.grade is None for row in self.current):
             whole = f"no grade is given, {whole}"
-        return f"{whole}; now: {told}" if past else f"{whole}: {told}"
+        return f"{whole}; now: {verdicts}" if past else f"{whole}: {verdicts}"
 
 
 _SHOWN_UNDATED = 4
@@ -215,28 +215,27 @@ def recordings_in(
     leave_out: Sequence[Path] = (),
     views: Sequence[CompletingView] = (),
 ) -> Iterator[tuple[Item, ...]]:
-    """Recordings of a folder (not of folders in it), or records of a data set.
+    """Recordings of a folder (without its subfolders), or records of a data set.
 
     Parameters
     ----------
     path : Path
     options, tacho, pulses_per_revolution
-        As of :func:`wearstate.datasets.measured.recording.read_recording`.
+        As in :func:`wearstate.datasets.measured.recording.read_recording`.
     leave_out : sequence of Path
-        Files of the folder that are no recordings: dates, baseline.
+        Files of the folder that are not recordings: dates, baseline.
     views : sequence of CompletingView
         Data sets that complete the records of a data set.
 
     Yields
     ------
     tuple of Item
-        In the order of their names; a data set stays open as long as the context.
+        Sorted by name; a data set stays open while the context is.
 
     Raises
     ------
     DataError
-        The folder has no recordings, or the data set cannot be read or declares something else
-        than the caller.
+        The folder has no recordings, or the data set cannot be read or contradicts the options.
     """
     read = partial(
         read_recording, options=options, tacho=tacho, pulses_per_revolution=pulses_per_revolution
@@ -267,13 +266,13 @@ def _recording_files(folder: Path) -> list[Path]:
 
 
 def _items_of(file: Path, read: Callable[[Path], Recording]) -> list[Item]:
-    """Every record of a data set; one item of another file, readable or not."""
+    """Every record of a data set; one item for any other file, readable or not."""
     if file.suffix.lower() in _DATA_SETS:
         try:
-            with JoinedSet(file) as data:  # closed: a process may not open a thousand files
+            with JoinedSet(file) as data:  # closed: the number of open files is limited
                 return _records(file, data, close=True)
         except DataError:
-            pass  # of another program, or damaged: reading it says which
+            pass  # from another program, or damaged: reading it raises the right error
     return [Item(name=file.name, machine="", path=file, row={}, load=partial(read, file))]
 
 
@@ -306,7 +305,7 @@ def _manifest_rows(data: DataSet) -> Iterator[dict[str, Any]]:
 
 
 def record_count(path: Path) -> int:
-    """Records of a data set; 1 of any other file, readable or not."""
+    """Number of records of a data set; 1 for any other file, readable or not."""
     if path.suffix.lower() not in _DATA_SETS:
         return 1
     try:
@@ -332,12 +331,12 @@ def times_of(items: Sequence[Item], dates: str) -> tuple[float | None, ...]:
     Returns
     -------
     tuple of (float or None)
-        [h]; None where a recording has none.
+        [h]; None for a recording without a time.
 
     Raises
     ------
     DataError
-        Not one of them, or no recording has a time.
+        `dates` is none of these, or no recording has a time.
     """
     if dates == "names":
         moments = [date_in(item.name) for item in items]
@@ -364,7 +363,7 @@ def _hours_in(row: Mapping[str, Any], column: str) -> float | None:
 
 
 def clock_is_operating(dates: str) -> bool:
-    """Whether times count operating hours; dates are of the calendar."""
+    """Whether times are operating hours, not calendar dates."""
     if dates in ("names", "mtime"):
         return False
     if Path(dates).suffix.lower() != ".csv":
@@ -387,7 +386,7 @@ def judge_all(
     dates: str | None = None,
     growth: Growth = "linear",
     seed: int = 0,
-    tell: Callable[[dict[str, Any]], None] | None = None,
+    on_result: Callable[[dict[str, Any]], None] | None = None,
     progress: Progress | None = None,
 ) -> Batch:
     """Judge recordings one after the other.
@@ -395,23 +394,24 @@ def judge_all(
     Parameters
     ----------
     source : Path
-        Where they are from.
+        Folder or file of the recordings.
     items : sequence of Item
     model : WearModel
     model_file : Path, optional
-        For its hash.
+        Its file, to be hashed.
     baselines : Baselines, optional
-        Of the machines.
+        Healthy recordings of the machines.
     plate : Nameplate, optional
-        Of the machines, for the estimate by their film equilibrium.
+        Nameplate of the machines, for the estimate by film equilibrium.
     dates : str, optional
-        As of :func:`times_of`: a trend is wanted.
+        Source of the times, as in :func:`times_of`; required for a trend.
     growth : {"linear", "log"}
-        Of the wear, for the trend.
+        Assumed growth of the wear, for the trend.
     seed : int
-        Of the trend's band.
-    tell : callable, optional
-        Given a table of each recording as soon as it is judged, then one of each trend.
+        Seed of the trend's band.
+    on_result : callable, optional
+        Called with a table for each recording as soon as it is judged, then with one for each
+        trend.
     progress : callable, optional
         Called with (recordings done, recordings).
 
@@ -422,9 +422,9 @@ def judge_all(
     Raises
     ------
     ModelError
-        The program's features are not the model's.
+        The features of this program are not those of the model.
     DataError
-        No recording has a time, though a trend is wanted.
+        A trend is requested but no recording has a time.
     """
     times = (None,) * len(items) if dates is None else times_of(items, dates)
     rows = []
@@ -432,15 +432,16 @@ def judge_all(
         estimate, film = _judged(item, model, baselines, plate)
         advice = _advice(estimate, model)
         rows.append(_row(number, item, time, estimate, advice))
-        if tell is not None:
-            tell(_line(item, time, estimate, advice) | {"film": film_table(film, plate, item.row)})
+        if on_result is not None:
+            line = _line(item, time, estimate, advice)
+            on_result(line | {"film": film_table(film, plate, item.row)})
         if progress is not None:
             progress(number + 1, len(items))
     clock = dates is not None and clock_is_operating(dates)
     trends = {} if dates is None else _trends(rows, model, growth, clock, seed)
-    if tell is not None:
+    if on_result is not None:
         for machine, trend in trends.items():
-            tell(trend_table(machine, trend))
+            on_result(trend_table(machine, trend))
     rows = _with_past(rows)
     rows = [_hastened(row, trends.get(row.machine), model) for row in rows]
     return Batch(
@@ -461,16 +462,17 @@ def judge_all(
 def _judged(
     item: Item, model: WearModel, baselines: Baselines | None, plate: Nameplate | None
 ) -> tuple[Estimate, FilmEstimate | None]:
-    """A recording that cannot be read is unusable, and does not stop the others."""
+    """Estimate of a recording; one that cannot be read is unusable and does not stop the others."""
     try:
         recording = item.load()
         baseline = None if baselines is None else baselines.of(recording)
         film = film_estimate(recording, model.card.severity, plate, baseline)
-        beside = known_beside(plate, recording, model.card, baseline)
-        estimate = model.estimate(as_told(recording, plate, baseline), baseline, **beside)
+        context = recording_context(plate, recording, model.card, baseline)
+        judged = corrected_recording(recording, plate, baseline)
+        estimate = model.estimate(judged, baseline, **context)
         return with_film(estimate, film), film
     except ModelError:
-        raise  # would be so for each of them
+        raise  # applies to every recording
     except (ValueError, OSError) as error:
         reasons = (fault_of(item, error),)
         return Estimate(verdict="unusable", reasons=reasons, mode=model.mode), None
@@ -544,7 +546,7 @@ def trend_table(machine: str, trend: Trend) -> dict[str, Any]:
 def _trends(
     rows: Sequence[BatchRow], model: WearModel, growth: Growth, operating: bool, seed: int
 ) -> dict[str, Trend]:
-    """Of every machine that has a graded recording with a time."""
+    """Trend of every machine that has a graded recording with a time."""
     usable: dict[str, list[tuple[float, ...]]] = {}
     for row in rows:
         point = (row.time_h, row.severity, row.low, row.high)
@@ -564,7 +566,7 @@ def _trends(
 
 
 def _with_past(rows: Sequence[BatchRow]) -> list[BatchRow]:
-    """Rows of which those before a machine's latest are past; one without a time is not."""
+    """Mark all but the latest row of each machine as past; a row without a time stays current."""
     latest: dict[str, float] = {}
     for row in rows:
         if row.time_h is not None:
@@ -576,7 +578,7 @@ def _with_past(rows: Sequence[BatchRow]) -> list[BatchRow]:
 
 
 def _hastened(row: BatchRow, trend: Trend | None, model: WearModel) -> BatchRow:
-    """The latest recording of a machine, advised by its trend; others as they are."""
+    """Add the trend to the advice on a machine's latest recording; return other rows unchanged."""
     usable = row.current and row.time_h is not None and row.grade is not None
     if not usable or trend is None or trend.outlook is None:
         return row
@@ -603,5 +605,5 @@ def _advice(estimate: Estimate, model: WearModel, outlook: Outlook | None = None
 
 
 def machine_heading(machine: str) -> str:
-    """A machine in words."""
+    """Name of a machine in a heading."""
     return f"machine {machine}" if machine else "the machine"

@@ -1,4 +1,4 @@
-"""Pictures of the report: the estimate among the grades, what moved, the signals, a trend."""
+"""Pictures of the report: the estimate on the scale of grades, changes, signals, a trend."""
 
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
@@ -24,9 +24,9 @@ from .verdict import MAP_CELL
 
 Float = NDArray[np.float64]
 
-_LEAST_SPAN_DB = 6.0  # of the colours of a map: less is nothing
+_LEAST_SPAN_DB = 6.0  # of the colour scale of a map: smaller changes stay pale
 _MOST_MAPS = 2
-_NARROW = 0.12  # of the gauge: a band that holds no name
+_NARROW = 0.12  # share of the gauge: a narrower band has no room for a name
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,7 +36,7 @@ class ReportPicture:
     Attributes
     ----------
     caption, alt : str
-        Below it, and instead of it.
+        Text below the picture, and its replacement.
     image : PageImage
     """
 
@@ -58,21 +58,21 @@ def report_pictures(
     evidence: Sequence[str] = (),
     most: int | None = None,
 ) -> list[ReportPicture]:
-    """What shows most of this machine: what moved, where its wear tells, and its spectrum.
+    """The most informative pictures of this machine: changes, effect of its wear, spectrum.
 
     Parameters
     ----------
     recording : Recording
     model : WearModel, optional
-        For its healthy reference; without it no map of what moved is drawn.
+        Supplies the healthy reference of the map of changes, which is not drawn without it.
     graded : bool
-        Without a grade the signal itself is shown, where a fault of the recording is seen.
+        Without a grade the signal itself is shown, because it reveals a faulty recording.
     healthy : numpy.ndarray [shape=(n_features,)], optional
         Baseline of the machine instead of the model's as-new machines.
     evidence : sequence of str
-        Features that are marked on the map.
+        Features to be marked on the map.
     most : int, optional
-        Pictures.
+        Largest number of pictures.
 
     Returns
     -------
@@ -93,7 +93,7 @@ def report_pictures(
 
 
 def _supported(view: View, kinds: Sequence[str]) -> list[Panel]:
-    """Those kinds that the recording supports; a report is no place for what it lacks."""
+    """Pictures of those kinds that the recording supports; the others are left out silently."""
     panels = []
     for kind in kinds:
         with suppress(DataError):
@@ -101,12 +101,12 @@ def _supported(view: View, kinds: Sequence[str]) -> list[Panel]:
     return panels
 
 
-# --- what moved over the crank angle
+# --- change over the crank angle
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Moved:
-    """Level against healthy in cells of angle and frequency, of one channel."""
+    """Level of one channel relative to healthy, in cells of angle and frequency."""
 
     channel: str
     angle: Float  # edges [deg]
@@ -122,12 +122,12 @@ def moved_panel(
     healthy: Float | None = None,
     evidence: Sequence[str] = (),
 ) -> Panel | None:
-    """Level of every cell of the crank-angle map against the healthy reference.
+    """Level of every cell of the crank-angle map relative to the healthy reference.
 
     Returns
     -------
     Panel or None
-        None where the model's features have no such map.
+        None if the model's features contain no such map.
     """
     cells = [(i, MAP_CELL.fullmatch(name)) for i, name in enumerate(model.names)]
     found = {i: match.groups() for i, match in cells if match is not None}
@@ -209,7 +209,7 @@ def _draw_moved(place: Any, *, maps: Sequence[_Moved]) -> None:
     axes[-1].set_xlabel("crank angle after the tacho pulse [deg]")
 
 
-# --- the estimate among the grades
+# --- the estimate on the scale of grades
 
 
 def gauge(estimate: Mapping[str, Any], limits: Mapping[str, Any]) -> ReportPicture:
@@ -239,7 +239,7 @@ def _gauge_figure(estimate: Mapping[str, Any], limits: Mapping[str, Any]) -> Any
 
 
 def draw_gauge(axes: Any, estimate: Mapping[str, Any], limits: Mapping[str, Any]) -> None:
-    """Grades as bands, the estimate with its interval, the condemning limit."""
+    """Draw the grades as bands, the estimate with its interval and the condemning limit."""
     edges = [1e3 * edge for edge in limits["grade_edges_m"]]
     low, value, high = (1e3 * estimate[key] for key in ("low", "severity", "high"))
     right = 1.15 * max(1.5 * edges[-1], high)
@@ -306,21 +306,21 @@ def _draw_trend(axes: Any, trend: Trend, limits: Mapping[str, Any]) -> None:
     axes.grid(alpha=0.3)
     axes.legend(fontsize=8, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, frameon=False)
     axes.set_ylabel(f"{short_name(limits['quantity'].split(',')[0])} [mm]")
-    _tell_time(axes, trend)
+    _label_time(axes, trend)
 
 
 _LINE_COLOUR = "#1f5a94"
 
 
 def _moments(trend: Trend, hours: Float) -> NDArray[Any]:
-    """Hours as an axis wants them: dates of the calendar, or hours of operation."""
+    """Times as the axis needs them: calendar dates, or operating hours."""
     if trend.clock == "operating":
         return hours
     return (3600 * hours).round().astype("datetime64[s]")
 
 
-def _tell_time(axes: Any, trend: Trend) -> None:
-    """Dates where dates were given."""
+def _label_time(axes: Any, trend: Trend) -> None:
+    """Label the time axis: dates for calendar times, else operating hours."""
     if trend.clock == "operating":
         axes.set_xlabel("operating hours [h]")
         return

@@ -1,6 +1,6 @@
-"""The film equilibrium beside a trained model: its estimate of a recording, and whether they agree.
+"""Estimate of a recording from its film equilibrium, and whether the trained model agrees.
 
-What the equilibrium needs is no training but the machine's nameplate and the conditions of the day.
+The equilibrium needs no training but the machine's nameplate and the conditions of the day.
 """
 
 import re
@@ -24,9 +24,9 @@ from ..film_clearance.clearance import (
 from ..film_clearance.wear_down import SinkingRun, film_wear_down, possible_bores, sinking_places
 from ..healthy_reference.healthy import Baseline
 from ..healthy_reference.probe_means import ProbeMeans, probe_means
-from ..nameplate.nameplate import Nameplate, told_conditions
+from ..nameplate.nameplate import Nameplate, known_conditions
 from ..wear_model.verdict import Estimate
-from .beside import length_words, with_second
+from .second_estimate import length_words, with_second
 
 if TYPE_CHECKING:
     from ...sim.bearing.rest_curve import RestCurve
@@ -42,32 +42,32 @@ def film_estimate(
     plate: Nameplate | None,
     baseline: Baseline | None = None,
 ) -> FilmEstimate | None:
-    """Severity of a machine from where its shaft runs.
+    """Severity of a machine from the position of its shaft.
 
     Parameters
     ----------
     recording : Recording
     severity : str
-        Column of the wear that is asked for.
+        Column of the requested wear.
     plate : Nameplate or None
-        What is known beside the signals.
+        Known machine data and operating conditions.
     baseline : Baseline, optional
-        Healthy recordings of the same machine: they tell the offsets of the probes.
+        Healthy recordings of the same machine; they determine the offsets of the probes.
 
     Returns
     -------
     FilmEstimate or None
-        None where no such estimate exists for this wear or machine.
+        None if no such estimate exists for this wear or machine.
     """
     kind = _NUMBER.sub("_{}_m", severity)
     if plate is None:
-        told = any(kind == each for each, _ in _WAYS) and probe_means(recording).names
-        return FilmEstimate(reason=_UNKNOWN) if told else None
-    way = _WAYS.get((kind, plate.scene.machine))
-    if way is None:
+        possible = any(kind == each for each, _ in _METHODS) and probe_means(recording).names
+        return FilmEstimate(reason=_UNKNOWN) if possible else None
+    method = _METHODS.get((kind, plate.scene.machine))
+    if method is None:
         return None
     healthy = () if baseline is None else baseline.positions
-    return way(probe_means(recording), plate, healthy, severity)
+    return method(probe_means(recording), plate, healthy, severity)
 
 
 def _journal(
@@ -81,10 +81,10 @@ def _journal(
     wear = scene.wear
     built = scene.bearing.clearance_diametral
     as_new = (wear.as_new, wear.grade_edges[0]) if wear else (built / _BUILT, built * _BUILT)
-    told, others = _possible_films(scene)
+    given, others = _possible_films(scene)
     return film_clearance(
         _run(means, plate, severity),
-        told,
+        given,
         [_probe(scene.sensors, name).angle for name in means.names],
         as_new,
         others=others,
@@ -94,22 +94,22 @@ def _journal(
 
 
 def _possible_films(scene: JournalScene) -> tuple["RestCurve", list[PossibleFilm]]:
-    """Film as the scene has it, and what it may be instead.
+    """Film of the scene, and the films it may be instead.
 
-    That is the other solution of Reynolds' equation, for the whole of the machine's life, or a
+    These are the other solution of Reynolds' equation, for the whole life of the machine, and a
     scar that came with the wear.
     """
     from ...sim.bearing.rest_curve import rest_curve
     from ...sim.journal.recording import (
-        film_geometry,  # compiled code: a second that others need not wait
+        film_geometry,  # compiled code: takes a second, needed only here
     )
 
     geometry = film_geometry(scene)
     finite, short = (rest_curve(geometry, rung) for rung in ("direct", "short"))
-    told, other = (short, finite) if scene.film.rung == "short" else (finite, short)
+    given, other = (short, finite) if scene.film.rung == "short" else (finite, short)
     scars = [rest_curve(geometry, scar=depth, turned=turned) for depth, turned in SCARS]
     share = _OTHER_FILM / len(scars)
-    return told, [
+    return given, [
         PossibleFilm(likely=_OTHER_FILM, now=other, new=other),
         *(
             PossibleFilm(likely=share, now=scar, new=finite, scar=depth)
@@ -118,8 +118,8 @@ def _possible_films(scene: JournalScene) -> tuple["RestCurve", list[PossibleFilm
     ]
 
 
-_OTHER_FILM = 0.5  # as likely as the film as told, another and all scars together
-_BUILT = 1.3  # makers' tolerances of a clearance, where no limits say what as new is
+_OTHER_FILM = 0.5  # prior weight relative to the given film: of the other one, of all scars
+_BUILT = 1.3  # makers' tolerance of a clearance, if no limits define as new
 
 
 def _shaft(
@@ -131,11 +131,11 @@ def _shaft(
     limits = scene.wear_down
     if limits is None or number >= len(scene.bearings):
         return FilmEstimate(reason="the nameplate has no such bearing, or no limits of wear-down")
-    mine = _of_bearing(means, scene, scene.bearings[number].name)
+    mine = _probes_of_bearing(means, scene, scene.bearings[number].name)
     reason = _missing(mine)
     if reason:
         return FilmEstimate(reason=reason)
-    others = [_of_bearing(each, scene, scene.bearings[number].name) for each in healthy]
+    others = [_probes_of_bearing(each, scene, scene.bearings[number].name) for each in healthy]
     run = _sinking_run(mine, plate, number, limits.condemning, severity)
     if isinstance(run, str):
         return FilmEstimate(reason=run)
@@ -154,7 +154,7 @@ def _shaft(
     )
 
 
-def _of_bearing(means: ProbeMeans, scene: ShaftScene, bearing: str) -> ProbeMeans:
+def _probes_of_bearing(means: ProbeMeans, scene: ShaftScene, bearing: str) -> ProbeMeans:
     """Means of the probes in one bearing."""
     known = {probe.name for probe in scene.probes if probe.bearing == bearing}
     rows = [i for i, name in enumerate(means.names) if name in known]
@@ -191,14 +191,14 @@ def _sinking_run(
 
 
 def journal_fault(scene: JournalScene, means: ProbeMeans) -> str:
-    """Why the place of a journal tells nothing of its clearance; empty where it does."""
+    """Why the clearance cannot be inferred from the journal position; empty if it can."""
     shaped = [
         name
-        for name, there in (
+        for name, present in (
             ("a scar", scene.bearing.scar > 0),
             ("grooves", scene.bearing.grooves),
         )
-        if there
+        if present
     ]
     if scene.bearing.inlet_fill < 1:
         return (
@@ -211,17 +211,17 @@ def journal_fault(scene: JournalScene, means: ProbeMeans) -> str:
             "journal position depends on its shape as much as on its clearance"
         )
     known = {probe.name for probe in scene.sensors}
-    strange = [name for name in means.names if name not in known]
-    if strange:
+    unknown = [name for name in means.names if name not in known]
+    if unknown:
         return (
-            f"probes {', '.join(strange)} are not on the nameplate ({', '.join(sorted(known))}), "
+            f"probes {', '.join(unknown)} are not on the nameplate ({', '.join(sorted(known))}), "
             "whose angles it gives; rename them, or give the scene with --scene"
         )
     return _missing(means)
 
 
 def _missing(means: ProbeMeans) -> str:
-    """What a recording lacks; empty where it has all."""
+    """What a recording lacks; empty if it is complete."""
     if len(means.names) < _FEWEST_PROBES:
         return (
             f"{len(means.names)} probes of the nameplate are in the recording, must be >= "
@@ -240,7 +240,7 @@ def _probe(probes: Sequence[ProximityProbe], name: str) -> ProximityProbe:
 
 
 def _readings(means: ProbeMeans, probes: Sequence[ProximityProbe]) -> tuple[Float, float]:
-    """Mean readings without the nameplate's own offsets and gains, and rms of the motion [m]."""
+    """Mean readings corrected for the nameplate's offsets and gains, and rms of the motion [m]."""
     mine = [_probe(probes, name) for name in means.names]
     gains = np.array([probe.gain for probe in mine])
     readings = means.means / gains - np.array([probe.offset for probe in mine])
@@ -250,7 +250,7 @@ def _readings(means: ProbeMeans, probes: Sequence[ProximityProbe]) -> tuple[Floa
 
 
 def _measured(means: ProbeMeans, severity: str, healthy: bool) -> float | None:
-    """Wear that was measured, where a recording is of a healthy machine and says so."""
+    """Measured wear [m] of a healthy recording; None if unknown."""
     value = float(means.row.get(severity, np.nan)) if healthy else np.nan
     return value if value > 0 else None
 
@@ -258,7 +258,7 @@ def _measured(means: ProbeMeans, severity: str, healthy: bool) -> float | None:
 def _run(
     means: ProbeMeans, plate: Nameplate, severity: str, *, healthy: bool = False
 ) -> JournalRun:
-    """A recording as the film sees it."""
+    """Input of the film inversion from one recording."""
     scene = cast(JournalScene, plate.on_the_day(means.row, means.speed_hz))
     readings, swing = _readings(means, scene.sensors)
     bearing, viscosity = scene.bearing, scene.oil.dynamic_viscosity
@@ -277,22 +277,22 @@ def _run(
     )
 
 
-_Way = Callable[[ProbeMeans, Nameplate, Sequence[ProbeMeans], str], FilmEstimate]
+_Method = Callable[[ProbeMeans, Nameplate, Sequence[ProbeMeans], str], FilmEstimate]
 
-_WAYS: dict[tuple[str, str], _Way] = {
+_METHODS: dict[tuple[str, str], _Method] = {
     ("diametral_clearance_bearing_m", "journal-bearing"): _journal,
     ("wear_down_bearing_{}_m", "propulsion-shaft"): _shaft,
 }
-"""Severity and machine -> how it is told from the place of the shaft. A new one is one row."""
+"""Severity and machine -> estimate from the shaft position. A new method is one row."""
 
 _NUMBER = re.compile(r"_[0-9]+_m$")
 
 
-# --- beside the trained model
+# --- comparison with the trained model
 
 
 def with_film(estimate: Estimate, film: FilmEstimate | None) -> Estimate:
-    """An estimate that says first where the film equilibrium contradicts it, or what was told.
+    """Put first that the film equilibrium contradicts the estimate or the given data.
 
     Examples
     --------
@@ -317,8 +317,8 @@ def with_film(estimate: Estimate, film: FilmEstimate | None) -> Estimate:
 
 
 _UNKNOWN = (
-    "load, oil and geometry of the machine are unknown, on which its severity depends as much as "
-    "on the signals; give its scene (--scene SCENE|TOML), or what differs from the trained one "
+    "load, oil and geometry of the machine are unknown, and the severity depends on them as much "
+    "as on the signals; give its scene (--scene SCENE|TOML), or differences from the trained one "
     "(--set PATH=VALUE)"
 )
 
@@ -326,20 +326,20 @@ _UNKNOWN = (
 def film_table(
     film: FilmEstimate | None, plate: Nameplate | None, row: Mapping[str, Any]
 ) -> dict[str, Any] | None:
-    """For JSON and pages; None where there is no such estimate.
+    """Estimate by the film equilibrium, for JSON and pages; None without one.
 
     Parameters
     ----------
     film : FilmEstimate or None
     plate : Nameplate or None
     row : mapping
-        What was noted beside the recording.
+        Conditions noted with the recording.
     """
     if film is None:
         return None
     if plate is None:
         return {**asdict(film), "nameplate": "", "text": film_words(film)}
-    day = told_conditions(plate, row)
+    day = known_conditions(plate, row)
     usual = "" if day else "; load and oil from the nameplate, as none are given for this day"
     return {
         **asdict(film),

@@ -9,9 +9,9 @@ from ...sim.output.recording import DataError, Recording
 from ..feature_rows.feature_choice import feature_words
 from ..healthy_reference.healthy import Baseline, Baselines
 from ..learning.grades import GRADE_COLOURS, NO_GRADE_COLOUR
-from ..nameplate.cautions import known_beside
+from ..nameplate.cautions import recording_context
 from ..nameplate.nameplate import Nameplate
-from ..nameplate.sensors import as_told
+from ..nameplate.sensors import corrected_recording
 from ..pages.embed import require_bokeh
 from ..pages.page import render
 from ..pages.points import PointBlock, point_block
@@ -31,11 +31,11 @@ from .figures import (
 from .points import trend_points
 from .verdict import finding_words, millimetres, report_table, zone_words
 
-_MOST_ROWS = 1000  # of the table of a batch: a page for reading
+_MOST_ROWS = 1000  # of the table of a batch: the page is for reading
 _MOST_DETAILS = 3  # recordings of a batch with pictures
 _MOST_TRENDS = 6
 _MOST_LETTERS = 160  # of a note in a table
-_FULL_SCALE = 1.5  # of a bar, in condemning limits; the limit's place in the style follows from it
+_FULL_SCALE = 1.5  # of a bar, in condemning limits; the style sheet places the limit accordingly
 
 
 def report_html(
@@ -52,15 +52,15 @@ def report_html(
     Parameters
     ----------
     table : dict
-        Of :func:`wearstate.diagnose.report.verdict.report_table`.
+        From :func:`wearstate.diagnose.report.verdict.report_table`.
     recording : Recording
         Its signals are drawn.
     model : WearModel, optional
-        For the map of what moved against its healthy reference.
+        For the map of changes from its healthy reference.
     baseline : Baseline, optional
-        That the estimate was given.
+        Healthy recordings used for the estimate.
     plate : Nameplate, optional
-        What it tells of sensors is taken out of the signals, as it was for the estimate.
+        Its sensor offsets and gains are removed from the signals, as for the estimate.
     interactive : bool
         Add the signals as curves to zoom and measure in.
 
@@ -76,7 +76,7 @@ def report_html(
     """
     estimate = table["estimate"]
     graded = estimate["severity"] is not None
-    judged = as_told(recording, plate, baseline)
+    judged = corrected_recording(recording, plate, baseline)
     pictures = report_pictures(
         judged,
         model,
@@ -98,13 +98,13 @@ def report_html(
 
 
 def _zoom_of(recording: Recording, pictures: Sequence[ReportPicture]) -> ZoomBlock | None:
-    """Curves of a recording beside its pictures; None where none can be computed."""
+    """Interactive curves of a recording; None if none can be computed."""
     require_bokeh()
     view = View(recording=recording)
     try:
         curves, _ = zoom_curves(view)
     except DataError:
-        return None  # the verdict says what is wrong with the recording
+        return None  # the verdict names the fault of the recording
     taken = sum(len(picture.image.address) for picture in pictures)
     return zoom_block(curves, speed=view.speed, taken=taken)
 
@@ -126,13 +126,13 @@ def batch_html(
         Its items can still be read.
     model : WearModel
     machine : str, optional
-        As of :func:`wearstate.diagnose.report.verdict.report_table`.
+        As in :func:`wearstate.diagnose.report.verdict.report_table`.
     baselines : Baselines, optional
-        That the estimates were given.
+        Healthy recordings used for the estimates.
     plate : Nameplate, optional
-        Of the machines, as of :func:`wearstate.diagnose.report.verdict.report_table`.
+        As in :func:`wearstate.diagnose.report.verdict.report_table`.
     interactive : bool
-        Trends to zoom in, whose points tell their recordings.
+        Make the trends interactive, with points that show their recordings.
 
     Returns
     -------
@@ -162,7 +162,7 @@ def batch_html(
         block=_zoom_of_trends(batch, shown, [*trends, *_pictures(details)])
         if interactive and shown
         else None,
-        untold=[_told(batch, name) for name in order[_MOST_TRENDS:]],
+        other_trends=[_trend_line(batch, name) for name in order[_MOST_TRENDS:]],
         assumptions=sorted({outlook.assumption for outlook in outlooks}),
         details=details,
         brief=brief_words,
@@ -178,18 +178,18 @@ def _pictures(details: Sequence[dict[str, Any]]) -> list[ReportPicture]:
 def _zoom_of_trends(
     batch: Batch, machines: Sequence[str], pictures: Sequence[ReportPicture]
 ) -> PointBlock:
-    """Trends beside their pictures."""
+    """Interactive trends, in addition to their pictures."""
     taken = sum(len(picture.image.address) for picture in pictures) + _ROW_BYTES * len(batch.rows)
     return point_block(
         [trend_points(batch, name, machine_heading(name)) for name in machines], taken=taken
     )
 
 
-_ROW_BYTES = 1_000  # of a recording in the table
+_ROW_BYTES = 1_000  # of one recording in the table
 
 
 def _machines(batch: Batch) -> list[str]:
-    """Machines with a trend, the shortest life first."""
+    """Machines with a trend, the shortest remaining life first."""
 
     def life(name: str) -> float:
         outlook = batch.trends[name].outlook
@@ -199,14 +199,14 @@ def _machines(batch: Batch) -> list[str]:
     return sorted(batch.trends, key=life)
 
 
-def _told(batch: Batch, name: str) -> str:
+def _trend_line(batch: Batch, name: str) -> str:
     trend = batch.trends[name]
     said = trend.outlook.text if trend.outlook else trend.reason
     return f"{machine_heading(name)}: {said}"
 
 
 def _bar(row: BatchRow, limit: float) -> str:
-    """The interval and the estimate on a line, as parts of the page: no picture for each row."""
+    """Interval and estimate on a line, as HTML elements: a picture per row would be too large."""
     low, value, high = (
         100 * min(max((length or 0.0) / (_FULL_SCALE * limit), 0.0), 1.0)
         for length in (row.low, row.severity, row.high)
@@ -226,17 +226,17 @@ def _details(
     baselines: Baselines | None,
     plate: Nameplate | None,
 ) -> list[dict[str, Any]]:
-    """Tables and pictures of the most urgent graded recordings, read once more."""
+    """Tables and pictures of the most urgent graded recordings, read again."""
     found = []
     for row in [row for row in batch.current if row.grade is not None][:_MOST_DETAILS]:
         try:
             recording = batch.items[row.number].load()
             baseline = None if baselines is None else baselines.of(recording)
-            beside = known_beside(plate, recording, model.card, baseline)
-            judged = as_told(recording, plate, baseline)
-            estimate = model.estimate(judged, baseline, **beside)
+            context = recording_context(plate, recording, model.card, baseline)
+            judged = corrected_recording(recording, plate, baseline)
+            estimate = model.estimate(judged, baseline, **context)
         except DataError:
-            continue  # it has gone since
+            continue  # removed in the meantime
         outlook = batch.outlook_of(row)
         table = report_table(
             recording,
@@ -247,11 +247,12 @@ def _details(
             plate=plate,
             outlook=outlook,
         )
-        found.append({"table": table, "pictures": _few(table, judged, model, estimate, baseline)})
+        pictures = _few_pictures(table, judged, model, estimate, baseline)
+        found.append({"table": table, "pictures": pictures})
     return found
 
 
-def _few(
+def _few_pictures(
     table: dict[str, Any],
     recording: Recording,
     model: WearModel,
@@ -288,7 +289,7 @@ def _colour(grade: int | None) -> str:
 
 
 def _sentence(text: str) -> str:
-    """A clause as a sentence; a name of a channel, feature or file at its start stays as it is."""
+    """A clause as a sentence; a channel, feature or file name at its start keeps its case."""
     plain = re.match(r"[a-z]+(?=[ ,:;])", text) is not None
     first = text[:1].upper() if plain else text[:1]
     return first + text[1:] + ("" if text.endswith((".", "?", "!")) else ".")

@@ -1,4 +1,4 @@
-"""Trends for a page to zoom in: estimates over time, and the recording behind each."""
+"""Interactive trends for a page: estimates over time, and the recording behind each."""
 
 from collections.abc import Mapping
 from datetime import UTC, datetime, timedelta
@@ -19,9 +19,9 @@ def trend_points(batch: Batch, machine: str, heading: str) -> PointAxes:
     ----------
     batch : Batch
     machine : str
-        Key of its trends.
+        Key in the batch's trends.
     heading : str
-        The machine in words.
+        Heading of the machine.
 
     Returns
     -------
@@ -68,7 +68,7 @@ def _band(trend: Trend, ahead: tuple[float, ...]) -> tuple[tuple[float, ...], ..
 
 
 def _is_drawn(row: BatchRow) -> bool:
-    """As of the trend: a time, an estimate and its interval."""
+    """Whether a row has a time, an estimate and its interval, as the trend requires."""
     return None not in (row.time_h, row.severity, row.low, row.high)
 
 

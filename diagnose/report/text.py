@@ -8,7 +8,7 @@ from ..feature_rows.feature_choice import feature_words
 from ..pages.words import severity_word
 from .advice import brief_words
 from .batch import Batch, BatchRow, machine_heading
-from .beside import is_first
+from .second_estimate import is_first
 from .verdict import finding_words, millimetres, zone_words
 
 _WIDTH = 96  # of a line
@@ -22,7 +22,7 @@ def report_text(table: Mapping[str, Any]) -> str:
     Parameters
     ----------
     table : mapping
-        Of :func:`wearstate.diagnose.report.verdict.report_table`.
+        From :func:`wearstate.diagnose.report.verdict.report_table`.
     """
     estimate, limits, advice = table["estimate"], table["limits"], table["advice"]
     lines = [("Recording", table["recording"]["label"])]
@@ -67,11 +67,11 @@ def report_text(table: Mapping[str, Any]) -> str:
 
 
 def _changes(table: Mapping[str, Any]) -> list[str]:
-    """What moved: together where that can be said, else the foremost."""
+    """What moved: the summary if there is one, else the largest changes."""
     if table["evidence_summary"]:
         return [table["evidence_summary"]]
-    foremost = table["evidence"][:_MOST_CHANGES]
-    return [f"{feature_words(item['feature'])}: {item['words']}" for item in foremost]
+    largest = table["evidence"][:_MOST_CHANGES]
+    return [f"{feature_words(item['feature'])}: {item['words']}" for item in largest]
 
 
 def _folded(name: str, text: str) -> str:
@@ -93,7 +93,7 @@ def batch_text(batch: Batch) -> str:
     lines.append(f"{'recording':{width}}  {'verdict':26}  {word + ' [mm]':22}  advice")
     lines += [_row_line(row, width) for row in batch.current]
     if any(row.verdict == "caution" for row in batch.current):
-        lines.append("?: graded with caution; a report of that recording alone says why")
+        lines.append("?: graded with caution; report that recording alone to see why")
     past = [row for row in batch.rows if not row.current]
     if past:
         lines.append(f"and {len(past)} earlier ones, in the trend")

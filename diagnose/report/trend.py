@@ -1,4 +1,4 @@
-"""Severity over time: a robust line since the last maintenance, and the life that it leaves."""
+"""Severity over time: a robust line since the last maintenance, and the remaining life."""
 
 import csv
 import math
@@ -20,53 +20,53 @@ Clock = Literal["operating", "calendar"]
 Growth = Literal["linear", "log"]
 
 FEWEST_POINTS = 5
-"""Recordings since the last maintenance that a line needs: two for it, three for its scatter."""
+"""Fewest recordings since the last maintenance: two for the line, three for its scatter."""
 
 _LONGEST_MOMENT_H: dict[Clock, float] = {"operating": 0.0, "calendar": 1.0}
-"""From the first recording to the last [h]: files that were copied have times seconds apart."""
+"""Longest span that counts as one moment [h]: copied files have times seconds apart."""
 
 _SOME_TIME: dict[Clock, str] = {"operating": "some time", "calendar": "more than an hour"}
 
 LONGEST_REACH = 3.0
-"""How far a line is believed, in lengths of the time it was seen over."""
+"""Largest extrapolation of a line, in multiples of the time observed."""
 
 ASSUMPTIONS: dict[Growth, str] = {
-    "linear": "wear goes on at the present rate, as while load, speed and lubrication stay "
-    "(Archard: the worn depth grows with pressure and sliding distance)",
-    "log": "wear goes on growing by the same share in equal times, as damage that feeds itself",
+    "linear": "wear continues at the present rate, as long as load, speed and lubrication stay "
+    "the same (Archard: the worn depth grows with pressure and sliding distance)",
+    "log": "wear keeps growing by the same share in equal times, as self-accelerating damage does",
 }
-"""What an extrapolation rests on."""
+"""Assumption behind an extrapolation."""
 
 _DRAWS = 400  # of the bootstrap: a 5 % quantile to about 1 %
-_MOST_POINTS = 100  # of a line: pairs grow with the square, more points are grouped
-_BESIDE = 3  # recordings on either side that show a step
-_STEP_SIZE = 4.0  # standard deviations: none in 10,000 recordings by chance
-_LEAST_STEP = 0.1  # of the severity: smaller repairs are none
-_MAD = 1.4826  # standard deviation of normal scatter over its median deviation
-_SMALLEST = 0.1  # of the median severity: a line's lowest value that scatter is a share of
+_MOST_POINTS = 100  # of a line: the number of pairs grows quadratically, so more points are grouped
+_AROUND_STEP = 3  # recordings on either side that show a step
+_STEP_SIZE = 4.0  # standard deviations: not once in 10,000 recordings by chance
+_LEAST_STEP = 0.1  # of the severity: a smaller drop is no repair
+_MAD = 1.4826  # standard deviation of normal scatter over its median absolute deviation
+_SMALLEST = 0.1  # of the median severity: lower bound of the value to which scatter is proportional
 
 
 @dataclass(frozen=True, kw_only=True)
 class Outlook:
-    """When the condemning limit is reached, from the last recording on.
+    """Time from the last recording until the condemning limit is reached.
 
     Attributes
     ----------
     clock : {"operating", "calendar"}
-        What the hours are of.
+        Kind of the hours.
     rate : float
-        Severity gained [m/h]; of a growth by shares at the last recording.
+        Growth of the severity [m/h]; for growth "log" at the last recording.
     remaining_low_h, remaining_h, remaining_high_h : float or None
-        Early end, median and late end of the time left [h]; None where it is beyond `reach_h` or
+        Early end, median and late end of the remaining time [h]; None if beyond `reach_h` or if
         the limit is never reached.
     reach_h : float
-        How far ahead the line is believed [h].
+        Largest extrapolation of the line [h].
     coverage : float
-        Nominal, of the band.
+        Nominal coverage of the band.
     text : str
-        In a sentence.
+        The outlook in a sentence.
     assumption : str
-        What it rests on.
+        Assumption behind the extrapolation.
     """
 
     clock: Clock
@@ -82,25 +82,25 @@ class Outlook:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Trend:
-    """Recordings of one machine in the order of time, and the line through the last of them.
+    """Recordings of one machine in order of time, and the line through the last of them.
 
     Attributes
     ----------
     time_h, severity, low, high : numpy.ndarray [shape=(n,)]
         [h], [m]
     starts : tuple of int
-        Recordings with which a stretch between two maintenances begins; the first is 0.
+        First recording of each period between two maintenances; the first is 0.
     ahead_h : numpy.ndarray [shape=(n_line,)]
-        Times of the line, from the last start into the future [h]; empty without a line.
+        Times of the line [h], from the last start into the future; empty without a line.
     line, line_low, line_high : numpy.ndarray [shape=(n_line,)]
         [m]
     outlook : Outlook or None
     reason : str
-        Why there is no outlook; empty where there is one.
+        Why there is no outlook; empty if there is one.
     clock : {"operating", "calendar"}
-        What the hours are of; those of the calendar since 1970.
+        Kind of the hours; calendar hours count from 1970.
     coverage : float
-        Nominal, of the intervals and of the band.
+        Nominal coverage of the intervals and of the band.
     """
 
     time_h: Float
@@ -137,25 +137,25 @@ def fit_trend(
     coverage: float = 0.9,
     seed: int = 0,
 ) -> Trend:
-    """A line through the severities of one machine since its last maintenance.
+    """Fit a line through the severities of one machine since its last maintenance.
 
     Parameters
     ----------
     time_h : array_like [shape=(n,)]
-        Operating hours or times of the calendar [h], in any order.
+        Operating hours or calendar times [h], in any order.
     severity, low, high : array_like [shape=(n,)]
         Estimates with their intervals [m], > 0.
     limit : float
         Condemning limit [m].
     clock : {"operating", "calendar"}
-        What `time_h` counts.
+        Kind of `time_h`.
     growth : {"linear", "log"}
-        Line through the severity (abrasive wear at a steady load) or through its logarithm (damage
-        that feeds itself).
+        Line through the severity (abrasive wear at a steady load) or through its logarithm
+        (self-accelerating damage).
     coverage : float
-        Of the intervals, and of the band of the remaining life.
+        Coverage of the intervals, and of the band of the remaining life.
     seed : int
-        Of the bootstrap.
+        Seed of the bootstrap.
 
     Returns
     -------
@@ -164,18 +164,19 @@ def fit_trend(
     Raises
     ------
     DataError
-        Not as many times as severities, or a value that is not finite or not > 0.
+        The numbers of times and severities differ, or a value is not finite or not > 0.
 
     Notes
     -----
-    Theil and Sen's line (median of the slopes of all pairs): a third of the recordings may be
-    wild. A fall of the severity that stays is a maintenance, and the line starts anew there.
+    The line is that of Theil and Sen (median of the slopes of all pairs): a third of the recordings
+    may be outliers. A lasting drop of the severity counts as maintenance, and a new line starts
+    there.
 
-    The band is of a bootstrap: the recordings' scatter about the line is drawn anew (as a share of
-    the line), and with it one factor for the whole machine, because what an estimate of one machine
-    errs by stays. That factor fills what the scatter leaves of the estimates' intervals. Its
-    validity hangs on the assumption of the growth: a change of load, speed or oil after the last
-    recording is not in it.
+    The band comes from a bootstrap: the recordings' scatter about the line (as a share of the line)
+    is drawn anew, together with one factor for the whole machine, because the estimates of one
+    machine share an error. That factor covers the part of the estimates' intervals that the scatter
+    does not. The band is valid only under the assumed growth: it does not include a change of load,
+    speed or oil after the last recording.
 
     References
     ----------
@@ -254,7 +255,7 @@ def _checked(time_h: ArrayLike, severity: ArrayLike, low: ArrayLike, high: Array
 
 
 def _starts(level: Float) -> tuple[int, ...]:
-    """Recordings at which a stretch between maintenances begins, from severities as logarithms."""
+    """First recordings of the periods between maintenances, from logarithms of the severity."""
     if level.size < 2 + 2:
         return (0,)
     moves = np.diff(level)
@@ -267,26 +268,26 @@ def _starts(level: Float) -> tuple[int, ...]:
 
 
 def _next_start(level: Float, start: int, bound: float) -> int | None:
-    """First step down after a start, at the steepest place of those that show it."""
+    """First step down after a start, at the steepest of the recordings that show it."""
     shown = [i for i in range(start + 1, level.size - 1) if _step(level, start, i) < bound]
     if not shown:
         return None
-    near = [i for i in shown if i < shown[0] + _BESIDE]
+    near = [i for i in shown if i < shown[0] + _AROUND_STEP]
     return min(near, key=lambda i: float(level[i] - level[i - 1]))
 
 
 def _step(level: Float, start: int, i: int) -> float:
-    """How much a few recordings from i on lie above those before; one wild one does not count."""
-    before, after = level[max(start, i - _BESIDE) : i], np.sort(level[i : i + _BESIDE])
+    """Rise of a few recordings from i on over those before; insensitive to one outlier."""
+    before, after = level[max(start, i - _AROUND_STEP) : i], np.sort(level[i : i + _AROUND_STEP])
     return float(after[1] - np.median(before))
 
 
-# --- lines and what they leave
+# --- lines and remaining life
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Lines:
-    """Lines of a bootstrap, the first being that of the recordings themselves."""
+    """Lines of a bootstrap; the first is that of the recordings themselves."""
 
     slope: Float
     offset: Float
@@ -295,16 +296,16 @@ class _Lines:
     growth: Growth
 
     def best(self, time: Float) -> Float:
-        """Of the recordings themselves [m, shape=(len(time),)]."""
+        """Severity by the line of the recordings themselves [m, shape=(len(time),)]."""
         return np.asarray(self.at(time)[0])
 
     def at(self, time: Float) -> Float:
-        """Of every line [m, shape=(n_lines, len(time))]."""
+        """Severity by every line [m, shape=(n_lines, len(time))]."""
         values = self.offset[:, None] + self.slope[:, None] * (time - self.origin)
         return (np.exp(values) if self.growth == "log" else values) * self.factor[:, None]
 
     def reached(self, limit: float) -> Float:
-        """When each line reaches a severity [h, shape=(n_lines,)]; inf where it does not grow."""
+        """When each line reaches a severity [h, shape=(n_lines,)]; inf if it does not grow."""
         aim = limit / self.factor
         aim = np.log(aim) if self.growth == "log" else aim
         grows = self.slope > 0
@@ -336,7 +337,7 @@ def _lines(points: Float, growth: Growth, coverage: float, rng: np.random.Genera
 
 
 def _grouped(time: Float, severity: Float) -> tuple[Float, Float]:
-    """Medians of neighbours where there are too many points for all pairs."""
+    """Group neighbouring points if there are too many for all pairs; medians of the severity."""
     if len(time) <= _MOST_POINTS:
         return time, severity
     bounds = np.array_split(np.arange(len(time)), _MOST_POINTS)
@@ -345,20 +346,20 @@ def _grouped(time: Float, severity: Float) -> tuple[Float, Float]:
 
 
 def _theil_sen(time: Float, values: Float) -> tuple[Float, Float]:
-    """Slopes and offsets [shape=(k,)] of k lines [shape=(k, n)]; all at once, unlike scipy's."""
+    """Slopes and offsets [shape=(k,)] of k lines [shape=(k, n)], vectorized unlike scipy's."""
     first, second = np.triu_indices(len(time), 1)
     gap = time[second] - time[first]
-    apart = gap > 0
-    rise = values[:, second[apart]] - values[:, first[apart]]
-    slope = np.median(rise / gap[apart], axis=1)
+    distinct = gap > 0
+    rise = values[:, second[distinct]] - values[:, first[distinct]]
+    slope = np.median(rise / gap[distinct], axis=1)
     return slope, np.median(values - slope[:, None] * time, axis=1)
 
 
 def _factors(severities: Float, rest: Float, coverage: float, rng: np.random.Generator) -> Float:
-    """Factors that the estimates of one machine may all be off by [shape=(_DRAWS,)].
+    """Common error factors of all estimates of one machine [shape=(_DRAWS,)].
 
-    Two halves of a log-normal that fill the intervals, without what scatters from one recording to
-    the next.
+    They follow two halves of a log-normal distribution that cover the intervals, minus the scatter
+    from recording to recording.
     """
     estimate, low, high = severities
     z = NormalDist().inv_cdf((1 + coverage) / 2)
@@ -383,7 +384,7 @@ def _outlook(
     left = np.maximum(lines.reached(limit) - last, 0.0)
     reach = LONGEST_REACH * span
     tail = 50 * (1 - coverage)
-    # "lower" takes one of the values: between two infinities there is nothing
+    # "lower" returns one of the values: infinities cannot be interpolated
     low, median, high = np.percentile(left, [tail, 50, 100 - tail], method="lower").tolist()
     bounded = [value if value <= reach else None for value in (low, median, high)]
     rate = float(lines.slope[0])
@@ -407,7 +408,7 @@ def _sentence(bounded: Sequence[float | None], reach: float, clock: Clock, cover
     if low is None:
         return (
             f"the condemning limit is not reached within {span_words(reach, clock)}, "
-            f"{LONGEST_REACH:g} times the time seen; nothing can be said of later"
+            f"{LONGEST_REACH:g} times the time observed; later times cannot be predicted"
         )
     if median == 0:
         return "the condemning limit is reached" + (
@@ -417,19 +418,19 @@ def _sentence(bounded: Sequence[float | None], reach: float, clock: Clock, cover
     if high is None:
         sure = f"not reached within {span_words(low, clock)}"
         early = sure if low > 0 else "perhaps reached already"
-        return f"the condemning limit is {early}{likely}; how late it may be cannot be said"
+        return f"the condemning limit is {early}{likely}; the latest time cannot be predicted"
     return f"the condemning limit is reached in {_range_words(low, high, clock)} ({share}){likely}"
 
 
 def _range_words(low: float, high: float, clock: Clock) -> str:
-    """Two lengths of time, their unit once where it is the same."""
+    """Two lengths of time, with the unit only once if it is the same."""
     first, last = span_words(low, clock), span_words(high, clock)
     number, _, unit = first.partition(" ")
     return f"{number if last.endswith(f' {unit}') else first} to {last}"
 
 
 def _shown_ahead(outlook: Outlook, span: float) -> float:
-    """How far a picture goes beyond the last recording [h]."""
+    """Range of a picture beyond the last recording [h]."""
     late = outlook.remaining_high_h or outlook.remaining_h
     if outlook.remaining_h == 0:
         return 0.1 * span
@@ -437,7 +438,7 @@ def _shown_ahead(outlook: Outlook, span: float) -> float:
 
 
 def span_words(hours: float, clock: Clock = "calendar") -> str:
-    """A length of time for people, with two figures.
+    """A length of time in words, with two figures.
 
     Examples
     --------
@@ -463,11 +464,11 @@ def _two_figures(value: float) -> str:
 _DATE = re.compile(
     r"(?<!\d)(\d{4})[-_.]?(\d\d)[-_.]?(\d\d)(?:[T_ -]?(\d\d)[-:.h]?(\d\d)(?:[-:.]?(\d\d))?)?(?!\d)"
 )
-_DAY_FIRST = re.compile(r"(?<!\d)(\d\d)\.(\d\d)\.(\d{4})(?!\d)")  # with dots it is never the month
+_DAY_FIRST = re.compile(r"(?<!\d)(\d\d)\.(\d\d)\.(\d{4})(?!\d)")  # with dots the day is first
 
 
 def date_in(text: str) -> datetime | None:
-    """Date, and time where there is one, in a file name or a cell, taken as UTC.
+    """Date and, if present, time in a file name or a cell, taken as UTC.
 
     The year comes first, or the day with dots between (``01.03.2024``, without a time).
 
@@ -495,7 +496,7 @@ def date_in(text: str) -> datetime | None:
 
 
 def hours_of(moment: datetime) -> float:
-    """Hours of the calendar since 1970 [h]."""
+    """Calendar hours since 1970 [h]."""
     return moment.timestamp() / 3600
 
 
@@ -510,12 +511,12 @@ def read_dates(path: Path) -> dict[str, float]:
     Returns
     -------
     dict
-        File name -> time [h]; of dates since 1970.
+        File name -> time [h]; dates count from 1970.
 
     Raises
     ------
     DataError
-        There is no such file or column, a date cannot be read, a file stands twice; all faults.
+        The file or a column is missing, a date cannot be read, a name occurs twice; all at once.
     """
     try:
         with path.open(encoding="utf-8-sig", newline="") as handle:
@@ -539,7 +540,7 @@ def read_dates(path: Path) -> dict[str, float]:
             faults.append(f"{path}: line {number}: {row[1:2]} must be a {heading[1]}; correct it")
         elif name in times:
             faults.append(
-                f"{path}: line {number}: {name} stands twice, must stand once; delete one"
+                f"{path}: line {number}: {name} occurs twice, must occur once; delete one"
             )
         else:
             times[name] = value

@@ -1,4 +1,4 @@
-"""The verdict on one recording, as a table: what the page, the terminal and JSON are made of."""
+"""The verdict on one recording as a table, from which page, text and JSON are made."""
 
 import hashlib
 import math
@@ -19,32 +19,32 @@ from ..healthy_reference.healthy import Baseline
 from ..learning.grades import GRADE_NAMES
 from ..nameplate.cautions import unseen_texts
 from ..nameplate.nameplate import Nameplate
-from ..nameplate.sensors import as_told, taken_out_words
+from ..nameplate.sensors import corrected_recording, correction_words
 from ..pages.words import quantity_name
 from ..pictures.view import View
 from ..twin.opinion import TwinOpinion
 from ..wear_model.estimate import WearModel, input_faults
 from ..wear_model.verdict import Estimate, unseen_words
 from .advice import advise, touched_grades
-from .beside import new_cautions, twin_table, with_twin
 from .film import film_estimate, film_table, with_film
+from .second_estimate import new_cautions, twin_table, with_twin
 from .trend import Outlook
 
 REPORT_SCHEMA = 2
 
 LARGEST_HASHED = 2**28
-"""Files above this size [byte] are told by the hash of their samples alone: reading on would take
-longer than the report."""
+"""Larger files [byte] are identified by the hash of their samples alone: hashing the whole file
+would take longer than the report."""
 
 MAP_CELL = re.compile(r"(.+)\.angle_(\d+)_(\d+)\.band_(\d+)_(\d+)\.level_db")
-"""Name of a level in a bin of the crank angle and a band of frequency."""
+"""Name of a feature: level in a crank-angle bin and a frequency band."""
 
 NO_REFERENCE = "Healthy reference missing"
 """Headline of a sound recording whose model needs healthy recordings of the machine."""
 
-_CHANCE = 0.05  # that the farthest feature of a healthy machine lies beyond
-_SURE = 0.9  # confidence in the boundaries of a zone, below which they are to be confirmed
-_SHOWN = {  # unit -> for people
+_CHANCE = 0.05  # that the farthest feature of a healthy machine exceeds the bound
+_SURE = 0.9  # confidence in the boundaries of a zone; below it they need confirmation
+_SHOWN = {  # SI unit -> displayed unit, factor
     "m": ("µm", 1e6),
     "m/s": ("mm/s", 1e3),
     "m/s^2": ("m/s²", 1.0),
@@ -66,51 +66,51 @@ def report_table(
     outlook: Outlook | None = None,
     files: Mapping[str, Path] | None = None,
 ) -> dict[str, Any]:
-    """Everything the report says, ready for JSON.
+    """Content of the report, ready for JSON.
 
     Parameters
     ----------
     recording : Recording
     model : WearModel
     estimate : Estimate
-        Of the model on the recording.
+        Estimate of the model for the recording.
     machine : str, optional
         Kind of machine for its ISO zone, a key of :data:`wearstate.features.signal.iso.KINDS`.
     baseline : Baseline, optional
-        That the estimate was given.
+        Healthy recordings used for the estimate.
     plate : Nameplate, optional
-        Of the machine, for the estimate by its film equilibrium.
+        Nameplate of the machine, for the estimate by film equilibrium.
     twin : TwinOpinion, optional
-        What the twin of the machine says of the recording.
+        Estimate by the twin of the machine.
     outlook : Outlook, optional
-        Of the machine's trend, for how soon to act.
+        Outlook of the machine's trend; it may shorten the horizon.
     files : mapping, optional
-        ``recording``, ``model``: files whose hashes are wanted.
+        ``recording``, ``model``: files to be hashed.
 
     Returns
     -------
     dict
-        ``schema_version``, ``headline``, ``recording``, ``estimate``, ``film`` (what the film
-        equilibrium says, None where it says nothing of this machine), ``twin`` (what the twin
-        says, None without), ``disagreements`` (of these with the model), ``grades_text``,
-        ``advice``, ``limits``, ``iso``, ``outlook``, ``evidence_summary``, ``evidence``,
-        ``baseline_note``, ``unseen`` (what would mislead the model without a warning), ``notice``,
-        ``provenance``. Lengths in metres, speeds in revolutions
-        per second.
+        ``schema_version``, ``headline``, ``recording``, ``estimate``, ``film`` (estimate by the
+        film equilibrium, None if there is none for this machine), ``twin`` (estimate by the twin,
+        or None), ``disagreements`` (of these with the model), ``grades_text``, ``advice``,
+        ``limits``, ``iso``, ``outlook``, ``evidence_summary``, ``evidence``, ``baseline_note``,
+        ``unseen`` (effects that mislead the model without a warning), ``notice``, ``provenance``.
+        Lengths in metres, speeds in revolutions per second.
 
     Raises
     ------
     DataError
-        There is no such kind of machine.
+        The kind of machine is unknown.
     """
     card = model.card
     quantity = quantity_name(card.severity)
+    corrections = correction_words(recording, plate, baseline)
     film = film_estimate(recording, card.severity, plate, baseline)
     trained, estimate = estimate, with_twin(with_film(estimate, film), twin)
     return {
         "schema_version": REPORT_SCHEMA,
         "headline": headline(estimate),
-        "recording": _recording_table(recording, card, taken_out_words(recording, plate, baseline)),
+        "recording": _recording_table(recording, card, corrections),
         "estimate": estimate.as_dict(),
         "film": film_table(film, plate, recording.row),
         "twin": twin_table(twin, trained),
@@ -118,8 +118,8 @@ def report_table(
         "grades_text": possible_words(estimate, card.grade_edges_m),
         "advice": asdict(advise(estimate, quantity, card.grade_edges_m, outlook)),
         "limits": limits_table(card),
-        # a level, not a comparison: known faults are taken out, whatever healthy recordings have
-        "iso": iso_table(as_told(recording, plate), machine),
+        # an absolute level: known sensor errors are removed even if healthy recordings share them
+        "iso": iso_table(corrected_recording(recording, plate), machine),
         "outlook": None if outlook is None else asdict(outlook),
         "evidence_summary": _quiet_words(estimate, len(model.names))
         or evidence_summary([item[:3] for item in estimate.evidence]),
@@ -146,7 +146,7 @@ def report_table(
 
 
 def baseline_note(model: WearModel, baseline: Baseline | None) -> str:
-    """What healthy recordings of the machine did to the estimate; empty where they are its base."""
+    """How healthy recordings of the machine affected the estimate; empty if it is based on them."""
     if model.mode == "referenced":
         return ""
     if baseline is None:
@@ -178,14 +178,14 @@ def headline(estimate: Estimate) -> str:
     return f"{words}, with caution" if estimate.verdict == "caution" else words
 
 
-def _recording_table(recording: Recording, card: ModelCard, taken_out: str) -> dict[str, Any]:
+def _recording_table(recording: Recording, card: ModelCard, corrections: str) -> dict[str, Any]:
     return {
         "source": recording.source,
         "origin": recording.origin,
         "channels": [asdict(channel) for channel in recording.channels],
         "label": _recording_line(recording)
-        + (f"; taken out of the readings: {taken_out}" if taken_out else ""),
-        "taken_out": taken_out,
+        + (f"; corrected in the readings: {corrections}" if corrections else ""),
+        "taken_out": corrections,
         "tacho": recording.tacho,
         "sample_rate_hz": recording.sample_rate,
         "duration_s": recording.duration,
@@ -220,7 +220,7 @@ def limits_table(card: ModelCard) -> dict[str, Any]:
 
 
 def model_table(model: WearModel, path: Path | None = None) -> dict[str, Any]:
-    """Where a model is from, and how it was judged when it was made."""
+    """Origin of a model, and its accuracy in training."""
     card, trained = model.card, model.card.trained_on
     return {
         "file_sha256": _file_hash(path),
@@ -240,23 +240,23 @@ def model_table(model: WearModel, path: Path | None = None) -> dict[str, Any]:
 
 
 def _file_hash(path: Path | None) -> str | None:
-    """SHA-256 of a file, as ``sha256sum`` gives it; None where it is too large."""
+    """SHA-256 of a file, as from ``sha256sum``; None if it is too large."""
     if path is None or path.stat().st_size > LARGEST_HASHED:
         return None
     with path.open("rb") as handle:
         return hashlib.file_digest(handle, "sha256").hexdigest()
 
 
-# --- the zone of its vibration
+# --- vibration severity zone
 
 
 def known_machine(machine: str | None) -> None:
-    """Refuse a kind of machine that there is not, before any work.
+    """Reject an unknown kind of machine before any work.
 
     Raises
     ------
     DataError
-        It is none of :data:`wearstate.features.signal.iso.KINDS`.
+        The kind is not in :data:`wearstate.features.signal.iso.KINDS`.
     """
     try:
         iso.machine_kind(machine or next(iter(iso.KINDS)))
@@ -265,24 +265,24 @@ def known_machine(machine: str | None) -> None:
 
 
 def iso_table(recording: Recording, machine: str | None) -> dict[str, Any]:
-    """Vibration severity and its zone, or why there is none.
+    """Vibration severity and its zone, or the reason for none.
 
     Parameters
     ----------
     recording : Recording
     machine : str, optional
-        Key of :data:`wearstate.features.signal.iso.KINDS`; no signal tells it.
+        Key of :data:`wearstate.features.signal.iso.KINDS`; it cannot be inferred from a signal.
 
     Returns
     -------
     dict
         ``machine``, ``standard``, ``band_hz``, ``channels`` (name, place, velocity [m/s], zone),
-        ``zone`` (the worst), ``note`` (what to think of it, or why there is none).
+        ``zone`` (the worst), ``note`` (how to read it, or why there is none).
 
     Raises
     ------
     DataError
-        There is no such kind.
+        The kind is unknown.
     """
     table: dict[str, Any] = {
         "machine": machine,
@@ -331,7 +331,7 @@ def iso_table(recording: Recording, machine: str | None) -> dict[str, Any]:
 def _zone_note(kind: iso.MachineKind) -> str:
     note = f"{kind.machine}; the zone is of the whole machine's vibration, not of one joint's wear"
     if kind.confidence < _SURE:
-        note += "; confirm the boundaries in the standard before a contract hangs on them"
+        note += "; confirm the boundaries in the standard before a contract relies on them"
     return note
 
 
@@ -341,14 +341,14 @@ def _zone_note(kind: iso.MachineKind) -> str:
 def evidence_words(
     name: str, value: float, healthy: float, units: Mapping[str, str] | None = None
 ) -> str:
-    """How a feature moved, with its unit.
+    """Change of a feature, with its unit.
 
     Parameters
     ----------
     name : str
-        Of the feature.
+        Name of the feature.
     value, healthy : float
-        Here, and of the healthy reference.
+        Value of the recording, and of the healthy reference.
     units : mapping, optional
         Unit of each channel.
 
@@ -372,12 +372,12 @@ def evidence_words(
     if last in _SIZES:
         unit = (units or {}).get(owner, "")
         unit, factor = _SHOWN.get(unit, (unit, 1.0))
-    here = f"{factor * value:.3g} {unit}".rstrip()
-    return f"{here} instead of {factor * healthy:.3g}"
+    present = f"{factor * value:.3g} {unit}".rstrip()
+    return f"{present} instead of {factor * healthy:.3g}"
 
 
 def _quiet_words(estimate: Estimate, n_features: int) -> str:
-    """That nothing stands out, where the farthest of many features lies as far by chance."""
+    """Statement that nothing stands out, if chance explains even the largest of many changes."""
     farthest = max((abs(moved) for *_, moved in estimate.evidence), default=math.inf)
     chance = NormalDist().inv_cdf(1 - _CHANCE / (2 * n_features))
     if farthest > chance:
@@ -389,18 +389,18 @@ def _quiet_words(estimate: Estimate, n_features: int) -> str:
 
 
 def evidence_summary(evidence: Sequence[tuple[str, float, float]]) -> str:
-    """Where most of the evidence lies, if it is levels over crank angle and frequency.
+    """Crank angles and frequencies of most of the evidence, if it consists of such levels.
 
     Parameters
     ----------
     evidence : sequence of (str, float, float)
-        Feature, its value, the healthy one.
+        Feature, its value, the healthy value.
 
     Returns
     -------
     str
-        Of each channel the span of its cells, the larger number first; empty where the evidence is
-        something else.
+        For each channel the range of its cells, the channel with most cells first; empty for other
+        evidence.
 
     Examples
     --------
@@ -431,7 +431,7 @@ def _span_words(channel: str, side: str, cells: Sequence[tuple[list[int], float]
 
 
 def _arc(left: Sequence[int], right: Sequence[int]) -> tuple[int, int]:
-    """Ends of the shortest arc that holds all bins, which may lie on both sides of 0 degrees."""
+    """Ends of the shortest arc that contains all bins; it may cross 0 degrees."""
     begins = sorted(set(left))
     ends = {
         begin: max(r for b, r in zip(left, right, strict=True) if b == begin) for begin in begins
@@ -469,18 +469,18 @@ def grades_words(grades: tuple[int, ...] | list[int]) -> str:
 
 
 def possible_words(estimate: Estimate, edges: Sequence[float]) -> str:
-    """Which grades cannot be excluded, and what to think where the interval says otherwise.
+    """Grades that cannot be excluded, and an explanation if the interval disagrees.
 
     Parameters
     ----------
     estimate : Estimate
     edges : sequence of float
-        Where grades 1, 2, … begin [m].
+        Lower bounds of grades 1, 2, … [m].
 
     Returns
     -------
     str
-        Empty where only one is possible and the interval stays within it.
+        Empty if only one is possible and the interval stays within it.
 
     Examples
     --------
@@ -510,7 +510,7 @@ def possible_words(estimate: Estimate, edges: Sequence[float]) -> str:
 
 
 def finding_words(finding: Mapping[str, Any]) -> str:
-    """A fault beside the wear, or a regime, with how far its finding can be trusted.
+    """Another fault than the wear, or a regime, with the reliability of the finding.
 
     Examples
     --------
@@ -535,7 +535,7 @@ def finding_words(finding: Mapping[str, Any]) -> str:
 
 
 def zone_words(table: Mapping[str, Any]) -> str:
-    """The zone in a sentence, or why there is none."""
+    """The zone in a sentence, or the reason for none."""
     if table["zone"] is None:
         return f"not given: {table['note']}"
     worst = max(table["channels"], key=lambda channel: (channel["zone"], channel["velocity_m_s"]))

@@ -13,9 +13,9 @@ from ...datasets.file.writer import refuse_output
 from ...datasets.measured.recording import read_recording
 from ...sim.output.recording import Recording, Table
 from ..healthy_reference.healthy import Baseline, Baselines
-from ..nameplate.cautions import known_beside
+from ..nameplate.cautions import recording_context
 from ..nameplate.nameplate import Nameplate, nameplate_of
-from ..nameplate.sensors import as_told
+from ..nameplate.sensors import corrected_recording
 from ..pages.page import save_page
 from ..report.figures import draw_gauge
 from ..report.page import report_html
@@ -249,9 +249,9 @@ def judged(
     """Report on a recording with what is known of its machine, all of it read."""
     baseline = baselines.of(recording) if baselines else None
     estimate = model.estimate(
-        as_told(recording, plate, baseline),
+        corrected_recording(recording, plate, baseline),
         baseline,
-        **known_beside(plate, recording, model.card, baseline),
+        **recording_context(plate, recording, model.card, baseline),
     )
     table = report_table(
         recording,

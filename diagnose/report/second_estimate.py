@@ -1,7 +1,7 @@
-"""A second estimate beside the trained model's, made in another way, and whether the two agree.
+"""A second estimate, independent of the trained model, and whether the two agree.
 
-Where both are there and contradict each other, that is the first thing to be said: one of them is
-told something wrong, or the machine is not what either takes it for.
+A contradiction is reported first: one of the two has wrong input, or the machine is not what it is
+assumed to be.
 """
 
 from collections.abc import Mapping
@@ -13,25 +13,25 @@ from ..twin.opinion import TwinOpinion
 from ..wear_model.verdict import Estimate
 
 SecondEstimate = FilmEstimate | TwinOpinion
-"""Either has `severity`, `low` and `high`, None where it says nothing, and `coverage`."""
+"""Both have `severity`, `low` and `high`, None without an estimate, and `coverage`."""
 
 
 def disagree(estimate: Estimate, second: SecondEstimate) -> bool:
-    """Whether two estimates have intervals that do not touch."""
+    """Whether the intervals of two estimates do not overlap."""
     if estimate.low is None or estimate.high is None or second.low is None or second.high is None:
         return False
     return second.high < estimate.low or estimate.high < second.low
 
 
 def with_second(estimate: Estimate, second: SecondEstimate, who: str, cure: str) -> Estimate:
-    """An estimate that says first where a second one contradicts it.
+    """Put the contradiction with a second estimate before the cautions of the first.
 
     Parameters
     ----------
     estimate : Estimate
     second : FilmEstimate or TwinOpinion
     who : str
-        What the second one is from.
+        Origin of the second estimate.
     cure : str
         What to check.
     """
@@ -45,7 +45,7 @@ def with_second(estimate: Estimate, second: SecondEstimate, who: str, cure: str)
 
 
 def length_words(found: SecondEstimate | Estimate) -> str:
-    """A wear with its interval [mm].
+    """Wear with its interval [mm].
 
     Examples
     --------
@@ -61,7 +61,7 @@ def length_words(found: SecondEstimate | Estimate) -> str:
 
 
 def with_twin(estimate: Estimate, twin: TwinOpinion | None) -> Estimate:
-    """An estimate that says first where the twin of the machine contradicts it.
+    """Put the contradiction with the machine's twin before the cautions of an estimate.
 
     Examples
     --------
@@ -77,7 +77,7 @@ def with_twin(estimate: Estimate, twin: TwinOpinion | None) -> Estimate:
 
 
 def twin_table(twin: TwinOpinion | None, estimate: Estimate) -> dict[str, Any] | None:
-    """For JSON and pages; None without a twin."""
+    """Estimate by the twin, for JSON and pages; None without a twin."""
     if twin is None:
         return None
     agrees = None if None in (twin.severity, estimate.severity) else not disagree(estimate, twin)
@@ -85,7 +85,7 @@ def twin_table(twin: TwinOpinion | None, estimate: Estimate) -> dict[str, Any] |
 
 
 def twin_words(twin: TwinOpinion) -> str:
-    """What the twin says in a clause.
+    """Estimate by the twin in a clause.
 
     Examples
     --------
@@ -101,10 +101,10 @@ def twin_words(twin: TwinOpinion) -> str:
 
 
 def new_cautions(before: Estimate, after: Estimate) -> list[str]:
-    """Disagreements that were put before the cautions of an estimate."""
+    """Disagreements that were added before the cautions of an estimate."""
     return list(after.cautions[: len(after.cautions) - len(before.cautions)])
 
 
 def is_first(caution: str, table: Mapping[str, Any]) -> bool:
-    """Whether a caution of a report's table is said first, and not once more among the others."""
+    """Whether a report shows a caution first, as a disagreement, and not among the others."""
     return caution in table["disagreements"]
