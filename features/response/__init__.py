@@ -1,4 +1,4 @@
 """Response to a force: transfer functions, impact tests, modes.
 
-May import ``features.signal``.
+It may import ``features.signal``.
 """

@@ -1,4 +1,4 @@
 """Rotation: tacho, speed, orders, crank angle, orbit, cylinder pressure, balancing.
 
-May import ``features.signal``.
+It may import ``features.signal``.
 """
